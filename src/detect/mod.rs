@@ -1,0 +1,5 @@
+//! Pixels to identified observations; knows no robot.
+
+mod picture;
+
+pub use picture::Picture;

@@ -1,0 +1,10 @@
+//! Rotations and rigid motions in closed form.
+//!
+//! Poses are named `a_from_b`: they map coordinates in frame b to coordinates in frame a.
+//! Perturbations are body-fixed (right) 6-vectors, translation first: `T * Exp([rho, phi])`.
+
+mod pose;
+mod rotation;
+
+pub use pose::{Pose, adjoint};
+pub use rotation::{exp_so3, log_so3, matrix_from_rpy, project_to_so3, right_jacobian_so3, rpy_from_matrix, skew};

@@ -1,0 +1,1 @@
+//! Dense factorisations of the reduced system; the only room that imports `faer`.

@@ -1,0 +1,5 @@
+//! The `robotcal` program.
+
+fn main() -> std::process::ExitCode {
+    robotcal::cli::main()
+}

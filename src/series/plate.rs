@@ -1,0 +1,97 @@
+//! The plate: what was printed, nominally.
+//!
+//! Plate frame: right-handed, origin at the plate's centre; looking at the printed face x is right, y is up,
+//! z comes out of the plate. Ids are row-major from the top-left.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// What is printed on the plate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PlateKind {
+    /// Discs and annuli of several sizes whose pattern codes the position.
+    CodedCircles,
+    /// A plain grid of dots.
+    CircleGrid,
+    /// A chessboard; the markers are its inner corners.
+    Chessboard,
+    /// A chessboard with ArUco markers in its light squares.
+    Charuco,
+    /// Points observed by someone else's detector.
+    Points,
+}
+
+/// One marker in the plate frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Marker {
+    /// Identity.
+    pub id: u32,
+    /// Nominal centre in the plate frame, m.
+    pub position_m: Vector3<f64>,
+    /// Radius of the outer circle, m; 0 for a point.
+    pub outer_radius_m: f64,
+    /// Radius of the inner circle, m; 0 for a disc.
+    pub inner_radius_m: f64,
+    /// Prior sigma of the centre per axis, m; the plate's tolerance where none is stated.
+    pub sigma_m: f64,
+}
+
+/// A measured distance between two markers: the only absolute length.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScaleBar {
+    /// Marker id at one end.
+    pub from: u32,
+    /// Marker id at the other end.
+    pub to: u32,
+    /// Measured distance, m.
+    pub distance_m: f64,
+    /// Its standard deviation, m.
+    pub sigma_m: f64,
+}
+
+/// A plate of markers as designed (or as corrected by an earlier calibration).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Plate {
+    /// What is printed.
+    pub kind: PlateKind,
+    /// Markers in a row (inner corners of a chessboard).
+    pub columns: u32,
+    /// Number of rows.
+    pub rows: u32,
+    /// Distance of neighbouring markers, m.
+    pub pitch_m: f64,
+    /// Prior sigma of a marker coordinate, m.
+    pub tolerance_m: f64,
+    /// Measured distance, if any.
+    pub scale: Option<ScaleBar>,
+    /// All markers, in the order of their ids.
+    pub markers: Vec<Marker>,
+}
+
+impl Plate {
+    /// Index in `markers` of a marker id.
+    pub fn index_of(&self, id: u32) -> Option<usize> {
+        self.markers.binary_search_by_key(&id, |m| m.id).ok()
+    }
+
+    /// A regular lattice of points, ids row-major from the top-left, origin at the centre.
+    pub fn lattice(kind: PlateKind, columns: u32, rows: u32, pitch_m: f64, tolerance_m: f64) -> Self {
+        let centre = |n: u32| (f64::from(n) - 1.0) / 2.0;
+        let markers = (0..columns * rows)
+            .map(|id| Marker {
+                id,
+                position_m: Vector3::new(
+                    (f64::from(id % columns) - centre(columns)) * pitch_m,
+                    (centre(rows) - f64::from(id / columns)) * pitch_m,
+                    0.0,
+                ),
+                outer_radius_m: 0.0,
+                inner_radius_m: 0.0,
+                sigma_m: tolerance_m,
+            })
+            .collect();
+        Self { kind, columns, rows, pitch_m, tolerance_m, scale: None, markers }
+    }
+}

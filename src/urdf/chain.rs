@@ -1,0 +1,62 @@
+//! The kinematic chain from a base link to a tip link.
+
+use nalgebra::Vector3;
+
+use crate::geom::Pose;
+
+/// How a joint moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum JointKind {
+    /// Does not move.
+    Fixed,
+    /// Rotates about its axis (URDF revolute or continuous), rad.
+    Revolute,
+    /// Slides along its axis, m.
+    Prismatic,
+}
+
+/// Where the position of a moving joint comes from: `multiplier * reading + offset`.
+///
+/// A joint with a reading of its own has multiplier 1 and offset 0; a mimic joint takes those of URDF.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drive {
+    /// Index in [`Chain::readings`].
+    pub reading: usize,
+    /// Factor on the reading.
+    pub multiplier: f64,
+    /// Added after the factor, rad or m.
+    pub offset: f64,
+}
+
+/// One joint of the chain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Joint {
+    /// URDF name.
+    pub name: String,
+    /// How it moves.
+    pub kind: JointKind,
+    /// Nominal `parent_from_joint` at zero position.
+    pub origin: Pose,
+    /// Unit axis in the joint frame; zero for a fixed joint.
+    pub axis: Vector3<f64>,
+    /// Lower and upper limit (rad or m) where the URDF states them (never for continuous joints).
+    pub limits: Option<(f64, f64)>,
+    /// What drives it; `None` for a fixed joint.
+    pub drive: Option<Drive>,
+}
+
+/// All joints from `base` to `tip`, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chain {
+    /// Name of the robot.
+    pub robot: String,
+    /// Base link.
+    pub base: String,
+    /// Tip link.
+    pub tip: String,
+    /// Joints in order from base to tip.
+    pub joints: Vec<Joint>,
+    /// Names of the joints whose readings the chain needs, in chain order.
+    pub readings: Vec<String>,
+}
