@@ -96,3 +96,49 @@ impl fmt::Display for Notice {
         Ok(())
     }
 }
+
+/// The known name that was probably meant by `given`: at most two letters (a third of a short word) away, else `None`.
+///
+/// Case and the choice between `-`, `_` and blank do not count. Of equally near names the first one wins.
+pub fn closest_name<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let plain = |s: &str| s.to_lowercase().replace(['-', ' '], "_").chars().collect::<Vec<_>>();
+    let given = plain(given);
+    let reach = given.len().div_ceil(3).min(2);
+    known
+        .into_iter()
+        .map(|name| (edit_distance(&given, &plain(name)), name))
+        .filter(|(distance, _)| *distance <= reach)
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, name)| name)
+}
+
+/// Levenshtein distance.
+fn edit_distance(a: &[char], b: &[char]) -> usize {
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(x != y);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::closest_name;
+
+    #[test]
+    fn a_misspelt_name_is_recognised_and_a_strange_one_is_not() {
+        let known = ["joint_unit", "base", "tip", "camera_mount"];
+        assert_eq!(closest_name("joint-units", known), Some("joint_unit"));
+        assert_eq!(closest_name("Camera_Mont", known), Some("camera_mount"));
+        assert_eq!(closest_name("tpi", known), None);
+        assert_eq!(closest_name("tipp", known), Some("tip"));
+        assert_eq!(closest_name("velocity", known), None);
+        assert_eq!(closest_name("", known), None);
+    }
+}

@@ -33,4 +33,4 @@ pub mod simulate;
 pub mod solve;
 pub mod urdf;
 
-pub use error::{Error, ErrorKind, Notice, Result};
+pub use error::{Error, ErrorKind, Notice, Result, closest_name};

@@ -81,14 +81,15 @@ pub fn matrix_from_rpy(rpy: [f64; 3]) -> Matrix3<f64> {
     )
 }
 
-/// Roll, pitch, yaw (rad) of a rotation; at gimbal lock yaw is put to zero.
+/// Roll, pitch, yaw (rad) of a rotation, exact to rounding also near gimbal lock; at gimbal lock yaw is (nearly) zero.
+///
+/// Near gimbal lock roll alone is ill determined, so yaw is taken from what the rounded roll and pitch leave over.
 pub fn rpy_from_matrix(r: &Matrix3<f64>) -> [f64; 3] {
     let horizontal = r[(0, 0)].hypot(r[(1, 0)]);
     let pitch = (-r[(2, 0)]).atan2(horizontal);
-    if horizontal > 1e-9 {
-        return [r[(2, 1)].atan2(r[(2, 2)]), pitch, r[(1, 0)].atan2(r[(0, 0)])];
-    }
-    [(-r[(1, 2)]).atan2(r[(1, 1)]), pitch, 0.0]
+    let roll = if horizontal > 1e-14 { r[(2, 1)].atan2(r[(2, 2)]) } else { (-r[(1, 2)]).atan2(r[(1, 1)]) };
+    let left = r * matrix_from_rpy([roll, pitch, 0.0]).transpose();
+    [roll, pitch, (left[(1, 0)] - left[(0, 1)]).atan2(left[(0, 0)] + left[(1, 1)])]
 }
 
 /// The rotation nearest to `m` (polar decomposition by a symmetric eigenproblem); `None` when `m` is near singular.

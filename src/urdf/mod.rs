@@ -1,5 +1,13 @@
 //! Robot descriptions: read by `urdf-rs`, patched as text so that every other byte stays.
 
 mod chain;
+mod elements;
+mod masses;
+mod patch;
+mod read;
+mod tree;
 
 pub use chain::{Chain, Drive, Joint, JointKind};
+pub use masses::{CarriedMass, Inertial};
+pub use patch::patch_origins;
+pub use read::{RobotDescription, read};

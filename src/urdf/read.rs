@@ -1,0 +1,164 @@
+//! Reading a URDF file.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use roxmltree::{Document, Node};
+
+use super::elements::{JointElement, Source};
+use super::masses::{Inertial, inertial};
+use crate::{Error, Notice, Result, closest_name};
+
+/// A robot as its URDF describes it, with the text it came from.
+#[derive(Debug, Clone)]
+pub struct RobotDescription {
+    /// The file.
+    pub path: PathBuf,
+    /// Name of the robot.
+    pub name: String,
+    /// The whole text, byte for byte, for [`super::patch_origins`].
+    pub text: String,
+    /// What was seen while reading that the user should know.
+    pub notices: Vec<Notice>,
+    /// Links in the order of the file.
+    pub(super) links: Vec<String>,
+    /// Joints in the order of the file.
+    pub(super) joints: Vec<JointElement>,
+    pub(super) inertials: BTreeMap<String, Inertial>,
+}
+
+/// Reads a URDF file.
+///
+/// # Errors
+/// Names file, line and joint: unreadable file or XML, unexpanded xacro, an unknown joint type, numbers that are none,
+/// a zero axis, links or joints of the same name, unknown links, a link with two parents, loops.
+pub fn read(path: &Path) -> Result<RobotDescription> {
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+    let text = String::from_utf8(bytes).map_err(|e| {
+        let what = format!("is not UTF-8 text (byte {})", e.utf8_error().valid_up_to());
+        Error::input(path.display(), what, "convert it: iconv -t UTF-8 in.urdf > out.urdf")
+    })?;
+    RobotDescription::from_text(path, text)
+}
+
+impl RobotDescription {
+    /// Reads a URDF from its text; `path` is for messages only.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn from_text(path: &Path, text: String) -> Result<Self> {
+        let document = parse(path, &text)?;
+        let robot = document.root_element();
+        let source =
+            Source { file: path.display().to_string(), document: &document, has_quaternions: version(robot) >= (1, 1) };
+        refuse_xacro(&source)?;
+        if robot.tag_name().name() != "robot" {
+            let what = format!("the root element is <{}>, not <robot>", robot.tag_name().name());
+            return Err(Error::input(source.place(robot), what, "give a URDF file"));
+        }
+        let links = named(&source, robot, "link")?;
+        let joint_nodes: Vec<_> = elements(robot, "joint").collect();
+        named(&source, robot, "joint")?;
+        joint_nodes.iter().try_for_each(|n| source.check(*n))?;
+
+        let read = urdf_rs::read_from_string(text.trim_start_matches('\u{feff}')).map_err(|e| {
+            let remedy = "check the file with check_urdf; every joint <limit> needs velocity, every link mass a value";
+            Error::input(path.display(), format!("urdf-rs cannot read it: {e}"), remedy)
+        })?;
+        if read.joints.len() != joint_nodes.len() || read.links.len() != links.len() {
+            let what = "two readers disagree on the number of its links and joints";
+            return Err(Error::input(path.display(), what, "check the file with check_urdf"));
+        }
+        let mut notices = Vec::new();
+        let joints = joint_nodes
+            .iter()
+            .zip(&read.joints)
+            .map(|(node, joint)| source.joint(*node, joint, &mut notices))
+            .collect::<Result<Vec<_>>>()?;
+        let mut inertials = BTreeMap::new();
+        for (node, link) in elements(robot, "link").zip(&read.links) {
+            if let Some(found) = inertial(&source, node, link)? {
+                inertials.insert(link.name.clone(), found);
+            }
+        }
+        let description =
+            Self { path: path.to_path_buf(), name: read.name, notices, links, joints, inertials, text: String::new() };
+        description.check_tree()?;
+        Ok(Self { text, ..description })
+    }
+
+    /// Mass and centre of mass of every link whose URDF states an `<inertial>`, by link name.
+    pub fn inertials(&self) -> &BTreeMap<String, Inertial> {
+        &self.inertials
+    }
+}
+
+/// Parses XML, with an error that knows the line.
+pub(super) fn parse<'a>(path: &Path, text: &'a str) -> Result<Document<'a>> {
+    Document::parse(text).map_err(|error| match &error {
+        roxmltree::Error::UnknownNamespace(prefix, at) if prefix == "xacro" => xacro(path, at.row),
+        _ => {
+            let what = format!("is not well-formed XML: {error}");
+            Error::input(format!("{}:{}", path.display(), error.pos().row), what, "correct the XML there")
+        }
+    })
+}
+
+fn xacro(path: &Path, line: u32) -> Error {
+    let file = path.file_name().map_or_else(|| "in.xacro".into(), |n| n.to_string_lossy());
+    let stem = file.split('.').next().unwrap_or("out");
+    let what = "is an unexpanded xacro, not a URDF: it describes no robot yet";
+    let remedy = format!("expand it first: xacro {file} > {stem}.expanded.urdf");
+    Error::input(format!("{}:{line}", path.display()), what, remedy)
+}
+
+/// Refuses macros, and substitutions in the attributes of links and joints.
+fn refuse_xacro(source: &Source<'_>) -> Result<()> {
+    let is_xacro = |namespace: Option<&str>| namespace.is_some_and(|uri| uri.contains("xacro"));
+    let found = source.document.descendants().filter(Node::is_element).find(|node| {
+        let kinematic = || node.ancestors().any(|a| matches!(a.tag_name().name(), "link" | "joint"));
+        let substituted = |value: &str| value.contains("${") || value.contains("$(");
+        is_xacro(node.tag_name().namespace())
+            || node.attributes().any(|a| is_xacro(a.namespace()))
+            || (node.attributes().any(|a| substituted(a.value())) && kinematic())
+    });
+    found
+        .map_or(Ok(()), |node| Err(xacro(Path::new(&source.file), source.document.text_pos_at(node.range().start).row)))
+}
+
+/// `version` of `<robot>` as (major, minor); 1.0 where it is missing or malformed, as urdfdom reads it.
+pub(super) fn version(robot: Node<'_, '_>) -> (u32, u32) {
+    let parts = robot.attribute("version").and_then(|v| v.trim().split_once('.'));
+    parts.and_then(|(major, minor)| Some((major.parse().ok()?, minor.parse().ok()?))).unwrap_or((1, 0))
+}
+
+/// Children of `<robot>` with that tag.
+pub(super) fn elements<'a, 'i>(robot: Node<'a, 'i>, tag: &'static str) -> impl Iterator<Item = Node<'a, 'i>> {
+    robot.children().filter(move |n| n.is_element() && n.tag_name().name() == tag)
+}
+
+/// Names of all elements of a tag; each must have one, of its own.
+fn named(source: &Source<'_>, robot: Node<'_, '_>, tag: &'static str) -> Result<Vec<String>> {
+    let mut seen = BTreeSet::new();
+    let mut names = Vec::new();
+    for node in elements(robot, tag) {
+        let name = node.attribute("name").unwrap_or_default();
+        if name.trim().is_empty() {
+            return Err(Error::input(source.place(node), format!("a <{tag}> without a name"), "give it a name"));
+        }
+        if !seen.insert(name) {
+            let what = format!("a second {tag} named \"{name}\"");
+            return Err(Error::input(source.place(node), what, "rename one of them"));
+        }
+        names.push(name.to_string());
+    }
+    Ok(names)
+}
+
+/// A remedy that names what was probably meant, else everything there is.
+pub(super) fn suggest<'a>(given: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
+    match closest_name(given, known.clone()) {
+        Some(meant) => format!("\"{meant}\" is there"),
+        None => format!("there are: {}", known.collect::<Vec<_>>().join(", ")),
+    }
+}

@@ -1,0 +1,209 @@
+//! The tree of links, and chains through it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::Vector3;
+use urdf_rs::JointType;
+
+use super::chain::{Chain, Drive, Joint, JointKind};
+use super::elements::JointElement;
+use super::read::{RobotDescription, suggest};
+use crate::{Error, Result};
+
+impl RobotDescription {
+    /// Names of all links, in the order of the file.
+    pub fn links(&self) -> impl Iterator<Item = &str> + Clone {
+        self.links.iter().map(String::as_str)
+    }
+
+    /// The chain of joints from `base` (default: the root) to `tip` (default: the only leaf below the base).
+    ///
+    /// A mimic joint is driven by the joint that it follows, inside the chain or not: `Chain::readings` has the
+    /// name of that joint.
+    ///
+    /// # Errors
+    /// Unknown links, several roots or leaves without a choice, a base that is not above the tip, joints of a type
+    /// that has no single reading (floating, planar, spherical), mimic joints that lead nowhere.
+    pub fn chain(&self, base: Option<&str>, tip: Option<&str>) -> Result<Chain> {
+        let base = match base {
+            Some(name) => self.known_link(name, "base")?,
+            None => self.only("base", self.roots(), "root")?,
+        };
+        let tip = match tip {
+            Some(name) => self.known_link(name, "tip")?,
+            None => self.only("tip", self.leaves_below(base), "leaf")?,
+        };
+        let mut chain = Chain {
+            robot: self.name.clone(),
+            base: base.to_string(),
+            tip: tip.to_string(),
+            joints: Vec::new(),
+            readings: Vec::new(),
+            reading_kinds: Vec::new(),
+        };
+        for element in self.path(base, tip)? {
+            let joint = self.chain_joint(element, &mut chain)?;
+            chain.joints.push(joint);
+        }
+        if chain.readings.is_empty() {
+            let what = format!("no joint moves between \"{base}\" and \"{tip}\"");
+            return Err(Error::input(self.path.display(), what, "choose another base or tip link"));
+        }
+        Ok(chain)
+    }
+
+    /// The joint above a link.
+    pub(super) fn joint_to(&self, link: &str) -> Option<&JointElement> {
+        self.joints.iter().find(|j| j.child == link)
+    }
+
+    /// Known links, one parent each, no loops.
+    pub(super) fn check_tree(&self) -> Result<()> {
+        let links: BTreeSet<&str> = self.links().collect();
+        if links.is_empty() {
+            return Err(Error::input(self.path.display(), "has no links", "give a URDF that describes a robot"));
+        }
+        let mut parents: BTreeMap<&str, &JointElement> = BTreeMap::new();
+        for joint in &self.joints {
+            let place = || format!("{}, joint \"{}\"", joint.place, joint.name);
+            for link in [&joint.parent, &joint.child] {
+                if !links.contains(link.as_str()) {
+                    let what = format!("names the link \"{link}\", which does not exist");
+                    return Err(Error::input(place(), what, suggest(link, self.links())));
+                }
+            }
+            if let Some(other) = parents.insert(&joint.child, joint) {
+                let what = format!("link \"{}\" has a second parent (the first by \"{}\")", joint.child, other.name);
+                return Err(Error::input(place(), what, "a URDF is a tree: remove one of the joints"));
+            }
+        }
+        for link in &links {
+            let mut current = *link;
+            for _ in 0..=links.len() {
+                match parents.get(current) {
+                    Some(joint) => current = &joint.parent,
+                    None => break,
+                }
+            }
+            if let Some(joint) = parents.get(current) {
+                let what = format!("links form a loop through \"{current}\"");
+                let place = format!("{}, joint \"{}\"", joint.place, joint.name);
+                return Err(Error::input(place, what, "a URDF is a tree: remove the joint that closes the loop"));
+            }
+        }
+        Ok(())
+    }
+
+    fn known_link(&self, name: &str, role: &str) -> Result<&str> {
+        self.links().find(|l| *l == name).ok_or_else(|| {
+            let what = format!("has no link \"{name}\" (wanted as {role})");
+            Error::input(self.path.display(), what, suggest(name, self.links()))
+        })
+    }
+
+    fn only<'a>(&self, role: &str, candidates: Vec<&'a str>, noun: &str) -> Result<&'a str> {
+        if let [one] = candidates[..] {
+            return Ok(one);
+        }
+        let what = format!("has {} {noun} links: {}", candidates.len(), candidates.join(", "));
+        let remedy = format!("name one: {role} = \"...\" in series.toml or --{role}");
+        Err(Error::input(self.path.display(), what, remedy))
+    }
+
+    fn roots(&self) -> Vec<&str> {
+        self.links().filter(|l| self.joint_to(l).is_none()).collect()
+    }
+
+    fn leaves_below(&self, base: &str) -> Vec<&str> {
+        let is_leaf = |link: &str| self.joints.iter().all(|j| j.parent != link);
+        self.links().filter(|l| *l != base && is_leaf(l) && self.ancestors(l).contains(&base)).collect()
+    }
+
+    /// Links above `link`, nearest first.
+    fn ancestors<'a>(&'a self, link: &'a str) -> Vec<&'a str> {
+        let up = |l: &&'a str| self.joint_to(l).map(|j| j.parent.as_str());
+        std::iter::successors(up(&link), up).collect()
+    }
+
+    /// Joints from `base` down to `tip`.
+    fn path<'a>(&'a self, base: &str, tip: &'a str) -> Result<Vec<&'a JointElement>> {
+        let mut joints = Vec::new();
+        let mut current = tip;
+        while current != base {
+            let Some(joint) = self.joint_to(current) else {
+                let above = self.ancestors(tip);
+                let what = format!("tip \"{tip}\" does not hang below base \"{base}\"");
+                let remedy = match above[..] {
+                    [] => format!("\"{tip}\" is the root itself; are base and tip exchanged?"),
+                    _ => format!("links above the tip are: {}", above.join(", ")),
+                };
+                return Err(Error::input(self.path.display(), what, remedy));
+            };
+            joints.push(joint);
+            current = &joint.parent;
+        }
+        joints.reverse();
+        Ok(joints)
+    }
+
+    fn chain_joint(&self, element: &JointElement, chain: &mut Chain) -> Result<Joint> {
+        let kind = kind(element)?;
+        let drive = (kind != JointKind::Fixed).then(|| self.drive(element, chain)).transpose()?;
+        Ok(Joint {
+            name: element.name.clone(),
+            kind,
+            origin: element.origin,
+            axis: if kind == JointKind::Fixed { Vector3::zeros() } else { element.axis },
+            limits: element.limits,
+            drive,
+        })
+    }
+
+    /// Follows mimic joints to the one that is read, and registers its reading.
+    fn drive(&self, element: &JointElement, chain: &mut Chain) -> Result<Drive> {
+        let (mut multiplier, mut offset) = (1.0, 0.0);
+        let mut driver = element;
+        let mut followed = BTreeSet::new();
+        while let Some(mimic) = &driver.mimic {
+            let place = format!("{}, joint \"{}\"", driver.place, driver.name);
+            if !followed.insert(&driver.name) {
+                let what = "mimic joints follow each other in a loop";
+                return Err(Error::input(place, what, "let one of them move by itself"));
+            }
+            // q = m (m' r + o') + o
+            offset += multiplier * mimic.offset;
+            multiplier *= mimic.multiplier;
+            driver = self.joints.iter().find(|j| j.name == mimic.joint).ok_or_else(|| {
+                let what = format!("mimics \"{}\", which does not exist", mimic.joint);
+                Error::input(place, what, suggest(&mimic.joint, self.joints.iter().map(|j| j.name.as_str())))
+            })?;
+        }
+        let kind = kind(driver)?;
+        if kind == JointKind::Fixed {
+            let place = format!("{}, joint \"{}\"", element.place, element.name);
+            let what = format!("mimics \"{}\", which is fixed", driver.name);
+            return Err(Error::input(place, what, "name a joint that moves"));
+        }
+        let known = chain.readings.iter().position(|r| *r == driver.name);
+        let reading = known.unwrap_or_else(|| {
+            chain.readings.push(driver.name.clone());
+            chain.reading_kinds.push(kind);
+            chain.readings.len() - 1
+        });
+        Ok(Drive { reading, multiplier, offset })
+    }
+}
+
+fn kind(element: &JointElement) -> Result<JointKind> {
+    match element.joint_type {
+        JointType::Fixed => Ok(JointKind::Fixed),
+        JointType::Revolute | JointType::Continuous => Ok(JointKind::Revolute),
+        JointType::Prismatic => Ok(JointKind::Prismatic),
+        JointType::Floating | JointType::Planar | JointType::Spherical => {
+            let place = format!("{}, joint \"{}\"", element.place, element.name);
+            let what = format!("is {:?} and has no single reading", element.joint_type).to_lowercase();
+            let remedy = format!("choose a base below it, for example base = \"{}\"", element.child);
+            Err(Error::input(place, what, remedy))
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! Reading robot descriptions.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use nalgebra::Vector3;
+use robotcal::geom::Pose;
+use robotcal::urdf::{JointKind, RobotDescription, read};
+
+fn robot(text: &str) -> RobotDescription {
+    RobotDescription::from_text(Path::new("r.urdf"), text.to_string()).unwrap()
+}
+
+/// The refusal of a description, as a person sees it.
+fn refusal(text: &str) -> String {
+    RobotDescription::from_text(Path::new("r.urdf"), text.to_string()).unwrap_err().to_string()
+}
+
+fn joint(name: &str, kind: &str, parent: &str, child: &str, inner: &str) -> String {
+    format!(
+        "\n<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/>{inner}</joint>"
+    )
+}
+
+fn wrap(links: &[&str], joints: &[String]) -> String {
+    let links: String = links.iter().map(|l| format!("\n<link name=\"{l}\"/>")).collect();
+    format!("<robot name=\"r\">{links}{}\n</robot>", joints.concat())
+}
+
+const Z: &str = "<axis xyz=\"0 0 1\"/>";
+
+#[test]
+fn a_chain_has_the_joints_in_order_with_their_kinds_and_readings() {
+    let limit = "<limit lower=\"-1\" upper=\"3\" effort=\"0\" velocity=\"0\"/>";
+    let text = wrap(
+        &["world", "rail", "a", "b", "c", "finger", "flange"],
+        &[
+            joint("x", "prismatic", "world", "rail", &format!("<axis xyz=\"2 0 0\"/>{limit}")),
+            joint("j2", "continuous", "a", "b", "<axis xyz=\"0 1 0\"/>"),
+            joint("mount", "fixed", "rail", "a", "<origin xyz=\"0 0 0.5\" rpy=\"0 0 0.1\"/>"),
+            joint("j3", "revolute", "b", "c", &format!("{Z}<mimic joint=\"g\" multiplier=\"-2\" offset=\"0.25\"/>")),
+            joint("g", "prismatic", "c", "finger", &format!("{Z}<mimic joint=\"x\" multiplier=\"3\" offset=\"0.5\"/>")),
+            joint("end", "fixed", "c", "flange", ""),
+        ],
+    );
+    let robot = robot(&text);
+    let chain = robot.chain(None, Some("flange")).unwrap();
+    assert_eq!((chain.base.as_str(), chain.tip.as_str()), ("world", "flange"));
+    let kinds: Vec<_> = chain.joints.iter().map(|j| (j.name.as_str(), j.kind)).collect();
+    use JointKind::{Fixed, Prismatic, Revolute};
+    assert_eq!(kinds, [("x", Prismatic), ("mount", Fixed), ("j2", Revolute), ("j3", Revolute), ("end", Fixed)]);
+    assert_eq!(chain.readings, ["x", "j2"]);
+    assert_eq!(chain.reading_kinds, [Prismatic, Revolute]);
+    assert_eq!(chain.joints[0].axis, Vector3::x(), "axes are normalised");
+    assert_eq!(chain.joints[0].limits, Some((-1.0, 3.0)));
+    assert_eq!(chain.joints[2].limits, None);
+    // j3 = -2 (3 x + 0.5) + 0.25
+    let drive = chain.joints[3].drive.unwrap();
+    assert_eq!((drive.reading, drive.multiplier, drive.offset), (0, -6.0, -0.75));
+    assert_eq!(chain.joints[1].origin, Pose::from_xyz_rpy([0.0, 0.0, 0.5], [0.0, 0.0, 0.1]));
+    let said = |n: &robotcal::Notice| n.place.contains("\"x\"") && n.what.contains("length 2");
+    assert!(robot.notices.iter().any(said), "{:?}", robot.notices);
+}
+
+#[test]
+fn a_mimic_driver_outside_the_chain_is_a_reading_with_its_own_kind() {
+    let text = wrap(
+        &["base", "a", "beside"],
+        &[
+            joint("follower", "revolute", "base", "a", &format!("{Z}<mimic joint=\"leader\"/>")),
+            joint("leader", "prismatic", "base", "beside", Z),
+        ],
+    );
+    let chain = robot(&text).chain(None, Some("a")).unwrap();
+    assert_eq!(chain.readings, ["leader"]);
+    assert_eq!(chain.reading_kinds, [JointKind::Prismatic]);
+}
+
+#[test]
+fn several_leaves_are_listed_and_unknown_names_get_a_suggestion() {
+    let text = wrap(
+        &["base", "a", "tool0", "camera"],
+        &[
+            joint("j1", "revolute", "base", "a", Z),
+            joint("t", "fixed", "a", "tool0", ""),
+            joint("c", "fixed", "a", "camera", ""),
+        ],
+    );
+    let robot = robot(&text);
+    let error = robot.chain(None, None).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    assert!(error.to_string().contains("tool0, camera"), "{error}");
+    let error = robot.chain(None, Some("tool_0")).unwrap_err().to_string();
+    assert!(error.contains("tool_0") && error.contains("\"tool0\" is there"), "{error}");
+    let error = robot.chain(Some("tool0"), Some("camera")).unwrap_err().to_string();
+    assert!(error.contains("does not hang below") && error.contains("a, base"), "{error}");
+    let error = robot.chain(Some("a"), Some("base")).unwrap_err().to_string();
+    assert!(error.contains("exchanged"), "{error}");
+    let error = robot.chain(Some("a"), Some("tool0")).unwrap_err().to_string();
+    assert!(error.contains("no joint moves"), "{error}");
+}
+
+#[test]
+fn joints_without_a_single_reading_are_refused_by_name() {
+    for kind in ["floating", "planar"] {
+        let joints = [joint("free", kind, "world", "base", ""), joint("j1", "revolute", "base", "tip", Z)];
+        let robot = robot(&wrap(&["world", "base", "tip"], &joints));
+        let error = robot.chain(None, None).unwrap_err().to_string();
+        assert!(error.contains("\"free\"") && error.contains(kind) && error.contains("base = \"base\""), "{error}");
+        assert_eq!(robot.chain(Some("base"), None).unwrap().readings, ["j1"]);
+    }
+}
+
+#[test]
+fn bad_joints_name_line_and_joint() {
+    for (inner, wanted) in [
+        ("<axis xyz=\"0 0 0\"/>", ["r.urdf:4", "\"j1\"", "zero"]),
+        ("<axis xyz=\"0 0 1 x\"/>", ["r.urdf:4", "\"j1\"", "0 0 1 x"]),
+        ("\n<origin xyz=\"0 0,5 1 2\"/>", ["r.urdf:5", "0 0,5 1 2", "decimal"]),
+        ("<origin rpv=\"0 0 1\"/>", ["r.urdf:4", "\"j1\"", "unknown attribute rpv"]),
+        ("<orign xyz=\"0 0 1\"/>", ["\"j1\"", "<orign>", "<origin>"]),
+        ("<origin/><origin xyz=\"0 0 1\"/>", ["r.urdf:4", "\"j1\"", "stands twice"]),
+        ("<origin quat_xyzw=\"0 0 0 1\"/>", ["\"j1\"", "quat_xyzw", "1.1"]),
+        ("<mimic joint=\"j9\" multiplier=\"two\"/>", ["r.urdf:4", "\"j1\"", "multiplier=\"two\""]),
+    ] {
+        let message = refusal(&wrap(&["a", "b"], &[joint("j1", "revolute", "a", "b", inner)]));
+        for part in wanted {
+            assert!(message.contains(part), "{part:?} not in:\n{message}");
+        }
+    }
+}
+
+#[test]
+fn bad_trees_and_texts_name_the_place() {
+    let fixed = |name: &str, parent: &str, child: &str| joint(name, "fixed", parent, child, "");
+    let cases: &[(String, &[&str])] = &[
+        (wrap(&["a", "a"], &[]), &["r.urdf:3", "second link named \"a\""]),
+        (wrap(&["a"], &[fixed("j1", "a", "b2")]), &["r.urdf:3", "\"b2\", which does not exist"]),
+        (wrap(&["a", "b"], &[joint("j1", "Revolute", "a", "b", Z)]), &["joint type", "revolute"]),
+        (wrap(&["a", "b", "c"], &[fixed("j", "a", "c"), fixed("k", "b", "c")]), &["\"k\"", "second parent", "\"j\""]),
+        (wrap(&["a", "b"], &[fixed("j", "a", "b"), fixed("k", "b", "a")]), &["loop"]),
+        (wrap(&["a", "b", "c"], &[fixed("j", "a", "b"), fixed("j", "b", "c")]), &["second joint named \"j\""]),
+        ("<robot name='r'>\n<link name='a'>\n</robot>".into(), &["r.urdf:3", "well-formed"]),
+        ("<sdf/>".into(), &["<sdf>", "URDF"]),
+        ("<robot name='r'/>".into(), &["no links"]),
+    ];
+    for (text, wanted) in cases {
+        let message = refusal(text);
+        for part in *wanted {
+            assert!(message.contains(part), "{part:?} not in:\n{message}");
+        }
+    }
+    let error = read(Path::new("no/such.urdf")).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    assert!(error.place.contains("no/such.urdf"));
+}
+
+#[test]
+fn mimic_joints_that_lead_nowhere_are_refused() {
+    let pair = |a: &str, b: &str| {
+        let joints = [
+            joint("p", "revolute", "a", "b", &format!("{Z}<mimic joint=\"{a}\"/>")),
+            joint("q", "revolute", "b", "c", &format!("{Z}<mimic joint=\"{b}\"/>")),
+            joint("f", "fixed", "c", "d", ""),
+        ];
+        robot(&wrap(&["a", "b", "c", "d"], &joints)).chain(None, None).unwrap_err().to_string()
+    };
+    assert!(pair("q", "p").contains("loop"));
+    assert!(pair("nobody", "p").contains("does not exist"));
+    assert!(pair("f", "p").contains("fixed"));
+}
+
+#[test]
+fn an_unexpanded_xacro_is_refused_with_the_command_that_expands_it() {
+    let declared = "<robot name=\"r\" xmlns:xacro=\"http://ros.org/wiki/xacro\">\n<link name=\"a\"/>";
+    let cases = [
+        format!("{declared}\n<xacro:include filename=\"x\"/></robot>"),
+        "<robot name=\"r\">\n<link name=\"a\"/>\n<xacro:arm/></robot>".to_string(),
+        wrap(&["a", "b"], &[joint("${prefix}j", "fixed", "a", "b", "")]),
+    ];
+    for text in cases {
+        let error = RobotDescription::from_text(Path::new("arm.urdf.xacro"), text).unwrap_err().to_string();
+        assert!(error.contains("xacro arm.urdf.xacro > arm.expanded.urdf"), "{error}");
+        assert!(error.contains("arm.urdf.xacro:"), "{error}");
+    }
+    let expanded = format!("{declared}<!-- <xacro:arm/> --></robot>");
+    assert_eq!(robot(&expanded).links().count(), 1, "a leftover declaration or comment is no macro");
+}
+
+#[test]
+fn defaults_that_were_never_written_are_not_invented() {
+    let limit = |attributes: &str| format!("{Z}<limit {attributes} effort=\"0\" velocity=\"0\"/>");
+    for (inner, wanted) in [
+        (Z.to_string(), None),
+        (limit(""), None),
+        (limit("lower=\"0\" upper=\"0\""), None),
+        (limit("upper=\"1\""), Some((0.0, 1.0))),
+    ] {
+        let chain = robot(&wrap(&["a", "b"], &[joint("j", "revolute", "a", "b", &inner)])).chain(None, None).unwrap();
+        assert_eq!(chain.joints[0].limits, wanted, "{inner}");
+    }
+    let noticed = |inner: &str| robot(&wrap(&["a", "b"], &[joint("j", "revolute", "a", "b", inner)])).notices;
+    assert!(noticed("")[0].what.contains("no axis"));
+    assert!(noticed(&format!("{Z}<origin rpy=\"90 0 0\"/>"))[0].what.contains("radians"));
+    assert!(noticed(&format!("{Z}<origin rpy=\"1.57 0 0\"/>")).is_empty());
+}
+
+#[test]
+fn masses_are_carried_by_the_last_joint_of_the_chain_before_them() {
+    let link = |name: &str, mass: f64| {
+        let inertia = "<inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/>";
+        format!(
+            "<link name=\"{name}\"><inertial><origin xyz=\"0.1 0 0\"/><mass value=\"{mass}\"/>{inertia}</inertial></link>"
+        )
+    };
+    let text = [
+        "<robot name=\"r\"><link name=\"tool\"/>".to_string(),
+        link("base", 50.0),
+        link("arm", 4.0),
+        link("gripper", 2.0),
+        joint("j1", "revolute", "base", "arm", Z),
+        joint("t", "fixed", "arm", "tool", ""),
+        joint("g", "revolute", "arm", "gripper", &format!("{Z}<origin xyz=\"0 0 1\" rpy=\"0 0 1.5707963267948966\"/>")),
+        "</robot>".to_string(),
+    ];
+    let robot = robot(&text.concat());
+    assert_eq!(robot.inertials().len(), 3, "a link without <inertial> has none");
+    let carried = robot.carried_masses(&robot.chain(None, Some("tool")).unwrap());
+    let by_link: BTreeMap<_, _> = carried.iter().map(|c| (c.link.as_str(), c)).collect();
+    assert_eq!(by_link.keys().copied().collect::<Vec<_>>(), ["arm", "gripper"]);
+    assert_eq!((by_link["gripper"].joint, by_link["gripper"].mass_kg), (0, 2.0));
+    // Rounding of cos(pi/2).
+    assert!((by_link["gripper"].centre_m - Vector3::new(0.0, 0.1, 1.0)).norm() < 1e-15);
+}
