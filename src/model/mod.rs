@@ -2,3 +2,7 @@
 
 pub mod camera;
 pub mod circle;
+pub mod joint_terms;
+pub mod mount;
+pub mod plate_modes;
+pub mod robot;
