@@ -1,5 +1,7 @@
 //! Pixels to identified observations; knows no robot.
 
+mod detection;
 mod picture;
 
+pub use detection::{Detection, Dropped};
 pub use picture::Picture;
