@@ -6,5 +6,5 @@
 mod pose;
 mod rotation;
 
-pub use pose::{Pose, adjoint};
+pub use pose::{Pose, adjoint, right_jacobian_se3};
 pub use rotation::{exp_so3, log_so3, matrix_from_rpy, project_to_so3, right_jacobian_so3, rpy_from_matrix, skew};

@@ -1,1 +1,8 @@
-//! To come.
+//! Parameters to predictions and Jacobians: camera, robot, plate, and the chain that joins them.
+
+pub mod camera;
+pub mod circle;
+pub mod joint_terms;
+pub mod mount;
+pub mod plate_modes;
+pub mod robot;

@@ -59,4 +59,7 @@ pub struct Chain {
     pub joints: Vec<Joint>,
     /// Names of the joints whose readings the chain needs, in chain order.
     pub readings: Vec<String>,
+    /// How the joint of each reading moves (fixes its unit: rad or m), same length as `readings`.
+    /// Kept apart from `joints` because a mimic joint may be driven from outside the chain.
+    pub reading_kinds: Vec<JointKind>,
 }

@@ -1,0 +1,195 @@
+//! Cameras: one table of lenses, one file per lens.
+//!
+//! To add a lens: write `src/model/camera/<lens>.rs` with its names and `distort` (value and derivatives), add a variant to
+//! [`Lens`] and a row to each `match` in this file (the compiler lists them), and a row to `tests/jacobians.rs`.
+
+mod brown;
+
+use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Most parameters that any camera has.
+pub const MAX_PARAMETERS: usize = 12;
+
+/// Names of the pinhole parameters, px, with which every camera starts.
+const PINHOLE: [&str; 4] = ["fx", "fy", "cx", "cy"];
+
+/// Lens distortion models.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Lens {
+    /// Brown-Conrady: k1 k2 p1 p2 k3, in the order of OpenCV and of ROS `plumb_bob`.
+    Brown,
+}
+
+/// A distorted point of the plane z = 1 with its derivatives.
+pub(super) struct Distorted {
+    pub point: Vector2<f64>,
+    pub d_point: Matrix2<f64>,
+    /// One column per lens coefficient.
+    pub d_coefficients: SMatrix<f64, 2, { MAX_PARAMETERS - 4 }>,
+}
+
+impl Lens {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Brown => "brown",
+        }
+    }
+
+    /// The lens of a name in files.
+    pub fn from_name(name: &str) -> Option<Self> {
+        [Self::Brown].into_iter().find(|lens| lens.name() == name)
+    }
+
+    /// Names of the lens coefficients (dimensionless), in the order of OpenCV.
+    pub fn coefficient_names(self) -> &'static [&'static str] {
+        match self {
+            Self::Brown => &brown::NAMES,
+        }
+    }
+
+    fn distort(self, c: &[f64], x: &Vector2<f64>) -> Distorted {
+        match self {
+            Self::Brown => brown::distort(c, x),
+        }
+    }
+
+    fn is_monotonic_to(self, c: &[f64], r2: f64) -> bool {
+        match self {
+            Self::Brown => brown::is_monotonic_to(c, r2),
+        }
+    }
+}
+
+/// A camera: x right, y down, z forward; pixel (0, 0) is the centre of the top-left pixel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Camera {
+    /// Lens model.
+    pub lens: Lens,
+    /// Columns of the image.
+    pub width_px: u32,
+    /// Rows of the image.
+    pub height_px: u32,
+    /// fx, fy, cx, cy (px), then the coefficients of the lens.
+    pub parameters: Vec<f64>,
+}
+
+/// The image of a point with its derivatives.
+#[derive(Debug, Clone, Copy)]
+pub struct Projection {
+    /// Column and row, px.
+    pub uv: Vector2<f64>,
+    /// With respect to the point in the camera frame, px/m.
+    pub d_point: Matrix2x3<f64>,
+    /// With respect to the parameters of the camera; columns beyond their number are zero.
+    pub d_parameters: SMatrix<f64, 2, MAX_PARAMETERS>,
+}
+
+impl Camera {
+    /// A camera without distortion: focal length `focal_px`, principal point in the middle of the image.
+    pub fn pinhole(lens: Lens, width_px: u32, height_px: u32, focal_px: f64) -> Self {
+        let middle = |n: u32| (f64::from(n) - 1.0) / 2.0;
+        let mut parameters = vec![focal_px, focal_px, middle(width_px), middle(height_px)];
+        parameters.resize(4 + lens.coefficient_names().len(), 0.0);
+        Self { lens, width_px, height_px, parameters }
+    }
+
+    /// Names of all parameters, in their order.
+    pub fn parameter_names(&self) -> impl Iterator<Item = &'static str> {
+        PINHOLE.into_iter().chain(self.lens.coefficient_names().iter().copied())
+    }
+
+    /// Unit of parameter `index`: "px" or "1".
+    pub fn parameter_unit(index: usize) -> &'static str {
+        if index < PINHOLE.len() { "px" } else { "1" }
+    }
+
+    /// Image (px) of a point in the camera frame (m); `None` behind the camera or where the lens model folds over.
+    pub fn project(&self, x_camera: &Vector3<f64>) -> Option<Vector2<f64>> {
+        let x = normalised(x_camera)?;
+        if !self.lens.is_monotonic_to(&self.parameters[4..], x.norm_squared()) {
+            return None;
+        }
+        let d = self.lens.distort(&self.parameters[4..], &x);
+        Some(self.to_pixels(&d.point))
+    }
+
+    /// As [`Camera::project`], with derivatives; `None` only behind the camera, so that an adjustment can pass through a poor state.
+    pub fn project_with_jacobian(&self, x_camera: &Vector3<f64>) -> Option<Projection> {
+        let x = normalised(x_camera)?;
+        let d = self.lens.distort(&self.parameters[4..], &x);
+        let (fx, fy) = (self.parameters[0], self.parameters[1]);
+        let scale = Matrix2::new(fx, 0.0, 0.0, fy);
+        let iz = 1.0 / x_camera.z;
+        let d_normalised = Matrix2x3::new(iz, 0.0, -x.x * iz, 0.0, iz, -x.y * iz);
+        let mut d_parameters = SMatrix::<f64, 2, MAX_PARAMETERS>::zeros();
+        d_parameters[(0, 0)] = d.point.x;
+        d_parameters[(1, 1)] = d.point.y;
+        d_parameters[(0, 2)] = 1.0;
+        d_parameters[(1, 3)] = 1.0;
+        d_parameters.fixed_view_mut::<2, { MAX_PARAMETERS - 4 }>(0, 4).copy_from(&(scale * d.d_coefficients));
+        Some(Projection { uv: self.to_pixels(&d.point), d_point: scale * d.d_point * d_normalised, d_parameters })
+    }
+
+    /// Direction (z = 1) in the camera frame that is imaged at `uv` px; `None` where no direction is.
+    pub fn ray(&self, uv: &Vector2<f64>) -> Option<Vector3<f64>> {
+        let p = &self.parameters;
+        let target = Vector2::new((uv.x - p[2]) / p[0], (uv.y - p[3]) / p[1]);
+        let mut x = target;
+        for _ in 0..50 {
+            let d = self.lens.distort(&p[4..], &x);
+            let step = d.d_point.try_inverse()? * (target - d.point);
+            // A bounded step keeps Newton on the inner branch of the lens.
+            x += step * (0.5 / step.norm().max(0.5));
+            if step.norm() < 1e-14 {
+                break;
+            }
+        }
+        let d = self.lens.distort(&p[4..], &x);
+        let reached = (d.point - target).norm() < 1e-9 && self.lens.is_monotonic_to(&p[4..], x.norm_squared());
+        reached.then(|| Vector3::new(x.x, x.y, 1.0))
+    }
+
+    /// True where `uv` lies on the sensor, at least `margin_px` from its border.
+    pub fn contains(&self, uv: &Vector2<f64>, margin_px: f64) -> bool {
+        let inside = |x: f64, n: u32| x >= margin_px - 0.5 && x <= f64::from(n) - 0.5 - margin_px;
+        inside(uv.x, self.width_px) && inside(uv.y, self.height_px)
+    }
+
+    fn to_pixels(&self, x: &Vector2<f64>) -> Vector2<f64> {
+        let p = &self.parameters;
+        Vector2::new(p[0] * x.x + p[2], p[1] * x.y + p[3])
+    }
+}
+
+fn normalised(x: &Vector3<f64>) -> Option<Vector2<f64>> {
+    (x.z > 1e-6).then(|| Vector2::new(x.x / x.z, x.y / x.z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ray_inverts_projection() {
+        let mut camera = Camera::pinhole(Lens::Brown, 1280, 1024, 800.0);
+        camera.parameters[4..].copy_from_slice(&[-0.15, 0.03, 8e-4, -5e-4, 0.002]);
+        for (u, v) in [(0.0, 0.0), (640.0, 500.0), (1279.0, 12.5), (33.0, 1023.0)] {
+            let uv = Vector2::new(u, v);
+            let ray = camera.ray(&uv).unwrap();
+            assert!((camera.project(&ray).unwrap() - uv).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_point_beyond_the_fold_has_no_image() {
+        let mut camera = Camera::pinhole(Lens::Brown, 1280, 1024, 800.0);
+        camera.parameters[4] = -0.3;
+        // r (1 - 0.3 r^2) has its maximum at r = 1.054.
+        assert!(camera.project(&Vector3::new(1.0, 0.0, 1.0)).is_some());
+        assert!(camera.project(&Vector3::new(1.1, 0.0, 1.0)).is_none());
+        assert!(camera.project(&Vector3::new(0.0, 0.0, -1.0)).is_none());
+    }
+}

@@ -1,0 +1,102 @@
+//! What a joint does that its reading does not say, beyond rigid geometry.
+//!
+//! `qt = q + sum_t p_t phi_t(q)`: every term is a basis function `phi` of the reading (and of the posture and the approach)
+//! times one parameter. To add a term: a variant of [`Term`], its rows in `name`, `prior_sigma` and `basis`.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::urdf::JointKind;
+
+/// Step of a joint (rad or m) over which the backlash term turns from one side to the other.
+const BACKLASH_STEP: f64 = 2e-3;
+
+/// Number of gravity basis functions of a joint.
+pub const GRAVITY_TERMS: u8 = 4;
+
+/// One kind of joint error; its parameter is in rad (or m for a prismatic joint) unless said otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Term {
+    /// Constant offset of the zero position.
+    Offset,
+    /// Error of the gear ratio, dimensionless: `kappa q`.
+    Gear,
+    /// `a cos(k q)` of the reading: first, second, ... harmonic of a gear.
+    Cosine(u8),
+    /// `b sin(k q)` of the reading.
+    Sine(u8),
+    /// Sag under gravity: the moment about the axis of a unit weight on a unit lever. Levers 0 and 1 are fixed in the
+    /// joint's own link, levers 2 and 3 in the link after the next moving joint of the chain.
+    Gravity(u8),
+    /// Backlash: `b tanh(dq / 2 mrad)` of the step from the previous stop.
+    Backlash,
+}
+
+impl Term {
+    /// Name in parameter blocks.
+    pub fn name(self) -> String {
+        match self {
+            Self::Offset => "offset".into(),
+            Self::Gear => "gear".into(),
+            Self::Cosine(k) => format!("cos_{k}"),
+            Self::Sine(k) => format!("sin_{k}"),
+            Self::Gravity(k) => format!("gravity_{k}"),
+            Self::Backlash => "backlash".into(),
+        }
+    }
+
+    /// Default prior sigma, in the unit of the parameter.
+    pub fn prior_sigma(self, kind: JointKind) -> f64 {
+        let per_metre = if kind == JointKind::Prismatic { 0.1 } else { 1.0 };
+        match self {
+            Self::Offset => 10e-3 * per_metre,
+            Self::Gear => 5e-4,
+            Self::Cosine(_) | Self::Sine(_) => 0.1e-3 * per_metre,
+            Self::Gravity(_) | Self::Backlash => 0.3e-3 * per_metre,
+        }
+    }
+}
+
+/// Posture-dependent quantities that the basis functions need, of one joint at one stop.
+#[derive(Debug, Clone, Copy)]
+pub struct TermContext {
+    /// Reading, rad or m.
+    pub reading: f64,
+    /// Step of the reading from the previous stop; `None` where the approach is not known.
+    pub approach: Option<f64>,
+    /// Moment of the unit weight about the axis for the four gravity levers, dimensionless.
+    pub gravity: [f64; GRAVITY_TERMS as usize],
+}
+
+impl Term {
+    /// Value of the basis function.
+    pub fn basis(self, context: &TermContext) -> f64 {
+        match self {
+            Self::Offset => 1.0,
+            Self::Gear => context.reading,
+            Self::Cosine(k) => (f64::from(k) * context.reading).cos(),
+            Self::Sine(k) => (f64::from(k) * context.reading).sin(),
+            Self::Gravity(k) => context.gravity[usize::from(k)],
+            Self::Backlash => context.approach.map_or(0.0, |step| (step / BACKLASH_STEP).tanh()),
+        }
+    }
+}
+
+/// Two unit vectors that complete `axis` to a right-handed frame: the levers of the gravity terms.
+pub(super) fn levers(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let helper = if axis.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+    let u = (helper - axis * axis.dot(&helper)).normalize();
+    [u, axis.cross(&u)]
+}
+
+/// A term of one joint with its parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct JointTerm {
+    /// Index of the reading that it belongs to.
+    pub reading: usize,
+    /// Kind.
+    pub term: Term,
+    /// Parameter.
+    pub value: f64,
+}

@@ -1,0 +1,28 @@
+//! Low-order deformations of a plate: what a printer, a roll of paper or a warped board does to all markers together.
+
+use nalgebra::{SMatrix, Vector3};
+
+/// Number of modes.
+pub const MODES: usize = 6;
+
+/// Names of the modes. Scale, aspect and skew are dimensionless; bows are heights in metres at the half-diagonal.
+pub const NAMES: [&str; MODES] = ["scale", "aspect", "skew", "bow_xx", "bow_xy", "bow_yy"];
+
+/// Default prior sigma of each mode.
+pub const PRIOR_SIGMA: [f64; MODES] = [1e-4, 1e-4, 1e-4, 3e-4, 3e-4, 3e-4];
+
+/// Displacement of a marker (m) per unit of each mode, one column a mode.
+///
+/// `half_diagonal_m` is the largest distance of a marker from the centre of the plate.
+pub fn basis(nominal: &Vector3<f64>, half_diagonal_m: f64) -> SMatrix<f64, 3, MODES> {
+    let (x, y) = (nominal.x, nominal.y);
+    let h = half_diagonal_m.max(1e-9);
+    let mut b = SMatrix::<f64, 3, MODES>::zeros();
+    b.set_column(0, nominal);
+    b.set_column(1, &(Vector3::new(x, -y, 0.0) / 2.0));
+    b.set_column(2, &(Vector3::new(y, x, 0.0) / 2.0));
+    b[(2, 3)] = x * x / (h * h);
+    b[(2, 4)] = x * y / (h * h);
+    b[(2, 5)] = y * y / (h * h);
+    b
+}

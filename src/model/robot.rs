@@ -1,0 +1,168 @@
+//! The robot: `base_from_tip(q) = prod_i [ origin_i Exp(xi_i) Motion_i(qt_i) ]` and its derivatives.
+
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+use super::joint_terms::{GRAVITY_TERMS, JointTerm, Term, TermContext, levers};
+use crate::geom::{Pose, adjoint, exp_so3, right_jacobian_se3};
+use crate::urdf::{Chain, Joint, JointKind};
+
+/// Where the robot stood: readings in the order of [`Chain::readings`], rad or m.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stop {
+    /// Readings.
+    pub readings: Vec<f64>,
+    /// Step of every reading from the stop before; `None` for the first stop or an unknown order.
+    pub approach: Option<Vec<f64>>,
+}
+
+impl Stop {
+    /// A stop that was reached from nowhere in particular.
+    pub fn at(readings: &[f64]) -> Self {
+        Self { readings: readings.to_vec(), approach: None }
+    }
+}
+
+/// A chain with its deviations from nominal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Robot {
+    /// Nominal chain.
+    pub chain: Chain,
+    /// Body-fixed twist on every origin of the chain, `[rho (m), phi (rad)]`.
+    pub twists: Vec<Vector6<f64>>,
+    /// Joint terms.
+    pub terms: Vec<JointTerm>,
+}
+
+/// The pose of the tip with its derivatives as body twists of `base_from_tip`.
+#[derive(Debug, Clone)]
+pub struct Kinematics {
+    /// Pose of the tip.
+    pub base_from_tip: Pose,
+    /// With respect to the twist of every joint of the chain.
+    pub d_twists: Vec<Matrix6<f64>>,
+    /// With respect to the true position behind every reading.
+    pub d_readings: Vec<Vector6<f64>>,
+    /// With respect to every joint term's parameter.
+    pub d_terms: Vec<Vector6<f64>>,
+}
+
+fn motion(joint: &Joint, position: f64) -> Pose {
+    match joint.kind {
+        JointKind::Fixed => Pose::identity(),
+        JointKind::Revolute => Pose::new(exp_so3(&(joint.axis * position)), Vector3::zeros()),
+        JointKind::Prismatic => Pose::new(nalgebra::Matrix3::identity(), joint.axis * position),
+    }
+}
+
+fn motion_twist(joint: &Joint) -> Vector6<f64> {
+    let (rho, phi) = match joint.kind {
+        JointKind::Fixed => (Vector3::zeros(), Vector3::zeros()),
+        JointKind::Revolute => (Vector3::zeros(), joint.axis),
+        JointKind::Prismatic => (joint.axis, Vector3::zeros()),
+    };
+    Vector6::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
+}
+
+impl Robot {
+    /// The robot as described, without any deviation.
+    pub fn nominal(chain: Chain) -> Self {
+        let twists = vec![Vector6::zeros(); chain.joints.len()];
+        Self { chain, twists, terms: Vec::new() }
+    }
+
+    /// Pose of the tip for exact readings at a stop of unknown approach.
+    pub fn base_from_tip(&self, readings: &[f64]) -> Pose {
+        self.pose_at(&Stop::at(readings), &vec![0.0; readings.len()])
+    }
+
+    /// Pose of the tip at a stop whose true positions lie `noise` (rad or m) beside what readings and terms say.
+    pub fn pose_at(&self, stop: &Stop, noise: &[f64]) -> Pose {
+        let positions = self.positions(stop, noise).0;
+        let mut pose = Pose::identity();
+        for (i, joint) in self.chain.joints.iter().enumerate() {
+            pose = &(&(&pose * &joint.origin) * &Pose::exp(&self.twists[i])) * &motion(joint, positions[i]);
+        }
+        pose
+    }
+
+    /// As [`Robot::pose_at`], with all derivatives.
+    pub fn kinematics(&self, stop: &Stop, noise: &[f64]) -> Kinematics {
+        let (positions, contexts) = self.positions(stop, noise);
+        let joints = &self.chain.joints;
+        let mut d_twists = vec![Matrix6::zeros(); joints.len()];
+        let mut d_readings = vec![Vector6::zeros(); self.chain.readings.len()];
+        // From the tip inwards: `rest_from_tip` is what lies behind the point of perturbation.
+        let mut rest_from_tip = Pose::identity();
+        for (i, joint) in joints.iter().enumerate().rev() {
+            if let Some(drive) = joint.drive {
+                let column = adjoint(&rest_from_tip.inverse()) * motion_twist(joint);
+                d_readings[drive.reading] += column * drive.multiplier;
+            }
+            rest_from_tip = &motion(joint, positions[i]) * &rest_from_tip;
+            d_twists[i] = adjoint(&rest_from_tip.inverse()) * right_jacobian_se3(&self.twists[i]);
+            rest_from_tip = &(&joint.origin * &Pose::exp(&self.twists[i])) * &rest_from_tip;
+        }
+        let d_terms = self.terms.iter().map(|t| d_readings[t.reading] * t.term.basis(&contexts[t.reading])).collect();
+        Kinematics { base_from_tip: rest_from_tip, d_twists, d_readings, d_terms }
+    }
+
+    /// `origin_i Exp(xi_i) Motion_i(offset_i)` for every joint: the corrected URDF, in which controller angles stay as they are.
+    pub fn corrected_origins(&self) -> Vec<Pose> {
+        let mut offsets = vec![0.0; self.chain.readings.len()];
+        for t in self.terms.iter().filter(|t| t.term == Term::Offset) {
+            offsets[t.reading] += t.value;
+        }
+        let corrected = |(joint, twist): (&Joint, &Vector6<f64>)| {
+            let offset = joint.drive.map_or(0.0, |d| d.multiplier * offsets[d.reading]);
+            &joint.origin.perturbed(twist) * &motion(joint, offset)
+        };
+        self.chain.joints.iter().zip(&self.twists).map(corrected).collect()
+    }
+
+    /// True position of every joint of the chain, and the context of the terms of every reading.
+    fn positions(&self, stop: &Stop, noise: &[f64]) -> (Vec<f64>, Vec<TermContext>) {
+        let mut contexts: Vec<TermContext> = (0..stop.readings.len())
+            .map(|r| TermContext {
+                reading: stop.readings[r],
+                approach: stop.approach.as_ref().map(|a| a[r]),
+                gravity: [0.0; GRAVITY_TERMS as usize],
+            })
+            .collect();
+        if self.terms.iter().any(|t| matches!(t.term, Term::Gravity(_))) {
+            self.fill_gravity(&mut contexts);
+        }
+        let mut moved: Vec<f64> = stop.readings.iter().zip(noise).map(|(q, dq)| q + dq).collect();
+        for t in &self.terms {
+            moved[t.reading] += t.value * t.term.basis(&contexts[t.reading]);
+        }
+        let position = |joint: &Joint| joint.drive.map_or(0.0, |d| d.multiplier * moved[d.reading] + d.offset);
+        (self.chain.joints.iter().map(position).collect(), contexts)
+    }
+
+    /// Gravity moments in the nominal posture, gravity along -z of the base; a sagging joint turns the way its moment pulls.
+    fn fill_gravity(&self, contexts: &mut [TermContext]) {
+        let weight = Vector3::new(0.0, 0.0, -1.0);
+        let mut pose = Pose::identity();
+        // Axis and link rotation behind every driven joint, base frame.
+        let mut links = Vec::new();
+        for joint in &self.chain.joints {
+            let position = joint.drive.map_or(0.0, |d| d.multiplier * contexts[d.reading].reading + d.offset);
+            pose = &(&pose * &joint.origin) * &motion(joint, position);
+            if let Some(drive) = joint.drive {
+                links.push((drive.reading, joint.kind, joint.axis, pose.rotation));
+            }
+        }
+        for (k, (reading, kind, axis, rotation)) in links.iter().enumerate() {
+            let base_axis = rotation * axis;
+            let moment = |lever: Vector3<f64>| match kind {
+                JointKind::Prismatic => base_axis.dot(&weight),
+                _ => base_axis.dot(&lever.cross(&weight)),
+            };
+            let own = levers(axis).map(|l| moment(rotation * l));
+            let next = links.get(k + 1).map_or([0.0; 2], |(_, _, next_axis, next_rotation)| {
+                levers(next_axis).map(|l| moment(next_rotation * l))
+            });
+            contexts[*reading].gravity = [own[0], own[1], next[0], next[1]];
+        }
+    }
+}
