@@ -250,9 +250,8 @@ mod tests {
     /// Independent witness: windows as plain tables, rotated and mirrored by index arithmetic, compared cell by cell.
     fn distance_by_tables(code: &PlateCode) -> CodeDistance {
         type Table = Vec<Vec<u8>>;
-        let quarter = |t: &Table| -> Table {
-            (0..t[0].len()).map(|j| (0..t.len()).rev().map(|i| t[i][j]).collect()).collect()
-        };
+        let quarter =
+            |t: &Table| -> Table { (0..t[0].len()).map(|j| (0..t.len()).rev().map(|i| t[i][j]).collect()).collect() };
         let mirror = |t: &Table| -> Table { t.iter().map(|r| r.iter().rev().copied().collect()).collect() };
         let mut windows: Vec<Table> = Vec::new();
         for (height, width) in [(4, 5), (5, 4)] {

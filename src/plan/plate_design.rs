@@ -220,7 +220,9 @@ fn shape(request: &PlateRequest) -> Result<(u32, u32)> {
     if short < WINDOW_SHORT || long < WINDOW_LONG {
         return Err(Error::input(
             "plate",
-            format!("{columns} x {rows} markers are too few: identity is read from windows of {WINDOW_SHORT}x{WINDOW_LONG}"),
+            format!(
+                "{columns} x {rows} markers are too few: identity is read from windows of {WINDOW_SHORT}x{WINDOW_LONG}"
+            ),
             "ask for at least 5 x 4 markers",
         ));
     }
@@ -294,7 +296,10 @@ fn check_sheet(request: &PlateRequest, columns: u32, rows: u32, pitch_m: f64) ->
                 sheet[0] * 1e3,
                 sheet[1] * 1e3
             ),
-            format!("take a pitch of at most {:.1} mm or fewer markers", largest_pitch(sheet, columns, rows).max(0.0) * 1e3),
+            format!(
+                "take a pitch of at most {:.1} mm or fewer markers",
+                largest_pitch(sheet, columns, rows).max(0.0) * 1e3
+            ),
         ));
     }
     Ok(())
@@ -306,7 +311,10 @@ fn check_viewing(v: &Viewing, columns: u32, rows: u32, pitch_m: f64) -> Result<f
     if !sane {
         return Err(Error::input(
             "camera",
-            format!("focal length {} px, distances {} to {} m, tilt {:.2} rad", v.focal_px, v.near_m, v.far_m, v.tilt_rad),
+            format!(
+                "focal length {} px, distances {} to {} m, tilt {:.2} rad",
+                v.focal_px, v.near_m, v.far_m, v.tilt_rad
+            ),
             "give positive values, the nearer distance first, and a tilt below 80 degrees",
         ));
     }
@@ -366,8 +374,7 @@ mod tests {
 
     #[test]
     fn count_and_sheet_choose_shape_and_pitch() {
-        let request =
-            PlateRequest { markers: Some(150), sheet_m: Some([0.297, 0.210]), ..PlateRequest::default() };
+        let request = PlateRequest { markers: Some(150), sheet_m: Some([0.297, 0.210]), ..PlateRequest::default() };
         let made = design(&request).unwrap();
         assert!((140..=160).contains(&made.plate.markers.len()), "{}", made.plate.markers.len());
         assert_eq!(made.sheet.paper, Some("A4"));
@@ -385,10 +392,12 @@ mod tests {
     #[test]
     fn unresolvable_and_oversized_plates_are_refused_with_the_pitch_to_take() {
         let far = Viewing { far_m: 2.0, ..viewing() };
-        let error = design(&PlateRequest { viewing: Some(far), pitch_m: Some(0.018), ..PlateRequest::default() }).unwrap_err();
+        let error =
+            design(&PlateRequest { viewing: Some(far), pitch_m: Some(0.018), ..PlateRequest::default() }).unwrap_err();
         assert!(error.what.contains("cannot resolve") && error.remedy.contains("40.2 mm"), "{error}");
         let near = Viewing { near_m: 0.05, ..viewing() };
-        let error = design(&PlateRequest { viewing: Some(near), pitch_m: Some(0.018), ..PlateRequest::default() }).unwrap_err();
+        let error =
+            design(&PlateRequest { viewing: Some(near), pitch_m: Some(0.018), ..PlateRequest::default() }).unwrap_err();
         assert!(error.what.contains("sees only"), "{error}");
         let a4 = Some([0.297, 0.210]);
         let error = design(&PlateRequest { sheet_m: a4, pitch_m: Some(0.018), ..PlateRequest::default() }).unwrap_err();
