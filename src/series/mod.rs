@@ -5,6 +5,7 @@
 mod inputs;
 mod joints;
 mod manifest;
+mod mcap;
 mod observation;
 mod observation_file;
 mod plate;
@@ -18,6 +19,7 @@ pub use joints::{DEFAULT_PLACEMENT, Stop, Stops};
 pub use manifest::{
     AngleUnit, CameraMount, CameraSection, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder,
 };
+pub use mcap::{CameraInfo, Clock, Extracted, Motion, Picking, RecordingOptions, StopReport, extract};
 pub use observation::{Edge, ImageObservations, Observation};
 pub use observation_file::observations_csv;
 pub use plate::{Marker, Plate, PlateKind, ScaleBar};
