@@ -1,1 +1,7 @@
-//! To come.
+//! What a result is worth: hold-out, identifiability, points of another device.
+
+mod hold_out;
+mod points;
+
+pub use hold_out::{Accuracy, Errors, hold_out};
+pub use points::{MeasuredPoint, PointFit, fit_points};

@@ -1,6 +1,42 @@
 //! Pixels to identified observations; knows no robot.
+//!
+//! A new kind of plate is one file that maps a [`Picture`] and a [`Plate`] to a [`Detection`], and one row in [`detect`].
 
+mod board_labels;
+pub mod chessboard;
 pub mod circles;
+mod detection;
+mod load;
 mod picture;
+mod run;
 
+pub use detection::{Detection, Dropped};
+pub use load::{LUMA_WEIGHTS, load};
 pub use picture::Picture;
+pub use run::{SeriesImage, detect_series};
+
+use crate::error::{Error, Result};
+use crate::series::{Plate, PlateKind};
+
+/// Finds and identifies the markers of a plate in a picture.
+///
+/// # Errors
+/// What the detector of the plate's kind says; the place is then `image`, for the caller to fill in the name.
+pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
+    match plate.kind {
+        PlateKind::Chessboard => chessboard::detect(picture, plate),
+        PlateKind::CodedCircles => {
+            circles::detect(picture, plate, &circles::Options::default()).map(circles::Detection::into_common)
+        }
+        PlateKind::CircleGrid | PlateKind::Charuco => Err(Error::input(
+            "plate",
+            format!("plates of kind {:?} cannot be detected yet", plate.kind),
+            "use coded circles or a chessboard, or give observations.csv",
+        )),
+        PlateKind::Points => Err(Error::input(
+            "plate",
+            "a plate of kind \"points\" has no markers that can be seen in an image",
+            "give observations.csv in the series folder, or set the `kind` that is printed",
+        )),
+    }
+}

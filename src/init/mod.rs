@@ -1,1 +1,11 @@
-//! To come.
+//! Starting values from nothing: homographies, focal length, poses, hand-camera and plate pose.
+
+mod focal;
+mod hand_eye;
+mod homography;
+mod resection;
+
+pub use focal::{FocalCandidate, focal_candidates};
+pub use hand_eye::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
+pub use homography::{Homography, PlanarPose};
+pub use resection::resect;

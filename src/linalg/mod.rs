@@ -97,7 +97,9 @@ mod tests {
 
     /// A badly scaled positive definite matrix.
     fn matrix() -> DMatrix<f64> {
-        let a = DMatrix::from_fn(9, 7, |i, j| ((7 * i * i + 13 * j * j + 5 * i * j) as f64).sin() * 10f64.powi(j as i32 - 3));
+        let a = DMatrix::from_fn(9, 7, |i, j| {
+            ((7 * i * i + 13 * j * j + 5 * i * j) as f64).sin() * 10f64.powi(j as i32 - 3)
+        });
         a.transpose() * a
     }
 

@@ -46,6 +46,15 @@ impl Term {
         }
     }
 
+    /// Unit of the parameter for a joint of `kind`.
+    pub fn unit(self, kind: JointKind) -> &'static str {
+        match (self, kind) {
+            (Self::Gear, _) => "1",
+            (_, JointKind::Prismatic) => "m",
+            _ => "rad",
+        }
+    }
+
     /// Default prior sigma, in the unit of the parameter.
     pub fn prior_sigma(self, kind: JointKind) -> f64 {
         let per_metre = if kind == JointKind::Prismatic { 0.1 } else { 1.0 };

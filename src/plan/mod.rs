@@ -1,1 +1,4 @@
-//! To come.
+//! What to print and where to look: the design of the plate, the choice of poses.
+
+pub mod plate_code;
+pub mod plate_design;

@@ -1,1 +1,14 @@
-//! To come.
+//! The modes of the program: short lists of stages over the same chain.
+//!
+//! `series -> observations -> free poses -> starting values -> joint fit -> assessment`. A new mode is a file here.
+
+mod build;
+mod free_poses;
+mod joint;
+mod solution;
+mod start;
+
+pub use build::{MeasuredSeries, MeasuredStop};
+pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
+pub use joint::{JointNoise, Options, RobotModel, identify};
+pub use solution::{Solution, StartVerdict};

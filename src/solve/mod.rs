@@ -1,1 +1,13 @@
-//! To come.
+//! The solver: block elimination, Levenberg-Marquardt, variance components, rejection.
+
+mod components;
+mod covariance;
+mod levenberg;
+mod snoop;
+mod system;
+
+pub use components::{ComponentOptions, estimate_components};
+pub use covariance::{Covariance, covariance};
+pub use levenberg::{Outcome, Settings, Status, solve};
+pub use snoop::{reject_images, reject_observations};
+pub use system::{Linearised, System, linearise_all};

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use super::ellipse::Ellipse;
+use crate::Notice;
 use crate::series::{Edge, Observation};
 
 /// What the detector looks for.
@@ -208,6 +209,33 @@ impl Detection {
             *counts.entry(d.reason).or_insert(0) += 1;
         }
         counts
+    }
+
+    /// The form that all detectors share, with a notice when the point spread is asymmetric or nothing was identified.
+    pub fn into_common(self) -> crate::detect::Detection {
+        let dropped =
+            self.dropped.iter().map(|d| crate::detect::Dropped { uv: d.uv, reason: d.reason.name() }).collect();
+        let mut notices = Vec::new();
+        if let Some(io) = self.inner_outer.filter(InnerOuter::asymmetric) {
+            let [u, v] = io.mean_px;
+            let what = format!(
+                "inner and outer circles are off by ({u:.4}, {v:.4}) px on the mean of {} annuli: the blur is asymmetric",
+                io.count
+            );
+            notices.push(Notice::new("image", what, "look for coma (stop the lens down) or motion during the exposure"));
+        }
+        let failure = match self.outcome {
+            Outcome::Identified { .. } => None,
+            Outcome::NoCandidates => Some(("nothing looks like a marker", "check focus, exposure and view")),
+            Outcome::NoLattice => Some(("markers, but no lattice of them", "bring more of the plate into the view")),
+            Outcome::Ambiguous => {
+                Some(("the place on the plate cannot be told", "check that plate.toml is the plate in the picture"))
+            }
+        };
+        if let Some((what, remedy)) = failure {
+            notices.push(Notice::new("image", what, remedy));
+        }
+        crate::detect::Detection { observations: self.observations, dropped, notices }
     }
 }
 

@@ -1,0 +1,121 @@
+//! Hold-out by image: a model fitted without an image predicts it from its joint readings alone.
+
+use serde::{Deserialize, Serialize};
+
+use crate::geom::Pose;
+use crate::init::resect;
+use crate::problem::{Image, Problem, Slack, State, Weighting, predict};
+use crate::solve::{Settings, solve};
+
+/// Errors of predicted images.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    /// RMS distance between measured and predicted markers in the image, px.
+    pub rms_px: f64,
+    /// RMS distance in space between where the image shows the markers and where the joint readings put them, mm.
+    pub rms_mm: f64,
+    /// Largest error of a single image, mm.
+    pub worst_mm: f64,
+    /// Number of images predicted.
+    pub images: usize,
+}
+
+/// Before and after.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Accuracy {
+    /// Nominal robot, with camera, hand-camera offset and plate fitted to the other images.
+    pub nominal: Errors,
+    /// Calibrated robot, fitted to the other images.
+    pub calibrated: Errors,
+    /// Error of each held-out image, nominal and calibrated, mm; in the order of the problem's images.
+    pub per_image_mm: Vec<Option<[f64; 2]>>,
+    /// Number of folds.
+    pub folds: usize,
+}
+
+const FOLDS: usize = 6;
+
+/// Joint error that a nominal robot is allowed per stop, rad or m, so that its geometric errors do not bend camera and plate.
+const NOMINAL_JOINT_ERROR: f64 = 3e-3;
+
+/// Predicts every image on the robot by models that have not seen it.
+pub fn hold_out(problem: &Problem, state: &State) -> Option<Accuracy> {
+    let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
+    let folds = FOLDS.min(on_robot.len());
+    if folds < 2 {
+        return None;
+    }
+    let mut nominal_problem = problem.clone();
+    let mut nominal_state = state.clone();
+    nominal_state.robot = crate::model::robot::Robot {
+        terms: state.robot.terms.clone(),
+        ..crate::model::robot::Robot::nominal(state.robot.chain.clone())
+    };
+    nominal_state.robot.terms.iter_mut().for_each(|t| t.value = 0.0);
+    let robot = problem.layout.twists.start..problem.layout.terms.end;
+    nominal_problem.layout.columns[robot].iter_mut().for_each(|c| c.free = false);
+    nominal_problem.noise.joint.iter_mut().flatten().for_each(|s| *s = s.max(NOMINAL_JOINT_ERROR));
+    let nominal = predictions(&nominal_problem, &nominal_state, &on_robot, folds)?;
+    let calibrated = predictions(problem, state, &on_robot, folds)?;
+    let mut per_image_mm = vec![None; problem.images.len()];
+    for ((i, a), (_, b)) in nominal.iter().zip(&calibrated) {
+        per_image_mm[*i] = Some([a.mm(), b.mm()]);
+    }
+    Some(Accuracy { nominal: summary(&nominal), calibrated: summary(&calibrated), per_image_mm, folds })
+}
+
+#[derive(Debug, Clone, Copy)]
+struct ImageError {
+    px2: f64,
+    mm2: f64,
+    count: f64,
+}
+
+impl ImageError {
+    fn mm(&self) -> f64 {
+        (self.mm2 / self.count).sqrt()
+    }
+}
+
+fn summary(errors: &[(usize, ImageError)]) -> Errors {
+    let sum = |f: fn(&ImageError) -> f64| errors.iter().map(|(_, e)| f(e)).sum::<f64>();
+    let count = sum(|e| e.count).max(1.0);
+    Errors {
+        rms_px: (sum(|e| e.px2) / count).sqrt(),
+        rms_mm: (sum(|e| e.mm2) / count).sqrt(),
+        worst_mm: errors.iter().map(|(_, e)| e.mm()).fold(0.0, f64::max),
+        images: errors.len(),
+    }
+}
+
+fn predictions(problem: &Problem, state: &State, on_robot: &[usize], folds: usize) -> Option<Vec<(usize, ImageError)>> {
+    let mut errors = Vec::new();
+    for fold in 0..folds {
+        let held: Vec<usize> =
+            on_robot.iter().copied().enumerate().filter(|(k, _)| k % folds == fold).map(|(_, i)| i).collect();
+        let mut rest = problem.clone();
+        held.iter().for_each(|&i| rest.images[i].rejected = Some("held out".into()));
+        let outcome = solve(&rest, state.clone(), &Settings { iterations: 30, decrement: 1e-2 });
+        for i in held {
+            let image = &problem.images[i];
+            let weighting = Weighting::of(problem, image);
+            let Some(predicted) = outcome.state.camera_from_plate(image, &Slack::None) else { continue };
+            let (seen, _) = resect(image, &outcome.state, &predicted, &weighting)?;
+            errors.push((i, image_error(image, &outcome.state, &predicted, &seen)));
+        }
+    }
+    errors.sort_by_key(|(i, _)| *i);
+    Some(errors)
+}
+
+fn image_error(image: &Image, state: &State, predicted: &Pose, seen: &Pose) -> ImageError {
+    let mut e = ImageError { px2: 0.0, mm2: 0.0, count: 0.0 };
+    for o in image.used() {
+        let x = state.plates[image.plate].position(o.marker);
+        let Some(p) = predict(image, state, predicted, o) else { continue };
+        e.px2 += (o.uv - p.uv).norm_squared();
+        e.mm2 += 1e6 * (predicted.transform(&x) - seen.transform(&x)).norm_squared();
+        e.count += 1.0;
+    }
+    e
+}

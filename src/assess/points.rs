@@ -1,0 +1,85 @@
+//! A kinematic model judged by points that another device measured: only the frame of the device and the reflector are fitted.
+
+use nalgebra::{DMatrix, DVector, Vector3, Vector6};
+
+use crate::geom::{Pose, skew};
+use crate::linalg::SymmetricFactor;
+use crate::model::robot::Robot;
+
+/// One point as a tracker saw it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredPoint {
+    /// Position in the frame of the device, m.
+    pub position_m: Vector3<f64>,
+    /// Readings in the order of the chain, rad or m.
+    pub readings: Vec<f64>,
+}
+
+/// The fit of the device's frame (6) and the reflector on the tip (3).
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointFit {
+    /// `device_from_base`.
+    pub device_from_base: Pose,
+    /// Reflector in the frame of the tip, m.
+    pub tip_point_m: Vector3<f64>,
+    /// Measured minus predicted, m, in the frame of the device.
+    pub residuals_m: Vec<Vector3<f64>>,
+    /// RMS of the lengths of the residuals, m.
+    pub rms_m: f64,
+}
+
+/// Least squares over the base frame and the reflector point; `None` where the points do not determine them.
+pub fn fit_points(robot: &Robot, points: &[MeasuredPoint]) -> Option<PointFit> {
+    let tips: Vec<Pose> = points.iter().map(|p| robot.base_from_tip(&p.readings)).collect();
+    let mut best: Option<PointFit> = None;
+    // The problem is not convex: the frame is started from the best rigid fit for several reflector positions.
+    for start in
+        [Vector3::zeros(), Vector3::new(0.0, 0.0, 0.2), Vector3::new(0.1, 0.0, 0.1), Vector3::new(-0.1, 0.1, 0.1)]
+    {
+        let Some(fit) = from_start(&tips, points, start) else { continue };
+        if best.as_ref().is_none_or(|b| fit.rms_m < b.rms_m) {
+            best = Some(fit);
+        }
+    }
+    best
+}
+
+fn from_start(tips: &[Pose], points: &[MeasuredPoint], start: Vector3<f64>) -> Option<PointFit> {
+    let mut tip_point = start;
+    let mut frame = rigid_fit(tips, points, &tip_point)?;
+    for _ in 0..100 {
+        let mut n = DMatrix::<f64>::zeros(9, 9);
+        let mut b = DVector::<f64>::zeros(9);
+        for (tip, p) in tips.iter().zip(points) {
+            let y = tip.transform(&tip_point);
+            let r = p.position_m - frame.transform(&y);
+            let mut j = DMatrix::<f64>::zeros(3, 9);
+            j.view_mut((0, 0), (3, 3)).copy_from(&frame.rotation);
+            j.view_mut((0, 3), (3, 3)).copy_from(&(-frame.rotation * skew(&y)));
+            j.view_mut((0, 6), (3, 3)).copy_from(&(frame.rotation * tip.rotation));
+            n += j.transpose() * &j;
+            b += j.transpose() * DVector::from_column_slice(r.as_slice());
+        }
+        let step = SymmetricFactor::new(&n).ok()?.solve(&b);
+        frame = frame.perturbed(&Vector6::from_column_slice(step.rows(0, 6).as_slice()));
+        tip_point += Vector3::new(step[6], step[7], step[8]);
+        if step.norm() < 1e-12 {
+            break;
+        }
+    }
+    let residuals_m: Vec<Vector3<f64>> =
+        tips.iter().zip(points).map(|(tip, p)| p.position_m - frame.transform(&tip.transform(&tip_point))).collect();
+    let rms_m = (residuals_m.iter().map(Vector3::norm_squared).sum::<f64>() / points.len() as f64).sqrt();
+    rms_m.is_finite().then_some(PointFit { device_from_base: frame, tip_point_m: tip_point, residuals_m, rms_m })
+}
+
+/// Rotation and translation that bring the reflector positions onto the measured points (Kabsch).
+fn rigid_fit(tips: &[Pose], points: &[MeasuredPoint], tip_point: &Vector3<f64>) -> Option<Pose> {
+    let n = points.len() as f64;
+    let ys: Vec<Vector3<f64>> = tips.iter().map(|t| t.transform(tip_point)).collect();
+    let mean_y = ys.iter().sum::<Vector3<f64>>() / n;
+    let mean_p = points.iter().map(|p| p.position_m).sum::<Vector3<f64>>() / n;
+    let m = ys.iter().zip(points).map(|(y, p)| (p.position_m - mean_p) * (y - mean_y).transpose()).sum();
+    let rotation = crate::geom::project_to_so3(&m)?;
+    Some(Pose::new(rotation, mean_p - rotation * mean_y))
+}

@@ -1,0 +1,244 @@
+//! From a lattice of corners in arbitrary orientation to ids on the board.
+//!
+//! The lattice finder numbers corners from an arbitrary origin, u to the right and v down in the image. Every quarter
+//! turn and every shift is compared with the colours that the squares must have: with row r and column c counted from
+//! the top-left square, a square is dark when r + c is even.
+
+use std::collections::BTreeMap;
+
+use super::Picture;
+use crate::geom::PlaneMap;
+
+/// A square seen in the wrong colour counts against a placement this much more than one in the right colour counts for it:
+/// half the squares of a blank margin are right by chance.
+const WRONG_COLOUR: f64 = 3.0;
+/// Least mean agreement (-1 to 1) of the visible squares.
+const LEAST_AGREEMENT: f64 = 0.5;
+
+/// Number of inner corners of the board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct BoardSize {
+    pub columns: i32,
+    pub rows: i32,
+}
+
+/// Corners in pixels by lattice coordinates (u to the right, v down).
+pub(super) type Lattice = BTreeMap<(i32, i32), [f64; 2]>;
+
+/// Which rectangle of the lattice is the board, and how it is turned there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Placement {
+    board: BoardSize,
+    /// Quarter turns of the board in the image.
+    turns: u8,
+    /// Whether the image shows the board mirrored.
+    mirrored: bool,
+    /// Least lattice coordinates of the board's corners.
+    origin: (i32, i32),
+}
+
+/// What the colours say about where the lattice lies on the board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Labelling {
+    /// One placement agrees clearly better than all others.
+    Unique(Placement),
+    /// The colours of the whole board are symmetric under a turn; this is the most upright placement.
+    Symmetric(Placement),
+    /// Different parts of the board agree equally well: too little of its outline is seen.
+    Ambiguous,
+    /// No placement agrees with the colours, but the mirrored board does.
+    Mirrored,
+    /// No placement agrees with the colours.
+    Contradiction,
+}
+
+impl Placement {
+    /// Extent of the board along u and v.
+    fn extent(self) -> (i32, i32) {
+        let BoardSize { columns, rows } = self.board;
+        if self.turns.is_multiple_of(2) { (columns, rows) } else { (rows, columns) }
+    }
+
+    /// Board coordinates (column, row) of a lattice corner, also off the board.
+    fn board_from_lattice(self, (u, v): (i32, i32)) -> (i32, i32) {
+        let (width, _) = self.extent();
+        let BoardSize { columns, rows } = self.board;
+        let (mut a, b) = (u - self.origin.0, v - self.origin.1);
+        if self.mirrored {
+            a = width - 1 - a;
+        }
+        match self.turns % 4 {
+            0 => (a, b),
+            1 => (b, rows - 1 - a),
+            2 => (columns - 1 - a, rows - 1 - b),
+            _ => (columns - 1 - b, a),
+        }
+    }
+
+    /// Marker id of a lattice corner; `None` off the board.
+    pub fn id(self, lattice: (i32, i32)) -> Option<u32> {
+        let (column, row) = self.board_from_lattice(lattice);
+        let inside = (0..self.board.columns).contains(&column) && (0..self.board.rows).contains(&row);
+        inside.then(|| u32::try_from(row * self.board.columns + column).ok()).flatten()
+    }
+
+    /// Whether the square whose corners of least u and v is `cell` is dark.
+    fn is_dark(self, (u, v): (i32, i32)) -> bool {
+        let (a, b) = (self.board_from_lattice((u, v)), self.board_from_lattice((u + 1, v + 1)));
+        (a.0.min(b.0) + a.1.min(b.1)).rem_euclid(2) == 0
+    }
+
+    /// Lattice cells of all squares of the board.
+    fn squares(self) -> impl Iterator<Item = (i32, i32)> {
+        let ((u0, v0), (width, height)) = (self.origin, self.extent());
+        (v0 - 1..v0 + height).flat_map(move |v| (u0 - 1..u0 + width).map(move |u| (u, v)))
+    }
+}
+
+/// A placement with how well it explains the picture.
+struct Scored {
+    placement: Placement,
+    /// Lattice corners on the board.
+    corners: usize,
+    score: f64,
+    /// Mean agreement of the visible squares, -1 to 1.
+    agreement: f64,
+}
+
+/// Finds where the lattice lies on the board from the colours of the squares.
+pub(super) fn label(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Labelling {
+    let Some(shades) = Shades::read(picture, lattice, board.columns.max(board.rows) + 1) else {
+        return Labelling::Contradiction;
+    };
+    let scored = candidates(lattice, &shades, board, false);
+    let Some(best) = scored.first().filter(|s| s.agreement >= LEAST_AGREEMENT) else {
+        let reflected = candidates(lattice, &shades, board, true);
+        let mirrored = reflected.first().is_some_and(|s| s.agreement >= LEAST_AGREEMENT);
+        return if mirrored { Labelling::Mirrored } else { Labelling::Contradiction };
+    };
+    // A shift past the edge of the board costs at least half a row of squares in the wrong colour; half of that is asked for.
+    let margin = 0.25 * (WRONG_COLOUR - 1.0) * f64::from(board.columns.min(board.rows) + 1);
+    let rivals: Vec<Placement> = scored.iter().filter(|s| s.score > best.score - margin).map(|s| s.placement).collect();
+    if rivals.len() == 1 {
+        return Labelling::Unique(best.placement);
+    }
+    let same_part = |p: &Placement| p.origin == best.placement.origin && p.extent() == best.placement.extent();
+    if !rivals.iter().all(same_part) {
+        return Labelling::Ambiguous;
+    }
+    let upright = rivals.iter().min_by_key(|p| p.turns.min(4 - p.turns));
+    Labelling::Symmetric(*upright.unwrap_or(&best.placement))
+}
+
+/// Placements that cover at least half of the lattice, best first.
+fn candidates(lattice: &Lattice, shades: &Shades, board: BoardSize, mirrored: bool) -> Vec<Scored> {
+    let Some((low, high)) = bounds(lattice) else { return Vec::new() };
+    let mut all = Vec::new();
+    for turns in 0..4 {
+        let (width, height) = Placement { board, turns, mirrored, origin: (0, 0) }.extent();
+        for v in low.1 - height + 1..=high.1 {
+            for u in low.0 - width + 1..=high.0 {
+                let placement = Placement { board, turns, mirrored, origin: (u, v) };
+                let corners = lattice.keys().filter(|&&k| placement.id(k).is_some()).count();
+                if 2 * corners >= lattice.len() {
+                    all.push(score(placement, corners, shades));
+                }
+            }
+        }
+    }
+    all.sort_by(|a, b| b.score.total_cmp(&a.score).then(b.corners.cmp(&a.corners)));
+    all
+}
+
+fn score(placement: Placement, corners: usize, shades: &Shades) -> Scored {
+    let (mut colours, mut agreement, mut seen) = (0.0, 0.0, 0.0);
+    for cell in placement.squares() {
+        let Some(shade) = shades.at(cell) else { continue };
+        let signed = if placement.is_dark(cell) { -shade } else { shade };
+        colours += if signed < 0.0 { WRONG_COLOUR * signed } else { signed };
+        agreement += signed;
+        seen += 1.0;
+    }
+    Scored { placement, corners, score: corners as f64 + colours, agreement: agreement / f64::max(seen, 1.0) }
+}
+
+fn bounds(lattice: &Lattice) -> Option<((i32, i32), (i32, i32))> {
+    let us = lattice.keys().map(|k| k.0);
+    let vs = lattice.keys().map(|k| k.1);
+    Some(((us.clone().min()?, vs.clone().min()?), (us.max()?, vs.max()?)))
+}
+
+/// Shade of every lattice cell in view: -1 as dark as the dark squares near it, 1 as light as the light ones.
+struct Shades {
+    origin: (i32, i32),
+    width: i32,
+    values: Vec<Option<f64>>,
+}
+
+impl Shades {
+    /// Reads the cells up to `reach` beyond the lattice.
+    fn read(picture: &Picture, lattice: &Lattice, reach: i32) -> Option<Self> {
+        let (low, high) = bounds(lattice)?;
+        let pairs: Vec<_> = lattice.iter().map(|(&(u, v), &uv)| ([f64::from(u), f64::from(v)], uv)).collect();
+        let map = PlaneMap::fit(&pairs)?;
+        let inner = inner_cells(picture, lattice);
+        let origin = (low.0 - reach, low.1 - reach);
+        let (width, height) = (high.0 - low.0 + 2 * reach + 1, high.1 - low.1 + 2 * reach + 1);
+        let cells = (0..height).flat_map(|j| (0..width).map(move |i| (origin.0 + i, origin.1 + j)));
+        let values = cells
+            .map(|cell| {
+                let centre = map.apply([f64::from(cell.0) + 0.5, f64::from(cell.1) + 0.5])?;
+                relative_shade(brightness(picture, centre)?, cell, &inner)
+            })
+            .collect();
+        Some(Self { origin, width, values })
+    }
+
+    fn at(&self, (u, v): (i32, i32)) -> Option<f64> {
+        let (i, j) = (u - self.origin.0, v - self.origin.1);
+        if i < 0 || j < 0 || i >= self.width {
+            return None;
+        }
+        self.values.get(usize::try_from(j * self.width + i).ok()?).copied().flatten()
+    }
+}
+
+/// Brightness of the cells whose four corners were found.
+fn inner_cells(picture: &Picture, lattice: &Lattice) -> Vec<((i32, i32), f64)> {
+    let corner = |u, v| lattice.get(&(u, v));
+    lattice
+        .keys()
+        .filter_map(|&(u, v)| {
+            let corners = [corner(u, v)?, corner(u + 1, v)?, corner(u, v + 1)?, corner(u + 1, v + 1)?];
+            let mean = |k: usize| corners.iter().map(|c| c[k]).sum::<f64>() / 4.0;
+            Some(((u, v), brightness(picture, [mean(0), mean(1)])?))
+        })
+        .collect()
+}
+
+/// Compares a brightness with the two colours near the cell, so that uneven light does not matter.
+fn relative_shade(value: f64, cell: (i32, i32), inner: &[((i32, i32), f64)]) -> Option<f64> {
+    let mut sums = [(0.0, 0.0); 2];
+    for &((u, v), brightness) in inner {
+        let distance2 = f64::from((u - cell.0).pow(2) + (v - cell.1).pow(2));
+        let weight = (distance2 + 1.0).powi(-2);
+        let sum = &mut sums[usize::from((u + v).rem_euclid(2) == 1)];
+        sum.0 += weight;
+        sum.1 += weight * brightness;
+    }
+    let [even, odd] = sums.map(|(weight, sum)| sum / weight);
+    let half_contrast = 0.5 * (even - odd).abs();
+    let shade = (value - 0.5 * (even + odd)) / half_contrast;
+    shade.is_finite().then(|| shade.clamp(-1.0, 1.0))
+}
+
+/// Mean of the 3 x 3 pixels around a point; `None` outside the picture.
+fn brightness(picture: &Picture, [u, v]: [f64; 2]) -> Option<f64> {
+    let inside = u >= 1.0 && v >= 1.0 && u <= picture.width as f64 - 2.0 && v <= picture.height as f64 - 2.0;
+    if !inside {
+        return None;
+    }
+    let (x, y) = (u.round() as usize, v.round() as usize);
+    let sum: f32 = (y - 1..=y + 1).map(|j| (x - 1..=x + 1).map(|i| picture.at(i, j)).sum::<f32>()).sum();
+    Some(f64::from(sum) / 9.0)
+}

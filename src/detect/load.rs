@@ -1,0 +1,126 @@
+//! Image files to [`Picture`]s in full depth.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use image::{DynamicImage, ImageError, ImageReader, Limits};
+
+use super::Picture;
+use crate::error::{Error, Result};
+
+/// Longest side that is accepted, px; the largest industrial sensors have about 20 000.
+const MAX_SIDE: u32 = 32_768;
+/// Memory that decoding one image may take, bytes.
+const MAX_DECODED_BYTES: u64 = 1 << 30;
+
+/// Weights of red, green and blue in the grey value (luma of ITU-R BT.709), applied to the stored counts.
+pub const LUMA_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
+
+/// Reads an image (png, tif, pgm, jpg, bmp; 8 or 16 bit, grey or colour) without reducing its depth.
+///
+/// Colour becomes grey with [`LUMA_WEIGHTS`]; an alpha channel is ignored. `bits` says how many bits of a 16-bit file
+/// are used when they sit in its low end (10 or 12 for most machine cameras), which fixes the saturation count.
+///
+/// # Errors
+/// A missing, unreadable, empty, truncated or oversized file; `bits` outside 1..=16 or counts beyond it.
+pub fn load(path: &Path, bits: Option<u32>) -> Result<Picture> {
+    let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+    let metadata = file.metadata().map_err(|e| Error::io(path, &e))?;
+    if metadata.is_dir() {
+        return Err(Error::input(path.display(), "is a folder, not an image", "name the image file"));
+    }
+    if metadata.len() == 0 {
+        return Err(Error::input(path.display(), "the file is empty", "record or copy the image again"));
+    }
+    let mut reader = ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(|e| Error::io(path, &e))?;
+    reader.limits(limits());
+    let decoded = reader.decode().map_err(|e| decode_error(path, &e))?;
+    let picture = to_picture(&decoded);
+    if picture.width < 2 || picture.height < 2 {
+        return Err(Error::input(
+            path.display(),
+            format!("is {} x {} px", picture.width, picture.height),
+            "check the recording: an image needs at least 2 x 2 px",
+        ));
+    }
+    match bits {
+        Some(bits) => with_bits(picture, bits, path),
+        None => Ok(picture),
+    }
+}
+
+fn limits() -> Limits {
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(MAX_SIDE);
+    limits.max_image_height = Some(MAX_SIDE);
+    limits.max_alloc = Some(MAX_DECODED_BYTES);
+    limits
+}
+
+fn decode_error(path: &Path, error: &ImageError) -> Error {
+    let place = path.display();
+    match error {
+        ImageError::Unsupported(e) => {
+            Error::input(place, format!("not a supported image: {e}"), "convert it to png, tif, pgm, jpg or bmp")
+        }
+        ImageError::Limits(e) => Error::input(
+            place,
+            format!("the image is too large: {e}"),
+            format!("check the file header; sides up to {MAX_SIDE} px are read"),
+        ),
+        ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
+            Error::input(place, "the file is truncated", "copy or record the image again")
+        }
+        other => Error::input(
+            place,
+            format!("cannot be decoded: {other}"),
+            "open it in an image viewer; copy or record it again if it is damaged",
+        ),
+    }
+}
+
+fn with_bits(picture: Picture, bits: u32, path: &Path) -> Result<Picture> {
+    if !(1..=16).contains(&bits) {
+        return Err(Error::input(
+            path.display(),
+            format!("bits = {bits} is not a pixel depth"),
+            "set `bits` under [camera] in series.toml to 8, 10, 12, 14 or 16, or remove it",
+        ));
+    }
+    let full_scale = ((1u32 << bits) - 1) as f32;
+    let peak = picture.pixels.iter().copied().fold(0.0_f32, f32::max);
+    if peak > full_scale {
+        return Err(Error::input(
+            path.display(),
+            format!("holds the count {peak}, above {full_scale} of bits = {bits}"),
+            "correct `bits` under [camera] in series.toml; remove it when the counts fill the whole file depth",
+        ));
+    }
+    Ok(Picture { full_scale, ..picture })
+}
+
+fn to_picture(decoded: &DynamicImage) -> Picture {
+    let (width, height) = (decoded.width() as usize, decoded.height() as usize);
+    let (pixels, full_scale) = match decoded {
+        DynamicImage::ImageLuma8(i) => (i.as_raw().iter().map(|&v| f32::from(v)).collect(), 255.0),
+        DynamicImage::ImageLuma16(i) => (i.as_raw().iter().map(|&v| f32::from(v)).collect(), 65535.0),
+        DynamicImage::ImageLumaA8(i) => (i.pixels().map(|p| f32::from(p.0[0])).collect(), 255.0),
+        DynamicImage::ImageLumaA16(i) => (i.pixels().map(|p| f32::from(p.0[0])).collect(), 65535.0),
+        DynamicImage::ImageRgb8(i) => (i.pixels().map(|p| luma(p.0.map(f32::from))).collect(), 255.0),
+        DynamicImage::ImageRgba8(i) => {
+            (i.pixels().map(|p| luma([p.0[0], p.0[1], p.0[2]].map(f32::from))).collect(), 255.0)
+        }
+        DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) => {
+            (decoded.to_rgb16().pixels().map(|p| luma(p.0.map(f32::from))).collect(), 65535.0)
+        }
+        // Floating-point TIFF: counts between 0 and 1 by convention of the decoder.
+        _ => (decoded.to_rgb32f().pixels().map(|p| 65535.0 * luma(p.0)).collect(), 65535.0),
+    };
+    Picture { width, height, pixels, full_scale }
+}
+
+/// Grey value of a colour; exact for equal channels.
+fn luma([r, g, b]: [f32; 3]) -> f32 {
+    g + LUMA_WEIGHTS[0] * (r - g) + LUMA_WEIGHTS[2] * (b - g)
+}

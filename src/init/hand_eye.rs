@@ -1,0 +1,286 @@
+//! Hand-camera and plate pose in closed form: `X C_j = A_j Z` for the unknown X and Z.
+//!
+//! C is `camera_from_plate`; A is `flange_from_base` (camera in the hand) or `base_from_flange` (camera fixed); X is the pose of
+//! the camera in the flange (or base) and Z that of the plate in the base (or flange). Three closed forms are tried on all images
+//! and on small samples of them, so that wrongly paired images cannot spoil every start:
+//! M. Shah, "Solving the robot-world/hand-eye calibration problem using the Kronecker product" (2013);
+//! F. Park and B. Martin, "Robot sensor calibration: solving AX=XB on the Euclidean group" (1994);
+//! A. Li, L. Wang and D. Wu, "Simultaneous robot-world and hand-eye calibration using dual-quaternions and Kronecker product" (2010),
+//! the Kronecker variant.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use crate::geom::{Pose, log_so3, project_to_so3};
+use crate::linalg::{SymmetricFactor, symmetric_eigen};
+
+/// What one image says: `X * camera_from_plate = chain * Z`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PosePair {
+    /// `camera_from_plate` measured in the image.
+    pub camera_from_plate: Pose,
+    /// `flange_from_base` (camera in the hand) or `base_from_flange` (fixed camera) from the readings.
+    pub chain: Pose,
+}
+
+/// X and Z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HandEye {
+    /// `flange_from_camera` or `base_from_camera`.
+    pub camera: Pose,
+    /// `base_from_plate` or `flange_from_plate`.
+    pub plate: Pose,
+}
+
+/// One candidate with the name of its closed form.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HandEyeStart {
+    /// Closed form and sample, in words.
+    pub origin: String,
+    /// The solution.
+    pub solution: HandEye,
+    /// Robust spread over the images: median of (rotation error + translation error over 1 m), rad.
+    pub median_error: f64,
+}
+
+impl HandEye {
+    /// Rotation error (rad) and translation error (m) of one image.
+    pub fn error(&self, pair: &PosePair) -> (f64, f64) {
+        (&self.camera * &pair.camera_from_plate).distance(&(&pair.chain * &self.plate))
+    }
+
+    fn median_error(&self, pairs: &[PosePair]) -> f64 {
+        let mut errors: Vec<f64> = pairs
+            .iter()
+            .map(|p| {
+                let (angle, distance) = self.error(p);
+                angle + distance
+            })
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        errors.get(errors.len() / 2).copied().unwrap_or(f64::INFINITY)
+    }
+}
+
+type ClosedForm = fn(&[PosePair]) -> Option<HandEye>;
+
+const CLOSED_FORMS: [(&str, ClosedForm); 3] = [
+    ("Shah, Kronecker product", shah),
+    ("Park-Martin, relative motions", park_martin),
+    ("Li, linear least squares", li),
+];
+
+/// Number of samples of images that are tried beside all of them.
+const SAMPLES: usize = 60;
+
+/// Images in a sample: enough rotation to fix X and Z, few enough to avoid a wrong pair.
+const SAMPLE_SIZE: usize = 5;
+
+/// Share of the images, by smallest error, with which the best sample is solved again.
+const CONSENSUS_SHARE: f64 = 0.5;
+
+/// Candidates, best robust spread first. Empty where no closed form has a solution.
+pub fn solve_hand_eye(pairs: &[PosePair]) -> Vec<HandEyeStart> {
+    let mut starts = Vec::new();
+    let mut add = |origin: String, solution: Option<HandEye>| {
+        if let Some(solution) = solution {
+            starts.push(HandEyeStart { origin, solution, median_error: solution.median_error(pairs) });
+        }
+    };
+    for (name, form) in CLOSED_FORMS {
+        add(format!("{name}, all images"), form(pairs));
+    }
+    if pairs.len() > SAMPLE_SIZE {
+        let mut best: Option<HandEye> = None;
+        let mut best_error = f64::INFINITY;
+        for sample in samples(pairs.len()) {
+            let chosen: Vec<PosePair> = sample.iter().map(|&i| pairs[i]).collect();
+            if let Some(solution) = shah(&chosen) {
+                let error = solution.median_error(pairs);
+                if error < best_error {
+                    (best, best_error) = (Some(solution), error);
+                }
+            }
+        }
+        if let Some(solution) = best {
+            let mut ranked: Vec<&PosePair> = pairs.iter().collect();
+            let size = |p: &PosePair| {
+                let (angle, distance) = solution.error(p);
+                angle + distance
+            };
+            ranked.sort_by(|a, b| size(a).total_cmp(&size(b)));
+            let keep = ((pairs.len() as f64 * CONSENSUS_SHARE) as usize).max(SAMPLE_SIZE);
+            let consensus: Vec<PosePair> = ranked.into_iter().take(keep).copied().collect();
+            add("Shah, best sample of images".into(), Some(solution));
+            for (name, form) in CLOSED_FORMS {
+                add(format!("{name}, consensus"), form(&consensus));
+            }
+        }
+    }
+    starts.sort_by(|a, b| a.median_error.total_cmp(&b.median_error));
+    starts
+}
+
+/// Samples of image indices from a fixed linear congruential sequence, so that every run tries the same.
+fn samples(count: usize) -> Vec<Vec<usize>> {
+    let mut seed: u64 = 0x9E37_79B9_7F4A_7C15;
+    let mut next = |bound: usize| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((seed >> 33) as usize) % bound
+    };
+    (0..SAMPLES)
+        .map(|_| {
+            let mut order: Vec<usize> = (0..count).collect();
+            for k in 0..SAMPLE_SIZE {
+                let other = k + next(count - k);
+                order.swap(k, other);
+            }
+            order.truncate(SAMPLE_SIZE);
+            order
+        })
+        .collect()
+}
+
+/// Translations of X and Z for given rotations: `R_X t_C + t_X = R_A t_Z + t_A`, linear.
+fn translations(pairs: &[PosePair], rx: Matrix3<f64>, rz: Matrix3<f64>) -> Option<HandEye> {
+    let mut n = DMatrix::<f64>::zeros(6, 6);
+    let mut b = DVector::<f64>::zeros(6);
+    for p in pairs {
+        let ra = p.chain.rotation;
+        let y = p.chain.translation - rx * p.camera_from_plate.translation;
+        // Unknowns t_X, t_Z with rows [I, -R_A].
+        for i in 0..3 {
+            n[(i, i)] += 1.0;
+            n[(3 + i, 3 + i)] += 1.0;
+            b[i] += y[i];
+            for j in 0..3 {
+                n[(i, 3 + j)] -= ra[(i, j)];
+                n[(3 + j, i)] -= ra[(i, j)];
+                b[3 + j] -= ra[(i, j)] * y[i];
+            }
+        }
+    }
+    // Directions that a sample leaves open (all rotations about one axis) stay near zero.
+    for i in 0..6 {
+        n[(i, i)] += 1e-9 * pairs.len() as f64;
+    }
+    let t = SymmetricFactor::new(&n).ok()?.solve(&b);
+    Some(HandEye {
+        camera: Pose::new(rx, Vector3::new(t[0], t[1], t[2])),
+        plate: Pose::new(rz, Vector3::new(t[3], t[4], t[5])),
+    })
+}
+
+fn shah(pairs: &[PosePair]) -> Option<HandEye> {
+    // R_X = sum R_A R_Z R_C' in the least-squares sense: K = sum kron(R_C, R_A) maps vec(R_Z) to vec(R_X).
+    let mut k = DMatrix::<f64>::zeros(9, 9);
+    for p in pairs {
+        k += DMatrix::from_column_slice(9, 9, p.camera_from_plate.rotation.kronecker(&p.chain.rotation).as_slice());
+    }
+    let (values, vectors) = symmetric_eigen(&(k.transpose() * &k))?;
+    let z = vectors.column(8).into_owned();
+    let x = &k * &z / values[8].max(0.0).sqrt();
+    let rotation = |v: &[f64]| {
+        let m = Matrix3::from_column_slice(v);
+        project_to_so3(&(m * m.determinant().signum()))
+    };
+    translations(pairs, rotation(x.as_slice())?, rotation(z.as_slice())?)
+}
+
+fn park_martin(pairs: &[PosePair]) -> Option<HandEye> {
+    // R_Ai R_Aj' log = R_X (R_Ci R_Cj' log): rotation vectors of the relative motions of flange and camera.
+    let mut m = Matrix3::zeros();
+    for (i, a) in pairs.iter().enumerate() {
+        for b in &pairs[..i] {
+            let flange = log_so3(&(a.chain.rotation * b.chain.rotation.transpose()));
+            let camera = log_so3(&(a.camera_from_plate.rotation * b.camera_from_plate.rotation.transpose()));
+            if flange.norm() < 3.0 && camera.norm() < 3.0 {
+                m += flange * camera.transpose();
+            }
+        }
+    }
+    let rx = project_to_so3(&m)?;
+    let mut sum = Matrix3::zeros();
+    for p in pairs {
+        sum += p.chain.rotation.transpose() * rx * p.camera_from_plate.rotation;
+    }
+    translations(pairs, rx, project_to_so3(&sum)?)
+}
+
+fn li(pairs: &[PosePair]) -> Option<HandEye> {
+    // Unknowns vec(R_X), vec(R_Z), t_X, t_Z in one homogeneous least-squares problem, rotations made orthogonal afterwards.
+    let mut n = DMatrix::<f64>::zeros(25, 25);
+    for p in pairs {
+        let (c, a) = (&p.camera_from_plate, &p.chain);
+        let mut rows = DMatrix::<f64>::zeros(12, 25);
+        let left = c.rotation.transpose().kronecker(&Matrix3::identity());
+        let right = Matrix3::identity().kronecker(&a.rotation);
+        rows.view_mut((0, 0), (9, 9)).copy_from(&left);
+        rows.view_mut((0, 9), (9, 9)).copy_from(&(-right));
+        for i in 0..3 {
+            for j in 0..3 {
+                rows[(9 + i, 3 * j + i)] = c.translation[j];
+                rows[(9 + i, 21 + j)] = -a.rotation[(i, j)];
+            }
+            rows[(9 + i, 18 + i)] = 1.0;
+            rows[(9 + i, 24)] = -a.translation[i];
+        }
+        n += rows.transpose() * rows;
+    }
+    let (_, vectors) = symmetric_eigen(&n)?;
+    let v = vectors.column(0);
+    let scale = v[24];
+    if scale.abs() < 1e-12 {
+        return None;
+    }
+    let rotation = |start: usize| project_to_so3(&Matrix3::from_fn(|i, j| v[start + 3 * j + i] / scale));
+    translations(pairs, rotation(0)?, rotation(9)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector6;
+
+    fn twist(seed: usize, size: f64) -> Vector6<f64> {
+        Vector6::from_fn(|i, _| size * ((seed * 7 + i * 13 + seed * seed * (i + 2)) as f64).sin())
+    }
+
+    fn world(count: usize) -> (HandEye, Vec<PosePair>) {
+        let truth = HandEye { camera: Pose::exp(&twist(901, 0.8)), plate: Pose::exp(&twist(77, 1.2)) };
+        let pairs = (0..count)
+            .map(|k| {
+                let chain = Pose::exp(&twist(k + 1, 1.1));
+                let camera_from_plate = &truth.camera.inverse() * &(&chain * &truth.plate);
+                PosePair { camera_from_plate, chain }
+            })
+            .collect();
+        (truth, pairs)
+    }
+
+    fn assert_close(a: &HandEye, b: &HandEye, bound: f64) {
+        for (p, q) in [(a.camera, b.camera), (a.plate, b.plate)] {
+            let (angle, distance) = p.distance(&q);
+            assert!(angle < bound && distance < bound, "{angle} {distance}");
+        }
+    }
+
+    #[test]
+    fn every_closed_form_is_exact_on_exact_data() {
+        let (truth, pairs) = world(8);
+        for (name, form) in CLOSED_FORMS {
+            println!("{name}");
+            assert_close(&form(&pairs).unwrap(), &truth, 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_third_of_wrong_pairs_does_not_spoil_the_best_start() {
+        let (truth, mut pairs) = world(18);
+        for k in 0..6 {
+            pairs[3 * k].chain = Pose::exp(&twist(400 + k, 1.0));
+        }
+        let starts = solve_hand_eye(&pairs);
+        assert_close(&starts[0].solution, &truth, 1e-6);
+        assert!(starts[0].median_error < 1e-6);
+    }
+}

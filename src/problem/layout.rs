@@ -1,0 +1,166 @@
+//! Names to columns.
+
+use std::ops::Range;
+
+use super::State;
+use crate::model::camera::Camera;
+use crate::model::plate_modes;
+
+/// One scalar unknown of the dense part of the problem.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Name, `block.component`, for example `robot/joint_3/origin.rx`.
+    pub name: String,
+    /// Unit: "m", "rad", "px" or "1".
+    pub unit: &'static str,
+    /// Prior mean where there is a prior (in the unit).
+    pub prior_mean: f64,
+    /// Prior sigma; infinite where there is none.
+    pub prior_sigma: f64,
+    /// False where the parameter stays at its value.
+    pub free: bool,
+}
+
+/// Columns of the dense part: robot, mountings and placements (which act through the camera poses), then cameras and plate
+/// shapes (which act on the pixels directly). Markers and the slack of the images have no columns of their own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// All columns.
+    pub columns: Vec<Column>,
+    /// Columns of the twists of the joints (six each).
+    pub twists: Range<usize>,
+    /// Columns of the joint terms.
+    pub terms: Range<usize>,
+    /// Six columns a mounting.
+    pub mountings: Vec<Range<usize>>,
+    /// Six columns a placement.
+    pub placements: Vec<Range<usize>>,
+    /// Columns of each camera.
+    pub cameras: Vec<Range<usize>>,
+    /// Columns of each plate's modes.
+    pub shapes: Vec<Range<usize>>,
+}
+
+const TWIST: [(&str, &str); 6] = [("x", "m"), ("y", "m"), ("z", "m"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad")];
+
+/// Prior sigmas of a joint origin: metres for the translations, rad for the rotations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OriginPrior {
+    /// Per axis, m.
+    pub translation_m: f64,
+    /// Per axis, rad.
+    pub rotation_rad: f64,
+}
+
+impl Default for OriginPrior {
+    fn default() -> Self {
+        Self { translation_m: 1e-3, rotation_rad: 2e-3 }
+    }
+}
+
+#[derive(Default)]
+struct Builder {
+    columns: Vec<Column>,
+}
+
+impl Builder {
+    fn add(&mut self, name: String, unit: &'static str, prior_sigma: f64) {
+        self.columns.push(Column { name, unit, prior_mean: 0.0, prior_sigma, free: true });
+    }
+
+    fn block(&mut self, add: impl FnOnce(&mut Self)) -> Range<usize> {
+        let start = self.columns.len();
+        add(self);
+        start..self.columns.len()
+    }
+
+    fn pose(&mut self, block: &str) -> Range<usize> {
+        self.block(|b| TWIST.iter().for_each(|(c, unit)| b.add(format!("{block}.{c}"), unit, f64::INFINITY)))
+    }
+}
+
+/// `hand_camera` when there is one, else `hand_camera/name`.
+fn named(block: &str, name: &str, count: usize) -> String {
+    if count == 1 { block.to_owned() } else { format!("{block}/{name}") }
+}
+
+impl Layout {
+    /// Columns for the unknowns in `state`, with default priors.
+    pub fn new(
+        state: &State,
+        mountings: &[String],
+        placements: &[String],
+        cameras: &[String],
+        plates: &[String],
+    ) -> Self {
+        let mut b = Builder::default();
+        let chain = &state.robot.chain;
+        let origin = OriginPrior::default();
+        let twists = b.block(|b| {
+            for joint in &chain.joints {
+                for (c, unit) in TWIST {
+                    let sigma = if unit == "m" { origin.translation_m } else { origin.rotation_rad };
+                    b.add(format!("robot/{}/origin.{c}", joint.name), unit, sigma);
+                }
+            }
+        });
+        let terms = b.block(|b| {
+            for t in &state.robot.terms {
+                let kind = chain.reading_kinds[t.reading];
+                let unit = t.term.unit(kind);
+                b.add(format!("robot/{}.{}", chain.readings[t.reading], t.term.name()), unit, t.term.prior_sigma(kind));
+            }
+        });
+        let mountings = mountings.iter().map(|m| b.pose(&named("hand_camera", m, mountings.len()))).collect();
+        let placements = placements.iter().map(|p| b.pose(&format!("plate/{p}"))).collect();
+        let cameras = (cameras.iter().zip(&state.cameras))
+            .map(|(name, camera)| {
+                b.block(|b| {
+                    for (k, p) in camera.parameter_names().enumerate() {
+                        let part = if k < 4 { "pinhole" } else { "lens" };
+                        b.add(format!("camera/{name}/{part}.{p}"), Camera::parameter_unit(k), f64::INFINITY);
+                    }
+                })
+            })
+            .collect();
+        let shapes = plates
+            .iter()
+            .map(|plate| {
+                b.block(|b| {
+                    for (k, mode) in plate_modes::NAMES.iter().enumerate() {
+                        let name = format!("{}.{mode}", named("plate_shape", plate, plates.len()));
+                        b.add(name, if k < 3 { "1" } else { "m" }, plate_modes::PRIOR_SIGMA[k]);
+                    }
+                })
+            })
+            .collect();
+        Self { columns: b.columns, twists, terms, mountings, placements, cameras, shapes }
+    }
+
+    /// Number of columns.
+    pub fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// True without any column.
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// Number of leading columns that act through the camera poses (robot, mountings, placements).
+    pub fn theta_len(&self) -> usize {
+        self.cameras.first().map_or(self.len(), |c| c.start)
+    }
+
+    /// Index of a column by its full name.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|c| c.name == name)
+    }
+
+    /// Sets the columns whose name fulfils `which` free or fixed.
+    pub fn set_free(&mut self, free: bool, which: impl Fn(&str) -> bool) {
+        for column in self.columns.iter_mut().filter(|c| which(&c.name)) {
+            column.free = free;
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! One image, linearised: normal equations in the space of its camera pose, its camera and plate shape, and its markers.
+//!
+//! Pixels know the robot only through the six degrees of freedom of the camera pose. So the pixels are condensed to blocks of
+//! pose (p, 6), intrinsics (e, camera parameters then plate modes) and markers (m, 3 each); the robot enters afterwards by
+//! `dp = G dtheta + L dslack` ([`chained`]).
+
+use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector6};
+
+use super::{Image, Measured, Problem, Slack, State};
+use crate::geom::Pose;
+use crate::model::camera::MAX_PARAMETERS;
+use crate::model::circle::{self, Prediction};
+use crate::model::plate_modes::{MODES, basis};
+
+/// Intrinsic unknowns of one image: camera parameters (padded), then plate modes.
+pub const E: usize = MAX_PARAMETERS + MODES;
+
+/// Normal-equation blocks of one marker in one image.
+#[derive(Debug, Clone)]
+pub struct MarkerTerms {
+    /// Index of the marker on its plate.
+    pub marker: usize,
+    /// 3x3 information.
+    pub mm: Matrix3<f64>,
+    /// Coupling with the pose.
+    pub mp: SMatrix<f64, 3, 6>,
+    /// Coupling with the intrinsics.
+    pub me: SMatrix<f64, 3, E>,
+    /// Right-hand side.
+    pub bm: Vector3<f64>,
+}
+
+/// One residual with what the robust weighting made of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residual {
+    /// Index among the observations of the image.
+    pub observation: usize,
+    /// Measured minus predicted, px.
+    pub duv: Vector2<f64>,
+    /// Length, normalised by the stated covariance and the pixel factor.
+    pub normalised: f64,
+    /// Huber weight.
+    pub weight: f64,
+}
+
+/// Normal-equation blocks of one image: minimise `sum rho(|r|)`, information = J' W J, right-hand side = J' W r.
+#[derive(Debug, Clone)]
+pub struct ImageTerms {
+    /// Robust cost (half the squared length where not robustified).
+    pub cost: f64,
+    /// Pose block.
+    pub pp: Matrix6<f64>,
+    /// Pose with intrinsics.
+    pub pe: SMatrix<f64, 6, E>,
+    /// Intrinsics.
+    pub ee: SMatrix<f64, E, E>,
+    /// Right-hand side of the pose.
+    pub bp: Vector6<f64>,
+    /// Right-hand side of the intrinsics.
+    pub be: SVector<f64, E>,
+    /// Markers that were seen, ascending.
+    pub markers: Vec<MarkerTerms>,
+    /// Residuals of the observations in use.
+    pub residuals: Vec<Residual>,
+}
+
+/// How residuals are weighted.
+#[derive(Debug, Clone, Copy)]
+pub struct Weighting {
+    /// Factor on the stated standard deviations.
+    pub pixel_factor: f64,
+    /// Huber bound on the normalised length.
+    pub huber: f64,
+}
+
+impl Weighting {
+    /// Of an image of `problem`.
+    pub fn of(problem: &Problem, image: &Image) -> Self {
+        Self { pixel_factor: problem.noise.pixel_factor[image.camera], huber: problem.huber }
+    }
+
+    fn huber(&self, length: f64) -> (f64, f64) {
+        if length <= self.huber {
+            (0.5 * length * length, 1.0)
+        } else {
+            (self.huber * (length - 0.5 * self.huber), self.huber / length)
+        }
+    }
+}
+
+/// Prediction of one observation; `None` where the marker is behind the camera.
+pub fn predict(image: &Image, state: &State, pose: &Pose, observation: &Measured) -> Option<Prediction> {
+    let position = state.plates[image.plate].position(observation.marker);
+    circle::centroid(&state.cameras[image.camera], pose, &position, observation.radius_m)
+}
+
+/// Normal-equation blocks of one image at a camera pose; `None` where an observed marker is behind the camera.
+pub fn linearise(image: &Image, state: &State, pose: &Pose, weighting: &Weighting) -> Option<ImageTerms> {
+    let mut t = ImageTerms {
+        cost: 0.0,
+        pp: Matrix6::zeros(),
+        pe: SMatrix::zeros(),
+        ee: SMatrix::zeros(),
+        bp: Vector6::zeros(),
+        be: SVector::zeros(),
+        markers: Vec::with_capacity(image.observations.len()),
+        residuals: Vec::with_capacity(image.observations.len()),
+    };
+    let plate = &state.plates[image.plate];
+    for (index, o) in image.observations.iter().enumerate().filter(|(_, o)| o.rejected.is_none()) {
+        let p = predict(image, state, pose, o)?;
+        let r = o.uv - p.uv;
+        let information = o.information / (weighting.pixel_factor * weighting.pixel_factor);
+        let normalised = (r.dot(&(information * r))).max(0.0).sqrt();
+        let (cost, weight) = weighting.huber(normalised);
+        t.cost += cost;
+        t.residuals.push(Residual { observation: index, duv: r, normalised, weight });
+        t.add(o.marker, &p, &basis(&plate.nominal[o.marker], plate.half_diagonal_m), &r, &(information * weight));
+    }
+    Some(t)
+}
+
+impl ImageTerms {
+    fn add(
+        &mut self,
+        marker: usize,
+        p: &Prediction,
+        modes: &SMatrix<f64, 3, MODES>,
+        r: &Vector2<f64>,
+        w: &Matrix2<f64>,
+    ) {
+        let mut je = SMatrix::<f64, 2, E>::zeros();
+        je.fixed_view_mut::<2, MAX_PARAMETERS>(0, 0).copy_from(&p.d_camera);
+        je.fixed_view_mut::<2, MODES>(0, MAX_PARAMETERS).copy_from(&(p.d_marker * modes));
+        let (wp, we, wr) = (w * p.d_pose, w * je, w * r);
+        self.pp += p.d_pose.transpose() * wp;
+        self.pe += p.d_pose.transpose() * we;
+        self.ee += je.transpose() * we;
+        self.bp += p.d_pose.transpose() * wr;
+        self.be += je.transpose() * wr;
+        let jm = p.d_marker.transpose();
+        let (mm, mp, me, bm) = (jm * w * p.d_marker, jm * wp, jm * we, jm * wr);
+        match self.markers.last_mut().filter(|last| last.marker == marker) {
+            Some(last) => {
+                last.mm += mm;
+                last.mp += mp;
+                last.me += me;
+                last.bm += bm;
+            }
+            None => self.markers.push(MarkerTerms { marker, mm, mp, me, bm }),
+        }
+    }
+}
+
+/// How the camera pose of one image depends on the dense columns that act through it, and on its slack.
+#[derive(Debug, Clone)]
+pub struct Chained {
+    /// `camera_from_plate`.
+    pub pose: Pose,
+    /// `G`, 6 x theta, all theta columns.
+    pub d_theta: DMatrix<f64>,
+    /// `L`, 6 x slack.
+    pub d_slack: DMatrix<f64>,
+}
+
+/// Pose of an image and its derivatives as body twists; `None` for an image off the robot that has no free pose.
+pub fn chained(problem: &Problem, state: &State, image: &Image, slack: &Slack) -> Option<Chained> {
+    let theta = problem.layout.theta_len();
+    if let Slack::Pose(pose) = slack {
+        return Some(Chained { pose: *pose, d_theta: DMatrix::zeros(6, theta), d_slack: DMatrix::identity(6, 6) });
+    }
+    let stop = image.stop.as_ref()?;
+    let zero = vec![0.0; stop.readings.len()];
+    let noise = if let Slack::Joints(dq) = slack { dq } else { &zero };
+    let kinematics = state.robot.kinematics(stop, noise);
+    let mounted = image.mount.linearised(
+        &state.mountings[image.mounting],
+        &kinematics.base_from_tip,
+        &state.placements[image.placement],
+    );
+    let layout = &problem.layout;
+    let mut g = DMatrix::zeros(6, theta);
+    for (k, d) in kinematics.d_twists.iter().enumerate() {
+        g.fixed_view_mut::<6, 6>(0, layout.twists.start + 6 * k).copy_from(&(mounted.d_robot * d));
+    }
+    for (k, d) in kinematics.d_terms.iter().enumerate() {
+        g.fixed_view_mut::<6, 1>(0, layout.terms.start + k).copy_from(&(mounted.d_robot * d));
+    }
+    g.fixed_view_mut::<6, 6>(0, layout.mountings[image.mounting].start).copy_from(&mounted.d_camera);
+    g.fixed_view_mut::<6, 6>(0, layout.placements[image.placement].start).copy_from(&Matrix6::identity());
+    let mut l = DMatrix::zeros(6, slack.len());
+    for (k, d) in kinematics.d_readings.iter().enumerate().take(slack.len()) {
+        l.fixed_view_mut::<6, 1>(0, k).copy_from(&(mounted.d_robot * d));
+    }
+    Some(Chained { pose: mounted.camera_from_plate, d_theta: g, d_slack: l })
+}

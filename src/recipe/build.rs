@@ -1,0 +1,185 @@
+//! Identified series to a problem: who shares what, by name.
+
+use nalgebra::{Matrix2, Vector2};
+
+use crate::error::{Error, Result};
+use crate::geom::Pose;
+use crate::model::camera::{Camera, Lens};
+use crate::model::mount::CameraMount;
+use crate::model::robot::{Robot, Stop};
+use crate::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State};
+use crate::series::{Edge, Observation, Plate};
+
+/// One series after detection, joint readings in SI and in the order of the chain.
+#[derive(Debug, Clone)]
+pub struct MeasuredSeries {
+    /// Name of the series, for messages.
+    pub name: String,
+    /// Series with the same camera share intrinsics.
+    pub camera: String,
+    /// Series with the same mounting share the hand-camera offset.
+    pub mounting: String,
+    /// Where the camera is.
+    pub mount: CameraMount,
+    /// Columns of the images.
+    pub width_px: u32,
+    /// Rows of the images.
+    pub height_px: u32,
+    /// Focal length as stated, px.
+    pub focal_px: Option<f64>,
+    /// Lens model.
+    pub lens: Lens,
+    /// What an observation of a circle means: true for the centroid of its image, false for its imaged centre.
+    pub centroid: bool,
+    /// The plate.
+    pub plate: Plate,
+    /// Series with the same plate name share its shape.
+    pub plate_name: String,
+    /// True where the rows stand in the order of visiting.
+    pub order_known: bool,
+    /// Stops in the order of the rows.
+    pub stops: Vec<MeasuredStop>,
+}
+
+/// One stop with what its image shows.
+#[derive(Debug, Clone)]
+pub struct MeasuredStop {
+    /// File name of the image.
+    pub image: String,
+    /// Readings, rad or m; `None` off the robot.
+    pub readings: Option<Vec<f64>>,
+    /// Where the plate stood.
+    pub placement: String,
+    /// What was seen.
+    pub observations: Vec<Observation>,
+    /// Why the image is left out already (unreadable, nothing found).
+    pub left_out: Option<String>,
+}
+
+/// Standard deviation of an observation whose source states none, px per axis.
+const DEFAULT_SIGMA_PX: f64 = 0.1;
+
+/// First guess of the joint noise: from above, rad or m.
+const FIRST_JOINT_NOISE: f64 = 3e-3;
+
+/// Fewest observations that fix a camera pose with a margin.
+const FEWEST_OBSERVATIONS: usize = 6;
+
+/// Huber bound: the 95 % point of the length of a 2-D standard normal vector.
+const HUBER: f64 = 2.45;
+
+fn intern(names: &mut Vec<String>, name: &str) -> usize {
+    names.iter().position(|n| n == name).unwrap_or_else(|| {
+        names.push(name.to_owned());
+        names.len() - 1
+    })
+}
+
+/// The problem and a state whose poses and focal lengths are still unknown (identities; pinhole of one image width).
+pub(super) fn build(robot: &Robot, series: &[MeasuredSeries]) -> Result<(Problem, State)> {
+    let (mut cameras, mut mountings, mut placements, mut plate_names) = (vec![], vec![], vec![], vec![]);
+    let (mut lenses, mut plates, mut images): (Vec<Camera>, Vec<Plate>, Vec<Image>) = (vec![], vec![], vec![]);
+    for (index, s) in series.iter().enumerate() {
+        let camera = intern(&mut cameras, &s.camera);
+        if camera == lenses.len() {
+            lenses.push(Camera::pinhole(s.lens, s.width_px, s.height_px, f64::from(s.width_px)));
+        }
+        if (lenses[camera].width_px, lenses[camera].height_px) != (s.width_px, s.height_px) {
+            return Err(Error::input(
+                format!("series {}", s.name),
+                format!(
+                    "camera '{}' has images of {}x{} px here and of {}x{} px in an earlier series",
+                    s.camera, s.width_px, s.height_px, lenses[camera].width_px, lenses[camera].height_px
+                ),
+                "give different cameras different names in [camera] of series.toml",
+            ));
+        }
+        let plate = intern(&mut plate_names, &s.plate_name);
+        if plate == plates.len() {
+            plates.push(s.plate.clone());
+        }
+        let mounting = intern(&mut mountings, &s.mounting);
+        let mut previous: Option<&Vec<f64>> = None;
+        for stop in &s.stops {
+            let approach = previous.zip(stop.readings.as_ref()).filter(|_| s.order_known);
+            let approach = approach.map(|(a, b)| b.iter().zip(a).map(|(b, a)| b - a).collect());
+            previous = stop.readings.as_ref().or(previous);
+            let observations = measured(stop, s)?;
+            let rejected = stop.left_out.clone().or_else(|| {
+                (observations.len() < FEWEST_OBSERVATIONS)
+                    .then(|| format!("only {} markers found, {FEWEST_OBSERVATIONS} are needed", observations.len()))
+            });
+            images.push(Image {
+                name: stop.image.clone(),
+                series: index,
+                camera,
+                mounting,
+                placement: intern(&mut placements, &stop.placement),
+                plate,
+                mount: s.mount,
+                stop: stop.readings.clone().map(|readings| Stop { readings, approach }),
+                observations,
+                rejected,
+            });
+        }
+    }
+    let state = State {
+        robot: robot.clone(),
+        mountings: vec![Pose::identity(); mountings.len()],
+        placements: vec![Pose::identity(); placements.len()],
+        plates: plates.iter().map(PlateShape::nominal).collect(),
+        slack: vec![Slack::Pose(Pose::identity()); images.len()],
+        cameras: lenses,
+    };
+    let mut layout = Layout::new(&state, &mountings, &placements, &cameras, &plate_names);
+    for (range, plate) in layout.shapes.clone().iter().zip(&plates) {
+        apply_scale_bar(&mut layout, range.start, plate);
+    }
+    let noise = Noise {
+        pixel_factor: vec![1.0; cameras.len()],
+        joint: vec![vec![FIRST_JOINT_NOISE; robot.chain.readings.len()]; cameras.len()],
+    };
+    Ok((Problem { layout, plates, placements, mountings, cameras, images, noise, huber: HUBER }, state))
+}
+
+fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<Measured>> {
+    let mut observations = Vec::with_capacity(stop.observations.len());
+    for o in &stop.observations {
+        let place = || format!("image {}, marker {}", stop.image, o.marker);
+        let marker = s.plate.index_of(o.marker).ok_or_else(|| {
+            Error::input(place(), "the plate has no such marker", "check that plate.toml belongs to this series")
+        })?;
+        let [uu, uv, vv] = o.covariance.unwrap_or([DEFAULT_SIGMA_PX.powi(2), 0.0, DEFAULT_SIGMA_PX.powi(2)]);
+        let information =
+            Matrix2::new(uu, uv, uv, vv).try_inverse().filter(|m| m[(0, 0)] > 0.0 && m.determinant() > 0.0);
+        let radius_m = match o.edge {
+            Edge::Outer => s.plate.markers[marker].outer_radius_m,
+            Edge::Inner => s.plate.markers[marker].inner_radius_m,
+        };
+        observations.push(Measured {
+            marker,
+            edge: o.edge,
+            radius_m: if s.centroid { radius_m } else { 0.0 },
+            uv: Vector2::from(o.uv),
+            information: information.ok_or_else(|| {
+                Error::input(place(), "the covariance is not positive definite", "check cov_uu, cov_uv, cov_vv")
+            })?,
+            rejected: None,
+        });
+    }
+    observations.sort_by_key(|o| (o.marker, o.edge));
+    Ok(observations)
+}
+
+/// A measured distance fixes the scale mode; the two markers' own tolerance is part of its uncertainty.
+fn apply_scale_bar(layout: &mut Layout, scale_column: usize, plate: &Plate) {
+    let Some(bar) = plate.scale else { return };
+    let (Some(a), Some(b)) = (plate.index_of(bar.from), plate.index_of(bar.to)) else { return };
+    let (a, b) = (&plate.markers[a], &plate.markers[b]);
+    let nominal = (a.position_m - b.position_m).norm();
+    if nominal > 0.0 {
+        let variance = bar.sigma_m.powi(2) + a.sigma_m.powi(2) + b.sigma_m.powi(2);
+        layout.columns[scale_column].prior_mean = bar.distance_m / nominal - 1.0;
+        layout.columns[scale_column].prior_sigma = variance.sqrt() / nominal;
+    }
+}

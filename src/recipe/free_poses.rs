@@ -1,0 +1,297 @@
+//! Free-pose adjustment: cameras, plate and one free camera pose an image; the robot takes no part.
+
+use nalgebra::{Matrix6, Vector2};
+
+use super::solution::StartVerdict;
+use crate::error::{Error, Result};
+use crate::geom::Pose;
+use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
+use crate::model::camera::Camera;
+use crate::problem::{Problem, Slack, State, Weighting};
+use crate::solve::{
+    ComponentOptions, Covariance, Linearised, Settings, Status, covariance, estimate_components, reject_observations,
+    solve,
+};
+
+/// Stand-alone pose of one image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreePose {
+    /// `camera_from_plate`.
+    pub camera_from_plate: Pose,
+    /// Covariance of its body twist [rho, phi], m and rad.
+    pub covariance: Matrix6<f64>,
+    /// RMS of the lengths of its residuals, px.
+    pub rms_px: f64,
+}
+
+/// The adjusted free poses.
+#[derive(Debug, Clone)]
+pub struct FreePoses {
+    /// One for each image of the problem; `None` for an image that is left out.
+    pub poses: Vec<Option<FreePose>>,
+    /// RMS of the lengths of all residuals, px per point.
+    pub rms_px: f64,
+    /// Number of observations in use.
+    pub observations: usize,
+    /// Cameras and plates of this adjustment.
+    pub state: State,
+    /// Pixel factors found.
+    pub pixel_factor: Vec<f64>,
+}
+
+/// RMS of a start, px per point, from which no further focal length is tried.
+const GOOD_START_PX: f64 = 2.0;
+
+/// Relative sigma of the focal length beyond which the images do not determine it.
+const WORST_FOCAL_SIGMA: f64 = 0.02;
+
+/// Most rounds of rejection.
+const ROUNDS: usize = 6;
+
+/// Adjusts from nothing. On return the problem holds rejections and pixel factors, and `state` the cameras, plates and poses.
+///
+/// # Errors
+/// When no image shows enough markers, when the plate is mirrored, when no start converges or the focal length is not determined.
+pub fn adjust_free_poses(
+    problem: &mut Problem,
+    state: State,
+    stated_focal_px: &[Option<f64>],
+) -> Result<(FreePoses, Vec<StartVerdict>)> {
+    let theta = problem.layout.theta_len();
+    let free_before: Vec<bool> = problem.layout.columns.iter().map(|c| c.free).collect();
+    problem.layout.columns[..theta].iter_mut().for_each(|c| c.free = false);
+    let homographies = fit_homographies(problem, &state)?;
+    let mut verdicts = Vec::new();
+    let mut start = state;
+    for camera in 0..problem.cameras.len() {
+        start = start_camera(problem, start, camera, &homographies, stated_focal_px[camera], &mut verdicts)?;
+    }
+    let result = finish(problem, start);
+    for (column, free) in problem.layout.columns.iter_mut().zip(free_before) {
+        column.free = free;
+    }
+    Ok((result?, verdicts))
+}
+
+fn fit_homographies(problem: &mut Problem, state: &State) -> Result<Vec<Option<Homography>>> {
+    let mut all = Vec::with_capacity(problem.images.len());
+    for image in &mut problem.images {
+        let plane: Vec<Vector2<f64>> = image.used().map(|o| state.plates[image.plate].nominal[o.marker].xy()).collect();
+        let pixels: Vec<Vector2<f64>> = image.used().map(|o| o.uv).collect();
+        let homography = if image.rejected.is_none() { Homography::fit(&plane, &pixels) } else { None };
+        if image.rejected.is_none() && homography.is_none() {
+            image.rejected = Some("its markers lie on a line".into());
+        }
+        all.push(homography);
+    }
+    if problem.used().count() == 0 {
+        let reasons: Vec<String> = (problem.images.iter().take(3))
+            .map(|i| format!("{}: {}", i.name, i.rejected.as_deref().unwrap_or("")))
+            .collect();
+        return Err(Error::input(
+            "images",
+            format!("no image shows the plate ({})", reasons.join("; ")),
+            "check that plate.toml describes the plate in the images, and look at one of them",
+        ));
+    }
+    Ok(all)
+}
+
+/// Poses of all images of a camera from homographies, refined, for one focal length; also counts views from behind.
+fn start_poses(
+    problem: &Problem,
+    state: &State,
+    camera: usize,
+    homographies: &[Option<Homography>],
+) -> (State, usize, usize) {
+    let mut next = state.clone();
+    let (mut behind, mut failed) = (0, 0);
+    let lens = &state.cameras[camera];
+    let centre = Vector2::new(lens.parameters[2], lens.parameters[3]);
+    for (i, image) in problem.used().filter(|(_, image)| image.camera == camera) {
+        let planar = homographies[i].as_ref().and_then(|h| h.pose(lens.parameters[0], centre));
+        let Some(planar) = planar else {
+            failed += 1;
+            continue;
+        };
+        behind += usize::from(planar.from_behind);
+        let weighting = Weighting::of(problem, image);
+        let tries = [planar, planar.flipped()].map(|p| resect(image, state, &p.camera_from_plate, &weighting));
+        let best = tries.into_iter().flatten().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        next.slack[i] = Slack::Pose(best.map_or(planar.camera_from_plate, |(pose, _)| pose));
+    }
+    (next, behind, failed)
+}
+
+/// Points instead of circles, one camera, markers as printed: a quick problem that tells good starts from bad ones.
+fn quick_problem(problem: &Problem, camera: usize) -> Problem {
+    let mut quick = problem.clone();
+    for image in &mut quick.images {
+        if image.camera != camera && image.rejected.is_none() {
+            image.rejected = Some("another camera".into());
+        }
+        image.observations.iter_mut().for_each(|o| o.radius_m = 0.0);
+    }
+    quick.plates.iter_mut().flat_map(|p| &mut p.markers).for_each(|m| m.sigma_m = 0.0);
+    let shapes = quick.layout.shapes.clone();
+    for c in shapes.into_iter().flatten() {
+        quick.layout.columns[c].free = false;
+    }
+    quick
+}
+
+fn start_camera(
+    problem: &Problem,
+    state: State,
+    camera: usize,
+    homographies: &[Option<Homography>],
+    stated: Option<f64>,
+    verdicts: &mut Vec<StartVerdict>,
+) -> Result<State> {
+    let name = &problem.cameras[camera];
+    let own: Vec<Homography> =
+        problem.used().filter(|(_, i)| i.camera == camera).filter_map(|(i, _)| homographies[i]).collect();
+    if own.is_empty() {
+        return Err(Error::input(
+            format!("camera {name}"),
+            "none of its images shows the plate",
+            "check that plate.toml describes the plate in the images",
+        ));
+    }
+    let (width, height) = (state.cameras[camera].width_px, state.cameras[camera].height_px);
+    let mut best: Option<(f64, State, usize)> = None;
+    for FocalCandidate { focal_px, origin } in focal_candidates(&own, width, height, stated) {
+        let of = format!("focal length of camera {name}");
+        let origin = format!("{origin}: {focal_px:.0} px");
+        if best.as_ref().is_some_and(|b| b.0 < GOOD_START_PX) {
+            verdicts.push(StartVerdict { of, origin, verdict: "not needed".into(), won: false });
+            continue;
+        }
+        let (rms, candidate, behind) = try_focal(problem, &state, camera, homographies, focal_px);
+        verdicts.push(StartVerdict { of, origin, verdict: format!("reached {rms:.3} px per point"), won: false });
+        if best.as_ref().is_none_or(|b| rms < b.0) {
+            verdicts.iter_mut().filter(|v| v.of.ends_with(&format!("camera {name}"))).for_each(|v| v.won = false);
+            if let Some(last) = verdicts.last_mut() {
+                last.won = rms.is_finite();
+            }
+            best = Some((rms, candidate, behind));
+        }
+    }
+    match best {
+        Some((rms, _, behind)) if rms.is_finite() && 2 * behind > own.len() => Err(Error::input(
+            format!("camera {name}"),
+            format!("{behind} of {} images show the plate mirrored, as if seen from behind", own.len()),
+            "check that the images are not flipped, and that the plate was not printed or described mirrored",
+        )),
+        Some((rms, state, _)) if rms.is_finite() => Ok(state),
+        _ => Err(Error::unsolved(
+            format!("camera {name}"),
+            "no starting focal length leads to camera poses that explain the markers",
+            "check pitch, columns and rows in plate.toml, or state focal_px in [camera] of series.toml",
+        )),
+    }
+}
+
+fn try_focal(
+    problem: &Problem,
+    state: &State,
+    camera: usize,
+    homographies: &[Option<Homography>],
+    focal_px: f64,
+) -> (f64, State, usize) {
+    let mut quick = quick_problem(problem, camera);
+    let mut trial = state.clone();
+    let lens = &state.cameras[camera];
+    trial.cameras[camera] = Camera::pinhole(lens.lens, lens.width_px, lens.height_px, focal_px);
+    let (mut trial, behind, failed) = start_poses(&quick, &trial, camera, homographies);
+    if failed > 0 {
+        return (f64::INFINITY, trial, behind);
+    }
+    // Focal lengths and the first radial coefficient first, then all.
+    let columns = quick.layout.cameras[camera].clone();
+    let early = [0, 1, 4];
+    for stage in 0..2 {
+        for (k, c) in columns.clone().enumerate() {
+            quick.layout.columns[c].free = problem.layout.columns[c].free && (stage == 1 || early.contains(&k));
+        }
+        let settings = Settings { iterations: 40, decrement: 0.1 };
+        let outcome = solve(&quick, trial, &settings);
+        trial = outcome.state;
+        let Some(lin) = outcome.linearised else { return (f64::INFINITY, trial, behind) };
+        if stage == 1 {
+            return (rms_px(&lin), trial, behind);
+        }
+    }
+    (f64::INFINITY, trial, behind)
+}
+
+fn rms_px(lin: &Linearised) -> f64 {
+    let (sum, count) = lin.terms.iter().fold((0.0, 0), |(s, n), t| {
+        (s + t.residuals.iter().map(|r| r.duv.norm_squared()).sum::<f64>(), n + t.residuals.len())
+    });
+    (sum / count.max(1) as f64).sqrt()
+}
+
+fn finish(problem: &mut Problem, start: State) -> Result<FreePoses> {
+    let options = ComponentOptions { joint: false, rounds: 20, ..ComponentOptions::default() };
+    let mut outcome = estimate_components(problem, start, &options);
+    for _ in 0..ROUNDS {
+        if reject_observations(problem, &outcome) == 0 {
+            break;
+        }
+        outcome = estimate_components(problem, outcome.state, &options);
+    }
+    let (Status::Converged, Some(lin)) = (outcome.status, &outcome.linearised) else {
+        return Err(Error::unsolved(
+            "free camera poses",
+            format!("the adjustment ended without converging ({:?})", outcome.status),
+            "look at the images for a wrong plate, motion blur or changed focus",
+        ));
+    };
+    let cov =
+        covariance(problem, &outcome.state, lin).map_err(|_| undetermined("the normal equations are singular"))?;
+    check_focal(problem, &outcome.state, &cov)?;
+    Ok(collect(problem, &outcome.state, lin, &cov))
+}
+
+fn undetermined(what: &str) -> Error {
+    Error::unsolved(
+        "camera",
+        format!("{what}: the images do not determine the camera"),
+        "take images from different directions: tilt the camera by 20 to 45 degrees to all sides, at two or more distances, rolled by 90 degrees",
+    )
+}
+
+fn check_focal(problem: &Problem, state: &State, cov: &Covariance) -> Result<()> {
+    for (k, range) in problem.layout.cameras.iter().enumerate() {
+        for (c, axis) in [(range.start, "fx"), (range.start + 1, "fy")] {
+            let focal = state.cameras[k].parameters[c - range.start];
+            let relative = cov.sigma(c) / focal.abs();
+            if problem.layout.columns[c].free && (relative.is_nan() || relative > WORST_FOCAL_SIGMA || focal <= 0.0) {
+                let what = format!("{axis} of {} is known to {:.1} % only", problem.cameras[k], 100.0 * relative);
+                return Err(undetermined(&what));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn collect(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance) -> FreePoses {
+    let mut poses = vec![None; problem.images.len()];
+    for (k, &i) in lin.images.iter().enumerate() {
+        let squares: f64 = lin.terms[k].residuals.iter().map(|r| r.duv.norm_squared()).sum();
+        let c = cov.slack(k, 6);
+        poses[i] = Some(FreePose {
+            camera_from_plate: lin.chains[k].pose,
+            covariance: Matrix6::from_column_slice(c.as_slice()),
+            rms_px: (squares / lin.terms[k].residuals.len().max(1) as f64).sqrt(),
+        });
+    }
+    FreePoses {
+        poses,
+        rms_px: rms_px(lin),
+        observations: lin.terms.iter().map(|t| t.residuals.len()).sum(),
+        state: state.clone(),
+        pixel_factor: problem.noise.pixel_factor.clone(),
+    }
+}

@@ -1,0 +1,253 @@
+//! The joint fit: robot, cameras, hand-camera offsets and plates directly against the pixels, with joint noise.
+
+use super::build::{MeasuredSeries, build};
+use super::free_poses::{FreePoses, adjust_free_poses};
+use super::solution::Solution;
+use super::start::{misfit, start_robot};
+use crate::assess::{Accuracy, hold_out};
+use crate::error::{Error, Notice, Result};
+use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
+use crate::model::robot::Robot;
+use crate::problem::{Problem, Slack, State};
+use crate::solve::{
+    ComponentOptions, Outcome, Status, covariance, estimate_components, reject_images, reject_observations,
+};
+use crate::urdf::Chain;
+
+/// What is assumed of the joint readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum JointNoise {
+    /// Noise per stop and joint, its size estimated from the data.
+    Estimated,
+    /// Known noise, rad or m; 0 takes the readings as exact.
+    Known(f64),
+}
+
+/// Which joint terms are fitted beside twists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RobotModel {
+    /// Joint offsets.
+    Rigid,
+    /// Offsets, gear scale, two harmonics.
+    Gear,
+    /// All of these, gravity and backlash.
+    Full,
+}
+
+/// How to identify.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Joint noise.
+    pub joint_noise: JointNoise,
+    /// Joint terms.
+    pub model: RobotModel,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { joint_noise: JointNoise::Estimated, model: RobotModel::Full }
+    }
+}
+
+impl RobotModel {
+    /// The nominal robot with the terms of this model.
+    pub fn robot(self, chain: Chain) -> Robot {
+        let mut terms = vec![Term::Offset];
+        if self != Self::Rigid {
+            terms.extend([Term::Gear, Term::Cosine(1), Term::Sine(1), Term::Cosine(2), Term::Sine(2)]);
+        }
+        if self == Self::Full {
+            terms.extend((0..GRAVITY_TERMS).map(Term::Gravity));
+            terms.push(Term::Backlash);
+        }
+        let readings = 0..chain.readings.len();
+        let terms = readings
+            .flat_map(|reading| terms.iter().map(move |&term| JointTerm { reading, term, value: 0.0 }))
+            .collect();
+        Robot { terms, ..Robot::nominal(chain) }
+    }
+}
+
+/// Free-pose RMS beyond which the camera model does not explain the images, px per point.
+const WORST_FREE_RMS_PX: f64 = 1.0;
+
+/// Joint noise beyond which the readings do not explain the images, rad or m.
+const WORST_JOINT_NOISE: f64 = 5e-3;
+
+/// Share of the robot's images that may be left out in a result worth having.
+const WORST_SHARE_LEFT_OUT: f64 = 0.25;
+
+/// Share left out beyond which there is no result.
+const HOPELESS_SHARE_LEFT_OUT: f64 = 0.5;
+
+/// Most rounds of rejection.
+const ROUNDS: usize = 12;
+
+/// Identifies robot, cameras, mountings and plates from identified series.
+///
+/// # Errors
+/// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset, or readings and images do
+/// not belong together.
+pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
+    let robot = options.model.robot(chain);
+    let (mut problem, state) = build(&robot, series)?;
+    let stated: Vec<Option<f64>> = (problem.cameras.iter())
+        .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
+        .collect();
+    let (free, mut starts) = adjust_free_poses(&mut problem, state, &stated)?;
+    let mut state = free.state.clone();
+    let on_robot = problem.used().filter(|(_, i)| i.stop.is_some()).count();
+    start_robot(&mut problem, &mut state, &free, &mut starts)?;
+    let outcome = fit(&mut problem, state, options);
+    let mut notices = Vec::new();
+    name_wrong_pairs(&mut problem, &outcome.state, &free);
+    check_left_out(&problem, on_robot)?;
+    let (Status::Converged, Some(linearised)) = (outcome.status, outcome.linearised) else {
+        return Err(Error::unsolved(
+            "joint fit",
+            format!("ended without converging ({:?})", outcome.status),
+            "look at the per-image table for images that do not belong, and at the starting values",
+        ));
+    };
+    let state = outcome.state;
+    let covariance = covariance(&problem, &state, &linearised).map_err(|_| {
+        Error::unsolved("joint fit", "the normal equations are singular", "take stops that move every joint")
+    })?;
+    let accuracy = hold_out(&problem, &state)
+        .ok_or_else(|| Error::unsolved("hold-out", "too few images to hold any out", "take more images"))?;
+    let failed_gates = gates(&problem, &free, &accuracy, on_robot);
+    few_images(on_robot, &mut notices);
+    Ok(Solution {
+        problem,
+        state,
+        linearised,
+        covariance,
+        free_poses: free,
+        accuracy,
+        starts,
+        notices,
+        failed_gates,
+        status: outcome.status,
+        iterations: outcome.iterations,
+    })
+}
+
+fn fit(problem: &mut Problem, mut state: State, options: &Options) -> Outcome {
+    let readings = state.robot.chain.readings.len();
+    let exact = options.joint_noise == JointNoise::Known(0.0);
+    for (slack, image) in state.slack.iter_mut().zip(&problem.images) {
+        if image.stop.is_some() {
+            *slack = if exact { Slack::None } else { Slack::Joints(vec![0.0; readings]) };
+        }
+    }
+    if let JointNoise::Known(sigma) = options.joint_noise {
+        problem.noise.joint.iter_mut().flatten().for_each(|s| *s = sigma.max(f64::MIN_POSITIVE));
+    }
+    let components =
+        ComponentOptions { joint: options.joint_noise == JointNoise::Estimated, ..ComponentOptions::default() };
+    let mut outcome = estimate_components(problem, state, &components);
+    for _ in 0..ROUNDS {
+        let images = reject_images(problem, &outcome);
+        if images.is_none() && reject_observations(problem, &outcome) == 0 {
+            break;
+        }
+        outcome = estimate_components(problem, outcome.state, &components);
+    }
+    outcome
+}
+
+/// Adds to every wrongly paired image by how much its readings miss, and whose readings would fit it.
+fn name_wrong_pairs(problem: &mut Problem, state: &State, free: &FreePoses) {
+    let mut remarks = Vec::new();
+    for (i, image) in problem.images.iter().enumerate() {
+        let wrong = image.rejected.as_ref().is_some_and(|r| r.starts_with("wrongly paired"));
+        let (true, Some(pose)) = (wrong, &free.poses[i]) else { continue };
+        let pose = &pose.camera_from_plate;
+        let Some((angle, distance)) = misfit(state, problem, pose, i) else { continue };
+        let mut text = format!(
+            "wrongly paired: {:.1} mm and {:.1} mrad from where its joint readings put it",
+            1e3 * distance,
+            1e3 * angle
+        );
+        let better = (0..problem.images.len())
+            .filter(|&k| k != i && problem.images[k].series == image.series)
+            .filter_map(|k| {
+                let mut swapped = problem.images[i].clone();
+                swapped.stop = problem.images[k].stop.clone();
+                let predicted = state.camera_from_plate(&swapped, &Slack::None)?;
+                let (a, d) = predicted.distance(pose);
+                Some((a + d, k))
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((size, k)) = better.filter(|(size, _)| *size < 0.1 * (angle + distance)) {
+            text += &format!("; it fits the readings of {} to {:.1} (mm + mrad)", problem.images[k].name, 1e3 * size);
+        }
+        remarks.push((i, text));
+    }
+    for (i, text) in remarks {
+        problem.images[i].rejected = Some(text);
+    }
+}
+
+fn left_out(problem: &Problem, on_robot: usize) -> usize {
+    on_robot - problem.used().filter(|(_, i)| i.stop.is_some()).count()
+}
+
+fn check_left_out(problem: &Problem, on_robot: usize) -> Result<()> {
+    let out = left_out(problem, on_robot);
+    if out as f64 <= HOPELESS_SHARE_LEFT_OUT * on_robot as f64 {
+        return Ok(());
+    }
+    let named: Vec<&str> = (problem.images.iter())
+        .filter(|i| i.rejected.as_ref().is_some_and(|r| r.starts_with("wrongly paired")))
+        .map(|i| i.name.as_str())
+        .take(5)
+        .collect();
+    Err(Error::unsolved(
+        "joint readings",
+        format!("{out} of {on_robot} images do not fit their joint readings ({} ...)", named.join(", ")),
+        "check joint_unit, the order and signs of the joints, that image names stand in the right rows, and that the plate did not move",
+    ))
+}
+
+fn gates(problem: &Problem, free: &FreePoses, accuracy: &Accuracy, on_robot: usize) -> Vec<String> {
+    let mut failed = Vec::new();
+    if free.rms_px > WORST_FREE_RMS_PX {
+        failed.push(format!(
+            "camera: free poses leave {:.2} px per point; the camera model or the plate does not describe these images",
+            free.rms_px
+        ));
+    }
+    for (k, camera) in problem.noise.joint.iter().enumerate() {
+        if let Some(worst) = camera.iter().copied().reduce(f64::max).filter(|s| *s > WORST_JOINT_NOISE) {
+            failed.push(format!(
+                "joint noise: {:.1} mrad with camera {}; the readings do not explain the images",
+                1e3 * worst,
+                problem.cameras[k]
+            ));
+        }
+    }
+    let out = left_out(problem, on_robot);
+    if out as f64 > WORST_SHARE_LEFT_OUT * on_robot as f64 {
+        failed.push(format!("images: {out} of {on_robot} do not fit their joint readings"));
+    }
+    if accuracy.calibrated.rms_mm > accuracy.nominal.rms_mm {
+        failed.push(format!(
+            "hold-out: the corrected robot predicts images no better than the nominal one ({:.3} mm against {:.3} mm)",
+            accuracy.calibrated.rms_mm, accuracy.nominal.rms_mm
+        ));
+    }
+    failed
+}
+
+fn few_images(on_robot: usize, notices: &mut Vec<Notice>) {
+    if on_robot < 20 {
+        notices.push(Notice::new(
+            "series",
+            format!(
+                "{on_robot} images of the robot are few: expect the prior (nominal model) to decide much of the result"
+            ),
+            "take 30 to 50 stops that move every joint through its range",
+        ));
+    }
+}

@@ -1,0 +1,49 @@
+//! What a mode returns: everything that outputs and reports are made from.
+
+use serde::{Deserialize, Serialize};
+
+use super::free_poses::FreePoses;
+use crate::assess::Accuracy;
+use crate::error::Notice;
+use crate::problem::{Problem, State};
+use crate::solve::{Covariance, Linearised, Status};
+
+/// How one starting value fared.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StartVerdict {
+    /// What was started: "focal length of front", "hand-camera and plate pose".
+    pub of: String,
+    /// Where the value came from.
+    pub origin: String,
+    /// What it reached, in words with unit.
+    pub verdict: String,
+    /// True for the one that was taken.
+    pub won: bool,
+}
+
+/// The result of a joint fit.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// Data, with the reasons of all rejections and the final variance components.
+    pub problem: Problem,
+    /// All estimates.
+    pub state: State,
+    /// Linearisation at the estimates: residuals and weights of the images in use.
+    pub linearised: Linearised,
+    /// Covariance of the estimates.
+    pub covariance: Covariance,
+    /// The stand-alone camera poses.
+    pub free_poses: FreePoses,
+    /// Before and after, held out.
+    pub accuracy: Accuracy,
+    /// Starting values with their verdicts.
+    pub starts: Vec<StartVerdict>,
+    /// What the user should know.
+    pub notices: Vec<Notice>,
+    /// Quality gates that failed, in words; empty for a good result.
+    pub failed_gates: Vec<String>,
+    /// How the last solve ended.
+    pub status: Status,
+    /// Steps tried in all.
+    pub iterations: usize,
+}

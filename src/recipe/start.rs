@@ -1,0 +1,221 @@
+//! Hand-camera and plate poses for all mountings and placements from the free camera poses.
+
+use std::collections::BTreeMap;
+
+use super::free_poses::FreePoses;
+use super::solution::StartVerdict;
+use crate::error::{Error, Result};
+use crate::geom::{Pose, log_so3};
+use crate::init::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
+use crate::linalg::symmetric_eigen;
+use crate::model::mount::CameraMount;
+use crate::problem::{Problem, Slack, State, predict};
+
+/// Robust spread (rad + m) of the best closed form beyond which readings and images do not belong together.
+const WORST_SPREAD: f64 = 0.08;
+
+/// An image is set aside before the joint fit when it misses by more than this many times the robust spread ...
+const SET_ASIDE_FACTOR: f64 = 6.0;
+
+/// ... and by more than this, rad + m: what a robot far from nominal may miss by.
+const SET_ASIDE_FLOOR: f64 = 0.03;
+
+/// Smallest rotation between stops about a second axis, rad, RMS.
+const LEAST_ROTATION: f64 = 0.05;
+
+/// Fewest images of the robot in a group with a hand-camera offset and plate pose of its own.
+const FEWEST_IMAGES: usize = 5;
+
+/// Closed forms whose pixel cost is compared.
+const COMPARED: usize = 4;
+
+/// Fills in mountings and placements of `state`; sets images aside that do not fit their readings.
+pub(super) fn start_robot(
+    problem: &mut Problem,
+    state: &mut State,
+    free: &FreePoses,
+    verdicts: &mut Vec<StartVerdict>,
+) -> Result<()> {
+    let mut groups: BTreeMap<(usize, usize), Vec<(usize, PosePair)>> = BTreeMap::new();
+    for (i, image) in problem.used() {
+        let (Some(stop), Some(pose)) = (&image.stop, &free.poses[i]) else { continue };
+        let tip = state.robot.base_from_tip(&stop.readings);
+        let chain = if image.mount == CameraMount::Hand { tip.inverse() } else { tip };
+        let pair = PosePair { camera_from_plate: pose.camera_from_plate, chain };
+        groups.entry((image.mounting, image.placement)).or_default().push((i, pair));
+    }
+    let mut order: Vec<_> = groups.into_iter().collect();
+    order.sort_by_key(|((m, p), pairs)| (std::cmp::Reverse(pairs.len()), *m, *p));
+    let (mut cameras, mut plates) = (BTreeMap::new(), BTreeMap::new());
+    for ((mounting, placement), pairs) in &order {
+        let poses: Vec<PosePair> = pairs.iter().map(|(_, p)| *p).collect();
+        let of = format!("hand-camera {} and plate {}", problem.mountings[*mounting], problem.placements[*placement]);
+        let known = (cameras.get(mounting).copied(), plates.get(placement).copied());
+        let solution = match known {
+            (Some(camera), Some(plate)) => HandEye { camera, plate },
+            (Some(camera), None) => {
+                closest(&poses, |p| HandEye { camera, plate: &p.chain.inverse() * &(&camera * &p.camera_from_plate) })
+            }
+            (None, Some(plate)) => {
+                closest(&poses, |p| HandEye { camera: &(&p.chain * &plate) * &p.camera_from_plate.inverse(), plate })
+            }
+            (None, None) => closed_form(problem, state, pairs, &poses, (*mounting, *placement), &of, verdicts)?,
+        };
+        cameras.insert(*mounting, solution.camera);
+        plates.insert(*placement, solution.plate);
+        set_aside(problem, pairs, &solution);
+    }
+    for (k, pose) in state.mountings.iter_mut().enumerate() {
+        *pose = cameras.get(&k).copied().unwrap_or(*pose);
+    }
+    for (k, pose) in state.placements.iter_mut().enumerate() {
+        *pose = plates.get(&k).copied().unwrap_or(*pose);
+    }
+    Ok(())
+}
+
+/// Of the solutions that single images give, the one that all images like best.
+fn closest(poses: &[PosePair], solution: impl Fn(&PosePair) -> HandEye) -> HandEye {
+    let median = |s: &HandEye| {
+        let mut e: Vec<f64> = poses.iter().map(|p| s.error(p)).map(|(a, d)| a + d).collect();
+        e.sort_by(f64::total_cmp);
+        e[e.len() / 2]
+    };
+    let mut best = solution(&poses[0]);
+    let mut best_error = median(&best);
+    for s in poses[1..].iter().map(solution) {
+        let error = median(&s);
+        if error < best_error {
+            (best, best_error) = (s, error);
+        }
+    }
+    best
+}
+
+fn closed_form(
+    problem: &Problem,
+    state: &State,
+    pairs: &[(usize, PosePair)],
+    poses: &[PosePair],
+    (mounting, placement): (usize, usize),
+    of: &str,
+    verdicts: &mut Vec<StartVerdict>,
+) -> Result<HandEye> {
+    if pairs.len() < FEWEST_IMAGES {
+        return Err(Error::unsolved(
+            of,
+            format!(
+                "only {} images of the robot show the plate, at least {FEWEST_IMAGES} are needed and some 30 to 50 wanted",
+                pairs.len()
+            ),
+            "take more images, or give series that share camera mounting and plate placement the same names",
+        ));
+    }
+    check_rotations(of, poses)?;
+    let starts = solve_hand_eye(poses);
+    let cost = |s: &HandEyeStart| {
+        let mut trial = state.clone();
+        trial.mountings[mounting] = s.solution.camera;
+        trial.placements[placement] = s.solution.plate;
+        median_pixels(problem, &trial, pairs)
+    };
+    let mut ranked: Vec<(f64, &HandEyeStart)> = starts.iter().take(COMPARED).map(|s| (cost(s), s)).collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((_, best)) = ranked.first() else {
+        return Err(no_fit(of, "no closed form has a solution"));
+    };
+    let winner = best.origin.clone();
+    for s in &starts {
+        let pixels = ranked.iter().find(|(_, r)| r.origin == s.origin).map(|(c, _)| format!("median {c:.1} px, "));
+        let spread = format!("median spread {:.2} mrad + mm", 1e3 * s.median_error);
+        verdicts.push(StartVerdict {
+            of: of.to_owned(),
+            origin: s.origin.clone(),
+            verdict: pixels.unwrap_or_default() + &spread,
+            won: s.origin == winner,
+        });
+    }
+    if best.median_error > WORST_SPREAD {
+        return Err(no_fit(
+            of,
+            &format!("even the best start leaves a median misfit of {:.0} (mm + mrad)", 1e3 * best.median_error),
+        ));
+    }
+    Ok(best.solution)
+}
+
+fn no_fit(of: &str, what: &str) -> Error {
+    Error::unsolved(
+        of,
+        format!("joint readings and images do not belong together: {what}"),
+        "check joint_unit, the order and signs of the joints in joints.csv, that image names stand in the right rows, base and tip, and that the plate did not move",
+    )
+}
+
+/// Median over the images of the RMS pixel error of the poses that the readings predict.
+fn median_pixels(problem: &Problem, state: &State, pairs: &[(usize, PosePair)]) -> f64 {
+    let mut errors: Vec<f64> = pairs
+        .iter()
+        .map(|(i, _)| {
+            let image = &problem.images[*i];
+            let Some(pose) = state.camera_from_plate(image, &Slack::None) else { return f64::INFINITY };
+            let (mut sum, mut count) = (0.0, 0.0);
+            for o in image.used() {
+                let Some(p) = predict(image, state, &pose, o) else { return f64::INFINITY };
+                sum += (o.uv - p.uv).norm_squared();
+                count += 1.0;
+            }
+            (sum / f64::max(count, 1.0)).sqrt()
+        })
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    errors[errors.len() / 2]
+}
+
+/// Hand-camera and plate pose need rotations about at least two axes.
+fn check_rotations(of: &str, poses: &[PosePair]) -> Result<()> {
+    let mut m = nalgebra::DMatrix::<f64>::zeros(3, 3);
+    let (mut largest, first) = (0.0_f64, &poses[0]);
+    let mut travel = 0.0_f64;
+    for p in poses {
+        let v = log_so3(&(first.chain.rotation.transpose() * p.chain.rotation));
+        largest = largest.max(v.norm());
+        travel = travel.max((first.chain.translation - p.chain.translation).norm());
+        m += nalgebra::DMatrix::from_column_slice(3, 3, (v * v.transpose()).as_slice()) / poses.len() as f64;
+    }
+    let second = symmetric_eigen(&m).map_or(0.0, |(values, _)| values[1].max(0.0).sqrt());
+    if second > LEAST_ROTATION {
+        return Ok(());
+    }
+    Err(Error::unsolved(
+        of,
+        format!(
+            "the stops are too much alike: the hand turned by at most {:.1} degrees, about a second axis by {:.1} degrees only",
+            largest.to_degrees(),
+            second.to_degrees()
+        ),
+        "move the wrist: tilt the camera by 20 to 45 degrees to all sides and roll it between the images",
+    ))
+}
+
+fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &HandEye) {
+    let mut sizes: Vec<f64> = pairs.iter().map(|(_, p)| solution.error(p)).map(|(a, d)| a + d).collect();
+    sizes.sort_by(f64::total_cmp);
+    let bound = (SET_ASIDE_FACTOR * sizes[sizes.len() / 2]).max(SET_ASIDE_FLOOR);
+    for (i, pair) in pairs {
+        let (angle, distance) = solution.error(pair);
+        if angle + distance > bound {
+            problem.images[*i].rejected = Some(format!(
+                "wrongly paired: its camera pose is {:.1} mm and {:.1} mrad from where its joint readings put it",
+                1e3 * distance,
+                1e3 * angle
+            ));
+        }
+    }
+}
+
+/// Pose error of the readings of an image against its free pose, for messages.
+pub(super) fn misfit(state: &State, problem: &Problem, free: &Pose, image: usize) -> Option<(f64, f64)> {
+    let predicted = state.camera_from_plate(&problem.images[image], &Slack::None)?;
+    Some(predicted.distance(free))
+}

@@ -1,0 +1,208 @@
+//! Variance components: how noisy pixels and joints are, decided by the data (REML fixed point, after Foerstner and MacKay).
+//!
+//! `s^2 = sum r^2 / (redundancy)`: every group of residuals is divided by the number of them that the parameters did not use up.
+//! For joint noise the redundancy of one latent is `1 - C / sigma^2` with its posterior variance C. Started from above.
+
+use super::covariance::{Covariance, covariance};
+use super::levenberg::{Outcome, Settings, Status, solve};
+use super::system::Linearised;
+use crate::problem::{Problem, Slack, State};
+use crate::urdf::JointKind;
+
+/// What is estimated and how long.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ComponentOptions {
+    /// Estimate the joint noise; else it stays as given in the problem.
+    pub joint: bool,
+    /// Most rounds.
+    pub rounds: usize,
+    /// Bounds of each inner solve.
+    pub settings: Settings,
+}
+
+impl Default for ComponentOptions {
+    fn default() -> Self {
+        Self { joint: true, rounds: 60, settings: Settings::default() }
+    }
+}
+
+/// Smallest joint noise, rad or m: below it nothing that a camera sees changes.
+pub const JOINT_NOISE_FLOOR: f64 = 1e-6;
+
+/// Weight, in observations, with which the noise of a single joint is drawn to that of all joints together.
+const SHRINKAGE: f64 = 5.0;
+
+/// Relative change of every component below which the rounds end.
+const CONVERGED: f64 = 0.01;
+
+/// Newton decrement between rounds: the components need no better.
+const ROUGH_DECREMENT: f64 = 0.05;
+
+/// Alternates solving and re-estimating until the components stand. The problem keeps the final components.
+pub fn estimate_components(problem: &mut Problem, start: State, options: &ComponentOptions) -> Outcome {
+    let rough = Settings { decrement: ROUGH_DECREMENT.max(options.settings.decrement), ..options.settings };
+    let mut outcome = solve(problem, start, &rough);
+    let mut iterations = outcome.iterations;
+    for round in 0..options.rounds {
+        let Some(lin) = &outcome.linearised else { break };
+        let Ok(cov) = covariance(problem, &outcome.state, lin) else {
+            outcome.status = Status::Stalled;
+            break;
+        };
+        let change = update(problem, &outcome.state, lin, &cov, options.joint);
+        tracing::debug!(round, change, pixel = ?problem.noise.pixel_factor, joint = ?problem.noise.joint, "variance components");
+        outcome = solve(problem, outcome.state, &rough);
+        iterations += outcome.iterations;
+        if change < CONVERGED || outcome.status == Status::BadStart {
+            break;
+        }
+    }
+    if outcome.status == Status::Converged {
+        outcome = solve(problem, outcome.state, &options.settings);
+        iterations += outcome.iterations;
+    }
+    Outcome { iterations, ..outcome }
+}
+
+/// One round; returns the largest relative change.
+fn update(problem: &mut Problem, state: &State, lin: &Linearised, cov: &Covariance, joint: bool) -> f64 {
+    let mut noise = problem.noise.clone();
+    let taken = effective_parameters(problem, state, lin, cov);
+    let mut change: f64 = 0.0;
+    let counts = lin.terms.iter().map(|t| 2.0 * t.residuals.len() as f64);
+    let total: f64 = counts.clone().sum();
+    for (camera, factor) in noise.pixel_factor.iter_mut().enumerate() {
+        let of_camera = lin.images.iter().zip(&lin.terms).filter(|(i, _)| problem.images[**i].camera == camera);
+        let (mut squares, mut count) = (0.0, 0.0);
+        for (_, terms) in of_camera {
+            squares += terms.residuals.iter().map(|r| r.weight * r.normalised * r.normalised).sum::<f64>();
+            count += 2.0 * terms.residuals.len() as f64;
+        }
+        let redundancy = count * (1.0 - taken / total);
+        if redundancy < 1.0 || squares <= 0.0 {
+            continue;
+        }
+        let ratio = (squares * huber_consistency(problem.huber) / redundancy).sqrt();
+        *factor *= ratio;
+        change = change.max((ratio - 1.0).abs());
+    }
+    if joint {
+        for (camera, sigma) in noise.joint.iter_mut().enumerate() {
+            change = change.max(update_joint(problem, state, lin, cov, camera, sigma));
+        }
+    }
+    problem.noise = noise;
+    change
+}
+
+/// Huber's weights take a little off the sum of squares of clean Gaussian data (two components); this gives it back.
+fn huber_consistency(k: f64) -> f64 {
+    let tail = (-0.5 * k * k).exp();
+    let q = normal_upper_tail(k);
+    let lost = (k * k + 2.0) * tail - k * (k * tail + (std::f64::consts::TAU).sqrt() * q);
+    2.0 / (2.0 - lost)
+}
+
+/// `P(z > k)` by the continued fraction of Mills' ratio, good beyond k = 1.
+fn normal_upper_tail(k: f64) -> f64 {
+    let mut mills = k;
+    for n in (1..60).rev() {
+        mills = k + f64::from(n) / mills;
+    }
+    (-0.5 * k * k).exp() / std::f64::consts::TAU.sqrt() / mills
+}
+
+/// Number of parameters that the pixels (and not the priors) determine.
+pub(super) fn effective_parameters(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance) -> f64 {
+    let columns = &problem.layout.columns;
+    let dense: f64 = (columns.iter().enumerate())
+        .filter(|(i, c)| c.free && cov.system.touched(*i))
+        .map(|(i, c)| 1.0 - cov.reduced[(i, i)] / (c.prior_sigma * c.prior_sigma))
+        .sum();
+    let mut slack = 0.0;
+    for (k, &i) in lin.images.iter().enumerate() {
+        let length = state.slack[i].len();
+        let c = cov.slack(k, length);
+        slack += match &state.slack[i] {
+            Slack::Joints(_) => {
+                let sigma = &problem.noise.joint[problem.images[i].camera];
+                (0..length).map(|r| 1.0 - c[(r, r)] / (sigma[r] * sigma[r])).sum()
+            }
+            _ => length as f64,
+        };
+    }
+    let covariances = cov.markers(problem, lin);
+    let markers: f64 = (problem.plates.iter().zip(&covariances))
+        .flat_map(|(plate, covariances)| plate.markers.iter().zip(covariances))
+        .filter_map(|(m, c)| c.map(|c| 3.0 - c.trace() / m.sigma_m.max(1e-9).powi(2)))
+        .sum();
+    dense + slack + markers
+}
+
+fn update_joint(
+    problem: &Problem,
+    state: &State,
+    lin: &Linearised,
+    cov: &Covariance,
+    camera: usize,
+    sigma: &mut [f64],
+) -> f64 {
+    let n = sigma.len();
+    let (mut squares, mut redundancy) = (vec![0.0; n], vec![0.0; n]);
+    for (k, &i) in lin.images.iter().enumerate().filter(|(_, i)| problem.images[**i].camera == camera) {
+        if let Slack::Joints(dq) = &state.slack[i] {
+            let c = cov.slack(k, n);
+            for r in 0..n {
+                squares[r] += dq[r] * dq[r];
+                redundancy[r] += (1.0 - c[(r, r)] / (sigma[r] * sigma[r])).max(0.0);
+            }
+        }
+    }
+    let kinds = &state.robot.chain.reading_kinds;
+    let mut change: f64 = 0.0;
+    let old = sigma.to_vec();
+    for kind in [JointKind::Revolute, JointKind::Prismatic] {
+        let members: Vec<usize> = (0..n).filter(|&r| kinds[r] == kind).collect();
+        let (all, free): (f64, f64) = members.iter().fold((0.0, 0.0), |(s, f), &r| (s + squares[r], f + redundancy[r]));
+        if free < 1e-9 {
+            continue;
+        }
+        let common = (all / free).max(JOINT_NOISE_FLOOR * JOINT_NOISE_FLOOR);
+        for &r in &members {
+            let variance = (squares[r] + SHRINKAGE * common) / (redundancy[r] + SHRINKAGE);
+            sigma[r] = variance.sqrt().clamp(JOINT_NOISE_FLOOR, 2.0 * old[r]);
+            if sigma[r] > JOINT_NOISE_FLOOR {
+                change = change.max((sigma[r] / old[r] - 1.0).abs());
+            }
+        }
+    }
+    change
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_upper_tail_of_the_normal_distribution_is_right() {
+        // Tables: P(z > 1.959964) = 0.025, P(z > 3) = 1.349898e-3.
+        assert!((normal_upper_tail(1.959_964) - 0.025).abs() < 1e-7);
+        assert!((normal_upper_tail(3.0) - 1.349_898e-3).abs() < 1e-9);
+    }
+
+    #[test]
+    fn huber_loses_three_percent_of_the_variance_at_its_usual_bound() {
+        // Rayleigh quadrature of the same quantity.
+        let k = 2.45;
+        let n = 200_000;
+        let h = 12.0 / f64::from(n);
+        let (mut full, mut weighted) = (0.0, 0.0);
+        for i in 0..n {
+            let e = (f64::from(i) + 0.5) * h;
+            let density = e * (-0.5 * e * e).exp() * h;
+            full += e * e * density;
+            weighted += (e * e).min(k * e) * density;
+        }
+        assert!((huber_consistency(k) - full / weighted).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,73 @@
+//! Covariance of every unknown from the factor of the reduced system.
+
+use nalgebra::{DMatrix, Matrix3, Matrix6};
+use rayon::prelude::*;
+
+use super::system::{Linearised, System};
+use crate::linalg::{NotPositiveDefinite, SymmetricFactor, product};
+use crate::problem::{Problem, State};
+
+/// Covariance of the reduced unknowns (dense columns, then slack), with what is needed for the eliminated markers.
+#[derive(Debug, Clone)]
+pub struct Covariance {
+    /// Covariance of the unknowns of the reduced system; fixed columns have zero variance.
+    pub reduced: DMatrix<f64>,
+    /// The undamped system that it is of.
+    pub system: System,
+    /// Natural logarithm of the determinant of the reduced information.
+    pub log_determinant: f64,
+}
+
+/// Covariance at a solution; an error where the information is not positive definite.
+pub fn covariance(problem: &Problem, state: &State, lin: &Linearised) -> Result<Covariance, NotPositiveDefinite> {
+    let system = System::new(problem, state, lin, 0.0);
+    let factor = SymmetricFactor::new(&system.information)?;
+    let mut reduced = factor.inverse();
+    for (i, c) in problem.layout.columns.iter().enumerate() {
+        if !c.free {
+            reduced[(i, i)] = 0.0;
+        }
+    }
+    Ok(Covariance { reduced, log_determinant: factor.log_determinant(), system })
+}
+
+impl Covariance {
+    /// Standard deviation of a dense column, in its unit.
+    pub fn sigma(&self, column: usize) -> f64 {
+        self.reduced[(column, column)].max(0.0).sqrt()
+    }
+
+    /// 6x6 block of six dense columns from `start`.
+    pub fn block(&self, start: usize) -> Matrix6<f64> {
+        self.reduced.fixed_view::<6, 6>(start, start).into_owned()
+    }
+
+    /// Covariance of the slack of the k-th image in use.
+    pub fn slack(&self, k: usize, length: usize) -> DMatrix<f64> {
+        let start = self.system.slack_start[k];
+        self.reduced.view((start, start), (length, length)).into_owned()
+    }
+
+    /// Covariance of the correction of every marker that was seen, m^2, per plate and marker, in the frame of the priors (the
+    /// plate frame that nominal markers define up to their tolerance).
+    pub fn markers(&self, problem: &Problem, lin: &Linearised) -> Vec<Vec<Option<Matrix3<f64>>>> {
+        let plate = |p: usize| {
+            let count = problem.plates[p].markers.len();
+            let seen: Vec<usize> = (0..count).filter(|&m| self.system.seen(p, m)).collect();
+            let parts: Vec<_> =
+                seen.par_iter().map(|&m| self.system.marker_coupling(problem, lin, p, m)).collect();
+            let mut d = DMatrix::zeros(3 * seen.len(), self.reduced.nrows());
+            for (k, (_, rows)) in parts.iter().enumerate() {
+                d.rows_mut(3 * k, 3).copy_from(rows);
+            }
+            let dc = product(&d, &self.reduced);
+            let mut all = vec![None; count];
+            for (k, &m) in seen.iter().enumerate() {
+                let c = dc.rows(3 * k, 3) * d.rows(3 * k, 3).transpose();
+                all[m] = Some(parts[k].0 + Matrix3::from_column_slice(c.as_slice()));
+            }
+            all
+        };
+        (0..problem.plates.len()).map(plate).collect()
+    }
+}

@@ -1,0 +1,99 @@
+//! Levenberg-Marquardt on the reduced system.
+
+use super::system::{Linearised, System, linearise_all};
+use crate::linalg::SymmetricFactor;
+use crate::problem::{Problem, State};
+
+/// Bounds of the iteration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Most accepted or refused steps.
+    pub iterations: usize,
+    /// Stop when the Newton decrement, an upper bound of every |step| / sigma, falls below this.
+    pub decrement: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { iterations: 100, decrement: 1e-3 }
+    }
+}
+
+/// How the iteration ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// The last step was below the bound.
+    Converged,
+    /// No step lowered the cost any more.
+    Stalled,
+    /// The bound on the iterations was reached.
+    OutOfIterations,
+    /// A marker lies behind its camera at the starting values, or they are not finite.
+    BadStart,
+}
+
+/// What the iteration reached.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// How it ended.
+    pub status: Status,
+    /// Best state.
+    pub state: State,
+    /// Its linearisation; `None` only for a bad start.
+    pub linearised: Option<Linearised>,
+    /// Steps tried.
+    pub iterations: usize,
+}
+
+const FIRST_LAMBDA: f64 = 1e-6;
+const LARGEST_LAMBDA: f64 = 1e10;
+
+/// Minimises the cost from `start`.
+pub fn solve(problem: &Problem, start: State, settings: &Settings) -> Outcome {
+    let Some(mut lin) = linearise_all(problem, &start) else {
+        return Outcome { status: Status::BadStart, state: start, linearised: None, iterations: 0 };
+    };
+    let mut state = start;
+    let mut lambda = FIRST_LAMBDA;
+    let mut status = Status::OutOfIterations;
+    let mut iterations = 0;
+    while iterations < settings.iterations {
+        iterations += 1;
+        let system = System::new(problem, &state, &lin, lambda);
+        let Ok(factor) = SymmetricFactor::new(&system.information) else {
+            lambda = (lambda * 10.0).max(1e-3);
+            if lambda > LARGEST_LAMBDA {
+                status = Status::Stalled;
+                break;
+            }
+            continue;
+        };
+        let x = factor.solve(&system.rhs);
+        // Every |step| / sigma is at most the square root of step' N step = step' rhs.
+        let decrement = x.dot(&system.rhs).max(0.0).sqrt();
+        let next = state.moved(&problem.layout, &system.step(problem, &lin, &x));
+        let tried = linearise_all(problem, &next);
+        let small = decrement < settings.decrement;
+        match tried {
+            Some(better) if better.cost <= lin.cost || (small && better.cost <= lin.cost * (1.0 + 1e-12)) => {
+                (state, lin) = (next, better);
+                lambda = (lambda * 0.1).max(1e-12);
+                if small {
+                    status = Status::Converged;
+                    break;
+                }
+            }
+            _ if small => {
+                status = Status::Converged;
+                break;
+            }
+            _ => lambda = (lambda * 10.0).max(1e-6),
+        }
+        if lambda > LARGEST_LAMBDA {
+            status = Status::Stalled;
+            break;
+        }
+    }
+    tracing::debug!(iterations, ?status, cost = lin.cost, "levenberg-marquardt");
+    Outcome { status, state, linearised: Some(lin), iterations }
+}

@@ -1,0 +1,78 @@
+//! Rejection with reasons: single observations by their residual, whole images by the joint error that they would need.
+
+use super::levenberg::Outcome;
+use crate::problem::{Problem, Slack, Weighting, chained, predict};
+
+/// Normalised residual length beyond which an observation is left out (a clean one is so with probability 4e-5).
+const OBSERVATION_BOUND: f64 = 4.5;
+
+/// A rejected observation comes back below this.
+const OBSERVATION_RETURN: f64 = 4.0;
+
+/// Joint error of an image, in robust sigmas per joint, beyond which it does not belong to its readings.
+const IMAGE_BOUND: f64 = 8.0;
+
+/// Smallest robust sigma of a joint that is believed in this test, rad or m.
+const IMAGE_SIGMA_FLOOR: f64 = 1e-4;
+
+/// Reason given to an observation that disagrees with all others.
+pub const OUTLIER: &str = "residual";
+
+/// Re-judges every observation at the outcome; returns how many verdicts changed.
+pub fn reject_observations(problem: &mut Problem, outcome: &Outcome) -> usize {
+    let state = &outcome.state;
+    let mut verdicts = Vec::new();
+    for (i, image) in problem.used() {
+        let Some(chain) = chained(problem, state, image, &state.slack[i]) else { continue };
+        let w = Weighting::of(problem, image);
+        for (k, o) in image.observations.iter().enumerate() {
+            if o.rejected.is_some_and(|r| r != OUTLIER) {
+                continue;
+            }
+            let Some(p) = predict(image, state, &chain.pose, o) else { continue };
+            let r = o.uv - p.uv;
+            let length = (r.dot(&(o.information * r))).max(0.0).sqrt() / w.pixel_factor;
+            let out = length > if o.rejected.is_some() { OBSERVATION_RETURN } else { OBSERVATION_BOUND };
+            if out != o.rejected.is_some() {
+                verdicts.push((i, k, out));
+            }
+        }
+    }
+    for &(i, k, out) in &verdicts {
+        problem.images[i].observations[k].rejected = out.then_some(OUTLIER);
+    }
+    verdicts.len()
+}
+
+/// Leaves out the image whose readings fit it worst, where they do not fit at all; returns its index.
+pub fn reject_images(problem: &mut Problem, outcome: &Outcome) -> Option<usize> {
+    let mut noise = Vec::new();
+    for (i, _) in problem.used() {
+        if let Slack::Joints(dq) = &outcome.state.slack[i] {
+            noise.push((i, dq));
+        }
+    }
+    let joints = noise.first()?.1.len();
+    let sigma: Vec<f64> = (0..joints)
+        .map(|r| {
+            let mut sizes: Vec<f64> = noise.iter().map(|(_, dq)| dq[r].abs()).collect();
+            sizes.sort_by(f64::total_cmp);
+            (1.4826 * sizes[sizes.len() / 2]).max(IMAGE_SIGMA_FLOOR)
+        })
+        .collect();
+    let score = |dq: &[f64]| (dq.iter().zip(&sigma).map(|(q, s)| (q / s).powi(2)).sum::<f64>() / joints as f64).sqrt();
+    let (worst, dq) = noise.iter().max_by(|a, b| score(a.1).total_cmp(&score(b.1)))?;
+    if score(dq) <= IMAGE_BOUND {
+        return None;
+    }
+    let (joint, error) =
+        dq.iter().enumerate().max_by(|a, b| (a.1 / sigma[a.0]).abs().total_cmp(&(b.1 / sigma[b.0]).abs()))?;
+    let reading = &outcome.state.robot.chain.readings[joint];
+    problem.images[*worst].rejected = Some(format!(
+        "wrongly paired: its joint readings would have to be wrong by {:.1} of the usual noise ({} alone by {:.2} mrad)",
+        score(dq),
+        reading,
+        error.abs() * 1e3
+    ));
+    Some(*worst)
+}
