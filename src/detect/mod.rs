@@ -25,9 +25,7 @@ use crate::series::{Plate, PlateKind};
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     match plate.kind {
         PlateKind::Chessboard => chessboard::detect(picture, plate),
-        PlateKind::CodedCircles => {
-            circles::detect(picture, plate, &circles::Options::default()).map(circles::Detection::into_common)
-        }
+        PlateKind::CodedCircles => circles::detect(picture, plate, &circles::Options::default())?.into_common(),
         PlateKind::CircleGrid | PlateKind::Charuco => Err(Error::input(
             "plate",
             format!("plates of kind {:?} cannot be detected yet", plate.kind),

@@ -177,7 +177,8 @@ fn without_nested(candidates: Vec<Candidate>, dropped: &mut Vec<Dropped>) -> Vec
             let outer = &candidates[j].ellipse;
             outer.mean_radius() > inner.mean_radius() && outer.relative_radius(inner.centre) < 1.0
         };
-        nested[i] = order[..k].iter().rev().take_while(near).any(holds) || order[k + 1..].iter().take_while(near).any(holds);
+        nested[i] =
+            order[..k].iter().rev().take_while(near).any(holds) || order[k + 1..].iter().take_while(near).any(holds);
     }
     for (c, _) in candidates.iter().zip(&nested).filter(|(_, n)| **n) {
         let ellipse = Some(c.ellipse);

@@ -163,7 +163,8 @@ impl Tracer<'_> {
         if let Some(origin) = self.points.first().copied() {
             let mut last = self.points[self.points.len() - 1];
             for &p in &self.points {
-                twice += f64::from((last[0] - origin[0]) * (p[1] - origin[1]) - (p[0] - origin[0]) * (last[1] - origin[1]));
+                twice +=
+                    f64::from((last[0] - origin[0]) * (p[1] - origin[1]) - (p[0] - origin[0]) * (last[1] - origin[1]));
                 last = p;
                 for k in 0..2 {
                     low[k] = low[k].min(p[k]);
@@ -194,7 +195,8 @@ mod tests {
 
     #[test]
     fn a_ring_has_a_dark_and_a_light_contour_and_corners_connect() {
-        let p = picture(&["........", "..###...", ".#...#..", ".#...#..", ".#...#..", "..###...", "........", "........"]);
+        let p =
+            picture(&["........", "..###...", ".#...#..", ".#...#..", ".#...#..", "..###...", "........", "........"]);
         let levels = Levels::of(&p, 8.0, 0.5);
         let found = contours(&p, &levels, 4, 100);
         assert_eq!(found.len(), 2);
@@ -207,7 +209,8 @@ mod tests {
 
     #[test]
     fn a_contour_at_the_border_is_clipped() {
-        let p = picture(&["##......", "##......", "........", "........", "........", "........", "........", "........"]);
+        let p =
+            picture(&["##......", "##......", "........", "........", "........", "........", "........", "........"]);
         let found = contours(&p, &Levels::of(&p, 8.0, 0.5), 2, 100);
         assert_eq!(found.len(), 1);
         assert!(found[0].clipped);

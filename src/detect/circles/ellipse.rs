@@ -123,7 +123,8 @@ impl Ellipse {
         let count = points.len() as f64;
         let (mx, my) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + f64::from(p[0]), y + f64::from(p[1])));
         let (mx, my) = (mx / count, my / count);
-        let spread = points.iter().map(|p| (f64::from(p[0]) - mx).powi(2) + (f64::from(p[1]) - my).powi(2)).sum::<f64>();
+        let spread =
+            points.iter().map(|p| (f64::from(p[0]) - mx).powi(2) + (f64::from(p[1]) - my).powi(2)).sum::<f64>();
         let scale = (2.0 * count / spread).sqrt();
         if !scale.is_finite() {
             return None;

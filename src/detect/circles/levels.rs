@@ -59,9 +59,10 @@ impl Levels {
     pub fn threshold_row(&self, y: usize, nodes: &mut Vec<f32>, out: &mut [f32]) {
         let (r0, r1, fy) = split(y as f32, self.rows);
         nodes.clear();
-        nodes.extend((0..self.cols).map(|c| {
-            self.threshold[r0 * self.cols + c] * (1.0 - fy) + self.threshold[r1 * self.cols + c] * fy
-        }));
+        nodes.extend(
+            (0..self.cols)
+                .map(|c| self.threshold[r0 * self.cols + c] * (1.0 - fy) + self.threshold[r1 * self.cols + c] * fy),
+        );
         let half = CELL / 2;
         let lead = half.min(out.len());
         out[..lead].fill(nodes[0]);
@@ -168,7 +169,7 @@ mod tests {
         let (width, height) = (203, 117);
         let pixels = (0..width * height)
             .map(|i| {
-                let (x, y) = (i % width, i / width);
+                let (x, y): (usize, usize) = (i % width, i / width);
                 let paper = 100.0 + 0.5 * x as f32;
                 let dark = (x % 40).abs_diff(20).pow(2) + (y % 40).abs_diff(20).pow(2) < 100;
                 if dark { 0.2 * paper } else { paper }

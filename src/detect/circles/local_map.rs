@@ -58,7 +58,12 @@ impl LocalMap {
     pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|a| {
             let b = self.bend[a];
-            self.origin[a] + self.slope[a][0] * x + self.slope[a][1] * y + 0.5 * b[0] * x * x + b[1] * x * y + 0.5 * b[2] * y * y
+            self.origin[a]
+                + self.slope[a][0] * x
+                + self.slope[a][1] * y
+                + 0.5 * b[0] * x * x
+                + b[1] * x * y
+                + 0.5 * b[2] * y * y
         })
     }
 
@@ -107,8 +112,10 @@ mod tests {
         let scaled: Vec<_> = pairs.iter().map(|(p, q)| (p.map(|v| v * 10.0), *q)).collect();
         let shift = LocalMap::fit(&scaled).unwrap().centroid_shift().map(|v| v * 100.0);
         let radius = 0.3;
-        let ring: Vec<[f64; 2]> =
-            (0..720).map(|k| (f64::from(k) * 0.5f64.to_radians()).sin_cos()).map(|(s, c)| map([radius * c, radius * s])).collect();
+        let ring: Vec<[f64; 2]> = (0..720)
+            .map(|k| (f64::from(k) * 0.5f64.to_radians()).sin_cos())
+            .map(|(s, c)| map([radius * c, radius * s]))
+            .collect();
         let (mut area, mut sum) = (0.0, [0.0; 2]);
         for (p, q) in ring.iter().zip(ring.iter().cycle().skip(1)) {
             let cross = p[0] * q[1] - q[0] * p[1];

@@ -158,15 +158,13 @@ pub fn refine_predicted(
     let (mut found, mut dropped) = (Vec::new(), Vec::new());
     for p in predicted {
         let target = predicted_target(picture, p);
-        let result = target.ok_or(Reason::LowContrast).and_then(|t| refine(picture, &t.start(&camera, 0.2), &mut pixels));
+        let result =
+            target.ok_or(Reason::LowContrast).and_then(|t| refine(picture, &t.start(&camera, 0.2), &mut pixels));
         match result {
             Ok(fit) => found.push(Found { marker: p.marker, measured: fit.measured, rescued: true }),
-            Err(reason) => dropped.push(Dropped {
-                uv: p.outer.centre,
-                reason,
-                ellipse: Some(p.outer),
-                marker: Some(p.marker),
-            }),
+            Err(reason) => {
+                dropped.push(Dropped { uv: p.outer.centre, reason, ellipse: Some(p.outer), marker: Some(p.marker) })
+            }
         }
     }
     (found, dropped)

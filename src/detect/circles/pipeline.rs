@@ -35,7 +35,7 @@ pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<Det
     })?;
     if picture.width < 16 || picture.height < 16 || picture.pixels.len() != picture.width * picture.height {
         let what = format!("{} x {} pixels with {} values", picture.width, picture.height, picture.pixels.len());
-        return Err(Error::input("picture", what, "check the image file"));
+        return Err(Error::input("image", what, "check the image file"));
     }
     let levels = Levels::of(picture, largest_marker(picture, options), THRESHOLD);
     let (candidates, mut dropped) = candidates(picture, &levels, options);
@@ -64,7 +64,7 @@ fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> Resu
             Verdict::Mirrored => {
                 let what = "the plate is seen in a mirror: its code is there, but left and right are exchanged";
                 let remedy = "switch off the mirroring in the camera driver, or look at the plate without a mirror";
-                return Err(Error::input("picture", what, remedy));
+                return Err(Error::input("image", what, remedy));
             }
             Verdict::Placed { placement, agreeing, disagreeing, runner_up } => {
                 if !matches!(outcome, Outcome::Identified { .. }) {
@@ -228,8 +228,7 @@ impl Work<'_> {
                 continue;
             }
             let clear = self.clear(cell, outer.semi_axes()[1], camera.blur_px);
-            let predicted =
-                Predicted { marker: marker.id, outer, ratio: self.ratio(cell), shape_sigma: 0.05, clear };
+            let predicted = Predicted { marker: marker.id, outer, ratio: self.ratio(cell), shape_sigma: 0.05, clear };
             let id = marker.id;
             let target = predicted_target(self.picture, &predicted);
             let result = target
@@ -264,15 +263,12 @@ impl Work<'_> {
     fn agree(&self, entries: &mut Vec<Entry>, dropped: &mut Vec<Dropped>) -> Option<InnerOuter> {
         let centres: BTreeMap<(i32, i32), [f64; 2]> =
             entries.iter().map(|e| (e.cell, e.fit.measured.outer.ellipse.centre)).collect();
-        let differences: Vec<Option<Difference>> =
-            entries.iter().map(|e| self.difference(e, &centres)).collect();
+        let differences: Vec<Option<Difference>> = entries.iter().map(|e| self.difference(e, &centres)).collect();
         let mean = |a: usize| median(differences.iter().flatten().map(|d| d.value[a]).collect());
         let common = if differences.iter().flatten().count() >= 5 { [mean(0), mean(1)] } else { [0.0; 2] };
         let good: Vec<bool> = differences
             .iter()
-            .map(|d| {
-                d.is_none_or(|d| (0..2).all(|a| (d.value[a] - common[a]).abs() < 5.0 * d.sigma[a] + d.slack))
-            })
+            .map(|d| d.is_none_or(|d| (0..2).all(|a| (d.value[a] - common[a]).abs() < 5.0 * d.sigma[a] + d.slack)))
             .collect();
         let summary = summary(&differences, &good);
         let mut keep = good.iter();
@@ -281,7 +277,12 @@ impl Work<'_> {
             if !ok {
                 let ellipse = e.fit.measured.outer.ellipse;
                 let marker = self.marker(e.cell).map(|m| m.id);
-                dropped.push(Dropped { uv: ellipse.centre, reason: Reason::InnerOuter, ellipse: Some(ellipse), marker });
+                dropped.push(Dropped {
+                    uv: ellipse.centre,
+                    reason: Reason::InnerOuter,
+                    ellipse: Some(ellipse),
+                    marker,
+                });
             }
             ok
         });

@@ -193,11 +193,8 @@ fn finish(
     let covariance = Covariance::of(factor, parameters, scale);
     let place = |e: Ellipse| Ellipse { centre: [0, 1].map(|a| e.centre[a] + anchor[a]), ..e };
     let outer = Imaged { edge: Edge::Outer, ellipse: place(state.ellipse()), covariance: covariance.block(0) };
-    let inner = state.inner_ellipse().map(|e| Imaged {
-        edge: Edge::Inner,
-        ellipse: place(e),
-        covariance: covariance.block(2),
-    });
+    let inner =
+        state.inner_ellipse().map(|e| Imaged { edge: Edge::Inner, ellipse: place(e), covariance: covariance.block(2) });
     let measured = Measured {
         outer,
         inner,
@@ -298,21 +295,16 @@ fn gather(picture: &Picture, start: &Start, anchor: [f64; 2], pixels: &mut Pixel
 /// Cholesky factor in place (lower triangle).
 fn cholesky(m: &mut Normal, n: usize) -> Option<()> {
     for j in 0..n {
-        let mut pivot = m[j][j];
-        for k in 0..j {
-            pivot -= m[j][k] * m[j][k];
-        }
-        if !(pivot > 1e-12 * m[j][j].abs()) {
+        let (pivots, below) = m[j..].split_first_mut()?;
+        let dot = |a: &[f64; ANNULUS], b: &[f64; ANNULUS]| a[..j].iter().zip(&b[..j]).map(|(x, y)| x * y).sum::<f64>();
+        let pivot = pivots[j] - dot(pivots, pivots);
+        if pivot.is_nan() || pivot <= 1e-12 * pivots[j].abs() {
             return None;
         }
         let root = pivot.sqrt();
-        m[j][j] = root;
-        for i in j + 1..n {
-            let mut v = m[i][j];
-            for k in 0..j {
-                v -= m[i][k] * m[j][k];
-            }
-            m[i][j] = v / root;
+        pivots[j] = root;
+        for row in below.iter_mut().take(n - j - 1) {
+            row[j] = (row[j] - dot(row, pivots)) / root;
         }
     }
     Some(())
@@ -321,17 +313,11 @@ fn cholesky(m: &mut Normal, n: usize) -> Option<()> {
 /// Solves in place with a factor of [`cholesky`].
 fn solve(l: &Normal, n: usize, b: &mut [f64; ANNULUS]) {
     for i in 0..n {
-        let mut v = b[i];
-        for k in 0..i {
-            v -= l[i][k] * b[k];
-        }
-        b[i] = v / l[i][i];
+        let known: f64 = l[i][..i].iter().zip(b.iter()).map(|(x, y)| x * y).sum();
+        b[i] = (b[i] - known) / l[i][i];
     }
     for i in (0..n).rev() {
-        let mut v = b[i];
-        for k in i + 1..n {
-            v -= l[k][i] * b[k];
-        }
-        b[i] = v / l[i][i];
+        let known: f64 = (i + 1..n).map(|k| l[k][i] * b[k]).sum();
+        b[i] = (b[i] - known) / l[i][i];
     }
 }

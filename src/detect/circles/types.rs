@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use super::ellipse::Ellipse;
-use crate::Notice;
 use crate::series::{Edge, Observation};
+use crate::{Error, Notice, Result};
 
 /// What the detector looks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -211,8 +211,12 @@ impl Detection {
         counts
     }
 
-    /// The form that all detectors share, with a notice when the point spread is asymmetric or nothing was identified.
-    pub fn into_common(self) -> crate::detect::Detection {
+    /// The form that all detectors share, with a notice when the point spread is asymmetric.
+    ///
+    /// # Errors
+    ///
+    /// Nothing was identified; the place is `image`.
+    pub fn into_common(self) -> Result<crate::detect::Detection> {
         let dropped =
             self.dropped.iter().map(|d| crate::detect::Dropped { uv: d.uv, reason: d.reason.name() }).collect();
         let mut notices = Vec::new();
@@ -222,7 +226,11 @@ impl Detection {
                 "inner and outer circles are off by ({u:.4}, {v:.4}) px on the mean of {} annuli: the blur is asymmetric",
                 io.count
             );
-            notices.push(Notice::new("image", what, "look for coma (stop the lens down) or motion during the exposure"));
+            notices.push(Notice::new(
+                "image",
+                what,
+                "look for coma (stop the lens down) or motion during the exposure",
+            ));
         }
         let failure = match self.outcome {
             Outcome::Identified { .. } => None,
@@ -233,9 +241,18 @@ impl Detection {
             }
         };
         if let Some((what, remedy)) = failure {
-            notices.push(Notice::new("image", what, remedy));
+            return Err(Error::input("image", format!("{what}{}", self.dropped_summary()), remedy));
         }
-        crate::detect::Detection { observations: self.observations, dropped, notices }
+        Ok(crate::detect::Detection { observations: self.observations, dropped, notices })
+    }
+
+    fn dropped_summary(&self) -> String {
+        let counts = self.dropped_counts();
+        if counts.is_empty() {
+            return String::new();
+        }
+        let parts: Vec<String> = counts.iter().map(|(reason, n)| format!("{n} {reason}")).collect();
+        format!(" (candidates dropped: {})", parts.join(", "))
     }
 }
 

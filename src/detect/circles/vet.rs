@@ -69,9 +69,7 @@ pub(super) fn neighbourhood(board: &Board, cell: Cell, candidates: &[Candidate])
     let pairs = |reach: i32| -> Vec<([f64; 2], [f64; 2])> {
         around(board, cell, reach)
             .filter(|(c, _)| *c != cell)
-            .map(|(c, p)| {
-                ([f64::from(c.0 - cell.0), f64::from(c.1 - cell.1)], candidates[p.candidate].ellipse.centre)
-            })
+            .map(|(c, p)| ([f64::from(c.0 - cell.0), f64::from(c.1 - cell.1)], candidates[p.candidate].ellipse.centre))
             .collect()
     };
     let close = pairs(1);
