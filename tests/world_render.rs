@@ -1,5 +1,7 @@
 //! Rendered pictures against the geometry that was put in.
 
+#![allow(clippy::unwrap_used)]
+
 use nalgebra::{Vector2, Vector3, Vector6};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -35,6 +35,9 @@ pub struct Accuracy {
 
 const FOLDS: usize = 6;
 
+/// Joint error that a nominal robot is allowed per stop, rad or m, so that its geometric errors do not bend camera and plate.
+const NOMINAL_JOINT_ERROR: f64 = 3e-3;
+
 /// Predicts every image on the robot by models that have not seen it.
 pub fn hold_out(problem: &Problem, state: &State) -> Option<Accuracy> {
     let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
@@ -51,6 +54,7 @@ pub fn hold_out(problem: &Problem, state: &State) -> Option<Accuracy> {
     nominal_state.robot.terms.iter_mut().for_each(|t| t.value = 0.0);
     let robot = problem.layout.twists.start..problem.layout.terms.end;
     nominal_problem.layout.columns[robot].iter_mut().for_each(|c| c.free = false);
+    nominal_problem.noise.joint.iter_mut().flatten().for_each(|s| *s = s.max(NOMINAL_JOINT_ERROR));
     let nominal = predictions(&nominal_problem, &nominal_state, &on_robot, folds)?;
     let calibrated = predictions(problem, state, &on_robot, folds)?;
     let mut per_image_mm = vec![None; problem.images.len()];

@@ -115,14 +115,14 @@ pub fn adjoint(pose: &Pose) -> Matrix6<f64> {
 impl Mul<&Pose> for &Pose {
     type Output = Pose;
     fn mul(self, other: &Pose) -> Pose {
-        Pose::new(self.rotation * other.rotation, self.transform(&other.translation))
+        *self * *other
     }
 }
 
 impl Mul for Pose {
     type Output = Pose;
     fn mul(self, other: Pose) -> Pose {
-        &self * &other
+        Pose::new(self.rotation * other.rotation, self.transform(&other.translation))
     }
 }
 

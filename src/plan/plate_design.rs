@@ -103,16 +103,16 @@ pub struct Sheet {
     pub height_m: f64,
 }
 
-/// Standard papers: name, short and long side in mm, by area.
+/// Standard papers: name, short and long side in mm. The first that fits is taken, so the American ones come only by size or name.
 const PAPERS: [(&str, f64, f64); 8] = [
     ("A5", 148.0, 210.0),
-    ("US letter", 215.9, 279.4),
     ("A4", 210.0, 297.0),
-    ("US ledger", 279.4, 431.8),
     ("A3", 297.0, 420.0),
     ("A2", 420.0, 594.0),
     ("A1", 594.0, 841.0),
     ("A0", 841.0, 1189.0),
+    ("US letter", 215.9, 279.4),
+    ("US ledger", 279.4, 431.8),
 ];
 
 impl Sheet {
@@ -130,7 +130,7 @@ impl Sheet {
         Some(Self { paper: Some(paper.0), width_m: w / 1e3, height_m: h / 1e3 })
     }
 
-    /// The smallest standard sheet that holds `plate` with its quiet zone and strips; without one, a sheet of just that size.
+    /// The smallest A sheet that holds `plate` with its quiet zone and strips; without one, a sheet of just that size.
     pub fn fitting(plate: &Plate) -> Self {
         let [width, height] = needed_size(plate.columns, plate.rows, plate.pitch_m, widest_radius(plate));
         let fits = |paper: &&(&str, f64, f64)| {

@@ -2,8 +2,24 @@
 //!
 //! A new source of recordings is one file here that returns a [`Series`], and one row in `read`.
 
+mod inputs;
+mod joints;
+mod manifest;
 mod observation;
+mod observation_file;
 mod plate;
+mod plate_file;
+mod read;
+mod table;
+mod units;
 
+pub use inputs::InputFile;
+pub use joints::{DEFAULT_PLACEMENT, Stop, Stops};
+pub use manifest::{
+    AngleUnit, CameraMount, CameraSection, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder,
+};
 pub use observation::{Edge, ImageObservations, Observation};
+pub use observation_file::observations_csv;
 pub use plate::{Marker, Plate, PlateKind, ScaleBar};
+pub use plate_file::{DEFAULT_TOLERANCE_M, plate_csv, plate_toml, read_plate};
+pub use read::{Series, Source, read, read_images};

@@ -66,7 +66,7 @@ impl Psf {
         let source = values.to_vec();
         values.fill(0.0);
         for lobe in self.lobes() {
-            let along = [lobe.along_u, lobe.along_v].map(|k| pixel_taps(k));
+            let along = [lobe.along_u, lobe.along_v].map(pixel_taps);
             blur_separably(&source, values, width, &along, self.reach);
         }
     }

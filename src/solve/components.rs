@@ -3,8 +3,6 @@
 //! `s^2 = sum r^2 / (redundancy)`: every group of residuals is divided by the number of them that the parameters did not use up.
 //! For joint noise the redundancy of one latent is `1 - C / sigma^2` with its posterior variance C. Started from above.
 
-use rayon::prelude::*;
-
 use super::covariance::{Covariance, covariance};
 use super::levenberg::{Outcome, Settings, Status, solve};
 use super::system::Linearised;
@@ -37,9 +35,13 @@ const SHRINKAGE: f64 = 5.0;
 /// Relative change of every component below which the rounds end.
 const CONVERGED: f64 = 0.01;
 
+/// Newton decrement between rounds: the components need no better.
+const ROUGH_DECREMENT: f64 = 0.05;
+
 /// Alternates solving and re-estimating until the components stand. The problem keeps the final components.
 pub fn estimate_components(problem: &mut Problem, start: State, options: &ComponentOptions) -> Outcome {
-    let mut outcome = solve(problem, start, &options.settings);
+    let rough = Settings { decrement: ROUGH_DECREMENT.max(options.settings.decrement), ..options.settings };
+    let mut outcome = solve(problem, start, &rough);
     let mut iterations = outcome.iterations;
     for round in 0..options.rounds {
         let Some(lin) = &outcome.linearised else { break };
@@ -49,11 +51,15 @@ pub fn estimate_components(problem: &mut Problem, start: State, options: &Compon
         };
         let change = update(problem, &outcome.state, lin, &cov, options.joint);
         tracing::debug!(round, change, pixel = ?problem.noise.pixel_factor, joint = ?problem.noise.joint, "variance components");
-        outcome = solve(problem, outcome.state, &options.settings);
+        outcome = solve(problem, outcome.state, &rough);
         iterations += outcome.iterations;
         if change < CONVERGED || outcome.status == Status::BadStart {
             break;
         }
+    }
+    if outcome.status == Status::Converged {
+        outcome = solve(problem, outcome.state, &options.settings);
+        iterations += outcome.iterations;
     }
     Outcome { iterations, ..outcome }
 }
@@ -125,18 +131,10 @@ pub(super) fn effective_parameters(problem: &Problem, state: &State, lin: &Linea
             _ => length as f64,
         };
     }
-    let markers: f64 = (problem.plates.iter().enumerate())
-        .map(|(p, plate)| {
-            let shares: Vec<f64> = (0..plate.markers.len())
-                .into_par_iter()
-                .filter(|&m| cov.system.seen(p, m))
-                .map(|m| {
-                    let sigma = plate.markers[m].sigma_m.max(1e-9);
-                    3.0 - cov.marker(problem, lin, p, m).trace() / (sigma * sigma)
-                })
-                .collect();
-            shares.iter().sum::<f64>()
-        })
+    let covariances = cov.markers(problem, lin);
+    let markers: f64 = (problem.plates.iter().zip(&covariances))
+        .flat_map(|(plate, covariances)| plate.markers.iter().zip(covariances))
+        .filter_map(|(m, c)| c.map(|c| 3.0 - c.trace() / m.sigma_m.max(1e-9).powi(2)))
         .sum();
     dense + slack + markers
 }

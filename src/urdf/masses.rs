@@ -45,7 +45,7 @@ impl RobotDescription {
                     carried.push(CarriedMass { link: link.clone(), joint, mass_kg: inertial.mass_kg, centre_m });
                     break;
                 }
-                here_from_link = &parent.origin * &here_from_link;
+                here_from_link = parent.origin * here_from_link;
                 current = &parent.parent;
             }
         }

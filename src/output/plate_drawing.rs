@@ -1,0 +1,200 @@
+//! Drawings of a plate: exact millimetres in PDF and SVG, and a PNG for looking at it.
+//!
+//! The drawing is first a list of [`Figure`]s in metres (origin at the sheet's centre, x right, y up), then written by one file
+//! per format. Everything but markers stays outside the quiet field, a pitch away from the outermost markers.
+
+use crate::plan::plate_design::{Sheet, quiet_field_m};
+use crate::series::{Plate, PlateKind};
+
+pub use super::plate_pdf::pdf;
+pub use super::plate_png::png;
+pub use super::plate_svg::svg;
+
+/// What stands beside the markers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Caption {
+    /// Name of the plate.
+    pub name: String,
+    /// The sheet to draw on.
+    pub sheet: Sheet,
+}
+
+/// One thing to draw, black on white; lengths in m.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Figure {
+    /// A disc, or an annulus when the inner radius is positive.
+    Ring { centre: [f64; 2], outer: f64, inner: f64 },
+    /// A filled polygon.
+    Polygon(Vec<[f64; 2]>),
+    /// A straight line.
+    Line { from: [f64; 2], to: [f64; 2], width: f64 },
+    /// A line of text; `at` is the middle of its baseline.
+    Text { at: [f64; 2], height: f64, text: String },
+}
+
+const LINE: f64 = 0.0002;
+const TEXT: f64 = 0.0028;
+
+/// All figures of a plate on its sheet.
+pub(super) fn figures(plate: &Plate, caption: &Caption) -> Vec<Figure> {
+    let mut all = marks(plate);
+    let quiet = quiet_field_m(plate);
+    let half = [caption.sheet.width_m / 2.0, caption.sheet.height_m / 2.0];
+    axes(quiet, half, &mut all);
+    let bottom = -quiet[1];
+    let lattice = format!("{} x {}, pitch {:.1} mm", plate.columns, plate.rows, plate.pitch_m * 1e3);
+    let line = |k: f64| [0.0, bottom - 0.0105 - k * 1.5 * TEXT];
+    scale_bar(bottom - 0.0045, half[0], &mut all);
+    text(line(0.0), &format!("{}. {lattice}.", caption.name), &mut all);
+    text(line(1.0), &advice(&caption.sheet), &mut all);
+    all
+}
+
+fn advice(sheet: &Sheet) -> String {
+    let size = format!("{:.0} x {:.0} mm", sheet.width_m * 1e3, sheet.height_m * 1e3);
+    let paper = sheet.paper.map_or(size.clone(), |p| format!("{p} ({size})"));
+    format!("Print at 100 % on {paper}. Measure the bar.")
+}
+
+/// The printed field itself.
+fn marks(plate: &Plate) -> Vec<Figure> {
+    if matches!(plate.kind, PlateKind::Chessboard) {
+        return squares(plate);
+    }
+    let ring = |m: &crate::series::Marker| Figure::Ring {
+        centre: [m.position_m.x, m.position_m.y],
+        outer: m.outer_radius_m,
+        inner: m.inner_radius_m,
+    };
+    plate.markers.iter().filter(|m| m.outer_radius_m > 0.0).map(ring).collect()
+}
+
+/// Dark squares around the inner corners, the one at the top-left dark.
+fn squares(plate: &Plate) -> Vec<Figure> {
+    let (columns, rows) = (plate.columns + 1, plate.rows + 1);
+    let at = |r: u32, c: u32| {
+        let x = (f64::from(c) - f64::from(columns) / 2.0) * plate.pitch_m;
+        [x, (f64::from(rows) / 2.0 - f64::from(r)) * plate.pitch_m]
+    };
+    let square = |k: u32| {
+        let (r, c) = (k / columns, k % columns);
+        ((r + c) % 2 == 0).then(|| Figure::Polygon(vec![at(r, c), at(r, c + 1), at(r + 1, c + 1), at(r + 1, c)]))
+    };
+    (0..columns * rows).filter_map(square).collect()
+}
+
+/// Marks on all four sides that point at the origin, arrows where the axes leave the field.
+fn axes(quiet: [f64; 2], half: [f64; 2], all: &mut Vec<Figure>) {
+    let along = (half[0] - quiet[0] - 0.006).clamp(0.004, 0.008);
+    let up = 0.0045;
+    let line = |from, to| Figure::Line { from, to, width: LINE };
+    all.push(line([-quiet[0] - along, 0.0], [-quiet[0], 0.0]));
+    all.push(line([quiet[0], 0.0], [quiet[0] + along, 0.0]));
+    all.push(line([0.0, -quiet[1] - 0.0015], [0.0, -quiet[1]]));
+    all.push(line([0.0, quiet[1]], [0.0, quiet[1] + up]));
+    let (x, y) = (quiet[0] + along, quiet[1] + up);
+    all.push(Figure::Polygon(vec![[x, 0.0], [x - 0.003, 0.001], [x - 0.003, -0.001]]));
+    all.push(Figure::Polygon(vec![[0.0, y], [0.001, y - 0.003], [-0.001, y - 0.003]]));
+    text([quiet[0] + along / 2.0, 0.002], "x", all);
+    text([0.003, quiet[1] + 0.001], "y", all);
+}
+
+/// A bar of 100 mm (50 mm on a small sheet) with a tick every 10 mm.
+fn scale_bar(y: f64, half_width: f64, all: &mut Vec<Figure>) {
+    let tens: u32 = if half_width > 0.075 { 10 } else { 5 };
+    let half = f64::from(tens) * 0.005;
+    all.push(Figure::Line { from: [-half, y], to: [half, y], width: LINE });
+    for k in 0..=tens {
+        let x = -half + f64::from(k) * 0.01;
+        let tick = if k == 0 || k == tens { 0.0025 } else { 0.0012 };
+        all.push(Figure::Line { from: [x, y - tick], to: [x, y + tick], width: LINE });
+    }
+    text([half + 0.008, y - TEXT / 3.0], &format!("{} mm", tens * 10), all);
+}
+
+fn text(at: [f64; 2], text: &str, all: &mut Vec<Figure>) {
+    all.push(Figure::Text { at, height: TEXT, text: text.to_owned() });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::plate_design::{PlateRequest, design};
+
+    fn small() -> (Plate, Caption) {
+        let made = design(&PlateRequest { shape: Some((9, 7)), ..PlateRequest::default() }).unwrap();
+        (made.plate, Caption { name: "test".to_owned(), sheet: made.sheet })
+    }
+
+    #[test]
+    fn nothing_but_markers_lies_in_the_quiet_field_and_all_lies_on_the_sheet() {
+        for shape in [(9, 7), (28, 18), (5, 4)] {
+            let made = design(&PlateRequest { shape: Some(shape), ..PlateRequest::default() }).unwrap();
+            let caption = Caption { name: "a name of usual length".to_owned(), sheet: made.sheet };
+            let quiet = quiet_field_m(&made.plate);
+            let in_field = |p: &[f64; 2]| p[0].abs() < quiet[0] - 1e-9 && p[1].abs() < quiet[1] - 1e-9;
+            let on_sheet = |p: &[f64; 2]| {
+                p[0].abs() < made.sheet.width_m / 2.0 - 0.003 && p[1].abs() < made.sheet.height_m / 2.0 - 0.003
+            };
+            for figure in figures(&made.plate, &caption) {
+                let corners = match figure {
+                    Figure::Ring { .. } => continue,
+                    Figure::Polygon(corners) => corners,
+                    Figure::Line { from, to, .. } => vec![from, to],
+                    // Helvetica is about half as wide as high on average.
+                    Figure::Text { at, height, text } => {
+                        let w = 0.25 * height * text.len() as f64 / 0.72;
+                        vec![[at[0] - w, at[1]], [at[0] + w, at[1] + height]]
+                    }
+                };
+                assert!(corners.iter().all(|p| !in_field(p)), "{shape:?} {corners:?}");
+                assert!(corners.iter().all(on_sheet), "{shape:?} {corners:?} {:?}", made.sheet);
+            }
+        }
+    }
+
+    #[test]
+    fn svg_states_every_marker_in_millimetres() {
+        let (plate, caption) = small();
+        let text = String::from_utf8(svg(&plate, &caption)).unwrap();
+        let document = roxmltree::Document::parse(&text).unwrap();
+        assert_eq!(document.root_element().attribute("width"), Some("297mm"));
+        assert_eq!(document.root_element().attribute("viewBox"), Some("-148.5 -105 297 210"));
+        let rings: Vec<_> = document.descendants().filter(|n| n.has_tag_name("circle")).collect();
+        assert_eq!(rings.len(), plate.markers.len());
+        let first = |name: &str| rings[0].attribute(name).unwrap().parse::<f64>().unwrap();
+        assert!((first("cx") + 72.0).abs() < 1e-9 && (first("cy") + 54.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn png_is_dark_on_every_marker_and_has_the_size_asked_for() {
+        let (plate, caption) = small();
+        let bytes = png(&plate, &caption, 150.0).unwrap();
+        let image = image::load_from_memory(&bytes).unwrap().into_luma8();
+        assert_eq!(
+            image.dimensions(),
+            ((0.297 / 0.0254 * 150.0_f64).round() as u32, (0.210 / 0.0254 * 150.0_f64).round() as u32)
+        );
+        let at = |x: f64, y: f64| {
+            let px = |v: f64, size: f64| ((v + size / 2.0) / 0.0254 * 150.0) as u32;
+            image.get_pixel(px(x, 0.297), px(-y, 0.210)).0[0]
+        };
+        for m in &plate.markers {
+            let (x, y) = (m.position_m.x, m.position_m.y);
+            assert_eq!(at(x, y) > 128, m.inner_radius_m > 0.0, "{}", m.id);
+            assert_eq!(at(x + (m.outer_radius_m + m.inner_radius_m) / 2.0, y), 0);
+            assert_eq!(at(x + 0.009, y + 0.009), 255);
+        }
+    }
+
+    #[test]
+    fn pdf_page_is_the_sheet_to_a_micrometre() {
+        let (plate, caption) = small();
+        let bytes = pdf(&plate, &caption);
+        let text = String::from_utf8_lossy(&bytes);
+        let from = text.find("/MediaBox [").unwrap() + 11;
+        let numbers: Vec<f64> =
+            text[from..from + text[from..].find(']').unwrap()].split_whitespace().map(|n| n.parse().unwrap()).collect();
+        assert!((numbers[2] / 72.0 * 25.4 - 297.0).abs() < 1e-3 && (numbers[3] / 72.0 * 25.4 - 210.0).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,173 @@
+//! The plate as PNG, for looking at it; for printing take the PDF.
+
+use std::io::Cursor;
+
+use image::{GrayImage, ImageFormat};
+
+use super::plate_drawing::{Caption, Figure, figures};
+use crate::error::{Error, Result};
+use crate::series::Plate;
+
+/// Samples per pixel and axis.
+const SAMPLES: i32 = 4;
+
+/// Draws the plate with `dpi` pixels per inch, edges smoothed.
+///
+/// # Errors
+/// When the picture would be larger than 400 million pixels.
+pub fn png(plate: &Plate, caption: &Caption, dpi: f64) -> Result<Vec<u8>> {
+    let scale = dpi / 0.0254;
+    let [width, height] = [caption.sheet.width_m, caption.sheet.height_m].map(|m| (m * scale).round());
+    let pixels = width * height;
+    if !(1.0..4e8).contains(&pixels) {
+        return Err(Error::input("--dpi", format!("{dpi} gives {width} x {height} pixels"), "take 50 to 600"));
+    }
+    let mut canvas = Canvas { image: GrayImage::from_pixel(width as u32, height as u32, image::Luma([255])), scale };
+    figures(plate, caption).iter().for_each(|f| canvas.draw(f));
+    let mut bytes = Cursor::new(Vec::new());
+    canvas
+        .image
+        .write_to(&mut bytes, ImageFormat::Png)
+        .map_err(|e| Error::input("plate picture", e, "take another --dpi"))?;
+    Ok(bytes.into_inner())
+}
+
+struct Canvas {
+    image: GrayImage,
+    scale: f64,
+}
+
+impl Canvas {
+    fn draw(&mut self, figure: &Figure) {
+        match figure {
+            Figure::Ring { centre, outer, inner } => {
+                let [x, y] = *centre;
+                let box_ = [x - outer, y - outer, x + outer, y + outer];
+                let ring = |p: [f64; 2]| {
+                    let d2 = (p[0] - x).powi(2) + (p[1] - y).powi(2);
+                    d2 < outer * outer && d2 >= inner * inner
+                };
+                self.fill(box_, ring);
+            }
+            Figure::Polygon(corners) => {
+                let fold = |i: usize, f: fn(f64, f64) -> f64, start: f64| corners.iter().map(|c| c[i]).fold(start, f);
+                let (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
+                let box_ =
+                    [fold(0, f64::min, low), fold(1, f64::min, low), fold(0, f64::max, high), fold(1, f64::max, high)];
+                self.fill(box_, |p| contains(corners, p));
+            }
+            Figure::Line { from, to, width } => {
+                // At least a pixel wide, so that it is seen at low resolution.
+                let half = width.max(1.0 / self.scale) / 2.0;
+                let low = [from[0].min(to[0]) - half, from[1].min(to[1]) - half];
+                let high = [from[0].max(to[0]) + half, from[1].max(to[1]) + half];
+                self.fill([low[0], low[1], high[0], high[1]], |p| distance_to_segment(p, *from, *to) <= half);
+            }
+            Figure::Text { at, height, text } => self.text(*at, *height, text),
+        }
+    }
+
+    /// Darkens every pixel of the box (m) by the share of its samples that lie inside.
+    fn fill(&mut self, [x0, y0, x1, y1]: [f64; 4], inside: impl Fn([f64; 2]) -> bool) {
+        let (width, height) = (f64::from(self.image.width()), f64::from(self.image.height()));
+        let column = |x: f64| (x * self.scale + width / 2.0).clamp(0.0, width - 1.0) as u32;
+        let row = |y: f64| (height / 2.0 - y * self.scale).clamp(0.0, height - 1.0) as u32;
+        for v in row(y1)..=row(y0) {
+            for u in column(x0)..=column(x1) {
+                let mut hits = 0;
+                for k in 0..SAMPLES * SAMPLES {
+                    let [du, dv] = [k % SAMPLES, k / SAMPLES].map(|i| (f64::from(i) + 0.5) / f64::from(SAMPLES));
+                    let x = (f64::from(u) + du - width / 2.0) / self.scale;
+                    let y = (height / 2.0 - f64::from(v) - dv) / self.scale;
+                    hits += i32::from(inside([x, y]));
+                }
+                let pixel = &mut self.image.get_pixel_mut(u, v).0[0];
+                *pixel = (i32::from(*pixel) - 255 * hits / (SAMPLES * SAMPLES)).max(0) as u8;
+            }
+        }
+    }
+
+    /// Text in a dot font of 5 x 7, capitals only.
+    fn text(&mut self, at: [f64; 2], height: f64, text: &str) {
+        let dot = height / 7.0;
+        let left = at[0] - 3.0 * dot * text.chars().count() as f64;
+        for (k, c) in text.chars().enumerate() {
+            for (row, bits) in glyph(c).into_iter().enumerate() {
+                for column in (0..5).filter(|c| bits >> (4 - c) & 1 == 1) {
+                    let x = left + (6 * k + column) as f64 * dot;
+                    let y = at[1] + (6 - row) as f64 * dot;
+                    self.fill([x, y, x + dot, y + dot], |p| p[0] >= x && p[0] < x + dot && p[1] >= y && p[1] < y + dot);
+                }
+            }
+        }
+    }
+}
+
+fn contains(corners: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
+    let mut inside = false;
+    for (k, a) in corners.iter().enumerate() {
+        let b = corners[(k + 1) % corners.len()];
+        if (a[1] > y) != (b[1] > y) && x < (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1]) + a[0] {
+            inside = !inside;
+        }
+    }
+    inside
+}
+
+fn distance_to_segment(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+    let (d, r) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+    let t = ((r[0] * d[0] + r[1] * d[1]) / (d[0] * d[0] + d[1] * d[1]).max(1e-30)).clamp(0.0, 1.0);
+    (r[0] - t * d[0]).hypot(r[1] - t * d[1])
+}
+
+/// Rows of a 5 x 7 glyph from the top, five bits each; unknown characters are blank.
+fn glyph(c: char) -> [u8; 7] {
+    match c.to_ascii_uppercase() {
+        'A' => [14, 17, 17, 31, 17, 17, 17],
+        'B' => [30, 17, 17, 30, 17, 17, 30],
+        'C' => [14, 17, 16, 16, 16, 17, 14],
+        'D' => [30, 17, 17, 17, 17, 17, 30],
+        'E' => [31, 16, 16, 30, 16, 16, 31],
+        'F' => [31, 16, 16, 30, 16, 16, 16],
+        'G' => [14, 17, 16, 23, 17, 17, 14],
+        'H' => [17, 17, 17, 31, 17, 17, 17],
+        'I' => [14, 4, 4, 4, 4, 4, 14],
+        'J' => [7, 2, 2, 2, 2, 18, 12],
+        'K' => [17, 18, 20, 24, 20, 18, 17],
+        'L' => [16, 16, 16, 16, 16, 16, 31],
+        'M' => [17, 27, 21, 21, 17, 17, 17],
+        'N' => [17, 25, 21, 19, 17, 17, 17],
+        'O' => [14, 17, 17, 17, 17, 17, 14],
+        'P' => [30, 17, 17, 30, 16, 16, 16],
+        'Q' => [14, 17, 17, 17, 21, 18, 13],
+        'R' => [30, 17, 17, 30, 20, 18, 17],
+        'S' => [15, 16, 16, 14, 1, 1, 30],
+        'T' => [31, 4, 4, 4, 4, 4, 4],
+        'U' => [17, 17, 17, 17, 17, 17, 14],
+        'V' => [17, 17, 17, 17, 17, 10, 4],
+        'W' => [17, 17, 17, 21, 21, 27, 17],
+        'X' => [17, 17, 10, 4, 10, 17, 17],
+        'Y' => [17, 17, 10, 4, 4, 4, 4],
+        'Z' => [31, 1, 2, 4, 8, 16, 31],
+        '0' => [14, 17, 19, 21, 25, 17, 14],
+        '1' => [4, 12, 4, 4, 4, 4, 14],
+        '2' => [14, 17, 1, 6, 8, 16, 31],
+        '3' => [31, 2, 4, 2, 1, 17, 14],
+        '4' => [2, 6, 10, 18, 31, 2, 2],
+        '5' => [31, 16, 30, 1, 1, 17, 14],
+        '6' => [6, 8, 16, 30, 17, 17, 14],
+        '7' => [31, 1, 2, 4, 8, 8, 8],
+        '8' => [14, 17, 17, 14, 17, 17, 14],
+        '9' => [14, 17, 17, 15, 1, 2, 12],
+        '.' => [0, 0, 0, 0, 0, 12, 12],
+        ',' => [0, 0, 0, 0, 12, 4, 8],
+        '-' => [0, 0, 0, 31, 0, 0, 0],
+        '%' => [24, 25, 2, 4, 8, 19, 3],
+        '(' => [2, 4, 8, 8, 8, 4, 2],
+        ')' => [8, 4, 2, 2, 2, 4, 8],
+        '/' => [0, 1, 2, 4, 8, 16, 0],
+        ':' => [0, 12, 12, 0, 12, 12, 0],
+        '_' => [0, 0, 0, 0, 0, 0, 31],
+        _ => [0; 7],
+    }
+}

@@ -1,0 +1,263 @@
+//! `plate.toml` and `plate.csv`.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::inputs::InputFile;
+use super::manifest::{check_format, read_toml, require_positive, to_toml};
+use super::plate::{Marker, Plate, PlateKind, ScaleBar};
+use super::table::{Row, Table, to_csv};
+use crate::{Error, Result};
+
+/// Prior sigma of a printed marker where the plate states none, m.
+pub const DEFAULT_TOLERANCE_M: f64 = 1e-4;
+
+const KNOWN: [&str; 10] =
+    ["id", "x_m", "y_m", "z_m", "outer_radius_m", "inner_radius_m", "sigma_m", "sigma_x_m", "sigma_y_m", "sigma_z_m"];
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlateFile {
+    format: u32,
+    kind: PlateKind,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    columns: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rows: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pitch_m: Option<f64>,
+    /// Radius of the dots of a circle-grid without a marker file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    radius_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    markers: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tolerance_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scale: Option<ScaleBar>,
+}
+
+/// Reads a plate: `plate.toml` and the marker file that it names.
+///
+/// # Errors
+/// By file and line: unknown keys or columns, missing sizes, doubles, circles that are none or overlap, markers that do
+/// not lie where their id says, an impossible scale bar.
+pub fn read_plate(path: &Path, inputs: &mut Vec<InputFile>) -> Result<Plate> {
+    let file: PlateFile = read_toml(path, inputs)?;
+    check_format(path, file.format)?;
+    for (key, value) in [("pitch_m", file.pitch_m), ("tolerance_m", file.tolerance_m), ("radius_m", file.radius_m)] {
+        require_positive(path, key, value)?;
+    }
+    let mut plate = nominal(path, &file)?;
+    if let Some(markers) = &file.markers {
+        let csv = path.with_file_name(markers);
+        plate.markers = read_markers(&Table::read(&csv, inputs)?, &plate)?;
+        check_ids(&csv, &plate)?;
+    }
+    check_overlap(path, &plate)?;
+    check_scale(path, &plate)?;
+    Ok(plate)
+}
+
+/// The plate as its TOML alone describes it.
+fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
+    let tolerance_m = file.tolerance_m.unwrap_or(DEFAULT_TOLERANCE_M);
+    let needs_file = matches!(file.kind, PlateKind::CodedCircles | PlateKind::Points);
+    if needs_file && file.markers.is_none() {
+        let what = "a plate of this kind needs a marker file";
+        return Err(Error::input(path.display(), what, "add markers = \"plate.csv\""));
+    }
+    if file.radius_m.is_some() && (file.kind != PlateKind::CircleGrid || file.markers.is_some()) {
+        let what = "radius_m is only for a circle-grid without a marker file";
+        return Err(Error::input(path.display(), what, "remove radius_m"));
+    }
+    if file.kind == PlateKind::Points {
+        let (columns, rows) = (file.columns.unwrap_or(0), file.rows.unwrap_or(0));
+        let pitch_m = file.pitch_m.unwrap_or(0.0);
+        let scale = file.scale;
+        return Ok(Plate { kind: file.kind, columns, rows, pitch_m, tolerance_m, scale, markers: Vec::new() });
+    }
+    let (Some(columns), Some(rows), Some(pitch_m)) = (file.columns, file.rows, file.pitch_m) else {
+        let what = "columns, rows and pitch_m are needed for a plate of this kind";
+        return Err(Error::input(path.display(), what, "add what is missing (pitch in metres)"));
+    };
+    if !(2..=1000).contains(&columns) || !(2..=1000).contains(&rows) {
+        let what = format!("columns = {columns}, rows = {rows}");
+        return Err(Error::input(path.display(), what, "give 2 to 1000 of each (inner corners of a chessboard)"));
+    }
+    if pitch_m >= 1.0 {
+        let what = format!("pitch_m = {pitch_m} makes a plate of {:.0} m", pitch_m * f64::from(columns));
+        return Err(Error::input(path.display(), what, "pitch_m is in metres: 18 mm are 0.018"));
+    }
+    let mut plate = Plate { scale: file.scale, ..Plate::lattice(file.kind, columns, rows, pitch_m, tolerance_m) };
+    for marker in &mut plate.markers {
+        marker.outer_radius_m = file.radius_m.unwrap_or(0.0);
+    }
+    Ok(plate)
+}
+
+fn read_markers(table: &Table, plate: &Plate) -> Result<Vec<Marker>> {
+    table.refuse_unknown(&KNOWN)?;
+    let id = table.require("id")?;
+    let xyz = [table.require("x_m")?, table.require("y_m")?, table.require("z_m")?];
+    let circles = matches!(plate.kind, PlateKind::CodedCircles | PlateKind::CircleGrid);
+    let radius = |name: &str| if circles { table.require(name).map(Some) } else { Ok(table.column(name)) };
+    let radii = [radius("outer_radius_m")?, radius("inner_radius_m")?];
+    let sigmas = ["sigma_m", "sigma_x_m", "sigma_y_m", "sigma_z_m"].map(|name| table.column(name));
+    let mut markers: Vec<(u64, Marker)> = Vec::new();
+    for row in &table.rows {
+        let [x, y, z] = xyz.map(|c| table.number(row, c));
+        let [outer_radius_m, inner_radius_m] = marker_radii(table, row, radii, circles)?;
+        let id = table.id(row, id)?;
+        let position_m = Vector3::new(x?, y?, z?);
+        let sigma_m = marker_sigma(table, row, sigmas)?.unwrap_or(plate.tolerance_m);
+        markers.push((row.line, Marker { id, position_m, outer_radius_m, inner_radius_m, sigma_m }));
+    }
+    if markers.is_empty() {
+        return Err(Error::input(table.place_of_header(), "has no markers", "give one row for every marker"));
+    }
+    markers.sort_by_key(|(line, m)| (m.id, *line));
+    if let Some(pair) = markers.windows(2).find(|p| p[0].1.id == p[1].1.id) {
+        let place = table.place_of_line(pair[1].0);
+        let what = format!("marker {} stands in line {} already", pair[1].1.id, pair[0].0);
+        return Err(Error::input(place, what, "give every marker one row"));
+    }
+    Ok(markers.into_iter().map(|(_, m)| m).collect())
+}
+
+/// Outer and inner radius, m; zero where a plate of points has no such column.
+fn marker_radii(table: &Table, row: &Row, columns: [Option<usize>; 2], circles: bool) -> Result<[f64; 2]> {
+    let read = |c: Option<usize>| c.map_or(Ok(0.0), |c| table.number(row, c));
+    let [outer, inner] = columns.map(read);
+    let (outer, inner) = (outer?, inner?);
+    let [Some(outer_column), inner_column] = columns else { return Ok([outer, inner]) };
+    if outer < 0.0 || (circles && outer == 0.0) {
+        return Err(table.refuse(row, outer_column, "is no radius", "give a positive radius in metres"));
+    }
+    if inner < 0.0 || inner > 0.0 && inner >= outer {
+        let what = format!("is not inside the outer radius {outer}");
+        return Err(table.refuse(row, inner_column.unwrap_or(outer_column), &what, "0 is a disc, else below outer"));
+    }
+    Ok([outer, inner])
+}
+
+/// `sigma_m`, or the largest of the three sigmas of a corrected plate.
+fn marker_sigma(table: &Table, row: &Row, columns: [Option<usize>; 4]) -> Result<Option<f64>> {
+    let mut sigma = None;
+    for column in columns.into_iter().flatten() {
+        let value = table.optional_number(row, Some(column))?;
+        if value.is_some_and(|v| v <= 0.0) {
+            return Err(table.refuse(row, column, "is no sigma", "give a positive number of metres"));
+        }
+        sigma = value.into_iter().chain(sigma).reduce(f64::max);
+    }
+    Ok(sigma)
+}
+
+/// Markers of a lattice lie where their id says: a mirrored, turned or millimetre plate is seen here.
+fn check_ids(csv: &Path, plate: &Plate) -> Result<()> {
+    if matches!(plate.kind, PlateKind::Points | PlateKind::CircleGrid) {
+        return Ok(());
+    }
+    let lattice = Plate::lattice(plate.kind, plate.columns, plate.rows, plate.pitch_m, plate.tolerance_m);
+    for marker in &plate.markers {
+        let place = || format!("{}, marker {}", csv.display(), marker.id);
+        let Some(wanted) = lattice.index_of(marker.id).map(|i| lattice.markers[i].position_m) else {
+            let what = format!("does not exist on a plate of {} x {}", plate.columns, plate.rows);
+            return Err(Error::input(place(), what, "ids are row-major from 0 at the top-left"));
+        };
+        let at = marker.position_m;
+        if (at - wanted).norm() > 0.5 * plate.pitch_m {
+            let what = format!(
+                "lies at ({}, {}, {}) m, but columns, rows and pitch_m put this id at ({}, {}, 0) m",
+                at.x, at.y, at.z, wanted.x, wanted.y
+            );
+            let remedy =
+                "metres; origin at the plate's centre, x right, y UP on the printed face, ids row-major from top-left";
+            return Err(Error::input(place(), what, remedy));
+        }
+    }
+    Ok(())
+}
+
+/// Neighbours must be apart by more than their radii.
+fn check_overlap(path: &Path, plate: &Plate) -> Result<()> {
+    let mut order: Vec<&Marker> = plate.markers.iter().collect();
+    order.sort_by(|a, b| a.position_m.x.total_cmp(&b.position_m.x));
+    let largest = order.iter().map(|m| m.outer_radius_m).fold(0.0, f64::max);
+    for (i, a) in order.iter().enumerate() {
+        // A point still occupies a micrometre, so that two of them cannot coincide.
+        let reach = a.outer_radius_m + largest + 1e-6;
+        for b in order[i + 1..].iter().take_while(|b| b.position_m.x - a.position_m.x <= reach) {
+            let distance = (a.position_m - b.position_m).norm();
+            if distance <= a.outer_radius_m + b.outer_radius_m + 1e-6 {
+                let (first, second) = (a.id.min(b.id), a.id.max(b.id));
+                let what = format!("markers {first} and {second} overlap: their centres are {distance} m apart");
+                return Err(Error::input(path.display(), what, "check positions and radii (not diameters), in metres"));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_scale(path: &Path, plate: &Plate) -> Result<()> {
+    let Some(scale) = plate.scale else { return Ok(()) };
+    require_positive(path, "scale.distance_m", Some(scale.distance_m))?;
+    require_positive(path, "scale.sigma_m", Some(scale.sigma_m))?;
+    let position = |id: u32| {
+        plate.index_of(id).map(|i| plate.markers[i].position_m).ok_or_else(|| {
+            let what = format!("[scale] names marker {id}, which does not exist");
+            Error::input(path.display(), what, "name two markers of the plate")
+        })
+    };
+    let nominal = (position(scale.from)? - position(scale.to)?).norm();
+    if (scale.distance_m / nominal - 1.0).abs() > 0.05 || nominal == 0.0 {
+        let what = format!(
+            "[scale] distance_m = {}, but markers {} and {} are nominally {nominal} m apart",
+            scale.distance_m, scale.from, scale.to
+        );
+        return Err(Error::input(path.display(), what, "check the marker ids and the unit (metres)"));
+    }
+    Ok(())
+}
+
+/// Text of `plate.toml`; `markers` is the name of the marker file, which coded circles and points need.
+///
+/// # Errors
+/// None in practice: every field can be written as TOML.
+pub fn plate_toml(plate: &Plate, markers: Option<&str>) -> Result<String> {
+    let lattice = plate.kind != PlateKind::Points || plate.columns > 0;
+    let radius = plate.markers.first().map(|m| m.outer_radius_m).filter(|r| *r > 0.0);
+    to_toml(
+        "plate.toml",
+        &PlateFile {
+            format: 1,
+            kind: plate.kind,
+            columns: lattice.then_some(plate.columns),
+            rows: lattice.then_some(plate.rows),
+            pitch_m: Some(plate.pitch_m).filter(|p| *p > 0.0),
+            radius_m: radius.filter(|_| plate.kind == PlateKind::CircleGrid && markers.is_none()),
+            markers: markers.map(str::to_string),
+            tolerance_m: Some(plate.tolerance_m),
+            scale: plate.scale,
+        },
+    )
+}
+
+/// Text of `plate.csv`; `sigma_m` only where a marker's differs from the plate's tolerance.
+pub fn plate_csv(plate: &Plate) -> String {
+    let sigmas = plate.markers.iter().any(|m| m.sigma_m != plate.tolerance_m);
+    let mut names: Vec<String> = KNOWN[..6].iter().map(|n| n.to_string()).collect();
+    names.extend(sigmas.then(|| "sigma_m".into()));
+    let mut rows = vec![names];
+    for m in &plate.markers {
+        let p = m.position_m;
+        let mut cells = vec![m.id.to_string()];
+        cells.extend([p.x, p.y, p.z, m.outer_radius_m, m.inner_radius_m].map(|v| format!("{v:?}")));
+        cells.extend(sigmas.then(|| format!("{:?}", m.sigma_m)));
+        rows.push(cells);
+    }
+    to_csv(&rows)
+}

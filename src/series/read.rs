@@ -1,0 +1,267 @@
+//! Reading a series folder.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use super::inputs::InputFile;
+use super::joints::Stops;
+use super::manifest::{AngleUnit, Manifest};
+use super::observation::ImageObservations;
+use super::observation_file;
+use super::plate::Plate;
+use super::plate_file::read_plate;
+use super::units;
+use crate::urdf::Chain;
+use crate::{Error, Notice, Result};
+
+const IMAGE_EXTENSIONS: [&str; 9] = ["png", "tif", "tiff", "pgm", "pnm", "ppm", "jpg", "jpeg", "bmp"];
+
+/// Where the image points come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Source {
+    /// Images, `Stop::path` of every stop.
+    Images {
+        /// The folder of the images.
+        folder: PathBuf,
+        /// Images with the lens cap on, if any.
+        dark: Vec<PathBuf>,
+        /// Images of uniform white, if any.
+        white: Vec<PathBuf>,
+    },
+    /// Observations from a file, in the order of the stops; stops without any are left out.
+    Observations(Vec<ImageObservations>),
+    /// A recording, which has the readings as well.
+    Recording(PathBuf),
+}
+
+/// A measurement series as read: nothing is judged yet but the files themselves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Name of the series: that of its folder.
+    pub name: String,
+    /// The folder.
+    pub folder: PathBuf,
+    /// The manifest as written; see [`Series::camera_name`] and [`Series::mounting`] for its defaults.
+    pub manifest: Manifest,
+    /// The plate.
+    pub plate: Plate,
+    /// Stops and raw readings (empty for a recording that has not been read yet).
+    pub stops: Stops,
+    /// Images, observations or a recording.
+    pub source: Source,
+    /// What was seen while reading that the user should know.
+    pub notices: Vec<Notice>,
+    /// Text files that were read, with their hashes; see [`Series::image_hashes`] for the images.
+    pub inputs: Vec<InputFile>,
+}
+
+/// Reads a series folder; `observations.csv` is used instead of images where it exists.
+///
+/// # Errors
+/// By file, line, image or joint: whatever does not follow the format or contradicts itself.
+pub fn read(folder: &Path) -> Result<Series> {
+    read_from(folder, folder.join("observations.csv").is_file())
+}
+
+/// Reads a series folder for its images, even where there is an `observations.csv`.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_images(folder: &Path) -> Result<Series> {
+    read_from(folder, false)
+}
+
+fn read_from(folder: &Path, use_observations: bool) -> Result<Series> {
+    let name = folder_name(folder)?;
+    let manifest_path = folder.join("series.toml");
+    let mut inputs = Vec::new();
+    let manifest = Manifest::read(&manifest_path, &mut inputs)?;
+    let plate = read_plate(&folder.join(&manifest.plate), &mut inputs)?;
+    let mut notices = Vec::new();
+    let mut stops = Stops::default();
+    let source = if let Some(recording) = &manifest.mcap {
+        Source::Recording(folder.join(recording))
+    } else {
+        stops = Stops::read(&folder.join("joints.csv"), &mut inputs)?;
+        if use_observations {
+            let path = folder.join("observations.csv");
+            observed(&path, &manifest, &plate, &stops, &mut inputs, &mut notices)?
+        } else {
+            pictured(folder, &mut stops, &mut notices)?
+        }
+    };
+    let folder = folder.to_path_buf();
+    Ok(Series { name, folder, manifest, plate, stops, source, notices, inputs })
+}
+
+fn folder_name(folder: &Path) -> Result<String> {
+    let full = folder.canonicalize().map_err(|e| Error::io(folder, &e))?;
+    if !full.is_dir() {
+        let remedy = "give the folder that holds series.toml";
+        return Err(Error::input(folder.display(), "is not a series folder", remedy));
+    }
+    Ok(full.file_name().map_or_else(|| "series".into(), |n| n.to_string_lossy().into_owned()))
+}
+
+fn observed(
+    path: &Path,
+    manifest: &Manifest,
+    plate: &Plate,
+    stops: &Stops,
+    inputs: &mut Vec<InputFile>,
+    notices: &mut Vec<Notice>,
+) -> Result<Source> {
+    let size = manifest.camera.width_px.zip(manifest.camera.height_px);
+    let images = observation_file::read(path, plate, size, inputs)?;
+    let (ordered, strange) = observation_file::in_order(images, stops.stops.iter().map(|s| s.image.as_str()));
+    observation_file::require_some(path, &ordered)?;
+    if !strange.is_empty() {
+        let what = format!("observes {} that joints.csv does not name: {}", count(strange.len()), some(&strange));
+        notices.push(Notice::new(
+            path.display(),
+            what,
+            "they are not used; add rows with empty joint cells to use them",
+        ));
+    }
+    let seen: BTreeSet<&str> = ordered.iter().map(|i| i.image.as_str()).collect();
+    let unseen: Vec<_> = stops.stops.iter().map(|s| s.image.clone()).filter(|i| !seen.contains(i.as_str())).collect();
+    if !unseen.is_empty() {
+        let what = format!("has no observation of {} in joints.csv: {}", count(unseen.len()), some(&unseen));
+        notices.push(Notice::new(path.display(), what, "they are left out"));
+    }
+    Ok(Source::Observations(ordered))
+}
+
+/// Finds the image of every stop, and tells of images without one.
+fn pictured(folder: &Path, stops: &mut Stops, notices: &mut Vec<Notice>) -> Result<Source> {
+    let images = folder.join("images");
+    let on_disk = image_files(&images)?;
+    let names: BTreeSet<String> = on_disk.iter().map(|p| file_name(p)).collect();
+    let csv = folder.join("joints.csv");
+    let mut missing = Vec::new();
+    for stop in &mut stops.stops {
+        if names.contains(&stop.image) {
+            stop.path = Some(images.join(&stop.image));
+        } else {
+            missing.push((stop.line, stop.image.clone()));
+        }
+    }
+    let remedy = |name: &str| match similar(name, &names) {
+        Some(there) => format!("\"{there}\" is there: write the name exactly"),
+        None => "copy the image or remove the row".to_string(),
+    };
+    // Some images lost among many are left out by name; most images lost is a wrong folder or wrong names.
+    if let Some((line, name)) = missing.first().filter(|_| 2 * missing.len() > stops.stops.len()) {
+        let what = format!(
+            "image \"{name}\" is not in {} ({} of {} images are missing; {} are there)",
+            images.display(),
+            missing.len(),
+            stops.stops.len(),
+            names.len()
+        );
+        return Err(Error::input(format!("{}:{line}", csv.display()), what, remedy(name)));
+    }
+    for (line, name) in &missing {
+        let what = format!("image \"{name}\" is not in {} and is left out", images.display());
+        notices.push(Notice::new(format!("{}:{line}", csv.display()), what, remedy(name)));
+    }
+    let named: BTreeSet<&str> = stops.stops.iter().map(|s| s.image.as_str()).collect();
+    let unnamed: Vec<String> = names.iter().filter(|n| !named.contains(n.as_str())).cloned().collect();
+    if !unnamed.is_empty() {
+        let what = format!("{} that no row of joints.csv names: {}", count(unnamed.len()), some(&unnamed));
+        notices.push(Notice::new(
+            images.display(),
+            what,
+            "they are not used; add a row with empty joint cells to use one",
+        ));
+    }
+    let optional = |name: &str| {
+        let path = folder.join(name);
+        if path.is_dir() { image_files(&path) } else { Ok(Vec::new()) }
+    };
+    Ok(Source::Images { dark: optional("dark")?, white: optional("white")?, folder: images })
+}
+
+/// Image files of a folder in the order of their names.
+fn image_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::io(folder, &e))?;
+    let mut files = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|e| Error::io(folder, &e))?.path();
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        let hidden = file_name(&path).starts_with('.');
+        if extension.is_some_and(|e| IMAGE_EXTENSIONS.contains(&e.as_str())) && !hidden {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+}
+
+/// A name on disk that differs by case or extension only.
+fn similar<'a>(name: &str, names: &'a BTreeSet<String>) -> Option<&'a str> {
+    let stem = |s: &str| s.rsplit_once('.').map_or(s, |(stem, _)| stem).to_lowercase();
+    let same = |there: &&String| {
+        there.eq_ignore_ascii_case(name) || stem(there) == stem(name) || stem(there) == name.to_lowercase()
+    };
+    names.iter().find(same).map(String::as_str)
+}
+
+fn count(images: usize) -> String {
+    if images == 1 { "1 image".into() } else { format!("{images} images") }
+}
+
+/// The first few names.
+fn some(names: &[String]) -> String {
+    let more = if names.len() > 3 { ", ..." } else { "" };
+    format!("{}{more}", names[..names.len().min(3)].join(", "))
+}
+
+impl Series {
+    /// Series with this camera share intrinsics.
+    pub fn camera_name(&self) -> &str {
+        self.manifest.camera.name.as_deref().unwrap_or(&self.name)
+    }
+
+    /// Series with this mounting share the hand-camera offset.
+    pub fn mounting(&self) -> &str {
+        self.manifest.camera.mounting.as_deref().unwrap_or(&self.name)
+    }
+
+    /// Unit of the revolute columns; recordings are in rad.
+    pub fn joint_unit(&self) -> AngleUnit {
+        self.manifest.joint_unit.unwrap_or(AngleUnit::Rad)
+    }
+
+    /// Readings of every stop in the order of `Chain::readings`, matched by name, rad and m; `None` for images taken
+    /// off the robot.
+    ///
+    /// # Errors
+    /// A joint of the chain that has no column (the columns are listed), and a `joint_unit` that cannot be true.
+    pub fn readings_for(&self, chain: &Chain) -> Result<Vec<Option<Vec<f64>>>> {
+        units::readings_for(&self.folder.join("joints.csv"), &self.stops, self.joint_unit(), chain)
+    }
+
+    /// What the readings of a chain give reason to say: columns that are not used, values beyond the URDF's limits.
+    pub fn reading_notices(&self, chain: &Chain) -> Vec<Notice> {
+        units::notices(&self.folder.join("joints.csv"), &self.stops, self.joint_unit(), chain)
+    }
+
+    /// Hashes of all image files (stops in order, then dark and white).
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn image_hashes(&self) -> Result<Vec<InputFile>> {
+        let mut files: Vec<&Path> = self.stops.stops.iter().filter_map(|s| s.path.as_deref()).collect();
+        if let Source::Images { dark, white, .. } = &self.source {
+            files.extend(dark.iter().chain(white).map(PathBuf::as_path));
+        }
+        files.into_par_iter().map(InputFile::of_file).collect()
+    }
+}

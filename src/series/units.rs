@@ -1,0 +1,209 @@
+//! Readings in chain order and SI, and whether the stated unit can be true.
+
+use std::path::Path;
+
+use super::joints::Stops;
+use super::manifest::AngleUnit;
+use crate::urdf::{Chain, Joint, JointKind};
+use crate::{Error, Notice, Result};
+
+/// No joint of an arm turns further than two full turns from zero on most of its stops.
+const TWO_TURNS_RAD: f64 = 4.0 * std::f64::consts::PI;
+/// A description may limit a joint to half a turn where the real one makes a whole turn to either side (UR arms).
+const FOREIGN_LIMITS_RAD: f64 = std::f64::consts::PI;
+/// Soft limits of controllers differ from those of the description by less than this.
+const SOFT_LIMITS_RAD: f64 = 0.5;
+/// Readings that all stay below this number of degrees are a whole turn if they are radians.
+const SMALL_DEG: f64 = 6.3;
+/// Fewer stops than this say nothing about their unit.
+const MANY_STOPS: usize = 5;
+
+/// Readings of every stop in the order of `Chain::readings`, rad and m; `None` for images taken off the robot.
+///
+/// # Errors
+/// A joint of the chain that has no column, and a unit that cannot be true.
+pub(super) fn readings_for(
+    file: &Path,
+    stops: &Stops,
+    unit: AngleUnit,
+    chain: &Chain,
+) -> Result<Vec<Option<Vec<f64>>>> {
+    let columns = columns_of(file, stops, chain)?;
+    let raw: Vec<Option<Vec<f64>>> = stops
+        .stops
+        .iter()
+        .map(|stop| stop.raw_readings.as_ref().map(|r| columns.iter().map(|&c| r[c]).collect()))
+        .collect();
+    let known: Vec<&[f64]> = raw.iter().flatten().map(Vec::as_slice).collect();
+    check_unit(file, unit, chain, &known)?;
+    Ok(raw.into_iter().map(|row| row.map(|q| to_si(chain, unit, &q))).collect())
+}
+
+fn columns_of(file: &Path, stops: &Stops, chain: &Chain) -> Result<Vec<usize>> {
+    let find = |name: &String| stops.joints.iter().position(|j| j == name);
+    let missing: Vec<&str> = chain.readings.iter().filter(|n| find(n).is_none()).map(String::as_str).collect();
+    if missing.is_empty() {
+        return Ok(chain.readings.iter().filter_map(find).collect());
+    }
+    let what = format!(
+        "has no readings of {} (needed from {} to {}); its joint columns are: {}",
+        missing.join(", "),
+        chain.base,
+        chain.tip,
+        stops.joints.join(", ")
+    );
+    let remedy = "name the columns as the joints in the URDF, or choose another base or tip";
+    Err(Error::input(file.display(), what, remedy))
+}
+
+fn to_si(chain: &Chain, unit: AngleUnit, raw: &[f64]) -> Vec<f64> {
+    let si = |(q, kind): (&f64, &JointKind)| match kind {
+        JointKind::Revolute => q * unit.in_rad(),
+        _ => *q,
+    };
+    raw.iter().zip(&chain.reading_kinds).map(si).collect()
+}
+
+/// The joint of the chain that a reading moves directly.
+fn own_joint(chain: &Chain, reading: usize) -> Option<&Joint> {
+    chain.joints.iter().find(|j| j.name == chain.readings[reading])
+}
+
+/// Limits of a reading, where its joint lies in the chain and states them.
+fn limits(chain: &Chain, reading: usize) -> Option<(f64, f64)> {
+    own_joint(chain, reading)?.limits
+}
+
+fn revolute(chain: &Chain) -> impl Iterator<Item = usize> + Clone + '_ {
+    (0..chain.readings.len()).filter(|&i| chain.reading_kinds[i] == JointKind::Revolute)
+}
+
+/// Whether the limits of these readings hold to within `slack` (rad or m) when the raw values are multiplied by `factor`.
+fn fits(chain: &Chain, mut readings: impl Iterator<Item = usize>, q: &[f64], factor: f64, slack: f64) -> bool {
+    readings.all(|i| limits(chain, i).is_none_or(|(low, high)| (low - slack..=high + slack).contains(&(q[i] * factor))))
+}
+
+fn check_unit(file: &Path, unit: AngleUnit, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
+    if rows.is_empty() {
+        return Ok(());
+    }
+    match unit {
+        AngleUnit::Rad => refuse_degrees_as_radians(file, chain, rows)?,
+        AngleUnit::Deg => refuse_radians_as_degrees(file, chain, rows)?,
+    }
+    refuse_millimetres(file, chain, rows)
+}
+
+fn refuse_degrees_as_radians(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
+    let possible = |q: &[f64], factor, slack| fits(chain, revolute(chain), q, factor, slack);
+    let mostly = |test: &dyn Fn(&[f64]) -> bool| 2 * rows.iter().filter(|q| test(q)).count() > rows.len();
+    let beyond_limits =
+        mostly(&|q| !possible(q, 1.0, FOREIGN_LIMITS_RAD) && possible(q, AngleUnit::Deg.in_rad(), SOFT_LIMITS_RAD));
+    let turning = revolute(chain).filter(|&i| mostly(&|q| q[i].abs() > TWO_TURNS_RAD)).count();
+    // One axis of many may be wound up; a third of them is not.
+    let wound_up = turning > 0 && 3 * turning >= revolute(chain).count();
+    if !beyond_limits && !wound_up {
+        return Ok(());
+    }
+    let (joint, (low, high)) = widest(chain, rows);
+    let why = match beyond_limits {
+        true => "beyond the limits in the URDF, which they keep if they are degrees",
+        false => "more than two turns as radians",
+    };
+    let what = format!("joint_unit is rad, but {joint} reads {low} to {high}: most rows are {why}");
+    Err(Error::input(file.display(), what, "write joint_unit = \"deg\" in series.toml"))
+}
+
+fn refuse_radians_as_degrees(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
+    let all = || revolute(chain).flat_map(|i| rows.iter().map(move |q| q[i]));
+    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(q), h.max(q)));
+    let small = low > -SMALL_DEG && high < SMALL_DEG && all().next().is_some();
+    if !small
+        || rows.len() < MANY_STOPS
+        || !rows.iter().all(|q| fits(chain, revolute(chain), q, 1.0, FOREIGN_LIMITS_RAD))
+    {
+        return Ok(());
+    }
+    let (joint, (joint_low, joint_high)) = widest(chain, rows);
+    let what = format!(
+        "joint_unit is deg, but all readings lie between {low} and {high} ({joint}: {joint_low} to {joint_high}): \
+         as degrees the robot hardly moves, as radians they are usual"
+    );
+    let remedy =
+        "write joint_unit = \"rad\" in series.toml (if they are degrees, convert them to radians in joints.csv)";
+    Err(Error::input(file.display(), what, remedy))
+}
+
+fn refuse_millimetres(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
+    let sliding = || (0..chain.readings.len()).filter(|&i| chain.reading_kinds[i] == JointKind::Prismatic);
+    let beyond = |i: usize| {
+        let only = || std::iter::once(i);
+        let count =
+            rows.iter().filter(|q| !fits(chain, only(), q, 1.0, 1.0) && fits(chain, only(), q, 1e-3, 0.01)).count();
+        2 * count > rows.len()
+    };
+    let Some(reading) = sliding().find(|&i| beyond(i)) else { return Ok(()) };
+    let (low, high) = range(rows, reading);
+    let what = format!(
+        "{} reads {low} to {high}, beyond the limits in the URDF, which it keeps if it is in millimetres",
+        chain.readings[reading]
+    );
+    Err(Error::input(file.display(), what, "prismatic joints are metres: divide the column by 1000"))
+}
+
+/// Name and range of the revolute reading that reaches furthest from zero.
+fn widest<'a>(chain: &'a Chain, rows: &[&[f64]]) -> (&'a str, (f64, f64)) {
+    let reach = |i: usize| rows.iter().map(|q| q[i].abs()).fold(0.0, f64::max);
+    let widest = revolute(chain).max_by(|&a, &b| reach(a).total_cmp(&reach(b)));
+    widest.map_or(("", (0.0, 0.0)), |i| (&chain.readings[i], range(rows, i)))
+}
+
+fn range(rows: &[&[f64]], reading: usize) -> (f64, f64) {
+    rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(q[reading]), h.max(q[reading])))
+}
+
+/// Columns that the chain does not need, and readings beyond the limits of the URDF.
+pub(super) fn notices(file: &Path, stops: &Stops, unit: AngleUnit, chain: &Chain) -> Vec<Notice> {
+    let mut notices = Vec::new();
+    let extra: Vec<&str> = stops.joints.iter().filter(|j| !chain.readings.contains(j)).map(String::as_str).collect();
+    if !extra.is_empty() {
+        let what = format!("columns that are no joints between {} and {}: {}", chain.base, chain.tip, extra.join(", "));
+        notices.push(Notice::new(file.display(), what, "they are not used; check the spelling if they should be"));
+    }
+    let Ok(columns) = columns_of(file, stops, chain) else { return notices };
+    for (reading, column) in columns.into_iter().enumerate() {
+        notices.extend(beyond_limits(file, stops, unit, chain, reading, column));
+    }
+    notices
+}
+
+/// The worst offender of one joint, and how many there are.
+fn beyond_limits(
+    file: &Path,
+    stops: &Stops,
+    unit: AngleUnit,
+    chain: &Chain,
+    reading: usize,
+    column: usize,
+) -> Option<Notice> {
+    let (low, high) = limits(chain, reading)?;
+    let revolute = chain.reading_kinds[reading] == JointKind::Revolute;
+    let factor = if revolute { unit.in_rad() } else { 1.0 };
+    let beyond = |q: f64| (low - q).max(q - high);
+    let outside: Vec<_> = stops
+        .stops
+        .iter()
+        .filter_map(|s| Some((s, s.raw_readings.as_ref()?[column] * factor)))
+        .filter(|(_, q)| beyond(*q) > 1e-9)
+        .collect();
+    let (stop, worst) = outside.iter().max_by(|a, b| beyond(a.1).total_cmp(&beyond(b.1)))?;
+    let shown = if revolute { "rad" } else { "m" };
+    let what = format!(
+        "{} reads {worst:.4} {shown}, beyond its limits {low} to {high} in the URDF ({} of {} images)",
+        chain.readings[reading],
+        outside.len(),
+        stops.stops.len()
+    );
+    let place = format!("{}:{}, image {}", file.display(), stop.line, stop.image);
+    Some(Notice::new(place, what, "check the joint's unit and sign, or correct the limits"))
+}
