@@ -9,6 +9,7 @@ mod detection;
 mod load;
 mod picture;
 mod run;
+mod saddle;
 
 pub use detection::{Detection, Dropped};
 pub use load::{LUMA_WEIGHTS, load};
