@@ -120,10 +120,10 @@ def bayer16(stamp, stop, shot):
     return image(stamp, rows.tobytes(), "bayer_rggb16", 2 * (WIDTH + 3), 1)
 
 
-def ros2_support(path):
-    """lz4 chunks, png and jpeg as CompressedImage, a camera info; the gripper has its own publisher."""
+def ros2_support(path, compression):
+    """Compressed chunks; png and jpeg as CompressedImage, a camera info; the gripper has its own publisher."""
     with open(path, "wb") as file:
-        writer = Ros2Writer(file, chunk_size=16384, compression=CompressionType.LZ4)
+        writer = Ros2Writer(file, chunk_size=16384, compression=compression)
         js = writer.register_msgdef("sensor_msgs/msg/JointState", definition("sensor_msgs/msg/JointState"))
         ci = writer.register_msgdef("sensor_msgs/msg/CompressedImage", definition("sensor_msgs/msg/CompressedImage"))
         info = writer.register_msgdef("sensor_msgs/msg/CameraInfo", definition("sensor_msgs/msg/CameraInfo"))
@@ -172,5 +172,6 @@ if __name__ == "__main__":
     rosbag2(target / "mono8", mono8)
     rosbag2(target / "bayer16_big_endian", bayer16, little_endian=False)
     rosbag2(target / "zipped_messages", mono8, compression=CompressionMode.MESSAGE)
-    ros2_support(target / "compressed.mcap")
+    ros2_support(target / "lz4.mcap", CompressionType.LZ4)
+    ros2_support(target / "zstd.mcap", CompressionType.ZSTD)
     others(target)

@@ -11,6 +11,7 @@ mod observation_file;
 mod plate;
 mod plate_file;
 mod read;
+mod recorded;
 mod table;
 mod units;
 
@@ -25,3 +26,4 @@ pub use observation_file::observations_csv;
 pub use plate::{Marker, Plate, PlateKind, ScaleBar};
 pub use plate_file::{DEFAULT_TOLERANCE_M, plate_csv, plate_toml, read_plate};
 pub use read::{Series, Source, read, read_images};
+pub use recorded::convert_recording;

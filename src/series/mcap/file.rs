@@ -59,6 +59,20 @@ pub(super) fn files_of(recording: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+/// Refuses other kinds of recordings, with the command that converts them.
+///
+/// # Errors
+/// As the name says; a recording that cannot be read.
+pub(in crate::series) fn require_mcap(recording: &Path) -> Result<()> {
+    for path in files_of(recording)? {
+        let head = head(&path)?;
+        if !head.starts_with(mcap::MAGIC) {
+            return Err(not_mcap(&path, &head));
+        }
+    }
+    Ok(())
+}
+
 /// rosbag2 numbers the files of a long recording: `name_0.mcap`, ..., `name_10.mcap`.
 fn split_number(path: &Path) -> (Option<u64>, PathBuf) {
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();

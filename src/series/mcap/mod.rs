@@ -14,5 +14,6 @@ mod pixels;
 mod scan;
 
 pub use extract::{Extracted, StopReport, extract};
+pub(super) use file::require_mcap;
 pub use messages::CameraInfo;
 pub use options::{Clock, Motion, Picking, RecordingOptions};

@@ -55,7 +55,7 @@ pub(super) fn to_image(raw: &RawImage) -> Decoded<DynamicImage> {
         _ => 1,
     };
     let (width, height) = (raw.width as usize, raw.height as usize);
-    let row_bytes = width.checked_mul(samples * depth).unwrap_or(usize::MAX);
+    let row_bytes = width.saturating_mul(samples * depth);
     let needed = raw.step.checked_mul(height.saturating_sub(1)).and_then(|n| n.checked_add(row_bytes));
     if width == 0 || height == 0 || raw.step < row_bytes || needed.is_none_or(|n| n > raw.data.len()) {
         return Err(format!(
@@ -232,7 +232,7 @@ mod tests {
     #[test]
     fn the_sharper_picture_wins_and_the_mean_has_less_noise() {
         let stripes = |low: u8, high: u8| {
-            let pixel = |x: u32, _| Luma([if x / 4 % 2 == 0 { low } else { high }]);
+            let pixel = |x: u32, _| Luma([if (x / 4).is_multiple_of(2) { low } else { high }]);
             DynamicImage::ImageLuma8(ImageBuffer::from_fn(32, 16, pixel))
         };
         assert!(sharpness(&stripes(0, 200)) > sharpness(&stripes(40, 160)));

@@ -171,7 +171,8 @@ impl Scan {
             }
             (None, [one]) => Ok(one),
             (None, []) => {
-                let said = format!("has no {what}; its topics are: {}", all());
+                let damage: String = self.notices.iter().map(|n| format!(" ({})", n.what)).collect();
+                let said = format!("has no {what}{damage}; its topics are: {}", all());
                 Err(Error::input(place(), said, "record them as well (ros2 bag record -s mcap -a)"))
             }
             (None, several) => {
