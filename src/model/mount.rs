@@ -3,20 +3,9 @@
 //! hand:  `camera_from_plate = flange_from_camera^-1 * base_from_flange^-1 * base_from_plate`
 //! fixed: `camera_from_plate = base_from_camera^-1   * base_from_flange    * flange_from_plate`
 
-use nalgebra::Matrix6;
-use serde::{Deserialize, Serialize};
-
 use crate::geom::{Pose, adjoint};
-
-/// Where the camera is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum CameraMount {
-    /// On the tip of the robot; the plate is fixed in the base.
-    Hand,
-    /// Fixed in the base; the plate is on the tip.
-    Fixed,
-}
+use crate::series::CameraMount;
+use nalgebra::Matrix6;
 
 /// A predicted camera pose with its derivatives as body twists of `camera_from_plate`.
 #[derive(Debug, Clone)]

@@ -13,8 +13,8 @@ pub use state::{PlateShape, Slack, State, Step};
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::model::mount::CameraMount;
 use crate::model::robot::Stop;
+use crate::series::CameraMount;
 use crate::series::{Edge, Plate};
 
 /// One observation, ready for the adjustment.

@@ -5,9 +5,9 @@ use nalgebra::{Matrix2, Vector2};
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
-use crate::model::mount::CameraMount;
 use crate::model::robot::{Robot, Stop};
 use crate::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State};
+use crate::series::CameraMount;
 use crate::series::{Edge, Observation, Plate};
 
 /// One series after detection, joint readings in SI and in the order of the chain.

@@ -5,10 +5,12 @@
 mod build;
 mod free_poses;
 mod joint;
+mod measure;
 mod solution;
 mod start;
 
 pub use build::{MeasuredSeries, MeasuredStop};
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
 pub use joint::{JointNoise, Options, RobotModel, identify};
+pub use measure::{Measured, measure};
 pub use solution::{Solution, StartVerdict};

@@ -8,8 +8,8 @@ use crate::error::{Error, Result};
 use crate::geom::{Pose, log_so3};
 use crate::init::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
 use crate::linalg::symmetric_eigen;
-use crate::model::mount::CameraMount;
 use crate::problem::{Problem, Slack, State, predict};
+use crate::series::CameraMount;
 
 /// Robust spread (rad + m) of the best closed form beyond which readings and images do not belong together.
 const WORST_SPREAD: f64 = 0.08;

@@ -54,8 +54,7 @@ impl Covariance {
         let plate = |p: usize| {
             let count = problem.plates[p].markers.len();
             let seen: Vec<usize> = (0..count).filter(|&m| self.system.seen(p, m)).collect();
-            let parts: Vec<_> =
-                seen.par_iter().map(|&m| self.system.marker_coupling(problem, lin, p, m)).collect();
+            let parts: Vec<_> = seen.par_iter().map(|&m| self.system.marker_coupling(problem, lin, p, m)).collect();
             let mut d = DMatrix::zeros(3 * seen.len(), self.reduced.nrows());
             for (k, (_, rows)) in parts.iter().enumerate() {
                 d.rows_mut(3 * k, 3).copy_from(rows);

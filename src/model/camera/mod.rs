@@ -31,6 +31,8 @@ pub(super) struct Distorted {
 }
 
 impl Lens {
+    const ALL: [Self; 1] = [Self::Brown];
+
     /// Name in files.
     pub fn name(self) -> &'static str {
         match self {
@@ -40,7 +42,12 @@ impl Lens {
 
     /// The lens of a name in files.
     pub fn from_name(name: &str) -> Option<Self> {
-        [Self::Brown].into_iter().find(|lens| lens.name() == name)
+        Self::ALL.into_iter().find(|lens| lens.name() == name)
+    }
+
+    /// Names of all lenses, as in files.
+    pub fn names() -> Vec<&'static str> {
+        Self::ALL.iter().map(|lens| lens.name()).collect()
     }
 
     /// Names of the lens coefficients (dimensionless), in the order of OpenCV.
