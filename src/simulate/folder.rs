@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::series::{observations_csv, plate_csv, plate_toml};
 
 /// What stands for the measurements.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub enum Content<'a> {
     /// `observations.csv`.
     Observations,

@@ -26,11 +26,8 @@ pub fn observe(plate: &Plate, camera: &Camera, camera_from_plate: &Pose, sigma_p
                 continue;
             }
             let Some(uv) = circle::centroid_uv(camera, camera_from_plate, &marker.position_m, radius_m) else { continue };
-            let noise = || sigma_px * rng.sample::<f64, _>(StandardNormal);
-            let [u, v] = [(); 2].map({
-                let mut noise = noise;
-                move |()| noise()
-            });
+            let mut noise = || sigma_px * rng.sample::<f64, _>(StandardNormal);
+            let (u, v) = (noise(), noise());
             let covariance = (sigma_px > 0.0).then_some([sigma_px * sigma_px, 0.0, sigma_px * sigma_px]);
             seen.push(Observation { marker: marker.id, edge, uv: [uv.x + u, uv.y + v], covariance });
         }

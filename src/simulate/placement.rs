@@ -45,7 +45,10 @@ pub(super) fn set_up(request: &WorldRequest, robot: &Robot, rng: &mut impl Rng) 
             *plate = *plate * near([0.0, 0.0, 0.02], [0.2, 0.3, 0.8], rng);
         }
         let candidates = fixed_cameras(reach);
-        setup.camera = best(&candidates, request, robot, rng, |c| Setup { camera: *c, ..setup.clone_with(&setup.plates) })?;
+        setup.camera = best(&candidates, request, robot, rng, |c| Setup {
+            camera: *c,
+            ..setup.clone_with(&setup.plates)
+        })?;
         return Ok(setup);
     }
     for k in 0..request.placements.max(1) {
@@ -102,7 +105,7 @@ fn plates_on_tables(reach: f64, placement: usize, rng: &mut impl Rng) -> Vec<Pos
 /// Cameras on a stand before the robot that look back at it.
 fn fixed_cameras(reach: f64) -> Vec<Pose> {
     // Optical axis along -x of the base, image down along -z.
-    let looking_back = Matrix3::from_columns(&[Vector3::y(), -Vector3::z(), -Vector3::x()]);
+    let looking_back = Matrix3::from_columns(&[Vector3::<f64>::y(), -Vector3::z(), -Vector3::x()]);
     let mut all = Vec::new();
     for height in [0.4, 0.6, 0.2] {
         for distance in [0.9, 1.1, 0.75] {

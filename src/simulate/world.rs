@@ -214,7 +214,8 @@ fn true_robot(request: &WorldRequest, rng: &mut impl Rng) -> Robot {
 fn true_plate(request: &WorldRequest, rng: &mut impl Rng) -> Plate {
     let mut plate = request.plate.clone();
     for marker in &mut plate.markers {
-        marker.position_m += Vector3::from_fn(|_, _| normal(request.marker_sigma_m, rng));
+        // Whole nanometres keep truth.toml short.
+        marker.position_m += Vector3::from_fn(|_, _| (normal(request.marker_sigma_m, rng) * 1e9).round() / 1e9);
     }
     plate
 }
@@ -368,7 +369,7 @@ fn terms_by_name(robot: &Robot) -> Vec<TermRecord> {
 
 fn marker_errors(nominal: &Plate, actual: &Plate) -> Vec<[f64; 3]> {
     let pairs = nominal.markers.iter().zip(&actual.markers);
-    pairs.map(|(n, a)| (a.position_m - n.position_m).into()).collect()
+    pairs.map(|(n, a)| (a.position_m - n.position_m).map(|v| (v * 1e9).round() / 1e9).into()).collect()
 }
 
 fn manifest(request: &WorldRequest) -> Manifest {
