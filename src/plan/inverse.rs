@@ -78,7 +78,13 @@ pub fn solve_from(robot: &Robot, limits: &[(f64, f64)], base_from_tip: &Pose, st
 }
 
 /// Readings that bring the tip to `base_from_tip`, from up to `starts` random starts.
-pub fn solve(robot: &Robot, limits: &[(f64, f64)], base_from_tip: &Pose, starts: usize, rng: &mut impl Rng) -> Option<Vec<f64>> {
+pub fn solve(
+    robot: &Robot,
+    limits: &[(f64, f64)],
+    base_from_tip: &Pose,
+    starts: usize,
+    rng: &mut impl Rng,
+) -> Option<Vec<f64>> {
     (0..starts).find_map(|_| {
         let start = random_readings(limits, &robot.chain.reading_kinds, rng);
         solve_from(robot, limits, base_from_tip, &start)

@@ -89,6 +89,7 @@ pub fn save(path: &Path, picture: &Picture) -> Result<()> {
         ImageBuffer::<Luma<u16>, _>::from_raw(width, height, picture.pixels.iter().map(|&v| v as u16).collect())
             .map(DynamicImage::ImageLuma16)
     };
-    let image = image.ok_or_else(|| Error::input(path.display(), "has not as many pixels as it says", "report this"))?;
+    let image =
+        image.ok_or_else(|| Error::input(path.display(), "has not as many pixels as it says", "report this"))?;
     image.save(path).map_err(|e| Error::input(path.display(), e, "check that the disk is writable and not full"))
 }

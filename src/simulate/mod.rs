@@ -1,6 +1,7 @@
 //! A world with known truth: rendered images, simulated robots, series with everything known.
 
 pub mod conditions;
+pub mod faults;
 pub mod folder;
 mod observe;
 mod placement;

@@ -15,7 +15,13 @@ const BORDER_PX: f64 = 3.0;
 
 /// Observations of all markers that are wholly in the image and large enough, both edges of annuli, with independent noise of
 /// `sigma_px` per axis.
-pub fn observe(plate: &Plate, camera: &Camera, camera_from_plate: &Pose, sigma_px: f64, rng: &mut impl Rng) -> Vec<Observation> {
+pub fn observe(
+    plate: &Plate,
+    camera: &Camera,
+    camera_from_plate: &Pose,
+    sigma_px: f64,
+    rng: &mut impl Rng,
+) -> Vec<Observation> {
     let mut seen = Vec::new();
     if camera_from_plate.inverse().translation.z <= 0.0 {
         return seen; // The back of the plate.
@@ -25,7 +31,9 @@ pub fn observe(plate: &Plate, camera: &Camera, camera_from_plate: &Pose, sigma_p
             if edge == Edge::Inner && radius_m <= 0.0 {
                 continue;
             }
-            let Some(uv) = circle::centroid_uv(camera, camera_from_plate, &marker.position_m, radius_m) else { continue };
+            let Some(uv) = circle::centroid_uv(camera, camera_from_plate, &marker.position_m, radius_m) else {
+                continue;
+            };
             let mut noise = || sigma_px * rng.sample::<f64, _>(StandardNormal);
             let (u, v) = (noise(), noise());
             let covariance = (sigma_px > 0.0).then_some([sigma_px * sigma_px, 0.0, sigma_px * sigma_px]);

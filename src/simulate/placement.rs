@@ -45,10 +45,8 @@ pub(super) fn set_up(request: &WorldRequest, robot: &Robot, rng: &mut impl Rng) 
             *plate = *plate * near([0.0, 0.0, 0.02], [0.2, 0.3, 0.8], rng);
         }
         let candidates = fixed_cameras(reach);
-        setup.camera = best(&candidates, request, robot, rng, |c| Setup {
-            camera: *c,
-            ..setup.clone_with(&setup.plates)
-        })?;
+        setup.camera =
+            best(&candidates, request, robot, rng, |c| Setup { camera: *c, ..setup.clone_with(&setup.plates) })?;
         return Ok(setup);
     }
     for k in 0..request.placements.max(1) {
@@ -61,10 +59,7 @@ pub(super) fn set_up(request: &WorldRequest, robot: &Robot, rng: &mut impl Rng) 
 
 /// A pose near the given one: 5 mm and 0.05 rad about it.
 fn near(xyz: [f64; 3], rpy: [f64; 3], rng: &mut impl Rng) -> Pose {
-    Pose::from_xyz_rpy(
-        xyz.map(|v| v + rng.random_range(-0.005..0.005)),
-        rpy.map(|v| v + rng.random_range(-0.05..0.05)),
-    )
+    Pose::from_xyz_rpy(xyz.map(|v| v + rng.random_range(-0.005..0.005)), rpy.map(|v| v + rng.random_range(-0.05..0.05)))
 }
 
 /// Length of the arm: the sum of all origins behind the first moving joint, m.

@@ -149,7 +149,11 @@ impl Truth {
     pub fn robot(&self, chain: &Chain) -> Result<Robot> {
         let mut robot = Robot::nominal(chain.clone());
         let unknown = |name: &str| {
-            Error::input("truth.toml", format!("joint \"{name}\" is not in the chain"), "give the URDF that it was made with")
+            Error::input(
+                "truth.toml",
+                format!("joint \"{name}\" is not in the chain"),
+                "give the URDF that it was made with",
+            )
         };
         for (name, twist) in &self.twists {
             let index = chain.joints.iter().position(|j| j.name == *name).ok_or_else(|| unknown(name))?;

@@ -252,13 +252,8 @@ impl World<'_> {
                 kinds.iter().map(|&k| normal(scaled(request.joint_noise_rad, k), &mut self.rng)).collect();
             let tip = self.actual.pose_at(&Visit { readings: readings.clone(), approach }, &noise);
             let camera_from_plate = self.setup.camera_from_plate(request.mount, &tip, at);
-            let seen = observe(
-                &self.true_plate,
-                &request.camera,
-                &camera_from_plate,
-                request.pixel_sigma_px,
-                &mut self.rng,
-            );
+            let seen =
+                observe(&self.true_plate, &request.camera, &camera_from_plate, request.pixel_sigma_px, &mut self.rng);
             let mut markers: Vec<u32> = seen.iter().map(|o| o.marker).collect();
             markers.dedup();
             if markers.len() >= request.least_markers {
@@ -278,7 +273,11 @@ impl World<'_> {
         let posture =
             (0..ATTEMPTS).find_map(|_| self.setup.random_posture(self.request, &self.nominal, at, &mut self.rng));
         let readings = posture.ok_or_else(|| {
-            Error::unsolved("simulated joint vectors", "no view of the plate is in reach", "choose another plate or robot")
+            Error::unsolved(
+                "simulated joint vectors",
+                "no view of the plate is in reach",
+                "choose another plate or robot",
+            )
         })?;
         let base_from_tip = PoseRecord::from(&self.actual.base_from_tip(&readings));
         Ok(HeldOutRecord { readings, base_from_tip })
