@@ -1,6 +1,93 @@
 //! Flags, progress, one thin file per subcommand; the only room that prints.
+//!
+//! To add a subcommand: a file with its `Args` and `run`, a variant of [`Command`] and a row in [`Command::run`].
+
+mod identify;
+mod progress;
+mod summary;
+mod verify;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::error::Result;
+
+/// Calibrates a robot, its camera and a plate of markers in one problem, directly from images.
+#[derive(Parser)]
+#[command(
+    name = "robotcal",
+    version,
+    about,
+    propagate_version = true,
+    subcommand_required = true,
+    arg_required_else_help = true
+)]
+struct Cli {
+    /// Say more on stderr (twice: everything)
+    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
+    verbose: u8,
+    /// Threads for images (default: all cores); the result does not depend on it
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<usize>,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Identify robot, camera, hand-camera offset and plate from one or more series
+    Identify(identify::IdentifyArgs),
+    /// Judge a corrected model by points that another device measured
+    Verify(verify::VerifyArgs),
+}
+
+/// What a subcommand that ran to its end says of its result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    /// Exit code 0.
+    Good,
+    /// Solved, but a named quality gate failed: exit code 1.
+    GateFailed,
+}
+
+impl Command {
+    fn run(&self) -> Result<Verdict> {
+        match self {
+            Self::Identify(args) => identify::run(args),
+            Self::Verify(args) => verify::run(args),
+        }
+    }
+}
 
 /// Runs the program with the arguments of the process.
-pub fn main() -> std::process::ExitCode {
-    std::process::ExitCode::SUCCESS
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    start_log(cli.verbose);
+    if let Some(threads) = cli.threads {
+        // Fails only where a pool exists already, which then serves as well.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    }
+    match cli.command.run() {
+        Ok(Verdict::Good) => ExitCode::SUCCESS,
+        Ok(Verdict::GateFailed) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn start_log(verbose: u8) {
+    let level = match verbose {
+        0 => tracing::Level::WARN,
+        1 => tracing::Level::INFO,
+        _ => tracing::Level::DEBUG,
+    };
+    tracing_subscriber::fmt()
+        .with_max_level(level)
+        .with_writer(std::io::stderr)
+        .with_target(false)
+        .without_time()
+        .init();
 }

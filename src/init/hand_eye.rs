@@ -45,7 +45,7 @@ pub struct HandEyeStart {
 impl HandEye {
     /// Rotation error (rad) and translation error (m) of one image.
     pub fn error(&self, pair: &PosePair) -> (f64, f64) {
-        (&self.camera * &pair.camera_from_plate).distance(&(&pair.chain * &self.plate))
+        (self.camera * pair.camera_from_plate).distance(&(pair.chain * self.plate))
     }
 
     fn median_error(&self, pairs: &[PosePair]) -> f64 {

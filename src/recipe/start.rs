@@ -54,10 +54,10 @@ pub(super) fn start_robot(
         let solution = match known {
             (Some(camera), Some(plate)) => HandEye { camera, plate },
             (Some(camera), None) => {
-                closest(&poses, |p| HandEye { camera, plate: &p.chain.inverse() * &(&camera * &p.camera_from_plate) })
+                closest(&poses, |p| HandEye { camera, plate: p.chain.inverse() * (camera * p.camera_from_plate) })
             }
             (None, Some(plate)) => {
-                closest(&poses, |p| HandEye { camera: &(&p.chain * &plate) * &p.camera_from_plate.inverse(), plate })
+                closest(&poses, |p| HandEye { camera: (p.chain * plate) * p.camera_from_plate.inverse(), plate })
             }
             (None, None) => closed_form(problem, state, pairs, &poses, (*mounting, *placement), &of, verdicts)?,
         };

@@ -9,6 +9,10 @@ use crate::{Error, Notice, Result};
 
 /// No joint of an arm turns further than two full turns from zero on most of its stops.
 const TWO_TURNS_RAD: f64 = 4.0 * std::f64::consts::PI;
+/// A description may limit a joint to half a turn where the real one makes a whole turn to either side (UR arms).
+const FOREIGN_LIMITS_RAD: f64 = std::f64::consts::PI;
+/// Soft limits of controllers differ from those of the description by less than this.
+const SOFT_LIMITS_RAD: f64 = 0.5;
 /// Readings that all stay below this number of degrees are a whole turn if they are radians.
 const SMALL_DEG: f64 = 6.3;
 /// Fewer stops than this say nothing about their unit.
@@ -74,16 +78,9 @@ fn revolute(chain: &Chain) -> impl Iterator<Item = usize> + Clone + '_ {
     (0..chain.readings.len()).filter(|&i| chain.reading_kinds[i] == JointKind::Revolute)
 }
 
-/// Whether every limit of these readings holds when the raw values are multiplied by `factor`.
-fn fits(chain: &Chain, readings: impl Iterator<Item = usize>, q: &[f64], factor: f64) -> bool {
-    // A hundredth of the range beyond a limit is a soft limit, not a wrong unit.
-    let inside = |i: usize| {
-        limits(chain, i).is_none_or(|(low, high)| {
-            let slack = 0.01 * (high - low);
-            (low - slack..=high + slack).contains(&(q[i] * factor))
-        })
-    };
-    readings.into_iter().all(inside)
+/// Whether the limits of these readings hold to within `slack` (rad or m) when the raw values are multiplied by `factor`.
+fn fits(chain: &Chain, mut readings: impl Iterator<Item = usize>, q: &[f64], factor: f64, slack: f64) -> bool {
+    readings.all(|i| limits(chain, i).is_none_or(|(low, high)| (low - slack..=high + slack).contains(&(q[i] * factor))))
 }
 
 fn check_unit(file: &Path, unit: AngleUnit, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
@@ -98,9 +95,10 @@ fn check_unit(file: &Path, unit: AngleUnit, chain: &Chain, rows: &[&[f64]]) -> R
 }
 
 fn refuse_degrees_as_radians(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
-    let degree = AngleUnit::Deg.in_rad();
+    let possible = |q: &[f64], factor, slack| fits(chain, revolute(chain), q, factor, slack);
     let mostly = |test: &dyn Fn(&[f64]) -> bool| 2 * rows.iter().filter(|q| test(q)).count() > rows.len();
-    let beyond_limits = mostly(&|q| !fits(chain, revolute(chain), q, 1.0) && fits(chain, revolute(chain), q, degree));
+    let beyond_limits =
+        mostly(&|q| !possible(q, 1.0, FOREIGN_LIMITS_RAD) && possible(q, AngleUnit::Deg.in_rad(), SOFT_LIMITS_RAD));
     let turning = revolute(chain).filter(|&i| mostly(&|q| q[i].abs() > TWO_TURNS_RAD)).count();
     // One axis of many may be wound up; a third of them is not.
     let wound_up = turning > 0 && 3 * turning >= revolute(chain).count();
@@ -120,7 +118,10 @@ fn refuse_radians_as_degrees(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Res
     let all = || revolute(chain).flat_map(|i| rows.iter().map(move |q| q[i]));
     let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(q), h.max(q)));
     let small = low > -SMALL_DEG && high < SMALL_DEG && all().next().is_some();
-    if !small || rows.len() < MANY_STOPS || !rows.iter().all(|q| fits(chain, revolute(chain), q, 1.0)) {
+    if !small
+        || rows.len() < MANY_STOPS
+        || !rows.iter().all(|q| fits(chain, revolute(chain), q, 1.0, FOREIGN_LIMITS_RAD))
+    {
         return Ok(());
     }
     let (joint, (joint_low, joint_high)) = widest(chain, rows);
@@ -137,7 +138,8 @@ fn refuse_millimetres(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()>
     let sliding = || (0..chain.readings.len()).filter(|&i| chain.reading_kinds[i] == JointKind::Prismatic);
     let beyond = |i: usize| {
         let only = || std::iter::once(i);
-        let count = rows.iter().filter(|q| !fits(chain, only(), q, 1.0) && fits(chain, only(), q, 1e-3)).count();
+        let count =
+            rows.iter().filter(|q| !fits(chain, only(), q, 1.0, 1.0) && fits(chain, only(), q, 1e-3, 0.01)).count();
         2 * count > rows.len()
     };
     let Some(reading) = sliding().find(|&i| beyond(i)) else { return Ok(()) };

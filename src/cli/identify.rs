@@ -1,0 +1,143 @@
+//! `robotcal identify`: series in, corrected robot out.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::{Verdict, progress, summary};
+use crate::error::{Error, Notice, Result};
+use crate::recipe::{self, JointNoise, MeasuredSeries, Options, RobotModel};
+use crate::series::{self, Series};
+use crate::urdf::{self, Chain, RobotDescription};
+
+/// Flags of `identify`.
+#[derive(Debug, Args)]
+pub(super) struct IdentifyArgs {
+    /// Robot description (URDF)
+    #[arg(long, value_name = "FILE")]
+    urdf: PathBuf,
+    /// Series folder; give it several times to fit several series of the same robot together
+    #[arg(long, value_name = "FOLDER", required = true)]
+    series: Vec<PathBuf>,
+    /// Folder for the results [default: reports/<series name>]
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    /// Base link (overrides series.toml)
+    #[arg(long, value_name = "LINK")]
+    base: Option<String>,
+    /// Tip link that carries camera or plate (overrides series.toml)
+    #[arg(long, value_name = "LINK")]
+    tip: Option<String>,
+    /// Joint noise in rad (m for a prismatic joint) instead of the estimate; 0 takes the readings as exact
+    #[arg(long, value_name = "SIGMA")]
+    joint_noise: Option<f64>,
+    /// Joint terms beside rigid geometry and offsets
+    #[arg(long, value_enum, default_value_t = Model::Full)]
+    robot_model: Model,
+    /// Also write the stand-alone camera poses (poses.csv)
+    #[arg(long)]
+    poses: bool,
+}
+
+/// Names of the robot models.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Model {
+    /// Link geometry and joint offsets
+    Rigid,
+    /// Also gear scale and two harmonics
+    Gear,
+    /// Also gravity and backlash
+    Full,
+}
+
+impl From<Model> for RobotModel {
+    fn from(model: Model) -> Self {
+        match model {
+            Model::Rigid => Self::Rigid,
+            Model::Gear => Self::Gear,
+            Model::Full => Self::Full,
+        }
+    }
+}
+
+pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
+    let options = Options { joint_noise: joint_noise(args.joint_noise)?, model: args.robot_model.into() };
+    let description = urdf::read(&args.urdf)?;
+    let all = read_all(&args.series)?;
+    let chain = chain(&description, &all, args)?;
+    let mut notices = description.notices.clone();
+    let measured = measure_all(&all, &chain, &mut notices)?;
+    let mut solution = recipe::identify(chain, &measured, &options)?;
+    notices.append(&mut solution.notices);
+    solution.notices = notices;
+    print!("{}", summary::text(&solution, &measured));
+    Ok(if solution.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed })
+}
+
+fn joint_noise(sigma: Option<f64>) -> Result<JointNoise> {
+    match sigma {
+        None => Ok(JointNoise::Estimated),
+        Some(s) if (0.0..0.1).contains(&s) => Ok(JointNoise::Known(s)),
+        Some(s) => Err(Error::input(
+            "--joint-noise",
+            format!("{s} is no joint noise in rad"),
+            "give 0 for exact readings or a value like 0.00005 (0.05 mrad)",
+        )),
+    }
+}
+
+fn read_all(folders: &[PathBuf]) -> Result<Vec<Series>> {
+    let mut all: Vec<Series> = Vec::new();
+    for folder in folders {
+        let s = series::read(folder)?;
+        if let Some(twin) = all.iter().find(|a| a.name == s.name) {
+            return Err(Error::input(
+                folder.display(),
+                format!("is named '{}' like the series in {}", s.name, twin.folder.display()),
+                "give every series folder a name of its own, and each series only once",
+            ));
+        }
+        all.push(s);
+    }
+    Ok(all)
+}
+
+fn chain(description: &RobotDescription, all: &[Series], args: &IdentifyArgs) -> Result<Chain> {
+    let base = agreed("base", args.base.as_deref(), all, |s| s.manifest.base.as_deref())?;
+    let tip = agreed("tip", args.tip.as_deref(), all, |s| s.manifest.tip.as_deref())?;
+    description.chain(base, tip)
+}
+
+/// A link that the flag or the manifests name; they must agree.
+fn agreed<'a>(
+    what: &str,
+    flag: Option<&'a str>,
+    all: &'a [Series],
+    of: impl Fn(&'a Series) -> Option<&'a str>,
+) -> Result<Option<&'a str>> {
+    if flag.is_some() {
+        return Ok(flag);
+    }
+    let mut named = all.iter().filter_map(|s| of(s).map(|link| (s, link)));
+    let Some((first, link)) = named.next() else { return Ok(None) };
+    match named.find(|(_, other)| *other != link) {
+        None => Ok(Some(link)),
+        Some((second, other)) => Err(Error::input(
+            second.folder.join("series.toml").display(),
+            format!("{what} = \"{other}\", while {} has {what} = \"{link}\"", first.name),
+            format!("series of one robot share base and tip: correct one, or give --{what}"),
+        )),
+    }
+}
+
+fn measure_all(all: &[Series], chain: &Chain, notices: &mut Vec<Notice>) -> Result<Vec<MeasuredSeries>> {
+    let mut measured = Vec::new();
+    for s in all {
+        let bar = progress::bar(s.stops.stops.len(), &s.name);
+        let m = recipe::measure(s, chain, all.len() > 1, |_| bar.inc(1))?;
+        bar.finish_and_clear();
+        notices.extend(m.notices);
+        measured.push(m.series);
+    }
+    Ok(measured)
+}

@@ -1,0 +1,111 @@
+//! `robotcal verify`: a corrected model judged by points that another device measured.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use nalgebra::Vector3;
+
+use super::Verdict;
+use crate::assess::{MeasuredPoint, fit_points};
+use crate::error::{Error, Result};
+use crate::model::robot::Robot;
+use crate::urdf::{self, Chain, JointKind};
+
+/// Flags of `verify`.
+#[derive(Debug, Args)]
+pub(super) struct VerifyArgs {
+    /// Robot description to judge (a corrected URDF)
+    #[arg(long, value_name = "FILE")]
+    urdf: PathBuf,
+    /// Nominal robot description to compare with
+    #[arg(long, value_name = "FILE")]
+    nominal: Option<PathBuf>,
+    /// Points of one reflector on the tip: x_m, y_m, z_m and one column per joint
+    #[arg(long, value_name = "FILE")]
+    points: PathBuf,
+    /// Unit of the revolute joints in that file
+    #[arg(long, value_enum)]
+    joint_unit: Unit,
+    /// Base link
+    #[arg(long, value_name = "LINK")]
+    base: Option<String>,
+    /// Tip link
+    #[arg(long, value_name = "LINK")]
+    tip: Option<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Unit {
+    Rad,
+    Deg,
+}
+
+pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
+    let rms = |file: &PathBuf| -> Result<(usize, f64, f64)> {
+        let chain = urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?;
+        let points = read_points(&args.points, &chain, args.joint_unit)?;
+        let fit = fit_points(&Robot::nominal(chain), &points).ok_or_else(|| {
+            Error::unsolved(
+                args.points.display(),
+                "the points do not determine the frame of the device and the reflector",
+                "measure at least 10 points that differ in position and in hand orientation",
+            )
+        })?;
+        let worst = fit.residuals_m.iter().map(Vector3::norm).fold(0.0, f64::max);
+        Ok((points.len(), 1e3 * fit.rms_m, 1e3 * worst))
+    };
+    let (count, corrected, worst) = rms(&args.urdf)?;
+    println!("points    {count} of {}; frame of the device and reflector fitted", args.points.display());
+    println!("model     {}: {corrected:.3} mm RMS, worst {worst:.3} mm", args.urdf.display());
+    let Some(file) = &args.nominal else { return Ok(Verdict::Good) };
+    let (_, nominal, worst) = rms(file)?;
+    println!("nominal   {}: {nominal:.3} mm RMS, worst {worst:.3} mm", file.display());
+    if corrected < nominal {
+        println!("verdict   good: {:.0} % of the nominal error", 100.0 * corrected / nominal);
+        return Ok(Verdict::Good);
+    }
+    println!("verdict   NOT TO BE TRUSTED: the corrected model is no better than the nominal one");
+    Ok(Verdict::GateFailed)
+}
+
+fn read_points(path: &std::path::Path, chain: &Chain, unit: Unit) -> Result<Vec<MeasuredPoint>> {
+    let bad = |line: u64, what: String, remedy: &str| Error::input(format!("{}:{line}", path.display()), what, remedy);
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_path(path)
+        .map_err(|e| Error::input(path.display(), e, "check the path"))?;
+    let header = reader.headers().map_err(|e| bad(1, e.to_string(), "the first line names the columns"))?.clone();
+    let column = |name: &str| {
+        header.iter().position(|h| h == name).ok_or_else(|| {
+            let present: Vec<&str> = header.iter().collect();
+            bad(
+                1,
+                format!("no column '{name}' (present: {})", present.join(", ")),
+                "name the columns x_m, y_m, z_m and each joint as in the URDF",
+            )
+        })
+    };
+    let axes = [column("x_m")?, column("y_m")?, column("z_m")?];
+    let joints: Vec<usize> = chain.readings.iter().map(|j| column(j)).collect::<Result<_>>()?;
+    let mut points = Vec::new();
+    for record in reader.records() {
+        let record =
+            record.map_err(|e| Error::input(path.display(), e, "every row has the columns of the first line"))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |c: usize| {
+            let cell = record.get(c).unwrap_or("");
+            cell.parse::<f64>()
+                .ok()
+                .filter(|v| v.is_finite())
+                .ok_or_else(|| bad(line, format!("'{cell}' in column {} is no number", &header[c]), "correct the cell"))
+        };
+        let position_m = Vector3::new(number(axes[0])?, number(axes[1])?, number(axes[2])?);
+        let mut readings = Vec::with_capacity(joints.len());
+        for (c, kind) in joints.iter().zip(&chain.reading_kinds) {
+            let degrees = unit == Unit::Deg && *kind != JointKind::Prismatic;
+            readings.push(if degrees { number(*c)?.to_radians() } else { number(*c)? });
+        }
+        points.push(MeasuredPoint { position_m, readings });
+    }
+    Ok(points)
+}

@@ -1,0 +1,146 @@
+//! Reading and writing plates.
+
+use std::fs;
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+use robotcal::series::{Marker, Plate, PlateKind, ScaleBar, plate_csv, plate_toml, read_plate};
+use tempfile::TempDir;
+
+fn plate_file(toml: &str, csv: &str) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("plate.csv"), csv).unwrap();
+    let path = folder.path().join("plate.toml");
+    fs::write(&path, toml).unwrap();
+    (folder, path)
+}
+
+fn plate(toml: &str, csv: &str) -> Plate {
+    let (_folder, path) = plate_file(toml, csv);
+    read_plate(&path, &mut Vec::new()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn refusal(toml: &str, csv: &str) -> String {
+    let (_folder, path) = plate_file(toml, csv);
+    let error = read_plate(&path, &mut Vec::new()).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    error.to_string()
+}
+
+#[track_caller]
+fn assert_says(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "{part:?} not in:\n{message}");
+    }
+}
+
+const CODED: &str = "format = 1\nkind = \"coded-circles\"\ncolumns = 2\nrows = 2\npitch_m = 0.02\n\
+                     markers = \"plate.csv\"\ntolerance_m = 0.0002\n";
+const HEADER: &str = "id,x_m,y_m,z_m,outer_radius_m,inner_radius_m,sigma_m\n";
+const ROWS: &str = "2,-0.01,-0.01,0,0.006,0.003,\n0,-0.01,0.01,0,0.004,0,0.00005\n1,0.01,0.01,0.0001,0.006,0,\n\
+                    3,0.01,-0.01,0,0.004,0.002,\n";
+
+fn table(from: &str, to: &str) -> String {
+    format!("{HEADER}{ROWS}").replace(from, to)
+}
+
+#[test]
+fn coded_circles_come_in_the_order_of_their_ids() {
+    let plate = plate(CODED, &table("", ""));
+    assert_eq!((plate.kind, plate.columns, plate.rows, plate.pitch_m), (PlateKind::CodedCircles, 2, 2, 0.02));
+    assert_eq!(plate.markers.iter().map(|m| m.id).collect::<Vec<_>>(), [0, 1, 2, 3]);
+    assert_eq!(plate.markers[1].position_m, Vector3::new(0.01, 0.01, 1e-4));
+    assert_eq!((plate.markers[0].sigma_m, plate.markers[1].sigma_m), (5e-5, 2e-4));
+    assert_eq!((plate.markers[2].outer_radius_m, plate.markers[2].inner_radius_m), (0.006, 0.003));
+}
+
+#[test]
+fn lattices_need_no_marker_file() {
+    for (kind, expected) in
+        [("chessboard", PlateKind::Chessboard), ("charuco", PlateKind::Charuco), ("circle-grid", PlateKind::CircleGrid)]
+    {
+        let toml = format!("format = 1\nkind = \"{kind}\"\ncolumns = 4\nrows = 3\npitch_m = 0.01\n");
+        let read = plate(&toml, "");
+        assert_eq!(read, Plate::lattice(expected, 4, 3, 0.01, 1e-4));
+        assert_says(&refusal(&toml.replace("rows = 3\n", ""), ""), &["columns, rows and pitch_m"]);
+        assert_says(&refusal(&toml.replace("rows = 3", "rows = 1"), ""), &["rows = 1"]);
+        assert_says(&refusal(&toml.replace("0.01", "10"), ""), &["pitch_m = 10", "metres"]);
+        assert_says(&refusal(&toml.replace("0.01", "0"), ""), &["pitch_m = 0", "positive"]);
+    }
+    let dots = "format = 1\nkind = \"circle-grid\"\ncolumns = 4\nrows = 3\npitch_m = 0.01\nradius_m = 0.003\n";
+    assert!(plate(dots, "").markers.iter().all(|m| m.outer_radius_m == 0.003));
+    assert_says(&refusal(&dots.replace("0.003", "0.006"), ""), &["0 and 4", "overlap", "diameters"]);
+    assert_says(&refusal(&dots.replace("circle-grid", "chessboard"), ""), &["radius_m"]);
+}
+
+#[test]
+fn a_bad_plate_names_line_column_and_marker() {
+    assert_says(&refusal(&CODED.replace("pitch_m", "pitch"), ""), &["plate.toml:5", "`pitch`", "\"pitch_m\" meant"]);
+    assert_says(&refusal(&CODED.replace("coded-circles", "coded"), ""), &["plate.toml:2", "`coded`"]);
+    assert_says(&refusal(&CODED.replace("markers = \"plate.csv\"\n", ""), ""), &["marker file", "plate.csv"]);
+    assert_says(&refusal(CODED, ""), &["plate.csv", "empty"]);
+    assert_says(&refusal(CODED, HEADER), &["plate.csv", "no markers"]);
+    let bad = |from: &str, to: &str| refusal(CODED, &table(from, to));
+    assert_says(&bad("outer_radius_m", "radius"), &["plate.csv:1", "\"radius\""]);
+    assert_says(&bad(",outer_radius_m", ",outer_radius"), &["plate.csv:1", "outer_radius", "\"outer_radius_m\" meant"]);
+    assert_says(&bad("0.006,0.003", "0.003,0.006"), &["plate.csv:2", "inner_radius_m", "0.006"]);
+    assert_says(&bad("0.006,0.003", "0,0"), &["plate.csv:2", "outer_radius_m"]);
+    assert_says(&bad("0.00005", "-1"), &["plate.csv:3", "sigma_m"]);
+    assert_says(&bad("3,0.01,-0.01", "1,0.01,-0.01"), &["plate.csv:5", "marker 1", "line 4"]);
+    assert_says(&bad("3,0.01,-0.01", "4,0.01,-0.01"), &["marker 4", "2 x 2"]);
+    assert_says(&bad("0.004,0,", "0.015,0,"), &["overlap"]);
+    assert_says(&bad("3,0.01,-0.01,0,", "3,10,-10,0,"), &["marker 3", "metres"]);
+    // y down is a mirrored plate
+    let mirrored =
+        table("", "").replace("0.01,-0.01", "T").replace("0.01,0.01", "0.01,-0.01").replace("T", "0.01,0.01");
+    assert_says(&refusal(CODED, &mirrored), &["marker", "y UP"]);
+}
+
+#[test]
+fn a_scale_bar_must_be_possible() {
+    let scaled = |from: u32, to: u32, distance: f64| {
+        format!("{CODED}[scale]\nfrom = {from}\nto = {to}\ndistance_m = {distance}\nsigma_m = 0.00002\n")
+    };
+    let read = plate(&scaled(0, 1, 0.02001), &table("", ""));
+    assert_eq!(read.scale, Some(ScaleBar { from: 0, to: 1, distance_m: 0.02001, sigma_m: 2e-5 }));
+    assert_says(&refusal(&scaled(0, 9, 0.02), &table("", "")), &["[scale]", "marker 9"]);
+    assert_says(&refusal(&scaled(0, 1, 20.0), &table("", "")), &["distance_m = 20", "unit"]);
+    assert_says(&refusal(&scaled(1, 1, 0.02), &table("", "")), &["marker ids"]);
+    assert_says(&refusal(&scaled(0, 1, -0.02), &table("", "")), &["positive"]);
+}
+
+#[test]
+fn points_and_corrected_plates() {
+    let toml = "format = 1\nkind = \"points\"\nmarkers = \"plate.csv\"\ntolerance_m = 0.001\n";
+    let csv = "id,x_m,y_m,z_m,sigma_x_m,sigma_y_m,sigma_z_m\n7,1,2,3,0.1,0.3,0.2\n5,0,0,0,,,\n";
+    let read = plate(toml, csv);
+    assert_eq!(read.index_of(7), Some(1));
+    assert_eq!((read.markers[0].sigma_m, read.markers[1].sigma_m), (0.001, 0.3));
+    assert_says(&refusal(toml, "id,x_m,y_m,z_m\n1,0,0,0\n2,0,0,0\n"), &["1 and 2", "overlap"]);
+}
+
+#[test]
+fn what_is_written_reads_back_the_same() {
+    let marker = |id, x: f64, outer: f64, inner: f64, sigma: f64| Marker {
+        id,
+        position_m: Vector3::new(x, 1.0 / 3.0, -1e-17),
+        outer_radius_m: outer,
+        inner_radius_m: inner,
+        sigma_m: sigma,
+    };
+    let points = Plate {
+        kind: PlateKind::Points,
+        columns: 0,
+        rows: 0,
+        pitch_m: 0.0,
+        tolerance_m: 1e-4,
+        scale: Some(ScaleBar { from: 3, to: 12, distance_m: 0.1 + 0.2, sigma_m: 1e-6 }),
+        markers: vec![marker(3, 0.0, 0.01, 0.005, 1e-4), marker(12, 0.3, 0.0, 0.0, 3e-5)],
+    };
+    assert_eq!(plate(&plate_toml(&points, Some("plate.csv")).unwrap(), &plate_csv(&points)), points);
+    let coded = plate(CODED, &table("", ""));
+    assert_eq!(plate(&plate_toml(&coded, Some("plate.csv")).unwrap(), &plate_csv(&coded)), coded);
+    let mut dots = Plate::lattice(PlateKind::CircleGrid, 5, 4, 0.012, 5e-5);
+    dots.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.004);
+    assert_eq!(plate(&plate_toml(&dots, None).unwrap(), ""), dots);
+}

@@ -1,0 +1,317 @@
+//! Reading and writing series folders: what is accepted, what is refused, and with which words.
+
+use std::fs;
+use std::path::Path;
+
+use robotcal::series::{
+    AngleUnit, CameraMount, Edge, ImageObservations, Manifest, Observation, PlateKind, Series, Source, Stop, StopOrder,
+    Stops, observations_csv, read, read_images,
+};
+use robotcal::urdf::{Chain, RobotDescription};
+use tempfile::TempDir;
+
+const MANIFEST: &str = "format = 1\njoint_unit = \"rad\"\ncamera_mount = \"hand\"\nplate = \"plate.toml\"\n";
+const PLATE: &str = "format = 1\nkind = \"chessboard\"\ncolumns = 3\nrows = 2\npitch_m = 0.02\ntolerance_m = 0.0001\n";
+const JOINTS: &str = "image,j1,j2,x\na.png,0.1,1.25,0.5\nb.png,-0.7,1.5,0.25\noff.png,,,\n";
+
+/// A series folder made of these files; empty files stand for images.
+fn folder(files: &[(&str, &str)]) -> TempDir {
+    let folder = tempfile::Builder::new().prefix("run").tempdir().unwrap();
+    for (name, text) in files {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+    folder
+}
+
+/// A good series with some files replaced or added.
+fn series_with(changes: &[(&str, &str)]) -> TempDir {
+    let good = [("series.toml", MANIFEST), ("plate.toml", PLATE), ("joints.csv", JOINTS)];
+    let images = ["images/a.png", "images/b.png", "images/off.png"].map(|i| (i, ""));
+    folder(&[&good[..], &images[..], changes].concat())
+}
+
+fn refusal(changes: &[(&str, &str)]) -> String {
+    let folder = series_with(changes);
+    let error = read(folder.path()).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    error.to_string()
+}
+
+#[track_caller]
+fn assert_says(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "{part:?} not in:\n{message}");
+    }
+}
+
+fn chain() -> Chain {
+    let joint = |name: &str, kind: &str, parent: &str, child: &str, lower: f64, upper: f64| {
+        format!(
+            "<joint name='{name}' type='{kind}'><parent link='{parent}'/><child link='{child}'/><axis xyz='0 0 1'/>\
+             <limit lower='{lower}' upper='{upper}' effort='0' velocity='0'/></joint>"
+        )
+    };
+    let text = format!(
+        "<robot name='r'><link name='a'/><link name='b'/><link name='c'/><link name='d'/>{}{}{}</robot>",
+        joint("x", "prismatic", "a", "b", 0.0, 2.0),
+        joint("j1", "revolute", "b", "c", -3.0, 3.0),
+        joint("j2", "revolute", "c", "d", -2.0, 2.0),
+    );
+    RobotDescription::from_text(Path::new("r.urdf"), text).unwrap().chain(None, None).unwrap()
+}
+
+#[test]
+fn a_folder_is_read_with_its_defaults() {
+    let folder = series_with(&[]);
+    let series = read(folder.path()).unwrap();
+    let name = folder.path().file_name().unwrap().to_str().unwrap();
+    assert_eq!([series.name.as_str(), series.camera_name(), series.mounting()], [name; 3]);
+    assert_eq!(series.manifest.camera_mount, CameraMount::Hand);
+    assert_eq!(series.manifest.robot.order, StopOrder::Visited);
+    assert_eq!(series.stops.joints, ["j1", "j2", "x"]);
+    assert_eq!(series.stops.stops[1].raw_readings, Some(vec![-0.7, 1.5, 0.25]));
+    assert_eq!(series.stops.stops[2].raw_readings, None, "an image off the robot");
+    assert_eq!(series.stops.stops[2].placement, "placement_0");
+    assert_eq!(series.plate.kind, PlateKind::Chessboard);
+    assert!(series.notices.is_empty(), "{:?}", series.notices);
+    let hashed: Vec<_> = series.inputs.iter().map(|i| i.path.file_name().unwrap().to_str().unwrap()).collect();
+    assert_eq!(hashed, ["series.toml", "plate.toml", "joints.csv"]);
+    // sha256sum of an empty file
+    let empty = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
+    assert!(series.image_hashes().unwrap().iter().all(|i| i.sha256 == empty));
+}
+
+#[test]
+fn byte_order_marks_crlf_blanks_and_quotes_do_not_matter() {
+    let joints = format!("\u{feff}{}", JOINTS.replace('\n', "  \r\n\r\n").replace("a.png", "\"a.png\""));
+    let manifest = format!("\u{feff}{}", MANIFEST.replace('\n', "\r\n"));
+    let odd = read(series_with(&[("joints.csv", &joints), ("series.toml", &manifest)]).path()).unwrap();
+    let plain = read(series_with(&[]).path()).unwrap();
+    let values =
+        |s: &Series| s.stops.stops.iter().map(|s| (s.image.clone(), s.raw_readings.clone())).collect::<Vec<_>>();
+    assert_eq!(values(&odd), values(&plain));
+    assert_eq!(odd.stops.stops.iter().map(|s| s.line).collect::<Vec<_>>(), [3, 5, 7]);
+    assert_eq!(plain.stops.stops.iter().map(|s| s.line).collect::<Vec<_>>(), [2, 3, 4]);
+}
+
+#[test]
+fn a_bad_manifest_names_line_and_key() {
+    let with = |line: &str| refusal(&[("series.toml", &format!("{MANIFEST}{line}\n"))]);
+    assert_says(&with("tipp = \"flange\""), &["series.toml:5", "`tipp`", "\"tip\" meant"]);
+    assert_says(&with("[camera]\nfocal_mm = 8"), &["series.toml:6", "`focal_mm`"]);
+    assert_says(&with("[camera]\nfocal_px = \"8\""), &["series.toml:6", "string"]);
+    assert_says(&with("[camera]\nfocal_px = -1"), &["focal_px = -1"]);
+    assert_says(&with("[camera]\nwidth_px = 100"), &["height_px"]);
+    assert_says(&with("[robot]\norder = \"random\""), &["series.toml:6", "`random`", "unknown"]);
+    let replaced = |from: &str, to: &str| refusal(&[("series.toml", &MANIFEST.replace(from, to))]);
+    assert_says(&replaced("joint_unit = \"rad\"\n", ""), &["series.toml", "joint_unit = \"deg\" or", "no default"]);
+    assert_says(&replaced("\"rad\"", "\"degree\""), &["series.toml:2", "`degree`", "`deg`"]);
+    assert_says(&replaced("format = 1", "format = 2"), &["format = 2", "format = 1"]);
+    assert_says(&replaced("camera_mount = \"hand\"\n", ""), &["camera_mount"]);
+    assert_says(&replaced("plate.toml", "plat.toml"), &["plat.toml"]);
+    assert_says(&read(Path::new("no/such/folder")).unwrap_err().to_string(), &["no/such/folder", "path"]);
+}
+
+#[test]
+fn a_bad_joint_table_names_line_and_column() {
+    let with = |text: &str| refusal(&[("joints.csv", text)]);
+    assert_says(&with(&JOINTS.replace("1.5", "")), &["joints.csv:3", "column j2", "empty cell", "off the robot"]);
+    assert_says(&with(&JOINTS.replace("1.5", "x1")), &["joints.csv:3", "column j2", "\"x1\" is not a number"]);
+    assert_says(&with(&JOINTS.replace("1.5", "nan")), &["joints.csv:3", "nan"]);
+    assert_says(&with(&JOINTS.replace("1.5", "\"1,5\"")), &["joints.csv:3", "decimal point"]);
+    assert_says(&with(&JOINTS.replace("1.5", "1,5")), &["joints.csv:3", "5 cells under 4", "decimal point"]);
+    assert_says(&with(&JOINTS.replace("b.png", "a.png")), &["joints.csv:3", "\"a.png\"", "line 2"]);
+    assert_says(&with(&JOINTS.replace("b.png", "images/b.png")), &["joints.csv:3", "file name alone"]);
+    assert_says(&with(&JOINTS.replace("image", "picture")), &["joints.csv:1", "no column \"image\"", "picture, j1"]);
+    assert_says(&with(&JOINTS.replace("j2", "j1")), &["joints.csv:1", "two columns", "j1"]);
+    assert_says(&with("image,j1\n"), &["joints.csv", "no rows"]);
+    assert_says(&with(""), &["joints.csv", "empty"]);
+    let german = "image;j1;j2;x\na.png;0,1;1,25;0,5\n";
+    assert_says(&with(german), &["joints.csv:1", "semicolons", "decimal comma", "decimal points"]);
+    assert_says(&with(&german.replace(';', "\t")), &["joints.csv:1", "tabs", "decimal comma"]);
+    let folder = series_with(&[]);
+    fs::write(folder.path().join("joints.csv"), [0xff, 0xfe, b'i', 0]).unwrap();
+    assert_says(&read(folder.path()).unwrap_err().to_string(), &["UTF-16", "UTF-8"]);
+    fs::write(folder.path().join("joints.csv"), b"image,j1\na.png,1\n\xfcber.png,2\n").unwrap();
+    assert_says(&read(folder.path()).unwrap_err().to_string(), &["joints.csv:3", "UTF-8"]);
+}
+
+#[test]
+fn placements_are_all_named_or_none() {
+    let named = "image,j1,j2,x,placement,time_s\na.png,0.1,1,0,left,10.5\nb.png,0.2,1,0,right,\n";
+    let series = read(series_with(&[("joints.csv", named)]).path()).unwrap();
+    let got: Vec<_> = series.stops.stops.iter().map(|s| (s.placement.as_str(), s.time_s)).collect();
+    assert_eq!(got, [("left", Some(10.5)), ("right", None)]);
+    let message = refusal(&[("joints.csv", &named.replace("right", ""))]);
+    assert_says(&message, &["joints.csv:3", "placement"]);
+    let empty = named.replace("right", "").replace("left", "");
+    assert_eq!(read(series_with(&[("joints.csv", &empty)]).path()).unwrap().stops.stops[0].placement, "placement_0");
+}
+
+#[test]
+fn images_and_rows_are_held_against_each_other() {
+    let folder = series_with(&[("images/extra.png", ""), ("images/notes.txt", ""), ("dark/1.png", "")]);
+    fs::remove_file(folder.path().join("images/b.png")).unwrap();
+    let series = read(folder.path()).unwrap();
+    assert_eq!(series.stops.stops.len(), 3, "a stop without its image was visited all the same");
+    assert_eq!(series.stops.stops[1].path, None);
+    assert_eq!(series.notices.len(), 2, "{:?}", series.notices);
+    assert_says(&series.notices[0].to_string(), &["joints.csv:3", "\"b.png\"", "left out"]);
+    assert_says(&series.notices[1].to_string(), &["1 image", "extra.png"]);
+    let Source::Images { dark, white, .. } = &series.source else { panic!("{:?}", series.source) };
+    assert_eq!((dark.len(), white.len()), (1, 0));
+    let message = refusal(&[("joints.csv", &JOINTS.replace(".png", ".PNG"))]);
+    assert_says(&message, &["joints.csv:2", "a.PNG", "3 of 3", "\"a.png\" is there"]);
+    let message = refusal(&[("joints.csv", &JOINTS.replace(".png", ""))]);
+    assert_says(&message, &["\"a.png\" is there"]);
+}
+
+#[test]
+fn readings_are_matched_by_name_in_si() {
+    let chain = chain();
+    let degrees = MANIFEST.replace("rad", "deg");
+    let joints = "image,j2,x,spare,j1\na.png,90,0.5,7,-45\nb.png,,,,\n";
+    let images = [("images/a.png", ""), ("images/b.png", "")];
+    let files = [("series.toml", degrees.as_str()), ("joints.csv", joints), images[0], images[1]];
+    let series = read(series_with(&files).path()).unwrap();
+    let readings = series.readings_for(&chain).unwrap();
+    let turn = std::f64::consts::FRAC_PI_2;
+    assert_eq!(chain.readings, ["x", "j1", "j2"]);
+    let row = readings[0].as_ref().unwrap();
+    assert_eq!(row[0], 0.5, "prismatic joints are metres whatever the unit");
+    assert!((row[1] + turn / 2.0).abs() < 1e-15 && (row[2] - turn).abs() < 1e-15);
+    assert_eq!(readings[1], None);
+    let notices = series.reading_notices(&chain);
+    assert_eq!(notices.len(), 1);
+    assert_says(&notices[0].to_string(), &["spare", "not used"]);
+
+    let renamed = joints.replace("j1", "joint1");
+    let series = read(series_with(&[("series.toml", &degrees), ("joints.csv", &renamed)]).path()).unwrap();
+    let error = series.readings_for(&chain).unwrap_err().to_string();
+    assert_says(&error, &["joints.csv", "no readings of j1", "j2, x, spare, joint1"]);
+}
+
+#[test]
+fn values_beyond_limits_are_noticed_by_name() {
+    let joints = JOINTS.replace("1.25", "2.25");
+    let series = read(series_with(&[("joints.csv", &joints)]).path()).unwrap();
+    assert!(series.readings_for(&chain()).is_ok());
+    let notices = series.reading_notices(&chain());
+    assert_eq!(notices.len(), 1, "{notices:?}");
+    assert_says(&notices[0].to_string(), &["joints.csv:2", "a.png", "j2", "2.25", "-2 to 2", "1 of 3"]);
+}
+
+/// Readings of three joints x, j1, j2 of `chain` from a table of that order.
+fn with_readings(unit: AngleUnit, rows: &[[f64; 3]]) -> Result<(), String> {
+    let mut series = read(series_with(&[]).path()).unwrap();
+    series.manifest.joint_unit = Some(unit);
+    series.stops.joints = ["x", "j1", "j2"].map(String::from).into();
+    let stop = series.stops.stops[0].clone();
+    series.stops.stops = rows.iter().map(|row| Stop { raw_readings: Some(row.to_vec()), ..stop.clone() }).collect();
+    series.readings_for(&chain()).map(|_| ()).map_err(|e| e.to_string())
+}
+
+#[test]
+fn an_impossible_unit_is_refused_and_a_possible_one_is_not() {
+    use AngleUnit::{Deg, Rad};
+    let degrees: Vec<[f64; 3]> = (0..6).map(|i| [0.5, -100.0 + 30.0 * f64::from(i), 40.0]).collect();
+    let radians: Vec<[f64; 3]> = degrees.iter().map(|[x, a, b]| [*x, a.to_radians(), b.to_radians()]).collect();
+    assert_eq!(with_readings(Deg, &degrees), Ok(()));
+    assert_eq!(with_readings(Rad, &radians), Ok(()));
+    assert_says(&with_readings(Rad, &degrees).unwrap_err(), &["joints.csv", "j1", "-100", "joint_unit = \"deg\""]);
+    assert_says(&with_readings(Deg, &radians).unwrap_err(), &["joints.csv", "j1", "joint_unit = \"rad\""]);
+    // A whole turn where the description allows half a one, on every stop.
+    let turned: Vec<[f64; 3]> = radians.iter().map(|[x, a, b]| [*x, a - 4.2, *b]).collect();
+    assert!(turned.iter().all(|q| q[1] < -3.0));
+    assert_eq!(with_readings(Rad, &turned), Ok(()));
+    // One row beyond its limits is a notice, not a wrong unit.
+    let mut one = radians.clone();
+    one[0][1] = 3.4;
+    assert_eq!(with_readings(Rad, &one), Ok(()));
+    // Few stops near zero in degrees prove nothing.
+    assert_eq!(with_readings(Deg, &[[0.5, 1.0, 2.0], [0.5, 1.5, -2.0]]), Ok(()));
+    // A robot that moves little about a pose far from zero is in degrees for sure.
+    let near: Vec<[f64; 3]> = (0..6).map(|i| [0.5, 45.0 + 0.1 * f64::from(i), 1.0]).collect();
+    assert_eq!(with_readings(Deg, &near), Ok(()));
+    let millimetres: Vec<[f64; 3]> = radians.iter().map(|[x, a, b]| [x * 1000.0, *a, *b]).collect();
+    assert_says(&with_readings(Rad, &millimetres).unwrap_err(), &["x reads 500", "millimetres"]);
+}
+
+#[test]
+fn observations_replace_images_and_are_checked_by_line() {
+    let header = "image,marker,u,v,edge,cov_uu,cov_uv,cov_vv,du,dv,reason\n";
+    let good = format!(
+        "{header}b.png,3,10.5,20.25,outer,0.01,0.001,0.02,0.1,0.2,\nb.png,1,1,2,,,,,,,\nb.png,2,1,2,,,,,9,9,outlier\n\
+         gone.png,1,1,2,,,,,,,\noff.png,0,3,4,,,,,,,\n"
+    );
+    let series = read(series_with(&[("observations.csv", &good)]).path()).unwrap();
+    let Source::Observations(images) = &series.source else { panic!("{:?}", series.source) };
+    let names: Vec<_> = images.iter().map(|i| i.image.as_str()).collect();
+    assert_eq!(names, ["b.png", "off.png"], "in the order of the stops");
+    assert_eq!(images[0].observations.iter().map(|o| o.marker).collect::<Vec<_>>(), [1, 3], "a reason leaves out");
+    assert_eq!(images[0].observations[1].covariance, Some([0.01, 0.001, 0.02]));
+    assert_eq!(images[0].observations[1].uv, [10.5, 20.25]);
+    assert_eq!(series.notices.len(), 2);
+    assert_says(&series.notices[0].to_string(), &["gone.png", "joints.csv does not name"]);
+    assert_says(&series.notices[1].to_string(), &["a.png", "no observation"]);
+    let images = read_images(series_with(&[("observations.csv", &good)]).path()).unwrap();
+    assert!(matches!(images.source, Source::Images { .. }));
+
+    let sized = format!("{MANIFEST}[camera]\nwidth_px = 100\nheight_px = 80\n");
+    let with = |rows: &str| refusal(&[("series.toml", &sized), ("observations.csv", &format!("{header}{rows}\n"))]);
+    assert_says(&with("a.png,6,1,2,,,,,,,"), &["observations.csv:2", "\"6\"", "0 to 5"]);
+    assert_says(&with("a.png,-1,1,2,,,,,,,"), &["observations.csv:2", "marker id"]);
+    assert_says(&with("a.png,1,x,2,,,,,,,"), &["observations.csv:2", "column u", "\"x\""]);
+    assert_says(&with("a.png,1,1,80,,,,,,,"), &["observations.csv:2", "column v", "outside the image of 100 x 80"]);
+    assert_says(&with("a.png,1,1,2,middle,,,,,,"), &["observations.csv:2", "middle", "outer or inner"]);
+    assert_says(&with("a.png,1,1,2,inner,,,,,,"), &["observations.csv:2", "disc"]);
+    assert_says(&with("a.png,1,1,2,,1,2,1,,,"), &["observations.csv:2", "not positive"]);
+    assert_says(&with("a.png,1,1,2,,1,,1,,,"), &["observations.csv:2", "cov_uv"]);
+    assert_says(&with("a.png,1,1,2,,,,,,,\na.png,1,1,3,,,,,,,"), &["observations.csv:3", "line 2"]);
+    assert_says(&with("c.png,1,1,2,,,,,,,"), &["observations.csv", "no usable observation"]);
+    let misspelt = refusal(&[("observations.csv", "image,marker,u,v,egde\na.png,1,1,2,inner\n")]);
+    assert_says(&misspelt, &["observations.csv:1", "egde", "\"edge\" meant"]);
+}
+
+#[test]
+fn what_is_written_reads_back_the_same() {
+    let text = format!(
+        "{MANIFEST}base = \"a\"\nmcap = \"run.mcap\"\n[camera]\nname = \"front\"\nmodel = \"brown\"\nfocal_px = 2250.125\nwidth_px = 640\n\
+         height_px = 480\nbits = 12\n[observations]\npoint = \"centre\"\n[robot]\nrepeatability_m = 3e-5\norder = \"unknown\"\n"
+    );
+    let series = read(series_with(&[("series.toml", &text)]).path()).unwrap();
+    assert!(matches!(&series.source, Source::Recording(path) if path.ends_with("run.mcap")));
+    let again = series.manifest.to_toml().unwrap();
+    assert_eq!(read(series_with(&[("series.toml", &again)]).path()).unwrap().manifest, series.manifest);
+    let short: Manifest = Manifest { mcap: None, ..read(series_with(&[]).path()).unwrap().manifest };
+    assert_eq!(short.to_toml().unwrap(), MANIFEST);
+
+    let stop = |image: &str, line, raw: Option<Vec<f64>>, placement: &str, time_s| Stop {
+        image: image.into(),
+        path: None,
+        raw_readings: raw,
+        placement: placement.into(),
+        time_s,
+        line,
+    };
+    let stops = Stops {
+        joints: vec!["j 1".into(), "arm,2".into()],
+        stops: vec![
+            stop("a \"1\".png", 2, Some(vec![0.1 + 0.2, -1e-17]), "left", Some(1732.000000001)),
+            stop("b.png", 3, None, "right side, far", None),
+        ],
+    };
+    let observations = vec![ImageObservations {
+        image: "a \"1\".png".into(),
+        observations: vec![
+            Observation { marker: 0, edge: Edge::Outer, uv: [1.0 / 3.0, 2e-9], covariance: None },
+            Observation { marker: 4, edge: Edge::Outer, uv: [5.0, 6.0], covariance: Some([0.1, -0.01, 0.3]) },
+        ],
+    }];
+    let files = [("joints.csv", stops.to_csv()), ("observations.csv", observations_csv(&observations))];
+    let read = read(series_with(&files.each_ref().map(|(n, t)| (*n, t.as_str()))).path()).unwrap();
+    assert_eq!(read.stops, stops);
+    assert_eq!(read.source, Source::Observations(observations));
+}
