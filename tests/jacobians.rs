@@ -3,6 +3,8 @@
 //! Tolerances: both sides are sums of some tens of products in f64 and differ by rounding alone, about 1e-14 of the largest entry
 //! of the block; circles lose two or three digits more, because moments of the contour (px^3) are divided by its area (px^2).
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 mod support;
 
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
@@ -123,7 +125,13 @@ fn projection_through_the_lens() {
 }
 
 /// Library and witness at one view of one circle: value and the 6 + 3 + 9 derivatives.
-fn circle_witness(camera: &Camera, pose: &Pose, centre: &Vector3<f64>, radius: f64, n: usize) -> (SMatrix<f64, 2, 18>, [f64; 2]) {
+fn circle_witness(
+    camera: &Camera,
+    pose: &Pose,
+    centre: &Vector3<f64>,
+    radius: f64,
+    n: usize,
+) -> (SMatrix<f64, 2, 18>, [f64; 2]) {
     let evaluate = |s: [bool; 18]| {
         let twist = std::array::from_fn(|k| variable(0.0, s[k]));
         let at = std::array::from_fn(|k| variable(centre[k], s[6 + k]));
@@ -197,8 +205,16 @@ fn problems(mount: CameraMount, deviation: f64, dice: &mut Dice) -> Vec<(Problem
             let mimic = parts.iter().any(|p| matches!(p, Part::Mimic(_)));
             let mut terms = all_terms();
             terms.retain(|t| !(mimic && matches!(t, robotcal::model::joint_terms::Term::Gravity(_))));
-            let request =
-                Request { parts, terms, mount, deviation, images: 3, placements: 3, lattice: (3, 2), ..Request::default() };
+            let request = Request {
+                parts,
+                terms,
+                mount,
+                deviation,
+                images: 3,
+                placements: 3,
+                lattice: (3, 2),
+                ..Request::default()
+            };
             problem(dice, &request)
         })
         .collect()
@@ -210,12 +226,11 @@ fn check_chained(problem: &Problem, state: &State, image: &Image, slack: &Slack)
     let value = witness::camera_from_plate(state, &problem.layout, image, slack, None).map(|d| d.re);
     assert!((library.pose.matrix() - value).amax() < 1e-12, "pose of {}", image.name);
     let twist = |seed| body_twist(&witness::camera_from_plate(state, &problem.layout, image, slack, Some(seed)));
-    let names: Vec<&str> = problem.layout.columns.iter().map(|c| c.name.as_str()).collect();
-    for c in 0..problem.layout.theta_len() {
+    for (c, column) in problem.layout.columns.iter().enumerate().take(problem.layout.theta_len()) {
         let (g, w) = (library.d_theta.column(c).into_owned(), twist(Seed::Column(c)));
         // Levers of up to some metres multiply the rounding.
         let off = (&g - w).amax();
-        assert!(off <= CHAIN * w.amax().max(1.0), "{} by {}: {off:e}\n{g}{w}", image.name, names[c]);
+        assert!(off <= CHAIN * w.amax().max(1.0), "{} by {}: {off:e}\n{g}{w}", image.name, column.name);
     }
     for k in 0..slack.len() {
         let (l, w) = (library.d_slack.column(k).into_owned(), twist(Seed::Slack(k)));
@@ -261,7 +276,8 @@ fn check_image(problem: &Problem, state: &State, image: &Image, slack: &Slack) {
     let layout = &problem.layout;
     let weighting = Weighting::of(problem, image);
     let library = linearise(image, state, pose, &weighting).unwrap();
-    let (mut pp, mut pe, mut ee) = (Matrix6::<f64>::zeros(), SMatrix::<f64, 6, E>::zeros(), SMatrix::<f64, E, E>::zeros());
+    let (mut pp, mut pe, mut ee) =
+        (Matrix6::<f64>::zeros(), SMatrix::<f64, 6, E>::zeros(), SMatrix::<f64, E, E>::zeros());
     let (mut bp, mut be) = (Vector6::zeros(), SMatrix::<f64, E, 1>::zeros());
     let mut cost = 0.0;
     assert_eq!(library.markers.len(), image.used().count());
@@ -272,7 +288,9 @@ fn check_image(problem: &Problem, state: &State, image: &Image, slack: &Slack) {
         };
         let uv = witness::predict(state, layout, image, slack, o, None).map(|d| d.re);
         let jp = SMatrix::<f64, 2, 6>::from_columns(&std::array::from_fn::<_, 6, _>(|k| by(Seed::Slack(k)).into()));
-        let jm = SMatrix::<f64, 2, 3>::from_columns(&std::array::from_fn::<_, 3, _>(|k| by(Seed::Marker(o.marker, k)).into()));
+        let jm = SMatrix::<f64, 2, 3>::from_columns(&std::array::from_fn::<_, 3, _>(|k| {
+            by(Seed::Marker(o.marker, k)).into()
+        }));
         let cameras = layout.cameras[image.camera].clone();
         let mut je = SMatrix::<f64, 2, E>::zeros();
         for (k, c) in cameras.enumerate() {
@@ -328,7 +346,8 @@ fn predictions_through_the_whole_chain() {
                     let through = p.d_pose * &chain.d_theta;
                     let scale = through.amax();
                     for c in 0..problem.layout.theta_len() {
-                        let w = witness::predict(&state, &problem.layout, image, &state.slack[i], o, Some(Seed::Column(c)));
+                        let w =
+                            witness::predict(&state, &problem.layout, image, &state.slack[i], o, Some(Seed::Column(c)));
                         let off = (through[(0, c)] - w[0].eps).abs().max((through[(1, c)] - w[1].eps).abs());
                         assert!(off < CIRCLE * scale, "{}: {off:e} of {scale:e}", problem.layout.columns[c].name);
                     }

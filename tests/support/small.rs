@@ -177,7 +177,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
             let wanted = view(dice);
             let seen_as = state.camera_from_plate(&image, &state.slack[i]).unwrap();
             // Both mounts have the plate's pose as the last factor.
-            state.placements[i] = &seen_as.inverse() * &wanted;
+            state.placements[i] = seen_as.inverse() * wanted;
         }
         let image = observed(dice, request, &plate, &state, image, i);
         if image.observations.len() == plate.markers.len() {
@@ -194,7 +194,8 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
 
 /// A camera pose 0.3 m in front of the plate, tilted by up to 50 degrees.
 fn view(dice: &mut Dice) -> Pose {
-    let tilt = Vector3::new(dice.between(-1.0, 1.0), dice.between(-1.0, 1.0), 0.0).normalize() * dice.between(0.0, 0.87);
+    let tilt =
+        Vector3::new(dice.between(-1.0, 1.0), dice.between(-1.0, 1.0), 0.0).normalize() * dice.between(0.0, 0.87);
     let facing = exp_so3(&Vector3::new(std::f64::consts::PI, 0.0, 0.0));
     let roll = exp_so3(&Vector3::new(0.0, 0.0, dice.between(-3.0, 3.0)));
     let translation = Vector3::new(dice.normal(0.01), dice.normal(0.01), dice.between(0.28, 0.4));

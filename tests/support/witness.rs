@@ -106,9 +106,9 @@ fn gravity(chain: &Chain, stop: &Stop, reading: usize, which: usize) -> f64 {
     let Some(carrier) = (if which < 2 { Some(own) } else { next }) else { return 0.0 };
     let mut pose = D4::identity();
     for (k, joint) in chain.joints.iter().enumerate().take(carrier + 1) {
-        let q = joint.drive.map_or(constant(0.0), |d| {
-            variable(stop.readings[d.reading] * d.multiplier + d.offset, k == own)
-        });
+        let q = joint
+            .drive
+            .map_or(constant(0.0), |d| variable(stop.readings[d.reading] * d.multiplier + d.offset, k == own));
         pose = pose * lift(&joint.origin.matrix()) * motion(joint.kind, &joint.axis, q);
     }
     let lever = levers(&chain.joints[carrier].axis)[which % 2].map(constant);
