@@ -210,6 +210,7 @@ fn problems(mount: CameraMount, deviation: f64, dice: &mut Dice) -> Vec<(Problem
                 terms,
                 mount,
                 deviation,
+                joint_noise: deviation,
                 images: 3,
                 placements: 3,
                 lattice: (3, 2),

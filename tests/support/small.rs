@@ -9,7 +9,8 @@ use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use robotcal::model::robot::{Robot, Stop};
 use robotcal::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State, predict};
-use robotcal::series::{CameraMount, Edge, Plate, PlateKind};
+use robotcal::recipe::{MeasuredSeries, MeasuredStop};
+use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 use robotcal::urdf::{Chain, Drive, Joint, JointKind};
 
 /// Random numbers of a printed seed.
@@ -87,15 +88,17 @@ pub struct Request {
     pub parts: Vec<Part>,
     pub terms: Vec<Term>,
     pub mount: CameraMount,
-    /// Spread of the deviations from nominal: twists (m, rad), joint terms and slack (rad or m).
+    /// Spread of the deviations from nominal: twists (m, rad) and joint terms (rad or m).
     pub deviation: f64,
+    /// Sigma of the slack, rad or m.
+    pub joint_noise: f64,
     pub images: usize,
     /// Image i sees placement i modulo this.
     pub placements: usize,
     pub lattice: (u32, u32),
     pub radius_m: f64,
-    /// True noise of the observations, px; stated is 0.1 px.
-    pub noise_px: f64,
+    /// True noise of the observations in units of the stated covariance.
+    pub pixel_factor: f64,
 }
 
 impl Default for Request {
@@ -105,11 +108,12 @@ impl Default for Request {
             terms: vec![Term::Offset],
             mount: CameraMount::Hand,
             deviation: 1e-3,
+            joint_noise: 1e-3,
             images: 6,
             placements: 1,
             lattice: (4, 3),
             radius_m: 0.006,
-            noise_px: 0.1,
+            pixel_factor: 1.3,
         }
     }
 }
@@ -143,8 +147,8 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
     let mut camera = Camera::pinhole(Lens::Brown, 1280, 1024, 1000.0);
     camera.parameters = vec![1010.0, 990.0, 655.0, 505.0, -0.15, 0.03, 8e-4, -5e-4, 0.004];
     let mounting = dice.pose(0.2, 3.0);
-    let slack: Vec<Slack> =
-        (0..request.images).map(|_| Slack::Joints((0..readings).map(|_| dice.normal(deviation)).collect())).collect();
+    let mut noise = || Slack::Joints((0..readings).map(|_| dice.normal(request.joint_noise)).collect());
+    let slack = (0..request.images).map(|_| noise()).collect();
     let mut state = State {
         robot,
         mountings: vec![mounting],
@@ -188,7 +192,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
     let (mountings, placements) = (names(1, "mounting"), names(state.placements.len(), "placement"));
     let cameras = vec!["front".to_owned()];
     let layout = Layout::new(&state, &mountings, &placements, &cameras, &["plate".to_owned()]);
-    let noise = Noise { pixel_factor: vec![1.3], joint: vec![vec![1e-3; readings]] };
+    let noise = Noise { pixel_factor: vec![request.pixel_factor], joint: vec![vec![request.joint_noise.max(1e-6); readings]] };
     (Problem { layout, plates: vec![plate], placements, mountings, cameras, images, noise, huber: 2.45 }, state)
 }
 
@@ -212,17 +216,51 @@ fn observed(dice: &mut Dice, request: &Request, plate: &Plate, state: &State, mu
         }
         let (uu, vv) = (0.01 * dice.between(0.5, 2.0), 0.01 * dice.between(0.5, 2.0));
         let uv = 0.3 * (uu * vv).sqrt();
+        let covariance = Matrix2::new(uu, uv, uv, vv);
         let mut o = Measured {
             marker,
             edge: Edge::Outer,
             radius_m: if marker % 5 == 4 { 0.0 } else { request.radius_m },
             uv: Vector2::zeros(),
-            information: Matrix2::new(uu, uv, uv, vv).try_inverse().unwrap(),
+            information: covariance.try_inverse().unwrap(),
             rejected: None,
         };
-        let clean = predict(&image, state, &pose, &o).unwrap().uv;
-        o.uv = clean + Vector2::new(dice.normal(request.noise_px), dice.normal(request.noise_px));
+        let noise = Vector2::new(dice.normal(1.0), dice.normal(1.0)) * request.pixel_factor;
+        o.uv = predict(&image, state, &pose, &o).unwrap().uv + covariance.cholesky().unwrap().l() * noise;
         image.observations.push(o);
     }
     image
+}
+
+/// The same data as a series for the recipes.
+pub fn series(problem: &Problem) -> MeasuredSeries {
+    let plate = problem.plates[0].clone();
+    let stop = |image: &Image| MeasuredStop {
+        image: image.name.clone(),
+        readings: image.stop.as_ref().map(|s| s.readings.clone()),
+        placement: problem.placements[image.placement].clone(),
+        observations: (image.observations.iter())
+            .map(|o| {
+                let c = o.information.try_inverse().unwrap();
+                let covariance = Some([c[(0, 0)], c[(0, 1)], c[(1, 1)]]);
+                Observation { marker: plate.markers[o.marker].id, edge: o.edge, uv: o.uv.into(), covariance }
+            })
+            .collect(),
+        left_out: None,
+    };
+    MeasuredSeries {
+        name: "small".into(),
+        camera: problem.cameras[0].clone(),
+        mounting: problem.mountings[0].clone(),
+        mount: problem.images[0].mount,
+        width_px: 1280,
+        height_px: 1024,
+        focal_px: None,
+        lens: Lens::Brown,
+        centroid: true,
+        plate_name: "plate".into(),
+        order_known: false,
+        stops: problem.images.iter().map(stop).collect(),
+        plate,
+    }
 }
