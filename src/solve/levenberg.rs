@@ -79,7 +79,9 @@ pub fn solve(problem: &Problem, start: State, settings: &Settings) -> Outcome {
         // Where the step promises less than the cost can resolve, the gradient is the better judge.
         let below_rounding = small || decrement * decrement < 10.0 * ROUNDING * lin.cost;
         match tried {
-            Some(better) if better.cost <= lin.cost || (below_rounding && better.cost <= lin.cost * (1.0 + ROUNDING)) => {
+            Some(better)
+                if better.cost <= lin.cost || (below_rounding && better.cost <= lin.cost * (1.0 + ROUNDING)) =>
+            {
                 (state, lin) = (next, better);
                 lambda = (lambda * 0.1).max(1e-12);
                 if small {
