@@ -82,8 +82,14 @@ impl Placement {
         inside.then(|| u32::try_from(row * self.board.columns + column).ok()).flatten()
     }
 
+    /// Lattice coordinates of all corners of the board.
+    pub fn corners(self) -> impl Iterator<Item = (i32, i32)> {
+        let ((u0, v0), (width, height)) = (self.origin, self.extent());
+        (v0..v0 + height).flat_map(move |v| (u0..u0 + width).map(move |u| (u, v)))
+    }
+
     /// Whether the square whose corners of least u and v is `cell` is dark.
-    fn is_dark(self, (u, v): (i32, i32)) -> bool {
+    pub fn is_dark(self, (u, v): (i32, i32)) -> bool {
         let (a, b) = (self.board_from_lattice((u, v)), self.board_from_lattice((u + 1, v + 1)));
         (a.0.min(b.0) + a.1.min(b.1)).rem_euclid(2) == 0
     }

@@ -7,10 +7,22 @@ use calib_targets::chessboard::{ChessboardDetector, ChessboardParams, detect_cor
 use calib_targets::core::GrayImageView;
 use calib_targets::detect::{DetectorConfig, ImageRefiner, default_chess_config};
 
-use super::board_labels::{BoardSize, Labelling, Lattice, label};
+use super::board_labels::{BoardSize, Labelling, Lattice, Placement, label};
+use super::saddle::{Saddle, Seed, Window, refine};
 use super::{Detection, Dropped, Picture};
 use crate::error::{Error, Notice, Result};
+use crate::geom::PlaneMap;
 use crate::series::{Edge, Observation, Plate};
+
+/// Pixels for one corner: as far along the edges as the next corners do not disturb, and near enough that the lens
+/// does not bend the edges.
+const WINDOW: Window = Window { reach: 0.4, radius_px: 16.0 };
+/// A corner with less than this share of the usual contrast is none.
+const WEAK: f64 = 0.3;
+/// A fit this many times worse than usual is disturbed by something else in the window ...
+const DISTURBED: f64 = 3.0;
+/// ... if its residuals exceed this share of the contrast.
+const LEAST_DISTURBED: f64 = 0.06;
 
 /// Finds the inner corners of a chessboard; parts of the board may be out of view or covered.
 ///
@@ -35,17 +47,75 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
         Labelling::Mirrored => return Err(mirrored()),
         Labelling::Contradiction => return Err(contradiction(board)),
     };
-    let mut detection = Detection { notices, ..Detection::default() };
-    for (&key, &uv) in &lattice {
-        match placement.id(key) {
-            Some(marker) => {
-                detection.observations.push(Observation { marker, edge: Edge::Outer, uv, covariance: None });
-            }
-            None => detection.dropped.push(Dropped { uv, reason: "off the board" }),
+    let mut detection = measure(picture, &lattice, placement);
+    detection.notices = notices;
+    Ok(detection)
+}
+
+/// A fitted corner with where it is on the lattice.
+struct Fitted {
+    key: (i32, i32),
+    marker: u32,
+    saddle: Saddle,
+}
+
+/// Sub-pixel positions of all corners of the board, also of those that the lattice finder left out.
+fn measure(picture: &Picture, lattice: &Lattice, placement: Placement) -> Detection {
+    let mut detection = Detection::default();
+    let mut fitted = Vec::new();
+    for key in placement.corners() {
+        let Some(marker) = placement.id(key) else { continue };
+        let Some(seed) = seed(lattice, key) else { continue };
+        match refine(picture, &seed, WINDOW) {
+            Ok(saddle) => fitted.push(Fitted { key, marker, saddle }),
+            Err(reason) if lattice.contains_key(&key) => detection.dropped.push(Dropped { uv: seed.uv, reason }),
+            Err(_) => {}
+        }
+    }
+    for (&key, &uv) in lattice {
+        if placement.id(key).is_none() {
+            detection.dropped.push(Dropped { uv, reason: "off the board" });
+        }
+    }
+    let typical_contrast = median(fitted.iter().map(|f| f.saddle.contrast.abs()));
+    let typical_noise = median(fitted.iter().map(|f| f.saddle.noise / f.saddle.contrast.abs()));
+    for Fitted { key: (u, v), marker, saddle } in fitted {
+        let contrast = if placement.is_dark((u - 1, v)) { -saddle.contrast } else { saddle.contrast };
+        let disturbed = saddle.noise > f64::max(DISTURBED * typical_noise, LEAST_DISTURBED) * contrast.abs();
+        if contrast < WEAK * typical_contrast {
+            detection.dropped.push(Dropped { uv: saddle.uv, reason: "weak or wrong contrast" });
+        } else if disturbed {
+            detection.dropped.push(Dropped { uv: saddle.uv, reason: "disturbed surroundings" });
+        } else {
+            let (uv, covariance) = (saddle.uv, Some(saddle.covariance));
+            detection.observations.push(Observation { marker, edge: Edge::Outer, uv, covariance });
         }
     }
     detection.observations.sort_by_key(|o| o.marker);
-    Ok(detection)
+    detection
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// A corner with the directions and lengths of the edges there, from the map of its neighbourhood.
+fn seed(lattice: &Lattice, (u, v): (i32, i32)) -> Option<Seed> {
+    let reach = 2;
+    let pairs: Vec<_> = (v - reach..=v + reach)
+        .flat_map(|j| (u - reach..=u + reach).map(move |i| (i, j)))
+        .filter(|&key| key != (u, v))
+        .filter_map(|key| Some(([f64::from(key.0 - u), f64::from(key.1 - v)], *lattice.get(&key)?)))
+        .collect();
+    let map = PlaneMap::fit(&pairs)?;
+    let [[xu, xv], [yu, yv]] = map.jacobian([0.0, 0.0])?;
+    let predicted = map.apply([0.0, 0.0])?;
+    let near =
+        |uv: &&[f64; 2]| (uv[0] - predicted[0]).hypot(uv[1] - predicted[1]) < 0.2 * xu.hypot(yu).min(xv.hypot(yv));
+    let uv = lattice.get(&(u, v)).filter(near).copied().unwrap_or(predicted);
+    Some(Seed { uv, sides: [[xu, yu], [xv, yv]] })
 }
 
 fn board_size(plate: &Plate) -> Result<BoardSize> {
@@ -85,10 +155,11 @@ fn corner_config() -> DetectorConfig {
     default_chess_config().with_refiner(refiner)
 }
 
-/// Grey values scaled to 8 bits, for finding corners only: 8-bit pictures stay as they are, deeper ones are stretched so
-/// that all but the brightest thousandth of their pixels fit.
+/// Grey values scaled to 8 bits, for finding corners only: bright 8-bit pictures stay as they are, others are stretched
+/// so that all but the brightest thousandth of their pixels fit.
 fn to_8_bit(picture: &Picture) -> Vec<u8> {
-    let scale = if picture.full_scale <= 255.0 { 1.0 } else { 255.0 / bright_level(picture) };
+    let bright = bright_level(picture);
+    let scale = if (128.0..=255.0).contains(&bright) && picture.full_scale <= 255.0 { 1.0 } else { 255.0 / bright };
     picture.pixels.iter().map(|&p| (p * scale + 0.5) as u8).collect()
 }
 

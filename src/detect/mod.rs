@@ -4,10 +4,12 @@
 
 mod board_labels;
 pub mod chessboard;
+pub mod circles;
 mod detection;
 mod load;
 mod picture;
 mod run;
+mod saddle;
 
 pub use detection::{Detection, Dropped};
 pub use load::{LUMA_WEIGHTS, load};
@@ -24,10 +26,11 @@ use crate::series::{Plate, PlateKind};
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     match plate.kind {
         PlateKind::Chessboard => chessboard::detect(picture, plate),
-        PlateKind::CodedCircles | PlateKind::CircleGrid | PlateKind::Charuco => Err(Error::input(
+        PlateKind::CodedCircles => circles::detect(picture, plate, &circles::Options::default())?.into_common(),
+        PlateKind::CircleGrid | PlateKind::Charuco => Err(Error::input(
             "plate",
             format!("plates of kind {:?} cannot be detected yet", plate.kind),
-            "use a chessboard, or give observations.csv",
+            "use coded circles or a chessboard, or give observations.csv",
         )),
         PlateKind::Points => Err(Error::input(
             "plate",

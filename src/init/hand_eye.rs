@@ -45,10 +45,11 @@ pub struct HandEyeStart {
 impl HandEye {
     /// Rotation error (rad) and translation error (m) of one image.
     pub fn error(&self, pair: &PosePair) -> (f64, f64) {
-        (&self.camera * &pair.camera_from_plate).distance(&(&pair.chain * &self.plate))
+        (self.camera * pair.camera_from_plate).distance(&(pair.chain * self.plate))
     }
 
-    fn median_error(&self, pairs: &[PosePair]) -> f64 {
+    /// Median over the images of rotation error (rad) plus translation error (m).
+    pub fn median_error(&self, pairs: &[PosePair]) -> f64 {
         let mut errors: Vec<f64> = pairs
             .iter()
             .map(|p| {
@@ -168,6 +169,26 @@ fn translations(pairs: &[PosePair], rx: Matrix3<f64>, rz: Matrix3<f64>) -> Optio
         camera: Pose::new(rx, Vector3::new(t[0], t[1], t[2])),
         plate: Pose::new(rz, Vector3::new(t[3], t[4], t[5])),
     })
+}
+
+/// Scale of the plate against the robot's link lengths that fits the pairs best, for the rotations of `solution`; about 1
+/// where the pitch of the plate is right. `None` where the stops do not determine it.
+pub fn plate_scale(pairs: &[PosePair], solution: &HandEye) -> Option<f64> {
+    let (rx, n) = (solution.camera.rotation, 7);
+    let mut normal = DMatrix::<f64>::zeros(n, n);
+    let mut rhs = DVector::<f64>::zeros(n);
+    for p in pairs {
+        // Unknowns t_X, t_Z, s with rows [I, -R_A, R_X t_C].
+        let mut rows = DMatrix::<f64>::zeros(3, n);
+        rows.view_mut((0, 0), (3, 3)).fill_with_identity();
+        rows.view_mut((0, 3), (3, 3)).copy_from(&-p.chain.rotation);
+        rows.view_mut((0, 6), (3, 1)).copy_from(&(rx * p.camera_from_plate.translation));
+        rhs += rows.transpose() * p.chain.translation;
+        normal += rows.transpose() * rows;
+    }
+    let factor = SymmetricFactor::new(&normal).ok()?;
+    let scale = factor.solve(&rhs)[6];
+    (scale.is_finite() && scale > 0.0).then_some(scale)
 }
 
 fn shah(pairs: &[PosePair]) -> Option<HandEye> {

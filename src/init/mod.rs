@@ -6,6 +6,6 @@ mod homography;
 mod resection;
 
 pub use focal::{FocalCandidate, focal_candidates};
-pub use hand_eye::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
+pub use hand_eye::{HandEye, HandEyeStart, PosePair, plate_scale, solve_hand_eye};
 pub use homography::{Homography, PlanarPose};
 pub use resection::resect;

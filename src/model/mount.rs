@@ -24,8 +24,8 @@ impl CameraMount {
     /// `camera` is `flange_from_camera` or `base_from_camera`; `plate` is `base_from_plate` or `flange_from_plate`.
     pub fn camera_from_plate(self, camera: &Pose, base_from_tip: &Pose, plate: &Pose) -> Pose {
         match self {
-            Self::Hand => &camera.inverse() * &(&base_from_tip.inverse() * plate),
-            Self::Fixed => &camera.inverse() * &(base_from_tip * plate),
+            Self::Hand => camera.inverse() * (&base_from_tip.inverse() * plate),
+            Self::Fixed => camera.inverse() * (base_from_tip * plate),
         }
     }
 

@@ -80,7 +80,7 @@ impl Robot {
         let positions = self.positions(stop, noise).0;
         let mut pose = Pose::identity();
         for (i, joint) in self.chain.joints.iter().enumerate() {
-            pose = &(&(&pose * &joint.origin) * &Pose::exp(&self.twists[i])) * &motion(joint, positions[i]);
+            pose = pose * joint.origin * Pose::exp(&self.twists[i]) * motion(joint, positions[i]);
         }
         pose
     }
@@ -98,9 +98,9 @@ impl Robot {
                 let column = adjoint(&rest_from_tip.inverse()) * motion_twist(joint);
                 d_readings[drive.reading] += column * drive.multiplier;
             }
-            rest_from_tip = &motion(joint, positions[i]) * &rest_from_tip;
+            rest_from_tip = motion(joint, positions[i]) * rest_from_tip;
             d_twists[i] = adjoint(&rest_from_tip.inverse()) * right_jacobian_se3(&self.twists[i]);
-            rest_from_tip = &(&joint.origin * &Pose::exp(&self.twists[i])) * &rest_from_tip;
+            rest_from_tip = joint.origin * Pose::exp(&self.twists[i]) * rest_from_tip;
         }
         let d_terms = self.terms.iter().map(|t| d_readings[t.reading] * t.term.basis(&contexts[t.reading])).collect();
         Kinematics { base_from_tip: rest_from_tip, d_twists, d_readings, d_terms }
@@ -114,7 +114,7 @@ impl Robot {
         }
         let corrected = |(joint, twist): (&Joint, &Vector6<f64>)| {
             let offset = joint.drive.map_or(0.0, |d| d.multiplier * offsets[d.reading]);
-            &joint.origin.perturbed(twist) * &motion(joint, offset)
+            joint.origin.perturbed(twist) * motion(joint, offset)
         };
         self.chain.joints.iter().zip(&self.twists).map(corrected).collect()
     }
@@ -147,7 +147,7 @@ impl Robot {
         let mut links = Vec::new();
         for joint in &self.chain.joints {
             let position = joint.drive.map_or(0.0, |d| d.multiplier * contexts[d.reading].reading + d.offset);
-            pose = &(&pose * &joint.origin) * &motion(joint, position);
+            pose = pose * joint.origin * motion(joint, position);
             if let Some(drive) = joint.drive {
                 links.push((drive.reading, joint.kind, joint.axis, pose.rotation));
             }

@@ -63,8 +63,8 @@ pub fn adjust_free_poses(
     let homographies = fit_homographies(problem, &state)?;
     let mut verdicts = Vec::new();
     let mut start = state;
-    for camera in 0..problem.cameras.len() {
-        start = start_camera(problem, start, camera, &homographies, stated_focal_px[camera], &mut verdicts)?;
+    for (camera, stated) in stated_focal_px.iter().enumerate() {
+        start = start_camera(problem, start, camera, &homographies, *stated, &mut verdicts)?;
     }
     let result = finish(problem, start);
     for (column, free) in problem.layout.columns.iter_mut().zip(free_before) {

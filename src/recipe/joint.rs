@@ -2,6 +2,7 @@
 
 use super::build::{MeasuredSeries, build};
 use super::free_poses::{FreePoses, adjust_free_poses};
+use super::moved::{Move, find_move};
 use super::solution::Solution;
 use super::start::{misfit, start_robot};
 use crate::assess::{Accuracy, hold_out};
@@ -101,7 +102,8 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let outcome = fit(&mut problem, state, options);
     let mut notices = Vec::new();
     name_wrong_pairs(&mut problem, &outcome.state, &free);
-    check_left_out(&problem, on_robot)?;
+    let moves: Vec<Move> = (0..series.len()).filter_map(|k| find_move(&problem, &outcome.state, &free, k)).collect();
+    check_left_out(&problem, on_robot, &moves)?;
     let (Status::Converged, Some(linearised)) = (outcome.status, outcome.linearised) else {
         return Err(Error::unsolved(
             "joint fit",
@@ -115,7 +117,8 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     })?;
     let accuracy = hold_out(&problem, &state)
         .ok_or_else(|| Error::unsolved("hold-out", "too few images to hold any out", "take more images"))?;
-    let failed_gates = gates(&problem, &free, &accuracy, on_robot);
+    let mut failed_gates = gates(&problem, &free, &accuracy, on_robot);
+    failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
     few_images(on_robot, &mut notices);
     Ok(Solution {
         problem,
@@ -193,10 +196,13 @@ fn left_out(problem: &Problem, on_robot: usize) -> usize {
     on_robot - problem.used().filter(|(_, i)| i.stop.is_some()).count()
 }
 
-fn check_left_out(problem: &Problem, on_robot: usize) -> Result<()> {
+fn check_left_out(problem: &Problem, on_robot: usize, moves: &[Move]) -> Result<()> {
     let out = left_out(problem, on_robot);
     if out as f64 <= HOPELESS_SHARE_LEFT_OUT * on_robot as f64 {
         return Ok(());
+    }
+    if let Some(m) = moves.first() {
+        return Err(Error::unsolved("joint readings", &m.what, &m.remedy));
     }
     let named: Vec<&str> = (problem.images.iter())
         .filter(|i| i.rejected.as_ref().is_some_and(|r| r.starts_with("wrongly paired")))

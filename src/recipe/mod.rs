@@ -6,8 +6,10 @@ mod build;
 mod free_poses;
 mod joint;
 mod measure;
+mod moved;
 mod solution;
 mod start;
+mod suspects;
 
 pub use build::{MeasuredSeries, MeasuredStop};
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};

@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 
 use super::free_poses::FreePoses;
 use super::solution::StartVerdict;
+use super::suspects::Suspects;
 use crate::error::{Error, Result};
 use crate::geom::{Pose, log_so3};
 use crate::init::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
 use crate::linalg::symmetric_eigen;
+use crate::model::robot::Robot;
 use crate::problem::{Problem, Slack, State, predict};
 use crate::series::CameraMount;
 
@@ -39,9 +41,7 @@ pub(super) fn start_robot(
     let mut groups: BTreeMap<(usize, usize), Vec<(usize, PosePair)>> = BTreeMap::new();
     for (i, image) in problem.used() {
         let (Some(stop), Some(pose)) = (&image.stop, &free.poses[i]) else { continue };
-        let tip = state.robot.base_from_tip(&stop.readings);
-        let chain = if image.mount == CameraMount::Hand { tip.inverse() } else { tip };
-        let pair = PosePair { camera_from_plate: pose.camera_from_plate, chain };
+        let pair = pose_pair(&state.robot, image.mount, &stop.readings, pose.camera_from_plate);
         groups.entry((image.mounting, image.placement)).or_default().push((i, pair));
     }
     let mut order: Vec<_> = groups.into_iter().collect();
@@ -54,10 +54,10 @@ pub(super) fn start_robot(
         let solution = match known {
             (Some(camera), Some(plate)) => HandEye { camera, plate },
             (Some(camera), None) => {
-                closest(&poses, |p| HandEye { camera, plate: &p.chain.inverse() * &(&camera * &p.camera_from_plate) })
+                closest(&poses, |p| HandEye { camera, plate: p.chain.inverse() * (camera * p.camera_from_plate) })
             }
             (None, Some(plate)) => {
-                closest(&poses, |p| HandEye { camera: &(&p.chain * &plate) * &p.camera_from_plate.inverse(), plate })
+                closest(&poses, |p| HandEye { camera: (p.chain * plate) * p.camera_from_plate.inverse(), plate })
             }
             (None, None) => closed_form(problem, state, pairs, &poses, (*mounting, *placement), &of, verdicts)?,
         };
@@ -72,6 +72,12 @@ pub(super) fn start_robot(
         *pose = plates.get(&k).copied().unwrap_or(*pose);
     }
     Ok(())
+}
+
+/// What one image says, for the closed forms.
+pub(super) fn pose_pair(robot: &Robot, mount: CameraMount, readings: &[f64], camera_from_plate: Pose) -> PosePair {
+    let tip = robot.base_from_tip(readings);
+    PosePair { camera_from_plate, chain: if mount == CameraMount::Hand { tip.inverse() } else { tip } }
 }
 
 /// Of the solutions that single images give, the one that all images like best.
@@ -134,6 +140,10 @@ fn closed_form(
             verdict: pixels.unwrap_or_default() + &spread,
             won: s.origin == winner,
         });
+    }
+    let suspects = Suspects { problem, robot: &state.robot, pairs };
+    if let Some(cause) = suspects.better_than(best.median_error) {
+        return Err(Error::unsolved(of, cause.what, cause.remedy));
     }
     if best.median_error > WORST_SPREAD {
         return Err(no_fit(

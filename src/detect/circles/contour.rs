@@ -1,0 +1,218 @@
+//! Closed contours of the thresholded picture, with sub-pixel points.
+//!
+//! The contours run along the cracks between dark and light pixels with the dark side on the left; dark pixels hang
+//! together over corners, so that thin rings stay closed. Every crack gives one point, where the counts between its
+//! two pixels pass the threshold.
+
+use super::levels::Levels;
+use crate::detect::Picture;
+
+const DARK: u8 = 1;
+const SEEN: u8 = 2;
+
+/// What a contour encloses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Encloses {
+    Dark,
+    Light,
+}
+
+/// A closed contour.
+#[derive(Debug, Clone)]
+pub(super) struct Contour {
+    pub encloses: Encloses,
+    /// Enclosed area, px^2.
+    pub area: f64,
+    pub points: Vec<[f32; 2]>,
+    /// Mean step of the counts across the contour, counts per px along rows or columns.
+    pub step: f32,
+    /// The contour runs along the border of the picture.
+    pub clipped: bool,
+    /// It was longer than the limit; the points are those of its first part.
+    pub too_long: bool,
+    /// Middle of the bounding box.
+    pub middle: [f64; 2],
+}
+
+/// All contours of at least `shortest` cracks; of longer ones than `longest` only the fact is kept.
+pub(super) fn contours(picture: &Picture, levels: &Levels, shortest: usize, longest: usize) -> Vec<Contour> {
+    let mut map = DarkMap::of(picture, levels);
+    let mut found = Vec::new();
+    let mut tracer = Tracer { picture, levels, longest, points: Vec::new() };
+    for y in 0..picture.height {
+        let start = (y + 1) * map.stride;
+        let mut x = 1;
+        while x <= picture.width {
+            let here = map.cells[start + x];
+            if here == DARK && map.cells[start + x - 1] & DARK == 0 {
+                let contour = tracer.follow(&mut map, x, y + 1);
+                if contour.too_long || contour.points.len() >= shortest {
+                    found.push(contour);
+                }
+            }
+            x += 1;
+        }
+    }
+    found
+}
+
+/// One byte per pixel with a light frame around the picture, so that following a contour needs no bounds.
+struct DarkMap {
+    stride: usize,
+    cells: Vec<u8>,
+}
+
+impl DarkMap {
+    fn of(picture: &Picture, levels: &Levels) -> Self {
+        let stride = picture.width + 2;
+        let mut cells = vec![0u8; stride * (picture.height + 2)];
+        let mut thresholds = vec![0.0f32; picture.width];
+        let mut nodes = Vec::new();
+        for (y, line) in picture.pixels.chunks_exact(picture.width).enumerate() {
+            levels.threshold_row(y, &mut nodes, &mut thresholds);
+            let out = &mut cells[(y + 1) * stride + 1..(y + 1) * stride + 1 + picture.width];
+            for ((o, v), t) in out.iter_mut().zip(line).zip(&thresholds) {
+                *o = u8::from(v < t);
+            }
+        }
+        Self { stride, cells }
+    }
+}
+
+struct Tracer<'a> {
+    picture: &'a Picture,
+    levels: &'a Levels,
+    longest: usize,
+    points: Vec<[f32; 2]>,
+}
+
+impl Tracer<'_> {
+    /// Follows the contour whose first crack is the left side of the dark cell (x, y) of the framed map.
+    fn follow(&mut self, map: &mut DarkMap, x: usize, y: usize) -> Contour {
+        const SOUTH: usize = 1;
+        self.points.clear();
+        let stride = map.stride;
+        let start = y * stride + x;
+        // Corner index: the top-left corner of the cell with that index. Directions: east, south, west, north.
+        let (mut corner, mut direction) = (start, SOUTH);
+        let (mut length, mut step, mut clipped) = (0usize, 0.0f32, false);
+        loop {
+            let (dark, light) = match direction {
+                0 => (corner - stride, corner),
+                1 => (corner, corner - 1),
+                2 => (corner - 1, corner - stride - 1),
+                _ => (corner - stride - 1, corner - stride),
+            };
+            if direction == SOUTH {
+                map.cells[dark] |= SEEN;
+            }
+            length += 1;
+            if length <= self.longest {
+                match self.crossing(dark, light, stride) {
+                    Some((point, rise)) => {
+                        self.points.push(point);
+                        step += rise;
+                    }
+                    None => clipped = true,
+                }
+            }
+            corner = match direction {
+                0 => corner + 1,
+                1 => corner + stride,
+                2 => corner - 1,
+                _ => corner - stride,
+            };
+            let around = [corner - stride, corner, corner - 1, corner - stride - 1]; // NE, SE, SW, NW
+            let (ahead_left, ahead_right) = match direction {
+                0 => (around[0], around[1]),
+                1 => (around[1], around[2]),
+                2 => (around[2], around[3]),
+                _ => (around[3], around[0]),
+            };
+            if map.cells[ahead_right] & DARK != 0 {
+                direction = (direction + 1) % 4;
+            } else if map.cells[ahead_left] & DARK == 0 {
+                direction = (direction + 3) % 4;
+            }
+            if corner == start && direction == SOUTH {
+                break;
+            }
+        }
+        self.contour(length, step, clipped)
+    }
+
+    /// Sub-pixel point between a dark and a light cell and the rise of counts across; `None` at the frame.
+    fn crossing(&self, dark: usize, light: usize, stride: usize) -> Option<([f32; 2], f32)> {
+        let (dx, dy) = (dark % stride, dark / stride);
+        let (lx, ly) = (light % stride, light / stride);
+        if lx == 0 || ly == 0 || lx > self.picture.width || ly > self.picture.height {
+            return None;
+        }
+        let below = self.picture.at(dx - 1, dy - 1);
+        let above = self.picture.at(lx - 1, ly - 1);
+        let (fx, fy) = ((dx - 1) as f32, (dy - 1) as f32);
+        let rise = above - below;
+        let t = ((self.levels.threshold_at(fx, fy) - below) / rise).clamp(0.0, 1.0);
+        let t = if t.is_finite() { t } else { 0.5 };
+        Some(([fx + t * (lx as f32 - dx as f32), fy + t * (ly as f32 - dy as f32)], rise))
+    }
+
+    fn contour(&self, length: usize, step: f32, clipped: bool) -> Contour {
+        let mut twice = 0.0f64;
+        let (mut low, mut high) = ([f32::MAX; 2], [f32::MIN; 2]);
+        if let Some(origin) = self.points.first().copied() {
+            let mut last = self.points[self.points.len() - 1];
+            for &p in &self.points {
+                twice +=
+                    f64::from((last[0] - origin[0]) * (p[1] - origin[1]) - (p[0] - origin[0]) * (last[1] - origin[1]));
+                last = p;
+                for k in 0..2 {
+                    low[k] = low[k].min(p[k]);
+                    high[k] = high[k].max(p[k]);
+                }
+            }
+        }
+        Contour {
+            encloses: if twice < 0.0 { Encloses::Dark } else { Encloses::Light },
+            area: twice.abs() / 2.0,
+            points: self.points.clone(),
+            step: step / self.points.len().max(1) as f32,
+            clipped,
+            too_long: length > self.longest,
+            middle: [0, 1].map(|k| 0.5 * f64::from(low[k] + high[k])),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(rows: &[&str]) -> Picture {
+        let pixels = rows.iter().flat_map(|r| r.bytes().map(|b| if b == b'#' { 20.0 } else { 200.0 })).collect();
+        Picture { width: rows[0].len(), height: rows.len(), pixels, full_scale: 255.0 }
+    }
+
+    #[test]
+    fn a_ring_has_a_dark_and_a_light_contour_and_corners_connect() {
+        let p =
+            picture(&["........", "..###...", ".#...#..", ".#...#..", ".#...#..", "..###...", "........", "........"]);
+        let levels = Levels::of(&p, 8.0, 0.5);
+        let found = contours(&p, &levels, 4, 100);
+        assert_eq!(found.len(), 2);
+        let outer = found.iter().find(|c| c.encloses == Encloses::Dark).unwrap();
+        let inner = found.iter().find(|c| c.encloses == Encloses::Light).unwrap();
+        assert_eq!((outer.points.len(), inner.points.len()), (20, 12));
+        assert!(outer.area > inner.area && !outer.clipped);
+        assert_eq!(outer.middle, [3.0, 3.0]);
+    }
+
+    #[test]
+    fn a_contour_at_the_border_is_clipped() {
+        let p =
+            picture(&["##......", "##......", "........", "........", "........", "........", "........", "........"]);
+        let found = contours(&p, &Levels::of(&p, 8.0, 0.5), 2, 100);
+        assert_eq!(found.len(), 1);
+        assert!(found[0].clipped);
+    }
+}

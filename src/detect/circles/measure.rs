@@ -1,0 +1,184 @@
+//! Measuring markers whose place is known: all candidates of a picture, or those that someone predicts.
+
+use super::candidate::{Candidate, Profile, candidates, largest_marker};
+use super::edge_model::Pixels;
+use super::ellipse::Ellipse;
+use super::levels::Levels;
+use super::refine::{Fit, Start, refine};
+use super::types::{Dropped, Found, Measured, Options, Reason};
+use crate::detect::Picture;
+
+/// Threshold between the envelopes: a little above the middle, where small blurred markers keep their size.
+pub(super) const THRESHOLD: f32 = 0.55;
+
+/// What the picture says about blur and noise, from some of its markers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Camera {
+    pub blur_px: f64,
+    /// Variance of a pixel on paper and on ink, counts^2.
+    pub noise: [f64; 2],
+}
+
+/// A marker to be measured.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Target {
+    pub ellipse: Ellipse,
+    pub ratio: Option<f64>,
+    pub paper: f64,
+    pub ink: f64,
+    pub clear: f64,
+    pub shape_sigma: Option<f64>,
+}
+
+impl Target {
+    pub fn start(&self, camera: &Camera, blur_sigma: f64) -> Start {
+        Start {
+            ellipse: self.ellipse,
+            ratio: self.ratio,
+            paper: self.paper,
+            ink: self.ink,
+            blur_px: camera.blur_px,
+            blur_sigma,
+            shape_sigma: self.shape_sigma,
+            clear: self.clear,
+            noise: camera.noise,
+        }
+    }
+}
+
+/// How many markers are measured to learn blur and noise.
+const LEARNERS: usize = 40;
+
+/// Learns blur and noise from some of the targets.
+pub(super) fn learn(picture: &Picture, targets: &[Target], guess_blur: f64, noise: f32, pixels: &mut Pixels) -> Camera {
+    let variance = f64::from(noise).powi(2);
+    let mut camera = Camera { blur_px: guess_blur, noise: [variance; 2] };
+    for _ in 0..2 {
+        let stride = targets.len().div_ceil(LEARNERS).max(1);
+        let fits: Vec<Fit> = targets
+            .iter()
+            .step_by(stride)
+            .filter_map(|t| refine(picture, &t.start(&camera, 0.7), pixels).ok())
+            .collect();
+        if fits.is_empty() {
+            return camera;
+        }
+        let blur = median(fits.iter().map(|f| f.measured.blur_px).collect());
+        let settled = (blur / camera.blur_px).ln().abs() < 0.15;
+        camera = Camera { blur_px: blur, noise: [0, 1].map(|side| plain_variance(&fits, side).unwrap_or(variance)) };
+        if settled {
+            break;
+        }
+    }
+    camera
+}
+
+/// Median over markers of the mean square residual on one side of the edge.
+fn plain_variance(fits: &[Fit], side: usize) -> Option<f64> {
+    let values: Vec<f64> =
+        fits.iter().map(|f| f.plain[side]).filter(|(_, n)| *n >= 12.0).map(|(sum, n)| sum / n).collect();
+    // the levels and gradients of a side take about two degrees of freedom from some tens of pixels: 4 %
+    (!values.is_empty()).then(|| (1.04 * median(values)).max(1.0 / 12.0))
+}
+
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Measures every candidate of a picture without asking which marker it is.
+///
+/// For plates without a code and for judging the image stage alone. Returns the markers in the order of the scan and
+/// the candidates that were dropped.
+pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<Dropped>) {
+    let levels = Levels::of(picture, largest_marker(picture, options), THRESHOLD);
+    let (candidates, mut dropped) = candidates(picture, &levels, options);
+    let targets: Vec<Target> = candidates.iter().map(|c| target_of(c, None, 1.75)).collect();
+    let mut pixels = Pixels::default();
+    let guess = median(candidates.iter().map(|c| c.blur_px).collect());
+    let camera = learn(picture, &targets, guess, levels.noise, &mut pixels);
+    let mut measured = Vec::new();
+    for target in &targets {
+        match refine(picture, &target.start(&camera, 0.3), &mut pixels) {
+            Ok(fit) => measured.push(fit.measured),
+            Err(reason) => dropped.push(drop_target(target, reason, None)),
+        }
+    }
+    (measured, dropped)
+}
+
+/// The target that a candidate makes; `ratio` is that of the plate's marker where it is known.
+pub(super) fn target_of(candidate: &Candidate, ratio: Option<f64>, clear: f64) -> Target {
+    let seen = candidate.open.then(|| candidate.hole.unwrap_or(0.5).clamp(0.25, 0.85));
+    Target {
+        ellipse: candidate.ellipse,
+        ratio: ratio.or(seen),
+        paper: f64::from(candidate.paper),
+        ink: f64::from(candidate.ink),
+        clear,
+        shape_sigma: None,
+    }
+}
+
+pub(super) fn drop_target(target: &Target, reason: Reason, marker: Option<u32>) -> Dropped {
+    Dropped { uv: target.ellipse.centre, reason, ellipse: Some(target.ellipse), marker }
+}
+
+/// A marker whose image is predicted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Predicted {
+    /// Identity.
+    pub marker: u32,
+    /// Ellipse of the outer circle's image.
+    pub outer: Ellipse,
+    /// Inner over outer radius; `None` for a disc.
+    pub ratio: Option<f64>,
+    /// Relative standard deviation of the predicted semi-axes.
+    pub shape_sigma: f64,
+    /// Relative radius (1 is the outer contour) out to which no other ink lies.
+    pub clear: f64,
+}
+
+/// Measures markers where they are predicted: the second pass after a first solve, for markers that were clipped by
+/// the border or missed at first.
+///
+/// The predicted centre may be wrong by about a quarter of a radius. The shape is held to the prediction within
+/// `shape_sigma`, so that a part of the contour determines the centre. `blur_px` is that of the first pass.
+pub fn refine_predicted(
+    picture: &Picture,
+    predicted: &[Predicted],
+    blur_px: f64,
+    noise: [f64; 2],
+) -> (Vec<Found>, Vec<Dropped>) {
+    let mut pixels = Pixels::default();
+    let camera = Camera { blur_px, noise: noise.map(|n| n * n) };
+    let (mut found, mut dropped) = (Vec::new(), Vec::new());
+    for p in predicted {
+        let target = predicted_target(picture, p);
+        let result =
+            target.ok_or(Reason::LowContrast).and_then(|t| refine(picture, &t.start(&camera, 0.2), &mut pixels));
+        match result {
+            Ok(fit) => found.push(Found { marker: p.marker, measured: fit.measured, rescued: true }),
+            Err(reason) => {
+                dropped.push(Dropped { uv: p.outer.centre, reason, ellipse: Some(p.outer), marker: Some(p.marker) })
+            }
+        }
+    }
+    (found, dropped)
+}
+
+pub(super) fn predicted_target(picture: &Picture, p: &Predicted) -> Option<Target> {
+    let profile = Profile::of(picture, &p.outer);
+    let contrast = profile.paper - profile.ring;
+    (contrast > 0.1 * profile.paper).then_some(Target {
+        ellipse: p.outer,
+        ratio: p.ratio,
+        paper: f64::from(profile.paper),
+        ink: f64::from(profile.ring),
+        clear: p.clear,
+        shape_sigma: Some(p.shape_sigma),
+    })
+}

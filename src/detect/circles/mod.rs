@@ -1,0 +1,30 @@
+//! Coded circles: from a grey picture to identified sub-pixel centres.
+//!
+//! ```text
+//! picture -> levels (envelopes, threshold) -> contour -> candidate (ellipse, tests)
+//!         -> lattice (neighbour to neighbour) -> code (position on the plate) -> vet (is every neighbour of one mind)
+//!         -> refine (blurred edge) -> inner/outer agreement -> Detection
+//! ```
+//!
+//! Every stage is a pure function of the picture; none knows a camera or a robot.
+
+mod candidate;
+mod code;
+mod contour;
+mod edge_model;
+mod ellipse;
+mod lattice;
+mod levels;
+mod local_map;
+mod measure;
+mod pipeline;
+mod refine;
+#[cfg(test)]
+pub(crate) mod synth;
+mod types;
+mod vet;
+
+pub use ellipse::Ellipse;
+pub use measure::{Predicted, measure, refine_predicted};
+pub use pipeline::detect;
+pub use types::{Detection, Dropped, Found, Imaged, InnerOuter, Measured, Options, Outcome, Reason};

@@ -1,0 +1,372 @@
+//! The detector: the stages in their order.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::candidate::{Candidate, candidates, largest_marker};
+use super::code::{Code, Verdict};
+use super::edge_model::Pixels;
+use super::lattice::{Lattice, lattices};
+use super::levels::Levels;
+use super::local_map::LocalMap;
+use super::measure::{Camera, Predicted, THRESHOLD, Target, drop_target, learn, median, predicted_target, target_of};
+use super::refine::{Fit, refine};
+use super::types::{Detection, Dropped, Found, InnerOuter, Options, Outcome, Reason};
+use super::vet::{Board, Placed, around, neighbourhood, vet};
+use crate::detect::Picture;
+use crate::series::{Edge, Observation, Plate};
+use crate::{Error, Result};
+
+/// Smallest lattice that is worth a try; below it chance cannot be excluded.
+const SMALLEST_LATTICE: usize = 9;
+
+/// Finds, identifies and measures the markers of a coded plate in one picture.
+///
+/// `uv` of an observation is the area centroid of the contour's image, with the covariance of the fit. A picture
+/// without markers, or in which they cannot be identified, is no error: see [`Detection::outcome`].
+///
+/// # Errors
+///
+/// The plate has no code (its markers are no lattice of circles); the picture is empty; the picture shows the plate in
+/// a mirror.
+pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<Detection> {
+    let code = Code::of(plate).filter(|_| !plate.markers.is_empty()).ok_or_else(|| {
+        let what = "its markers do not form a lattice of circles with a radius";
+        Error::input("plate", what, "give a plate of kind coded-circles with plate.csv as made by `robotcal plate`")
+    })?;
+    if picture.width < 16 || picture.height < 16 || picture.pixels.len() != picture.width * picture.height {
+        let what = format!("{} x {} pixels with {} values", picture.width, picture.height, picture.pixels.len());
+        return Err(Error::input("image", what, "check the image file"));
+    }
+    let levels = Levels::of(picture, largest_marker(picture, options), THRESHOLD);
+    let (candidates, mut dropped) = candidates(picture, &levels, options);
+    let lattices = lattices(&candidates, SMALLEST_LATTICE);
+    let (mut board, outcome) = identify(&code, &lattices, &candidates)?;
+    let vetted = vet(&mut board, &code, &candidates);
+    attach(&mut board, &code, &candidates);
+    drop_unused(&board, &vetted, &lattices, &candidates, &mut dropped);
+    let mut work = Work { picture, plate, code: &code, candidates: &candidates, pixels: Pixels::default() };
+    let measured = work.measure(&board, &levels, options, &mut dropped);
+    Ok(work.detection(&board, measured, outcome, dropped))
+}
+
+/// Puts the lattices on the plate.
+fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> Result<(Board, Outcome)> {
+    let mut board = Board::new();
+    let mut outcome = match (candidates.is_empty(), lattices.is_empty()) {
+        (true, _) => Outcome::NoCandidates,
+        (false, true) => Outcome::NoLattice,
+        _ => Outcome::Ambiguous,
+    };
+    for lattice in lattices {
+        let classes = code.classes_of(lattice, candidates);
+        match code.locate(&classes) {
+            Verdict::Ambiguous => {}
+            Verdict::Mirrored => {
+                let what = "the plate is seen in a mirror: its code is there, but left and right are exchanged";
+                let remedy = "switch off the mirroring in the camera driver, or look at the plate without a mirror";
+                return Err(Error::input("image", what, remedy));
+            }
+            Verdict::Placed { placement, agreeing, disagreeing, runner_up } => {
+                if !matches!(outcome, Outcome::Identified { .. }) {
+                    outcome = Outcome::Identified { agreeing, disagreeing, runner_up };
+                }
+                for (cell, site) in &lattice.cells {
+                    let class = classes.get(cell).copied().flatten();
+                    board.entry(placement.apply(*cell)).or_insert(Placed { candidate: site.candidate, class });
+                }
+            }
+        }
+    }
+    Ok((board, outcome))
+}
+
+/// Cells of the plate next to known ones that are not on the board, with the map around each.
+fn open_cells(board: &Board, code: &Code, candidates: &[Candidate]) -> Vec<((i32, i32), LocalMap)> {
+    let mut cells = BTreeSet::new();
+    for (c, r) in board.keys() {
+        for (i, j) in [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, 1), (-1, 1), (1, -1)] {
+            let cell = (c + i, r + j);
+            if !board.contains_key(&cell) && code.marker_at(cell).is_some() {
+                cells.insert(cell);
+            }
+        }
+    }
+    let map = |cell| {
+        let enough = around(board, cell, 2).count() >= 6;
+        if enough { neighbourhood(board, cell, candidates).map(|(m, _)| (cell, m)) } else { None }
+    };
+    cells.into_iter().filter_map(map).collect()
+}
+
+/// Takes up candidates that no lattice reached but that lie where the plate has a marker of their class.
+fn attach(board: &mut Board, code: &Code, candidates: &[Candidate]) {
+    let mut used: BTreeSet<usize> = board.values().map(|p| p.candidate).collect();
+    for _ in 0..4 {
+        let mut taken = Vec::new();
+        for (cell, map) in open_cells(board, code, candidates) {
+            let (place, step) = (map.at([0.0, 0.0]), map.shorter_step());
+            let fits = |i: &usize| {
+                let e = &candidates[*i].ellipse;
+                let off = (e.centre[0] - place[0]).hypot(e.centre[1] - place[1]);
+                let Some(unit) = map.ellipse(1.0) else { return false };
+                off < 0.2 * step
+                    && code.classify(&candidates[*i], e.mean_radius() / unit.mean_radius()) == code.class_at(cell)
+            };
+            if let Some(i) = (0..candidates.len()).filter(|i| !used.contains(i)).find(fits) {
+                used.insert(i);
+                taken.push((cell, Placed { candidate: i, class: code.class_at(cell) }));
+            }
+        }
+        if taken.is_empty() {
+            break;
+        }
+        board.extend(taken);
+    }
+}
+
+fn drop_unused(
+    board: &Board,
+    vetted: &[((i32, i32), usize, Reason)],
+    lattices: &[Lattice],
+    candidates: &[Candidate],
+    dropped: &mut Vec<Dropped>,
+) {
+    let mut reasons: BTreeMap<usize, Reason> = (0..candidates.len()).map(|i| (i, Reason::OffLattice)).collect();
+    for site in lattices.iter().flat_map(|l| l.cells.values()) {
+        reasons.insert(site.candidate, Reason::NoIdentity);
+    }
+    for (_, i, reason) in vetted {
+        reasons.insert(*i, *reason);
+    }
+    for p in board.values() {
+        reasons.remove(&p.candidate);
+    }
+    for (i, reason) in reasons {
+        let ellipse = candidates[i].ellipse;
+        dropped.push(Dropped { uv: ellipse.centre, reason, ellipse: Some(ellipse), marker: None });
+    }
+}
+
+/// One measured marker with its cell.
+struct Entry {
+    cell: (i32, i32),
+    fit: Fit,
+    rescued: bool,
+}
+
+struct Work<'a> {
+    picture: &'a Picture,
+    plate: &'a Plate,
+    code: &'a Code,
+    candidates: &'a [Candidate],
+    pixels: Pixels,
+}
+
+/// Measured markers, blur and noise of the picture.
+struct Harvest {
+    entries: Vec<Entry>,
+    camera: Camera,
+    inner_outer: Option<InnerOuter>,
+}
+
+impl Work<'_> {
+    fn marker(&self, cell: (i32, i32)) -> Option<&crate::series::Marker> {
+        self.code.marker_at(cell).map(|i| &self.plate.markers[i])
+    }
+
+    fn ratio(&self, cell: (i32, i32)) -> Option<f64> {
+        self.marker(cell).map(|m| m.inner_radius_m / m.outer_radius_m).filter(|r| *r > 0.0)
+    }
+
+    /// Relative radius out to which the neighbours leave paper, for a marker with this minor semi-axis.
+    fn clear(&self, cell: (i32, i32), minor_px: f64, blur_px: f64) -> f64 {
+        let own = self.marker(cell).map_or(0.3, |m| m.outer_radius_m / self.plate.pitch_m);
+        (1.0 - self.code.radii()[1]) / own - 1.8 * blur_px / minor_px
+    }
+
+    fn target(&self, cell: (i32, i32), placed: &Placed, blur_px: f64) -> Target {
+        let c = &self.candidates[placed.candidate];
+        let clear = self.clear(cell, c.ellipse.semi_axes()[1], blur_px);
+        let mut target = target_of(c, self.ratio(cell), clear);
+        if self.ratio(cell).is_none() {
+            target.ratio = None;
+        }
+        target
+    }
+
+    fn measure(&mut self, board: &Board, levels: &Levels, options: &Options, dropped: &mut Vec<Dropped>) -> Harvest {
+        let guess = median(board.values().map(|p| self.candidates[p.candidate].blur_px).collect());
+        let targets: Vec<((i32, i32), Target)> =
+            board.iter().map(|(cell, p)| (*cell, self.target(*cell, p, guess))).collect();
+        let plain: Vec<Target> = targets.iter().map(|t| t.1).collect();
+        let camera = learn(self.picture, &plain, guess, levels.noise, &mut self.pixels);
+        let mut entries = Vec::new();
+        for (cell, target) in &targets {
+            match refine(self.picture, &target.start(&camera, 0.3), &mut self.pixels) {
+                Ok(fit) => entries.push(Entry { cell: *cell, fit, rescued: false }),
+                Err(reason) => dropped.push(drop_target(target, reason, self.marker(*cell).map(|m| m.id))),
+            }
+        }
+        if options.rescue {
+            let rescued = self.rescue(board, &camera, dropped);
+            entries.extend(rescued);
+            entries.sort_by_key(|e| e.cell);
+        }
+        let inner_outer = self.agree(&mut entries, dropped);
+        Harvest { entries, camera, inner_outer }
+    }
+
+    /// Looks where the neighbours say that a marker must be.
+    fn rescue(&mut self, board: &Board, camera: &Camera, dropped: &mut Vec<Dropped>) -> Vec<Entry> {
+        let mut found = Vec::new();
+        for (cell, map) in open_cells(board, self.code, self.candidates) {
+            let Some(marker) = self.marker(cell) else { continue };
+            let Some(outer) = map.ellipse(marker.outer_radius_m / self.plate.pitch_m) else { continue };
+            let half = outer.half_extent();
+            let size = [self.picture.width as f64, self.picture.height as f64];
+            if (0..2).any(|a| outer.centre[a] < half[a] + 1.0 || outer.centre[a] > size[a] - half[a] - 2.0) {
+                continue;
+            }
+            let clear = self.clear(cell, outer.semi_axes()[1], camera.blur_px);
+            let predicted = Predicted { marker: marker.id, outer, ratio: self.ratio(cell), shape_sigma: 0.05, clear };
+            let id = marker.id;
+            let target = predicted_target(self.picture, &predicted);
+            let result = target
+                .ok_or(Reason::LowContrast)
+                .and_then(|t| refine(self.picture, &t.start(camera, 0.2), &mut self.pixels))
+                .and_then(|fit| self.credible(&fit, &outer));
+            match result {
+                Ok(fit) => {
+                    let seen = fit.measured.outer.ellipse.centre;
+                    // the candidate that lay there was dropped with a reason: it is found after all
+                    dropped.retain(|d| (d.uv[0] - seen[0]).hypot(d.uv[1] - seen[1]) > 0.5 * outer.semi_axes()[1]);
+                    found.push(Entry { cell, fit, rescued: true });
+                }
+                Err(reason) => {
+                    dropped.push(Dropped { uv: outer.centre, reason, ellipse: Some(outer), marker: Some(id) });
+                }
+            }
+        }
+        found
+    }
+
+    /// A rescued marker must look as predicted: size, place and darkness of the ink.
+    fn credible(&self, fit: &Fit, predicted: &super::ellipse::Ellipse) -> std::result::Result<Fit, Reason> {
+        let e = &fit.measured.outer.ellipse;
+        let off = predicted.relative_radius(e.centre);
+        let size = (e.mean_radius() / predicted.mean_radius()).ln().abs();
+        if off > 0.4 || size > 0.12 { Err(Reason::OutOfPlace) } else { Ok(*fit) }
+    }
+
+    /// Inner and outer centre of an annulus must agree up to what perspective and distortion make of circles of
+    /// different size, which the neighbours tell.
+    fn agree(&self, entries: &mut Vec<Entry>, dropped: &mut Vec<Dropped>) -> Option<InnerOuter> {
+        let centres: BTreeMap<(i32, i32), [f64; 2]> =
+            entries.iter().map(|e| (e.cell, e.fit.measured.outer.ellipse.centre)).collect();
+        let differences: Vec<Option<Difference>> = entries.iter().map(|e| self.difference(e, &centres)).collect();
+        let mean = |a: usize| median(differences.iter().flatten().map(|d| d.value[a]).collect());
+        let common = if differences.iter().flatten().count() >= 5 { [mean(0), mean(1)] } else { [0.0; 2] };
+        let good: Vec<bool> = differences
+            .iter()
+            .map(|d| d.is_none_or(|d| (0..2).all(|a| (d.value[a] - common[a]).abs() < 5.0 * d.sigma[a] + d.slack)))
+            .collect();
+        let summary = summary(&differences, &good);
+        let mut keep = good.iter();
+        entries.retain(|e| {
+            let ok = keep.next().copied().unwrap_or(true);
+            if !ok {
+                let ellipse = e.fit.measured.outer.ellipse;
+                let marker = self.marker(e.cell).map(|m| m.id);
+                dropped.push(Dropped {
+                    uv: ellipse.centre,
+                    reason: Reason::InnerOuter,
+                    ellipse: Some(ellipse),
+                    marker,
+                });
+            }
+            ok
+        });
+        summary
+    }
+
+    fn difference(&self, entry: &Entry, centres: &BTreeMap<(i32, i32), [f64; 2]>) -> Option<Difference> {
+        let measured = &entry.fit.measured;
+        let inner = measured.inner?;
+        let marker = self.marker(entry.cell)?;
+        let pairs: Vec<([f64; 2], [f64; 2])> = (-2..=2)
+            .flat_map(|j| (-2..=2).map(move |i| (i, j)))
+            .filter_map(|(i, j)| {
+                let c = centres.get(&(entry.cell.0 + i, entry.cell.1 + j))?;
+                Some(([f64::from(i), f64::from(j)], *c))
+            })
+            .collect();
+        let map = LocalMap::fit(&pairs)?;
+        let pitch = self.plate.pitch_m;
+        let squares = (marker.outer_radius_m / pitch).powi(2) - (marker.inner_radius_m / pitch).powi(2);
+        let expected = map.centroid_shift().map(|v| -v * squares);
+        let (ci, co) = (inner.ellipse.centre, measured.outer.ellipse.centre);
+        let (vi, vo) = (inner.covariance, measured.outer.covariance);
+        let sigma = |a: usize| (vi[2 * a] + vo[2 * a] - 2.0 * entry.fit.cross[a]).max(1e-10).sqrt();
+        // the expectation is good to a tenth; a one-sided neighbourhood to a third
+        let part = if pairs.len() >= 20 { 0.1 } else { 0.35 };
+        let slack = 0.02 + part * expected[0].hypot(expected[1]);
+        let value = [0, 1].map(|a| ci[a] - co[a] - expected[a]);
+        Some(Difference { value, sigma: [sigma(0), sigma(1)], slack })
+    }
+
+    fn detection(&self, board: &Board, harvest: Harvest, outcome: Outcome, dropped: Vec<Dropped>) -> Detection {
+        let outcome = if board.is_empty() && matches!(outcome, Outcome::Identified { .. }) {
+            Outcome::Ambiguous
+        } else {
+            outcome
+        };
+        let mut found: Vec<Found> = harvest
+            .entries
+            .iter()
+            .filter_map(|e| {
+                let marker = self.marker(e.cell)?.id;
+                Some(Found { marker, measured: e.fit.measured, rescued: e.rescued })
+            })
+            .collect();
+        found.sort_by_key(|f| f.marker);
+        let observations = found.iter().flat_map(observations_of).collect();
+        let blur_px = median(found.iter().map(|f| f.measured.blur_px).collect());
+        let noise = harvest.camera.noise.map(f64::sqrt);
+        Detection { observations, found, dropped, outcome, blur_px, noise, inner_outer: harvest.inner_outer }
+    }
+}
+
+/// The observations of a measured marker: outer, then inner.
+pub(super) fn observations_of(found: &Found) -> Vec<Observation> {
+    let one = |imaged: &super::types::Imaged| Observation {
+        marker: found.marker,
+        edge: imaged.edge,
+        uv: imaged.ellipse.centre,
+        covariance: Some(imaged.covariance),
+    };
+    let inner = found.measured.inner.as_ref().filter(|i| i.edge == Edge::Inner);
+    std::iter::once(&found.measured.outer).chain(inner).map(one).collect()
+}
+
+/// Unexplained difference inner - outer centre of an annulus.
+#[derive(Debug, Clone, Copy)]
+struct Difference {
+    value: [f64; 2],
+    sigma: [f64; 2],
+    slack: f64,
+}
+
+fn summary(differences: &[Option<Difference>], good: &[bool]) -> Option<InnerOuter> {
+    let used: Vec<&Difference> =
+        differences.iter().zip(good).filter(|(_, g)| **g).filter_map(|(d, _)| d.as_ref()).collect();
+    if used.len() < 3 {
+        return None;
+    }
+    let weight = |a: usize| used.iter().map(|d| d.sigma[a].powi(-2)).sum::<f64>();
+    let mean = |a: usize| used.iter().map(|d| d.value[a] * d.sigma[a].powi(-2)).sum::<f64>() / weight(a);
+    Some(InnerOuter {
+        mean_px: [mean(0), mean(1)],
+        sigma_px: [weight(0).sqrt().recip(), weight(1).sqrt().recip()],
+        count: used.len(),
+    })
+}

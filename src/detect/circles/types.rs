@@ -1,0 +1,275 @@
+//! What the detector is asked and what it answers.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use super::ellipse::Ellipse;
+use crate::series::{Edge, Observation};
+use crate::{Error, Notice, Result};
+
+/// What the detector looks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Largest diameter of a marker's image, px; `None`: an eighth of the picture's longer side.
+    pub largest_marker_px: Option<f64>,
+    /// Smallest semi-axis of a marker's image, px.
+    pub smallest_semi_axis_px: f64,
+    /// Smallest ratio of the semi-axes (0.5 is a tilt of 60 degrees).
+    pub smallest_aspect: f64,
+    /// Smallest contrast between paper and ink as a fraction of the paper's brightness.
+    pub smallest_contrast: f64,
+    /// Look again, with the contour predicted from the neighbours, for markers that were missed.
+    pub rescue: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            largest_marker_px: None,
+            smallest_semi_axis_px: 2.2,
+            smallest_aspect: 0.22,
+            smallest_contrast: 0.12,
+            rescue: true,
+        }
+    }
+}
+
+/// Why a candidate was not used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Reason {
+    /// Smaller than the smallest semi-axis.
+    TooSmall,
+    /// Larger than the largest marker.
+    TooLarge,
+    /// More elongated than the smallest aspect.
+    TooElongated,
+    /// The contour is not an ellipse.
+    NotAnEllipse,
+    /// Too little difference between inside and outside.
+    LowContrast,
+    /// Cut by the border of the picture.
+    CutByBorder,
+    /// Too many pixels at the top of the sensor's range.
+    Saturated,
+    /// Two contours of the same sign inside each other, or a hole that is not concentric.
+    Nesting,
+    /// Not part of any lattice of markers.
+    OffLattice,
+    /// Part of a lattice whose position on the plate cannot be told.
+    NoIdentity,
+    /// On the lattice, but outside the plate.
+    OffPlate,
+    /// Its class is not the one the plate has in this place.
+    WrongClass,
+    /// The plate's pattern around it does not agree.
+    NeighboursDisagree,
+    /// It does not lie where its neighbours say.
+    OutOfPlace,
+    /// The blurred-edge model does not describe its pixels.
+    EdgeModel,
+    /// The fit of the blurred-edge model did not converge.
+    NoConvergence,
+    /// The centres of the inner and the outer edge do not agree.
+    InnerOuter,
+}
+
+impl Reason {
+    /// Short name as written to files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::TooSmall => "too small",
+            Self::TooLarge => "too large",
+            Self::TooElongated => "too elongated",
+            Self::NotAnEllipse => "not an ellipse",
+            Self::LowContrast => "low contrast",
+            Self::CutByBorder => "cut by the border",
+            Self::Saturated => "saturated",
+            Self::Nesting => "nesting",
+            Self::OffLattice => "off the lattice",
+            Self::NoIdentity => "no identity",
+            Self::OffPlate => "off the plate",
+            Self::WrongClass => "wrong class",
+            Self::NeighboursDisagree => "neighbours disagree",
+            Self::OutOfPlace => "out of place",
+            Self::EdgeModel => "edge model",
+            Self::NoConvergence => "no convergence",
+            Self::InnerOuter => "inner and outer edge disagree",
+        }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A candidate that was not used, where, and why.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dropped {
+    /// Its place, px.
+    pub uv: [f64; 2],
+    /// Why.
+    pub reason: Reason,
+    /// The ellipse of its contour, where one was fitted.
+    pub ellipse: Option<Ellipse>,
+    /// The marker it would have been, where that is known.
+    pub marker: Option<u32>,
+}
+
+/// The image of one circle as measured by the blurred-edge model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Imaged {
+    /// Which circle of the marker.
+    pub edge: Edge,
+    /// Area centroid of the circle's image, with the ellipse of its first two harmonics.
+    pub ellipse: Ellipse,
+    /// Covariance (uu, uv, vv) of the centroid, px^2.
+    pub covariance: [f64; 3],
+}
+
+/// The fit of the blurred-edge model to one marker.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// Outer circle.
+    pub outer: Imaged,
+    /// Inner circle of an annulus.
+    pub inner: Option<Imaged>,
+    /// Sigma of the blur (optics and pixel aperture together), px.
+    pub blur_px: f64,
+    /// Brightness of the paper at the marker, counts.
+    pub paper: f64,
+    /// Brightness of the ink, counts.
+    pub ink: f64,
+    /// Rms of the residuals, counts.
+    pub rms: f64,
+    /// Gradient of the illumination (column, row) as a fraction of the paper's brightness, 1/px.
+    pub gradient: [f64; 2],
+    /// Part of the wanted pixels that could be used (inside the picture, not saturated).
+    pub visible: f64,
+}
+
+/// One identified marker.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
+    /// Identity.
+    pub marker: u32,
+    /// Measurement.
+    pub measured: Measured,
+    /// It was found by looking where its neighbours said.
+    pub rescued: bool,
+}
+
+/// How the identification went.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Outcome {
+    /// Markers were identified.
+    Identified {
+        /// Cells of the lattice that agree with the plate.
+        agreeing: usize,
+        /// Cells that do not.
+        disagreeing: usize,
+        /// Disagreements of the next best position on the plate.
+        runner_up: usize,
+    },
+    /// Nothing in the picture looks like a marker.
+    NoCandidates,
+    /// Markers, but no lattice of them.
+    NoLattice,
+    /// Too few markers, or too many in doubt, to tell where on the plate they are.
+    Ambiguous,
+}
+
+/// What was found in one picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detection {
+    /// Identified contours ordered by marker and edge; `uv` is the area centroid of the contour's image.
+    pub observations: Vec<Observation>,
+    /// The same markers with all that was measured.
+    pub found: Vec<Found>,
+    /// Candidates that were not used.
+    pub dropped: Vec<Dropped>,
+    /// How the identification went.
+    pub outcome: Outcome,
+    /// Median blur, px; NaN without markers.
+    pub blur_px: f64,
+    /// Noise of a pixel on paper and on ink, counts.
+    pub noise: [f64; 2],
+    /// Mean difference inner - outer centre that geometry does not explain, with its standard error, px;
+    /// coma of the lens or motion with a changing speed shows here.
+    pub inner_outer: Option<InnerOuter>,
+}
+
+impl Detection {
+    /// Number of dropped candidates for every reason.
+    pub fn dropped_counts(&self) -> BTreeMap<Reason, usize> {
+        let mut counts = BTreeMap::new();
+        for d in &self.dropped {
+            *counts.entry(d.reason).or_insert(0) += 1;
+        }
+        counts
+    }
+
+    /// The form that all detectors share, with a notice when the point spread is asymmetric.
+    ///
+    /// # Errors
+    ///
+    /// Nothing was identified; the place is `image`.
+    pub fn into_common(self) -> Result<crate::detect::Detection> {
+        let dropped =
+            self.dropped.iter().map(|d| crate::detect::Dropped { uv: d.uv, reason: d.reason.name() }).collect();
+        let mut notices = Vec::new();
+        if let Some(io) = self.inner_outer.filter(InnerOuter::asymmetric) {
+            let [u, v] = io.mean_px;
+            let what = format!(
+                "inner and outer circles are off by ({u:.4}, {v:.4}) px on the mean of {} annuli: the blur is asymmetric",
+                io.count
+            );
+            notices.push(Notice::new(
+                "image",
+                what,
+                "look for coma (stop the lens down) or motion during the exposure",
+            ));
+        }
+        let failure = match self.outcome {
+            Outcome::Identified { .. } => None,
+            Outcome::NoCandidates => Some(("nothing looks like a marker", "check focus, exposure and view")),
+            Outcome::NoLattice => Some(("markers, but no lattice of them", "bring more of the plate into the view")),
+            Outcome::Ambiguous => {
+                Some(("the place on the plate cannot be told", "check that plate.toml is the plate in the picture"))
+            }
+        };
+        if let Some((what, remedy)) = failure {
+            return Err(Error::input("image", format!("{what}{}", self.dropped_summary()), remedy));
+        }
+        Ok(crate::detect::Detection { observations: self.observations, dropped, notices })
+    }
+
+    fn dropped_summary(&self) -> String {
+        let counts = self.dropped_counts();
+        if counts.is_empty() {
+            return String::new();
+        }
+        let parts: Vec<String> = counts.iter().map(|(reason, n)| format!("{n} {reason}")).collect();
+        format!(" (candidates dropped: {})", parts.join(", "))
+    }
+}
+
+/// Mean unexplained difference between the centres of inner and outer circles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InnerOuter {
+    /// Mean difference (column, row), px.
+    pub mean_px: [f64; 2],
+    /// Standard error of the mean per axis, px.
+    pub sigma_px: [f64; 2],
+    /// Number of annuli.
+    pub count: usize,
+}
+
+impl InnerOuter {
+    /// The difference is significant (4 sigma) and larger than 0.005 px: the point spread is asymmetric.
+    pub fn asymmetric(&self) -> bool {
+        (0..2).any(|k| self.mean_px[k].abs() > (4.0 * self.sigma_px[k]).max(0.005))
+    }
+}

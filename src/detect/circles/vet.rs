@@ -1,0 +1,80 @@
+//! Second thoughts about an identified lattice: every marker must agree with the plate and with its neighbours.
+
+use std::collections::BTreeMap;
+
+use super::candidate::Candidate;
+use super::code::Code;
+use super::lattice::Cell;
+use super::local_map::LocalMap;
+use super::types::Reason;
+
+/// A candidate on a cell of the plate.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Placed {
+    pub candidate: usize,
+    /// Its class as seen.
+    pub class: Option<u8>,
+}
+
+/// Candidates by cell (column, row) of the plate.
+pub(super) type Board = BTreeMap<Cell, Placed>;
+
+/// Removes the cells that cannot be trusted, with the reason for each.
+pub(super) fn vet(board: &mut Board, code: &Code, candidates: &[Candidate]) -> Vec<(Cell, usize, Reason)> {
+    let mut dropped = Vec::new();
+    let judge = |board: &mut Board, verdict: &dyn Fn(&Board, Cell, &Placed) -> Option<Reason>, dropped: &mut Vec<_>| {
+        let bad: Vec<(Cell, usize, Reason)> =
+            board.iter().filter_map(|(c, p)| verdict(board, *c, p).map(|r| (*c, p.candidate, r))).collect();
+        for entry in bad {
+            board.remove(&entry.0);
+            dropped.push(entry);
+        }
+    };
+    judge(board, &|_, cell, _| code.marker_at(cell).is_none().then_some(Reason::OffPlate), &mut dropped);
+    judge(board, &|board, cell, _| disputed(board, cell, code).then_some(Reason::NeighboursDisagree), &mut dropped);
+    judge(board, &|_, cell, p| (p.class != code.class_at(cell)).then_some(Reason::WrongClass), &mut dropped);
+    let out_of_place = |board: &Board, cell: Cell, p: &Placed| {
+        let (map, tolerance) = neighbourhood(board, cell, candidates)?;
+        let (expected, seen) = (map.at([0.0, 0.0]), candidates[p.candidate].ellipse.centre);
+        let off = (seen[0] - expected[0]).hypot(seen[1] - expected[1]);
+        (off > tolerance * map.shorter_step() + 0.5).then_some(Reason::OutOfPlace)
+    };
+    judge(board, &out_of_place, &mut dropped);
+    dropped
+}
+
+/// Too few of the markers around have the class of their cell: the lattice has slipped here.
+fn disputed(board: &Board, cell: Cell, code: &Code) -> bool {
+    let (mut agree, mut differ) = (0, 0);
+    for (c, p) in around(board, cell, 2) {
+        match p.class {
+            Some(k) if code.class_at(c) == Some(k) => agree += 1,
+            Some(_) => differ += 1,
+            None => {}
+        }
+    }
+    agree < 3 || 3 * differ > agree
+}
+
+/// The cells of a square window.
+pub(super) fn around(board: &Board, cell: Cell, reach: i32) -> impl Iterator<Item = (Cell, &Placed)> {
+    (-reach..=reach)
+        .flat_map(move |j| (-reach..=reach).map(move |i| (cell.0 + i, cell.1 + j)))
+        .filter_map(|c| board.get(&c).map(|p| (c, p)))
+}
+
+/// Map around a cell from its neighbours without itself, and how far (in pitches) it may be off: the eight direct
+/// neighbours interpolate closely, fewer or one-sided ones extrapolate.
+pub(super) fn neighbourhood(board: &Board, cell: Cell, candidates: &[Candidate]) -> Option<(LocalMap, f64)> {
+    let pairs = |reach: i32| -> Vec<([f64; 2], [f64; 2])> {
+        around(board, cell, reach)
+            .filter(|(c, _)| *c != cell)
+            .map(|(c, p)| ([f64::from(c.0 - cell.0), f64::from(c.1 - cell.1)], candidates[p.candidate].ellipse.centre))
+            .collect()
+    };
+    let close = pairs(1);
+    if close.len() == 8 {
+        return LocalMap::fit(&close).map(|m| (m, 0.08));
+    }
+    LocalMap::fit(&pairs(2)).map(|m| (m, 0.25))
+}

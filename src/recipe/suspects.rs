@@ -1,0 +1,166 @@
+//! When readings and images do not fit: the usual mistakes, tried one by one, named where one of them explains it.
+
+use super::start::pose_pair;
+use crate::init::{PosePair, plate_scale, solve_hand_eye};
+use crate::model::robot::Robot;
+use crate::problem::Problem;
+use crate::urdf::JointKind;
+
+/// Misfit (rad + m) below which nobody is suspected: within what a robot misses nominal by.
+const UNSUSPICIOUS: f64 = 0.025;
+
+/// A mistake explains the misfit when undoing it leaves less than this share of it.
+const EXPLAINS: f64 = 0.25;
+
+/// Relative error of the plate's scale that is told from errors of the robot.
+const SCALE_ERROR: f64 = 0.02;
+
+/// A mistake that explains the misfit.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Cause {
+    /// What was found.
+    pub what: String,
+    /// What to do.
+    pub remedy: String,
+}
+
+/// Images of one camera mounting and one plate placement with what they say.
+pub(super) struct Suspects<'a> {
+    pub problem: &'a Problem,
+    pub robot: &'a Robot,
+    pub pairs: &'a [(usize, PosePair)],
+}
+
+impl Suspects<'_> {
+    /// The mistake that, undone, fits far better than `misfit`, if there is one.
+    pub fn better_than(&self, misfit: f64) -> Option<Cause> {
+        if misfit < UNSUSPICIOUS {
+            return None;
+        }
+        let mut best: Option<(f64, Cause)> = None;
+        for (readings, cause) in self.hypotheses() {
+            let error = self.misfit(&readings);
+            if error < EXPLAINS * misfit && best.as_ref().is_none_or(|(e, _)| error < *e) {
+                best = Some((error, cause));
+            }
+        }
+        if let Some((error, cause)) = self.wrong_scale() {
+            if error < EXPLAINS * misfit && best.as_ref().is_none_or(|(e, _)| error < *e) {
+                best = Some((error, cause));
+            }
+        }
+        best.map(|(_, cause)| cause)
+    }
+
+    fn readings(&self) -> Vec<Vec<f64>> {
+        let stop = |i: usize| self.problem.images[i].stop.as_ref();
+        self.pairs.iter().map(|(i, _)| stop(*i).map(|s| s.readings.clone()).unwrap_or_default()).collect()
+    }
+
+    fn misfit(&self, readings: &[Vec<f64>]) -> f64 {
+        let pairs: Vec<PosePair> = (self.pairs.iter().zip(readings))
+            .map(|((i, pair), q)| pose_pair(self.robot, self.problem.images[*i].mount, q, pair.camera_from_plate))
+            .collect();
+        solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error)
+    }
+
+    /// Readings with one mistake undone, and its name.
+    fn hypotheses(&self) -> Vec<(Vec<Vec<f64>>, Cause)> {
+        let given = self.readings();
+        let (names, kinds) = (&self.robot.chain.readings, &self.robot.chain.reading_kinds);
+        let n = names.len();
+        let mut all = Vec::new();
+        let mut add = |change: &dyn Fn(&mut Vec<f64>), what: String, remedy: String| {
+            let mut changed = given.clone();
+            changed.iter_mut().for_each(change);
+            all.push((changed, Cause { what, remedy }));
+        };
+        for (k, name) in names.iter().enumerate() {
+            add(
+                &|q| q[k] = -q[k],
+                format!("the readings of {name} have the wrong sign: with {name} negated the images fit"),
+                format!(
+                    "negate the column {name} of joints.csv, or the axis of {name} in the URDF if the controller counts that way"
+                ),
+            );
+            for (other, other_name) in names.iter().enumerate().skip(k + 1) {
+                add(
+                    &|q| q.swap(k, other),
+                    format!("the joints stand in another order: with {name} and {other_name} exchanged the images fit"),
+                    format!("exchange the column names {name} and {other_name} in joints.csv"),
+                );
+            }
+        }
+        let turned = |factor: f64| {
+            move |q: &mut Vec<f64>| {
+                for (v, kind) in q.iter_mut().zip(kinds) {
+                    if *kind == JointKind::Revolute {
+                        *v *= factor;
+                    }
+                }
+            }
+        };
+        let (to_rad, to_deg) = (1f64.to_radians(), 1f64.to_degrees());
+        add(
+            &turned(to_rad),
+            "the joint values are degrees, read as radians: converted, the images fit".into(),
+            "write joint_unit = \"deg\" in series.toml".into(),
+        );
+        add(
+            &turned(to_deg),
+            "the joint values are radians, read as degrees: converted, the images fit".into(),
+            "write joint_unit = \"rad\" in series.toml".into(),
+        );
+        let reversed: Vec<usize> = (0..n).rev().collect();
+        add(
+            &|q| *q = reversed.iter().map(|&k| q[k]).collect(),
+            "the joints stand in reverse order: reversed, the images fit".into(),
+            "reverse the column names in joints.csv".into(),
+        );
+        for (shift, words) in [(1, "the row below"), (given.len() - 1, "the row above")] {
+            let mut shifted = given.clone();
+            shifted.rotate_left(shift);
+            all.push((
+                shifted,
+                Cause {
+                    what: format!(
+                        "images and joint readings are shifted by one row: every image fits the readings of {words}"
+                    ),
+                    remedy: "shift the image names in joints.csv by one row".into(),
+                },
+            ));
+        }
+        all
+    }
+
+    fn wrong_scale(&self) -> Option<(f64, Cause)> {
+        let poses: Vec<PosePair> = self.pairs.iter().map(|(_, p)| *p).collect();
+        let start = solve_hand_eye(&poses).into_iter().next()?;
+        let scale = plate_scale(&poses, &start.solution)?;
+        if (scale - 1.0).abs() < SCALE_ERROR {
+            return None;
+        }
+        let scaled: Vec<PosePair> = poses
+            .iter()
+            .map(|p| {
+                let mut pose = p.camera_from_plate;
+                pose.translation *= scale;
+                PosePair { camera_from_plate: pose, ..*p }
+            })
+            .collect();
+        let error = solve_hand_eye(&scaled).first()?.median_error;
+        let plate = &self.problem.plates[self.problem.images[self.pairs.first()?.0].plate];
+        let what = format!(
+            "the plate is {scale:.3} times as large as plate.toml says, judged by the robot's link lengths: a pitch of {:.3} mm instead of {:.3} mm fits",
+            1e3 * scale * plate.pitch_m,
+            1e3 * plate.pitch_m
+        );
+        Some((
+            error,
+            Cause {
+                what,
+                remedy: "measure the pitch of the plate with a ruler and correct pitch_m in plate.toml".into(),
+            },
+        ))
+    }
+}

@@ -1,0 +1,119 @@
+//! The wall between the rooms: imports go downwards only, and no file grows without bound.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Rooms from the bottom up; rooms on one level are peers and do not import each other, but for the pairs in `PEERS`.
+const LEVELS: [&[&str]; 12] = [
+    &["error"],
+    &["geom", "linalg"],
+    &["series", "urdf"],
+    &["detect"],
+    &["model"],
+    &["problem"],
+    &["plan"],
+    &["init", "solve"],
+    &["assess"],
+    &["recipe", "simulate"],
+    &["output"],
+    &["cli"],
+];
+
+/// Peers where the first may import the second: readings are matched to chains, and a recipe may be tried on a simulated world.
+const PEERS: [(&str, &str); 1] = [("series", "urdf")];
+
+const MOST_LINES: usize = 600;
+
+fn sources(folder: &Path, into: &mut Vec<PathBuf>) {
+    let mut entries: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    entries.sort();
+    for path in entries {
+        if path.is_dir() {
+            sources(&path, into);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            into.push(path);
+        }
+    }
+}
+
+fn all_sources() -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    assert!(files.len() > 30, "found only {} source files", files.len());
+    files
+}
+
+fn room(path: &Path) -> String {
+    let inside = path.strip_prefix(Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).unwrap();
+    let first = inside.components().next().unwrap().as_os_str().to_string_lossy().into_owned();
+    first.trim_end_matches(".rs").to_owned()
+}
+
+/// Rooms that a line names by `crate::room`, outside comments.
+fn named_rooms(line: &str) -> Vec<String> {
+    let code = line.split("//").next().unwrap_or("");
+    code.match_indices("crate::")
+        .map(|(at, m)| {
+            let rest = &code[at + m.len()..];
+            rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
+        })
+        .collect()
+}
+
+#[test]
+fn imports_go_downwards() {
+    let level: BTreeMap<&str, usize> =
+        LEVELS.iter().enumerate().flat_map(|(k, rooms)| rooms.iter().map(move |r| (*r, k))).collect();
+    let mut wrong = Vec::new();
+    for path in all_sources() {
+        let own = room(&path);
+        let Some(&own_level) = level.get(own.as_str()) else { continue };
+        for (number, line) in fs::read_to_string(&path).unwrap().lines().enumerate() {
+            for other in named_rooms(line).into_iter().filter(|o| *o != own) {
+                let Some(&other_level) = level.get(other.as_str()) else { continue };
+                let peers = PEERS.contains(&(own.as_str(), other.as_str()));
+                if other_level > own_level || (other_level == own_level && !peers) {
+                    wrong.push(format!("{}:{}: {own} imports {other}", path.display(), number + 1));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "imports against the direction of the rooms:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn files_stay_small() {
+    let long: Vec<String> = all_sources()
+        .iter()
+        .map(|p| (p, fs::read_to_string(p).unwrap().lines().count()))
+        .filter(|(_, lines)| *lines > MOST_LINES)
+        .map(|(p, lines)| format!("{}: {lines} lines", p.display()))
+        .collect();
+    assert!(long.is_empty(), "files over {MOST_LINES} lines:\n{}", long.join("\n"));
+}
+
+#[test]
+fn only_linalg_knows_the_factorisation_libraries() {
+    let mut wrong = Vec::new();
+    for path in all_sources().into_iter().filter(|p| room(p) != "linalg") {
+        let text = fs::read_to_string(&path).unwrap();
+        if ["use faer", "faer::", "use clarabel", "clarabel::"].iter().any(|w| text.contains(w)) {
+            wrong.push(path.display().to_string());
+        }
+    }
+    assert!(wrong.is_empty(), "faer or clarabel outside linalg: {wrong:?}");
+}
+
+#[test]
+fn only_the_command_line_prints() {
+    let mut wrong = Vec::new();
+    for path in all_sources().into_iter().filter(|p| room(p) != "cli") {
+        let text = fs::read_to_string(&path).unwrap();
+        let code = text.split("#[cfg(test)]").next().unwrap_or("");
+        if ["println!(", "eprintln!(", "print!(", "eprint!("].iter().any(|w| code.contains(w)) {
+            wrong.push(path.display().to_string());
+        }
+    }
+    assert!(wrong.is_empty(), "printing outside cli: {wrong:?}");
+}

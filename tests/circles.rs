@@ -1,0 +1,21 @@
+//! The circle detector on rendered pictures with known truth.
+
+mod circles_support;
+
+use circles_support::{View, errors, report, scene};
+use robotcal::detect::circles::{Options, Outcome, detect};
+
+#[test]
+fn a_whole_plate_is_found_and_measured() {
+    let view = View { distance_m: 0.55, tilt_deg: 25.0, azimuth_deg: 30.0, roll_deg: 20.0, ..View::default() };
+    let scene = scene(&view);
+    let picture = scene.render(1);
+    let start = std::time::Instant::now();
+    let found = detect(&picture, &scene.plate, &Options::default()).unwrap();
+    println!("{:?} in {:?}", found.outcome, start.elapsed());
+    assert!(matches!(found.outcome, Outcome::Identified { .. }));
+    let e = errors(&scene, &found);
+    report(&scene, &found, &e);
+    assert_eq!(e.wrong, 0);
+    assert!(e.found as f64 >= 0.99 * e.visible as f64);
+}
