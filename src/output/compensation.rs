@@ -12,7 +12,6 @@ const HEADER: &str = "\
 # m_1, m_2: moment about the axis of a unit weight (along -z of the root) at unit levers u and axis x u of the joint's own link;
 # m_3, m_4: the same about this axis for levers u' and axis' x u' of the link after the next moving joint.
 # u is the unit vector along x (along y where |axis_x| >= 0.9) without its part along the axis. Joint offsets are in the URDF.
-format = 1
 ";
 
 /// The values of one joint.
