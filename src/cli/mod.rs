@@ -3,7 +3,9 @@
 //! To add a subcommand: a file with its `Args` and `run`, a variant of [`Command`] and a row in [`Command::run`].
 
 mod identify;
+mod plate;
 mod progress;
+mod simulate;
 mod summary;
 mod verify;
 
@@ -38,6 +40,10 @@ struct Cli {
 enum Command {
     /// Identify robot, camera, hand-camera offset and plate from one or more series
     Identify(identify::IdentifyArgs),
+    /// Design a plate of coded circles and draw it for printing
+    Plate(plate::PlateArgs),
+    /// Make a series of a robot with known errors, with images or observations
+    Simulate(Box<simulate::SimulateArgs>),
     /// Judge a corrected model by points that another device measured
     Verify(verify::VerifyArgs),
 }
@@ -55,6 +61,8 @@ impl Command {
     fn run(&self) -> Result<Verdict> {
         match self {
             Self::Identify(args) => identify::run(args),
+            Self::Plate(args) => plate::run(args),
+            Self::Simulate(args) => simulate::run(args),
             Self::Verify(args) => verify::run(args),
         }
     }

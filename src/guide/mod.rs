@@ -1,1 +1,28 @@
-//! The manual.
+//! The manual: formulation, conventions, a tour of the program, how to take a series, how to read the result, decisions.
+
+#[doc = include_str!("formulation.md")]
+pub mod formulation {}
+
+#[doc = include_str!("conventions.md")]
+pub mod conventions {}
+
+#[doc = include_str!("tour.md")]
+pub mod tour {}
+
+#[doc = include_str!("capture.md")]
+pub mod capture {}
+
+#[doc = include_str!("reading_the_result.md")]
+pub mod reading_the_result {}
+
+#[doc = include_str!("decisions.md")]
+pub mod decisions {
+    #[doc = include_str!("decisions/0001_pose_space.md")]
+    pub mod d0001_pose_space {}
+
+    #[doc = include_str!("decisions/0002_joint_noise.md")]
+    pub mod d0002_joint_noise {}
+
+    #[doc = include_str!("decisions/0003_dependencies.md")]
+    pub mod d0003_dependencies {}
+}

@@ -1,8 +1,17 @@
 //! A world with known truth: rendered images, simulated robots, series with everything known.
 
 pub mod conditions;
+pub mod faults;
+pub mod folder;
+mod observe;
+mod placement;
 pub mod psf;
 pub mod raster;
 pub mod render;
 pub mod scenery;
 pub mod sensor;
+pub mod truth;
+pub mod world;
+
+pub use observe::{is_seen, observe};
+pub use world::{RobotErrors, SimulatedSeries, WorldRequest, series, typical_camera};

@@ -30,10 +30,11 @@ pub fn ground(
     let wide = rect.grown(psf.reach());
     let mut values = vec![conditions.table_reflectance as f32; wide.width * wide.height];
     let mut canvas = Canvas { values: &mut values, rect: wide, raster: Rasteriser::default() };
+    let imager = Imager::new(camera, camera_from_plate);
     for thing in clutter(&sheet, conditions) {
-        canvas.paint(&imaged(camera, camera_from_plate, &thing.outline), thing.reflectance);
+        canvas.paint(&imager.image(&thing.outline), thing.reflectance);
     }
-    canvas.paint(&imaged(camera, camera_from_plate, &sheet_outline(&sheet)), conditions.light_reflectance);
+    canvas.paint(&imager.image(&sheet_outline(&sheet)), conditions.light_reflectance);
     psf.blur(&mut values, wide.width);
     let inner = values.chunks_exact(wide.width).skip(psf.reach()).take(rect.height);
     inner.flat_map(|line| &line[psf.reach()..psf.reach() + rect.width]).copied().collect()
@@ -128,19 +129,65 @@ fn clutter(sheet: &Sheet, conditions: &ImagingConditions) -> Vec<Thing> {
 
 fn sheet_outline(sheet: &Sheet) -> Vec<Vector3<f64>> {
     let (w, h) = (sheet.width_m / 2.0, sheet.height_m / 2.0);
-    let corners = [(-w, -h), (w, -h), (w, h), (-w, h)];
-    let mut outline = Vec::new();
-    for k in 0..4 {
-        let (a, b) = (corners[k], corners[(k + 1) % 4]);
-        let along = |t: f64| Vector3::new(a.0 + (b.0 - a.0) * t, a.1 + (b.1 - a.1) * t, 0.0);
-        outline.extend((0..64).map(|i| along(f64::from(i) / 64.0)));
-    }
-    outline
+    [(-w, -h), (w, -h), (w, h), (-w, h)].map(|(x, y)| Vector3::new(x, y, 0.0)).to_vec()
 }
 
-/// The image of an outline; points behind the camera or beyond the lens are left out.
-fn imaged(camera: &Camera, camera_from_plate: &Pose, outline: &[Vector3<f64>]) -> Vec<Vector2<f64>> {
-    with_sense(outline.iter().filter_map(|x| camera.project(&camera_from_plate.transform(x))).collect())
+/// Images outlines of any size: what lies behind the camera or beyond the lens is cut off in space.
+struct Imager<'a> {
+    camera: &'a Camera,
+    camera_from_plate: &'a Pose,
+    /// Largest distance from the axis on the plane z = 1 that the lens images.
+    field: f64,
+}
+
+/// Sides of the cone that outlines are cut with.
+const CONE_SIDES: usize = 24;
+/// Widest field that is considered, on the plane z = 1.
+const WIDEST_FIELD: f64 = 4.0;
+
+impl<'a> Imager<'a> {
+    fn new(camera: &'a Camera, camera_from_plate: &'a Pose) -> Self {
+        let has_image = |r: f64| camera.project(&Vector3::new(r, 0.0, 1.0)).is_some();
+        let (mut low, mut high) = (0.0, WIDEST_FIELD);
+        for _ in 0..40 {
+            let middle = (low + high) / 2.0;
+            if has_image(middle) { low = middle } else { high = middle }
+        }
+        Self { camera, camera_from_plate, field: 0.999 * low }
+    }
+
+    fn image(&self, outline: &[Vector3<f64>]) -> Vec<Vector2<f64>> {
+        let in_camera: Vec<_> = outline.iter().map(|x| self.camera_from_plate.transform(x)).collect();
+        let seen = (0..CONE_SIDES).fold(in_camera, |polygon, side| self.cut(&polygon, side));
+        // Straight edges become curves in the image.
+        let pieces = if seen.len() > 20 { 3 } else { 32 };
+        let along = |k: usize| {
+            let (a, b) = (seen[k], seen[(k + 1) % seen.len()]);
+            (0..pieces).map(move |i| a + (b - a) * (f64::from(i) / f64::from(pieces)))
+        };
+        with_sense((0..seen.len()).flat_map(along).filter_map(|x| self.camera.project(&x)).collect())
+    }
+
+    /// Cuts a polygon with one side of the cone (Sutherland and Hodgman).
+    fn cut(&self, polygon: &[Vector3<f64>], side: usize) -> Vec<Vector3<f64>> {
+        let step = TAU / CONE_SIDES as f64;
+        let (sin, cos) = (side as f64 * step).sin_cos();
+        let inwards = Vector3::new(-cos, -sin, self.field * (step / 2.0).cos());
+        // A little in front of the camera, so that no corner ends in its centre.
+        let depth = |x: &Vector3<f64>| inwards.dot(x) - 1e-6;
+        let mut kept = Vec::with_capacity(polygon.len() + 2);
+        for (k, a) in polygon.iter().enumerate() {
+            let b = &polygon[(k + 1) % polygon.len()];
+            let (da, db) = (depth(a), depth(b));
+            if da >= 0.0 {
+                kept.push(*a);
+            }
+            if (da >= 0.0) != (db >= 0.0) {
+                kept.push(a + (b - a) * (da / (da - db)));
+            }
+        }
+        kept
+    }
 }
 
 /// The outline in the sense that counts as covered.

@@ -1,13 +1,12 @@
 //! Covariance of every unknown from the factor of the reduced system.
 
 use nalgebra::{DMatrix, Matrix3, Matrix6};
-use rayon::prelude::*;
 
 use super::system::{Linearised, System};
-use crate::linalg::{NotPositiveDefinite, SymmetricFactor, product};
+use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
 use crate::problem::{Problem, State};
 
-/// Covariance of the reduced unknowns (dense columns, then slack), with what is needed for the eliminated markers.
+/// Covariance of the reduced unknowns (dense columns, then slack or markers), with what is needed for the eliminated family.
 #[derive(Debug, Clone)]
 pub struct Covariance {
     /// Covariance of the unknowns of the reduced system; fixed columns have zero variance.
@@ -44,29 +43,12 @@ impl Covariance {
 
     /// Covariance of the slack of the k-th image in use.
     pub fn slack(&self, k: usize, length: usize) -> DMatrix<f64> {
-        let start = self.system.slack_start[k];
-        self.reduced.view((start, start), (length, length)).into_owned()
+        self.system.slack_covariance(&self.reduced, k, length)
     }
 
     /// Covariance of the correction of every marker that was seen, m^2, per plate and marker, in the frame of the priors (the
     /// plate frame that nominal markers define up to their tolerance).
     pub fn markers(&self, problem: &Problem, lin: &Linearised) -> Vec<Vec<Option<Matrix3<f64>>>> {
-        let plate = |p: usize| {
-            let count = problem.plates[p].markers.len();
-            let seen: Vec<usize> = (0..count).filter(|&m| self.system.seen(p, m)).collect();
-            let parts: Vec<_> = seen.par_iter().map(|&m| self.system.marker_coupling(problem, lin, p, m)).collect();
-            let mut d = DMatrix::zeros(3 * seen.len(), self.reduced.nrows());
-            for (k, (_, rows)) in parts.iter().enumerate() {
-                d.rows_mut(3 * k, 3).copy_from(rows);
-            }
-            let dc = product(&d, &self.reduced);
-            let mut all = vec![None; count];
-            for (k, &m) in seen.iter().enumerate() {
-                let c = dc.rows(3 * k, 3) * d.rows(3 * k, 3).transpose();
-                all[m] = Some(parts[k].0 + Matrix3::from_column_slice(c.as_slice()));
-            }
-            all
-        };
-        (0..problem.plates.len()).map(plate).collect()
+        self.system.marker_covariances(problem, lin, &self.reduced)
     }
 }

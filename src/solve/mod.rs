@@ -1,5 +1,7 @@
 //! The solver: block elimination, Levenberg-Marquardt, variance components, rejection.
 
+mod by_markers;
+mod by_slack;
 mod components;
 mod covariance;
 mod levenberg;
@@ -10,4 +12,4 @@ pub use components::{ComponentOptions, estimate_components};
 pub use covariance::{Covariance, covariance};
 pub use levenberg::{Outcome, Settings, Status, solve};
 pub use snoop::{reject_images, reject_observations};
-pub use system::{Linearised, System, linearise_all};
+pub use system::{Elimination, Linearised, System, linearise_all};

@@ -1,0 +1,262 @@
+//! `robotcal simulate`: a series of a robot with known errors, with images or with observations.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+
+use super::{Verdict, progress};
+use crate::error::{Error, Result};
+use crate::plan::plate_design::{PlateRequest, design};
+use crate::plan::viewpoint::ViewRange;
+use crate::series::{AngleUnit, CameraMount, Edge, Plate, read_plate};
+use crate::simulate::conditions::ImagingConditions;
+use crate::simulate::faults::{FAULTS, Fault};
+use crate::simulate::folder::{Content, write};
+use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series, typical_camera};
+use crate::urdf;
+
+/// Flags of `simulate`.
+#[derive(Debug, Args)]
+pub(super) struct SimulateArgs {
+    /// Robot description (URDF); its errors are put on top
+    #[arg(long, value_name = "FILE")]
+    urdf: PathBuf,
+    /// New folder for the series
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// Base link
+    #[arg(long, value_name = "LINK")]
+    base: Option<String>,
+    /// Tip link
+    #[arg(long, value_name = "LINK")]
+    tip: Option<String>,
+    /// Plate [default: the 504-marker plate of `robotcal plate`]
+    #[arg(long, value_name = "FILE")]
+    plate: Option<PathBuf>,
+    /// Where the camera is
+    #[arg(long, value_enum, default_value_t = Mount::Hand)]
+    mount: Mount,
+    /// Number of stops
+    #[arg(long, default_value_t = 50)]
+    images: usize,
+    /// Number of places where the plate stands
+    #[arg(long, default_value_t = 1)]
+    placements: usize,
+    /// Write observations.csv instead of images
+    #[arg(long)]
+    observations: bool,
+    /// Observations of outer edges only
+    #[arg(long, requires = "observations")]
+    outer_only: bool,
+    /// Unit of joints.csv
+    #[arg(long, value_enum, default_value_t = Unit::Deg)]
+    joint_unit: Unit,
+    /// Errors of the robot (sigma): origins by 0.3 mm and 1 mrad, offsets of 3 mrad; full: gear, sag, backlash, too
+    #[arg(long, value_enum, default_value_t = Errors::Rigid)]
+    errors: Errors,
+    /// Joint noise (sigma), mrad
+    #[arg(long, value_name = "MRAD", default_value_t = 0.02)]
+    joint_noise_mrad: f64,
+    /// Noise of the observations (sigma per axis), px; images have that of their sensor
+    #[arg(long, value_name = "PX", default_value_t = 0.02)]
+    pixel_noise_px: f64,
+    /// Errors of the markers (sigma per axis), mm
+    #[arg(long, value_name = "MM", default_value_t = 0.03)]
+    marker_noise_mm: f64,
+    /// Columns of the images
+    #[arg(long, default_value_t = 1280)]
+    width_px: u32,
+    /// Rows of the images
+    #[arg(long, default_value_t = 1024)]
+    height_px: u32,
+    /// Horizontal field of view, degrees
+    #[arg(long, default_value_t = 60.0)]
+    field_deg: f64,
+    /// Nearest view, m
+    #[arg(long, default_value_t = 0.12)]
+    near_m: f64,
+    /// Farthest view, m
+    #[arg(long, default_value_t = 0.6)]
+    far_m: f64,
+    /// Largest tilt, degrees
+    #[arg(long, default_value_t = 50.0)]
+    tilt_deg: f64,
+    /// Markers that every view shows at least
+    #[arg(long, default_value_t = 20)]
+    least_markers: usize,
+    /// Joint vectors kept aside in truth.toml
+    #[arg(long, default_value_t = 100)]
+    held_out: usize,
+    /// Light, blur, sensor and surroundings of the images (TOML, any of the fields of ImagingConditions)
+    #[arg(long, value_name = "FILE")]
+    conditions: Option<PathBuf>,
+    /// Bits per pixel: 8, 10, 12 or 16 (overrides the conditions)
+    #[arg(long)]
+    bits: Option<u8>,
+    /// Put one thing wrong (a name, or "list")
+    #[arg(long, value_name = "NAME")]
+    fault: Option<String>,
+    /// Seed of everything
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Mount {
+    Hand,
+    Fixed,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Unit {
+    Rad,
+    Deg,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Errors {
+    None,
+    Rigid,
+    Full,
+}
+
+impl From<Errors> for RobotErrors {
+    fn from(errors: Errors) -> Self {
+        let rigid = Self::default();
+        match errors {
+            Errors::None => Self { translation_m: 0.0, rotation_rad: 0.0, offset_rad: 0.0, ..rigid },
+            Errors::Rigid => rigid,
+            Errors::Full => {
+                Self { gear: 3e-4, harmonic_rad: 0.1e-3, gravity_rad: 0.2e-3, backlash_rad: 0.1e-3, ..rigid }
+            }
+        }
+    }
+}
+
+pub(super) fn run(args: &SimulateArgs) -> Result<Verdict> {
+    let fault = match args.fault.as_deref() {
+        Some("list") => {
+            FAULTS.iter().for_each(|e| println!("{}", e.name));
+            return Ok(Verdict::Good);
+        }
+        name => name.map(named_fault).transpose()?,
+    };
+    let conditions = conditions(args)?;
+    let mut made = series(&request(args)?)?;
+    if args.outer_only {
+        made.observations.iter_mut().for_each(|i| i.observations.retain(|o| o.edge == Edge::Outer));
+    }
+    if let Some(fault) = fault {
+        if args.observations && fault.expectation().needs_images {
+            let place = format!("--fault {}", fault.expectation().name);
+            return Err(Error::input(place, "shows in images only", "leave --observations out"));
+        }
+        fault.apply(&mut made)?;
+        if args.outer_only {
+            made.observations.iter_mut().for_each(|i| i.observations.retain(|o| o.edge == Edge::Outer));
+        }
+    }
+    save(args, &made, &conditions)?;
+    if let Some(fault) = fault {
+        fault.apply_to_folder(&args.out)?;
+    }
+    print!("{}", summary(&made, &args.out));
+    Ok(Verdict::Good)
+}
+
+fn named_fault(name: &str) -> Result<Fault> {
+    Fault::from_name(name).ok_or_else(|| {
+        let known = crate::closest_name(name, FAULTS.iter().map(|e| e.name));
+        let remedy = known.map_or_else(|| "--fault list shows all".to_owned(), |k| format!("is \"{k}\" meant?"));
+        Error::input("--fault", format!("there is no fault \"{name}\""), remedy)
+    })
+}
+
+fn conditions(args: &SimulateArgs) -> Result<ImagingConditions> {
+    let mut conditions = match &args.conditions {
+        None => ImagingConditions::default(),
+        Some(path) => {
+            let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+            toml::from_str(&text).map_err(|e| {
+                Error::input(path.display(), e.message(), "see the fields of ImagingConditions in the manual")
+            })?
+        }
+    };
+    conditions.bits = args.bits.unwrap_or(conditions.bits);
+    if ![8, 10, 12, 16].contains(&conditions.bits) {
+        return Err(Error::input("--bits", conditions.bits, "give 8, 10, 12 or 16"));
+    }
+    Ok(conditions)
+}
+
+fn request(args: &SimulateArgs) -> Result<WorldRequest> {
+    let sane = args.near_m > 0.0
+        && args.far_m >= args.near_m
+        && (0.0..85.0).contains(&args.tilt_deg)
+        && (5.0..140.0).contains(&args.field_deg)
+        && args.width_px >= 64
+        && args.height_px >= 64;
+    if !sane {
+        let remedy = "near-m > 0, far-m >= near-m, tilt below 85 degrees, field of 5 to 140 degrees, at least 64x64 px";
+        return Err(Error::input("simulate", "the camera or its views cannot be", remedy));
+    }
+    let chain = urdf::read(&args.urdf)?.chain(args.base.as_deref(), args.tip.as_deref())?;
+    Ok(WorldRequest {
+        camera: typical_camera(args.width_px, args.height_px, args.field_deg.to_radians()),
+        mount: match args.mount {
+            Mount::Hand => CameraMount::Hand,
+            Mount::Fixed => CameraMount::Fixed,
+        },
+        images: args.images,
+        placements: args.placements,
+        errors: args.errors.into(),
+        joint_noise_rad: args.joint_noise_mrad / 1e3,
+        pixel_sigma_px: args.pixel_noise_px,
+        marker_sigma_m: args.marker_noise_mm / 1e3,
+        views: ViewRange {
+            near_m: args.near_m,
+            far_m: args.far_m,
+            tilt_rad: args.tilt_deg.to_radians(),
+            ..ViewRange::default()
+        },
+        least_markers: args.least_markers,
+        held_out: args.held_out,
+        joint_unit: match args.joint_unit {
+            Unit::Rad => AngleUnit::Rad,
+            Unit::Deg => AngleUnit::Deg,
+        },
+        seed: args.seed,
+        ..WorldRequest::typical(chain, plate(args)?)
+    })
+}
+
+fn plate(args: &SimulateArgs) -> Result<Plate> {
+    match &args.plate {
+        Some(path) => read_plate(path, &mut Vec::new()),
+        None => Ok(design(&PlateRequest::default())?.plate),
+    }
+}
+
+fn save(args: &SimulateArgs, made: &SimulatedSeries, conditions: &ImagingConditions) -> Result<()> {
+    if args.observations {
+        return write(&args.out, made, Content::Observations);
+    }
+    let bar = progress::bar(made.truth.stops.len(), "rendering");
+    let progress = |_: &str| bar.inc(1);
+    let written = write(&args.out, made, Content::Images { conditions, progress: &progress });
+    bar.finish_and_clear();
+    written
+}
+
+fn summary(made: &SimulatedSeries, folder: &Path) -> String {
+    let seen: usize = made.observations.iter().map(|i| i.observations.len()).sum();
+    let stops = made.observations.len();
+    format!(
+        "series    {}: {stops} stops, {:.0} contours in view on average, {} joint vectors kept aside\n\
+         truth     {}/truth.toml\n",
+        folder.display(),
+        seen as f64 / stops.max(1) as f64,
+        made.truth.held_out.len(),
+        folder.display()
+    )
+}

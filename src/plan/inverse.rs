@@ -1,0 +1,92 @@
+//! Numerical inverse kinematics: damped Newton steps with the analytic Jacobian, inside the joint limits.
+//!
+//! From starts all over the joint ranges the iteration ends in every configuration of the arm (elbow, wrist flips, the
+//! redundant axis of a seven-axis arm); none is preferred.
+
+use nalgebra::{Matrix6, Vector6};
+use rand::{Rng, RngExt};
+
+use crate::geom::Pose;
+use crate::model::robot::{Robot, Stop};
+use crate::urdf::{Chain, JointKind};
+
+/// Newton steps before a start is given up.
+const STEPS: usize = 40;
+/// Longest step, rad or m per reading.
+const LONGEST_STEP: f64 = 0.5;
+/// Error of a solution, m and rad.
+const TOLERANCE: f64 = 1e-9;
+/// Range of a joint that the URDF does not limit, rad.
+const UNLIMITED: (f64, f64) = (-std::f64::consts::PI, std::f64::consts::PI);
+
+/// Lower and upper limit of every reading, rad or m; joints without limits get one turn.
+///
+/// The limits of a mimic joint are limits of the joint that it follows.
+pub fn reading_limits(chain: &Chain) -> Vec<(f64, f64)> {
+    let mut limits: Vec<Option<(f64, f64)>> = vec![None; chain.readings.len()];
+    for joint in &chain.joints {
+        let (Some(drive), Some((low, high))) = (joint.drive, joint.limits) else { continue };
+        if drive.multiplier == 0.0 {
+            continue;
+        }
+        let [a, b] = [low, high].map(|l| (l - drive.offset) / drive.multiplier);
+        let own = (a.min(b), a.max(b));
+        let merged = limits[drive.reading].map_or(own, |(l, h)| (l.max(own.0), h.min(own.1)));
+        limits[drive.reading] = Some(merged);
+    }
+    limits.into_iter().map(|l| l.unwrap_or(UNLIMITED)).collect()
+}
+
+/// Readings drawn evenly from the joint ranges; from the inner full turn where a joint has more.
+pub fn random_readings(limits: &[(f64, f64)], kinds: &[JointKind], rng: &mut impl Rng) -> Vec<f64> {
+    let draw = |(&(low, high), kind): (&(f64, f64), &JointKind)| {
+        let turn = std::f64::consts::PI;
+        let (low, high) = if *kind == JointKind::Prismatic { (low, high) } else { (low.max(-turn), high.min(turn)) };
+        if high > low { rng.random_range(low..high) } else { low }
+    };
+    limits.iter().zip(kinds).map(draw).collect()
+}
+
+/// Readings that bring the tip to `base_from_tip`, found from `start`; `None` when the iteration does not get there within
+/// the limits.
+pub fn solve_from(robot: &Robot, limits: &[(f64, f64)], base_from_tip: &Pose, start: &[f64]) -> Option<Vec<f64>> {
+    let zeros = vec![0.0; start.len()];
+    let mut q = start.to_vec();
+    let mut last = f64::INFINITY;
+    for _ in 0..STEPS {
+        let k = robot.kinematics(&Stop::at(&q), &zeros);
+        let error = (k.base_from_tip.inverse() * *base_from_tip).log();
+        let size = error.norm();
+        if size < TOLERANCE {
+            return Some(q);
+        }
+        // Damping that vanishes with the error keeps the last steps those of Newton.
+        let damping = (1e-2 * size.min(last)).powi(2).max(1e-12);
+        last = size;
+        let mut normal = Matrix6::identity() * damping;
+        for j in &k.d_readings {
+            normal += j * j.transpose();
+        }
+        let weights: Vector6<f64> = normal.cholesky()?.solve(&error);
+        let step: Vec<f64> = k.d_readings.iter().map(|j| j.dot(&weights)).collect();
+        let longest = step.iter().fold(LONGEST_STEP, |m, s| m.max(s.abs()));
+        for ((q, s), (low, high)) in q.iter_mut().zip(&step).zip(limits) {
+            *q = (*q + s * LONGEST_STEP / longest).clamp(*low, *high);
+        }
+    }
+    None
+}
+
+/// Readings that bring the tip to `base_from_tip`, from up to `starts` random starts.
+pub fn solve(
+    robot: &Robot,
+    limits: &[(f64, f64)],
+    base_from_tip: &Pose,
+    starts: usize,
+    rng: &mut impl Rng,
+) -> Option<Vec<f64>> {
+    (0..starts).find_map(|_| {
+        let start = random_readings(limits, &robot.chain.reading_kinds, rng);
+        solve_from(robot, limits, base_from_tip, &start)
+    })
+}

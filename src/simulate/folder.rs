@@ -1,0 +1,95 @@
+//! Writes a simulated series as a folder that the program reads like any other.
+
+use std::path::Path;
+
+use image::{DynamicImage, ImageBuffer, Luma};
+use rayon::prelude::*;
+
+use super::conditions::ImagingConditions;
+use super::world::SimulatedSeries;
+use crate::detect::Picture;
+use crate::error::{Error, Result};
+use crate::series::{observations_csv, plate_csv, plate_toml};
+
+/// What stands for the measurements.
+#[derive(Clone, Copy)]
+pub enum Content<'a> {
+    /// `observations.csv`.
+    Observations,
+    /// Rendered pictures under these conditions; `progress` is called after each, from any thread.
+    Images {
+        /// Light, blur, sensor, surroundings.
+        conditions: &'a ImagingConditions,
+        /// Called with the file name of each finished picture.
+        progress: &'a (dyn Fn(&str) + Sync),
+    },
+}
+
+/// Writes the series into `folder`, which must be new or empty.
+///
+/// # Errors
+/// A folder with something in it, and whatever the disk refuses.
+pub fn write(folder: &Path, series: &SimulatedSeries, content: Content<'_>) -> Result<()> {
+    let is_used = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
+    if is_used {
+        return Err(Error::input(folder.display(), "is not empty", "give a new folder, or remove this one"));
+    }
+    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
+    let mut manifest = series.manifest.clone();
+    let mut truth = series.truth.clone();
+    match content {
+        Content::Observations => put(&folder.join("observations.csv"), observations_csv(&series.observations))?,
+        Content::Images { conditions, progress } => {
+            truth.pixel_sigma_px = None;
+            manifest.camera.width_px = None;
+            manifest.camera.height_px = None;
+            manifest.camera.bits = (9..16).contains(&conditions.bits).then_some(u32::from(conditions.bits));
+            write_images(&folder.join("images"), series, conditions, progress)?;
+        }
+    }
+    put(&folder.join("series.toml"), manifest.to_toml()?)?;
+    put(&folder.join("joints.csv"), series.stops.to_csv())?;
+    let has_circles = series.plate.markers.iter().any(|m| m.outer_radius_m > 0.0);
+    put(&folder.join("plate.toml"), plate_toml(&series.plate, has_circles.then_some("plate.csv"))?)?;
+    if has_circles {
+        put(&folder.join("plate.csv"), plate_csv(&series.plate))?;
+    }
+    put(&folder.join("truth.toml"), truth.to_toml()?)
+}
+
+fn put(path: &Path, text: String) -> Result<()> {
+    std::fs::write(path, text).map_err(|e| Error::io(path, &e))
+}
+
+fn write_images(
+    folder: &Path,
+    series: &SimulatedSeries,
+    conditions: &ImagingConditions,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
+    (0..series.truth.stops.len()).into_par_iter().try_for_each(|k| {
+        let name = &series.truth.stops[k].image;
+        save(&folder.join(name), &series.render(k, conditions))?;
+        progress(name);
+        Ok(())
+    })
+}
+
+/// Saves a picture in full depth: 8 bit as it is, more as 16 bit with the counts in the low end.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn save(path: &Path, picture: &Picture) -> Result<()> {
+    let (width, height) = (picture.width as u32, picture.height as u32);
+    let image: Option<DynamicImage> = if picture.full_scale <= 255.0 {
+        ImageBuffer::<Luma<u8>, _>::from_raw(width, height, picture.pixels.iter().map(|&v| v as u8).collect())
+            .map(DynamicImage::ImageLuma8)
+    } else {
+        ImageBuffer::<Luma<u16>, _>::from_raw(width, height, picture.pixels.iter().map(|&v| v as u16).collect())
+            .map(DynamicImage::ImageLuma16)
+    };
+    let image =
+        image.ok_or_else(|| Error::input(path.display(), "has not as many pixels as it says", "report this"))?;
+    image.save(path).map_err(|e| Error::input(path.display(), e, "check that the disk is writable and not full"))
+}

@@ -1,0 +1,391 @@
+//! A robot with known errors that looks at a plate with known errors through a known camera.
+//!
+//! The poses are those that an operator would drive to with the nominal robot: random views of the plate, reached by inverse
+//! kinematics of the nominal chain inside the joint limits, in every configuration of the arm. What the camera sees there
+//! comes from the true robot, with joint noise of its own at every stop.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+use super::conditions::ImagingConditions;
+use super::observe::observe;
+use super::placement::{self, Setup};
+use super::render::render;
+use super::truth::{HeldOutRecord, PoseRecord, StopRecord, TermRecord, Truth};
+use crate::detect::Picture;
+use crate::error::{Error, Result};
+use crate::geom::Pose;
+use crate::model::camera::{Camera, Lens};
+use crate::model::joint_terms::{JointTerm, Term};
+use crate::model::robot::{Robot, Stop as Visit};
+use crate::plan::viewpoint::ViewRange;
+use crate::series::{AngleUnit, CameraMount, CameraSection, ImageObservations, Manifest, Plate, Stop, Stops};
+use crate::urdf::{Chain, JointKind};
+
+/// Attempts at one more workable pose before the world is called impossible.
+const ATTEMPTS: usize = 3000;
+
+/// Standard deviations of the true robot's errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RobotErrors {
+    /// Displacement of each moving joint's origin, m per axis.
+    pub translation_m: f64,
+    /// Tilt of each moving joint's origin, rad per axis.
+    pub rotation_rad: f64,
+    /// Offset of each joint, rad (a tenth of it in m for a prismatic joint).
+    pub offset_rad: f64,
+    /// Gear scale, as a share.
+    pub gear: f64,
+    /// First and second harmonic, rad.
+    pub harmonic_rad: f64,
+    /// Sag for a unit moment, rad.
+    pub gravity_rad: f64,
+    /// Backlash, rad.
+    pub backlash_rad: f64,
+}
+
+impl Default for RobotErrors {
+    /// Typical geometric errors: 0.3 mm, 1 mrad, offsets of 3 mrad; nothing beyond rigid geometry.
+    fn default() -> Self {
+        Self {
+            translation_m: 0.3e-3,
+            rotation_rad: 1e-3,
+            offset_rad: 3e-3,
+            gear: 0.0,
+            harmonic_rad: 0.0,
+            gravity_rad: 0.0,
+            backlash_rad: 0.0,
+        }
+    }
+}
+
+/// What world is wanted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorldRequest {
+    /// The nominal robot.
+    pub chain: Chain,
+    /// The nominal plate.
+    pub plate: Plate,
+    /// The true camera.
+    pub camera: Camera,
+    /// Where the camera is.
+    pub mount: CameraMount,
+    /// Number of stops.
+    pub images: usize,
+    /// Number of places where the plate stands.
+    pub placements: usize,
+    /// Errors of the robot.
+    pub errors: RobotErrors,
+    /// Standard deviation of the joint noise, rad (a tenth of it in m for a prismatic joint).
+    pub joint_noise_rad: f64,
+    /// Standard deviation of observations, px per axis.
+    pub pixel_sigma_px: f64,
+    /// Standard deviation of the markers' positions, m per axis.
+    pub marker_sigma_m: f64,
+    /// Views.
+    pub views: ViewRange,
+    /// Markers that every view shows at least.
+    pub least_markers: usize,
+    /// Number of joint vectors kept aside.
+    pub held_out: usize,
+    /// Unit of the readings in joints.csv.
+    pub joint_unit: AngleUnit,
+    /// Seed of everything.
+    pub seed: u64,
+}
+
+impl WorldRequest {
+    /// A robot and a plate with everything else typical: 50 stops of a camera in the hand, 0.02 mrad of joint noise.
+    pub fn typical(chain: Chain, plate: Plate) -> Self {
+        Self {
+            chain,
+            plate,
+            camera: typical_camera(1280, 1024, 60_f64.to_radians()),
+            mount: CameraMount::Hand,
+            images: 50,
+            placements: 1,
+            errors: RobotErrors::default(),
+            joint_noise_rad: 0.02e-3,
+            pixel_sigma_px: 0.02,
+            marker_sigma_m: 0.03e-3,
+            views: ViewRange::default(),
+            least_markers: 20,
+            held_out: 100,
+            joint_unit: AngleUnit::Deg,
+            seed: 1,
+        }
+    }
+}
+
+/// An industrial camera with the distortion of a common lens; `field_rad` is the horizontal field of view.
+pub fn typical_camera(width_px: u32, height_px: u32, field_rad: f64) -> Camera {
+    let focal_px = f64::from(width_px) / 2.0 / (field_rad / 2.0).tan();
+    let mut camera = Camera::pinhole(Lens::Brown, width_px, height_px, focal_px);
+    camera.parameters[1] *= 1.0004;
+    camera.parameters[2] += 0.006 * f64::from(width_px);
+    camera.parameters[3] -= 0.004 * f64::from(height_px);
+    camera.parameters[4..].copy_from_slice(&[-0.11, 0.09, 4e-4, -3e-4, -0.02]);
+    camera
+}
+
+/// A series with everything known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulatedSeries {
+    /// The manifest.
+    pub manifest: Manifest,
+    /// The plate as it is believed to be.
+    pub plate: Plate,
+    /// The plate as it is.
+    pub true_plate: Plate,
+    /// Readings of the stops.
+    pub stops: Stops,
+    /// What a perfect detector with pixel noise would report, in the order of the stops.
+    pub observations: Vec<ImageObservations>,
+    /// What was put in.
+    pub truth: Truth,
+}
+
+/// Simulates a series; the same request gives the same series.
+///
+/// # Errors
+/// When the robot cannot bring the plate into enough views.
+pub fn series(request: &WorldRequest) -> Result<SimulatedSeries> {
+    let mut rng = ChaCha8Rng::seed_from_u64(request.seed);
+    let nominal = Robot::nominal(request.chain.clone());
+    let actual = true_robot(request, &mut rng);
+    let true_plate = true_plate(request, &mut rng);
+    let setup = placement::set_up(request, &nominal, &mut rng)?;
+    let mut world = World { request, nominal, actual, true_plate, setup, rng };
+    let mut seen = Vec::with_capacity(request.images);
+    let mut before: Option<Vec<f64>> = None;
+    for k in 0..request.images {
+        let view = world.next_view(k, before.as_deref())?;
+        before = Some(view.readings.clone());
+        seen.push(view);
+    }
+    let held_out = (0..request.held_out).map(|k| world.held_out(k)).collect::<Result<Vec<_>>>()?;
+    Ok(world.into_series(seen, held_out))
+}
+
+/// Standard deviation of a joint quantity given for revolute joints.
+fn scaled(value_rad: f64, kind: JointKind) -> f64 {
+    if kind == JointKind::Prismatic { 0.1 * value_rad } else { value_rad }
+}
+
+fn normal(sigma: f64, rng: &mut impl Rng) -> f64 {
+    sigma * rng.sample::<f64, _>(StandardNormal)
+}
+
+fn true_robot(request: &WorldRequest, rng: &mut impl Rng) -> Robot {
+    let e = &request.errors;
+    let mut robot = Robot::nominal(request.chain.clone());
+    for (joint, twist) in request.chain.joints.iter().zip(&mut robot.twists) {
+        for k in 0..6 {
+            let sigma = if k < 3 { e.translation_m } else { e.rotation_rad };
+            let value = normal(sigma, rng);
+            twist[k] = if joint.kind == JointKind::Fixed { 0.0 } else { value };
+        }
+    }
+    for (reading, &kind) in request.chain.reading_kinds.iter().enumerate() {
+        let mut add = |term: Term, sigma: f64| {
+            let value = normal(sigma, rng);
+            if sigma > 0.0 {
+                robot.terms.push(JointTerm { reading, term, value });
+            }
+        };
+        add(Term::Offset, scaled(e.offset_rad, kind));
+        add(Term::Gear, e.gear);
+        for k in [1, 2] {
+            add(Term::Cosine(k), scaled(e.harmonic_rad, kind));
+            add(Term::Sine(k), scaled(e.harmonic_rad, kind));
+        }
+        for k in 0..4 {
+            add(Term::Gravity(k), scaled(e.gravity_rad, kind));
+        }
+        add(Term::Backlash, scaled(e.backlash_rad, kind));
+    }
+    robot
+}
+
+fn true_plate(request: &WorldRequest, rng: &mut impl Rng) -> Plate {
+    let mut plate = request.plate.clone();
+    for marker in &mut plate.markers {
+        // Whole nanometres keep truth.toml short.
+        marker.position_m += Vector3::from_fn(|_, _| (normal(request.marker_sigma_m, rng) * 1e9).round() / 1e9);
+    }
+    plate
+}
+
+/// One accepted stop.
+struct Seen {
+    readings: Vec<f64>,
+    raw: Vec<f64>,
+    noise: Vec<f64>,
+    placement: usize,
+    camera_from_plate: Pose,
+    observations: ImageObservations,
+}
+
+struct World<'a> {
+    request: &'a WorldRequest,
+    nominal: Robot,
+    actual: Robot,
+    true_plate: Plate,
+    setup: Setup,
+    rng: ChaCha8Rng,
+}
+
+impl World<'_> {
+    fn next_view(&mut self, index: usize, before: Option<&[f64]>) -> Result<Seen> {
+        let request = self.request;
+        let at = index % self.setup.plates.len();
+        let kinds = &request.chain.reading_kinds;
+        for _ in 0..ATTEMPTS {
+            let Some(wanted) = self.setup.random_posture(request, &self.nominal, at, &mut self.rng) else { continue };
+            let (raw, readings) = as_written(&wanted, kinds, request.joint_unit);
+            let approach = before.map(|b| readings.iter().zip(b).map(|(q, p)| q - p).collect());
+            let noise: Vec<f64> =
+                kinds.iter().map(|&k| normal(scaled(request.joint_noise_rad, k), &mut self.rng)).collect();
+            let tip = self.actual.pose_at(&Visit { readings: readings.clone(), approach }, &noise);
+            let camera_from_plate = self.setup.camera_from_plate(request.mount, &tip, at);
+            let seen =
+                observe(&self.true_plate, &request.camera, &camera_from_plate, request.pixel_sigma_px, &mut self.rng);
+            let mut markers: Vec<u32> = seen.iter().map(|o| o.marker).collect();
+            markers.dedup();
+            if markers.len() >= request.least_markers {
+                let observations = ImageObservations { image: image_name(index), observations: seen };
+                return Ok(Seen { readings, raw, noise, placement: at, camera_from_plate, observations });
+            }
+        }
+        Err(Error::unsolved(
+            format!("simulated stop {index}"),
+            format!("no workable pose in {ATTEMPTS} attempts: none in reach shows {} markers", request.least_markers),
+            "allow more distance, less tilt, fewer markers, or a plate that suits the robot's size",
+        ))
+    }
+
+    fn held_out(&mut self, index: usize) -> Result<HeldOutRecord> {
+        let at = index % self.setup.plates.len();
+        let posture =
+            (0..ATTEMPTS).find_map(|_| self.setup.random_posture(self.request, &self.nominal, at, &mut self.rng));
+        let readings = posture.ok_or_else(|| {
+            Error::unsolved(
+                "simulated joint vectors",
+                "no view of the plate is in reach",
+                "choose another plate or robot",
+            )
+        })?;
+        let base_from_tip = PoseRecord::from(&self.actual.base_from_tip(&readings));
+        Ok(HeldOutRecord { readings, base_from_tip })
+    }
+
+    fn into_series(self, seen: Vec<Seen>, held_out: Vec<HeldOutRecord>) -> SimulatedSeries {
+        let request = self.request;
+        let chain = &request.chain;
+        let names = |at: usize| format!("placement_{at}");
+        let record = |s: &Seen| StopRecord {
+            image: s.observations.image.clone(),
+            placement: names(s.placement),
+            joint_noise: s.noise.clone(),
+            camera_from_plate: PoseRecord::from(&s.camera_from_plate),
+        };
+        let truth = Truth {
+            format: 1,
+            seed: request.seed,
+            base: chain.base.clone(),
+            tip: chain.tip.clone(),
+            joints: chain.readings.clone(),
+            camera_mount: request.mount,
+            joint_noise_sigma: chain.reading_kinds.iter().map(|&k| scaled(request.joint_noise_rad, k)).collect(),
+            pixel_sigma_px: Some(request.pixel_sigma_px),
+            camera: request.camera.clone(),
+            camera_pose: PoseRecord::from(&self.setup.camera),
+            plate_poses: self.setup.plates.iter().enumerate().map(|(k, p)| (names(k), p.into())).collect(),
+            twists: twists_by_name(&self.actual),
+            terms: terms_by_name(&self.actual),
+            marker_errors_m: marker_errors(&request.plate, &self.true_plate),
+            fault: None,
+            stops: seen.iter().map(record).collect(),
+            held_out,
+        };
+        let stop = |s: &Seen| Stop {
+            image: s.observations.image.clone(),
+            path: None,
+            raw_readings: Some(s.raw.clone()),
+            placement: names(s.placement),
+            time_s: None,
+            line: 0,
+        };
+        SimulatedSeries {
+            manifest: manifest(request),
+            plate: request.plate.clone(),
+            stops: Stops { joints: chain.readings.clone(), stops: seen.iter().map(stop).collect() },
+            observations: seen.into_iter().map(|s| s.observations).collect(),
+            true_plate: self.true_plate,
+            truth,
+        }
+    }
+}
+
+impl SimulatedSeries {
+    /// Renders the picture of stop `index`; its noise depends on the seed and on the index only.
+    pub fn render(&self, index: usize, conditions: &ImagingConditions) -> Picture {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.truth.seed);
+        rng.set_stream(1 + index as u64);
+        let pose = self.truth.stops[index].camera_from_plate.pose();
+        render(&self.true_plate, &self.truth.camera, &pose, conditions, &mut rng)
+    }
+}
+
+fn image_name(index: usize) -> String {
+    format!("img_{index:03}.png")
+}
+
+/// Readings as a controller shows them (1e-5 degrees, 1e-6 rad or 1e-7 m), and the same in SI.
+fn as_written(readings: &[f64], kinds: &[JointKind], unit: AngleUnit) -> (Vec<f64>, Vec<f64>) {
+    let one = |(&q, &kind): (&f64, &JointKind)| match (kind, unit) {
+        (JointKind::Prismatic, _) => ((q * 1e7).round() / 1e7, 1.0),
+        (_, AngleUnit::Deg) => ((q / unit.in_rad() * 1e5).round() / 1e5, unit.in_rad()),
+        (_, AngleUnit::Rad) => ((q * 1e6).round() / 1e6, 1.0),
+    };
+    let written: Vec<(f64, f64)> = readings.iter().zip(kinds).map(one).collect();
+    (written.iter().map(|w| w.0).collect(), written.iter().map(|w| w.0 * w.1).collect())
+}
+
+fn twists_by_name(robot: &Robot) -> BTreeMap<String, [f64; 6]> {
+    let moving = robot.chain.joints.iter().zip(&robot.twists).filter(|(j, _)| j.kind != JointKind::Fixed);
+    moving.map(|(j, t)| (j.name.clone(), (*t).into())).collect()
+}
+
+fn terms_by_name(robot: &Robot) -> Vec<TermRecord> {
+    let name = |reading: usize| robot.chain.readings[reading].clone();
+    robot.terms.iter().map(|t| TermRecord { joint: name(t.reading), term: t.term, value: t.value }).collect()
+}
+
+fn marker_errors(nominal: &Plate, actual: &Plate) -> Vec<[f64; 3]> {
+    let pairs = nominal.markers.iter().zip(&actual.markers);
+    pairs.map(|(n, a)| (a.position_m - n.position_m).map(|v| (v * 1e9).round() / 1e9).into()).collect()
+}
+
+fn manifest(request: &WorldRequest) -> Manifest {
+    Manifest {
+        format: 1,
+        joint_unit: Some(request.joint_unit),
+        base: Some(request.chain.base.clone()),
+        tip: Some(request.chain.tip.clone()),
+        camera_mount: request.mount,
+        plate: "plate.toml".to_owned(),
+        mcap: None,
+        camera: CameraSection {
+            width_px: Some(request.camera.width_px),
+            height_px: Some(request.camera.height_px),
+            ..CameraSection::default()
+        },
+        observations: Default::default(),
+        robot: Default::default(),
+    }
+}
