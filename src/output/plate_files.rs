@@ -2,16 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
-use rayon::prelude::*;
+use nalgebra::Matrix3;
 
 use super::Context;
 use super::gauge::{plates_tied_to, rigid, rigid_covariance, seen_markers};
 use super::names::{file_names, plate_name};
 use super::text::csv;
 use crate::error::Result;
-use crate::linalg::product;
-use crate::model::plate_modes::basis;
+use crate::model::plate_modes::{MODES, basis};
 use crate::recipe::Solution;
 use crate::series::plate_toml;
 
@@ -58,39 +56,19 @@ pub(super) fn position_covariances(solution: &Solution, plate: usize) -> Result<
     let (problem, covariance) = (&solution.problem, &solution.covariance);
     let shape = &solution.state.plates[plate];
     let frame = rigid_covariance(problem, &seen_markers(problem, &plates_tied_to(problem, BTreeSet::from([plate]))))?;
-    let modes = problem.layout.shapes[plate].start;
-    // A marker is v - D y with variance V of v and the reduced unknowns y, and its position adds the modes: B y.
-    let parts: Vec<(Matrix3<f64>, DMatrix<f64>)> = (0..shape.nominal.len())
-        .into_par_iter()
-        .map(|m| {
-            let (own, coupling) = covariance.system.marker_coupling(problem, &solution.linearised, plate, m);
-            let mut f = -coupling;
+    let start = problem.layout.shapes[plate].start;
+    let modes = covariance.reduced.fixed_view::<MODES, MODES>(start, start).into_owned();
+    let all = covariance.positions(problem, &solution.state, &solution.linearised).swap_remove(plate);
+    let one = |(m, seen): (usize, Option<Matrix3<f64>>)| match seen {
+        Some(total) => {
+            let n = rigid(&shape.nominal[m]);
+            total - n * frame * n.transpose()
+        }
+        None => {
             let b = basis(&shape.nominal[m], shape.half_diagonal_m);
-            for c in 0..b.ncols() {
-                for r in 0..3 {
-                    f[(r, modes + c)] += b[(r, c)];
-                }
-            }
-            (own, f)
-        })
-        .collect();
-    let mut all = DMatrix::zeros(3 * parts.len(), covariance.reduced.nrows());
-    for (k, (_, f)) in parts.iter().enumerate() {
-        all.rows_mut(3 * k, 3).copy_from(f);
-    }
-    let pulled = product(&all, &covariance.reduced);
-    let own = |(k, (own, f)): (usize, &(Matrix3<f64>, DMatrix<f64>))| {
-        let spread = pulled.rows(3 * k, 3) * f.transpose();
-        let total = own + Matrix3::from_column_slice(spread.as_slice());
-        match covariance.system.seen(plate, k) {
-            true => total - frame_part(&shape.nominal[k], &frame),
-            false => total,
+            let tolerance = problem.plates[plate].markers[m].sigma_m;
+            b * modes * b.transpose() + Matrix3::identity() * tolerance.powi(2)
         }
     };
-    Ok(parts.iter().enumerate().map(own).collect())
-}
-
-fn frame_part(x: &Vector3<f64>, frame: &nalgebra::Matrix6<f64>) -> Matrix3<f64> {
-    let n = rigid(x);
-    n * frame * n.transpose()
+    Ok(all.into_iter().enumerate().map(one).collect())
 }
