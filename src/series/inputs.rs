@@ -18,8 +18,12 @@ pub struct InputFile {
 impl InputFile {
     /// A file whose bytes are at hand.
     pub fn of_bytes(path: &Path, bytes: &[u8]) -> Self {
-        let sha256 = Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect();
-        Self { path: path.to_path_buf(), sha256 }
+        Self::of_digest(path, &Sha256::digest(bytes))
+    }
+
+    /// A file whose SHA-256 is at hand.
+    pub(super) fn of_digest(path: &Path, digest: &[u8]) -> Self {
+        Self { path: path.to_path_buf(), sha256: digest.iter().map(|b| format!("{b:02x}")).collect() }
     }
 
     /// Reads and hashes a file.

@@ -154,6 +154,22 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 }
 
 impl Manifest {
+    /// A manifest with nothing but what must be said.
+    pub fn plain(camera_mount: CameraMount, plate: &str) -> Self {
+        Self {
+            format: 1,
+            joint_unit: Some(AngleUnit::Rad),
+            base: None,
+            tip: None,
+            camera_mount,
+            plate: plate.to_string(),
+            mcap: None,
+            camera: CameraSection::default(),
+            observations: ObservationsSection::default(),
+            robot: RobotSection::default(),
+        }
+    }
+
     /// Text of `series.toml`.
     ///
     /// # Errors
@@ -166,10 +182,6 @@ impl Manifest {
     pub(super) fn read(path: &Path, inputs: &mut Vec<InputFile>) -> Result<Self> {
         let manifest: Self = read_toml(path, inputs)?;
         check_format(path, manifest.format)?;
-        if manifest.joint_unit.is_none() && manifest.mcap.is_none() {
-            let remedy = "write joint_unit = \"deg\" or joint_unit = \"rad\"; there is no default on purpose";
-            return Err(Error::input(path.display(), "does not say the unit of the joint readings", remedy));
-        }
         let camera = &manifest.camera;
         let positive = [
             ("camera.focal_px", camera.focal_px),
@@ -189,6 +201,15 @@ impl Manifest {
             return Err(Error::input(path.display(), what, "give both or none"));
         }
         Ok(manifest)
+    }
+
+    /// Readings of joints.csv need their unit; those of a recording are in rad.
+    pub(super) fn require_joint_unit(&self, path: &Path) -> Result<()> {
+        if self.joint_unit.is_some() {
+            return Ok(());
+        }
+        let remedy = "write joint_unit = \"deg\" or joint_unit = \"rad\"; there is no default on purpose";
+        Err(Error::input(path.display(), "does not say the unit of the joint readings", remedy))
     }
 }
 

@@ -1,6 +1,6 @@
 //! `plate.toml` and `plate.csv`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -59,6 +59,12 @@ pub fn read_plate(path: &Path, inputs: &mut Vec<InputFile>) -> Result<Plate> {
     check_overlap(path, &plate)?;
     check_scale(path, &plate)?;
     Ok(plate)
+}
+
+/// The marker file that a plate names.
+pub(super) fn marker_file(path: &Path) -> Result<Option<PathBuf>> {
+    let file: PlateFile = read_toml(path, &mut Vec::new())?;
+    Ok(file.markers.map(|markers| path.with_file_name(markers)))
 }
 
 /// The plate as its TOML alone describes it.

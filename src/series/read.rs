@@ -8,10 +8,12 @@ use rayon::prelude::*;
 use super::inputs::InputFile;
 use super::joints::Stops;
 use super::manifest::{AngleUnit, Manifest};
+use super::mcap::require_mcap;
 use super::observation::ImageObservations;
 use super::observation_file;
 use super::plate::Plate;
 use super::plate_file::read_plate;
+use super::recorded::{is_recording, manifest_beside};
 use super::units;
 use crate::urdf::Chain;
 use crate::{Error, Notice, Result};
@@ -57,23 +59,45 @@ pub struct Series {
     pub inputs: Vec<InputFile>,
 }
 
-/// Reads a series folder; `observations.csv` is used instead of images where it exists.
+/// Reads a series folder; `observations.csv` is used instead of images where it exists. A recording (an `.mcap` file or a
+/// rosbag2 folder) may be given instead, with a manifest of its name or a `series.toml` beside it; its stops come with
+/// [`Series::with_recording`].
 ///
 /// # Errors
 /// By file, line, image or joint: whatever does not follow the format or contradicts itself.
-pub fn read(folder: &Path) -> Result<Series> {
-    read_from(folder, folder.join("observations.csv").is_file())
+pub fn read(path: &Path) -> Result<Series> {
+    if is_recording(path) {
+        return read_recording(path);
+    }
+    read_folder(path, path.join("observations.csv").is_file())
 }
 
-/// Reads a series folder for its images, even where there is an `observations.csv`.
+/// Reads a series for its images, even where there is an `observations.csv`.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_images(folder: &Path) -> Result<Series> {
-    read_from(folder, false)
+pub fn read_images(path: &Path) -> Result<Series> {
+    if is_recording(path) {
+        return read_recording(path);
+    }
+    read_folder(path, false)
 }
 
-fn read_from(folder: &Path, use_observations: bool) -> Result<Series> {
+fn read_recording(path: &Path) -> Result<Series> {
+    // A bag of another kind is named as such before its manifest is missed.
+    require_mcap(path)?;
+    let manifest_path = manifest_beside(path)?;
+    let folder = manifest_path.parent().unwrap_or(path).to_path_buf();
+    let mut inputs = Vec::new();
+    let mut manifest = Manifest::read(&manifest_path, &mut inputs)?;
+    manifest.mcap = Some(file_name(path));
+    let plate = read_plate(&folder.join(&manifest.plate), &mut inputs)?;
+    let name = path.file_stem().map_or_else(|| "series".into(), |n| n.to_string_lossy().into_owned());
+    let source = Source::Recording(path.to_path_buf());
+    Ok(Series { name, folder, manifest, plate, stops: Stops::default(), source, notices: Vec::new(), inputs })
+}
+
+fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     let name = folder_name(folder)?;
     let manifest_path = folder.join("series.toml");
     let mut inputs = Vec::new();
@@ -84,6 +108,7 @@ fn read_from(folder: &Path, use_observations: bool) -> Result<Series> {
     let source = if let Some(recording) = &manifest.mcap {
         Source::Recording(folder.join(recording))
     } else {
+        manifest.require_joint_unit(&manifest_path)?;
         stops = Stops::read(&folder.join("joints.csv"), &mut inputs)?;
         if use_observations {
             let path = folder.join("observations.csv");
@@ -177,11 +202,17 @@ fn pictured(folder: &Path, stops: &mut Stops, notices: &mut Vec<Notice>) -> Resu
             "they are not used; add a row with empty joint cells to use one",
         ));
     }
+    let (dark, white) = optional_images(folder)?;
+    Ok(Source::Images { folder: images, dark, white })
+}
+
+/// Images in dark/ and white/, where there are any.
+pub(super) fn optional_images(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     let optional = |name: &str| {
         let path = folder.join(name);
         if path.is_dir() { image_files(&path) } else { Ok(Vec::new()) }
     };
-    Ok(Source::Images { dark: optional("dark")?, white: optional("white")?, folder: images })
+    Ok((optional("dark")?, optional("white")?))
 }
 
 /// Image files of a folder in the order of their names.
@@ -200,7 +231,8 @@ fn image_files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-fn file_name(path: &Path) -> String {
+/// Last part of a path.
+pub(super) fn file_name(path: &Path) -> String {
     path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
@@ -245,12 +277,21 @@ impl Series {
     /// # Errors
     /// A joint of the chain that has no column (the columns are listed), and a `joint_unit` that cannot be true.
     pub fn readings_for(&self, chain: &Chain) -> Result<Vec<Option<Vec<f64>>>> {
-        units::readings_for(&self.folder.join("joints.csv"), &self.stops, self.joint_unit(), chain)
+        if let Source::Recording(path) = &self.source {
+            let what = "the stops have not been taken out of this recording";
+            return Err(Error::input(path.display(), what, "convert it first: robotcal convert run1.mcap run1/"));
+        }
+        units::readings_for(&self.readings_file(), &self.stops, self.joint_unit(), chain)
     }
 
     /// What the readings of a chain give reason to say: columns that are not used, values beyond the URDF's limits.
     pub fn reading_notices(&self, chain: &Chain) -> Vec<Notice> {
-        units::notices(&self.folder.join("joints.csv"), &self.stops, self.joint_unit(), chain)
+        units::notices(&self.readings_file(), &self.stops, self.joint_unit(), chain)
+    }
+
+    /// The file that the readings come from, for messages.
+    fn readings_file(&self) -> PathBuf {
+        self.folder.join(self.manifest.mcap.as_deref().unwrap_or("joints.csv"))
     }
 
     /// Hashes of all image files (stops in order, then dark and white).

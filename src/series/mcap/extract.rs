@@ -1,0 +1,387 @@
+//! Second pass: the pictures of the standstills, and the joints at their stamps.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use image::{DynamicImage, ImageFormat};
+use rayon::prelude::*;
+
+use super::cdr::Decoded;
+use super::file::{Message, for_each};
+use super::messages::{self, CameraInfo, RawImage};
+use super::motion::{Interpolated, Posture, Standstill, interpolate, postures, standstills};
+use super::options::{Motion, Picking, RecordingOptions};
+use super::pixels;
+use super::scan::{Scan, scan, time_ns};
+use crate::series::{DEFAULT_PLACEMENT, InputFile, Stop, Stops};
+use crate::{Error, Notice, Result};
+
+/// Of a long standstill so many pictures are looked at.
+const MOST_PICTURES: usize = 9;
+/// The ends of a standstill are left out where it is long enough, ns: stamps of image and joints may differ a little.
+const MARGIN_NS: i64 = 50_000_000;
+/// Delays of images and joints that differ by more deserve a look, s.
+const NOTABLE_DELAY_S: f64 = 0.05;
+
+/// How one stop was taken from a recording.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct StopReport {
+    /// Name of its picture.
+    pub image: String,
+    /// Largest joint speed at its stamp, rad/s or m/s.
+    pub speed: f64,
+    /// From its stamp to the nearest joint sample, s.
+    pub nearest_sample_s: f64,
+    /// Pictures that were looked at.
+    pub pictures: usize,
+    /// Mean squared gradient of the best picture, 16-bit counts.
+    pub sharpness: f64,
+    /// Noise of one picture, counts; known where pictures were averaged.
+    pub noise_counts: Option<f64>,
+}
+
+/// The stops of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extracted {
+    /// Stops with the paths of their pictures; readings in rad and m.
+    pub stops: Stops,
+    /// How each stop was taken, in the same order.
+    pub reports: Vec<StopReport>,
+    /// Topic of the joint states.
+    pub joint_topic: String,
+    /// Topic of the images.
+    pub image_topic: String,
+    /// How much longer images take from stamp to recording than joint states (median), s.
+    pub image_delay_s: f64,
+    /// The camera as the recording describes it.
+    pub camera_info: Option<CameraInfo>,
+    /// What was seen while reading that the user should know.
+    pub notices: Vec<Notice>,
+    /// The files of the recording.
+    pub inputs: Vec<InputFile>,
+}
+
+/// Takes the stops out of a recording (an `.mcap` file or a rosbag2 folder) and writes their pictures to `images`.
+///
+/// # Errors
+/// Other kinds of recordings (with the command that converts them); topics or joints that are missing or not unique;
+/// images and joints that were never taken at the same time; a robot that never stands still.
+pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> Result<Extracted> {
+    let mut scan = scan(recording, options.clock)?;
+    let (joint_topic, samples, joints) = scan.joint_topic(options)?;
+    let (image_topic, mut times) = scan.image_topic(options)?;
+    times.sort_unstable();
+    times.dedup();
+    let postures = postures(&samples, &joints);
+    require_overlap(&scan, &postures, &times)?;
+    let groups = groups(&mut scan, &postures, &times, options)?;
+    std::fs::create_dir_all(images).map_err(|e| Error::io(images, &e))?;
+    let mut collector = Collector::new(groups, images, options, &postures);
+    for file in scan.files.clone() {
+        // Damage was told of by the first pass.
+        for_each(&file, |message| if message.topic == image_topic { collector.take(&message) } else { Ok(()) })?;
+    }
+    let taken = collector.finish()?;
+    if taken.rows.is_empty() {
+        let place = format!("{}, topic {image_topic}", recording.display());
+        let what = taken
+            .malformed
+            .map_or("no image can be read".into(), |(_, reason)| format!("no image can be read: one {reason}"));
+        return Err(Error::input(place, what, "record as mono8, mono16, rgb8, bayer or compressed (jpeg, png)"));
+    }
+    let mut notices = std::mem::take(&mut scan.notices);
+    if let Some((count, reason)) = taken.malformed {
+        let place = format!("{}, topic {image_topic}", recording.display());
+        notices.push(Notice::new(place, format!("{count} images cannot be read: one {reason}"), "they are left out"));
+    }
+    let image_delay_s = scan.delay_s(&image_topic) - scan.delay_s(&joint_topic);
+    if image_delay_s.abs() > NOTABLE_DELAY_S {
+        let what = format!("images arrive {image_delay_s:.3} s later after their stamp than joint states");
+        let remedy = "check that camera and robot stamp by the same clock; a robot that stands is not affected";
+        notices.push(Notice::new(recording.display(), what, remedy));
+    }
+    let (stops, reports) = taken.rows.into_values().unzip();
+    Ok(Extracted {
+        stops: Stops { joints, stops },
+        reports,
+        image_delay_s,
+        camera_info: scan.camera_info(&image_topic).cloned(),
+        joint_topic,
+        image_topic,
+        notices,
+        inputs: scan.inputs,
+    })
+}
+
+fn require_overlap(scan: &Scan, postures: &[Posture], times: &[i64]) -> Result<()> {
+    let place = scan.recording.display();
+    let (Some(first), Some(last)) = (postures.first(), postures.last()) else {
+        let what = "its joint states never tell all joints";
+        return Err(Error::input(place, what, "record all publishers of the joint states"));
+    };
+    let (Some(&from), Some(&to)) = (times.first(), times.last()) else { return Ok(()) };
+    if from <= last.time_ns && first.time_ns <= to {
+        return Ok(());
+    }
+    let seconds = |ns: i64| ns as f64 * 1e-9;
+    let what = format!(
+        "its images are stamped {:.1} s to {:.1} s, its joint states {:.1} s to {:.1} s: never at the same time",
+        seconds(from),
+        seconds(to),
+        seconds(first.time_ns),
+        seconds(last.time_ns)
+    );
+    Err(Error::input(place, what, "synchronise the clocks, or use the times of recording (--clock log)"))
+}
+
+/// Image times that belong to one stop.
+type Group = Vec<i64>;
+
+fn groups(scan: &mut Scan, postures: &[Posture], times: &[i64], options: &RecordingOptions) -> Result<Vec<Group>> {
+    let still = standstills(postures, options.still_speed, (options.least_still_s * 1e9) as i64);
+    let mut groups: Vec<Group> = Vec::new();
+    let mut empty = 0;
+    let mut used = 0;
+    for standstill in &still {
+        let Standstill { from_ns, to_ns } = shrunk(*standstill);
+        let inside = &times[times.partition_point(|t| *t < from_ns)..times.partition_point(|t| *t <= to_ns)];
+        used += inside.len();
+        match inside {
+            [] => empty += 1,
+            _ => groups.push(spread(inside)),
+        }
+    }
+    let place = scan.recording.display().to_string();
+    if let Motion::Accept { interval_s } = options.motion {
+        let outside =
+            |t: &i64| still.iter().all(|s| !(s.from_ns..=s.to_ns).contains(t)) && interpolate(postures, *t).is_some();
+        let mut last = i64::MIN;
+        for time in times.iter().copied().filter(outside) {
+            if time.saturating_sub(last) >= (interval_s * 1e9) as i64 {
+                groups.push(vec![time]);
+                last = time;
+            }
+        }
+        groups.sort();
+    } else if used < times.len() && !groups.is_empty() {
+        let what = format!("{} of {} images were taken in motion and are not used", times.len() - used, times.len());
+        scan.notices.push(Notice::new(&place, what, ""));
+    }
+    if empty > 0 {
+        let what = format!("{empty} of {} standstills have no image", still.len());
+        scan.notices.push(Notice::new(&place, what, "wait longer at each stop, or check the stamps of the images"));
+    }
+    if groups.is_empty() {
+        return Err(no_stop(&place, postures, still.len(), options));
+    }
+    Ok(groups)
+}
+
+/// Why there is no stop at all.
+fn no_stop(place: &str, postures: &[Posture], standstills: usize, options: &RecordingOptions) -> Error {
+    if standstills > 0 {
+        let what = format!("none of its images was taken in one of the {standstills} standstills of the robot");
+        return Error::input(place, what, "check the stamps of images and joint states (--clock log)");
+    }
+    let mut steps: Vec<i64> = postures.windows(2).map(|w| w[1].time_ns - w[0].time_ns).collect();
+    steps.sort_unstable();
+    let step_s = steps.get(steps.len() / 2).map_or(f64::INFINITY, |ns| *ns as f64 * 1e-9);
+    let what = format!(
+        "the robot never stands still for {} s (joints slower than {} rad/s; a joint state comes every {step_s:.3} s)",
+        options.least_still_s, options.still_speed
+    );
+    let remedy = "stop the robot for each image; images in motion are taken only on demand (--motion accept)";
+    Error::input(place, what, remedy)
+}
+
+fn shrunk(standstill: Standstill) -> Standstill {
+    let Standstill { from_ns, to_ns } = standstill;
+    if to_ns - from_ns < 8 * MARGIN_NS {
+        return standstill;
+    }
+    Standstill { from_ns: from_ns + MARGIN_NS, to_ns: to_ns - MARGIN_NS }
+}
+
+/// At most [`MOST_PICTURES`], evenly spread.
+fn spread(times: &[i64]) -> Group {
+    let count = times.len().min(MOST_PICTURES);
+    (0..count).map(|k| times[k * times.len() / count + times.len() / count / 2]).collect()
+}
+
+/// A picture as the recording has it.
+enum Frame {
+    Raw(RawImage),
+    Compressed(Vec<u8>),
+}
+
+impl Frame {
+    fn read(message: &Message<'_>) -> Decoded<Self> {
+        match message.schema {
+            messages::COMPRESSED_IMAGE => messages::compressed_image(message.data).map(Self::Compressed),
+            _ => RawImage::read(message.data).map(Self::Raw),
+        }
+    }
+
+    fn decode(&self) -> Decoded<DynamicImage> {
+        match self {
+            Self::Raw(raw) => pixels::to_image(raw),
+            Self::Compressed(bytes) => {
+                image::load_from_memory(bytes).map_err(|e| format!("is no picture that can be read ({e})"))
+            }
+        }
+    }
+
+    /// Bytes that can be written as they are, with the extension of their format.
+    fn file(&self) -> Option<(&[u8], &'static str)> {
+        let Self::Compressed(bytes) = self else { return None };
+        match image::guess_format(bytes) {
+            Ok(ImageFormat::Jpeg) => Some((bytes, "jpg")),
+            Ok(ImageFormat::Png) => Some((bytes, "png")),
+            _ => None,
+        }
+    }
+}
+
+/// Pictures of one stop that have come so far.
+struct Open {
+    waiting: usize,
+    frames: Vec<(i64, Frame)>,
+}
+
+/// Gathers the wanted pictures as they pass by, and finishes a stop when its last one has come.
+struct Collector<'a> {
+    stop_of: BTreeMap<i64, usize>,
+    open: Vec<Open>,
+    images: &'a Path,
+    options: &'a RecordingOptions,
+    postures: &'a [Posture],
+    taken: Taken,
+}
+
+/// Finished stops by the time of their picture.
+#[derive(Default)]
+struct Taken {
+    rows: BTreeMap<i64, (Stop, StopReport)>,
+    /// How many pictures could not be read, and why the first could not.
+    malformed: Option<(usize, String)>,
+}
+
+impl Taken {
+    fn reject(&mut self, reason: String) {
+        self.malformed.get_or_insert((0, reason)).0 += 1;
+    }
+}
+
+impl<'a> Collector<'a> {
+    fn new(groups: Vec<Group>, images: &'a Path, options: &'a RecordingOptions, postures: &'a [Posture]) -> Self {
+        let stop_of = groups.iter().enumerate().flat_map(|(i, g)| g.iter().map(move |t| (*t, i))).collect();
+        let open = groups.iter().map(|g| Open { waiting: g.len(), frames: Vec::new() }).collect();
+        Self { stop_of, open, images, options, postures, taken: Taken::default() }
+    }
+
+    fn take(&mut self, message: &Message<'_>) -> Result<()> {
+        let Ok(stamp_ns) = messages::stamp_of(message.data) else { return Ok(()) };
+        let time = time_ns(stamp_ns, message, self.options.clock);
+        let Some(stop) = self.stop_of.remove(&time) else { return Ok(()) };
+        match Frame::read(message) {
+            Ok(frame) => self.open[stop].frames.push((time, frame)),
+            Err(reason) => self.taken.reject(reason),
+        }
+        self.open[stop].waiting -= 1;
+        if self.open[stop].waiting == 0 {
+            self.close(stop)?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<Taken> {
+        for stop in 0..self.open.len() {
+            self.close(stop)?;
+        }
+        Ok(self.taken)
+    }
+
+    /// Chooses or averages the pictures of a stop and writes the result.
+    fn close(&mut self, stop: usize) -> Result<()> {
+        let frames = std::mem::take(&mut self.open[stop].frames);
+        let decoded: Vec<Decoded<DynamicImage>> = frames.par_iter().map(|(_, frame)| frame.decode()).collect();
+        let mut pictures = Vec::new();
+        for ((time, frame), picture) in frames.into_iter().zip(decoded) {
+            match picture {
+                Ok(picture) => pictures.push((time, frame, picture)),
+                Err(reason) => self.taken.reject(reason),
+            }
+        }
+        let sharpness: Vec<f64> = pictures.par_iter().map(|(_, _, picture)| pixels::sharpness(picture)).collect();
+        // The first of equally sharp ones, so that the choice does not depend on anything else.
+        let Some(best) = (0..pictures.len()).reduce(|a, b| if sharpness[b] > sharpness[a] { b } else { a }) else {
+            return Ok(());
+        };
+        let (times, pixels_only): (Vec<i64>, Vec<DynamicImage>) = match self.options.picking {
+            Picking::Average => pictures.iter().map(|(t, _, p)| (*t, p.clone())).unzip(),
+            Picking::Sharpest => (vec![pictures[best].0], Vec::new()),
+        };
+        let averaged = pixels::average(&pixels_only);
+        let noise_counts = averaged.as_ref().map(|(_, noise)| *noise);
+        let times = if averaged.is_some() { times } else { vec![pictures[best].0] };
+        let Some(joints) = mean_joints(self.postures, &times) else { return Ok(()) };
+        let time = times[times.len() / 2];
+        let image = match averaged {
+            Some((mean, _)) => self.write_png(time, &mean)?,
+            None => match pictures[best].1.file() {
+                Some((bytes, extension)) => self.write(time, extension, bytes)?,
+                None => self.write_png(time, &pictures[best].2)?,
+            },
+        };
+        let stop = Stop {
+            path: Some(self.images.join(&image)),
+            image: image.clone(),
+            raw_readings: Some(joints.positions),
+            placement: DEFAULT_PLACEMENT.to_string(),
+            time_s: Some(time as f64 * 1e-9),
+            line: 0,
+        };
+        let report = StopReport {
+            image,
+            speed: joints.speed,
+            nearest_sample_s: joints.nearest_ns as f64 * 1e-9,
+            pictures: pictures.len(),
+            sharpness: sharpness[best],
+            noise_counts,
+        };
+        self.taken.rows.insert(time, (stop, report));
+        Ok(())
+    }
+
+    fn write_png(&self, time: i64, picture: &DynamicImage) -> Result<String> {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut bytes, ImageFormat::Png).map_err(|e| {
+            Error::input(self.images.display(), format!("a picture cannot be written: {e}"), "report this")
+        })?;
+        self.write(time, "png", bytes.get_ref())
+    }
+
+    /// Writes a picture named by its stamp.
+    fn write(&self, time: i64, extension: &str, bytes: &[u8]) -> Result<String> {
+        const SECOND: i64 = 1_000_000_000;
+        let name = format!("{}.{:09}.{extension}", time.div_euclid(SECOND), time.rem_euclid(SECOND));
+        let path = self.images.join(&name);
+        std::fs::write(&path, bytes).map_err(|e| Error::io(&path, &e))?;
+        Ok(name)
+    }
+}
+
+/// Joints at the mean of some times; the largest speed and distance among them.
+fn mean_joints(postures: &[Posture], times: &[i64]) -> Option<Interpolated> {
+    let all = times.iter().map(|t| interpolate(postures, *t)).collect::<Option<Vec<_>>>()?;
+    let mut mean = all.first()?.clone();
+    for other in &all[1..] {
+        for (sum, q) in mean.positions.iter_mut().zip(&other.positions) {
+            *sum += q;
+        }
+        mean.speed = mean.speed.max(other.speed);
+        mean.nearest_ns = mean.nearest_ns.max(other.nearest_ns);
+    }
+    mean.positions.iter_mut().for_each(|q| *q /= all.len() as f64);
+    Some(mean)
+}

@@ -1,0 +1,19 @@
+//! Recordings in MCAP (rosbag2): joint states and images become stops of a series.
+//!
+//! The robot moves, stands, moves: standstills are found from the joints, and one picture is taken of each. Two passes
+//! over the file, in constant memory: the first reads joints and stamps, the second the pictures that were chosen.
+//! Nothing of ROS is needed.
+
+mod cdr;
+mod extract;
+mod file;
+mod messages;
+mod motion;
+mod options;
+mod pixels;
+mod scan;
+
+pub use extract::{Extracted, StopReport, extract};
+pub(super) use file::require_mcap;
+pub use messages::CameraInfo;
+pub use options::{Clock, Motion, Picking, RecordingOptions};

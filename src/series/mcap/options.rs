@@ -1,0 +1,74 @@
+//! What may be chosen when a recording is read.
+
+/// Which time of a message counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Clock {
+    /// The stamp in its header: when the data were taken.
+    #[default]
+    Stamp,
+    /// When it was recorded: for drivers whose stamps come from different clocks.
+    Log,
+}
+
+/// What to do with a recording whose robot never stands still.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Motion {
+    /// Refuse it.
+    #[default]
+    Refuse,
+    /// Take images all the same, at least this many seconds apart, with joints interpolated at their stamps.
+    Accept {
+        /// Least time between two images, s.
+        interval_s: f64,
+    },
+}
+
+/// Which picture stands for a standstill.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Picking {
+    /// The sharpest image.
+    #[default]
+    Sharpest,
+    /// The mean of the images: less noise, and the noise becomes known.
+    Average,
+}
+
+/// How a recording is read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordingOptions {
+    /// Joints whose readings are needed; empty: all of the topic.
+    pub joints: Vec<String>,
+    /// Topic of the joint states; needed when there are several.
+    pub joint_topic: Option<String>,
+    /// Topic of the images; needed when there are several.
+    pub image_topic: Option<String>,
+    /// Which time counts.
+    pub clock: Clock,
+    /// Whether images in motion are taken.
+    pub motion: Motion,
+    /// Sharpest image or average.
+    pub picking: Picking,
+    /// Fastest joint of a robot that stands still, rad/s or m/s.
+    pub still_speed: f64,
+    /// Shortest standstill, s.
+    pub least_still_s: f64,
+}
+
+impl Default for RecordingOptions {
+    fn default() -> Self {
+        Self {
+            joints: Vec::new(),
+            joint_topic: None,
+            image_topic: None,
+            clock: Clock::Stamp,
+            motion: Motion::Refuse,
+            picking: Picking::Sharpest,
+            // Encoder noise of 0.1 mrad over the window of 0.1 s is 1 mrad/s; slow moves are above 10 mrad/s.
+            still_speed: 5e-3,
+            least_still_s: 0.3,
+        }
+    }
+}

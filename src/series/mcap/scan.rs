@@ -1,0 +1,270 @@
+//! First pass over a recording: joint samples, stamps of the images, what else there is.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use super::cdr::Decoded;
+use super::file::{Message, files_of, for_each, hash};
+use super::messages::{self, CameraInfo, JointState};
+use super::options::{Clock, RecordingOptions};
+use crate::series::InputFile;
+use crate::{Error, Notice, Result};
+
+/// Some joints at one time.
+#[derive(Debug, Clone)]
+pub(super) struct JointSample {
+    pub time_ns: i64,
+    pub names: Rc<Vec<String>>,
+    /// rad or m.
+    pub positions: Vec<f64>,
+}
+
+/// Type and number of messages of a topic.
+#[derive(Debug, Clone, Default)]
+struct Topic {
+    schema: String,
+    encoding: String,
+    messages: usize,
+    /// Messages that could not be read, and why the first could not.
+    malformed: usize,
+    reason: String,
+    unstamped: bool,
+    /// Time from stamp to recording, ns.
+    delays_ns: Vec<i64>,
+}
+
+/// Everything of the first pass.
+#[derive(Debug, Default)]
+pub(super) struct Scan {
+    pub recording: PathBuf,
+    pub files: Vec<PathBuf>,
+    topics: BTreeMap<String, Topic>,
+    joints: BTreeMap<String, Vec<JointSample>>,
+    images: BTreeMap<String, Vec<i64>>,
+    infos: BTreeMap<String, CameraInfo>,
+    pub notices: Vec<Notice>,
+    pub inputs: Vec<InputFile>,
+}
+
+/// Reads a recording once.
+pub(super) fn scan(recording: &Path, clock: Clock) -> Result<Scan> {
+    let files = files_of(recording)?;
+    let mut scan = Scan { recording: recording.to_path_buf(), files, ..Scan::default() };
+    for path in scan.files.clone() {
+        let damage = for_each(&path, |message| {
+            scan.note(&message, clock);
+            Ok(())
+        })?;
+        scan.notices.extend(damage);
+        scan.inputs.push(hash(&path)?);
+    }
+    scan.judge()?;
+    Ok(scan)
+}
+
+/// Time of a message by the chosen clock, ns; a stamp of zero means that none was set.
+pub(super) fn time_ns(stamp_ns: i64, message: &Message<'_>, clock: Clock) -> i64 {
+    match clock {
+        Clock::Stamp if stamp_ns != 0 => stamp_ns,
+        _ => message.log_time_ns as i64,
+    }
+}
+
+impl Scan {
+    fn note(&mut self, message: &Message<'_>, clock: Clock) {
+        let topic = self.topics.entry(message.topic.to_string()).or_default();
+        topic.schema = message.schema.to_string();
+        topic.encoding = message.encoding.to_string();
+        topic.messages += 1;
+        if message.encoding != "cdr" {
+            return;
+        }
+        if let Err(reason) = self.decode(message, clock)
+            && let Some(topic) = self.topics.get_mut(message.topic)
+        {
+            topic.malformed += 1;
+            if topic.reason.is_empty() {
+                topic.reason = reason;
+            }
+        }
+    }
+
+    fn decode(&mut self, message: &Message<'_>, clock: Clock) -> Decoded<()> {
+        match message.schema {
+            messages::JOINT_STATE => {
+                let state = JointState::read(message.data)?;
+                let time_ns = self.stamped(message, state.stamp_ns, clock);
+                if state.positions.is_empty() {
+                    return Ok(());
+                }
+                if state.positions.iter().any(|q| !q.is_finite()) {
+                    return Err("has a position that is not finite".into());
+                }
+                let samples = self.joints.entry(message.topic.to_string()).or_default();
+                let names = match samples.last() {
+                    Some(last) if *last.names == state.names => Rc::clone(&last.names),
+                    _ => Rc::new(state.names),
+                };
+                samples.push(JointSample { time_ns, names, positions: state.positions });
+            }
+            messages::IMAGE | messages::COMPRESSED_IMAGE => {
+                let time_ns = self.stamped(message, messages::stamp_of(message.data)?, clock);
+                self.images.entry(message.topic.to_string()).or_default().push(time_ns);
+            }
+            messages::CAMERA_INFO if !self.infos.contains_key(message.topic) => {
+                self.infos.insert(message.topic.to_string(), CameraInfo::read(message.data)?);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn stamped(&mut self, message: &Message<'_>, stamp_ns: i64, clock: Clock) -> i64 {
+        if let Some(topic) = self.topics.get_mut(message.topic) {
+            topic.unstamped |= stamp_ns == 0;
+            topic.delays_ns.push(message.log_time_ns as i64 - stamp_ns);
+        }
+        time_ns(stamp_ns, message, clock)
+    }
+
+    /// What the whole pass showed: malformed or unstamped topics; recordings of ROS 1.
+    fn judge(&mut self) -> Result<()> {
+        let shown = self.recording.display().to_string();
+        if let Some((name, topic)) = self.topics.iter().find(|(_, t)| t.encoding == "ros1") {
+            let what = format!("holds ROS 1 messages ({name}: {})", topic.schema);
+            let remedy =
+                format!("convert it: pip install rosbags; rosbags-convert --src {shown} --dst run1 --dst-storage mcap");
+            return Err(Error::input(shown, what, remedy));
+        }
+        for (name, topic) in &self.topics {
+            let place = format!("{shown}, topic {name}");
+            if topic.malformed > 0 {
+                let what =
+                    format!("{} of {} messages cannot be read: one {}", topic.malformed, topic.messages, topic.reason);
+                self.notices.push(Notice::new(&place, what, "they are left out"));
+            }
+            if topic.unstamped {
+                let what = "messages without a stamp: the time of recording stands for it";
+                self.notices.push(Notice::new(&place, what, "let the driver stamp its messages"));
+            }
+        }
+        Ok(())
+    }
+
+    fn with_schema<'a>(&'a self, schemas: &'a [&str]) -> impl Iterator<Item = &'a str> {
+        self.topics.iter().filter(|(_, t)| schemas.contains(&t.schema.as_str())).map(|(name, _)| name.as_str())
+    }
+
+    /// The topic asked for, or the only one among the candidates.
+    fn choose<'a>(&self, asked: Option<&'a str>, candidates: &[&'a str], what: &str, flag: &str) -> Result<&'a str> {
+        let place = || self.recording.display();
+        let all = || {
+            let rows = self.topics.iter().map(|(name, t)| format!("{name} ({}, {})", t.schema, t.messages));
+            rows.collect::<Vec<_>>().join("; ")
+        };
+        match (asked, candidates) {
+            (Some(asked), _) if candidates.contains(&asked) => Ok(asked),
+            (Some(asked), _) => {
+                let said = format!("topic {asked} has no {what}; its topics are: {}", all());
+                Err(Error::input(place(), said, format!("name another {flag}")))
+            }
+            (None, [one]) => Ok(one),
+            (None, []) => {
+                let damage: String = self.notices.iter().map(|n| format!(" ({})", n.what)).collect();
+                let said = format!("has no {what}{damage}; its topics are: {}", all());
+                Err(Error::input(place(), said, "record them as well (ros2 bag record -s mcap -a)"))
+            }
+            (None, several) => {
+                let said = format!("has several topics with {what}: {}", several.join(", "));
+                Err(Error::input(place(), said, format!("name one with {flag}")))
+            }
+        }
+    }
+
+    /// The topic of the joint states, its samples, and the joints to read (all of the topic when none are asked for).
+    pub fn joint_topic(&mut self, options: &RecordingOptions) -> Result<(String, Vec<JointSample>, Vec<String>)> {
+        let names_of = |topic: &str| -> Vec<String> {
+            let mut names: Vec<String> = Vec::new();
+            for sample in self.joints.get(topic).into_iter().flatten() {
+                for name in sample.names.iter() {
+                    if !names.contains(name) {
+                        names.push(name.clone());
+                    }
+                }
+            }
+            names
+        };
+        let mut candidates: Vec<&str> = self.with_schema(&[messages::JOINT_STATE]).collect();
+        let has_all = |topic: &&str| {
+            let names = names_of(topic);
+            options.joints.iter().all(|j| names.contains(j))
+        };
+        if candidates.len() > 1 && options.joint_topic.is_none() && candidates.iter().any(has_all) {
+            candidates.retain(has_all);
+        }
+        let asked = options.joint_topic.as_deref();
+        let topic = self.choose(asked, &candidates, "joint states", "--joint-topic")?.to_string();
+        let names = names_of(&topic);
+        let missing: Vec<&str> = options.joints.iter().filter(|j| !names.contains(j)).map(String::as_str).collect();
+        let place = format!("{}, topic {topic}", self.recording.display());
+        if names.is_empty() {
+            return Err(self.unreadable(&topic, "joint states"));
+        }
+        if !missing.is_empty() {
+            let what = format!("has no positions of {}; its joints are: {}", missing.join(", "), names.join(", "));
+            return Err(Error::input(place, what, "compare with the joint names in the URDF, or choose another tip"));
+        }
+        let joints = if options.joints.is_empty() { names.clone() } else { options.joints.clone() };
+        let extra: Vec<&str> = names.iter().filter(|n| !joints.contains(n)).map(String::as_str).collect();
+        if !extra.is_empty() {
+            let what = format!("joints that the chain does not need: {}", extra.join(", "));
+            self.notices.push(Notice::new(place, what, "they are ignored"));
+        }
+        Ok((topic.clone(), self.joints.remove(&topic).unwrap_or_default(), joints))
+    }
+
+    /// The topic of the images and their times, ns.
+    pub fn image_topic(&mut self, options: &RecordingOptions) -> Result<(String, Vec<i64>)> {
+        let asked = options.image_topic.as_deref();
+        let mut candidates: Vec<&str> = self.with_schema(&[messages::IMAGE, messages::COMPRESSED_IMAGE]).collect();
+        if asked.is_none() {
+            candidates.retain(|c| !c.ends_with("/compressedDepth"));
+            let raw = candidates.clone();
+            // The same images twice: the raw ones are better.
+            candidates.retain(|c| c.strip_suffix("/compressed").is_none_or(|base| !raw.contains(&base)));
+        }
+        let topic = self.choose(asked, &candidates, "images", "--image-topic")?.to_string();
+        let times = self.images.remove(&topic).unwrap_or_default();
+        if times.is_empty() {
+            return Err(self.unreadable(&topic, "images"));
+        }
+        Ok((topic, times))
+    }
+
+    /// A topic without one message of use.
+    fn unreadable(&self, topic: &str, what: &str) -> Error {
+        let reason = self.topics.get(topic).map_or("", |t| t.reason.as_str());
+        let place = format!("{}, topic {topic}", self.recording.display());
+        let reason = if reason.is_empty() { String::new() } else { format!(": one {reason}") };
+        Error::input(place, format!("none of its {what} can be used{reason}"), "record it again")
+    }
+
+    /// The camera info beside an image topic, or the only one.
+    pub fn camera_info(&self, image_topic: &str) -> Option<&CameraInfo> {
+        let base = image_topic.strip_suffix("/compressed").unwrap_or(image_topic);
+        let beside = base.rsplit_once('/').map(|(namespace, _)| format!("{namespace}/camera_info"));
+        match beside.and_then(|topic| self.infos.get(&topic)) {
+            Some(info) => Some(info),
+            None if self.infos.len() == 1 => self.infos.values().next(),
+            None => None,
+        }
+    }
+
+    /// Median time from stamp to recording, s.
+    pub fn delay_s(&self, topic: &str) -> f64 {
+        let mut delays = self.topics.get(topic).map(|t| t.delays_ns.clone()).unwrap_or_default();
+        delays.sort_unstable();
+        delays.get(delays.len() / 2).map_or(0.0, |d| *d as f64 * 1e-9)
+    }
+}

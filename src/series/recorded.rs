@@ -1,0 +1,136 @@
+//! Series whose images and readings come from a recording, and recordings turned into series folders.
+
+use std::path::{Path, PathBuf};
+
+use super::manifest::{AngleUnit, CameraMount, Manifest};
+use super::mcap::{CameraInfo, Extracted, RecordingOptions, extract};
+use super::read::{Series, Source, file_name, optional_images};
+use crate::{Error, Notice, Result};
+
+/// Whether a path is a recording: an `.mcap` file, another bag that will be refused with advice, or a rosbag2 folder.
+pub(super) fn is_recording(path: &Path) -> bool {
+    if path.is_dir() {
+        return !path.join("series.toml").exists() && path.join("metadata.yaml").exists();
+    }
+    path.extension().is_some_and(|e| ["mcap", "bag", "db3", "zstd"].iter().any(|known| e == *known))
+}
+
+/// The manifest of a recording that is given by itself: `<its name>.toml` or `series.toml` beside it.
+pub(super) fn manifest_beside(recording: &Path) -> Result<PathBuf> {
+    let candidates = [recording.with_extension("toml"), recording.with_file_name("series.toml")];
+    let found = candidates.iter().find(|p| p.is_file()).cloned();
+    found.ok_or_else(|| {
+        let what = format!(
+            "nothing beside it says which plate was seen: neither {} nor {} exists",
+            candidates[0].display(),
+            candidates[1].display()
+        );
+        let remedy =
+            "write one: format = 1, camera_mount = \"hand\", plate = \"plate.toml\", and base and tip if needed";
+        Error::input(recording.display(), what, remedy)
+    })
+}
+
+impl Series {
+    /// The same series with the stops of its recording: pictures are written to `images`. A series that has no recording
+    /// comes back as it is.
+    ///
+    /// # Errors
+    /// As [`extract`].
+    pub fn with_recording(mut self, images: &Path, options: &RecordingOptions) -> Result<Self> {
+        let Source::Recording(recording) = &self.source else { return Ok(self) };
+        let extracted = extract(recording, images, options)?;
+        let (dark, white) = optional_images(&self.folder)?;
+        self.source = Source::Images { folder: images.to_path_buf(), dark, white };
+        self.notices.extend(extracted.notices);
+        self.inputs.extend(extracted.inputs);
+        fill_camera(&mut self.manifest, extracted.camera_info.as_ref());
+        self.stops = extracted.stops;
+        Ok(self)
+    }
+}
+
+/// What a camera info knows and the manifest does not.
+fn fill_camera(manifest: &mut Manifest, info: Option<&CameraInfo>) {
+    let Some(info) = info else { return };
+    if let Some([fx, fy, ..]) = info.intrinsics {
+        manifest.camera.focal_px.get_or_insert(0.5 * (fx + fy));
+    }
+    if manifest.camera.width_px.is_none() && info.width_px > 0 && info.height_px > 0 {
+        manifest.camera.width_px = Some(info.width_px);
+        manifest.camera.height_px = Some(info.height_px);
+    }
+}
+
+/// Writes the stops of a recording as a series folder: `series.toml`, `joints.csv`, `images/`. A manifest beside the
+/// recording is carried over, and so is the plate that it names.
+///
+/// # Errors
+/// As [`extract`]; a folder that exists already; files that cannot be written.
+pub fn convert_recording(recording: &Path, folder: &Path, options: &RecordingOptions) -> Result<Extracted> {
+    if folder.exists() {
+        return Err(Error::input(folder.display(), "exists already", "name a new folder, or remove this one"));
+    }
+    let unfinished = folder.with_file_name(format!(".{}.unfinished", file_name(folder)));
+    if unfinished.exists() {
+        std::fs::remove_dir_all(&unfinished).map_err(|e| Error::io(&unfinished, &e))?;
+    }
+    std::fs::create_dir_all(&unfinished).map_err(|e| Error::io(&unfinished, &e))?;
+    let done = write_folder(recording, &unfinished, folder, options);
+    if done.is_err() {
+        // The reason of the failure matters more than a folder that could not be removed.
+        let _ = std::fs::remove_dir_all(&unfinished);
+    }
+    done
+}
+
+fn write_folder(recording: &Path, unfinished: &Path, folder: &Path, options: &RecordingOptions) -> Result<Extracted> {
+    let mut extracted = extract(recording, &unfinished.join("images"), options)?;
+    let manifest = carried_manifest(recording, unfinished, &mut extracted)?;
+    write(&unfinished.join("series.toml"), manifest.to_toml()?.as_bytes())?;
+    write(&unfinished.join("joints.csv"), extracted.stops.to_csv().as_bytes())?;
+    std::fs::rename(unfinished, folder).map_err(|e| Error::io(folder, &e))?;
+    for stop in &mut extracted.stops.stops {
+        stop.path = Some(folder.join("images").join(&stop.image));
+    }
+    Ok(extracted)
+}
+
+/// The manifest for the folder, with its plate copied; a plain one where there is none beside the recording.
+fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extracted) -> Result<Manifest> {
+    let mut manifest = match manifest_beside(recording) {
+        Ok(path) => {
+            let mut manifest = Manifest::read(&path, &mut extracted.inputs)?;
+            manifest.plate = copy_plate(&path.with_file_name(&manifest.plate), unfinished)?;
+            manifest
+        }
+        Err(_) => {
+            let place = unfinished.with_file_name("series.toml");
+            let what = "nothing beside the recording says where the camera is and which plate was seen";
+            let remedy = "check camera_mount in series.toml and put plate.toml into the folder";
+            extracted.notices.push(Notice::new(place.display(), what, remedy));
+            Manifest::plain(CameraMount::Hand, "plate.toml")
+        }
+    };
+    manifest.mcap = None;
+    manifest.joint_unit.get_or_insert(AngleUnit::Rad);
+    fill_camera(&mut manifest, extracted.camera_info.as_ref());
+    Ok(manifest)
+}
+
+/// Copies the plate file and the marker file that it names; returns the name of the plate file.
+fn copy_plate(plate: &Path, folder: &Path) -> Result<String> {
+    let copy = |from: &Path| {
+        let to = folder.join(file_name(from));
+        std::fs::copy(from, &to).map_err(|e| Error::io(from, &e))
+    };
+    copy(plate)?;
+    if let Some(markers) = super::plate_file::marker_file(plate)? {
+        copy(&markers)?;
+    }
+    Ok(file_name(plate))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    std::fs::write(path, bytes).map_err(|e| Error::io(path, &e))
+}

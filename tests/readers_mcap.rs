@@ -1,0 +1,250 @@
+//! Recordings by independent writers (tests/make_recordings.py), whole, damaged and of the wrong kind.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use image::DynamicImage;
+use robotcal::series::{Clock, Extracted, Motion, Picking, RecordingOptions, extract};
+use tempfile::TempDir;
+
+const STOPS: usize = 5;
+const START_NS: i64 = 1_700_000_000_000_000_000;
+const SIZE: (u32, u32) = (32, 24);
+
+fn recording(name: &str) -> PathBuf {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recordings")).join(name)
+}
+
+fn options(joints: &[&str]) -> RecordingOptions {
+    RecordingOptions { joints: joints.iter().map(|j| j.to_string()).collect(), ..RecordingOptions::default() }
+}
+
+fn three() -> RecordingOptions {
+    options(&["joint_1", "joint_2", "joint_3"])
+}
+
+fn read(path: &Path, options: &RecordingOptions) -> (TempDir, Extracted) {
+    let folder = tempfile::tempdir().unwrap();
+    let extracted = extract(path, &folder.path().join("images"), options).unwrap_or_else(|e| panic!("{e}"));
+    (folder, extracted)
+}
+
+fn refusal(path: &Path, options: &RecordingOptions) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let error = extract(path, folder.path(), options).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is left behind");
+    error.to_string()
+}
+
+/// The formulas of make_recordings.py.
+fn posture(stop: usize) -> [f64; 3] {
+    let k = stop as f64;
+    [0.1 * k, 0.5 - 0.2 * k, if stop % 2 == 0 { 0.25 } else { -0.25 }]
+}
+
+fn count(stop: usize, shot: usize, x: u32, y: u32) -> u32 {
+    let pattern = (7 * x + 13 * y + 29 * stop as u32 + x * y) % 201;
+    if shot == 4 { pattern } else { 50 + pattern / 2 }
+}
+
+fn stamp_ns(stop: usize, shot: usize) -> i64 {
+    START_NS + (15 * stop + shot) as i64 * 100_000_000 + 5_000_000
+}
+
+fn pictures(extracted: &Extracted) -> Vec<DynamicImage> {
+    extracted.stops.stops.iter().map(|s| image::open(s.path.as_ref().unwrap()).unwrap()).collect()
+}
+
+#[track_caller]
+fn assert_stops(extracted: &Extracted, shot: usize) {
+    assert_eq!(extracted.stops.stops.len(), STOPS);
+    for (k, stop) in extracted.stops.stops.iter().enumerate() {
+        let ns = stamp_ns(k, shot);
+        assert!(
+            stop.image.starts_with(&format!("{}.{:09}.", ns / 1_000_000_000, ns % 1_000_000_000)),
+            "{}",
+            stop.image
+        );
+        // A stamp of 1.7e9 s has 0.24 us of resolution in a double.
+        assert!((stop.time_s.unwrap() - ns as f64 * 1e-9).abs() < 1e-6);
+        for (q, wanted) in stop.raw_readings.as_ref().unwrap().iter().zip(posture(k)) {
+            assert!((q - wanted).abs() < 1e-12, "stop {k}: {q} {wanted}");
+        }
+        assert!(extracted.reports[k].speed < 1e-9 && extracted.reports[k].nearest_sample_s < 0.0051);
+    }
+}
+
+#[test]
+fn a_rosbag2_folder_gives_the_sharpest_picture_of_every_standstill() {
+    let (_folder, extracted) = read(&recording("mono8"), &three());
+    assert_stops(&extracted, 4);
+    for (k, picture) in pictures(&extracted).iter().enumerate() {
+        let grey = picture.as_luma8().unwrap();
+        assert_eq!(grey.dimensions(), SIZE);
+        assert!(grey.enumerate_pixels().all(|(x, y, p)| u32::from(p.0[0]) == count(k, 4, x, y)), "stop {k}");
+    }
+    assert_eq!(extracted.stops.joints, ["joint_1", "joint_2", "joint_3"]);
+    assert_eq!(
+        (extracted.joint_topic.as_str(), extracted.image_topic.as_str()),
+        ("/joint_states", "/camera/image_raw")
+    );
+    // Images are recorded 30 ms after their stamp, joints 1 ms.
+    assert!((extracted.image_delay_s - 0.029).abs() < 1e-9);
+    let said: String = extracted.notices.iter().map(|n| format!("{n}\n")).collect();
+    assert!(said.contains("does not need: gripper") && said.contains("in motion"), "{said}");
+    assert_eq!(extracted.inputs.len(), 1);
+    assert_eq!(extracted.inputs[0].sha256.len(), 64);
+}
+
+#[test]
+fn big_endian_sixteen_bit_mosaics_keep_their_depth() {
+    let (_folder, extracted) = read(&recording("bayer16_big_endian"), &three());
+    assert_stops(&extracted, 4);
+    for (k, picture) in pictures(&extracted).iter().enumerate() {
+        let colour = picture.as_rgb16().unwrap();
+        assert_eq!(colour.dimensions(), SIZE);
+        for (x, y, pixel) in colour.enumerate_pixels() {
+            // Red, green and blue of the pattern are 200, 100 and 50 times the counts, where they stand.
+            let (channel, gain) = match (y % 2, x % 2) {
+                (0, 0) => (0, 200),
+                (1, 1) => (2, 50),
+                _ => (1, 100),
+            };
+            assert_eq!(u32::from(pixel.0[channel]), gain * count(k, 4, x, y), "stop {k} at {x}, {y}");
+        }
+    }
+}
+
+#[test]
+fn compressed_images_are_kept_as_they_are_and_the_camera_info_is_read() {
+    let (_folder, extracted) = read(&recording("lz4.mcap"), &options(&[]));
+    assert_stops(&extracted, 4);
+    let (_other, same) = read(&recording("zstd.mcap"), &options(&[]));
+    assert_eq!((&same.reports, &same.stops.joints), (&extracted.reports, &extracted.stops.joints));
+    assert_eq!(pictures(&same), pictures(&extracted), "chunk compression does not matter");
+    assert_eq!(extracted.stops.joints, ["joint_1", "joint_2", "joint_3"], "all joints when none are asked for");
+    let names: Vec<_> = extracted.stops.stops.iter().map(|s| s.image.rsplit_once('.').unwrap().1).collect();
+    assert_eq!(names, ["png", "png", "png", "png", "jpg"]);
+    for (k, picture) in pictures(&extracted)[..4].iter().enumerate() {
+        let grey = picture.as_luma8().unwrap();
+        assert!(grey.enumerate_pixels().all(|(x, y, p)| u32::from(p.0[0]) == count(k, 4, x, y)), "stop {k}");
+    }
+    let info = extracted.camera_info.unwrap();
+    assert_eq!((info.width_px, info.height_px, info.distortion_model.as_str()), (32, 24, "plumb_bob"));
+    assert_eq!(info.intrinsics, Some([40.0, 41.0, 15.5, 11.5]));
+    assert_eq!(info.distortion, [-0.1, 0.05, 0.0, 0.0, 0.0]);
+}
+
+#[test]
+fn averaging_takes_all_pictures_of_a_standstill_and_tells_the_noise() {
+    let options = RecordingOptions { picking: Picking::Average, ..three() };
+    let (_folder, extracted) = read(&recording("mono8"), &options);
+    assert_eq!(extracted.stops.stops.len(), STOPS);
+    for (k, picture) in pictures(&extracted).iter().enumerate() {
+        let n = extracted.reports[k].pictures as u32;
+        assert!((8..=9).contains(&n), "{n}");
+        for (x, y, p) in picture.as_luma16().unwrap().enumerate_pixels() {
+            let mean = 257 * ((n - 1) * count(k, 0, x, y) + count(k, 4, x, y));
+            assert!((u32::from(p.0[0]) * n).abs_diff(mean) <= n, "stop {k} at {x}, {y}");
+        }
+        // One of n pictures differs by d: its variance over the pictures is d^2 / n.
+        let all = || (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y)));
+        let d2: f64 = all().map(|(x, y)| (f64::from(count(k, 0, x, y)) - f64::from(count(k, 4, x, y))).powi(2)).sum();
+        let noise = (d2 / f64::from(SIZE.0 * SIZE.1) / f64::from(n)).sqrt();
+        let got = extracted.reports[k].noise_counts.unwrap();
+        assert!((got / noise - 1.0).abs() < 1e-9, "{got} {noise}");
+    }
+}
+
+#[test]
+fn the_clock_of_recording_can_be_used_instead_of_stamps() {
+    let options = RecordingOptions { clock: Clock::Log, ..three() };
+    let (_folder, extracted) = read(&recording("mono8"), &options);
+    assert_eq!(extracted.stops.stops.len(), STOPS);
+    for (k, stop) in extracted.stops.stops.iter().enumerate() {
+        let ns = stamp_ns(k, 4) + 30_000_000;
+        assert!((stop.time_s.unwrap() - ns as f64 * 1e-9).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_robot_that_never_stands_is_refused_unless_asked_for() {
+    let restless = RecordingOptions { least_still_s: 5.0, ..three() };
+    let message = refusal(&recording("mono8"), &restless);
+    assert!(message.contains("never stands still for 5 s") && message.contains("every 0.010 s"), "{message}");
+    let accepting = RecordingOptions { motion: Motion::Accept { interval_s: 0.45 }, ..restless };
+    let (_folder, extracted) = read(&recording("mono8"), &accepting);
+    // Images every 0.1 s over 7.0 s, at least 0.45 s apart: every fifth.
+    assert_eq!(extracted.stops.stops.len(), 14);
+    let moving = &extracted.stops.stops[2];
+    assert!((moving.time_s.unwrap() - (START_NS as f64 * 1e-9 + 1.005)).abs() < 1e-6);
+    // 5 ms into the half second from stop 0 to stop 1.
+    let wanted = posture(0)[0] + 0.01 * (posture(1)[0] - posture(0)[0]);
+    assert!((moving.raw_readings.as_ref().unwrap()[0] - wanted).abs() < 1e-12);
+    assert!(extracted.reports[2].speed > 0.1, "{:?}", extracted.reports[2]);
+}
+
+#[test]
+fn missing_joints_and_topics_are_listed() {
+    let message = refusal(&recording("mono8"), &options(&["joint_1", "joint_7"]));
+    assert!(message.contains("no positions of joint_7") && message.contains("gripper, joint_1"), "{message}");
+    let topic = |joint: Option<&str>, image: Option<&str>| RecordingOptions {
+        joint_topic: joint.map(String::from),
+        image_topic: image.map(String::from),
+        ..three()
+    };
+    let message = refusal(&recording("mono8"), &topic(Some("/note"), None));
+    assert!(message.contains("/note has no joint states") && message.contains("/joint_states"), "{message}");
+    let message = refusal(&recording("mono8"), &topic(None, Some("/camera/other")));
+    assert!(message.contains("/camera/image_raw (sensor_msgs/msg/Image, 70)"), "{message}");
+    let (_folder, extracted) = read(&recording("mono8"), &topic(Some("/joint_states"), Some("/camera/image_raw")));
+    assert_stops(&extracted, 4);
+}
+
+#[test]
+fn other_recordings_are_refused_with_the_command_that_converts_them() {
+    for (name, words) in [
+        ("old.bag", ["ROS 1 bag", "rosbags-convert --src"]),
+        ("sqlite", ["sqlite", "rosbags-convert --src"]),
+        ("sqlite/sqlite.db3", ["sqlite", "--dst-storage mcap"]),
+        ("zipped_messages", ["compressed by itself", "message compression"]),
+        ("nothing.mcap", ["nothing.mcap", "path"]),
+        ("../make_recordings.py", ["not an MCAP file", "begin"]),
+    ] {
+        let message = refusal(&recording(name), &three());
+        assert!(words.iter().all(|w| message.contains(w)), "{name}: {message}");
+    }
+}
+
+#[test]
+fn a_cut_or_damaged_file_gives_what_stands_before_the_damage() {
+    let whole = fs::read(recording("lz4.mcap")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cut.mcap");
+    let mut last = STOPS;
+    for share in [9, 7, 5] {
+        fs::write(&path, &whole[..whole.len() * share / 10]).unwrap();
+        let (_images, extracted) = read(&path, &three());
+        let stops = extracted.stops.stops.len();
+        assert!(stops <= last && stops >= 1, "{stops} stops of {share} tenths");
+        assert!(extracted.notices.iter().any(|n| n.what.contains("cut off")), "{:?}", extracted.notices);
+        last = stops;
+        for (k, stop) in extracted.stops.stops.iter().enumerate() {
+            let wanted = posture(k);
+            assert!(stop.raw_readings.as_ref().unwrap().iter().zip(wanted).all(|(q, w)| (q - w).abs() < 1e-12));
+        }
+    }
+    assert!(last < STOPS, "half a file does not have all stops");
+    // One wrong byte in the middle: the checksum of its chunk fails, and nothing of that chunk is used.
+    let mut wrong = whole.clone();
+    wrong[whole.len() / 2] ^= 0x10;
+    fs::write(&path, &wrong).unwrap();
+    let (_images, extracted) = read(&path, &three());
+    assert!((1..STOPS).contains(&extracted.stops.stops.len()));
+    assert!(extracted.notices.iter().any(|n| n.what.contains("damaged")), "{:?}", extracted.notices);
+    // Nothing at all before the damage.
+    fs::write(&path, &whole[..40]).unwrap();
+    let message = refusal(&path, &three());
+    assert!(message.contains("no joint states"), "{message}");
+}

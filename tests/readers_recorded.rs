@@ -1,0 +1,125 @@
+//! Series whose stops come from a recording, and recordings turned into series folders.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use robotcal::series::{RecordingOptions, Series, Source, convert_recording, read};
+use robotcal::urdf::{Chain, RobotDescription};
+use tempfile::TempDir;
+
+const MANIFEST: &str = "format = 1\ncamera_mount = \"hand\"\nplate = \"board.toml\"\nbase = \"base\"\n";
+const BOARD: &str = "format = 1\nkind = \"points\"\nmarkers = \"board.csv\"\ntolerance_m = 0.0001\n";
+const MARKERS: &str = "id,x_m,y_m,z_m\n0,0,0,0\n1,0.1,0,0\n";
+
+fn recording(name: &str) -> PathBuf {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recordings")).join(name)
+}
+
+/// A folder with a recording named run.mcap, and a manifest of that name beside it.
+fn recorded(manifest_name: &str, manifest: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(recording("lz4.mcap"), folder.path().join("run.mcap")).unwrap();
+    for (name, text) in [(manifest_name, manifest), ("board.toml", BOARD), ("board.csv", MARKERS)] {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+/// joint_3 comes first here, so that names and not columns decide.
+fn chain() -> Chain {
+    let joint = |name: &str, parent: &str, child: &str| {
+        format!(
+            "<joint name='{name}' type='revolute'><parent link='{parent}'/><child link='{child}'/>\
+             <axis xyz='0 0 1'/><limit lower='-0.45' upper='3' effort='0' velocity='0'/></joint>"
+        )
+    };
+    let text = format!(
+        "<robot name='r'><link name='base'/><link name='b'/><link name='c'/><link name='d'/>{}{}{}</robot>",
+        joint("joint_3", "base", "b"),
+        joint("joint_1", "b", "c"),
+        joint("joint_2", "c", "d"),
+    );
+    RobotDescription::from_text(Path::new("r.urdf"), text).unwrap().chain(None, None).unwrap()
+}
+
+fn with_stops(path: &Path, images: &Path) -> Series {
+    let chain = chain();
+    let options = RecordingOptions { joints: chain.readings.clone(), ..RecordingOptions::default() };
+    read(path).unwrap().with_recording(images, &options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn a_recording_and_the_folder_made_of_it_are_the_same_series() {
+    let folder = recorded("run.toml", MANIFEST);
+    let path = folder.path().join("run.mcap");
+    let unread = read(&path).unwrap();
+    assert_eq!((unread.name.as_str(), unread.manifest.base.as_deref()), ("run", Some("base")));
+    assert!(matches!(&unread.source, Source::Recording(p) if *p == path));
+    let error = unread.readings_for(&chain()).unwrap_err().to_string();
+    assert!(error.contains("robotcal convert"), "{error}");
+
+    let direct = with_stops(&path, &folder.path().join("pictures"));
+    let readings = direct.readings_for(&chain()).unwrap();
+    assert_eq!(readings.len(), 5);
+    // Stop 3 of make_recordings.py: joint_3, joint_1, joint_2.
+    for (q, wanted) in readings[3].as_ref().unwrap().iter().zip([-0.25, 0.3, -0.1]) {
+        assert!((q - wanted).abs() < 1e-12, "{readings:?}");
+    }
+    assert_eq!(direct.manifest.camera.focal_px, Some(40.5), "from the camera info");
+    assert_eq!(direct.manifest.camera.width_px, Some(32));
+    assert_eq!(direct.image_hashes().unwrap().len(), 5);
+    assert!(direct.inputs.iter().any(|i| i.path == path));
+    assert!(direct.reading_notices(&chain()).is_empty());
+
+    let converted = folder.path().join("converted");
+    let extracted = convert_recording(&path, &converted, &RecordingOptions::default()).unwrap();
+    assert_eq!(extracted.reports.len(), 5);
+    let series = read(&converted).unwrap_or_else(|e| panic!("{e}"));
+    assert!(series.notices.is_empty(), "{:?}", series.notices);
+    assert_eq!(series.plate, direct.plate);
+    assert_eq!(series.readings_for(&chain()).unwrap(), readings);
+    for (a, b) in series.stops.stops.iter().zip(&direct.stops.stops) {
+        assert_eq!((&a.image, a.time_s), (&b.image, b.time_s));
+        assert_eq!(fs::read(a.path.as_ref().unwrap()).unwrap(), fs::read(b.path.as_ref().unwrap()).unwrap());
+    }
+    assert_eq!(series.manifest.camera, direct.manifest.camera);
+
+    let error = convert_recording(&path, &converted, &RecordingOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("exists already"), "{error}");
+}
+
+#[test]
+fn a_manifest_may_name_its_recording() {
+    let folder = recorded("series.toml", &format!("{MANIFEST}mcap = \"run.mcap\"\n"));
+    let named = with_stops(folder.path(), &folder.path().join("a"));
+    let given = with_stops(&folder.path().join("run.mcap"), &folder.path().join("b"));
+    assert_eq!(named.stops.joints, given.stops.joints);
+    assert_eq!(named.stops.stops.len(), 5);
+    assert_eq!(given.name, "run");
+}
+
+#[test]
+fn a_recording_without_a_manifest_says_what_to_write() {
+    let folder = recorded("other.toml", MANIFEST);
+    let path = folder.path().join("run.mcap");
+    let error = read(&path).unwrap_err().to_string();
+    assert!(error.contains("run.toml") && error.contains("series.toml") && error.contains("plate = "), "{error}");
+    let converted = folder.path().join("converted");
+    let extracted = convert_recording(&path, &converted, &RecordingOptions::default()).unwrap();
+    assert!(extracted.notices.iter().any(|n| n.remedy.contains("plate.toml")), "{:?}", extracted.notices);
+    assert!(fs::read_to_string(converted.join("series.toml")).unwrap().contains("joint_unit = \"rad\""));
+    let error = read(&recording("old.bag")).unwrap_err().to_string();
+    assert!(error.contains("ROS 1") && error.contains("rosbags-convert"), "{error}");
+    let error = read(&recording("sqlite")).unwrap_err().to_string();
+    assert!(error.contains("sqlite") && error.contains("rosbags-convert"), "{error}");
+}
+
+#[test]
+fn a_conversion_that_fails_leaves_nothing_behind() {
+    let folder = recorded("run.toml", &MANIFEST.replace("board.toml", "lost.toml"));
+    let before = fs::read_dir(folder.path()).unwrap().count();
+    let error =
+        convert_recording(&folder.path().join("run.mcap"), &folder.path().join("out"), &RecordingOptions::default());
+    assert!(error.unwrap_err().to_string().contains("lost.toml"));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), before);
+}
