@@ -122,8 +122,8 @@ fn relative(a: &Matrix6<f64>, b: &Matrix6<f64>) -> f64 {
 }
 
 /// Estimated markers lie up to 0.2 mm beside the nominal ones 130 mm from the centre, so that the rigid motion of the data and that
-/// of the nominal markers differ by this share of the frame's own covariance, which is up to 5 times that of the data.
-const TOLERANCE: f64 = 5.0 * 2.0 * 2e-4 / 0.13;
+/// of the nominal markers differ by this share.
+const TOLERANCE: f64 = 2e-4 / 0.13;
 
 fn table(files: &BTreeMap<String, Vec<u8>>, name: &str) -> Vec<BTreeMap<String, String>> {
     csv::Reader::from_reader(files[name].as_slice()).deserialize().map(|r| r.unwrap()).collect()
