@@ -61,4 +61,9 @@ impl Covariance {
     pub fn markers(&self, problem: &Problem, lin: &Linearised) -> Vec<Vec<Option<Matrix3<f64>>>> {
         self.system.marker_covariances(problem, lin, &self.reduced)
     }
+
+    /// Covariance of the position (plate modes and correction) of every marker that was seen, as [`Covariance::markers`].
+    pub fn positions(&self, problem: &Problem, state: &State, lin: &Linearised) -> Vec<Vec<Option<Matrix3<f64>>>> {
+        self.system.position_covariances(problem, state, lin, &self.reduced)
+    }
 }
