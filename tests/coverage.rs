@@ -21,10 +21,11 @@ fn chain() -> Chain {
 
 /// 50 stops with typical errors: 0.3 mm, 1 mrad, offsets of 3 mrad, 0.02 mrad of joint noise, 0.05 px.
 fn world(chain: &Chain, seed: u64) -> SimulatedSeries {
-    let mut plate = Plate::lattice(PlateKind::Points, 12, 9, 0.025, 0.1e-3);
-    plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.007);
+    let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.1e-3);
+    plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.01);
     let request = WorldRequest {
         pixel_sigma_px: 0.05,
+        least_markers: 12,
         marker_sigma_m: 0.1e-3,
         seed,
         ..WorldRequest::typical(chain.clone(), plate)
