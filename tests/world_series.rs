@@ -138,7 +138,9 @@ fn published_poses_of_the_robots() {
     // KR 6 R900, data sheet: with A2 = -90 and A3 = 90 degrees the flange is 25 + 420 + 80 mm before and 400 + 455 + 35 mm above the foot.
     let at = |name: &str, q: &[f64]| Robot::nominal(chain(name)).base_from_tip(q).translation;
     let quarter = std::f64::consts::FRAC_PI_2;
-    assert!((at("kuka_kr6_r900", &[0.0, -quarter, quarter, 0.0, 0.0, 0.0]) - Vector3::new(0.525, 0.0, 0.89)).norm() < 1e-9);
+    assert!(
+        (at("kuka_kr6_r900", &[0.0, -quarter, quarter, 0.0, 0.0, 0.0]) - Vector3::new(0.525, 0.0, 0.89)).norm() < 1e-9
+    );
     // LBR iiwa: upright 360 + 420 + 400 + 126 mm.
     assert!((at("lbr_iiwa_14", &[0.0; 7]) - Vector3::new(0.0, 0.0, 1.306)).norm() < 1e-9);
     // UR10e at zero: x = a2 + a3, y = -(d4 + d6), z = d1 - d5.
