@@ -92,7 +92,7 @@ fn a_rosbag2_folder_gives_the_sharpest_picture_of_every_standstill() {
     // Images are recorded 30 ms after their stamp, joints 1 ms.
     assert!((extracted.image_delay_s - 0.029).abs() < 1e-9);
     let said: String = extracted.notices.iter().map(|n| format!("{n}\n")).collect();
-    assert!(said.contains("does not need: gripper") && said.contains("in motion"), "{said}");
+    assert!(said.contains("does not need: gripper") && said.contains("outside the standstills"), "{said}");
     assert_eq!(extracted.inputs.len(), 1);
     assert_eq!(extracted.inputs[0].sha256.len(), 64);
 }

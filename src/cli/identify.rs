@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::recording::{Pictures, RecordingArgs};
 use super::{Verdict, progress, summary};
 use crate::error::{Error, Notice, Result};
 use crate::recipe::{self, JointNoise, MeasuredSeries, Options, RobotModel};
@@ -16,7 +17,7 @@ pub(super) struct IdentifyArgs {
     /// Robot description (URDF)
     #[arg(long, value_name = "FILE")]
     urdf: PathBuf,
-    /// Series folder; give it several times to fit several series of the same robot together
+    /// Series folder or recording (.mcap, rosbag2 folder); give it several times to fit several series of the same robot together
     #[arg(long, value_name = "FOLDER", required = true)]
     series: Vec<PathBuf>,
     /// Folder for the results [default: reports/<series name>]
@@ -37,6 +38,8 @@ pub(super) struct IdentifyArgs {
     /// Also write the stand-alone camera poses (poses.csv)
     #[arg(long)]
     poses: bool,
+    #[command(flatten)]
+    recording: RecordingArgs,
 }
 
 /// Names of the robot models.
@@ -65,6 +68,8 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let description = urdf::read(&args.urdf)?;
     let all = read_all(&args.series)?;
     let chain = chain(&description, &all, args)?;
+    let pictures = Pictures::new();
+    let all = pictures.of_recordings(all, &args.recording.options(&chain.readings)?)?;
     let mut notices = description.notices.clone();
     let measured = measure_all(&all, &chain, &mut notices)?;
     let mut solution = recipe::identify(chain, &measured, &options)?;
