@@ -97,10 +97,12 @@ fn estimators_find_the_truth_within_their_sigma_where_their_noise_model_is_true(
             estimator.title(),
             found.components
         );
-        if matches!(estimator, Estimator::BlocksAndRepeatability | Estimator::FullAndRepeatability | Estimator::Joint) {
+        // The joint noise that two ways of writing down the same model find; relative sigma 1 / sqrt(2 * 25 * 6) = 6 %, four of
+        // them. C is no such model: what all poses share counts there in every pose anew, and takes the joint noise up.
+        if matches!(estimator, Estimator::FullAndRepeatability | Estimator::Joint) {
             assert!(mean < 2.0, "{}: {mean}", estimator.title());
             let common = (found.components.iter().map(|s| s * s).sum::<f64>() / 6.0).sqrt();
-            assert!((common / 2e-4).ln().abs() < 0.3, "{}: joint noise {common:e}", estimator.title());
+            assert!((common / 2e-4).ln().abs() < 0.24, "{}: joint noise {common:e}", estimator.title());
         }
     }
     let stage = PoseStage::adjusted(&problem, &start).unwrap();
