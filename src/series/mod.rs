@@ -23,7 +23,7 @@ pub use manifest::{
 pub use mcap::{CameraInfo, Clock, Extracted, Motion, Picking, RecordingOptions, StopReport, extract};
 pub use observation::{Edge, ImageObservations, Observation};
 pub use observation_file::observations_csv;
-pub use plate::{Marker, Plate, PlateKind, ScaleBar};
+pub use plate::{Aruco, Marker, Plate, PlateKind, ScaleBar};
 pub use plate_file::{DEFAULT_TOLERANCE_M, plate_csv, plate_toml, read_plate};
 pub use read::{Series, Source, read, read_images};
 pub use recorded::convert_recording;
