@@ -3,11 +3,13 @@
 //! The lattice of corners comes from the `calib-targets` library; which corner is which, the sub-pixel position in the
 //! full depth of the picture and its covariance are found here.
 
+use std::collections::BTreeMap;
+
 use calib_targets::chessboard::{ChessboardDetector, ChessboardParams, detect_corners};
 use calib_targets::core::GrayImageView;
 use calib_targets::detect::{DetectorConfig, ImageRefiner, default_chess_config};
 
-use super::board_labels::{BoardSize, Labelling, Lattice, Placement, label};
+use super::board_labels::{BoardSize, Label, Labelling, Lattice, Placement, label};
 use super::saddle::{Saddle, Seed, Window, refine};
 use super::{Detection, Dropped, Picture};
 use crate::error::{Error, Notice, Result};
@@ -17,6 +19,10 @@ use crate::series::{Edge, Observation, Plate};
 /// Pixels for one corner: as far along the edges as the next corners do not disturb, and near enough that the lens
 /// does not bend the edges.
 const WINDOW: Window = Window { reach: 0.4, radius_px: 16.0 };
+/// Neighbours up to this many squares away say where a corner is and how the edges run ...
+const REACH: i32 = 2;
+/// ... and up to this many where a gap in the lattice has to be bridged.
+const FAR_REACH: i32 = 5;
 /// A corner with less than this share of the usual contrast is none.
 const WEAK: f64 = 0.3;
 /// A fit this many times worse than usual is disturbed by something else in the window ...
@@ -37,7 +43,8 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
     let lattice = find_lattice(picture).ok_or_else(no_board)?;
     let mut notices = Vec::new();
-    let placement = match label(picture, &lattice, board) {
+    let Label { labelling, blank_line } = label(picture, &lattice, board);
+    let placement = match labelling {
         Labelling::Unique(placement) => placement,
         Labelling::Symmetric(placement) => {
             notices.push(symmetric_notice(board));
@@ -47,52 +54,99 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
         Labelling::Mirrored => return Err(mirrored()),
         Labelling::Contradiction => return Err(contradiction(board)),
     };
+    if blank_line {
+        notices.push(blank_line_notice(board));
+    }
     let mut detection = measure(picture, &lattice, placement);
     detection.notices = notices;
     Ok(detection)
 }
 
-/// A fitted corner with where it is on the lattice.
-struct Fitted {
-    key: (i32, i32),
-    marker: u32,
-    saddle: Saddle,
-}
-
 /// Sub-pixel positions of all corners of the board, also of those that the lattice finder left out.
 fn measure(picture: &Picture, lattice: &Lattice, placement: Placement) -> Detection {
     let mut detection = Detection::default();
-    let mut fitted = Vec::new();
-    for key in placement.corners() {
-        let Some(marker) = placement.id(key) else { continue };
-        let Some(seed) = seed(lattice, key) else { continue };
-        match refine(picture, &seed, WINDOW) {
-            Ok(saddle) => fitted.push(Fitted { key, marker, saddle }),
-            Err(reason) if lattice.contains_key(&key) => detection.dropped.push(Dropped { uv: seed.uv, reason }),
-            Err(_) => {}
-        }
-    }
+    let mut fitted = BTreeMap::new();
     for (&key, &uv) in lattice {
-        if placement.id(key).is_none() {
-            detection.dropped.push(Dropped { uv, reason: "off the board" });
+        let seed = seed(lattice, key, REACH).ok_or("no neighbours");
+        match seed.and_then(|seed| refine(picture, &seed, WINDOW)) {
+            _ if placement.id(key).is_none() => detection.dropped.push(Dropped { uv, reason: "off the board" }),
+            Ok(saddle) => drop(fitted.insert(key, saddle)),
+            Err(reason) => detection.dropped.push(Dropped { uv, reason }),
         }
     }
-    let typical_contrast = median(fitted.iter().map(|f| f.saddle.contrast.abs()));
-    let typical_noise = median(fitted.iter().map(|f| f.saddle.noise / f.saddle.contrast.abs()));
-    for Fitted { key: (u, v), marker, saddle } in fitted {
-        let contrast = if placement.is_dark((u - 1, v)) { -saddle.contrast } else { saddle.contrast };
-        let disturbed = saddle.noise > f64::max(DISTURBED * typical_noise, LEAST_DISTURBED) * contrast.abs();
-        if contrast < WEAK * typical_contrast {
-            detection.dropped.push(Dropped { uv: saddle.uv, reason: "weak or wrong contrast" });
-        } else if disturbed {
-            detection.dropped.push(Dropped { uv: saddle.uv, reason: "disturbed surroundings" });
-        } else {
+    let usual = Usual::of(&fitted);
+    let mut kept = BTreeMap::new();
+    for (key, saddle) in fitted {
+        match usual.fault(key, &saddle, placement) {
+            None => drop(kept.insert(key, saddle)),
+            Some(reason) => detection.dropped.push(Dropped { uv: saddle.uv, reason }),
+        }
+    }
+    find_missing(picture, lattice, placement, &usual, &mut kept);
+    for (key, saddle) in kept {
+        if let Some(marker) = placement.id(key) {
             let (uv, covariance) = (saddle.uv, Some(saddle.covariance));
             detection.observations.push(Observation { marker, edge: Edge::Outer, uv, covariance });
         }
     }
     detection.observations.sort_by_key(|o| o.marker);
     detection
+}
+
+/// Fits the corners that the lattice lacks, working outwards from those that are known.
+fn find_missing(
+    picture: &Picture,
+    lattice: &Lattice,
+    placement: Placement,
+    usual: &Usual,
+    kept: &mut BTreeMap<(i32, i32), Saddle>,
+) {
+    let mut known: Lattice = kept.iter().map(|(&key, saddle)| (key, saddle.uv)).collect();
+    let mut reach = REACH;
+    loop {
+        let missing = placement.corners().filter(|key| !known.contains_key(key) && !lattice.contains_key(key));
+        let found: Vec<_> = missing
+            .filter_map(|key| {
+                let saddle = refine(picture, &seed(&known, key, reach)?, WINDOW).ok()?;
+                usual.fault(key, &saddle, placement).is_none().then_some((key, saddle))
+            })
+            .collect();
+        if found.is_empty() && reach == FAR_REACH {
+            return;
+        }
+        reach = if found.is_empty() { FAR_REACH } else { REACH };
+        known.extend(found.iter().map(|(key, saddle)| (*key, saddle.uv)));
+        kept.extend(found);
+    }
+}
+
+/// What most corners of the picture have in common.
+struct Usual {
+    /// Half the step between the squares, counts.
+    contrast: f64,
+    /// Residual of the fit over that.
+    residual: f64,
+}
+
+impl Usual {
+    fn of(fitted: &BTreeMap<(i32, i32), Saddle>) -> Self {
+        Self {
+            contrast: median(fitted.values().map(|s| s.contrast.abs())),
+            residual: median(fitted.values().map(|s| s.noise / s.contrast.abs())),
+        }
+    }
+
+    /// Why a fitted corner cannot be one of this board.
+    fn fault(&self, (u, v): (i32, i32), saddle: &Saddle, placement: Placement) -> Option<&'static str> {
+        let contrast = if placement.is_dark((u - 1, v)) { -saddle.contrast } else { saddle.contrast };
+        if contrast < WEAK * self.contrast {
+            Some("weak or wrong contrast")
+        } else if saddle.noise > f64::max(DISTURBED * self.residual, LEAST_DISTURBED) * contrast {
+            Some("disturbed surroundings")
+        } else {
+            None
+        }
+    }
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {
@@ -102,8 +156,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// A corner with the directions and lengths of the edges there, from the map of its neighbourhood.
-fn seed(lattice: &Lattice, (u, v): (i32, i32)) -> Option<Seed> {
-    let reach = 2;
+fn seed(lattice: &Lattice, (u, v): (i32, i32), reach: i32) -> Option<Seed> {
     let pairs: Vec<_> = (v - reach..=v + reach)
         .flat_map(|j| (u - reach..=u + reach).map(move |i| (i, j)))
         .filter(|&key| key != (u, v))
@@ -197,7 +250,11 @@ fn ambiguous() -> Error {
 }
 
 fn mirrored() -> Error {
-    Error::input("image", "the chessboard is mirrored", "turn off mirroring in the camera or in the image export")
+    Error::input(
+        "image",
+        "the chessboard is mirrored, or its top-left square is light",
+        "turn off mirroring in the camera or in the image export; the plate's first square must be dark",
+    )
 }
 
 fn contradiction(board: BoardSize) -> Error {
@@ -216,5 +273,13 @@ fn symmetric_notice(board: BoardSize) -> Notice {
             board.columns, board.rows
         ),
         "keep the camera within 90 degrees of upright, or use a board with an odd and an even number of squares",
+    )
+}
+
+fn blank_line_notice(board: BoardSize) -> Notice {
+    Notice::new(
+        "image",
+        "a whole line of the chessboard's squares is not seen where it should be",
+        format!("if nothing covers it, the board has fewer than {} x {} inner corners", board.columns, board.rows),
     )
 }

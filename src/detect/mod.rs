@@ -6,13 +6,17 @@ mod board_labels;
 pub mod chessboard;
 pub mod circles;
 mod detection;
+mod flat_field;
 mod load;
+mod mosaic;
 mod picture;
 mod run;
 mod saddle;
 
 pub use detection::{Detection, Dropped};
+pub use flat_field::FlatField;
 pub use load::{LUMA_WEIGHTS, load};
+pub use mosaic::Mosaic;
 pub use picture::Picture;
 pub use run::{SeriesImage, detect_series};
 

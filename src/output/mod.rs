@@ -1,6 +1,90 @@
 //! Solution -> bytes.
+//!
+//! Exporters are pure: [`files`] makes every file of a result in memory, [`write_all`] alone touches the disk.
+//! A new exporter is one file here and one row in [`files`].
 
+mod camera_file;
+mod compensation;
+mod estimates;
+mod gauge;
+mod names;
+mod observation_table;
 pub mod plate_drawing;
+mod plate_files;
 mod plate_pdf;
 mod plate_png;
 mod plate_svg;
+mod pose_files;
+mod residuals;
+mod robot_files;
+pub mod solution_json;
+mod solution_record;
+mod text;
+mod write;
+
+pub use write::write_all;
+
+use std::collections::BTreeMap;
+
+use crate::error::Result;
+use crate::recipe::Solution;
+use crate::series::InputFile;
+use crate::urdf::RobotDescription;
+
+/// What the exporters need beside the solution.
+#[derive(Debug, Clone)]
+pub struct Context<'a> {
+    /// The robot as read, whose text is patched.
+    pub robot: &'a RobotDescription,
+    /// Name of the robot in file names.
+    pub robot_name: &'a str,
+    /// Names of the series, in the order in which they were given.
+    pub series: Vec<String>,
+    /// All files that were read, with their hashes.
+    pub inputs: Vec<InputFile>,
+    /// Options in words: name and value, in the order in which they are to be shown.
+    pub options: Vec<(String, String)>,
+    /// The command line.
+    pub command: String,
+    /// Whether stand-alone poses are wanted (`--poses`).
+    pub poses: Poses,
+}
+
+/// Whether poses.csv is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Poses {
+    /// Write the stand-alone camera poses.
+    Written,
+    /// Leave them out.
+    LeftOut,
+}
+
+/// Every file of the result: name -> bytes.
+///
+/// # Errors
+/// A camera that a ROS camera_info cannot express, a URDF that cannot be patched, estimates that are not finite.
+pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, Vec<u8>>> {
+    let mut files = BTreeMap::new();
+    let mut add = |name: String, text: String| files.insert(name, text.into_bytes());
+    add(robot_files::urdf_name(context), robot_files::urdf(solution, context)?);
+    add("kinematics.yaml".into(), robot_files::kinematics_yaml(solution));
+    add("compensation.toml".into(), compensation::compensation_toml(solution)?);
+    for (name, text) in camera_file::cameras(solution)? {
+        add(name, text);
+    }
+    for (name, text) in pose_files::mountings(solution).into_iter().chain(pose_files::placements(solution)?) {
+        add(name, text);
+    }
+    for (name, text) in plate_files::plates(solution, context)? {
+        add(name, text);
+    }
+    if context.poses == Poses::Written {
+        add("poses.csv".into(), pose_files::poses_csv(solution, context)?);
+    }
+    add("observations.csv".into(), observation_table::observations_csv(solution, context));
+    let mut names: Vec<String> = files.keys().cloned().collect();
+    names.push(solution_json::FILE_NAME.into());
+    names.sort();
+    files.insert(solution_json::FILE_NAME.into(), solution_json::solution_json(solution, context, names)?);
+    Ok(files)
+}

@@ -3,8 +3,9 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, Vector3};
 use rayon::prelude::*;
 
-use super::system::{FIXED_MARKER_SIGMA_M, Linearised, intrinsic_columns, scatter};
+use super::system::{Carried, FIXED_MARKER_SIGMA_M, Linearised, intrinsic_columns, scatter};
 use crate::linalg::product;
+use crate::model::plate_modes::MODES;
 use crate::problem::{Problem, Slack, State, Step};
 
 /// One marker, ready to be eliminated: data of all images and its prior.
@@ -71,19 +72,28 @@ impl MarkersEliminated {
         Step { dense, slack, markers }
     }
 
-    /// Covariance of the correction of every marker that was seen: `V + D cov(x) D'` with `D = V * coupling`.
+    /// Covariance of every marker that was seen: `V + D cov(x) D'` with `D = V * coupling`, less what moves the marker with `x`
+    /// for a position instead of a correction.
     pub fn marker_covariances(
         &self,
         problem: &Problem,
         lin: &Linearised,
         slack_start: &[usize],
         reduced: &DMatrix<f64>,
+        carried: Option<&Carried>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         let plate = |(p, markers): (usize, &Vec<Marker>)| {
             let seen: Vec<usize> = (0..markers.len()).filter(|&m| markers[m].seen).collect();
             let rows: Vec<DMatrix<f64>> = seen
                 .par_iter()
-                .map(|&m| self.marker_coupling(problem, lin, slack_start, (p, m), reduced.nrows()))
+                .map(|&m| {
+                    let mut d = self.marker_coupling(problem, lin, slack_start, (p, m), reduced.nrows());
+                    if let Some((start, modes)) = carried.map(|c| c(p, m)) {
+                        let mut own = d.columns_mut(start, MODES);
+                        own -= modes;
+                    }
+                    d
+                })
                 .collect();
             let mut d = DMatrix::zeros(3 * seen.len(), reduced.nrows());
             for (k, rows) in rows.iter().enumerate() {

@@ -6,8 +6,9 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::system::{FIXED_MARKER_SIGMA_M, Linearised, intrinsic_columns};
+use super::system::{Carried, FIXED_MARKER_SIGMA_M, Linearised, intrinsic_columns};
 use crate::linalg::product;
+use crate::model::plate_modes::MODES;
 use crate::problem::{Problem, Slack, State, Step};
 
 /// Parts in which images are summed; fixed, so that the sums do not depend on the number of threads.
@@ -95,10 +96,23 @@ impl SlackEliminated {
         &block.inverse + product(&d, &own) * d.transpose()
     }
 
-    /// Covariance of every marker that was seen.
-    pub fn marker_covariances(&self, reduced: &DMatrix<f64>) -> Vec<Vec<Option<Matrix3<f64>>>> {
-        let of = |start: &Option<usize>| start.map(|s| reduced.fixed_view::<3, 3>(s, s).into_owned());
-        self.marker_start.iter().map(|plate| plate.iter().map(of).collect()).collect()
+    /// Covariance of every marker that was seen; with what moves it with the dense columns for a position.
+    pub fn marker_covariances(
+        &self,
+        reduced: &DMatrix<f64>,
+        carried: Option<&Carried>,
+    ) -> Vec<Vec<Option<Matrix3<f64>>>> {
+        let of = |p: usize, m: usize, start: usize| {
+            let own = reduced.fixed_view::<3, 3>(start, start).into_owned();
+            let Some((modes_start, modes)) = carried.map(|c| c(p, m)) else { return own };
+            let with_modes = reduced.fixed_view::<3, MODES>(start, modes_start) * modes.transpose();
+            let of_modes = modes * reduced.fixed_view::<MODES, MODES>(modes_start, modes_start) * modes.transpose();
+            own + with_modes + with_modes.transpose() + of_modes
+        };
+        let plate = |(p, starts): (usize, &Vec<Option<usize>>)| {
+            starts.iter().enumerate().map(|(m, start)| start.map(|s| of(p, m, s))).collect()
+        };
+        self.marker_start.iter().enumerate().map(plate).collect()
     }
 }
 

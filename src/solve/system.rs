@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::by_markers::MarkersEliminated;
 use super::by_slack::SlackEliminated;
 use crate::model::camera::MAX_PARAMETERS;
+use crate::model::plate_modes::{MODES, basis};
 use crate::problem::{Chained, E, Image, ImageTerms, Problem, Slack, State, Step, Weighting, chained, linearise};
 
 /// Smallest prior sigma of a marker coordinate, m: below it a marker counts as fixed.
@@ -109,6 +110,9 @@ impl Elimination {
     }
 }
 
+/// What moves a marker (plate, index) with the dense columns beside its correction: first column, 3 x modes.
+pub(super) type Carried<'a> = dyn Fn(usize, usize) -> (usize, SMatrix<f64, 3, MODES>) + Sync + 'a;
+
 /// What is needed to get the eliminated family back.
 #[derive(Debug, Clone)]
 enum Eliminated {
@@ -211,9 +215,34 @@ impl System {
         lin: &Linearised,
         reduced: &DMatrix<f64>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
+        self.marker_covariances_with(problem, lin, reduced, None)
+    }
+
+    /// Covariance of the position (plate modes and correction) of every marker that was seen, per plate and marker.
+    pub fn position_covariances(
+        &self,
+        problem: &Problem,
+        state: &State,
+        lin: &Linearised,
+        reduced: &DMatrix<f64>,
+    ) -> Vec<Vec<Option<Matrix3<f64>>>> {
+        let carried = |plate: usize, marker: usize| {
+            let shape = &state.plates[plate];
+            (problem.layout.shapes[plate].start, basis(&shape.nominal[marker], shape.half_diagonal_m))
+        };
+        self.marker_covariances_with(problem, lin, reduced, Some(&carried))
+    }
+
+    fn marker_covariances_with(
+        &self,
+        problem: &Problem,
+        lin: &Linearised,
+        reduced: &DMatrix<f64>,
+        carried: Option<&Carried>,
+    ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         match &self.eliminated {
-            Eliminated::Markers(e) => e.marker_covariances(problem, lin, &self.slack_start, reduced),
-            Eliminated::Slack(e) => e.marker_covariances(reduced),
+            Eliminated::Markers(e) => e.marker_covariances(problem, lin, &self.slack_start, reduced, carried),
+            Eliminated::Slack(e) => e.marker_covariances(reduced, carried),
         }
     }
 }

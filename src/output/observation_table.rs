@@ -1,0 +1,42 @@
+//! observations.csv: everything that was measured, its residual, and why some of it was left out.
+
+use super::Context;
+use super::names::ImageNames;
+use super::residuals::{poses, residuals};
+use super::text::csv;
+use crate::recipe::Solution;
+use crate::series::Edge;
+
+const HEADER: [&str; 11] = ["image", "marker", "u", "v", "edge", "cov_uu", "cov_uv", "cov_vv", "du", "dv", "reason"];
+
+/// Text of observations.csv; covariances as the detector states them, du and dv measured minus predicted (px). For an image
+/// that is left out the prediction is that of its joint readings.
+pub(super) fn observations_csv(solution: &Solution, context: &Context) -> String {
+    let names = ImageNames::new(&solution.problem, context);
+    let poses = poses(solution);
+    let mut rows = vec![HEADER.map(String::from).to_vec()];
+    for (k, image) in solution.problem.images.iter().enumerate() {
+        let markers = &solution.problem.plates[image.plate].markers;
+        let residuals = residuals(solution, k, poses[k].as_ref());
+        for (o, residual) in image.observations.iter().zip(residuals) {
+            let covariance = o.information.try_inverse().unwrap_or_default();
+            let edge = match o.edge {
+                Edge::Outer => "outer",
+                Edge::Inner => "inner",
+            };
+            let mut row = vec![names.of(k).to_owned(), markers[o.marker].id.to_string()];
+            row.extend([o.uv.x, o.uv.y].map(|v| format!("{v:?}")));
+            row.push(edge.into());
+            row.extend([(0, 0), (0, 1), (1, 1)].map(|at| format!("{:?}", covariance[at])));
+            row.extend([0, 1].map(|at| residual.map_or_else(String::new, |r| format!("{:.6}", r[at]))));
+            row.push(
+                image
+                    .rejected
+                    .as_ref()
+                    .map_or_else(|| o.rejected.unwrap_or_default().to_owned(), |reason| format!("image: {reason}")),
+            );
+            rows.push(row);
+        }
+    }
+    csv(&rows)
+}

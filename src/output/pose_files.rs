@@ -1,0 +1,163 @@
+//! hand_camera.yaml, plate_pose.yaml and poses.csv.
+
+use std::collections::BTreeSet;
+
+use nalgebra::Matrix6;
+
+use super::Context;
+use super::gauge::{markers_of, plates_in, plates_tied_to, rigid_covariance, seen_markers};
+use super::names::{ImageNames, file_names};
+use super::text::{csv, list, quoted};
+use crate::error::Result;
+use crate::geom::{Pose, adjoint};
+use crate::problem::Image;
+use crate::recipe::{FreePose, Solution};
+use crate::series::CameraMount;
+
+const PERTURBATION: &str = "\
+# The pose maps coordinates in child to coordinates in parent (m, rad; rpy: R = Rz(yaw) Ry(pitch) Rx(roll)).
+# covariance: 6x6, row by row, of the body-fixed perturbation parent_from_child * Exp([rho, phi]), translation rho (m) first,
+# then rotation phi (rad).
+";
+
+const INNER: &str = "\
+# It refers to the plate frame that the nominal markers define (inner constraints).
+";
+
+const OPTICAL: &str = "\
+# The camera frame is optical: z forward, x right, y down.
+";
+
+struct PoseFile<'a> {
+    parent: &'a str,
+    child: &'a str,
+    pose: &'a Pose,
+    covariance: Matrix6<f64>,
+    remark: &'a str,
+}
+
+impl PoseFile<'_> {
+    fn text(&self) -> String {
+        let c = &self.covariance;
+        format!(
+            "{PERTURBATION}{}parent: {}\nchild: {}\nxyz_m: {}\nquat_xyzw: {}\nrpy_rad: {}\ncovariance: {}\n",
+            self.remark,
+            quoted(self.parent),
+            quoted(self.child),
+            list(self.pose.xyz()),
+            list(self.pose.quaternion_xyzw()),
+            list(self.pose.rpy()),
+            list((0..36).map(|k| 0.5 * (c[(k / 6, k % 6)] + c[(k % 6, k / 6)]))),
+        )
+    }
+}
+
+/// True where an image in use ties the six columns of a pose to the data.
+pub(super) fn determined(solution: &Solution, start: usize) -> bool {
+    (start..start + 6).all(|c| solution.covariance.system.touched(c))
+}
+
+fn first_on_robot(solution: &Solution, which: impl Fn(&Image) -> bool) -> Option<&Image> {
+    solution.problem.used().map(|(_, i)| i).find(|i| i.stop.is_some() && which(i))
+}
+
+/// `flange_from_camera` (or `base_from_camera`) of every mounting that the robot's images determine.
+pub(super) fn mountings(solution: &Solution) -> Vec<(String, String)> {
+    let problem = &solution.problem;
+    let chain = &solution.state.robot.chain;
+    let mut out = Vec::new();
+    for (k, file) in file_names("hand_camera", "yaml", &problem.mountings).into_iter().enumerate() {
+        let start = problem.layout.mountings[k].start;
+        let Some(image) = first_on_robot(solution, |i| i.mounting == k).filter(|_| determined(solution, start)) else {
+            continue;
+        };
+        let parent = match image.mount {
+            CameraMount::Hand => &chain.tip,
+            CameraMount::Fixed => &chain.base,
+        };
+        let text = PoseFile {
+            parent,
+            child: &problem.cameras[image.camera],
+            pose: &solution.state.mountings[k],
+            covariance: solution.covariance.block(start),
+            remark: OPTICAL,
+        };
+        out.push((file, text.text()));
+    }
+    out
+}
+
+/// Covariance of the pose of a plate in the frame of its nominal markers.
+pub(super) fn placement_covariance(solution: &Solution, placement: usize) -> Result<Matrix6<f64>> {
+    let problem = &solution.problem;
+    let plates = plates_tied_to(problem, plates_in(problem, placement));
+    let rigid = rigid_covariance(problem, &seen_markers(problem, &plates))?;
+    Ok(solution.covariance.block(problem.layout.placements[placement].start) - rigid)
+}
+
+/// `base_from_plate` (or `flange_from_plate`) of every placement that the robot's images determine.
+pub(super) fn placements(solution: &Solution) -> Result<Vec<(String, String)>> {
+    let problem = &solution.problem;
+    let chain = &solution.state.robot.chain;
+    let mut out = Vec::new();
+    for (k, file) in file_names("plate_pose", "yaml", &problem.placements).into_iter().enumerate() {
+        let start = problem.layout.placements[k].start;
+        let Some(image) = first_on_robot(solution, |i| i.placement == k).filter(|_| determined(solution, start)) else {
+            continue;
+        };
+        let parent = match image.mount {
+            CameraMount::Hand => &chain.base,
+            CameraMount::Fixed => &chain.tip,
+        };
+        let text = PoseFile {
+            parent,
+            child: if problem.placements.len() == 1 { "plate" } else { &problem.placements[k] },
+            pose: &solution.state.placements[k],
+            covariance: placement_covariance(solution, k)?,
+            remark: INNER,
+        };
+        out.push((file, text.text()));
+    }
+    Ok(out)
+}
+
+/// Stand-alone poses: `plate_from_camera` with the covariance of its body twist, one for each image.
+///
+/// The inverse of `T Exp(x)` is `T^-1 Exp(-Ad_T x)`.
+pub(super) fn plate_from_camera(free: &FreePose, rigid: &Matrix6<f64>) -> (Pose, Matrix6<f64>) {
+    let ad = adjoint(&free.camera_from_plate);
+    let covariance = ad * (free.covariance - rigid) * ad.transpose();
+    (free.camera_from_plate.inverse(), 0.5 * (covariance + covariance.transpose()))
+}
+
+/// `(N' P N)^-1` of every plate in the adjustment of the free poses; `None` for a plate without any pose.
+pub(super) fn free_rigid_covariances(solution: &Solution) -> Result<Vec<Option<Matrix6<f64>>>> {
+    let problem = &solution.problem;
+    let free = &solution.free_poses.poses;
+    (0..problem.plates.len())
+        .map(|plate| {
+            let images = problem.images.iter().zip(free).filter(|(i, f)| i.plate == plate && f.is_some());
+            let seen: BTreeSet<(usize, usize)> = markers_of(images.map(|(i, _)| i));
+            if seen.is_empty() { Ok(None) } else { rigid_covariance(problem, &seen).map(Some) }
+        })
+        .collect()
+}
+
+/// Text of poses.csv.
+pub(super) fn poses_csv(solution: &Solution, context: &Context) -> Result<String> {
+    let names = ImageNames::new(&solution.problem, context);
+    let upper = || (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
+    let mut header: Vec<String> = ["image", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"].map(String::from).to_vec();
+    header.extend(upper().map(|(i, j)| format!("c{}{}", i + 1, j + 1)));
+    let mut rows = vec![header];
+    let rigid = free_rigid_covariances(solution)?;
+    for (k, free) in solution.free_poses.poses.iter().enumerate() {
+        let (Some(free), Some(rigid)) = (free, &rigid[solution.problem.images[k].plate]) else { continue };
+        let (pose, covariance) = plate_from_camera(free, rigid);
+        let mut row = vec![names.of(k).to_owned()];
+        row.extend(pose.xyz().iter().chain(&pose.quaternion_xyzw()).map(|v| format!("{v:?}")));
+        row.extend(upper().map(|at| format!("{:?}", covariance[at])));
+        rows.push(row);
+    }
+    Ok(csv(&rows))
+}

@@ -1,0 +1,27 @@
+//! Residuals of every observation at the estimates, used or not.
+
+use nalgebra::Vector2;
+
+use crate::geom::Pose;
+use crate::problem::{Slack, predict};
+use crate::recipe::Solution;
+
+/// Where each image was taken from, as the estimates say: with its joint noise for images in use, from the readings alone
+/// for those left out, `None` where there is neither.
+pub(super) fn poses(solution: &Solution) -> Vec<Option<Pose>> {
+    let (problem, state) = (&solution.problem, &solution.state);
+    let mut poses: Vec<Option<Pose>> = (problem.images.iter())
+        .map(|i| i.stop.as_ref().and_then(|_| state.camera_from_plate(i, &Slack::None)))
+        .collect();
+    for (&i, chain) in solution.linearised.images.iter().zip(&solution.linearised.chains) {
+        poses[i] = Some(chain.pose);
+    }
+    poses
+}
+
+/// Measured minus predicted, px, of every observation of an image; `None` where nothing can be predicted.
+pub(super) fn residuals(solution: &Solution, image: usize, pose: Option<&Pose>) -> Vec<Option<Vector2<f64>>> {
+    let i = &solution.problem.images[image];
+    let residual = |o| predict(i, &solution.state, pose?, o).map(|p| o.uv - p.uv);
+    i.observations.iter().map(residual).collect()
+}

@@ -1,0 +1,417 @@
+//! solution.json: everything that the solve went from and arrived at, so that it can be judged and repeated.
+//!
+//! The file has its own structures, apart from those of the solver, so that it keeps its shape when they change. A change of
+//! meaning raises [`FORMAT`]. Units stand in the names; poses are `a_from_b`, perturbations body-fixed with translation first.
+
+use std::collections::BTreeMap;
+use std::io;
+
+use serde::{Deserialize, Serialize};
+
+use super::Context;
+use super::solution_record::record;
+use crate::assess::Errors;
+use crate::error::{Error, Notice, Result};
+use crate::geom::Pose;
+use crate::model::camera::Lens;
+use crate::recipe::{Solution, StartVerdict};
+use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
+use crate::urdf::JointKind;
+
+/// Name of the file.
+pub const FILE_NAME: &str = "solution.json";
+
+/// Version of the format.
+pub const FORMAT: u32 = 1;
+
+/// A pose `parent_from_child`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PoseRecord {
+    /// Translation, m.
+    pub xyz_m: [f64; 3],
+    /// Rotation, qx qy qz qw.
+    pub quat_xyzw: [f64; 4],
+}
+
+impl From<&Pose> for PoseRecord {
+    fn from(pose: &Pose) -> Self {
+        Self { xyz_m: pose.xyz(), quat_xyzw: pose.quaternion_xyzw() }
+    }
+}
+
+impl From<&PoseRecord> for Pose {
+    fn from(record: &PoseRecord) -> Self {
+        Self::from_xyz_quaternion(record.xyz_m, record.quat_xyzw)
+    }
+}
+
+/// The program that wrote the file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProgramRecord {
+    /// Name.
+    pub name: String,
+    /// Version.
+    pub version: String,
+    /// Command line.
+    pub command: String,
+    /// Options in words.
+    pub options: Vec<(String, String)>,
+}
+
+/// One joint of the chain with what was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JointRecord {
+    /// URDF name.
+    pub name: String,
+    /// How it moves.
+    pub kind: JointKind,
+    /// Unit axis in the joint frame.
+    pub axis: [f64; 3],
+    /// Nominal `parent_from_joint`.
+    pub nominal_origin: PoseRecord,
+    /// Body twist on the nominal origin, m and rad.
+    pub twist: [f64; 6],
+    /// Corrected `parent_from_joint` with the joint offset folded in, as in the corrected URDF.
+    pub corrected_origin: PoseRecord,
+    /// Limits, rad or m.
+    pub limits: Option<(f64, f64)>,
+    /// Reading that drives it, with factor and offset (rad or m).
+    pub drive: Option<(String, f64, f64)>,
+}
+
+/// One joint term.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TermRecord {
+    /// Reading that it belongs to.
+    pub reading: String,
+    /// Name of the term.
+    pub term: String,
+    /// Value, in `unit`.
+    pub value: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// The robot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RobotRecord {
+    /// Name.
+    pub name: String,
+    /// Base link.
+    pub base: String,
+    /// Tip link.
+    pub tip: String,
+    /// Names of the readings, in chain order.
+    pub readings: Vec<String>,
+    /// How the joint of each reading moves.
+    pub reading_kinds: Vec<JointKind>,
+    /// The chain.
+    pub joints: Vec<JointRecord>,
+    /// Joint terms.
+    pub terms: Vec<TermRecord>,
+}
+
+/// One scalar estimate of the dense part, in the order of the covariance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EstimateRecord {
+    /// Name, `block.component`.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Value; none for a component of a pose, whose perturbation the column is.
+    pub value: Option<f64>,
+    /// Posterior sigma; none where nothing determines it or it was held fixed.
+    pub sigma: Option<f64>,
+    /// Mean of its prior.
+    pub prior_mean: Option<f64>,
+    /// Sigma of its prior; none where there is no prior.
+    pub prior_sigma: Option<f64>,
+    /// False where it was held fixed.
+    pub free: bool,
+    /// `1 - sigma^2 / prior_sigma^2`: how much of what is known comes from the data.
+    pub share_of_data: Option<f64>,
+}
+
+/// A camera.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraRecord {
+    /// Name.
+    pub name: String,
+    /// Lens model.
+    pub lens: Lens,
+    /// Columns of its images.
+    pub width_px: u32,
+    /// Rows.
+    pub height_px: u32,
+    /// Parameters by name.
+    pub parameters: Vec<(String, f64)>,
+    /// Estimated factor on the stated standard deviations of its observations.
+    pub pixel_factor: f64,
+    /// Joint noise of each reading with this camera, rad or m.
+    pub joint_noise: Vec<f64>,
+}
+
+/// A mounting or placement.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlacedRecord {
+    /// Name.
+    pub name: String,
+    /// Pose.
+    pub pose: PoseRecord,
+    /// Covariance of its body twist, 36 numbers; none where no image of the robot determines it.
+    pub covariance: Option<Vec<f64>>,
+}
+
+/// A plate: as given, and corrected.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlateRecord {
+    /// Name: that of the first series that shows it.
+    pub name: String,
+    /// What is printed on it.
+    pub kind: PlateKind,
+    /// Columns.
+    pub columns: u32,
+    /// Rows.
+    pub rows: u32,
+    /// Pitch, m.
+    pub pitch_m: f64,
+    /// Prior sigma of a marker, m.
+    pub tolerance_m: f64,
+    /// Measured distance.
+    pub scale: Option<ScaleBar>,
+    /// Amplitudes of its modes.
+    pub modes: BTreeMap<String, f64>,
+    /// Marker ids.
+    pub id: Vec<u32>,
+    /// Nominal positions, m.
+    pub nominal_m: Vec<[f64; 3]>,
+    /// Outer and inner radii, m.
+    pub radii_m: Vec<[f64; 2]>,
+    /// Prior sigmas, m.
+    pub prior_sigma_m: Vec<f64>,
+    /// Corrections beside the modes, m.
+    pub correction_m: Vec<[f64; 3]>,
+    /// Corrected positions, m.
+    pub position_m: Vec<[f64; 3]>,
+}
+
+/// A stand-alone camera pose.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FreePoseRecord {
+    /// `plate_from_camera`.
+    pub plate_from_camera: PoseRecord,
+    /// Covariance of its body twist in the frame of the nominal markers, 36 numbers.
+    pub covariance: Vec<f64>,
+    /// RMS of the lengths of its residuals, px.
+    pub rms_px: f64,
+}
+
+/// Observations of one image, one entry each.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ObservationColumns {
+    /// Marker ids.
+    pub marker: Vec<u32>,
+    /// Contours.
+    pub edge: Vec<Edge>,
+    /// Radius of the circle observed, m; 0 for a point or an imaged centre.
+    pub radius_m: Vec<f64>,
+    /// Measured, px.
+    pub uv: Vec<[f64; 2]>,
+    /// Stated covariance uu, uv, vv, px^2.
+    pub covariance: Vec<[f64; 3]>,
+    /// Measured minus predicted, px.
+    pub duv: Vec<Option<[f64; 2]>>,
+    /// Why it is left out.
+    pub reason: Vec<Option<String>>,
+}
+
+/// One image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageRecord {
+    /// Name.
+    pub name: String,
+    /// Name of its series.
+    pub series: String,
+    /// Index of its camera.
+    pub camera: usize,
+    /// Index of its mounting.
+    pub mounting: usize,
+    /// Index of its placement.
+    pub placement: usize,
+    /// Index of its plate.
+    pub plate: usize,
+    /// Where the camera is.
+    pub camera_mount: CameraMount,
+    /// Readings, rad or m; none off the robot.
+    pub readings: Option<Vec<f64>>,
+    /// Step of every reading from the stop before.
+    pub approach: Option<Vec<f64>>,
+    /// Estimated joint noise, rad or m.
+    pub joint_noise: Option<Vec<f64>>,
+    /// `camera_from_plate` as estimated; from the readings alone for an image that is left out.
+    pub camera_from_plate: Option<PoseRecord>,
+    /// Stand-alone pose.
+    pub free_pose: Option<FreePoseRecord>,
+    /// RMS of the lengths of the residuals in use, px.
+    pub rms_px: Option<f64>,
+    /// Held-out error with nominal and calibrated robot, mm.
+    pub held_out_mm: Option<[f64; 2]>,
+    /// Why the image is left out.
+    pub reason: Option<String>,
+    /// Observations.
+    pub observations: ObservationColumns,
+}
+
+/// Residuals in numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StatisticsRecord {
+    /// Images given.
+    pub images: usize,
+    /// Images in use.
+    pub images_used: usize,
+    /// Observations in use.
+    pub observations_used: usize,
+    /// Observations left out in images in use.
+    pub observations_left_out: usize,
+    /// RMS of the lengths of the residuals in use, px per point.
+    pub rms_px: f64,
+    /// The same with free poses.
+    pub free_pose_rms_px: f64,
+    /// Largest normalised residual in use.
+    pub largest_normalised: f64,
+    /// Cost at the solution.
+    pub cost: f64,
+    /// Huber bound on normalised lengths.
+    pub huber: f64,
+}
+
+/// Accuracy on held-out images.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AccuracyRecord {
+    /// Nominal robot.
+    pub nominal: Errors,
+    /// Calibrated robot.
+    pub calibrated: Errors,
+    /// Folds of the hold-out.
+    pub folds: usize,
+}
+
+/// The whole file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SolutionRecord {
+    /// Version of the format: [`FORMAT`].
+    pub format: u32,
+    /// What wrote it.
+    pub program: ProgramRecord,
+    /// Files of this result.
+    pub files: Vec<String>,
+    /// What was read.
+    pub inputs: Vec<InputFile>,
+    /// How the last solve ended.
+    pub status: String,
+    /// Steps tried in all.
+    pub iterations: usize,
+    /// Quality gates that failed.
+    pub failed_gates: Vec<String>,
+    /// Accuracy.
+    pub accuracy: AccuracyRecord,
+    /// Residuals.
+    pub statistics: StatisticsRecord,
+    /// What the user should know.
+    pub notices: Vec<Notice>,
+    /// Starting values.
+    pub starts: Vec<StartVerdict>,
+    /// Robot.
+    pub robot: RobotRecord,
+    /// Cameras with their variance components.
+    pub cameras: Vec<CameraRecord>,
+    /// `flange_from_camera`, or `base_from_camera` of a fixed camera.
+    pub mountings: Vec<PlacedRecord>,
+    /// `base_from_plate`, or `flange_from_plate` for a fixed camera; covariance in the frame of the nominal markers.
+    pub placements: Vec<PlacedRecord>,
+    /// Plates.
+    pub plates: Vec<PlateRecord>,
+    /// All scalar estimates.
+    pub estimates: Vec<EstimateRecord>,
+    /// Covariance of `estimates`: lower triangle, row by row. Poses of plates are in the frame that the marker priors define.
+    pub covariance_lower: Vec<f64>,
+    /// Images with their observations.
+    pub images: Vec<ImageRecord>,
+}
+
+/// Bytes of solution.json: one line for each field of [`SolutionRecord`].
+///
+/// # Errors
+/// Estimates that are not finite.
+pub(super) fn solution_json(solution: &Solution, context: &Context, files: Vec<String>) -> Result<Vec<u8>> {
+    let record = record(solution, context, files)?;
+    let mut bytes = Vec::new();
+    let mut serializer = serde_json::Serializer::with_formatter(&mut bytes, FieldPerLine::default());
+    record.serialize(&mut serializer).map_err(|e| Error::unsolved(FILE_NAME, e, "report this"))?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// Compact JSON with a new line before each field of the outermost object.
+#[derive(Default)]
+struct FieldPerLine {
+    depth: usize,
+}
+
+impl FieldPerLine {
+    fn open(&mut self, w: &mut (impl io::Write + ?Sized), bracket: &[u8]) -> io::Result<()> {
+        self.depth += 1;
+        w.write_all(bracket)
+    }
+
+    fn close(&mut self, w: &mut (impl io::Write + ?Sized), bracket: &[u8]) -> io::Result<()> {
+        self.depth -= 1;
+        if self.depth == 0 {
+            w.write_all(b"\n")?;
+        }
+        w.write_all(bracket)
+    }
+}
+
+impl serde_json::ser::Formatter for FieldPerLine {
+    fn begin_object<W: io::Write + ?Sized>(&mut self, w: &mut W) -> io::Result<()> {
+        self.open(w, b"{")
+    }
+
+    fn end_object<W: io::Write + ?Sized>(&mut self, w: &mut W) -> io::Result<()> {
+        self.close(w, b"}")
+    }
+
+    fn begin_array<W: io::Write + ?Sized>(&mut self, w: &mut W) -> io::Result<()> {
+        self.open(w, b"[")
+    }
+
+    fn end_array<W: io::Write + ?Sized>(&mut self, w: &mut W) -> io::Result<()> {
+        self.close(w, b"]")
+    }
+
+    fn begin_object_key<W: io::Write + ?Sized>(&mut self, w: &mut W, first: bool) -> io::Result<()> {
+        w.write_all(if first { b"" } else { b"," })?;
+        w.write_all(if self.depth == 1 { b"\n" } else { b"" })
+    }
+}
+
+/// Reads solution.json back.
+///
+/// # Errors
+/// Text that is no such file, and other versions of the format.
+pub fn read(bytes: &[u8]) -> Result<SolutionRecord> {
+    #[derive(Deserialize)]
+    struct Version {
+        format: u32,
+    }
+    let refuse =
+        |e: serde_json::Error| Error::input(FILE_NAME, e, "give the solution.json that `robotcal identify` wrote");
+    let version: Version = serde_json::from_slice(bytes).map_err(refuse)?;
+    if version.format != FORMAT {
+        let what = format!("format = {}", version.format);
+        let remedy = format!("this program reads format = {FORMAT}; a newer one may be needed");
+        return Err(Error::input(FILE_NAME, what, remedy));
+    }
+    serde_json::from_slice(bytes).map_err(refuse)
+}

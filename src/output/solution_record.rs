@@ -1,0 +1,232 @@
+//! From a solution to the record in solution.json.
+
+use nalgebra::Matrix6;
+
+use super::Context;
+use super::estimates::{estimates, lower_triangle};
+use super::names::{ImageNames, plate_name, series_name};
+use super::pose_files::{determined, free_rigid_covariances, placement_covariance, plate_from_camera};
+use super::residuals::{poses, residuals};
+use super::solution_json::{
+    AccuracyRecord, CameraRecord, FORMAT, FreePoseRecord, ImageRecord, JointRecord, ObservationColumns, PlacedRecord,
+    PlateRecord, ProgramRecord, RobotRecord, SolutionRecord, StatisticsRecord, TermRecord,
+};
+use crate::error::Result;
+use crate::geom::Pose;
+use crate::model::plate_modes;
+use crate::problem::{Image, Slack, State};
+use crate::recipe::Solution;
+
+/// The record of a solution.
+///
+/// # Errors
+/// Estimates that are not finite, markers that define no frame.
+pub(super) fn record(solution: &Solution, context: &Context, files: Vec<String>) -> Result<SolutionRecord> {
+    let accuracy = &solution.accuracy;
+    Ok(SolutionRecord {
+        format: FORMAT,
+        program: ProgramRecord {
+            name: env!("CARGO_PKG_NAME").into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            command: context.command.clone(),
+            options: context.options.clone(),
+        },
+        files,
+        inputs: context.inputs.clone(),
+        status: format!("{:?}", solution.status).to_lowercase(),
+        iterations: solution.iterations,
+        failed_gates: solution.failed_gates.clone(),
+        accuracy: AccuracyRecord { nominal: accuracy.nominal, calibrated: accuracy.calibrated, folds: accuracy.folds },
+        statistics: statistics(solution),
+        notices: solution.notices.clone(),
+        starts: solution.starts.clone(),
+        robot: robot(&solution.state),
+        cameras: cameras(solution),
+        mountings: mountings(solution),
+        placements: placements(solution)?,
+        plates: plates(solution, context),
+        estimates: estimates(solution, context)?,
+        covariance_lower: lower_triangle(solution),
+        images: images(solution, context)?,
+    })
+}
+
+/// Residuals in numbers.
+pub(super) fn statistics(solution: &Solution) -> StatisticsRecord {
+    let problem = &solution.problem;
+    let all = || solution.linearised.terms.iter().flat_map(|t| &t.residuals);
+    let used = all().count();
+    let squares: f64 = all().map(|r| r.duv.norm_squared()).sum();
+    let given: usize = problem.used().map(|(_, i)| i.observations.len()).sum();
+    StatisticsRecord {
+        images: problem.images.len(),
+        images_used: problem.used().count(),
+        observations_used: used,
+        observations_left_out: given - problem.used().map(|(_, i)| i.used().count()).sum::<usize>(),
+        rms_px: (squares / used.max(1) as f64).sqrt(),
+        free_pose_rms_px: solution.free_poses.rms_px,
+        largest_normalised: all().map(|r| r.normalised).fold(0.0, f64::max),
+        cost: solution.linearised.cost,
+        huber: problem.huber,
+    }
+}
+
+fn robot(state: &State) -> RobotRecord {
+    let robot = &state.robot;
+    let chain = &robot.chain;
+    let corrected = robot.corrected_origins();
+    let joints = chain.joints.iter().enumerate().map(|(k, j)| JointRecord {
+        name: j.name.clone(),
+        kind: j.kind,
+        axis: j.axis.into(),
+        nominal_origin: (&j.origin).into(),
+        twist: robot.twists[k].into(),
+        corrected_origin: (&corrected[k]).into(),
+        limits: j.limits,
+        drive: j.drive.map(|d| (chain.readings[d.reading].clone(), d.multiplier, d.offset)),
+    });
+    let terms = robot.terms.iter().map(|t| TermRecord {
+        reading: chain.readings[t.reading].clone(),
+        term: t.term.name(),
+        value: t.value,
+        unit: t.term.unit(chain.reading_kinds[t.reading]).into(),
+    });
+    RobotRecord {
+        name: chain.robot.clone(),
+        base: chain.base.clone(),
+        tip: chain.tip.clone(),
+        readings: chain.readings.clone(),
+        reading_kinds: chain.reading_kinds.clone(),
+        joints: joints.collect(),
+        terms: terms.collect(),
+    }
+}
+
+fn cameras(solution: &Solution) -> Vec<CameraRecord> {
+    let problem = &solution.problem;
+    let camera = |(k, name): (usize, &String)| {
+        let c = &solution.state.cameras[k];
+        CameraRecord {
+            name: name.clone(),
+            lens: c.lens,
+            width_px: c.width_px,
+            height_px: c.height_px,
+            parameters: c.parameter_names().map(String::from).zip(c.parameters.iter().copied()).collect(),
+            pixel_factor: problem.noise.pixel_factor[k],
+            joint_noise: problem.noise.joint[k].clone(),
+        }
+    };
+    problem.cameras.iter().enumerate().map(camera).collect()
+}
+
+fn flat(c: &Matrix6<f64>) -> Vec<f64> {
+    (0..36).map(|k| c[(k / 6, k % 6)]).collect()
+}
+
+fn mountings(solution: &Solution) -> Vec<PlacedRecord> {
+    let problem = &solution.problem;
+    let placed = |(k, name): (usize, &String)| {
+        let start = problem.layout.mountings[k].start;
+        let covariance = determined(solution, start).then(|| flat(&solution.covariance.block(start)));
+        PlacedRecord { name: name.clone(), pose: (&solution.state.mountings[k]).into(), covariance }
+    };
+    problem.mountings.iter().enumerate().map(placed).collect()
+}
+
+fn placements(solution: &Solution) -> Result<Vec<PlacedRecord>> {
+    let problem = &solution.problem;
+    let placed = |(k, name): (usize, &String)| {
+        let covariance = match determined(solution, problem.layout.placements[k].start) {
+            true => Some(flat(&placement_covariance(solution, k)?)),
+            false => None,
+        };
+        Ok(PlacedRecord { name: name.clone(), pose: (&solution.state.placements[k]).into(), covariance })
+    };
+    problem.placements.iter().enumerate().map(placed).collect()
+}
+
+fn plates(solution: &Solution, context: &Context) -> Vec<PlateRecord> {
+    let problem = &solution.problem;
+    let plate = |(k, p): (usize, &crate::series::Plate)| {
+        let shape = &solution.state.plates[k];
+        PlateRecord {
+            name: plate_name(problem, context, k),
+            kind: p.kind,
+            columns: p.columns,
+            rows: p.rows,
+            pitch_m: p.pitch_m,
+            tolerance_m: p.tolerance_m,
+            scale: p.scale,
+            modes: plate_modes::NAMES.iter().map(|n| n.to_string()).zip(shape.modes).collect(),
+            id: p.markers.iter().map(|m| m.id).collect(),
+            nominal_m: p.markers.iter().map(|m| m.position_m.into()).collect(),
+            radii_m: p.markers.iter().map(|m| [m.outer_radius_m, m.inner_radius_m]).collect(),
+            prior_sigma_m: p.markers.iter().map(|m| m.sigma_m).collect(),
+            correction_m: shape.corrections.iter().map(|c| (*c).into()).collect(),
+            position_m: (0..p.markers.len()).map(|m| shape.position(m).into()).collect(),
+        }
+    };
+    problem.plates.iter().enumerate().map(plate).collect()
+}
+
+fn images(solution: &Solution, context: &Context) -> Result<Vec<ImageRecord>> {
+    let problem = &solution.problem;
+    let names = ImageNames::new(problem, context);
+    let poses = poses(solution);
+    let rigid = free_rigid_covariances(solution)?;
+    let image = |(k, i): (usize, &Image)| {
+        let free = solution.free_poses.poses[k].as_ref().zip(rigid[i.plate].as_ref());
+        let joint_noise = match (&solution.state.slack[k], &i.rejected, &i.stop) {
+            (Slack::Joints(dq), None, Some(_)) => Some(dq.clone()),
+            _ => None,
+        };
+        let observations = observations(solution, k, poses[k].as_ref());
+        ImageRecord {
+            name: names.of(k).to_owned(),
+            series: series_name(context, i.series),
+            camera: i.camera,
+            mounting: i.mounting,
+            placement: i.placement,
+            plate: i.plate,
+            camera_mount: i.mount,
+            readings: i.stop.as_ref().map(|s| s.readings.clone()),
+            approach: i.stop.as_ref().and_then(|s| s.approach.clone()),
+            joint_noise,
+            camera_from_plate: poses[k].as_ref().map(Into::into),
+            free_pose: free.map(|(free, rigid)| {
+                let (pose, covariance) = plate_from_camera(free, rigid);
+                FreePoseRecord { plate_from_camera: (&pose).into(), covariance: flat(&covariance), rms_px: free.rms_px }
+            }),
+            rms_px: rms_px(solution, k),
+            held_out_mm: solution.accuracy.per_image_mm.get(k).copied().flatten(),
+            reason: i.rejected.clone(),
+            observations,
+        }
+    };
+    Ok(problem.images.iter().enumerate().map(image).collect())
+}
+
+/// RMS of the lengths of the residuals of an image in use, px.
+pub(super) fn rms_px(solution: &Solution, image: usize) -> Option<f64> {
+    let at = solution.linearised.images.iter().position(|&i| i == image)?;
+    let residuals = &solution.linearised.terms[at].residuals;
+    let squares: f64 = residuals.iter().map(|r| r.duv.norm_squared()).sum();
+    Some((squares / residuals.len().max(1) as f64).sqrt())
+}
+
+fn observations(solution: &Solution, image: usize, pose: Option<&Pose>) -> ObservationColumns {
+    let i = &solution.problem.images[image];
+    let markers = &solution.problem.plates[i.plate].markers;
+    let mut columns = ObservationColumns::default();
+    for (o, residual) in i.observations.iter().zip(residuals(solution, image, pose)) {
+        let c = o.information.try_inverse().unwrap_or_default();
+        columns.marker.push(markers[o.marker].id);
+        columns.edge.push(o.edge);
+        columns.radius_m.push(o.radius_m);
+        columns.uv.push(o.uv.into());
+        columns.covariance.push([c[(0, 0)], c[(0, 1)], c[(1, 1)]]);
+        columns.duv.push(residual.map(Into::into));
+        columns.reason.push(o.rejected.map(String::from));
+    }
+    columns
+}

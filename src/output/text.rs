@@ -1,0 +1,80 @@
+//! Numbers and names as YAML, TOML and CSV want them.
+
+/// A number that every YAML and TOML reader takes for a float and reads back exactly.
+///
+/// YAML 1.1 readers want a point in the mantissa and a sign in the exponent.
+pub(super) fn number(value: f64) -> String {
+    let plain = format!("{:?}", value + 0.0);
+    let Some((mantissa, exponent)) = plain.split_once('e') else { return plain };
+    let point = if mantissa.contains('.') { "" } else { ".0" };
+    let sign = if exponent.starts_with('-') { "" } else { "+" };
+    format!("{mantissa}{point}e{sign}{exponent}")
+}
+
+/// `[1.0, 2.0]`, in YAML and TOML.
+pub(super) fn list(values: impl IntoIterator<Item = f64>) -> String {
+    format!("[{}]", values.into_iter().map(number).collect::<Vec<_>>().join(", "))
+}
+
+/// A string in double quotes with the escapes that YAML, TOML and JSON share.
+pub(super) fn quoted(text: &str) -> String {
+    let mut out = String::with_capacity(text.len() + 2);
+    out.push('"');
+    for c in text.chars() {
+        match c {
+            '"' => out.push_str("\\\""),
+            '\\' => out.push_str("\\\\"),
+            '\n' => out.push_str("\\n"),
+            '\t' => out.push_str("\\t"),
+            c if c.is_control() => out.push_str(&format!("\\u{:04x}", u32::from(c))),
+            c => out.push(c),
+        }
+    }
+    out.push('"');
+    out
+}
+
+/// A name as it is where it is a plain key of YAML and TOML, else in quotes.
+pub(super) fn key(name: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    let letter_first = name.starts_with(|c: char| c.is_ascii_alphabetic());
+    // Words that YAML 1.1 takes for booleans or nothing.
+    let reserved = ["y", "n", "yes", "no", "on", "off", "true", "false", "null"];
+    match letter_first && name.chars().all(plain) && !reserved.contains(&name.to_lowercase().as_str()) {
+        true => name.to_owned(),
+        false => quoted(name),
+    }
+}
+
+/// Text of a table; cells are quoted where needed.
+pub(super) fn csv(rows: &[Vec<String>]) -> String {
+    let cell = |cell: &String| match cell.contains([',', '"', '\n', '\r']) || cell.trim() != cell {
+        true => format!("\"{}\"", cell.replace('"', "\"\"")),
+        false => cell.clone(),
+    };
+    rows.iter().map(|row| row.iter().map(cell).collect::<Vec<_>>().join(",") + "\n").collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_floats_in_yaml_1_1_and_read_back_exactly() {
+        for (value, text) in [(0.0, "0.0"), (-0.0, "0.0"), (1e-7, "1.0e-7"), (1.5e-9, "1.5e-9"), (1e20, "1.0e+20")] {
+            assert_eq!(number(value), text);
+        }
+        for value in [0.1 + 0.2, -1.0 / 3.0 * 1e-12, f64::MIN_POSITIVE, 12345.678e30] {
+            assert_eq!(number(value).parse::<f64>(), Ok(value));
+        }
+    }
+
+    #[test]
+    fn names_are_quoted_where_they_are_no_plain_key() {
+        assert_eq!(key("joint_a1"), "joint_a1");
+        assert_eq!(key("joint 1"), "\"joint 1\"");
+        assert_eq!(key("NO"), "\"NO\"");
+        assert_eq!(key("1"), "\"1\"");
+        assert_eq!(quoted("a\"b\\c\n"), r#""a\"b\\c\n""#);
+    }
+}

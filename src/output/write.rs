@@ -1,0 +1,143 @@
+//! The only place of this room that touches the disk.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::solution_json;
+use crate::error::{Error, Result};
+
+/// Writes all files into `dir`, replacing an earlier result as a whole: a failure leaves `dir` as it was.
+///
+/// Files are written to a folder beside `dir`, which then takes its place. Files in `dir` that do not belong to the earlier
+/// result (notes, say) are kept. Missing parents are made.
+///
+/// # Errors
+/// A `dir` that is a file, or holds something else than an earlier result; anything that cannot be written or renamed.
+pub fn write_all(dir: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
+    let target = resolve(dir)?;
+    let foreign = foreign_files(&target, files)?;
+    let new = beside(&target, "new")?;
+    let written = write_files(&new, files).and_then(|()| replace(&target, &new, &foreign));
+    if written.is_err() && new.exists() {
+        // The first error is the one to report.
+        let _ = fs::remove_dir_all(&new);
+    }
+    written
+}
+
+/// The real path of the target, whose parent exists.
+fn resolve(dir: &Path) -> Result<PathBuf> {
+    if dir.as_os_str().is_empty() {
+        return Err(Error::input("results folder", "has no name", "name a folder for the results"));
+    }
+    if dir.exists() {
+        let target = dir.canonicalize().map_err(|e| Error::io(dir, &e))?;
+        if !target.is_dir() {
+            return Err(Error::input(dir.display(), "is a file, not a folder", "name a folder for the results"));
+        }
+        return Ok(target);
+    }
+    let name = dir
+        .file_name()
+        .ok_or_else(|| Error::input(dir.display(), "does not name a folder", "name a folder for the results"))?;
+    let parent = match dir.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    fs::create_dir_all(parent).map_err(|e| Error::io(parent, &e))?;
+    Ok(parent.canonicalize().map_err(|e| Error::io(parent, &e))?.join(name))
+}
+
+/// Names in the target that are not of the result that it holds.
+fn foreign_files(target: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<Vec<String>> {
+    if !target.exists() {
+        return Ok(Vec::new());
+    }
+    let mut there = BTreeSet::new();
+    for entry in fs::read_dir(target).map_err(|e| Error::io(target, &e))? {
+        let entry = entry.map_err(|e| Error::io(target, &e))?;
+        there.insert(entry.file_name().into_string().map_err(|name| {
+            Error::input(target.display(), format!("holds {}", name.display()), "choose another folder for the results")
+        })?);
+    }
+    if there.is_empty() {
+        return Ok(Vec::new());
+    }
+    let own = earlier_files(target).ok_or_else(|| {
+        let what = "is not empty and holds no earlier result of this program";
+        Error::input(target.display(), what, "choose another folder for the results, or empty this one")
+    })?;
+    let foreign: Vec<String> = there.into_iter().filter(|name| !own.contains(name)).collect();
+    match foreign.iter().find(|name| files.contains_key(*name)) {
+        Some(name) => {
+            let what = "would be overwritten, but is not of the earlier result in this folder";
+            Err(Error::input(target.join(name).display(), what, "move it away, or choose another folder"))
+        }
+        None => Ok(foreign),
+    }
+}
+
+/// Files of the result in a folder, as its solution.json lists them.
+fn earlier_files(target: &Path) -> Option<BTreeSet<String>> {
+    #[derive(Deserialize)]
+    struct Listed {
+        files: BTreeSet<String>,
+    }
+    let bytes = fs::read(target.join(solution_json::FILE_NAME)).ok()?;
+    serde_json::from_slice::<Listed>(&bytes).ok().map(|l| l.files)
+}
+
+/// A name beside the target that nothing has yet.
+fn beside(target: &Path, purpose: &str) -> Result<PathBuf> {
+    let name = target.file_name().map(|n| n.to_string_lossy().into_owned()).ok_or_else(|| {
+        Error::input(target.display(), "cannot be replaced", "name a folder below it for the results")
+    })?;
+    let candidate = |k: u32| target.with_file_name(format!(".{name}.{purpose}-{}-{k}", std::process::id()));
+    (0..1000).map(candidate).find(|p| !p.exists()).ok_or_else(|| {
+        Error::input(
+            target.display(),
+            "many unfinished results lie beside it",
+            "remove them (names that begin with a point)",
+        )
+    })
+}
+
+fn write_files(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
+    fs::create_dir(folder).map_err(|e| Error::io(folder, &e))?;
+    for (name, bytes) in files {
+        let path = folder.join(name);
+        write_synced(&path, bytes).map_err(|e| Error::io(&path, &e))?;
+    }
+    Ok(())
+}
+
+/// Writes a file through to the disk, so that a full disk is noticed here.
+fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = fs::File::create_new(path)?;
+    io::Write::write_all(&mut file, bytes)?;
+    file.sync_all()
+}
+
+/// Puts `new` in the place of `target`; what was there comes back when that fails.
+fn replace(target: &Path, new: &Path, foreign: &[String]) -> Result<()> {
+    let fail = |e: io::Error| Error::io(target, &e);
+    if !target.exists() {
+        return fs::rename(new, target).map_err(fail);
+    }
+    let old = beside(target, "old")?;
+    fs::rename(target, &old).map_err(fail)?;
+    if let Err(error) = fs::rename(new, target) {
+        return match fs::rename(&old, target) {
+            Ok(()) => Err(fail(error)),
+            Err(_) => Err(Error::input(target.display(), error, format!("the earlier result is in {}", old.display()))),
+        };
+    }
+    for name in foreign {
+        fs::rename(old.join(name), target.join(name)).map_err(|e| Error::io(&old.join(name), &e))?;
+    }
+    fs::remove_dir_all(&old).map_err(|e| Error::io(&old, &e))
+}

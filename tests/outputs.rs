@@ -1,0 +1,329 @@
+//! Every file of a result, read back by another reader than the writer.
+
+mod outputs_support;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Matrix6;
+use outputs_support::{context, robot, solved};
+use robotcal::geom::Pose;
+use robotcal::model::joint_terms::Term;
+use robotcal::model::robot::Robot;
+use robotcal::output::{files, solution_json};
+use robotcal::problem::Slack;
+use robotcal::recipe::RobotModel;
+use robotcal::series::{CameraMount, read_plate};
+use serde::Deserialize;
+
+type Files = BTreeMap<String, Vec<u8>>;
+
+fn text<'a>(files: &'a Files, name: &str) -> &'a str {
+    let bytes = files.get(name).unwrap_or_else(|| panic!("no {name} among {:?}", files.keys()));
+    std::str::from_utf8(bytes).unwrap()
+}
+
+fn rows(files: &Files, name: &str) -> Vec<BTreeMap<String, String>> {
+    csv::Reader::from_reader(text(files, name).as_bytes()).deserialize().map(|r| r.unwrap()).collect()
+}
+
+#[derive(Debug, Deserialize)]
+struct PoseYaml {
+    parent: String,
+    child: String,
+    xyz_m: [f64; 3],
+    quat_xyzw: [f64; 4],
+    rpy_rad: [f64; 3],
+    covariance: Vec<f64>,
+}
+
+impl PoseYaml {
+    fn read(files: &Files, name: &str) -> Self {
+        serde_saphyr::from_str(text(files, name)).unwrap()
+    }
+
+    fn pose(&self) -> Pose {
+        Pose::from_xyz_quaternion(self.xyz_m, self.quat_xyzw)
+    }
+}
+
+fn assert_covariance(c: &Matrix6<f64>, what: &str) {
+    assert!((c - c.transpose()).amax() <= 1e-12 * c.amax(), "{what} is not symmetric");
+    let scale = c.diagonal().map(f64::sqrt);
+    let correlations = Matrix6::from_fn(|i, j| c[(i, j)] / (scale[i] * scale[j]));
+    let least = correlations.symmetric_eigenvalues().min();
+    assert!(least > 0.0, "{what} has the eigenvalue {least:e} in units of its diagonal");
+}
+
+fn reread_chain(files: &Files) -> robotcal::urdf::Chain {
+    let urdf = text(files, "kuka_kr6_r900.calibrated.urdf").to_owned();
+    let description = robotcal::urdf::RobotDescription::from_text(Path::new("calibrated.urdf"), urdf).unwrap();
+    description.chain(None, None).unwrap()
+}
+
+#[test]
+fn kinematics_of_the_reread_urdf_are_those_of_the_rigid_model() {
+    let description = robot();
+    let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
+    let files = files(&solution, &context(&description)).unwrap();
+    let reread = Robot::nominal(reread_chain(&files));
+    let mut rigid = solution.state.robot.clone();
+    rigid.terms.retain(|t| t.term == Term::Offset);
+    for stop in solution.problem.images.iter().filter_map(|i| i.stop.as_ref()) {
+        let (angle, distance) = reread.base_from_tip(&stop.readings).distance(&rigid.base_from_tip(&stop.readings));
+        assert!(distance < 1e-9 && angle < 1e-9, "{distance:e} m {angle:e} rad");
+    }
+    let nominal = Robot::nominal(description.chain(None, None).unwrap());
+    let q = [0.1, -1.6, 1.9, 0.2, 1.2, 0.3];
+    assert!(nominal.base_from_tip(&q).distance(&reread.base_from_tip(&q)).1 > 1e-4, "nothing was corrected");
+}
+
+#[test]
+fn kinematics_yaml_says_the_same_as_the_urdf() {
+    #[derive(Deserialize)]
+    struct Origin {
+        x: f64,
+        y: f64,
+        z: f64,
+        roll: f64,
+        pitch: f64,
+        yaw: f64,
+    }
+    let description = robot();
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let files = files(&solution, &context(&description)).unwrap();
+    let yaml: BTreeMap<String, BTreeMap<String, Origin>> =
+        serde_saphyr::from_str(text(&files, "kinematics.yaml")).unwrap();
+    let chain = reread_chain(&files);
+    assert_eq!(yaml["kinematics"].len(), chain.joints.len());
+    for joint in &chain.joints {
+        let o = &yaml["kinematics"][&joint.name];
+        let pose = Pose::from_xyz_rpy([o.x, o.y, o.z], [o.roll, o.pitch, o.yaw]);
+        let (angle, distance) = pose.distance(&joint.origin);
+        assert!(angle < 1e-12 && distance < 1e-15, "{}: {angle:e} {distance:e}", joint.name);
+    }
+}
+
+#[test]
+fn files_chained_by_their_frames_give_the_camera_pose_of_the_solver() {
+    for mount in [CameraMount::Hand, CameraMount::Fixed] {
+        let description = robot();
+        let solution = solved(mount, RobotModel::Rigid, &description);
+        let files = files(&solution, &context(&description)).unwrap();
+        let (camera, plate) = (PoseYaml::read(&files, "hand_camera.yaml"), PoseYaml::read(&files, "plate_pose.yaml"));
+        for pose in [&camera, &plate] {
+            assert!(pose.pose().distance(&Pose::from_xyz_rpy(pose.xyz_m, pose.rpy_rad)).0 < 1e-12);
+            assert_covariance(&Matrix6::from_row_slice(&pose.covariance), &pose.child);
+        }
+        let chain = reread_chain(&files);
+        assert_eq!((camera.child.as_str(), plate.child.as_str()), ("front", "plate"));
+        // Both are given in frames of the robot: walk base -> camera and base -> plate.
+        let reread = Robot::nominal(chain.clone());
+        for image in &solution.problem.images {
+            let tip = reread.base_from_tip(&image.stop.as_ref().unwrap().readings);
+            let base_from = |p: &PoseYaml| if p.parent == chain.tip { tip * p.pose() } else { p.pose() };
+            let camera_from_plate = base_from(&camera).inverse() * base_from(&plate);
+            let solver = solution.state.camera_from_plate(image, &Slack::None).unwrap();
+            let (angle, distance) = camera_from_plate.distance(&solver);
+            assert!(angle < 1e-9 && distance < 1e-9, "{mount:?} {}: {angle:e} {distance:e}", image.name);
+        }
+        let parents = match mount {
+            CameraMount::Hand => (&chain.tip, &chain.base),
+            CameraMount::Fixed => (&chain.base, &chain.tip),
+        };
+        assert_eq!((&camera.parent, &plate.parent), parents);
+    }
+}
+
+#[test]
+fn camera_yaml_is_a_ros_camera_info() {
+    #[derive(Deserialize)]
+    struct Matrix {
+        rows: usize,
+        cols: usize,
+        data: Vec<f64>,
+    }
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct CameraInfo {
+        image_width: u32,
+        image_height: u32,
+        camera_name: String,
+        camera_matrix: Matrix,
+        distortion_model: String,
+        distortion_coefficients: Matrix,
+        rectification_matrix: Matrix,
+        projection_matrix: Matrix,
+    }
+    let description = robot();
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let files = files(&solution, &context(&description)).unwrap();
+    let info: CameraInfo = serde_saphyr::from_str(text(&files, "camera.yaml")).unwrap();
+    assert_eq!((info.image_width, info.image_height, info.camera_name.as_str()), (1280, 1024, "front"));
+    assert_eq!(info.distortion_model, "plumb_bob");
+    for (m, shape) in [
+        (&info.camera_matrix, (3, 3)),
+        (&info.distortion_coefficients, (1, 5)),
+        (&info.rectification_matrix, (3, 3)),
+        (&info.projection_matrix, (3, 4)),
+    ] {
+        assert_eq!((m.rows, m.cols, m.data.len()), (shape.0, shape.1, shape.0 * shape.1));
+    }
+    // plumb_bob as the documentation of ROS image_geometry and OpenCV write it.
+    let (k, d) = (&info.camera_matrix.data, &info.distortion_coefficients.data);
+    let camera = &solution.state.cameras[0];
+    for point in [[0.1, 0.2, 1.0], [-0.5, 0.4, 1.3], [0.3, -0.35, 0.8]] {
+        let (x, y) = (point[0] / point[2], point[1] / point[2]);
+        let r2 = x * x + y * y;
+        let radial = 1.0 + d[0] * r2 + d[1] * r2 * r2 + d[4] * r2 * r2 * r2;
+        let xd = x * radial + 2.0 * d[2] * x * y + d[3] * (r2 + 2.0 * x * x);
+        let yd = y * radial + d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * x * y;
+        let uv = camera.project(&point.into()).unwrap();
+        assert!((k[0] * xd + k[2] - uv.x).abs() < 1e-9 && (k[4] * yd + k[5] - uv.y).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn the_corrected_plate_is_a_plate() {
+    let description = robot();
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let files = files(&solution, &context(&description)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["plate.toml", "plate.csv"] {
+        std::fs::write(folder.path().join(name), &files[name]).unwrap();
+    }
+    let plate = read_plate(&folder.path().join("plate.toml"), &mut Vec::new()).unwrap();
+    assert_eq!(plate.markers.len(), 48);
+    for (k, m) in plate.markers.iter().enumerate() {
+        assert_eq!(m.position_m, solution.state.plates[0].position(k));
+        // Better than the print tolerance, and not better than the pixels of 24 images allow (0.05 px at 1100 px and 0.15 m).
+        let floor = 0.05 / 1100.0 * 0.15 / 24f64.sqrt();
+        assert!((floor..1e-4).contains(&m.sigma_m), "marker {}: {:e}", m.id, m.sigma_m);
+    }
+}
+
+#[test]
+fn compensation_has_every_term_but_the_offset() {
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Joint {
+        gear_scale: Option<f64>,
+        harmonics: Option<Vec<f64>>,
+        gravity: Option<Vec<f64>>,
+        backlash_rad: Option<f64>,
+    }
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Compensation {
+        #[serde(default)]
+        joint: BTreeMap<String, Joint>,
+    }
+    let description = robot();
+    let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
+    let files = files(&solution, &context(&description)).unwrap();
+    let read: Compensation = toml::from_str(text(&files, "compensation.toml")).unwrap();
+    let robot = &solution.state.robot;
+    assert_eq!(read.joint.len(), robot.chain.readings.len());
+    for t in &robot.terms {
+        let joint = &read.joint[&robot.chain.readings[t.reading]];
+        let value = match t.term {
+            Term::Offset => continue,
+            Term::Gear => joint.gear_scale.unwrap(),
+            Term::Cosine(k) => joint.harmonics.as_ref().unwrap()[2 * usize::from(k) - 2],
+            Term::Sine(k) => joint.harmonics.as_ref().unwrap()[2 * usize::from(k) - 1],
+            Term::Gravity(k) => joint.gravity.as_ref().unwrap()[usize::from(k)],
+            Term::Backlash => joint.backlash_rad.unwrap(),
+        };
+        assert_eq!(value, t.value, "{:?}", t.term);
+    }
+    let rigid = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let rigid = robotcal::output::files(&rigid, &context(&description)).unwrap();
+    let none: Compensation = toml::from_str(text(&rigid, "compensation.toml")).unwrap();
+    assert!(none.joint.is_empty());
+}
+
+#[test]
+fn observations_csv_has_all_observations_with_reasons_and_is_a_series_input() {
+    let description = robot();
+    let mut solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    solution.problem.images[3].rejected = Some("wrongly paired, \"really\"".into());
+    solution.problem.images[5].observations[2].rejected = Some("residual");
+    let files = files(&solution, &context(&description)).unwrap();
+    let table = rows(&files, "observations.csv");
+    let all: usize = solution.problem.images.iter().map(|i| i.observations.len()).sum();
+    assert_eq!(table.len(), all);
+    let left_out = table.iter().filter(|r| !r["reason"].is_empty()).count();
+    assert_eq!(left_out, solution.problem.images[3].observations.len() + 1);
+    let squares: f64 = table.iter().map(|r| ["du", "dv"].map(|c| r[c].parse::<f64>().unwrap().powi(2))).flatten().sum();
+    // 0.05 px per axis.
+    let rms = (squares / (2.0 * all as f64)).sqrt();
+    assert!((0.04..0.06).contains(&rms), "{rms}");
+
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    for name in ["observations.csv", "plate.toml", "plate.csv"] {
+        write(name, text(&files, name));
+    }
+    write(
+        "series.toml",
+        "format = 1\njoint_unit = \"rad\"\ncamera_mount = \"hand\"\nplate = \"plate.toml\"\n\
+         [camera]\nwidth_px = 1280\nheight_px = 1024\n",
+    );
+    let joints = solution.problem.images.iter().map(|i| format!("{},0.1\n", i.name)).collect::<String>();
+    write("joints.csv", &format!("image,joint_a1\n{joints}"));
+    let series = robotcal::series::read(folder.path()).unwrap();
+    let robotcal::series::Source::Observations(images) = series.source else { panic!("no observations") };
+    let read: usize = images.iter().map(|i| i.observations.len()).sum();
+    assert_eq!(read, all - left_out);
+}
+
+#[test]
+fn solution_json_reads_back_with_everything_in_it() {
+    let description = robot();
+    let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
+    let files = files(&solution, &context(&description)).unwrap();
+    let record = solution_json::read(&files["solution.json"]).unwrap();
+    assert_eq!(record.files, files.keys().cloned().collect::<Vec<_>>());
+    let layout = &solution.problem.layout;
+    assert_eq!(record.estimates.len(), layout.len());
+    assert_eq!(record.covariance_lower.len(), layout.len() * (layout.len() + 1) / 2);
+    let values = solution.state.values(layout);
+    let mut diagonal = 0;
+    for (k, e) in record.estimates.iter().enumerate() {
+        assert_eq!(e.name, layout.columns[k].name);
+        assert!(e.value.is_none_or(|v| v == values[k]));
+        // The 6 columns of the camera's mounting and of the plate's placement are perturbations.
+        assert_eq!(e.value.is_none(), e.name.starts_with("hand_camera.") || e.name.starts_with("plate/"), "{}", e.name);
+        assert_eq!(e.prior_sigma.is_none(), layout.columns[k].prior_sigma.is_infinite());
+        diagonal += k;
+        let variance = record.covariance_lower[diagonal + k];
+        assert!((variance.sqrt() - e.sigma.unwrap()).abs() <= 1e-12 * e.sigma.unwrap());
+    }
+    for (k, image) in record.images.iter().enumerate() {
+        let given = &solution.problem.images[k];
+        assert_eq!(image.name, given.name);
+        assert_eq!(image.readings.as_ref(), given.stop.as_ref().map(|s| &s.readings));
+        assert_eq!(image.observations.uv.len(), given.observations.len());
+        assert!(image.free_pose.is_some() && image.held_out_mm.is_some());
+    }
+    assert_eq!(record.inputs[0].sha256.len(), 64);
+    let again: solution_json::SolutionRecord = solution_json::read(&serde_json::to_vec(&record).unwrap()).unwrap();
+    assert_eq!(again, record);
+    // Text files are the same on every run.
+    let second = robotcal::output::files(&solution, &context(&description)).unwrap();
+    assert_eq!(files, second);
+    let newer = String::from_utf8(files["solution.json"].clone()).unwrap().replacen("\"format\":1", "\"format\":2", 1);
+    assert!(solution_json::read(newer.as_bytes()).unwrap_err().what.contains("format = 2"));
+}
+
+#[test]
+fn nothing_names_a_folder_of_the_machine() {
+    let description = robot();
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let files = files(&solution, &context(&description)).unwrap();
+    let named: Vec<PathBuf> = files.keys().map(PathBuf::from).collect();
+    assert!(named.iter().all(|n| n.components().count() == 1));
+    for (name, bytes) in &files {
+        assert!(!String::from_utf8_lossy(bytes).contains("/somewhere/"), "{name}");
+    }
+}
