@@ -20,7 +20,9 @@ pub use joints::{DEFAULT_PLACEMENT, Stop, Stops};
 pub use manifest::{
     AngleUnit, CameraMount, CameraSection, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder,
 };
-pub use mcap::{CameraInfo, Clock, Extracted, Motion, Picking, RecordingOptions, StopReport, extract};
+pub use mcap::{
+    CameraInfo, Clock, Extracted, Motion, Picking, RecordingOptions, Shown, StopReport, extract, write_recording,
+};
 pub use observation::{Edge, ImageObservations, Observation};
 pub use observation_file::observations_csv;
 pub use plate::{Aruco, Marker, Plate, PlateKind, ScaleBar};
