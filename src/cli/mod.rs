@@ -43,7 +43,7 @@ struct Cli {
 enum Command {
     /// Compare two-stage estimators with the joint fit, on a series or in simulation
     Compare(compare::CompareArgs),
-    /// Turn a recording (MCAP, rosbag2) into a series folder
+    /// Turn a recording (MCAP, rosbag2) into a series folder, or a series folder into a recording
     Convert(convert::ConvertArgs),
     /// Identify robot, camera, hand-camera offset and plate from one or more series
     Identify(identify::IdentifyArgs),
