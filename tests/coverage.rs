@@ -12,7 +12,7 @@ use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
 use robotcal::urdf::Chain;
 use std::path::Path;
 
-const SEEDS: u64 = 24;
+const SEEDS: u64 = 20;
 
 fn chain() -> Chain {
     let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
