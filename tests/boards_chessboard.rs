@@ -72,7 +72,7 @@ fn uneven_light_does_not_move_corners() {
     let even = tilted(9, 6, 0.3);
     let flat = found(&even, 0);
     for (slope, most) in [(0.0003, 0.002), (0.001, 0.004)] {
-        let scene = Scene { slope: [slope, -0.5 * slope], ..even };
+        let scene = Scene { slope: [slope, -0.5 * slope], ..even.clone() };
         let uneven = found(&scene, 0);
         let shifts: Vec<_> = uneven
             .observations

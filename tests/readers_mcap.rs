@@ -248,3 +248,29 @@ fn a_cut_or_damaged_file_gives_what_stands_before_the_damage() {
     let message = refusal(&path, &three());
     assert!(message.contains("no joint states"), "{message}");
 }
+
+/// Wrong bytes anywhere, in checked chunks and in a file without checksums: an answer or an error, never a panic.
+#[test]
+fn wrong_bytes_never_panic() {
+    use rand::{RngExt, SeedableRng};
+    let seed = 20_250_204;
+    println!("seed {seed}");
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("wrong.mcap");
+    for name in ["lz4.mcap", "mono8/mono8.mcap"] {
+        let whole = fs::read(recording(name)).unwrap();
+        for _ in 0..60 {
+            let mut wrong = whole.clone();
+            for _ in 0..random.random_range(1..4) {
+                let at = random.random_range(0..wrong.len());
+                wrong[at] ^= 1 << random.random_range(0..8);
+            }
+            fs::write(&path, &wrong).unwrap();
+            match extract(&path, &folder.path().join("images"), &three()) {
+                Ok(extracted) => assert!(extracted.stops.stops.len() <= 2 * STOPS),
+                Err(error) => assert_eq!(error.exit_code(), 2),
+            }
+        }
+    }
+}

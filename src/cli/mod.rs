@@ -40,7 +40,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Turn a recording (MCAP, rosbag2) into a series folder
+    /// Turn a recording (MCAP, rosbag2) into a series folder, or a series folder into a recording
     Convert(convert::ConvertArgs),
     /// Identify robot, camera, hand-camera offset and plate from one or more series
     Identify(identify::IdentifyArgs),

@@ -61,6 +61,11 @@ pub(super) enum Labelling {
 }
 
 impl Placement {
+    /// Lattice coordinates that are board coordinates already.
+    pub fn identity(board: BoardSize) -> Self {
+        Self { board, turns: 0, mirrored: false, origin: (0, 0) }
+    }
+
     /// Extent of the board along u and v.
     fn extent(self) -> (i32, i32) {
         let BoardSize { columns, rows } = self.board;

@@ -3,32 +3,20 @@
 //! The lattice of corners comes from the `calib-targets` library; which corner is which, the sub-pixel position in the
 //! full depth of the picture and its covariance are found here.
 
-use std::collections::BTreeMap;
-
 use calib_targets::chessboard::{ChessboardDetector, ChessboardParams, detect_corners};
 use calib_targets::core::GrayImageView;
 use calib_targets::detect::{DetectorConfig, ImageRefiner, default_chess_config};
 
-use super::board_labels::{BoardSize, Label, Labelling, Lattice, Placement, label};
-use super::saddle::{Saddle, Seed, Window, refine};
-use super::{Detection, Dropped, Picture};
+use super::board_labels::{BoardSize, Label, Labelling, Lattice, label};
+use super::corners::measure;
+use super::saddle::Window;
+use super::{Detection, Picture};
 use crate::error::{Error, Notice, Result};
-use crate::geom::PlaneMap;
-use crate::series::{Edge, Observation, Plate};
+use crate::series::Plate;
 
 /// Pixels for one corner: as far along the edges as the next corners do not disturb, and near enough that the lens
 /// does not bend the edges.
-const WINDOW: Window = Window { reach: 0.4, radius_px: 16.0 };
-/// Neighbours up to this many squares away say where a corner is and how the edges run ...
-const REACH: i32 = 2;
-/// ... and up to this many where a gap in the lattice has to be bridged.
-const FAR_REACH: i32 = 5;
-/// A corner with less than this share of the usual contrast is none.
-const WEAK: f64 = 0.3;
-/// A fit this many times worse than usual is disturbed by something else in the window ...
-const DISTURBED: f64 = 3.0;
-/// ... if its residuals exceed this share of the contrast.
-const LEAST_DISTURBED: f64 = 0.06;
+pub(super) const WINDOW: Window = Window { reach: 0.4, radius_px: 16.0, arm: 1.0, keep_off_px: 0.0 };
 
 /// Finds the inner corners of a chessboard; parts of the board may be out of view or covered.
 ///
@@ -57,121 +45,12 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     if blank_line {
         notices.push(blank_line_notice(board));
     }
-    let mut detection = measure(picture, &lattice, placement);
+    let mut detection = measure(picture, &lattice, placement, WINDOW);
     detection.notices = notices;
     Ok(detection)
 }
 
-/// Sub-pixel positions of all corners of the board, also of those that the lattice finder left out.
-fn measure(picture: &Picture, lattice: &Lattice, placement: Placement) -> Detection {
-    let mut detection = Detection::default();
-    let mut fitted = BTreeMap::new();
-    for (&key, &uv) in lattice {
-        let seed = seed(lattice, key, REACH).ok_or("no neighbours");
-        match seed.and_then(|seed| refine(picture, &seed, WINDOW)) {
-            _ if placement.id(key).is_none() => detection.dropped.push(Dropped { uv, reason: "off the board" }),
-            Ok(saddle) => drop(fitted.insert(key, saddle)),
-            Err(reason) => detection.dropped.push(Dropped { uv, reason }),
-        }
-    }
-    let usual = Usual::of(&fitted);
-    let mut kept = BTreeMap::new();
-    for (key, saddle) in fitted {
-        match usual.fault(key, &saddle, placement) {
-            None => drop(kept.insert(key, saddle)),
-            Some(reason) => detection.dropped.push(Dropped { uv: saddle.uv, reason }),
-        }
-    }
-    find_missing(picture, lattice, placement, &usual, &mut kept);
-    for (key, saddle) in kept {
-        if let Some(marker) = placement.id(key) {
-            let (uv, covariance) = (saddle.uv, Some(saddle.covariance));
-            detection.observations.push(Observation { marker, edge: Edge::Outer, uv, covariance });
-        }
-    }
-    detection.observations.sort_by_key(|o| o.marker);
-    detection
-}
-
-/// Fits the corners that the lattice lacks, working outwards from those that are known.
-fn find_missing(
-    picture: &Picture,
-    lattice: &Lattice,
-    placement: Placement,
-    usual: &Usual,
-    kept: &mut BTreeMap<(i32, i32), Saddle>,
-) {
-    let mut known: Lattice = kept.iter().map(|(&key, saddle)| (key, saddle.uv)).collect();
-    let mut reach = REACH;
-    loop {
-        let missing = placement.corners().filter(|key| !known.contains_key(key) && !lattice.contains_key(key));
-        let found: Vec<_> = missing
-            .filter_map(|key| {
-                let saddle = refine(picture, &seed(&known, key, reach)?, WINDOW).ok()?;
-                usual.fault(key, &saddle, placement).is_none().then_some((key, saddle))
-            })
-            .collect();
-        if found.is_empty() && reach == FAR_REACH {
-            return;
-        }
-        reach = if found.is_empty() { FAR_REACH } else { REACH };
-        known.extend(found.iter().map(|(key, saddle)| (*key, saddle.uv)));
-        kept.extend(found);
-    }
-}
-
-/// What most corners of the picture have in common.
-struct Usual {
-    /// Half the step between the squares, counts.
-    contrast: f64,
-    /// Residual of the fit over that.
-    residual: f64,
-}
-
-impl Usual {
-    fn of(fitted: &BTreeMap<(i32, i32), Saddle>) -> Self {
-        Self {
-            contrast: median(fitted.values().map(|s| s.contrast.abs())),
-            residual: median(fitted.values().map(|s| s.noise / s.contrast.abs())),
-        }
-    }
-
-    /// Why a fitted corner cannot be one of this board.
-    fn fault(&self, (u, v): (i32, i32), saddle: &Saddle, placement: Placement) -> Option<&'static str> {
-        let contrast = if placement.is_dark((u - 1, v)) { -saddle.contrast } else { saddle.contrast };
-        if contrast < WEAK * self.contrast {
-            Some("weak or wrong contrast")
-        } else if saddle.noise > f64::max(DISTURBED * self.residual, LEAST_DISTURBED) * contrast {
-            Some("disturbed surroundings")
-        } else {
-            None
-        }
-    }
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// A corner with the directions and lengths of the edges there, from the map of its neighbourhood.
-fn seed(lattice: &Lattice, (u, v): (i32, i32), reach: i32) -> Option<Seed> {
-    let pairs: Vec<_> = (v - reach..=v + reach)
-        .flat_map(|j| (u - reach..=u + reach).map(move |i| (i, j)))
-        .filter(|&key| key != (u, v))
-        .filter_map(|key| Some(([f64::from(key.0 - u), f64::from(key.1 - v)], *lattice.get(&key)?)))
-        .collect();
-    let map = PlaneMap::fit(&pairs)?;
-    let [[xu, xv], [yu, yv]] = map.jacobian([0.0, 0.0])?;
-    let predicted = map.apply([0.0, 0.0])?;
-    let near =
-        |uv: &&[f64; 2]| (uv[0] - predicted[0]).hypot(uv[1] - predicted[1]) < 0.2 * xu.hypot(yu).min(xv.hypot(yv));
-    let uv = lattice.get(&(u, v)).filter(near).copied().unwrap_or(predicted);
-    Some(Seed { uv, sides: [[xu, yu], [xv, yv]] })
-}
-
-fn board_size(plate: &Plate) -> Result<BoardSize> {
+pub(super) fn board_size(plate: &Plate) -> Result<BoardSize> {
     let size = (i32::try_from(plate.columns), i32::try_from(plate.rows));
     match size {
         (Ok(columns @ 2..=1000), Ok(rows @ 2..=1000)) => Ok(BoardSize { columns, rows }),
@@ -199,7 +78,7 @@ fn find_lattice(picture: &Picture) -> Option<Lattice> {
 }
 
 /// Saddle fit over 9 x 9 px: half the scatter of the library's default on real images.
-fn corner_config() -> DetectorConfig {
+pub(super) fn corner_config() -> DetectorConfig {
     let mut refiner = ImageRefiner::saddle_point();
     if let ImageRefiner::SaddlePoint(config) = &mut refiner {
         config.radius = 4;
@@ -210,7 +89,7 @@ fn corner_config() -> DetectorConfig {
 
 /// Grey values scaled to 8 bits, for finding corners only: bright 8-bit pictures stay as they are, others are stretched
 /// so that all but the brightest thousandth of their pixels fit.
-fn to_8_bit(picture: &Picture) -> Vec<u8> {
+pub(super) fn to_8_bit(picture: &Picture) -> Vec<u8> {
     let bright = bright_level(picture);
     let scale = if (128.0..=255.0).contains(&bright) && picture.full_scale <= 255.0 { 1.0 } else { 255.0 / bright };
     picture.pixels.iter().map(|&p| (p * scale + 0.5) as u8).collect()

@@ -69,6 +69,10 @@ pub(super) struct Window {
     pub reach: f64,
     /// Largest radius, px.
     pub radius_px: f64,
+    /// Pixels further from both edges than this share of the side, less `keep_off_px`, are left out: something is printed there.
+    pub arm: f64,
+    /// Distance to keep from what is printed there, px.
+    pub keep_off_px: f64,
 }
 
 struct Pixel {
@@ -155,6 +159,8 @@ fn pixels(picture: &Picture, seed: &Seed, window: Window) -> Result<Vec<Pixel>, 
     let low = |c: f64| (c - window.radius_px).ceil().max(0.0);
     let high = |c: f64, last: f64| (c + window.radius_px).floor().min(last);
     let (x1, y1) = (high(cx, last_x), high(cy, last_y));
+    // Distance from the edges per unit of the coordinates p and q.
+    let (from_b, from_a) = (area.abs() / bx.hypot(by), area.abs() / ax.hypot(ay));
     let mut found = Vec::new();
     let mut y = low(cy);
     while y <= y1 {
@@ -163,7 +169,9 @@ fn pixels(picture: &Picture, seed: &Seed, window: Window) -> Result<Vec<Pixel>, 
             let (dx, dy) = (x - cx, y - cy);
             let (p, q) = ((dx * by - dy * bx) / area, (dy * ax - dx * ay) / area);
             let near = dx * dx + dy * dy <= window.radius_px * window.radius_px;
-            if near && p.abs() <= window.reach && q.abs() <= window.reach {
+            let on_arm = (p.abs() - window.arm) * from_b <= -window.keep_off_px
+                || (q.abs() - window.arm) * from_a <= -window.keep_off_px;
+            if near && on_arm && p.abs() <= window.reach && q.abs() <= window.reach {
                 found.push(Pixel { x: dx, y: dy, value: f64::from(picture.at(x as usize, y as usize)) });
             }
             x += 1.0;

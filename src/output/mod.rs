@@ -5,6 +5,7 @@
 
 mod camera_file;
 mod compensation;
+mod compensation_read;
 mod estimates;
 mod gauge;
 mod names;
@@ -22,6 +23,7 @@ mod solution_record;
 mod text;
 mod write;
 
+pub use compensation_read::read_compensation;
 pub use write::write_all;
 
 use std::collections::BTreeMap;

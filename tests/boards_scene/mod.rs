@@ -2,6 +2,7 @@
 
 #![allow(dead_code)]
 
+use calib_targets::aruco::Dictionary;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -49,9 +50,23 @@ fn project(m: &[[f64; 3]; 3], p: [f64; 2]) -> [f64; 2] {
 /// Fine pixels per pixel and axis.
 const FINE: usize = 3;
 
+/// What is printed beside the squares of a chessboard, or instead of them.
+#[derive(Debug, Clone)]
+pub enum Print {
+    Chessboard,
+    /// Markers of a dictionary in the light squares.
+    Charuco {
+        dictionary: Dictionary,
+        ratio: f64,
+    },
+    /// Dark dots: x, y (down) and radius.
+    Dots(Vec<[f64; 3]>),
+}
+
 /// How a board is recorded.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Scene {
+    pub print: Print,
     pub columns: u32,
     pub rows: u32,
     pub size: (usize, usize),
@@ -70,6 +85,7 @@ pub struct Scene {
 impl Scene {
     pub fn new(columns: u32, rows: u32, view: View) -> Self {
         Self {
+            print: Print::Chessboard,
             columns,
             rows,
             size: (640, 480),
@@ -85,9 +101,35 @@ impl Scene {
 
     /// Shade of the printed plane: 0 dark, 1 light; a quiet margin around the board.
     fn shade(&self, [x, y]: [f64; 2]) -> f64 {
+        if let Print::Dots(dots) = &self.print {
+            let inside = |d: &[f64; 3]| (x - d[0]).powi(2) + (y - d[1]).powi(2) < d[2] * d[2];
+            return if dots.iter().any(inside) { 0.0 } else { 1.0 };
+        }
         let (c, r) = ((x + 1.0).floor(), (y + 1.0).floor());
         let inside = c >= 0.0 && r >= 0.0 && c <= f64::from(self.columns) && r <= f64::from(self.rows);
-        if inside && (c + r).rem_euclid(2.0) < 0.5 { 0.0 } else { 1.0 }
+        if !inside {
+            return 1.0;
+        }
+        if (c + r).rem_euclid(2.0) < 0.5 { 0.0 } else { self.light_square([x + 1.0 - c, y + 1.0 - r], c, r) }
+    }
+
+    /// Shade inside a light square; `at` runs from 0 to 1 along both sides.
+    fn light_square(&self, at: [f64; 2], c: f64, r: f64) -> f64 {
+        let Print::Charuco { dictionary, ratio } = &self.print else { return 1.0 };
+        let side = dictionary.marker_size() + 2;
+        let bit = at.map(|t| ((t - 0.5) / ratio + 0.5) * side as f64);
+        if bit.iter().any(|b| *b < 0.0 || *b >= side as f64) {
+            return 1.0;
+        }
+        let [x, y] = bit.map(|b| b as usize);
+        if x == 0 || y == 0 || x == side - 1 || y == side - 1 {
+            return 0.0;
+        }
+        // Light squares before this one, row by row.
+        let before = r as usize * (self.columns as usize + 1) + c as usize;
+        let code = dictionary.codes()[before / 2];
+        let index = (y - 1) * (side - 2) + x - 1;
+        1.0 - f64::from(((code >> index) & 1) as u8)
     }
 
     /// True position of a corner.
