@@ -134,6 +134,7 @@ fn what_is_written_reads_back_the_same() {
         rows: 0,
         pitch_m: 0.0,
         tolerance_m: 1e-4,
+        aruco: None,
         scale: Some(ScaleBar { from: 3, to: 12, distance_m: 0.1 + 0.2, sigma_m: 1e-6 }),
         markers: vec![marker(3, 0.0, 0.01, 0.005, 1e-4), marker(12, 0.3, 0.0, 0.0, 3e-5)],
     };

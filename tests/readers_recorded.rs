@@ -3,7 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use robotcal::series::{RecordingOptions, Series, Source, convert_recording, read};
+use robotcal::geom::Pose;
+use robotcal::series::{
+    Edge, ImageObservations, Observation, RecordingOptions, Series, Shown, Source, convert_recording, extract, read,
+    write_recording,
+};
 use robotcal::urdf::{Chain, RobotDescription};
 use tempfile::TempDir;
 
@@ -122,4 +126,64 @@ fn a_conversion_that_fails_leaves_nothing_behind() {
         convert_recording(&folder.path().join("run.mcap"), &folder.path().join("out"), &RecordingOptions::default());
     assert!(error.unwrap_err().to_string().contains("lost.toml"));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), before);
+}
+
+/// Stops of the `lz4.mcap` recording as a folder, with one picture as 16-bit tif and one image off the robot.
+fn folder_series(folder: &Path) -> Series {
+    let recorded = recorded("run.toml", MANIFEST);
+    let converted = folder.join("series");
+    convert_recording(&recorded.path().join("run.mcap"), &converted, &RecordingOptions::default()).unwrap();
+    let joints = fs::read_to_string(converted.join("joints.csv")).unwrap();
+    let first = joints.lines().nth(1).unwrap().split(',').next().unwrap().to_string();
+    let picture = image::open(converted.join("images").join(&first)).unwrap();
+    picture.to_luma16().save(converted.join("images/deep.tif")).unwrap();
+    fs::copy(converted.join("images").join(&first), converted.join("images/off.png")).unwrap();
+    fs::write(converted.join("joints.csv"), joints.replace(&first, "deep.tif") + "off.png,,,,\n").unwrap();
+    read(&converted).unwrap()
+}
+
+#[test]
+fn a_folder_written_as_a_recording_reads_back_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let series = folder_series(folder.path());
+    let chain = chain();
+    let readings = series.readings_for(&chain).unwrap();
+    let poses: Vec<_> =
+        readings.iter().map(|r| r.as_ref().map(|_| Pose::from_xyz_rpy([1.0, 2.0, 3.0], [0.0; 3]))).collect();
+    let marks = [ImageObservations {
+        image: "deep.tif".into(),
+        observations: vec![Observation { marker: 1, edge: Edge::Outer, uv: [3.0, 4.25], covariance: None }],
+    }];
+    let shown =
+        Shown { joints: &chain.readings, readings: &readings, frames: Some(("base", "d", &poses)), marks: &marks };
+    let path = folder.path().join("again.mcap");
+    let notices = write_recording(&path, &series, shown).unwrap();
+    assert_eq!(notices.len(), 1, "the image off the robot is told of: {notices:?}");
+    let error = write_recording(&path, &series, shown).unwrap_err().to_string();
+    assert!(error.contains("exists already"), "{error}");
+
+    let options = RecordingOptions { joints: chain.readings.clone(), ..RecordingOptions::default() };
+    let again = extract(&path, &folder.path().join("pictures"), &options).unwrap();
+    assert!(again.notices.is_empty(), "{:?}", again.notices);
+    assert_eq!(again.stops.stops.len(), 5);
+    for ((a, b), readings) in again.stops.stops.iter().zip(&series.stops.stops).zip(&readings) {
+        assert_eq!(&a.raw_readings, readings);
+        // Nanoseconds of a double of 1.7e9 s.
+        assert!((a.time_s.unwrap() - b.time_s.unwrap()).abs() < 1e-6);
+        let [one, other] = [a, b].map(|s| image::open(s.path.as_ref().unwrap()).unwrap());
+        assert_eq!(one, other, "{} {}", a.image, b.image);
+    }
+
+    let bytes = fs::read(&path).unwrap();
+    let mut counts = std::collections::BTreeMap::new();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        *counts.entry(message.channel.topic.clone()).or_insert(0) += 1;
+        if message.channel.topic == "/camera/annotations" {
+            let text: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
+            assert_eq!(text["points"][0]["points"][0], serde_json::json!({"x": 3.5, "y": 4.75}));
+        }
+    }
+    let expected = [("/camera/annotations", 1), ("/camera/image/compressed", 5), ("/joint_states", 255), ("/tf", 5)];
+    assert_eq!(counts, expected.map(|(t, n)| (t.to_string(), n)).into());
 }

@@ -1,13 +1,15 @@
 //! `robotcal identify`: series in, corrected robot out.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
+use super::recording::{Pictures, RecordingArgs};
 use super::{Verdict, progress, summary};
 use crate::error::{Error, Notice, Result};
+use crate::output::{self, Context, Poses};
 use crate::recipe::{self, JointNoise, MeasuredSeries, Options, RobotModel};
-use crate::series::{self, Series};
+use crate::series::{self, InputFile, Series};
 use crate::urdf::{self, Chain, RobotDescription};
 
 /// Flags of `identify`.
@@ -16,7 +18,7 @@ pub(super) struct IdentifyArgs {
     /// Robot description (URDF)
     #[arg(long, value_name = "FILE")]
     urdf: PathBuf,
-    /// Series folder; give it several times to fit several series of the same robot together
+    /// Series folder or recording (.mcap, rosbag2 folder); give it several times to fit several series of the same robot together
     #[arg(long, value_name = "FOLDER", required = true)]
     series: Vec<PathBuf>,
     /// Folder for the results [default: reports/<series name>]
@@ -37,6 +39,8 @@ pub(super) struct IdentifyArgs {
     /// Also write the stand-alone camera poses (poses.csv)
     #[arg(long)]
     poses: bool,
+    #[command(flatten)]
+    recording: RecordingArgs,
 }
 
 /// Names of the robot models.
@@ -65,13 +69,44 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let description = urdf::read(&args.urdf)?;
     let all = read_all(&args.series)?;
     let chain = chain(&description, &all, args)?;
+    let pictures = Pictures::new();
+    let all = pictures.of_recordings(all, &args.recording.options(&chain.readings)?)?;
     let mut notices = description.notices.clone();
     let measured = measure_all(&all, &chain, &mut notices)?;
     let mut solution = recipe::identify(chain, &measured, &options)?;
     notices.append(&mut solution.notices);
     solution.notices = notices;
+    let names: Vec<String> = all.iter().map(|s| s.name.clone()).collect();
+    let folder = args.out.clone().unwrap_or_else(|| Path::new("reports").join(names.join("+")));
+    let context = Context {
+        robot: &description,
+        robot_name: &description.name,
+        series: names,
+        inputs: inputs(args, &all)?,
+        options: in_words(args),
+        command: std::env::args().collect::<Vec<_>>().join(" "),
+        poses: if args.poses { Poses::Written } else { Poses::LeftOut },
+    };
+    let files = output::files(&solution, &context)?;
+    output::write_all(&folder, &files)?;
     print!("{}", summary::text(&solution, &measured));
+    println!("results   {} ({} files)", folder.display(), files.len());
     Ok(if solution.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed })
+}
+
+fn inputs(args: &IdentifyArgs, all: &[Series]) -> Result<Vec<InputFile>> {
+    let mut inputs = vec![InputFile::of_file(&args.urdf)?];
+    for s in all {
+        inputs.extend(s.inputs.iter().cloned());
+        inputs.extend(s.image_hashes()?);
+    }
+    Ok(inputs)
+}
+
+fn in_words(args: &IdentifyArgs) -> Vec<(String, String)> {
+    let joint_noise = args.joint_noise.map_or("estimated".to_owned(), |s| format!("{s} rad"));
+    let robot_model = args.robot_model.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned());
+    vec![("joint noise".to_owned(), joint_noise), ("robot model".to_owned(), robot_model)]
 }
 
 fn joint_noise(sigma: Option<f64>) -> Result<JointNoise> {

@@ -2,9 +2,11 @@
 //!
 //! To add a subcommand: a file with its `Args` and `run`, a variant of [`Command`] and a row in [`Command::run`].
 
+mod convert;
 mod identify;
 mod plate;
 mod progress;
+mod recording;
 mod simulate;
 mod summary;
 mod verify;
@@ -38,6 +40,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Turn a recording (MCAP, rosbag2) into a series folder, or a series folder into a recording
+    Convert(convert::ConvertArgs),
     /// Identify robot, camera, hand-camera offset and plate from one or more series
     Identify(identify::IdentifyArgs),
     /// Design a plate of coded circles and draw it for printing
@@ -60,6 +64,7 @@ pub(crate) enum Verdict {
 impl Command {
     fn run(&self) -> Result<Verdict> {
         match self {
+            Self::Convert(args) => convert::run(args),
             Self::Identify(args) => identify::run(args),
             Self::Plate(args) => plate::run(args),
             Self::Simulate(args) => simulate::run(args),

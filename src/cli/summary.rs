@@ -142,24 +142,62 @@ const LEAST_SHARE: f64 = 0.1;
 fn undetermined(out: &mut String, s: &Solution) -> std::fmt::Result {
     let layout = &s.problem.layout;
     let robot = layout.twists.start..layout.terms.end;
-    let names: Vec<&str> = robot
+    let gauge = GaugeNames::of(s);
+    let weak: Vec<&str> = robot
         .clone()
         .filter(|&c| {
             let column = &layout.columns[c];
             column.free && 1.0 - (s.covariance.sigma(c) / column.prior_sigma).powi(2) < LEAST_SHARE
         })
         .map(|c| layout.columns[c].name.trim_start_matches("robot/"))
+        .filter(|name| !gauge.contains(name))
         .collect();
-    if names.is_empty() {
-        return writeln!(out, "unknown   nothing: every robot parameter is determined by the data");
+    writeln!(out, "gauge     {}", gauge.in_words())?;
+    if weak.is_empty() {
+        return writeln!(out, "unknown   nothing else: the data determine every robot parameter");
     }
     writeln!(
         out,
-        "unknown   {} of {} robot parameters stay near nominal (data say little): {}",
-        names.len(),
+        "unknown   {} of {} robot parameters stay near nominal, the data say little of them: {}",
+        weak.len(),
         robot.len(),
-        grouped(&names)
+        grouped(&weak)
     )
+}
+
+/// Robot parameters that no series can tell from the pose of plate and camera.
+struct GaugeNames {
+    first: Vec<String>,
+    last: Vec<String>,
+}
+
+impl GaugeNames {
+    fn of(s: &Solution) -> Self {
+        let chain = &s.state.robot.chain;
+        let moving = |j: &&crate::urdf::Joint| j.drive.is_some();
+        let before = chain.joints.iter().take_while(|j| j.drive.is_none());
+        let after = chain.joints.iter().rev().take_while(|j| j.drive.is_none());
+        let mut first: Vec<String> =
+            before.chain(chain.joints.iter().find(moving)).map(|j| format!("{}/origin", j.name)).collect();
+        let mut last: Vec<String> = after.map(|j| format!("{}/origin", j.name)).collect();
+        first.extend(chain.readings.first().map(|r| format!("{r}.offset")));
+        last.extend(chain.readings.last().map(|r| format!("{r}.offset")));
+        Self { first, last }
+    }
+
+    fn contains(&self, name: &str) -> bool {
+        self.first
+            .iter()
+            .chain(&self.last)
+            .any(|g| name == g || name.strip_prefix(g.as_str()).is_some_and(|rest| rest.starts_with('.')))
+    }
+
+    fn in_words(&self) -> String {
+        let (first, last) = (self.first.join(", "), self.last.join(", "));
+        format!(
+            "{first} cannot be told from the pose of the plate, {last} not from that of the camera: they need not be"
+        )
+    }
 }
 
 /// `joint_1/origin.x`, `joint_1/origin.y` -> `joint_1/origin (x y)`.

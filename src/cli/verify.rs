@@ -9,6 +9,7 @@ use super::Verdict;
 use crate::assess::{MeasuredPoint, fit_points};
 use crate::error::{Error, Result};
 use crate::model::robot::Robot;
+use crate::output::read_compensation;
 use crate::urdf::{self, Chain, JointKind};
 
 /// Flags of `verify`.
@@ -17,6 +18,9 @@ pub(super) struct VerifyArgs {
     /// Robot description to judge (a corrected URDF)
     #[arg(long, value_name = "FILE")]
     urdf: PathBuf,
+    /// Its compensation.toml: gear scale, harmonics, gravity and backlash, which a URDF cannot hold
+    #[arg(long, value_name = "FILE")]
+    compensation: Option<PathBuf>,
     /// Nominal robot description to compare with
     #[arg(long, value_name = "FILE")]
     nominal: Option<PathBuf>,
@@ -41,10 +45,12 @@ enum Unit {
 }
 
 pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
-    let rms = |file: &PathBuf| -> Result<(usize, f64, f64)> {
+    let rms = |file: &PathBuf, compensation: Option<&PathBuf>| -> Result<(usize, f64, f64)> {
         let chain = urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?;
         let points = read_points(&args.points, &chain, args.joint_unit)?;
-        let fit = fit_points(&Robot::nominal(chain), &points).ok_or_else(|| {
+        let terms = compensation.map_or(Ok(Vec::new()), |c| read_compensation(c, &chain))?;
+        let robot = Robot { terms, ..Robot::nominal(chain) };
+        let fit = fit_points(&robot, &points).ok_or_else(|| {
             Error::unsolved(
                 args.points.display(),
                 "the points do not determine the frame of the device and the reflector",
@@ -54,11 +60,11 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
         let worst = fit.residuals_m.iter().map(Vector3::norm).fold(0.0, f64::max);
         Ok((points.len(), 1e3 * fit.rms_m, 1e3 * worst))
     };
-    let (count, corrected, worst) = rms(&args.urdf)?;
+    let (count, corrected, worst) = rms(&args.urdf, args.compensation.as_ref())?;
     println!("points    {count} of {}; frame of the device and reflector fitted", args.points.display());
     println!("model     {}: {corrected:.3} mm RMS, worst {worst:.3} mm", args.urdf.display());
     let Some(file) = &args.nominal else { return Ok(Verdict::Good) };
-    let (_, nominal, worst) = rms(file)?;
+    let (_, nominal, worst) = rms(file, None)?;
     println!("nominal   {}: {nominal:.3} mm RMS, worst {worst:.3} mm", file.display());
     if corrected < nominal {
         println!("verdict   good: {:.0} % of the nominal error", 100.0 * corrected / nominal);

@@ -13,7 +13,7 @@ use crate::geom::PlaneMap;
 /// half the squares of a blank margin are right by chance.
 const WRONG_COLOUR: f64 = 3.0;
 /// Least mean agreement (-1 to 1) of the visible squares.
-const LEAST_AGREEMENT: f64 = 0.5;
+const LEAST_AGREEMENT: f64 = 0.65;
 
 /// Number of inner corners of the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +37,14 @@ pub(super) struct Placement {
     origin: (i32, i32),
 }
 
+/// Where the lattice lies on the board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Label {
+    pub labelling: Labelling,
+    /// Whether a whole line of squares is in view but not of the board's colours.
+    pub blank_line: bool,
+}
+
 /// What the colours say about where the lattice lies on the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Labelling {
@@ -46,13 +54,18 @@ pub(super) enum Labelling {
     Symmetric(Placement),
     /// Different parts of the board agree equally well: too little of its outline is seen.
     Ambiguous,
-    /// No placement agrees with the colours, but the mirrored board does.
+    /// The mirrored board agrees better with the colours.
     Mirrored,
-    /// No placement agrees with the colours.
+    /// No placement agrees with the colours, or the lattice is larger than the board.
     Contradiction,
 }
 
 impl Placement {
+    /// Lattice coordinates that are board coordinates already.
+    pub fn identity(board: BoardSize) -> Self {
+        Self { board, turns: 0, mirrored: false, origin: (0, 0) }
+    }
+
     /// Extent of the board along u and v.
     fn extent(self) -> (i32, i32) {
         let BoardSize { columns, rows } = self.board;
@@ -112,18 +125,43 @@ struct Scored {
 }
 
 /// Finds where the lattice lies on the board from the colours of the squares.
-pub(super) fn label(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Labelling {
+pub(super) fn label(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Label {
     let Some(shades) = Shades::read(picture, lattice, board.columns.max(board.rows) + 1) else {
-        return Labelling::Contradiction;
+        return Label { labelling: Labelling::Contradiction, blank_line: false };
     };
-    let scored = candidates(lattice, &shades, board, false);
+    let labelling = choose(lattice, &shades, board);
+    let blank_line = match labelling {
+        Labelling::Unique(placement) | Labelling::Symmetric(placement) => has_blank_line(&shades, placement),
+        _ => false,
+    };
+    Label { labelling, blank_line }
+}
+
+/// Whether the dark squares of a whole line of the board, as far as they are in view, are not dark.
+fn has_blank_line(shades: &Shades, placement: Placement) -> bool {
+    let ((u0, v0), (width, height)) = (placement.origin, placement.extent());
+    let blank = |line: &mut dyn Iterator<Item = (i32, i32)>| {
+        let dark: Vec<f64> = line.filter(|&cell| placement.is_dark(cell)).filter_map(|cell| shades.at(cell)).collect();
+        dark.len() >= 2 && dark.iter().all(|&shade| shade > 0.0)
+    };
+    (u0 - 1..u0 + width).any(|u| blank(&mut (v0 - 1..v0 + height).map(|v| (u, v))))
+        || (v0 - 1..v0 + height).any(|v| blank(&mut (u0 - 1..u0 + width).map(|u| (u, v))))
+}
+
+fn choose(lattice: &Lattice, shades: &Shades, board: BoardSize) -> Labelling {
+    let scored = candidates(lattice, shades, board, false);
     let Some(best) = scored.first().filter(|s| s.agreement >= LEAST_AGREEMENT) else {
-        let reflected = candidates(lattice, &shades, board, true);
-        let mirrored = reflected.first().is_some_and(|s| s.agreement >= LEAST_AGREEMENT);
-        return if mirrored { Labelling::Mirrored } else { Labelling::Contradiction };
+        return Labelling::Contradiction;
     };
     // A shift past the edge of the board costs at least half a row of squares in the wrong colour; half of that is asked for.
     let margin = 0.25 * (WRONG_COLOUR - 1.0) * f64::from(board.columns.min(board.rows) + 1);
+    let reflected = candidates(lattice, shades, board, true);
+    if reflected.first().is_some_and(|s| s.score > best.score + margin) {
+        return Labelling::Mirrored;
+    }
+    if goes_on(lattice, best.placement) {
+        return Labelling::Contradiction;
+    }
     let rivals: Vec<Placement> = scored.iter().filter(|s| s.score > best.score - margin).map(|s| s.placement).collect();
     if rivals.len() == 1 {
         return Labelling::Unique(best.placement);
@@ -134,6 +172,15 @@ pub(super) fn label(picture: &Picture, lattice: &Lattice, board: BoardSize) -> L
     }
     let upright = rivals.iter().min_by_key(|p| p.turns.min(4 - p.turns));
     Labelling::Symmetric(*upright.unwrap_or(&best.placement))
+}
+
+/// Whether the lattice goes on beyond a side of the board by most of a further line: then it is a larger board.
+fn goes_on(lattice: &Lattice, placement: Placement) -> bool {
+    let ((u0, v0), (width, height)) = (placement.origin, placement.extent());
+    let present = |key: (i32, i32)| lattice.contains_key(&key);
+    let column = |u: i32| 2 * (v0..v0 + height).filter(|&v| present((u, v))).count() >= height as usize;
+    let row = |v: i32| 2 * (u0..u0 + width).filter(|&u| present((u, v))).count() >= width as usize;
+    column(u0 - 1) || column(u0 + width) || row(v0 - 1) || row(v0 + height)
 }
 
 /// Placements that cover at least half of the lattice, best first.

@@ -7,22 +7,16 @@ use calib_targets::chessboard::{ChessboardDetector, ChessboardParams, detect_cor
 use calib_targets::core::GrayImageView;
 use calib_targets::detect::{DetectorConfig, ImageRefiner, default_chess_config};
 
-use super::board_labels::{BoardSize, Labelling, Lattice, Placement, label};
-use super::saddle::{Saddle, Seed, Window, refine};
-use super::{Detection, Dropped, Picture};
+use super::board_labels::{BoardSize, Label, Labelling, Lattice, label};
+use super::corners::measure;
+use super::saddle::Window;
+use super::{Detection, Picture};
 use crate::error::{Error, Notice, Result};
-use crate::geom::PlaneMap;
-use crate::series::{Edge, Observation, Plate};
+use crate::series::Plate;
 
 /// Pixels for one corner: as far along the edges as the next corners do not disturb, and near enough that the lens
 /// does not bend the edges.
-const WINDOW: Window = Window { reach: 0.4, radius_px: 16.0 };
-/// A corner with less than this share of the usual contrast is none.
-const WEAK: f64 = 0.3;
-/// A fit this many times worse than usual is disturbed by something else in the window ...
-const DISTURBED: f64 = 3.0;
-/// ... if its residuals exceed this share of the contrast.
-const LEAST_DISTURBED: f64 = 0.06;
+pub(super) const WINDOW: Window = Window { reach: 0.4, radius_px: 16.0, arm: 1.0, keep_off_px: 0.0 };
 
 /// Finds the inner corners of a chessboard; parts of the board may be out of view or covered.
 ///
@@ -37,7 +31,8 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
     let lattice = find_lattice(picture).ok_or_else(no_board)?;
     let mut notices = Vec::new();
-    let placement = match label(picture, &lattice, board) {
+    let Label { labelling, blank_line } = label(picture, &lattice, board);
+    let placement = match labelling {
         Labelling::Unique(placement) => placement,
         Labelling::Symmetric(placement) => {
             notices.push(symmetric_notice(board));
@@ -47,78 +42,15 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
         Labelling::Mirrored => return Err(mirrored()),
         Labelling::Contradiction => return Err(contradiction(board)),
     };
-    let mut detection = measure(picture, &lattice, placement);
+    if blank_line {
+        notices.push(blank_line_notice(board));
+    }
+    let mut detection = measure(picture, &lattice, placement, WINDOW);
     detection.notices = notices;
     Ok(detection)
 }
 
-/// A fitted corner with where it is on the lattice.
-struct Fitted {
-    key: (i32, i32),
-    marker: u32,
-    saddle: Saddle,
-}
-
-/// Sub-pixel positions of all corners of the board, also of those that the lattice finder left out.
-fn measure(picture: &Picture, lattice: &Lattice, placement: Placement) -> Detection {
-    let mut detection = Detection::default();
-    let mut fitted = Vec::new();
-    for key in placement.corners() {
-        let Some(marker) = placement.id(key) else { continue };
-        let Some(seed) = seed(lattice, key) else { continue };
-        match refine(picture, &seed, WINDOW) {
-            Ok(saddle) => fitted.push(Fitted { key, marker, saddle }),
-            Err(reason) if lattice.contains_key(&key) => detection.dropped.push(Dropped { uv: seed.uv, reason }),
-            Err(_) => {}
-        }
-    }
-    for (&key, &uv) in lattice {
-        if placement.id(key).is_none() {
-            detection.dropped.push(Dropped { uv, reason: "off the board" });
-        }
-    }
-    let typical_contrast = median(fitted.iter().map(|f| f.saddle.contrast.abs()));
-    let typical_noise = median(fitted.iter().map(|f| f.saddle.noise / f.saddle.contrast.abs()));
-    for Fitted { key: (u, v), marker, saddle } in fitted {
-        let contrast = if placement.is_dark((u - 1, v)) { -saddle.contrast } else { saddle.contrast };
-        let disturbed = saddle.noise > f64::max(DISTURBED * typical_noise, LEAST_DISTURBED) * contrast.abs();
-        if contrast < WEAK * typical_contrast {
-            detection.dropped.push(Dropped { uv: saddle.uv, reason: "weak or wrong contrast" });
-        } else if disturbed {
-            detection.dropped.push(Dropped { uv: saddle.uv, reason: "disturbed surroundings" });
-        } else {
-            let (uv, covariance) = (saddle.uv, Some(saddle.covariance));
-            detection.observations.push(Observation { marker, edge: Edge::Outer, uv, covariance });
-        }
-    }
-    detection.observations.sort_by_key(|o| o.marker);
-    detection
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// A corner with the directions and lengths of the edges there, from the map of its neighbourhood.
-fn seed(lattice: &Lattice, (u, v): (i32, i32)) -> Option<Seed> {
-    let reach = 2;
-    let pairs: Vec<_> = (v - reach..=v + reach)
-        .flat_map(|j| (u - reach..=u + reach).map(move |i| (i, j)))
-        .filter(|&key| key != (u, v))
-        .filter_map(|key| Some(([f64::from(key.0 - u), f64::from(key.1 - v)], *lattice.get(&key)?)))
-        .collect();
-    let map = PlaneMap::fit(&pairs)?;
-    let [[xu, xv], [yu, yv]] = map.jacobian([0.0, 0.0])?;
-    let predicted = map.apply([0.0, 0.0])?;
-    let near =
-        |uv: &&[f64; 2]| (uv[0] - predicted[0]).hypot(uv[1] - predicted[1]) < 0.2 * xu.hypot(yu).min(xv.hypot(yv));
-    let uv = lattice.get(&(u, v)).filter(near).copied().unwrap_or(predicted);
-    Some(Seed { uv, sides: [[xu, yu], [xv, yv]] })
-}
-
-fn board_size(plate: &Plate) -> Result<BoardSize> {
+pub(super) fn board_size(plate: &Plate) -> Result<BoardSize> {
     let size = (i32::try_from(plate.columns), i32::try_from(plate.rows));
     match size {
         (Ok(columns @ 2..=1000), Ok(rows @ 2..=1000)) => Ok(BoardSize { columns, rows }),
@@ -146,7 +78,7 @@ fn find_lattice(picture: &Picture) -> Option<Lattice> {
 }
 
 /// Saddle fit over 9 x 9 px: half the scatter of the library's default on real images.
-fn corner_config() -> DetectorConfig {
+pub(super) fn corner_config() -> DetectorConfig {
     let mut refiner = ImageRefiner::saddle_point();
     if let ImageRefiner::SaddlePoint(config) = &mut refiner {
         config.radius = 4;
@@ -157,7 +89,7 @@ fn corner_config() -> DetectorConfig {
 
 /// Grey values scaled to 8 bits, for finding corners only: bright 8-bit pictures stay as they are, others are stretched
 /// so that all but the brightest thousandth of their pixels fit.
-fn to_8_bit(picture: &Picture) -> Vec<u8> {
+pub(super) fn to_8_bit(picture: &Picture) -> Vec<u8> {
     let bright = bright_level(picture);
     let scale = if (128.0..=255.0).contains(&bright) && picture.full_scale <= 255.0 { 1.0 } else { 255.0 / bright };
     picture.pixels.iter().map(|&p| (p * scale + 0.5) as u8).collect()
@@ -197,7 +129,11 @@ fn ambiguous() -> Error {
 }
 
 fn mirrored() -> Error {
-    Error::input("image", "the chessboard is mirrored", "turn off mirroring in the camera or in the image export")
+    Error::input(
+        "image",
+        "the chessboard is mirrored, or its top-left square is light",
+        "turn off mirroring in the camera or in the image export; the plate's first square must be dark",
+    )
 }
 
 fn contradiction(board: BoardSize) -> Error {
@@ -216,5 +152,13 @@ fn symmetric_notice(board: BoardSize) -> Notice {
             board.columns, board.rows
         ),
         "keep the camera within 90 degrees of upright, or use a board with an odd and an even number of squares",
+    )
+}
+
+fn blank_line_notice(board: BoardSize) -> Notice {
+    Notice::new(
+        "image",
+        "a whole line of the chessboard's squares is not seen where it should be",
+        format!("if nothing covers it, the board has fewer than {} x {} inner corners", board.columns, board.rows),
     )
 }

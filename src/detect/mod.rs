@@ -3,16 +3,22 @@
 //! A new kind of plate is one file that maps a [`Picture`] and a [`Plate`] to a [`Detection`], and one row in [`detect`].
 
 mod board_labels;
+pub mod charuco;
 pub mod chessboard;
 pub mod circles;
+mod corners;
 mod detection;
+mod flat_field;
 mod load;
+mod mosaic;
 mod picture;
 mod run;
 mod saddle;
 
 pub use detection::{Detection, Dropped};
+pub use flat_field::FlatField;
 pub use load::{LUMA_WEIGHTS, load};
+pub use mosaic::Mosaic;
 pub use picture::Picture;
 pub use run::{SeriesImage, detect_series};
 
@@ -27,11 +33,8 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     match plate.kind {
         PlateKind::Chessboard => chessboard::detect(picture, plate),
         PlateKind::CodedCircles => circles::detect(picture, plate, &circles::Options::default())?.into_common(),
-        PlateKind::CircleGrid | PlateKind::Charuco => Err(Error::input(
-            "plate",
-            format!("plates of kind {:?} cannot be detected yet", plate.kind),
-            "use coded circles or a chessboard, or give observations.csv",
-        )),
+        PlateKind::CircleGrid => circles::detect_grid(picture, plate, &circles::Options::default()),
+        PlateKind::Charuco => charuco::detect(picture, plate),
         PlateKind::Points => Err(Error::input(
             "plate",
             "a plate of kind \"points\" has no markers that can be seen in an image",

@@ -22,8 +22,8 @@ type Matrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
 const MAX_STEPS: usize = 25;
 /// A step below this moves no corner visibly, px.
 const STEP_TOLERANCE_PX: f64 = 1e-4;
-/// Pixel noise over half the step of an edge for which the priors are stated.
-const NOISE_PER_CONTRAST: f64 = 0.03;
+/// Noise of the pixels over half the step of an edge, as long as it is not known.
+const START_NOISE: f64 = 0.03;
 /// Prior sigma of the slope of the light, share of the contrast per px.
 const SLOPE_PER_PX: f64 = 0.0003;
 /// Prior sigma of the growth of the dark squares, in blurs.
@@ -37,6 +37,8 @@ const OFF_LATTICE: f64 = 0.2;
 /// What print, lens and blur of other shapes leave beyond the noise, px per axis; seen on real boards after their
 /// printing errors are taken out.
 const SYSTEMATIC_PX: f64 = 0.015;
+/// A corner nearer to the edge of the picture is not fitted, px.
+const LEAST_MARGIN_PX: f64 = 4.0;
 /// Least sine of the angle between the two edges.
 const LEAST_CROSSING: f64 = 0.1;
 
@@ -67,6 +69,10 @@ pub(super) struct Window {
     pub reach: f64,
     /// Largest radius, px.
     pub radius_px: f64,
+    /// Pixels further from both edges than this share of the side, less `keep_off_px`, are left out: something is printed there.
+    pub arm: f64,
+    /// Distance to keep from what is printed there, px.
+    pub keep_off_px: f64,
 }
 
 struct Pixel {
@@ -84,26 +90,57 @@ struct Prediction {
 /// Fits the model around a seed; the reason where that is not possible.
 pub(super) fn refine(picture: &Picture, seed: &Seed, window: Window) -> Result<Saddle, &'static str> {
     let pixels = pixels(picture, seed, window)?;
-    let mut state = start(seed, &pixels);
-    let prior = prior(state[10]);
-    let (mut normal, mut right, mut cost) = accumulate(&pixels, &state, &prior, picture.full_scale);
-    let mut damping = 1e-3;
-    for _ in 0..MAX_STEPS {
-        let Some(step) = solve(&normal, &right, damping) else { return Err(NO_FIT) };
-        let trial = state + step;
-        let (trial_normal, trial_right, trial_cost) = accumulate(&pixels, &trial, &prior, picture.full_scale);
-        let small = step[0].hypot(step[1]) < STEP_TOLERANCE_PX;
-        if trial_cost <= cost {
-            (state, normal, right, cost) = (trial, trial_normal, trial_right, trial_cost);
-            damping = f64::max(damping * 0.1, 1e-9);
-        } else {
-            damping *= 10.0;
-        }
-        if small || damping > 1e9 {
-            return finish(seed, &state, &normal, cost, pixels.len());
-        }
+    let guess = start(seed, &pixels);
+    let first =
+        Problem { pixels: &pixels, prior: prior(START_NOISE * guess[10], guess[10]), full_scale: picture.full_scale };
+    let rough = first.minimise(&guess)?;
+    let second = Problem { prior: prior(rough.variance(pixels.len()).sqrt(), rough.state[10]), ..first };
+    finish(seed, &second.minimise(&rough.state)?, pixels.len())
+}
+
+/// Least squares over the pixels of one corner.
+struct Problem<'a> {
+    pixels: &'a [Pixel],
+    prior: [(usize, f64); 5],
+    full_scale: f32,
+}
+
+/// The minimum, with the normal matrix there.
+struct Minimum {
+    state: Vector,
+    normal: Matrix,
+    cost: f64,
+}
+
+impl Minimum {
+    /// Of the residuals, counts^2.
+    fn variance(&self, pixels: usize) -> f64 {
+        self.cost / (pixels - PARAMETERS) as f64
     }
-    Err(NO_FIT)
+}
+
+impl Problem<'_> {
+    /// Levenberg-Marquardt.
+    fn minimise(&self, start: &Vector) -> Result<Minimum, &'static str> {
+        let mut state = *start;
+        let (mut normal, mut right, mut cost) = accumulate(self, &state);
+        let mut damping = 1e-3;
+        for _ in 0..MAX_STEPS {
+            let Some(step) = solve(&normal, &right, damping) else { return Err(NO_FIT) };
+            let trial = state + step;
+            let (trial_normal, trial_right, trial_cost) = accumulate(self, &trial);
+            if trial_cost <= cost {
+                (state, normal, right, cost) = (trial, trial_normal, trial_right, trial_cost);
+                damping = f64::max(damping * 0.1, 1e-9);
+            } else {
+                damping *= 10.0;
+            }
+            if step[0].hypot(step[1]) < STEP_TOLERANCE_PX || damping > 1e9 {
+                return Ok(Minimum { state, normal, cost });
+            }
+        }
+        Err(NO_FIT)
+    }
 }
 
 const NO_FIT: &str = "no crossing of two edges";
@@ -116,9 +153,14 @@ fn pixels(picture: &Picture, seed: &Seed, window: Window) -> Result<Vec<Pixel>, 
     }
     let [cx, cy] = seed.uv;
     let (last_x, last_y) = (picture.width as f64 - 1.0, picture.height as f64 - 1.0);
+    if cx.min(cy).min(last_x - cx).min(last_y - cy) < LEAST_MARGIN_PX {
+        return Err("at the edge of the picture");
+    }
     let low = |c: f64| (c - window.radius_px).ceil().max(0.0);
     let high = |c: f64, last: f64| (c + window.radius_px).floor().min(last);
     let (x1, y1) = (high(cx, last_x), high(cy, last_y));
+    // Distance from the edges per unit of the coordinates p and q.
+    let (from_b, from_a) = (area.abs() / bx.hypot(by), area.abs() / ax.hypot(ay));
     let mut found = Vec::new();
     let mut y = low(cy);
     while y <= y1 {
@@ -127,7 +169,9 @@ fn pixels(picture: &Picture, seed: &Seed, window: Window) -> Result<Vec<Pixel>, 
             let (dx, dy) = (x - cx, y - cy);
             let (p, q) = ((dx * by - dy * bx) / area, (dy * ax - dx * ay) / area);
             let near = dx * dx + dy * dy <= window.radius_px * window.radius_px;
-            if near && p.abs() <= window.reach && q.abs() <= window.reach {
+            let on_arm = (p.abs() - window.arm) * from_b <= -window.keep_off_px
+                || (q.abs() - window.arm) * from_a <= -window.keep_off_px;
+            if near && on_arm && p.abs() <= window.reach && q.abs() <= window.reach {
                 found.push(Pixel { x: dx, y: dy, value: f64::from(picture.at(x as usize, y as usize)) });
             }
             x += 1.0;
@@ -157,21 +201,20 @@ fn start(seed: &Seed, pixels: &[Pixel]) -> Vector {
     state
 }
 
-/// Weights of the parameters that are zero in an ideal picture, at the contrast `amplitude`.
-fn prior(amplitude: f64) -> [(usize, f64); 5] {
-    let noise = NOISE_PER_CONTRAST * amplitude;
-    let slope = NOISE_PER_CONTRAST / SLOPE_PER_PX;
-    let growth = noise / GROWTH;
-    [(6, growth * growth), (8, slope * slope), (9, slope * slope), (11, slope * slope), (12, slope * slope)]
+/// Weights of the parameters that are zero in an ideal picture, at a noise and a contrast in counts.
+fn prior(noise: f64, contrast: f64) -> [(usize, f64); 5] {
+    let growth = (noise / GROWTH).powi(2);
+    let slope = (noise / (SLOPE_PER_PX * contrast)).powi(2);
+    [(6, growth), (8, slope), (9, slope), (11, slope), (12, slope)]
 }
 
-fn accumulate(pixels: &[Pixel], state: &Vector, prior: &[(usize, f64)], full_scale: f32) -> (Matrix, Vector, f64) {
-    let full_scale = f64::from(full_scale);
+fn accumulate(problem: &Problem, state: &Vector) -> (Matrix, Vector, f64) {
+    let full_scale = f64::from(problem.full_scale);
     let mut normal = Matrix::zeros();
     let mut right = Vector::zeros();
     let mut cost = 0.0;
     let edges = Edges::new(state);
-    for pixel in pixels {
+    for pixel in problem.pixels {
         let predicted = edges.predict(state, pixel);
         let clipped = predicted.value >= full_scale;
         let residual = pixel.value - predicted.value.min(full_scale);
@@ -187,7 +230,7 @@ fn accumulate(pixels: &[Pixel], state: &Vector, prior: &[(usize, f64)], full_sca
             }
         }
     }
-    for (i, weight) in prior {
+    for (i, weight) in &problem.prior {
         normal[(*i, *i)] += weight;
         right[*i] -= weight * state[*i];
         cost += weight * state[*i] * state[*i];
@@ -205,7 +248,8 @@ fn solve(normal: &Matrix, right: &Vector, damping: f64) -> Option<Vector> {
     step.iter().all(|x| x.is_finite()).then_some(step)
 }
 
-fn finish(seed: &Seed, state: &Vector, normal: &Matrix, cost: f64, count: usize) -> Result<Saddle, &'static str> {
+fn finish(seed: &Seed, minimum: &Minimum, pixels: usize) -> Result<Saddle, &'static str> {
+    let Minimum { state, normal, .. } = minimum;
     let blurs = [state[4].exp(), state[5].exp()];
     let crossing = (state[2] - state[3]).sin().abs();
     let in_range = |s: &f64| (BLUR_RANGE_PX.0..=BLUR_RANGE_PX.1).contains(s);
@@ -217,7 +261,7 @@ fn finish(seed: &Seed, state: &Vector, normal: &Matrix, cost: f64, count: usize)
         return Err("off the lattice");
     }
     let inverse = normal.cholesky().ok_or(NO_FIT)?.inverse();
-    let variance = cost / (count - PARAMETERS) as f64;
+    let variance = minimum.variance(pixels);
     let floor = SYSTEMATIC_PX * SYSTEMATIC_PX;
     Ok(Saddle {
         uv: [seed.uv[0] + state[0], seed.uv[1] + state[1]],

@@ -126,7 +126,7 @@ impl Mul for Pose {
     }
 }
 
-/// Right Jacobian of SE(3): `Exp(x + d) = Exp(x) Exp(J_r(x) d)` to first order, by its power series (for `|x|` up to about 1).
+/// Right Jacobian of SE(3): `Exp(x + d) = Exp(x) Exp(J_r(x) d)` to first order, by its power series (exact to rounding for rotations up to pi).
 pub fn right_jacobian_se3(twist: &Vector6<f64>) -> Matrix6<f64> {
     let rho = skew(&twist.fixed_rows::<3>(0).into_owned());
     let phi = skew(&twist.fixed_rows::<3>(3).into_owned());
@@ -136,7 +136,7 @@ pub fn right_jacobian_se3(twist: &Vector6<f64>) -> Matrix6<f64> {
     ad.fixed_view_mut::<3, 3>(0, 3).copy_from(&rho);
     let mut term = Matrix6::identity();
     let mut sum = Matrix6::identity();
-    for n in 1..20 {
+    for n in 1..60 {
         term = -term * ad / f64::from(n + 1);
         sum += term;
         if term.amax() < 1e-18 {

@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
-use super::camera::{Camera, MAX_PARAMETERS};
+use super::camera::{Camera, MAX_PARAMETERS, Projection};
 use crate::geom::{Pose, skew};
 
 /// Samples of the contour.
@@ -64,23 +64,27 @@ pub fn centroid(camera: &Camera, camera_from_plate: &Pose, centre: &Vector3<f64>
     if radius_m == 0.0 {
         return point(camera, camera_from_plate, centre);
     }
-    let mut samples = [None; N];
+    let mut samples = [Projection::default(); N];
     let mut uv = [Vector2::zeros(); N];
     for (k, [c, s]) in SAMPLES.cos_sin.iter().enumerate() {
         let x = centre + Vector3::new(c * radius_m, s * radius_m, 0.0);
-        let p = point(camera, camera_from_plate, &x)?;
-        uv[k] = p.uv;
-        samples[k] = Some(p);
+        samples[k] = camera.project_with_jacobian(&camera_from_plate.transform(&x))?;
+        uv[k] = samples[k].uv;
     }
     let (mean, weights) = centroid_weights(&uv);
-    let mut sum =
-        Prediction { uv: mean, d_pose: SMatrix::zeros(), d_marker: Matrix2x3::zeros(), d_camera: SMatrix::zeros() };
-    for (p, g) in samples.iter().flatten().zip(&weights) {
-        sum.d_pose += g * p.d_pose;
-        sum.d_marker += g * p.d_marker;
-        sum.d_camera += g * p.d_camera;
+    // With K_k = g_k d_point_k R: d_marker = sum K_k and d_phi = -sum K_k [centre + offset_k]x.
+    let (mut d_marker, mut d_turn) = (Matrix2x3::zeros(), Matrix2x3::zeros());
+    let mut d_camera = SMatrix::<f64, 2, MAX_PARAMETERS>::zeros();
+    for ((p, g), [c, s]) in samples.iter().zip(&weights).zip(&SAMPLES.cos_sin) {
+        let k = g * p.d_point * camera_from_plate.rotation;
+        d_marker += k;
+        d_turn += k * skew(&Vector3::new(c * radius_m, s * radius_m, 0.0));
+        d_camera += g * p.d_parameters;
     }
-    Some(sum)
+    let mut d_pose = SMatrix::<f64, 2, 6>::zeros();
+    d_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&d_marker);
+    d_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-d_turn - d_marker * skew(centre)));
+    Some(Prediction { uv: mean, d_pose, d_marker, d_camera })
 }
 
 /// Area centroid of the image of a circle, px, without derivatives; `None` where the lens does not image all of it.
@@ -106,8 +110,15 @@ fn centroid_weights(uv: &[Vector2<f64>; N]) -> (Vector2<f64>, [Matrix2<f64>; N])
     let origin = uv.iter().sum::<Vector2<f64>>() / N as f64;
     let x: [f64; N] = std::array::from_fn(|k| uv[k].x - origin.x);
     let y: [f64; N] = std::array::from_fn(|k| uv[k].y - origin.y);
-    let d =
-        |f: &[f64; N]| -> [f64; N] { std::array::from_fn(|i| (0..N).map(|j| SAMPLES.derivative[i][j] * f[j]).sum()) };
+    let d = |f: &[f64; N]| -> [f64; N] {
+        let mut out = [0.0; N];
+        for (column, f) in SAMPLES.derivative.iter().zip(f) {
+            for (o, c) in out.iter_mut().zip(column) {
+                *o -= c * f;
+            }
+        }
+        out
+    };
     let (dx, dy) = (d(&x), d(&y));
     let (dxx, dyy) = (d(&x.map(|a| a * a)), d(&y.map(|a| a * a)));
     // Green: area = sum x y', moments = sum x^2 y' / 2 and -sum y^2 x' / 2 (the common factor 2 pi / N cancels).

@@ -5,6 +5,7 @@
 
 mod camera_file;
 mod compensation;
+mod compensation_read;
 mod estimates;
 mod gauge;
 mod names;
@@ -23,6 +24,7 @@ mod solution_record;
 mod text;
 mod write;
 
+pub use compensation_read::read_compensation;
 pub use report::report_html;
 pub use write::write_all;
 

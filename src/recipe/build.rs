@@ -100,12 +100,15 @@ pub(super) fn build(robot: &Robot, series: &[MeasuredSeries]) -> Result<(Problem
         }
         let mounting = intern(&mut mountings, &s.mounting);
         let mut previous: Option<&Vec<f64>> = None;
-        for stop in &s.stops {
+        for (row, stop) in s.stops.iter().enumerate() {
             let approach = previous.zip(stop.readings.as_ref()).filter(|_| s.order_known);
             let approach = approach.map(|(a, b)| b.iter().zip(a).map(|(b, a)| b - a).collect());
             previous = stop.readings.as_ref().or(previous);
             let observations = measured(stop, s)?;
-            let rejected = stop.left_out.clone().or_else(|| {
+            let twin =
+                s.stops[..row].iter().find(|t| !t.observations.is_empty() && t.observations == stop.observations);
+            let duplicate = twin.map(|t| format!("duplicate: it shows exactly what {} shows", t.image));
+            let rejected = stop.left_out.clone().or(duplicate).or_else(|| {
                 (observations.len() < FEWEST_OBSERVATIONS)
                     .then(|| format!("only {} markers found, {FEWEST_OBSERVATIONS} are needed", observations.len()))
             });

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix6, Vector2};
 
+use super::focus::find_focus_change;
 use super::solution::StartVerdict;
 use crate::error::{Error, Result};
 use crate::geom::Pose;
@@ -37,6 +38,8 @@ pub struct FreePoses {
     pub state: State,
     /// Pixel factors found.
     pub pixel_factor: Vec<f64>,
+    /// A change of focus or zoom within the images of a camera, in words.
+    pub focus_change: Option<String>,
 }
 
 /// RMS of a start, px per point, from which no further focal length is tried.
@@ -232,7 +235,29 @@ fn rms_px(lin: &Linearised) -> f64 {
     (sum / count.max(1) as f64).sqrt()
 }
 
+/// Largest angle between two views of a camera below which all images are alike, rad.
+const LEAST_TURN: f64 = 0.09;
+
+/// A camera is determined by views from different directions only.
+fn check_views(problem: &Problem, state: &State) -> Result<()> {
+    for (camera, name) in problem.cameras.iter().enumerate() {
+        let views: Vec<&Pose> = (problem.used().filter(|(_, i)| i.camera == camera))
+            .filter_map(|(i, _)| if let Slack::Pose(pose) = &state.slack[i] { Some(pose) } else { None })
+            .collect();
+        let Some(first) = views.first() else { continue };
+        let turn = views.iter().map(|v| first.distance(v).0).fold(0.0, f64::max);
+        if turn < LEAST_TURN {
+            return Err(undetermined(&format!(
+                "the images of {name} are all alike: they differ by {:.1} degrees at most",
+                turn.to_degrees()
+            )));
+        }
+    }
+    Ok(())
+}
+
 fn finish(problem: &mut Problem, start: State) -> Result<FreePoses> {
+    check_views(problem, &start)?;
     let options = ComponentOptions { joint: false, rounds: 20, ..ComponentOptions::default() };
     let mut outcome = estimate_components(problem, start, &options);
     for _ in 0..ROUNDS {
@@ -293,5 +318,6 @@ fn collect(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance)
         observations: lin.terms.iter().map(|t| t.residuals.len()).sum(),
         state: state.clone(),
         pixel_factor: problem.noise.pixel_factor.clone(),
+        focus_change: find_focus_change(problem, state, lin),
     }
 }

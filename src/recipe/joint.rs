@@ -2,11 +2,12 @@
 
 use super::build::{MeasuredSeries, build};
 use super::free_poses::{FreePoses, adjust_free_poses};
+use super::gates::{gates, remarks};
 use super::moved::{Move, find_move};
 use super::solution::Solution;
 use super::start::{misfit, start_robot};
-use crate::assess::{Accuracy, hold_out};
-use crate::error::{Error, Notice, Result};
+use crate::assess::hold_out;
+use crate::error::{Error, Result};
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::robot::Robot;
 use crate::problem::{Problem, Slack, State};
@@ -69,15 +70,6 @@ impl RobotModel {
     }
 }
 
-/// Free-pose RMS beyond which the camera model does not explain the images, px per point.
-const WORST_FREE_RMS_PX: f64 = 1.0;
-
-/// Joint noise beyond which the readings do not explain the images, rad or m.
-const WORST_JOINT_NOISE: f64 = 5e-3;
-
-/// Share of the robot's images that may be left out in a result worth having.
-const WORST_SHARE_LEFT_OUT: f64 = 0.25;
-
 /// Share left out beyond which there is no result.
 const HOPELESS_SHARE_LEFT_OUT: f64 = 0.5;
 
@@ -117,9 +109,9 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     })?;
     let accuracy = hold_out(&problem, &state)
         .ok_or_else(|| Error::unsolved("hold-out", "too few images to hold any out", "take more images"))?;
-    let mut failed_gates = gates(&problem, &free, &accuracy, on_robot);
+    let mut failed_gates = gates(&problem, &state, &free, &accuracy, on_robot);
     failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
-    few_images(on_robot, &mut notices);
+    remarks(&problem, &state, on_robot, &mut notices);
     Ok(Solution {
         problem,
         state,
@@ -168,7 +160,7 @@ fn name_wrong_pairs(problem: &mut Problem, state: &State, free: &FreePoses) {
         let pose = &pose.camera_from_plate;
         let Some((angle, distance)) = misfit(state, problem, pose, i) else { continue };
         let mut text = format!(
-            "wrongly paired: {:.1} mm and {:.1} mrad from where its joint readings put it",
+            "wrongly paired or taken in motion: {:.1} mm and {:.1} mrad from where its joint readings put it",
             1e3 * distance,
             1e3 * angle
         );
@@ -192,7 +184,7 @@ fn name_wrong_pairs(problem: &mut Problem, state: &State, free: &FreePoses) {
     }
 }
 
-fn left_out(problem: &Problem, on_robot: usize) -> usize {
+pub(super) fn left_out(problem: &Problem, on_robot: usize) -> usize {
     on_robot - problem.used().filter(|(_, i)| i.stop.is_some()).count()
 }
 
@@ -214,46 +206,4 @@ fn check_left_out(problem: &Problem, on_robot: usize, moves: &[Move]) -> Result<
         format!("{out} of {on_robot} images do not fit their joint readings ({} ...)", named.join(", ")),
         "check joint_unit, the order and signs of the joints, that image names stand in the right rows, and that the plate did not move",
     ))
-}
-
-fn gates(problem: &Problem, free: &FreePoses, accuracy: &Accuracy, on_robot: usize) -> Vec<String> {
-    let mut failed = Vec::new();
-    if free.rms_px > WORST_FREE_RMS_PX {
-        failed.push(format!(
-            "camera: free poses leave {:.2} px per point; the camera model or the plate does not describe these images",
-            free.rms_px
-        ));
-    }
-    for (k, camera) in problem.noise.joint.iter().enumerate() {
-        if let Some(worst) = camera.iter().copied().reduce(f64::max).filter(|s| *s > WORST_JOINT_NOISE) {
-            failed.push(format!(
-                "joint noise: {:.1} mrad with camera {}; the readings do not explain the images",
-                1e3 * worst,
-                problem.cameras[k]
-            ));
-        }
-    }
-    let out = left_out(problem, on_robot);
-    if out as f64 > WORST_SHARE_LEFT_OUT * on_robot as f64 {
-        failed.push(format!("images: {out} of {on_robot} do not fit their joint readings"));
-    }
-    if accuracy.calibrated.rms_mm > accuracy.nominal.rms_mm {
-        failed.push(format!(
-            "hold-out: the corrected robot predicts images no better than the nominal one ({:.3} mm against {:.3} mm)",
-            accuracy.calibrated.rms_mm, accuracy.nominal.rms_mm
-        ));
-    }
-    failed
-}
-
-fn few_images(on_robot: usize, notices: &mut Vec<Notice>) {
-    if on_robot < 20 {
-        notices.push(Notice::new(
-            "series",
-            format!(
-                "{on_robot} images of the robot are few: expect the prior (nominal model) to decide much of the result"
-            ),
-            "take 30 to 50 stops that move every joint through its range",
-        ));
-    }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::build::{MeasuredSeries, MeasuredStop};
-use crate::detect::detect_series;
+use crate::detect::{FlatField, Picture, detect_series};
 use crate::error::{Error, Notice, Result};
 use crate::model::camera::Lens;
 use crate::series::{CirclePoint, Observation, Series, Source, StopOrder};
@@ -114,9 +114,13 @@ fn look(
     notices: &mut Vec<Notice>,
 ) -> Result<Look> {
     let bits = series.manifest.camera.bits;
-    let _ = (dark, white);
+    let flat_field = FlatField::from_images(dark, white, bits)?;
+    let corrected = |picture: Picture| match &flat_field {
+        Some(flat_field) => flat_field.apply(picture),
+        None => Ok(picture),
+    };
     let paths: Vec<PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.clone()).collect();
-    let mut found = detect_series(&paths, bits, &series.plate, Ok, progress).into_iter();
+    let mut found = detect_series(&paths, bits, &series.plate, corrected, progress).into_iter();
     let mut sizes: BTreeMap<(usize, usize), usize> = BTreeMap::new();
     let mut results = Vec::new();
     for stop in &series.stops.stops {

@@ -3,7 +3,9 @@
 //! `series -> observations -> free poses -> starting values -> joint fit -> assessment`. A new mode is a file here.
 
 mod build;
+mod focus;
 mod free_poses;
+mod gates;
 mod joint;
 mod measure;
 mod moved;

@@ -216,7 +216,7 @@ fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &Hand
         let (angle, distance) = solution.error(pair);
         if angle + distance > bound {
             problem.images[*i].rejected = Some(format!(
-                "wrongly paired: its camera pose is {:.1} mm and {:.1} mrad from where its joint readings put it",
+                "wrongly paired or taken in motion: its camera pose is {:.1} mm and {:.1} mrad from where its joint readings put it",
                 1e3 * distance,
                 1e3 * angle
             ));

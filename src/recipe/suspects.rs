@@ -12,8 +12,11 @@ const UNSUSPICIOUS: f64 = 0.025;
 /// A mistake explains the misfit when undoing it leaves less than this share of it.
 const EXPLAINS: f64 = 0.25;
 
-/// Relative error of the plate's scale that is told from errors of the robot.
-const SCALE_ERROR: f64 = 0.02;
+/// Relative error of the plate's scale that is told from errors of the robot ...
+const SCALE_ERROR: f64 = 0.015;
+
+/// ... when correcting it leaves less than this share of the misfit.
+const SCALE_EXPLAINS: f64 = 0.6;
 
 /// A mistake that explains the misfit.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,17 +37,15 @@ pub(super) struct Suspects<'a> {
 impl Suspects<'_> {
     /// The mistake that, undone, fits far better than `misfit`, if there is one.
     pub fn better_than(&self, misfit: f64) -> Option<Cause> {
+        if let Some((_, cause)) = self.wrong_scale().filter(|(error, _)| *error < SCALE_EXPLAINS * misfit) {
+            return Some(cause);
+        }
         if misfit < UNSUSPICIOUS {
             return None;
         }
         let mut best: Option<(f64, Cause)> = None;
         for (readings, cause) in self.hypotheses() {
             let error = self.misfit(&readings);
-            if error < EXPLAINS * misfit && best.as_ref().is_none_or(|(e, _)| error < *e) {
-                best = Some((error, cause));
-            }
-        }
-        if let Some((error, cause)) = self.wrong_scale() {
             if error < EXPLAINS * misfit && best.as_ref().is_none_or(|(e, _)| error < *e) {
                 best = Some((error, cause));
             }

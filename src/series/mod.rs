@@ -20,10 +20,12 @@ pub use joints::{DEFAULT_PLACEMENT, Stop, Stops};
 pub use manifest::{
     AngleUnit, CameraMount, CameraSection, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder,
 };
-pub use mcap::{CameraInfo, Clock, Extracted, Motion, Picking, RecordingOptions, StopReport, extract};
+pub use mcap::{
+    CameraInfo, Clock, Extracted, Motion, Picking, RecordingOptions, Shown, StopReport, extract, write_recording,
+};
 pub use observation::{Edge, ImageObservations, Observation};
 pub use observation_file::observations_csv;
-pub use plate::{Marker, Plate, PlateKind, ScaleBar};
+pub use plate::{Aruco, Marker, Plate, PlateKind, ScaleBar};
 pub use plate_file::{DEFAULT_TOLERANCE_M, plate_csv, plate_toml, read_plate};
 pub use read::{Series, Source, read, read_images};
 pub use recorded::convert_recording;

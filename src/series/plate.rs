@@ -51,6 +51,16 @@ pub struct ScaleBar {
     pub sigma_m: f64,
 }
 
+/// The ArUco markers of a ChArUco board; ids count up row by row, as OpenCV prints them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Aruco {
+    /// Name of the dictionary as OpenCV spells it, such as `DICT_4X4_50`.
+    pub dictionary: String,
+    /// Side of a marker with its black border, m.
+    pub side_m: f64,
+}
+
 /// A plate of markers as designed (or as corrected by an earlier calibration).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plate {
@@ -64,6 +74,9 @@ pub struct Plate {
     pub pitch_m: f64,
     /// Prior sigma of a marker coordinate, m.
     pub tolerance_m: f64,
+    /// What is printed in the light squares of a ChArUco board; the detector looks for it where it is not stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub aruco: Option<Aruco>,
     /// Measured distance, if any.
     pub scale: Option<ScaleBar>,
     /// All markers, in the order of their ids.
@@ -92,6 +105,6 @@ impl Plate {
                 sigma_m: tolerance_m,
             })
             .collect();
-        Self { kind, columns, rows, pitch_m, tolerance_m, scale: None, markers }
+        Self { kind, columns, rows, pitch_m, tolerance_m, aruco: None, scale: None, markers }
     }
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::inputs::InputFile;
 use super::manifest::{check_format, read_toml, require_positive, to_toml};
-use super::plate::{Marker, Plate, PlateKind, ScaleBar};
+use super::plate::{Aruco, Marker, Plate, PlateKind, ScaleBar};
 use super::table::{Row, Table, to_csv};
 use crate::{Error, Result};
 
@@ -35,6 +35,8 @@ struct PlateFile {
     markers: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     tolerance_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    aruco: Option<Aruco>,
     #[serde(skip_serializing_if = "Option::is_none")]
     scale: Option<ScaleBar>,
 }
@@ -83,7 +85,16 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
         let (columns, rows) = (file.columns.unwrap_or(0), file.rows.unwrap_or(0));
         let pitch_m = file.pitch_m.unwrap_or(0.0);
         let scale = file.scale;
-        return Ok(Plate { kind: file.kind, columns, rows, pitch_m, tolerance_m, scale, markers: Vec::new() });
+        return Ok(Plate {
+            kind: file.kind,
+            columns,
+            rows,
+            pitch_m,
+            tolerance_m,
+            aruco: None,
+            scale,
+            markers: Vec::new(),
+        });
     }
     let (Some(columns), Some(rows), Some(pitch_m)) = (file.columns, file.rows, file.pitch_m) else {
         let what = "columns, rows and pitch_m are needed for a plate of this kind";
@@ -97,11 +108,29 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
         let what = format!("pitch_m = {pitch_m} makes a plate of {:.0} m", pitch_m * f64::from(columns));
         return Err(Error::input(path.display(), what, "pitch_m is in metres: 18 mm are 0.018"));
     }
-    let mut plate = Plate { scale: file.scale, ..Plate::lattice(file.kind, columns, rows, pitch_m, tolerance_m) };
+    let mut plate = Plate {
+        aruco: aruco(path, file, pitch_m)?,
+        scale: file.scale,
+        ..Plate::lattice(file.kind, columns, rows, pitch_m, tolerance_m)
+    };
     for marker in &mut plate.markers {
         marker.outer_radius_m = file.radius_m.unwrap_or(0.0);
     }
     Ok(plate)
+}
+
+/// The markers of a ChArUco board, where they are stated; no other kind has any.
+fn aruco(path: &Path, file: &PlateFile, pitch_m: f64) -> Result<Option<Aruco>> {
+    let place = path.display();
+    match (&file.aruco, file.kind) {
+        (Some(aruco), PlateKind::Charuco) if aruco.side_m > 0.0 && aruco.side_m < pitch_m => Ok(Some(aruco.clone())),
+        (Some(aruco), PlateKind::Charuco) => {
+            let what = format!("[aruco] side_m = {} does not fit into a square of {pitch_m} m", aruco.side_m);
+            Err(Error::input(place, what, "give the side of a marker with its black border, in metres"))
+        }
+        (Some(_), _) => Err(Error::input(place, "[aruco] is only for a charuco plate", "remove it or correct `kind`")),
+        (None, _) => Ok(None),
+    }
 }
 
 fn read_markers(table: &Table, plate: &Plate) -> Result<Vec<Marker>> {
@@ -247,6 +276,7 @@ pub fn plate_toml(plate: &Plate, markers: Option<&str>) -> Result<String> {
             radius_m: radius.filter(|_| plate.kind == PlateKind::CircleGrid && markers.is_none()),
             markers: markers.map(str::to_string),
             tolerance_m: Some(plate.tolerance_m),
+            aruco: plate.aruco.clone(),
             scale: plate.scale,
         },
     )

@@ -105,10 +105,9 @@ fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extract
             manifest
         }
         Err(_) => {
-            let place = unfinished.with_file_name("series.toml");
-            let what = "nothing beside the recording says where the camera is and which plate was seen";
+            let what = "nothing beside it says where the camera is and which plate was seen";
             let remedy = "check camera_mount in series.toml and put plate.toml into the folder";
-            extracted.notices.push(Notice::new(place.display(), what, remedy));
+            extracted.notices.push(Notice::new(recording.display(), what, remedy));
             Manifest::plain(CameraMount::Hand, "plate.toml")
         }
     };

@@ -205,12 +205,12 @@ impl Fault {
             _ => {}
         }
         let path = folder.join("expected.toml");
-        std::fs::write(&path, self.expectation().to_toml()).map_err(|e| Error::io(&path, &e))
+        std::fs::write(&path, self.expectation().expected_toml()).map_err(|e| Error::io(&path, &e))
     }
 }
 
 impl Expectation {
-    fn to_toml(&self) -> String {
+    fn expected_toml(&self) -> String {
         let codes: Vec<String> = self.exit_codes.iter().map(u8::to_string).collect();
         let words: Vec<String> = self.words.iter().map(|w| format!("\"{w}\"")).collect();
         format!("exit_codes = [{}]\nwords = [{}]\n", codes.join(", "), words.join(", "))

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
-use super::system::{Linearised, System};
+use super::system::{Elimination, Linearised, System};
 use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
 use crate::problem::{Problem, State};
 
@@ -19,7 +19,17 @@ pub struct Covariance {
 
 /// Covariance at a solution; an error where the information is not positive definite.
 pub fn covariance(problem: &Problem, state: &State, lin: &Linearised) -> Result<Covariance, NotPositiveDefinite> {
-    let system = System::new(problem, state, lin, 0.0);
+    covariance_by(Elimination::cheaper(lin, problem), problem, state, lin)
+}
+
+/// As [`covariance`], by a given elimination.
+pub fn covariance_by(
+    which: Elimination,
+    problem: &Problem,
+    state: &State,
+    lin: &Linearised,
+) -> Result<Covariance, NotPositiveDefinite> {
+    let system = System::with(which, problem, state, lin, 0.0);
     let factor = SymmetricFactor::new(&system.information)?;
     let mut reduced = factor.inverse();
     for (i, c) in problem.layout.columns.iter().enumerate() {

@@ -46,6 +46,8 @@ pub struct Outcome {
 }
 
 const FIRST_LAMBDA: f64 = 1e-6;
+/// Relative rounding of a cost summed over thousands of residuals.
+const ROUNDING: f64 = 1e-12;
 const LARGEST_LAMBDA: f64 = 1e10;
 
 /// Minimises the cost from `start`.
@@ -74,8 +76,12 @@ pub fn solve(problem: &Problem, start: State, settings: &Settings) -> Outcome {
         let next = state.moved(&problem.layout, &system.step(problem, &lin, &x));
         let tried = linearise_all(problem, &next);
         let small = decrement < settings.decrement;
+        // Where the step promises less than the cost can resolve, the gradient is the better judge.
+        let below_rounding = small || decrement * decrement < 10.0 * ROUNDING * lin.cost;
         match tried {
-            Some(better) if better.cost <= lin.cost || (small && better.cost <= lin.cost * (1.0 + 1e-12)) => {
+            Some(better)
+                if better.cost <= lin.cost || (below_rounding && better.cost <= lin.cost * (1.0 + ROUNDING)) =>
+            {
                 (state, lin) = (next, better);
                 lambda = (lambda * 0.1).max(1e-12);
                 if small {

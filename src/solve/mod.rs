@@ -9,7 +9,7 @@ mod snoop;
 mod system;
 
 pub use components::{ComponentOptions, estimate_components};
-pub use covariance::{Covariance, covariance};
+pub use covariance::{Covariance, covariance, covariance_by};
 pub use levenberg::{Outcome, Settings, Status, solve};
 pub use snoop::{reject_images, reject_observations};
 pub use system::{Elimination, Linearised, System, linearise_all};

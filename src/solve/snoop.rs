@@ -69,7 +69,7 @@ pub fn reject_images(problem: &mut Problem, outcome: &Outcome) -> Option<usize> 
         dq.iter().enumerate().max_by(|a, b| (a.1 / sigma[a.0]).abs().total_cmp(&(b.1 / sigma[b.0]).abs()))?;
     let reading = &outcome.state.robot.chain.readings[joint];
     problem.images[*worst].rejected = Some(format!(
-        "wrongly paired: its joint readings would have to be wrong by {:.1} of the usual noise ({} alone by {:.2} mrad)",
+        "wrongly paired or taken in motion: its joint readings would have to be wrong by {:.1} of the usual noise ({} alone by {:.2} mrad)",
         score(dq),
         reading,
         error.abs() * 1e3

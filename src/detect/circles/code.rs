@@ -72,24 +72,42 @@ const MARGIN: usize = 3;
 impl Code {
     /// Code of a plate of circles; `None` when its markers do not form a lattice.
     pub fn of(plate: &Plate) -> Option<Self> {
-        let mut classes: Vec<Class> = Vec::new();
         let (columns, rows) = (plate.columns as i32, plate.rows as i32);
-        let mut cells = vec![None; plate.columns as usize * plate.rows as usize];
-        for (index, m) in plate.markers.iter().enumerate() {
-            let centre = |n: i32| f64::from(n - 1) / 2.0;
-            let column = (m.position_m.x / plate.pitch_m + centre(columns)).round();
-            let row = (centre(rows) - m.position_m.y / plate.pitch_m).round();
-            let inside = (0.0..f64::from(columns)).contains(&column) && (0.0..f64::from(rows)).contains(&row);
-            if !inside || !m.outer_radius_m.is_normal() {
+        let centre = |n: i32| f64::from(n - 1) / 2.0;
+        let cells: Option<Vec<Cell>> = plate
+            .markers
+            .iter()
+            .map(|m| {
+                let column = (m.position_m.x / plate.pitch_m + centre(columns)).round();
+                let row = (centre(rows) - m.position_m.y / plate.pitch_m).round();
+                let inside = (0.0..f64::from(columns)).contains(&column) && (0.0..f64::from(rows)).contains(&row);
+                inside.then_some((column as i32, row as i32))
+            })
+            .collect();
+        Self::on_cells(plate, &cells?, plate.pitch_m, (columns, rows))
+    }
+
+    /// Code of a plate whose markers lie on these cells (not negative) of a lattice with this step.
+    pub fn of_cells(plate: &Plate, cells: &[Cell], step_m: f64) -> Option<Self> {
+        let size = (cells.iter().map(|c| c.0).max()? + 1, cells.iter().map(|c| c.1).max()? + 1);
+        Self::on_cells(plate, cells, step_m, size)
+    }
+
+    fn on_cells(plate: &Plate, places: &[Cell], step_m: f64, (columns, rows): (i32, i32)) -> Option<Self> {
+        let mut classes: Vec<Class> = Vec::new();
+        let mut cells = vec![None; usize::try_from(columns * rows).ok()?];
+        for (index, (m, (column, row))) in plate.markers.iter().zip(places).enumerate() {
+            if !m.outer_radius_m.is_normal() {
                 return None;
             }
-            let class = Class { radius: m.outer_radius_m / plate.pitch_m, ratio: m.inner_radius_m / m.outer_radius_m };
+            let class = Class { radius: m.outer_radius_m / step_m, ratio: m.inner_radius_m / m.outer_radius_m };
             let same = |c: &Class| (c.radius / class.radius).ln().abs() < 0.05 && (c.ratio - class.ratio).abs() < 0.05;
             let number = classes.iter().position(same).unwrap_or_else(|| {
                 classes.push(class);
                 classes.len() - 1
             });
-            cells[row as usize * plate.columns as usize + column as usize] = Some((index, u8::try_from(number).ok()?));
+            let cell = usize::try_from(row * columns + column).ok()?;
+            *cells.get_mut(cell)? = Some((index, u8::try_from(number).ok()?));
         }
         let mut shares = vec![0.0; classes.len()];
         cells.iter().flatten().for_each(|(_, c)| shares[usize::from(*c)] += 1.0 / plate.markers.len() as f64);

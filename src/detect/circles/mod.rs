@@ -13,6 +13,7 @@ mod code;
 mod contour;
 mod edge_model;
 mod ellipse;
+mod grid;
 mod lattice;
 mod levels;
 mod local_map;
@@ -25,6 +26,7 @@ mod types;
 mod vet;
 
 pub use ellipse::Ellipse;
+pub use grid::detect_grid;
 pub use measure::{Predicted, measure, refine_predicted};
 pub use pipeline::detect;
 pub use types::{Detection, Dropped, Found, Imaged, InnerOuter, Measured, Options, Outcome, Reason};

@@ -33,6 +33,17 @@ pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<Det
         let what = "its markers do not form a lattice of circles with a radius";
         Error::input("plate", what, "give a plate of kind coded-circles with plate.csv as made by `robotcal plate`")
     })?;
+    detect_coded(picture, plate, options, &code, |lattices, candidates| identify(&code, lattices, candidates))
+}
+
+/// The stages around the identification.
+pub(super) fn detect_coded(
+    picture: &Picture,
+    plate: &Plate,
+    options: &Options,
+    code: &Code,
+    identify: impl FnOnce(&[Lattice], &[Candidate]) -> Result<(Board, Outcome)>,
+) -> Result<Detection> {
     if picture.width < 16 || picture.height < 16 || picture.pixels.len() != picture.width * picture.height {
         let what = format!("{} x {} pixels with {} values", picture.width, picture.height, picture.pixels.len());
         return Err(Error::input("image", what, "check the image file"));
@@ -40,11 +51,11 @@ pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<Det
     let levels = Levels::of(picture, largest_marker(picture, options), THRESHOLD);
     let (candidates, mut dropped) = candidates(picture, &levels, options);
     let lattices = lattices(&candidates, SMALLEST_LATTICE);
-    let (mut board, outcome) = identify(&code, &lattices, &candidates)?;
-    let vetted = vet(&mut board, &code, &candidates);
-    attach(&mut board, &code, &candidates);
+    let (mut board, outcome) = identify(&lattices, &candidates)?;
+    let vetted = vet(&mut board, code, &candidates);
+    attach(&mut board, code, &candidates);
     drop_unused(&board, &vetted, &lattices, &candidates, &mut dropped);
-    let mut work = Work { picture, plate, code: &code, candidates: &candidates, pixels: Pixels::default() };
+    let mut work = Work { picture, plate, code, candidates: &candidates, pixels: Pixels::default() };
     let measured = work.measure(&board, &levels, options, &mut dropped);
     Ok(work.detection(&board, measured, outcome, dropped))
 }

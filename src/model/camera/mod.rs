@@ -84,7 +84,7 @@ pub struct Camera {
 }
 
 /// The image of a point with its derivatives.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Projection {
     /// Column and row, px.
     pub uv: Vector2<f64>,

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::words::significant;
+use super::words::fixed;
 use crate::output::solution_json::{ImageRecord, SolutionRecord};
 
 /// One row for each image: what it contributed, how well it is predicted, why it was left out.
@@ -28,7 +28,7 @@ fn row(i: &ImageRecord) -> Markup {
         None => i.observations.reason.iter().filter(|o| o.is_none()).count(),
         Some(_) => 0,
     };
-    let number = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), significant);
+    let number = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| fixed(v, 3));
     html! { tr {
         td.name { (i.name) }
         td.n { (used) " of " (found) }

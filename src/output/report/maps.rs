@@ -9,7 +9,9 @@ use crate::model::camera::Camera;
 use crate::output::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
 
 const WIDTH: f64 = 560.0;
-const MARGIN: f64 = 14.0;
+const MARGIN: f64 = 6.0;
+/// Usual length of a scale bar on paper.
+const BAR: f64 = 34.0;
 /// Room for the scale below a map.
 const LEGEND: f64 = 34.0;
 
@@ -55,24 +57,25 @@ impl Field {
         [MARGIN + s * (at[0] - self.low[0]), MARGIN + s * y]
     }
 
-    /// Draws vectors of a value unit with a scale bar; the longest usual vector becomes some twentieth of the width.
-    fn draw(&self, arrows: &[Arrow], label: &str, unit: &str, class: &str) -> (Svg, f64) {
+    /// Draws vectors in `unit` with a scale bar, which is some twice their RMS length and `bar_length` long on paper.
+    fn draw(&self, arrows: &[Arrow], label: &str, unit: &str, bar_length: f64) -> (Svg, f64) {
+        let class = "vector";
         let size = |k: usize| self.scale() * (self.high[k] - self.low[k]);
         let mut svg = Svg::new(WIDTH.min(size(0) + 2.0 * MARGIN), size(1) + 2.0 * MARGIN + LEGEND, label);
         svg.rect([MARGIN, MARGIN], [size(0), size(1)], "frame");
         let typical = rms(arrows);
         let bar = round_below(2.0 * typical);
-        let paper_per_unit = (0.06 * WIDTH) / bar.max(f64::MIN_POSITIVE);
+        let paper_per_unit = bar_length / bar.max(f64::MIN_POSITIVE);
         let flip = if self.up { -1.0 } else { 1.0 };
         let step = arrows.len().div_ceil(MOST_VECTORS).max(1);
         let drawn = arrows
             .iter()
             .step_by(step)
             .map(|(at, v)| (self.place(*at), [paper_per_unit * v[0], flip * paper_per_unit * v[1]]));
-        svg.vectors(drawn, class);
+        svg.vectors_inside([MARGIN, MARGIN], [size(0), size(1)], drawn, class);
         let y = MARGIN + size(1) + 20.0;
-        svg.vectors([([MARGIN, y], [0.06 * WIDTH, 0.0])].into_iter(), class);
-        svg.text([MARGIN + 0.06 * WIDTH + 8.0, y + 4.0], Anchor::Start, &format!("{} {unit}", plain(bar)));
+        svg.vectors([([MARGIN, y], [bar_length, 0.0])].into_iter(), class);
+        svg.text([MARGIN + bar_length + 8.0, y + 4.0], Anchor::Start, &format!("{} {unit}", plain(bar)));
         (svg, typical)
     }
 }
@@ -98,7 +101,7 @@ pub(super) fn residuals_over_image(record: &SolutionRecord, camera: usize) -> Op
     }
     let field = Field { low: [-0.5; 2], high: [f64::from(c.width_px) - 0.5, f64::from(c.height_px) - 0.5], up: false };
     let label = format!("Residuals of all images of camera {} over the image", c.name);
-    let (svg, typical) = field.draw(&arrows, &label, "px", "vector");
+    let (svg, typical) = field.draw(&arrows, &label, "px", BAR);
     let caption = format!("RMS length {typical:.3} px; {}.", selection(arrows.len()));
     Some(Map { svg: svg.finish(), caption })
 }
@@ -124,7 +127,7 @@ pub(super) fn residuals_over_plate(record: &SolutionRecord, plate: usize) -> Opt
     if arrows.is_empty() {
         return None;
     }
-    let (svg, typical) = plate_field(p).draw(&arrows, "Mean residual of every marker over the plate", "µm", "vector");
+    let (svg, typical) = plate_field(p).draw(&arrows, "Mean residual of every marker over the plate", "µm", BAR);
     let caption = format!("RMS length {typical:.1} µm; {}.", selection(arrows.len()));
     Some(Map { svg: with_markers(svg, p), caption })
 }
@@ -141,7 +144,7 @@ pub(super) fn plate_corrections(record: &SolutionRecord, plate: usize) -> Option
         return None;
     }
     let field = plate_field(p);
-    let (mut svg, typical) = field.draw(&arrows, "Corrections of the markers against nominal", "µm", "vector");
+    let (mut svg, typical) = field.draw(&arrows, "Corrections of the markers against nominal", "µm", BAR);
     for (m, z) in heights.iter().enumerate() {
         let class = if *z >= 0.0 { "above" } else { "below" };
         svg.circle(field.place(plate_place(p, m)), 0.5 + 7.0 * (z.abs() / highest.max(1e-9)).sqrt(), class);
@@ -177,7 +180,7 @@ pub(super) fn distortion(camera_record: &CameraRecord) -> Option<Map> {
     let largest = arrows.iter().map(|(_, v)| v[0].hypot(v[1])).fold(0.0, f64::max);
     let field = Field { low: [-0.5; 2], high: [w - 0.5, h - 0.5], up: false };
     let label = format!("Distortion of camera {}", camera_record.name);
-    let (mut svg, _) = field.draw(&arrows, &label, "px", "vector");
+    let (mut svg, _) = field.draw(&arrows, &label, "px", 0.6 * BAR);
     let centre = [camera.parameters[2], camera.parameters[3]];
     svg.circle(field.place(centre), 3.5, "above");
     let caption = format!(
@@ -210,7 +213,7 @@ fn plate_field(p: &PlateRecord) -> Field {
             high[k] = high[k].max(x);
         }
     }
-    let room = 0.06 * (high[0] - low[0]).max(high[1] - low[1]).max(1e-6);
+    let room = 0.09 * (high[0] - low[0]).max(high[1] - low[1]).max(1e-6);
     Field { low: low.map(|x| x - room), high: high.map(|x| x + room), up: true }
 }
 

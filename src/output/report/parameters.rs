@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 
-use super::words::{fixed, grouped, parameter, plus_minus, significant, unit};
+use super::words::{fixed, grouped, parameter, plus_minus, short, significant, unit};
 use super::{figure, maps};
 use crate::geom::Pose;
 use crate::output::solution_json::{EstimateRecord, PlacedRecord, SolutionRecord};
@@ -47,9 +47,16 @@ pub(super) fn robot(r: &SolutionRecord) -> Markup {
             "Estimate ± sigma. The bar says how much of it the data decided: full, the images decided alone; "
             "empty, they said nothing and the parameter stays at its nominal value within the tolerance stated in the head."
         }
-        (grid(r, "Joint origin", |name| name.strip_suffix("/origin")))
-        (grid(r, "Joint", |name| (!name.ends_with("/origin")).then_some(name)))
+        (grid(r, "Joint origin", |block, _| block.strip_suffix("/origin")))
+        (grid(r, "Joint", |block, c| other(block, !c.contains('_'))))
+        (grid(r, "Gear harmonics of the reading q", |block, c| other(block, c.starts_with("cos_") || c.starts_with("sin_"))))
+        (grid(r, "Sag under gravity", |block, c| other(block, c.starts_with("gravity_"))))
     }
+}
+
+/// The joint of a block that is not its origin.
+fn other(block: &str, wanted: bool) -> Option<&str> {
+    (wanted && !block.ends_with("/origin")).then_some(block)
 }
 
 fn known(e: &EstimateRecord) -> Option<(f64, f64)> {
@@ -66,12 +73,12 @@ fn strongest(r: &SolutionRecord) -> Vec<(&EstimateRecord, f64, f64)> {
 }
 
 /// Blocks of the robot as rows, components as columns.
-fn grid<'a>(r: &'a SolutionRecord, head: &str, row: impl Fn(&'a str) -> Option<&'a str>) -> Markup {
+fn grid<'a>(r: &'a SolutionRecord, head: &str, row: impl Fn(&'a str, &'a str) -> Option<&'a str>) -> Markup {
     let mut rows: Vec<(&str, BTreeMap<&str, &EstimateRecord>)> = Vec::new();
     let mut columns: Vec<&EstimateRecord> = Vec::new();
     for e in &r.estimates {
         let Some((block, component)) = e.name.strip_prefix("robot/").and_then(|n| n.rsplit_once('.')) else { continue };
-        let Some(name) = row(block) else { continue };
+        let Some(name) = row(block, component) else { continue };
         match rows.iter_mut().find(|(n, _)| *n == name) {
             Some((_, cells)) => {
                 cells.insert(component, e);
@@ -100,13 +107,8 @@ fn component_of(e: &EstimateRecord) -> &str {
 
 fn column_head(e: &EstimateRecord) -> Markup {
     let (factor, unit) = unit(e);
-    let name = match component_of(e).split_once('_') {
-        Some((kind @ ("cos" | "sin"), k)) => format!("{kind} {k}q"),
-        Some((kind, k)) => format!("{kind} {k}"),
-        None => component_of(e).to_owned(),
-    };
     html! {
-        (name) ", " (unit)
+        (short(component_of(e))) ", " (unit)
         @if let Some(p) = e.prior_sigma { br; span.note { "tol. " (significant(factor * p)) } }
     }
 }
@@ -144,8 +146,8 @@ pub(super) fn undetermined(r: &SolutionRecord) -> Markup {
         @if !pairs.is_empty() {
             h3 { "Parameters that are hard to tell apart" }
             p.note {
-                "The images fix the two together better than each alone (correlation beyond " (STRONG) "). "
-                "This does not harm the robot's accuracy as long as both are used together."
+                "The images fix a combination of the two well, and each alone badly (correlation beyond " (STRONG) "). "
+                "This does not harm the accuracy as long as both are used together."
             }
             ul { @for (a, b, rho) in pairs.iter().take(MOST_PAIRS) { li {
                 (parameter(&r.estimates[*a].name)) " and " (parameter(&r.estimates[*b].name)) " (" (fixed(*rho, 3)) ")"

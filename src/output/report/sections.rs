@@ -23,6 +23,7 @@ pub(super) fn head(r: &SolutionRecord) -> Markup {
             strong { (v.headline) }
             @if !v.reasons.is_empty() { ul { @for reason in &v.reasons { li { (reason) } } } }
         }
+        p { (next_step(r)) }
         div.big {
             div { b { (significant(before.rms_mm)) " → " (significant(after.rms_mm)) " mm" } span { "position error, before → after" } }
             div { b { (fixed(before.rms_mm / after.rms_mm, 1)) " times" } span { "better on images the fit had not seen" } }
@@ -30,6 +31,20 @@ pub(super) fn head(r: &SolutionRecord) -> Markup {
             div { b { (significant(r.statistics.rms_px)) " px" } span { "what is left in the images (RMS per point)" } }
         }
     }
+}
+
+/// What to do with the files.
+fn next_step(r: &SolutionRecord) -> Markup {
+    let urdf = r.files.iter().find(|f| f.ends_with(".calibrated.urdf"));
+    html! {
+        @if let Some(urdf) = urdf { "The corrected robot is " code { (urdf) } ", joint offsets included. " }
+        @if beyond_urdf(r) { "What a URDF cannot say (gear, sag, backlash) is in " code { "compensation.toml" } ". " }
+    }
+}
+
+/// True where the robot model has terms beside the joint offsets.
+fn beyond_urdf(r: &SolutionRecord) -> bool {
+    r.robot.terms.iter().any(|t| t.term != "offset")
 }
 
 /// Before and after on held-out images.
@@ -41,7 +56,8 @@ pub(super) fn accuracy(r: &SolutionRecord) -> Markup {
             "How well do the joint readings alone say where the plate appears? The images were put aside in "
             (r.accuracy.folds) " groups in turn; a model fitted to the other groups had to predict them. "
             "In millimetres this is the distance between where the image shows the markers and where the robot model puts them; "
-            "it includes how well the robot repeats."
+            "it includes how well the robot repeats. "
+            @if beyond_urdf(r) { "The calibrated robot is the whole model, corrected URDF and compensation.toml together." }
         }
         div.wide { table {
             thead { tr { th { "Model" } th.n { "error, mm RMS" } th.n { "in the image, px RMS" } th.n { "worst image, mm" } th.n { "images" } } }

@@ -77,6 +77,20 @@ impl Svg {
         ));
     }
 
+    /// Vectors as one path, cut off at a rectangle (corner, size).
+    pub fn vectors_inside(
+        &mut self,
+        at: [f64; 2],
+        size: [f64; 2],
+        all: impl Iterator<Item = ([f64; 2], [f64; 2])>,
+        class: &str,
+    ) {
+        let [x, y, w, h] = [at[0], at[1], size[0], size[1]].map(n);
+        self.add(format_args!("<svg x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" viewBox=\"{x} {y} {w} {h}\">"));
+        self.vectors(all, class);
+        self.add(format_args!("</svg>"));
+    }
+
     /// Vectors as one path: a line each from its foot.
     pub fn vectors(&mut self, all: impl Iterator<Item = ([f64; 2], [f64; 2])>, class: &str) {
         let mut d = String::new();

@@ -51,8 +51,28 @@ pub(super) fn grouped<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
             None => groups.push((block, vec![component])),
         }
     }
-    let words = |block: &str| block.trim_start_matches("robot/").replace("/origin", " origin");
-    groups.iter().map(|(block, c)| format!("{}: {}", words(block), c.join(", "))).collect()
+    let words = |block: &str| match block.strip_prefix("plate_shape") {
+        Some(plate) => format!("plate{}", plate.replace('/', " of ")),
+        None => short_block(block),
+    };
+    let components = |c: &[&str]| c.iter().map(|c| short(c)).collect::<Vec<_>>().join(", ");
+    groups.iter().map(|(block, c)| format!("{}: {}", words(block), components(c))).collect()
+}
+
+/// Name of a block of the robot.
+fn short_block(block: &str) -> String {
+    let name = block.trim_start_matches("robot/");
+    name.strip_suffix("/origin").map_or_else(|| name.to_owned(), |joint| format!("{joint} origin"))
+}
+
+/// Short name of a component, for heads of tables and lists: `cos_2` -> "cos 2q".
+pub(super) fn short(component: &str) -> String {
+    match component.split_once('_') {
+        Some((wave @ ("cos" | "sin"), "1")) => format!("{wave} q"),
+        Some((wave @ ("cos" | "sin"), k)) => format!("{wave} {k}q"),
+        Some(("gravity", k)) => format!("sag {k}"),
+        _ => component.replace('_', " "),
+    }
 }
 
 /// Factor from SI to the unit for people, and that unit.
@@ -70,10 +90,11 @@ pub(super) fn unit(e: &EstimateRecord) -> (f64, &'static str) {
 
 /// Decimals that show two significant digits of `sigma`.
 fn decimals(sigma: f64) -> usize {
-    if !(sigma > 0.0 && sigma.is_finite()) {
-        return 3;
+    // Rounded first, so that 0.998 is shown like 1.0.
+    match format!("{sigma:.1e}").split_once('e').and_then(|(_, exponent)| exponent.parse::<i32>().ok()) {
+        Some(exponent) if sigma > 0.0 => (1 - exponent).clamp(0, 9) as usize,
+        _ => 3,
     }
-    (1.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize
 }
 
 /// "0.412 ± 0.035", both with as many decimals as sigma deserves.
@@ -136,14 +157,15 @@ mod tests {
         ] {
             assert_eq!(parameter(name), words);
         }
-        let names = ["robot/a/origin.x", "robot/a/origin.rz", "robot/a.gear"];
-        assert_eq!(grouped(names.into_iter()), ["a origin: x, rz", "a: gear"]);
+        let names = ["robot/a/origin.x", "robot/a/origin.rz", "robot/a.gear", "robot/a.cos_2", "plate_shape.bow_xx"];
+        assert_eq!(grouped(names.into_iter()), ["a origin: x, rz", "a: gear, cos 2q", "plate: bow xx"]);
     }
 
     #[test]
     fn numbers_show_what_their_sigma_deserves() {
         assert_eq!(plus_minus(-0.41234, 0.0354), "\u{2212}0.412 ± 0.035");
         assert_eq!(plus_minus(1234.5, 120.0), "1234 ± 120");
+        assert_eq!(plus_minus(0.0, 0.9996), "0.0 ± 1.0");
         assert_eq!(fixed(-0.0001, 2), "0.00");
         assert_eq!(significant(0.01234), "0.0123");
         assert_eq!((plain(0.5), plain(20.0), plain(0.02)), ("0.5".into(), "20".into(), "0.02".into()));

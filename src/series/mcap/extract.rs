@@ -164,7 +164,11 @@ fn groups(scan: &mut Scan, postures: &[Posture], times: &[i64], options: &Record
         }
         groups.sort();
     } else if used < times.len() && !groups.is_empty() {
-        let what = format!("{} of {} images were taken in motion and are not used", times.len() - used, times.len());
+        let what = format!(
+            "{} of {} images were taken outside the standstills and are not used",
+            times.len() - used,
+            times.len()
+        );
         scan.notices.push(Notice::new(&place, what, ""));
     }
     if empty > 0 {
@@ -190,7 +194,7 @@ fn no_stop(place: &str, postures: &[Posture], standstills: usize, options: &Reco
         "the robot never stands still for {} s (joints slower than {} rad/s; a joint state comes every {step_s:.3} s)",
         options.least_still_s, options.still_speed
     );
-    let remedy = "stop the robot for each image; images in motion are taken only on demand (--motion accept)";
+    let remedy = "stop the robot for each image; images in motion are taken only on demand (--in-motion SECONDS)";
     Error::input(place, what, remedy)
 }
 

@@ -7,13 +7,16 @@
 mod cdr;
 mod extract;
 mod file;
+mod interfaces;
 mod messages;
 mod motion;
 mod options;
 mod pixels;
 mod scan;
+mod write;
 
 pub use extract::{Extracted, StopReport, extract};
 pub(super) use file::require_mcap;
 pub use messages::CameraInfo;
 pub use options::{Clock, Motion, Picking, RecordingOptions};
+pub use write::{Shown, write_recording};

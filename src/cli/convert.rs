@@ -1,0 +1,103 @@
+//! `robotcal convert`: a recording becomes a series folder, a series folder becomes a recording.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::Verdict;
+use super::recording::RecordingArgs;
+use crate::error::{Error, Result};
+use crate::model::robot::Robot;
+use crate::series::{self, Extracted, Shown, Source, convert_recording};
+use crate::urdf::{self, Chain};
+
+/// Flags of `convert`.
+#[derive(Debug, Args)]
+pub(super) struct ConvertArgs {
+    /// Recording (an .mcap file or a rosbag2 folder), or series folder
+    #[arg(value_name = "FROM")]
+    from: PathBuf,
+    /// New series folder, or new .mcap file for a series folder
+    #[arg(value_name = "TO")]
+    to: PathBuf,
+    /// Robot description: its joints are taken [default: all that are recorded]; a series folder needs it
+    #[arg(long, value_name = "FILE")]
+    urdf: Option<PathBuf>,
+    /// Base link
+    #[arg(long, value_name = "LINK", requires = "urdf")]
+    base: Option<String>,
+    /// Tip link
+    #[arg(long, value_name = "LINK", requires = "urdf")]
+    tip: Option<String>,
+    #[command(flatten)]
+    recording: RecordingArgs,
+}
+
+pub(super) fn run(args: &ConvertArgs) -> Result<Verdict> {
+    let chain = match &args.urdf {
+        Some(file) => Some(urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?),
+        None => None,
+    };
+    if args.to.extension().is_some_and(|e| e == "mcap") {
+        to_recording(args, chain)?;
+    } else {
+        let joints = chain.map_or_else(Vec::new, |c| c.readings);
+        let extracted = convert_recording(&args.from, &args.to, &args.recording.options(&joints)?)?;
+        print!("{}", text(&extracted));
+    }
+    println!("written   {}", args.to.display());
+    Ok(Verdict::Good)
+}
+
+/// A series folder as a recording, with the nominal tip and the observations where there are any.
+fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<()> {
+    let Some(chain) = chain else {
+        let what = "the joints of a series mean nothing without their robot";
+        return Err(Error::input(args.from.display(), what, "add --urdf robot.urdf (and --base, --tip if needed)"));
+    };
+    let series = series::read_images(&args.from)?;
+    let readings = series.readings_for(&chain)?;
+    let robot = Robot::nominal(chain.clone());
+    let poses: Vec<_> = readings.iter().map(|r| r.as_ref().map(|q| robot.base_from_tip(q))).collect();
+    let marks = match series::read(&args.from)?.source {
+        Source::Observations(marks) => marks,
+        _ => Vec::new(),
+    };
+    let frames = Some((chain.base.as_str(), chain.tip.as_str(), poses.as_slice()));
+    let shown = Shown { joints: &chain.readings, readings: &readings, frames, marks: &marks };
+    let notices = series::write_recording(&args.to, &series, shown)?;
+    let usable = series.stops.stops.iter().zip(&readings).filter(|(s, r)| s.path.is_some() && r.is_some()).count();
+    println!("stops     {usable} with image, joints and nominal tip; {} with observations marked", marks.len());
+    for notice in series.notices.iter().chain(&series.reading_notices(&chain)).chain(&notices) {
+        println!("note      {notice}");
+    }
+    Ok(())
+}
+
+/// What was taken, as a person reads it.
+fn text(extracted: &Extracted) -> String {
+    let reports = &extracted.reports;
+    let worst = |of: fn(&crate::series::StopReport) -> f64| reports.iter().map(of).fold(0.0, f64::max);
+    let pictures: usize = reports.iter().map(|r| r.pictures).sum();
+    let mut text = format!(
+        "stops     {} from {pictures} images of {} and the joints {} of {}\n\
+         time      images recorded {:+.1} ms later than joint states, counted from their stamps\n\
+         joints    nearest sample within {:.1} ms, fastest {:.2e} rad/s (m/s) at an exposure\n",
+        reports.len(),
+        extracted.image_topic,
+        extracted.stops.joints.join(", "),
+        extracted.joint_topic,
+        1e3 * extracted.image_delay_s,
+        1e3 * worst(|r| r.nearest_sample_s),
+        worst(|r| r.speed),
+    );
+    let noises: Vec<f64> = reports.iter().filter_map(|r| r.noise_counts).collect();
+    if !noises.is_empty() {
+        let rms = (noises.iter().map(|n| n * n).sum::<f64>() / noises.len() as f64).sqrt();
+        text += &format!("noise     {rms:.2} counts in one image\n");
+    }
+    for notice in &extracted.notices {
+        text += &format!("note      {notice}\n");
+    }
+    text
+}

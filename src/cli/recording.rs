@@ -1,0 +1,98 @@
+//! Flags for recordings, and the place where their pictures wait while a command runs.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+
+use crate::error::{Error, Result};
+use crate::series::{Clock, Motion, Picking, RecordingOptions, Series, Source};
+
+/// Flags that say how a recording is read.
+#[derive(Debug, Args)]
+pub(super) struct RecordingArgs {
+    /// Recordings: topic of the joint states, when there are several
+    #[arg(long, value_name = "TOPIC")]
+    joint_topic: Option<String>,
+    /// Recordings: topic of the images, when there are several
+    #[arg(long, value_name = "TOPIC")]
+    image_topic: Option<String>,
+    /// Recordings: whose time counts, that of the message's stamp or that of its recording
+    #[arg(long, value_enum, default_value_t = ClockName::Stamp)]
+    clock: ClockName,
+    /// Recordings: what stands for a standstill, its sharpest image or the average of its images
+    #[arg(long, value_enum, default_value_t = PickingName::Sharpest)]
+    picture: PickingName,
+    /// Recordings: also take images while the robot moves, this many seconds apart
+    #[arg(long, value_name = "SECONDS")]
+    in_motion: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ClockName {
+    Stamp,
+    Log,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum PickingName {
+    Sharpest,
+    Average,
+}
+
+impl RecordingArgs {
+    /// Options for these joints (empty: all that are recorded).
+    pub(super) fn options(&self, joints: &[String]) -> Result<RecordingOptions> {
+        let motion = match self.in_motion {
+            None => Motion::Refuse,
+            Some(interval_s) if interval_s > 0.0 && interval_s.is_finite() => Motion::Accept { interval_s },
+            Some(s) => {
+                return Err(Error::input("--in-motion", format!("{s} is no time"), "give seconds, for example 0.5"));
+            }
+        };
+        Ok(RecordingOptions {
+            joints: joints.to_vec(),
+            joint_topic: self.joint_topic.clone(),
+            image_topic: self.image_topic.clone(),
+            clock: if self.clock == ClockName::Log { Clock::Log } else { Clock::Stamp },
+            motion,
+            picking: if self.picture == PickingName::Average { Picking::Average } else { Picking::Sharpest },
+            ..RecordingOptions::default()
+        })
+    }
+}
+
+/// A folder for pictures of recordings, removed when it is dropped.
+pub(super) struct Pictures(PathBuf);
+
+impl Pictures {
+    /// A folder of this process alone; nothing is created before it is needed.
+    pub(super) fn new() -> Self {
+        Self(std::env::temp_dir().join(format!("robotcal-{}", std::process::id())))
+    }
+
+    /// Takes the stops out of the recordings among `all`; the other series stay as they are.
+    pub(super) fn of_recordings(&self, all: Vec<Series>, options: &RecordingOptions) -> Result<Vec<Series>> {
+        let one = |series: Series| match series.source {
+            Source::Recording(_) => {
+                let images = self.0.join(&series.name);
+                series.with_recording(&images, options)
+            }
+            _ => Ok(series),
+        };
+        all.into_iter().map(one).collect()
+    }
+}
+
+impl Drop for Pictures {
+    fn drop(&mut self) {
+        remove(&self.0);
+    }
+}
+
+fn remove(folder: &Path) {
+    if folder.exists()
+        && let Err(error) = std::fs::remove_dir_all(folder)
+    {
+        tracing::warn!("{} could not be removed: {error}", folder.display());
+    }
+}

@@ -1,0 +1,65 @@
+//! compensation.toml read back into joint terms.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::error::{Error, Result};
+use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
+use crate::urdf::Chain;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    joint: BTreeMap<String, Joint>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Joint {
+    gear_scale: Option<f64>,
+    #[serde(default)]
+    harmonics: Vec<f64>,
+    #[serde(default)]
+    gravity: Vec<f64>,
+    backlash_rad: Option<f64>,
+}
+
+/// Joint terms of a compensation.toml for a chain, joints matched by name.
+///
+/// # Errors
+/// Names the file, and the line or joint: unreadable text, unknown keys, a joint that the chain does not have, wrong counts.
+pub fn read_compensation(path: &Path, chain: &Chain) -> Result<Vec<JointTerm>> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+    let file: File = toml::from_str(&text)
+        .map_err(|e| Error::input(path.display(), e, "use the compensation.toml that identify wrote"))?;
+    let mut terms = Vec::new();
+    for (name, joint) in &file.joint {
+        let place = || format!("{}: [joint.{name}]", path.display());
+        let reading = chain.readings.iter().position(|r| r == name).ok_or_else(|| {
+            Error::input(
+                place(),
+                format!("the robot has no such joint (it has {})", chain.readings.join(", ")),
+                "use the compensation.toml of this robot",
+            )
+        })?;
+        if joint.harmonics.len() % 2 != 0 || joint.gravity.len() > usize::from(GRAVITY_TERMS) {
+            return Err(Error::input(
+                place(),
+                "harmonics come in pairs (cosine, sine) and gravity in up to four terms",
+                "use the compensation.toml that identify wrote",
+            ));
+        }
+        let mut add = |term: Term, value: f64| terms.push(JointTerm { reading, term, value });
+        joint.gear_scale.into_iter().for_each(|v| add(Term::Gear, v));
+        for (k, pair) in (1u8..).zip(joint.harmonics.chunks(2)) {
+            add(Term::Cosine(k), pair[0]);
+            add(Term::Sine(k), pair[1]);
+        }
+        (0..GRAVITY_TERMS).zip(&joint.gravity).for_each(|(k, v)| add(Term::Gravity(k), *v));
+        joint.backlash_rad.into_iter().for_each(|v| add(Term::Backlash, v));
+    }
+    Ok(terms)
+}

@@ -1,0 +1,131 @@
+//! Quality gates: what a result must fulfil to be trusted, and remarks that do not stop anyone.
+
+use super::free_poses::FreePoses;
+use super::joint::left_out;
+use crate::assess::Accuracy;
+use crate::error::Notice;
+use crate::problem::{Problem, State};
+
+/// Free-pose RMS beyond which the camera model does not explain the images, px per point.
+const WORST_FREE_RMS_PX: f64 = 1.0;
+
+/// Joint noise beyond which the readings do not explain the images, rad or m: robots repeat to some 0.1 mrad.
+const WORST_JOINT_NOISE: f64 = 2e-3;
+
+/// Share of the robot's images that may be left out in a result worth having.
+const WORST_SHARE_LEFT_OUT: f64 = 0.25;
+
+/// Share of single observations that may be left out: clean data lose 4e-5.
+const WORST_SHARE_REJECTED: f64 = 0.05;
+
+/// Prior sigmas beyond which a deviation is no longer within tolerance.
+const BEYOND_TOLERANCE: f64 = 5.0;
+
+/// Gates that failed, in words with the first thing to look at.
+pub(super) fn gates(
+    problem: &Problem,
+    state: &State,
+    free: &FreePoses,
+    accuracy: &Accuracy,
+    on_robot: usize,
+) -> Vec<String> {
+    let mut failed: Vec<String> = free.focus_change.iter().map(|f| format!("{f}; fix focus and zoom")).collect();
+    if free.rms_px > WORST_FREE_RMS_PX {
+        failed.push(format!(
+            "camera: free poses leave {:.2} px per point; the camera model or the plate does not describe these images",
+            free.rms_px
+        ));
+    }
+    for (k, camera) in problem.noise.joint.iter().enumerate() {
+        if let Some(worst) = camera.iter().copied().reduce(f64::max).filter(|s| *s > WORST_JOINT_NOISE) {
+            failed.push(format!(
+                "joint noise: {:.1} mrad with camera {}; the readings do not explain the images: look for loose camera or plate, motion, wrong robot model",
+                1e3 * worst,
+                problem.cameras[k]
+            ));
+        }
+    }
+    let out = left_out(problem, on_robot);
+    if out as f64 > WORST_SHARE_LEFT_OUT * on_robot as f64 {
+        failed.push(format!("images: {out} of {on_robot} do not fit their joint readings"));
+    }
+    failed.extend(rejected_observations(problem));
+    for (plate, shape) in problem.layout.shapes.iter().zip(&state.plates) {
+        let scale = &problem.layout.columns[plate.start];
+        let sigmas = (shape.modes[0] - scale.prior_mean) / scale.prior_sigma;
+        if sigmas.abs() > BEYOND_TOLERANCE {
+            failed.push(format!(
+                "plate: its scale comes out {:.3} % from nominal, {:.0} times its tolerance; measure the plate, correct pitch_m or give [scale] in plate.toml",
+                100.0 * shape.modes[0],
+                sigmas.abs()
+            ));
+        }
+    }
+    if accuracy.calibrated.rms_mm > accuracy.nominal.rms_mm {
+        failed.push(format!(
+            "hold-out: the corrected robot predicts images no better than the nominal one ({:.3} mm against {:.3} mm)",
+            accuracy.calibrated.rms_mm, accuracy.nominal.rms_mm
+        ));
+    }
+    failed
+}
+
+fn rejected_observations(problem: &Problem) -> Option<String> {
+    let (mut out, mut all, mut worst) = (0, 0, (0.0, ""));
+    for (_, image) in problem.used() {
+        let (n, rejected) = (image.observations.len(), image.observations.len() - image.used().count());
+        (out, all) = (out + rejected, all + n);
+        let share = rejected as f64 / n.max(1) as f64;
+        if share > worst.0 {
+            worst = (share, image.name.as_str());
+        }
+    }
+    let share = f64::from(out as u32) / f64::from(all.max(1) as u32);
+    (share > WORST_SHARE_REJECTED).then(|| {
+        format!(
+            "observations: {:.0} % were left out, {:.0} % in {}; look for markers taken for others, a bent plate, changed focus",
+            100.0 * share,
+            100.0 * worst.0,
+            worst.1
+        )
+    })
+}
+
+/// What the user should know, though the result stands.
+pub(super) fn remarks(problem: &Problem, state: &State, on_robot: usize, notices: &mut Vec<Notice>) {
+    if on_robot < 20 {
+        notices.push(Notice::new(
+            "series",
+            format!(
+                "{on_robot} images of the robot are few: expect the prior (nominal model) to decide much of the result"
+            ),
+            "take 30 to 50 stops that move every joint through its range",
+        ));
+    }
+    for (plate, shape) in problem.plates.iter().zip(&state.plates) {
+        for (marker, correction) in plate.markers.iter().zip(&shape.corrections) {
+            if correction.norm() > BEYOND_TOLERANCE * marker.sigma_m {
+                notices.push(Notice::new(
+                    format!("marker {}", marker.id),
+                    format!(
+                        "lies {:.2} mm from where the plate file says, far beyond its tolerance",
+                        1e3 * correction.norm()
+                    ),
+                    "printed wrongly, moved, or taken for another? its corrected position stands in plate.csv",
+                ));
+            }
+        }
+    }
+    let values = state.values(&problem.layout);
+    for c in problem.layout.twists.start..problem.layout.terms.end {
+        let column = &problem.layout.columns[c];
+        let sigmas = ((values[c] - column.prior_mean) / column.prior_sigma).abs();
+        if sigmas > BEYOND_TOLERANCE {
+            notices.push(Notice::new(
+                &column.name,
+                format!("{:.3e} {} is {sigmas:.0} times what robots usually deviate by", values[c], column.unit),
+                "check that the URDF is of this robot, and its mastering",
+            ));
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! A series as a recording: joint states, images, transforms and marks on the images, for viewers and other programs.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use image::ImageFormat;
+use mcap::records::MessageHeader;
+use mcap::{Compression, WriteOptions, Writer};
+
+use super::interfaces::{ANNOTATIONS, ANNOTATIONS_SCHEMA, TRANSFORMS, definition};
+use super::messages::{COMPRESSED_IMAGE, JOINT_STATE};
+use crate::geom::Pose;
+use crate::series::{ImageObservations, Series, Stop};
+use crate::{Error, Notice, Result};
+
+/// Joint states are written this often while the robot stands, ns.
+const PERIOD_NS: i64 = 20_000_000;
+/// The robot stands for this long before and after each image, ns.
+const STANDING_NS: i64 = 500_000_000;
+/// Distance of images in time where the series does not tell, ns.
+const STEP_NS: i64 = 2_000_000_000;
+
+/// What a recording shows beside the images.
+#[derive(Debug, Clone, Copy)]
+pub struct Shown<'a> {
+    /// Names of the joints, in the order of the readings.
+    pub joints: &'a [String],
+    /// Readings of every stop, rad and m; a stop without any is left out.
+    pub readings: &'a [Option<Vec<f64>>],
+    /// Base and tip link, and `base_from_tip` of every stop.
+    pub frames: Option<(&'a str, &'a str, &'a [Option<Pose>])>,
+    /// Points to mark on the images.
+    pub marks: &'a [ImageObservations],
+}
+
+/// Writes the stops of a series as an MCAP recording that [`super::extract`] reads back as the same series.
+///
+/// Topics: `/joint_states`, `/camera/image/compressed` (png and jpg as they are, other formats as png), `/tf`,
+/// `/camera/annotations`. Stamps are the times of the stops; where they are missing, not in order or too dense for
+/// standstills, two seconds apart.
+///
+/// # Errors
+/// A file that exists already or cannot be written, an image that cannot be read.
+pub fn write_recording(path: &Path, series: &Series, shown: Shown<'_>) -> Result<Vec<Notice>> {
+    if path.exists() {
+        return Err(Error::input(path.display(), "exists already", "name a new file, or remove this one"));
+    }
+    let unfinished = unfinished(path);
+    let done = write_stops(&unfinished, series, shown);
+    match &done {
+        Ok(_) => std::fs::rename(&unfinished, path).map_err(|e| Error::io(path, &e))?,
+        // The reason of the failure matters more than a file that could not be removed.
+        Err(_) => drop(std::fs::remove_file(&unfinished)),
+    }
+    done
+}
+
+fn unfinished(path: &Path) -> PathBuf {
+    let name = path.file_name().map_or_else(|| "recording".into(), |n| n.to_string_lossy());
+    path.with_file_name(format!(".{name}.unfinished"))
+}
+
+fn write_stops(path: &Path, series: &Series, shown: Shown<'_>) -> Result<Vec<Notice>> {
+    let mut recording = Recording::create(path)?;
+    let mut notices = Vec::new();
+    let marks: BTreeMap<&str, &ImageObservations> = shown.marks.iter().map(|m| (m.image.as_str(), m)).collect();
+    let usable: Vec<(usize, &Stop, &Vec<f64>, &PathBuf)> = series
+        .stops
+        .stops
+        .iter()
+        .zip(shown.readings)
+        .enumerate()
+        .filter_map(|(i, (stop, readings))| Some((i, stop, readings.as_ref()?, stop.path.as_ref()?)))
+        .collect();
+    if usable.is_empty() {
+        let what = "has no stop with both an image and joint readings";
+        return Err(Error::input(series.folder.display(), what, "look at joints.csv and images/"));
+    }
+    let left_out = series.stops.stops.len() - usable.len();
+    if left_out > 0 {
+        let what = format!("{left_out} images off the robot, or missing, are not in the recording");
+        notices.push(Notice::new(series.folder.display(), what, ""));
+    }
+    let times = times(&usable.iter().map(|(_, stop, ..)| *stop).collect::<Vec<_>>());
+    for (time, (i, stop, readings, image)) in times.into_iter().zip(usable) {
+        for k in -(STANDING_NS / PERIOD_NS)..=STANDING_NS / PERIOD_NS {
+            // The image is written at its time, among the joint states.
+            recording.joint_state(time + k * PERIOD_NS, shown.joints, readings)?;
+            if k == 0 {
+                recording.image(time, image)?;
+                if let Some((base, tip, poses)) = shown.frames
+                    && let Some(Some(pose)) = poses.get(i)
+                {
+                    recording.transform(time, base, tip, pose)?;
+                }
+                if let Some(marks) = marks.get(stop.image.as_str()) {
+                    recording.marks(time, marks)?;
+                }
+            }
+        }
+    }
+    recording.finish()?;
+    Ok(notices)
+}
+
+/// Times of the stops, ns, at least so far apart that every one is a standstill of its own.
+fn times(stops: &[&Stop]) -> Vec<i64> {
+    let stated: Option<Vec<i64>> = stops.iter().map(|s| s.time_s.map(|t| (t * 1e9).round() as i64)).collect();
+    let apart = |times: &Vec<i64>| {
+        times.iter().all(|t| *t >= STANDING_NS) && times.windows(2).all(|w| w[1] - w[0] > 2 * STANDING_NS + PERIOD_NS)
+    };
+    stated.filter(apart).unwrap_or_else(|| (1..=stops.len() as i64).map(|k| k * STEP_NS).collect())
+}
+
+/// An MCAP file being written.
+struct Recording {
+    path: PathBuf,
+    writer: Writer<BufWriter<File>>,
+    sequence: u32,
+}
+
+impl Recording {
+    fn create(path: &Path) -> Result<Self> {
+        let file = File::create(path).map_err(|e| Error::io(path, &e))?;
+        let options = WriteOptions::new().profile("ros2").compression(Some(Compression::Zstd));
+        let writer = options.create(BufWriter::new(file)).map_err(|e| refused(path, &e))?;
+        Ok(Self { path: path.to_path_buf(), writer, sequence: 0 })
+    }
+
+    fn message(&mut self, time_ns: i64, topic: &str, schema: &str, data: &[u8]) -> Result<()> {
+        let written = self.channel(topic, schema).and_then(|channel_id| {
+            let time = time_ns.max(0) as u64;
+            let header = MessageHeader { channel_id, sequence: self.sequence, log_time: time, publish_time: time };
+            self.writer.write_to_known_channel(&header, data)
+        });
+        self.sequence = self.sequence.wrapping_add(1);
+        written.map_err(|e| refused(&self.path, &e))
+    }
+
+    /// Schema and channel are written once: the writer knows what it has.
+    fn channel(&mut self, topic: &str, schema: &str) -> mcap::McapResult<u16> {
+        let json = schema == ANNOTATIONS;
+        let (kind, text) = match json {
+            true => ("jsonschema", ANNOTATIONS_SCHEMA.to_string()),
+            false => ("ros2msg", definition(schema)),
+        };
+        let id = self.writer.add_schema(schema, kind, text.as_bytes())?;
+        self.writer.add_channel(id, topic, if json { "json" } else { "cdr" }, &BTreeMap::new())
+    }
+
+    fn joint_state(&mut self, time_ns: i64, names: &[String], positions: &[f64]) -> Result<()> {
+        let mut cdr = CdrWriter::with_header(time_ns, "");
+        cdr.u32(names.len() as u32);
+        names.iter().for_each(|name| cdr.string(name));
+        cdr.f64s(positions);
+        cdr.f64s(&[]);
+        cdr.f64s(&[]);
+        self.message(time_ns, "/joint_states", JOINT_STATE, &cdr.0)
+    }
+
+    fn image(&mut self, time_ns: i64, path: &Path) -> Result<()> {
+        let mut bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+        let unreadable = |e: image::ImageError| Error::input(path.display(), e, "remove the image or its row");
+        let format = match image::guess_format(&bytes) {
+            Ok(ImageFormat::Jpeg) => "jpeg",
+            Ok(ImageFormat::Png) => "png",
+            _ => {
+                let picture = image::load_from_memory(&bytes).map_err(unreadable)?;
+                let mut png = std::io::Cursor::new(Vec::new());
+                picture.write_to(&mut png, ImageFormat::Png).map_err(unreadable)?;
+                bytes = png.into_inner();
+                "png"
+            }
+        };
+        let mut cdr = CdrWriter::with_header(time_ns, "camera");
+        cdr.string(format);
+        cdr.u32(bytes.len() as u32);
+        cdr.0.extend(&bytes);
+        self.message(time_ns, "/camera/image/compressed", COMPRESSED_IMAGE, &cdr.0)
+    }
+
+    fn transform(&mut self, time_ns: i64, parent: &str, child: &str, parent_from_child: &Pose) -> Result<()> {
+        let mut cdr = CdrWriter::new();
+        cdr.u32(1);
+        cdr.header(time_ns, parent);
+        cdr.string(child);
+        parent_from_child.xyz().iter().chain(&parent_from_child.quaternion_xyzw()).for_each(|v| cdr.f64(*v));
+        self.message(time_ns, "/tf", TRANSFORMS, &cdr.0)
+    }
+
+    fn marks(&mut self, time_ns: i64, marks: &ImageObservations) -> Result<()> {
+        let (seconds, nanoseconds) = split(time_ns);
+        // Viewers count from the corner of the top-left pixel, not from its centre.
+        let points: Vec<_> =
+            marks.observations.iter().map(|o| serde_json::json!({"x": o.uv[0] + 0.5, "y": o.uv[1] + 0.5})).collect();
+        let text = serde_json::json!({
+            "circles": [], "texts": [],
+            "points": [{
+                "timestamp": {"sec": seconds, "nsec": nanoseconds}, "type": 1, "points": points, "thickness": 2.0,
+                "outline_color": {"r": 0.0, "g": 0.8, "b": 0.2, "a": 1.0}, "outline_colors": [],
+                "fill_color": {"r": 0.0, "g": 0.8, "b": 0.2, "a": 1.0},
+            }],
+        });
+        self.message(time_ns, "/camera/annotations", ANNOTATIONS, text.to_string().as_bytes())
+    }
+
+    fn finish(mut self) -> Result<()> {
+        self.writer.finish().map(|_| ()).map_err(|e| refused(&self.path, &e))
+    }
+}
+
+fn refused(path: &Path, error: &mcap::McapError) -> Error {
+    Error::input(path.display(), format!("cannot be written: {error}"), "check that the disk is not full")
+}
+
+/// Seconds and nanoseconds of a stamp.
+fn split(time_ns: i64) -> (i32, u32) {
+    const SECOND: i64 = 1_000_000_000;
+    let seconds = i32::try_from(time_ns.div_euclid(SECOND)).unwrap_or(i32::MAX);
+    (seconds, time_ns.rem_euclid(SECOND) as u32)
+}
+
+/// Plain CDR in little-endian order, the counterpart of [`super::cdr::Cdr`].
+struct CdrWriter(Vec<u8>);
+
+impl CdrWriter {
+    fn new() -> Self {
+        Self(vec![0, 1, 0, 0])
+    }
+
+    fn with_header(time_ns: i64, frame: &str) -> Self {
+        let mut cdr = Self::new();
+        cdr.header(time_ns, frame);
+        cdr
+    }
+
+    fn header(&mut self, time_ns: i64, frame: &str) {
+        let (seconds, nanoseconds) = split(time_ns);
+        self.u32(seconds as u32);
+        self.u32(nanoseconds);
+        self.string(frame);
+    }
+
+    /// Alignment counts from the end of the encapsulation header.
+    fn align(&mut self, to: usize) {
+        let body = self.0.len() - 4;
+        self.0.resize(4 + body.next_multiple_of(to), 0);
+    }
+
+    fn u32(&mut self, value: u32) {
+        self.align(4);
+        self.0.extend(value.to_le_bytes());
+    }
+
+    fn f64(&mut self, value: f64) {
+        self.align(8);
+        self.0.extend(value.to_le_bytes());
+    }
+
+    fn f64s(&mut self, values: &[f64]) {
+        self.u32(values.len() as u32);
+        values.iter().for_each(|v| self.f64(*v));
+    }
+
+    fn string(&mut self, text: &str) {
+        self.u32(text.len() as u32 + 1);
+        self.0.extend(text.as_bytes());
+        self.0.push(0);
+    }
+}

@@ -1,0 +1,157 @@
+//! ChArUco boards and plain grids of dots on rendered pictures with known truth.
+
+#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
+mod boards_scene;
+
+use boards_scene::{Print, Scene, View};
+use calib_targets::aruco::builtins::DICT_4X4_50;
+use nalgebra::Vector3;
+use robotcal::detect::{Detection, Picture, detect};
+use robotcal::series::{Aruco, Edge, Plate, PlateKind};
+
+const COLUMNS: u32 = 8;
+const ROWS: u32 = 5;
+
+fn charuco_plate(aruco: Option<(&str, f64)>) -> Plate {
+    let aruco = aruco.map(|(name, ratio)| Aruco { dictionary: name.to_owned(), side_m: ratio * 0.01 });
+    Plate { aruco, ..Plate::lattice(PlateKind::Charuco, COLUMNS, ROWS, 0.01, 1e-4) }
+}
+
+fn charuco_scene(angle: f64) -> Scene {
+    let view = View::new(COLUMNS, ROWS, [321.3, 239.6], 46.0, angle, [0.015, -0.01]);
+    Scene { print: Print::Charuco { dictionary: DICT_4X4_50, ratio: 0.7 }, ..Scene::new(COLUMNS, ROWS, view) }
+}
+
+fn rms(errors: &[[f64; 2]]) -> f64 {
+    (errors.iter().map(|e| e[0] * e[0] + e[1] * e[1]).sum::<f64>() / (2 * errors.len()) as f64).sqrt()
+}
+
+fn errors(detection: &Detection, truth: impl Fn(u32) -> [f64; 2]) -> Vec<[f64; 2]> {
+    detection
+        .observations
+        .iter()
+        .map(|o| {
+            let t = truth(o.marker);
+            [o.uv[0] - t[0], o.uv[1] - t[1]]
+        })
+        .collect()
+}
+
+fn mirror(picture: &Picture) -> Picture {
+    let pixels = (0..picture.pixels.len())
+        .map(|k| picture.at(picture.width - 1 - k % picture.width, k / picture.width))
+        .collect();
+    Picture { pixels, ..picture.clone() }
+}
+
+#[test]
+fn charuco_corners_are_identified_in_every_orientation() {
+    for step in 0..4 {
+        let scene = charuco_scene(0.2 + 1.6 * f64::from(step));
+        let detection = detect(&scene.render(0), &charuco_plate(Some(("DICT_4X4_50", 0.7)))).unwrap();
+        assert_eq!(detection.observations.len(), 40, "{:?}", detection.dropped);
+        assert!(detection.notices.is_empty());
+        let error = rms(&errors(&detection, |id| scene.corner(id)));
+        assert!(error < 0.006, "step {step}: {error}");
+    }
+}
+
+#[test]
+fn part_of_a_charuco_board_keeps_its_ids() {
+    let view = View::new(COLUMNS, ROWS, [120.0, 100.0], 60.0, 0.1, [0.0, 0.0]);
+    let scene = Scene { view, ..charuco_scene(0.0) };
+    let detection = detect(&scene.render(0), &charuco_plate(Some(("DICT_4X4_50", 0.7)))).unwrap();
+    assert!((15..40).contains(&detection.observations.len()), "{}", detection.observations.len());
+    let error = rms(&errors(&detection, |id| scene.corner(id)));
+    assert!(error < 0.006, "{error}");
+}
+
+#[test]
+fn an_unstated_dictionary_is_found_and_a_wrong_one_or_a_mirror_refused() {
+    let picture = charuco_scene(0.1).render(0);
+    let detection = detect(&picture, &charuco_plate(None)).unwrap();
+    assert_eq!(detection.observations.len(), 40);
+    assert!(detection.notices[0].what.contains("4X4") && detection.notices[0].what.contains("0.7"));
+    let wrong = detect(&picture, &charuco_plate(Some(("DICT_6X6_250", 0.7)))).expect_err("another dictionary");
+    assert!(wrong.what.contains("DICT_6X6_250"), "{wrong}");
+    let unknown = detect(&picture, &charuco_plate(Some(("DICT_9X9", 0.7)))).expect_err("no such dictionary");
+    assert!(unknown.what.contains("DICT_9X9"), "{unknown}");
+    let mirrored = detect(&mirror(&picture), &charuco_plate(Some(("DICT_4X4_50", 0.7)))).expect_err("mirrored");
+    assert!(mirrored.what.contains("mirrored"), "{mirrored}");
+}
+
+/// A grid of dots of 0.25 steps radius; `large` have 0.36.
+fn dots(kind: &str, large: &[u32]) -> (Plate, Scene) {
+    let (columns, rows): (u32, u32) = if kind == "asymmetric" { (4, 11) } else { (9, 6) };
+    let step = 0.01;
+    let mut plate = Plate::lattice(PlateKind::CircleGrid, columns, rows, step, 1e-4);
+    for m in &mut plate.markers {
+        if kind == "asymmetric" {
+            // As OpenCV numbers them: every other row is shifted by one unit, the dots of a row are two units apart.
+            let (c, r) = (m.id % columns, m.id / columns);
+            let x = f64::from(2 * c + r % 2) - f64::from(2 * columns - 1) / 2.0;
+            m.position_m = Vector3::new(x * step, (f64::from(rows - 1) / 2.0 - f64::from(r)) * step, 0.0);
+        }
+        let radius = if large.contains(&m.id) { 0.36 } else { 0.25 };
+        m.outer_radius_m = radius * if kind == "asymmetric" { step * 2f64.sqrt() } else { step };
+    }
+    let places = plate.markers.iter().map(|m| [m.position_m.x / step, -m.position_m.y / step, m.outer_radius_m / step]);
+    let print = Print::Dots(places.collect());
+    let pixels = if kind == "asymmetric" { 34.0 } else { 44.0 };
+    let view = View::new(1, 1, [320.7, 240.4], pixels, 0.0, [0.012, -0.008]);
+    (plate, Scene { print, ..Scene::new(columns, rows, view) })
+}
+
+/// Centroid of the image of a circle under the view: mean over its area by rings, right to 1e-4 px.
+fn centroid(scene: &Scene, dot: [f64; 3]) -> [f64; 2] {
+    let outline: Vec<[f64; 2]> = (0..720)
+        .map(|k| {
+            let a = f64::from(k) * std::f64::consts::TAU / 720.0;
+            scene.view.pixel([dot[0] + dot[2] * a.cos(), dot[1] + dot[2] * a.sin()])
+        })
+        .collect();
+    let (mut area, mut sum) = (0.0, [0.0; 2]);
+    for k in 0..outline.len() {
+        let (p, q) = (outline[k], outline[(k + 1) % outline.len()]);
+        let cross = p[0] * q[1] - p[1] * q[0];
+        area += cross / 2.0;
+        for a in 0..2 {
+            sum[a] += (p[a] + q[a]) * cross / 6.0;
+        }
+    }
+    sum.map(|s| s / area)
+}
+
+#[test]
+fn plain_grids_are_identified() {
+    for (kind, large, angles, symmetric) in [
+        ("symmetric", vec![], vec![0.0, 0.4, -0.9], true),
+        ("symmetric", vec![12], vec![0.0, 1.7, 3.3, 4.8], false),
+        ("asymmetric", vec![], vec![0.0, 1.7, 3.3, 4.8], false),
+    ] {
+        for angle in angles {
+            let (plate, scene) = dots(kind, &large);
+            let view =
+                View::new(1, 1, [320.7, 240.4], if kind == "asymmetric" { 34.0 } else { 44.0 }, angle, [0.012, -0.008]);
+            let scene = Scene { view, ..scene };
+            let detection = detect(&scene.render(0), &plate).unwrap_or_else(|e| panic!("{kind} {angle}: {e}"));
+            let outer: Vec<_> = detection.observations.iter().filter(|o| o.edge == Edge::Outer).collect();
+            assert_eq!(outer.len(), plate.markers.len(), "{kind} {large:?} {angle}: {:?}", detection.dropped);
+            assert_eq!(!detection.notices.is_empty(), symmetric, "{kind} {angle}: {:?}", detection.notices);
+            let Print::Dots(dots) = &scene.print else { panic!("dots") };
+            let error = rms(&errors(&detection, |id| centroid(&scene, dots[id as usize])));
+            assert!(error < 0.01, "{kind} {large:?} {angle}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_mirrored_or_incomplete_grid_is_refused() {
+    let (plate, scene) = dots("symmetric", &[12]);
+    let error = detect(&mirror(&scene.render(0)), &plate).expect_err("mirrored");
+    assert!(error.what.contains("mirrored"), "{error}");
+    let (plate, scene) = dots("symmetric", &[]);
+    let view = View::new(1, 1, [110.0, 240.4], 44.0, 0.0, [0.0, 0.0]);
+    assert!(detect(&Scene { view, ..scene }.render(0), &plate).is_err());
+}

@@ -1,0 +1,207 @@
+//! Chessboard corners on rendered boards with known truth.
+
+#![allow(missing_docs, clippy::expect_used, clippy::panic)]
+
+mod boards_scene;
+
+use boards_scene::{Scene, View};
+use robotcal::detect::{Detection, Mosaic, Picture, detect};
+use robotcal::series::{Plate, PlateKind};
+
+fn plate(columns: u32, rows: u32) -> Plate {
+    Plate::lattice(PlateKind::Chessboard, columns, rows, 0.01, 1e-4)
+}
+
+fn found(scene: &Scene, seed: u64) -> Detection {
+    match detect(&scene.render(seed), &plate(scene.columns, scene.rows)) {
+        Ok(detection) => detection,
+        Err(error) => panic!("seed {seed}: {error}"),
+    }
+}
+
+fn errors(scene: &Scene, detection: &Detection) -> Vec<[f64; 2]> {
+    let error = |o: &robotcal::series::Observation| {
+        let truth = scene.corner(o.marker);
+        [o.uv[0] - truth[0], o.uv[1] - truth[1]]
+    };
+    detection.observations.iter().map(error).collect()
+}
+
+fn rms(errors: &[[f64; 2]]) -> f64 {
+    (errors.iter().map(|e| e[0] * e[0] + e[1] * e[1]).sum::<f64>() / (2 * errors.len()) as f64).sqrt()
+}
+
+fn tilted(columns: u32, rows: u32, angle: f64) -> Scene {
+    Scene::new(columns, rows, View::new(columns, rows, [321.3, 239.6], 33.0, angle, [0.02, -0.015]))
+}
+
+#[test]
+fn corners_without_noise_are_exact_in_every_orientation() {
+    // Rounding to whole counts is noise of 0.29 counts; the renderer's samples add up to 0.003 px.
+    for step in 0..12 {
+        let scene = tilted(9, 6, f64::from(step) * std::f64::consts::TAU / 12.0);
+        let detection = found(&scene, 0);
+        let errors = errors(&scene, &detection);
+        assert_eq!(detection.observations.len(), 54, "step {step}: {:?}", detection.dropped);
+        assert!(detection.notices.is_empty(), "{:?}", detection.notices);
+        assert!(rms(&errors) < 0.004, "step {step}: {}", rms(&errors));
+    }
+}
+
+#[test]
+fn the_stated_covariance_covers_the_noise() {
+    // Systematic share of the stated covariance: 0.015 px per axis; rendered boards have none, so it is taken off.
+    let systematic = 0.015_f64.powi(2);
+    let mut normalised = Vec::new();
+    for seed in 0..12 {
+        let scene = Scene { noise: 8.0, ..tilted(9, 6, 0.5 * seed as f64) };
+        let detection = found(&scene, seed);
+        for (o, e) in detection.observations.iter().zip(errors(&scene, &detection)) {
+            let [uu, uv, vv] = o.covariance.expect("a covariance");
+            let (uu, vv) = (uu - systematic, vv - systematic);
+            normalised.push((e[0] * e[0] * vv - 2.0 * e[0] * e[1] * uv + e[1] * e[1] * uu) / (uu * vv - uv * uv) / 2.0);
+        }
+    }
+    let mean = normalised.iter().sum::<f64>() / normalised.len() as f64;
+    // 1 +- 3 / sqrt(12 * 54) by chance, and a few percent for the linearisation.
+    assert!((0.85..1.15).contains(&mean), "{mean} over {}", normalised.len());
+}
+
+#[test]
+fn uneven_light_does_not_move_corners() {
+    let even = tilted(9, 6, 0.3);
+    let flat = found(&even, 0);
+    for (slope, most) in [(0.0003, 0.002), (0.001, 0.004)] {
+        let scene = Scene { slope: [slope, -0.5 * slope], ..even.clone() };
+        let uneven = found(&scene, 0);
+        let shifts: Vec<_> = uneven
+            .observations
+            .iter()
+            .zip(&flat.observations)
+            .map(|(a, b)| [a.uv[0] - b.uv[0], a.uv[1] - b.uv[1]])
+            .collect();
+        println!("slope {slope}: {}", rms(&shifts));
+        assert!(rms(&shifts) < most, "slope {slope}: {}", rms(&shifts));
+    }
+}
+
+#[test]
+fn over_exposed_squares_do_not_move_corners() {
+    let scene = Scene { light: 330.0, ..tilted(9, 6, 0.3) };
+    let errors = errors(&scene, &found(&scene, 0));
+    assert!(rms(&errors) < 0.006, "{}", rms(&errors));
+}
+
+#[test]
+fn sixteen_bits_are_used_in_full() {
+    // The whole contrast is 25 of 65535 counts of 16 bit above a tenth of full scale; in 8 bits it would be gone.
+    let scene = Scene { dark: 100.0, light: 420.0, full_scale: 65535.0, ..tilted(9, 6, 0.2) };
+    let detection = found(&scene, 0);
+    assert_eq!(detection.observations.len(), 54);
+    assert!(rms(&errors(&scene, &detection)) < 0.004);
+}
+
+#[test]
+fn a_board_cut_by_the_edge_of_the_image_keeps_its_ids() {
+    for (centre, least) in [([60.0, 240.0], 25), ([590.0, 240.0], 25), ([321.0, 20.0], 20), ([330.0, 470.0], 20)] {
+        for angle in [0.05, 3.1] {
+            let scene = Scene::new(9, 6, View::new(9, 6, centre, 33.0, angle, [0.01, 0.01]));
+            let detection = found(&scene, 0);
+            assert!(detection.observations.len() >= least, "{centre:?}: {}", detection.observations.len());
+            assert!(detection.observations.len() < 54);
+            assert!(
+                rms(&errors(&scene, &detection)) < 0.006,
+                "{centre:?} {angle}: {}",
+                rms(&errors(&scene, &detection))
+            );
+        }
+    }
+}
+
+#[test]
+fn a_board_beyond_two_opposite_edges_is_refused() {
+    let scene = Scene::new(15, 6, View::new(15, 6, [320.0, 240.0], 60.0, 0.02, [0.0, 0.0]));
+    let error = detect(&scene.render(0), &plate(15, 6)).expect_err("the place on the board is unknown");
+    assert!(error.what.contains("outline"), "{error}");
+}
+
+#[test]
+fn a_covered_part_is_left_out_and_the_rest_keeps_its_ids() {
+    let scene = tilted(9, 6, 0.1);
+    let mut picture = scene.render(0);
+    // A cable across the board.
+    for y in 0..picture.height {
+        for x in 300..330 {
+            picture.pixels[y * picture.width + x] = 60.0;
+        }
+    }
+    let detection = detect(&picture, &plate(9, 6)).expect("a board");
+    assert!((40..54).contains(&detection.observations.len()), "{}", detection.observations.len());
+    assert!(rms(&errors(&scene, &detection)) < 0.01, "{}", rms(&errors(&scene, &detection)));
+}
+
+#[test]
+fn a_mirrored_board_is_refused_where_its_colours_show_it() {
+    // 10 x 8 squares: mirrored, the first square is light.
+    let scene = tilted(9, 7, 0.1);
+    let picture = scene.render(0);
+    let mirrored = mirror(&picture);
+    let error = detect(&mirrored, &plate(9, 7)).expect_err("mirrored");
+    assert!(error.what.contains("mirrored"), "{error}");
+    assert!(detect(&picture, &plate(9, 7)).is_ok());
+}
+
+fn mirror(picture: &Picture) -> Picture {
+    let pixels = (0..picture.pixels.len())
+        .map(|k| picture.at(picture.width - 1 - k % picture.width, k / picture.width))
+        .collect();
+    Picture { pixels, ..picture.clone() }
+}
+
+#[test]
+fn a_board_that_is_its_own_half_turn_is_upright_with_a_notice() {
+    for (columns, rows) in [(9, 7), (8, 6)] {
+        let scene = tilted(columns, rows, 0.4);
+        let detection = found(&scene, 0);
+        assert_eq!(detection.notices.len(), 1, "{:?}", detection.notices);
+        assert!(rms(&errors(&scene, &detection)) < 0.004);
+    }
+}
+
+#[test]
+fn another_board_than_the_plate_file_says_is_refused_or_noted() {
+    let picture = tilted(9, 6, 0.1).render(0);
+    for (columns, rows) in [(6, 5), (8, 6), (9, 5)] {
+        let found = detect(&picture, &plate(columns, rows));
+        assert!(found.is_err(), "{columns} x {rows}");
+    }
+    // Lines more than printed differ from covered lines by nothing in the picture.
+    for (columns, rows) in [(10, 6), (9, 7), (12, 9)] {
+        let larger = detect(&picture, &plate(columns, rows)).expect("a part of the larger board");
+        assert!(larger.notices.iter().any(|n| n.what.contains("whole line")), "{:?}", larger.notices);
+    }
+    let empty = Picture { pixels: vec![80.0; picture.pixels.len()], ..picture };
+    let error = detect(&empty, &plate(9, 6)).expect_err("nothing there");
+    assert!(error.what.contains("no chessboard"), "{error}");
+}
+
+#[test]
+fn balancing_a_mosaic_moves_no_corner() {
+    let scene = Scene { dark: 300.0, light: 2400.0, full_scale: 4095.0, ..tilted(9, 6, 0.25) };
+    let grey = scene.render(0);
+    let sensitivity = |x: usize, y: usize| [0.55, 1.0, 1.0, 0.7][2 * (y % 2) + x % 2];
+    let pixels = (0..grey.pixels.len())
+        .map(|k| (grey.pixels[k] * sensitivity(k % grey.width, k / grey.width)).round())
+        .collect();
+    let raw = Picture { pixels, ..grey.clone() };
+    let balanced = Mosaic::Rggb.to_grey(raw).expect("an exposed picture");
+    let (a, b) = (detect(&grey, &plate(9, 6)), detect(&balanced, &plate(9, 6)));
+    let (a, b) = (a.expect("grey"), b.expect("balanced"));
+    let shifts: Vec<[f64; 2]> =
+        a.observations.iter().zip(&b.observations).map(|(p, q)| [p.uv[0] - q.uv[0], p.uv[1] - q.uv[1]]).collect();
+    assert_eq!(shifts.len(), 54);
+    // Rounding to whole counts (0.3 of 2100) leaves about 1e-4 px.
+    assert!(rms(&shifts) < 1e-3, "{}", rms(&shifts));
+    assert_eq!(Mosaic::from_ros_encoding("bayer_gbrg16"), Some(Mosaic::Gbrg));
+    assert_eq!(Mosaic::from_ros_encoding("rgb8"), None);
+}

@@ -1,0 +1,181 @@
+//! Image files, flat-field correction and whole series: what is read, and what is said about files that cannot be.
+
+#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Rgb};
+use robotcal::Error;
+use robotcal::detect::{FlatField, Picture, detect_series, load};
+use robotcal::series::{Plate, PlateKind};
+
+mod boards_scene;
+use boards_scene::{Scene, View};
+
+fn ramp(x: u32, y: u32) -> u16 {
+    (x * 700 + y * 90) as u16
+}
+
+fn refused(path: &Path, bits: Option<u32>) -> Error {
+    let error = load(path, bits).expect_err("refused");
+    assert!(error.place.contains(&*path.file_name().unwrap().to_string_lossy()), "{error}");
+    assert!(!error.remedy.is_empty());
+    error
+}
+
+#[test]
+fn every_format_keeps_its_depth() {
+    let folder = tempfile::tempdir().unwrap();
+    let deep: ImageBuffer<Luma<u16>, Vec<u16>> = ImageBuffer::from_fn(40, 30, |x, y| Luma([ramp(x, y)]));
+    let flat = GrayImage::from_fn(40, 30, |x, y| Luma([(ramp(x, y) >> 8) as u8]));
+    for extension in ["png", "tif", "pgm"] {
+        let path = folder.path().join(format!("deep.{extension}"));
+        DynamicImage::ImageLuma16(deep.clone()).save(&path).unwrap();
+        let picture = load(&path, None).unwrap();
+        assert_eq!((picture.width, picture.height, picture.full_scale), (40, 30, 65535.0), "{extension}");
+        assert_eq!(picture.at(39, 29), f32::from(ramp(39, 29)), "{extension}");
+    }
+    for extension in ["png", "tif", "pgm", "bmp", "jpg"] {
+        let path = folder.path().join(format!("flat.{extension}"));
+        DynamicImage::ImageLuma8(flat.clone()).save(&path).unwrap();
+        let picture = load(&path, None).unwrap();
+        assert_eq!(picture.full_scale, 255.0);
+        // JPEG is lossy; its quantisation at the encoder's default quality is a few counts.
+        let tolerance = if extension == "jpg" { 8.0 } else { 0.0 };
+        assert!((picture.at(20, 10) - f32::from(ramp(20, 10) >> 8)).abs() <= tolerance, "{extension}");
+    }
+}
+
+#[test]
+fn colour_becomes_luma_in_full_depth() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("colour.png");
+    let colour: ImageBuffer<Rgb<u16>, Vec<u16>> =
+        ImageBuffer::from_fn(8, 8, |x, _| Rgb([1000 + x as u16, 2001, 30003]));
+    DynamicImage::ImageRgb16(colour).save(&path).unwrap();
+    let picture = load(&path, None).unwrap();
+    let expected = 0.2126 * 1003.0 + 0.7152 * 2001.0 + 0.0722 * 30003.0;
+    assert!((picture.at(3, 0) - expected).abs() < 0.01, "{} {expected}", picture.at(3, 0));
+    assert_eq!(picture.full_scale, 65535.0);
+}
+
+#[test]
+fn bits_in_the_low_end_set_the_saturation() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("twelve.png");
+    let image: ImageBuffer<Luma<u16>, Vec<u16>> =
+        ImageBuffer::from_fn(8, 8, |x, _| Luma([if x == 3 { 4095 } else { 7 }]));
+    DynamicImage::ImageLuma16(image).save(&path).unwrap();
+    assert_eq!(load(&path, Some(12)).unwrap().full_scale, 4095.0);
+    assert!(refused(&path, Some(10)).what.contains("4095"));
+    assert!(refused(&path, Some(40)).what.contains("40"));
+}
+
+#[test]
+fn broken_files_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let whole = at("whole.png");
+    DynamicImage::ImageLuma8(GrayImage::from_fn(200, 100, |x, y| Luma([(x * y) as u8]))).save(&whole).unwrap();
+    let bytes = std::fs::read(&whole).unwrap();
+    refused(&at("missing.png"), None);
+    for (name, content) in [
+        ("empty.png", Vec::new()),
+        ("truncated.png", bytes[..bytes.len() / 2].to_vec()),
+        ("header.png", bytes[..20].to_vec()),
+        ("text.png", b"image,joint_1\n".to_vec()),
+        ("huge.pgm", b"P5 4000000000 4000000000 255\n0".to_vec()),
+        ("wide.pgm", b"P5 60000 2 255\n0".to_vec()),
+        ("large.pgm", b"P5 32000 32000 65535\n0".to_vec()),
+        ("single.pgm", b"P5 1 1 255\n0".to_vec()),
+    ] {
+        std::fs::write(at(name), content).unwrap();
+        refused(&at(name), None);
+    }
+    let error = load(folder.path(), None).expect_err("a folder");
+    assert!(error.what.contains("folder"), "{error}");
+}
+
+fn save(path: &Path, picture: &Picture) {
+    let image: ImageBuffer<Luma<u16>, Vec<u16>> =
+        ImageBuffer::from_fn(picture.width as u32, picture.height as u32, |x, y| {
+            Luma([picture.at(x as usize, y as usize).round() as u16])
+        });
+    DynamicImage::ImageLuma16(image).save(path).unwrap();
+}
+
+#[test]
+fn flat_field_takes_out_dark_counts_and_vignetting() {
+    let folder = tempfile::tempdir().unwrap();
+    let (width, height) = (60, 40);
+    let make = |f: &dyn Fn(usize, usize) -> f32| Picture {
+        width,
+        height,
+        pixels: (0..width * height).map(|k| f(k % width, k / width)).collect(),
+        full_scale: 65535.0,
+    };
+    let dark = |x: usize, y: usize| 500.0 + ((x * 7 + y * 13) % 50) as f32;
+    let gain = |x: usize, _y: usize| 1.0 - 0.01 * x as f32;
+    let scene = |x: usize, y: usize| 20_000.0 + 100.0 * ((x + y) % 17) as f32;
+    let mut paths: Vec<Vec<PathBuf>> = Vec::new();
+    for (name, level) in [("dark", 0.0), ("white", 50_000.0)] {
+        // Two images each, above and below the mean.
+        let two = [-20.0, 20.0].map(|offset| {
+            let path = folder.path().join(format!("{name}{offset}.png"));
+            save(&path, &make(&|x, y| (dark(x, y) + offset + level * gain(x, y)).round()));
+            path
+        });
+        paths.push(two.to_vec());
+    }
+    let field = FlatField::from_images(&paths[0], &paths[1], None).unwrap().unwrap();
+    let mut raw = make(&|x, y| (dark(x, y) + scene(x, y) * gain(x, y)).round());
+    raw.pixels[61] = 65535.0;
+    let corrected = field.apply(raw).unwrap();
+    assert_eq!(corrected.pixels[61], 65535.0, "a saturated pixel stays saturated");
+    for y in 0..height {
+        for x in 0..width {
+            let error = corrected.at(x, y) - scene(x, y);
+            // Rounding of raw, dark and white by at most 1.5 counts in all, at a gain of 0.41 or more; a thousandth
+            // of the pixels may be brighter than the reference.
+            assert!((x, y) == (1, 1) || error.abs() < 4.0, "{x} {y}: {error}");
+        }
+    }
+    assert!(FlatField::from_images(&[], &[], None).unwrap().is_none());
+    let small = Picture { width: 10, height: 10, pixels: vec![0.0; 100], full_scale: 65535.0 };
+    assert!(field.apply(small).expect_err("another size").what.contains("60 x 40"));
+    let error = FlatField::from_images(&paths[1], &paths[0], None).expect_err("swapped");
+    assert!(error.what.contains("not brighter"), "{error}");
+}
+
+#[test]
+fn one_bad_image_does_not_fail_the_series() {
+    let folder = tempfile::tempdir().unwrap();
+    let plate = Plate::lattice(PlateKind::Chessboard, 6, 5, 0.01, 1e-4);
+    let scene = |size| Scene { size, ..Scene::new(6, 5, View::new(6, 5, [150.0, 120.0], 26.0, 0.1, [0.01, 0.0])) };
+    let mut paths = Vec::new();
+    for (name, size) in [("a.png", (300, 240)), ("odd.png", (320, 240)), ("c.png", (300, 240)), ("d.png", (300, 240))] {
+        let path = folder.path().join(name);
+        save(&path, &Picture { full_scale: 65535.0, ..scene(size).render(0) });
+        paths.push(path);
+    }
+    std::fs::write(folder.path().join("broken.png"), b"").unwrap();
+    paths.insert(2, folder.path().join("broken.png"));
+    let seen = AtomicUsize::new(0);
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let count = |_: &Path| {
+            seen.fetch_add(1, Ordering::Relaxed);
+        };
+        pool.install(|| detect_series(&paths, Some(8), &plate, Ok, count))
+    };
+    let (one, two) = (run(1), run(2));
+    assert_eq!(one, two, "the same bits with one thread and with two");
+    assert_eq!(seen.load(Ordering::Relaxed), 10);
+    assert_eq!(one[0].as_ref().unwrap().detection.observations.len(), 30);
+    assert_eq!(one[0], one[3]);
+    for (index, name, text) in [(1, "odd.png", "320 x 240"), (2, "broken.png", "empty")] {
+        let error = one[index].as_ref().expect_err(name);
+        assert!(error.place.contains(name) && error.what.contains(text), "{error}");
+    }
+}

@@ -1,0 +1,51 @@
+//! Chessboards of real robots, where the recordings are at hand.
+
+#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+
+use robotcal::detect::{Detection, detect_series};
+use robotcal::geom::PlaneMap;
+use robotcal::series::{Plate, PlateKind};
+
+const COLUMNS: u32 = 11;
+const ROWS: u32 = 8;
+
+/// Largest distance of a corner from the plane map of all: lens distortion of these cameras bends the board by a few pixels, a
+/// wrong id is off by a square (15 px and more).
+const BENT_PX: f64 = 6.0;
+
+fn largest_misfit(detection: &Detection) -> f64 {
+    let at = |id: u32| [f64::from(id % COLUMNS), f64::from(id / COLUMNS)];
+    let pairs: Vec<_> = detection.observations.iter().map(|o| (at(o.marker), o.uv)).collect();
+    let map = PlaneMap::fit(&pairs).expect("a plane map");
+    let distance = |(board, uv): &([f64; 2], [f64; 2])| {
+        let p = map.apply(*board).expect("in view");
+        (p[0] - uv[0]).hypot(p[1] - uv[1])
+    };
+    pairs.iter().map(distance).fold(0.0, f64::max)
+}
+
+#[test]
+fn all_corners_of_the_real_boards_are_found_with_the_right_ids() {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/real"));
+    if !root.is_dir() {
+        println!("skipped: no recordings in {}", root.display());
+        return;
+    }
+    let plate = Plate::lattice(PlateKind::Chessboard, COLUMNS, ROWS, 0.01, 5e-5);
+    for series in ["nachi-2025-01-17", "nachi-2025-02-04", "nachi-2025-02-19", "aubo-2024-12-16"] {
+        let mut images: Vec<PathBuf> =
+            std::fs::read_dir(root.join(series).join("images")).unwrap().map(|e| e.unwrap().path()).collect();
+        images.sort();
+        assert_eq!(images.len(), 24, "{series}");
+        for (path, found) in images.iter().zip(detect_series(&images, None, &plate, Ok, |_| ())) {
+            let detection = found.unwrap_or_else(|e| panic!("{e}")).detection;
+            let count = detection.observations.len();
+            assert!(count >= 87, "{}: {count} corners, {:?}", path.display(), detection.dropped);
+            assert!(detection.notices.is_empty(), "{}: {:?}", path.display(), detection.notices);
+            let misfit = largest_misfit(&detection);
+            assert!(misfit < BENT_PX, "{}: {misfit} px", path.display());
+        }
+    }
+}

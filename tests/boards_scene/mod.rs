@@ -1,0 +1,201 @@
+//! Rendered boards with known corners, independent of the library's own renderer.
+
+#![allow(dead_code)]
+
+use calib_targets::aruco::Dictionary;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+use robotcal::detect::Picture;
+
+/// A projective map from the board (unit: one square, origin at the first inner corner, x right, y down) to pixels.
+#[derive(Debug, Clone, Copy)]
+pub struct View(pub [[f64; 3]; 3]);
+
+impl View {
+    /// A view centred on the board of `columns` x `rows` corners: turned by `angle`, with `square` px per square and some perspective.
+    pub fn new(columns: u32, rows: u32, centre: [f64; 2], square: f64, angle: f64, tilt: [f64; 2]) -> Self {
+        let (s, c) = angle.sin_cos();
+        let middle = [(f64::from(columns) - 1.0) / 2.0, (f64::from(rows) - 1.0) / 2.0];
+        // Perspective about the middle of the board.
+        let turn = [[square * c, -square * s, 0.0], [square * s, square * c, 0.0], [tilt[0], tilt[1], 1.0]];
+        let to_middle = [[1.0, 0.0, -middle[0]], [0.0, 1.0, -middle[1]], [0.0, 0.0, 1.0]];
+        let shift = [[1.0, 0.0, centre[0]], [0.0, 1.0, centre[1]], [0.0, 0.0, 1.0]];
+        Self(product(shift, product(turn, to_middle)))
+    }
+
+    pub fn pixel(&self, p: [f64; 2]) -> [f64; 2] {
+        project(&self.0, p)
+    }
+
+    fn inverse(&self) -> [[f64; 3]; 3] {
+        let m = &self.0;
+        let minor = |r: usize, c: usize| {
+            let (r1, r2, c1, c2) = ((r + 1) % 3, (r + 2) % 3, (c + 1) % 3, (c + 2) % 3);
+            m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1]
+        };
+        std::array::from_fn(|i| std::array::from_fn(|j| minor(j, i)))
+    }
+}
+
+fn product(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+fn project(m: &[[f64; 3]; 3], p: [f64; 2]) -> [f64; 2] {
+    let row = |i: usize| m[i][0] * p[0] + m[i][1] * p[1] + m[i][2];
+    [row(0) / row(2), row(1) / row(2)]
+}
+
+/// Fine pixels per pixel and axis.
+const FINE: usize = 3;
+
+/// What is printed beside the squares of a chessboard, or instead of them.
+#[derive(Debug, Clone)]
+pub enum Print {
+    Chessboard,
+    /// Markers of a dictionary in the light squares.
+    Charuco {
+        dictionary: Dictionary,
+        ratio: f64,
+    },
+    /// Dark dots: x, y (down) and radius.
+    Dots(Vec<[f64; 3]>),
+}
+
+/// How a board is recorded.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    pub print: Print,
+    pub columns: u32,
+    pub rows: u32,
+    pub size: (usize, usize),
+    pub view: View,
+    pub dark: f64,
+    pub light: f64,
+    /// Gaussian blur, px, beside the area of the pixel.
+    pub blur: f64,
+    /// Standard deviation of the noise, counts.
+    pub noise: f64,
+    /// Relative change of the light per px, along x and y.
+    pub slope: [f64; 2],
+    pub full_scale: f64,
+}
+
+impl Scene {
+    pub fn new(columns: u32, rows: u32, view: View) -> Self {
+        Self {
+            print: Print::Chessboard,
+            columns,
+            rows,
+            size: (640, 480),
+            view,
+            dark: 30.0,
+            light: 190.0,
+            blur: 0.9,
+            noise: 0.0,
+            slope: [0.0; 2],
+            full_scale: 255.0,
+        }
+    }
+
+    /// Shade of the printed plane: 0 dark, 1 light; a quiet margin around the board.
+    fn shade(&self, [x, y]: [f64; 2]) -> f64 {
+        if let Print::Dots(dots) = &self.print {
+            let inside = |d: &[f64; 3]| (x - d[0]).powi(2) + (y - d[1]).powi(2) < d[2] * d[2];
+            return if dots.iter().any(inside) { 0.0 } else { 1.0 };
+        }
+        let (c, r) = ((x + 1.0).floor(), (y + 1.0).floor());
+        let inside = c >= 0.0 && r >= 0.0 && c <= f64::from(self.columns) && r <= f64::from(self.rows);
+        if !inside {
+            return 1.0;
+        }
+        if (c + r).rem_euclid(2.0) < 0.5 { 0.0 } else { self.light_square([x + 1.0 - c, y + 1.0 - r], c, r) }
+    }
+
+    /// Shade inside a light square; `at` runs from 0 to 1 along both sides.
+    fn light_square(&self, at: [f64; 2], c: f64, r: f64) -> f64 {
+        let Print::Charuco { dictionary, ratio } = &self.print else { return 1.0 };
+        let side = dictionary.marker_size() + 2;
+        let bit = at.map(|t| ((t - 0.5) / ratio + 0.5) * side as f64);
+        if bit.iter().any(|b| *b < 0.0 || *b >= side as f64) {
+            return 1.0;
+        }
+        let [x, y] = bit.map(|b| b as usize);
+        if x == 0 || y == 0 || x == side - 1 || y == side - 1 {
+            return 0.0;
+        }
+        // Light squares before this one, row by row.
+        let before = r as usize * (self.columns as usize + 1) + c as usize;
+        let code = dictionary.codes()[before / 2];
+        let index = (y - 1) * (side - 2) + x - 1;
+        1.0 - f64::from(((code >> index) & 1) as u8)
+    }
+
+    /// True position of a corner.
+    pub fn corner(&self, marker: u32) -> [f64; 2] {
+        self.view.pixel([f64::from(marker % self.columns), f64::from(marker / self.columns)])
+    }
+
+    /// Renders on a grid three times as fine, 21 samples each, blurs there and sums up the pixels: an edge is right to 0.002 px.
+    pub fn render(&self, seed: u64) -> Picture {
+        let (width, height) = self.size;
+        let inverse = self.view.inverse();
+        let margin = (4.0 * self.blur).ceil() as usize;
+        let (w, h) = (FINE * (width + 2 * margin), FINE * (height + 2 * margin));
+        let step = 1.0 / FINE as f64;
+        let sharp: Vec<f32> = (0..w * h)
+            .map(|k| {
+                let edge = |n: usize| n as f64 * step - margin as f64 - 0.5;
+                let corner = [edge(k % w), edge(k / w)];
+                let shade =
+                    |x: f64, y: f64| self.shade(project(&inverse, [corner[0] + x * step, corner[1] + y * step]));
+                let rim = shade(0.0, 0.0) + shade(1.0, 0.0) + shade(0.0, 1.0) + shade(1.0, 1.0);
+                if rim == 0.0 || rim == 4.0 {
+                    return rim as f32 / 4.0;
+                }
+                let sample = |s: u32| shade((f64::from(s) + 0.5) / 21.0, ((f64::from(s) * 13.0 + 0.5) / 21.0).fract());
+                (0..21).map(sample).sum::<f64>() as f32 / 21.0
+            })
+            .collect();
+        let blurred = blur(&sharp, w, h, self.blur * FINE as f64, margin * FINE);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let normal = Normal::new(0.0, self.noise.max(1e-12)).expect("a positive sigma");
+        let pixels = blurred
+            .iter()
+            .enumerate()
+            .map(|(k, &shade)| {
+                let shade = f64::from(shade);
+                let (x, y) = ((k % width) as f64 - width as f64 / 2.0, (k / width) as f64 - height as f64 / 2.0);
+                let light = 1.0 + self.slope[0] * x + self.slope[1] * y;
+                let value = (self.dark + (self.light - self.dark) * shade) * light + normal.sample(&mut rng);
+                value.round().clamp(0.0, self.full_scale) as f32
+            })
+            .collect();
+        Picture { width, height, pixels, full_scale: self.full_scale as f32 }
+    }
+}
+
+/// Separable Gaussian over the fine picture with its margin; returns the pixels without it.
+fn blur(sharp: &[f32], w: usize, h: usize, sigma: f64, margin: usize) -> Vec<f32> {
+    let kernel: Vec<f32> =
+        (0..=2 * margin).map(|k| (-0.5 * ((k as f64 - margin as f64) / sigma).powi(2)).exp() as f32).collect();
+    let total: f32 = kernel.iter().sum::<f32>() * FINE as f32;
+    // One pixel is the sum over its fine pixels of the blurred values: both in one kernel.
+    let wide: Vec<f32> = (0..kernel.len() + FINE - 1)
+        .map(|k| (0..FINE).filter_map(|f| kernel.get(k.checked_sub(f)?)).sum::<f32>() / total)
+        .collect();
+    let (width, height) = ((w - 2 * margin) / FINE, (h - 2 * margin) / FINE);
+    let rows: Vec<f32> = (0..h * width)
+        .map(|k| {
+            let start = (k / width) * w + (k % width) * FINE;
+            wide.iter().zip(&sharp[start..]).map(|(g, s)| g * s).sum()
+        })
+        .collect();
+    (0..width * height)
+        .map(|k| {
+            let start = (k / width) * FINE * width + k % width;
+            wide.iter().enumerate().map(|(i, g)| g * rows[start + i * width]).sum()
+        })
+        .collect()
+}

@@ -1,0 +1,494 @@
+//! What must hold of any solver of this problem, whatever it eliminates first.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod support;
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use robotcal::geom::{Pose, exp_so3};
+use robotcal::linalg::SymmetricFactor;
+use robotcal::model::joint_terms::Term;
+use robotcal::problem::{Image, Problem, Slack, State, Step};
+use robotcal::recipe::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
+use robotcal::series::CameraMount;
+use robotcal::solve::{
+    ComponentOptions, Elimination, Outcome, Settings, Status, System, covariance, covariance_by, estimate_components,
+    linearise_all, solve,
+};
+use support::dense::{Dense, Unknown};
+use support::small::{Dice, Part, Request, problem, series};
+
+/// Iterates to where rounding ends it.
+const TIGHT: Settings = Settings { iterations: 200, decrement: 1e-9 };
+
+fn converged(problem: &Problem, start: State, settings: &Settings) -> Outcome {
+    let outcome = solve(problem, start, settings);
+    assert_eq!(outcome.status, Status::Converged);
+    outcome
+}
+
+/// A marker that no image shows.
+const UNSEEN: usize = 7;
+
+/// Joint noise, exact readings and a free pose; rejected observations, an unseen marker and gross errors; fixed columns.
+fn awkward(mount: CameraMount) -> (Problem, State) {
+    let mut dice = Dice::new(11);
+    let terms = vec![Term::Offset, Term::Gear, Term::Gravity(0)];
+    let (mut problem, mut state) = problem(&mut dice, &Request { terms, mount, images: 7, ..Request::default() });
+    state.slack[4] = Slack::None;
+    state.slack[5] = Slack::Pose(state.camera_from_plate(&problem.images[5], &state.slack[5]).unwrap());
+    problem.images[5].stop = None;
+    problem.images[6].rejected = Some("test".into());
+    for image in &mut problem.images {
+        image.observations[UNSEEN].rejected = Some("test");
+    }
+    problem.images[1].observations[2].uv.x += 3.0;
+    problem.images[2].observations[3].rejected = Some("test");
+    problem.plates[0].markers[4].sigma_m = 3e-5;
+    problem.layout.set_free(false, |name| name.ends_with("joint_2/origin.rx") || name == "camera/front/lens.k3");
+    (problem, state)
+}
+
+/// A step away from the solution, so that the right-hand side is not nearly zero.
+fn shaken(problem: &Problem, state: &State) -> State {
+    let mut dice = Dice::new(12);
+    let prior = |s: f64| if s.is_finite() { s } else { 1e-3 };
+    let step = Step {
+        dense: DVector::from_iterator(
+            problem.layout.len(),
+            problem.layout.columns.iter().map(|c| if c.free { dice.normal(0.3 * prior(c.prior_sigma)) } else { 0.0 }),
+        ),
+        slack: state.slack.iter().map(|s| vec![3e-4; s.len()]).collect(),
+        markers: state.plates.iter().map(|p| vec![Vector3::new(1e-5, -2e-5, 3e-5); p.nominal.len()]).collect(),
+    };
+    state.moved(&problem.layout, &step)
+}
+
+/// What is compared is known to about rounding times condition, in units of sigma; a factor for the length of the sums.
+fn tolerance(condition: f64) -> f64 {
+    assert!(condition < 1e10, "test problem too badly conditioned: {condition:e}");
+    100.0 * f64::EPSILON * condition
+}
+
+#[test]
+fn the_reduced_system_equals_the_dense_normal_equations() {
+    for mount in [CameraMount::Hand, CameraMount::Fixed] {
+        let (problem, state) = awkward(mount);
+        let state = shaken(&problem, &state);
+        let dense = Dense::new(&problem, &state);
+        let (cov, x, condition) = dense.solve();
+        let bound = tolerance(condition);
+        for which in [Elimination::Markers, Elimination::Slack] {
+            println!("{mount:?} {which:?}");
+            check_step(which, &problem, &state, &dense, (&cov, &x), bound);
+            check_covariance(which, &problem, &state, &dense, &cov, bound);
+        }
+    }
+}
+
+fn check_step(
+    which: Elimination,
+    problem: &Problem,
+    state: &State,
+    dense: &Dense,
+    (cov, x): (&DMatrix<f64>, &DVector<f64>),
+    bound: f64,
+) {
+    let lin = linearise_all(problem, state).unwrap();
+    let system = System::with(which, problem, state, &lin, 0.0);
+    let reduced = SymmetricFactor::new(&system.information).unwrap().solve(&system.rhs);
+    let step = system.step(problem, &lin, &reduced);
+    for (at, u) in dense.unknowns.iter().enumerate() {
+        let got = match *u {
+            Unknown::Column(c) => step.dense[c],
+            Unknown::Slack(i, k) => step.slack[i][k],
+            // An unseen marker gets no step, though its prior asks for one: nothing depends on it.
+            Unknown::Marker(UNSEEN, k) => {
+                assert_eq!(step.markers[0][UNSEEN][k], 0.0);
+                continue;
+            }
+            Unknown::Marker(m, k) => step.markers[0][m][k],
+        };
+        let off = (got - x[at]).abs() / cov[(at, at)].sqrt();
+        assert!(off < bound * x.len() as f64, "{u:?}: {got:e} for {:e}, off by {off:e} sigma", x[at]);
+    }
+}
+
+fn check_covariance(
+    which: Elimination,
+    problem: &Problem,
+    state: &State,
+    dense: &Dense,
+    truth: &DMatrix<f64>,
+    bound: f64,
+) {
+    let lin = linearise_all(problem, state).unwrap();
+    let library = covariance_by(which, problem, state, &lin).unwrap();
+    let index = |u: &Unknown| match *u {
+        Unknown::Column(c) => Some(c),
+        Unknown::Slack(i, k) => {
+            let position = lin.images.iter().position(|&used| used == i).unwrap();
+            library.system.slack_start.get(position).map(|start| start + k)
+        }
+        Unknown::Marker(..) => None,
+    };
+    let mut compared = 0;
+    for (a, ua) in dense.unknowns.iter().enumerate() {
+        for (b, ub) in dense.unknowns.iter().enumerate() {
+            let (Some(i), Some(j)) = (index(ua), index(ub)) else { continue };
+            let unit = (truth[(a, a)] * truth[(b, b)]).sqrt();
+            let off = (library.reduced[(i, j)] - truth[(a, b)]).abs() / unit;
+            assert!(off < bound, "{ua:?} with {ub:?}: {off:e}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 3000, "{compared}");
+    for (c, column) in problem.layout.columns.iter().enumerate().filter(|(_, c)| !c.free) {
+        assert_eq!(library.sigma(c), 0.0, "{}", column.name);
+    }
+    for (k, &i) in lin.images.iter().enumerate().filter(|(_, i)| !state.slack[**i].is_empty()) {
+        let n = state.slack[i].len();
+        let at = dense.find(Unknown::Slack(i, 0)).unwrap();
+        let expected = truth.view((at, at), (n, n));
+        let got = library.slack(k, n);
+        for (a, b) in (0..n).flat_map(|a| (0..n).map(move |b| (a, b))) {
+            let unit = (expected[(a, a)] * expected[(b, b)]).sqrt();
+            assert!((got[(a, b)] - expected[(a, b)]).abs() < bound * unit, "slack of image {i}\n{got}{expected}");
+        }
+    }
+    let markers = &library.markers(problem, &lin)[0];
+    for (m, covariance) in markers.iter().enumerate() {
+        let Some(covariance) = covariance else {
+            assert_eq!(m, UNSEEN, "a marker that was seen has no covariance");
+            continue;
+        };
+        let at = dense.find(Unknown::Marker(m, 0)).unwrap();
+        let expected = truth.fixed_view::<3, 3>(at, at);
+        let off = (covariance - expected).amax() / expected.diagonal().max();
+        assert!(off < bound, "marker {m}: {off:e}\n{covariance}{expected}");
+    }
+}
+
+#[test]
+fn the_right_hand_side_is_the_slope_of_the_cost() {
+    let (problem, state) = awkward(CameraMount::Hand);
+    let state = shaken(&problem, &state);
+    let dense = Dense::new(&problem, &state);
+    let (cov, ..) = dense.solve();
+    let mut dice = Dice::new(13);
+    for _ in 0..10 {
+        let mut step = Step {
+            dense: DVector::zeros(problem.layout.len()),
+            slack: state.slack.iter().map(|s| vec![0.0; s.len()]).collect(),
+            markers: vec![vec![Vector3::zeros(); problem.plates[0].markers.len()]],
+        };
+        let mut slope = 0.0;
+        for (at, u) in dense.unknowns.iter().enumerate() {
+            // Conditional sigmas: a step of one in every coordinate raises the cost by about one each.
+            let d = dice.normal(1.0) / dense.information[(at, at)].sqrt();
+            slope -= d * dense.rhs[at];
+            match *u {
+                Unknown::Column(c) => step.dense[c] = d,
+                Unknown::Slack(i, k) => step.slack[i][k] = d,
+                Unknown::Marker(m, k) => step.markers[0][m][k] = d,
+            }
+        }
+        let cost = |h: f64| {
+            let scaled = Step {
+                dense: &step.dense * h,
+                slack: step.slack.iter().map(|s| s.iter().map(|x| x * h).collect()).collect(),
+                markers: step.markers.iter().map(|p| p.iter().map(|x| x * h).collect()).collect(),
+            };
+            linearise_all(&problem, &state.moved(&problem.layout, &scaled)).unwrap().cost
+        };
+        // The cost is quadratic but for curvature of relative size 1e-3 and Huber's kinks: central differences at h are right
+        // to h^2 and rounding of the cost over h.
+        let h = 1e-3;
+        let numeric = (cost(h) - cost(-h)) / (2.0 * h);
+        let unit = slope.abs().max((cov.nrows() as f64).sqrt());
+        assert!((numeric - slope).abs() < 1e-3 * unit, "{numeric} {slope}");
+    }
+}
+
+/// Poses of all images, robot and camera of two outcomes, in units of sigma of the first.
+fn assert_same_solution(a: (&Problem, &Outcome), b: &Outcome, names: impl Fn(&str) -> bool, bound: f64) {
+    let (problem, a) = a;
+    let lin = a.linearised.as_ref().unwrap();
+    let cov = covariance(problem, &a.state, lin).unwrap();
+    let (va, vb) = (a.state.values(&problem.layout), b.state.values(&problem.layout));
+    let mut compared = 0;
+    for (c, column) in problem.layout.columns.iter().enumerate().filter(|(_, c)| names(&c.name)) {
+        let sigma = cov.sigma(c);
+        if va[c] == vb[c] {
+            continue;
+        }
+        let off = (va[c] - vb[c]).abs() / sigma;
+        assert!(off < bound, "{}: {:e} and {:e}, {off:e} sigma", column.name, va[c], vb[c]);
+        compared += 1;
+    }
+    assert!(compared > 0, "nothing to compare");
+}
+
+fn cost(outcome: &Outcome) -> f64 {
+    outcome.linearised.as_ref().unwrap().cost
+}
+
+/// Two solutions of the same least-squares problem whose Newton decrement is 1e-9 differ by that and by rounding times the
+/// condition of the problem (about 1e8), in sigma.
+const SAME: f64 = 1e-6;
+
+#[test]
+fn another_base_frame_changes_nothing() {
+    let mut dice = Dice::new(21);
+    let terms = vec![Term::Offset, Term::Gear];
+    let (problem, state) = problem(&mut dice, &Request { terms, ..Request::default() });
+    let first = converged(&problem, state.clone(), &TIGHT);
+    let new_from_old = dice.pose(2.0, 3.0);
+    let mut moved = state;
+    moved.robot.chain.joints[0].origin = new_from_old * moved.robot.chain.joints[0].origin;
+    moved.placements.iter_mut().for_each(|p| *p = new_from_old * *p);
+    let second = converged(&problem, moved, &TIGHT);
+    assert!((cost(&first) - cost(&second)).abs() < 1e-9 * cost(&first));
+    assert_same_solution((&problem, &first), &second, |_| true, SAME);
+    for (i, image) in problem.used() {
+        let [a, b] = [&first, &second].map(|o| o.state.camera_from_plate(image, &o.state.slack[i]).unwrap());
+        let (angle, distance) = a.distance(&b);
+        assert!(angle < 1e-9 && distance < 1e-9, "{}: {angle:e} rad {distance:e} m", image.name);
+    }
+    let sigmas = |o: &Outcome| covariance(&problem, &o.state, o.linearised.as_ref().unwrap()).unwrap();
+    let (a, b) = (sigmas(&first), sigmas(&second));
+    for c in problem.layout.twists.start..problem.layout.terms.end {
+        assert!((a.sigma(c) / b.sigma(c) - 1.0).abs() < 1e-6, "{}", problem.layout.columns[c].name);
+    }
+}
+
+#[test]
+fn another_plate_frame_changes_nothing() {
+    let mut dice = Dice::new(22);
+    let (mut problem, state) = problem(&mut dice, &Request::default());
+    // Modes are about the origin of the plate and would mean something else.
+    problem.layout.set_free(false, |n| n.starts_with("plate_shape"));
+    let mut start = state;
+    start.plates[0].modes = [0.0; 6];
+    let first = converged(&problem, start.clone(), &TIGHT);
+    let new_from_old = Pose::new(exp_so3(&Vector3::new(0.0, 0.0, 1.1)), Vector3::new(0.05, -0.2, 0.01));
+    for x in &mut start.plates[0].nominal {
+        *x = new_from_old.transform(x);
+    }
+    start.plates[0].corrections.iter_mut().for_each(|c| *c = new_from_old.rotation * *c);
+    start.placements.iter_mut().for_each(|p| *p = *p * new_from_old.inverse());
+    for slack in &mut start.slack {
+        if let Slack::Pose(p) = slack {
+            *p = *p * new_from_old.inverse();
+        }
+    }
+    let second = converged(&problem, start, &TIGHT);
+    assert!((cost(&first) - cost(&second)).abs() < 1e-9 * cost(&first));
+    assert_same_solution((&problem, &first), &second, |n| !n.starts_with("plate"), SAME);
+}
+
+fn with_slack(state: &State, problem: &Problem, slack: impl Fn(usize, &Image) -> Slack) -> State {
+    let slack = problem.images.iter().enumerate().map(|(i, image)| slack(i, image)).collect();
+    State { slack, ..state.clone() }
+}
+
+fn free_poses(problem: &Problem, state: &State) -> State {
+    with_slack(state, problem, |i, image| Slack::Pose(state.camera_from_plate(image, &state.slack[i]).unwrap()))
+}
+
+/// Largest difference of the camera columns in sigma, and of log sigma.
+fn camera_difference(problem: &Problem, a: &Outcome, b: &Outcome) -> (f64, f64) {
+    let covariance_of = |o: &Outcome| covariance(problem, &o.state, o.linearised.as_ref().unwrap()).unwrap();
+    let (ca, cb) = (covariance_of(a), covariance_of(b));
+    let (va, vb) = (a.state.values(&problem.layout), b.state.values(&problem.layout));
+    problem.layout.cameras[0].clone().fold((0.0, 0.0), |(value, sigma), c| {
+        let off = (va[c] - vb[c]).abs() / ca.sigma(c);
+        (f64::max(value, off), f64::max(sigma, (ca.sigma(c) / cb.sigma(c)).ln().abs()))
+    })
+}
+
+#[test]
+fn large_joint_noise_tends_to_the_free_poses() {
+    let mut dice = Dice::new(32);
+    // A gantry with a wrist has no singular posture: joints and camera pose are of a size.
+    let parts = [[Part::Prismatic; 3], [Part::Revolute; 3]].concat();
+    let (mut problem, state) = problem(&mut dice, &Request { parts, ..Request::default() });
+    // The valley along which joints trade against twists is long and curved: many steps.
+    let settings = Settings { iterations: 1000, decrement: 1e-5 };
+    let free = converged(&problem, free_poses(&problem, &state), &settings);
+    let differences = [0.1, 1.0].map(|sigma| {
+        problem.noise.joint = vec![vec![sigma; 6]];
+        camera_difference(&problem, &free, &converged(&problem, state.clone(), &settings))
+    });
+    println!("{differences:?}");
+    // The slack pulls with (sigma of the free pose / joint noise)^2: a hundred times less for ten times the noise, of which a
+    // factor of five is granted to curvature (the images of one plate share their error in depth, some centimetres).
+    let [(value, sigma), (less, least)] = differences;
+    assert!(value < 0.1 && less < value / 20.0, "{differences:?}");
+    assert!(sigma < 0.1 && least < sigma / 20.0, "{differences:?}");
+}
+
+#[test]
+fn vanishing_joint_noise_tends_to_the_hard_fit() {
+    let mut dice = Dice::new(32);
+    let (mut problem, state) = problem(&mut dice, &Request { joint_noise: 0.0, ..Request::default() });
+    problem.noise.joint = vec![vec![1e-9; 6]];
+    let soft = converged(&problem, state.clone(), &TIGHT);
+    let hard = converged(&problem, with_slack(&state, &problem, |_, _| Slack::None), &TIGHT);
+    // A pixel noise of 0.1 px over ten markers is some 1e-5 rad: (1e-9 / 1e-5)^2 of a sigma, and rounding at a condition of 1e10.
+    assert_same_solution((&problem, &hard), &soft, |_| true, 1e-4);
+    assert!((cost(&hard) - cost(&soft)).abs() < 1e-6 * cost(&hard));
+}
+
+#[test]
+fn poses_mode_is_the_free_pose_adjustment() {
+    let mut dice = Dice::new(33);
+    let (mut problem, state) = problem(&mut dice, &Request { images: 8, lattice: (5, 4), ..Request::default() });
+    // From nothing, with rejection and variance components ...
+    let mut nothing = state.clone();
+    nothing.plates[0].modes = [0.0; 6];
+    nothing.plates[0].corrections.iter_mut().for_each(|c| *c = Vector3::zeros());
+    let (found, _) = adjust_free_poses(&mut problem, nothing, &[None]).unwrap();
+    // ... and with the same weights from the truth, robot present but tied to nothing.
+    let mode = converged(&problem, free_poses(&problem, &state), &TIGHT);
+    let cov = covariance(&problem, &mode.state, mode.linearised.as_ref().unwrap()).unwrap();
+    // The recipe stops when no unknown moves by more than 1e-3 of its sigma.
+    assert_same_solution(
+        (&problem, &mode),
+        &Outcome { state: found.state.clone(), ..mode.clone() },
+        |n| n.starts_with("camera"),
+        2e-3,
+    );
+    for (k, (i, image)) in problem.used().enumerate() {
+        let pose = found.poses[i].as_ref().unwrap();
+        let direct = mode.state.camera_from_plate(image, &mode.state.slack[i]).unwrap();
+        let off = (direct.inverse() * pose.camera_from_plate).log();
+        let c = cov.slack(k, 6);
+        for a in 0..6 {
+            assert!(off[a].abs() < 2e-3 * c[(a, a)].sqrt(), "{}: {off}", image.name);
+            let ratio = pose.covariance[(a, a)] / c[(a, a)];
+            assert!((ratio - 1.0).abs() < 1e-3, "{}: variance ratio {ratio}", image.name);
+        }
+    }
+    // A robot that is tied to nothing stays where its priors hold it.
+    for c in problem.layout.twists.start..problem.layout.terms.end {
+        let prior = problem.layout.columns[c].prior_sigma;
+        assert!((cov.sigma(c) / prior - 1.0).abs() < 1e-9, "{}", problem.layout.columns[c].name);
+    }
+}
+
+#[test]
+fn variance_components_recover_pixel_and_joint_noise() {
+    // Sum of squared normalised errors of log sigma over seeds: each is chi-squared with one degree of freedom.
+    let (mut pixel, mut joint) = (0.0, 0.0);
+    let seeds = 6;
+    for seed in 0..seeds {
+        let mut dice = Dice::new(40 + seed);
+        let truth = 2e-4;
+        let request = Request {
+            images: 25,
+            lattice: (5, 4),
+            joint_noise: truth,
+            pixel_factor: 1.3,
+            deviation: 5e-4,
+            ..Request::default()
+        };
+        let (mut problem, state) = problem(&mut dice, &request);
+        // From above, as the recipes do.
+        problem.noise.pixel_factor = vec![3.0];
+        problem.noise.joint = vec![vec![3e-3; 6]];
+        let options = ComponentOptions { rounds: 100, ..ComponentOptions::default() };
+        let outcome = estimate_components(&mut problem, state, &options);
+        assert_eq!(outcome.status, Status::Converged);
+        let lin = outcome.linearised.as_ref().unwrap();
+        let cov = covariance(&problem, &outcome.state, lin).unwrap();
+        let sigma = &problem.noise.joint[0];
+        // Redundancy of the latents: what the data say of them; the relative sigma of a sigma is 1 / sqrt(2 r).
+        let redundancy: f64 = (0..lin.images.len())
+            .map(|k| (0..6).map(|r| 1.0 - cov.slack(k, 6)[(r, r)] / sigma[r].powi(2)).sum::<f64>())
+            .sum();
+        let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / 6.0).sqrt();
+        let observations = 2.0 * lin.terms.iter().map(|t| t.residuals.len() as f64).sum::<f64>();
+        let used = 70.0 + 6.0 * lin.images.len() as f64;
+        println!("pixel {} joint {mean:e} redundancy {redundancy:.0}", problem.noise.pixel_factor[0]);
+        pixel += (problem.noise.pixel_factor[0] / 1.3).ln().powi(2) * 2.0 * (observations - used);
+        joint += (mean / truth).ln().powi(2) * 2.0 * redundancy;
+    }
+    // 99.9 % point of chi-squared with 6 degrees of freedom.
+    assert!(pixel < 22.5, "pixel noise is off: chi-squared {pixel:.1} of {seeds}");
+    assert!(joint < 22.5, "joint noise is off: chi-squared {joint:.1} of {seeds}");
+}
+
+#[test]
+fn one_thread_and_two_give_the_same_bits() {
+    // Many markers: they are eliminated; few: the slack is.
+    for lattice in [(7, 6), (4, 3)] {
+        let mut dice = Dice::new(51);
+        let request = Request { images: 14, lattice, radius_m: 0.0, joint_noise: 1e-4, ..Request::default() };
+        let (problem, state) = problem(&mut dice, &request);
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let options = Options { joint_noise: JointNoise::Estimated, model: RobotModel::Gear };
+            pool.install(|| identify(state.robot.chain.clone(), &[series(&problem)], &options)).unwrap()
+        };
+        assert_same_bits(&run(1), &run(2));
+    }
+}
+
+fn assert_same_bits(one: &Solution, two: &Solution) {
+    let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<u64>>();
+    // Comparison of numbers takes 0 for -0, nothing else; none of these is NaN in a converged solution.
+    assert_eq!(one.problem.noise, two.problem.noise);
+    assert_eq!(one.iterations, two.iterations);
+    assert_eq!(one.state, two.state);
+    assert_eq!(one.free_poses.state, two.free_poses.state);
+    assert_eq!(one.free_poses.poses, two.free_poses.poses);
+    assert_eq!(one.accuracy, two.accuracy);
+    assert_eq!(bits(one.covariance.reduced.as_slice()), bits(two.covariance.reduced.as_slice()));
+    assert_eq!(one.linearised.cost.to_bits(), two.linearised.cost.to_bits());
+    let markers = |s: &Solution| s.covariance.markers(&s.problem, &s.linearised);
+    assert_eq!(markers(one), markers(two));
+}
+
+#[test]
+fn fixed_columns_do_not_move() {
+    let mut dice = Dice::new(61);
+    let (mut problem, state) = problem(&mut dice, &Request::default());
+    let mut start = state;
+    start.cameras[0].parameters[0] += 2.0;
+    let fixed =
+        |n: &str| n.contains("joint_3") || n.ends_with(".fx") || n.starts_with("hand_camera") || n.ends_with("skew");
+    problem.layout.set_free(false, fixed);
+    let outcome = converged(&problem, start.clone(), &Settings::default());
+    let (before, after) = (start.values(&problem.layout), outcome.state.values(&problem.layout));
+    let mut moved = 0;
+    for (c, column) in problem.layout.columns.iter().enumerate() {
+        if fixed(&column.name) {
+            assert_eq!(before[c].to_bits(), after[c].to_bits(), "{}", column.name);
+        } else {
+            moved += usize::from(before[c] != after[c]);
+        }
+    }
+    assert_eq!(start.mountings, outcome.state.mountings);
+    assert!(moved > 30);
+}
+
+#[test]
+fn what_no_data_touch_keeps_its_prior() {
+    let mut dice = Dice::new(62);
+    let request =
+        Request { parts: vec![Part::Revolute; 6], terms: vec![Term::Offset, Term::Backlash], ..Request::default() };
+    let (mut problem, mut state) = problem(&mut dice, &request);
+    for image in &mut problem.images {
+        image.stop.as_mut().unwrap().approach = None;
+    }
+    state.robot.terms.iter_mut().filter(|t| t.term == Term::Backlash).for_each(|t| t.value = 0.0);
+    let backlash = problem.layout.find("robot/joint_1.backlash").unwrap();
+    problem.layout.columns[backlash].prior_mean = 1e-4;
+    let outcome = converged(&problem, state, &TIGHT);
+    let cov = covariance(&problem, &outcome.state, outcome.linearised.as_ref().unwrap()).unwrap();
+    let values = outcome.state.values(&problem.layout);
+    let column = &problem.layout.columns[backlash];
+    assert!((cov.sigma(backlash) / column.prior_sigma - 1.0).abs() < 1e-12);
+    assert!((values[backlash] - 1e-4).abs() < 1e-9 * column.prior_sigma);
+}
