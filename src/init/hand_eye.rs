@@ -271,7 +271,7 @@ mod tests {
         let pairs = (0..count)
             .map(|k| {
                 let chain = Pose::exp(&twist(k + 1, 1.1));
-                let camera_from_plate = &truth.camera.inverse() * &(&chain * &truth.plate);
+                let camera_from_plate = truth.camera.inverse() * chain * truth.plate;
                 PosePair { camera_from_plate, chain }
             })
             .collect();

@@ -37,10 +37,8 @@ pub(super) struct Suspects<'a> {
 impl Suspects<'_> {
     /// The mistake that, undone, fits far better than `misfit`, if there is one.
     pub fn better_than(&self, misfit: f64) -> Option<Cause> {
-        if let Some((error, cause)) = self.wrong_scale() {
-            if error < SCALE_EXPLAINS * misfit {
-                return Some(cause);
-            }
+        if let Some((_, cause)) = self.wrong_scale().filter(|(error, _)| *error < SCALE_EXPLAINS * misfit) {
+            return Some(cause);
         }
         if misfit < UNSUSPICIOUS {
             return None;
