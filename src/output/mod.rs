@@ -17,6 +17,7 @@ mod plate_pdf;
 mod plate_png;
 mod plate_svg;
 mod pose_files;
+mod report;
 mod residuals;
 mod robot_files;
 pub mod solution_json;
@@ -25,6 +26,7 @@ mod text;
 mod write;
 
 pub use compensation_read::read_compensation;
+pub use report::report_html;
 pub use write::write_all;
 
 use std::collections::BTreeMap;
@@ -86,8 +88,13 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
     }
     add("observations.csv".into(), observation_table::observations_csv(solution, context));
     let mut names: Vec<String> = files.keys().cloned().collect();
-    names.push(solution_json::FILE_NAME.into());
+    names.extend([REPORT.to_owned(), solution_json::FILE_NAME.to_owned()]);
     names.sort();
-    files.insert(solution_json::FILE_NAME.into(), solution_json::solution_json(solution, context, names)?);
+    let record = solution_record::record(solution, context, names)?;
+    files.insert(REPORT.into(), report::report_html(&record).into_bytes());
+    files.insert(solution_json::FILE_NAME.into(), solution_json::to_bytes(&record)?);
     Ok(files)
 }
+
+/// Name of the report.
+const REPORT: &str = "report.html";

@@ -8,13 +8,11 @@ use std::io;
 
 use serde::{Deserialize, Serialize};
 
-use super::Context;
-use super::solution_record::record;
 use crate::assess::Errors;
 use crate::error::{Error, Notice, Result};
 use crate::geom::Pose;
 use crate::model::camera::Lens;
-use crate::recipe::{Solution, StartVerdict};
+use crate::recipe::StartVerdict;
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
 use crate::urdf::JointKind;
 
@@ -193,6 +191,8 @@ pub struct PlateRecord {
     pub correction_m: Vec<[f64; 3]>,
     /// Corrected positions, m.
     pub position_m: Vec<[f64; 3]>,
+    /// Their sigmas in the frame of the nominal markers, m.
+    pub sigma_m: Vec<[f64; 3]>,
 }
 
 /// A stand-alone camera pose.
@@ -342,9 +342,8 @@ pub struct SolutionRecord {
 /// Bytes of solution.json: one line for each field of [`SolutionRecord`].
 ///
 /// # Errors
-/// Estimates that are not finite.
-pub(super) fn solution_json(solution: &Solution, context: &Context, files: Vec<String>) -> Result<Vec<u8>> {
-    let record = record(solution, context, files)?;
+/// None in practice: every field can be written as JSON.
+pub fn to_bytes(record: &SolutionRecord) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut serializer = serde_json::Serializer::with_formatter(&mut bytes, FieldPerLine::default());
     record.serialize(&mut serializer).map_err(|e| Error::unsolved(FILE_NAME, e, "report this"))?;

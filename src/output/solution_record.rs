@@ -5,6 +5,7 @@ use nalgebra::Matrix6;
 use super::Context;
 use super::estimates::{estimates, lower_triangle};
 use super::names::{ImageNames, plate_name, series_name};
+use super::plate_files::position_covariances;
 use super::pose_files::{determined, free_rigid_covariances, placement_covariance, plate_from_camera};
 use super::residuals::{poses, residuals};
 use super::solution_json::{
@@ -44,7 +45,7 @@ pub(super) fn record(solution: &Solution, context: &Context, files: Vec<String>)
         cameras: cameras(solution),
         mountings: mountings(solution),
         placements: placements(solution)?,
-        plates: plates(solution, context),
+        plates: plates(solution, context)?,
         estimates: estimates(solution, context)?,
         covariance_lower: lower_triangle(solution),
         images: images(solution, context)?,
@@ -145,11 +146,12 @@ fn placements(solution: &Solution) -> Result<Vec<PlacedRecord>> {
     problem.placements.iter().enumerate().map(placed).collect()
 }
 
-fn plates(solution: &Solution, context: &Context) -> Vec<PlateRecord> {
+fn plates(solution: &Solution, context: &Context) -> Result<Vec<PlateRecord>> {
     let problem = &solution.problem;
     let plate = |(k, p): (usize, &crate::series::Plate)| {
         let shape = &solution.state.plates[k];
-        PlateRecord {
+        let sigmas = position_covariances(solution, k)?;
+        Ok(PlateRecord {
             name: plate_name(problem, context, k),
             kind: p.kind,
             columns: p.columns,
@@ -164,7 +166,8 @@ fn plates(solution: &Solution, context: &Context) -> Vec<PlateRecord> {
             prior_sigma_m: p.markers.iter().map(|m| m.sigma_m).collect(),
             correction_m: shape.corrections.iter().map(|c| (*c).into()).collect(),
             position_m: (0..p.markers.len()).map(|m| shape.position(m).into()).collect(),
-        }
+            sigma_m: sigmas.iter().map(|c| [0, 1, 2].map(|d| c[(d, d)].max(0.0).sqrt())).collect(),
+        })
     };
     problem.plates.iter().enumerate().map(plate).collect()
 }

@@ -1,0 +1,42 @@
+//! The table of images.
+
+use maud::{Markup, html};
+
+use super::words::fixed;
+use crate::output::solution_json::{ImageRecord, SolutionRecord};
+
+/// One row for each image: what it contributed, how well it is predicted, why it was left out.
+pub(super) fn table(r: &SolutionRecord) -> Markup {
+    html! {
+        h2 { "Images" }
+        p.note {
+            "Markers: used of those found. Residual: RMS per point in the joint fit. Held out: how far the robot model misses the "
+            "plate in an image that it had not seen, nominal and calibrated."
+        }
+        div.wide { table {
+            thead { tr {
+                th { "Image" } th.n { "markers" } th.n { "residual, px" } th.n { "nominal, mm" } th.n { "calibrated, mm" } th { "left out because" }
+            } }
+            tbody { @for i in &r.images { (row(i)) } }
+        } }
+    }
+}
+
+fn row(i: &ImageRecord) -> Markup {
+    let found = i.observations.reason.len();
+    let used = match i.reason {
+        None => i.observations.reason.iter().filter(|o| o.is_none()).count(),
+        Some(_) => 0,
+    };
+    let number = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| fixed(v, 3));
+    html! { tr {
+        td.name { (i.name) }
+        td.n { (used) " of " (found) }
+        td.n { (number(i.rms_px)) }
+        td.n { (number(i.held_out_mm.map(|e| e[0]))) }
+        td.n { (number(i.held_out_mm.map(|e| e[1]))) }
+        @if let Some(reason) = &i.reason { td.reason.out { (reason) } }
+        @else if i.readings.is_none() { td { "taken off the robot: helps camera and plate only" } }
+        @else { td {} }
+    } }
+}

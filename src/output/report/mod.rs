@@ -1,0 +1,54 @@
+//! report.html: one self-contained page, made from the record in solution.json and nothing else.
+//!
+//! A new section is one function in `sections`, `parameters` or `images` and one row in [`report_html`].
+
+mod images;
+mod maps;
+mod parameters;
+mod plots;
+mod sections;
+mod svg;
+mod verdict;
+mod words;
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use crate::output::solution_json::SolutionRecord;
+
+const STYLE: &str = include_str!("style.css");
+
+/// The page.
+pub fn report_html(record: &SolutionRecord) -> String {
+    let page: Markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { "Calibration of " (record.robot.name) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                (sections::head(record))
+                (sections::accuracy(record))
+                (sections::left_out(record))
+                (sections::joint_noise(record))
+                (sections::residuals(record))
+                (parameters::robot(record))
+                (parameters::undetermined(record))
+                (parameters::placed(record))
+                (parameters::cameras(record))
+                (sections::plates(record))
+                (images::table(record))
+                (sections::starts(record))
+                (sections::record(record))
+            }
+        }
+    };
+    page.into_string()
+}
+
+/// A figure with its caption.
+fn figure(svg: &str, caption: &str) -> Markup {
+    html! { figure { (PreEscaped(svg)) figcaption { (caption) } } }
+}

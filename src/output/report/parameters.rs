@@ -1,0 +1,234 @@
+//! Parameters: robot, cameras, poses; what the data do not determine.
+
+use std::collections::BTreeMap;
+
+use maud::{Markup, html};
+
+use super::words::{fixed, grouped, parameter, plus_minus, short, significant, unit};
+use super::{figure, maps};
+use crate::geom::Pose;
+use crate::output::solution_json::{EstimateRecord, PlacedRecord, SolutionRecord};
+use crate::series::CameraMount;
+
+/// Share of data below which a parameter stays at its nominal value.
+const LEAST_SHARE: f64 = 0.1;
+
+/// Correlation from which two parameters are hard to tell apart.
+const STRONG: f64 = 0.95;
+
+/// Most correlations that are listed.
+const MOST_PAIRS: usize = 20;
+
+/// Most corrections in the list of the strongest.
+const MOST_CORRECTIONS: usize = 12;
+
+/// Corrections of the robot.
+pub(super) fn robot(r: &SolutionRecord) -> Markup {
+    let strongest = strongest(r);
+    html! {
+        h2 { "What was corrected on the robot" }
+        h3 { "The corrections that are surest to be real" }
+        @if strongest.is_empty() {
+            p { "No correction is larger than three times its sigma." }
+        } @else {
+            div.wide { table {
+                thead { tr { th { "Parameter" } th.n { "correction" } th { "unit" } th.n { "times its sigma" } } }
+                tbody { @for (e, value, sigma) in strongest {
+                    @let (factor, unit) = unit(e);
+                    tr {
+                        td { (parameter(&e.name)) } td.n { (plus_minus(factor * value, factor * sigma)) }
+                        td { (unit) } td.n { (format!("{:.0}", (value / sigma).abs())) }
+                    }
+                } }
+            } }
+        }
+        h3 { "All corrections" }
+        p.note {
+            "Estimate ± sigma. The bar says how much of it the data decided: full, the images decided alone; "
+            "empty, they said nothing and the parameter stays at its nominal value within the tolerance stated in the head."
+        }
+        (grid(r, "Joint origin", |block, _| block.strip_suffix("/origin")))
+        (grid(r, "Joint", |block, c| other(block, !c.contains('_'))))
+        (grid(r, "Gear harmonics of the reading q", |block, c| other(block, c.starts_with("cos_") || c.starts_with("sin_"))))
+        (grid(r, "Sag under gravity", |block, c| other(block, c.starts_with("gravity_"))))
+    }
+}
+
+/// The joint of a block that is not its origin.
+fn other(block: &str, wanted: bool) -> Option<&str> {
+    (wanted && !block.ends_with("/origin")).then_some(block)
+}
+
+fn known(e: &EstimateRecord) -> Option<(f64, f64)> {
+    e.value.zip(e.sigma).filter(|(_, sigma)| *sigma > 0.0)
+}
+
+fn strongest(r: &SolutionRecord) -> Vec<(&EstimateRecord, f64, f64)> {
+    let of_robot = r.estimates.iter().filter(|e| e.name.starts_with("robot/"));
+    let mut all: Vec<_> = of_robot.filter_map(|e| known(e).map(|(v, s)| (e, v, s))).collect();
+    all.retain(|(_, value, sigma)| value.abs() > 3.0 * sigma);
+    all.sort_by(|a, b| (b.1 / b.2).abs().total_cmp(&(a.1 / a.2).abs()));
+    all.truncate(MOST_CORRECTIONS);
+    all
+}
+
+/// Blocks of the robot as rows, components as columns.
+fn grid<'a>(r: &'a SolutionRecord, head: &str, row: impl Fn(&'a str, &'a str) -> Option<&'a str>) -> Markup {
+    let mut rows: Vec<(&str, BTreeMap<&str, &EstimateRecord>)> = Vec::new();
+    let mut columns: Vec<&EstimateRecord> = Vec::new();
+    for e in &r.estimates {
+        let Some((block, component)) = e.name.strip_prefix("robot/").and_then(|n| n.rsplit_once('.')) else { continue };
+        let Some(name) = row(block, component) else { continue };
+        match rows.iter_mut().find(|(n, _)| *n == name) {
+            Some((_, cells)) => {
+                cells.insert(component, e);
+            }
+            None => rows.push((name, BTreeMap::from([(component, e)]))),
+        }
+        if !columns.iter().any(|c| component_of(c) == component) {
+            columns.push(e);
+        }
+    }
+    if rows.is_empty() {
+        return html! {};
+    }
+    html! { div.wide { table {
+        thead { tr { th { (head) } @for c in &columns { th.n { (column_head(c)) } } } }
+        tbody { @for (name, cells) in &rows { tr {
+            td { (name) }
+            @for c in &columns { (cells.get(component_of(c)).map_or_else(|| html! { td {} }, |e| cell(e, c))) }
+        } } }
+    } } }
+}
+
+fn component_of(e: &EstimateRecord) -> &str {
+    e.name.rsplit_once('.').map_or("", |(_, c)| c)
+}
+
+fn column_head(e: &EstimateRecord) -> Markup {
+    let (factor, unit) = unit(e);
+    html! {
+        (short(component_of(e))) ", " (unit)
+        @if let Some(p) = e.prior_sigma { br; span.note { "tol. " (significant(factor * p)) } }
+    }
+}
+
+fn cell(e: &EstimateRecord, head: &EstimateRecord) -> Markup {
+    let Some((value, sigma)) = known(e) else { return html! { td.grid { "fixed" } } };
+    let (factor, own) = unit(e);
+    let share = 100.0 * e.share_of_data.unwrap_or(1.0);
+    let class = if share < 100.0 * LEAST_SHARE { "weak" } else { "" };
+    html! { td.grid {
+        (plus_minus(factor * value, factor * sigma)) @if own != unit(head).1 { " " (own) }
+        span.bar title={ (format!("{share:.0}")) " % from the data" } { i class=(class) style={ "width:" (format!("{share:.0}")) "%" } {} }
+    } }
+}
+
+/// What the data do not determine, and what they cannot tell apart.
+pub(super) fn undetermined(r: &SolutionRecord) -> Markup {
+    let weak: Vec<&str> = (r.estimates.iter())
+        .filter(|e| e.free && e.share_of_data.is_some_and(|s| s < LEAST_SHARE))
+        .map(|e| e.name.as_str())
+        .collect();
+    let pairs = correlations(r);
+    html! {
+        h2 { "What the data could not determine" }
+        @if weak.is_empty() {
+            p { "Nothing: the data say something about every parameter." }
+        } @else {
+            p {
+                (weak.len()) " of " (r.estimates.len()) " parameters stay near nominal, because the data decide less than 10 % of them. "
+                "Some of this is in the nature of things (the pose of the base is that of the plate, the last joint's that of the camera); "
+                "the rest asks for stops that move the joint further."
+            }
+            ul { @for line in grouped(weak.iter().copied()) { li { (line) } } }
+        }
+        @if !pairs.is_empty() {
+            h3 { "Parameters that are hard to tell apart" }
+            p.note {
+                "The images fix a combination of the two well, and each alone badly (correlation beyond " (STRONG) "). "
+                "This does not harm the accuracy as long as both are used together."
+            }
+            ul { @for (a, b, rho) in pairs.iter().take(MOST_PAIRS) { li {
+                (parameter(&r.estimates[*a].name)) " and " (parameter(&r.estimates[*b].name)) " (" (fixed(*rho, 3)) ")"
+            } } }
+            @if pairs.len() > MOST_PAIRS { p.note { "and " (pairs.len() - MOST_PAIRS) " weaker pairs." } }
+        }
+    }
+}
+
+/// Pairs with a strong correlation, strongest first.
+fn correlations(r: &SolutionRecord) -> Vec<(usize, usize, f64)> {
+    let n = r.estimates.len();
+    let at = |i: usize, j: usize| r.covariance_lower.get(i * (i + 1) / 2 + j).copied().unwrap_or(0.0);
+    let mut pairs = Vec::new();
+    for i in 0..n {
+        for j in 0..i {
+            let rho = at(i, j) / (at(i, i) * at(j, j)).sqrt();
+            if rho.abs() > STRONG {
+                pairs.push((j, i, rho));
+            }
+        }
+    }
+    pairs.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+    pairs
+}
+
+/// Poses of cameras and plates.
+pub(super) fn placed(r: &SolutionRecord) -> Markup {
+    let fixed_camera = r.images.iter().any(|i| i.camera_mount == CameraMount::Fixed);
+    let (camera, plate) = match fixed_camera {
+        false => (&r.robot.tip, &r.robot.base),
+        true => (&r.robot.base, &r.robot.tip),
+    };
+    let cameras = r.mountings.iter().map(|m| (format!("camera in {camera}"), m, r.mountings.len()));
+    let plates = r.placements.iter().map(|p| (format!("plate in {plate}"), p, r.placements.len()));
+    html! {
+        h2 { "Camera and plate poses" }
+        p.note { "Sigmas are per axis of the camera (of the plate). Roll, pitch, yaw as in URDF." }
+        div.wide { table {
+            thead { tr {
+                th { "Pose" } th.n { "x, mm" } th.n { "y, mm" } th.n { "z, mm" } th.n { "roll, °" } th.n { "pitch, °" } th.n { "yaw, °" }
+                th.n { "sigma, mm" } th.n { "sigma, °" }
+            } }
+            tbody { @for (what, record, several) in cameras.chain(plates) { (placed_row(&what, record, several)) } }
+        } }
+    }
+}
+
+fn placed_row(what: &str, p: &PlacedRecord, several: usize) -> Markup {
+    let pose = Pose::from(&p.pose);
+    let sigma = |k: usize| p.covariance.as_ref().and_then(|c| c.get(7 * k)).map(|v| v.max(0.0).sqrt());
+    let sigmas = |first: usize, factor: f64| match [first, first + 1, first + 2].map(sigma) {
+        [Some(x), Some(y), Some(z)] => [x, y, z].map(|s| significant(factor * s)).join(" "),
+        _ => "not determined".into(),
+    };
+    html! { tr {
+        td { (what) @if several > 1 { " (" (p.name) ")" } }
+        @for v in pose.xyz() { td.n { (fixed(1e3 * v, 3)) } }
+        @for v in pose.rpy() { td.n { (fixed(v.to_degrees(), 4)) } }
+        td.n { (sigmas(0, 1e3)) }
+        td.n { (sigmas(3, 180.0 / std::f64::consts::PI)) }
+    } }
+}
+
+/// Cameras: parameters and distortion.
+pub(super) fn cameras(r: &SolutionRecord) -> Markup {
+    html! {
+        h2 { @if r.cameras.len() == 1 { "Camera" } @else { "Cameras" } }
+        @for camera in &r.cameras {
+            h3 { (camera.name) ", " (camera.lens.name()) " lens, " (camera.width_px) " × " (camera.height_px) " px" }
+            div.pair {
+                div.wide { table {
+                    thead { tr { th { "Parameter" } th.n { "estimate" } th { "unit" } } }
+                    tbody { @for e in r.estimates.iter().filter(|e| e.name.starts_with(&format!("camera/{}/", camera.name))) {
+                        @if let Some((value, sigma)) = known(e) {
+                            tr { td { (component_of(e)) } td.n { (plus_minus(value, sigma)) } td { (unit(e).1) } }
+                        }
+                    } }
+                } }
+                @if let Some(map) = maps::distortion(camera) { (figure(&map.svg, &map.caption)) }
+            }
+        }
+    }
+}

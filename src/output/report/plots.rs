@@ -1,0 +1,145 @@
+//! Plots of numbers: histogram of held-out errors, joint noise.
+
+use super::svg::{Anchor, Svg, ticks};
+use super::words::plain;
+use crate::output::solution_json::SolutionRecord;
+use crate::urdf::JointKind;
+
+const WIDTH: f64 = 560.0;
+const HEIGHT: f64 = 230.0;
+const LEFT: f64 = 46.0;
+const RIGHT: f64 = 12.0;
+const TOP: f64 = 12.0;
+const BOTTOM: f64 = 44.0;
+
+/// Bins of the histogram.
+const BINS: usize = 18;
+
+/// Ratio of largest to smallest error from which the axis is logarithmic.
+const WIDE_RANGE: f64 = 6.0;
+
+/// Axis of errors in mm, linear or logarithmic.
+struct Axis {
+    low: f64,
+    high: f64,
+    logarithmic: bool,
+}
+
+impl Axis {
+    fn of(errors: &[[f64; 2]]) -> Self {
+        let all = || errors.iter().flatten().copied().filter(|e| *e > 0.0);
+        let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
+        match high / low > WIDE_RANGE {
+            true => Self { low: low * 0.9, high: high * 1.1, logarithmic: true },
+            false => Self { low: 0.0, high: high.max(1e-9) * 1.05, logarithmic: false },
+        }
+    }
+
+    /// Place on the axis, 0 to 1.
+    fn place(&self, value: f64) -> f64 {
+        match self.logarithmic {
+            true => (value / self.low).ln() / (self.high / self.low).ln(),
+            false => (value - self.low) / (self.high - self.low),
+        }
+    }
+
+    fn marks(&self) -> Vec<f64> {
+        if !self.logarithmic {
+            return ticks(self.high);
+        }
+        let first = self.low.log10().floor() as i32;
+        let decades = (first..first + 12).flat_map(|p| [1.0, 2.0, 5.0].map(|m| m * 10f64.powi(p)));
+        decades.filter(|v| (self.low..=self.high).contains(v)).collect()
+    }
+}
+
+/// Held-out error of every image before and after.
+pub(super) fn histogram(record: &SolutionRecord) -> Option<String> {
+    let errors: Vec<[f64; 2]> = record.images.iter().filter_map(|i| i.held_out_mm).collect();
+    if errors.is_empty() {
+        return None;
+    }
+    let axis = Axis::of(&errors);
+    let mut bins = [[0usize; 2]; BINS];
+    for e in &errors {
+        for side in 0..2 {
+            let bin = (axis.place(e[side]) * BINS as f64).floor().clamp(0.0, BINS as f64 - 1.0);
+            bins[bin as usize][side] += 1;
+        }
+    }
+    let most = bins.iter().flatten().copied().max().unwrap_or(1).max(4) as f64;
+    let mut svg =
+        Svg::new(WIDTH, HEIGHT, "Histogram of the error of each held-out image before and after calibration, in mm");
+    let (w, h) = (WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM);
+    let y = |count: f64| TOP + h * (1.0 - count / most);
+    for t in ticks(most).into_iter().filter(|t| t.fract() == 0.0) {
+        svg.line([LEFT, y(t)], [LEFT + w, y(t)], "grid");
+        svg.text([LEFT - 6.0, y(t) + 4.0], Anchor::End, &format!("{t:.0}"));
+    }
+    let step = w / BINS as f64;
+    for (k, [before, after]) in bins.iter().enumerate() {
+        let x = LEFT + step * k as f64;
+        for (count, shift, class) in [(*before, 0.06, "before"), (*after, 0.5, "after")] {
+            if count > 0 {
+                svg.rect([x + shift * step, y(count as f64)], [0.44 * step, TOP + h - y(count as f64)], class);
+            }
+        }
+    }
+    svg.line([LEFT, TOP + h], [LEFT + w, TOP + h], "axis");
+    for mark in axis.marks() {
+        let x = LEFT + w * axis.place(mark);
+        svg.line([x, TOP + h], [x, TOP + h + 4.0], "axis");
+        svg.text([x, TOP + h + 17.0], Anchor::Middle, &plain(mark));
+    }
+    let scale = if axis.logarithmic { " (logarithmic)" } else { "" };
+    svg.text([LEFT + w / 2.0, HEIGHT - 8.0], Anchor::Middle, &format!("error of an image, mm{scale}"));
+    svg.text_upwards([13.0, TOP + h / 2.0], "images");
+    Some(svg.finish())
+}
+
+/// Joint noise in thousandths of a degree (of a millimetre for a prismatic joint), a bar for each joint and camera.
+pub(super) fn joint_noise(record: &SolutionRecord) -> Option<String> {
+    let cameras = &record.cameras;
+    let names = &record.robot.readings;
+    let shown = |k: usize, sigma: f64| match record.robot.reading_kinds[k] {
+        JointKind::Prismatic => (1e3 * sigma, format!("{} mm", plain_digits(1e3 * sigma))),
+        _ => {
+            let degrees = sigma.to_degrees();
+            (1e3 * degrees, format!("{degrees:.4}° = {:.3} mm at 1 m", 1e3 * sigma))
+        }
+    };
+    let largest =
+        cameras.iter().flat_map(|c| c.joint_noise.iter().enumerate().map(|(k, s)| shown(k, *s).0)).fold(0.0, f64::max);
+    if largest <= 0.0 || names.is_empty() {
+        return None;
+    }
+    let (left, bar, gap) = (130.0, 16.0, 8.0);
+    let row = bar * cameras.len() as f64 + gap;
+    let height = row * names.len() as f64 + gap;
+    let mut svg = Svg::new(WIDTH, height, "Joint noise of each joint");
+    let reach = WIDTH - left - 210.0;
+    for (k, name) in names.iter().enumerate() {
+        let top = gap / 2.0 + row * k as f64;
+        svg.text([left - 8.0, top + row / 2.0], Anchor::End, &shortened(name));
+        for (c, camera) in cameras.iter().enumerate() {
+            let (size, label) = shown(k, camera.joint_noise[k]);
+            let y = top + bar * c as f64;
+            let width = (reach * size / largest).max(1.0);
+            svg.rect([left, y + 1.0], [width, bar - 2.0], "after");
+            let camera = if cameras.len() > 1 { format!(" ({})", camera.name) } else { String::new() };
+            svg.text([left + width + 6.0, y + bar - 4.0], Anchor::Start, &(label + &camera));
+        }
+    }
+    Some(svg.finish())
+}
+
+fn plain_digits(value: f64) -> String {
+    format!("{value:.4}")
+}
+
+fn shortened(name: &str) -> String {
+    match name.chars().count() {
+        0..=17 => name.to_owned(),
+        _ => name.chars().take(16).chain(['…']).collect(),
+    }
+}

@@ -1,0 +1,232 @@
+//! The sections in words and plots.
+
+use maud::{Markup, PreEscaped, html};
+
+use super::figure;
+use super::verdict::verdict;
+use super::words::{count, fixed, plus_minus, significant, unit};
+use super::{maps, plots};
+use crate::output::solution_json::SolutionRecord;
+
+/// Title, verdict and the numbers that matter most.
+pub(super) fn head(r: &SolutionRecord) -> Markup {
+    let v = verdict(r);
+    let (before, after) = (&r.accuracy.nominal, &r.accuracy.calibrated);
+    html! {
+        h1 { "Calibration of " (r.robot.name) }
+        p.sub {
+            (r.robot.base) " to " (r.robot.tip) ", " (count(r.robot.readings.len(), "moving joint")) "; "
+            (count(r.statistics.images_used, "image")) " of " (r.statistics.images) " used. "
+            (r.program.name) " " (r.program.version) "."
+        }
+        div class={ "verdict " (v.class) } {
+            strong { (v.headline) }
+            @if !v.reasons.is_empty() { ul { @for reason in &v.reasons { li { (reason) } } } }
+        }
+        p { (next_step(r)) }
+        div.big {
+            div { b { (significant(before.rms_mm)) " → " (significant(after.rms_mm)) " mm" } span { "position error, before → after" } }
+            div { b { (fixed(before.rms_mm / after.rms_mm, 1)) " times" } span { "better on images the fit had not seen" } }
+            div { b { (significant(after.worst_mm)) " mm" } span { "worst single image after" } }
+            div { b { (significant(r.statistics.rms_px)) " px" } span { "what is left in the images (RMS per point)" } }
+        }
+    }
+}
+
+/// What to do with the files.
+fn next_step(r: &SolutionRecord) -> Markup {
+    let urdf = r.files.iter().find(|f| f.ends_with(".calibrated.urdf"));
+    html! {
+        @if let Some(urdf) = urdf { "The corrected robot is " code { (urdf) } ", joint offsets included. " }
+        @if beyond_urdf(r) { "What a URDF cannot say (gear, sag, backlash) is in " code { "compensation.toml" } ". " }
+    }
+}
+
+/// True where the robot model has terms beside the joint offsets.
+fn beyond_urdf(r: &SolutionRecord) -> bool {
+    r.robot.terms.iter().any(|t| t.term != "offset")
+}
+
+/// Before and after on held-out images.
+pub(super) fn accuracy(r: &SolutionRecord) -> Markup {
+    let rows = [("Nominal robot", &r.accuracy.nominal), ("Calibrated robot", &r.accuracy.calibrated)];
+    html! {
+        h2 { "Accuracy before and after" }
+        p {
+            "How well do the joint readings alone say where the plate appears? The images were put aside in "
+            (r.accuracy.folds) " groups in turn; a model fitted to the other groups had to predict them. "
+            "In millimetres this is the distance between where the image shows the markers and where the robot model puts them; "
+            "it includes how well the robot repeats. "
+            @if beyond_urdf(r) { "The calibrated robot is the whole model, corrected URDF and compensation.toml together." }
+        }
+        div.wide { table {
+            thead { tr { th { "Model" } th.n { "error, mm RMS" } th.n { "in the image, px RMS" } th.n { "worst image, mm" } th.n { "images" } } }
+            tbody { @for (name, e) in rows { tr {
+                td { (name) } td.n { (significant(e.rms_mm)) } td.n { (significant(e.rms_px)) }
+                td.n { (significant(e.worst_mm)) } td.n { (e.images) }
+            } } }
+        } }
+        @if let Some(svg) = plots::histogram(r) {
+            figure {
+                (PreEscaped(svg))
+                figcaption { span.key.before {} "nominal robot   " span.key.after {} "calibrated robot" }
+            }
+        }
+    }
+}
+
+/// What was read, what was left out and why, and what else should be known.
+pub(super) fn left_out(r: &SolutionRecord) -> Markup {
+    let mut series: Vec<&str> = Vec::new();
+    r.images.iter().for_each(|i| {
+        if !series.contains(&i.series.as_str()) {
+            series.push(&i.series)
+        }
+    });
+    let rejected: Vec<_> = r.images.iter().filter_map(|i| i.reason.as_ref().map(|reason| (&i.name, reason))).collect();
+    html! {
+        h2 { "What was read, and what was left out" }
+        div.wide { table {
+            thead { tr { th { "Series" } th { "camera" } th.n { "images" } th.n { "used" } th.n { "on the robot" } th.n { "markers observed" } } }
+            tbody { @for name in &series { (series_row(r, name)) } }
+        } }
+        @if rejected.is_empty() {
+            p { "Every image was used." }
+        } @else {
+            p { (count(rejected.len(), "image")) " left out:" }
+            ul { @for (name, reason) in &rejected { li { code { (name) } " " (reason) } } }
+        }
+        @if r.statistics.observations_left_out > 0 {
+            p {
+                (count(r.statistics.observations_left_out, "single observation")) " of "
+                (r.statistics.observations_left_out + r.statistics.observations_used)
+                " left out because of a large residual (all are in observations.csv)."
+            }
+        }
+        @if !r.notices.is_empty() {
+            h3 { "Notes" }
+            ul { @for n in &r.notices { li {
+                code { (n.place) } " " (n.what) @if !n.remedy.is_empty() { span.note { " (" (n.remedy) ")" } }
+            } } }
+        }
+    }
+}
+
+fn series_row(r: &SolutionRecord, name: &str) -> Markup {
+    let images = || r.images.iter().filter(|i| i.series == name);
+    let used = || images().filter(|i| i.reason.is_none());
+    let markers: usize = used().map(|i| i.observations.reason.iter().filter(|o| o.is_none()).count()).sum();
+    let camera = images().next().and_then(|i| r.cameras.get(i.camera)).map_or("", |c| &c.name);
+    html! { tr {
+        td.name { (name) } td { (camera) } td.n { (images().count()) } td.n { (used().count()) }
+        td.n { (images().filter(|i| i.readings.is_some()).count()) } td.n { (markers) }
+    } }
+}
+
+/// How well each joint repeats its reading.
+pub(super) fn joint_noise(r: &SolutionRecord) -> Markup {
+    html! {
+        h2 { "Joint noise" }
+        p {
+            "How far a joint typically stands from where its reading and the model say (one sigma), as the images show it. "
+            "No model can remove this part: it bounds the accuracy of a single move."
+        }
+        @match plots::joint_noise(r) {
+            Some(svg) => (figure(&svg, "Each bar is one joint; the second number is the effect on a tool 1 m from the axis.")),
+            None => p { "The readings were taken as exact." },
+        }
+    }
+}
+
+/// Residual maps.
+pub(super) fn residuals(r: &SolutionRecord) -> Markup {
+    html! {
+        h2 { "Residuals" }
+        p {
+            "What the model leaves unexplained in the images (measured minus predicted). A healthy map looks like noise: "
+            "short lines in all directions. A pattern means that the lens model or the plate does not describe what was seen."
+        }
+        div.pair {
+            @for (k, camera) in r.cameras.iter().enumerate() {
+                @if let Some(map) = maps::residuals_over_image(r, k) {
+                    (figure(&map.svg, &format!("Over the image of camera {}, all images together. {}", camera.name, map.caption)))
+                }
+            }
+            @for (k, plate) in r.plates.iter().enumerate() {
+                @if let Some(map) = maps::residuals_over_plate(r, k) {
+                    (figure(&map.svg, &format!("Over the plate{}, mean of all images for each marker. {}", of_several(r, &plate.name), map.caption)))
+                }
+            }
+        }
+    }
+}
+
+/// " of run1" where there are several plates.
+fn of_several(r: &SolutionRecord, plate: &str) -> String {
+    if r.plates.len() > 1 { format!(" of {plate}") } else { String::new() }
+}
+
+/// The plates as found.
+pub(super) fn plates(r: &SolutionRecord) -> Markup {
+    let modes: Vec<_> = r.estimates.iter().filter(|e| e.name.starts_with("plate_shape")).collect();
+    html! {
+        h2 { "Plate" }
+        p { "The plate is part of what is estimated: corrected positions with sigmas are in plate.csv." }
+        @if !modes.is_empty() {
+            div.wide { table {
+                thead { tr { th { "Shape of the whole plate" } th.n { "estimate" } th { "unit" } th.n { "tolerance" } th.n { "share of data" } } }
+                tbody { @for e in modes { @if let (Some(value), Some(sigma)) = (e.value, e.sigma) {
+                    @let (factor, unit) = unit(e);
+                    tr {
+                        td { (super::words::parameter(&e.name)) }
+                        td.n { (plus_minus(factor * value, factor * sigma)) } td { (unit) }
+                        td.n { @if let Some(p) = e.prior_sigma { (significant(factor * p)) } }
+                        td.n { @if let Some(s) = e.share_of_data { (format!("{:.0} %", 100.0 * s)) } }
+                    }
+                } } }
+            } }
+        }
+        div.pair { @for (k, plate) in r.plates.iter().enumerate() {
+            @if let Some(map) = maps::plate_corrections(r, k) {
+                (figure(&map.svg, &format!("Corrected markers{} against nominal. {}", of_several(r, &plate.name), map.caption)))
+            }
+        } }
+    }
+}
+
+/// Where the solution started.
+pub(super) fn starts(r: &SolutionRecord) -> Markup {
+    html! {
+        h2 { "Starting values" }
+        p { "No guess was needed. These starts were tried; the one in bold won." }
+        div.wide { table {
+            thead { tr { th { "Of" } th { "from" } th { "reached" } } }
+            tbody { @for s in &r.starts { tr {
+                @if s.won { td { b { (s.of) } } td { b { (s.origin) } } td { b { (s.verdict) } } }
+                @else { td { (s.of) } td { (s.origin) } td { (s.verdict) } }
+            } } }
+        } }
+    }
+}
+
+/// What is needed to repeat the result.
+pub(super) fn record(r: &SolutionRecord) -> Markup {
+    html! {
+        h2 { "For the record" }
+        p { code { (r.program.command) } }
+        p { (r.program.name) " " (r.program.version) "; the last solve " (r.status) " after " (count(r.iterations, "step")) " in all." }
+        @if !r.program.options.is_empty() {
+            div.wide { table {
+                thead { tr { th { "Option" } th { "value" } } }
+                tbody { @for (name, value) in &r.program.options { tr { td { (name) } td { (value) } } } }
+            } }
+        }
+        h3 { "Files of this result" }
+        p { @for (k, f) in r.files.iter().enumerate() { @if k > 0 { ", " } code { (f) } } }
+        h3 { "Files read, with SHA-256" }
+        div.wide { table {
+            thead { tr { th { "File" } th { "SHA-256" } } }
+            tbody { @for f in &r.inputs { tr { td.name { code { (f.path.display()) } } td.name { code { (f.sha256) } } } } }
+        } }
+    }
+}

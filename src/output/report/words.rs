@@ -1,0 +1,173 @@
+//! Names and numbers for people.
+
+use crate::output::solution_json::EstimateRecord;
+
+/// Name of a parameter in words: `robot/joint_3/origin.rx` -> "joint_3 origin, rotation about x".
+pub(super) fn parameter(name: &str) -> String {
+    let (block, component) = name.rsplit_once('.').unwrap_or((name, ""));
+    let part = component_words(component);
+    let mut levels = block.splitn(2, '/');
+    match (levels.next().unwrap_or_default(), levels.next()) {
+        ("robot", Some(rest)) => match rest.strip_suffix("/origin") {
+            Some(joint) => format!("{joint} origin, {part}"),
+            None => format!("{rest} {part}"),
+        },
+        ("hand_camera", None) => format!("hand-camera offset, {part}"),
+        ("hand_camera", Some(mounting)) => format!("hand-camera offset ({mounting}), {part}"),
+        ("plate", Some(placement)) => format!("plate pose ({placement}), {part}"),
+        ("camera", Some(rest)) => {
+            let camera = rest.rsplit_once('/').map_or(rest, |(camera, _)| camera);
+            format!("{component} of camera {camera}")
+        }
+        ("plate_shape", None) => format!("plate {part}"),
+        ("plate_shape", Some(plate)) => format!("plate {part} ({plate})"),
+        _ => name.to_owned(),
+    }
+}
+
+fn component_words(component: &str) -> String {
+    match component {
+        "x" | "y" | "z" => format!("shift along {component}"),
+        "rx" | "ry" | "rz" => format!("rotation about {}", &component[1..]),
+        "gear" => "gear scale".into(),
+        "aspect" => "x/y scale".into(),
+        _ => match component.split_once('_') {
+            Some(("cos", k)) => format!("gear harmonic {k} (cosine)"),
+            Some(("sin", k)) => format!("gear harmonic {k} (sine)"),
+            Some(("gravity", k)) => format!("sag term {k}"),
+            Some(("bow", axes)) => format!("bow {axes}"),
+            _ => component.to_owned(),
+        },
+    }
+}
+
+/// Parameters by block: "joint_1 origin (x, y, rz)".
+pub(super) fn grouped<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
+    for name in names {
+        let (block, component) = name.rsplit_once('.').unwrap_or((name, ""));
+        match groups.iter_mut().find(|(b, _)| *b == block) {
+            Some((_, components)) => components.push(component),
+            None => groups.push((block, vec![component])),
+        }
+    }
+    let words = |block: &str| match block.strip_prefix("plate_shape") {
+        Some(plate) => format!("plate{}", plate.replace('/', " of ")),
+        None => short_block(block),
+    };
+    let components = |c: &[&str]| c.iter().map(|c| short(c)).collect::<Vec<_>>().join(", ");
+    groups.iter().map(|(block, c)| format!("{}: {}", words(block), components(c))).collect()
+}
+
+/// Name of a block of the robot.
+fn short_block(block: &str) -> String {
+    let name = block.trim_start_matches("robot/");
+    name.strip_suffix("/origin").map_or_else(|| name.to_owned(), |joint| format!("{joint} origin"))
+}
+
+/// Short name of a component, for heads of tables and lists: `cos_2` -> "cos 2q".
+pub(super) fn short(component: &str) -> String {
+    match component.split_once('_') {
+        Some((wave @ ("cos" | "sin"), "1")) => format!("{wave} q"),
+        Some((wave @ ("cos" | "sin"), k)) => format!("{wave} {k}q"),
+        Some(("gravity", k)) => format!("sag {k}"),
+        _ => component.replace('_', " "),
+    }
+}
+
+/// Factor from SI to the unit for people, and that unit.
+pub(super) fn unit(e: &EstimateRecord) -> (f64, &'static str) {
+    let small = e.prior_sigma.is_some_and(|s| s < 1e-3);
+    match (e.unit.as_str(), small) {
+        ("m", _) => (1e3, "mm"),
+        ("rad", true) => (60.0 * 180.0 / std::f64::consts::PI, "arcmin"),
+        ("rad", false) => (180.0 / std::f64::consts::PI, "°"),
+        ("1", true) => (1e6, "ppm"),
+        ("px", _) => (1.0, "px"),
+        _ => (1.0, ""),
+    }
+}
+
+/// Decimals that show two significant digits of `sigma`.
+fn decimals(sigma: f64) -> usize {
+    // Rounded first, so that 0.998 is shown like 1.0.
+    match format!("{sigma:.1e}").split_once('e').and_then(|(_, exponent)| exponent.parse::<i32>().ok()) {
+        Some(exponent) if sigma > 0.0 => (1 - exponent).clamp(0, 9) as usize,
+        _ => 3,
+    }
+}
+
+/// "0.412 ± 0.035", both with as many decimals as sigma deserves.
+pub(super) fn plus_minus(value: f64, sigma: f64) -> String {
+    let d = decimals(sigma);
+    format!("{} ± {sigma:.d$}", minus(&format!("{value:.d$}")))
+}
+
+/// With a true minus sign, and none before a zero.
+fn minus(number: &str) -> String {
+    match number.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| matches!(c, '0' | '.')) => rest.to_owned(),
+        Some(rest) => format!("\u{2212}{rest}"),
+        None => number.to_owned(),
+    }
+}
+
+/// A number with a fixed number of decimals.
+pub(super) fn fixed(value: f64, decimals: usize) -> String {
+    minus(&format!("{value:.decimals$}"))
+}
+
+/// A positive number with three significant digits.
+pub(super) fn significant(value: f64) -> String {
+    if !value.is_finite() {
+        return "–".into();
+    }
+    if value == 0.0 {
+        return "0".into();
+    }
+    let d = (2.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    minus(&format!("{value:.d$}"))
+}
+
+/// A scale as few characters: 0.5, 20.
+pub(super) fn plain(value: f64) -> String {
+    let d = (-value.abs().log10().floor()).clamp(0.0, 6.0) as usize;
+    format!("{value:.d$}")
+}
+
+/// "1 image", "3 images".
+pub(super) fn count(n: usize, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_have_names_in_words() {
+        for (name, words) in [
+            ("robot/joint_3/origin.rx", "joint_3 origin, rotation about x"),
+            ("robot/a/b.offset", "a/b offset"),
+            ("robot/joint_3.cos_2", "joint_3 gear harmonic 2 (cosine)"),
+            ("hand_camera.rz", "hand-camera offset, rotation about z"),
+            ("plate/placement_0.z", "plate pose (placement_0), shift along z"),
+            ("camera/front/lens.k1", "k1 of camera front"),
+            ("plate_shape.scale", "plate scale"),
+        ] {
+            assert_eq!(parameter(name), words);
+        }
+        let names = ["robot/a/origin.x", "robot/a/origin.rz", "robot/a.gear", "robot/a.cos_2", "plate_shape.bow_xx"];
+        assert_eq!(grouped(names.into_iter()), ["a origin: x, rz", "a: gear, cos 2q", "plate: bow xx"]);
+    }
+
+    #[test]
+    fn numbers_show_what_their_sigma_deserves() {
+        assert_eq!(plus_minus(-0.41234, 0.0354), "\u{2212}0.412 ± 0.035");
+        assert_eq!(plus_minus(1234.5, 120.0), "1234 ± 120");
+        assert_eq!(plus_minus(0.0, 0.9996), "0.0 ± 1.0");
+        assert_eq!(fixed(-0.0001, 2), "0.00");
+        assert_eq!(significant(0.01234), "0.0123");
+        assert_eq!((plain(0.5), plain(20.0), plain(0.02)), ("0.5".into(), "20".into(), "0.02".into()));
+    }
+}
