@@ -1,8 +1,8 @@
 #!/bin/sh
-# Makes all series of this folder anew with the program. The same version makes the same bytes.
+# Makes all series of this folder anew with the program.
 set -eu
 cd "$(dirname "$0")/.."
-cargo build --release --quiet
+cargo build --release --quiet --bin robotcal
 robotcal=target/release/robotcal
 kr6=robots/kuka_kr6_r900/kuka_kr6_r900.urdf
 

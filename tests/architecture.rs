@@ -21,7 +21,7 @@ const LEVELS: [&[&str]; 12] = [
 ];
 
 /// Peers where the first may import the second: readings are matched to chains, and a recipe may be tried on a simulated world.
-const PEERS: [(&str, &str); 1] = [("series", "urdf")];
+const PEERS: [(&str, &str); 2] = [("series", "urdf"), ("recipe", "simulate")];
 
 const MOST_LINES: usize = 600;
 

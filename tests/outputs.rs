@@ -254,7 +254,7 @@ fn observations_csv_has_all_observations_with_reasons_and_is_a_series_input() {
     assert_eq!(table.len(), all);
     let left_out = table.iter().filter(|r| !r["reason"].is_empty()).count();
     assert_eq!(left_out, solution.problem.images[3].observations.len() + 1);
-    let squares: f64 = table.iter().map(|r| ["du", "dv"].map(|c| r[c].parse::<f64>().unwrap().powi(2))).flatten().sum();
+    let squares: f64 = table.iter().flat_map(|r| ["du", "dv"].map(|c| r[c].parse::<f64>().unwrap().powi(2))).sum();
     // 0.05 px per axis.
     let rms = (squares / (2.0 * all as f64)).sqrt();
     assert!((0.04..0.06).contains(&rms), "{rms}");

@@ -199,3 +199,106 @@ fn a_chessboard_has_its_corners_where_the_model_says() {
         assert!(dark.iter().all(|v| *v < 0.2) && light.iter().all(|v| *v > 0.6), "corner {}", marker.id);
     }
 }
+
+/// Central moments of what is darker than the ground: variance along u and v, and skewness along u, px.
+fn spread(conditions: &ImagingConditions) -> (f64, f64, f64) {
+    let camera = Camera::pinhole(Lens::Brown, 400, 300, 1000.0);
+    // In the right half of the image, where coma points to the right.
+    let pose =
+        Pose::new(nalgebra::Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0)), Vector3::new(0.06, 0.0, 0.5));
+    let window = PixelRect { x: 289, y: 119, width: 61, height: 61 };
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let picture = render_window(&one_marker(0.004, 0.0, [0.0; 2]), &camera, &pose, conditions, &window, &mut rng);
+    let (mass, middle) = dark_centroid(&picture, &window, conditions);
+    // Coma and motion are centred on their mean.
+    assert!((middle - Vector2::new(199.5 + 120.0, 149.5)).norm() < 3e-3, "{middle}");
+    let ground = conditions.exposure * conditions.light_reflectance * conditions.full_scale();
+    let mut moments = (0.0, 0.0, 0.0);
+    for y in 0..61 {
+        for x in 0..61 {
+            let dark = (ground - f64::from(picture.at(x, y))) / mass;
+            let (du, dv) = (289.0 + x as f64 - middle.x, 119.0 + y as f64 - middle.y);
+            moments.0 += dark * du * du;
+            moments.1 += dark * dv * dv;
+            moments.2 += dark * du * du * du;
+        }
+    }
+    moments
+}
+
+#[test]
+fn blur_defocus_motion_and_coma_spread_the_light_as_they_say() {
+    // A disc of 8 px radius has a variance of r^2 / 4; pixels and blurs add theirs.
+    let disc = 16.0 + 1.0 / 12.0;
+    let base = ImagingConditions::ideal(0.7);
+    let near = |value: f64, expected: f64| (value - expected).abs() < 0.02;
+    let (u, v, _) = spread(&base);
+    assert!(near(u, disc + 0.49) && near(v, disc + 0.49), "{u} {v}");
+    // Defocus of 2 px m times |1 / 0.5 - 1 / 0.8| per metre is 1.5 px.
+    let (u, v, _) = spread(&ImagingConditions { focus_m: Some(0.8), defocus_px_m: 2.0, ..base.clone() });
+    assert!(near(u, disc + 0.49 + 2.25) && near(v, disc + 0.49 + 2.25), "{u} {v}");
+    // 3 mm of motion along x at 0.5 m and 1000 px is an even smear of 6 px: 36 / 12 less the steps of the 12 instants.
+    let (u, v, _) = spread(&ImagingConditions { motion: [0.003, 0.0, 0.0, 0.0, 0.0, 0.0], ..base.clone() });
+    assert!((u - disc - 0.49 - 3.0).abs() < 0.05 && near(v, disc + 0.49), "{u} {v}");
+    // A tail of 3 px at the corner is 1.44 px here: skewed to the right, at the same centroid.
+    let (_, _, skew) = spread(&ImagingConditions { coma_px: 3.0, ..base.clone() });
+    let (_, _, even) = spread(&base);
+    assert!(even.abs() < 0.02 && skew > 0.1, "{even} {skew}");
+}
+
+#[test]
+fn occluders_cover_glare_saturates_and_vignetting_darkens_the_corner() {
+    use robotcal::simulate::conditions::{Glare, Occluder};
+    let camera = Camera::pinhole(Lens::Brown, 300, 200, 800.0);
+    let pose = Pose::new(nalgebra::Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0)), Vector3::new(0.0, 0.0, 0.2));
+    let conditions = ImagingConditions {
+        vignetting: 0.4,
+        glare: vec![Glare { at_px: [220.0, 60.0], radius_px: 8.0, strength: 1.5 }],
+        occluders: vec![Occluder {
+            outline_px: vec![[40.0, 120.0], [90.0, 120.0], [90.0, 170.0], [40.0, 170.0]],
+            reflectance: 0.3,
+        }],
+        ..ImagingConditions::ideal(0.8)
+    };
+    let picture =
+        render(&one_marker(0.003, 0.0, [0.0; 2]), &camera, &pose, &conditions, &mut ChaCha8Rng::seed_from_u64(0));
+    let at = |x: usize, y: usize| f64::from(picture.at(x, y)) / 65535.0;
+    let fall_off =
+        |x: f64, y: f64| 1.0 - 0.4 * ((x - 149.5).powi(2) + (y - 99.5).powi(2)) / (149.5 * 149.5 + 99.5 * 99.5);
+    assert!((at(65, 145) - 0.85 * 0.3 * fall_off(65.0, 145.0)).abs() < 1e-4);
+    assert!((at(0, 0) - 0.85 * 0.85 * 0.6).abs() < 1e-4);
+    assert!((at(220, 60) - 1.0).abs() < 1e-9);
+    assert!((at(149, 99) - 0.85 * 0.06 * fall_off(149.0, 99.0)).abs() < 1e-4);
+}
+
+#[test]
+fn the_plate_ends_where_its_sheet_ends_even_when_it_reaches_behind_the_camera() {
+    // A view along the plate at grazing incidence: near edge of the sheet behind the camera, far edge in the image.
+    let plate = design(&PlateRequest::default()).unwrap().plate;
+    let camera = wide_camera();
+    let tilt = exp_so3(&Vector3::new(std::f64::consts::PI - 1.1, 0.0, 0.0));
+    let pose = Pose::new(tilt, Vector3::new(0.0, 0.0, 0.15));
+    let conditions = ImagingConditions { table_reflectance: 0.3, ..ImagingConditions::ideal(0.5) };
+    let picture = render(&plate, &camera, &pose, &conditions, &mut ChaCha8Rng::seed_from_u64(0));
+    let plate_from_camera = pose.inverse();
+    let mut checked = [0; 2];
+    for (x, y) in (10..1270).step_by(30).flat_map(|x| (10..1014).step_by(30).map(move |y| (x, y))) {
+        let Some(ray) = camera.ray(&Vector2::new(f64::from(x), f64::from(y))) else { continue };
+        let direction = plate_from_camera.rotation * ray;
+        let t = -plate_from_camera.translation.z / direction.z;
+        let hit = plate_from_camera.translation + direction * t;
+        let beside = |v: f64, half: f64| (v.abs() - half).abs() < 0.02;
+        if t > 3.0 || beside(hit.x, 0.297) || beside(hit.y, 0.21) {
+            continue;
+        }
+        let on_sheet = t > 0.0 && hit.x.abs() < 0.297 && hit.y.abs() < 0.21;
+        let in_field = hit.x.abs() < 0.26 && hit.y.abs() < 0.17;
+        let value = f64::from(picture.at(x as usize, y as usize)) / 65535.0;
+        if !(on_sheet && in_field) {
+            let expected = 0.85 * if on_sheet { 0.85 } else { 0.3 };
+            assert!((value - expected).abs() < 1e-3, "({x}, {y}): {value} {expected}");
+            checked[usize::from(on_sheet)] += 1;
+        }
+    }
+    assert!(checked.iter().all(|c| *c > 5), "{checked:?}");
+}

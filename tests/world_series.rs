@@ -211,3 +211,24 @@ fn the_robot_files_say_what_the_urdf_says() {
         assert!(text("source").len() > 40);
     }
 }
+
+#[test]
+fn the_shipped_images_are_what_the_simulation_makes() {
+    // The command stands in datasets/README.md. Another libm may differ in the last bit, so counts may differ by one.
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/kr6_small");
+    let plate = design(&PlateRequest::default()).unwrap().plate;
+    let made =
+        series(&WorldRequest { images: 24, seed: 1, ..WorldRequest::typical(chain("kuka_kr6_r900"), plate) }).unwrap();
+    let read = robotcal::series::read(&folder).unwrap();
+    assert_eq!(read.plate, made.plate);
+    for (a, b) in read.stops.stops.iter().zip(&made.stops.stops) {
+        let pairs = a.raw_readings.iter().flatten().zip(b.raw_readings.iter().flatten());
+        assert!(pairs.clone().count() == 6 && pairs.into_iter().all(|(p, q)| (p - q).abs() < 2e-5), "{}", a.image);
+    }
+    let conditions = std::fs::read_to_string(folder.with_extension("conditions.toml")).unwrap();
+    let conditions: ImagingConditions = toml::from_str(&conditions).unwrap();
+    let shipped = robotcal::detect::load(read.stops.stops[5].path.as_ref().unwrap(), None).unwrap();
+    let rendered = made.render(5, &conditions);
+    let worst = shipped.pixels.iter().zip(&rendered.pixels).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(worst <= 1.0, "{worst}");
+}

@@ -64,11 +64,15 @@ pub fn hold_out(problem: &Problem, state: &State) -> Option<Accuracy> {
     Some(Accuracy { nominal: summary(&nominal), calibrated: summary(&calibrated), per_image_mm, folds })
 }
 
-#[derive(Debug, Clone, Copy)]
-struct ImageError {
-    px2: f64,
-    mm2: f64,
-    count: f64,
+/// Squared errors of one predicted image, summed over its markers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImageError {
+    /// Between measured and predicted markers in the image, px^2.
+    pub px2: f64,
+    /// Between where the image shows the markers and where the joint readings put them, mm^2.
+    pub mm2: f64,
+    /// Number of markers.
+    pub count: f64,
 }
 
 impl ImageError {
@@ -97,15 +101,20 @@ fn predictions(problem: &Problem, state: &State, on_robot: &[usize], folds: usiz
         held.iter().for_each(|&i| rest.images[i].rejected = Some("held out".into()));
         let outcome = solve(&rest, state.clone(), &Settings { iterations: 30, decrement: 1e-2 });
         for i in held {
-            let image = &problem.images[i];
-            let weighting = Weighting::of(problem, image);
-            let Some(predicted) = outcome.state.camera_from_plate(image, &Slack::None) else { continue };
-            let (seen, _) = resect(image, &outcome.state, &predicted, &weighting)?;
-            errors.push((i, image_error(image, &outcome.state, &predicted, &seen)));
+            errors.push((i, predict_image(problem, &outcome.state, i)?));
         }
     }
     errors.sort_by_key(|(i, _)| *i);
     Some(errors)
+}
+
+/// Error of an image that `state` was not fitted to, predicted from its joint readings alone; `None` off the robot, or where
+/// its markers do not give a pose.
+pub fn predict_image(problem: &Problem, state: &State, image: usize) -> Option<ImageError> {
+    let image = &problem.images[image];
+    let predicted = state.camera_from_plate(image, &Slack::None)?;
+    let (seen, _) = resect(image, state, &predicted, &Weighting::of(problem, image))?;
+    Some(image_error(image, state, &predicted, &seen))
 }
 
 fn image_error(image: &Image, state: &State, predicted: &Pose, seen: &Pose) -> ImageError {

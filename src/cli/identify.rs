@@ -45,7 +45,7 @@ pub(super) struct IdentifyArgs {
 
 /// Names of the robot models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Model {
+pub(super) enum Model {
     /// Link geometry and joint offsets
     Rigid,
     /// Also gear scale and two harmonics
@@ -68,7 +68,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let options = Options { joint_noise: joint_noise(args.joint_noise)?, model: args.robot_model.into() };
     let description = urdf::read(&args.urdf)?;
     let all = read_all(&args.series)?;
-    let chain = chain(&description, &all, args)?;
+    let chain = chain(&description, &all, args.base.as_deref(), args.tip.as_deref())?;
     let pictures = Pictures::new();
     let all = pictures.of_recordings(all, &args.recording.options(&chain.readings)?)?;
     let mut notices = description.notices.clone();
@@ -121,7 +121,7 @@ fn joint_noise(sigma: Option<f64>) -> Result<JointNoise> {
     }
 }
 
-fn read_all(folders: &[PathBuf]) -> Result<Vec<Series>> {
+pub(super) fn read_all(folders: &[PathBuf]) -> Result<Vec<Series>> {
     let mut all: Vec<Series> = Vec::new();
     for folder in folders {
         let s = series::read(folder)?;
@@ -137,9 +137,14 @@ fn read_all(folders: &[PathBuf]) -> Result<Vec<Series>> {
     Ok(all)
 }
 
-fn chain(description: &RobotDescription, all: &[Series], args: &IdentifyArgs) -> Result<Chain> {
-    let base = agreed("base", args.base.as_deref(), all, |s| s.manifest.base.as_deref())?;
-    let tip = agreed("tip", args.tip.as_deref(), all, |s| s.manifest.tip.as_deref())?;
+pub(super) fn chain(
+    description: &RobotDescription,
+    all: &[Series],
+    base: Option<&str>,
+    tip: Option<&str>,
+) -> Result<Chain> {
+    let base = agreed("base", base, all, |s| s.manifest.base.as_deref())?;
+    let tip = agreed("tip", tip, all, |s| s.manifest.tip.as_deref())?;
     description.chain(base, tip)
 }
 
@@ -165,7 +170,7 @@ fn agreed<'a>(
     }
 }
 
-fn measure_all(all: &[Series], chain: &Chain, notices: &mut Vec<Notice>) -> Result<Vec<MeasuredSeries>> {
+pub(super) fn measure_all(all: &[Series], chain: &Chain, notices: &mut Vec<Notice>) -> Result<Vec<MeasuredSeries>> {
     let mut measured = Vec::new();
     for s in all {
         let bar = progress::bar(s.stops.stops.len(), &s.name);

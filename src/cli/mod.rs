@@ -2,6 +2,7 @@
 //!
 //! To add a subcommand: a file with its `Args` and `run`, a variant of [`Command`] and a row in [`Command::run`].
 
+mod compare;
 mod convert;
 mod identify;
 mod plate;
@@ -40,6 +41,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Compare two-stage estimators with the joint fit, on a series or in simulation
+    Compare(compare::CompareArgs),
     /// Turn a recording (MCAP, rosbag2) into a series folder, or a series folder into a recording
     Convert(convert::ConvertArgs),
     /// Identify robot, camera, hand-camera offset and plate from one or more series
@@ -64,6 +67,7 @@ pub(crate) enum Verdict {
 impl Command {
     fn run(&self) -> Result<Verdict> {
         match self {
+            Self::Compare(args) => compare::run(args),
             Self::Convert(args) => convert::run(args),
             Self::Identify(args) => identify::run(args),
             Self::Plate(args) => plate::run(args),

@@ -25,4 +25,7 @@ pub mod decisions {
 
     #[doc = include_str!("decisions/0003_dependencies.md")]
     pub mod d0003_dependencies {}
+
+    #[doc = include_str!("decisions/0004_boards.md")]
+    pub mod d0004_boards {}
 }

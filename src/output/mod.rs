@@ -4,6 +4,7 @@
 //! A new exporter is one file here and one row in [`files`].
 
 mod camera_file;
+pub mod comparison;
 mod compensation;
 mod compensation_read;
 mod estimates;

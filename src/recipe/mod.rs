@@ -3,18 +3,26 @@
 //! `series -> observations -> free poses -> starting values -> joint fit -> assessment`. A new mode is a file here.
 
 mod build;
+mod compare;
 mod focus;
 mod free_poses;
 mod gates;
 mod joint;
 mod measure;
 mod moved;
+mod simulated;
 mod solution;
 mod start;
+mod study;
 mod suspects;
+mod two_stage;
 
 pub use build::{MeasuredSeries, MeasuredStop};
+pub use compare::{Comparison, ComparisonRow, HeldOut, TruthError, compare};
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
 pub use joint::{JointNoise, Options, RobotModel, identify};
 pub use measure::{Measured, measure};
+pub use simulated::measured;
 pub use solution::{Solution, StartVerdict};
+pub use study::{Study, StudyCell, StudyRequest, study};
+pub use two_stage::{Estimate, Estimator, PoseStage, estimate_all, fit_joint, fit_poses, linear_step};

@@ -132,9 +132,10 @@ impl View<'_> {
             let from = (y - patch.rect.y) as usize * patch.rect.width + (common.x - patch.rect.x) as usize;
             let to = (y - self.window.y) as usize * self.window.width + (common.x - self.window.x) as usize;
             let line = &patch.values[from..from + common.width];
+            let start = plane.at(f64::from(common.x), f64::from(y)) as f32;
+            let step = plane.slope.x as f32;
             for (k, (c, p)) in cover[to..to + common.width].iter_mut().zip(line).enumerate() {
-                let here = plane.at(f64::from(common.x) + k as f64, f64::from(y)) as f32;
-                *c += weight * p / here.max(1e-6);
+                *c += weight * p / (start + step * k as f32).max(1e-6);
             }
         }
     }
@@ -144,12 +145,12 @@ impl View<'_> {
         let c = self.conditions;
         let dark = (c.dark_reflectance / c.light_reflectance) as f32;
         let width = self.window.width;
-        for (row, line) in ground.chunks_exact_mut(width).enumerate() {
+        for ((row, line), cover) in ground.chunks_exact_mut(width).enumerate().zip(cover.chunks_exact(width)) {
             let v = f64::from(self.window.y) + row as f64;
-            for (k, value) in line.iter_mut().enumerate() {
+            for (k, (value, cover)) in line.iter_mut().zip(cover).enumerate() {
                 let uv = Vector2::new(f64::from(self.window.x) + k as f64, v);
                 let light = (c.exposure * c.illumination(uv, self.centre)) as f32;
-                *value *= light * (1.0 - (1.0 - dark) * cover[row * width + k]);
+                *value *= light * (1.0 - (1.0 - dark) * cover);
             }
         }
     }

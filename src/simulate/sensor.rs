@@ -11,10 +11,11 @@ use super::raster::PixelRect;
 pub fn expose(light: &mut [f32], rect: &PixelRect, size: [u32; 2], conditions: &ImagingConditions, rng: &mut impl Rng) {
     let full_scale = conditions.full_scale();
     let well = conditions.full_well_e;
-    let noisy = well.is_finite() && well > 0.0;
-    let has_pattern = noisy && (conditions.dark_sigma_e > 0.0 || conditions.gain_sigma > 0.0);
+    let is_noisy = well.is_finite() && well > 0.0;
+    let has_pattern = is_noisy && (conditions.dark_sigma_e > 0.0 || conditions.gain_sigma > 0.0);
+    let read_variance = conditions.read_noise_e.powi(2);
     let (middle_u, middle_v) = ((f64::from(size[0]) - 1.0) / 2.0, (f64::from(size[1]) - 1.0) / 2.0);
-    let corner2 = middle_u * middle_u + middle_v * middle_v;
+    let loss = conditions.vignetting / (middle_u * middle_u + middle_v * middle_v);
     for (row, line) in light.chunks_exact_mut(rect.width).enumerate() {
         let v = i64::from(rect.y) + row as i64;
         let dv2 = (v as f64 - middle_v).powi(2);
@@ -22,17 +23,17 @@ pub fn expose(light: &mut [f32], rect: &PixelRect, size: [u32; 2], conditions: &
         let mut pattern = Pattern::new(conditions.sensor_seed, v, i64::from(rect.x), has_pattern);
         for (column, value) in line.iter_mut().enumerate() {
             let du = f64::from(rect.x) + column as f64 - middle_u;
-            let vignette = 1.0 - conditions.vignetting * (du * du + dv2) / corner2;
-            let mut signal = f64::from(*value) * vignette;
-            if noisy {
+            let mut signal = f64::from(*value) * (1.0 - loss * (du * du + dv2));
+            if is_noisy {
                 let [gain, dark] = pattern.next();
                 signal *= 1.0 + conditions.gain_sigma * gain;
                 let dark_e = (conditions.dark_e + conditions.dark_sigma_e * dark).max(0.0);
                 let electrons = (signal * well).max(0.0) + dark_e;
-                let sigma = (electrons + conditions.read_noise_e.powi(2)).sqrt();
+                let sigma = (electrons + read_variance).sqrt();
                 signal = (electrons + sigma * rng.sample::<f64, _>(StandardNormal)) / well;
             }
-            *value = (signal * full_scale).round().clamp(0.0, full_scale) as f32;
+            // Truncation after adding a half rounds non-negative values.
+            *value = ((signal * full_scale).clamp(0.0, full_scale) + 0.5) as u32 as f32;
         }
     }
 }

@@ -158,11 +158,16 @@ fn update_joint(
             }
         }
     }
-    let kinds = &state.robot.chain.reading_kinds;
+    share_out(&state.robot.chain.reading_kinds, &squares, &redundancy, sigma)
+}
+
+/// New joint noise from the sum of squares and the redundancy of each reading's latents; every reading is drawn to the common
+/// noise of its kind. Returns the largest relative change.
+pub fn share_out(kinds: &[JointKind], squares: &[f64], redundancy: &[f64], sigma: &mut [f64]) -> f64 {
     let mut change: f64 = 0.0;
     let old = sigma.to_vec();
     for kind in [JointKind::Revolute, JointKind::Prismatic] {
-        let members: Vec<usize> = (0..n).filter(|&r| kinds[r] == kind).collect();
+        let members: Vec<usize> = (0..sigma.len()).filter(|&r| kinds[r] == kind).collect();
         let (all, free): (f64, f64) = members.iter().fold((0.0, 0.0), |(s, f), &r| (s + squares[r], f + redundancy[r]));
         if free < 1e-9 {
             continue;

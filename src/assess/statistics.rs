@@ -1,0 +1,81 @@
+//! Small statistics of comparisons.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+/// A ratio with its interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Ratio {
+    /// Ratio of the root mean squares.
+    pub value: f64,
+    /// 2.5 % point over resampled units.
+    pub low: f64,
+    /// 97.5 % point.
+    pub high: f64,
+}
+
+/// Resamplings of a bootstrap.
+const RESAMPLINGS: usize = 2000;
+
+/// Ratio of the RMS of `a` to that of `b`, paired by unit (an image or a seed): `(sum of squares, weight)` each, with the
+/// percentile bootstrap interval over units. The same input gives the same interval. `None` without units or where b is zero.
+pub fn bootstrap_ratio(a: &[(f64, f64)], b: &[(f64, f64)]) -> Option<Ratio> {
+    let n = a.len();
+    if n == 0 || n != b.len() {
+        return None;
+    }
+    let ratio = |units: &mut dyn Iterator<Item = usize>| {
+        let (mut sa, mut wa, mut sb, mut wb) = (0.0, 0.0, 0.0, 0.0);
+        for i in units {
+            sa += a[i].0;
+            wa += a[i].1;
+            sb += b[i].0;
+            wb += b[i].1;
+        }
+        ((sa / wa) / (sb / wb)).sqrt()
+    };
+    let value = ratio(&mut (0..n));
+    let mut rng = ChaCha8Rng::seed_from_u64(n as u64);
+    let mut all: Vec<f64> = (0..RESAMPLINGS).map(|_| ratio(&mut (0..n).map(|_| rng.random_range(0..n)))).collect();
+    all.retain(|r| r.is_finite());
+    all.sort_by(f64::total_cmp);
+    let at = |p: f64| all.get(((all.len() as f64 - 1.0) * p).round().max(0.0) as usize).copied();
+    Some(Ratio { value, low: at(0.025)?, high: at(0.975)? }).filter(|r| r.value.is_finite())
+}
+
+/// Root of the mean square of `(sum of squares, weight)` units.
+pub fn root_mean_square(units: &[(f64, f64)]) -> f64 {
+    let (s, w) = units.iter().fold((0.0, 0.0), |(s, w), u| (s + u.0, w + u.1));
+    (s / w).sqrt()
+}
+
+/// Median; `None` of nothing.
+pub fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_interval_holds_the_ratio_and_narrows_with_more_units() {
+        let units = |n: usize, size: f64, shift: f64| -> Vec<(f64, f64)> {
+            (0..n).map(|k| (size * (1.0 + 0.8 * (k as f64 * 2.4 + shift).sin()), 1.0)).collect()
+        };
+        let width = |n: usize| {
+            let r = bootstrap_ratio(&units(n, 4.0, 0.0), &units(n, 1.0, 1.0)).unwrap();
+            assert!(r.low < r.value && r.value < r.high, "{r:?}");
+            assert!((r.value - 2.0).abs() < 0.2, "{r:?}");
+            r.high - r.low
+        };
+        // The width falls like one over the root of the number of units.
+        let (few, many) = (width(20), width(320));
+        assert!(many < 0.4 * few, "{few} {many}");
+        assert_eq!(bootstrap_ratio(&[], &[]), None);
+        assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
+    }
+}

@@ -1,0 +1,106 @@
+//! `robotcal compare`: two-stage estimators beside the joint fit, on a series or as a simulated study.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::recording::{Pictures, RecordingArgs};
+use super::{Verdict, identify, progress};
+use crate::error::{Error, Result};
+use crate::output::comparison::{comparison_markdown, study_html, study_markdown, study_verdict};
+use crate::recipe::{self, Options, StudyRequest};
+use crate::series::Series;
+use crate::simulate::truth::Truth;
+use crate::urdf;
+
+/// Flags of `compare`.
+#[derive(Debug, Args)]
+pub(super) struct CompareArgs {
+    /// Robot description (URDF)
+    #[arg(long, value_name = "FILE")]
+    urdf: PathBuf,
+    /// Series folder; give it several times to fit several series of the same robot together
+    #[arg(long, value_name = "FOLDER", required_unless_present = "study")]
+    series: Vec<PathBuf>,
+    /// Simulate where the joint fit beats two stages, over repeatability and number of markers, instead of reading a series
+    #[arg(long, conflicts_with = "series")]
+    study: bool,
+    /// Simulated series in every cell of the study
+    #[arg(long, value_name = "N", default_value_t = 30, requires = "study")]
+    seeds: u64,
+    /// Folder for the report
+    #[arg(long, value_name = "FOLDER", default_value = "reports")]
+    out: PathBuf,
+    /// Base link (overrides series.toml)
+    #[arg(long, value_name = "LINK")]
+    base: Option<String>,
+    /// Tip link that carries camera or plate (overrides series.toml)
+    #[arg(long, value_name = "LINK")]
+    tip: Option<String>,
+    /// Joint terms beside rigid geometry and offsets
+    #[arg(long, value_enum, default_value_t = identify::Model::Full)]
+    robot_model: identify::Model,
+    #[command(flatten)]
+    recording: RecordingArgs,
+}
+
+pub(super) fn run(args: &CompareArgs) -> Result<Verdict> {
+    if args.study { study(args) } else { series(args) }
+}
+
+fn series(args: &CompareArgs) -> Result<Verdict> {
+    let description = urdf::read(&args.urdf)?;
+    let all = identify::read_all(&args.series)?;
+    let chain = identify::chain(&description, &all, args.base.as_deref(), args.tip.as_deref())?;
+    let all = Pictures::new().of_recordings(all, &args.recording.options(&chain.readings)?)?;
+    let truth = truth_of(&all)?;
+    let mut notices = Vec::new();
+    let measured = identify::measure_all(&all, &chain, &mut notices)?;
+    let options = Options { model: args.robot_model.into(), ..Options::default() };
+    let solution = recipe::identify(chain, &measured, &options)?;
+    let bar = progress::bar(1, "folds");
+    let comparison = recipe::compare(&solution, truth.as_ref(), |done, total| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    print!("{}", comparison_markdown(&comparison));
+    Ok(Verdict::Good)
+}
+
+/// truth.toml of a single simulated series.
+fn truth_of(all: &[Series]) -> Result<Option<Truth>> {
+    let [only] = all else { return Ok(None) };
+    let path = only.folder.join("truth.toml");
+    if path.exists() { Truth::read(&path).map(Some) } else { Ok(None) }
+}
+
+fn study(args: &CompareArgs) -> Result<Verdict> {
+    let chain = urdf::read(&args.urdf)?.chain(args.base.as_deref(), args.tip.as_deref())?;
+    if args.seeds < 2 {
+        return Err(Error::input("--seeds", "fewer than 2 worlds give no interval", "give 30 or more"));
+    }
+    let request = StudyRequest { seeds: args.seeds, ..StudyRequest::full(chain) };
+    let bar = progress::bar(1, "cells");
+    let study = recipe::study(&request, |done, total| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    let command = format!("robotcal compare --study --urdf {} --seeds {}", args.urdf.display(), args.seeds);
+    write(&args.out.join("two-stage-vs-joint.md"), &study_markdown(&study, &command))?;
+    write(&args.out.join("two-stage-vs-joint.html"), &study_html(&study, &command))?;
+    for line in study_verdict(&study) {
+        println!("{line}");
+    }
+    println!("report    {}", args.out.join("two-stage-vs-joint.html").display());
+    Ok(Verdict::Good)
+}
+
+fn write(path: &Path, text: &str) -> Result<()> {
+    let io = |e: std::io::Error| Error::io(path, &e);
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(io)?;
+    }
+    std::fs::write(path, text).map_err(io)
+}

@@ -1,0 +1,481 @@
+//! Two-stage estimators: free camera poses first, then the robot from the poses; every honest way to weight the second stage.
+//!
+//! After the first stage everything is a least-squares fit of `log(reference^-1 * pose(theta))` to the poses that the images
+//! say, with error covariance `V = V0 + sum L S L'`: a known part, and latent noise `S` of unknown size that enters through `L`.
+//! The estimators differ in nothing but `V0` and `L`; sizes are variance components (REML), as in the joint fit.
+//! Partial minimisation over cameras, plate and markers leaves a Schur complement, so that the full covariance of the poses,
+//! taken at the joint solution, gives the joint solution again.
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+
+use crate::geom::{Pose, right_jacobian_se3};
+use crate::linalg::{SymmetricFactor, product};
+use crate::problem::{Chained, Problem, Slack, State, Step, chained};
+use crate::solve::{
+    ComponentOptions, Elimination, Settings, Status, System, covariance, estimate_components, linearise_all, share_out,
+};
+
+use super::joint::JointNoise;
+
+/// The estimators that are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Estimator {
+    /// Two stages; one variance for positions and one for rotations, from the data.
+    Isotropic,
+    /// Two stages; the 6x6 covariance of every pose, with a common factor from the data.
+    Blocks,
+    /// Two stages; the 6x6 covariance of every pose, and joint noise from the data.
+    BlocksAndRepeatability,
+    /// Two stages; the covariance of all poses together, and joint noise from the data.
+    FullAndRepeatability,
+    /// Joint fit; readings exact.
+    HardJoint,
+    /// Joint fit; joint noise from the data.
+    Joint,
+}
+
+impl Estimator {
+    /// All, in the order A to F.
+    pub const ALL: [Self; 6] = [
+        Self::Isotropic,
+        Self::Blocks,
+        Self::BlocksAndRepeatability,
+        Self::FullAndRepeatability,
+        Self::HardJoint,
+        Self::Joint,
+    ];
+
+    /// Letter in tables.
+    pub fn letter(self) -> char {
+        match self {
+            Self::Isotropic => 'A',
+            Self::Blocks => 'B',
+            Self::BlocksAndRepeatability => 'C',
+            Self::FullAndRepeatability => 'D',
+            Self::HardJoint => 'E',
+            Self::Joint => 'F',
+        }
+    }
+
+    /// What it is, for tables.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Isotropic => "two-stage, isotropic weights",
+            Self::Blocks => "two-stage, 6x6 covariance of each pose",
+            Self::BlocksAndRepeatability => "two-stage, 6x6 covariances and joint noise",
+            Self::FullAndRepeatability => "two-stage, full covariance and joint noise",
+            Self::HardJoint => "joint, readings exact",
+            Self::Joint => "joint, with joint noise",
+        }
+    }
+}
+
+/// What an estimator found.
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    /// Which.
+    pub estimator: Estimator,
+    /// All unknowns; cameras and plates of the two-stage estimators are those of the first stage.
+    pub state: State,
+    /// Covariance of the columns that act through the camera poses (robot, mountings, placements).
+    pub covariance: DMatrix<f64>,
+    /// Its variance components: isotropic position (m) and rotation (rad), a factor, or joint noise per camera and reading.
+    pub components: Vec<f64>,
+}
+
+/// Camera poses as measurements: in the chart `x = log(reference^-1 * pose)` they are `offset`, with a covariance.
+#[derive(Debug, Clone)]
+pub struct PoseStage {
+    /// Images on the robot, as in the problem.
+    pub images: Vec<usize>,
+    /// Where the charts are.
+    pub references: Vec<Pose>,
+    /// Measured `x`, six a pose, body twists of `camera_from_plate` (m, rad).
+    pub offset: DVector<f64>,
+    /// Covariance of all poses together.
+    pub covariance: DMatrix<f64>,
+    /// Cameras and plates of this stage.
+    pub state: State,
+    /// Pixel factors of this stage.
+    pub pixel_factor: Vec<f64>,
+}
+
+impl PoseStage {
+    /// The free-pose adjustment of the observations in use, from the poses that `start` predicts.
+    pub fn adjusted(problem: &Problem, start: &State) -> Option<Self> {
+        let mut free = without_robot(problem);
+        let options = ComponentOptions { joint: false, ..ComponentOptions::default() };
+        let outcome = estimate_components(&mut free, with_free_poses(problem, start)?, &options);
+        if outcome.status != Status::Converged {
+            return None;
+        }
+        Self::linearised(&free, &outcome.state)
+    }
+
+    /// The adjustment linearised at the poses, cameras and plates of `state`: one step from there, not iterated.
+    pub fn linearised(problem: &Problem, state: &State) -> Option<Self> {
+        let free = without_robot(problem);
+        let at = with_free_poses(problem, state)?;
+        let lin = linearise_all(&free, &at)?;
+        let system = System::with(Elimination::Markers, &free, &at, &lin, 0.0);
+        let factor = SymmetricFactor::new(&system.information).ok()?;
+        let (x, all) = (factor.solve(&system.rhs), factor.inverse());
+        let on_robot: Vec<usize> =
+            (0..lin.images.len()).filter(|&k| problem.images[lin.images[k]].stop.is_some()).collect();
+        let rows: Vec<usize> = on_robot
+            .iter()
+            .flat_map(|&k| (0..6).map(move |c| (k, c)))
+            .map(|(k, c)| system.slack_start[k] + c)
+            .collect();
+        Some(Self {
+            images: on_robot.iter().map(|&k| lin.images[k]).collect(),
+            references: on_robot.iter().map(|&k| lin.chains[k].pose).collect(),
+            offset: DVector::from_iterator(rows.len(), rows.iter().map(|&r| x[r])),
+            covariance: DMatrix::from_fn(rows.len(), rows.len(), |i, j| all[(rows[i], rows[j])]),
+            state: at,
+            pixel_factor: free.noise.pixel_factor,
+        })
+    }
+
+    fn blocks(&self) -> Vec<Matrix6<f64>> {
+        (0..self.images.len()).map(|k| self.covariance.fixed_view::<6, 6>(6 * k, 6 * k).into_owned()).collect()
+    }
+}
+
+fn without_robot(problem: &Problem) -> Problem {
+    let mut free = problem.clone();
+    let theta = free.layout.theta_len();
+    free.layout.columns[..theta].iter_mut().for_each(|c| c.free = false);
+    free
+}
+
+fn with_free_poses(problem: &Problem, state: &State) -> Option<State> {
+    let mut next = state.clone();
+    for (i, image) in problem.used() {
+        next.slack[i] = Slack::Pose(state.camera_from_plate(image, &state.slack[i])?);
+    }
+    Some(next)
+}
+
+/// Latent noise of one pose: `L` (6 x n) and the component that each of its columns belongs to.
+struct Latent {
+    enters_by: DMatrix<f64>,
+    component: Vec<usize>,
+}
+
+/// Error model of the second stage: what is known, and sizes to be found.
+struct ErrorModel {
+    estimator: Estimator,
+    known: DMatrix<f64>,
+    blocks: Vec<Matrix6<f64>>,
+    /// Sizes, in the unit of the latents.
+    sizes: Vec<f64>,
+    /// False where the sizes are given.
+    estimated: bool,
+}
+
+/// First guesses, from above: position (m) and rotation (rad) of a pose, factor on its stated sigma, joint noise (rad or m).
+const FIRST_ISOTROPIC: f64 = 1e-2;
+const FIRST_FACTOR: f64 = 30.0;
+const FIRST_JOINT_NOISE: f64 = 3e-3;
+
+/// Rounds of variance components, and relative change that ends them.
+const ROUNDS: usize = 100;
+const STANDING: f64 = 1e-3;
+
+/// Gauss-Newton steps at given weights, and the decrement (in sigma) that ends them.
+const STEPS: usize = 30;
+const DECREMENT: f64 = 1e-9;
+
+impl ErrorModel {
+    fn new(problem: &Problem, stage: &PoseStage, estimator: Estimator, noise: JointNoise) -> Option<Self> {
+        let n = stage.offset.len();
+        let blocks = stage.blocks();
+        let block_diagonal = || {
+            let mut v = DMatrix::zeros(n, n);
+            for (k, b) in blocks.iter().enumerate() {
+                v.fixed_view_mut::<6, 6>(6 * k, 6 * k).copy_from(b);
+            }
+            v
+        };
+        let joints: usize = problem.noise.joint.iter().map(Vec::len).sum();
+        let (first, estimated) = match noise {
+            JointNoise::Estimated => (FIRST_JOINT_NOISE, true),
+            JointNoise::Known(sigma) => (sigma, false),
+        };
+        let (known, sizes, estimated) = match estimator {
+            Estimator::Isotropic => (DMatrix::zeros(n, n), vec![FIRST_ISOTROPIC; 2], true),
+            Estimator::Blocks => (DMatrix::zeros(n, n), vec![FIRST_FACTOR], true),
+            Estimator::BlocksAndRepeatability => (block_diagonal(), vec![first; joints], estimated),
+            Estimator::FullAndRepeatability => (stage.covariance.clone(), vec![first; joints], estimated),
+            Estimator::HardJoint | Estimator::Joint => return None,
+        };
+        Some(Self { estimator, known, blocks, sizes, estimated })
+    }
+
+    fn latent(&self, problem: &Problem, image: usize, k: usize, d_slack: &DMatrix<f64>) -> Option<Latent> {
+        Some(match self.estimator {
+            Estimator::Isotropic => Latent { enters_by: DMatrix::identity(6, 6), component: vec![0, 0, 0, 1, 1, 1] },
+            Estimator::Blocks => {
+                let root = self.blocks[k].cholesky()?.l();
+                Latent { enters_by: DMatrix::from_column_slice(6, 6, root.as_slice()), component: vec![0; 6] }
+            }
+            _ => {
+                let first: usize = problem.noise.joint[..problem.images[image].camera].iter().map(Vec::len).sum();
+                Latent { enters_by: d_slack.clone(), component: (first..first + d_slack.ncols()).collect() }
+            }
+        })
+    }
+
+    /// `V`.
+    fn covariance(&self, latents: &[Latent]) -> DMatrix<f64> {
+        let mut v = self.known.clone();
+        for (k, l) in latents.iter().enumerate() {
+            let sizes = DVector::from_iterator(l.component.len(), l.component.iter().map(|&c| self.sizes[c].powi(2)));
+            let mut block = v.view_mut((6 * k, 6 * k), (6, 6));
+            block += &l.enters_by * DMatrix::from_diagonal(&sizes) * l.enters_by.transpose();
+        }
+        v
+    }
+
+    /// New sizes from the latents that the residuals ask for; returns the largest relative change.
+    ///
+    /// `weighted` is `V^-1 (residual)`, `projected` is `V^-1` less what the parameters take.
+    fn update(
+        &mut self,
+        problem: &Problem,
+        kinds: &[crate::urdf::JointKind],
+        latents: &[Latent],
+        weighted: &DVector<f64>,
+        projected: &DMatrix<f64>,
+    ) -> f64 {
+        let (mut squares, mut redundancy) = (vec![0.0; self.sizes.len()], vec![0.0; self.sizes.len()]);
+        for (k, l) in latents.iter().enumerate() {
+            let pull = l.enters_by.transpose() * weighted.rows(6 * k, 6);
+            let share = l.enters_by.transpose() * projected.view((6 * k, 6 * k), (6, 6)) * &l.enters_by;
+            for (a, &c) in l.component.iter().enumerate() {
+                let variance = self.sizes[c].powi(2);
+                squares[c] += (variance * pull[a]).powi(2);
+                redundancy[c] += (variance * share[(a, a)]).max(0.0);
+            }
+        }
+        if matches!(self.estimator, Estimator::Isotropic | Estimator::Blocks) {
+            let mut change: f64 = 0.0;
+            for (size, (s, r)) in
+                self.sizes.iter_mut().zip(squares.iter().zip(&redundancy)).filter(|(_, (_, r))| **r > 1e-9)
+            {
+                let next = (s / r).sqrt().max(f64::MIN_POSITIVE);
+                change = change.max((next / *size - 1.0).abs());
+                *size = next;
+            }
+            return change;
+        }
+        let mut change: f64 = 0.0;
+        let mut first = 0;
+        for camera in &problem.noise.joint {
+            let own = first..first + camera.len();
+            let sigma = &mut self.sizes[own.clone()];
+            change = change.max(share_out(kinds, &squares[own.clone()], &redundancy[own], sigma));
+            first += camera.len();
+        }
+        change
+    }
+}
+
+/// The predicted poses at a state, in the charts of the stage.
+struct Predicted {
+    /// Measured minus predicted.
+    residual: DVector<f64>,
+    /// Derivative of the prediction by the columns that act through the poses; fixed columns are zero.
+    jacobian: DMatrix<f64>,
+    /// Derivative of each prediction by its joint readings.
+    d_slack: Vec<DMatrix<f64>>,
+}
+
+fn predict(problem: &Problem, stage: &PoseStage, state: &State) -> Option<Predicted> {
+    let theta = problem.layout.theta_len();
+    let n = stage.offset.len();
+    let mut p = Predicted { residual: stage.offset.clone(), jacobian: DMatrix::zeros(n, theta), d_slack: Vec::new() };
+    for (k, &i) in stage.images.iter().enumerate() {
+        let image = &problem.images[i];
+        let exact = Slack::Joints(vec![0.0; image.stop.as_ref()?.readings.len()]);
+        let Chained { pose, d_theta, d_slack } = chained(problem, state, image, &exact)?;
+        let x: Vector6<f64> = (stage.references[k].inverse() * pose).log();
+        let chart = right_jacobian_se3(&x).try_inverse()?;
+        let chart = DMatrix::from_column_slice(6, 6, chart.as_slice());
+        let mut residual = p.residual.fixed_rows_mut::<6>(6 * k);
+        residual -= x;
+        p.jacobian.rows_mut(6 * k, 6).copy_from(&(&chart * d_theta));
+        p.d_slack.push(chart * d_slack);
+    }
+    for (c, column) in problem.layout.columns[..theta].iter().enumerate().filter(|(_, c)| !c.free) {
+        debug_assert!(!column.free);
+        p.jacobian.column_mut(c).fill(0.0);
+    }
+    Some(p)
+}
+
+/// Normal equations of the second stage.
+struct Normal {
+    information: DMatrix<f64>,
+    rhs: DVector<f64>,
+    /// `V^-1 G`.
+    weighted_jacobian: DMatrix<f64>,
+}
+
+fn normal(problem: &Problem, state: &State, p: &Predicted, weight: &DMatrix<f64>) -> Normal {
+    let weighted_jacobian = product(weight, &p.jacobian);
+    let mut information = product(&p.jacobian.transpose(), &weighted_jacobian);
+    let mut rhs = weighted_jacobian.transpose() * &p.residual;
+    let values = state.values(&problem.layout);
+    for (c, column) in problem.layout.columns[..information.nrows()].iter().enumerate() {
+        let prior = column.prior_sigma.powi(-2);
+        if !column.free || (prior == 0.0 && information[(c, c)] == 0.0) {
+            information[(c, c)] = 1.0;
+            rhs[c] = 0.0;
+        } else if prior > 0.0 {
+            information[(c, c)] += prior;
+            rhs[c] += (column.prior_mean - values[c]) * prior;
+        }
+    }
+    Normal { information, rhs, weighted_jacobian }
+}
+
+fn moved(problem: &Problem, state: &State, step: &DVector<f64>) -> State {
+    let mut dense = DVector::zeros(problem.layout.len());
+    dense.rows_mut(0, step.len()).copy_from(step);
+    let step = Step {
+        dense,
+        slack: vec![Vec::new(); state.slack.len()],
+        markers: state.plates.iter().map(|p| vec![nalgebra::Vector3::zeros(); p.nominal.len()]).collect(),
+    };
+    state.moved(&problem.layout, &step)
+}
+
+/// The robot from free poses, by one of the four two-stage estimators; `None` where it has no solution.
+///
+/// `start` gives robot, mountings and placements to start from; priors are those of the problem. `noise` is of the joint noise
+/// of the estimators that have one.
+pub fn fit_poses(
+    problem: &Problem,
+    stage: &PoseStage,
+    start: &State,
+    estimator: Estimator,
+    noise: JointNoise,
+) -> Option<Estimate> {
+    let mut model = ErrorModel::new(problem, stage, estimator, noise)?;
+    let mut state = State {
+        cameras: stage.state.cameras.clone(),
+        plates: stage.state.plates.clone(),
+        slack: stage.state.slack.clone(),
+        ..start.clone()
+    };
+    let kinds = state.robot.chain.reading_kinds.clone();
+    let mut standing = !model.estimated;
+    for _ in 0..ROUNDS {
+        let p = predict(problem, stage, &state)?;
+        let latents: Vec<Latent> = (stage.images.iter().zip(&p.d_slack).enumerate())
+            .map(|(k, (&i, l))| model.latent(problem, i, k, l))
+            .collect::<Option<_>>()?;
+        let weight = SymmetricFactor::new(&model.covariance(&latents)).ok()?.inverse();
+        state = gauss_newton(problem, stage, state, &weight)?;
+        let p = predict(problem, stage, &state)?;
+        let normal = normal(problem, &state, &p, &weight);
+        let covariance = SymmetricFactor::new(&normal.information).ok()?.inverse();
+        if standing {
+            let covariance = zero_fixed(problem, covariance);
+            return Some(Estimate { estimator, state, covariance, components: model.sizes });
+        }
+        let taken = product(&product(&normal.weighted_jacobian, &covariance), &normal.weighted_jacobian.transpose());
+        let change = model.update(problem, &kinds, &latents, &(&weight * &p.residual), &(&weight - taken));
+        standing = change < STANDING;
+    }
+    None
+}
+
+fn zero_fixed(problem: &Problem, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
+    for (c, _) in problem.layout.columns[..covariance.nrows()].iter().enumerate().filter(|(_, c)| !c.free) {
+        covariance[(c, c)] = 0.0;
+    }
+    covariance
+}
+
+fn gauss_newton(problem: &Problem, stage: &PoseStage, mut state: State, weight: &DMatrix<f64>) -> Option<State> {
+    for _ in 0..STEPS {
+        let p = predict(problem, stage, &state)?;
+        let n = normal(problem, &state, &p, weight);
+        let step = SymmetricFactor::new(&n.information).ok()?.solve(&n.rhs);
+        state = moved(problem, &state, &step);
+        if step.dot(&n.rhs).max(0.0).sqrt() < DECREMENT {
+            break;
+        }
+    }
+    Some(state)
+}
+
+/// One linear step of the second stage at `start`, the components given: zero where `start` solves it already.
+///
+/// Returns the step of the columns that act through the poses, and their covariance.
+pub fn linear_step(
+    problem: &Problem,
+    stage: &PoseStage,
+    start: &State,
+    sigma: f64,
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let model = ErrorModel::new(problem, stage, Estimator::FullAndRepeatability, JointNoise::Known(sigma))?;
+    let p = predict(problem, stage, start)?;
+    let latents: Vec<Latent> = (stage.images.iter().zip(&p.d_slack).enumerate())
+        .map(|(k, (&i, l))| model.latent(problem, i, k, l))
+        .collect::<Option<_>>()?;
+    let weight = SymmetricFactor::new(&model.covariance(&latents)).ok()?.inverse();
+    let n = normal(problem, start, &p, &weight);
+    let factor = SymmetricFactor::new(&n.information).ok()?;
+    Some((factor.solve(&n.rhs), zero_fixed(problem, factor.inverse())))
+}
+
+/// One of the joint estimators on the observations in use, from `start`.
+pub fn fit_joint(
+    problem: &Problem,
+    start: &State,
+    estimator: Estimator,
+    noise: JointNoise,
+) -> Option<(Problem, Estimate)> {
+    let mut own = problem.clone();
+    let mut state = start.clone();
+    let hard = estimator == Estimator::HardJoint || noise == JointNoise::Known(0.0);
+    for (slack, image) in state.slack.iter_mut().zip(&own.images) {
+        if let Some(stop) = &image.stop {
+            *slack = if hard { Slack::None } else { Slack::Joints(vec![0.0; stop.readings.len()]) };
+        }
+    }
+    let first = if let JointNoise::Known(sigma) = noise { sigma } else { FIRST_JOINT_NOISE };
+    own.noise.joint.iter_mut().flatten().for_each(|s| *s = first.max(f64::MIN_POSITIVE));
+    let options = ComponentOptions {
+        joint: !hard && noise == JointNoise::Estimated,
+        settings: Settings { decrement: 1e-4, ..Settings::default() },
+        ..ComponentOptions::default()
+    };
+    let outcome = estimate_components(&mut own, state, &options);
+    let lin = outcome.linearised.filter(|_| outcome.status == Status::Converged)?;
+    let theta = own.layout.theta_len();
+    let covariance = covariance(&own, &outcome.state, &lin).ok()?.reduced.view((0, 0), (theta, theta)).into_owned();
+    let components = if hard { Vec::new() } else { own.noise.joint.concat() };
+    Some((own, Estimate { estimator, state: outcome.state, covariance, components }))
+}
+
+/// All estimators on the same observations, outliers, priors and gauge; `None` for one that has no solution.
+pub fn estimate_all(problem: &Problem, start: &State) -> Vec<(Estimator, Option<Estimate>)> {
+    let stage = PoseStage::adjusted(problem, start);
+    Estimator::ALL
+        .into_iter()
+        .map(|estimator| {
+            let found = match estimator {
+                Estimator::HardJoint | Estimator::Joint => {
+                    fit_joint(problem, start, estimator, JointNoise::Estimated).map(|(_, e)| e)
+                }
+                _ => stage.as_ref().and_then(|s| fit_poses(problem, s, start, estimator, JointNoise::Estimated)),
+            };
+            (estimator, found)
+        })
+        .collect()
+}

@@ -1,0 +1,113 @@
+//! Stated uncertainties against known truth, over independent worlds.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use nalgebra::Vector6;
+use robotcal::assess::{MeasuredPoint, View, fit_points, predict_pose};
+use robotcal::geom::Pose;
+use robotcal::model::robot::Robot;
+use robotcal::recipe::{Options, Solution, identify, measured};
+use robotcal::series::{CameraMount, Plate, PlateKind};
+use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
+use robotcal::urdf::Chain;
+use std::path::Path;
+
+const SEEDS: u64 = 20;
+
+fn chain() -> Chain {
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap()
+}
+
+/// 50 stops with typical errors: 0.3 mm, 1 mrad, offsets of 3 mrad, 0.02 mrad of joint noise, 0.05 px.
+fn world(chain: &Chain, seed: u64) -> SimulatedSeries {
+    let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.1e-3);
+    plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.01);
+    let request = WorldRequest {
+        pixel_sigma_px: 0.05,
+        least_markers: 12,
+        marker_sigma_m: 0.1e-3,
+        seed,
+        ..WorldRequest::typical(chain.clone(), plate)
+    };
+    series(&request).unwrap()
+}
+
+/// Error of the predicted `plate_from_camera` at every held-out joint vector: in units of its stated sigma (whitened by the
+/// Cholesky factor of the stated covariance), and in the raw axes over the stated sigma of each.
+fn errors(solution: &Solution, world: &SimulatedSeries, chain: &Chain) -> Vec<[Vector6<f64>; 2]> {
+    let truth = world.truth.robot(chain).unwrap();
+    let camera = world.truth.camera_pose.pose();
+    let plate = world.truth.plate_poses.values().next().unwrap().pose();
+    let view = View::first(&solution.problem).unwrap();
+    (world.truth.held_out.iter())
+        .map(|h| {
+            let p = predict_pose(&solution.problem, &solution.state, &solution.covariance, view, &h.readings).unwrap();
+            let actual =
+                CameraMount::Hand.camera_from_plate(&camera, &truth.base_from_tip(&h.readings), &plate).inverse();
+            let off = (p.plate_from_camera.inverse() * actual).log();
+            let whitened = p.model.cholesky().unwrap().l().solve_lower_triangular(&off).unwrap();
+            [whitened, off.zip_map(&p.model.diagonal(), |e, v| e / v.sqrt())]
+        })
+        .collect()
+}
+
+/// RMS position error of the flange relative to the plate, m. Plate frame and flange frame are gauge: the rigid motion of the
+/// plate and the point on the flange that fit the truth best are taken out.
+fn flange_error(robot: &Robot, world: &SimulatedSeries) -> f64 {
+    let plate_from_base: Pose = world.truth.plate_poses.values().next().unwrap().pose().inverse();
+    let points: Vec<MeasuredPoint> = (world.truth.held_out.iter())
+        .map(|h| MeasuredPoint {
+            position_m: (plate_from_base * h.base_from_tip.pose()).translation,
+            readings: h.readings.clone(),
+        })
+        .collect();
+    fit_points(robot, &points).unwrap().rms_m
+}
+
+/// Share of the values within `bound`.
+fn share<'a>(values: impl Iterator<Item = &'a f64>, bound: f64) -> f64 {
+    let (inside, all) = values.fold((0.0, 0.0), |(i, n), v| (i + f64::from(u8::from(v.abs() <= bound)), n + 1.0));
+    inside / all
+}
+
+#[test]
+fn held_out_poses_lie_within_their_stated_sigmas_and_are_ten_times_better_than_nominal() {
+    let chain = chain();
+    let nominal_robot = Robot::nominal(chain.clone());
+    let (mut independent, mut everywhere, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
+    for seed in 1..=SEEDS {
+        let started = std::time::Instant::now();
+        let world = world(&chain, seed);
+        let made = started.elapsed();
+        let solution = identify(chain.clone(), &[measured(&world, &chain)], &Options::default()).unwrap();
+        let found = errors(&solution, &world, &chain);
+        let (nominal, calibrated) = (flange_error(&nominal_robot, &world), flange_error(&solution.state.robot, &world));
+        let nees = found.iter().map(|[w, _]| w.norm_squared()).sum::<f64>() / (6.0 * found.len() as f64);
+        println!(
+            "seed {seed}: nominal {:.4} mm, calibrated {:.4} mm; mean squared normalised error {nees:.2}; joint noise {:?} urad; pixel {:.3}; {} markers; {made:?} {:?}",
+            1e3 * nominal,
+            1e3 * calibrated,
+            solution.problem.noise.joint[0].iter().map(|s| (s * 1e7).round() / 10.0).collect::<Vec<_>>(),
+            solution.problem.noise.pixel_factor[0],
+            solution.free_poses.observations,
+            started.elapsed()
+        );
+        independent.extend(found[0][0].iter().copied());
+        everywhere.extend(found.iter().flat_map(|[_, raw]| raw.iter().copied()));
+        ratios.push(nominal / calibrated);
+    }
+    let worst = ratios.iter().copied().fold(f64::INFINITY, f64::min);
+    println!("nominal over calibrated: worst {worst:.1}");
+    for (bound, expected) in [(1.0, 0.6827), (2.0, 0.9545)] {
+        // Six whitened components of one vector a seed are independent: binomial. All vectors of a seed share one solution, at
+        // worst as if there were one value a seed.
+        let spread = |n: f64| 3.0 * (expected * (1.0 - expected) / n).sqrt();
+        let one = share(independent.iter(), bound);
+        let all = share(everywhere.iter(), bound);
+        println!("within {bound} sigma: {one:.3} of independent, {all:.3} of all; expected {expected}");
+        assert!((one - expected).abs() < spread(independent.len() as f64), "{one}");
+        assert!((all - expected).abs() < spread(SEEDS as f64), "{all}");
+    }
+    assert!(worst >= 10.0, "{ratios:?}");
+}
