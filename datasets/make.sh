@@ -19,7 +19,7 @@ for fault in $($robotcal simulate --urdf $kr6 --out none --fault list); do
     missing-image* | unreadable-image | image-of-other-size | no-markers)
         # Small pictures of few stops, nearly without noise, to keep the files small.
         content="--images 8 --width-px 480 --height-px 360 --near-m 0.15 --far-m 0.3 --least-markers 25 --conditions datasets/bad/conditions.toml" ;;
-    *) content="--images 16 --observations --outer-only" ;;
+    *) content="--images 30 --observations --outer-only" ;;
     esac
     # shellcheck disable=SC2086
     $robotcal simulate --urdf $kr6 --plate "$plate/plate.toml" --out "datasets/bad/$fault" --held-out 0 --seed 7 $content --fault "$fault" >/dev/null

@@ -71,7 +71,7 @@ const CLOSED_FORMS: [(&str, ClosedForm); 3] = [
 ];
 
 /// Number of samples of images that are tried beside all of them.
-const SAMPLES: usize = 60;
+const SAMPLES: usize = 500;
 
 /// Images in a sample: enough rotation to fix X and Z, few enough to avoid a wrong pair.
 const SAMPLE_SIZE: usize = 5;

@@ -18,6 +18,9 @@ const WORST_SHARE_LEFT_OUT: f64 = 0.25;
 /// Share of single observations that may be left out: clean data lose 4e-5.
 const WORST_SHARE_REJECTED: f64 = 0.05;
 
+/// Times the median held-out error from which an image stands out.
+const STANDS_OUT: f64 = 2.5;
+
 /// Prior sigmas beyond which a deviation is no longer within tolerance.
 const BEYOND_TOLERANCE: f64 = 5.0;
 
@@ -39,9 +42,10 @@ pub(super) fn gates(
     for (k, camera) in problem.noise.joint.iter().enumerate() {
         if let Some(worst) = camera.iter().copied().reduce(f64::max).filter(|s| *s > WORST_JOINT_NOISE) {
             failed.push(format!(
-                "joint noise: {:.1} mrad with camera {}; the readings do not explain the images: look for loose camera or plate, motion, wrong robot model",
+                "joint noise: {:.1} mrad with camera {}; the readings do not explain the images: look for loose camera or plate, motion, wrong robot model{}",
                 1e3 * worst,
-                problem.cameras[k]
+                problem.cameras[k],
+                worst_predicted(problem, accuracy)
             ));
         }
     }
@@ -68,6 +72,23 @@ pub(super) fn gates(
         ));
     }
     failed
+}
+
+/// Images that the others predict far worse than usual, in words; empty where none stands out.
+fn worst_predicted(problem: &Problem, accuracy: &Accuracy) -> String {
+    let mut errors: Vec<(f64, &str)> = (problem.images.iter().zip(&accuracy.per_image_mm))
+        .filter_map(|(image, e)| e.map(|[_, calibrated]| (calibrated, image.name.as_str())))
+        .collect();
+    errors.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let usual = errors.get(errors.len() / 2).map_or(0.0, |e| e.0);
+    let standing_out: Vec<String> = (errors.iter().take_while(|e| e.0 > STANDS_OUT * usual).take(4))
+        .map(|(mm, name)| format!("{name} ({mm:.1} mm)"))
+        .collect();
+    if standing_out.is_empty() {
+        String::new()
+    } else {
+        format!("; the others predict worst {}", standing_out.join(", "))
+    }
 }
 
 fn rejected_observations(problem: &Problem) -> Option<String> {

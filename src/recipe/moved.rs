@@ -56,8 +56,13 @@ pub(super) fn find_move(problem: &Problem, state: &State, free: &FreePoses, seri
         .min_by(|a, b| a.1.spread.total_cmp(&b.1.spread))?;
     let images: Vec<usize> = place.members.iter().map(|&k| wrong[k].0).collect();
     let (from, to) = (images.first()?, images.last()?);
+    let own = |i: &usize| problem.images[*i].series == series;
+    let neighbour = (*to + 1..problem.images.len()).find(own).or_else(|| (0..*from).rev().find(own))?;
+    let (early, late) = if neighbour > *to { (*to, neighbour) } else { (neighbour, *from) };
     let what = format!(
-        "{name} was moved: {} images, {} to {}, agree on a place {:.1} mm and {:.1} mrad from that of the others",
+        "{name} was moved between {} and {}: {} images, {} to {}, agree on a place {:.1} mm and {:.1} mrad from that of the others",
+        problem.images[early].name,
+        problem.images[late].name,
         images.len(),
         problem.images[*from].name,
         problem.images[*to].name,

@@ -7,17 +7,21 @@ use crate::output::solution_json::{ImageRecord, SolutionRecord};
 
 /// One row for each image: what it contributed, how well it is predicted, why it was left out.
 pub(super) fn table(r: &SolutionRecord) -> Markup {
+    let several = r.images.iter().any(|i| i.series != r.images[0].series);
     html! {
         h2 { "Images" }
         p.note {
             "Markers: used of those found. Residual: RMS per point in the joint fit. Held out: how far the robot model misses the "
             "plate in an image that it had not seen, nominal and calibrated."
         }
-        div.wide { table {
+        div.wide.long { table {
             thead { tr {
                 th { "Image" } th.n { "markers" } th.n { "residual, px" } th.n { "nominal, mm" } th.n { "calibrated, mm" } th { "left out because" }
             } }
-            tbody { @for i in &r.images { (row(i)) } }
+            tbody { @for (k, i) in r.images.iter().enumerate() {
+                @if several && (k == 0 || r.images[k - 1].series != i.series) { tr { th colspan="6" { (i.series) } } }
+                (row(i))
+            } }
         } }
     }
 }

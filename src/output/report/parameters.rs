@@ -165,13 +165,20 @@ fn correlations(r: &SolutionRecord) -> Vec<(usize, usize, f64)> {
     for i in 0..n {
         for j in 0..i {
             let rho = at(i, j) / (at(i, i) * at(j, j)).sqrt();
-            if rho.abs() > STRONG {
+            if rho.abs() > STRONG && !share_a_gauge(&r.estimates[i].name, &r.estimates[j].name) {
                 pairs.push((j, i, rho));
             }
         }
     }
     pairs.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
     pairs
+}
+
+/// Poses of two plates, or of two mountings: all hang on the same robot, which makes them move together.
+fn share_a_gauge(a: &str, b: &str) -> bool {
+    let block = |name: &str| name.rsplit_once('.').map_or(String::new(), |(block, _)| block.to_owned());
+    let both = |kind: &str| a.starts_with(kind) && b.starts_with(kind);
+    (both("plate/") || both("hand_camera/")) && block(a) != block(b)
 }
 
 /// Poses of cameras and plates.

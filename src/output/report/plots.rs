@@ -5,8 +5,8 @@ use super::words::plain;
 use crate::output::solution_json::SolutionRecord;
 use crate::urdf::JointKind;
 
-const WIDTH: f64 = 560.0;
-const HEIGHT: f64 = 230.0;
+const WIDTH: f64 = 460.0;
+const HEIGHT: f64 = 220.0;
 const LEFT: f64 = 46.0;
 const RIGHT: f64 = 12.0;
 const TOP: f64 = 12.0;
@@ -113,11 +113,11 @@ pub(super) fn joint_noise(record: &SolutionRecord) -> Option<String> {
     if largest <= 0.0 || names.is_empty() {
         return None;
     }
-    let (left, bar, gap) = (130.0, 16.0, 8.0);
+    let (left, bar, gap) = (106.0, 16.0, 8.0);
     let row = bar * cameras.len() as f64 + gap;
     let height = row * names.len() as f64 + gap;
     let mut svg = Svg::new(WIDTH, height, "Joint noise of each joint");
-    let reach = WIDTH - left - 210.0;
+    let reach = WIDTH - left - 175.0;
     for (k, name) in names.iter().enumerate() {
         let top = gap / 2.0 + row * k as f64;
         svg.text([left - 8.0, top + row / 2.0], Anchor::End, &shortened(name));
@@ -139,7 +139,7 @@ fn plain_digits(value: f64) -> String {
 
 fn shortened(name: &str) -> String {
     match name.chars().count() {
-        0..=17 => name.to_owned(),
-        _ => name.chars().take(16).chain(['…']).collect(),
+        0..=14 => name.to_owned(),
+        _ => name.chars().take(13).chain(['…']).collect(),
     }
 }

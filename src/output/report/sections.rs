@@ -194,14 +194,22 @@ pub(super) fn plates(r: &SolutionRecord) -> Markup {
     }
 }
 
+/// Verdict of a start that was spared.
+const NOT_NEEDED: &str = "not needed";
+
 /// Where the solution started.
 pub(super) fn starts(r: &SolutionRecord) -> Markup {
+    let tried = || r.starts.iter().filter(|s| s.verdict != NOT_NEEDED);
+    let spared = r.starts.len() - tried().count();
     html! {
         h2 { "Starting values" }
-        p { "No guess was needed. These starts were tried; the one in bold won." }
-        div.wide { table {
+        p {
+            "No guess was needed. These starts were tried; the ones in bold won."
+            @if spared > 0 { " " (count(spared, "further start")) " not needed." }
+        }
+        div.wide.long { table {
             thead { tr { th { "Of" } th { "from" } th { "reached" } } }
-            tbody { @for s in &r.starts { tr {
+            tbody { @for s in tried() { tr {
                 @if s.won { td { b { (s.of) } } td { b { (s.origin) } } td { b { (s.verdict) } } }
                 @else { td { (s.of) } td { (s.origin) } td { (s.verdict) } }
             } } }
@@ -224,7 +232,7 @@ pub(super) fn record(r: &SolutionRecord) -> Markup {
         h3 { "Files of this result" }
         p { @for (k, f) in r.files.iter().enumerate() { @if k > 0 { ", " } code { (f) } } }
         h3 { "Files read, with SHA-256" }
-        div.wide { table {
+        div.wide.long { table {
             thead { tr { th { "File" } th { "SHA-256" } } }
             tbody { @for f in &r.inputs { tr { td.name { code { (f.path.display()) } } td.name { code { (f.sha256) } } } } }
         } }

@@ -1,0 +1,124 @@
+//! The report: complete, self-contained, and safe against whatever stands in names.
+
+mod outputs_support;
+
+use outputs_support::{context, robot, solved};
+use robotcal::output::{files, report_html, solution_json};
+use robotcal::recipe::RobotModel;
+use robotcal::series::CameraMount;
+
+fn record() -> solution_json::SolutionRecord {
+    let description = robot();
+    let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
+    let files = files(&solution, &context(&description)).unwrap();
+    let record = solution_json::read(&files["solution.json"]).unwrap();
+    // The page is made from the record alone: what it says is in solution.json.
+    assert_eq!(report_html(&record).as_bytes(), files["report.html"]);
+    record
+}
+
+/// The outermost `<svg>` elements of a page.
+fn drawings(page: &str) -> Vec<&str> {
+    let (mut found, mut depth, mut start, mut at) = (Vec::new(), 0, 0, 0);
+    while let Some(next) = page[at..].find("svg") {
+        let here = at + next;
+        at = here + 3;
+        if page[..here].ends_with('<') {
+            depth += 1;
+            if depth == 1 {
+                start = here - 1;
+            }
+        } else if page[..here].ends_with("</") {
+            depth -= 1;
+            if depth == 0 {
+                found.push(&page[start..here + 4]);
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn the_page_is_complete_and_self_contained() {
+    let record = record();
+    let page = report_html(&record);
+    for text in [
+        "Accuracy before and after",
+        "What was read, and what was left out",
+        "Joint noise",
+        "Residuals",
+        "What was corrected on the robot",
+        "What the data could not determine",
+        "Plate",
+        "Starting values",
+        "For the record",
+    ] {
+        assert!(page.contains(&format!("<h2>{text}</h2>")), "no section \"{text}\"");
+    }
+    for image in &record.images {
+        assert!(page.contains(&image.name), "{} is missing", image.name);
+    }
+    assert!(page.contains(&record.inputs[0].sha256));
+    for foreign in ["<script", "<link", "<img", "@import", "url(", "href="] {
+        assert!(!page.contains(foreign), "the page contains {foreign}");
+    }
+    for broken in ["NaN", ">inf", "-inf", "Infinity"] {
+        assert!(!page.contains(broken), "the page says {broken}");
+    }
+    // Histogram, joint noise, residuals over image and plate, distortion, plate corrections.
+    let drawings = drawings(&page);
+    assert_eq!(drawings.len(), 6);
+    for drawing in drawings {
+        let document = roxmltree::Document::parse(drawing).unwrap();
+        assert!(document.descendants().filter(|n| n.is_element()).count() > 5);
+    }
+}
+
+#[test]
+fn the_verdict_follows_the_gates_and_then_the_doubts() {
+    let mut record = record();
+    assert!(report_html(&record).contains("class=\"verdict good\""));
+    record.accuracy.calibrated.worst_mm = 10.0 * record.accuracy.calibrated.rms_mm;
+    let page = report_html(&record);
+    assert!(page.contains("class=\"verdict care\"") && page.contains("One image is off"));
+    record.accuracy.nominal.rms_mm = record.accuracy.calibrated.rms_mm;
+    assert!(report_html(&record).contains("The gain is small"));
+    record.failed_gates.push("joint noise: 12.0 mrad".into());
+    let page = report_html(&record);
+    assert!(page.contains("class=\"verdict failed\"") && page.contains("joint noise: 12.0 mrad"));
+}
+
+#[test]
+fn names_and_reasons_cannot_break_the_page() {
+    let mut record = record();
+    let hostile = "</td><script>alert(1)</script> & \"x\"";
+    record.images[0].name = hostile.into();
+    record.images[0].reason = Some(hostile.into());
+    record.images[1].series = hostile.into();
+    record.robot.name = hostile.into();
+    record.robot.readings[0] = hostile.into();
+    record.cameras[0].name = hostile.into();
+    record.plates[0].name = hostile.into();
+    record.program.command = hostile.into();
+    let page = report_html(&record);
+    assert!(!page.contains("<script"), "a name reached the page as markup");
+    for drawing in drawings(&page) {
+        roxmltree::Document::parse(drawing).unwrap();
+    }
+}
+
+#[test]
+fn a_result_without_robot_terms_plots_or_covariances_still_has_a_page() {
+    let mut record = record();
+    record.robot.terms.clear();
+    record.estimates.clear();
+    record.covariance_lower.clear();
+    record.cameras.iter_mut().for_each(|c| c.joint_noise.iter_mut().for_each(|s| *s = 0.0));
+    for image in &mut record.images {
+        image.held_out_mm = None;
+        image.observations = solution_json::ObservationColumns::default();
+    }
+    let page = report_html(&record);
+    assert!(page.contains("The readings were taken as exact."));
+    assert!(!page.contains("NaN"));
+}
