@@ -40,7 +40,7 @@ fn refusal(path: &Path, options: &RecordingOptions) -> String {
 /// The formulas of make_recordings.py.
 fn posture(stop: usize) -> [f64; 3] {
     let k = stop as f64;
-    [0.1 * k, 0.5 - 0.2 * k, if stop % 2 == 0 { 0.25 } else { -0.25 }]
+    [0.1 * k, 0.5 - 0.2 * k, if stop.is_multiple_of(2) { 0.25 } else { -0.25 }]
 }
 
 fn count(stop: usize, shot: usize, x: u32, y: u32) -> u32 {
