@@ -2,8 +2,10 @@
 //!
 //! Model of the picture near a corner at c, with d the offset of a pixel from it:
 //!
-//!     I = min(full scale, b + b_x d_x + b_y d_y + (a + a_x d_x + a_y d_y) erf(w1) erf(w2))
-//!     w1 = u1 + k erf(u2),  w2 = u2 + k erf(u1),  u_i = n_i . d / (sqrt(2) s_i)
+//! ```text
+//! I = min(full scale, b + b_x d_x + b_y d_y + (a + a_x d_x + a_y d_y) erf(w1) erf(w2))
+//! w1 = u1 + k erf(u2),  w2 = u2 + k erf(u1),  u_i = n_i . d / (sqrt(2) s_i)
+//! ```
 //!
 //! Two blurred edges with normals n_i and blurs s_i cross at c; the linear terms carry uneven light, k the growth of the
 //! dark squares in print (each edge steps sideways at the crossing), and the clipping leaves over-exposed squares out
