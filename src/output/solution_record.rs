@@ -114,7 +114,7 @@ fn cameras(solution: &Solution) -> Vec<CameraRecord> {
             height_px: c.height_px,
             parameters: c.parameter_names().map(String::from).zip(c.parameters.iter().copied()).collect(),
             pixel_factor: problem.noise.pixel_factor[k],
-            joint_noise: problem.noise.joint[k].clone(),
+            joint_noise: problem.joint_sigma(k),
         }
     };
     problem.cameras.iter().enumerate().map(camera).collect()

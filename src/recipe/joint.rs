@@ -83,7 +83,7 @@ const ROUNDS: usize = 12;
 /// not belong together.
 pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
     let robot = options.model.robot(chain);
-    let (mut problem, state) = build(&robot, series)?;
+    let (mut problem, state) = build(&robot, series, options.joint_noise == JointNoise::Estimated)?;
     let stated: Vec<Option<f64>> = (problem.cameras.iter())
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();

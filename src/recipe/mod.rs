@@ -8,6 +8,7 @@ mod focus;
 mod free_poses;
 mod gates;
 mod joint;
+mod local_errors;
 mod measure;
 mod moved;
 mod simulated;

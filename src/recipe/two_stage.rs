@@ -274,8 +274,10 @@ impl ErrorModel {
         let mut first = 0;
         for camera in &problem.noise.joint {
             let own = first..first + camera.len();
-            let sigma = &mut self.sizes[own.clone()];
-            change = change.max(share_out(kinds, &squares[own.clone()], &redundancy[own], sigma));
+            for group in problem.noise.groups(kinds) {
+                let sigma = &mut self.sizes[own.clone()];
+                change = change.max(share_out(&group, &squares[own.clone()], &redundancy[own.clone()], sigma));
+            }
             first += camera.len();
         }
         change
