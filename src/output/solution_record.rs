@@ -180,7 +180,7 @@ fn images(solution: &Solution, context: &Context) -> Result<Vec<ImageRecord>> {
     let image = |(k, i): (usize, &Image)| {
         let free = solution.free_poses.poses[k].as_ref().zip(rigid[i.plate].as_ref());
         let joint_noise = match (&solution.state.slack[k], &i.rejected, &i.stop) {
-            (Slack::Joints(dq), None, Some(_)) => Some(dq.clone()),
+            (Slack::Joints(dq), None, Some(_)) => Some(dq[..solution.state.robot.chain.readings.len()].to_vec()),
             _ => None,
         };
         let observations = observations(solution, k, poses[k].as_ref());

@@ -73,6 +73,8 @@ pub struct Noise {
     pub joint: Vec<Vec<f64>>,
     /// Local error of every reading, rad or m: common to stops at the same reading. Zero where no stops share readings.
     pub local: Vec<f64>,
+    /// Apparent tilt of the plate in every image, rad: per camera. Empty where it is not part of the slack.
+    pub tilt: Vec<f64>,
 }
 
 impl Noise {
@@ -112,12 +114,15 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Variances of the slack of one reading at a stop, rad^2 or m^2: its own part, and the part of the local error that no
+    /// Variances of the slack of one reading (behind the readings: of the tilt) at a stop, rad^2 or m^2: its own part, and the part of the local error that no
     /// column stands for.
     pub fn slack_variance(&self, image: &Image, reading: usize) -> [f64; 2] {
+        let Some(own) = self.noise.joint[image.camera].get(reading) else {
+            return [self.noise.tilt[image.camera].powi(2), 0.0];
+        };
         let covered = image.local_share.get(reading).map_or(0.0, |s| s.min(1.0));
         let local = self.noise.local.get(reading).map_or(0.0, |s| s * s);
-        [self.noise.joint[image.camera][reading].powi(2), (1.0 - covered) * local]
+        [own * own, (1.0 - covered) * local]
     }
 
     /// Information (inverse of the variance) of the slack of one reading at a stop.

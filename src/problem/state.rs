@@ -1,7 +1,8 @@
 //! Every unknown, with its value.
 
-use nalgebra::{DVector, Vector3, Vector6};
+use nalgebra::{DVector, Vector2, Vector3, Vector6};
 
+use super::linearise::{seen_centre, tilt_axes};
 use super::{Image, Layout};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
@@ -14,7 +15,8 @@ use crate::series::Plate;
 pub enum Slack {
     /// Free camera pose: the image has no tie to the robot (`camera_from_plate`).
     Pose(Pose),
-    /// Joint noise of this stop, rad or m per reading.
+    /// Joint noise of this stop, rad or m per reading; where two values follow, they are the apparent tilt of the plate about
+    /// its x and y axes, rad: what smooth errors of an image (lens, focus, air) do to the pose that it shows.
     Joints(Vec<f64>),
     /// None: readings are exact.
     None,
@@ -33,6 +35,14 @@ impl Slack {
     /// True where there is no unknown.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// Apparent tilt of the plate about its x and y axes, rad; `None` where there is none for a robot with this many readings.
+    pub fn tilt(&self, readings: usize) -> Option<[f64; 2]> {
+        match self {
+            Self::Joints(values) => values.get(readings..).and_then(|t| t.try_into().ok()),
+            _ => None,
+        }
     }
 
     fn moved(&self, step: &[f64]) -> Self {
@@ -171,6 +181,8 @@ impl State {
             (_, None) => return None,
         };
         let tip = self.robot.pose_at(image.stop.as_ref()?, dq);
-        Some(image.mount.camera_from_plate(&self.mountings[image.mounting], &tip, &self.placements[image.placement]))
+        let pose = image.mount.camera_from_plate(&self.mountings[image.mounting], &tip, &self.placements[image.placement]);
+        let Some([x, y]) = slack.tilt(image.stop.as_ref()?.readings.len()) else { return Some(pose) };
+        Some(pose * Pose::exp(&(tilt_axes(&seen_centre(image, self)) * Vector2::new(x, y))))
     }
 }

@@ -63,6 +63,9 @@ const DEFAULT_SIGMA_PX: f64 = 0.1;
 /// First guess of the joint noise: from above, rad or m.
 const FIRST_JOINT_NOISE: f64 = 3e-3;
 
+/// First guess of the apparent tilt of the plate in an image: from above, rad.
+const FIRST_TILT: f64 = 1e-3;
+
 /// Fewest observations that fix a camera pose with a margin.
 const FEWEST_OBSERVATIONS: usize = 6;
 
@@ -153,6 +156,7 @@ pub(super) fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool
         pixel_factor: vec![1.0; cameras.len()],
         joint: vec![vec![FIRST_JOINT_NOISE; readings]; cameras.len()],
         local: first_local(&state, &layout),
+        tilt: vec![FIRST_TILT; cameras.len()],
     };
     Ok((Problem { layout, plates, placements, mountings, cameras, images, noise, huber: HUBER }, state))
 }

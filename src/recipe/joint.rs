@@ -132,7 +132,7 @@ fn fit(problem: &mut Problem, mut state: State, options: &Options) -> Outcome {
     let exact = options.joint_noise == JointNoise::Known(0.0);
     for (slack, image) in state.slack.iter_mut().zip(&problem.images) {
         if image.stop.is_some() {
-            *slack = if exact { Slack::None } else { Slack::Joints(vec![0.0; readings]) };
+            *slack = if exact { Slack::None } else { Slack::Joints(vec![0.0; readings + 2]) };
         }
     }
     if let JointNoise::Known(sigma) = options.joint_noise {

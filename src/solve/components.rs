@@ -169,9 +169,14 @@ fn update_joint(problem: &Problem, state: &State, lin: &Linearised, cov: &Covari
     let kinds = &robot.chain.reading_kinds;
     let mut own = vec![Tally::new(n); noise.joint.len()];
     let mut local = Tally::new(n);
+    let mut tilt = Tally::new(noise.tilt.len());
     for (k, &i) in lin.images.iter().enumerate() {
         let Slack::Joints(dq) = &state.slack[i] else { continue };
-        let (c, image) = (cov.slack(k, n), &problem.images[i]);
+        let (c, image) = (cov.slack(k, dq.len()), &problem.images[i]);
+        for (r, value) in dq.iter().enumerate().skip(n) {
+            let prior = problem.slack_variance(image, r)[0];
+            tilt.add(image.camera, *value, c[(r, r)], prior, prior);
+        }
         for r in 0..n {
             let [own_part, local_part] = problem.slack_variance(image, r);
             let prior = own_part + local_part;
@@ -188,6 +193,9 @@ fn update_joint(problem: &Problem, state: &State, lin: &Linearised, cov: &Covari
         local.add(term.reading, term.value, cov.reduced[(c, c)], prior, prior);
     }
     let mut change: f64 = 0.0;
+    for camera in 0..noise.tilt.len() {
+        change = change.max(share_out(&[camera], &tilt.squares, &tilt.redundancy, &mut noise.tilt));
+    }
     for group in problem.noise.groups(kinds) {
         if noise.local.get(group[0]).is_some_and(|s| *s > 0.0) {
             change = change.max(share_out(&group, &local.squares, &local.redundancy, &mut noise.local));

@@ -193,7 +193,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
     let cameras = vec!["front".to_owned()];
     let layout = Layout::new(&state, &mountings, &placements, &cameras, &["plate".to_owned()]);
     let noise =
-        Noise { pixel_factor: vec![request.pixel_factor], joint: vec![vec![request.joint_noise.max(1e-6); readings]], local: Vec::new() };
+        Noise { pixel_factor: vec![request.pixel_factor], joint: vec![vec![request.joint_noise.max(1e-6); readings]], local: Vec::new(), tilt: Vec::new() };
     (Problem { layout, plates: vec![plate], placements, mountings, cameras, images, noise, huber: 2.45 }, state)
 }
 
