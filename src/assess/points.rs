@@ -135,6 +135,9 @@ impl PointFit {
         let (model, noise) = (left(&by_model), left(&by_noise));
         let of_model = product(&model, covariance).component_mul(&model).sum() / n as f64;
         let of_noise = noise.norm_squared() / n as f64;
-        Some(ExpectedRms { model_m: of_model.max(0.0).sqrt(), with_joint_noise_m: (of_model + of_noise).max(0.0).sqrt() })
+        Some(ExpectedRms {
+            model_m: of_model.max(0.0).sqrt(),
+            with_joint_noise_m: (of_model + of_noise).max(0.0).sqrt(),
+        })
     }
 }

@@ -125,7 +125,8 @@ fn joint_noise(out: &mut String, s: &Solution) -> std::fmt::Result {
             })
             .collect();
         let camera = if s.problem.cameras.len() > 1 { format!(" ({})", s.problem.cameras[k]) } else { String::new() };
-        writeln!(out, "joints    noise in mrad{camera}: {}", parts.join(", "))?;
+        let tilt = s.problem.noise.tilt.get(k).map(|t| format!("; apparent tilt of the plate {:.3}", 1e3 * t));
+        writeln!(out, "joints    noise in mrad{camera}: {}{}", parts.join(", "), tilt.unwrap_or_default())?;
     }
     Ok(())
 }

@@ -110,7 +110,8 @@ impl Robot {
     pub fn local_errors(&self, stop: &Stop) -> Vec<f64> {
         let mut errors = vec![0.0; stop.readings.len()];
         for t in self.terms.iter().filter(|t| matches!(t.term, Term::Local(_))) {
-            let context = TermContext { reading: stop.readings[t.reading], approach: None, gravity: Default::default() };
+            let context =
+                TermContext { reading: stop.readings[t.reading], approach: None, gravity: Default::default() };
             errors[t.reading] += t.value * t.term.basis(&context);
         }
         errors

@@ -115,6 +115,7 @@ fn cameras(solution: &Solution) -> Vec<CameraRecord> {
             parameters: c.parameter_names().map(String::from).zip(c.parameters.iter().copied()).collect(),
             pixel_factor: problem.noise.pixel_factor[k],
             joint_noise: problem.joint_sigma(k),
+            apparent_tilt_rad: problem.noise.tilt.get(k).copied().unwrap_or(0.0),
         }
     };
     problem.cameras.iter().enumerate().map(camera).collect()

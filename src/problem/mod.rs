@@ -78,6 +78,13 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// Every size of the slack at `first`, rad or m.
+    pub fn start_at(&mut self, first: f64) {
+        self.joint.iter_mut().flatten().for_each(|s| *s = first);
+        self.local.iter_mut().filter(|s| **s > 0.0).for_each(|s| *s = first);
+        self.tilt.fill(first);
+    }
+
     /// Readings whose noise is alike: of one kind, with local errors told apart or not.
     pub fn groups(&self, kinds: &[JointKind]) -> Vec<Vec<usize>> {
         let apart = |r: usize| self.local.get(r).is_some_and(|s| *s > 0.0);
@@ -131,12 +138,28 @@ impl Problem {
         1.0 / (own + local)
     }
 
+    /// Leaves the local errors out: their columns stay at zero.
+    pub fn without_local_errors(&mut self, state: &mut State) {
+        let first = self.layout.terms.start;
+        for c in self.layout.locals.clone() {
+            self.layout.columns[c].free = false;
+            state.robot.terms[c - first].value = 0.0;
+        }
+        self.noise.local.fill(0.0);
+    }
+
     /// The priors of the local errors follow their noise component.
     pub fn hold_local_priors(&mut self, robot: &Robot) {
         let first = self.layout.terms.start;
         for c in self.layout.locals.clone() {
             self.layout.columns[c].prior_sigma = self.noise.local[robot.terms[c - first].reading];
         }
+    }
+
+    /// Slack of a stop whose readings are right: joint noise, and tilt where it has a size.
+    pub fn exact_slack(&self, image: &Image) -> Slack {
+        let readings = image.stop.as_ref().map_or(0, |s| s.readings.len());
+        Slack::exact(readings, !self.noise.tilt.is_empty())
     }
 
     /// Standard deviation of the whole joint noise of a camera's stops, per reading, rad or m.

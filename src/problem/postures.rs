@@ -11,8 +11,10 @@ const FEWEST_IN_COMMON: usize = 2;
 
 /// Readings that two stops have in common; empty where it may be chance.
 pub fn common_readings(a: &Stop, b: &Stop) -> Vec<usize> {
-    let same: Vec<usize> =
-        (a.readings.iter().zip(&b.readings).enumerate()).filter(|(_, (a, b))| (*a - *b).abs() < SAME_READING).map(|(r, _)| r).collect();
+    let same: Vec<usize> = (a.readings.iter().zip(&b.readings).enumerate())
+        .filter(|(_, (a, b))| (*a - *b).abs() < SAME_READING)
+        .map(|(r, _)| r)
+        .collect();
     if same.len() < FEWEST_IN_COMMON { Vec::new() } else { same }
 }
 
@@ -41,9 +43,9 @@ pub fn joined(count: usize, pairs: impl Iterator<Item = (usize, usize)>) -> Vec<
 /// Images of `among` in groups that share readings, directly or through others; an image off the robot is alone.
 pub fn posture_groups(images: &[Image], among: &[usize]) -> Vec<Vec<usize>> {
     let stop = |k: usize| images[among[k]].stop.as_ref();
-    let related = (0..among.len()).flat_map(|a| (0..a).map(move |b| (b, a))).filter(|&(a, b)| {
-        stop(a).zip(stop(b)).is_some_and(|(a, b)| !common_readings(a, b).is_empty())
-    });
+    let related = (0..among.len())
+        .flat_map(|a| (0..a).map(move |b| (b, a)))
+        .filter(|&(a, b)| stop(a).zip(stop(b)).is_some_and(|(a, b)| !common_readings(a, b).is_empty()));
     joined(among.len(), related).into_iter().map(|set| set.into_iter().map(|k| among[k]).collect()).collect()
 }
 

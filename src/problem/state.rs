@@ -10,6 +10,9 @@ use crate::model::plate_modes::{MODES, basis};
 use crate::model::robot::Robot;
 use crate::series::Plate;
 
+/// Number of tilts behind the joint noise of a stop.
+const TILTS: usize = 2;
+
 /// What an image may deviate by from the pose that the robot says.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Slack {
@@ -23,6 +26,11 @@ pub enum Slack {
 }
 
 impl Slack {
+    /// Joint noise of a stop, with or without tilt, all zero.
+    pub fn exact(readings: usize, tilts: bool) -> Self {
+        Self::Joints(vec![0.0; readings + if tilts { TILTS } else { 0 }])
+    }
+
     /// Number of unknowns.
     pub fn len(&self) -> usize {
         match self {
@@ -181,7 +189,8 @@ impl State {
             (_, None) => return None,
         };
         let tip = self.robot.pose_at(image.stop.as_ref()?, dq);
-        let pose = image.mount.camera_from_plate(&self.mountings[image.mounting], &tip, &self.placements[image.placement]);
+        let pose =
+            image.mount.camera_from_plate(&self.mountings[image.mounting], &tip, &self.placements[image.placement]);
         let Some([x, y]) = slack.tilt(image.stop.as_ref()?.readings.len()) else { return Some(pose) };
         Some(pose * Pose::exp(&(tilt_axes(&seen_centre(image, self)) * Vector2::new(x, y))))
     }

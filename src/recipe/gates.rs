@@ -40,7 +40,8 @@ pub(super) fn gates(
         ));
     }
     for k in 0..problem.cameras.len() {
-        if let Some(worst) = problem.joint_sigma(k).iter().copied().reduce(f64::max).filter(|s| *s > WORST_JOINT_NOISE) {
+        if let Some(worst) = problem.joint_sigma(k).iter().copied().reduce(f64::max).filter(|s| *s > WORST_JOINT_NOISE)
+        {
             failed.push(format!(
                 "joint noise: {:.1} mrad with camera {}; the readings do not explain the images: look for loose camera or plate, motion, wrong robot model{}",
                 1e3 * worst,

@@ -128,11 +128,10 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
 }
 
 fn fit(problem: &mut Problem, mut state: State, options: &Options) -> Outcome {
-    let readings = state.robot.chain.readings.len();
     let exact = options.joint_noise == JointNoise::Known(0.0);
     for (slack, image) in state.slack.iter_mut().zip(&problem.images) {
         if image.stop.is_some() {
-            *slack = if exact { Slack::None } else { Slack::Joints(vec![0.0; readings + 2]) };
+            *slack = if exact { Slack::None } else { problem.exact_slack(image) };
         }
     }
     if let JointNoise::Known(sigma) = options.joint_noise {

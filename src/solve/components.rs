@@ -141,16 +141,34 @@ pub(super) fn effective_parameters(problem: &Problem, state: &State, lin: &Linea
     dense + slack + markers
 }
 
-/// Sums of squares of latents of one kind, and how many of them the data determine.
+/// Sums of squares of latents per reading, and how many of them the data determine.
 #[derive(Debug, Clone)]
-struct Tally {
-    squares: Vec<f64>,
-    redundancy: Vec<f64>,
+pub struct Tally {
+    /// Sums of squares, rad^2 or m^2.
+    pub squares: Vec<f64>,
+    /// Redundancies.
+    pub redundancy: Vec<f64>,
 }
 
 impl Tally {
-    fn new(readings: usize) -> Self {
+    /// Nothing counted yet.
+    pub fn new(readings: usize) -> Self {
         Self { squares: vec![0.0; readings], redundancy: vec![0.0; readings] }
+    }
+
+    /// Variance of the readings of a group together; `None` where the data say nothing.
+    pub fn common(&self, group: &[usize]) -> Option<f64> {
+        let sum = |v: &[f64]| group.iter().map(|&r| v[r]).sum::<f64>();
+        let free = sum(&self.redundancy);
+        (free > 1e-9).then(|| (sum(&self.squares) / free).max(JOINT_NOISE_FLOOR * JOINT_NOISE_FLOOR))
+    }
+
+    fn with(mut self, other: &Self, which: impl Fn(usize) -> bool) -> Self {
+        for r in (0..self.squares.len()).filter(|&r| which(r)) {
+            self.squares[r] += other.squares[r];
+            self.redundancy[r] += other.redundancy[r];
+        }
+        self
     }
 
     /// Adds a latent with its prior variance and the variance that the data leave it. Where the latent is the sum of several,
@@ -194,28 +212,29 @@ fn update_joint(problem: &Problem, state: &State, lin: &Linearised, cov: &Covari
     }
     let mut change: f64 = 0.0;
     for camera in 0..noise.tilt.len() {
-        change = change.max(share_out(&[camera], &tilt.squares, &tilt.redundancy, &mut noise.tilt));
+        change = change.max(share_out(&[camera], &tilt, tilt.common(&[camera]), &mut noise.tilt));
     }
     for group in problem.noise.groups(kinds) {
         if noise.local.get(group[0]).is_some_and(|s| *s > 0.0) {
-            change = change.max(share_out(&group, &local.squares, &local.redundancy, &mut noise.local));
+            // A few postures tell little of their local errors: they are drawn to the noise of all joints of the kind.
+            let alike: Vec<usize> = (0..n).filter(|&r| kinds[r] == kinds[group[0]]).collect();
+            let whole = own.iter().fold(local.clone(), |sum, tally| sum.with(tally, |r| noise.local[r] == 0.0));
+            let common = whole.common(&alike);
+            change = change.max(share_out(&group, &local, common, &mut noise.local));
         }
         for (tally, sigma) in own.iter().zip(&mut noise.joint) {
-            change = change.max(share_out(&group, &tally.squares, &tally.redundancy, sigma));
+            change = change.max(share_out(&group, tally, tally.common(&group), sigma));
         }
     }
     change
 }
 
-/// New joint noise from the sum of squares and the redundancy of each reading's latents; every reading is drawn to the common
-/// noise of its group. Returns the largest relative change.
-pub fn share_out(group: &[usize], squares: &[f64], redundancy: &[f64], sigma: &mut [f64]) -> f64 {
+/// New noise from the sum of squares and the redundancy of each reading's latents; every reading is drawn to the common
+/// variance. Returns the largest relative change.
+pub fn share_out(group: &[usize], tally: &Tally, common: Option<f64>, sigma: &mut [f64]) -> f64 {
     let mut change: f64 = 0.0;
-    let (all, free): (f64, f64) = group.iter().fold((0.0, 0.0), |(s, f), &r| (s + squares[r], f + redundancy[r]));
-    if free < 1e-9 {
-        return change;
-    }
-    let common = (all / free).max(JOINT_NOISE_FLOOR * JOINT_NOISE_FLOOR);
+    let Some(common) = common else { return change };
+    let (squares, redundancy) = (&tally.squares, &tally.redundancy);
     for &r in group {
         let variance = (squares[r] + SHRINKAGE * common) / (redundancy[r] + SHRINKAGE);
         let next = variance.sqrt().clamp(JOINT_NOISE_FLOOR, 2.0 * sigma[r].max(JOINT_NOISE_FLOOR));
