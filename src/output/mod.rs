@@ -10,6 +10,8 @@ mod compensation_read;
 mod estimates;
 mod gauge;
 mod names;
+pub mod plan_files;
+pub mod plan_start;
 mod observation_table;
 pub mod plate_drawing;
 mod plate_files;
