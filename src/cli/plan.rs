@@ -207,7 +207,12 @@ fn request(args: &PlanArgs, chain: Chain) -> Result<PlanRequest> {
         },
         candidates: CandidateOptions {
             count: args.candidates.max(args.count),
-            views: ViewRange { near_m: args.distance_m[0], far_m: args.distance_m[1], tilt_rad, ..ViewRange::default() },
+            views: ViewRange {
+                near_m: args.distance_m[0],
+                far_m: args.distance_m[1],
+                tilt_rad,
+                ..ViewRange::default()
+            },
             sight: SightLimits {
                 least_markers: args.markers,
                 incidence_rad: (tilt_rad + 0.35).min(1.4),
@@ -244,7 +249,9 @@ fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
     let stops = Stops::read(path, &mut Vec::new())?;
     let column = |name: &String| {
         let at = stops.joints.iter().position(|j| j == name);
-        at.ok_or_else(|| Error::input(path.display(), format!("has no column \"{name}\""), "name every joint of the chain"))
+        at.ok_or_else(|| {
+            Error::input(path.display(), format!("has no column \"{name}\""), "name every joint of the chain")
+        })
     };
     let columns: Vec<usize> = chain.readings.iter().map(column).collect::<Result<_>>()?;
     let in_si = |raw: &Vec<f64>| {
@@ -275,7 +282,11 @@ fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<Image>)> {
         (Some(text), _) => pose("--hand-camera", text)?,
         (None, CameraMount::Hand) => Pose::from_xyz_rpy([0.0, 0.0, 0.08], [0.0; 3]),
         (None, CameraMount::Fixed) => {
-            return Err(Error::input("--hand-camera", "is missing", "say where the fixed camera stands in the base frame"));
+            return Err(Error::input(
+                "--hand-camera",
+                "is missing",
+                "say where the fixed camera stands in the base frame",
+            ));
         }
     };
     let mut placements = Vec::new();
@@ -343,7 +354,9 @@ fn summary(
     }
     let taught = plan.legs.iter().filter(|l| !l.is_free).count();
     if taught > 0 {
-        text += &format!("ways      {taught} without a free straight way were found; teach a posture in between (plan.json)\n");
+        text += &format!(
+            "ways      {taught} without a free straight way were found; teach a posture in between (plan.json)\n"
+        );
     }
     let worst = plan.imbalance.iter().copied().fold(0.0, f64::max);
     text += &format!("approach  every joint from both sides (one-sidedness at most {:.0} %)\n", 1e2 * worst);

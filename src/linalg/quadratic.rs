@@ -81,8 +81,8 @@ pub fn minimise_quadratic(
     let p = CscMatrix::new_from_triplets(n, n, rows_p, columns_p, values_p);
     let cones = [ZeroConeT(equations), NonnegativeConeT(m - equations)];
     let settings = DefaultSettings { verbose: false, max_iter: 200, ..DefaultSettings::default() };
-    let mut solver =
-        DefaultSolver::new(&p, gradient.as_slice(), &matrix, &a.bound, &cones, settings).map_err(|_| NotSolved::Failed)?;
+    let mut solver = DefaultSolver::new(&p, gradient.as_slice(), &matrix, &a.bound, &cones, settings)
+        .map_err(|_| NotSolved::Failed)?;
     solver.solve();
     match solver.solution.status {
         SolverStatus::Solved | SolverStatus::AlmostSolved => {
@@ -111,9 +111,8 @@ mod tests {
     #[test]
     fn rows_that_exclude_each_other_are_told() {
         let row = |low, high| LinearRow { coefficients: vec![1.0, 1.0], low, high };
-        let made = |rows: &[LinearRow]| {
-            minimise_quadratic(&DMatrix::zeros(2, 2), &DVector::zeros(2), &[(0.0, 1.0); 2], rows)
-        };
+        let made =
+            |rows: &[LinearRow]| minimise_quadratic(&DMatrix::zeros(2, 2), &DVector::zeros(2), &[(0.0, 1.0); 2], rows);
         assert_eq!(made(&[row(3.0, 3.0)]), Err(NotSolved::Infeasible));
         assert_eq!(made(&[row(f64::NEG_INFINITY, 0.5), row(0.8, f64::INFINITY)]), Err(NotSolved::Infeasible));
         assert!(made(&[row(1.0, 1.5)]).is_ok());

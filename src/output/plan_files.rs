@@ -6,9 +6,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::recipe::{Forecast, Plan, PlanRequest, image_name};
-use crate::series::{
-    AngleUnit, CameraSection, DEFAULT_PLACEMENT, Manifest, Stop, Stops, plate_csv, plate_toml,
-};
+use crate::series::{AngleUnit, CameraSection, DEFAULT_PLACEMENT, Manifest, Stop, Stops, plate_csv, plate_toml};
 use crate::urdf::JointKind;
 
 /// Name of the file that lists the others.

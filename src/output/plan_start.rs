@@ -102,7 +102,9 @@ pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -
     for (slot, (_, value)) in lens.parameters.iter_mut().zip(&camera.parameters) {
         *slot = *value;
     }
-    let used = |i: &&ImageRecord| on_robot(i) && (i.camera, i.mounting, i.plate) == (first.camera, first.mounting, first.plate);
+    let used = |i: &&ImageRecord| {
+        on_robot(i) && (i.camera, i.mounting, i.plate) == (first.camera, first.mounting, first.plate)
+    };
     let images: Vec<Image> = record.images.iter().filter(used).map(|i| taken(i, camera.pixel_factor, record)).collect();
     let setting = Setting {
         robot: calibrated(record, chain, model),

@@ -105,10 +105,8 @@ pub fn candidates(setting: &Setting, scene: &Scene, options: &CandidateOptions) 
     let (mut found, mut tally) = (Vec::new(), Tally::default());
     let mut first = 0;
     while found.len() < options.count && first < VIEWS_PER_CANDIDATE * options.count {
-        let round: Vec<(Vec<Candidate>, Tally)> = (first..first + ROUND)
-            .into_par_iter()
-            .map(|k| one_view(setting, scene, options, &limits, k))
-            .collect();
+        let round: Vec<(Vec<Candidate>, Tally)> =
+            (first..first + ROUND).into_par_iter().map(|k| one_view(setting, scene, options, &limits, k)).collect();
         for (some, counted) in round {
             found.extend(some);
             tally.add(&counted);

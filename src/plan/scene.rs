@@ -175,11 +175,8 @@ impl Scene {
     /// What comes too near at these readings with the plate at `placement`; `None` where nothing does.
     pub fn collision(&self, readings: &[f64], placement: usize) -> Option<String> {
         let links = self.robot.link_poses(readings);
-        let ends: Vec<[Vector3<f64>; 2]> = self
-            .capsules
-            .iter()
-            .map(|c| c.ends_m.map(|e| c.joint.map_or(e, |j| links[j].transform(&e))))
-            .collect();
+        let ends: Vec<[Vector3<f64>; 2]> =
+            self.capsules.iter().map(|c| c.ends_m.map(|e| c.joint.map_or(e, |j| links[j].transform(&e)))).collect();
         let near = |distance: f64, c: &Capsule, other: f64| distance < c.radius_m + other + self.clearance_m;
         for &(a, b) in &self.pairs {
             let distance = segment_distance_m([&ends[a][0], &ends[a][1]], [&ends[b][0], &ends[b][1]]);
@@ -241,9 +238,8 @@ fn compared(capsules: &[Capsule], clearance_m: f64) -> Vec<(usize, usize)> {
     let apart = |a: usize, b: usize| {
         let (a, b) = (&capsules[a], &capsules[b]);
         let (low, high) = (a.order.min(b.order), a.order.max(b.order));
-        let between: f64 = (low + 1..high)
-            .map(|o| capsules.iter().filter(|c| c.order == o).map(&length).fold(0.0, f64::max))
-            .sum();
+        let between: f64 =
+            (low + 1..high).map(|o| capsules.iter().filter(|c| c.order == o).map(&length).fold(0.0, f64::max)).sum();
         between > a.radius_m + b.radius_m + clearance_m
     };
     let all = (0..capsules.len()).flat_map(|b| (0..b).map(move |a| (a, b)));

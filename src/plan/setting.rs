@@ -129,11 +129,11 @@ pub fn rough_knowledge(problem: &Problem, camera: &Camera) -> DMatrix<f64> {
     let sigma = |k: usize| {
         let c = &problem.layout.columns[k];
         let mounting = problem.layout.mountings.iter().any(|m| m.contains(&k));
-        match (c.prior_sigma.is_finite(), c.unit) {
-            (true, _) => c.prior_sigma,
-            (_, "m") => if mounting { 0.1 } else { 1.0 },
-            (_, "rad") => if mounting { 0.3 } else { 1.0 },
-            (_, "px") => 0.5 * focal,
+        match (c.unit, mounting) {
+            _ if c.prior_sigma.is_finite() => c.prior_sigma,
+            ("m", true) => 0.1,
+            ("rad", true) => 0.3,
+            ("px", _) => 0.5 * focal,
             _ => 1.0,
         }
     };

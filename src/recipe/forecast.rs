@@ -78,7 +78,12 @@ const WORTH_NAMING: f64 = 0.25;
 ///
 /// # Errors
 /// Where the images do not determine camera, plate or hand-camera offset.
-pub fn exact_covariance(problem: &Problem, state: &State, setting: &Setting, images: Vec<Image>) -> Result<DMatrix<f64>> {
+pub fn exact_covariance(
+    problem: &Problem,
+    state: &State,
+    setting: &Setting,
+    images: Vec<Image>,
+) -> Result<DMatrix<f64>> {
     let mut problem = problem.clone();
     let mut state = state.clone();
     state.slack = vec![setting.slack(); images.len()];
