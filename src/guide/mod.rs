@@ -18,6 +18,9 @@ pub mod reading_the_result {}
 #[doc = include_str!("planning.md")]
 pub mod planning {}
 
+#[doc = include_str!("programs.md")]
+pub mod programs {}
+
 #[doc = include_str!("decisions.md")]
 pub mod decisions {
     #[doc = include_str!("decisions/0001_pose_space.md")]

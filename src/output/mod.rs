@@ -29,7 +29,7 @@ mod write;
 
 pub use compensation_read::read_compensation;
 pub use report::report_html;
-pub use write::write_all;
+pub use write::{write_all, write_beside};
 
 use std::collections::BTreeMap;
 

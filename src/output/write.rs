@@ -29,6 +29,35 @@ pub fn write_all(dir: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
     written
 }
 
+/// Writes files into a folder among whatever is there, each one whole or not at all; none of them may be one of `inputs`.
+///
+/// # Errors
+/// A file that is one of the inputs; anything that cannot be written or renamed.
+pub fn write_beside(dir: &Path, files: &[(String, &[u8])], inputs: &[PathBuf]) -> Result<()> {
+    let target = resolve(dir)?;
+    fs::create_dir_all(&target).map_err(|e| Error::io(&target, &e))?;
+    for (k, (name, _)) in files.iter().enumerate() {
+        let path = target.join(name);
+        let real = path.canonicalize().unwrap_or_else(|_| path.clone());
+        if inputs.iter().any(|i| i.canonicalize().is_ok_and(|i| i == real)) {
+            return Err(Error::input(path.display(), "is the input itself", "choose another folder with --out"));
+        }
+        if files[..k].iter().any(|(other, _)| other == name) {
+            return Err(Error::input(path.display(), "is the name of two files", "correct them one after the other"));
+        }
+    }
+    for (name, bytes) in files {
+        let path = target.join(name);
+        let new = beside(&path, "new")?;
+        let written = write_synced(&new, bytes).and_then(|()| fs::rename(&new, &path));
+        if let Err(error) = written {
+            let _ = fs::remove_file(&new);
+            return Err(Error::io(&path, &error));
+        }
+    }
+    Ok(())
+}
+
 /// The real path of the target, whose parent exists.
 fn resolve(dir: &Path) -> Result<PathBuf> {
     if dir.as_os_str().is_empty() {
