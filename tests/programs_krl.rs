@@ -165,11 +165,12 @@ fn check(seed: u64) {
     };
     meets(&aggregate(&dat, "XP1="), &aggregate(&new_dat, "XP1="), &q[1], "XP1");
     meets(&aggregate(&dat, "XP2 ="), &aggregate(&new_dat, "XP2 ="), &q[2], "XP2");
-    meets(&aggregate(&src, "\nPTP {X"[..5].as_ref()), &aggregate(&new_src, "\nPTP "), &q[3], "P3");
+    let third = |text: &str| aggregate(text.lines().find(|l| l.starts_with("PTP {X")).unwrap(), "PTP");
+    meets(&third(&src), &third(&new_src), &q[3], "P3");
     meets(&aggregate(&src, "CIRC"), &aggregate(&new_src, "CIRC"), &q[5], "P5");
     meets(&aggregate(&src, "} , "), &aggregate(&new_src, "} , "), &q[6], "P6");
-    let mut fourth = aggregate(&src, "\nPTP ");
-    fourth.insert("Z".into(), aggregate(&src, "\nLIN ")["Z"]);
+    let mut fourth = third(&src);
+    fourth.insert("Z".into(), format!("{up:.4}").parse().unwrap());
     let flange = base * pose(&fourth) * tool.inverse();
     let near = inverse::solve_from(&cell.nominal, &limits, &flange, &q[3]).unwrap();
     meets(&fourth, &aggregate(&lin, "LIN "), &near, "P4");
