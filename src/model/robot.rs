@@ -85,6 +85,17 @@ impl Robot {
         pose
     }
 
+    /// Pose behind every joint of the chain, in the base frame, for exact readings.
+    pub fn link_poses(&self, readings: &[f64]) -> Vec<Pose> {
+        let positions = self.positions(&Stop::at(readings), &vec![0.0; readings.len()]).0;
+        let mut pose = Pose::identity();
+        let behind = |(i, joint): (usize, &Joint)| {
+            pose = pose * joint.origin * Pose::exp(&self.twists[i]) * motion(joint, positions[i]);
+            pose
+        };
+        self.chain.joints.iter().enumerate().map(behind).collect()
+    }
+
     /// As [`Robot::pose_at`], with all derivatives.
     pub fn kinematics(&self, stop: &Stop, noise: &[f64]) -> Kinematics {
         let (positions, contexts) = self.positions(stop, noise);
