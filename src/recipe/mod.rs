@@ -9,6 +9,7 @@ mod forecast;
 mod free_poses;
 mod gates;
 mod joint;
+mod local_errors;
 mod measure;
 mod moved;
 mod plan;
