@@ -9,6 +9,7 @@ mod compensation;
 mod compensation_read;
 mod estimates;
 mod gauge;
+pub mod monte_carlo;
 mod names;
 mod observation_table;
 pub mod plan_files;

@@ -12,6 +12,7 @@ mod joint;
 mod local_errors;
 mod loose;
 mod measure;
+mod monte_carlo;
 mod moved;
 mod plan;
 mod simulated;
@@ -29,6 +30,7 @@ pub use forecast::{
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
 pub use joint::{JointNoise, Options, RobotModel, identify};
 pub use measure::{Measured, measure};
+pub use monte_carlo::{BLOCKS, BlockResult, MonteCarloCell, MonteCarloRequest, monte_carlo};
 pub use plan::{Budget, Plan, PlanRequest, Wish, plan};
 pub use simulated::measured;
 pub use solution::{Solution, StartVerdict};
