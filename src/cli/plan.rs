@@ -20,7 +20,7 @@ use crate::plan::setting::Setting;
 use crate::plan::viewpoint::ViewRange;
 use crate::plan::visibility::SightLimits;
 use crate::problem::Image;
-use crate::recipe::{Budget, Forecast, Plan, PlanRequest, RobotModel, Wish, forecast, plan};
+use crate::recipe::{Budget, Forecast, Plan, PlanRequest, PlanStudyRequest, RobotModel, Wish, forecast, plan, plan_study};
 use crate::series::{CameraMount, Stops, read_plate};
 use crate::simulate::typical_camera;
 use crate::urdf::{self, Chain, JointKind};
@@ -35,7 +35,7 @@ pub(super) struct PlanArgs {
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// Plate (plate.toml)
-    #[arg(long, value_name = "FILE", required_unless_present = "from")]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["from", "study"])]
     plate: Option<PathBuf>,
     /// Number of images
     #[arg(long, default_value_t = 50)]
@@ -129,6 +129,9 @@ pub(super) struct PlanArgs {
     /// Seed of the candidates
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Study instead of a plan: 30 planned against 60 random poses in as many simulated worlds; writes study.md
+    #[arg(long, value_name = "WORLDS")]
+    study: Option<u64>,
 }
 
 /// Numbers between commas.
@@ -153,6 +156,9 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     check(args)?;
     let description = urdf::read(&args.urdf)?;
     let chain = description.chain(args.base.as_deref(), args.tip.as_deref())?;
+    if let Some(seeds) = args.study {
+        return study(args, chain, seeds);
+    }
     let request = request(args, chain)?;
     let plan = plan(&request)?;
     let forecast = forecast(&request, &plan)?;
@@ -161,6 +167,22 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     let files = plan_files::plan_files(&request, &plan, &forecast, &command, BTreeMap::new())?;
     write_all(&args.out, &files)?;
     print!("{}", summary(&request, &plan, &forecast, &files, &args.out));
+    Ok(Verdict::Good)
+}
+
+/// Images planned and drawn in a study.
+const STUDIED: [usize; 2] = [30, 60];
+
+fn study(args: &PlanArgs, chain: Chain, seeds: u64) -> Result<Verdict> {
+    let robot = chain.robot.clone();
+    let [planned, random] = STUDIED;
+    let request = PlanStudyRequest { chain, seeds, planned, random, candidates: args.candidates };
+    let study = plan_study(&request, |seed| tracing::info!("world {seed} done"))?;
+    let text = plan_files::study_table(&robot, &request, &study);
+    std::fs::create_dir_all(&args.out).map_err(|e| Error::io(&args.out, &e))?;
+    let path = args.out.join("study.md");
+    std::fs::write(&path, &text).map_err(|e| Error::io(&path, &e))?;
+    print!("{text}");
     Ok(Verdict::Good)
 }
 
@@ -338,8 +360,8 @@ fn summary(
         plan.legs.len(),
         plan.pool.len(),
         plan.tally.views,
-        1e2 * plan.relaxed_efficiency,
-        1e2 * plan.rounded_efficiency,
+        1e2 * plan.efficiency[0],
+        1e2 * plan.efficiency[1],
         1e3 * forecast.before_m,
         1e3 * forecast.flange_m,
         plan.targets.len(),

@@ -12,6 +12,7 @@ mod joint;
 mod measure;
 mod moved;
 mod plan;
+mod plan_study;
 mod simulated;
 mod solution;
 mod start;
@@ -27,7 +28,8 @@ pub use forecast::{
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
 pub use joint::{JointNoise, Options, RobotModel, identify};
 pub use measure::{Measured, measure};
-pub use plan::{Budget, Plan, PlanRequest, Wish, plan};
+pub use plan::{Budget, Choice, Plan, PlanRequest, Wish, choose, plan};
+pub use plan_study::{PlanStudy, PlanStudyRequest, PlanStudyRow, plan_study};
 pub use simulated::measured;
 pub use solution::{Solution, StartVerdict};
 pub use study::{Study, StudyCell, StudyRequest, study};
