@@ -13,14 +13,14 @@ use super::simulate::Mount;
 use crate::error::{Error, Result};
 use crate::geom::{OrientedBox, Pose};
 use crate::model::camera::Camera;
-use crate::output::{plan_files, plan_start, solution_json, write_all};
+use crate::output::{plan_files, plan_html, plan_programs, plan_start, solution_json, write_all};
 use crate::plan::candidates::CandidateOptions;
 use crate::plan::scene::{SceneOptions, arm_length_m};
 use crate::plan::setting::Setting;
 use crate::plan::viewpoint::ViewRange;
 use crate::plan::visibility::SightLimits;
 use crate::problem::Image;
-use crate::recipe::{Budget, Forecast, Plan, PlanRequest, PlanStudyRequest, RobotModel, Wish, forecast, plan, plan_study};
+use crate::recipe::{check_wish, Budget, Forecast, Plan, PlanRequest, PlanStudyRequest, RobotModel, Wish, forecast, image_name, plan, plan_study};
 use crate::series::{CameraMount, Stops, read_plate};
 use crate::simulate::typical_camera;
 use crate::urdf::{self, Chain, JointKind};
@@ -162,9 +162,12 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     let request = request(args, chain)?;
     let plan = plan(&request)?;
     let forecast = forecast(&request, &plan)?;
+    check_wish(&request, &forecast)?;
     let command: Vec<String> = std::env::args().skip(1).collect();
     let command = format!("robotcal {}", command.join(" "));
-    let files = plan_files::plan_files(&request, &plan, &forecast, &command, BTreeMap::new())?;
+    let mut more = plan_programs::programs(&request, &plan);
+    more.insert("plan.html".into(), plan_html(&request, &plan, &forecast, &command).into_bytes());
+    let files = plan_files::plan_files(&request, &plan, &forecast, &command, more)?;
     write_all(&args.out, &files)?;
     print!("{}", summary(&request, &plan, &forecast, &files, &args.out));
     Ok(Verdict::Good)
@@ -346,6 +349,9 @@ fn camera(args: &PlanArgs) -> Result<Camera> {
     }
 }
 
+/// Poses whose gain is said on the terminal.
+const GAINS_SHOWN: usize = 10;
+
 fn summary(
     request: &PlanRequest,
     plan: &Plan,
@@ -385,8 +391,18 @@ fn summary(
     for line in &forecast.words {
         text += &format!("remark    {line}\n");
     }
+    if !request.taken.is_empty() {
+        for g in forecast.gains.iter().take(GAINS_SHOWN) {
+            text += &format!(
+                "helps     {}: flange {:.4} -> {:.4} mm, most by {}\n",
+                image_name(g.leg),
+                1e3 * g.flange_m[0],
+                1e3 * g.flange_m[1],
+                g.parameter
+            );
+        }
+    }
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
     text += &format!("written   {}: {}\n", folder.display(), names.join(", "));
-    let _ = request;
     text
 }

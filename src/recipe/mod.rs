@@ -23,6 +23,7 @@ mod two_stage;
 pub use build::{MeasuredSeries, MeasuredStop};
 pub use compare::{Comparison, ComparisonRow, HeldOut, TruthError, compare};
 pub use forecast::{
+    Gain, check_wish,
     CurvePoint, Forecast, JointRange, ParameterForecast, exact_covariance, flange_m, forecast, image_name,
 };
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
