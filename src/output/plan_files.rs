@@ -198,6 +198,8 @@ pub fn study_table(robot: &str, request: &PlanStudyRequest, study: &PlanStudy) -
     if let Some(r) = &study.planned_to_random {
         text += &format!("Planned over random: {:.3} (95 % of resampled worlds: {:.3} to {:.3}).\n", r.value, r.low, r.high);
     }
+    let [planned, drawn] = study.views_m().map(|m| 1e3 * m);
+    text += &format!("Over held-out views of the plate: {planned:.4} mm planned, {drawn:.4} mm random.\n");
     let least = |k: usize| study.rows.iter().map(|r| r.efficiency[k]).fold(1.0, f64::min);
     text += &format!("Least certified efficiency: relaxation {:.4}, whole images {:.4}.\n", least(0), least(1));
     for (seed, reason) in &study.failed {

@@ -14,12 +14,15 @@ use crate::assess::{Ratio, bootstrap_ratio, flange_error_m, root_mean_square};
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
-use crate::plan::candidates::CandidateOptions;
+use crate::model::joint_terms::JointTerm;
+use crate::model::robot::Robot;
+use crate::plan::candidates::{CandidateOptions, workspace};
 use crate::plan::information::flange_weight;
-use crate::plan::scene::SceneOptions;
+use crate::plan::scene::{Scene, SceneOptions};
 use crate::plan::setting::{Setting, scale_sigma};
 use crate::plan::visibility::SightLimits;
 use crate::series::{CameraMount, Plate, PlateKind, ScaleBar};
+use crate::simulate::truth::Truth;
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
 use crate::urdf::{Chain, JointKind};
 
@@ -43,10 +46,12 @@ pub struct PlanStudyRequest {
 pub struct PlanStudyRow {
     /// Seed.
     pub seed: u64,
-    /// Flange error with the planned images: found and predicted, RMS over the held-out joint vectors, m.
+    /// Flange error with the planned images: found and predicted, RMS over held-out joint vectors of the workspace, m.
     pub planned_m: [f64; 2],
     /// The same with the random images.
     pub random_m: [f64; 2],
+    /// Error found over held-out views of the plate, planned and random, m.
+    pub views_m: [f64; 2],
     /// Certified efficiency of relaxation and whole images.
     pub efficiency: [f64; 2],
 }
@@ -66,6 +71,9 @@ pub struct PlanStudy {
 const MARKER_SIGMA_M: f64 = 0.003e-3;
 /// Standard deviation of the distance of its outermost markers, m.
 const BAR_SIGMA_M: f64 = 0.002e-3;
+/// Held-out joint vectors of the workspace, and the first seed of their draw (those of plans are small).
+const HELD_OUT: usize = 150;
+const HELD_OUT_SEED: u64 = 1_000_000;
 /// Noise of an observation, px.
 const PIXEL_SIGMA_PX: f64 = 0.05;
 /// Joint noise, rad.
@@ -74,6 +82,11 @@ const JOINT_SIGMA_RAD: f64 = 0.03e-3;
 const ROUGH: (f64, f64) = (5e-3, 0.01);
 
 impl PlanStudy {
+    /// RMS over the worlds of the error found over views of the plate: planned, random, m.
+    pub fn views_m(&self) -> [f64; 2] {
+        [0, 1].map(|k| root_mean_square(&self.rows.iter().map(|r| (r.views_m[k].powi(2), 1.0)).collect::<Vec<_>>()))
+    }
+
     /// RMS over the worlds of (planned found, planned predicted, random found, random predicted), m.
     pub fn overall_m(&self) -> [f64; 4] {
         let rms = |of: fn(&PlanStudyRow) -> f64| {
@@ -179,25 +192,44 @@ fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
     let choice = choose(&chosen)?;
     wanted.images = request.planned;
     wanted.postures = Some(choice.chosen.iter().map(|&k| choice.pool[k].readings.clone()).collect());
-    wanted.held_out = 0;
     let mut planned = series(&wanted)?;
     planned.plate = believed;
-    let held_out: Vec<Vec<f64>> = random.truth.held_out.iter().map(|h| h.readings.clone()).collect();
+    let scene = Scene::new(&chosen.setting, &chosen.scene);
+    let held_out = workspace(&chosen.setting, &scene, HELD_OUT, 0.0, HELD_OUT_SEED + seed);
     let weight = flange_weight(&choice.problem, &chosen.setting.robot, &held_out);
     let predicted = |visits: &[Vec<f64>]| predict(&chosen, &choice.problem, &choice.state, visits, &weight);
     let kinds = &request.chain;
     let visits = |s: &SimulatedSeries| -> Vec<Vec<f64>> {
         measured(s, kinds).stops.into_iter().filter_map(|s| s.readings).collect()
     };
-    let poses: Vec<(Vec<f64>, Pose)> =
-        random.truth.held_out.iter().map(|h| (h.readings.clone(), h.base_from_tip.pose())).collect();
-    let found = |s: &SimulatedSeries| found(request, s, &poses);
+    let actual = true_robot(&request.chain, truth);
+    let in_workspace: Vec<(Vec<f64>, Pose)> =
+        held_out.into_iter().map(|q| (q.clone(), actual.base_from_tip(&q))).collect();
+    let at_plate: Vec<(Vec<f64>, Pose)> =
+        truth.held_out.iter().map(|h| (h.readings.clone(), h.base_from_tip.pose())).collect();
+    let [planned_found, random_found] = [&planned, &random].map(|s| found(request, s, [&in_workspace, &at_plate]));
+    let (planned_found, random_found) = (planned_found?, random_found?);
     Ok(PlanStudyRow {
         seed,
-        planned_m: [found(&planned)?, predicted(&visits(&planned))?],
-        random_m: [found(&random)?, predicted(&visits(&random))?],
+        planned_m: [planned_found[0], predicted(&visits(&planned))?],
+        random_m: [random_found[0], predicted(&visits(&random))?],
+        views_m: [planned_found[1], random_found[1]],
         efficiency: choice.efficiency,
     })
+}
+
+/// The robot of a world.
+fn true_robot(chain: &Chain, truth: &Truth) -> Robot {
+    let mut robot = Robot::nominal(chain.clone());
+    for (joint, twist) in robot.chain.joints.iter().zip(&mut robot.twists) {
+        *twist = truth.twists.get(&joint.name).map_or(Vector6::zeros(), |t| Vector6::from(*t));
+    }
+    let reading = |name: &String| chain.readings.iter().position(|r| r == name);
+    let term = |t: &crate::simulate::truth::TermRecord| {
+        Some(JointTerm { reading: reading(&t.joint)?, term: t.term, value: t.value })
+    };
+    robot.terms = truth.terms.iter().filter_map(term).collect();
+    robot
 }
 
 fn joint_sigma(chain: &Chain) -> Vec<f64> {
@@ -217,12 +249,13 @@ fn predict(
     Ok(flange_m(weight, &exact_covariance(problem, state, setting, images)?))
 }
 
-/// Flange error after the whole identification of a series.
-fn found(request: &PlanStudyRequest, series: &SimulatedSeries, poses: &[(Vec<f64>, Pose)]) -> Result<f64> {
+/// Flange errors after the whole identification of a series, over two sets of joint vectors.
+fn found(request: &PlanStudyRequest, series: &SimulatedSeries, sets: [&[(Vec<f64>, Pose)]; 2]) -> Result<[f64; 2]> {
     let options = Options { joint_noise: JointNoise::Estimated, model: RobotModel::Rigid };
     let solution = identify(request.chain.clone(), &[measured(series, &request.chain)], &options)?;
     let plate = solution.state.placements[0];
-    flange_error_m(&solution.state.robot, &plate, poses).ok_or_else(|| {
+    let [a, b] = sets.map(|poses| flange_error_m(&solution.state.robot, &plate, poses));
+    a.zip(b).map(|(a, b)| [a, b]).ok_or_else(|| {
         crate::error::Error::unsolved("study", "the held-out joint vectors determine no error", "take more of them")
     })
 }
