@@ -15,12 +15,15 @@ use crate::geom::{OrientedBox, Pose};
 use crate::model::camera::Camera;
 use crate::output::{plan_files, plan_html, plan_programs, plan_start, solution_json, write_all};
 use crate::plan::candidates::CandidateOptions;
-use crate::plan::scene::{SceneOptions, arm_length_m};
+use crate::plan::scene::{self, SceneOptions, arm_length_m};
 use crate::plan::setting::Setting;
 use crate::plan::viewpoint::ViewRange;
 use crate::plan::visibility::SightLimits;
 use crate::problem::Image;
-use crate::recipe::{check_wish, Budget, Forecast, Plan, PlanRequest, PlanStudyRequest, RobotModel, Wish, forecast, image_name, plan, plan_study};
+use crate::recipe::{
+    Budget, Forecast, PlaceForecast, Plan, PlanRequest, PlanStudyRequest, RobotModel, Wish, check_wish, choose,
+    compare_places, forecast, image_name, place_words, plan, plan_study,
+};
 use crate::series::{CameraMount, Stops, read_plate};
 use crate::simulate::typical_camera;
 use crate::urdf::{self, Chain, JointKind};
@@ -159,9 +162,23 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     if let Some(seeds) = args.study {
         return study(args, chain, seeds);
     }
-    let request = request(args, chain)?;
+    let (capsules, meshes) = description.carried_capsules(&chain);
+    let described = scene::described(&capsules, &chain);
+    let mut request = request(args, chain)?;
+    request.scene.described = described;
+    let mut words = settle_place(args, &mut request)?;
+    if meshes > 0 {
+        words.push(format!(
+            "{meshes} collision meshes of the URDF were not read: their links are capsules from joint to joint \
+             (--link-radius-mm sets how thick)"
+        ));
+    }
     let plan = plan(&request)?;
-    let forecast = forecast(&request, &plan)?;
+    let mut forecast = forecast(&request, &plan)?;
+    if request.setting.placements.len() > 1 {
+        words.extend(place_words(&compare_places(&request, &plan)?));
+    }
+    forecast.words.extend(words);
     check_wish(&request, &forecast)?;
     let command: Vec<String> = std::env::args().skip(1).collect();
     let command = format!("robotcal {}", command.join(" "));
@@ -171,6 +188,38 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     write_all(&args.out, &files)?;
     print!("{}", summary(&request, &plan, &forecast, &files, &args.out));
     Ok(Verdict::Good)
+}
+
+/// Candidates when places are compared before the plan.
+const TRIAL_CANDIDATES: usize = 600;
+
+/// Where the user names no place for the plate, several are compared and the best is taken; says so in words.
+fn settle_place(args: &PlanArgs, request: &mut PlanRequest) -> Result<Vec<String>> {
+    let free = args.plate_pose.is_empty() && args.from.is_none() && request.setting.mount == CameraMount::Hand;
+    if !free {
+        return Ok(Vec::new());
+    }
+    let arm = arm_length_m(&request.setting.robot);
+    let place = |name: &str, far: f64, high: f64, tilt_deg: f64| {
+        let pose = Pose::from_xyz_rpy([far * arm, 0.0, high * arm], [0.0, -tilt_deg.to_radians(), 0.0]);
+        (format!("{name} (x {:.2} m, z {:.2} m, tilted {tilt_deg:.0} degrees)", far * arm, high * arm), pose)
+    };
+    request.setting.placements = vec![
+        place("near", 0.4, 0.0, 0.0),
+        place("middle", 0.5, 0.0, 0.0),
+        place("far", 0.65, 0.0, 0.0),
+        place("raised", 0.5, 0.3, 30.0),
+    ];
+    let mut trial = request.clone();
+    trial.candidates.count = TRIAL_CANDIDATES.max(8 * trial.count);
+    trial.budget = Budget::default();
+    let places = compare_places(&trial, &choose(&trial)?)?;
+    let error = |p: &&PlaceForecast| p.flange_m.unwrap_or(f64::INFINITY);
+    let best = places.iter().min_by(|a, b| error(a).total_cmp(&error(b))).map_or(0, |p| p.placement);
+    let mut words = vec![format!("no --plate-pose was given: the plate is planned {}", places[best].name)];
+    words.extend(place_words(&places));
+    request.setting.placements = vec![("placement_0".to_owned(), request.setting.placements[best].1)];
+    Ok(words)
 }
 
 /// Images planned and drawn in a study.

@@ -196,7 +196,10 @@ pub fn study_table(robot: &str, request: &PlanStudyRequest, study: &PlanStudy) -
         random_predicted / random,
     );
     if let Some(r) = &study.planned_to_random {
-        text += &format!("Planned over random: {:.3} (95 % of resampled worlds: {:.3} to {:.3}).\n", r.value, r.low, r.high);
+        text += &format!(
+            "Planned over random: {:.3} (95 % of resampled worlds: {:.3} to {:.3}).\n",
+            r.value, r.low, r.high
+        );
     }
     let [planned, drawn] = study.views_m().map(|m| 1e3 * m);
     text += &format!("Over held-out views of the plate: {planned:.4} mm planned, {drawn:.4} mm random.\n");

@@ -87,7 +87,7 @@ pub struct Forecast {
 }
 
 /// Share of a prior variance that must go before a parameter counts as known.
-const KNOWN_SHARE: f64 = 0.75;
+pub(super) const KNOWN_SHARE: f64 = 0.75;
 /// Share below which a parameter asked for counts as not found.
 const LEAST_SHARE: f64 = 0.3;
 /// Range of a joint that is called small, rad.

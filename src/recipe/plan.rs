@@ -165,7 +165,7 @@ pub fn plan(request: &PlanRequest) -> Result<Plan> {
     Ok(Plan { choice, legs, imbalance })
 }
 
-fn criterion(wish: &Wish, layout: &Layout, weight: &DMatrix<f64>) -> Result<Criterion> {
+pub(super) fn criterion(wish: &Wish, layout: &Layout, weight: &DMatrix<f64>) -> Result<Criterion> {
     let robot = layout.terms.end;
     match wish {
         Wish::Workspace | Wish::Targets(_) => Ok(Criterion::weighted(weight)),

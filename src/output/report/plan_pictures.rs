@@ -93,7 +93,8 @@ fn drawn(segments: &[Segment], view: View) -> String {
     let scale = (WIDTH - 2.0 * MARGIN) / (x1 - x0).max(y1 - y0).max(1e-6);
     let height = 2.0 * MARGIN + scale * (y1 - y0);
     let at = |p: [f64; 2]| [MARGIN + scale * (p[0] - x0), MARGIN + scale * (y1 - p[1])];
-    let label = if view == View::Side { "Arm and camera views from the side" } else { "Arm and camera views from above" };
+    let label =
+        if view == View::Side { "Arm and camera views from the side" } else { "Arm and camera views from above" };
     let mut svg = Svg::new(WIDTH, height, label);
     let first = (x0 / 0.2).ceil() as i32;
     for k in first..=(x1 / 0.2).floor() as i32 {
@@ -127,7 +128,8 @@ pub(super) fn coverage(request: &PlanRequest, plan: &Plan) -> String {
         let pose = &plan.pool[leg.stop].camera_from_plate;
         for k in seen_markers(&setting.plate, camera, pose) {
             let Some(uv) = camera.project(&pose.transform(&setting.plate.markers[k].position_m)) else { continue };
-            let cell = |a: usize| ((uv[a] + 0.5) / size[a] * CELLS[a] as f64).clamp(0.0, CELLS[a] as f64 - 1.0) as usize;
+            let cell =
+                |a: usize| ((uv[a] + 0.5) / size[a] * CELLS[a] as f64).clamp(0.0, CELLS[a] as f64 - 1.0) as usize;
             counts[cell(1) * CELLS[0] + cell(0)] += 1;
         }
     }
@@ -140,7 +142,12 @@ pub(super) fn coverage(request: &PlanRequest, plan: &Plan) -> String {
         let class = ["h1", "h2", "h3", "h4"][((4.0 * count as f64 / most) as usize).min(3)];
         svg.rect(at, cell, class);
     }
-    let edges = [([0.0, 0.0], [WIDTH, 0.0]), ([WIDTH, 0.0], [0.0, height]), ([WIDTH, height], [-WIDTH, 0.0]), ([0.0, height], [0.0, -height])];
+    let edges = [
+        ([0.0, 0.0], [WIDTH, 0.0]),
+        ([WIDTH, 0.0], [0.0, height]),
+        ([WIDTH, height], [-WIDTH, 0.0]),
+        ([0.0, height], [0.0, -height]),
+    ];
     svg.vectors(edges.into_iter(), "axis");
     svg.finish()
 }
@@ -173,7 +180,8 @@ pub(super) fn curve(forecast: &Forecast) -> String {
     let (height, left, bottom) = (260.0, 56.0, 40.0);
     let mut svg = Svg::new(WIDTH, height, "Expected error of the flange over the number of images");
     let points = &forecast.curve;
-    let all = || points.iter().flat_map(|p| [1e3 * p.planned_m, 1e3 * p.random_m]).filter(|v| v.is_finite() && *v > 0.0);
+    let all =
+        || points.iter().flat_map(|p| [1e3 * p.planned_m, 1e3 * p.random_m]).filter(|v| v.is_finite() && *v > 0.0);
     let (low, high) = (all().fold(f64::INFINITY, f64::min) / 1.15, all().fold(0.0, f64::max) * 1.15);
     if points.len() < 2 || low >= high {
         svg.text([WIDTH / 2.0, height / 2.0], Anchor::Middle, "too few images for a curve");
