@@ -10,6 +10,7 @@ mod free_poses;
 mod gates;
 mod joint;
 mod local_errors;
+mod loose;
 mod measure;
 mod moved;
 mod plan;
