@@ -117,6 +117,17 @@ impl Robot {
         Kinematics { base_from_tip: rest_from_tip, d_twists, d_readings, d_terms }
     }
 
+    /// Local error of every reading at a stop, rad or m.
+    pub fn local_errors(&self, stop: &Stop) -> Vec<f64> {
+        let mut errors = vec![0.0; stop.readings.len()];
+        for t in self.terms.iter().filter(|t| matches!(t.term, Term::Local(_))) {
+            let context =
+                TermContext { reading: stop.readings[t.reading], approach: None, gravity: Default::default() };
+            errors[t.reading] += t.value * t.term.basis(&context);
+        }
+        errors
+    }
+
     /// `origin_i Exp(xi_i) Motion_i(offset_i)` for every joint: the corrected URDF, in which controller angles stay as they are.
     pub fn corrected_origins(&self) -> Vec<Pose> {
         let mut offsets = vec![0.0; self.chain.readings.len()];

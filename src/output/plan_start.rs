@@ -167,6 +167,7 @@ fn taken(image: &ImageRecord, pixel_factor: f64, record: &SolutionRecord) -> Ima
         mount: image.camera_mount,
         stop,
         observations: observations(&image.observations, pixel_factor, &plate.id),
+        local_share: Vec::new(),
         rejected: None,
     }
 }

@@ -61,7 +61,7 @@ impl Setting {
             mountings: one("hand_camera"),
             cameras: one("camera"),
             images: Vec::new(),
-            noise: Noise { pixel_factor: vec![1.0], joint: vec![joint] },
+            noise: Noise { pixel_factor: vec![1.0], joint: vec![joint], local: Vec::new(), tilt: Vec::new() },
             huber: HUBER,
         };
         (problem, state)
@@ -95,6 +95,7 @@ impl Setting {
             mount: self.mount,
             stop: Some(Stop::at(readings)),
             observations: Vec::new(),
+            local_share: Vec::new(),
             rejected: None,
         };
         let information = Matrix2::identity() * self.pixel_sigma_px.powi(-2);

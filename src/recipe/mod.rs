@@ -9,6 +9,8 @@ mod forecast;
 mod free_poses;
 mod gates;
 mod joint;
+mod local_errors;
+mod loose;
 mod measure;
 mod moved;
 mod places;
