@@ -36,6 +36,9 @@ pub(super) struct IdentifyArgs {
     /// Joint terms beside rigid geometry and offsets
     #[arg(long, value_enum, default_value_t = Model::Full)]
     robot_model: Model,
+    /// Lens: auto (by hold-out, says why), brown, fisheye, parallax, rational or thin_prism [default: as in series.toml, else brown]
+    #[arg(long, value_name = "LENS")]
+    camera: Option<String>,
     /// Where joint offsets go
     #[arg(long, value_enum, default_value_t = OffsetsName::Folded)]
     offsets: OffsetsName,
@@ -93,7 +96,15 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let pictures = Pictures::new();
     let all = pictures.of_recordings(all, &args.recording.options(&chain.readings)?)?;
     let mut notices = description.notices.clone();
-    let measured = measure_all(&all, &chain, &mut notices)?;
+    let mut measured = measure_all(&all, &chain, &mut notices)?;
+    match args.camera.as_deref() {
+        None => {}
+        Some("auto") => notices.extend(recipe::choose_lens(&chain, &mut measured)?),
+        Some(name) => {
+            let lens = super::simulate::lens(name)?;
+            measured.iter_mut().for_each(|s| s.lens = lens);
+        }
+    }
     let mut solution = recipe::identify(chain, &measured, &options)?;
     notices.append(&mut solution.notices);
     solution.notices = notices;

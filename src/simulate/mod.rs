@@ -14,4 +14,4 @@ pub mod truth;
 pub mod world;
 
 pub use observe::{is_seen, observe};
-pub use world::{RobotErrors, SimulatedSeries, WorldRequest, series, typical_camera};
+pub use world::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series, typical_camera};
