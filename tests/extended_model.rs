@@ -51,12 +51,7 @@ fn rms(errors: RobotErrors, model: RobotModel) -> f64 {
 
 #[test]
 fn gear_harmonic_and_sag_errors_need_the_extended_model() {
-    let errors = RobotErrors {
-        gear: 5e-4,
-        harmonic_rad: 0.2e-3,
-        gravity_rad: 0.4e-3,
-        ..RobotErrors::default()
-    };
+    let errors = RobotErrors { gear: 5e-4, harmonic_rad: 0.2e-3, gravity_rad: 0.4e-3, ..RobotErrors::default() };
     let (rigid, full) = (rms(errors, RobotModel::Rigid), rms(errors, RobotModel::Full));
     println!("present: rigid {:.4} mm, full {:.4} mm, {:.2} times", 1e3 * rigid, 1e3 * full, rigid / full);
     assert!(rigid > 3.0 * full, "{rigid} {full}");

@@ -6,6 +6,7 @@ mod compare;
 mod compensate;
 mod convert;
 mod identify;
+mod plan;
 mod plate;
 mod progress;
 mod recording;
@@ -50,6 +51,8 @@ enum Command {
     Convert(convert::ConvertArgs),
     /// Identify robot, camera, hand-camera offset and plate from one or more series
     Identify(identify::IdentifyArgs),
+    /// Plan where to take images, and say what they will be worth
+    Plan(Box<plan::PlanArgs>),
     /// Design a plate of coded circles and draw it for printing
     Plate(plate::PlateArgs),
     /// Make a series of a robot with known errors, with images or observations
@@ -74,6 +77,7 @@ impl Command {
             Self::Compensate(args) => compensate::run(args),
             Self::Convert(args) => convert::run(args),
             Self::Identify(args) => identify::run(args),
+            Self::Plan(args) => plan::run(args),
             Self::Plate(args) => plate::run(args),
             Self::Simulate(args) => simulate::run(args),
             Self::Verify(args) => verify::run(args),
