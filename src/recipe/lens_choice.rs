@@ -59,9 +59,9 @@ fn held_out_errors(chain: &Chain, series: &[MeasuredSeries], lens: Lens) -> Resu
     let robot = Robot::nominal(chain.clone());
     let mut all = series.to_vec();
     all.iter_mut().for_each(|s| s.lens = lens);
-    let (full, _) = build(&robot, &all)?;
-    let aside = |image: usize, marker: usize| (marker + 7 * image) % KEPT_ASIDE == 0;
-    let (mut problem, state) = build(&robot, &all)?;
+    let (full, _) = build(&robot, &all, false)?;
+    let aside = |image: usize, marker: usize| (marker + 7 * image).is_multiple_of(KEPT_ASIDE);
+    let (mut problem, state) = build(&robot, &all, false)?;
     for (i, image) in problem.images.iter_mut().enumerate() {
         image.observations.retain(|o| !aside(i, o.marker));
     }
