@@ -33,13 +33,13 @@ pub fn fit_lens(camera: &Camera, lens: Lens, depths_m: &[f64; 2]) -> Option<Lens
     let mut damping = 1e-6;
     let mut cost = squares(&fitted, &points)?;
     for _ in 0..STEPS {
-        let step = step(&fitted, &points, damping)?;
         let mut next = fitted.clone();
-        next.parameters.iter_mut().zip(&step).for_each(|(p, s)| *p += s);
-        match squares(&next, &points).filter(|c| *c <= cost) {
+        let step = step(&fitted, &points, damping);
+        next.parameters.iter_mut().zip(step.iter().flatten()).for_each(|(p, s)| *p += s);
+        match squares(&next, &points).filter(|c| step.is_some() && *c <= cost) {
             Some(lower) => {
                 let settled = cost - lower < 1e-12 * (cost + 1e-12);
-                (fitted, cost, damping) = (next, lower, (0.1 * damping).max(1e-14));
+                (fitted, cost, damping) = (next, lower, (0.1 * damping).max(1e-9));
                 if settled {
                     break;
                 }
