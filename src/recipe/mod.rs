@@ -11,6 +11,7 @@ mod gates;
 mod joint;
 mod lens_choice;
 mod local_errors;
+mod loose;
 mod measure;
 mod moved;
 mod plan;
