@@ -10,6 +10,7 @@
 //! | [`model`] | parameters -> predictions and Jacobians |
 //! | [`problem`] | parameter blocks, priors, columns, residuals |
 //! | [`plan`] | plate design, pose planning |
+//! | [`programs`] | program text -> targets -> program text for the real robot |
 //! | [`init`], [`solve`], [`assess`] | starting values, the solver, what the result is worth |
 //! | [`simulate`], [`recipe`] | a world with known truth; the modes of the program |
 //! | [`output`] | solution -> bytes |
@@ -27,6 +28,7 @@ pub mod model;
 pub mod output;
 pub mod plan;
 pub mod problem;
+pub mod programs;
 pub mod recipe;
 pub mod series;
 pub mod simulate;

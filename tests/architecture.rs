@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms from the bottom up; rooms on one level are peers and do not import each other, but for the pairs in `PEERS`.
-const LEVELS: [&[&str]; 12] = [
+const LEVELS: [&[&str]; 13] = [
     &["error"],
     &["geom", "linalg"],
     &["series", "urdf"],
@@ -13,6 +13,7 @@ const LEVELS: [&[&str]; 12] = [
     &["model"],
     &["problem"],
     &["plan"],
+    &["programs"],
     &["init", "solve"],
     &["assess"],
     &["recipe", "simulate"],

@@ -3,8 +3,10 @@
 //! To add a subcommand: a file with its `Args` and `run`, a variant of [`Command`] and a row in [`Command::run`].
 
 mod compare;
+mod compensate;
 mod convert;
 mod identify;
+mod plan;
 mod plate;
 mod progress;
 mod recording;
@@ -43,10 +45,14 @@ struct Cli {
 enum Command {
     /// Compare two-stage estimators with the joint fit, on a series or in simulation
     Compare(compare::CompareArgs),
+    /// Correct the targets of a robot program for the real robot, or move it to another robot
+    Compensate(Box<compensate::CompensateArgs>),
     /// Turn a recording (MCAP, rosbag2) into a series folder, or a series folder into a recording
     Convert(convert::ConvertArgs),
     /// Identify robot, camera, hand-camera offset and plate from one or more series
     Identify(identify::IdentifyArgs),
+    /// Plan where to take images, and say what they will be worth
+    Plan(Box<plan::PlanArgs>),
     /// Design a plate of coded circles and draw it for printing
     Plate(plate::PlateArgs),
     /// Make a series of a robot with known errors, with images or observations
@@ -68,8 +74,10 @@ impl Command {
     fn run(&self) -> Result<Verdict> {
         match self {
             Self::Compare(args) => compare::run(args),
+            Self::Compensate(args) => compensate::run(args),
             Self::Convert(args) => convert::run(args),
             Self::Identify(args) => identify::run(args),
+            Self::Plan(args) => plan::run(args),
             Self::Plate(args) => plate::run(args),
             Self::Simulate(args) => simulate::run(args),
             Self::Verify(args) => verify::run(args),

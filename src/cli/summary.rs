@@ -116,15 +116,17 @@ fn image_noise_px(s: &Solution, camera: usize) -> f64 {
 
 fn joint_noise(out: &mut String, s: &Solution) -> std::fmt::Result {
     let chain = &s.state.robot.chain;
-    for (k, sigma) in s.problem.noise.joint.iter().enumerate() {
-        let parts: Vec<String> = (chain.readings.iter().zip(&chain.reading_kinds).zip(sigma))
+    for k in 0..s.problem.cameras.len() {
+        let sigma = s.problem.joint_sigma(k);
+        let parts: Vec<String> = (chain.readings.iter().zip(&chain.reading_kinds).zip(&sigma))
             .map(|((name, kind), s)| match kind {
                 JointKind::Prismatic => format!("{name} {:.3} mm", 1e3 * s),
                 _ => format!("{name} {:.3}", 1e3 * s),
             })
             .collect();
         let camera = if s.problem.cameras.len() > 1 { format!(" ({})", s.problem.cameras[k]) } else { String::new() };
-        writeln!(out, "joints    noise in mrad{camera}: {}", parts.join(", "))?;
+        let tilt = s.problem.noise.tilt.get(k).map(|t| format!("; apparent tilt of the plate {:.3}", 1e3 * t));
+        writeln!(out, "joints    noise in mrad{camera}: {}{}", parts.join(", "), tilt.unwrap_or_default())?;
     }
     Ok(())
 }
@@ -141,7 +143,7 @@ const LEAST_SHARE: f64 = 0.1;
 
 fn undetermined(out: &mut String, s: &Solution) -> std::fmt::Result {
     let layout = &s.problem.layout;
-    let robot = layout.twists.start..layout.terms.end;
+    let robot = layout.robot();
     let gauge = GaugeNames::of(s);
     let weak: Vec<&str> = robot
         .clone()

@@ -15,6 +15,12 @@ pub mod capture {}
 #[doc = include_str!("reading_the_result.md")]
 pub mod reading_the_result {}
 
+#[doc = include_str!("planning.md")]
+pub mod planning {}
+
+#[doc = include_str!("programs.md")]
+pub mod programs {}
+
 #[doc = include_str!("decisions.md")]
 pub mod decisions {
     #[doc = include_str!("decisions/0001_pose_space.md")]

@@ -11,6 +11,8 @@ mod estimates;
 mod gauge;
 mod names;
 mod observation_table;
+pub mod plan_files;
+pub mod plan_start;
 pub mod plate_drawing;
 mod plate_files;
 mod plate_pdf;
@@ -27,7 +29,7 @@ mod write;
 
 pub use compensation_read::read_compensation;
 pub use report::report_html;
-pub use write::write_all;
+pub use write::{write_all, write_beside};
 
 use std::collections::BTreeMap;
 

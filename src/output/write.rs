@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::solution_json;
+use super::{plan_files, solution_json};
 use crate::error::{Error, Result};
 
 /// Writes all files into `dir`, replacing an earlier result as a whole: a failure leaves `dir` as it was.
@@ -27,6 +27,35 @@ pub fn write_all(dir: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
         let _ = fs::remove_dir_all(&new);
     }
     written
+}
+
+/// Writes files into a folder among whatever is there, each one whole or not at all; none of them may be one of `inputs`.
+///
+/// # Errors
+/// A file that is one of the inputs; anything that cannot be written or renamed.
+pub fn write_beside(dir: &Path, files: &[(String, &[u8])], inputs: &[PathBuf]) -> Result<()> {
+    let target = resolve(dir)?;
+    fs::create_dir_all(&target).map_err(|e| Error::io(&target, &e))?;
+    for (k, (name, _)) in files.iter().enumerate() {
+        let path = target.join(name);
+        let real = path.canonicalize().unwrap_or_else(|_| path.clone());
+        if inputs.iter().any(|i| i.canonicalize().is_ok_and(|i| i == real)) {
+            return Err(Error::input(path.display(), "is the input itself", "choose another folder with --out"));
+        }
+        if files[..k].iter().any(|(other, _)| other == name) {
+            return Err(Error::input(path.display(), "is the name of two files", "correct them one after the other"));
+        }
+    }
+    for (name, bytes) in files {
+        let path = target.join(name);
+        let new = beside(&path, "new")?;
+        let written = write_synced(&new, bytes).and_then(|()| fs::rename(&new, &path));
+        if let Err(error) = written {
+            let _ = fs::remove_file(&new);
+            return Err(Error::io(&path, &error));
+        }
+    }
+    Ok(())
 }
 
 /// The real path of the target, whose parent exists.
@@ -81,14 +110,17 @@ fn foreign_files(target: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<Vec
     }
 }
 
-/// Files of the result in a folder, as its solution.json lists them.
+/// Files of the result in a folder, as its solution.json or plan.json lists them.
 fn earlier_files(target: &Path) -> Option<BTreeSet<String>> {
     #[derive(Deserialize)]
     struct Listed {
         files: BTreeSet<String>,
     }
-    let bytes = fs::read(target.join(solution_json::FILE_NAME)).ok()?;
-    serde_json::from_slice::<Listed>(&bytes).ok().map(|l| l.files)
+    let listed = |name: &str| {
+        let bytes = fs::read(target.join(name)).ok()?;
+        serde_json::from_slice::<Listed>(&bytes).ok().map(|l| l.files)
+    };
+    listed(solution_json::FILE_NAME).or_else(|| listed(plan_files::FILE_NAME))
 }
 
 /// A name beside the target that nothing has yet.

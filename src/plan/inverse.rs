@@ -19,10 +19,10 @@ const TOLERANCE: f64 = 1e-9;
 /// Range of a joint that the URDF does not limit, rad.
 const UNLIMITED: (f64, f64) = (-std::f64::consts::PI, std::f64::consts::PI);
 
-/// Lower and upper limit of every reading, rad or m; joints without limits get one turn.
+/// Lower and upper limit of every reading that the URDF limits, rad or m.
 ///
 /// The limits of a mimic joint are limits of the joint that it follows.
-pub fn reading_limits(chain: &Chain) -> Vec<(f64, f64)> {
+pub fn stated_limits(chain: &Chain) -> Vec<Option<(f64, f64)>> {
     let mut limits: Vec<Option<(f64, f64)>> = vec![None; chain.readings.len()];
     for joint in &chain.joints {
         let (Some(drive), Some((low, high))) = (joint.drive, joint.limits) else { continue };
@@ -34,7 +34,12 @@ pub fn reading_limits(chain: &Chain) -> Vec<(f64, f64)> {
         let merged = limits[drive.reading].map_or(own, |(l, h)| (l.max(own.0), h.min(own.1)));
         limits[drive.reading] = Some(merged);
     }
-    limits.into_iter().map(|l| l.unwrap_or(UNLIMITED)).collect()
+    limits
+}
+
+/// Lower and upper limit of every reading, rad or m; joints without limits get one turn.
+pub fn reading_limits(chain: &Chain) -> Vec<(f64, f64)> {
+    stated_limits(chain).into_iter().map(|l| l.unwrap_or(UNLIMITED)).collect()
 }
 
 /// Readings drawn evenly from the joint ranges; from the inner full turn where a joint has more.
@@ -47,34 +52,77 @@ pub fn random_readings(limits: &[(f64, f64)], kinds: &[JointKind], rng: &mut imp
     limits.iter().zip(kinds).map(draw).collect()
 }
 
+/// A robot that is to bring its tip somewhere, and what its joints may do.
+#[derive(Debug, Clone, Copy)]
+pub struct Reach<'a> {
+    /// The robot, with its joint terms.
+    pub robot: &'a Robot,
+    /// Lower and upper limit of every reading, rad or m.
+    pub limits: &'a [(f64, f64)],
+    /// True for readings that keep the value of the start; empty: none.
+    pub held: &'a [bool],
+    /// Readings of the stop before, which tell the side of the backlash.
+    pub previous: Option<&'a [f64]>,
+}
+
+/// An iteration that did not arrive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stalled {
+    /// Where it ended, rad or m.
+    pub readings: Vec<f64>,
+    /// Body twist from there to the wanted pose, m and rad.
+    pub error: Vector6<f64>,
+}
+
+impl Reach<'_> {
+    /// The stop at these readings, with its approach.
+    pub fn stop(&self, readings: &[f64]) -> Stop {
+        let approach = self.previous.map(|p| readings.iter().zip(p).map(|(q, p)| q - p).collect());
+        Stop { readings: readings.to_vec(), approach }
+    }
+
+    /// Readings that bring the tip to `base_from_tip`: of all steps that lead there the shortest ones from `start`.
+    ///
+    /// # Errors
+    /// [`Stalled`] where the iteration does not get there within the limits.
+    pub fn solve_from(&self, base_from_tip: &Pose, start: &[f64]) -> Result<Vec<f64>, Stalled> {
+        let zeros = vec![0.0; start.len()];
+        let mut q = start.to_vec();
+        let mut last = f64::INFINITY;
+        let mut error = Vector6::zeros();
+        for _ in 0..STEPS {
+            let k = self.robot.kinematics(&self.stop(&q), &zeros);
+            error = (k.base_from_tip.inverse() * *base_from_tip).log();
+            let size = error.norm();
+            if size < TOLERANCE {
+                return Ok(q);
+            }
+            // Damping that vanishes with the error keeps the last steps those of Newton.
+            let damping = (1e-2 * size.min(last)).powi(2).max(1e-12);
+            last = size;
+            let free = |i: usize| !self.held.get(i).copied().unwrap_or(false);
+            let mut normal = Matrix6::identity() * damping;
+            for (_, j) in k.d_readings.iter().enumerate().filter(|(i, _)| free(*i)) {
+                normal += j * j.transpose();
+            }
+            let Some(factor) = normal.cholesky() else { break };
+            let weights: Vector6<f64> = factor.solve(&error);
+            let step = |(i, j): (usize, &Vector6<f64>)| if free(i) { j.dot(&weights) } else { 0.0 };
+            let step: Vec<f64> = k.d_readings.iter().enumerate().map(step).collect();
+            let longest = step.iter().fold(LONGEST_STEP, |m, s| m.max(s.abs()));
+            for (i, (q, s)) in q.iter_mut().zip(&step).enumerate().filter(|(i, _)| free(*i)) {
+                let (low, high) = self.limits[i];
+                *q = (*q + s * LONGEST_STEP / longest).clamp(low, high);
+            }
+        }
+        Err(Stalled { readings: q, error })
+    }
+}
+
 /// Readings that bring the tip to `base_from_tip`, found from `start`; `None` when the iteration does not get there within
 /// the limits.
 pub fn solve_from(robot: &Robot, limits: &[(f64, f64)], base_from_tip: &Pose, start: &[f64]) -> Option<Vec<f64>> {
-    let zeros = vec![0.0; start.len()];
-    let mut q = start.to_vec();
-    let mut last = f64::INFINITY;
-    for _ in 0..STEPS {
-        let k = robot.kinematics(&Stop::at(&q), &zeros);
-        let error = (k.base_from_tip.inverse() * *base_from_tip).log();
-        let size = error.norm();
-        if size < TOLERANCE {
-            return Some(q);
-        }
-        // Damping that vanishes with the error keeps the last steps those of Newton.
-        let damping = (1e-2 * size.min(last)).powi(2).max(1e-12);
-        last = size;
-        let mut normal = Matrix6::identity() * damping;
-        for j in &k.d_readings {
-            normal += j * j.transpose();
-        }
-        let weights: Vector6<f64> = normal.cholesky()?.solve(&error);
-        let step: Vec<f64> = k.d_readings.iter().map(|j| j.dot(&weights)).collect();
-        let longest = step.iter().fold(LONGEST_STEP, |m, s| m.max(s.abs()));
-        for ((q, s), (low, high)) in q.iter_mut().zip(&step).zip(limits) {
-            *q = (*q + s * LONGEST_STEP / longest).clamp(*low, *high);
-        }
-    }
-    None
+    Reach { robot, limits, held: &[], previous: None }.solve_from(base_from_tip, start).ok()
 }
 
 /// Readings that bring the tip to `base_from_tip`, from up to `starts` random starts.

@@ -5,11 +5,14 @@
 mod build;
 mod compare;
 mod focus;
+mod forecast;
 mod free_poses;
 mod gates;
 mod joint;
+mod local_errors;
 mod measure;
 mod moved;
+mod plan;
 mod simulated;
 mod solution;
 mod start;
@@ -19,9 +22,13 @@ mod two_stage;
 
 pub use build::{MeasuredSeries, MeasuredStop};
 pub use compare::{Comparison, ComparisonRow, HeldOut, TruthError, compare};
+pub use forecast::{
+    CurvePoint, Forecast, JointRange, ParameterForecast, exact_covariance, flange_m, forecast, image_name,
+};
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
 pub use joint::{JointNoise, Options, RobotModel, identify};
 pub use measure::{Measured, measure};
+pub use plan::{Budget, Plan, PlanRequest, Wish, plan};
 pub use simulated::measured;
 pub use solution::{Solution, StartVerdict};
 pub use study::{Study, StudyCell, StudyRequest, study};

@@ -1,0 +1,364 @@
+//! `robotcal compensate`: a program made for the nominal robot, corrected for the real one.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+
+use super::Verdict;
+use crate::error::{Error, Result};
+use crate::geom::{Pose, exp_so3};
+use crate::model::joint_terms::{JointTerm, Term};
+use crate::model::robot::Robot;
+use crate::output::{read_compensation, write_beside};
+use crate::programs::program::Posture;
+use crate::programs::{
+    self, Correction, Kind, Language, Left, Models, Outcome, Postures, Program, Setting, Target, TextFile,
+};
+use crate::urdf::{self, Chain, JointKind};
+
+/// Flags of `compensate`.
+#[derive(Debug, Args)]
+pub(super) struct CompensateArgs {
+    /// Program files of one language: tables (.csv), KRL (.src, .dat), RAPID (.mod) or URScript (.script)
+    #[arg(value_name = "PROGRAM", required = true)]
+    programs: Vec<PathBuf>,
+    /// Robot description that the controller uses, for which the program was made; with --from it is needed for poses only
+    #[arg(long, value_name = "FILE", required_unless_present = "from")]
+    nominal: Option<PathBuf>,
+    /// Robot description of the robot that runs the program (a corrected URDF)
+    #[arg(long, visible_alias = "to", value_name = "FILE")]
+    urdf: PathBuf,
+    /// Its compensation.toml: gear scale, harmonics, gravity and backlash, which a URDF cannot hold
+    #[arg(long, visible_alias = "to-compensation", value_name = "FILE")]
+    compensation: Option<PathBuf>,
+    /// Retarget: robot description of the robot on which the program was taught [default: the nominal one]
+    #[arg(long, value_name = "FILE")]
+    from: Option<PathBuf>,
+    /// compensation.toml of the robot on which the program was taught
+    #[arg(long, value_name = "FILE", requires = "from")]
+    from_compensation: Option<PathBuf>,
+    /// Folder for the corrected files, which keep their names
+    #[arg(long, value_name = "FOLDER", default_value = "compensated")]
+    out: PathBuf,
+    /// Language [default: by the extension of the files]
+    #[arg(long, value_enum)]
+    language: Option<LanguageName>,
+    /// Base link: the frame in which the controller computes poses
+    #[arg(long, value_name = "LINK")]
+    base: Option<String>,
+    /// Tip link: the controller's flange
+    #[arg(long, value_name = "LINK")]
+    tip: Option<String>,
+    /// Unit of the revolute joints in tables
+    #[arg(long, value_enum)]
+    joint_unit: Option<Unit>,
+    /// Joints in the order of the program's axes, separated by commas [default: as in the URDF, prismatic ones last]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    axes: Vec<String>,
+    /// Joints that keep their programmed value, separated by commas
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    hold: Vec<String>,
+    /// Joint values near which the first pose is reached, in deg (mm) and in the order of the axes, separated by commas [default: middle of the ranges]
+    #[arg(long, value_name = "VALUES", value_delimiter = ',', allow_hyphen_values = true)]
+    start: Vec<f64>,
+    /// Tool where the program sets none, in the notation of the language
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true)]
+    tool: Vec<f64>,
+    /// Work frame where the program sets none, in the notation of the language
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true)]
+    work: Vec<f64>,
+    /// The robot does not visit the targets in the order of the text: backlash stays out of account
+    #[arg(long)]
+    unordered: bool,
+    /// Ignore status and turn, or confdata: a pose means the posture next to the target before it
+    #[arg(long)]
+    nearest_posture: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Unit {
+    Rad,
+    Deg,
+}
+
+/// Names of the languages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LanguageName {
+    /// Table of joints or flange poses
+    Csv,
+    /// KUKA KRL
+    Krl,
+    /// ABB RAPID
+    Rapid,
+    /// Universal Robots URScript
+    Urscript,
+}
+
+impl From<LanguageName> for Language {
+    fn from(name: LanguageName) -> Self {
+        match name {
+            LanguageName::Csv => Self::Csv,
+            LanguageName::Krl => Self::Krl,
+            LanguageName::Rapid => Self::Rapid,
+            LanguageName::Urscript => Self::UrScript,
+        }
+    }
+}
+
+pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
+    let robot = |file: &Path, compensation: Option<&PathBuf>| -> Result<Robot> {
+        let chain = urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?;
+        let terms = compensation.map_or(Ok(Vec::new()), |c| read_compensation(c, &chain))?;
+        let counts = |t: &JointTerm| !args.unordered || t.term != Term::Backlash;
+        Ok(Robot { terms: terms.into_iter().filter(counts).collect(), ..Robot::nominal(chain) })
+    };
+    let nominal = args.nominal.as_ref().or(args.from.as_ref()).unwrap_or(&args.urdf);
+    let controller = robot(nominal, None)?;
+    let to = robot(&args.urdf, args.compensation.as_ref())?;
+    let from = args.from.as_ref().map(|f| robot(f, args.from_compensation.as_ref())).transpose()?;
+    for (file, other) in [(Some(&args.urdf), Some(&to)), (args.from.as_ref(), from.as_ref())] {
+        if let (Some(file), Some(other)) = (file, other) {
+            same_joints(nominal, &controller.chain, file, &other.chain)?;
+        }
+    }
+    let axes = axes(args, &controller.chain)?;
+    let language = language(args)?;
+    let setting = Setting {
+        chain: &controller.chain,
+        axes: &axes,
+        rad_per_unit: args.joint_unit.map(|u| if u == Unit::Deg { 1f64.to_radians() } else { 1.0 }),
+        tool: frame("--tool", &args.tool, language)?,
+        work: frame("--work", &args.work, language)?,
+    };
+    let files = args.programs.iter().map(|p| text_file(p)).collect::<Result<_>>()?;
+    let mut program = programs::read(language, files, &setting)?;
+    let needs_controller = |t: &&Target| matches!(&t.kind, Kind::Pose(p) if p.joint_fields.iter().all(Option::is_none));
+    if let (None, Some(t)) = (&args.nominal, program.targets.iter().find(needs_controller)) {
+        let place = format!("{}:{} {}", program.files[t.file].name, t.line, t.name);
+        let what = "is a pose, which the controller turns into joints by its own model";
+        return Err(Error::input(place, what, "give that model with --nominal"));
+    }
+    if args.nearest_posture {
+        for target in &mut program.targets {
+            if let Kind::Pose(pose) = &mut target.kind {
+                pose.posture = Posture::Nearest;
+            }
+        }
+    }
+    let models = Models { controller: &controller, from: from.as_ref().unwrap_or(&controller), to: &to };
+    let done = programs::compensate(&program, models, &postures(args, &controller.chain, &axes)?);
+    let left = done.left(&program);
+    let report = report_csv(&program, &done.outcomes, &controller.chain);
+    let mut written: Vec<(String, &[u8])> = Vec::new();
+    for (path, bytes) in args.programs.iter().zip(&done.files) {
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        written.push((name, bytes));
+    }
+    written.push((REPORT.to_owned(), report.as_bytes()));
+    write_beside(&args.out, &written, &args.programs)?;
+    print!("{}", text(&program, &done.outcomes, &left, &controller.chain));
+    println!("results   {} ({} files)", args.out.display(), written.len());
+    Ok(if left.is_empty() { Verdict::Good } else { Verdict::GateFailed })
+}
+
+/// Name of the table of corrections.
+const REPORT: &str = "corrections.csv";
+
+fn language(args: &CompensateArgs) -> Result<Language> {
+    if let Some(name) = args.language {
+        return Ok(name.into());
+    }
+    let mut all = args.programs.iter().map(|p| Language::of_file(p).map(|l| (p, l)));
+    let Some((first, language)) = all.next().transpose()? else {
+        return Err(Error::input("compensate", "no program is given", "name at least one file"));
+    };
+    for other in all {
+        let (path, other) = other?;
+        if other != language {
+            let what = format!("is of another language than {}", first.display());
+            return Err(Error::input(path.display(), what, "give programs of one language, or --language"));
+        }
+    }
+    Ok(language)
+}
+
+fn text_file(path: &Path) -> Result<TextFile> {
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+    if bytes.contains(&0) {
+        let what = "is not a text of single bytes (it holds zero bytes, as UTF-16 does)";
+        return Err(Error::input(path.display(), what, "save it as UTF-8 or as the controller writes it"));
+    }
+    Ok(TextFile { name: path.display().to_string(), bytes })
+}
+
+/// The readings of both chains are the same.
+fn same_joints(file: &Path, chain: &Chain, other_file: &Path, other: &Chain) -> Result<()> {
+    if chain.readings == other.readings && chain.reading_kinds == other.reading_kinds {
+        return Ok(());
+    }
+    let what = format!(
+        "has the joints {} from {} to {}, but {} has {}",
+        other.readings.join(", "),
+        other.base,
+        other.tip,
+        file.display(),
+        chain.readings.join(", ")
+    );
+    Err(Error::input(
+        other_file.display(),
+        what,
+        "give descriptions of the same type of robot; choose --base and --tip",
+    ))
+}
+
+fn known(flag: &str, name: &str, chain: &Chain) -> Result<usize> {
+    chain.readings.iter().position(|r| r == name).ok_or_else(|| {
+        let what = format!("\"{name}\" is no joint of the chain");
+        Error::input(flag, what, format!("its joints are {}", chain.readings.join(", ")))
+    })
+}
+
+/// Readings in the order of the program's axes.
+fn axes(args: &CompensateArgs, chain: &Chain) -> Result<Vec<usize>> {
+    let n = chain.readings.len();
+    if args.axes.is_empty() {
+        let turning = |i: &usize| chain.reading_kinds[*i] != JointKind::Prismatic;
+        return Ok((0..n).filter(turning).chain((0..n).filter(|i| !turning(i))).collect());
+    }
+    let axes: Vec<usize> = args.axes.iter().map(|name| known("--axes", name, chain)).collect::<Result<_>>()?;
+    let all = (0..n).all(|i| axes.iter().filter(|a| **a == i).count() == 1);
+    let remedy = format!("name each of {} once", chain.readings.join(", "));
+    if all { Ok(axes) } else { Err(Error::input("--axes", "does not name every joint once", remedy)) }
+}
+
+fn postures(args: &CompensateArgs, chain: &Chain, axes: &[usize]) -> Result<Postures> {
+    let mut held = vec![false; chain.readings.len()];
+    for name in &args.hold {
+        held[known("--hold", name, chain)?] = true;
+    }
+    let limits = crate::plan::inverse::reading_limits(chain);
+    // A straight arm is singular: a little beside the middle of the ranges.
+    let mut start: Vec<f64> =
+        limits.iter().map(|(low, high)| 0.5 * (low + high) + 0.05 * (high - low).min(2.0)).collect();
+    if !args.start.is_empty() {
+        if args.start.len() != axes.len() {
+            let what = format!("{} values for {} joints", args.start.len(), axes.len());
+            return Err(Error::input("--start", what, "give one value for each joint, in deg (mm)"));
+        }
+        for (&reading, value) in axes.iter().zip(&args.start) {
+            let prismatic = chain.reading_kinds[reading] == JointKind::Prismatic;
+            start[reading] = if prismatic { 1e-3 * value } else { value.to_radians() };
+        }
+    }
+    Ok(Postures { held, start })
+}
+
+/// A frame on the command line, in the notation of the language.
+fn frame(flag: &str, numbers: &[f64], language: Language) -> Result<Option<Pose>> {
+    if numbers.is_empty() {
+        return Ok(None);
+    }
+    let bad = |remedy: &str| Error::input(flag, format!("{} numbers", numbers.len()), remedy);
+    match (language, numbers) {
+        (Language::UrScript, &[x, y, z, rx, ry, rz]) => {
+            Ok(Some(Pose::new(exp_so3(&[rx, ry, rz].into()), [x, y, z].into())))
+        }
+        (Language::UrScript, _) => Err(bad("give x,y,z,rx,ry,rz in m and rad")),
+        (Language::Krl, &[x, y, z, a, b, c]) => {
+            let [x, y, z] = [x, y, z].map(|v| 1e-3 * v);
+            Ok(Some(Pose::from_xyz_rpy([x, y, z], [c, b, a].map(f64::to_radians))))
+        }
+        (Language::Krl, _) => Err(bad("give X,Y,Z,A,B,C in mm and deg")),
+        (Language::Rapid, &[x, y, z, q1, q2, q3, q4]) => {
+            Ok(Some(Pose::from_xyz_quaternion([x, y, z].map(|v| 1e-3 * v), [q2, q3, q4, q1])))
+        }
+        (Language::Rapid, _) => Err(bad("give x,y,z,q1,q2,q3,q4 in mm, q1 the scalar part")),
+        (Language::Csv, &[x, y, z, qx, qy, qz, qw]) => Ok(Some(Pose::from_xyz_quaternion([x, y, z], [qx, qy, qz, qw]))),
+        (Language::Csv, _) => Err(bad("give x_m,y_m,z_m,qx,qy,qz,qw")),
+    }
+}
+
+/// One row for every target: what the correction is, or why there is none.
+fn report_csv(program: &Program, outcomes: &[Outcome], chain: &Chain) -> String {
+    let mut out = String::from(
+        "file,line,target,correction_mm,correction_mrad,largest_joint_change,joint,residual_m,residual_rad,left_because\n",
+    );
+    let cell = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+    for (t, outcome) in program.targets.iter().zip(outcomes) {
+        let head = format!("{},{},{}", cell(&program.files[t.file].name), t.line, cell(&t.name));
+        let _ = match outcome {
+            Outcome::Done(c) => {
+                let (joint, change) = c.largest_change();
+                let (mm, mrad) = (1e3 * c.shift_m, 1e3 * c.turn_rad);
+                let (name, rest_m, rest_rad) = (cell(&chain.readings[joint]), c.residual_m, c.residual_rad);
+                writeln!(out, "{head},{mm:.4},{mrad:.4},{change:.9},{name},{rest_m:.2e},{rest_rad:.2e},")
+            }
+            Outcome::Left(why) => writeln!(out, "{head},,,,,,,{}", cell(why)),
+        };
+    }
+    for l in &program.left {
+        let _ =
+            writeln!(out, "{},{},{},,,,,,,{}", cell(&program.files[l.file].name), l.line, cell(&l.name), cell(&l.why));
+    }
+    out
+}
+
+/// Targets listed one by one on the terminal; more only by their largest corrections.
+const SHOWN: usize = 10;
+
+fn text(program: &Program, outcomes: &[Outcome], left: &[Left], chain: &Chain) -> String {
+    let mut done: Vec<(usize, &Correction)> = outcomes
+        .iter()
+        .enumerate()
+        .filter_map(|(k, o)| if let Outcome::Done(c) = o { Some((k, c)) } else { None })
+        .collect();
+    let rms = |of: fn(&Correction) -> f64| {
+        1e3 * (done.iter().map(|(_, c)| of(c).powi(2)).sum::<f64>() / done.len().max(1) as f64).sqrt()
+    };
+    let worst = |of: fn(&Correction) -> f64| done.iter().map(|(_, c)| of(c)).fold(0.0, f64::max);
+    let mut out = format!("targets   {} corrected, {} left as they are\n", done.len(), left.len());
+    if !done.is_empty() {
+        let _ = writeln!(
+            out,
+            "correction {:.3} mm and {:.3} mrad RMS, at most {:.3} mm and {:.3} mrad",
+            rms(|c| c.shift_m),
+            rms(|c| c.turn_rad),
+            1e3 * worst(|c| c.shift_m),
+            1e3 * worst(|c| c.turn_rad)
+        );
+        let _ = writeln!(
+            out,
+            "residual  at most {:.1e} m and {:.1e} rad, with the numbers as written",
+            worst(|c| c.residual_m),
+            worst(|c| c.residual_rad)
+        );
+    }
+    if done.len() > SHOWN {
+        let _ = writeln!(out, "largest   {SHOWN} of {} (all in {REPORT}):", done.len());
+        done.sort_by(|a, b| b.1.shift_m.total_cmp(&a.1.shift_m));
+        done.truncate(SHOWN);
+    }
+    for (k, c) in done {
+        let t = &program.targets[k];
+        let (joint, change) = c.largest_change();
+        let change = match chain.reading_kinds[joint] {
+            JointKind::Prismatic => format!("{:+.4} mm", 1e3 * change),
+            _ => format!("{:+.4} deg", change.to_degrees()),
+        };
+        let (mm, mrad) = (1e3 * c.shift_m, 1e3 * c.turn_rad);
+        let file = &program.files[t.file].name;
+        let _ = writeln!(
+            out,
+            "  {file}:{} {}: {mm:.3} mm, {mrad:.3} mrad; {} {change}",
+            t.line, t.name, chain.readings[joint]
+        );
+    }
+    for notice in &program.notices {
+        let _ = writeln!(out, "note      {notice}");
+    }
+    for l in left {
+        let _ = writeln!(out, "left      {}:{} {}: {}", program.files[l.file].name, l.line, l.name, l.why);
+    }
+    out
+}

@@ -1,0 +1,254 @@
+//! Targets of a program and how they are written.
+
+use std::f64::consts::PI;
+
+use super::codes::Codes;
+use super::field::{Edit, Field};
+use crate::error::Notice;
+use crate::geom::{Pose, exp_so3, log_so3, matrix_from_rpy, rpy_from_matrix};
+
+/// One file of a program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TextFile {
+    /// Name for messages.
+    pub name: String,
+    /// Its bytes, in whatever encoding its comments are.
+    pub bytes: Vec<u8>,
+}
+
+/// A program with what was found in it.
+#[derive(Debug, Clone)]
+pub struct Program {
+    /// Its files.
+    pub files: Vec<TextFile>,
+    /// Targets in the order in which the robot first visits them.
+    pub targets: Vec<Target>,
+    /// Targets that are there, but cannot be understood from the text alone.
+    pub left: Vec<Left>,
+    /// Edits that are made in any case (names of new columns).
+    pub edits: Vec<Edit>,
+    /// What the user should know.
+    pub notices: Vec<Notice>,
+}
+
+/// A target that stays as it is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Left {
+    /// Index of the file.
+    pub file: usize,
+    /// Line, from 1.
+    pub line: usize,
+    /// Name in the program, or the instruction.
+    pub name: String,
+    /// Why.
+    pub why: String,
+}
+
+/// A value, or why its target stays as it is.
+pub(super) type Understood<T> = std::result::Result<T, String>;
+
+/// One target.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Target {
+    /// Index of the file.
+    pub file: usize,
+    /// Line, from 1.
+    pub line: usize,
+    /// Name in the program, or the instruction.
+    pub name: String,
+    /// True where the target before it in the list is the one that the robot comes from.
+    pub follows: bool,
+    /// What it says.
+    pub kind: Kind,
+}
+
+/// What a target says.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Kind {
+    /// Joint values.
+    Joints(JointTarget),
+    /// A pose of the tool.
+    Pose(Box<PoseTarget>),
+}
+
+/// Joint values, one for every reading of the chain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointTarget {
+    /// rad or m; not finite where the text leaves an axis out.
+    pub readings: Vec<f64>,
+    /// Their numbers in the text; `None` for axes that the target does not have (they are held).
+    pub fields: Vec<Option<Field>>,
+}
+
+/// A pose of the tool in a work object, as the controller computes it with its own model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseTarget {
+    /// Position fields, m.
+    pub position: [Field; 3],
+    /// Rotation fields.
+    pub rotation: RotationFields,
+    /// `base_from_work`.
+    pub base_from_work: Pose,
+    /// `flange_from_tool`.
+    pub flange_from_tool: Pose,
+    /// Values of the axes that the target fixes beside the pose (external axes), by reading.
+    pub fixed: Vec<Option<f64>>,
+    /// Which of the postures that reach the pose is meant.
+    pub posture: Posture,
+    /// Where the joints of the corrected target go, beside the pose: numbers by reading.
+    pub joint_fields: Vec<Option<Field>>,
+}
+
+/// How a rotation is written.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RotationFields {
+    /// `A`, `B`, `C` with `R = Rz(A) Ry(B) Rx(C)`, rad.
+    Abc([Field; 3]),
+    /// Rotation vector, rad.
+    Vector([Field; 3]),
+    /// Quaternion in the order x, y, z, w.
+    Quaternion([Field; 4]),
+}
+
+/// Which of the postures that reach a pose is meant.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Posture {
+    /// That next to the target before.
+    Nearest,
+    /// That next to these joint values, rad or m.
+    Near(Vec<f64>),
+    /// That of the codes in the text; the six readings are those of axes 1 to 6.
+    Coded(Codes, [usize; 6]),
+}
+
+impl PoseTarget {
+    /// `base_from_flange` of the text as it is.
+    pub fn base_from_flange(&self) -> Pose {
+        self.base_from_work * self.work_from_tool() * self.flange_from_tool.inverse()
+    }
+
+    /// Fills numbers that the text leaves out (not finite so far) with those of the pose before.
+    pub(super) fn complete(&mut self, base_from_flange: &Pose) {
+        let before = self.base_from_work.inverse() * *base_from_flange * self.flange_from_tool;
+        let fill = |field: &mut Field, value: f64| {
+            if !field.written.is_finite() {
+                field.written = value / field.si;
+            }
+        };
+        self.position.iter_mut().zip(before.xyz()).for_each(|(f, v)| fill(f, v));
+        if let RotationFields::Abc(fields) = &mut self.rotation {
+            let [c, b, a] = before.rpy();
+            fields.iter_mut().zip([a, b, c]).for_each(|(f, v)| fill(f, v));
+        }
+    }
+
+    /// True where the text leaves numbers out.
+    pub(super) fn is_partial(&self) -> bool {
+        let rotation = match &self.rotation {
+            RotationFields::Abc(f) | RotationFields::Vector(f) => &f[..],
+            RotationFields::Quaternion(f) => &f[..],
+        };
+        self.position.iter().chain(rotation).any(|f| !f.written.is_finite())
+    }
+
+    fn work_from_tool(&self) -> Pose {
+        let position = self.position.each_ref().map(Field::value);
+        Pose::new(self.rotation.matrix(), position.into())
+    }
+
+    /// Edits that write another `base_from_flange`, and the pose that a reader of the new text finds.
+    pub fn edits(&self, base_from_flange: &Pose, files: &[TextFile]) -> (Vec<Edit>, Pose) {
+        let new = self.base_from_work.inverse() * *base_from_flange * self.flange_from_tool;
+        let mut edits = Vec::new();
+        let mut write = |field: &Field, value: f64| {
+            let (edit, read) = field.edit(value, &files[field.file].bytes);
+            edits.extend(edit);
+            read
+        };
+        let position = [0, 1, 2].map(|i| write(&self.position[i], new.translation[i]));
+        let rotation = self.rotation.write(&new, &mut write);
+        let read = Pose::new(rotation, position.into());
+        (edits, self.base_from_work * read * self.flange_from_tool.inverse())
+    }
+}
+
+impl RotationFields {
+    fn matrix(&self) -> nalgebra::Matrix3<f64> {
+        match self {
+            Self::Abc(fields) => {
+                let [a, b, c] = fields.each_ref().map(Field::value);
+                matrix_from_rpy([c, b, a])
+            }
+            Self::Vector(fields) => exp_so3(&fields.each_ref().map(Field::value).into()),
+            Self::Quaternion(fields) => {
+                Pose::from_xyz_quaternion([0.0; 3], fields.each_ref().map(Field::value)).rotation
+            }
+        }
+    }
+
+    /// Writes the rotation of `new` in the way nearest to the text as it is; returns what a reader finds.
+    fn write(&self, new: &Pose, write: &mut impl FnMut(&Field, f64) -> f64) -> nalgebra::Matrix3<f64> {
+        match self {
+            Self::Abc(fields) => {
+                let old = fields.each_ref().map(Field::value);
+                let best = abc_near(&new.rotation, old);
+                let [a, b, c] = [0, 1, 2].map(|i| write(&fields[i], best[i]));
+                matrix_from_rpy([c, b, a])
+            }
+            Self::Vector(fields) => {
+                let old = nalgebra::Vector3::from(fields.each_ref().map(Field::value));
+                let short = log_so3(&new.rotation);
+                let angle = short.norm();
+                // Whole turns more or less about the same axis say the same.
+                let turned =
+                    |turns: f64| if angle < 1e-9 { short } else { short * ((angle + 2.0 * PI * turns) / angle) };
+                let best = [-2.0, -1.0, 1.0, 2.0]
+                    .map(turned)
+                    .into_iter()
+                    .fold(short, |best, v| if (v - old).norm() < (best - old).norm() - 1e-9 { v } else { best });
+                exp_so3(&[0, 1, 2].map(|i| write(&fields[i], best[i])).into())
+            }
+            Self::Quaternion(fields) => {
+                let old = fields.each_ref().map(Field::value);
+                let q = new.quaternion_xyzw();
+                let sign = if q.iter().zip(old).map(|(a, b)| a * b).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
+                let read = [0, 1, 2, 3].map(|i| write(&fields[i], sign * q[i]));
+                Pose::from_xyz_quaternion([0.0; 3], read).rotation
+            }
+        }
+    }
+}
+
+/// Of all ways to write a rotation as A, B, C (rad), the one nearest to `old`.
+fn abc_near(rotation: &nalgebra::Matrix3<f64>, old: [f64; 3]) -> [f64; 3] {
+    let [c, b, a] = rpy_from_matrix(rotation);
+    let unwound = |abc: [f64; 3]| {
+        let turn = |k: usize| abc[k] + 2.0 * PI * ((old[k] - abc[k]) / (2.0 * PI)).round();
+        [turn(0), turn(1), turn(2)]
+    };
+    let far = |abc: &[f64; 3]| abc.iter().zip(old).map(|(x, o)| (x - o).abs()).fold(0.0, f64::max);
+    let ways = [unwound([a, b, c]), unwound([a + PI, PI - b, c + PI])];
+    if far(&ways[1]) < far(&ways[0]) - 1e-9 { ways[1] } else { ways[0] }
+}
+
+impl JointTarget {
+    /// Edits that write other readings, and the readings that a reader of the new text finds.
+    pub fn edits(&self, readings: &[f64], files: &[TextFile]) -> (Vec<Edit>, Vec<f64>) {
+        write_joints(&self.fields, readings, files)
+    }
+}
+
+/// Edits that write readings where they have a number in the text.
+pub(super) fn write_joints(fields: &[Option<Field>], readings: &[f64], files: &[TextFile]) -> (Vec<Edit>, Vec<f64>) {
+    let mut edits = Vec::new();
+    let write = |(field, value): (&Option<Field>, &f64)| match field {
+        None => *value,
+        Some(field) => {
+            let (edit, read) = field.edit(*value, &files[field.file].bytes);
+            edits.extend(edit);
+            read
+        }
+    };
+    let read = fields.iter().zip(readings).map(write).collect();
+    (edits, read)
+}

@@ -1,0 +1,231 @@
+//! CSV tables of targets: one row each, visited in their order.
+//!
+//! Joint targets have one column for every joint, named as in the URDF. Flange poses have `x_m,y_m,z_m,qx,qy,qz,qw`; they get joint
+//! columns with the result, and joint columns that are there already say which posture is meant.
+
+use std::ops::Range;
+
+use super::Setting;
+use super::field::{Edit, Field, Place};
+use super::program::{JointTarget, Kind, PoseTarget, Posture, Program, RotationFields, Target, TextFile};
+use crate::error::{Error, Result, closest_name};
+use crate::geom::Pose;
+use crate::urdf::JointKind;
+
+const POSE_COLUMNS: [&str; 7] = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"];
+/// Decimals of angles in rad and of lengths in m; two fewer for degrees.
+const DECIMALS: usize = 9;
+
+/// A row: its line and the bytes of its cells, quotes and blanks left out.
+struct Row {
+    line: usize,
+    cells: Vec<Range<usize>>,
+    /// Byte after its last cell.
+    end: usize,
+}
+
+/// Cells of a row within `range` of the bytes.
+fn cells(bytes: &[u8], range: Range<usize>, separator: u8) -> Vec<Range<usize>> {
+    let mut out = Vec::new();
+    let mut start = range.start;
+    let mut quoted = false;
+    for at in range.clone() {
+        quoted ^= bytes[at] == b'"';
+        if bytes[at] == separator && !quoted {
+            out.push(trimmed(bytes, start..at));
+            start = at + 1;
+        }
+    }
+    out.push(trimmed(bytes, start..range.end));
+    out
+}
+
+fn trimmed(bytes: &[u8], range: Range<usize>) -> Range<usize> {
+    let cell = &bytes[range.clone()];
+    let blank = |b: &u8| b.is_ascii_whitespace() || *b == b'"';
+    let (head, tail) =
+        (cell.iter().take_while(|b| blank(b)).count(), cell.iter().rev().take_while(|b| blank(b)).count());
+    if head == cell.len() { range.start..range.start } else { range.start + head..range.end - tail }
+}
+
+/// All rows that are not blank; the first is the header.
+fn rows(file: &TextFile) -> (Vec<Row>, u8) {
+    let bytes = file.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&file.bytes);
+    let mut start = file.bytes.len() - bytes.len();
+    let first = bytes.split(|b| *b == b'\n').next().unwrap_or_default();
+    let separator = [b',', b';', b'\t'].into_iter().find(|s| first.contains(s)).unwrap_or(b',');
+    let mut out = Vec::new();
+    for (number, text) in (1..).zip(bytes.split(|b| *b == b'\n')) {
+        let end = start + text.len() - usize::from(text.ends_with(b"\r"));
+        if !text.trim_ascii().is_empty() {
+            out.push(Row { line: number, cells: cells(&file.bytes, start..end, separator), end });
+        }
+        start += text.len() + 1;
+    }
+    (out, separator)
+}
+
+/// Columns of the table, by what they mean.
+struct Columns {
+    names: Vec<String>,
+    pose: Option<[usize; 7]>,
+    /// Column of every reading; empty where there are none.
+    joints: Vec<usize>,
+}
+
+fn columns(file: &TextFile, header: &Row, setting: &Setting<'_>) -> Result<Columns> {
+    let text = |r: &Range<usize>| String::from_utf8_lossy(&file.bytes[r.clone()]).into_owned();
+    let names: Vec<String> = header.cells.iter().map(text).collect();
+    let place = || format!("{}:{}", file.name, header.line);
+    if let Some(twice) = (1..names.len()).find(|&i| names[..i].contains(&names[i])) {
+        return Err(Error::input(place(), format!("two columns are named \"{}\"", names[twice]), "rename one"));
+    }
+    let find = |name: &str| names.iter().position(|n| n == name);
+    let all = |wanted: &[&str]| -> Result<Vec<usize>> {
+        let (there, missing): (Vec<&str>, Vec<&str>) = wanted.iter().copied().partition(|n| find(n).is_some());
+        match missing.first() {
+            Some(name) if !there.is_empty() => {
+                let what = format!("has no column \"{name}\" (its columns are {})", names.join(", "));
+                let remedy = match closest_name(name, names.iter().map(String::as_str)) {
+                    Some(meant) => format!("rename \"{meant}\" to \"{name}\""),
+                    None => format!("add it: {} belong together", wanted.join(", ")),
+                };
+                Err(Error::input(place(), what, remedy))
+            }
+            _ => Ok(there.into_iter().filter_map(find).collect()),
+        }
+    };
+    let pose = <[usize; 7]>::try_from(all(&POSE_COLUMNS)?).ok();
+    let readings: Vec<&str> = setting.chain.readings.iter().map(String::as_str).collect();
+    let joints = all(&readings)?;
+    if pose.is_none() && joints.is_empty() {
+        let what = format!("has neither joint columns nor pose columns (its columns are {})", names.join(", "));
+        let remedy = format!("name them {}, or {}", readings.join(", "), POSE_COLUMNS.join(", "));
+        return Err(Error::input(place(), what, remedy));
+    }
+    Ok(Columns { names, pose, joints })
+}
+
+/// Reads one table.
+pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
+    let mut program = Program { files, targets: Vec::new(), left: Vec::new(), edits: Vec::new(), notices: Vec::new() };
+    let mut targets = Vec::new();
+    for index in 0..program.files.len() {
+        let file = &program.files[index];
+        let (rows, separator) = rows(file);
+        let Some((header, rows)) = rows.split_first() else {
+            return Err(Error::input(&file.name, "is empty", "its first line names the columns"));
+        };
+        let columns = columns(file, header, setting)?;
+        let table = Table { file, index, columns, separator, setting };
+        if table.columns.joints.is_empty() {
+            let names = setting.chain.readings.iter().map(|n| format!("{}{n}", char::from(separator)));
+            program.edits.push(Edit { file: index, range: header.end..header.end, text: names.collect() });
+        }
+        for (k, row) in rows.iter().enumerate() {
+            targets.push(table.target(row, k > 0)?);
+        }
+    }
+    program.targets = targets;
+    Ok(program)
+}
+
+struct Table<'a> {
+    file: &'a TextFile,
+    index: usize,
+    columns: Columns,
+    separator: u8,
+    setting: &'a Setting<'a>,
+}
+
+impl Table<'_> {
+    fn target(&self, row: &Row, follows: bool) -> Result<Target> {
+        if row.cells.len() != self.columns.names.len() {
+            let what = format!("{} cells under {} column names", row.cells.len(), self.columns.names.len());
+            let place = format!("{}:{}", self.file.name, row.line);
+            return Err(Error::input(place, what, "give every row all cells; numbers need a decimal point"));
+        }
+        let kind = match self.columns.pose {
+            None => Kind::Joints(self.joints(row)?),
+            Some(pose) => Kind::Pose(Box::new(self.pose(row, pose)?)),
+        };
+        Ok(Target { file: self.index, line: row.line, name: format!("row {}", row.line), follows, kind })
+    }
+
+    fn joints(&self, row: &Row) -> Result<JointTarget> {
+        let fields = self.joint_fields(row)?;
+        let readings = fields.iter().map(Field::value).collect();
+        Ok(JointTarget { readings, fields: fields.into_iter().map(Some).collect() })
+    }
+
+    fn joint_fields(&self, row: &Row) -> Result<Vec<Field>> {
+        let units = self.units()?;
+        let field = |(&column, (si, decimals)): (&usize, (f64, usize))| self.field(row, column, si, decimals);
+        self.columns.joints.iter().zip(units).map(field).collect()
+    }
+
+    /// SI value and decimals of every reading's unit.
+    fn units(&self) -> Result<Vec<(f64, usize)>> {
+        let kinds = &self.setting.chain.reading_kinds;
+        let Some(rad) = self.setting.rad_per_unit else {
+            let what = "does not tell whether its joints are in rad or deg";
+            return Err(Error::input(&self.file.name, what, "add --joint-unit rad or --joint-unit deg"));
+        };
+        let unit = |kind: &JointKind| match kind {
+            JointKind::Prismatic => (1.0, DECIMALS),
+            _ if rad == 1.0 => (1.0, DECIMALS),
+            _ => (rad, DECIMALS - 2),
+        };
+        Ok(kinds.iter().map(unit).collect())
+    }
+
+    fn pose(&self, row: &Row, columns: [usize; 7]) -> Result<PoseTarget> {
+        let field = |k: usize| self.field(row, columns[k], 1.0, DECIMALS);
+        let q = [field(3)?, field(4)?, field(5)?, field(6)?];
+        let norm = q.iter().map(|f| f.value().powi(2)).sum::<f64>().sqrt();
+        if (norm - 1.0).abs() > 1e-3 {
+            let place = format!("{}:{}", self.file.name, row.line);
+            return Err(Error::input(
+                place,
+                format!("the quaternion has the norm {norm}, not 1"),
+                "order: qx, qy, qz, qw",
+            ));
+        }
+        let empty = |c: &usize| row.cells[*c].is_empty();
+        let given = !self.columns.joints.is_empty() && !self.columns.joints.iter().all(empty);
+        let posture = if given { Posture::Near(self.joints(row)?.readings) } else { Posture::Nearest };
+        let joint_fields = if given { self.joint_fields(row)? } else { self.new_joint_fields(row)? };
+        Ok(PoseTarget {
+            position: [field(0)?, field(1)?, field(2)?],
+            rotation: RotationFields::Quaternion(q),
+            base_from_work: self.setting.work.unwrap_or_else(Pose::identity),
+            flange_from_tool: self.setting.tool.unwrap_or_else(Pose::identity),
+            fixed: vec![None; self.setting.chain.readings.len()],
+            posture,
+            joint_fields: joint_fields.into_iter().map(Some).collect(),
+        })
+    }
+
+    /// Fields of joints in empty cells, or behind the row.
+    fn new_joint_fields(&self, row: &Row) -> Result<Vec<Field>> {
+        let new = |(k, (si, decimals)): (usize, (f64, usize))| {
+            let place = match self.columns.joints.get(k) {
+                Some(&column) => Place::Missing(row.cells[column].start, String::new()),
+                None => Place::Missing(row.end, char::from(self.separator).to_string()),
+            };
+            Field { file: self.index, place, written: f64::NAN, si, decimals }
+        };
+        Ok(self.units()?.into_iter().enumerate().map(new).collect())
+    }
+
+    fn field(&self, row: &Row, column: usize, si: f64, decimals: usize) -> Result<Field> {
+        let range = row.cells[column].clone();
+        let cell = String::from_utf8_lossy(&self.file.bytes[range.clone()]);
+        let written = cell.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
+            let place = format!("{}:{}", self.file.name, row.line);
+            let what = format!("column {}: \"{cell}\" is not a number", self.columns.names[column]);
+            Error::input(place, what, "write a finite number with a decimal point")
+        })?;
+        Ok(Field { file: self.index, place: Place::At(range), written, si, decimals })
+    }
+}
