@@ -226,6 +226,7 @@ fn request(args: &SimulateArgs) -> Result<WorldRequest> {
             ..ViewRange::default()
         },
         least_markers: args.least_markers,
+        postures: None,
         held_out: args.held_out,
         joint_unit: match args.joint_unit {
             Unit::Rad => AngleUnit::Rad,

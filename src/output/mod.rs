@@ -12,6 +12,7 @@ mod gauge;
 mod names;
 mod observation_table;
 pub mod plan_files;
+pub mod plan_programs;
 pub mod plan_start;
 pub mod plate_drawing;
 mod plate_files;
@@ -28,7 +29,7 @@ mod text;
 mod write;
 
 pub use compensation_read::read_compensation;
-pub use report::report_html;
+pub use report::{plan_html, report_html};
 pub use write::{write_all, write_beside};
 
 use std::collections::BTreeMap;

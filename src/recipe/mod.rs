@@ -10,9 +10,12 @@ mod free_poses;
 mod gates;
 mod joint;
 mod local_errors;
+mod loose;
 mod measure;
 mod moved;
+mod places;
 mod plan;
+mod plan_study;
 mod simulated;
 mod solution;
 mod start;
@@ -23,12 +26,15 @@ mod two_stage;
 pub use build::{MeasuredSeries, MeasuredStop};
 pub use compare::{Comparison, ComparisonRow, HeldOut, TruthError, compare};
 pub use forecast::{
-    CurvePoint, Forecast, JointRange, ParameterForecast, exact_covariance, flange_m, forecast, image_name,
+    CurvePoint, Forecast, Gain, JointRange, ParameterForecast, check_wish, exact_covariance, flange_m, forecast,
+    image_name,
 };
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
 pub use joint::{JointNoise, Options, RobotModel, identify};
 pub use measure::{Measured, measure};
-pub use plan::{Budget, Plan, PlanRequest, Wish, plan};
+pub use places::{PlaceForecast, compare_places, place_words};
+pub use plan::{Budget, Choice, Plan, PlanRequest, Wish, choose, plan};
+pub use plan_study::{PlanStudy, PlanStudyRequest, PlanStudyRow, plan_study};
 pub use simulated::measured;
 pub use solution::{Solution, StartVerdict};
 pub use study::{Study, StudyCell, StudyRequest, study};

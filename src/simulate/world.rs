@@ -90,6 +90,8 @@ pub struct WorldRequest {
     pub views: ViewRange,
     /// Markers that every view shows at least.
     pub least_markers: usize,
+    /// Readings of the stops (rad or m), where they are not to be drawn; `images` of them are visited, whatever they show.
+    pub postures: Option<Vec<Vec<f64>>>,
     /// Number of joint vectors kept aside.
     pub held_out: usize,
     /// Unit of the readings in joints.csv.
@@ -114,6 +116,7 @@ impl WorldRequest {
             marker_sigma_m: 0.03e-3,
             views: ViewRange::default(),
             least_markers: 20,
+            postures: None,
             held_out: 100,
             joint_unit: AngleUnit::Deg,
             seed: 1,
@@ -245,7 +248,10 @@ impl World<'_> {
         let at = index % self.setup.plates.len();
         let kinds = &request.chain.reading_kinds;
         for _ in 0..ATTEMPTS {
-            let Some(wanted) = self.setup.random_posture(request, &self.nominal, at, &mut self.rng) else { continue };
+            let given = request.postures.as_ref().and_then(|p| p.get(index).cloned());
+            let is_given = given.is_some();
+            let drawn = given.or_else(|| self.setup.random_posture(request, &self.nominal, at, &mut self.rng));
+            let Some(wanted) = drawn else { continue };
             let (raw, readings) = as_written(&wanted, kinds, request.joint_unit);
             let approach = before.map(|b| readings.iter().zip(b).map(|(q, p)| q - p).collect());
             let noise: Vec<f64> =
@@ -256,7 +262,7 @@ impl World<'_> {
                 observe(&self.true_plate, &request.camera, &camera_from_plate, request.pixel_sigma_px, &mut self.rng);
             let mut markers: Vec<u32> = seen.iter().map(|o| o.marker).collect();
             markers.dedup();
-            if markers.len() >= request.least_markers {
+            if is_given || markers.len() >= request.least_markers {
                 let observations = ImageObservations { image: image_name(index), observations: seen };
                 return Ok(Seen { readings, raw, noise, placement: at, camera_from_plate, observations });
             }
