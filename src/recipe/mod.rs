@@ -9,6 +9,7 @@ mod forecast;
 mod free_poses;
 mod gates;
 mod joint;
+mod lens_choice;
 mod local_errors;
 mod loose;
 mod measure;
@@ -31,6 +32,7 @@ pub use forecast::{
 };
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
 pub use joint::{JointNoise, Options, RobotModel, identify};
+pub use lens_choice::choose_lens;
 pub use measure::{Measured, measure};
 pub use places::{PlaceForecast, compare_places, place_words};
 pub use plan::{Budget, Choice, Plan, PlanRequest, Wish, choose, plan};

@@ -135,6 +135,28 @@ pub fn typical_camera(width_px: u32, height_px: u32, field_rad: f64) -> Camera {
     camera
 }
 
+/// A camera with a typical lens of the given kind; `field_rad` is the horizontal field of view (but for its distortion).
+pub fn lens_camera(lens: Lens, width_px: u32, height_px: u32, field_rad: f64) -> Camera {
+    let brown = typical_camera(width_px, height_px, field_rad);
+    let mut camera = Camera::pinhole(lens, width_px, height_px, brown.parameters[0]);
+    camera.parameters[..4].copy_from_slice(&brown.parameters[..4]);
+    let start: &[f64] = &brown.parameters[4..];
+    let coefficients = match lens {
+        Lens::Brown => start.to_vec(),
+        Lens::Fisheye => {
+            // Equidistant: the same field takes a shorter image.
+            let shorter = (field_rad / 2.0).tan() / (field_rad / 2.0);
+            camera.parameters[..2].iter_mut().for_each(|f| *f *= shorter);
+            vec![0.03, -0.015, 0.006, -0.002]
+        }
+        Lens::Rational => vec![0.42, 0.06, 3e-4, -2e-4, 0.002, 0.78, 0.18, 0.012],
+        Lens::ThinPrism => [start, &[3e-3, -2e-3, -2.5e-3, 1.5e-3]].concat(),
+        Lens::Parallax => [start, &[0.012, -0.008]].concat(),
+    };
+    camera.parameters[4..].copy_from_slice(&coefficients);
+    camera
+}
+
 /// A series with everything known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatedSeries {
