@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use super::recording::{Pictures, RecordingArgs};
 use super::{Verdict, progress, summary};
 use crate::error::{Error, Notice, Result};
-use crate::output::{self, Context, Poses};
+use crate::output::{self, Context, Offsets, Poses};
 use crate::recipe::{self, JointNoise, MeasuredSeries, Options, RobotModel};
 use crate::series::{self, InputFile, Series};
 use crate::urdf::{self, Chain, RobotDescription};
@@ -36,6 +36,12 @@ pub(super) struct IdentifyArgs {
     /// Joint terms beside rigid geometry and offsets
     #[arg(long, value_enum, default_value_t = Model::Full)]
     robot_model: Model,
+    /// Lens: auto (by hold-out, says why), brown, fisheye, parallax, rational or thin_prism [default: as in series.toml, else brown]
+    #[arg(long, value_name = "LENS")]
+    camera: Option<String>,
+    /// Where joint offsets go
+    #[arg(long, value_enum, default_value_t = OffsetsName::Folded)]
+    offsets: OffsetsName,
     /// Also write the stand-alone camera poses (poses.csv)
     #[arg(long)]
     poses: bool,
@@ -52,6 +58,24 @@ pub(super) enum Model {
     Gear,
     /// Also gravity and backlash
     Full,
+}
+
+/// Names of the ways for joint offsets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum OffsetsName {
+    /// Into the origins: controller angles stay as they are
+    Folded,
+    /// Into mastering.csv, for the controller; the origins are without them
+    Mastering,
+}
+
+impl From<OffsetsName> for Offsets {
+    fn from(name: OffsetsName) -> Self {
+        match name {
+            OffsetsName::Folded => Self::Folded,
+            OffsetsName::Mastering => Self::Mastering,
+        }
+    }
 }
 
 impl From<Model> for RobotModel {
@@ -72,7 +96,15 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let pictures = Pictures::new();
     let all = pictures.of_recordings(all, &args.recording.options(&chain.readings)?)?;
     let mut notices = description.notices.clone();
-    let measured = measure_all(&all, &chain, &mut notices)?;
+    let mut measured = measure_all(&all, &chain, &mut notices)?;
+    match args.camera.as_deref() {
+        None => {}
+        Some("auto") => notices.extend(recipe::choose_lens(&chain, &mut measured)?),
+        Some(name) => {
+            let lens = super::simulate::lens(name)?;
+            measured.iter_mut().for_each(|s| s.lens = lens);
+        }
+    }
     let mut solution = recipe::identify(chain, &measured, &options)?;
     notices.append(&mut solution.notices);
     solution.notices = notices;
@@ -85,6 +117,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
         inputs: inputs(args, &all)?,
         options: in_words(args),
         command: std::env::args().collect::<Vec<_>>().join(" "),
+        offsets: args.offsets.into(),
         poses: if args.poses { Poses::Written } else { Poses::LeftOut },
     };
     let files = output::files(&solution, &context)?;

@@ -9,12 +9,15 @@ mod forecast;
 mod free_poses;
 mod gates;
 mod joint;
+mod lens_choice;
 mod local_errors;
 mod loose;
 mod measure;
 mod monte_carlo;
 mod moved;
+mod places;
 mod plan;
+mod plan_study;
 mod simulated;
 mod solution;
 mod start;
@@ -25,13 +28,17 @@ mod two_stage;
 pub use build::{MeasuredSeries, MeasuredStop};
 pub use compare::{Comparison, ComparisonRow, HeldOut, TruthError, compare};
 pub use forecast::{
-    CurvePoint, Forecast, JointRange, ParameterForecast, exact_covariance, flange_m, forecast, image_name,
+    CurvePoint, Forecast, Gain, JointRange, ParameterForecast, check_wish, exact_covariance, flange_m, forecast,
+    image_name,
 };
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
 pub use joint::{JointNoise, Options, RobotModel, identify};
+pub use lens_choice::choose_lens;
 pub use measure::{Measured, measure};
 pub use monte_carlo::{BLOCKS, BlockResult, MonteCarloCell, MonteCarloRequest, monte_carlo};
-pub use plan::{Budget, Plan, PlanRequest, Wish, plan};
+pub use places::{PlaceForecast, compare_places, place_words};
+pub use plan::{Budget, Choice, Plan, PlanRequest, Wish, choose, plan};
+pub use plan_study::{PlanStudy, PlanStudyRequest, PlanStudyRow, plan_study};
 pub use simulated::measured;
 pub use solution::{Solution, StartVerdict};
 pub use study::{Study, StudyCell, StudyRequest, study};

@@ -3,6 +3,7 @@
 pub mod conditions;
 pub mod faults;
 pub mod folder;
+pub mod image_study;
 mod observe;
 mod placement;
 pub mod psf;
@@ -15,4 +16,4 @@ pub mod world;
 
 pub use crate::plan::visibility::is_seen;
 pub use observe::observe;
-pub use world::{RobotErrors, SimulatedSeries, WorldRequest, series, typical_camera};
+pub use world::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series, typical_camera};
