@@ -8,7 +8,8 @@ use super::recording::{Pictures, RecordingArgs};
 use super::{Verdict, identify, progress};
 use crate::error::{Error, Result};
 use crate::output::comparison::{comparison_markdown, study_html, study_markdown, study_verdict};
-use crate::recipe::{self, Options, StudyRequest};
+use crate::output::monte_carlo::monte_carlo_markdown;
+use crate::recipe::{self, MonteCarloRequest, Options, StudyRequest};
 use crate::series::Series;
 use crate::simulate::truth::Truth;
 use crate::urdf;
@@ -20,13 +21,16 @@ pub(super) struct CompareArgs {
     #[arg(long, value_name = "FILE")]
     urdf: PathBuf,
     /// Series folder; give it several times to fit several series of the same robot together
-    #[arg(long, value_name = "FOLDER", required_unless_present = "study")]
+    #[arg(long, value_name = "FOLDER", required_unless_present_any = ["study", "monte_carlo"])]
     series: Vec<PathBuf>,
     /// Simulate where the joint fit beats two stages, over repeatability and number of markers, instead of reading a series
     #[arg(long, conflicts_with = "series")]
     study: bool,
-    /// Simulated series in every cell of the study
-    #[arg(long, value_name = "N", default_value_t = 30, requires = "study")]
+    /// Simulate series with errors drawn from the priors, and judge the stated uncertainties by the known truth
+    #[arg(long, conflicts_with_all = ["series", "study"])]
+    monte_carlo: bool,
+    /// Simulated series in every cell of the study, or for each joint noise of the Monte-Carlo test
+    #[arg(long, value_name = "N", default_value_t = 30)]
     seeds: u64,
     /// Folder for the report
     #[arg(long, value_name = "FOLDER", default_value = "reports")]
@@ -45,7 +49,11 @@ pub(super) struct CompareArgs {
 }
 
 pub(super) fn run(args: &CompareArgs) -> Result<Verdict> {
-    if args.study { study(args) } else { series(args) }
+    match (args.study, args.monte_carlo) {
+        (true, _) => study(args),
+        (_, true) => monte_carlo(args),
+        _ => series(args),
+    }
 }
 
 fn series(args: &CompareArgs) -> Result<Verdict> {
@@ -94,6 +102,34 @@ fn study(args: &CompareArgs) -> Result<Verdict> {
         println!("{line}");
     }
     println!("report    {}", args.out.join("two-stage-vs-joint.html").display());
+    Ok(Verdict::Good)
+}
+
+/// Joint noise of the Monte-Carlo test, rad, and images of a series.
+const MONTE_CARLO_NOISE: [f64; 4] = [0.0, 5e-6, 2e-5, 1e-4];
+const MONTE_CARLO_IMAGES: usize = 40;
+
+fn monte_carlo(args: &CompareArgs) -> Result<Verdict> {
+    let chain = urdf::read(&args.urdf)?.chain(args.base.as_deref(), args.tip.as_deref())?;
+    let request = MonteCarloRequest {
+        chain,
+        seeds: args.seeds,
+        images: MONTE_CARLO_IMAGES,
+        joint_noise_rad: MONTE_CARLO_NOISE.to_vec(),
+    };
+    let bar = progress::bar(1, "noise levels");
+    let cells = recipe::monte_carlo(&request, |done, total| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    let tip = args.tip.as_deref().map(|t| format!(" --tip {t}")).unwrap_or_default();
+    let command = format!("robotcal compare --monte-carlo --urdf {}{tip} --seeds {}", args.urdf.display(), args.seeds);
+    let text = monte_carlo_markdown(&cells, &command);
+    let path = args.out.join("monte-carlo.md");
+    write(&path, &text)?;
+    print!("{text}");
+    println!("report    {}", path.display());
     Ok(Verdict::Good)
 }
 

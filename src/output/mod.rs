@@ -10,6 +10,7 @@ mod compensation_read;
 mod controller_files;
 mod estimates;
 mod gauge;
+pub mod monte_carlo;
 mod names;
 mod observation_table;
 pub mod plan_files;

@@ -21,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
 use crate::model::joint_terms::{JointTerm, Term};
+use crate::model::plate_modes::{PRIOR_SIGMA, basis};
 use crate::model::robot::{Robot, Stop as Visit};
 use crate::plan::viewpoint::ViewRange;
 use crate::series::{AngleUnit, CameraMount, CameraSection, ImageObservations, Manifest, Plate, Stop, Stops};
@@ -86,6 +87,8 @@ pub struct WorldRequest {
     pub pixel_sigma_px: f64,
     /// Standard deviation of the markers' positions, m per axis.
     pub marker_sigma_m: f64,
+    /// Whether the plate also deviates by the modes of [`crate::model::plate_modes`], with their prior sizes.
+    pub plate_modes: bool,
     /// Views.
     pub views: ViewRange,
     /// Markers that every view shows at least.
@@ -114,6 +117,7 @@ impl WorldRequest {
             joint_noise_rad: 0.02e-3,
             pixel_sigma_px: 0.02,
             marker_sigma_m: 0.03e-3,
+            plate_modes: false,
             views: ViewRange::default(),
             least_markers: 20,
             postures: None,
@@ -238,6 +242,13 @@ fn true_robot(request: &WorldRequest, rng: &mut impl Rng) -> Robot {
 
 fn true_plate(request: &WorldRequest, rng: &mut impl Rng) -> Plate {
     let mut plate = request.plate.clone();
+    if request.plate_modes {
+        let half_diagonal = plate.markers.iter().map(|m| m.position_m.norm()).fold(0.0, f64::max);
+        let modes = nalgebra::SVector::from(PRIOR_SIGMA.map(|sigma| normal(sigma, rng)));
+        for marker in &mut plate.markers {
+            marker.position_m += basis(&marker.position_m, half_diagonal) * modes;
+        }
+    }
     for marker in &mut plate.markers {
         // Whole nanometres keep truth.toml short.
         marker.position_m += Vector3::from_fn(|_, _| (normal(request.marker_sigma_m, rng) * 1e9).round() / 1e9);

@@ -180,11 +180,18 @@ impl Tally {
     }
 }
 
-/// Noise of the stops by themselves, and local errors where stops share readings.
-fn update_joint(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance, noise: &mut Noise) -> f64 {
-    let robot = &state.robot;
+/// What the latents of the slack tell of each size.
+struct Tallies {
+    /// Noise of the stops by themselves, per camera.
+    own: Vec<Tally>,
+    local: Tally,
+    /// Apparent tilt, indexed by camera.
+    tilt: Tally,
+}
+
+fn tallies(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance) -> Tallies {
+    let (robot, noise) = (&state.robot, &problem.noise);
     let n = robot.chain.readings.len();
-    let kinds = &robot.chain.reading_kinds;
     let mut own = vec![Tally::new(n); noise.joint.len()];
     let mut local = Tally::new(n);
     let mut tilt = Tally::new(noise.tilt.len());
@@ -210,6 +217,30 @@ fn update_joint(problem: &Problem, state: &State, lin: &Linearised, cov: &Covari
         let prior = noise.local[term.reading].powi(2);
         local.add(term.reading, term.value, cov.reduced[(c, c)], prior, prior);
     }
+    Tallies { own, local, tilt }
+}
+
+/// Standard deviation of the joint noise of every camera and reading, rad or m: `sigma / sqrt(2 r)` with the redundancy `r` of
+/// its latents and the weight that the other joints lend it.
+pub fn joint_noise_sigmas(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance) -> Vec<Vec<f64>> {
+    let t = tallies(problem, state, lin, cov);
+    let of_camera = |(camera, own): (usize, &Tally)| {
+        let all: f64 = own.redundancy.iter().chain(&t.local.redundancy).sum();
+        let sigma = problem.joint_sigma(camera);
+        let one = |(r, s): (usize, &f64)| {
+            let redundancy = own.redundancy[r] + t.local.redundancy[r] + SHRINKAGE.min(all);
+            s / (2.0 * redundancy.max(0.5)).sqrt()
+        };
+        sigma.iter().enumerate().map(one).collect()
+    };
+    t.own.iter().enumerate().map(of_camera).collect()
+}
+
+/// Noise of the stops by themselves, local errors where stops share readings, and apparent tilt.
+fn update_joint(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance, noise: &mut Noise) -> f64 {
+    let kinds = &state.robot.chain.reading_kinds;
+    let n = kinds.len();
+    let Tallies { own, local, tilt } = tallies(problem, state, lin, cov);
     let mut change: f64 = 0.0;
     for camera in 0..noise.tilt.len() {
         change = change.max(share_out(&[camera], &tilt, tilt.common(&[camera]), &mut noise.tilt));
