@@ -2,15 +2,16 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use nalgebra::Vector3;
 
+use super::joint_table::{self, Unit};
 use super::Verdict;
 use crate::assess::{MeasuredPoint, fit_points};
 use crate::error::{Error, Result};
 use crate::model::robot::Robot;
 use crate::output::read_compensation;
-use crate::urdf::{self, Chain, JointKind};
+use crate::urdf::{self, Chain};
 
 /// Flags of `verify`.
 #[derive(Debug, Args)]
@@ -36,12 +37,6 @@ pub(super) struct VerifyArgs {
     /// Tip link
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Unit {
-    Rad,
-    Deg,
 }
 
 pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
@@ -75,43 +70,10 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
 }
 
 fn read_points(path: &std::path::Path, chain: &Chain, unit: Unit) -> Result<Vec<MeasuredPoint>> {
-    let bad = |line: u64, what: String, remedy: &str| Error::input(format!("{}:{line}", path.display()), what, remedy);
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(|e| Error::input(path.display(), e, "check the path"))?;
-    let header = reader.headers().map_err(|e| bad(1, e.to_string(), "the first line names the columns"))?.clone();
-    let column = |name: &str| {
-        header.iter().position(|h| h == name).ok_or_else(|| {
-            let present: Vec<&str> = header.iter().collect();
-            bad(
-                1,
-                format!("no column '{name}' (present: {})", present.join(", ")),
-                "name the columns x_m, y_m, z_m and each joint as in the URDF",
-            )
-        })
+    let rows = joint_table::read(path, &["x_m", "y_m", "z_m"], &chain.readings, &chain.reading_kinds, unit)?;
+    let point = |(xyz, readings): (Vec<f64>, Vec<f64>)| MeasuredPoint {
+        position_m: Vector3::from_column_slice(&xyz),
+        readings,
     };
-    let axes = [column("x_m")?, column("y_m")?, column("z_m")?];
-    let joints: Vec<usize> = chain.readings.iter().map(|j| column(j)).collect::<Result<_>>()?;
-    let mut points = Vec::new();
-    for record in reader.records() {
-        let record =
-            record.map_err(|e| Error::input(path.display(), e, "every row has the columns of the first line"))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let number = |c: usize| {
-            let cell = record.get(c).unwrap_or("");
-            cell.parse::<f64>()
-                .ok()
-                .filter(|v| v.is_finite())
-                .ok_or_else(|| bad(line, format!("'{cell}' in column {} is no number", &header[c]), "correct the cell"))
-        };
-        let position_m = Vector3::new(number(axes[0])?, number(axes[1])?, number(axes[2])?);
-        let mut readings = Vec::with_capacity(joints.len());
-        for (c, kind) in joints.iter().zip(&chain.reading_kinds) {
-            let degrees = unit == Unit::Deg && *kind != JointKind::Prismatic;
-            readings.push(if degrees { number(*c)?.to_radians() } else { number(*c)? });
-        }
-        points.push(MeasuredPoint { position_m, readings });
-    }
-    Ok(points)
+    Ok(rows.into_iter().map(point).collect())
 }

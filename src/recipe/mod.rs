@@ -4,25 +4,33 @@
 
 mod build;
 mod compare;
+mod dry_run;
+mod evidence;
 mod focus;
 mod free_poses;
 mod gates;
 mod joint;
 mod measure;
 mod moved;
+mod selection;
 mod simulated;
 mod solution;
 mod start;
 mod study;
 mod suspects;
 mod two_stage;
+mod worth;
 
 pub use build::{MeasuredSeries, MeasuredStop};
 pub use compare::{Comparison, ComparisonRow, HeldOut, TruthError, compare};
+pub use dry_run::dry_run;
+pub use evidence::{Evidence, identify};
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
-pub use joint::{JointNoise, Options, RobotModel, identify};
+pub use joint::{JointNoise, Options, RobotModel};
 pub use measure::{Measured, measure};
+pub use selection::{Config, Parameters, Selection, StatedPrior};
 pub use simulated::measured;
 pub use solution::{Solution, StartVerdict};
 pub use study::{Study, StudyCell, StudyRequest, study};
 pub use two_stage::{Estimate, Estimator, PoseStage, estimate_all, fit_joint, fit_poses, linear_step};
+pub use worth::{REPORT_LARGER, Worth, still, stops};
