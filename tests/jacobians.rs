@@ -249,6 +249,9 @@ fn camera_poses_by_robot_terms_mounts_and_slack() {
                 for (i, image) in problem.images.iter().enumerate() {
                     check_chained(&problem, &state, image, &state.slack[i]);
                     check_chained(&problem, &state, image, &Slack::None);
+                    let Slack::Joints(noise) = &state.slack[i] else { unreachable!() };
+                    let tilted = [noise.as_slice(), &[deviation, -0.7 * deviation]].concat();
+                    check_chained(&problem, &state, image, &Slack::Joints(tilted));
                     let free = state.camera_from_plate(image, &state.slack[i]).unwrap();
                     check_chained(&problem, &state, image, &Slack::Pose(free));
                 }

@@ -66,7 +66,8 @@ impl Bordered {
             }
             if let Slack::Joints(dq) = &state.slack[lin.images[k]] {
                 for r in 0..dq.len() {
-                    a[(slack_start[k] + r, slack_start[k] + r)] += problem.noise.joint[0][r].powi(-2);
+                    a[(slack_start[k] + r, slack_start[k] + r)] +=
+                        problem.slack_information(&problem.images[lin.images[k]], r);
                 }
             }
         }

@@ -149,7 +149,7 @@ fn correction(problem: &Problem, state: &State, lin: &Linearised, k: usize, of_d
             let l = &chain.d_slack;
             let mut h = l.transpose() * &pp * l;
             for r in 0..dq.len() {
-                h[(r, r)] += problem.noise.joint[problem.images[i].camera][r].powi(-2);
+                h[(r, r)] += problem.slack_information(&problem.images[i], r);
             }
             let Some(inverse) = h.try_inverse() else { return 1.0 };
             let pl = &pp * l;

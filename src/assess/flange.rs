@@ -106,7 +106,8 @@ impl<'a> FlangeModel<'a> {
         for (k, d) in kinematics.d_twists.iter().enumerate() {
             j.fixed_view_mut::<6, 6>(0, self.layout.twists.start + 6 * k).copy_from(d);
         }
-        for (k, d) in kinematics.d_terms.iter().enumerate() {
+        // Local errors are noise near single readings, not properties of the robot.
+        for (k, d) in kinematics.d_terms.iter().enumerate().take(self.layout.locals.start - self.layout.terms.start) {
             j.fixed_view_mut::<6, 1>(0, self.layout.terms.start + k).copy_from(d);
         }
         j.fixed_view_mut::<6, 6>(0, self.still_column).copy_from(&-adjoint(&pose.inverse()));

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geom::Pose;
 use crate::init::resect;
-use crate::problem::{Image, Problem, Slack, State, Weighting, predict};
+use crate::problem::{Image, Problem, Slack, State, Weighting, posture_groups, predict};
 use crate::solve::{Settings, solve};
 
 /// Errors of predicted images.
@@ -41,10 +41,10 @@ const NOMINAL_JOINT_ERROR: f64 = 3e-3;
 /// Predicts every image on the robot by models that have not seen it.
 pub fn hold_out(problem: &Problem, state: &State) -> Option<Accuracy> {
     let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
-    let folds = FOLDS.min(on_robot.len());
-    if folds < 2 {
+    if on_robot.len() < 2 {
         return None;
     }
+    let folds = folds(problem, &on_robot);
     let mut nominal_problem = problem.clone();
     let mut nominal_state = state.clone();
     nominal_state.robot = crate::model::robot::Robot {
@@ -54,14 +54,15 @@ pub fn hold_out(problem: &Problem, state: &State) -> Option<Accuracy> {
     nominal_state.robot.terms.iter_mut().for_each(|t| t.value = 0.0);
     let robot = problem.layout.twists.start..problem.layout.terms.end;
     nominal_problem.layout.columns[robot].iter_mut().for_each(|c| c.free = false);
+    nominal_problem.noise.local.fill(0.0);
     nominal_problem.noise.joint.iter_mut().flatten().for_each(|s| *s = s.max(NOMINAL_JOINT_ERROR));
-    let nominal = predictions(&nominal_problem, &nominal_state, &on_robot, folds)?;
-    let calibrated = predictions(problem, state, &on_robot, folds)?;
+    let nominal = predictions(&nominal_problem, &nominal_state, &folds)?;
+    let calibrated = predictions(problem, state, &folds)?;
     let mut per_image_mm = vec![None; problem.images.len()];
     for ((i, a), (_, b)) in nominal.iter().zip(&calibrated) {
         per_image_mm[*i] = Some([a.mm(), b.mm()]);
     }
-    Some(Accuracy { nominal: summary(&nominal), calibrated: summary(&calibrated), per_image_mm, folds })
+    Some(Accuracy { nominal: summary(&nominal), calibrated: summary(&calibrated), per_image_mm, folds: folds.len() })
 }
 
 /// Squared errors of one predicted image, summed over its markers.
@@ -92,15 +93,26 @@ fn summary(errors: &[(usize, ImageError)]) -> Errors {
     }
 }
 
-fn predictions(problem: &Problem, state: &State, on_robot: &[usize], folds: usize) -> Option<Vec<(usize, ImageError)>> {
+/// Images that are held out together. Images that share joint readings stay together: they are off by the same local errors,
+/// and one of them would tell of the others.
+fn folds(problem: &Problem, on_robot: &[usize]) -> Vec<Vec<usize>> {
+    let mut groups = posture_groups(&problem.images, on_robot);
+    if groups.len() < 3 {
+        groups = on_robot.iter().map(|&i| vec![i]).collect();
+    }
+    let mut folds = vec![Vec::new(); FOLDS.min(groups.len())];
+    let count = folds.len();
+    groups.into_iter().enumerate().for_each(|(k, group)| folds[k % count].extend(group));
+    folds
+}
+
+fn predictions(problem: &Problem, state: &State, folds: &[Vec<usize>]) -> Option<Vec<(usize, ImageError)>> {
     let mut errors = Vec::new();
-    for fold in 0..folds {
-        let held: Vec<usize> =
-            on_robot.iter().copied().enumerate().filter(|(k, _)| k % folds == fold).map(|(_, i)| i).collect();
+    for held in folds {
         let mut rest = problem.clone();
         held.iter().for_each(|&i| rest.images[i].rejected = Some("held out".into()));
         let outcome = solve(&rest, state.clone(), &Settings { iterations: 30, decrement: 1e-2 });
-        for i in held {
+        for &i in held {
             errors.push((i, predict_image(problem, &outcome.state, i)?));
         }
     }

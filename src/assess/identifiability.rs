@@ -128,7 +128,7 @@ pub fn identifiability(
     // Ascending shares are descending informations.
     let values = shares.map(|k| (1.0 / k.max(f64::MIN_POSITIVE) - 1.0).max(0.0));
     let listed: Vec<usize> =
-        (0..layout.len()).filter(|c| layout.columns[*c].free && covariance[(*c, *c)] > 0.0 && !layout.columns[*c].name.contains(".local_")).collect();
+        (0..layout.len()).filter(|c| layout.columns[*c].free && covariance[(*c, *c)] > 0.0 && !layout.locals.contains(c)).collect();
     let names: Vec<String> = listed.iter().map(|&c| short_name(&layout.columns[c].name)).collect();
     let all = DMatrix::from_fn(listed.len(), listed.len(), |i, j| covariance[(listed[i], listed[j])]);
     judge(robot, layout, stops, known, &values, &vectors, &all, &names)

@@ -19,7 +19,7 @@ pub use identifiability::{
     Cause, Correlation, Identifiability, Observability, UnknownDirection, frame_parameters, identifiability,
     identifiability_of_stops,
 };
-pub use points::{MeasuredPoint, PointFit, fit_points};
+pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
 pub use propagate::{PredictedPose, View, predict_pose};
 pub use statistics::{Ratio, bootstrap_ratio, median, root_mean_square};
 pub use stops::{Structural, ideal_stops, minimal_set, structural};

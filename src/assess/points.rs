@@ -1,10 +1,10 @@
 //! A kinematic model judged by points that another device measured: only the frame of the device and the reflector are fitted.
 
-use nalgebra::{DMatrix, DVector, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3x6, Vector3, Vector6};
 
 use crate::geom::{Pose, skew};
-use crate::linalg::SymmetricFactor;
-use crate::model::robot::Robot;
+use crate::linalg::{SymmetricFactor, product};
+use crate::model::robot::{Robot, Stop};
 
 /// One point as a tracker saw it.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,4 +82,62 @@ fn rigid_fit(tips: &[Pose], points: &[MeasuredPoint], tip_point: &Vector3<f64>) 
     let m = ys.iter().zip(points).map(|(y, p)| (p.position_m - mean_p) * (y - mean_y).transpose()).sum();
     let rotation = crate::geom::project_to_so3(&m)?;
     Some(Pose::new(rotation, mean_p - rotation * mean_y))
+}
+
+/// What a fit of points should leave, by the covariance of the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExpectedRms {
+    /// From the uncertainty of the model alone, m.
+    pub model_m: f64,
+    /// With the joint noise of every stop, m.
+    pub with_joint_noise_m: f64,
+}
+
+impl PointFit {
+    /// Expected RMS of the residuals: the model's errors at the points, less what the fit of frame and reflector takes up.
+    ///
+    /// `covariance` is that of the robot's columns (twists, then terms), m and rad; `joint_sigma` that of every reading.
+    pub fn expected(
+        &self,
+        robot: &Robot,
+        points: &[MeasuredPoint],
+        covariance: &DMatrix<f64>,
+        joint_sigma: &[f64],
+    ) -> Option<ExpectedRms> {
+        let (n, columns, readings) = (points.len(), covariance.nrows(), joint_sigma.len());
+        let mut by_model = DMatrix::zeros(3 * n, columns);
+        let mut by_noise = DMatrix::zeros(3 * n, n * readings);
+        let mut fitted = DMatrix::zeros(3 * n, 9);
+        for (k, p) in points.iter().enumerate() {
+            let kinematics = robot.kinematics(&Stop::at(&p.readings), &vec![0.0; readings]);
+            let tip = kinematics.base_from_tip;
+            let turned = self.device_from_base.rotation * tip.rotation;
+            let mut moved = Matrix3x6::zeros();
+            moved.fixed_view_mut::<3, 3>(0, 0).copy_from(&turned);
+            moved.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-turned * skew(&self.tip_point_m)));
+            for (i, d) in kinematics.d_twists.iter().enumerate() {
+                by_model.fixed_view_mut::<3, 6>(3 * k, 6 * i).copy_from(&(moved * d));
+            }
+            let first = 6 * kinematics.d_twists.len();
+            for (i, d) in kinematics.d_terms.iter().enumerate() {
+                by_model.fixed_view_mut::<3, 1>(3 * k, first + i).copy_from(&(moved * d));
+            }
+            for (r, d) in kinematics.d_readings.iter().enumerate() {
+                by_noise.fixed_view_mut::<3, 1>(3 * k, k * readings + r).copy_from(&(moved * d * joint_sigma[r]));
+            }
+            let y = tip.transform(&self.tip_point_m);
+            fitted.fixed_view_mut::<3, 3>(3 * k, 0).copy_from(&self.device_from_base.rotation);
+            fitted.fixed_view_mut::<3, 3>(3 * k, 3).copy_from(&(-self.device_from_base.rotation * skew(&y)));
+            fitted.fixed_view_mut::<3, 3>(3 * k, 6).copy_from(&turned);
+        }
+        let normal = SymmetricFactor::new(&(fitted.transpose() * &fitted)).ok()?;
+        let left = |j: &DMatrix<f64>| j - &fitted * normal.solve_many(&(fitted.transpose() * j));
+        let (model, noise) = (left(&by_model), left(&by_noise));
+        let of_model = product(&model, covariance).component_mul(&model).sum() / n as f64;
+        let of_noise = noise.norm_squared() / n as f64;
+        Some(ExpectedRms {
+            model_m: of_model.max(0.0).sqrt(),
+            with_joint_noise_m: (of_model + of_noise).max(0.0).sqrt(),
+        })
+    }
 }

@@ -67,14 +67,14 @@ pub fn predict_pose(
         mount: view.mount,
         stop: Some(Stop::at(readings)),
         observations: Vec::new(),
+        local_share: Vec::new(),
         rejected: None,
     };
     let chain = chained(problem, state, &image, &Slack::Joints(vec![0.0; readings.len()]))?;
     let theta = problem.layout.theta_len();
     let of_theta = covariance.reduced.view((0, 0), (theta, theta));
     let model = &chain.d_theta * of_theta * chain.d_theta.transpose();
-    let noise =
-        nalgebra::DVector::from_iterator(readings.len(), problem.noise.joint.get(view.camera)?.iter().map(|s| s * s));
+    let noise = nalgebra::DVector::from_vec(problem.joint_sigma(view.camera)).map(|s| s * s);
     let noise = &chain.d_slack * DMatrix::from_diagonal(&noise) * chain.d_slack.transpose();
     // A body twist d of camera_from_plate is the body twist -Ad d of its inverse.
     let turned = |c: DMatrix<f64>| {

@@ -33,9 +33,7 @@ const WIDEST_M: f64 = 0.5;
 
 /// Free columns of the robot's own parameters.
 pub fn robot_columns(layout: &Layout) -> Vec<usize> {
-    (layout.twists.start..layout.terms.end)
-        .filter(|&c| layout.columns[c].free && !layout.columns[c].name.contains(".local_"))
-        .collect()
+    layout.robot().filter(|&c| layout.columns[c].free).collect()
 }
 
 /// What stops tell of the robot.

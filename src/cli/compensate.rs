@@ -8,20 +8,24 @@ use clap::{Args, ValueEnum};
 use super::Verdict;
 use crate::error::{Error, Result};
 use crate::geom::{Pose, exp_so3};
+use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::robot::Robot;
 use crate::output::{read_compensation, write_beside};
-use crate::programs::{self, Correction, Language, Left, Models, Outcome, Postures, Program, Setting, TextFile};
+use crate::programs::program::Posture;
+use crate::programs::{
+    self, Correction, Kind, Language, Left, Models, Outcome, Postures, Program, Setting, Target, TextFile,
+};
 use crate::urdf::{self, Chain, JointKind};
 
 /// Flags of `compensate`.
 #[derive(Debug, Args)]
 pub(super) struct CompensateArgs {
-    /// Program files of one language: tables (.csv) or URScript (.script)
+    /// Program files of one language: tables (.csv), KRL (.src, .dat), RAPID (.mod) or URScript (.script)
     #[arg(value_name = "PROGRAM", required = true)]
     programs: Vec<PathBuf>,
-    /// Robot description that the controller uses, for which the program was made
-    #[arg(long, value_name = "FILE")]
-    nominal: PathBuf,
+    /// Robot description that the controller uses, for which the program was made; with --from it is needed for poses only
+    #[arg(long, value_name = "FILE", required_unless_present = "from")]
+    nominal: Option<PathBuf>,
     /// Robot description of the robot that runs the program (a corrected URDF)
     #[arg(long, visible_alias = "to", value_name = "FILE")]
     urdf: PathBuf,
@@ -67,6 +71,9 @@ pub(super) struct CompensateArgs {
     /// The robot does not visit the targets in the order of the text: backlash stays out of account
     #[arg(long)]
     unordered: bool,
+    /// Ignore status and turn, or confdata: a pose means the posture next to the target before it
+    #[arg(long)]
+    nearest_posture: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -80,6 +87,10 @@ enum Unit {
 enum LanguageName {
     /// Table of joints or flange poses
     Csv,
+    /// KUKA KRL
+    Krl,
+    /// ABB RAPID
+    Rapid,
     /// Universal Robots URScript
     Urscript,
 }
@@ -88,6 +99,8 @@ impl From<LanguageName> for Language {
     fn from(name: LanguageName) -> Self {
         match name {
             LanguageName::Csv => Self::Csv,
+            LanguageName::Krl => Self::Krl,
+            LanguageName::Rapid => Self::Rapid,
             LanguageName::Urscript => Self::UrScript,
         }
     }
@@ -97,14 +110,16 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     let robot = |file: &Path, compensation: Option<&PathBuf>| -> Result<Robot> {
         let chain = urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?;
         let terms = compensation.map_or(Ok(Vec::new()), |c| read_compensation(c, &chain))?;
-        Ok(Robot { terms, ..Robot::nominal(chain) })
+        let counts = |t: &JointTerm| !args.unordered || t.term != Term::Backlash;
+        Ok(Robot { terms: terms.into_iter().filter(counts).collect(), ..Robot::nominal(chain) })
     };
-    let controller = robot(&args.nominal, None)?;
+    let nominal = args.nominal.as_ref().or(args.from.as_ref()).unwrap_or(&args.urdf);
+    let controller = robot(nominal, None)?;
     let to = robot(&args.urdf, args.compensation.as_ref())?;
     let from = args.from.as_ref().map(|f| robot(f, args.from_compensation.as_ref())).transpose()?;
     for (file, other) in [(Some(&args.urdf), Some(&to)), (args.from.as_ref(), from.as_ref())] {
         if let (Some(file), Some(other)) = (file, other) {
-            same_joints(&args.nominal, &controller.chain, file, &other.chain)?;
+            same_joints(nominal, &controller.chain, file, &other.chain)?;
         }
     }
     let axes = axes(args, &controller.chain)?;
@@ -118,8 +133,18 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     };
     let files = args.programs.iter().map(|p| text_file(p)).collect::<Result<_>>()?;
     let mut program = programs::read(language, files, &setting)?;
-    if args.unordered {
-        program.targets.iter_mut().for_each(|t| t.follows = false);
+    let needs_controller = |t: &&Target| matches!(&t.kind, Kind::Pose(p) if p.joint_fields.iter().all(Option::is_none));
+    if let (None, Some(t)) = (&args.nominal, program.targets.iter().find(needs_controller)) {
+        let place = format!("{}:{} {}", program.files[t.file].name, t.line, t.name);
+        let what = "is a pose, which the controller turns into joints by its own model";
+        return Err(Error::input(place, what, "give that model with --nominal"));
+    }
+    if args.nearest_posture {
+        for target in &mut program.targets {
+            if let Kind::Pose(pose) = &mut target.kind {
+                pose.posture = Posture::Nearest;
+            }
+        }
     }
     let models = Models { controller: &controller, from: from.as_ref().unwrap_or(&controller), to: &to };
     let done = programs::compensate(&program, models, &postures(args, &controller.chain, &axes)?);
@@ -240,6 +265,15 @@ fn frame(flag: &str, numbers: &[f64], language: Language) -> Result<Option<Pose>
             Ok(Some(Pose::new(exp_so3(&[rx, ry, rz].into()), [x, y, z].into())))
         }
         (Language::UrScript, _) => Err(bad("give x,y,z,rx,ry,rz in m and rad")),
+        (Language::Krl, &[x, y, z, a, b, c]) => {
+            let [x, y, z] = [x, y, z].map(|v| 1e-3 * v);
+            Ok(Some(Pose::from_xyz_rpy([x, y, z], [c, b, a].map(f64::to_radians))))
+        }
+        (Language::Krl, _) => Err(bad("give X,Y,Z,A,B,C in mm and deg")),
+        (Language::Rapid, &[x, y, z, q1, q2, q3, q4]) => {
+            Ok(Some(Pose::from_xyz_quaternion([x, y, z].map(|v| 1e-3 * v), [q2, q3, q4, q1])))
+        }
+        (Language::Rapid, _) => Err(bad("give x,y,z,q1,q2,q3,q4 in mm, q1 the scalar part")),
         (Language::Csv, &[x, y, z, qx, qy, qz, qw]) => Ok(Some(Pose::from_xyz_quaternion([x, y, z], [qx, qy, qz, qw]))),
         (Language::Csv, _) => Err(bad("give x_m,y_m,z_m,qx,qy,qz,qw")),
     }

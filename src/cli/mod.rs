@@ -9,6 +9,7 @@ mod compensate;
 mod convert;
 mod identify;
 mod joint_table;
+mod plan;
 mod plate;
 mod progress;
 mod recording;
@@ -54,6 +55,8 @@ enum Command {
     Convert(convert::ConvertArgs),
     /// Identify robot, camera, hand-camera offset and plate from one or more series
     Identify(identify::IdentifyArgs),
+    /// Plan where to take images, and say what they will be worth
+    Plan(Box<plan::PlanArgs>),
     /// Design a plate of coded circles and draw it for printing
     Plate(plate::PlateArgs),
     /// Print a solution again, or compare two over the workspace
@@ -80,6 +83,7 @@ impl Command {
             Self::Compensate(args) => compensate::run(args),
             Self::Convert(args) => convert::run(args),
             Self::Identify(args) => identify::run(args),
+            Self::Plan(args) => plan::run(args),
             Self::Plate(args) => plate::run(args),
             Self::Show(args) => show::run(args),
             Self::Simulate(args) => simulate::run(args),

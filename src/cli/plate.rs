@@ -53,7 +53,7 @@ pub(super) struct PlateArgs {
 }
 
 /// Two numbers with an x between them.
-fn pair<T: std::str::FromStr + Copy>(text: &str) -> std::result::Result<[T; 2], String> {
+pub(super) fn pair<T: std::str::FromStr + Copy>(text: &str) -> std::result::Result<[T; 2], String> {
     let parts: Vec<T> = text.split(['x', 'X']).filter_map(|p| p.trim().parse().ok()).collect();
     <[T; 2]>::try_from(parts).map_err(|_| "give two numbers with an x between them".to_owned())
 }

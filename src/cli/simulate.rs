@@ -102,7 +102,7 @@ pub(super) struct SimulateArgs {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Mount {
+pub(super) enum Mount {
     Hand,
     Fixed,
 }
@@ -118,6 +118,15 @@ enum Errors {
     None,
     Rigid,
     Full,
+}
+
+impl From<Mount> for CameraMount {
+    fn from(mount: Mount) -> Self {
+        match mount {
+            Mount::Hand => Self::Hand,
+            Mount::Fixed => Self::Fixed,
+        }
+    }
 }
 
 impl From<Errors> for RobotErrors {
@@ -203,10 +212,7 @@ fn request(args: &SimulateArgs) -> Result<WorldRequest> {
     let chain = urdf::read(&args.urdf)?.chain(args.base.as_deref(), args.tip.as_deref())?;
     Ok(WorldRequest {
         camera: typical_camera(args.width_px, args.height_px, args.field_deg.to_radians()),
-        mount: match args.mount {
-            Mount::Hand => CameraMount::Hand,
-            Mount::Fixed => CameraMount::Fixed,
-        },
+        mount: args.mount.into(),
         images: args.images,
         placements: args.placements,
         errors: args.errors.into(),

@@ -149,7 +149,9 @@ fn joint_noise(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
             })
             .collect();
         let of = if r.cameras.len() > 1 { format!(" ({})", camera.name) } else { String::new() };
-        writeln!(out, "joints    noise in mrad{of}: {}", parts.join(", "))?;
+        let tilt = Some(camera.apparent_tilt_rad).filter(|t| *t > 0.0);
+        let tilt = tilt.map(|t| format!("; apparent tilt of the plate {:.3}", 1e3 * t));
+        writeln!(out, "joints    noise in mrad{of}: {}{}", parts.join(", "), tilt.unwrap_or_default())?;
     }
     Ok(())
 }
@@ -195,7 +197,7 @@ fn map(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 fn undetermined(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     let Some(found) = &r.identifiability else { return Ok(()) };
     writeln!(out, "gauge     {}", gauge(found))?;
-    let robot = || r.estimates.iter().filter(|e| e.name.starts_with("robot/") && e.free);
+    let robot = || r.estimates.iter().filter(|e| e.name.starts_with("robot/") && e.free && !e.name.contains(".local_"));
     let gauge: Vec<&str> = (found.unknown.iter())
         .filter(|d| matches!(d.cause, Cause::Base | Cause::Tip))
         .flat_map(|d| d.parameters.iter().map(|(name, _)| name.as_str()))

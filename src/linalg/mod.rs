@@ -1,6 +1,10 @@
-//! Dense factorisations of the reduced system; the only room that imports `faer`.
+//! Dense factorisations and quadratic programmes; the only room that imports `faer` and `clarabel`.
 //!
 //! Everything runs on one thread: parallelism lies outside, over images.
+
+mod quadratic;
+
+pub use quadratic::{LinearRow, NotSolved, minimise_quadratic};
 
 use faer::linalg::solvers::{Llt, Solve};
 use faer::{MatRef, Par, Side};

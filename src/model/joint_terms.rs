@@ -11,6 +11,9 @@ use crate::urdf::JointKind;
 /// Step of a joint (rad or m) over which the backlash term turns from one side to the other.
 const BACKLASH_STEP: f64 = 2e-3;
 
+/// Range of readings (rad or m, one sigma) over which the local error of a joint is the same.
+const LOCAL_RANGE: f64 = 3e-3;
+
 /// Number of gravity basis functions of a joint.
 pub const GRAVITY_TERMS: u8 = 4;
 
@@ -31,9 +34,17 @@ pub enum Term {
     Gravity(u8),
     /// Backlash: `b tanh(dq / 2 mrad)` of the step from the previous stop.
     Backlash,
+    /// What the joint is off by near one reading (given in urad or um) to which it came back for several stops: whatever it
+    /// is, it does not change while the joint stands still, and is nearly the same when it comes back.
+    Local(i32),
 }
 
 impl Term {
+    /// Local error near a reading, rad or m.
+    pub fn local(reading: f64) -> Self {
+        Self::Local((1e6 * reading).round() as i32)
+    }
+
     /// Name in parameter blocks.
     pub fn name(self) -> String {
         match self {
@@ -43,6 +54,7 @@ impl Term {
             Self::Sine(k) => format!("sin_{k}"),
             Self::Gravity(k) => format!("gravity_{k}"),
             Self::Backlash => "backlash".into(),
+            Self::Local(at) => format!("local_{:.4}", 1e-6 * f64::from(at)),
         }
     }
 
@@ -54,6 +66,7 @@ impl Term {
             ("backlash", _) => Some(Self::Backlash),
             (_, Some(("cos", k))) => k.parse().ok().map(Self::Cosine),
             (_, Some(("sin", k))) => k.parse().ok().map(Self::Sine),
+            (_, Some(("local", at))) => at.parse().ok().map(Self::local),
             (_, Some(("gravity", k))) => k.parse().ok().filter(|k| *k < GRAVITY_TERMS).map(Self::Gravity),
             _ => None,
         }
@@ -76,6 +89,8 @@ impl Term {
             Self::Gear => 5e-4,
             Self::Cosine(_) | Self::Sine(_) => 0.1e-3 * per_metre,
             Self::Gravity(_) | Self::Backlash => 0.3e-3 * per_metre,
+            // A variance component: the data decide.
+            Self::Local(_) => 3e-3 * per_metre,
         }
     }
 }
@@ -101,6 +116,10 @@ impl Term {
             Self::Sine(k) => (f64::from(k) * context.reading).sin(),
             Self::Gravity(k) => context.gravity[usize::from(k)],
             Self::Backlash => context.approach.map_or(0.0, |step| (step / BACKLASH_STEP).tanh()),
+            Self::Local(at) => {
+                let distance = (context.reading - 1e-6 * f64::from(at)) / LOCAL_RANGE;
+                (-0.5 * distance * distance).exp()
+            }
         }
     }
 }

@@ -85,6 +85,17 @@ impl Robot {
         pose
     }
 
+    /// Pose behind every joint of the chain, in the base frame, for exact readings.
+    pub fn link_poses(&self, readings: &[f64]) -> Vec<Pose> {
+        let positions = self.positions(&Stop::at(readings), &vec![0.0; readings.len()]).0;
+        let mut pose = Pose::identity();
+        let behind = |(i, joint): (usize, &Joint)| {
+            pose = pose * joint.origin * Pose::exp(&self.twists[i]) * motion(joint, positions[i]);
+            pose
+        };
+        self.chain.joints.iter().enumerate().map(behind).collect()
+    }
+
     /// As [`Robot::pose_at`], with all derivatives.
     pub fn kinematics(&self, stop: &Stop, noise: &[f64]) -> Kinematics {
         let (positions, contexts) = self.positions(stop, noise);
@@ -104,6 +115,17 @@ impl Robot {
         }
         let d_terms = self.terms.iter().map(|t| d_readings[t.reading] * t.term.basis(&contexts[t.reading])).collect();
         Kinematics { base_from_tip: rest_from_tip, d_twists, d_readings, d_terms }
+    }
+
+    /// Local error of every reading at a stop, rad or m.
+    pub fn local_errors(&self, stop: &Stop) -> Vec<f64> {
+        let mut errors = vec![0.0; stop.readings.len()];
+        for t in self.terms.iter().filter(|t| matches!(t.term, Term::Local(_))) {
+            let context =
+                TermContext { reading: stop.readings[t.reading], approach: None, gravity: Default::default() };
+            errors[t.reading] += t.value * t.term.basis(&context);
+        }
+        errors
     }
 
     /// `origin_i Exp(xi_i) Motion_i(offset_i)` for every joint: the corrected URDF, in which controller angles stay as they are.

@@ -27,7 +27,7 @@ struct Joint {
 impl Joint {
     fn take(&mut self, term: Term, value: f64) -> Result<()> {
         match term {
-            Term::Offset => {}
+            Term::Offset | Term::Local(_) => {}
             Term::Gear => self.gear_scale = Some(value),
             Term::Cosine(k) => put(&mut self.harmonics, harmonic(k)?, value),
             Term::Sine(k) => put(&mut self.harmonics, harmonic(k)? + 1, value),

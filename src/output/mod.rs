@@ -13,6 +13,8 @@ pub mod flange_table;
 mod gauge;
 mod names;
 mod observation_table;
+pub mod plan_files;
+pub mod plan_start;
 pub mod plate_drawing;
 mod plate_files;
 mod plate_pdf;

@@ -151,6 +151,9 @@ pub struct CameraRecord {
     pub pixel_factor: f64,
     /// Joint noise of each reading with this camera, rad or m.
     pub joint_noise: Vec<f64>,
+    /// Apparent tilt of the plate in each image, rad; 0 where it is not part of the model.
+    #[serde(default)]
+    pub apparent_tilt_rad: f64,
 }
 
 /// A mounting or placement.

@@ -145,7 +145,8 @@ fn cameras(solution: &Solution) -> Vec<CameraRecord> {
             height_px: c.height_px,
             parameters: c.parameter_names().map(String::from).zip(c.parameters.iter().copied()).collect(),
             pixel_factor: problem.noise.pixel_factor[k],
-            joint_noise: problem.noise.joint[k].clone(),
+            joint_noise: problem.joint_sigma(k),
+            apparent_tilt_rad: problem.noise.tilt.get(k).copied().unwrap_or(0.0),
         }
     };
     problem.cameras.iter().enumerate().map(camera).collect()
@@ -211,7 +212,7 @@ fn images(solution: &Solution, context: &Context) -> Result<Vec<ImageRecord>> {
     let image = |(k, i): (usize, &Image)| {
         let free = solution.free_poses.poses[k].as_ref().zip(rigid[i.plate].as_ref());
         let joint_noise = match (&solution.state.slack[k], &i.rejected, &i.stop) {
-            (Slack::Joints(dq), None, Some(_)) => Some(dq.clone()),
+            (Slack::Joints(dq), None, Some(_)) => Some(dq[..solution.state.robot.chain.readings.len()].to_vec()),
             _ => None,
         };
         let observations = observations(solution, k, poses[k].as_ref());

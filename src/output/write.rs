@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::solution_json;
+use super::{plan_files, solution_json};
 use crate::error::{Error, Result};
 
 /// Writes all files into `dir`, replacing an earlier result as a whole: a failure leaves `dir` as it was.
@@ -110,14 +110,17 @@ fn foreign_files(target: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<Vec
     }
 }
 
-/// Files of the result in a folder, as its solution.json lists them.
+/// Files of the result in a folder, as its solution.json or plan.json lists them.
 fn earlier_files(target: &Path) -> Option<BTreeSet<String>> {
     #[derive(Deserialize)]
     struct Listed {
         files: BTreeSet<String>,
     }
-    let bytes = fs::read(target.join(solution_json::FILE_NAME)).ok()?;
-    serde_json::from_slice::<Listed>(&bytes).ok().map(|l| l.files)
+    let listed = |name: &str| {
+        let bytes = fs::read(target.join(name)).ok()?;
+        serde_json::from_slice::<Listed>(&bytes).ok().map(|l| l.files)
+    };
+    listed(solution_json::FILE_NAME).or_else(|| listed(plan_files::FILE_NAME))
 }
 
 /// A name beside the target that nothing has yet.

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::State;
 use crate::model::camera::Camera;
+use crate::model::joint_terms::Term;
 use crate::model::plate_modes;
 
 /// One scalar unknown of the dense part of the problem.
@@ -31,6 +32,8 @@ pub struct Layout {
     pub twists: Range<usize>,
     /// Columns of the joint terms.
     pub terms: Range<usize>,
+    /// Those of them that are local errors: latent noise, not properties of the robot.
+    pub locals: Range<usize>,
     /// Six columns a mounting.
     pub mountings: Vec<Range<usize>>,
     /// Six columns a placement.
@@ -111,6 +114,8 @@ impl Layout {
                 b.add(format!("robot/{}.{}", chain.readings[t.reading], t.term.name()), unit, t.term.prior_sigma(kind));
             }
         });
+        let local_count = state.robot.terms.iter().rev().take_while(|t| matches!(t.term, Term::Local(_))).count();
+        let locals = terms.end - local_count..terms.end;
         let mountings = mountings.iter().map(|m| b.pose(&named("hand_camera", m, mountings.len()))).collect();
         let placements = placements.iter().map(|p| b.pose(&format!("plate/{p}"))).collect();
         let cameras = (cameras.iter().zip(&state.cameras))
@@ -134,7 +139,12 @@ impl Layout {
                 })
             })
             .collect();
-        Self { columns: b.columns, twists, terms, mountings, placements, cameras, shapes }
+        Self { columns: b.columns, twists, terms, locals, mountings, placements, cameras, shapes }
+    }
+
+    /// Columns of what belongs to the robot: twists and joint terms, without the local errors.
+    pub fn robot(&self) -> Range<usize> {
+        self.twists.start..self.locals.start
     }
 
     /// Number of columns.

@@ -4,10 +4,10 @@
 //! pose (p, 6), intrinsics (e, camera parameters then plate modes) and markers (m, 3 each); the robot enters afterwards by
 //! `dp = G dtheta + L dslack` ([`chained`]).
 
-use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, Matrix6x2, SMatrix, SVector, Vector2, Vector3, Vector6};
 
 use super::{Image, Measured, Problem, Slack, State};
-use crate::geom::Pose;
+use crate::geom::{Pose, adjoint, right_jacobian_se3};
 use crate::model::camera::MAX_PARAMETERS;
 use crate::model::circle::{self, Prediction};
 use crate::model::plate_modes::{MODES, basis};
@@ -163,6 +163,23 @@ pub struct Chained {
     pub d_slack: DMatrix<f64>,
 }
 
+/// Middle of the markers that an image shows, plate frame, m.
+pub(super) fn seen_centre(image: &Image, state: &State) -> Vector3<f64> {
+    let nominal = &state.plates[image.plate].nominal;
+    let sum: Vector3<f64> = image.observations.iter().map(|o| nominal[o.marker]).sum();
+    sum / image.observations.len().max(1) as f64
+}
+
+/// Body twists of `camera_from_plate` that turn the plate about its x and y axes through `centre`.
+pub(super) fn tilt_axes(centre: &Vector3<f64>) -> Matrix6x2<f64> {
+    let mut axes = Matrix6x2::zeros();
+    for (k, axis) in [Vector3::x(), Vector3::y()].into_iter().enumerate() {
+        axes.fixed_view_mut::<3, 1>(0, k).copy_from(&centre.cross(&axis));
+        axes.fixed_view_mut::<3, 1>(3, k).copy_from(&axis);
+    }
+    axes
+}
+
 /// Pose of an image and its derivatives as body twists; `None` for an image off the robot that has no free pose.
 pub fn chained(problem: &Problem, state: &State, image: &Image, slack: &Slack) -> Option<Chained> {
     let theta = problem.layout.theta_len();
@@ -192,5 +209,15 @@ pub fn chained(problem: &Problem, state: &State, image: &Image, slack: &Slack) -
     for (k, d) in kinematics.d_readings.iter().enumerate().take(slack.len()) {
         l.fixed_view_mut::<6, 1>(0, k).copy_from(&(mounted.d_robot * d));
     }
-    Some(Chained { pose: mounted.camera_from_plate, d_theta: g, d_slack: l })
+    let pose = mounted.camera_from_plate;
+    let Some([x, y]) = slack.tilt(stop.readings.len()) else { return Some(Chained { pose, d_theta: g, d_slack: l }) };
+    let axes = tilt_axes(&seen_centre(image, state));
+    let tilt = axes * Vector2::new(x, y);
+    let turned = Pose::exp(&tilt);
+    // What moves the pose before the tilt moves it after the tilt as seen from the tilted plate.
+    let carry = adjoint(&turned.inverse());
+    let carry = DMatrix::from_column_slice(6, 6, carry.as_slice());
+    let mut l = &carry * l;
+    l.view_mut((0, stop.readings.len()), (6, 2)).copy_from(&(right_jacobian_se3(&tilt) * axes));
+    Some(Chained { pose: pose * turned, d_theta: carry * g, d_slack: l })
 }

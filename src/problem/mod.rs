@@ -6,18 +6,21 @@
 mod layout;
 mod linearise;
 mod select;
+mod postures;
 mod state;
 
 pub use layout::{Column, Layout, OriginPrior};
 pub use linearise::{Chained, E, ImageTerms, MarkerTerms, Residual, Weighting, chained, linearise, predict};
 pub use select::short_name;
+pub use postures::{common_readings, joined, posture_groups};
 pub use state::{PlateShape, Slack, State, Step};
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::model::robot::Stop;
+use crate::model::robot::{Robot, Stop};
 use crate::series::CameraMount;
 use crate::series::{Edge, Plate};
+use crate::urdf::JointKind;
 
 /// One observation, ready for the adjustment.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +60,8 @@ pub struct Image {
     pub stop: Option<Stop>,
     /// Observations, ordered by marker.
     pub observations: Vec<Measured>,
+    /// Share of the local variance of each reading that the local errors of this stop cover; empty where there are none.
+    pub local_share: Vec<f64>,
     /// Why the image is left out; `None` while it is used.
     pub rejected: Option<String>,
 }
@@ -66,8 +71,34 @@ pub struct Image {
 pub struct Noise {
     /// Factor on the stated standard deviations of the observations, per camera.
     pub pixel_factor: Vec<f64>,
-    /// Joint noise, rad or m: per camera, per reading.
+    /// Joint noise of every stop by itself, rad or m: per camera, per reading.
     pub joint: Vec<Vec<f64>>,
+    /// Local error of every reading, rad or m: common to stops at the same reading. Zero where no stops share readings.
+    pub local: Vec<f64>,
+    /// Apparent tilt of the plate in every image, rad: per camera. Empty where it is not part of the slack.
+    pub tilt: Vec<f64>,
+}
+
+impl Noise {
+    /// Every size of the slack at `first`, rad or m.
+    pub fn start_at(&mut self, first: f64) {
+        self.joint.iter_mut().flatten().for_each(|s| *s = first);
+        self.local.iter_mut().filter(|s| **s > 0.0).for_each(|s| *s = first);
+        self.tilt.fill(first);
+    }
+
+    /// Readings whose noise is alike: of one kind, with local errors told apart or not.
+    pub fn groups(&self, kinds: &[JointKind]) -> Vec<Vec<usize>> {
+        let apart = |r: usize| self.local.get(r).is_some_and(|s| *s > 0.0);
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for r in 0..kinds.len() {
+            match groups.iter_mut().find(|g| kinds[g[0]] == kinds[r] && apart(g[0]) == apart(r)) {
+                Some(group) => group.push(r),
+                None => groups.push(vec![r]),
+            }
+        }
+        groups
+    }
 }
 
 /// Everything that is given.
@@ -92,6 +123,53 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// Variances of the slack of one reading (behind the readings: of the tilt) at a stop, rad^2 or m^2: its own part, and the part of the local error that no
+    /// column stands for.
+    pub fn slack_variance(&self, image: &Image, reading: usize) -> [f64; 2] {
+        let Some(own) = self.noise.joint[image.camera].get(reading) else {
+            return [self.noise.tilt[image.camera].powi(2), 0.0];
+        };
+        let covered = image.local_share.get(reading).map_or(0.0, |s| s.min(1.0));
+        let local = self.noise.local.get(reading).map_or(0.0, |s| s * s);
+        [own * own, (1.0 - covered) * local]
+    }
+
+    /// Information (inverse of the variance) of the slack of one reading at a stop.
+    pub fn slack_information(&self, image: &Image, reading: usize) -> f64 {
+        let [own, local] = self.slack_variance(image, reading);
+        1.0 / (own + local)
+    }
+
+    /// Leaves the local errors out: their columns stay at zero.
+    pub fn without_local_errors(&mut self, state: &mut State) {
+        let first = self.layout.terms.start;
+        for c in self.layout.locals.clone() {
+            self.layout.columns[c].free = false;
+            state.robot.terms[c - first].value = 0.0;
+        }
+        self.noise.local.fill(0.0);
+    }
+
+    /// The priors of the local errors follow their noise component.
+    pub fn hold_local_priors(&mut self, robot: &Robot) {
+        let first = self.layout.terms.start;
+        for c in self.layout.locals.clone() {
+            self.layout.columns[c].prior_sigma = self.noise.local[robot.terms[c - first].reading];
+        }
+    }
+
+    /// Slack of a stop whose readings are right: joint noise, and tilt where it has a size.
+    pub fn exact_slack(&self, image: &Image) -> Slack {
+        let readings = image.stop.as_ref().map_or(0, |s| s.readings.len());
+        Slack::exact(readings, !self.noise.tilt.is_empty())
+    }
+
+    /// Standard deviation of the whole joint noise of a camera's stops, per reading, rad or m.
+    pub fn joint_sigma(&self, camera: usize) -> Vec<f64> {
+        let local = self.noise.local.iter().chain(std::iter::repeat(&0.0));
+        self.noise.joint[camera].iter().zip(local).map(|(own, local)| own.hypot(*local)).collect()
+    }
+
     /// Images that take part.
     pub fn used(&self) -> impl Iterator<Item = (usize, &Image)> {
         self.images.iter().enumerate().filter(|(_, image)| image.rejected.is_none())

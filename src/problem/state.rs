@@ -1,7 +1,8 @@
 //! Every unknown, with its value.
 
-use nalgebra::{DVector, Vector3, Vector6};
+use nalgebra::{DVector, Vector2, Vector3, Vector6};
 
+use super::linearise::{seen_centre, tilt_axes};
 use super::{Image, Layout};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
@@ -9,18 +10,27 @@ use crate::model::plate_modes::{MODES, basis};
 use crate::model::robot::Robot;
 use crate::series::Plate;
 
+/// Number of tilts behind the joint noise of a stop.
+const TILTS: usize = 2;
+
 /// What an image may deviate by from the pose that the robot says.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Slack {
     /// Free camera pose: the image has no tie to the robot (`camera_from_plate`).
     Pose(Pose),
-    /// Joint noise of this stop, rad or m per reading.
+    /// Joint noise of this stop, rad or m per reading; where two values follow, they are the apparent tilt of the plate about
+    /// its x and y axes, rad: what smooth errors of an image (lens, focus, air) do to the pose that it shows.
     Joints(Vec<f64>),
     /// None: readings are exact.
     None,
 }
 
 impl Slack {
+    /// Joint noise of a stop, with or without tilt, all zero.
+    pub fn exact(readings: usize, tilts: bool) -> Self {
+        Self::Joints(vec![0.0; readings + if tilts { TILTS } else { 0 }])
+    }
+
     /// Number of unknowns.
     pub fn len(&self) -> usize {
         match self {
@@ -33,6 +43,14 @@ impl Slack {
     /// True where there is no unknown.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// Apparent tilt of the plate about its x and y axes, rad; `None` where there is none for a robot with this many readings.
+    pub fn tilt(&self, readings: usize) -> Option<[f64; 2]> {
+        match self {
+            Self::Joints(values) => values.get(readings..).and_then(|t| t.try_into().ok()),
+            _ => None,
+        }
     }
 
     fn moved(&self, step: &[f64]) -> Self {
@@ -187,6 +205,9 @@ impl State {
             (_, None) => return None,
         };
         let tip = self.robot.pose_at(image.stop.as_ref()?, dq);
-        Some(image.mount.camera_from_plate(&self.mountings[image.mounting], &tip, &self.placements[image.placement]))
+        let pose =
+            image.mount.camera_from_plate(&self.mountings[image.mounting], &tip, &self.placements[image.placement]);
+        let Some([x, y]) = slack.tilt(image.stop.as_ref()?.readings.len()) else { return Some(pose) };
+        Some(pose * Pose::exp(&(tilt_axes(&seen_centre(image, self)) * Vector2::new(x, y))))
     }
 }

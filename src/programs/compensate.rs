@@ -4,10 +4,13 @@
 //! (those of a pose are `N^-1(pose)`) becomes the joints `q'` with `B(q') = A(q)`, and a pose becomes `N(q')`: the controller turns it back into
 //! `q'` by its own model.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector6;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::codes::{Branch, Codes};
 use super::field::{Edit, Place, splice};
 use super::program::{Kind, Left, PoseTarget, Posture, Program, Target, Understood, write_joints};
 use crate::geom::Pose;
@@ -143,6 +146,10 @@ struct Work<'a> {
     limits: Vec<(f64, f64)>,
     /// Readings of the target before: as programmed, and as corrected.
     before: Option<(Vec<f64>, Vec<f64>)>,
+    /// True after a target whose joints are not known.
+    lost: bool,
+    /// Joints of the last pose with each code.
+    by_code: BTreeMap<String, Vec<f64>>,
     rng: ChaCha8Rng,
 }
 
@@ -150,11 +157,21 @@ impl<'a> Work<'a> {
     fn new(models: Models<'a>, postures: &'a Postures) -> Self {
         let limits = inverse::stated_limits(&models.to.chain);
         let limits = limits.into_iter().map(|l| l.unwrap_or((f64::NEG_INFINITY, f64::INFINITY))).collect();
-        Self { models, postures, limits, before: None, rng: ChaCha8Rng::seed_from_u64(SEED) }
+        Self {
+            models,
+            postures,
+            limits,
+            before: None,
+            lost: false,
+            by_code: BTreeMap::new(),
+            rng: ChaCha8Rng::seed_from_u64(SEED),
+        }
     }
 
     fn target(&mut self, target: &Target, program: &Program) -> Understood<(Correction, Vec<Edit>)> {
-        let (programmed, held) = match &target.kind {
+        let follows = target.follows && !std::mem::replace(&mut self.lost, true);
+        let kind = &self.completed(target, follows)?;
+        let (programmed, held) = match kind {
             Kind::Joints(joints) => {
                 let absent = joints.fields.iter().map(Option::is_none);
                 (joints.readings.clone(), absent.zip(&self.postures.held).map(|(a, h)| a || *h).collect())
@@ -165,7 +182,7 @@ impl<'a> Work<'a> {
                 (self.joints_of(pose, &held)?, held)
             }
         };
-        let before = if target.follows { self.before.take() } else { None };
+        let before = if follows { self.before.take() } else { None };
         let (programmed_before, corrected_before) = before.unzip();
         let meant = reach(self.models.from, &self.limits, &held, programmed_before.as_deref()).stop(&programmed);
         let wanted = self.models.from.pose_at(&meant, &vec![0.0; programmed.len()]);
@@ -173,15 +190,17 @@ impl<'a> Work<'a> {
         let corrected = self.reached(&to, &wanted, &programmed);
         // The next target is approached from here also when this one stays as it is.
         self.before = Some((programmed.clone(), corrected.clone().unwrap_or_else(|_| programmed.clone())));
+        self.lost = false;
         let corrected = corrected?;
-        let (edits, read) = match &target.kind {
+        let (edits, read) = match kind {
             Kind::Joints(joints) => joints.edits(&corrected, &program.files),
             Kind::Pose(pose) if pose.joint_fields.iter().any(Option::is_some) => {
                 write_joints(&pose.joint_fields, &corrected, &program.files)
             }
             Kind::Pose(pose) => {
-                let (edits, base_from_flange) =
+                let (mut edits, base_from_flange) =
                     pose.edits(&self.models.controller.base_from_tip(&corrected), &program.files);
+                edits.extend(self.code_edits(pose, &programmed, &corrected, program));
                 let controller = reach(self.models.controller, &self.limits, &held, None);
                 let read = controller.solve_from(&base_from_flange, &corrected);
                 (edits, read.map_err(|_| "the corrected pose is singular for the controller's model".to_owned())?)
@@ -196,6 +215,37 @@ impl<'a> Work<'a> {
         }
         let correction = Correction { programmed, corrected: read, shift_m, turn_rad, residual_m, residual_rad };
         Ok((correction, edits))
+    }
+
+    /// The target with what its text leaves out, which is what the target before it says.
+    fn completed(&self, target: &Target, follows: bool) -> Understood<Kind> {
+        let before = self.before.as_ref().filter(|_| follows).map(|(q, _)| q);
+        let unknown = || "it leaves numbers out, and the target before it is not known".to_owned();
+        let mut kind = target.kind.clone();
+        match &mut kind {
+            Kind::Joints(joints) => {
+                for (i, q) in joints.readings.iter_mut().enumerate().filter(|(_, q)| !q.is_finite()) {
+                    // Axes that the target does not have keep their place, wherever that is.
+                    let known = before.map(|b| b[i]);
+                    *q = match joints.fields[i] {
+                        None => known.unwrap_or(self.postures.start[i]),
+                        Some(_) => known.ok_or_else(unknown)?,
+                    };
+                }
+            }
+            Kind::Pose(pose) if pose.is_partial() => {
+                pose.complete(&self.models.controller.base_from_tip(before.ok_or_else(unknown)?));
+            }
+            Kind::Pose(_) => {}
+        }
+        Ok(kind)
+    }
+
+    fn code_edits(&self, pose: &PoseTarget, programmed: &[f64], corrected: &[f64], program: &Program) -> Vec<Edit> {
+        let Posture::Coded(codes, axes) = &pose.posture else { return Vec::new() };
+        let six = |q: &[f64]| axes.map(|i| q[i]);
+        let branch = |q: &[f64]| Branch::of(self.models.controller, axes, q);
+        codes.edits((&six(programmed), branch(programmed)), (&six(corrected), branch(corrected)), &program.files)
     }
 
     /// Readings within the limits that reach `wanted` in the posture of `start`.
@@ -251,42 +301,84 @@ impl<'a> Work<'a> {
         let wanted = pose.base_from_flange();
         let fix = |q: &[f64]| q.iter().zip(&pose.fixed).map(|(q, f)| f.unwrap_or(*q)).collect::<Vec<f64>>();
         let near = match (&pose.posture, &self.before) {
-            (Posture::Near(q), _) | (Posture::Nearest, Some((q, _))) => fix(q),
-            (Posture::Nearest, None) => fix(&self.postures.start),
+            (Posture::Near(q), _) => fix(q),
+            (_, Some((q, _))) => fix(q),
+            (_, None) => fix(&self.postures.start),
         };
-        let controller = reach(self.models.controller, &self.limits, held, None);
-        let close = controller.solve_from(&wanted, &near).ok();
-        if let Some(q) = close.filter(|q| largest_change(&near, q).1.abs() < 1.0) {
-            return Ok(q);
+        let codes = match &pose.posture {
+            Posture::Coded(codes, axes) => Some((codes, axes)),
+            _ => None,
+        };
+        // Postures that a code had before are good starts for it.
+        let known = codes.and_then(|(c, _)| self.by_code.get(&c.shown()).map(|q| fix(q)));
+        for start in std::iter::once(&near).chain(&known) {
+            if let Some(q) = self.coded(&wanted, start, &near, held, codes)
+                && (codes.is_some() || largest_change(&near, &q).1.abs() < 1.0)
+            {
+                self.remember(codes, &q);
+                return Ok(q);
+            }
         }
-        self.nearest(&wanted, &near, held).ok_or_else(|| {
-            let remedy = "look at the base and tip link, and at tool and work object";
-            format!("the controller's model does not reach this pose ({remedy})")
-        })
+        let found = self.nearest(&wanted, &near, held, codes).ok_or_else(|| {
+            let remedy = "look at the base and tip link, and at tool and work frame";
+            let posture = codes.map_or(String::new(), |(c, _)| format!(" in the posture {}", c.shown()));
+            format!("the controller's model does not reach this pose{posture} ({remedy})")
+        })?;
+        self.remember(codes, &found);
+        Ok(found)
     }
 
-    /// Of the postures that random starts find, whole turns more or less, the one nearest to `near`.
-    fn nearest(&mut self, wanted: &Pose, near: &[f64], held: &[bool]) -> Option<Vec<f64>> {
+    fn remember(&mut self, codes: Option<(&Codes, &[usize; 6])>, q: &[f64]) {
+        if let Some((codes, _)) = codes {
+            self.by_code.insert(codes.shown(), q.to_vec());
+        }
+    }
+
+    /// Joints that reach a pose, found from `start`, if they are of the posture that is meant; whole turns as the codes say, else towards `near`.
+    fn coded(
+        &self,
+        wanted: &Pose,
+        start: &[f64],
+        near: &[f64],
+        held: &[bool],
+        codes: Option<(&Codes, &[usize; 6])>,
+    ) -> Option<Vec<f64>> {
+        let robot = self.models.controller;
+        let q = reach(robot, &self.limits, held, None).solve_from(wanted, start).ok()?;
+        let Some((codes, axes)) = codes else { return Some(self.turned_towards(&q, near, held)) };
+        let mut q = q;
+        for (axis, &i) in axes.iter().enumerate().filter(|(_, i)| !held[**i]) {
+            q[i] = codes.turned(axis, q[i], near[i], self.limits[i])?;
+        }
+        codes.mean(Branch::of(robot, axes, &q)).then_some(q)
+    }
+
+    /// Of the postures that random starts find the one nearest to `near`.
+    fn nearest(
+        &mut self,
+        wanted: &Pose,
+        near: &[f64],
+        held: &[bool],
+        codes: Option<(&Codes, &[usize; 6])>,
+    ) -> Option<Vec<f64>> {
         let robot = self.models.controller;
         let draw = inverse::reading_limits(&robot.chain);
         let mut best: Option<(f64, Vec<f64>)> = None;
         for k in 0..STARTS {
-            let mut start = if k == 0 {
-                near.to_vec()
-            } else {
-                inverse::random_readings(&draw, &robot.chain.reading_kinds, &mut self.rng)
+            let mut start = match k {
+                0 => near.to_vec(),
+                _ => inverse::random_readings(&draw, &robot.chain.reading_kinds, &mut self.rng),
             };
             for (i, q) in start.iter_mut().enumerate().filter(|(i, _)| held[*i]) {
                 *q = near[i];
             }
-            let Ok(q) = reach(robot, &self.limits, held, None).solve_from(wanted, &start) else { continue };
-            let q = self.turned_towards(&q, near, held);
+            let Some(q) = self.coded(wanted, &start, near, held, codes) else { continue };
             let distance = q.iter().zip(near).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             if best.as_ref().is_none_or(|(d, _)| distance < *d - 1e-9) {
                 best = Some((distance, q));
             }
-            // Eight postures of a six-axis arm, found several times by then.
-            if k >= STARTS / 4 && best.is_some() {
+            // Codes leave one posture; without them a six-axis arm has eight, found several times by then.
+            if best.is_some() && (codes.is_some() || k >= STARTS / 4) {
                 break;
             }
         }

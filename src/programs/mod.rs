@@ -4,15 +4,19 @@
 //! |---|---|
 //! | [`field`] | one number in the text, and its replacement |
 //! | [`program`] | targets: joints or a pose, made of fields |
+//! | [`codes`] | status and turn, confdata: which posture a pose means |
 //! | [`compensate`] | targets of one robot to targets of another |
 //! | `scan` | tokens that all languages share |
-//! | `table`, `urscript` | text -> targets |
+//! | `table`, `krl`, `rapid`, `urscript` | text -> targets |
 //!
 //! To add a language: a file that turns texts into a [`Program`], a variant of [`Language`] with its rows in this file.
 
+pub mod codes;
 pub mod compensate;
 pub mod field;
+mod krl;
 pub mod program;
+mod rapid;
 mod scan;
 mod table;
 mod urscript;
@@ -31,13 +35,26 @@ use crate::urdf::Chain;
 pub enum Language {
     /// A table of joint targets or flange poses.
     Csv,
+    /// KUKA KRL: .src and .dat.
+    Krl,
+    /// ABB RAPID.
+    Rapid,
     /// Universal Robots URScript.
     UrScript,
 }
 
 /// Extensions of the files of each language.
-const EXTENSIONS: [(&str, Language); 3] =
-    [("csv", Language::Csv), ("script", Language::UrScript), ("urscript", Language::UrScript)];
+const EXTENSIONS: [(&str, Language); 9] = [
+    ("csv", Language::Csv),
+    ("src", Language::Krl),
+    ("dat", Language::Krl),
+    ("mod", Language::Rapid),
+    ("modx", Language::Rapid),
+    ("prg", Language::Rapid),
+    ("sys", Language::Rapid),
+    ("script", Language::UrScript),
+    ("urscript", Language::UrScript),
+];
 
 impl Language {
     /// The language that the name of a file tells.
@@ -76,6 +93,8 @@ pub struct Setting<'a> {
 pub fn read(language: Language, files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
     match language {
         Language::Csv => table::read(files, setting),
+        Language::Krl => krl::read(files, setting),
+        Language::Rapid => rapid::read(files, setting),
         Language::UrScript => urscript::read(files, setting),
     }
 }

@@ -2,9 +2,10 @@
 
 use std::f64::consts::PI;
 
+use super::codes::Codes;
 use super::field::{Edit, Field};
 use crate::error::Notice;
-use crate::geom::{Pose, exp_so3, log_so3};
+use crate::geom::{Pose, exp_so3, log_so3, matrix_from_rpy, rpy_from_matrix};
 
 /// One file of a program.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -73,7 +74,7 @@ pub enum Kind {
 /// Joint values, one for every reading of the chain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointTarget {
-    /// rad or m.
+    /// rad or m; not finite where the text leaves an axis out.
     pub readings: Vec<f64>,
     /// Their numbers in the text; `None` for axes that the target does not have (they are held).
     pub fields: Vec<Option<Field>>,
@@ -101,6 +102,8 @@ pub struct PoseTarget {
 /// How a rotation is written.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RotationFields {
+    /// `A`, `B`, `C` with `R = Rz(A) Ry(B) Rx(C)`, rad.
+    Abc([Field; 3]),
     /// Rotation vector, rad.
     Vector([Field; 3]),
     /// Quaternion in the order x, y, z, w.
@@ -114,12 +117,38 @@ pub enum Posture {
     Nearest,
     /// That next to these joint values, rad or m.
     Near(Vec<f64>),
+    /// That of the codes in the text; the six readings are those of axes 1 to 6.
+    Coded(Codes, [usize; 6]),
 }
 
 impl PoseTarget {
     /// `base_from_flange` of the text as it is.
     pub fn base_from_flange(&self) -> Pose {
         self.base_from_work * self.work_from_tool() * self.flange_from_tool.inverse()
+    }
+
+    /// Fills numbers that the text leaves out (not finite so far) with those of the pose before.
+    pub(super) fn complete(&mut self, base_from_flange: &Pose) {
+        let before = self.base_from_work.inverse() * *base_from_flange * self.flange_from_tool;
+        let fill = |field: &mut Field, value: f64| {
+            if !field.written.is_finite() {
+                field.written = value / field.si;
+            }
+        };
+        self.position.iter_mut().zip(before.xyz()).for_each(|(f, v)| fill(f, v));
+        if let RotationFields::Abc(fields) = &mut self.rotation {
+            let [c, b, a] = before.rpy();
+            fields.iter_mut().zip([a, b, c]).for_each(|(f, v)| fill(f, v));
+        }
+    }
+
+    /// True where the text leaves numbers out.
+    pub(super) fn is_partial(&self) -> bool {
+        let rotation = match &self.rotation {
+            RotationFields::Abc(f) | RotationFields::Vector(f) => &f[..],
+            RotationFields::Quaternion(f) => &f[..],
+        };
+        self.position.iter().chain(rotation).any(|f| !f.written.is_finite())
     }
 
     fn work_from_tool(&self) -> Pose {
@@ -146,6 +175,10 @@ impl PoseTarget {
 impl RotationFields {
     fn matrix(&self) -> nalgebra::Matrix3<f64> {
         match self {
+            Self::Abc(fields) => {
+                let [a, b, c] = fields.each_ref().map(Field::value);
+                matrix_from_rpy([c, b, a])
+            }
             Self::Vector(fields) => exp_so3(&fields.each_ref().map(Field::value).into()),
             Self::Quaternion(fields) => {
                 Pose::from_xyz_quaternion([0.0; 3], fields.each_ref().map(Field::value)).rotation
@@ -156,6 +189,12 @@ impl RotationFields {
     /// Writes the rotation of `new` in the way nearest to the text as it is; returns what a reader finds.
     fn write(&self, new: &Pose, write: &mut impl FnMut(&Field, f64) -> f64) -> nalgebra::Matrix3<f64> {
         match self {
+            Self::Abc(fields) => {
+                let old = fields.each_ref().map(Field::value);
+                let best = abc_near(&new.rotation, old);
+                let [a, b, c] = [0, 1, 2].map(|i| write(&fields[i], best[i]));
+                matrix_from_rpy([c, b, a])
+            }
             Self::Vector(fields) => {
                 let old = nalgebra::Vector3::from(fields.each_ref().map(Field::value));
                 let short = log_so3(&new.rotation);
@@ -178,6 +217,18 @@ impl RotationFields {
             }
         }
     }
+}
+
+/// Of all ways to write a rotation as A, B, C (rad), the one nearest to `old`.
+fn abc_near(rotation: &nalgebra::Matrix3<f64>, old: [f64; 3]) -> [f64; 3] {
+    let [c, b, a] = rpy_from_matrix(rotation);
+    let unwound = |abc: [f64; 3]| {
+        let turn = |k: usize| abc[k] + 2.0 * PI * ((old[k] - abc[k]) / (2.0 * PI)).round();
+        [turn(0), turn(1), turn(2)]
+    };
+    let far = |abc: &[f64; 3]| abc.iter().zip(old).map(|(x, o)| (x - o).abs()).fold(0.0, f64::max);
+    let ways = [unwound([a, b, c]), unwound([a + PI, PI - b, c + PI])];
+    if far(&ways[1]) < far(&ways[0]) - 1e-9 { ways[1] } else { ways[0] }
 }
 
 impl JointTarget {

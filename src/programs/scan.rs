@@ -151,6 +151,10 @@ impl<'a> Reader<'a> {
         self.tokens.get(self.at.checked_add_signed(n)?)
     }
 
+    pub fn ahead_is_mark(&self, n: isize, mark: u8) -> bool {
+        self.ahead(n).is_some_and(|t| t.kind == TokenKind::Mark(mark))
+    }
+
     pub fn done(&self) -> bool {
         self.at >= self.tokens.len()
     }
@@ -216,6 +220,33 @@ impl<'a> Reader<'a> {
                 None
             }
         }
+    }
+
+    /// The present token for messages.
+    pub fn shown(&self) -> String {
+        match self.peek() {
+            None => "the end of the text".into(),
+            Some(t) if t.kind == TokenKind::LineEnd => "the end of the line".into(),
+            Some(t) => format!("\"{}\"", String::from_utf8_lossy(self.text(t))),
+        }
+    }
+
+    /// The word at the present place in capital letters.
+    pub fn name(&self) -> Option<String> {
+        self.word().map(|w| String::from_utf8_lossy(w).to_ascii_uppercase())
+    }
+
+    /// To the beginning of the next line.
+    pub fn skip_line(&mut self) {
+        while self.peek().is_some_and(|t| t.kind != TokenKind::LineEnd) {
+            self.at += 1;
+        }
+        self.at += 1;
+    }
+
+    /// True at the end of a line or of the text.
+    pub fn at_line_end(&self) -> bool {
+        self.peek().is_none_or(|t| t.kind == TokenKind::LineEnd)
     }
 
     /// Index of the mark that closes the bracket at token `open`.

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use super::local_errors::{local_share, local_terms};
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
@@ -62,6 +63,9 @@ const DEFAULT_SIGMA_PX: f64 = 0.1;
 /// First guess of the joint noise: from above, rad or m.
 const FIRST_JOINT_NOISE: f64 = 3e-3;
 
+/// First guess of the apparent tilt of the plate in an image: from above, rad.
+const FIRST_TILT: f64 = 1e-3;
+
 /// Fewest observations that fix a camera pose with a margin.
 const FEWEST_OBSERVATIONS: usize = 6;
 
@@ -76,7 +80,9 @@ fn intern(names: &mut Vec<String>, name: &str) -> usize {
 }
 
 /// The problem and a state whose poses and focal lengths are still unknown (identities; pinhole of one image width).
-pub(super) fn build(robot: &Robot, series: &[MeasuredSeries]) -> Result<(Problem, State)> {
+///
+/// With `local_errors` the errors of readings that stops have in common become columns.
+pub(super) fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool) -> Result<(Problem, State)> {
     let (mut cameras, mut mountings, mut placements, mut plate_names) = (vec![], vec![], vec![], vec![]);
     let (mut lenses, mut plates, mut images): (Vec<Camera>, Vec<Plate>, Vec<Image>) = (vec![], vec![], vec![]);
     for (index, s) in series.iter().enumerate() {
@@ -122,12 +128,20 @@ pub(super) fn build(robot: &Robot, series: &[MeasuredSeries]) -> Result<(Problem
                 mount: s.mount,
                 stop: stop.readings.clone().map(|readings| Stop { readings, approach }),
                 observations,
+                local_share: Vec::new(),
                 rejected,
             });
         }
     }
+    let mut robot = robot.clone();
+    if local_errors {
+        robot.terms.extend(local_terms(&images, robot.chain.readings.len()));
+        let shares: Vec<Vec<f64>> = images.iter().map(|image| local_share(&robot.terms, image)).collect();
+        images.iter_mut().zip(shares).for_each(|(image, share)| image.local_share = share);
+    }
+    let readings = robot.chain.readings.len();
     let state = State {
-        robot: robot.clone(),
+        robot,
         mountings: vec![Pose::identity(); mountings.len()],
         placements: vec![Pose::identity(); placements.len()],
         plates: plates.iter().map(PlateShape::nominal).collect(),
@@ -140,9 +154,19 @@ pub(super) fn build(robot: &Robot, series: &[MeasuredSeries]) -> Result<(Problem
     }
     let noise = Noise {
         pixel_factor: vec![1.0; cameras.len()],
-        joint: vec![vec![FIRST_JOINT_NOISE; robot.chain.readings.len()]; cameras.len()],
+        joint: vec![vec![FIRST_JOINT_NOISE; readings]; cameras.len()],
+        local: first_local(&state, &layout),
+        tilt: vec![FIRST_TILT; cameras.len()],
     };
     Ok((Problem { layout, plates, placements, mountings, cameras, images, noise, huber: HUBER }, state))
+}
+
+/// First guess of the local error of every reading that has columns for it; 0 for the others.
+fn first_local(state: &State, layout: &Layout) -> Vec<f64> {
+    let mut first = vec![0.0; state.robot.chain.readings.len()];
+    let terms = layout.locals.start - layout.terms.start;
+    state.robot.terms[terms..].iter().for_each(|t| first[t.reading] = FIRST_JOINT_NOISE);
+    first
 }
 
 fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<Measured>> {

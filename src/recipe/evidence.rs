@@ -70,7 +70,7 @@ fn evidence(full: &Solution, model: RobotModel) -> Option<Evidence> {
     }
     let outcome = solve(&problem, state, &Settings::default());
     let lin = outcome.linearised?;
-    let robot = problem.layout.twists.start..problem.layout.terms.end;
+    let robot = problem.layout.robot();
     let parameters = problem.layout.columns[robot].iter().filter(|c| c.free).count();
     let log_evidence = log_evidence(&problem, &outcome.state, &lin)?;
     Some(Evidence { model, log_evidence, cost: lin.cost, parameters })

@@ -39,8 +39,9 @@ pub(super) fn gates(
             free.rms_px
         ));
     }
-    for (k, camera) in problem.noise.joint.iter().enumerate() {
-        if let Some(worst) = camera.iter().copied().reduce(f64::max).filter(|s| *s > WORST_JOINT_NOISE) {
+    for k in 0..problem.cameras.len() {
+        if let Some(worst) = problem.joint_sigma(k).iter().copied().reduce(f64::max).filter(|s| *s > WORST_JOINT_NOISE)
+        {
             failed.push(format!(
                 "joint noise: {:.1} mrad with camera {}; the readings do not explain the images: look for loose camera or plate, motion, wrong robot model{}",
                 1e3 * worst,
@@ -138,7 +139,7 @@ pub(super) fn remarks(problem: &Problem, state: &State, on_robot: usize, notices
         }
     }
     let values = state.values(&problem.layout);
-    for c in problem.layout.twists.start..problem.layout.terms.end {
+    for c in problem.layout.robot() {
         let column = &problem.layout.columns[c];
         let sigmas = ((values[c] - column.prior_mean) / column.prior_sigma).abs();
         if sigmas > BEYOND_TOLERANCE {

@@ -95,7 +95,7 @@ const ROUNDS: usize = 12;
 /// As [`super::identify`] with one robot model.
 pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
     let robot = options.model.robot(chain);
-    let (mut problem, mut state) = build(&robot, series)?;
+    let (mut problem, mut state) = build(&robot, series, options.joint_noise == JointNoise::Estimated)?;
     options.selection.apply(&mut problem.layout, &mut state)?;
     let stated: Vec<Option<f64>> = (problem.cameras.iter())
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
@@ -145,11 +145,10 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
 }
 
 fn fit(problem: &mut Problem, mut state: State, options: &Options) -> Outcome {
-    let readings = state.robot.chain.readings.len();
     let exact = options.joint_noise == JointNoise::Known(0.0);
     for (slack, image) in state.slack.iter_mut().zip(&problem.images) {
         if image.stop.is_some() {
-            *slack = if exact { Slack::None } else { Slack::Joints(vec![0.0; readings]) };
+            *slack = if exact { Slack::None } else { problem.exact_slack(image) };
         }
     }
     if let JointNoise::Known(sigma) = options.joint_noise {

@@ -113,7 +113,7 @@ impl Selection {
     /// Unknown names with the closest ones, units that do not belong, and poses, which nothing but the images can tell.
     pub fn apply(&self, layout: &mut Layout, state: &mut State) -> Result<()> {
         self.set_priors(layout, state)?;
-        let robot = layout.twists.start..layout.terms.end;
+        let robot = layout.robot();
         if self.parameters == Parameters::Minimal {
             let kept = minimal_set(&state.robot, layout, &structural(&state.robot, layout));
             robot.clone().filter(|c| !kept.contains(c)).for_each(|c| layout.columns[c].free = false);

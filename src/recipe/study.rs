@@ -142,7 +142,7 @@ fn world(
 /// The problem of a world, started at the true camera and poses with the nominal robot.
 fn problem(request: &StudyRequest, world: &SimulatedSeries) -> Result<(Problem, State)> {
     let robot = RobotModel::Rigid.robot(request.chain.clone());
-    let (problem, mut state) = build(&robot, &[measured(world, &request.chain)])?;
+    let (problem, mut state) = build(&robot, &[measured(world, &request.chain)], true)?;
     state.cameras = vec![world.truth.camera.clone()];
     state.mountings = vec![world.truth.camera_pose.pose()];
     state.placements = world.truth.plate_poses.values().map(|p| p.pose()).collect();

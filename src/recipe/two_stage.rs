@@ -12,7 +12,8 @@ use crate::geom::{Pose, right_jacobian_se3};
 use crate::linalg::{SymmetricFactor, product};
 use crate::problem::{Chained, Problem, Slack, State, Step, chained};
 use crate::solve::{
-    ComponentOptions, Elimination, Settings, Status, System, covariance, estimate_components, linearise_all, share_out,
+    ComponentOptions, Elimination, Settings, Status, System, Tally, covariance, estimate_components, linearise_all,
+    share_out,
 };
 
 use super::joint::JointNoise;
@@ -161,6 +162,8 @@ fn with_free_poses(problem: &Problem, state: &State) -> Option<State> {
 struct Latent {
     enters_by: DMatrix<f64>,
     component: Vec<usize>,
+    /// Known variance beside that of the component.
+    beside: Vec<f64>,
 }
 
 /// Error model of the second stage: what is known, and sizes to be found.
@@ -180,7 +183,7 @@ const FIRST_FACTOR: f64 = 30.0;
 const FIRST_JOINT_NOISE: f64 = 3e-3;
 
 /// Rounds of variance components, and relative change that ends them.
-const ROUNDS: usize = 100;
+const ROUNDS: usize = 60;
 const STANDING: f64 = 1e-3;
 
 /// Gauss-Newton steps at given weights, and the decrement (in sigma) that ends them.
@@ -198,7 +201,7 @@ impl ErrorModel {
             }
             v
         };
-        let joints: usize = problem.noise.joint.iter().map(Vec::len).sum();
+        let sizes = problem.cameras.len() * sizes_per_camera(problem);
         let (first, estimated) = match noise {
             JointNoise::Estimated => (FIRST_JOINT_NOISE, true),
             JointNoise::Known(sigma) => (sigma, false),
@@ -206,8 +209,8 @@ impl ErrorModel {
         let (known, sizes, estimated) = match estimator {
             Estimator::Isotropic => (DMatrix::zeros(n, n), vec![FIRST_ISOTROPIC; 2], true),
             Estimator::Blocks => (DMatrix::zeros(n, n), vec![FIRST_FACTOR], true),
-            Estimator::BlocksAndRepeatability => (block_diagonal(), vec![first; joints], estimated),
-            Estimator::FullAndRepeatability => (stage.covariance.clone(), vec![first; joints], estimated),
+            Estimator::BlocksAndRepeatability => (block_diagonal(), vec![first; sizes], estimated),
+            Estimator::FullAndRepeatability => (stage.covariance.clone(), vec![first; sizes], estimated),
             Estimator::HardJoint | Estimator::Joint => return None,
         };
         Some(Self { estimator, known, blocks, sizes, estimated })
@@ -215,14 +218,26 @@ impl ErrorModel {
 
     fn latent(&self, problem: &Problem, image: usize, k: usize, d_slack: &DMatrix<f64>) -> Option<Latent> {
         Some(match self.estimator {
-            Estimator::Isotropic => Latent { enters_by: DMatrix::identity(6, 6), component: vec![0, 0, 0, 1, 1, 1] },
+            Estimator::Isotropic => {
+                Latent { enters_by: DMatrix::identity(6, 6), component: vec![0, 0, 0, 1, 1, 1], beside: vec![0.0; 6] }
+            }
             Estimator::Blocks => {
                 let root = self.blocks[k].cholesky()?.l();
-                Latent { enters_by: DMatrix::from_column_slice(6, 6, root.as_slice()), component: vec![0; 6] }
+                Latent {
+                    enters_by: DMatrix::from_column_slice(6, 6, root.as_slice()),
+                    component: vec![0; 6],
+                    beside: vec![0.0; 6],
+                }
             }
             _ => {
-                let first: usize = problem.noise.joint[..problem.images[image].camera].iter().map(Vec::len).sum();
-                Latent { enters_by: d_slack.clone(), component: (first..first + d_slack.ncols()).collect() }
+                let image = &problem.images[image];
+                let per_camera = sizes_per_camera(problem);
+                let component = |k: usize| image.camera * per_camera + k.min(per_camera - 1);
+                Latent {
+                    enters_by: d_slack.clone(),
+                    component: (0..d_slack.ncols()).map(component).collect(),
+                    beside: (0..d_slack.ncols()).map(|k| problem.slack_variance(image, k)[1]).collect(),
+                }
             }
         })
     }
@@ -231,7 +246,8 @@ impl ErrorModel {
     fn covariance(&self, latents: &[Latent]) -> DMatrix<f64> {
         let mut v = self.known.clone();
         for (k, l) in latents.iter().enumerate() {
-            let sizes = DVector::from_iterator(l.component.len(), l.component.iter().map(|&c| self.sizes[c].powi(2)));
+            let variances = l.component.iter().zip(&l.beside).map(|(&c, beside)| self.sizes[c].powi(2) + beside);
+            let sizes = DVector::from_iterator(l.component.len(), variances);
             let mut block = v.view_mut((6 * k, 6 * k), (6, 6));
             block += &l.enters_by * DMatrix::from_diagonal(&sizes) * l.enters_by.transpose();
         }
@@ -249,20 +265,20 @@ impl ErrorModel {
         weighted: &DVector<f64>,
         projected: &DMatrix<f64>,
     ) -> f64 {
-        let (mut squares, mut redundancy) = (vec![0.0; self.sizes.len()], vec![0.0; self.sizes.len()]);
+        let mut tally = Tally::new(self.sizes.len());
         for (k, l) in latents.iter().enumerate() {
             let pull = l.enters_by.transpose() * weighted.rows(6 * k, 6);
             let share = l.enters_by.transpose() * projected.view((6 * k, 6 * k), (6, 6)) * &l.enters_by;
             for (a, &c) in l.component.iter().enumerate() {
                 let variance = self.sizes[c].powi(2);
-                squares[c] += (variance * pull[a]).powi(2);
-                redundancy[c] += (variance * share[(a, a)]).max(0.0);
+                tally.squares[c] += (variance * pull[a]).powi(2);
+                tally.redundancy[c] += (variance * share[(a, a)]).max(0.0);
             }
         }
         if matches!(self.estimator, Estimator::Isotropic | Estimator::Blocks) {
             let mut change: f64 = 0.0;
             for (size, (s, r)) in
-                self.sizes.iter_mut().zip(squares.iter().zip(&redundancy)).filter(|(_, (_, r))| **r > 1e-9)
+                self.sizes.iter_mut().zip(tally.squares.iter().zip(&tally.redundancy)).filter(|(_, (_, r))| **r > 1e-9)
             {
                 let next = (s / r).sqrt().max(f64::MIN_POSITIVE);
                 change = change.max((next / *size - 1.0).abs());
@@ -271,15 +287,22 @@ impl ErrorModel {
             return change;
         }
         let mut change: f64 = 0.0;
-        let mut first = 0;
-        for camera in &problem.noise.joint {
-            let own = first..first + camera.len();
-            let sigma = &mut self.sizes[own.clone()];
-            change = change.max(share_out(kinds, &squares[own.clone()], &redundancy[own], sigma));
-            first += camera.len();
+        let per_camera = sizes_per_camera(problem);
+        for camera in 0..problem.cameras.len() {
+            let mut groups = problem.noise.groups(kinds);
+            groups.extend((!problem.noise.tilt.is_empty()).then(|| vec![per_camera - 1]));
+            for group in groups {
+                let group: Vec<usize> = group.iter().map(|r| camera * per_camera + r).collect();
+                change = change.max(share_out(&group, &tally, tally.common(&group), &mut self.sizes));
+            }
         }
         change
     }
+}
+
+/// Sizes of the joint-noise estimators per camera: one a reading, and the apparent tilt of the plate if there is one.
+fn sizes_per_camera(problem: &Problem) -> usize {
+    problem.noise.joint.first().map_or(0, Vec::len) + usize::from(!problem.noise.tilt.is_empty())
 }
 
 /// The predicted poses at a state, in the charts of the stage.
@@ -298,7 +321,7 @@ fn predict(problem: &Problem, stage: &PoseStage, state: &State) -> Option<Predic
     let mut p = Predicted { residual: stage.offset.clone(), jacobian: DMatrix::zeros(n, theta), d_slack: Vec::new() };
     for (k, &i) in stage.images.iter().enumerate() {
         let image = &problem.images[i];
-        let exact = Slack::Joints(vec![0.0; image.stop.as_ref()?.readings.len()]);
+        let exact = problem.exact_slack(image);
         let Chained { pose, d_theta, d_slack } = chained(problem, state, image, &exact)?;
         let x: Vector6<f64> = (stage.references[k].inverse() * pose).log();
         let chart = right_jacobian_se3(&x).try_inverse()?;
@@ -363,16 +386,21 @@ pub fn fit_poses(
     estimator: Estimator,
     noise: JointNoise,
 ) -> Option<Estimate> {
-    let mut model = ErrorModel::new(problem, stage, estimator, noise)?;
     let mut state = State {
         cameras: stage.state.cameras.clone(),
         plates: stage.state.plates.clone(),
         slack: stage.state.slack.clone(),
         ..start.clone()
     };
+    let mut problem = problem.clone();
+    if matches!(estimator, Estimator::Isotropic | Estimator::Blocks) || noise != JointNoise::Estimated {
+        problem.without_local_errors(&mut state);
+    }
+    let problem = &problem;
+    let mut model = ErrorModel::new(problem, stage, estimator, noise)?;
     let kinds = state.robot.chain.reading_kinds.clone();
     let mut standing = !model.estimated;
-    for _ in 0..ROUNDS {
+    for round in 1.. {
         let p = predict(problem, stage, &state)?;
         let latents: Vec<Latent> = (stage.images.iter().zip(&p.d_slack).enumerate())
             .map(|(k, (&i, l))| model.latent(problem, i, k, l))
@@ -388,7 +416,8 @@ pub fn fit_poses(
         }
         let taken = product(&product(&normal.weighted_jacobian, &covariance), &normal.weighted_jacobian.transpose());
         let change = model.update(problem, &kinds, &latents, &(&weight * &p.residual), &(&weight - taken));
-        standing = change < STANDING;
+        // Sizes that go to nothing never stand, but matter no more.
+        standing = change < STANDING || round >= ROUNDS;
     }
     None
 }
@@ -444,12 +473,17 @@ pub fn fit_joint(
     let mut state = start.clone();
     let hard = estimator == Estimator::HardJoint || noise == JointNoise::Known(0.0);
     for (slack, image) in state.slack.iter_mut().zip(&own.images) {
-        if let Some(stop) = &image.stop {
-            *slack = if hard { Slack::None } else { Slack::Joints(vec![0.0; stop.readings.len()]) };
+        if image.stop.is_some() {
+            *slack = if hard { Slack::None } else { problem.exact_slack(image) };
         }
     }
     let first = if let JointNoise::Known(sigma) = noise { sigma } else { FIRST_JOINT_NOISE };
-    own.noise.joint.iter_mut().flatten().for_each(|s| *s = first.max(f64::MIN_POSITIVE));
+    own.noise.start_at(first.max(f64::MIN_POSITIVE));
+    if hard || noise != JointNoise::Estimated {
+        own.without_local_errors(&mut state);
+    } else {
+        own.hold_local_priors(&state.robot);
+    }
     let options = ComponentOptions {
         joint: !hard && noise == JointNoise::Estimated,
         settings: Settings { decrement: 1e-4, ..Settings::default() },
@@ -459,7 +493,7 @@ pub fn fit_joint(
     let lin = outcome.linearised.filter(|_| outcome.status == Status::Converged)?;
     let theta = own.layout.theta_len();
     let covariance = covariance(&own, &outcome.state, &lin).ok()?.reduced.view((0, 0), (theta, theta)).into_owned();
-    let components = if hard { Vec::new() } else { own.noise.joint.concat() };
+    let components = if hard { Vec::new() } else { (0..own.cameras.len()).flat_map(|c| own.joint_sigma(c)).collect() };
     Some((own, Estimate { estimator, state: outcome.state, covariance, components }))
 }
 

@@ -41,7 +41,10 @@ pub struct Stops {
 
 impl Stops {
     /// Reads joints.csv.
-    pub(super) fn read(path: &Path, inputs: &mut Vec<InputFile>) -> Result<Self> {
+    ///
+    /// # Errors
+    /// Unreadable files, rows without an image, cells that are no numbers, some joints of a row empty.
+    pub fn read(path: &Path, inputs: &mut Vec<InputFile>) -> Result<Self> {
         Self::from_table(&Table::read(path, inputs)?)
     }
 

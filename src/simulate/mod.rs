@@ -13,5 +13,6 @@ pub mod sensor;
 pub mod truth;
 pub mod world;
 
-pub use observe::{is_seen, observe};
+pub use crate::plan::visibility::is_seen;
+pub use observe::observe;
 pub use world::{RobotErrors, SimulatedSeries, WorldRequest, series, typical_camera};

@@ -37,10 +37,10 @@ impl MarkersEliminated {
         let (mut a, mut rhs, slack_start) = space.to_robot_space(problem, lin);
         for (&start, &image) in slack_start.iter().zip(&lin.images) {
             if let Slack::Joints(dq) = &state.slack[image] {
-                let sigma = &problem.noise.joint[problem.images[image].camera];
-                for (k, (q, s)) in dq.iter().zip(sigma).enumerate() {
-                    a[(start + k, start + k)] += s.powi(-2);
-                    rhs[start + k] -= q * s.powi(-2);
+                for (k, q) in dq.iter().enumerate() {
+                    let information = problem.slack_information(&problem.images[image], k);
+                    a[(start + k, start + k)] += information;
+                    rhs[start + k] -= q * information;
                 }
             }
         }

@@ -195,9 +195,10 @@ fn add_image(
     let mut h = l.transpose() * &pp * l;
     let mut slack_rhs = l.transpose() * &bp;
     if let Slack::Joints(dq) = &state.slack[lin.images[k]] {
-        for (r, (q, s)) in dq.iter().zip(&problem.noise.joint[image.camera]).enumerate() {
-            h[(r, r)] += s.powi(-2);
-            slack_rhs[r] -= q * s.powi(-2);
+        for (r, q) in dq.iter().enumerate() {
+            let information = problem.slack_information(image, r);
+            h[(r, r)] += information;
+            slack_rhs[r] -= q * information;
         }
     }
     for r in 0..h.nrows() {

@@ -6,8 +6,7 @@
 use super::covariance::{Covariance, covariance};
 use super::levenberg::{Outcome, Settings, Status, solve};
 use super::system::Linearised;
-use crate::problem::{Problem, Slack, State};
-use crate::urdf::JointKind;
+use crate::problem::{Noise, Problem, Slack, State};
 
 /// What is estimated and how long.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,11 +90,10 @@ fn update(problem: &mut Problem, state: &State, lin: &Linearised, cov: &Covarian
         change = change.max((ratio - 1.0).abs());
     }
     if joint {
-        for (camera, sigma) in noise.joint.iter_mut().enumerate() {
-            change = change.max(update_joint(problem, state, lin, cov, camera, sigma));
-        }
+        change = change.max(update_joint(problem, state, lin, cov, &mut noise));
     }
     problem.noise = noise;
+    problem.hold_local_priors(&state.robot);
     change
 }
 
@@ -129,8 +127,8 @@ pub(super) fn effective_parameters(problem: &Problem, state: &State, lin: &Linea
         let c = cov.slack(k, length);
         slack += match &state.slack[i] {
             Slack::Joints(_) => {
-                let sigma = &problem.noise.joint[problem.images[i].camera];
-                (0..length).map(|r| 1.0 - c[(r, r)] / (sigma[r] * sigma[r])).sum()
+                let image = &problem.images[i];
+                (0..length).map(|r| 1.0 - c[(r, r)] * problem.slack_information(image, r)).sum()
             }
             _ => length as f64,
         };
@@ -143,47 +141,107 @@ pub(super) fn effective_parameters(problem: &Problem, state: &State, lin: &Linea
     dense + slack + markers
 }
 
-fn update_joint(
-    problem: &Problem,
-    state: &State,
-    lin: &Linearised,
-    cov: &Covariance,
-    camera: usize,
-    sigma: &mut [f64],
-) -> f64 {
-    let n = sigma.len();
-    let (mut squares, mut redundancy) = (vec![0.0; n], vec![0.0; n]);
-    for (k, &i) in lin.images.iter().enumerate().filter(|(_, i)| problem.images[**i].camera == camera) {
-        if let Slack::Joints(dq) = &state.slack[i] {
-            let c = cov.slack(k, n);
-            for r in 0..n {
-                squares[r] += dq[r] * dq[r];
-                redundancy[r] += (1.0 - c[(r, r)] / (sigma[r] * sigma[r])).max(0.0);
+/// Sums of squares of latents per reading, and how many of them the data determine.
+#[derive(Debug, Clone)]
+pub struct Tally {
+    /// Sums of squares, rad^2 or m^2.
+    pub squares: Vec<f64>,
+    /// Redundancies.
+    pub redundancy: Vec<f64>,
+}
+
+impl Tally {
+    /// Nothing counted yet.
+    pub fn new(readings: usize) -> Self {
+        Self { squares: vec![0.0; readings], redundancy: vec![0.0; readings] }
+    }
+
+    /// Variance of the readings of a group together; `None` where the data say nothing.
+    pub fn common(&self, group: &[usize]) -> Option<f64> {
+        let sum = |v: &[f64]| group.iter().map(|&r| v[r]).sum::<f64>();
+        let free = sum(&self.redundancy);
+        (free > 1e-9).then(|| (sum(&self.squares) / free).max(JOINT_NOISE_FLOOR * JOINT_NOISE_FLOOR))
+    }
+
+    fn with(mut self, other: &Self, which: impl Fn(usize) -> bool) -> Self {
+        for r in (0..self.squares.len()).filter(|&r| which(r)) {
+            self.squares[r] += other.squares[r];
+            self.redundancy[r] += other.redundancy[r];
+        }
+        self
+    }
+
+    /// Adds a latent with its prior variance and the variance that the data leave it. Where the latent is the sum of several,
+    /// `part` is the variance of the one that is counted: its share in the estimate, and in what was learnt of it.
+    fn add(&mut self, reading: usize, value: f64, left: f64, prior: f64, part: f64) {
+        let share = part / prior;
+        self.squares[reading] += (share * value).powi(2);
+        self.redundancy[reading] += share * (1.0 - left / prior).max(0.0);
+    }
+}
+
+/// Noise of the stops by themselves, and local errors where stops share readings.
+fn update_joint(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance, noise: &mut Noise) -> f64 {
+    let robot = &state.robot;
+    let n = robot.chain.readings.len();
+    let kinds = &robot.chain.reading_kinds;
+    let mut own = vec![Tally::new(n); noise.joint.len()];
+    let mut local = Tally::new(n);
+    let mut tilt = Tally::new(noise.tilt.len());
+    for (k, &i) in lin.images.iter().enumerate() {
+        let Slack::Joints(dq) = &state.slack[i] else { continue };
+        let (c, image) = (cov.slack(k, dq.len()), &problem.images[i]);
+        for (r, value) in dq.iter().enumerate().skip(n) {
+            let prior = problem.slack_variance(image, r)[0];
+            tilt.add(image.camera, *value, c[(r, r)], prior, prior);
+        }
+        for r in 0..n {
+            let [own_part, local_part] = problem.slack_variance(image, r);
+            let prior = own_part + local_part;
+            own[image.camera].add(r, dq[r], c[(r, r)], prior, own_part);
+            if local_part > 0.0 {
+                local.add(r, dq[r], c[(r, r)], prior, local_part);
             }
         }
     }
-    share_out(&state.robot.chain.reading_kinds, &squares, &redundancy, sigma)
+    let first = problem.layout.terms.start;
+    for c in problem.layout.locals.clone().filter(|&c| cov.system.touched(c)) {
+        let term = &robot.terms[c - first];
+        let prior = noise.local[term.reading].powi(2);
+        local.add(term.reading, term.value, cov.reduced[(c, c)], prior, prior);
+    }
+    let mut change: f64 = 0.0;
+    for camera in 0..noise.tilt.len() {
+        change = change.max(share_out(&[camera], &tilt, tilt.common(&[camera]), &mut noise.tilt));
+    }
+    for group in problem.noise.groups(kinds) {
+        if noise.local.get(group[0]).is_some_and(|s| *s > 0.0) {
+            // A few postures tell little of their local errors: they are drawn to the noise of all joints of the kind.
+            let alike: Vec<usize> = (0..n).filter(|&r| kinds[r] == kinds[group[0]]).collect();
+            let whole = own.iter().fold(local.clone(), |sum, tally| sum.with(tally, |r| noise.local[r] == 0.0));
+            let common = whole.common(&alike);
+            change = change.max(share_out(&group, &local, common, &mut noise.local));
+        }
+        for (tally, sigma) in own.iter().zip(&mut noise.joint) {
+            change = change.max(share_out(&group, tally, tally.common(&group), sigma));
+        }
+    }
+    change
 }
 
-/// New joint noise from the sum of squares and the redundancy of each reading's latents; every reading is drawn to the common
-/// noise of its kind. Returns the largest relative change.
-pub fn share_out(kinds: &[JointKind], squares: &[f64], redundancy: &[f64], sigma: &mut [f64]) -> f64 {
+/// New noise from the sum of squares and the redundancy of each reading's latents; every reading is drawn to the common
+/// variance. Returns the largest relative change.
+pub fn share_out(group: &[usize], tally: &Tally, common: Option<f64>, sigma: &mut [f64]) -> f64 {
     let mut change: f64 = 0.0;
-    let old = sigma.to_vec();
-    for kind in [JointKind::Revolute, JointKind::Prismatic] {
-        let members: Vec<usize> = (0..sigma.len()).filter(|&r| kinds[r] == kind).collect();
-        let (all, free): (f64, f64) = members.iter().fold((0.0, 0.0), |(s, f), &r| (s + squares[r], f + redundancy[r]));
-        if free < 1e-9 {
-            continue;
+    let Some(common) = common else { return change };
+    let (squares, redundancy) = (&tally.squares, &tally.redundancy);
+    for &r in group {
+        let variance = (squares[r] + SHRINKAGE * common) / (redundancy[r] + SHRINKAGE);
+        let next = variance.sqrt().clamp(JOINT_NOISE_FLOOR, 2.0 * sigma[r].max(JOINT_NOISE_FLOOR));
+        if next > JOINT_NOISE_FLOOR {
+            change = change.max((next / sigma[r] - 1.0).abs());
         }
-        let common = (all / free).max(JOINT_NOISE_FLOOR * JOINT_NOISE_FLOOR);
-        for &r in &members {
-            let variance = (squares[r] + SHRINKAGE * common) / (redundancy[r] + SHRINKAGE);
-            sigma[r] = variance.sqrt().clamp(JOINT_NOISE_FLOOR, 2.0 * old[r]);
-            if sigma[r] > JOINT_NOISE_FLOOR {
-                change = change.max((sigma[r] / old[r] - 1.0).abs());
-            }
-        }
+        sigma[r] = next;
     }
     change
 }

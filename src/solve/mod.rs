@@ -8,7 +8,7 @@ mod levenberg;
 mod snoop;
 mod system;
 
-pub use components::{ComponentOptions, estimate_components, share_out};
+pub use components::{ComponentOptions, Tally, estimate_components, share_out};
 pub use covariance::{Covariance, covariance, covariance_by};
 pub use levenberg::{Outcome, Settings, Status, solve};
 pub use snoop::{reject_images, reject_observations};

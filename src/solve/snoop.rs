@@ -1,7 +1,7 @@
 //! Rejection with reasons: single observations by their residual, whole images by the joint error that they would need.
 
 use super::levenberg::Outcome;
-use crate::problem::{Problem, Slack, Weighting, chained, predict};
+use crate::problem::{Problem, Slack, State, Weighting, chained, predict};
 
 /// Normalised residual length beyond which an observation is left out (a clean one is so with probability 4e-5).
 const OBSERVATION_BOUND: f64 = 4.5;
@@ -44,15 +44,22 @@ pub fn reject_observations(problem: &mut Problem, outcome: &Outcome) -> usize {
     verdicts.len()
 }
 
+/// Noise and local error of every reading at a stop, rad or m.
+fn whole_error(problem: &Problem, state: &State, image: usize, noise: &[f64]) -> Vec<f64> {
+    let local = problem.images[image].stop.as_ref().map(|s| state.robot.local_errors(s)).unwrap_or_default();
+    noise.iter().zip(local).map(|(n, l)| n + l).collect()
+}
+
 /// Leaves out the image whose readings fit it worst, where they do not fit at all; returns its index.
 pub fn reject_images(problem: &mut Problem, outcome: &Outcome) -> Option<usize> {
     let mut noise = Vec::new();
     for (i, _) in problem.used() {
         if let Slack::Joints(dq) = &outcome.state.slack[i] {
-            noise.push((i, dq));
+            noise.push((i, whole_error(problem, &outcome.state, i, dq)));
         }
     }
     let joints = noise.first()?.1.len();
+    let noise: Vec<(usize, &[f64])> = noise.iter().map(|(i, dq)| (*i, dq.as_slice())).collect();
     let sigma: Vec<f64> = (0..joints)
         .map(|r| {
             let mut sizes: Vec<f64> = noise.iter().map(|(_, dq)| dq[r].abs()).collect();

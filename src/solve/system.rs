@@ -56,8 +56,8 @@ fn prior_cost(problem: &Problem, state: &State, images: &[usize]) -> f64 {
         .iter()
         .map(|&i| match &state.slack[i] {
             Slack::Joints(dq) => {
-                let sigma = &problem.noise.joint[problem.images[i].camera];
-                dq.iter().zip(sigma).map(|(q, s)| (q / s).powi(2)).sum()
+                let image = &problem.images[i];
+                dq.iter().enumerate().map(|(r, q)| q * q * problem.slack_information(image, r)).sum()
             }
             _ => 0.0,
         })

@@ -194,3 +194,18 @@ pub fn assert_meets(reached: &Pose, wanted: &Pose, what: &str) {
     let (rad, m) = reached.distance(wanted);
     assert!(rad < 1e-6 && m < 1e-6, "{what}: {m:e} m, {rad:e} rad");
 }
+
+/// Status and turn as the manual defines them, for the KR 6 R900: S bit 2 and T are signs; bit 1 is A3 against the stretched arm, whose
+/// wrist lies 35 mm beside axis 4's line at 420 mm; bit 0 is the wrist centre against axis 1.
+pub fn status_turn(q: &[f64]) -> (u32, u32) {
+    let phi = (35.0f64 / 420.0).atan() - 0.0;
+    let (a2, a3) = (q[1], q[2]);
+    // Wrist centre before axis 1, in the plane of the arm, m; x forward, z up.
+    let reach = 0.025 + 0.455 * a2.cos() + 0.42 * (a2 + a3).cos() - 0.035 * (a2 + a3).sin() * SIDE;
+    let status = u32::from(reach < 0.0) | u32::from(a3 >= -phi * SIDE) << 1 | u32::from(q[4] < 0.0) << 2;
+    let turn = q.iter().enumerate().map(|(k, v)| u32::from(*v < 0.0) << k).sum();
+    (status, turn)
+}
+
+/// Side of the 35 mm: the wrist lies above axis 3 when the forearm is level.
+const SIDE: f64 = -1.0;

@@ -124,6 +124,7 @@ pub fn all_terms() -> Vec<Term> {
         terms.extend([Term::Cosine(k), Term::Sine(k)]);
     }
     terms.extend((0..GRAVITY_TERMS).map(Term::Gravity));
+    terms.push(Term::local(0.2));
     terms
 }
 
@@ -174,6 +175,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
                 approach: (i > 0).then(|| (0..readings).map(|_| dice.normal(2e-3)).collect()),
             }),
             observations: Vec::new(),
+            local_share: Vec::new(),
             rejected: None,
         };
         if state.placements.len() == i && i < request.placements {
@@ -192,8 +194,12 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
     let (mountings, placements) = (names(1, "mounting"), names(state.placements.len(), "placement"));
     let cameras = vec!["front".to_owned()];
     let layout = Layout::new(&state, &mountings, &placements, &cameras, &["plate".to_owned()]);
-    let noise =
-        Noise { pixel_factor: vec![request.pixel_factor], joint: vec![vec![request.joint_noise.max(1e-6); readings]] };
+    let noise = Noise {
+        pixel_factor: vec![request.pixel_factor],
+        joint: vec![vec![request.joint_noise.max(1e-6); readings]],
+        local: Vec::new(),
+        tilt: Vec::new(),
+    };
     (Problem { layout, plates: vec![plate], placements, mountings, cameras, images, noise, huber: 2.45 }, state)
 }
 

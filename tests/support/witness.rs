@@ -126,6 +126,7 @@ fn phi(robot: &Robot, stop: &Stop, reading: usize, term: Term) -> f64 {
         Term::Cosine(k) => (f64::from(k) * q).cos(),
         Term::Sine(k) => (f64::from(k) * q).sin(),
         Term::Gravity(k) => gravity(&robot.chain, stop, reading, k.into()),
+        Term::Local(at) => (-((q - 1e-6 * f64::from(at)) / 3e-3).powi(2) / 2.0).exp(),
         Term::Backlash => stop.approach.as_ref().map_or(0.0, |a| (a[reading] / 2e-3).tanh()),
     }
 }
@@ -163,10 +164,23 @@ pub fn camera_from_plate(state: &State, layout: &Layout, image: &Image, slack: &
     let tip = base_from_tip(&state.robot, layout, stop, noise, seed);
     let camera = perturbed(&state.mountings[image.mounting], layout.mountings[image.mounting].start, seed);
     let plate = perturbed(&state.placements[image.placement], layout.placements[image.placement].start, seed);
-    match image.mount {
+    let pose = match image.mount {
         CameraMount::Hand => inverse(&(tip * camera)) * plate,
         CameraMount::Fixed => inverse(&camera) * tip * plate,
+    };
+    if noise.len() == stop.readings.len() {
+        return pose;
     }
+    // The plate turns about axes through the middle of what is seen: shift, turn, shift back.
+    let seen = image.observations.iter().map(|o| state.plates[image.plate].nominal[o.marker]);
+    let centre = seen.sum::<Vector3<f64>>() / image.observations.len() as f64;
+    let mut turn = [constant(0.0); 6];
+    for k in 0..2 {
+        let reading = stop.readings.len() + k;
+        turn[3 + k] = variable(noise[reading], seed == Some(Seed::Slack(reading)));
+    }
+    let shift = |sign: f64| lift(&nalgebra::Matrix4::new_translation(&(centre * sign)));
+    pose * shift(1.0) * exp(&turn) * shift(-1.0)
 }
 
 /// Pinhole and Brown-Conrady, in the order of OpenCV: fx fy cx cy k1 k2 p1 p2 k3.

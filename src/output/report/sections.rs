@@ -44,7 +44,7 @@ fn next_step(r: &SolutionRecord) -> Markup {
 
 /// True where the robot model has terms beside the joint offsets.
 fn beyond_urdf(r: &SolutionRecord) -> bool {
-    r.robot.terms.iter().any(|t| t.term != "offset")
+    r.robot.terms.iter().any(|t| t.term != "offset" && !t.term.starts_with("local_"))
 }
 
 /// Before and after on held-out images.

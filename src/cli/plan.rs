@@ -1,0 +1,370 @@
+//! `robotcal plan`: where to take images, and what they will be worth.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nalgebra::Vector3;
+
+use super::Verdict;
+use super::choices::Model;
+use super::plate::pair;
+use super::simulate::Mount;
+use crate::error::{Error, Result};
+use crate::geom::{OrientedBox, Pose};
+use crate::model::camera::Camera;
+use crate::output::{plan_files, plan_start, solution_json, write_all};
+use crate::plan::candidates::CandidateOptions;
+use crate::plan::scene::{SceneOptions, arm_length_m};
+use crate::plan::setting::Setting;
+use crate::plan::viewpoint::ViewRange;
+use crate::plan::visibility::SightLimits;
+use crate::problem::Image;
+use crate::recipe::{Budget, Forecast, Plan, PlanRequest, RobotModel, Wish, forecast, plan};
+use crate::series::{CameraMount, Stops, read_plate};
+use crate::simulate::typical_camera;
+use crate::urdf::{self, Chain, JointKind};
+
+/// Flags of `plan`.
+#[derive(Debug, Args)]
+pub(super) struct PlanArgs {
+    /// Robot description (URDF)
+    #[arg(long, value_name = "FILE")]
+    urdf: PathBuf,
+    /// New folder for joints.csv, programs and plan.html, or one of an earlier plan
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// Plate (plate.toml)
+    #[arg(long, value_name = "FILE", required_unless_present = "from")]
+    plate: Option<PathBuf>,
+    /// Number of images
+    #[arg(long, default_value_t = 50)]
+    count: usize,
+    /// Plan further images for this result: camera, poses and noise are taken from it
+    #[arg(long, value_name = "solution.json", conflicts_with_all = ["plate", "camera", "camera_fov_deg", "hand_camera"])]
+    from: Option<PathBuf>,
+    /// Base link
+    #[arg(long, value_name = "LINK")]
+    base: Option<String>,
+    /// Tip link
+    #[arg(long, value_name = "LINK")]
+    tip: Option<String>,
+    /// Camera (ROS camera_info)
+    #[arg(long, value_name = "FILE")]
+    camera: Option<PathBuf>,
+    /// Horizontal field of view, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 60.0, conflicts_with = "camera")]
+    camera_fov_deg: f64,
+    /// Columns and rows of the images
+    #[arg(long, value_name = "WxH", default_value = "1280x1024", value_parser = pair::<u32>, conflicts_with = "camera")]
+    image: [u32; 2],
+    /// Where the camera is
+    #[arg(long, value_enum, default_value_t = Mount::Hand)]
+    mount: Mount,
+    /// Camera on the flange (for a fixed camera: in the base frame), roughly: x,y,z,roll,pitch,yaw in m and degrees, or a file
+    /// like hand_camera.yaml [default: 80 mm before the flange, looking along its z]
+    #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true)]
+    hand_camera: Option<String>,
+    /// Plate in the base frame (for a fixed camera: on the flange), roughly: x,y,z,roll,pitch,yaw in m and degrees, or a file;
+    /// several times for several places [default: on the table before the robot]
+    #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true)]
+    plate_pose: Vec<String>,
+    /// Joint terms that shall be found
+    #[arg(long, value_enum, default_value_t = Model::Rigid)]
+    robot_model: Model,
+    /// Accuracy is meant at these joint vectors (columns as in joints.csv, degrees), not over the workspace
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["d_optimal", "parameters"])]
+    targets: Option<PathBuf>,
+    /// All parameters of the robot alike, not the flange
+    #[arg(long, conflicts_with = "parameters")]
+    d_optimal: bool,
+    /// These parameters only, for example joint_1 or joint_2.gear
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    parameters: Vec<String>,
+    /// Noise of an observation (sigma per axis), px
+    #[arg(long, value_name = "PX", default_value_t = 0.05)]
+    pixel_noise_px: f64,
+    /// Joint noise (sigma), mrad
+    #[arg(long, value_name = "MRAD", default_value_t = 0.03)]
+    joint_noise_mrad: f64,
+    /// Nearest and farthest distance from camera to plate, m
+    #[arg(long, value_name = "NEARxFAR", default_value = "0.15x0.6", value_parser = pair::<f64>)]
+    distance_m: [f64; 2],
+    /// Largest tilt of the view, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 55.0)]
+    tilt_deg: f64,
+    /// Depths between which the image is sharp, m
+    #[arg(long, value_name = "NEARxFAR", value_parser = pair::<f64>)]
+    focus_m: Option<[f64; 2]>,
+    /// Markers that every view shows at least
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    markers: usize,
+    /// Candidates to choose from
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    candidates: usize,
+    /// Images at most with the plate at one place
+    #[arg(long, value_name = "N")]
+    per_placement: Option<usize>,
+    /// Images at most in one posture of the arm (elbow, wrist)
+    #[arg(long, value_name = "N")]
+    per_posture: Option<usize>,
+    /// Travel at most: greatest joint motion from the middle posture, summed over the images, rad
+    #[arg(long, value_name = "RAD")]
+    travel_rad: Option<f64>,
+    /// Box that is in the way, in the base frame: middle and edges x,y,z,a,b,c, m
+    #[arg(long, value_name = "BOX", allow_hyphen_values = true)]
+    r#box: Vec<String>,
+    /// Height of the table in the base frame, m [default: below plate and robot]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    table_z_m: Option<f64>,
+    /// Least distance between what must not touch, mm
+    #[arg(long, value_name = "MM", default_value_t = 10.0)]
+    clearance_mm: f64,
+    /// Radius of links without collision geometry, mm [default: by the length of the arm]
+    #[arg(long, value_name = "MM")]
+    link_radius_mm: Option<f64>,
+    /// Radius of the camera's body, mm
+    #[arg(long, value_name = "MM", default_value_t = 30.0)]
+    camera_radius_mm: f64,
+    /// Seed of the candidates
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// Numbers between commas.
+fn numbers(flag: &str, text: &str, count: usize, remedy: &str) -> Result<Vec<f64>> {
+    let all: Vec<f64> = text.split(',').filter_map(|p| p.trim().parse().ok()).filter(|v: &f64| v.is_finite()).collect();
+    if all.len() != count || text.split(',').count() != count {
+        return Err(Error::input(flag, format!("\"{text}\" is not {count} numbers with commas between"), remedy));
+    }
+    Ok(all)
+}
+
+/// A pose as six numbers, or of a file.
+fn pose(flag: &str, text: &str) -> Result<Pose> {
+    if Path::new(text).is_file() {
+        return plan_start::read_pose(Path::new(text));
+    }
+    let v = numbers(flag, text, 6, "give x,y,z,roll,pitch,yaw in m and degrees, or a file that exists")?;
+    Ok(Pose::from_xyz_rpy([v[0], v[1], v[2]], [v[3], v[4], v[5]].map(f64::to_radians)))
+}
+
+pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
+    check(args)?;
+    let description = urdf::read(&args.urdf)?;
+    let chain = description.chain(args.base.as_deref(), args.tip.as_deref())?;
+    let request = request(args, chain)?;
+    let plan = plan(&request)?;
+    let forecast = forecast(&request, &plan)?;
+    let command: Vec<String> = std::env::args().skip(1).collect();
+    let command = format!("robotcal {}", command.join(" "));
+    let files = plan_files::plan_files(&request, &plan, &forecast, &command, BTreeMap::new())?;
+    write_all(&args.out, &files)?;
+    print!("{}", summary(&request, &plan, &forecast, &files, &args.out));
+    Ok(Verdict::Good)
+}
+
+fn check(args: &PlanArgs) -> Result<()> {
+    let positive = [
+        ("--pixel-noise-px", args.pixel_noise_px),
+        ("--camera-fov-deg", args.camera_fov_deg),
+        ("--distance-m", args.distance_m[0]),
+        ("--tilt-deg", args.tilt_deg),
+    ];
+    if let Some((flag, value)) = positive.iter().find(|(_, v)| !(*v > 0.0 && v.is_finite())) {
+        return Err(Error::input(flag, format!("is {value}"), "give a positive number"));
+    }
+    if args.distance_m[1] < args.distance_m[0] {
+        return Err(Error::input("--distance-m", "the farthest is nearer than the nearest", "give NEARxFAR"));
+    }
+    if args.tilt_deg >= 85.0 || args.camera_fov_deg >= 170.0 {
+        return Err(Error::input("--tilt-deg, --camera-fov-deg", "too large", "give less than 85 and 170 degrees"));
+    }
+    if args.count == 0 {
+        return Err(Error::input("--count", "is 0", "ask for one image at least"));
+    }
+    Ok(())
+}
+
+fn request(args: &PlanArgs, chain: Chain) -> Result<PlanRequest> {
+    let wish = wish(args, &chain)?;
+    let (setting, taken) = setting(args, chain)?;
+    let boxes = args.r#box.iter().map(|text| {
+        let v = numbers("--box", text, 6, "give middle and edges: x,y,z,a,b,c in m")?;
+        let half_m = Vector3::new(v[3], v[4], v[5]) / 2.0;
+        Ok(OrientedBox { pose: Pose::from_xyz_rpy([v[0], v[1], v[2]], [0.0; 3]), half_m })
+    });
+    let tilt_rad = args.tilt_deg.to_radians();
+    Ok(PlanRequest {
+        taken,
+        count: args.count,
+        wish,
+        budget: Budget {
+            most_per_placement: args.per_placement,
+            least_per_placement: None,
+            most_per_posture: args.per_posture,
+            travel_rad: args.travel_rad,
+        },
+        candidates: CandidateOptions {
+            count: args.candidates.max(args.count),
+            views: ViewRange {
+                near_m: args.distance_m[0],
+                far_m: args.distance_m[1],
+                tilt_rad,
+                ..ViewRange::default()
+            },
+            sight: SightLimits {
+                least_markers: args.markers,
+                incidence_rad: (tilt_rad + 0.35).min(1.4),
+                focus_m: args.focus_m.map_or((0.0, f64::INFINITY), |[a, b]| (a, b)),
+            },
+            seed: args.seed,
+            ..CandidateOptions::default()
+        },
+        scene: SceneOptions {
+            link_radius_m: args.link_radius_mm.map(|mm| mm / 1e3),
+            camera_radius_m: args.camera_radius_mm / 1e3,
+            clearance_m: args.clearance_mm / 1e3,
+            table_z_m: args.table_z_m,
+            boxes: boxes.collect::<Result<_>>()?,
+            described: Vec::new(),
+        },
+        setting,
+    })
+}
+
+fn wish(args: &PlanArgs, chain: &Chain) -> Result<Wish> {
+    if let Some(path) = &args.targets {
+        return Ok(Wish::Targets(targets(path, chain)?));
+    }
+    Ok(match (args.d_optimal, args.parameters.is_empty()) {
+        (true, _) => Wish::Parameters,
+        (_, false) => Wish::Named(args.parameters.clone()),
+        _ => Wish::Workspace,
+    })
+}
+
+/// Joint vectors of a file, in degrees (m for prismatic joints), as rad and m in the order of the chain.
+fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
+    let stops = Stops::read(path, &mut Vec::new())?;
+    let column = |name: &String| {
+        let at = stops.joints.iter().position(|j| j == name);
+        at.ok_or_else(|| {
+            Error::input(path.display(), format!("has no column \"{name}\""), "name every joint of the chain")
+        })
+    };
+    let columns: Vec<usize> = chain.readings.iter().map(column).collect::<Result<_>>()?;
+    let in_si = |raw: &Vec<f64>| {
+        let one = |(c, kind): (&usize, &JointKind)| {
+            if *kind == JointKind::Revolute { raw[*c].to_radians() } else { raw[*c] }
+        };
+        columns.iter().zip(&chain.reading_kinds).map(one).collect()
+    };
+    Ok(stops.stops.iter().filter_map(|s| s.raw_readings.as_ref()).map(in_si).collect())
+}
+
+fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<Image>)> {
+    let model: RobotModel = args.robot_model.into();
+    if let Some(path) = &args.from {
+        let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+        let record = solution_json::read(&bytes)?;
+        let (mut setting, taken) = plan_start::from_solution(&record, chain, model)?;
+        for (k, text) in args.plate_pose.iter().enumerate() {
+            setting.placements.push((format!("new_{k}"), pose("--plate-pose", text)?));
+        }
+        return Ok((setting, taken));
+    }
+    let plate = args.plate.as_ref().ok_or_else(|| Error::input("--plate", "is missing", "give plate.toml"))?;
+    let plate = read_plate(plate, &mut Vec::new())?;
+    let robot = model.robot(chain);
+    let mount: CameraMount = args.mount.into();
+    let mounting = match (&args.hand_camera, mount) {
+        (Some(text), _) => pose("--hand-camera", text)?,
+        (None, CameraMount::Hand) => Pose::from_xyz_rpy([0.0, 0.0, 0.08], [0.0; 3]),
+        (None, CameraMount::Fixed) => {
+            return Err(Error::input(
+                "--hand-camera",
+                "is missing",
+                "say where the fixed camera stands in the base frame",
+            ));
+        }
+    };
+    let mut placements = Vec::new();
+    for (k, text) in args.plate_pose.iter().enumerate() {
+        placements.push((format!("placement_{k}"), pose("--plate-pose", text)?));
+    }
+    if placements.is_empty() {
+        let place = match mount {
+            CameraMount::Hand => Pose::from_xyz_rpy([0.5 * arm_length_m(&robot), 0.0, 0.0], [0.0; 3]),
+            CameraMount::Fixed => Pose::from_xyz_rpy([0.0, 0.0, 0.05], [0.0; 3]),
+        };
+        placements.push(("placement_0".to_owned(), place));
+    }
+    let joint_sigma = robot.chain.reading_kinds.iter().map(|kind| {
+        let rad = args.joint_noise_mrad / 1e3;
+        if *kind == JointKind::Prismatic { 0.1 * rad } else { rad }
+    });
+    let setting = Setting {
+        joint_sigma: joint_sigma.collect(),
+        camera: camera(args)?,
+        mount,
+        mounting,
+        placements,
+        plate,
+        pixel_sigma_px: args.pixel_noise_px,
+        robot,
+    };
+    Ok((setting, Vec::new()))
+}
+
+fn camera(args: &PlanArgs) -> Result<Camera> {
+    match &args.camera {
+        Some(path) => plan_start::read_camera(path),
+        None => Ok(typical_camera(args.image[0], args.image[1], args.camera_fov_deg.to_radians())),
+    }
+}
+
+fn summary(
+    request: &PlanRequest,
+    plan: &Plan,
+    forecast: &Forecast,
+    files: &BTreeMap<String, Vec<u8>>,
+    folder: &Path,
+) -> String {
+    let mut text = format!(
+        "plan      {} images of {} candidates ({} views tried)\n\
+         certified {:.1} % of the best weights, {:.1} % after rounding\n\
+         flange    {:.3} mm before, {:.3} mm expected (RMS over {} joint vectors)\n",
+        plan.legs.len(),
+        plan.pool.len(),
+        plan.tally.views,
+        1e2 * plan.relaxed_efficiency,
+        1e2 * plan.rounded_efficiency,
+        1e3 * forecast.before_m,
+        1e3 * forecast.flange_m,
+        plan.targets.len(),
+    );
+    for point in &forecast.curve {
+        text += &format!(
+            "          {:4} images: {:.3} mm ({:.3} mm at random)\n",
+            point.images,
+            1e3 * point.planned_m,
+            1e3 * point.random_m
+        );
+    }
+    let taught = plan.legs.iter().filter(|l| !l.is_free).count();
+    if taught > 0 {
+        text += &format!(
+            "ways      {taught} without a free straight way were found; teach a posture in between (plan.json)\n"
+        );
+    }
+    let worst = plan.imbalance.iter().copied().fold(0.0, f64::max);
+    text += &format!("approach  every joint from both sides (one-sidedness at most {:.0} %)\n", 1e2 * worst);
+    for line in &forecast.words {
+        text += &format!("remark    {line}\n");
+    }
+    let names: Vec<&str> = files.keys().map(String::as_str).collect();
+    text += &format!("written   {}: {}\n", folder.display(), names.join(", "));
+    let _ = request;
+    text
+}

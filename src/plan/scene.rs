@@ -1,0 +1,247 @@
+//! What the robot must not touch: itself, the plate, the table, boxes.
+//!
+//! Every link is one or more capsules in the frame behind its joint. The check is one of distances, with a clearance.
+
+use nalgebra::Vector3;
+
+use super::setting::Setting;
+use crate::geom::{OrientedBox, Pose, segment_distance_m};
+use crate::model::robot::Robot;
+use crate::series::{CameraMount, Plate};
+use crate::urdf::JointKind;
+
+/// A segment with a radius, in the frame behind a joint of the chain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Capsule {
+    /// What it is, for messages.
+    pub name: String,
+    /// Index in the chain of the joint that carries it; `None`: fixed to the base.
+    pub joint: Option<usize>,
+    /// Number of moving joints before it.
+    pub order: usize,
+    /// Ends, m.
+    pub ends_m: [Vector3<f64>; 2],
+    /// Radius, m.
+    pub radius_m: f64,
+}
+
+/// Sizes of what is not described by the URDF.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneOptions {
+    /// Radius of a link without collision geometry, m; `None`: a share of the arm's length.
+    pub link_radius_m: Option<f64>,
+    /// Radius of the camera's body, m.
+    pub camera_radius_m: f64,
+    /// Least distance, m.
+    pub clearance_m: f64,
+    /// Height of the table, m, in the base frame; `None`: below the lowest plate, at most the foot of the robot.
+    pub table_z_m: Option<f64>,
+    /// Boxes in the base frame.
+    pub boxes: Vec<OrientedBox>,
+    /// Links with collision geometry of their own, in place of capsules along the links that carry them.
+    pub described: Vec<Capsule>,
+}
+
+impl Default for SceneOptions {
+    fn default() -> Self {
+        Self {
+            link_radius_m: None,
+            camera_radius_m: 0.03,
+            clearance_m: 0.01,
+            table_z_m: None,
+            boxes: Vec::new(),
+            described: Vec::new(),
+        }
+    }
+}
+
+/// Radius of a link as a share of the arm's length.
+const RADIUS_SHARE: f64 = 0.055;
+/// Half the thickness of a plate, m.
+const HALF_PLATE_M: f64 = 0.006;
+/// Margin of the plate around its outermost markers, in pitches.
+const PLATE_MARGIN: f64 = 1.0;
+/// Moving joints before a link that may be near the table: those of the foot.
+const FOOT: usize = 1;
+
+/// Everything that may collide.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    robot: Robot,
+    capsules: Vec<Capsule>,
+    /// Pairs of capsules that are compared.
+    pairs: Vec<(usize, usize)>,
+    /// Boxes that stand still, by name.
+    boxes: Vec<(String, OrientedBox)>,
+    /// Plates that stand still, one for each placement; empty for a plate in the hand.
+    plates: Vec<OrientedBox>,
+    /// Plate in the tip frame.
+    plate_in_hand: Option<OrientedBox>,
+    table_z_m: f64,
+    clearance_m: f64,
+}
+
+/// Length of the arm: the sum of all origins behind the first moving joint, m.
+pub fn arm_length_m(robot: &Robot) -> f64 {
+    let joints = robot.chain.joints.iter().skip_while(|j| j.kind == JointKind::Fixed).skip(1);
+    joints.map(|j| j.origin.translation.norm()).sum()
+}
+
+/// The plate as a box in its own frame.
+fn plate_box(plate: &Plate) -> OrientedBox {
+    let margin = PLATE_MARGIN * plate.pitch_m;
+    let half = |k: usize| plate.markers.iter().map(|m| m.position_m[k].abs()).fold(0.0, f64::max) + margin;
+    let below = Vector3::new(0.0, 0.0, -HALF_PLATE_M);
+    OrientedBox {
+        pose: Pose::new(nalgebra::Matrix3::identity(), below),
+        half_m: Vector3::new(half(0), half(1), HALF_PLATE_M),
+    }
+}
+
+/// Capsules along the links, from each moving joint to the next and to the tip, where `described` has none.
+fn along_links(robot: &Robot, radius_m: f64, described: &[Capsule]) -> Vec<Capsule> {
+    let joints = &robot.chain.joints;
+    let mut all = Vec::new();
+    let (mut carrier, mut order, mut end) = (None, 0, Pose::identity());
+    let mut close = |carrier: Option<usize>, order: usize, end: &Pose| {
+        let name = carrier.map_or("base".to_owned(), |k: usize| format!("link after {}", joints[k].name));
+        if !described.iter().any(|c| c.order == order) {
+            let ends_m = [Vector3::zeros(), end.translation];
+            all.push(Capsule { name, joint: carrier, order, ends_m, radius_m });
+        }
+    };
+    for (k, joint) in joints.iter().enumerate() {
+        end = end * joint.origin;
+        if joint.kind != JointKind::Fixed {
+            close(carrier, order, &end);
+            (carrier, order, end) = (Some(k), order + 1, Pose::identity());
+        }
+    }
+    close(carrier, order, &end);
+    all
+}
+
+impl Scene {
+    /// The scene of a setting.
+    pub fn new(setting: &Setting, options: &SceneOptions) -> Self {
+        let robot = &setting.robot;
+        let arm = arm_length_m(robot);
+        let radius = options.link_radius_m.unwrap_or(RADIUS_SHARE * arm);
+        let mut capsules = options.described.clone();
+        capsules.extend(along_links(robot, radius, &options.described));
+        capsules.sort_by_key(|c| c.order);
+        let last = robot.chain.joints.len() - 1;
+        let moving = robot.chain.joints.iter().filter(|j| j.kind != JointKind::Fixed).count();
+        let plate = plate_box(&setting.plate);
+        let (mut boxes, mut plates, mut plate_in_hand) = (Vec::new(), Vec::new(), None);
+        match setting.mount {
+            CameraMount::Hand => {
+                let ends_m = [Vector3::zeros(), setting.mounting.translation];
+                capsules.push(Capsule {
+                    name: "camera".into(),
+                    joint: Some(last),
+                    order: moving + 1,
+                    ends_m,
+                    radius_m: options.camera_radius_m,
+                });
+                plates = setting.placements.iter().map(|p| plate.placed(&p.1)).collect();
+            }
+            CameraMount::Fixed => {
+                let half_m = Vector3::repeat(options.camera_radius_m);
+                boxes.push(("camera".to_owned(), OrientedBox { pose: setting.mounting, half_m }));
+                plate_in_hand = setting.placements.first().map(|p| plate.placed(&p.1));
+            }
+        }
+        boxes.extend(options.boxes.iter().enumerate().map(|(k, b)| (format!("box {}", k + 1), *b)));
+        let lowest = plates.iter().flat_map(|p| p.corners()).map(|c| c.z).fold(0.0, f64::min);
+        let pairs = compared(&capsules, options.clearance_m);
+        Self {
+            robot: robot.clone(),
+            pairs,
+            capsules,
+            boxes,
+            plates,
+            plate_in_hand,
+            table_z_m: options.table_z_m.unwrap_or(lowest - options.clearance_m),
+            clearance_m: options.clearance_m,
+        }
+    }
+
+    /// Capsules of links and camera.
+    pub fn capsules(&self) -> &[Capsule] {
+        &self.capsules
+    }
+
+    /// What comes too near at these readings with the plate at `placement`; `None` where nothing does.
+    pub fn collision(&self, readings: &[f64], placement: usize) -> Option<String> {
+        let links = self.robot.link_poses(readings);
+        let ends: Vec<[Vector3<f64>; 2]> =
+            self.capsules.iter().map(|c| c.ends_m.map(|e| c.joint.map_or(e, |j| links[j].transform(&e)))).collect();
+        let near = |distance: f64, c: &Capsule, other: f64| distance < c.radius_m + other + self.clearance_m;
+        for &(a, b) in &self.pairs {
+            let distance = segment_distance_m([&ends[a][0], &ends[a][1]], [&ends[b][0], &ends[b][1]]);
+            if near(distance, &self.capsules[a], self.capsules[b].radius_m) {
+                return Some(format!("{} and {}", self.capsules[a].name, self.capsules[b].name));
+            }
+        }
+        let still = self.boxes.iter().map(|(name, b)| (name.as_str(), b));
+        let plate = self.plates.get(placement).map(|p| ("plate", p));
+        for (name, obstacle) in still.clone().chain(plate) {
+            for (c, e) in self.capsules.iter().zip(&ends).filter(|(c, _)| c.order > 0) {
+                if near(obstacle.distance_to_segment_m(&e[0], &e[1]), c, 0.0) {
+                    return Some(format!("{} and {name}", c.name));
+                }
+            }
+        }
+        let table = self.table_z_m + self.clearance_m;
+        for (c, e) in self.capsules.iter().zip(&ends).filter(|(c, _)| c.order > FOOT) {
+            if e[0].z.min(e[1].z) - c.radius_m < table {
+                return Some(format!("{} and table", c.name));
+            }
+        }
+        self.plate_in_hand_collides(&links, &ends, table)
+    }
+
+    /// The plate in the hand against table, boxes and all links but the two that carry it.
+    fn plate_in_hand_collides(&self, links: &[Pose], ends: &[[Vector3<f64>; 2]], table: f64) -> Option<String> {
+        let plate = self.plate_in_hand?.placed(links.last()?);
+        if plate.corners().iter().any(|c| c.z < table) {
+            return Some("plate and table".into());
+        }
+        let last = self.capsules.iter().map(|c| c.order).max()?;
+        for (c, e) in self.capsules.iter().zip(ends).filter(|(c, _)| c.order + 1 < last) {
+            if plate.distance_to_segment_m(&e[0], &e[1]) < c.radius_m + self.clearance_m {
+                return Some(format!("{} and plate", c.name));
+            }
+        }
+        // Corners and middle against boxes: a plate is thin, and a box it would cut through elsewhere reaches the arm first.
+        let probes = plate.corners().into_iter().chain([plate.pose.translation]);
+        let hit = |b: &OrientedBox| probes.clone().any(|p| b.distance_m(&p) < self.clearance_m);
+        self.boxes.iter().find(|(_, b)| hit(b)).map(|(name, _)| format!("plate and {name}"))
+    }
+
+    /// True where the straight way between two joint vectors is free, checked every `step` (rad or m of any joint).
+    pub fn way_is_free(&self, from: &[f64], to: &[f64], placement: usize, step: f64) -> bool {
+        let longest = from.iter().zip(to).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
+        let pieces = (longest / step).ceil().max(1.0) as usize;
+        (1..pieces).all(|k| {
+            let t = k as f64 / pieces as f64;
+            let at: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + t * (b - a)).collect();
+            self.collision(&at, placement).is_none()
+        })
+    }
+}
+
+/// Pairs of capsules with enough between them to come apart; neighbours touch by construction.
+fn compared(capsules: &[Capsule], clearance_m: f64) -> Vec<(usize, usize)> {
+    let length = |c: &Capsule| (c.ends_m[1] - c.ends_m[0]).norm();
+    let apart = |a: usize, b: usize| {
+        let (a, b) = (&capsules[a], &capsules[b]);
+        let (low, high) = (a.order.min(b.order), a.order.max(b.order));
+        let between: f64 =
+            (low + 1..high).map(|o| capsules.iter().filter(|c| c.order == o).map(&length).fold(0.0, f64::max)).sum();
+        between > a.radius_m + b.radius_m + clearance_m
+    };
+    let all = (0..capsules.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+    all.filter(|&(a, b)| apart(a, b)).collect()
+}

@@ -1,0 +1,143 @@
+//! What is roughly known before the measurement, as a problem without images.
+
+use nalgebra::{DMatrix, Matrix2, Vector2};
+
+use super::visibility::seen_markers;
+use crate::geom::Pose;
+use crate::model::camera::Camera;
+use crate::model::robot::{Robot, Stop};
+use crate::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State, predict};
+use crate::series::{CameraMount, Edge, Plate};
+
+/// Huber bound of planned images; predictions have no residuals, so that it never acts.
+const HUBER: f64 = 2.45;
+
+/// Robot, camera and plates as far as they are known.
+#[derive(Debug, Clone)]
+pub struct Setting {
+    /// The robot with the joint terms that shall be found.
+    pub robot: Robot,
+    /// The camera.
+    pub camera: Camera,
+    /// Where the camera is.
+    pub mount: CameraMount,
+    /// `flange_from_camera`, or `base_from_camera` of a fixed camera.
+    pub mounting: Pose,
+    /// Names and poses of the places where the plate may stand: `base_from_plate`, or `flange_from_plate`.
+    pub placements: Vec<(String, Pose)>,
+    /// The plate.
+    pub plate: Plate,
+    /// Standard deviation of an observation, px per axis.
+    pub pixel_sigma_px: f64,
+    /// Joint noise of every reading, rad or m.
+    pub joint_sigma: Vec<f64>,
+}
+
+/// The least joint noise that is planned with, rad or m.
+pub const LEAST_JOINT_SIGMA: f64 = 1e-6;
+
+impl Setting {
+    /// A problem with the columns of this setting and no image, and the state about which it is linearised.
+    pub fn problem(&self) -> (Problem, State) {
+        let names: Vec<String> = self.placements.iter().map(|p| p.0.clone()).collect();
+        let one = |name: &str| vec![name.to_owned()];
+        let state = State {
+            robot: self.robot.clone(),
+            mountings: vec![self.mounting],
+            placements: self.placements.iter().map(|p| p.1).collect(),
+            cameras: vec![self.camera.clone()],
+            plates: vec![PlateShape::nominal(&self.plate)],
+            slack: Vec::new(),
+        };
+        let mut layout = Layout::new(&state, &one("hand_camera"), &names, &one("camera"), &one("plate"));
+        if let Some(bar) = self.plate.scale {
+            let ends = [bar.from, bar.to].map(|id| self.plate.index_of(id).map(|k| &self.plate.markers[k]));
+            if let [Some(a), Some(b)] = ends {
+                let length = (a.position_m - b.position_m).norm();
+                let variance = bar.sigma_m.powi(2) + a.sigma_m.powi(2) + b.sigma_m.powi(2);
+                layout.columns[layout.shapes[0].start].prior_sigma = variance.sqrt() / length;
+            }
+        }
+        let joint = self.joint_sigma.iter().map(|s| s.max(LEAST_JOINT_SIGMA)).collect();
+        let problem = Problem {
+            layout,
+            plates: vec![self.plate.clone()],
+            placements: names,
+            mountings: one("hand_camera"),
+            cameras: one("camera"),
+            images: Vec::new(),
+            noise: Noise { pixel_factor: vec![1.0], joint: vec![joint], local: Vec::new(), tilt: Vec::new() },
+            huber: HUBER,
+        };
+        (problem, state)
+    }
+
+    /// `camera_from_plate` at joint readings.
+    pub fn camera_from_plate(&self, readings: &[f64], placement: usize) -> Pose {
+        let tip = self.robot.base_from_tip(readings);
+        self.mount.camera_from_plate(&self.mounting, &tip, &self.placements[placement].1)
+    }
+
+    /// `base_from_tip` for a view `plate_from_camera`.
+    pub fn base_from_tip(&self, plate_from_camera: &Pose, placement: usize) -> Pose {
+        let plate = &self.placements[placement].1;
+        match self.mount {
+            CameraMount::Hand => *plate * *plate_from_camera * self.mounting.inverse(),
+            CameraMount::Fixed => self.mounting * plate_from_camera.inverse() * plate.inverse(),
+        }
+    }
+
+    /// The image that would be taken: every marker seen, observed where it is predicted. `None` where nothing is seen.
+    pub fn image(&self, state: &State, name: &str, readings: &[f64], placement: usize) -> Option<Image> {
+        let pose = self.camera_from_plate(readings, placement);
+        let mut image = Image {
+            name: name.to_owned(),
+            series: 0,
+            camera: 0,
+            mounting: 0,
+            placement,
+            plate: 0,
+            mount: self.mount,
+            stop: Some(Stop::at(readings)),
+            observations: Vec::new(),
+            local_share: Vec::new(),
+            rejected: None,
+        };
+        let information = Matrix2::identity() * self.pixel_sigma_px.powi(-2);
+        for marker in seen_markers(&self.plate, &self.camera, &pose) {
+            let m = &self.plate.markers[marker];
+            for (edge, radius_m) in [(Edge::Outer, m.outer_radius_m), (Edge::Inner, m.inner_radius_m)] {
+                if edge == Edge::Inner && radius_m <= 0.0 {
+                    continue;
+                }
+                let mut o = Measured { marker, edge, radius_m, uv: Vector2::zeros(), information, rejected: None };
+                o.uv = predict(&image, state, &pose, &o)?.uv;
+                image.observations.push(o);
+            }
+        }
+        (!image.observations.is_empty()).then_some(image)
+    }
+
+    /// The slack of a planned image: joint noise, of which nothing is known yet.
+    pub fn slack(&self) -> Slack {
+        Slack::Joints(vec![0.0; self.joint_sigma.len()])
+    }
+}
+
+/// Information that is assumed of columns without a prior, because something is roughly known: 1/sigma^2 on the diagonal.
+pub fn rough_knowledge(problem: &Problem, camera: &Camera) -> DMatrix<f64> {
+    let focal = camera.parameters[0];
+    let sigma = |k: usize| {
+        let c = &problem.layout.columns[k];
+        let mounting = problem.layout.mountings.iter().any(|m| m.contains(&k));
+        match (c.unit, mounting) {
+            _ if c.prior_sigma.is_finite() => c.prior_sigma,
+            ("m", true) => 0.1,
+            ("rad", true) => 0.3,
+            ("px", _) => 0.5 * focal,
+            _ => 1.0,
+        }
+    };
+    let n = problem.layout.len();
+    DMatrix::from_fn(n, n, |i, j| if i == j { sigma(i).powi(-2) } else { 0.0 })
+}

@@ -1,0 +1,68 @@
+//! Stops that share joint readings: what a joint is off by there, it is off by at all of them.
+
+use super::Image;
+use crate::model::robot::Stop;
+
+/// Readings closer than this, rad or m, are the same posture of a joint.
+const SAME_READING: f64 = 2e-3;
+
+/// Fewest readings in common that make two stops related: a single one agrees by chance now and then.
+const FEWEST_IN_COMMON: usize = 2;
+
+/// Readings that two stops have in common; empty where it may be chance.
+pub fn common_readings(a: &Stop, b: &Stop) -> Vec<usize> {
+    let same: Vec<usize> = (a.readings.iter().zip(&b.readings).enumerate())
+        .filter(|(_, (a, b))| (*a - *b).abs() < SAME_READING)
+        .map(|(r, _)| r)
+        .collect();
+    if same.len() < FEWEST_IN_COMMON { Vec::new() } else { same }
+}
+
+/// Sets of indices below `count`, joined by the pairs; each set ascending, in the order of their first members.
+pub fn joined(count: usize, pairs: impl Iterator<Item = (usize, usize)>) -> Vec<Vec<usize>> {
+    let mut parent: Vec<usize> = (0..count).collect();
+    fn root(parent: &mut [usize], mut i: usize) -> usize {
+        while parent[i] != i {
+            parent[i] = parent[parent[i]];
+            i = parent[i];
+        }
+        i
+    }
+    for (a, b) in pairs {
+        let (a, b) = (root(&mut parent, a), root(&mut parent, b));
+        parent[a.max(b)] = a.min(b);
+    }
+    let mut sets: Vec<Vec<usize>> = vec![Vec::new(); count];
+    for i in 0..count {
+        sets[root(&mut parent, i)].push(i);
+    }
+    sets.retain(|s| !s.is_empty());
+    sets
+}
+
+/// Images of `among` in groups that share readings, directly or through others; an image off the robot is alone.
+pub fn posture_groups(images: &[Image], among: &[usize]) -> Vec<Vec<usize>> {
+    let stop = |k: usize| images[among[k]].stop.as_ref();
+    let related = (0..among.len())
+        .flat_map(|a| (0..a).map(move |b| (b, a)))
+        .filter(|&(a, b)| stop(a).zip(stop(b)).is_some_and(|(a, b)| !common_readings(a, b).is_empty()));
+    joined(among.len(), related).into_iter().map(|set| set.into_iter().map(|k| among[k]).collect()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_reading_in_common_is_chance_two_are_a_posture() {
+        let (a, b, c) = (Stop::at(&[0.1, 0.2, 0.3]), Stop::at(&[0.1005, 0.9, 0.8]), Stop::at(&[0.1, 0.2, -0.3]));
+        assert!(common_readings(&a, &b).is_empty());
+        assert_eq!(common_readings(&a, &c), [0, 1]);
+    }
+
+    #[test]
+    fn pairs_join_into_sets() {
+        let pairs = [(3, 1), (4, 5), (1, 5)];
+        assert_eq!(joined(6, pairs.into_iter()), [vec![0], vec![1, 3, 4, 5], vec![2]]);
+    }
+}

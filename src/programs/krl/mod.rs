@@ -1,0 +1,376 @@
+//! KUKA KRL, `.src` with its `.dat`: motions to `E6POS`, `POS`, `FRAME`, `E6AXIS` and `AXIS`, `$TOOL` and `$BASE` (mm and degrees).
+
+mod aggregate;
+
+use std::collections::BTreeMap;
+
+use aggregate::{Aggregate, index};
+
+use super::Setting;
+use super::program::{Kind, Left, PoseTarget, Program, Target, TextFile, Understood};
+use super::scan::{Dialect, Reader, TokenKind};
+use crate::error::{Error, Result};
+use crate::geom::Pose;
+use crate::urdf::JointKind;
+
+const DIALECT: Dialect = Dialect { comment: b';', quotes: b"\"", header: Some(b'&'), based_numbers: true };
+/// Motions and how many targets they have.
+const MOVES: [(&str, usize); 7] =
+    [("PTP", 1), ("LIN", 1), ("CIRC", 2), ("SPTP", 1), ("SLIN", 1), ("SCIRC", 2), ("SPL", 1)];
+const RELATIVE: [&str; 6] = ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL"];
+const POSE_NAMES: [&str; 8] = ["X", "Y", "Z", "A", "B", "C", "S", "T"];
+const AXIS_NAMES: [&str; 6] = ["A1", "A2", "A3", "A4", "A5", "A6"];
+
+/// What a name stands for.
+#[derive(Debug, Clone)]
+enum Value {
+    Aggregate(Aggregate),
+    /// Another name.
+    Name(String),
+    Expression,
+}
+
+/// Where a frame comes from.
+#[derive(Debug, Clone)]
+enum FrameIs {
+    Known(Pose),
+    /// Not set in the text so far.
+    Unset,
+    /// Set to something that the text does not tell.
+    Unknown(String),
+}
+
+/// Reads a module of one or more files.
+pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
+    let mut module = Module {
+        setting,
+        prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
+        values: BTreeMap::new(),
+        declared: Vec::new(),
+        tool: FrameIs::Unset,
+        base: FrameIs::Unset,
+        visited: BTreeMap::new(),
+        fresh: true,
+        program: Program { files: vec![], targets: vec![], left: vec![], edits: vec![], notices: vec![] },
+    };
+    // Data first: programs use them in whatever order the files are given.
+    let has_moves = |file: &TextFile| !file.name.to_ascii_lowercase().ends_with(".dat");
+    for wanted in [false, true] {
+        for (index, file) in files.iter().enumerate().filter(|(_, f)| has_moves(f) == wanted) {
+            module.file(Reader::new(file, index, DIALECT)?, wanted)?;
+        }
+    }
+    module.unvisited();
+    let mut program = module.program;
+    program.files = files;
+    Ok(program)
+}
+
+struct Module<'a> {
+    setting: &'a Setting<'a>,
+    prismatic: Vec<bool>,
+    values: BTreeMap<String, Value>,
+    /// Positions declared in data files that are no data of the controller: name, file, line.
+    declared: Vec<(String, usize, usize)>,
+    tool: FrameIs,
+    base: FrameIs,
+    /// File and byte of a target -> its index in the program.
+    visited: BTreeMap<(usize, usize), usize>,
+    fresh: bool,
+    program: Program,
+}
+
+impl Module<'_> {
+    fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
+        (self.tool, self.base, self.fresh) = (FrameIs::Unset, FrameIs::Unset, true);
+        let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
+        while !reader.done() {
+            let Some(word) = reader.name() else {
+                reader.skip_line();
+                continue;
+            };
+            if moves && let Some((_, count)) = MOVES.iter().find(|(name, _)| *name == word) {
+                self.motion(&mut reader, &word, *count)?;
+            } else if moves && RELATIVE.contains(&word.as_str()) {
+                self.leave(&reader, &word, "it is relative to the position before".into());
+            } else if moves && word == "BAS" {
+                self.bas(&mut reader);
+            } else {
+                self.assignment(&mut reader, system || moves)?;
+            }
+            reader.skip_line();
+        }
+        Ok(())
+    }
+
+    /// `[DECL] [GLOBAL] [TYPE] NAME[n] = value`.
+    fn assignment(&mut self, reader: &mut Reader<'_>, no_targets: bool) -> Result<()> {
+        let mut name = String::new();
+        while let Some(word) = reader.name() {
+            reader.at += 1;
+            name = word + &index(reader);
+        }
+        let component = reader.is_mark(b'.');
+        while component && !reader.at_line_end() && !reader.is_mark(b'=') {
+            reader.at += 1;
+        }
+        let (file, line) = (reader.index, reader.line());
+        if name.is_empty() || !reader.take_mark(b'=') || reader.is_mark(b'=') {
+            return Ok(());
+        }
+        let value = match component {
+            true => Value::Expression,
+            false => self.value(reader)?,
+        };
+        match name.as_str() {
+            "$TOOL" => self.tool = self.frame(&value),
+            "$BASE" => self.base = self.frame(&value),
+            "FDAT_ACT" => self.use_data(&value),
+            _ => {
+                if !no_targets
+                    && let Value::Aggregate(a) = &value
+                    && (a.has(&["S", "T"]) || a.has(&AXIS_NAMES))
+                {
+                    self.declared.push((name.clone(), file, line));
+                }
+                self.refuse_twins(&name, &value, reader)?;
+                self.values.insert(name, value);
+            }
+        }
+        Ok(())
+    }
+
+    /// Modules have names of their own: two of them cannot be read together.
+    fn refuse_twins(&self, name: &str, value: &Value, reader: &Reader<'_>) -> Result<()> {
+        match (self.values.get(name), value) {
+            (Some(Value::Aggregate(a)), Value::Aggregate(b)) if a.file != b.file => {
+                let what = format!("{name} has a value in another of the files already");
+                Err(Error::input(reader.place(), what, "correct modules one after the other"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// An aggregate, a name, or anything else; the reader ends behind it or somewhere before the end of the line.
+    fn value(&self, reader: &mut Reader<'_>) -> Result<Value> {
+        let value = if reader.is_mark(b'{') {
+            Value::Aggregate(Aggregate::read(reader)?)
+        } else if let Some(word) = reader.name() {
+            reader.at += 1;
+            Value::Name(word + &index(reader))
+        } else {
+            Value::Expression
+        };
+        let next = reader.peek().map(|t| t.kind);
+        let ends = reader.at_line_end() || next == Some(TokenKind::Mark(b',')) || next == Some(TokenKind::Word);
+        Ok(if ends { value } else { Value::Expression })
+    }
+
+    /// The aggregate behind a value, through names.
+    fn resolved<'v>(&'v self, value: &'v Value) -> Understood<(&'v Aggregate, Option<&'v str>)> {
+        let mut value = value;
+        let mut name = None;
+        for _ in 0..8 {
+            match value {
+                Value::Aggregate(a) if a.is_computed() && !a.has(&["IPO_FRAME"]) => break,
+                Value::Aggregate(a) => return Ok((a, name)),
+                Value::Name(n) => {
+                    name = Some(n.as_str());
+                    let missing = || format!("{n} is in none of the files (give its .dat, or $config.dat, as well)");
+                    value = self.values.get(n).ok_or_else(missing)?;
+                }
+                Value::Expression => break,
+            }
+        }
+        Err("its target is computed, not written in numbers".into())
+    }
+
+    fn frame(&self, value: &Value) -> FrameIs {
+        if let Value::Name(name) = value
+            && name == "$NULLFRAME"
+        {
+            return FrameIs::Known(Pose::identity());
+        }
+        match self.resolved(value) {
+            Ok((aggregate, _)) => match aggregate.frame() {
+                Some(frame) => FrameIs::Known(frame),
+                None => FrameIs::Unknown("not all of X, Y, Z, A, B, C are given".into()),
+            },
+            Err(why) => FrameIs::Unknown(why.replace("its target", "it")),
+        }
+    }
+
+    /// `TOOL_DATA[n]` or `BASE_DATA[n]`; number 0 is the flange or the world.
+    fn numbered(&self, table: &str, number: i64) -> FrameIs {
+        match number {
+            0 => FrameIs::Known(Pose::identity()),
+            n => self.frame(&Value::Name(format!("{table}[{n}]"))),
+        }
+    }
+
+    /// Tool and base of a set of motion data, as `BAS` sets them.
+    fn data_frames(&self, data: &Aggregate) -> Option<(FrameIs, FrameIs)> {
+        let (tool, base) = (data.whole("TOOL_NO")?, data.whole("BASE_NO")?);
+        if data.word("IPO_FRAME").is_some_and(|w| w == "TCP") {
+            let why = "the tool is fixed in the room (IPO_FRAME #TCP)".to_owned();
+            return Some((FrameIs::Unknown(why.clone()), FrameIs::Unknown(why)));
+        }
+        Some((self.numbered("TOOL_DATA", tool), self.numbered("BASE_DATA", base)))
+    }
+
+    fn use_data(&mut self, value: &Value) {
+        if let Ok((data, _)) = self.resolved(value)
+            && let Some((tool, base)) = self.data_frames(data)
+        {
+            (self.tool, self.base) = (tool, base);
+        }
+    }
+
+    /// `BAS(#TOOL, n)` and `BAS(#BASE, n)`.
+    fn bas(&mut self, reader: &mut Reader<'_>) {
+        reader.at += 1;
+        if !(reader.take_mark(b'(') && reader.take_mark(b'#')) {
+            return;
+        }
+        let what = reader.name();
+        reader.at += 1;
+        reader.take_mark(b',');
+        let number = reader.take_number().map(|(n, _)| n as i64);
+        let frame = |table| match number {
+            Some(n) => self.numbered(table, n),
+            None => FrameIs::Unknown("its number is computed".into()),
+        };
+        match what.as_deref() {
+            Some("TOOL") => self.tool = frame("TOOL_DATA"),
+            Some("BASE") => self.base = frame("BASE_DATA"),
+            _ => {}
+        }
+    }
+
+    /// A motion; the reader stands on its name.
+    fn motion(&mut self, reader: &mut Reader<'_>, name: &str, count: usize) -> Result<()> {
+        let line = reader.line();
+        reader.at += 1;
+        for k in 0..count {
+            if k > 0 && !reader.take_mark(b',') {
+                let what = format!("{name} has {k} targets, not {count}");
+                return Err(Error::input(format!("{}:{line}", reader.file.name), what, "complete the motion"));
+            }
+            if reader.at_line_end() {
+                let what = format!("{name} has no target");
+                return Err(Error::input(format!("{}:{line}", reader.file.name), what, "complete the motion"));
+            }
+            let value = self.value(reader)?;
+            // To where the robot stands already.
+            if matches!(&value, Value::Name(n) if n.starts_with('$')) {
+                continue;
+            }
+            if let Err(why) = self.visit(&value, name, (reader.index, line)) {
+                self.leave_at(reader.index, line, name, why);
+            }
+        }
+        Ok(())
+    }
+
+    fn leave(&mut self, reader: &Reader<'_>, name: &str, why: String) {
+        self.leave_at(reader.index, reader.line(), name, why);
+    }
+
+    fn leave_at(&mut self, file: usize, line: usize, name: &str, why: String) {
+        self.fresh = true;
+        self.program.left.push(Left { file, line, name: name.to_owned(), why });
+    }
+
+    fn visit(&mut self, value: &Value, motion: &str, from: (usize, usize)) -> Understood<()> {
+        let (aggregate, name) = self.resolved(value)?;
+        let named = name.unwrap_or(motion).to_owned();
+        let kind = self.kind(aggregate, &self.tool, &self.base)?;
+        let place = if name.is_some() { (aggregate.file, aggregate.line) } else { from };
+        self.add(named, place, kind, !self.fresh)?;
+        Ok(())
+    }
+
+    fn add(&mut self, name: String, (file, line): (usize, usize), kind: Kind, follows: bool) -> Understood<()> {
+        let first = first_byte(&kind);
+        self.fresh = false;
+        let Some(&known) = self.visited.get(&(file, first)) else {
+            self.visited.insert((file, first), self.program.targets.len());
+            self.program.targets.push(Target { file, line, name, follows, kind });
+            return Ok(());
+        };
+        // Visited again: the next target does not come from the one before it in the list.
+        self.fresh = true;
+        match (&self.program.targets[known].kind, &kind) {
+            (Kind::Pose(a), Kind::Pose(b))
+                if (a.flange_from_tool, a.base_from_work) != (b.flange_from_tool, b.base_from_work) =>
+            {
+                Err(format!("{name} is used with different $TOOL or $BASE; give it a position for each"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn kind(&self, a: &Aggregate, tool: &FrameIs, base: &FrameIs) -> Understood<Kind> {
+        let axes = self.setting.axes;
+        if a.has(&AXIS_NAMES) {
+            return Ok(Kind::Joints(a.joints(axes, &self.prismatic)));
+        }
+        if !a.has(&POSE_NAMES) {
+            return Err("it has neither axes A1 to A6 nor components X to C".into());
+        }
+        let frame = |name: &str, is: &FrameIs, flag: Option<Pose>, flag_name: &str| match (is, flag) {
+            (FrameIs::Known(pose), _) => Ok(*pose),
+            (_, Some(pose)) => Ok(pose),
+            (FrameIs::Unknown(why), _) => Err(format!("{name} is not known: {why}, or give {flag_name}")),
+            (FrameIs::Unset, _) => Err(format!("{name} is not set before it; give {flag_name}")),
+        };
+        Ok(Kind::Pose(Box::new(PoseTarget {
+            position: a.position(),
+            rotation: a.rotation(),
+            base_from_work: frame("$BASE", base, self.setting.work, "--work")?,
+            flange_from_tool: frame("$TOOL", tool, self.setting.tool, "--tool")?,
+            fixed: a.external(axes, &self.prismatic),
+            posture: a.posture(axes),
+            joint_fields: vec![None; axes.len()],
+        })))
+    }
+
+    /// Declared positions that no motion of the files goes to: by their own motion data (`XP1` with `FP1`), or by the flags.
+    fn unvisited(&mut self) {
+        for (name, file, line) in std::mem::take(&mut self.declared) {
+            let Some(Value::Aggregate(a)) = self.values.get(&name) else { continue };
+            let data = name.strip_prefix('X').and_then(|n| match self.values.get(&format!("F{n}")) {
+                Some(Value::Aggregate(data)) => self.data_frames(data),
+                _ => None,
+            });
+            let (tool, base) = data.unwrap_or((FrameIs::Unset, FrameIs::Unset));
+            let kind = self.kind(a, &tool, &base);
+            if let Ok(kind) = &kind
+                && self.visited.contains_key(&(file, first_byte(kind)))
+            {
+                continue;
+            }
+            let visited = self.program.targets.iter().any(|t| t.file == file && t.line == line && t.name == name);
+            if visited {
+                continue;
+            }
+            let done = kind.and_then(|kind| self.add(name.clone(), (file, line), kind, false));
+            if let Err(why) = done {
+                self.leave_at(file, line, &name, format!("no motion of the files goes there, and {why}"));
+            }
+        }
+    }
+}
+
+/// Byte that tells a target from all others of its file.
+fn first_byte(kind: &Kind) -> usize {
+    use super::field::{Field, Place};
+    let start = |f: &Field| match &f.place {
+        Place::At(range) => range.start,
+        Place::Missing(at, _) => *at,
+    };
+    match kind {
+        Kind::Joints(joints) => joints.fields.iter().flatten().map(start).min().unwrap_or(0),
+        Kind::Pose(pose) => pose.position.iter().map(start).min().unwrap_or(0),
+    }
+}

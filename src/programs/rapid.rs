@@ -1,0 +1,497 @@
+//! ABB RAPID: moves to `robtarget` and `jointtarget`, declared or in the instruction, with `tooldata` and `wobjdata` (mm and degrees).
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use super::Setting;
+use super::codes::{Code, Codes};
+use super::field::{Field, Place};
+use super::program::{
+    JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, TextFile, Understood,
+};
+use super::scan::{Dialect, Reader, TokenKind};
+use crate::error::{Error, Result};
+use crate::geom::Pose;
+use crate::urdf::JointKind;
+
+const DIALECT: Dialect = Dialect { comment: b'!', quotes: b"\"", header: None, based_numbers: false };
+/// Beginnings of the names of instructions that move the robot to their first arguments.
+const MOVES: [&str; 6] = ["MOVE", "TRIGGL", "TRIGGJ", "TRIGGC", "ARC", "SPOT"];
+/// Instructions that begin so, but move no robot.
+const NO_MOVES: [&str; 2] = ["MOVEEXTJ", "ARCREFRESH"];
+const TYPES: [&str; 4] = ["ROBTARGET", "JOINTTARGET", "TOOLDATA", "WOBJDATA"];
+const DECIMALS_MM: usize = 4;
+const DECIMALS_DEG: usize = 6;
+const DECIMALS_QUATERNION: usize = 9;
+/// An external axis that is not there.
+const NO_AXIS: f64 = 9e9;
+
+/// `[..]` with what is in it.
+#[derive(Debug, Clone)]
+enum Node {
+    List(Vec<Node>),
+    Number(f64, Range<usize>),
+    Word(String),
+    Other,
+}
+
+/// Declared data.
+#[derive(Debug, Clone)]
+struct Datum {
+    kind: String,
+    file: usize,
+    line: usize,
+    /// `None` where the text does not give its numbers.
+    value: Option<Node>,
+}
+
+/// Reads modules that belong together.
+pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
+    let mut task = Task {
+        setting,
+        data: BTreeMap::new(),
+        visited: BTreeMap::new(),
+        fresh: true,
+        program: Program { files: vec![], targets: vec![], left: vec![], edits: vec![], notices: vec![] },
+    };
+    for (index, file) in files.iter().enumerate() {
+        task.declarations(Reader::new(file, index, DIALECT)?)?;
+    }
+    for (index, file) in files.iter().enumerate() {
+        task.fresh = true;
+        task.moves(Reader::new(file, index, DIALECT)?)?;
+    }
+    task.unvisited()?;
+    let mut program = task.program;
+    program.files = files;
+    Ok(program)
+}
+
+struct Task<'a> {
+    setting: &'a Setting<'a>,
+    data: BTreeMap<String, Datum>,
+    /// File and first byte of a target -> its index in the program.
+    visited: BTreeMap<(usize, usize), usize>,
+    fresh: bool,
+    program: Program,
+}
+
+/// A value in the text; the reader ends behind it.
+///
+/// # Errors
+/// A bracket that is not closed.
+fn node(reader: &mut Reader<'_>) -> Result<Node> {
+    if let Some((value, range)) = reader.take_number() {
+        return Ok(Node::Number(value, range));
+    }
+    if !reader.is_mark(b'[') {
+        let name = reader.name();
+        reader.at += 1;
+        return Ok(name.map_or(Node::Other, Node::Word));
+    }
+    let Some(close) = reader.closing(reader.at) else {
+        return Err(Error::input(reader.place(), "a list [ is not closed", "close it with ]"));
+    };
+    reader.at += 1;
+    let mut list = Vec::new();
+    while reader.at < close {
+        reader.skip_line_ends();
+        let mut item = node(reader)?;
+        reader.skip_line_ends();
+        while reader.at < close && !reader.is_mark(b',') {
+            item = Node::Other;
+            reader.at += 1;
+        }
+        reader.take_mark(b',');
+        list.push(item);
+    }
+    reader.at = close + 1;
+    Ok(Node::List(list))
+}
+
+/// To behind the next semicolon.
+fn skip_statement(reader: &mut Reader<'_>) {
+    while !reader.done() && !reader.take_mark(b';') {
+        reader.at += 1;
+    }
+}
+
+fn numbers<const N: usize>(node: &Node) -> Option<[(f64, Range<usize>); N]> {
+    let Node::List(list) = node else { return None };
+    let number = |n: &Node| match n {
+        Node::Number(value, range) => Some((*value, range.clone())),
+        _ => None,
+    };
+    list.iter().map(number).collect::<Option<Vec<_>>>()?.try_into().ok()
+}
+
+/// `[[x, y, z], [q1, q2, q3, q4]]`, q1 the scalar part.
+fn frame(node: &Node) -> Option<Pose> {
+    let Node::List(list) = node else { return None };
+    let (trans, rot) = (list.first()?, list.get(1)?);
+    let trans = numbers::<3>(trans)?.map(|(v, _)| 1e-3 * v);
+    let [w, x, y, z] = numbers::<4>(rot)?.map(|(v, _)| v);
+    Some(Pose::from_xyz_quaternion(trans, [x, y, z, w]))
+}
+
+impl Task<'_> {
+    /// All data of a file, and assignments to them.
+    fn declarations(&mut self, mut reader: Reader<'_>) -> Result<()> {
+        while !reader.done() {
+            let Some(word) = reader.name() else {
+                reader.at += 1;
+                continue;
+            };
+            reader.at += 1;
+            if TYPES.contains(&word.as_str()) && reader.word().is_some() {
+                self.declaration(&mut reader, word)?;
+            } else if self.data.contains_key(&word) {
+                let assigned = reader.is_mark(b':') && reader.ahead_is_mark(1, b'=');
+                let component = reader.is_mark(b'.');
+                if (assigned && !reader.ahead_is_mark(-2, b'\\')) || component {
+                    self.data.entry(word).and_modify(|d| d.value = None);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// `TYPE name := value;` behind its type.
+    fn declaration(&mut self, reader: &mut Reader<'_>, kind: String) -> Result<()> {
+        let (Some(name), line) = (reader.name(), reader.line()) else { return Ok(()) };
+        reader.at += 1;
+        let array = reader.is_mark(b'{');
+        let has_value = reader.is_mark(b':') && reader.ahead_is_mark(1, b'=');
+        let mut value = None;
+        if has_value && !array {
+            reader.at += 2;
+            reader.skip_line_ends();
+            let (place, read) = (reader.place(), node(reader)?);
+            reader.skip_line_ends();
+            if !reader.is_mark(b';') {
+                let what = format!("{name} does not end with a semicolon");
+                return Err(Error::input(place, what, "write TYPE name:=[..];"));
+            }
+            check(&kind, &name, &read, &place)?;
+            value = Some(read);
+        }
+        let twin = self.data.get(&name);
+        if let Some(twin) = twin.filter(|t| t.file != reader.index) {
+            let what = format!("{name} is declared in {} already", twin.line);
+            return Err(Error::input(reader.place(), what, "correct modules with equal names one after the other"));
+        }
+        // Two data of one name in one file belong to different routines.
+        let value = if twin.is_some() { None } else { value };
+        self.data.insert(name, Datum { kind, file: reader.index, line, value });
+        Ok(())
+    }
+
+    fn moves(&mut self, mut reader: Reader<'_>) -> Result<()> {
+        while !reader.done() {
+            let Some(word) = reader.name() else {
+                reader.at += 1;
+                continue;
+            };
+            let begins = reader.at == 0
+                || matches!(reader.ahead(-1).map(|t| t.kind), Some(TokenKind::LineEnd | TokenKind::Mark(b';' | b':')));
+            let moves = MOVES.iter().any(|m| word.starts_with(m)) && !NO_MOVES.contains(&word.as_str());
+            let follows = reader.ahead(1).map(|t| t.kind);
+            let called = !matches!(follows, Some(TokenKind::Mark(b':' | b'(' | b';') | TokenKind::LineEnd));
+            if begins && moves && called {
+                self.instruction(&mut reader)?;
+                skip_statement(&mut reader);
+            } else {
+                reader.at += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// A move; the reader stands on its name.
+    fn instruction(&mut self, reader: &mut Reader<'_>) -> Result<()> {
+        let line = reader.line();
+        let name = String::from_utf8_lossy(reader.word().unwrap_or_default()).into_owned();
+        reader.at += 1;
+        let mut arguments = Vec::new();
+        let mut work = None;
+        let mut nothing = true;
+        let mut plain = Vec::new();
+        loop {
+            reader.skip_line_ends();
+            if reader.done() || (nothing && reader.is_mark(b';')) {
+                let what = format!("{name} does not end with a semicolon");
+                return Err(Error::input(format!("{}:{line}", reader.file.name), what, "complete the instruction"));
+            }
+            if reader.take_mark(b'\\') {
+                let switch = reader.name().unwrap_or_default();
+                reader.at += 1;
+                if reader.take_mark(b':') && reader.take_mark(b'=') {
+                    let value = node(reader)?;
+                    if switch == "WOBJ" {
+                        work = Some(value);
+                    }
+                }
+                continue;
+            }
+            if reader.is_mark(b';') {
+                break;
+            }
+            if reader.take_mark(b',') {
+                continue;
+            }
+            nothing = false;
+            arguments.push(node(reader)?);
+            plain.push(true);
+            // What follows up to the comma makes it an expression.
+            while !matches!(
+                reader.peek().map(|t| t.kind),
+                None | Some(TokenKind::Mark(b',' | b';' | b'\\') | TokenKind::LineEnd)
+            ) {
+                let open = matches!(reader.peek().map(|t| t.kind), Some(TokenKind::Mark(b'(' | b'[' | b'{')));
+                reader.at = if open { reader.closing(reader.at).unwrap_or(reader.at) + 1 } else { reader.at + 1 };
+                if let Some(last) = plain.last_mut() {
+                    *last = false;
+                }
+            }
+        }
+        let count = self.targets_of(&name, &arguments);
+        let tool = self.tool_of(&arguments, count);
+        for k in 0..count {
+            let done = match plain[k] {
+                true => self.visit(&arguments[k], &name, (reader.index, line), &tool, work.as_ref())?,
+                false => Err("its target is computed, not written in numbers".to_owned()),
+            };
+            if let Err(why) = done {
+                self.leave((reader.index, line), &name, why);
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of arguments that are targets: two for circles.
+    fn targets_of(&self, name: &str, arguments: &[Node]) -> usize {
+        let name = name.to_ascii_uppercase();
+        let circle = ["MOVEC", "TRIGGC", "ARCC", "SPOTC"].iter().any(|c| name.starts_with(c));
+        (1 + usize::from(circle)).min(arguments.len())
+    }
+
+    /// Name of the tool: the argument that is one, else that behind speed and zone.
+    fn tool_of(&self, arguments: &[Node], targets: usize) -> Option<String> {
+        let word = |n: &Node| if let Node::Word(w) = n { Some(w.clone()) } else { None };
+        let is_tool = |w: &String| w == "TOOL0" || self.data.get(w).is_some_and(|d| d.kind == "TOOLDATA");
+        let rest = arguments.get(targets..).unwrap_or_default();
+        rest.iter().filter_map(word).find(is_tool).or_else(|| rest.get(2).and_then(word))
+    }
+
+    fn leave(&mut self, (file, line): (usize, usize), name: &str, why: String) {
+        self.fresh = true;
+        self.program.left.push(Left { file, line, name: name.to_owned(), why });
+    }
+
+    fn visit(
+        &mut self,
+        value: &Node,
+        name: &str,
+        from: (usize, usize),
+        tool: &Option<String>,
+        work: Option<&Node>,
+    ) -> Result<Understood<()>> {
+        let (value, place, name) = match value {
+            Node::List(_) => {
+                let place = format!("{}:{}", "the instruction in line", from.1);
+                let kind = if name.to_ascii_uppercase().starts_with("MOVEABSJ") { "JOINTTARGET" } else { "ROBTARGET" };
+                check(kind, name, value, &place)?;
+                (value.clone(), from, name.to_owned())
+            }
+            Node::Word(word) => match self.data.get(word) {
+                Some(Datum { value: Some(value), file, line, .. }) => (value.clone(), (*file, *line), word.clone()),
+                Some(_) => return Ok(Err(format!("{word} is computed, not written in numbers"))),
+                None => return Ok(Err(format!("{word} is in none of the files (give its module as well)"))),
+            },
+            _ => return Ok(Err("its target is computed, not written in numbers".into())),
+        };
+        let follows = !self.fresh;
+        Ok(self.kind(&value, place.0, tool.as_deref(), work).and_then(|kind| self.add(name, place, kind, follows)))
+    }
+
+    fn add(&mut self, name: String, (file, line): (usize, usize), kind: Kind, follows: bool) -> Understood<()> {
+        let first = first_byte(&kind);
+        self.fresh = false;
+        let Some(&known) = self.visited.get(&(file, first)) else {
+            self.visited.insert((file, first), self.program.targets.len());
+            self.program.targets.push(Target { file, line, name, follows, kind });
+            return Ok(());
+        };
+        // Visited again: the next target does not come from the one before it in the list.
+        self.fresh = true;
+        match (&self.program.targets[known].kind, &kind) {
+            (Kind::Pose(a), Kind::Pose(b))
+                if (a.flange_from_tool, a.base_from_work) != (b.flange_from_tool, b.base_from_work) =>
+            {
+                Err(format!("{name} is used with different tools or work objects; give it a robtarget for each"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn kind(&self, value: &Node, file: usize, tool: Option<&str>, work: Option<&Node>) -> Understood<Kind> {
+        let Node::List(parts) = value else { return Err("it is no robtarget and no jointtarget".into()) };
+        let external = parts.last().and_then(numbers::<6>).unwrap_or_default();
+        if parts.len() == 2 {
+            return Ok(Kind::Joints(self.joints(&parts[0], &external, file)?));
+        }
+        let computed = || "it is computed, not written in numbers".to_owned();
+        let trans = numbers::<3>(&parts[0]).ok_or_else(computed)?;
+        let [w, x, y, z] = numbers::<4>(&parts[1]).ok_or_else(computed)?;
+        let cf = numbers::<4>(&parts[2]).ok_or_else(computed)?;
+        let field = |(written, range): (f64, Range<usize>), si: f64, decimals: usize| Field {
+            file,
+            place: Place::At(range),
+            written,
+            si,
+            decimals,
+        };
+        let axes = self.setting.axes;
+        let posture = match axes.get(..6).and_then(|a| <[usize; 6]>::try_from(a).ok()) {
+            None => Posture::Nearest,
+            Some(six) => {
+                let cf = cf.map(|(value, range)| Code { file, range, value: value as i64 });
+                Posture::Coded(Codes::Rapid(Box::new(cf)), six)
+            }
+        };
+        let mut fixed = vec![None; axes.len()];
+        for (&reading, (value, _)) in axes.iter().skip(6).zip(&external) {
+            fixed[reading] = (*value < NO_AXIS).then_some(value * self.unit(reading).0);
+        }
+        Ok(Kind::Pose(Box::new(PoseTarget {
+            position: trans.map(|t| field(t, 1e-3, DECIMALS_MM)),
+            rotation: RotationFields::Quaternion([x, y, z, w].map(|q| field(q, 1.0, DECIMALS_QUATERNION))),
+            base_from_work: self.work(work)?,
+            flange_from_tool: self.tool(tool)?,
+            fixed,
+            posture,
+            joint_fields: vec![None; axes.len()],
+        })))
+    }
+
+    /// SI value and decimals of a reading's unit.
+    fn unit(&self, reading: usize) -> (f64, usize) {
+        match self.setting.chain.reading_kinds[reading] {
+            JointKind::Prismatic => (1e-3, DECIMALS_MM),
+            _ => (1f64.to_radians(), DECIMALS_DEG),
+        }
+    }
+
+    fn joints(&self, axes: &Node, external: &[(f64, Range<usize>); 6], file: usize) -> Understood<JointTarget> {
+        let values = numbers::<6>(axes).ok_or("it is computed, not written in numbers")?;
+        let n = self.setting.axes.len();
+        let mut target = JointTarget { readings: vec![f64::NAN; n], fields: vec![None; n] };
+        for (&reading, (written, range)) in self.setting.axes.iter().zip(values.iter().chain(external)) {
+            if *written >= NO_AXIS {
+                continue;
+            }
+            let (si, decimals) = self.unit(reading);
+            target.readings[reading] = written * si;
+            let place = Place::At(range.clone());
+            target.fields[reading] = Some(Field { file, place, written: *written, si, decimals });
+        }
+        Ok(target)
+    }
+
+    fn datum(&self, name: &str, kind: &str, flag: &str) -> Understood<&Node> {
+        let of_kind = self.data.get(name).filter(|d| d.kind == kind);
+        let missing = || format!("{name} is not written in numbers in the files (give its module as well, or {flag})");
+        of_kind.and_then(|d| d.value.as_ref()).ok_or_else(missing)
+    }
+
+    fn tool(&self, name: Option<&str>) -> Understood<Pose> {
+        let read = || {
+            let name = name.ok_or("its tool is not named; give --tool")?;
+            if name == "TOOL0" {
+                return Ok(Pose::identity());
+            }
+            let Node::List(parts) = self.datum(name, "TOOLDATA", "--tool")? else { return Err(String::new()) };
+            match parts.first() {
+                Some(Node::Word(w)) if w == "TRUE" => {}
+                _ => return Err(format!("{name} is a tool fixed in the room")),
+            }
+            parts.get(1).and_then(frame).ok_or_else(|| format!("{name} is not written in numbers"))
+        };
+        read().or_else(|why| self.setting.tool.ok_or(why))
+    }
+
+    fn work(&self, name: Option<&Node>) -> Understood<Pose> {
+        let name = match name {
+            None => return Ok(self.setting.work.unwrap_or_else(Pose::identity)),
+            Some(Node::Word(name)) if name == "WOBJ0" => return Ok(Pose::identity()),
+            Some(Node::Word(name)) => name,
+            Some(_) => return Err("its work object is computed".into()),
+        };
+        let read = || {
+            let Node::List(parts) = self.datum(name, "WOBJDATA", "--work")? else { return Err(String::new()) };
+            match (parts.first(), parts.get(1)) {
+                (Some(Node::Word(held)), Some(Node::Word(fixed))) if held == "FALSE" && fixed == "TRUE" => {}
+                _ => return Err(format!("{name} is held by the robot or moved by a unit")),
+            }
+            let frames = parts.get(3).and_then(frame).zip(parts.get(4).and_then(frame));
+            frames.map(|(user, object)| user * object).ok_or_else(|| format!("{name} is not written in numbers"))
+        };
+        read().or_else(|why| self.setting.work.ok_or(why))
+    }
+
+    /// Declared targets to which no move of the files goes.
+    fn unvisited(&mut self) -> Result<()> {
+        let all: Vec<(String, Datum)> = self.data.iter().map(|(n, d)| (n.clone(), d.clone())).collect();
+        for (name, datum) in all.into_iter().filter(|(_, d)| d.kind.ends_with("TARGET")) {
+            let seen =
+                self.program.targets.iter().any(|t| t.file == datum.file && t.line == datum.line && t.name == name);
+            let known = self.program.left.iter().any(|l| l.why.contains(&name));
+            let Some(value) = datum.value.filter(|_| !seen && !known) else { continue };
+            let place = (datum.file, datum.line);
+            let done = self.kind(&value, datum.file, None, None).and_then(|k| self.add(name.clone(), place, k, false));
+            if let Err(why) = done {
+                self.leave(place, &name, format!("no move of the files goes there, and {why}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The shape of the literal of a datum.
+fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result<()> {
+    let shape: &[usize] = match kind {
+        "ROBTARGET" => &[3, 4, 4, 6],
+        "JOINTTARGET" => &[6, 6],
+        _ => return Ok(()),
+    };
+    let Node::List(parts) = value else { return Ok(()) };
+    let count = |n: &Node| if let Node::List(l) = n { l.len() } else { 0 };
+    let found: Vec<usize> = parts.iter().map(count).collect();
+    if found != shape {
+        let what = format!("{name} has {found:?} numbers in its brackets, a {} has {shape:?}", kind.to_lowercase());
+        return Err(Error::input(place, what, "complete it"));
+    }
+    let norm = (kind == "ROBTARGET").then(|| numbers::<4>(&parts[1])).flatten();
+    if let Some(q) = norm {
+        let norm = q.iter().map(|(v, _)| v * v).sum::<f64>().sqrt();
+        if (norm - 1.0).abs() > 0.01 {
+            return Err(Error::input(
+                place,
+                format!("the quaternion of {name} has the norm {norm:.4}, not 1"),
+                "correct it",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn first_byte(kind: &Kind) -> usize {
+    let start = |f: &Field| match &f.place {
+        Place::At(range) => range.start,
+        Place::Missing(at, _) => *at,
+    };
+    match kind {
+        Kind::Joints(joints) => joints.fields.iter().flatten().map(start).min().unwrap_or(0),
+        Kind::Pose(pose) => start(&pose.position[0]),
+    }
+}

@@ -1,0 +1,277 @@
+//! What planned images will be worth: predicted accuracy of the flange and of every parameter.
+
+use nalgebra::DMatrix;
+
+use super::plan::{Plan, PlanRequest};
+use crate::error::{Error, Result};
+use crate::plan::criterion::Criterion;
+use crate::plan::setting::Setting;
+use crate::problem::{Image, Problem, State};
+use crate::solve::{covariance, linearise_all};
+use crate::urdf::JointKind;
+
+/// Predicted sigma of one parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterForecast {
+    /// Name of the column.
+    pub name: String,
+    /// Unit.
+    pub unit: &'static str,
+    /// Before.
+    pub prior_sigma: f64,
+    /// After the planned images.
+    pub sigma: f64,
+    /// What this sigma alone does to the flange over the targets, RMS, m.
+    pub flange_m: f64,
+}
+
+/// A point of the curve of accuracy over the number of images.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurvePoint {
+    /// Planned images.
+    pub images: usize,
+    /// RMS error of the flange over the targets, m.
+    pub planned_m: f64,
+    /// The same for as many of the candidates taken as they come, m.
+    pub random_m: f64,
+}
+
+/// Range of one joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointRange {
+    /// Name.
+    pub name: String,
+    /// How it moves.
+    pub kind: JointKind,
+    /// Limits, rad or m.
+    pub limits: (f64, f64),
+    /// Readings of the planned stops.
+    pub planned: Vec<f64>,
+}
+
+/// The forecast of a plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Forecast {
+    /// RMS error of the flange over the targets before any planned image, m.
+    pub before_m: f64,
+    /// After all of them, m.
+    pub flange_m: f64,
+    /// Parameters of the robot.
+    pub parameters: Vec<ParameterForecast>,
+    /// Accuracy over the number of images.
+    pub curve: Vec<CurvePoint>,
+    /// Chosen stops by importance (indices into the legs), the most important first.
+    pub importance: Vec<usize>,
+    /// Joint ranges.
+    pub ranges: Vec<JointRange>,
+    /// What will stay unknown, and other remarks, in words.
+    pub words: Vec<String>,
+}
+
+/// Share of a prior variance that must go before a parameter counts as known.
+const KNOWN_SHARE: f64 = 0.75;
+/// Effect on the flange from which an unknown parameter is named, as a share of the predicted error.
+const WORTH_NAMING: f64 = 0.25;
+
+/// Covariance of all columns from taken and planned images, markers and joint noise eliminated; columns without a prior start
+/// from nothing.
+///
+/// # Errors
+/// Where the images do not determine camera, plate or hand-camera offset.
+pub fn exact_covariance(
+    problem: &Problem,
+    state: &State,
+    setting: &Setting,
+    images: Vec<Image>,
+) -> Result<DMatrix<f64>> {
+    let mut problem = problem.clone();
+    let mut state = state.clone();
+    state.slack = vec![setting.slack(); images.len()];
+    let n = problem.layout.len();
+    problem.images = images;
+    let singular = || {
+        let what = format!("{} images do not determine camera, plate and hand-camera offset", problem.images.len());
+        Error::unsolved("plan: forecast", what, "plan more images, or views that differ more in tilt and distance")
+    };
+    let lin = linearise_all(&problem, &state).ok_or_else(singular)?;
+    let all = covariance(&problem, &state, &lin).map_err(|_| singular())?;
+    Ok(all.reduced.view((0, 0), (n, n)).into_owned())
+}
+
+/// RMS error of the flange from a covariance of all columns, m.
+pub fn flange_m(weight: &DMatrix<f64>, covariance: &DMatrix<f64>) -> f64 {
+    weight.dot(covariance).max(0.0).sqrt()
+}
+
+impl Plan {
+    /// The images of planned stops (indices into the legs).
+    fn images(&self, setting: &Setting, legs: impl Iterator<Item = usize>) -> Vec<Image> {
+        let image = |k: usize| {
+            let c = &self.pool[self.legs[k].stop];
+            setting.image(&self.state, &image_name(k), &c.readings, c.placement)
+        };
+        legs.filter_map(image).collect()
+    }
+}
+
+/// Name of the image of a planned stop, as in joints.csv.
+pub fn image_name(index: usize) -> String {
+    format!("img_{index:03}.png")
+}
+
+/// Forecast of a plan: exact at the points of the curve, with every marker's correction eliminated.
+///
+/// # Errors
+/// Where the planned images do not determine camera, plate and hand-camera offset.
+pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
+    let setting = &request.setting;
+    let n = plan.legs.len();
+    let importance = importance(plan);
+    let exact = |legs: &[usize]| {
+        let mut images = request.taken.clone();
+        images.extend(plan.images(setting, legs.iter().copied()));
+        exact_covariance(&plan.problem, &plan.state, setting, images)
+    };
+    let whole = exact(&(0..n).collect::<Vec<_>>())?;
+    let random = |count: usize| {
+        let mut images = request.taken.clone();
+        let step = plan.pool.len() as f64 / count as f64;
+        images.extend((0..count).filter_map(|k| {
+            let c = &plan.pool[(k as f64 * step) as usize];
+            setting.image(&plan.state, "", &c.readings, c.placement)
+        }));
+        exact_covariance(&plan.problem, &plan.state, setting, images)
+    };
+    let mut curve = Vec::new();
+    for count in counts(n) {
+        let (Ok(planned), Ok(random)) = (exact(&importance[..count]), random(count)) else { continue };
+        let [planned_m, random_m] = [planned, random].map(|c| flange_m(&plan.weight, &c));
+        curve.push(CurvePoint { images: count, planned_m, random_m });
+    }
+    let before = match request.taken.is_empty() {
+        true => Criterion::weighted(&plan.weight).value(&plan.known).map_or(f64::NAN, f64::sqrt),
+        false => flange_m(&plan.weight, &exact(&[])?),
+    };
+    let flange = flange_m(&plan.weight, &whole);
+    let parameters = parameters(plan, &whole);
+    let ranges = ranges(request, plan);
+    let words = words(&parameters, &ranges, plan, flange);
+    Ok(Forecast { before_m: before, flange_m: flange, parameters, curve, importance, ranges, words })
+}
+
+/// Numbers of images at which the curve is computed.
+fn counts(n: usize) -> Vec<usize> {
+    let grid = [4, 6, 8, 10, 13, 17, 22, 30, 40, 55, 75, 100, 140, 200, 300];
+    grid.into_iter().filter(|k| *k < n).chain([n]).collect()
+}
+
+/// Stops by importance: the one that is missed least is taken out first.
+fn importance(plan: &Plan) -> Vec<usize> {
+    let criterion = Criterion::weighted(&plan.weight);
+    let of = |leg: usize| &plan.information[plan.legs[leg].stop];
+    let mut left: Vec<usize> = (0..plan.legs.len()).collect();
+    let mut m = left.iter().fold(plan.known.clone(), |m, &k| m + of(k));
+    let mut out = Vec::with_capacity(left.len());
+    while left.len() > 1 {
+        let Ok(at) = criterion.evaluate(&m) else { break };
+        // To second order in what is taken away the loss is slope + curvature / 2.
+        let loss = |k: usize| {
+            let x = of(k);
+            let first = at.slope.dot(x);
+            first + (&at.slope * x).dot(&(x * &at.covariance).transpose()).max(0.0)
+        };
+        let losses: Vec<f64> = left.iter().map(|&k| loss(k)).collect();
+        let least = (0..left.len()).min_by(|&a, &b| losses[a].total_cmp(&losses[b])).unwrap_or(0);
+        let gone = left.remove(least);
+        m -= of(gone);
+        out.push(gone);
+    }
+    out.extend(left);
+    out.reverse();
+    out
+}
+
+fn parameters(plan: &Plan, covariance: &DMatrix<f64>) -> Vec<ParameterForecast> {
+    let layout = &plan.problem.layout;
+    let one = |k: usize| {
+        let c = &layout.columns[k];
+        let sigma = covariance[(k, k)].max(0.0).sqrt();
+        ParameterForecast {
+            name: c.name.trim_start_matches("robot/").to_owned(),
+            unit: c.unit,
+            prior_sigma: c.prior_sigma,
+            sigma,
+            flange_m: sigma * plan.weight[(k, k)].max(0.0).sqrt(),
+        }
+    };
+    (0..layout.terms.end).map(one).collect()
+}
+
+impl ParameterForecast {
+    /// `1 - sigma^2 / prior^2`.
+    pub fn share_of_data(&self) -> f64 {
+        1.0 - (self.sigma / self.prior_sigma).powi(2)
+    }
+
+    /// True where the planned images determine it by themselves.
+    pub fn is_known(&self) -> bool {
+        self.share_of_data() > KNOWN_SHARE
+    }
+}
+
+fn ranges(request: &PlanRequest, plan: &Plan) -> Vec<JointRange> {
+    let chain = &request.setting.robot.chain;
+    let limits = crate::plan::inverse::reading_limits(chain);
+    let one = |k: usize| JointRange {
+        name: chain.readings[k].clone(),
+        kind: chain.reading_kinds[k],
+        limits: limits[k],
+        planned: plan.legs.iter().map(|l| plan.pool[l.stop].readings[k]).collect(),
+    };
+    (0..chain.readings.len()).map(one).collect()
+}
+
+impl JointRange {
+    /// Least and greatest planned reading.
+    pub fn used(&self) -> (f64, f64) {
+        let fold = |f: fn(f64, f64) -> f64, start| self.planned.iter().copied().fold(start, f);
+        (fold(f64::min, f64::INFINITY), fold(f64::max, f64::NEG_INFINITY))
+    }
+}
+
+fn words(parameters: &[ParameterForecast], ranges: &[JointRange], plan: &Plan, flange: f64) -> Vec<String> {
+    let mut words = Vec::new();
+    let terms = &parameters[plan.problem.layout.terms.clone()];
+    for range in ranges {
+        let own = terms.iter().filter(|p| p.name.starts_with(&format!("{}.", range.name)));
+        let unknown: Vec<&ParameterForecast> = own.filter(|p| !p.is_known()).collect();
+        let (low, high) = range.used();
+        let span = match range.kind {
+            JointKind::Prismatic => format!("{:.0} mm", 1e3 * (high - low)),
+            _ => format!("{:.0} degrees", (high - low).to_degrees()),
+        };
+        let named: Vec<String> = unknown
+            .iter()
+            .filter(|p| p.flange_m > WORTH_NAMING * flange)
+            .map(|p| format!("{} (up to {:.3} mm at the flange)", short(&p.name), 1e3 * p.flange_m))
+            .collect();
+        if !named.is_empty() {
+            words.push(format!(
+                "{} of {} will not be known by themselves: these images move it over {span}",
+                named.join(", "),
+                range.name
+            ));
+        }
+    }
+    let known = parameters.iter().filter(|p| p.is_known()).count();
+    words.push(format!(
+        "{known} of {} parameters of the robot are determined one by one; of the others only sums matter to the flange \
+         (base against plate, flange against camera, neighbouring links), and these are in the predicted error",
+        parameters.len()
+    ));
+    words
+}
+
+fn short(name: &str) -> &str {
+    name.rsplit('.').next().unwrap_or(name)
+}

@@ -1,0 +1,47 @@
+//! Local errors of the joints: one column for every reading to which a joint came back, or at which it stood still.
+
+use crate::model::joint_terms::{JointTerm, Term, TermContext};
+use crate::problem::{Image, common_readings, joined};
+
+/// Share of the stops that must have a reading in common with others before the local errors of that joint are told apart:
+/// a few coincidences tell too little.
+const LEAST_SHARE_TIED: f64 = 0.5;
+
+/// Terms for the readings that stops have in common, in the order of the readings.
+pub(super) fn local_terms(images: &[Image], readings: usize) -> Vec<JointTerm> {
+    let stops: Vec<&[f64]> = images.iter().filter_map(|i| i.stop.as_ref()).map(|s| s.readings.as_slice()).collect();
+    let on_robot: Vec<_> = images.iter().filter_map(|i| i.stop.as_ref()).collect();
+    let mut pairs: Vec<Vec<(usize, usize)>> = vec![Vec::new(); readings];
+    for (b, later) in on_robot.iter().enumerate() {
+        for (a, earlier) in on_robot[..b].iter().enumerate() {
+            for r in common_readings(earlier, later) {
+                pairs[r].push((a, b));
+            }
+        }
+    }
+    let mut terms = Vec::new();
+    for (reading, pairs) in pairs.into_iter().enumerate() {
+        let mut sets = joined(stops.len(), pairs.into_iter());
+        sets.retain(|set| set.len() > 1);
+        let tied: usize = sets.iter().map(Vec::len).sum();
+        if (tied as f64) < LEAST_SHARE_TIED * stops.len() as f64 {
+            continue;
+        }
+        for set in sets {
+            let mean = set.iter().map(|&k| stops[k][reading]).sum::<f64>() / set.len() as f64;
+            terms.push(JointTerm { reading, term: Term::local(mean), value: 0.0 });
+        }
+    }
+    terms
+}
+
+/// Sum of the squares of the local basis functions of every reading at the stop of an image.
+pub(super) fn local_share(terms: &[JointTerm], image: &Image) -> Vec<f64> {
+    let Some(stop) = &image.stop else { return Vec::new() };
+    let mut share = vec![0.0; stop.readings.len()];
+    for t in terms.iter().filter(|t| matches!(t.term, Term::Local(_))) {
+        let context = TermContext { reading: stop.readings[t.reading], approach: None, gravity: Default::default() };
+        share[t.reading] += t.term.basis(&context).powi(2);
+    }
+    share
+}

@@ -1,0 +1,242 @@
+//! Planning: candidates, choice, order, and what the chosen images will be worth.
+
+use nalgebra::DMatrix;
+
+use crate::error::{Error, Result};
+use crate::linalg::LinearRow;
+use crate::plan::candidates::{Candidate, CandidateOptions, Tally, candidates, workspace};
+use crate::plan::criterion::Criterion;
+use crate::plan::information::{all_information, flange_weight, image_information};
+use crate::plan::order::{Leg, imbalance, tour};
+use crate::plan::relax::{Design, NoDesign};
+use crate::plan::rounding::round;
+use crate::plan::scene::{Scene, SceneOptions};
+use crate::plan::setting::{Setting, rough_knowledge};
+use crate::problem::{Image, Layout, Problem, State};
+
+/// What the user wants to know.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Wish {
+    /// The position of the flange over the workspace (I-optimal).
+    Workspace,
+    /// The position of the flange at these joint vectors (I-optimal).
+    Targets(Vec<Vec<f64>>),
+    /// All parameters of the robot alike (D-optimal).
+    Parameters,
+    /// These parameters, each in units of its prior sigma.
+    Named(Vec<String>),
+}
+
+/// Linear limits on the choice.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Budget {
+    /// Images at most with the plate at one place.
+    pub most_per_placement: Option<usize>,
+    /// Images at least with the plate at every place.
+    pub least_per_placement: Option<usize>,
+    /// Images at most in one posture of the arm.
+    pub most_per_posture: Option<usize>,
+    /// Sum over the images of the greatest joint motion from the middle posture, rad, at most.
+    pub travel_rad: Option<f64>,
+}
+
+/// What is to be planned.
+#[derive(Debug, Clone)]
+pub struct PlanRequest {
+    /// What is roughly known.
+    pub setting: Setting,
+    /// Images that were taken already.
+    pub taken: Vec<Image>,
+    /// Images.
+    pub count: usize,
+    /// Criterion.
+    pub wish: Wish,
+    /// Limits on the choice.
+    pub budget: Budget,
+    /// Candidates.
+    pub candidates: CandidateOptions,
+    /// What must not be touched.
+    pub scene: SceneOptions,
+}
+
+/// The planned stops.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// All candidates.
+    pub pool: Vec<Candidate>,
+    /// Their information about all columns.
+    pub information: Vec<DMatrix<f64>>,
+    /// What fell out.
+    pub tally: Tally,
+    /// Relaxed weights.
+    pub weights: Vec<f64>,
+    /// Certified efficiency of the relaxation.
+    pub relaxed_efficiency: f64,
+    /// Certified efficiency of the whole images.
+    pub rounded_efficiency: f64,
+    /// Chosen candidates in the order of the visit, with the ways to them.
+    pub legs: Vec<Leg>,
+    /// Joint vectors over which the accuracy of the flange is meant.
+    pub targets: Vec<Vec<f64>>,
+    /// Its weight: the mean squared error is `tr(W cov)`.
+    pub weight: DMatrix<f64>,
+    /// Information before the first image.
+    pub known: DMatrix<f64>,
+    /// The problem without images.
+    pub problem: Problem,
+    /// The state about which it is linearised.
+    pub state: State,
+    /// One-sidedness of the approach of each joint.
+    pub imbalance: Vec<f64>,
+}
+
+/// Joint vectors that stand for the workspace.
+const TARGETS: usize = 250;
+
+/// Chooses poses and their order.
+///
+/// # Errors
+/// Where no pose is workable, where limits contradict each other, where a parameter asked for is unknown.
+pub fn plan(request: &PlanRequest) -> Result<Plan> {
+    let setting = &request.setting;
+    let scene = Scene::new(setting, &request.scene);
+    let (pool, tally) = candidates(setting, &scene, &request.candidates)?;
+    let (problem, state) = setting.problem();
+    let information = all_information(&problem, setting, &state, &pool);
+    let mut known = rough_knowledge(&problem, &setting.camera);
+    for image in &request.taken {
+        if let Some(m) = image_information(&problem, setting, &state, image) {
+            known += m;
+        }
+    }
+    let margin = request.candidates.limit_margin;
+    let targets = match &request.wish {
+        Wish::Targets(list) => list.clone(),
+        _ => workspace(setting, &scene, TARGETS, margin, request.candidates.seed),
+    };
+    let targets = if targets.is_empty() { pool.iter().map(|c| c.readings.clone()).collect() } else { targets };
+    let weight = flange_weight(&problem, &setting.robot, &targets);
+    let criterion = criterion(&request.wish, &problem.layout, &weight)?;
+    let rows = rows(&request.budget, &pool, setting.placements.len());
+    let design =
+        Design { known: &known, candidates: &information, criterion: &criterion, count: request.count, rows: &rows };
+    let relaxed = design.relax().map_err(|reason| no_plan(reason, request, pool.len()))?;
+    let rounded = round(&design, &relaxed).ok_or_else(|| no_plan(NoDesign::Contradiction, request, pool.len()))?;
+    let legs = legs(&pool, &rounded.chosen, &scene, setting.placements.len());
+    let visited: Vec<&[f64]> = legs.iter().map(|l| pool[l.stop].readings.as_slice()).collect();
+    let imbalance = imbalance(&visited);
+    Ok(Plan {
+        information,
+        tally,
+        weights: relaxed.weights,
+        relaxed_efficiency: relaxed.efficiency,
+        rounded_efficiency: rounded.efficiency,
+        legs,
+        targets,
+        weight,
+        known,
+        problem,
+        state,
+        imbalance,
+        pool,
+    })
+}
+
+fn criterion(wish: &Wish, layout: &Layout, weight: &DMatrix<f64>) -> Result<Criterion> {
+    let robot = layout.terms.end;
+    match wish {
+        Wish::Workspace | Wish::Targets(_) => Ok(Criterion::weighted(weight)),
+        Wish::Parameters => Ok(Criterion::Volume(robot)),
+        Wish::Named(names) => {
+            let mut b = DMatrix::zeros(layout.len(), 0);
+            for name in names {
+                let wanted: Vec<usize> = (0..robot)
+                    .filter(|&k| layout.columns[k].name.trim_start_matches("robot/").starts_with(name.as_str()))
+                    .collect();
+                if wanted.is_empty() {
+                    let known = layout.columns[..robot].iter().map(|c| c.name.trim_start_matches("robot/"));
+                    let closest = crate::error::closest_name(name, known.clone());
+                    let remedy = match closest {
+                        Some(c) => format!("did you mean \"{c}\"?"),
+                        None => format!("give a joint or one of {}", known.take(8).collect::<Vec<_>>().join(", ")),
+                    };
+                    return Err(Error::input("--parameters", format!("there is no parameter \"{name}\""), remedy));
+                }
+                for k in wanted {
+                    b = b.insert_column(0, 0.0);
+                    b[(k, 0)] = 1.0 / layout.columns[k].prior_sigma;
+                }
+            }
+            Ok(Criterion::MeanVariance(b))
+        }
+    }
+}
+
+/// Rows of the polytope.
+fn rows(budget: &Budget, pool: &[Candidate], placements: usize) -> Vec<LinearRow> {
+    let mut rows = Vec::new();
+    let mut group = |low: f64, high: f64, inside: &dyn Fn(&Candidate) -> f64| {
+        rows.push(LinearRow { coefficients: pool.iter().map(inside).collect(), low, high });
+    };
+    if budget.most_per_placement.is_some() || budget.least_per_placement.is_some() {
+        for p in 0..placements {
+            let low = budget.least_per_placement.unwrap_or(0) as f64;
+            let high = budget.most_per_placement.map_or(f64::INFINITY, |m| m as f64);
+            group(low, high, &|c| f64::from(u8::from(c.placement == p)));
+        }
+    }
+    if let Some(most) = budget.most_per_posture {
+        let mut postures: Vec<u32> = pool.iter().map(|c| c.posture).collect();
+        postures.sort_unstable();
+        postures.dedup();
+        for posture in postures {
+            group(0.0, most as f64, &|c| f64::from(u8::from(c.posture == posture)));
+        }
+    }
+    if let Some(travel) = budget.travel_rad {
+        let joints = pool.first().map_or(0, |c| c.readings.len());
+        let middle: Vec<f64> = (0..joints)
+            .map(|j| {
+                let mut all: Vec<f64> = pool.iter().map(|c| c.readings[j]).collect();
+                all.sort_by(f64::total_cmp);
+                all[all.len() / 2]
+            })
+            .collect();
+        group(f64::NEG_INFINITY, travel, &|c| crate::plan::order::motion(&c.readings, &middle));
+    }
+    rows
+}
+
+fn legs(pool: &[Candidate], chosen: &[usize], scene: &Scene, placements: usize) -> Vec<Leg> {
+    let mut all = Vec::new();
+    for placement in 0..placements {
+        let here: Vec<usize> = chosen.iter().copied().filter(|&k| pool[k].placement == placement).collect();
+        let stops: Vec<Vec<f64>> = here.iter().map(|&k| pool[k].readings.clone()).collect();
+        let spare: Vec<Vec<f64>> =
+            pool.iter().filter(|c| c.placement == placement).map(|c| c.readings.clone()).collect();
+        let part = tour(&stops, scene, placement, &spare);
+        all.extend(part.into_iter().map(|leg| Leg { stop: here[leg.stop], ..leg }));
+    }
+    all
+}
+
+fn no_plan(reason: NoDesign, request: &PlanRequest, pool: usize) -> Error {
+    let count = request.count;
+    match reason {
+        NoDesign::TooFew => Error::unsolved(
+            "plan",
+            format!("only {pool} workable poses were found, {count} are wanted"),
+            "ask for fewer images, search longer (--candidates), or loosen --markers, --tilt-deg, --distance-m",
+        ),
+        NoDesign::Contradiction => Error::input(
+            "plan",
+            format!("no choice of {count} images fulfils the limits per placement, per posture and of travel"),
+            "loosen --per-placement, --per-posture or --travel-rad, or ask for another --count",
+        ),
+        NoDesign::Numerical => Error::unsolved(
+            "plan",
+            "the information of the candidates is not positive definite",
+            "check --pixel-sigma-px and --joint-noise-mrad, and the size of the plate",
+        ),
+    }
+}
