@@ -17,6 +17,7 @@ mod show;
 mod simulate;
 mod summary;
 mod verify;
+mod verify_series;
 
 use std::process::ExitCode;
 

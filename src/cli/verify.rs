@@ -1,4 +1,4 @@
-//! `robotcal verify`: a corrected model judged by points that another device measured.
+//! `robotcal verify`: a corrected model judged by points that another device measured, or by another series.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,8 @@ use clap::Args;
 use nalgebra::Vector3;
 
 use super::joint_table::{self, Unit};
-use super::Verdict;
+use super::recording::RecordingArgs;
+use super::{Verdict, verify_series};
 use crate::assess::{MeasuredPoint, fit_points};
 use crate::error::{Error, Result};
 use crate::model::robot::Robot;
@@ -18,36 +19,48 @@ use crate::urdf::{self, Chain};
 pub(super) struct VerifyArgs {
     /// Robot description to judge (a corrected URDF)
     #[arg(long, value_name = "FILE")]
-    urdf: PathBuf,
+    pub(super) urdf: PathBuf,
     /// Its compensation.toml: gear scale, harmonics, gravity and backlash, which a URDF cannot hold
     #[arg(long, value_name = "FILE")]
-    compensation: Option<PathBuf>,
+    pub(super) compensation: Option<PathBuf>,
     /// Nominal robot description to compare with
     #[arg(long, value_name = "FILE")]
-    nominal: Option<PathBuf>,
+    pub(super) nominal: Option<PathBuf>,
     /// Points of one reflector on the tip: x_m, y_m, z_m and one column per joint
-    #[arg(long, value_name = "FILE")]
-    points: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "series", requires = "joint_unit")]
+    points: Option<PathBuf>,
     /// Unit of the revolute joints in that file
     #[arg(long, value_enum)]
-    joint_unit: Unit,
+    joint_unit: Option<Unit>,
+    /// Another series of the robot, in mm and px; several are judged together
+    #[arg(long, value_name = "FOLDER", conflicts_with = "points")]
+    pub(super) series: Vec<PathBuf>,
     /// Base link
     #[arg(long, value_name = "LINK")]
-    base: Option<String>,
+    pub(super) base: Option<String>,
     /// Tip link
     #[arg(long, value_name = "LINK")]
-    tip: Option<String>,
+    pub(super) tip: Option<String>,
+    #[command(flatten)]
+    recording: RecordingArgs,
 }
 
 pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
+    match (&args.points, args.joint_unit) {
+        (Some(file), Some(unit)) => points(args, file, unit),
+        _ => verify_series::run(args, &args.recording),
+    }
+}
+
+fn points(args: &VerifyArgs, points_file: &std::path::Path, unit: Unit) -> Result<Verdict> {
     let rms = |file: &PathBuf, compensation: Option<&PathBuf>| -> Result<(usize, f64, f64)> {
         let chain = urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?;
-        let points = read_points(&args.points, &chain, args.joint_unit)?;
+        let points = read_points(points_file, &chain, unit)?;
         let terms = compensation.map_or(Ok(Vec::new()), |c| read_compensation(c, &chain))?;
         let robot = Robot { terms, ..Robot::nominal(chain) };
         let fit = fit_points(&robot, &points).ok_or_else(|| {
             Error::unsolved(
-                args.points.display(),
+                points_file.display(),
                 "the points do not determine the frame of the device and the reflector",
                 "measure at least 10 points that differ in position and in hand orientation",
             )
@@ -56,7 +69,7 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
         Ok((points.len(), 1e3 * fit.rms_m, 1e3 * worst))
     };
     let (count, corrected, worst) = rms(&args.urdf, args.compensation.as_ref())?;
-    println!("points    {count} of {}; frame of the device and reflector fitted", args.points.display());
+    println!("points    {count} of {}; frame of the device and reflector fitted", points_file.display());
     println!("model     {}: {corrected:.3} mm RMS, worst {worst:.3} mm", args.urdf.display());
     let Some(file) = &args.nominal else { return Ok(Verdict::Good) };
     let (_, nominal, worst) = rms(file, None)?;

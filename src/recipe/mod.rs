@@ -22,6 +22,7 @@ mod start;
 mod study;
 mod suspects;
 mod two_stage;
+mod verify;
 mod worth;
 
 pub use build::{MeasuredSeries, MeasuredStop};
@@ -40,4 +41,5 @@ pub use simulated::measured;
 pub use solution::{Solution, StartVerdict};
 pub use study::{Study, StudyCell, StudyRequest, study};
 pub use two_stage::{Estimate, Estimator, PoseStage, estimate_all, fit_joint, fit_poses, linear_step};
+pub use verify::{JudgedImage, verify_series};
 pub use worth::{REPORT_LARGER, Worth, still, stops};
