@@ -2,6 +2,7 @@
 
 use super::free_poses::FreePoses;
 use super::joint::left_out;
+use super::loose::loose_mountings;
 use crate::assess::Accuracy;
 use crate::error::Notice;
 use crate::problem::{Problem, State};
@@ -50,6 +51,7 @@ pub(super) fn gates(
             ));
         }
     }
+    failed.extend(loose_mountings(problem, state));
     let out = left_out(problem, on_robot);
     if out as f64 > WORST_SHARE_LEFT_OUT * on_robot as f64 {
         failed.push(format!("images: {out} of {on_robot} do not fit their joint readings"));

@@ -12,6 +12,7 @@ mod free_poses;
 mod gates;
 mod joint;
 mod local_errors;
+mod loose;
 mod measure;
 mod moved;
 mod selection;

@@ -68,6 +68,8 @@ pub enum Fault {
     MovingRobot,
     /// A few markers that are not where the plate file says.
     MovedMarkers,
+    /// A camera that tips over between two positions on its mount.
+    LooseCamera,
 }
 
 /// What a fault is called and what the program must answer.
@@ -96,7 +98,7 @@ const fn row(
 }
 
 /// Every fault.
-pub const FAULTS: [Expectation; 23] = [
+pub const FAULTS: [Expectation; 24] = [
     row(Fault::DegreesAsRadians, "degrees-as-radians", false, &[2], &["joints.csv", "deg"]),
     row(Fault::RadiansAsDegrees, "radians-as-degrees", false, &[2], &["joints.csv", "rad"]),
     row(Fault::UnknownJoint, "unknown-joint", false, &[2], &["joints.csv", "joint_a3"]),
@@ -120,6 +122,7 @@ pub const FAULTS: [Expectation; 23] = [
     row(Fault::ChangedFocus, "changed-focus", false, &[1, 3], &["focus", "img_010.png"]),
     row(Fault::MovingRobot, "moving-robot", false, &[0, 1], &["img_005.png", "img_013.png"]),
     row(Fault::MovedMarkers, "moved-markers", false, &[0, 1], &["marker 17", "marker 40"]),
+    row(Fault::LooseCamera, "loose-camera", false, &[1], &["camera mount", "roll", "loose"]),
 ];
 
 impl Fault {
@@ -166,6 +169,7 @@ impl Fault {
             Self::ChangedFocus => refocus(series),
             Self::MovingRobot => move_robot(series),
             Self::MovedMarkers => move_markers(series),
+            Self::LooseCamera => loosen_camera(series),
             Self::MissingImage
             | Self::MissingImages
             | Self::UnreadableImage
@@ -322,6 +326,14 @@ fn move_robot(series: &mut SimulatedSeries) {
             let hand = series.truth.camera_mount == CameraMount::Hand;
             observe_again(series, k..k + 1, |pose, _, _| *pose = if hand { lag * *pose } else { *pose * lag });
         }
+    }
+}
+
+/// At two stops of five the camera is rolled by 1.2 mrad on its mount.
+fn loosen_camera(series: &mut SimulatedSeries) {
+    for k in (0..series.observations.len()).filter(|k| matches!(k % 5, 1 | 2)) {
+        let roll = Pose::exp(&Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 1.2e-3));
+        observe_again(series, k..k + 1, |pose, _, _| *pose = roll * *pose);
     }
 }
 
