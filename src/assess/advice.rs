@@ -83,7 +83,9 @@ impl<'a> Adviser<'a> {
                     let jc = &j * &known.covariance;
                     let total = DMatrix::from_column_slice(6, 6, noise.as_slice()) + &jc * j.transpose();
                     let Some(factor) = total.cholesky() else { continue };
-                    let Some(taken) = factor.l().solve_lower_triangular(&jc.columns(0, n).into_owned()) else { continue };
+                    let Some(taken) = factor.l().solve_lower_triangular(&jc.columns(0, n).into_owned()) else {
+                        continue;
+                    };
                     candidates.push(Candidate { reading, value, taken });
                 }
             }
@@ -164,7 +166,11 @@ impl<'a> Adviser<'a> {
             _ => format!("{:.0} deg", v.to_degrees()),
         };
         if high - low < STANDS_STILL {
-            return format!("move {joint}, which stands at {} in all stops: add stops with {joint} near {}", shown(low), shown(value));
+            return format!(
+                "move {joint}, which stands at {} in all stops: add stops with {joint} near {}",
+                shown(low),
+                shown(value)
+            );
         }
         format!("add stops with {joint} near {} (so far {} to {})", shown(value), shown(low), shown(high))
     }

@@ -61,9 +61,8 @@ struct Seen {
 impl Seen {
     fn new(problem: &Problem, lin: &Linearised) -> Self {
         let shown = lin.terms.iter().zip(&lin.images);
-        let mut order: Vec<(usize, usize)> = shown
-            .flat_map(|(t, &i)| t.markers.iter().map(move |m| (problem.images[i].plate, m.marker)))
-            .collect();
+        let mut order: Vec<(usize, usize)> =
+            shown.flat_map(|(t, &i)| t.markers.iter().map(move |m| (problem.images[i].plate, m.marker))).collect();
         order.sort_unstable();
         order.dedup();
         Self { order }

@@ -127,8 +127,9 @@ pub fn identifiability(
     let (shares, vectors) = symmetric_eigen(&k)?;
     // Ascending shares are descending informations.
     let values = shares.map(|k| (1.0 / k.max(f64::MIN_POSITIVE) - 1.0).max(0.0));
-    let listed: Vec<usize> =
-        (0..layout.len()).filter(|c| layout.columns[*c].free && covariance[(*c, *c)] > 0.0 && !layout.locals.contains(c)).collect();
+    let listed: Vec<usize> = (0..layout.len())
+        .filter(|c| layout.columns[*c].free && covariance[(*c, *c)] > 0.0 && !layout.locals.contains(c))
+        .collect();
     let names: Vec<String> = listed.iter().map(|&c| short_name(&layout.columns[c].name)).collect();
     let all = DMatrix::from_fn(listed.len(), listed.len(), |i, j| covariance[(listed[i], listed[j])]);
     judge(robot, layout, stops, known, &values, &vectors, &all, &names)
@@ -251,7 +252,8 @@ fn named(v: &DVector<f64>, names: &[String]) -> Vec<(String, f64)> {
 pub fn frame_parameters(robot: &Robot) -> [Vec<String>; 2] {
     let chain = &robot.chain;
     let origin = |name: &str| format!("{}.origin", name.replace('/', "."));
-    let before = chain.joints.iter().take_while(|j| j.drive.is_none()).chain(chain.joints.iter().find(|j| j.drive.is_some()));
+    let before =
+        chain.joints.iter().take_while(|j| j.drive.is_none()).chain(chain.joints.iter().find(|j| j.drive.is_some()));
     let mut first: Vec<String> = before.map(|j| origin(&j.name)).collect();
     let mut last: Vec<String> =
         chain.joints.iter().rev().take_while(|j| j.drive.is_none()).map(|j| origin(&j.name)).collect();
@@ -315,7 +317,8 @@ fn correlations(
         let remedy = match (camera(&all[first]), camera(&all[second])) {
             (true, true) => "fill the whole image, tilt by 20 to 45 degrees, and vary the distance".to_owned(),
             _ if v.norm() > 0.0 => adviser.in_words(Some(&v)),
-            _ => "roll the camera about its axis at some stops, tilt by 20 to 45 degrees, and vary the distance".to_owned(),
+            _ => "roll the camera about its axis at some stops, tilt by 20 to 45 degrees, and vary the distance"
+                .to_owned(),
         };
         Correlation { first: all[first].clone(), second: all[second].clone(), correlation: rho, remedy }
     };

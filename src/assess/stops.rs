@@ -109,7 +109,9 @@ impl StopsKnowledge {
 
     /// Directions (columns, orthonormal, in units of the priors) of which the stops say less than [`LEAST_SHARE`].
     pub fn unknown(&self) -> DMatrix<f64> {
-        let Some((values, vectors)) = symmetric_eigen(&self.information) else { return DMatrix::zeros(self.scale.len(), 0) };
+        let Some((values, vectors)) = symmetric_eigen(&self.information) else {
+            return DMatrix::zeros(self.scale.len(), 0);
+        };
         let least = LEAST_SHARE / (1.0 - LEAST_SHARE);
         let count = values.iter().filter(|v| **v < least).count();
         vectors.columns(0, count).into_owned()

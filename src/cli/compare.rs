@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::recording::{Pictures, RecordingArgs};
 use super::choices::Model;
+use super::recording::{Pictures, RecordingArgs};
 use super::{Verdict, identify, progress};
 use crate::error::{Error, Result};
 use crate::output::comparison::{comparison_markdown, study_html, study_markdown, study_verdict};

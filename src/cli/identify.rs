@@ -78,7 +78,9 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
             let measured = measure_all(&all, &chain, &mut notices)?;
             Task { inputs: inputs(urdf, &all)?, description, chain, measured, notices }
         }
-        (None, None) => return Err(Error::input("identify", "no robot is given", "give --urdf and --series, or --from")),
+        (None, None) => {
+            return Err(Error::input("identify", "no robot is given", "give --urdf and --series, or --from"));
+        }
     };
     solve(args, &options, task)
 }

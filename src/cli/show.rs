@@ -50,7 +50,9 @@ fn compare(args: &ShowArgs, a: &SolutionRecord, b: &SolutionRecord) -> Result<Ve
     let found = compare_solutions(a, b)?;
     println!("first     {}", args.solutions[0].display());
     println!("second    {}", args.solutions[1].display());
-    println!("flange    distance of the flange between the two models, base frames and a point of the flange brought together:");
+    println!(
+        "flange    distance of the flange between the two models, base frames and a point of the flange brought together:"
+    );
     match &found.covered {
         Some(d) => print_difference("in the region of the stops", d, a),
         None => println!("          their stops have no region in common"),

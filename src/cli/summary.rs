@@ -35,7 +35,8 @@ pub(super) fn of_stops(found: &Identifiability) -> String {
 /// Every parameter with sigma, prior and share of data.
 pub(super) fn parameters(r: &SolutionRecord) -> String {
     let shown = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.4e}"));
-    let mut out = String::from("parameter, unit: value, sigma, sigma by the scatter of images, prior sigma, share of data\n");
+    let mut out =
+        String::from("parameter, unit: value, sigma, sigma by the scatter of images, prior sigma, share of data\n");
     for e in &r.estimates {
         let share = e.share_of_data.map_or("-".to_owned(), |s| format!("{:.0} %", 100.0 * s));
         let sigma = if e.free { shown(e.sigma) } else { "fixed".to_owned() };
@@ -47,7 +48,14 @@ pub(super) fn parameters(r: &SolutionRecord) -> String {
 
 fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     let robot = &r.robot;
-    writeln!(out, "robot     {} ({} -> {}, {} moving joints)", robot.name, robot.base, robot.tip, robot.readings.len())?;
+    writeln!(
+        out,
+        "robot     {} ({} -> {}, {} moving joints)",
+        robot.name,
+        robot.base,
+        robot.tip,
+        robot.readings.len()
+    )?;
     for one in &r.series {
         let images = || r.images.iter().filter(|i| i.series == one.name);
         let used = || images().filter(|i| i.reason.is_none());
@@ -62,7 +70,11 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
             one.height_px
         )?;
     }
-    limited(out, "left out", r.images.iter().filter_map(|i| i.reason.as_ref().map(|why| format!("{}: {why}", i.name))))?;
+    limited(
+        out,
+        "left out",
+        r.images.iter().filter_map(|i| i.reason.as_ref().map(|why| format!("{}: {why}", i.name))),
+    )?;
     if r.statistics.observations_left_out > 0 {
         writeln!(out, "left out  {} single observations with large residuals", r.statistics.observations_left_out)?;
     }
@@ -189,7 +201,9 @@ fn map(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
             at(&all, 1.0).map_or(String::new(), |w| format!(", up to {w:.2} mm elsewhere"))
         )?;
     }
-    let Some((scatter, ratio)) = r.scatter.as_ref().and_then(|s| s.flange_ratio.map(|ratio| (s, ratio))) else { return Ok(()) };
+    let Some((scatter, ratio)) = r.scatter.as_ref().and_then(|s| s.flange_ratio.map(|ratio| (s, ratio))) else {
+        return Ok(());
+    };
     let larger = if scatter.larger_stated { "; the larger ones are stated" } else { "" };
     writeln!(out, "scatter   the images scatter {ratio:.2} times as much as the noise model says (flange){larger}")
 }
@@ -259,7 +273,11 @@ fn identifiability(out: &mut String, found: &Identifiability, who: &str) -> std:
         )?;
     }
     let by_stops = found.unknown.iter().filter(|d| d.cause == Cause::Stops);
-    limited(out, "untold", by_stops.map(|d| format!("{}: {}", direction(d), d.remedy.as_deref().unwrap_or("more stops"))))?;
+    limited(
+        out,
+        "untold",
+        by_stops.map(|d| format!("{}: {}", direction(d), d.remedy.as_deref().unwrap_or("more stops"))),
+    )?;
     limited(
         out,
         "alike",

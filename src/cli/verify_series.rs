@@ -25,7 +25,10 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let pairs: Vec<(&JudgedImage, &JudgedImage)> =
         model.iter().filter_map(|m| nominal.iter().find(|n| same(m, n)).map(|n| (m, n))).collect();
     let (model, nominal): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
-    println!("images    {} that both models predict; camera, hand-camera offset and plate fitted to the others", model.len());
+    println!(
+        "images    {} that both models predict; camera, hand-camera offset and plate fitted to the others",
+        model.len()
+    );
     println!("{}", line("model", &args.urdf, &model));
     println!("{}", line("nominal", file, &nominal));
     let ratio = bootstrap_ratio(&units(&model), &units(&nominal)).ok_or_else(|| {
@@ -41,7 +44,12 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     Ok(Verdict::GateFailed)
 }
 
-fn judged(args: &VerifyArgs, urdf: &Path, compensation: Option<&Path>, recording: &RecordingArgs) -> Result<Vec<JudgedImage>> {
+fn judged(
+    args: &VerifyArgs,
+    urdf: &Path,
+    compensation: Option<&Path>,
+    recording: &RecordingArgs,
+) -> Result<Vec<JudgedImage>> {
     let description = urdf::read(urdf)?;
     let all = read_all(&args.series)?;
     let chain = chain(&description, &all, args.base.as_deref(), args.tip.as_deref())?;

@@ -58,12 +58,8 @@ fn stop(image: &ImageRecord, series: &str, placements: &[String]) -> Result<Meas
     if [o.edge.len(), o.uv.len(), o.covariance.len()].iter().any(|len| *len != o.marker.len()) {
         return Err(damaged(format!("image {} has columns of different lengths", image.name)));
     }
-    let observation = |k: usize| Observation {
-        marker: o.marker[k],
-        edge: o.edge[k],
-        uv: o.uv[k],
-        covariance: Some(o.covariance[k]),
-    };
+    let observation =
+        |k: usize| Observation { marker: o.marker[k], edge: o.edge[k], uv: o.uv[k], covariance: Some(o.covariance[k]) };
     let observations: Vec<Observation> = (0..o.marker.len()).map(observation).collect();
     let placement = placements.get(image.placement);
     let prefix = format!("{series}/");

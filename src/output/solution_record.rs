@@ -10,7 +10,8 @@ use super::pose_files::{determined, free_rigid_covariances, placement_covariance
 use super::residuals::{poses, residuals};
 use super::solution_json::{
     AccuracyRecord, CameraRecord, FORMAT, FreePoseRecord, ImageRecord, JointRecord, ObservationColumns, PlacedRecord,
-    PlateRecord, ProgramRecord, RobotRecord, ScatterRecord, SeriesRecord, SolutionRecord, StatisticsRecord, TermRecord, UrdfRecord,
+    PlateRecord, ProgramRecord, RobotRecord, ScatterRecord, SeriesRecord, SolutionRecord, StatisticsRecord, TermRecord,
+    UrdfRecord,
 };
 use crate::error::Result;
 use crate::geom::Pose;

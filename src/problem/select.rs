@@ -64,8 +64,11 @@ fn proposals(pattern: &str, known: &[String]) -> String {
         return format!("is {} meant?", close.join(" or "));
     }
     let block = plain.rsplit_once('.').map_or(plain.as_str(), |(block, _)| block);
-    let of_block: Vec<&str> =
-        known.iter().map(String::as_str).filter(|n| n.strip_prefix(block).is_some_and(|r| r.starts_with('.'))).collect();
+    let of_block: Vec<&str> = known
+        .iter()
+        .map(String::as_str)
+        .filter(|n| n.strip_prefix(block).is_some_and(|r| r.starts_with('.')))
+        .collect();
     if !of_block.is_empty() {
         return format!("{block} has {}", of_block.join(", "));
     }
@@ -80,7 +83,9 @@ mod tests {
 
     #[test]
     fn short_long_and_starred_names_mean_the_same_column() {
-        for pattern in ["joint_2.offset", "robot/joint_2.offset", "robot.joint_2.offset", "joint_2", "*.offset", "joint_*.off*"] {
+        for pattern in
+            ["joint_2.offset", "robot/joint_2.offset", "robot.joint_2.offset", "joint_2", "*.offset", "joint_*.off*"]
+        {
             assert!(names(pattern, "robot/joint_2.offset"), "{pattern}");
         }
         for pattern in ["camera.front.k3", "camera/front/lens.k3", "camera.front", "camera.*.k3"] {

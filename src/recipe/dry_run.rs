@@ -28,8 +28,7 @@ fn stops(series: &[Series], chain: &Chain) -> Result<Vec<Stop>> {
 fn layout(options: &Options, chain: Chain, series: &[Series]) -> Result<(Layout, State)> {
     let cameras: Vec<String> = series.iter().map(|s| s.camera_name().to_owned()).collect();
     let mountings: Vec<String> = series.iter().map(|s| s.mounting().to_owned()).collect();
-    let mut placements: Vec<String> =
-        series.iter().flat_map(|s| &s.stops.stops).map(|s| s.placement.clone()).collect();
+    let mut placements: Vec<String> = series.iter().flat_map(|s| &s.stops.stops).map(|s| s.placement.clone()).collect();
     placements.sort();
     placements.dedup();
     let lens = |s: &Series| s.manifest.camera.model.as_deref().and_then(Lens::from_name).unwrap_or(Lens::Brown);

@@ -93,7 +93,9 @@ impl StatedPrior {
             return Err(Error::input(
                 place,
                 format!("the prior of {} is given with {other}", short_name(name)),
-                format!("its unit is {unit}: write {{ {key} = ... }}; name shifts and rotations apart (x y z, rx ry rz)"),
+                format!(
+                    "its unit is {unit}: write {{ {key} = ... }}; name shifts and rotations apart (x y z, rx ry rz)"
+                ),
             ));
         }
         let sigma = given.iter().find(|(u, _)| *u == unit).and_then(|(_, v)| *v);
@@ -157,9 +159,14 @@ impl Selection {
                     return Err(Error::input(place, what, "give priors for robot, camera or plate shape"));
                 }
                 let camera = layout.cameras.iter().any(|r| r.contains(&c));
-                if camera && (prior.mean.is_none() || prior == &StatedPrior { mean: prior.mean, ..Default::default() }) {
+                if camera && (prior.mean.is_none() || prior == &StatedPrior { mean: prior.mean, ..Default::default() })
+                {
                     let what = format!("the prior of {} needs mean and sigma", short_name(&column.name));
-                    return Err(Error::input(place, what, "a camera has no nominal values: write { mean = ..., sigma... = ... }"));
+                    return Err(Error::input(
+                        place,
+                        what,
+                        "a camera has no nominal values: write { mean = ..., sigma... = ... }",
+                    ));
                 }
                 let sigma = prior.sigma_in(&place, &column.name, column.unit)?;
                 if let Some(mean) = prior.mean.filter(|m| !m.is_finite()) {

@@ -2,9 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::assess::{
-    FlangeModel, Identifiability, WorkspacePoint, clustered_covariance, identifiability,
-};
+use crate::assess::{FlangeModel, Identifiability, WorkspacePoint, clustered_covariance, identifiability};
 use crate::error::Notice;
 use crate::geom::Pose;
 use crate::model::robot::Stop;

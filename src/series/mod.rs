@@ -17,10 +17,10 @@ mod units;
 
 pub use inputs::InputFile;
 pub use joints::{DEFAULT_PLACEMENT, Stop, Stops};
+pub(crate) use manifest::read_toml;
 pub use manifest::{
     AngleUnit, CameraMount, CameraSection, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder,
 };
-pub(crate) use manifest::read_toml;
 pub use mcap::{
     CameraInfo, Clock, Extracted, Motion, Picking, RecordingOptions, Shown, StopReport, extract, write_recording,
 };

@@ -137,7 +137,13 @@ fn bounds(r: &SolutionRecord) -> Vec<f64> {
     (1..CLASSES.len()).map(|k| all[(all.len() - 1) * k / CLASSES.len()]).collect()
 }
 
-fn map(r: &SolutionRecord, bounds: &[f64], label: &str, project: impl Fn(&[f64; 3]) -> [f64; 2], axes: [&str; 2]) -> String {
+fn map(
+    r: &SolutionRecord,
+    bounds: &[f64],
+    label: &str,
+    project: impl Fn(&[f64; 3]) -> [f64; 2],
+    axes: [&str; 2],
+) -> String {
     let places: Vec<[f64; 2]> = r.workspace.iter().map(|w| project(&w.xyz_m)).collect();
     let low = [0, 1].map(|k| places.iter().map(|p| p[k]).fold(f64::INFINITY, f64::min));
     let high = [0, 1].map(|k| places.iter().map(|p| p[k]).fold(f64::NEG_INFINITY, f64::max));
