@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::at::AtArgs;
 use super::choices::{ChoiceArgs, in_words};
@@ -11,7 +11,7 @@ use super::show::read_solution;
 use super::{Verdict, progress, summary};
 use crate::error::{Error, Notice, Result};
 use crate::output::solution_json::{self, FILE_NAME};
-use crate::output::{self, Context, Poses, restore};
+use crate::output::{self, Context, Offsets, Poses, restore};
 use crate::recipe::{self, MeasuredSeries, Options};
 use crate::series::{self, InputFile, Series};
 use crate::urdf::{self, Chain, RobotDescription};
@@ -40,6 +40,12 @@ pub(super) struct IdentifyArgs {
     /// Tip link that carries camera or plate (overrides series.toml)
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
+    /// Lens: auto (by hold-out, says why), brown, fisheye, parallax, rational or thin_prism [default: as in series.toml, else brown]
+    #[arg(long, value_name = "LENS")]
+    camera: Option<String>,
+    /// Where joint offsets go
+    #[arg(long, value_enum, default_value_t = OffsetsName::Folded)]
+    offsets: OffsetsName,
     /// Also write the stand-alone camera poses (poses.csv)
     #[arg(long)]
     poses: bool,
@@ -49,6 +55,24 @@ pub(super) struct IdentifyArgs {
     at: AtArgs,
     #[command(flatten)]
     recording: RecordingArgs,
+}
+
+/// Names of the ways for joint offsets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum OffsetsName {
+    /// Into the origins: controller angles stay as they are
+    Folded,
+    /// Into mastering.csv, for the controller; the origins are without them
+    Mastering,
+}
+
+impl From<OffsetsName> for Offsets {
+    fn from(name: OffsetsName) -> Self {
+        match name {
+            OffsetsName::Folded => Self::Folded,
+            OffsetsName::Mastering => Self::Mastering,
+        }
+    }
 }
 
 /// What is solved.
@@ -99,7 +123,15 @@ fn again(args: &IdentifyArgs, path: &Path) -> Result<Task> {
 }
 
 fn solve(args: &IdentifyArgs, options: &Options, task: Task) -> Result<Verdict> {
-    let Task { description, chain, measured, mut notices, inputs } = task;
+    let Task { description, chain, mut measured, mut notices, inputs } = task;
+    match args.camera.as_deref() {
+        None => {}
+        Some("auto") => notices.extend(recipe::choose_lens(&chain, &mut measured)?),
+        Some(name) => {
+            let lens = super::simulate::lens(name)?;
+            measured.iter_mut().for_each(|s| s.lens = lens);
+        }
+    }
     let mut solution = recipe::identify(chain, &measured, options)?;
     notices.append(&mut solution.notices);
     solution.notices = notices;
@@ -112,6 +144,7 @@ fn solve(args: &IdentifyArgs, options: &Options, task: Task) -> Result<Verdict> 
         inputs,
         options: in_words(options),
         command: std::env::args().collect::<Vec<_>>().join(" "),
+        offsets: args.offsets.into(),
         poses: if args.poses { Poses::Written } else { Poses::LeftOut },
     };
     let files = output::files(&solution, &context)?;

@@ -13,14 +13,17 @@ use super::simulate::Mount;
 use crate::error::{Error, Result};
 use crate::geom::{OrientedBox, Pose};
 use crate::model::camera::Camera;
-use crate::output::{plan_files, plan_start, solution_json, write_all};
+use crate::output::{plan_files, plan_html, plan_programs, plan_start, solution_json, write_all};
 use crate::plan::candidates::CandidateOptions;
-use crate::plan::scene::{SceneOptions, arm_length_m};
+use crate::plan::scene::{self, SceneOptions, arm_length_m};
 use crate::plan::setting::Setting;
 use crate::plan::viewpoint::ViewRange;
 use crate::plan::visibility::SightLimits;
 use crate::problem::Image;
-use crate::recipe::{Budget, Forecast, Plan, PlanRequest, RobotModel, Wish, forecast, plan};
+use crate::recipe::{
+    Budget, Forecast, PlaceForecast, Plan, PlanRequest, PlanStudyRequest, RobotModel, Wish, check_wish, choose,
+    compare_places, forecast, image_name, place_words, plan, plan_study,
+};
 use crate::series::{CameraMount, Stops, read_plate};
 use crate::simulate::typical_camera;
 use crate::urdf::{self, Chain, JointKind};
@@ -35,7 +38,7 @@ pub(super) struct PlanArgs {
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// Plate (plate.toml)
-    #[arg(long, value_name = "FILE", required_unless_present = "from")]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["from", "study"])]
     plate: Option<PathBuf>,
     /// Number of images
     #[arg(long, default_value_t = 50)]
@@ -129,6 +132,9 @@ pub(super) struct PlanArgs {
     /// Seed of the candidates
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Study instead of a plan: 30 planned against 60 random poses in as many simulated worlds; writes study.md
+    #[arg(long, value_name = "WORLDS")]
+    study: Option<u64>,
 }
 
 /// Numbers between commas.
@@ -153,14 +159,82 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     check(args)?;
     let description = urdf::read(&args.urdf)?;
     let chain = description.chain(args.base.as_deref(), args.tip.as_deref())?;
-    let request = request(args, chain)?;
+    if let Some(seeds) = args.study {
+        return study(args, chain, seeds);
+    }
+    let (capsules, meshes) = description.carried_capsules(&chain);
+    let described = scene::described(&capsules, &chain);
+    let mut request = request(args, chain)?;
+    request.scene.described = described;
+    let mut words = settle_place(args, &mut request)?;
+    if meshes > 0 {
+        words.push(format!(
+            "{meshes} collision meshes of the URDF were not read: their links are capsules from joint to joint \
+             (--link-radius-mm sets how thick)"
+        ));
+    }
     let plan = plan(&request)?;
-    let forecast = forecast(&request, &plan)?;
+    let mut forecast = forecast(&request, &plan)?;
+    if request.setting.placements.len() > 1 {
+        words.extend(place_words(&compare_places(&request, &plan)?));
+    }
+    forecast.words.extend(words);
+    check_wish(&request, &forecast)?;
     let command: Vec<String> = std::env::args().skip(1).collect();
     let command = format!("robotcal {}", command.join(" "));
-    let files = plan_files::plan_files(&request, &plan, &forecast, &command, BTreeMap::new())?;
+    let mut more = plan_programs::programs(&request, &plan);
+    more.insert("plan.html".into(), plan_html(&request, &plan, &forecast, &command).into_bytes());
+    let files = plan_files::plan_files(&request, &plan, &forecast, &command, more)?;
     write_all(&args.out, &files)?;
     print!("{}", summary(&request, &plan, &forecast, &files, &args.out));
+    Ok(Verdict::Good)
+}
+
+/// Candidates when places are compared before the plan.
+const TRIAL_CANDIDATES: usize = 600;
+
+/// Where the user names no place for the plate, several are compared and the best is taken; says so in words.
+fn settle_place(args: &PlanArgs, request: &mut PlanRequest) -> Result<Vec<String>> {
+    let free = args.plate_pose.is_empty() && args.from.is_none() && request.setting.mount == CameraMount::Hand;
+    if !free {
+        return Ok(Vec::new());
+    }
+    let arm = arm_length_m(&request.setting.robot);
+    let place = |name: &str, far: f64, high: f64, tilt_deg: f64| {
+        let pose = Pose::from_xyz_rpy([far * arm, 0.0, high * arm], [0.0, -tilt_deg.to_radians(), 0.0]);
+        (format!("{name} (x {:.2} m, z {:.2} m, tilted {tilt_deg:.0} degrees)", far * arm, high * arm), pose)
+    };
+    request.setting.placements = vec![
+        place("near", 0.4, 0.0, 0.0),
+        place("middle", 0.5, 0.0, 0.0),
+        place("far", 0.65, 0.0, 0.0),
+        place("raised", 0.5, 0.3, 30.0),
+    ];
+    let mut trial = request.clone();
+    trial.candidates.count = TRIAL_CANDIDATES.max(8 * trial.count);
+    trial.budget = Budget::default();
+    let places = compare_places(&trial, &choose(&trial)?)?;
+    let error = |p: &&PlaceForecast| p.flange_m.unwrap_or(f64::INFINITY);
+    let best = places.iter().min_by(|a, b| error(a).total_cmp(&error(b))).map_or(0, |p| p.placement);
+    let mut words = vec![format!("no --plate-pose was given: the plate is planned {}", places[best].name)];
+    words.extend(place_words(&places));
+    request.setting.placements = vec![("placement_0".to_owned(), request.setting.placements[best].1)];
+    Ok(words)
+}
+
+/// Images planned and drawn in a study.
+const STUDIED: [usize; 2] = [30, 60];
+
+fn study(args: &PlanArgs, chain: Chain, seeds: u64) -> Result<Verdict> {
+    let robot = chain.robot.clone();
+    let [planned, random] = STUDIED;
+    let request = PlanStudyRequest { chain, seeds, planned, random, candidates: args.candidates };
+    let study = plan_study(&request, |seed| tracing::info!("world {seed} done"))?;
+    let text = plan_files::study_table(&robot, &request, &study);
+    std::fs::create_dir_all(&args.out).map_err(|e| Error::io(&args.out, &e))?;
+    let path = args.out.join("study.md");
+    std::fs::write(&path, &text).map_err(|e| Error::io(&path, &e))?;
+    print!("{text}");
     Ok(Verdict::Good)
 }
 
@@ -324,6 +398,9 @@ fn camera(args: &PlanArgs) -> Result<Camera> {
     }
 }
 
+/// Poses whose gain is said on the terminal.
+const GAINS_SHOWN: usize = 10;
+
 fn summary(
     request: &PlanRequest,
     plan: &Plan,
@@ -338,8 +415,8 @@ fn summary(
         plan.legs.len(),
         plan.pool.len(),
         plan.tally.views,
-        1e2 * plan.relaxed_efficiency,
-        1e2 * plan.rounded_efficiency,
+        1e2 * plan.efficiency[0],
+        1e2 * plan.efficiency[1],
         1e3 * forecast.before_m,
         1e3 * forecast.flange_m,
         plan.targets.len(),
@@ -363,8 +440,18 @@ fn summary(
     for line in &forecast.words {
         text += &format!("remark    {line}\n");
     }
+    if !request.taken.is_empty() {
+        for g in forecast.gains.iter().take(GAINS_SHOWN) {
+            text += &format!(
+                "helps     {}: flange {:.4} -> {:.4} mm, most by {}\n",
+                image_name(g.leg),
+                1e3 * g.flange_m[0],
+                1e3 * g.flange_m[1],
+                g.parameter
+            );
+        }
+    }
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
     text += &format!("written   {}: {}\n", folder.display(), names.join(", "));
-    let _ = request;
     text
 }

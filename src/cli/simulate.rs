@@ -6,13 +6,14 @@ use clap::{Args, ValueEnum};
 
 use super::{Verdict, progress};
 use crate::error::{Error, Result};
+use crate::model::camera::Lens;
 use crate::plan::plate_design::{PlateRequest, design};
 use crate::plan::viewpoint::ViewRange;
 use crate::series::{AngleUnit, CameraMount, Edge, Plate, read_plate};
 use crate::simulate::conditions::ImagingConditions;
 use crate::simulate::faults::{FAULTS, Fault};
 use crate::simulate::folder::{Content, write};
-use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series, typical_camera};
+use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series};
 use crate::urdf;
 
 /// Flags of `simulate`.
@@ -36,6 +37,9 @@ pub(super) struct SimulateArgs {
     /// Where the camera is
     #[arg(long, value_enum, default_value_t = Mount::Hand)]
     mount: Mount,
+    /// Lens: brown, fisheye, parallax, rational or thin_prism
+    #[arg(long, default_value = "brown")]
+    lens: String,
     /// Number of stops
     #[arg(long, default_value_t = 50)]
     images: usize,
@@ -198,6 +202,14 @@ fn conditions(args: &SimulateArgs) -> Result<ImagingConditions> {
     Ok(conditions)
 }
 
+/// The lens of a name on the command line.
+pub(super) fn lens(name: &str) -> Result<Lens> {
+    Lens::from_name(name).ok_or_else(|| {
+        let remedy = format!("use one of: {}", Lens::names().join(", "));
+        Error::input("lens", format!("'{name}' is not a lens model of this program"), remedy)
+    })
+}
+
 fn request(args: &SimulateArgs) -> Result<WorldRequest> {
     let sane = args.near_m > 0.0
         && args.far_m >= args.near_m
@@ -211,7 +223,7 @@ fn request(args: &SimulateArgs) -> Result<WorldRequest> {
     }
     let chain = urdf::read(&args.urdf)?.chain(args.base.as_deref(), args.tip.as_deref())?;
     Ok(WorldRequest {
-        camera: typical_camera(args.width_px, args.height_px, args.field_deg.to_radians()),
+        camera: lens_camera(lens(&args.lens)?, args.width_px, args.height_px, args.field_deg.to_radians()),
         mount: args.mount.into(),
         images: args.images,
         placements: args.placements,
@@ -226,6 +238,7 @@ fn request(args: &SimulateArgs) -> Result<WorldRequest> {
             ..ViewRange::default()
         },
         least_markers: args.least_markers,
+        postures: None,
         held_out: args.held_out,
         joint_unit: match args.joint_unit {
             Unit::Rad => AngleUnit::Rad,

@@ -3,6 +3,7 @@
 pub mod camera;
 pub mod circle;
 pub mod joint_terms;
+pub mod mdh;
 pub mod mount;
 pub mod plate_modes;
 pub mod robot;

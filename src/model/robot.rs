@@ -141,6 +141,30 @@ impl Robot {
         self.chain.joints.iter().zip(&self.twists).map(corrected).collect()
     }
 
+    /// This robot under a controller whose zero points have been corrected, and these corrections (added to every reading), rad or m.
+    ///
+    /// Offsets are gone; the terms are those of the new readings (exact for gears and harmonics, gravity as before).
+    pub fn mastered(&self) -> (Self, Vec<f64>) {
+        let n = self.chain.readings.len();
+        let sum = |reading: usize, term: Term| {
+            self.terms.iter().filter(|t| t.reading == reading && t.term == term).map(|t| t.value).sum::<f64>()
+        };
+        // q + offset + gear q = (q + shift)(1 + gear)
+        let shifts: Vec<f64> = (0..n).map(|r| sum(r, Term::Offset) / (1.0 + sum(r, Term::Gear))).collect();
+        let mut robot = self.clone();
+        robot.terms.retain(|t| t.term != Term::Offset);
+        for t in &mut robot.terms {
+            let turned = |k: u8| (f64::from(k) * shifts[t.reading]).sin_cos();
+            // a cos k(q - s) + b sin k(q - s), sorted by cos kq and sin kq.
+            t.value = match t.term {
+                Term::Cosine(k) => turned(k).1 * t.value - turned(k).0 * sum(t.reading, Term::Sine(k)),
+                Term::Sine(k) => turned(k).1 * t.value + turned(k).0 * sum(t.reading, Term::Cosine(k)),
+                _ => t.value,
+            };
+        }
+        (robot, shifts)
+    }
+
     /// True position of every joint of the chain, and the context of the terms of every reading.
     fn positions(&self, stop: &Stop, noise: &[f64]) -> (Vec<f64>, Vec<TermContext>) {
         let mut contexts: Vec<TermContext> = (0..stop.readings.len())

@@ -2,8 +2,8 @@
 
 use super::names::file_names;
 use super::text::{list, quoted};
-use crate::error::Result;
-use crate::model::camera::{Camera, Lens};
+use crate::error::{Error, Result};
+use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::recipe::Solution;
 
 /// One file for each camera, as (file name, text).
@@ -12,22 +12,63 @@ use crate::recipe::Solution;
 /// A lens that camera_info cannot express.
 pub(super) fn cameras(solution: &Solution) -> Result<Vec<(String, String)>> {
     let names = &solution.problem.cameras;
-    let texts = names.iter().zip(&solution.state.cameras).map(|(name, camera)| camera_yaml(name, camera));
+    let depths = depths(solution);
+    let cameras = names.iter().zip(&solution.state.cameras).zip(&depths);
+    let texts = cameras.map(|((name, camera), depths)| camera_yaml(name, camera, depths));
     file_names("camera", "yaml", names).into_iter().zip(texts).map(|(file, text)| Ok((file, text?))).collect()
 }
 
+/// Nearest and farthest plate centre that each camera saw, m.
+fn depths(solution: &Solution) -> Vec<[f64; 2]> {
+    let mut all = vec![[f64::INFINITY, 0.0f64]; solution.problem.cameras.len()];
+    for (i, image) in solution.problem.used() {
+        let Some(pose) = &solution.free_poses.poses[i] else { continue };
+        let z = pose.camera_from_plate.translation.z;
+        let range = &mut all[image.camera];
+        *range = [range[0].min(z), range[1].max(z)];
+    }
+    all.into_iter().map(|[near, far]| if far > 0.0 { [near, far] } else { [1.0, 1.0] }).collect()
+}
+
 /// Text of one camera_info; pixel (0, 0) is the centre of the top-left pixel, as in OpenCV and ROS.
-pub(super) fn camera_yaml(name: &str, camera: &Camera) -> Result<String> {
-    let [fx, fy, cx, cy] = [0, 1, 2, 3].map(|k| camera.parameters[k]);
-    // The order of OpenCV's five coefficients (k1, k2, t1, t2, k3) is that of the lens.
-    let (model, coefficients) = match camera.lens {
-        Lens::Brown => ("plumb_bob", camera.parameters[4..].to_vec()),
+///
+/// A lens that ROS has no model for is fitted by one that it has, and the text says what that costs.
+///
+/// # Errors
+/// A lens that no model of ROS comes near to.
+pub(super) fn camera_yaml(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<String> {
+    let (camera, remark) = match camera.lens {
+        Lens::Brown | Lens::Rational | Lens::Fisheye => (camera.clone(), String::new()),
+        Lens::ThinPrism | Lens::Parallax => {
+            let lens = camera.lens.name();
+            let fit = fit_lens(camera, Lens::Rational, depths_m).ok_or_else(|| {
+                Error::unsolved(
+                    format!("camera {name}"),
+                    format!("no camera model of ROS comes near to its {lens} lens"),
+                    "identify with --camera brown or rational",
+                )
+            })?;
+            let remark = format!(
+                "# NOT THE IDENTIFIED LENS ({lens}, see solution.json), for which ROS has no model, but the nearest rational_polynomial:\n\
+                 # loss {:.3} px RMS over the image, at most {:.3} px, for points {:.3} to {:.3} m away.\n",
+                fit.rms_px, fit.worst_px, depths_m[0], depths_m[1]
+            );
+            (fit.camera, remark)
+        }
     };
+    let [fx, fy, cx, cy] = [0, 1, 2, 3].map(|k| camera.parameters[k]);
+    // The coefficients of these lenses stand in the order of OpenCV.
+    let model = match camera.lens {
+        Lens::Fisheye => "equidistant",
+        Lens::Rational => "rational_polynomial",
+        _ => "plumb_bob",
+    };
+    let coefficients = camera.parameters[4..].to_vec();
     let matrix = |rows: usize, columns: usize, data: &[f64]| {
         format!("\n  rows: {rows}\n  cols: {columns}\n  data: {}\n", list(data.iter().copied()))
     };
     Ok(format!(
-        "image_width: {}\nimage_height: {}\ncamera_name: {}\ncamera_matrix:{}distortion_model: {model}\n\
+        "{remark}image_width: {}\nimage_height: {}\ncamera_name: {}\ncamera_matrix:{}distortion_model: {model}\n\
          distortion_coefficients:{}rectification_matrix:{}projection_matrix:{}",
         camera.width_px,
         camera.height_px,

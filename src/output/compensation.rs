@@ -1,5 +1,7 @@
 //! compensation.toml: what the corrected URDF cannot say of the joints.
 
+use super::Context;
+use super::controller_files::{exported, offsets_in_words};
 use super::text::{key, list, number};
 use crate::error::{Error, Result};
 use crate::model::joint_terms::Term;
@@ -11,7 +13,7 @@ const HEADER: &str = "\
 # harmonics = [a1, b1, a2, b2, ..] and gravity in rad (m for a prismatic joint), step from the previous stop in rad (m).
 # m_1, m_2: moment about the axis of a unit weight (along -z of the root) at unit levers u and axis x u of the joint's own link;
 # m_3, m_4: the same about this axis for levers u' and axis' x u' of the link after the next moving joint.
-# u is the unit vector along x (along y where |axis_x| >= 0.9) without its part along the axis. Joint offsets are in the URDF.
+# u is the unit vector along x (along y where |axis_x| >= 0.9) without its part along the axis.
 ";
 
 /// The values of one joint.
@@ -69,13 +71,15 @@ fn put(values: &mut Vec<f64>, index: usize, value: f64) {
 ///
 /// # Errors
 /// A harmonic of order 0.
-pub(super) fn compensation_toml(solution: &Solution) -> Result<String> {
-    let robot = &solution.state.robot;
+pub(super) fn compensation_toml(solution: &Solution, context: &Context) -> Result<String> {
+    let robot = exported(solution, context);
     let mut joints: Vec<Joint> = robot.chain.readings.iter().map(|_| Joint::default()).collect();
     for t in &robot.terms {
         joints[t.reading].take(t.term, t.value)?;
     }
     let sections = robot.chain.readings.iter().zip(&joints).map(|(name, joint)| (name, joint.text()));
     let sections = sections.filter(|(_, text)| !text.is_empty());
-    Ok(sections.fold(HEADER.to_owned(), |out, (name, text)| out + &format!("\n[joint.{}]\n{text}", key(name))))
+    Ok(sections.fold(format!("{HEADER}# {}\n", offsets_in_words(context)), |out, (name, text)| {
+        out + &format!("\n[joint.{}]\n{text}", key(name))
+    }))
 }

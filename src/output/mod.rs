@@ -7,6 +7,7 @@ mod camera_file;
 pub mod comparison;
 mod compensation;
 mod compensation_read;
+mod controller_files;
 pub mod difference;
 mod estimates;
 pub mod flange_table;
@@ -14,6 +15,7 @@ mod gauge;
 mod names;
 mod observation_table;
 pub mod plan_files;
+pub mod plan_programs;
 pub mod plan_start;
 pub mod plate_drawing;
 mod plate_files;
@@ -31,7 +33,7 @@ mod text;
 mod write;
 
 pub use compensation_read::read_compensation;
-pub use report::report_html;
+pub use report::{plan_html, report_html};
 pub use write::{write_all, write_beside};
 
 use std::collections::BTreeMap;
@@ -56,8 +58,19 @@ pub struct Context<'a> {
     pub options: Vec<(String, String)>,
     /// The command line.
     pub command: String,
+    /// Where joint offsets go (`--offsets`).
+    pub offsets: Offsets,
     /// Whether stand-alone poses are wanted (`--poses`).
     pub poses: Poses,
+}
+
+/// Where joint offsets go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Offsets {
+    /// Into the origins: controller angles stay as they are.
+    Folded,
+    /// Into the mastering table of the controller; the origins are without them.
+    Mastering,
 }
 
 /// Whether poses.csv is written.
@@ -77,8 +90,11 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
     let mut files = BTreeMap::new();
     let mut add = |name: String, text: String| files.insert(name, text.into_bytes());
     add(robot_files::urdf_name(context), robot_files::urdf(solution, context)?);
-    add("kinematics.yaml".into(), robot_files::kinematics_yaml(solution));
-    add("compensation.toml".into(), compensation::compensation_toml(solution)?);
+    add("kinematics.yaml".into(), robot_files::kinematics_yaml(solution, context));
+    add("kinematics.xacro".into(), controller_files::xacro(solution, context));
+    add("mdh.csv".into(), controller_files::mdh_csv(solution, context));
+    add("mastering.csv".into(), controller_files::mastering_csv(solution, context));
+    add("compensation.toml".into(), compensation::compensation_toml(solution, context)?);
     for (name, text) in camera_file::cameras(solution)? {
         add(name, text);
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::recipe::{Forecast, Plan, PlanRequest, image_name};
+use crate::recipe::{Forecast, Plan, PlanRequest, PlanStudy, PlanStudyRequest, image_name};
 use crate::series::{AngleUnit, CameraSection, DEFAULT_PLACEMENT, Manifest, Stop, Stops, plate_csv, plate_toml};
 use crate::urdf::JointKind;
 
@@ -157,8 +157,8 @@ fn record<'a>(
         robot: &chain.robot,
         joints: &chain.readings,
         candidates: plan.pool.len(),
-        relaxed_efficiency: plan.relaxed_efficiency,
-        rounded_efficiency: plan.rounded_efficiency,
+        relaxed_efficiency: plan.efficiency[0],
+        rounded_efficiency: plan.efficiency[1],
         flange_before_m: forecast.before_m,
         flange_m: forecast.flange_m,
         curve: (forecast.curve.iter())
@@ -177,4 +177,36 @@ fn record<'a>(
             })
             .collect(),
     }
+}
+
+/// A study as a table in Markdown.
+pub fn study_table(robot: &str, request: &PlanStudyRequest, study: &PlanStudy) -> String {
+    let [found, predicted, random, random_predicted] = study.overall_m().map(|m| 1e3 * m);
+    let mut text = format!(
+        "## {robot}: {} planned images against {} random ones, {} worlds\n\n\
+         | | found, mm | predicted, mm | predicted / found |\n|---|---|---|---|\n\
+         | {} planned | {found:.4} | {predicted:.4} | {:.3} |\n\
+         | {} random | {random:.4} | {random_predicted:.4} | {:.3} |\n\n",
+        request.planned,
+        request.random,
+        study.rows.len(),
+        request.planned,
+        predicted / found,
+        request.random,
+        random_predicted / random,
+    );
+    if let Some(r) = &study.planned_to_random {
+        text += &format!(
+            "Planned over random: {:.3} (95 % of resampled worlds: {:.3} to {:.3}).\n",
+            r.value, r.low, r.high
+        );
+    }
+    let [planned, drawn] = study.views_m().map(|m| 1e3 * m);
+    text += &format!("Over held-out views of the plate: {planned:.4} mm planned, {drawn:.4} mm random.\n");
+    let least = |k: usize| study.rows.iter().map(|r| r.efficiency[k]).fold(1.0, f64::min);
+    text += &format!("Least certified efficiency: relaxation {:.4}, whole images {:.4}.\n", least(0), least(1));
+    for (seed, reason) in &study.failed {
+        text += &format!("World {seed} was left out: {}\n", reason.replace('\n', " "));
+    }
+    text + "\n"
 }

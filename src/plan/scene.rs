@@ -8,7 +8,7 @@ use super::setting::Setting;
 use crate::geom::{OrientedBox, Pose, segment_distance_m};
 use crate::model::robot::Robot;
 use crate::series::{CameraMount, Plate};
-use crate::urdf::JointKind;
+use crate::urdf::{CarriedCapsule, Chain, JointKind};
 
 /// A segment with a radius, in the frame behind a joint of the chain.
 #[derive(Debug, Clone, PartialEq)]
@@ -119,6 +119,19 @@ fn along_links(robot: &Robot, radius_m: f64, described: &[Capsule]) -> Vec<Capsu
     }
     close(carrier, order, &end);
     all
+}
+
+/// Capsules of the URDF's collision geometry, for [`SceneOptions::described`].
+pub fn described(capsules: &[CarriedCapsule], chain: &Chain) -> Vec<Capsule> {
+    let moving = |upto: usize| chain.joints[..=upto].iter().filter(|j| j.kind != JointKind::Fixed).count();
+    let one = |c: &CarriedCapsule| Capsule {
+        name: c.link.clone(),
+        joint: c.joint,
+        order: c.joint.map_or(0, moving),
+        ends_m: c.ends_m,
+        radius_m: c.radius_m,
+    };
+    capsules.iter().map(one).collect()
 }
 
 impl Scene {

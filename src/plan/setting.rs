@@ -50,13 +50,8 @@ impl Setting {
             slack: Vec::new(),
         };
         let mut layout = Layout::new(&state, &one("hand_camera"), &names, &one("camera"), &one("plate"));
-        if let Some(bar) = self.plate.scale {
-            let ends = [bar.from, bar.to].map(|id| self.plate.index_of(id).map(|k| &self.plate.markers[k]));
-            if let [Some(a), Some(b)] = ends {
-                let length = (a.position_m - b.position_m).norm();
-                let variance = bar.sigma_m.powi(2) + a.sigma_m.powi(2) + b.sigma_m.powi(2);
-                layout.columns[layout.shapes[0].start].prior_sigma = variance.sqrt() / length;
-            }
+        if let Some(sigma) = scale_sigma(&self.plate) {
+            layout.columns[layout.shapes[0].start].prior_sigma = sigma;
         }
         let joint = self.joint_sigma.iter().map(|s| s.max(LEAST_JOINT_SIGMA)).collect();
         let problem = Problem {
@@ -122,6 +117,15 @@ impl Setting {
     pub fn slack(&self) -> Slack {
         Slack::Joints(vec![0.0; self.joint_sigma.len()])
     }
+}
+
+/// Standard deviation of the plate's scale from its measured distance, as a share; `None` where none was measured.
+pub fn scale_sigma(plate: &Plate) -> Option<f64> {
+    let bar = plate.scale?;
+    let [a, b] = [bar.from, bar.to].map(|id| plate.index_of(id).map(|k| &plate.markers[k]));
+    let (a, b) = (a?, b?);
+    let variance = bar.sigma_m.powi(2) + a.sigma_m.powi(2) + b.sigma_m.powi(2);
+    Some(variance.sqrt() / (a.position_m - b.position_m).norm())
 }
 
 /// Information that is assumed of columns without a prior, because something is roughly known: 1/sigma^2 on the diagonal.

@@ -123,7 +123,7 @@ impl Layout {
                 b.block(|b| {
                     for (k, p) in camera.parameter_names().enumerate() {
                         let part = if k < 4 { "pinhole" } else { "lens" };
-                        b.add(format!("camera/{name}/{part}.{p}"), Camera::parameter_unit(k), f64::INFINITY);
+                        b.add(format!("camera/{name}/{part}.{p}"), Camera::parameter_unit(k), camera.prior_sigma(k));
                     }
                 })
             })

@@ -2,8 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::plan::{Plan, PlanRequest};
+use super::plan::{Plan, PlanRequest, Wish};
 use crate::error::{Error, Result};
+use crate::linalg::SymmetricFactor;
 use crate::plan::criterion::Criterion;
 use crate::plan::setting::Setting;
 use crate::problem::{Image, Problem, State};
@@ -49,6 +50,21 @@ pub struct JointRange {
     pub planned: Vec<f64>,
 }
 
+/// What one planned image brings by itself, on top of what is known before all of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gain {
+    /// Index into the legs.
+    pub leg: usize,
+    /// RMS error of the flange before and after, m.
+    pub flange_m: [f64; 2],
+    /// Parameter whose part in it shrinks most.
+    pub parameter: String,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Its sigma before and after.
+    pub sigma: [f64; 2],
+}
+
 /// The forecast of a plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Forecast {
@@ -62,6 +78,8 @@ pub struct Forecast {
     pub curve: Vec<CurvePoint>,
     /// Chosen stops by importance (indices into the legs), the most important first.
     pub importance: Vec<usize>,
+    /// What every image brings by itself, the greatest gain first.
+    pub gains: Vec<Gain>,
     /// Joint ranges.
     pub ranges: Vec<JointRange>,
     /// What will stay unknown, and other remarks, in words.
@@ -69,7 +87,11 @@ pub struct Forecast {
 }
 
 /// Share of a prior variance that must go before a parameter counts as known.
-const KNOWN_SHARE: f64 = 0.75;
+pub(super) const KNOWN_SHARE: f64 = 0.75;
+/// Share below which a parameter asked for counts as not found.
+const LEAST_SHARE: f64 = 0.3;
+/// Range of a joint that is called small, rad.
+const SMALL_RANGE_RAD: f64 = 0.6;
 /// Effect on the flange from which an unknown parameter is named, as a share of the predicted error.
 const WORTH_NAMING: f64 = 0.25;
 
@@ -155,8 +177,10 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
     let flange = flange_m(&plan.weight, &whole);
     let parameters = parameters(plan, &whole);
     let ranges = ranges(request, plan);
-    let words = words(&parameters, &ranges, plan, flange);
-    Ok(Forecast { before_m: before, flange_m: flange, parameters, curve, importance, ranges, words })
+    let mut words = words(&parameters, &ranges, plan, flange);
+    words.extend(scale_word(plan, &whole, flange));
+    let gains = gains(plan);
+    Ok(Forecast { before_m: before, flange_m: flange, parameters, curve, importance, gains, ranges, words })
 }
 
 /// Numbers of images at which the curve is computed.
@@ -189,6 +213,77 @@ fn importance(plan: &Plan) -> Vec<usize> {
     out.extend(left);
     out.reverse();
     out
+}
+
+fn gains(plan: &Plan) -> Vec<Gain> {
+    let layout = &plan.problem.layout;
+    let inverse = |m: &DMatrix<f64>| SymmetricFactor::new(m).ok().map(|f| f.inverse());
+    let Some(before) = inverse(&plan.known) else { return Vec::new() };
+    let sigma = |c: &DMatrix<f64>, k: usize| c[(k, k)].max(0.0).sqrt();
+    let one = |leg: usize| {
+        let after = inverse(&(&plan.known + &plan.information[plan.legs[leg].stop]))?;
+        let drop = |k: usize| plan.weight[(k, k)].max(0.0).sqrt() * (sigma(&before, k) - sigma(&after, k));
+        let best = (0..layout.terms.end).max_by(|&a, &b| drop(a).total_cmp(&drop(b)))?;
+        Some(Gain {
+            leg,
+            flange_m: [flange_m(&plan.weight, &before), flange_m(&plan.weight, &after)],
+            parameter: layout.columns[best].name.trim_start_matches("robot/").to_owned(),
+            unit: layout.columns[best].unit,
+            sigma: [sigma(&before, best), sigma(&after, best)],
+        })
+    };
+    let mut all: Vec<Gain> = (0..plan.legs.len()).filter_map(one).collect();
+    all.sort_by(|a, b| a.flange_m[1].total_cmp(&b.flange_m[1]));
+    all
+}
+
+/// Says so where the scale of the plate is most of the error: it is the only length, and no pose makes it better known.
+fn scale_word(plan: &Plan, covariance: &DMatrix<f64>, flange: f64) -> Option<String> {
+    let scale = plan.problem.layout.shapes.first()?.start;
+    let column = covariance.column(scale);
+    let part = (column.dot(&(&plan.weight * column)) / covariance[(scale, scale)]).max(0.0).sqrt();
+    (part > WORTH_NAMING * flange).then(|| {
+        format!(
+            "{:.3} mm of the expected {:.3} mm come from the scale of the plate, known to {:.1e}: no further image helps there; \
+             measure the distance of two far markers and put it into [scale] of plate.toml",
+            1e3 * part,
+            1e3 * flange,
+            covariance[(scale, scale)].sqrt()
+        )
+    })
+}
+
+/// Refuses a plan that cannot do what was asked: named parameters that stay as unknown as before.
+///
+/// # Errors
+/// Names the parameter, how far its joint moves, and what to change.
+pub fn check_wish(request: &PlanRequest, forecast: &Forecast) -> Result<()> {
+    let Wish::Named(names) = &request.wish else { return Ok(()) };
+    for name in names {
+        let asked: Vec<&ParameterForecast> = forecast.parameters.iter().filter(|p| p.name.starts_with(name)).collect();
+        if asked.iter().any(|p| p.share_of_data() > LEAST_SHARE) {
+            continue;
+        }
+        let joint = name.split(['.', '/']).next().unwrap_or(name);
+        let moved = forecast.ranges.iter().find(|r| r.name == joint).map(|r| (r.used().1 - r.used().0, r.kind));
+        let (what, remedy) = match moved {
+            Some((span, JointKind::Revolute)) if span < SMALL_RANGE_RAD => (
+                format!("its joint moves over {:.1} degrees only", span.to_degrees()),
+                "widen the limits of this joint in the URDF, or put the plate where it has to move more (--plate-pose)",
+            ),
+            _ => (
+                "at these poses it cannot be told apart from the pose of the plate, the camera on the flange or a \
+                 neighbouring link"
+                    .to_owned(),
+                "ask for the accuracy of the flange instead (leave --parameters out), or put the plate at several places \
+                 (--plate-pose several times)",
+            ),
+        };
+        let best = asked.iter().map(|p| p.sigma / p.prior_sigma).fold(1.0, f64::min);
+        let what = format!("{name} would stay unknown (sigma {:.0} % of its tolerance): {what}", 1e2 * best);
+        return Err(Error::unsolved("plan: --parameters", what, remedy));
+    }
+    Ok(())
 }
 
 fn parameters(plan: &Plan, covariance: &DMatrix<f64>) -> Vec<ParameterForecast> {

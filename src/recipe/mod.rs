@@ -11,11 +11,14 @@ mod forecast;
 mod free_poses;
 mod gates;
 mod joint;
+mod lens_choice;
 mod local_errors;
 mod loose;
 mod measure;
 mod moved;
+mod places;
 mod plan;
+mod plan_study;
 mod selection;
 mod simulated;
 mod solution;
@@ -31,12 +34,16 @@ pub use compare::{Comparison, ComparisonRow, HeldOut, TruthError, compare};
 pub use dry_run::dry_run;
 pub use evidence::{Evidence, identify};
 pub use forecast::{
-    CurvePoint, Forecast, JointRange, ParameterForecast, exact_covariance, flange_m, forecast, image_name,
+    CurvePoint, Forecast, Gain, JointRange, ParameterForecast, check_wish, exact_covariance, flange_m, forecast,
+    image_name,
 };
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
 pub use joint::{JointNoise, Options, RobotModel};
+pub use lens_choice::choose_lens;
 pub use measure::{Measured, measure};
-pub use plan::{Budget, Plan, PlanRequest, Wish, plan};
+pub use places::{PlaceForecast, compare_places, place_words};
+pub use plan::{Budget, Choice, Plan, PlanRequest, Wish, choose, plan};
+pub use plan_study::{PlanStudy, PlanStudyRequest, PlanStudyRow, plan_study};
 pub use selection::{Config, Parameters, Selection, StatedPrior};
 pub use simulated::measured;
 pub use solution::{Solution, StartVerdict};

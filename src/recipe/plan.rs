@@ -62,6 +62,28 @@ pub struct PlanRequest {
 /// The planned stops.
 #[derive(Debug, Clone)]
 pub struct Plan {
+    /// What they were chosen from.
+    pub choice: Choice,
+    /// Chosen candidates in the order of the visit, with the ways to them.
+    pub legs: Vec<Leg>,
+    /// One-sidedness of the approach of each joint.
+    pub imbalance: Vec<f64>,
+}
+
+impl std::ops::Deref for Plan {
+    type Target = Choice;
+
+    fn deref(&self) -> &Choice {
+        &self.choice
+    }
+}
+
+/// Joint vectors that stand for the workspace.
+const TARGETS: usize = 250;
+
+/// The choice before it is put in order.
+#[derive(Debug, Clone)]
+pub struct Choice {
     /// All candidates.
     pub pool: Vec<Candidate>,
     /// Their information about all columns.
@@ -70,12 +92,10 @@ pub struct Plan {
     pub tally: Tally,
     /// Relaxed weights.
     pub weights: Vec<f64>,
-    /// Certified efficiency of the relaxation.
-    pub relaxed_efficiency: f64,
-    /// Certified efficiency of the whole images.
-    pub rounded_efficiency: f64,
-    /// Chosen candidates in the order of the visit, with the ways to them.
-    pub legs: Vec<Leg>,
+    /// Chosen candidates, ascending.
+    pub chosen: Vec<usize>,
+    /// Certified efficiency of relaxation and whole images.
+    pub efficiency: [f64; 2],
     /// Joint vectors over which the accuracy of the flange is meant.
     pub targets: Vec<Vec<f64>>,
     /// Its weight: the mean squared error is `tr(W cov)`.
@@ -86,18 +106,13 @@ pub struct Plan {
     pub problem: Problem,
     /// The state about which it is linearised.
     pub state: State,
-    /// One-sidedness of the approach of each joint.
-    pub imbalance: Vec<f64>,
 }
 
-/// Joint vectors that stand for the workspace.
-const TARGETS: usize = 250;
-
-/// Chooses poses and their order.
+/// Chooses poses.
 ///
 /// # Errors
 /// Where no pose is workable, where limits contradict each other, where a parameter asked for is unknown.
-pub fn plan(request: &PlanRequest) -> Result<Plan> {
+pub fn choose(request: &PlanRequest) -> Result<Choice> {
     let setting = &request.setting;
     let scene = Scene::new(setting, &request.scene);
     let (pool, tally) = candidates(setting, &scene, &request.candidates)?;
@@ -122,27 +137,35 @@ pub fn plan(request: &PlanRequest) -> Result<Plan> {
         Design { known: &known, candidates: &information, criterion: &criterion, count: request.count, rows: &rows };
     let relaxed = design.relax().map_err(|reason| no_plan(reason, request, pool.len()))?;
     let rounded = round(&design, &relaxed).ok_or_else(|| no_plan(NoDesign::Contradiction, request, pool.len()))?;
-    let legs = legs(&pool, &rounded.chosen, &scene, setting.placements.len());
-    let visited: Vec<&[f64]> = legs.iter().map(|l| pool[l.stop].readings.as_slice()).collect();
-    let imbalance = imbalance(&visited);
-    Ok(Plan {
-        information,
+    Ok(Choice {
         tally,
         weights: relaxed.weights,
-        relaxed_efficiency: relaxed.efficiency,
-        rounded_efficiency: rounded.efficiency,
-        legs,
+        chosen: rounded.chosen,
+        efficiency: [relaxed.efficiency, rounded.efficiency],
         targets,
         weight,
-        known,
         problem,
         state,
-        imbalance,
         pool,
+        information,
+        known,
     })
 }
 
-fn criterion(wish: &Wish, layout: &Layout, weight: &DMatrix<f64>) -> Result<Criterion> {
+/// Chooses poses and their order.
+///
+/// # Errors
+/// As [`choose`].
+pub fn plan(request: &PlanRequest) -> Result<Plan> {
+    let choice = choose(request)?;
+    let scene = Scene::new(&request.setting, &request.scene);
+    let legs = legs(&choice.pool, &choice.chosen, &scene, request.setting.placements.len());
+    let visited: Vec<&[f64]> = legs.iter().map(|l| choice.pool[l.stop].readings.as_slice()).collect();
+    let imbalance = imbalance(&visited);
+    Ok(Plan { choice, legs, imbalance })
+}
+
+pub(super) fn criterion(wish: &Wish, layout: &Layout, weight: &DMatrix<f64>) -> Result<Criterion> {
     let robot = layout.terms.end;
     match wish {
         Wish::Workspace | Wish::Targets(_) => Ok(Criterion::weighted(weight)),

@@ -15,4 +15,4 @@ pub mod world;
 
 pub use crate::plan::visibility::is_seen;
 pub use observe::observe;
-pub use world::{RobotErrors, SimulatedSeries, WorldRequest, series, typical_camera};
+pub use world::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series, typical_camera};

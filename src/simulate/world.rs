@@ -90,6 +90,8 @@ pub struct WorldRequest {
     pub views: ViewRange,
     /// Markers that every view shows at least.
     pub least_markers: usize,
+    /// Readings of the stops (rad or m), where they are not to be drawn; `images` of them are visited, whatever they show.
+    pub postures: Option<Vec<Vec<f64>>>,
     /// Number of joint vectors kept aside.
     pub held_out: usize,
     /// Unit of the readings in joints.csv.
@@ -114,6 +116,7 @@ impl WorldRequest {
             marker_sigma_m: 0.03e-3,
             views: ViewRange::default(),
             least_markers: 20,
+            postures: None,
             held_out: 100,
             joint_unit: AngleUnit::Deg,
             seed: 1,
@@ -129,6 +132,28 @@ pub fn typical_camera(width_px: u32, height_px: u32, field_rad: f64) -> Camera {
     camera.parameters[2] += 0.006 * f64::from(width_px);
     camera.parameters[3] -= 0.004 * f64::from(height_px);
     camera.parameters[4..].copy_from_slice(&[-0.11, 0.09, 4e-4, -3e-4, -0.02]);
+    camera
+}
+
+/// A camera with a typical lens of the given kind; `field_rad` is the horizontal field of view (but for its distortion).
+pub fn lens_camera(lens: Lens, width_px: u32, height_px: u32, field_rad: f64) -> Camera {
+    let brown = typical_camera(width_px, height_px, field_rad);
+    let mut camera = Camera::pinhole(lens, width_px, height_px, brown.parameters[0]);
+    camera.parameters[..4].copy_from_slice(&brown.parameters[..4]);
+    let start: &[f64] = &brown.parameters[4..];
+    let coefficients = match lens {
+        Lens::Brown => start.to_vec(),
+        Lens::Fisheye => {
+            // Equidistant: the same field takes a shorter image.
+            let shorter = (field_rad / 2.0).tan() / (field_rad / 2.0);
+            camera.parameters[..2].iter_mut().for_each(|f| *f *= shorter);
+            vec![0.03, -0.015, 0.006, -0.002]
+        }
+        Lens::Rational => vec![0.42, 0.06, 3e-4, -2e-4, 0.002, 0.78, 0.18, 0.012],
+        Lens::ThinPrism => [start, &[3e-3, -2e-3, -2.5e-3, 1.5e-3]].concat(),
+        Lens::Parallax => [start, &[0.012, -0.008]].concat(),
+    };
+    camera.parameters[4..].copy_from_slice(&coefficients);
     camera
 }
 
@@ -245,7 +270,10 @@ impl World<'_> {
         let at = index % self.setup.plates.len();
         let kinds = &request.chain.reading_kinds;
         for _ in 0..ATTEMPTS {
-            let Some(wanted) = self.setup.random_posture(request, &self.nominal, at, &mut self.rng) else { continue };
+            let given = request.postures.as_ref().and_then(|p| p.get(index).cloned());
+            let is_given = given.is_some();
+            let drawn = given.or_else(|| self.setup.random_posture(request, &self.nominal, at, &mut self.rng));
+            let Some(wanted) = drawn else { continue };
             let (raw, readings) = as_written(&wanted, kinds, request.joint_unit);
             let approach = before.map(|b| readings.iter().zip(b).map(|(q, p)| q - p).collect());
             let noise: Vec<f64> =
@@ -256,7 +284,7 @@ impl World<'_> {
                 observe(&self.true_plate, &request.camera, &camera_from_plate, request.pixel_sigma_px, &mut self.rng);
             let mut markers: Vec<u32> = seen.iter().map(|o| o.marker).collect();
             markers.dedup();
-            if markers.len() >= request.least_markers {
+            if is_given || markers.len() >= request.least_markers {
                 let observations = ImageObservations { image: image_name(index), observations: seen };
                 return Ok(Seen { readings, raw, noise, placement: at, camera_from_plate, observations });
             }

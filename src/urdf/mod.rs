@@ -1,6 +1,7 @@
 //! Robot descriptions: read by `urdf-rs`, patched as text so that every other byte stays.
 
 mod chain;
+mod collisions;
 mod elements;
 mod masses;
 mod patch;
@@ -8,6 +9,7 @@ mod read;
 mod tree;
 
 pub use chain::{Chain, Drive, Joint, JointKind};
+pub use collisions::CarriedCapsule;
 pub use masses::{CarriedMass, Inertial};
 pub use patch::patch_origins;
 pub use read::{RobotDescription, read};

@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal, Uniform};
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::Robot;
-use robotcal::output::{Context, Poses};
+use robotcal::output::{Context, Offsets, Poses};
 use robotcal::recipe::{MeasuredSeries, MeasuredStop, Options, RobotModel, Solution, identify};
 use robotcal::series::{CameraMount, Edge, InputFile, Observation, Plate, PlateKind};
 use robotcal::urdf::RobotDescription;
@@ -38,6 +38,7 @@ pub fn context(robot: &RobotDescription) -> Context<'_> {
         inputs: vec![InputFile::of_bytes(Path::new("run1/series.toml"), b"format = 1")],
         options: vec![("joint noise".into(), "estimated".into())],
         command: "robotcal identify --urdf kuka.urdf --series run1/".into(),
+        offsets: Offsets::Folded,
         poses: Poses::Written,
     }
 }

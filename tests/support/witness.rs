@@ -4,8 +4,9 @@
 //! the slope of a height, the area centroid comes from the Fourier coefficients of the contour.
 
 use nalgebra::{Matrix4, SMatrix, Vector3, Vector6};
-use num_dual::Dual64;
+use num_dual::{Dual64, DualNum};
 use robotcal::geom::Pose;
+use robotcal::model::camera::Lens;
 use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::{Robot, Stop};
 use robotcal::problem::{Image, Layout, Measured, Slack, State};
@@ -185,12 +186,42 @@ pub fn camera_from_plate(state: &State, layout: &Layout, image: &Image, slack: &
 
 /// Pinhole and Brown-Conrady, in the order of OpenCV: fx fy cx cy k1 k2 p1 p2 k3.
 pub fn project(p: &[D], x: &[D; 3]) -> [D; 2] {
+    project_through(Lens::Brown, p, x)
+}
+
+/// The image of a point through any lens, by the formulas of the documentation of each.
+pub fn project_through(lens: Lens, p: &[D], x: &[D; 3]) -> [D; 2] {
     let (a, b) = (x[0] / x[2], x[1] / x[2]);
     let r2 = a * a + b * b;
-    let two = constant(2.0);
-    let radial = p[4] * r2 + p[5] * r2 * r2 + p[8] * r2 * r2 * r2 + constant(1.0);
-    let u = a * radial + p[6] * two * a * b + p[7] * (r2 + two * a * a);
-    let v = b * radial + p[6] * (r2 + two * b * b) + p[7] * two * a * b;
+    let (one, two) = (constant(1.0), constant(2.0));
+    let cubic = |k1: D, k2: D, k3: D| k1 * r2 + k2 * r2 * r2 + k3 * r2 * r2 * r2 + one;
+    let tangential =
+        |p1: D, p2: D| [p1 * two * a * b + p2 * (r2 + two * a * a), p1 * (r2 + two * b * b) + p2 * two * a * b];
+    let [u, v] = match lens {
+        Lens::Fisheye => {
+            let r = r2.sqrt();
+            let t = r.atan();
+            let t2 = t * t;
+            let f = t * (one + p[4] * t2 + p[5] * t2 * t2 + p[6] * t2 * t2 * t2 + p[7] * t2 * t2 * t2 * t2) / r;
+            [a * f, b * f]
+        }
+        _ => {
+            let zero = constant(0.0);
+            let depth = |k: usize| if lens == Lens::Parallax { p[k] / x[2] } else { zero };
+            let mut radial = cubic(p[4] + depth(9), p[5] + depth(10), p[8]);
+            if lens == Lens::Rational {
+                radial /= cubic(p[9], p[10], p[11]);
+            }
+            let [mut u, mut v] = tangential(p[6], p[7]);
+            u += a * radial;
+            v += b * radial;
+            if lens == Lens::ThinPrism {
+                u += p[9] * r2 + p[10] * r2 * r2;
+                v += p[11] * r2 + p[12] * r2 * r2;
+            }
+            [u, v]
+        }
+    };
     [p[0] * u + p[2], p[1] * v + p[3]]
 }
 

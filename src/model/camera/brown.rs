@@ -1,8 +1,9 @@
 //! Brown-Conrady distortion: three radial and two tangential coefficients.
 
-use nalgebra::{Matrix2, SMatrix, Vector2};
+use nalgebra::Vector2;
 
-use super::{Distorted, MAX_PARAMETERS};
+use super::radial::{radial_tangential, tangential_columns};
+use super::{Coefficients, Distorted};
 
 pub(super) const NAMES: [&str; 5] = ["k1", "k2", "p1", "p2", "k3"];
 
@@ -13,25 +14,15 @@ pub(super) fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
     let r2 = x * x + y * y;
     let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
     let slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3));
-    let (xy2, xx2, yy2) = (2.0 * x * y, r2 + 2.0 * x * x, r2 + 2.0 * y * y);
-    let cross = x * y * slope + 2.0 * (p1 * x + p2 * y);
-    let mut d_coefficients = SMatrix::<f64, 2, { MAX_PARAMETERS - 4 }>::zeros();
+    let (image, d_point) = radial_tangential(point, radial, slope, [p1, p2]);
+    let mut d_coefficients = Coefficients::zeros();
     let (r4, r6) = (r2 * r2, r2 * r2 * r2);
-    for (k, column) in [[x * r2, y * r2], [x * r4, y * r4], [xy2, yy2], [xx2, xy2], [x * r6, y * r6]].iter().enumerate()
-    {
+    let [a, b] = tangential_columns(x, y);
+    for (k, column) in [[x * r2, y * r2], [x * r4, y * r4], a, b, [x * r6, y * r6]].iter().enumerate() {
         d_coefficients[(0, k)] = column[0];
         d_coefficients[(1, k)] = column[1];
     }
-    Distorted {
-        point: Vector2::new(x * radial + p1 * xy2 + p2 * xx2, y * radial + p1 * yy2 + p2 * xy2),
-        d_point: Matrix2::new(
-            radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x,
-            cross,
-            cross,
-            radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x,
-        ),
-        d_coefficients,
-    }
+    Distorted::flat(image, d_point, d_coefficients)
 }
 
 /// True while `r (1 + k1 r^2 + k2 r^4 + k3 r^6)` still grows from the axis out to `r2 = r^2`.

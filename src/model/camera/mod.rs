@@ -4,22 +4,41 @@
 //! [`Lens`] and a row to each `match` in this file (the compiler lists them), and a row to `tests/jacobians.rs`.
 
 mod brown;
+mod fisheye;
+mod fit;
+mod parallax;
+mod radial;
+mod rational;
+mod thin_prism;
 
 use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
+pub use fit::{LensFit, fit_lens};
+
 /// Most parameters that any camera has.
-pub const MAX_PARAMETERS: usize = 12;
+pub const MAX_PARAMETERS: usize = 13;
+
+/// Derivatives of a distorted point by the coefficients of a lens, one column each.
+type Coefficients = SMatrix<f64, 2, { MAX_PARAMETERS - 4 }>;
 
 /// Names of the pinhole parameters, px, with which every camera starts.
 const PINHOLE: [&str; 4] = ["fx", "fy", "cx", "cy"];
 
 /// Lens distortion models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
 pub enum Lens {
     /// Brown-Conrady: k1 k2 p1 p2 k3, in the order of OpenCV and of ROS `plumb_bob`.
     Brown,
+    /// Kannala-Brandt: k1 k2 k3 k4, in the order of OpenCV's fisheye and of ROS `equidistant`.
+    Fisheye,
+    /// Rational: k1 k2 p1 p2 k3 k4 k5 k6, in the order of OpenCV and of ROS `rational_polynomial`.
+    Rational,
+    /// Brown-Conrady with a thin prism: k1 k2 p1 p2 k3 s1 s2 s3 s4.
+    ThinPrism,
+    /// Brown-Conrady with radial coefficients that depend on the distance: k1 k2 p1 p2 k3 k1z k2z (the last two in m).
+    Parallax,
 }
 
 /// A distorted point of the plane z = 1 with its derivatives.
@@ -27,16 +46,30 @@ pub(super) struct Distorted {
     pub point: Vector2<f64>,
     pub d_point: Matrix2<f64>,
     /// One column per lens coefficient.
-    pub d_coefficients: SMatrix<f64, 2, { MAX_PARAMETERS - 4 }>,
+    pub d_coefficients: Coefficients,
+    /// With respect to 1 / depth (1/m).
+    pub d_inverse_depth: Vector2<f64>,
+}
+
+impl Distorted {
+    /// Of a lens that does not see the distance.
+    fn flat(point: Vector2<f64>, d_point: Matrix2<f64>, d_coefficients: Coefficients) -> Self {
+        Self { point, d_point, d_coefficients, d_inverse_depth: Vector2::zeros() }
+    }
 }
 
 impl Lens {
-    const ALL: [Self; 1] = [Self::Brown];
+    /// All lenses, the simpler ones first.
+    pub const ALL: [Self; 5] = [Self::Brown, Self::Fisheye, Self::Parallax, Self::Rational, Self::ThinPrism];
 
     /// Name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Brown => "brown",
+            Self::Fisheye => "fisheye",
+            Self::Rational => "rational",
+            Self::ThinPrism => "thin_prism",
+            Self::Parallax => "parallax",
         }
     }
 
@@ -54,18 +87,40 @@ impl Lens {
     pub fn coefficient_names(self) -> &'static [&'static str] {
         match self {
             Self::Brown => &brown::NAMES,
+            Self::Fisheye => &fisheye::NAMES,
+            Self::Rational => &rational::NAMES,
+            Self::ThinPrism => &thin_prism::NAMES,
+            Self::Parallax => &parallax::NAMES,
         }
     }
 
-    fn distort(self, c: &[f64], x: &Vector2<f64>) -> Distorted {
+    /// Prior sigma of a coefficient about zero. Where numerator and denominator (or prism and tilt) nearly say the same, a wide prior keeps the
+    /// result finite; elsewhere there is none.
+    pub fn prior_sigma(self, coefficient: usize) -> f64 {
+        match (self, coefficient) {
+            (Self::Rational, 5..) => 1.0,
+            (Self::ThinPrism, 5..) => 0.05,
+            (Self::Parallax, 5..) => 0.1,
+            _ => f64::INFINITY,
+        }
+    }
+
+    fn distort(self, c: &[f64], x: &Vector2<f64>, inverse_depth: f64) -> Distorted {
         match self {
             Self::Brown => brown::distort(c, x),
+            Self::Fisheye => fisheye::distort(c, x),
+            Self::Rational => rational::distort(c, x),
+            Self::ThinPrism => thin_prism::distort(c, x),
+            Self::Parallax => parallax::distort(c, x, inverse_depth),
         }
     }
 
-    fn is_monotonic_to(self, c: &[f64], r2: f64) -> bool {
+    fn is_monotonic_to(self, c: &[f64], r2: f64, inverse_depth: f64) -> bool {
         match self {
-            Self::Brown => brown::is_monotonic_to(c, r2),
+            Self::Brown | Self::ThinPrism => brown::is_monotonic_to(c, r2),
+            Self::Fisheye => fisheye::is_monotonic_to(c, r2),
+            Self::Rational => rational::is_monotonic_to(c, r2),
+            Self::Parallax => parallax::is_monotonic_to(c, r2, inverse_depth),
         }
     }
 }
@@ -108,6 +163,11 @@ impl Camera {
         PINHOLE.into_iter().chain(self.lens.coefficient_names().iter().copied())
     }
 
+    /// Prior sigma of parameter `index` about zero; infinite for none.
+    pub fn prior_sigma(&self, index: usize) -> f64 {
+        index.checked_sub(PINHOLE.len()).map_or(f64::INFINITY, |k| self.lens.prior_sigma(k))
+    }
+
     /// Unit of parameter `index`: "px" or "1".
     pub fn parameter_unit(index: usize) -> &'static str {
         if index < PINHOLE.len() { "px" } else { "1" }
@@ -116,17 +176,18 @@ impl Camera {
     /// Image (px) of a point in the camera frame (m); `None` behind the camera or where the lens model folds over.
     pub fn project(&self, x_camera: &Vector3<f64>) -> Option<Vector2<f64>> {
         let x = normalised(x_camera)?;
-        if !self.lens.is_monotonic_to(&self.parameters[4..], x.norm_squared()) {
+        let inverse_depth = 1.0 / x_camera.z;
+        if !self.lens.is_monotonic_to(&self.parameters[4..], x.norm_squared(), inverse_depth) {
             return None;
         }
-        let d = self.lens.distort(&self.parameters[4..], &x);
+        let d = self.lens.distort(&self.parameters[4..], &x, inverse_depth);
         Some(self.to_pixels(&d.point))
     }
 
     /// As [`Camera::project`], with derivatives; `None` only behind the camera, so that an adjustment can pass through a poor state.
     pub fn project_with_jacobian(&self, x_camera: &Vector3<f64>) -> Option<Projection> {
         let x = normalised(x_camera)?;
-        let d = self.lens.distort(&self.parameters[4..], &x);
+        let d = self.lens.distort(&self.parameters[4..], &x, 1.0 / x_camera.z);
         let (fx, fy) = (self.parameters[0], self.parameters[1]);
         let scale = Matrix2::new(fx, 0.0, 0.0, fy);
         let iz = 1.0 / x_camera.z;
@@ -137,16 +198,20 @@ impl Camera {
         d_parameters[(0, 2)] = 1.0;
         d_parameters[(1, 3)] = 1.0;
         d_parameters.fixed_view_mut::<2, { MAX_PARAMETERS - 4 }>(0, 4).copy_from(&(scale * d.d_coefficients));
-        Some(Projection { uv: self.to_pixels(&d.point), d_point: scale * d.d_point * d_normalised, d_parameters })
+        let mut d_point = d.d_point * d_normalised;
+        let mut by_depth = d_point.column_mut(2);
+        by_depth -= d.d_inverse_depth * (iz * iz);
+        Some(Projection { uv: self.to_pixels(&d.point), d_point: scale * d_point, d_parameters })
     }
 
-    /// Direction (z = 1) in the camera frame that is imaged at `uv` px; `None` where no direction is.
+    /// Direction (z = 1) in the camera frame that is imaged at `uv` px; `None` where no direction is. A lens that sees the distance is
+    /// taken as it is far away.
     pub fn ray(&self, uv: &Vector2<f64>) -> Option<Vector3<f64>> {
         let p = &self.parameters;
         let target = Vector2::new((uv.x - p[2]) / p[0], (uv.y - p[3]) / p[1]);
         let mut x = target;
         for _ in 0..50 {
-            let d = self.lens.distort(&p[4..], &x);
+            let d = self.lens.distort(&p[4..], &x, 0.0);
             let step = d.d_point.try_inverse()? * (target - d.point);
             // A bounded step keeps Newton on the inner branch of the lens.
             x += step * (0.5 / step.norm().max(0.5));
@@ -154,8 +219,8 @@ impl Camera {
                 break;
             }
         }
-        let d = self.lens.distort(&p[4..], &x);
-        let reached = (d.point - target).norm() < 1e-9 && self.lens.is_monotonic_to(&p[4..], x.norm_squared());
+        let d = self.lens.distort(&p[4..], &x, 0.0);
+        let reached = (d.point - target).norm() < 1e-9 && self.lens.is_monotonic_to(&p[4..], x.norm_squared(), 0.0);
         reached.then(|| Vector3::new(x.x, x.y, 1.0))
     }
 

@@ -6,11 +6,15 @@ mod images;
 mod knowledge;
 mod maps;
 mod parameters;
+mod plan_page;
+mod plan_pictures;
 mod plots;
 mod sections;
 mod svg;
 mod verdict;
 mod words;
+
+pub use plan_page::plan_html;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

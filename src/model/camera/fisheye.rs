@@ -1,0 +1,49 @@
+//! Kannala-Brandt: a point at the angle t from the axis is imaged at the distance `t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8)`.
+//!
+//! J. Kannala, S. Brandt, *A generic camera model and calibration method* (2006), as in OpenCV's fisheye and ROS `equidistant`.
+//! Points must lie before the camera (less than a right angle from the axis).
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::radial::grows_to;
+use super::{Coefficients, Distorted};
+
+pub(super) const NAMES: [&str; 4] = ["k1", "k2", "k3", "k4"];
+
+/// Below this distance from the axis the series is exact to rounding.
+const NEAR_AXIS: f64 = 1e-4;
+
+/// Image distance and its derivative by the angle.
+fn image_of(c: &[f64], t: f64) -> (f64, f64) {
+    let s = t * t;
+    let even = 1.0 + s * (c[0] + s * (c[1] + s * (c[2] + s * c[3])));
+    (t * even, 1.0 + s * (3.0 * c[0] + s * (5.0 * c[1] + s * (7.0 * c[2] + s * 9.0 * c[3]))))
+}
+
+/// Distorts a point of the plane z = 1.
+pub(super) fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
+    let r2 = point.norm_squared();
+    let r = r2.sqrt();
+    let t = r.atan();
+    // The factor on the point, and its derivative by r over r.
+    let (factor, by_r) = if r < NEAR_AXIS {
+        let second = c[0] - 1.0 / 3.0;
+        (1.0 + second * r2, 2.0 * second)
+    } else {
+        let (image, slope) = image_of(c, t);
+        (image / r, (slope / (1.0 + r2) - image / r) / r2)
+    };
+    let mut d_coefficients = Coefficients::zeros();
+    let mut power = if r < NEAR_AXIS { 1.0 } else { t / r };
+    for k in 0..NAMES.len() {
+        power *= t * t;
+        d_coefficients.set_column(k, &(point * power));
+    }
+    let d_point = Matrix2::identity() * factor + point * point.transpose() * by_r;
+    Distorted::flat(point * factor, d_point, d_coefficients)
+}
+
+/// True while the image still moves outwards from the axis to `r2 = r^2`.
+pub(super) fn is_monotonic_to(c: &[f64], r2: f64) -> bool {
+    grows_to(r2.sqrt().atan(), |t| image_of(c, t).0)
+}

@@ -1,0 +1,89 @@
+//! One lens expressed by another, and what that loses.
+
+use nalgebra::{SMatrix, SVector, Vector2, Vector3};
+
+use super::{Camera, Lens, MAX_PARAMETERS};
+
+/// Points across the image.
+const ACROSS: usize = 33;
+/// Most Gauss-Newton steps.
+const STEPS: usize = 60;
+
+/// The nearest camera of another lens.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LensFit {
+    /// It.
+    pub camera: Camera,
+    /// RMS of what it loses over the image, px.
+    pub rms_px: f64,
+    /// The most that it loses, px.
+    pub worst_px: f64,
+}
+
+/// Fits a camera with the lens `lens` to `camera` over its whole image, for points from the nearer to the farther depth (m).
+///
+/// `None` where too little of the image has a direction, or where the fit does not settle.
+pub fn fit_lens(camera: &Camera, lens: Lens, depths_m: &[f64; 2]) -> Option<LensFit> {
+    let points = points(camera, depths_m);
+    if points.len() < ACROSS * ACROSS / 2 {
+        return None;
+    }
+    let mut fitted = Camera::pinhole(lens, camera.width_px, camera.height_px, camera.parameters[0]);
+    fitted.parameters[..4].copy_from_slice(&camera.parameters[..4]);
+    let mut damping = 1e-6;
+    let mut cost = squares(&fitted, &points)?;
+    for _ in 0..STEPS {
+        let mut next = fitted.clone();
+        let step = step(&fitted, &points, damping);
+        next.parameters.iter_mut().zip(step.iter().flatten()).for_each(|(p, s)| *p += s);
+        match squares(&next, &points).filter(|c| step.is_some() && *c <= cost) {
+            Some(lower) => {
+                let settled = cost - lower < 1e-12 * (cost + 1e-12);
+                (fitted, cost, damping) = (next, lower, (0.1 * damping).max(1e-9));
+                if settled {
+                    break;
+                }
+            }
+            None if damping > 1e6 => break,
+            None => damping *= 10.0,
+        }
+    }
+    let losses: Vec<f64> = points.iter().filter_map(|(x, uv)| Some((fitted.project(x)? - uv).norm())).collect();
+    let worst_px = losses.iter().fold(0.0, |m: f64, l| m.max(*l));
+    let complete = losses.len() == points.len();
+    complete.then(|| LensFit { camera: fitted, rms_px: (cost / points.len() as f64).sqrt(), worst_px })
+}
+
+/// Points in space (m) with their images (px), all over the image and the depths.
+fn points(camera: &Camera, depths_m: &[f64; 2]) -> Vec<(Vector3<f64>, Vector2<f64>)> {
+    let place = |k: usize, n: u32| k as f64 * (f64::from(n) - 1.0) / (ACROSS - 1) as f64;
+    let mut points = Vec::new();
+    for i in 0..ACROSS * ACROSS {
+        let uv = Vector2::new(place(i % ACROSS, camera.width_px), place(i / ACROSS, camera.height_px));
+        let Some(ray) = camera.ray(&uv) else { continue };
+        let all = [depths_m[0], 0.5 * (depths_m[0] + depths_m[1]), depths_m[1]].map(|z| ray * z);
+        points.extend(all.iter().filter_map(|x| Some((*x, camera.project(x)?))));
+    }
+    points
+}
+
+fn squares(camera: &Camera, points: &[(Vector3<f64>, Vector2<f64>)]) -> Option<f64> {
+    let square =
+        |(x, uv): &(Vector3<f64>, Vector2<f64>)| Some((camera.project_with_jacobian(x)?.uv - uv).norm_squared());
+    points.iter().map(square).sum::<Option<f64>>().filter(|s| s.is_finite())
+}
+
+fn step(camera: &Camera, points: &[(Vector3<f64>, Vector2<f64>)], damping: f64) -> Option<Vec<f64>> {
+    let mut normal = SMatrix::<f64, MAX_PARAMETERS, MAX_PARAMETERS>::zeros();
+    let mut right = SVector::<f64, MAX_PARAMETERS>::zeros();
+    for (x, uv) in points {
+        let p = camera.project_with_jacobian(x)?;
+        normal += p.d_parameters.transpose() * p.d_parameters;
+        right += p.d_parameters.transpose() * (uv - p.uv);
+    }
+    for k in 0..MAX_PARAMETERS {
+        normal[(k, k)] += if k < camera.parameters.len() { damping * normal[(k, k)] + 1e-9 } else { 1.0 };
+    }
+    let step = normal.cholesky()?.solve(&right);
+    Some(step.iter().take(camera.parameters.len()).copied().collect())
+}

@@ -1,0 +1,44 @@
+//! What several lenses share: a radial factor with two tangential (decentring) terms.
+
+use nalgebra::{Matrix2, Vector2};
+
+/// `x radial + tangential` and its derivative; `slope` is twice the derivative of the radial factor by r^2.
+pub(super) fn radial_tangential(
+    x: &Vector2<f64>,
+    radial: f64,
+    slope: f64,
+    [p1, p2]: [f64; 2],
+) -> (Vector2<f64>, Matrix2<f64>) {
+    let (x, y) = (x.x, x.y);
+    let [a, b] = tangential_columns(x, y);
+    let cross = x * y * slope + 2.0 * (p1 * x + p2 * y);
+    (
+        Vector2::new(x * radial + p1 * a[0] + p2 * b[0], y * radial + p1 * a[1] + p2 * b[1]),
+        Matrix2::new(
+            radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x,
+            cross,
+            cross,
+            radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x,
+        ),
+    )
+}
+
+/// Derivatives by p1 and p2.
+pub(super) fn tangential_columns(x: f64, y: f64) -> [[f64; 2]; 2] {
+    let r2 = x * x + y * y;
+    [[2.0 * x * y, r2 + 2.0 * y * y], [r2 + 2.0 * x * x, 2.0 * x * y]]
+}
+
+/// True while `value(r)` still grows from the axis out to `r`, looked at in 48 steps.
+pub(super) fn grows_to(r: f64, value: impl Fn(f64) -> f64) -> bool {
+    const STEPS: usize = 48;
+    let mut last = value(0.0);
+    for k in 1..=STEPS {
+        let next = value(r * k as f64 / STEPS as f64);
+        if !(next > last || r == 0.0) {
+            return false;
+        }
+        last = next;
+    }
+    true
+}

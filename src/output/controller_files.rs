@@ -1,0 +1,143 @@
+//! The corrected robot for those who read no URDF: xacro properties, joint offsets for the controller, a table of MDH parameters.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::text::{csv, number};
+use super::{Context, Offsets};
+use crate::model::mdh::{Mdh, Unfit};
+use crate::model::robot::Robot;
+use crate::plan::inverse;
+use crate::recipe::Solution;
+use crate::urdf::JointKind;
+
+/// The robot as the files of this result describe it: offsets folded into origins, or left to the controller.
+pub(super) fn exported(solution: &Solution, context: &Context) -> Robot {
+    match context.offsets {
+        Offsets::Folded => solution.state.robot.clone(),
+        Offsets::Mastering => solution.state.robot.mastered().0,
+    }
+}
+
+/// How offsets are dealt with, as a sentence for the head of a file.
+pub(super) fn offsets_in_words(context: &Context) -> &'static str {
+    match context.offsets {
+        Offsets::Folded => {
+            "Joint offsets are folded in: controller angles stay as they are, and mastering must not be changed."
+        }
+        Offsets::Mastering => "Joint offsets are NOT in here: enter those of mastering.csv in the controller first.",
+    }
+}
+
+/// Part of a property's name: letters, digits and `_`.
+fn identifier(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+}
+
+/// Origins as xacro properties `NAME_origin_xyz` and `NAME_origin_rpy`.
+pub(super) fn xacro(solution: &Solution, context: &Context) -> String {
+    let robot = exported(solution, context);
+    let mut out = format!(
+        "<?xml version=\"1.0\"?>\n<!-- Corrected joint origins (m, rad) as properties, for robot descriptions written in xacro (ROS): include this file and write\n\
+         \x20    <origin xyz=\"${{NAME_origin_xyz}}\" rpy=\"${{NAME_origin_rpy}}\"/> in the joint NAME. {} -->\n\
+         <robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\">\n",
+        offsets_in_words(context)
+    );
+    for (joint, origin) in robot.chain.joints.iter().zip(robot.corrected_origins()) {
+        let name = identifier(&joint.name);
+        let list = |v: [f64; 3]| v.map(number).join(" ");
+        out += &format!("  <xacro:property name=\"{name}_origin_xyz\" value=\"{}\"/>\n", list(origin.xyz()));
+        out += &format!("  <xacro:property name=\"{name}_origin_rpy\" value=\"{}\"/>\n", list(origin.rpy()));
+    }
+    out + "</robot>\n"
+}
+
+/// Joint offsets for the controller: one row for every joint.
+pub(super) fn mastering_csv(solution: &Solution, context: &Context) -> String {
+    let robot = &solution.state.robot;
+    let offsets = robot.mastered().1;
+    let mut rows = vec![["joint", "offset", "sigma", "unit", "determined", "in_urdf"].map(String::from).to_vec()];
+    for (reading, name) in robot.chain.readings.iter().enumerate() {
+        let prismatic = robot.chain.reading_kinds[reading] == JointKind::Prismatic;
+        let (unit, factor) = if prismatic { ("mm", 1e3) } else { ("deg", 1f64.to_degrees()) };
+        let column = solution.problem.layout.find(&format!("robot/{name}.offset"));
+        let sigma = column.map_or(f64::NAN, |c| solution.covariance.reduced[(c, c)].max(0.0).sqrt());
+        let prior = column.map_or(f64::NAN, |c| solution.problem.layout.columns[c].prior_sigma);
+        // Half of the prior: the data say at least as much as the tolerance that was assumed.
+        let determined = if sigma < 0.5 * prior { "yes" } else { "no" };
+        let folded = if context.offsets == Offsets::Folded { "yes" } else { "no" };
+        let numbers = [offsets[reading], sigma].map(|v| format!("{:.6}", v * factor + 0.0));
+        let [offset, sigma] = numbers;
+        rows.push(vec![name.clone(), offset, sigma, unit.into(), determined.into(), folded.into()]);
+    }
+    let note = match context.offsets {
+        Offsets::Folded => {
+            "# They are in the corrected URDF already (in_urdf = yes): entering them in the controller as well would count them twice.\n"
+        }
+        Offsets::Mastering => {
+            "# They are not in the corrected URDF, which belongs to a controller with these offsets entered.\n"
+        }
+    };
+    format!(
+        "# Joint offsets for the mastering (zero point) table of the controller: where it shows the angle q, the joint stands at q + offset,\n\
+         # so that after the correction it has to show q + offset. Not determined (no): known only together with base or tool; leave it.\n{note}{}",
+        csv(&rows)
+    )
+}
+
+/// Postures at which the table is held against the origins.
+const POSTURES: usize = 500;
+/// Seed of these postures.
+const SEED: u64 = 8;
+
+/// Modified Denavit-Hartenberg parameters, or why there are none.
+pub(super) fn mdh_csv(solution: &Solution, context: &Context) -> String {
+    let mut robot = exported(solution, context);
+    let origins = robot.corrected_origins();
+    robot.chain.joints.iter_mut().zip(origins).for_each(|(j, o)| j.origin = o);
+    let robot = Robot::nominal(robot.chain);
+    let head = format!(
+        "# Modified Denavit-Hartenberg parameters (Craig), for controllers and toolboxes that take no other model. Link i:\n\
+         # T = RotX(alpha_rad) TransX(a_m) RotZ(q + theta_offset_rad) TransZ(d_m) (prismatic: TransZ(d_m + q)); base and tip are full poses. {}\n",
+        offsets_in_words(context)
+    );
+    let mdh = match Mdh::of(&robot.chain) {
+        Ok(mdh) => mdh,
+        Err(Unfit(why)) => return format!("{head}# No table: {why}. Use the URDF or kinematics.yaml.\n"),
+    };
+    let limits = inverse::reading_limits(&robot.chain);
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let errors: Vec<(f64, f64)> = (0..POSTURES)
+        .map(|_| inverse::random_readings(&limits, &robot.chain.reading_kinds, &mut rng))
+        .map(|q| mdh.base_from_tip(&q).distance(&robot.base_from_tip(&q)))
+        .collect();
+    let worst = |of: fn(&(f64, f64)) -> f64| 1e3 * errors.iter().map(of).fold(0.0, f64::max);
+    let rms = 1e3 * (errors.iter().map(|e| e.1 * e.1).sum::<f64>() / POSTURES as f64).sqrt();
+    let mut out = head;
+    if !mdh.parallel.is_empty() {
+        let pairs: Vec<String> =
+            mdh.parallel.iter().map(|(a, b, mrad)| format!("{a} and {b} ({mrad:.3} mrad)")).collect();
+        out += &format!(
+            "# WARNING: nearly parallel axes are taken as parallel, because no usable MDH parameters say otherwise: {}.\n",
+            pairs.join(", ")
+        );
+    }
+    out += &format!(
+        "# Against the corrected URDF at {POSTURES} postures: {rms:.4} mm RMS, at most {:.4} mm and {:.4} mrad.\n",
+        worst(|e| e.1),
+        worst(|e| e.0)
+    );
+    let pose = |name: &str, p: &crate::geom::Pose| {
+        let words = |v: [f64; 3]| v.map(number).join(" ");
+        format!("# {name}: xyz_m {}, rpy_rad {}\n", words(p.xyz()), words(p.rpy()))
+    };
+    out += &pose("base_from_first", &mdh.base);
+    out += &pose("last_from_tip", &mdh.tip);
+    let mut rows = vec![["joint", "kind", "alpha_rad", "a_m", "theta_offset_rad", "d_m"].map(String::from).to_vec()];
+    for link in &mdh.links {
+        let kind = if link.kind == JointKind::Prismatic { "prismatic" } else { "revolute" };
+        let numbers = [link.alpha_rad, link.a_m, link.theta_rad, link.d_m].map(number);
+        rows.push([vec![link.joint.clone(), kind.into()], numbers.to_vec()].concat());
+    }
+    out + &csv(&rows)
+}

@@ -1,0 +1,47 @@
+//! KUKA KRL: a .src with the motions and a .dat with the axis positions.
+
+use super::{EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S};
+
+/// Axes that KRL names A1.. and E1..
+const AXES: usize = 6;
+/// External axes.
+const EXTERNAL: usize = 6;
+
+/// The .src; `None` for more axes than KRL has.
+pub(super) fn source(route: &Route<'_>) -> Option<String> {
+    if route.joints.len() > AXES + EXTERNAL {
+        return None;
+    }
+    let mut text = format!(
+        "&ACCESS RVP\nDEF {NAME}()\n; Joints in order: {}\n; Trigger: output 1. Slowly: 10 percent.\n\
+         BAS(#INITMOV,0)\nBAS(#VEL_PTP,10)\n",
+        route.joints.join(", ")
+    );
+    for (k, visit) in route.visits.iter().enumerate() {
+        if let Purpose::MovePlate(place, _) = &visit.purpose {
+            text += &format!("; Move the plate to {place}, then continue\nHALT\n");
+        }
+        text += &format!("PTP XP{k}\n");
+        if let Purpose::Image(image) | Purpose::MovePlate(_, image) = &visit.purpose {
+            text += &format!(
+                "WAIT SEC {SETTLE_S:?}\n; TRIGGER {image}\nPULSE($OUT[1],TRUE,{PULSE_S:?})\nWAIT SEC {EXPOSE_S:?}\n"
+            );
+        }
+    }
+    Some(text + "END\n")
+}
+
+/// The .dat; `None` as for [`source`].
+pub(super) fn data(route: &Route<'_>) -> Option<String> {
+    if route.joints.len() > AXES + EXTERNAL {
+        return None;
+    }
+    let name = |k: usize| if k < AXES { format!("A{}", k + 1) } else { format!("E{}", k - AXES + 1) };
+    let mut text = format!("&ACCESS RVP\nDEFDAT {NAME} PUBLIC\n");
+    for (k, visit) in route.visits.iter().enumerate() {
+        let axes: Vec<String> =
+            route.shown(&visit.readings).iter().enumerate().map(|(j, q)| format!("{} {q:.5}", name(j))).collect();
+        text += &format!("DECL E6AXIS XP{k}={{{}}}\n", axes.join(","));
+    }
+    Some(text + "ENDDAT\n")
+}

@@ -1,0 +1,106 @@
+//! The planned stops as programs of robot controllers, with dwell and trigger marks.
+//!
+//! All writers go through the same list of [`Visit`]s. A new language is one file and one row in [`programs`].
+
+mod krl;
+mod rapid;
+mod ros;
+mod urscript;
+
+use std::collections::BTreeMap;
+
+use crate::plan::order::motion;
+use crate::recipe::{Plan, PlanRequest, image_name};
+use crate::urdf::JointKind;
+
+/// Name of the programs.
+const NAME: &str = "robotcal_plan";
+/// Time for the arm to come to rest before the trigger, s.
+const SETTLE_S: f64 = 1.0;
+/// Time after the trigger, s.
+const EXPOSE_S: f64 = 0.5;
+/// Length of the trigger pulse, s.
+const PULSE_S: f64 = 0.2;
+/// Greatest joint speed, rad/s (or m/s).
+const SPEED: f64 = 0.5;
+/// Shortest time of a motion, s.
+const LEAST_TIME_S: f64 = 1.0;
+
+/// What happens at the end of a motion.
+#[derive(Debug, Clone, PartialEq)]
+enum Purpose {
+    /// Nothing: a posture on the way.
+    Pass,
+    /// An image is taken.
+    Image(String),
+    /// The operator moves the plate to this place before the motion, then an image is taken.
+    MovePlate(String, String),
+}
+
+/// One motion of the program.
+#[derive(Debug, Clone, PartialEq)]
+struct Visit {
+    /// Readings, rad or m.
+    readings: Vec<f64>,
+    /// What for.
+    purpose: Purpose,
+    /// Time of the motion, s.
+    time_s: f64,
+}
+
+/// What every writer needs.
+struct Route<'a> {
+    joints: &'a [String],
+    kinds: &'a [JointKind],
+    visits: Vec<Visit>,
+}
+
+fn route<'a>(request: &'a PlanRequest, plan: &Plan) -> Route<'a> {
+    let chain = &request.setting.robot.chain;
+    let mut visits: Vec<Visit> = Vec::new();
+    let mut placement = None;
+    for (k, leg) in plan.legs.iter().enumerate() {
+        let stop = &plan.pool[leg.stop];
+        let image = image_name(k);
+        let moved = placement.is_some_and(|p| p != stop.placement);
+        placement = Some(stop.placement);
+        let purpose = match moved {
+            true => Purpose::MovePlate(request.setting.placements[stop.placement].0.clone(), image),
+            false => Purpose::Image(image),
+        };
+        let ways = leg.via.iter().map(|q| (q.clone(), Purpose::Pass));
+        for (readings, purpose) in ways.chain([(stop.readings.clone(), purpose)]) {
+            let length = visits.last().map_or(0.0, |v| motion(&v.readings, &readings));
+            visits.push(Visit { readings, purpose, time_s: (length / SPEED).max(LEAST_TIME_S) });
+        }
+    }
+    Route { joints: &chain.readings, kinds: &chain.reading_kinds, visits }
+}
+
+impl Route<'_> {
+    /// Readings as teach pendants show them: degrees, or mm.
+    fn shown(&self, readings: &[f64]) -> Vec<f64> {
+        let one = |(q, kind): (&f64, &JointKind)| match kind {
+            JointKind::Prismatic => 1e3 * q,
+            _ => q.to_degrees(),
+        };
+        readings.iter().zip(self.kinds).map(one).collect()
+    }
+}
+
+/// Programs in all languages that can express the plan: file name -> bytes.
+pub fn programs(request: &PlanRequest, plan: &Plan) -> BTreeMap<String, Vec<u8>> {
+    let route = route(request, plan);
+    let mut files = BTreeMap::new();
+    let mut add = |name: &str, text: Option<String>| {
+        if let Some(text) = text {
+            files.insert(format!("{NAME}.{name}"), text.into_bytes());
+        }
+    };
+    add("src", krl::source(&route));
+    add("dat", krl::data(&route));
+    add("mod", rapid::module(&route));
+    add("script", urscript::script(&route));
+    add("trajectory.yaml", Some(ros::trajectory(&route)));
+    files
+}

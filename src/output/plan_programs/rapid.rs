@@ -1,0 +1,38 @@
+//! ABB RAPID: one module with joint targets.
+
+use super::{EXPOSE_S, PULSE_S, Purpose, Route, SETTLE_S};
+
+/// Axes of the arm in a joint target.
+const AXES: usize = 6;
+/// What RAPID writes for an external axis that is not there.
+const ABSENT: &str = "9E9";
+
+/// The module; `None` for more axes than a joint target has.
+pub(super) fn module(route: &Route<'_>) -> Option<String> {
+    if route.joints.len() > 2 * AXES {
+        return None;
+    }
+    let mut targets = String::new();
+    let mut body = String::new();
+    for (k, visit) in route.visits.iter().enumerate() {
+        let mut cells: Vec<String> = route.shown(&visit.readings).iter().map(|q| format!("{q:.5}")).collect();
+        cells.resize(cells.len().max(AXES), "0".to_owned());
+        cells.resize(2 * AXES, ABSENT.to_owned());
+        let (arm, external) = cells.split_at(AXES);
+        targets += &format!("  CONST jointtarget p{k} := [[{}],[{}]];\n", arm.join(","), external.join(","));
+        if let Purpose::MovePlate(place, _) = &visit.purpose {
+            body += &format!("    TPWrite \"Move the plate to {place}, then start\";\n    Stop;\n");
+        }
+        body += &format!("    MoveAbsJ p{k}\\NoEOffs, v100, fine, tool0;\n");
+        if let Purpose::Image(image) | Purpose::MovePlate(_, image) = &visit.purpose {
+            body += &format!(
+                "    WaitTime {SETTLE_S:?};\n    ! TRIGGER {image}\n    PulseDO\\PLength:={PULSE_S:?}, doTrigger;\n    \
+                 WaitTime {EXPOSE_S:?};\n"
+            );
+        }
+    }
+    let joints = route.joints.join(", ");
+    Some(format!(
+        "MODULE RobotcalPlan\n  ! Joints in order: {joints}\n{targets}  PROC robotcal_plan()\n{body}  ENDPROC\nENDMODULE\n"
+    ))
+}

@@ -1,0 +1,262 @@
+//! What planning is worth: planned poses against random ones in simulated worlds, identified end to end.
+
+use nalgebra::{DMatrix, Vector6};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use super::evidence::identify;
+use super::forecast::{exact_covariance, flange_m};
+use super::joint::{JointNoise, Options, RobotModel};
+use super::plan::{Budget, PlanRequest, Wish, choose};
+use super::simulated::measured;
+use crate::assess::{Ratio, bootstrap_ratio, flange_error_m, root_mean_square};
+use crate::error::Result;
+use crate::geom::Pose;
+use crate::model::camera::{Camera, Lens};
+use crate::model::joint_terms::JointTerm;
+use crate::model::robot::Robot;
+use crate::plan::candidates::{CandidateOptions, workspace};
+use crate::plan::information::flange_weight;
+use crate::plan::scene::{Scene, SceneOptions};
+use crate::plan::setting::{Setting, scale_sigma};
+use crate::plan::visibility::SightLimits;
+use crate::series::{CameraMount, Plate, PlateKind, ScaleBar};
+use crate::simulate::truth::Truth;
+use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
+use crate::urdf::{Chain, JointKind};
+
+/// What is studied.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanStudyRequest {
+    /// The nominal robot.
+    pub chain: Chain,
+    /// Worlds.
+    pub seeds: u64,
+    /// Planned images.
+    pub planned: usize,
+    /// Random images.
+    pub random: usize,
+    /// Candidates of every plan.
+    pub candidates: usize,
+}
+
+/// One world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlanStudyRow {
+    /// Seed.
+    pub seed: u64,
+    /// Flange error with the planned images: found and predicted, RMS over held-out joint vectors of the workspace, m.
+    pub planned_m: [f64; 2],
+    /// The same with the random images.
+    pub random_m: [f64; 2],
+    /// Error found over held-out views of the plate, planned and random, m.
+    pub views_m: [f64; 2],
+    /// Certified efficiency of relaxation and whole images.
+    pub efficiency: [f64; 2],
+}
+
+/// The study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanStudy {
+    /// Worlds in which both series could be identified.
+    pub rows: Vec<PlanStudyRow>,
+    /// Seeds of the others, with the reason.
+    pub failed: Vec<(u64, String)>,
+    /// Error of the planned over the random images, with bootstrap interval over the worlds.
+    pub planned_to_random: Option<Ratio>,
+}
+
+/// Standard deviation of a marker, believed and true, m: a plate that a measuring machine has measured.
+const MARKER_SIGMA_M: f64 = 0.003e-3;
+/// Standard deviation of the distance of its outermost markers, m.
+const BAR_SIGMA_M: f64 = 0.002e-3;
+/// Held-out joint vectors of the workspace, and the first seed of their draw (those of plans are small).
+const HELD_OUT: usize = 150;
+const HELD_OUT_SEED: u64 = 1_000_000;
+/// Noise of an observation, px.
+const PIXEL_SIGMA_PX: f64 = 0.05;
+/// Joint noise, rad.
+const JOINT_SIGMA_RAD: f64 = 0.03e-3;
+/// How well the user knows where camera and plate are: m and rad per axis.
+const ROUGH: (f64, f64) = (5e-3, 0.01);
+
+impl PlanStudy {
+    /// RMS over the worlds of the error found over views of the plate: planned, random, m.
+    pub fn views_m(&self) -> [f64; 2] {
+        [0, 1].map(|k| root_mean_square(&self.rows.iter().map(|r| (r.views_m[k].powi(2), 1.0)).collect::<Vec<_>>()))
+    }
+
+    /// RMS over the worlds of (planned found, planned predicted, random found, random predicted), m.
+    pub fn overall_m(&self) -> [f64; 4] {
+        let rms = |of: fn(&PlanStudyRow) -> f64| {
+            root_mean_square(&self.rows.iter().map(|r| (of(r).powi(2), 1.0)).collect::<Vec<_>>())
+        };
+        [rms(|r| r.planned_m[0]), rms(|r| r.planned_m[1]), rms(|r| r.random_m[0]), rms(|r| r.random_m[1])]
+    }
+}
+
+/// A plate of 96 points, 0.33 m by 0.21 m.
+fn plate() -> Plate {
+    let mut plate = Plate::lattice(PlateKind::Points, 12, 8, 0.03, MARKER_SIGMA_M);
+    plate.markers.iter_mut().for_each(|m| m.sigma_m = MARKER_SIGMA_M);
+    let [a, b] = [0, plate.markers.len() - 1].map(|k| plate.markers[k]);
+    let distance_m = (a.position_m - b.position_m).norm();
+    plate.scale = Some(ScaleBar { from: a.id, to: b.id, distance_m, sigma_m: BAR_SIGMA_M });
+    plate
+}
+
+/// Runs the study.
+///
+/// The robot's errors are drawn from the priors of the fit (origins 1 mm and 2 mrad, offsets 10 mrad), the scale of the plate
+/// from its prior: so a prediction that is right agrees with the errors found, over many worlds. Camera, hand-camera offset and
+/// plate pose are known to the planner only roughly (5 mm, 10 mrad, no distortion).
+///
+/// # Errors
+/// Where no world can be made at all.
+pub fn plan_study(request: &PlanStudyRequest, progress: impl Fn(u64) + Sync) -> Result<PlanStudy> {
+    let all: Vec<(u64, Result<PlanStudyRow>)> = (1..=request.seeds)
+        .into_par_iter()
+        .map(|seed| {
+            let row = one_world(request, seed);
+            progress(seed);
+            (seed, row)
+        })
+        .collect();
+    let (mut rows, mut failed) = (Vec::new(), Vec::new());
+    for (seed, row) in all {
+        match row {
+            Ok(row) => rows.push(row),
+            Err(e) => failed.push((seed, e.to_string())),
+        }
+    }
+    let squares = |of: fn(&PlanStudyRow) -> f64| rows.iter().map(|r| (of(r).powi(2), 1.0)).collect::<Vec<_>>();
+    let planned_to_random = bootstrap_ratio(&squares(|r| r.planned_m[0]), &squares(|r| r.random_m[0]));
+    Ok(PlanStudy { rows, failed, planned_to_random })
+}
+
+fn world_request(request: &PlanStudyRequest, plate: Plate, seed: u64) -> WorldRequest {
+    let mut world = WorldRequest::typical(request.chain.clone(), plate);
+    world.errors = RobotErrors { translation_m: 1e-3, rotation_rad: 2e-3, offset_rad: 10e-3, ..RobotErrors::default() };
+    world.joint_noise_rad = JOINT_SIGMA_RAD;
+    world.pixel_sigma_px = PIXEL_SIGMA_PX;
+    world.marker_sigma_m = MARKER_SIGMA_M;
+    world.views.near_m = 0.2;
+    world.seed = seed;
+    world
+}
+
+fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
+    let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let believed = plate();
+    let scale = 1.0 + normal() * scale_sigma(&believed).unwrap_or(0.0);
+    let mut printed = believed.clone();
+    printed.markers.iter_mut().for_each(|m| m.position_m *= scale);
+    let mut wanted = world_request(request, printed, seed);
+    wanted.images = request.random;
+    let mut random = series(&wanted)?;
+    random.plate = believed.clone();
+    let mut rough = || Vector6::from_fn(|k, _| normal() * if k < 3 { ROUGH.0 } else { ROUGH.1 });
+    let truth = &random.truth;
+    let setting = Setting {
+        robot: RobotModel::Rigid.robot(request.chain.clone()),
+        camera: Camera::pinhole(
+            Lens::Brown,
+            truth.camera.width_px,
+            truth.camera.height_px,
+            truth.camera.parameters[0].round(),
+        ),
+        mount: CameraMount::Hand,
+        mounting: truth.camera_pose.pose().perturbed(&rough()),
+        placements: truth.plate_poses.iter().map(|(n, p)| (n.clone(), p.pose().perturbed(&rough()))).collect(),
+        plate: believed.clone(),
+        pixel_sigma_px: PIXEL_SIGMA_PX,
+        joint_sigma: joint_sigma(&request.chain),
+    };
+    let chosen = PlanRequest {
+        setting,
+        taken: Vec::new(),
+        count: request.planned,
+        wish: Wish::Workspace,
+        budget: Budget::default(),
+        candidates: CandidateOptions {
+            count: request.candidates,
+            views: wanted.views,
+            sight: SightLimits { least_markers: wanted.least_markers, ..SightLimits::default() },
+            seed,
+            ..CandidateOptions::default()
+        },
+        scene: SceneOptions::default(),
+    };
+    let choice = choose(&chosen)?;
+    wanted.images = request.planned;
+    wanted.postures = Some(choice.chosen.iter().map(|&k| choice.pool[k].readings.clone()).collect());
+    let mut planned = series(&wanted)?;
+    planned.plate = believed;
+    let scene = Scene::new(&chosen.setting, &chosen.scene);
+    let held_out = workspace(&chosen.setting, &scene, HELD_OUT, 0.0, HELD_OUT_SEED + seed);
+    let weight = flange_weight(&choice.problem, &chosen.setting.robot, &held_out);
+    let predicted = |visits: &[Vec<f64>]| predict(&chosen, &choice.problem, &choice.state, visits, &weight);
+    let kinds = &request.chain;
+    let visits = |s: &SimulatedSeries| -> Vec<Vec<f64>> {
+        measured(s, kinds).stops.into_iter().filter_map(|s| s.readings).collect()
+    };
+    let actual = true_robot(&request.chain, truth);
+    let in_workspace: Vec<(Vec<f64>, Pose)> =
+        held_out.into_iter().map(|q| (q.clone(), actual.base_from_tip(&q))).collect();
+    let at_plate: Vec<(Vec<f64>, Pose)> =
+        truth.held_out.iter().map(|h| (h.readings.clone(), h.base_from_tip.pose())).collect();
+    let [planned_found, random_found] = [&planned, &random].map(|s| found(request, s, [&in_workspace, &at_plate]));
+    let (planned_found, random_found) = (planned_found?, random_found?);
+    Ok(PlanStudyRow {
+        seed,
+        planned_m: [planned_found[0], predicted(&visits(&planned))?],
+        random_m: [random_found[0], predicted(&visits(&random))?],
+        views_m: [planned_found[1], random_found[1]],
+        efficiency: choice.efficiency,
+    })
+}
+
+/// The robot of a world.
+fn true_robot(chain: &Chain, truth: &Truth) -> Robot {
+    let mut robot = Robot::nominal(chain.clone());
+    for (joint, twist) in robot.chain.joints.iter().zip(&mut robot.twists) {
+        *twist = truth.twists.get(&joint.name).map_or(Vector6::zeros(), |t| Vector6::from(*t));
+    }
+    let reading = |name: &String| chain.readings.iter().position(|r| r == name);
+    let term = |t: &crate::simulate::truth::TermRecord| {
+        Some(JointTerm { reading: reading(&t.joint)?, term: t.term, value: t.value })
+    };
+    robot.terms = truth.terms.iter().filter_map(term).collect();
+    robot
+}
+
+fn joint_sigma(chain: &Chain) -> Vec<f64> {
+    let one = |kind: &JointKind| if *kind == JointKind::Prismatic { 0.1 * JOINT_SIGMA_RAD } else { JOINT_SIGMA_RAD };
+    chain.reading_kinds.iter().map(one).collect()
+}
+
+fn predict(
+    request: &PlanRequest,
+    problem: &crate::problem::Problem,
+    state: &crate::problem::State,
+    visits: &[Vec<f64>],
+    weight: &DMatrix<f64>,
+) -> Result<f64> {
+    let setting = &request.setting;
+    let images = visits.iter().filter_map(|q| setting.image(state, "", q, 0)).collect();
+    Ok(flange_m(weight, &exact_covariance(problem, state, setting, images)?))
+}
+
+/// Flange errors after the whole identification of a series, over two sets of joint vectors.
+fn found(request: &PlanStudyRequest, series: &SimulatedSeries, sets: [&[(Vec<f64>, Pose)]; 2]) -> Result<[f64; 2]> {
+    let options = Options { joint_noise: JointNoise::Estimated, model: RobotModel::Rigid, ..Options::default() };
+    let solution = identify(request.chain.clone(), &[measured(series, &request.chain)], &options)?;
+    let plate = solution.state.placements[0];
+    let [a, b] = sets.map(|poses| flange_error_m(&solution.state.robot, &plate, poses));
+    a.zip(b).map(|(a, b)| [a, b]).ok_or_else(|| {
+        crate::error::Error::unsolved("study", "the held-out joint vectors determine no error", "take more of them")
+    })
+}

@@ -1,0 +1,86 @@
+//! Lenses: simulated ones are recovered, `--camera auto` tells them apart, and what ROS cannot say is said with its loss.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use robotcal::model::camera::{Camera, Lens, fit_lens};
+use robotcal::plan::plate_design::{PlateRequest, design};
+use robotcal::recipe::{choose_lens, measured};
+use robotcal::simulate::{SimulatedSeries, WorldRequest, lens_camera, series};
+use robotcal::urdf::{Chain, read};
+
+fn chain() -> Chain {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf");
+    read(&path).unwrap().chain(Some("base_link"), Some("tool0")).unwrap()
+}
+
+fn world(lens: Lens, field_deg: f64) -> SimulatedSeries {
+    let plate = design(&PlateRequest { markers: Some(120), ..PlateRequest::default() }).unwrap().plate;
+    let request = WorldRequest {
+        camera: lens_camera(lens, 1280, 1024, field_deg.to_radians()),
+        images: 10,
+        held_out: 2,
+        seed: 7,
+        ..WorldRequest::typical(chain(), plate)
+    };
+    series(&request).unwrap()
+}
+
+/// The lens that made the images is chosen, or one that predicts them as well.
+#[test]
+fn hold_out_tells_lenses_apart() {
+    for (lens, field_deg, not) in [
+        (Lens::Brown, 60.0, &[][..]),
+        (Lens::Fisheye, 100.0, &[Lens::Brown, Lens::Parallax, Lens::ThinPrism][..]),
+        (Lens::ThinPrism, 60.0, &[Lens::Brown, Lens::Fisheye, Lens::Rational, Lens::Parallax][..]),
+        (Lens::Parallax, 60.0, &[Lens::Brown, Lens::Fisheye, Lens::Rational, Lens::ThinPrism][..]),
+    ] {
+        let made = world(lens, field_deg);
+        let mut seen = vec![measured(&made, &chain())];
+        seen[0].lens = Lens::Brown;
+        let notices = choose_lens(&chain(), &mut seen).unwrap();
+        println!("{lens:?}: {}", notices[0]);
+        let chosen = seen[0].lens;
+        assert!(!not.contains(&chosen), "{lens:?} taken for {chosen:?}: {}", notices[0]);
+        assert!(lens != Lens::Brown || chosen == Lens::Brown, "{}", notices[0]);
+        assert!(notices[0].what.contains("had not seen"));
+    }
+}
+
+#[test]
+fn a_lens_is_expressed_by_another_with_its_loss() {
+    let camera = lens_camera(Lens::ThinPrism, 1280, 1024, 1.0);
+    let fit = fit_lens(&camera, Lens::Rational, &[0.4, 0.8]).unwrap();
+    assert!(fit.worst_px >= fit.rms_px && fit.worst_px > 0.01, "a prism is no radial lens: {fit:?}");
+    // The loss is what the two cameras differ by.
+    let (mut worst, mut beyond) = (0.0f64, 0);
+    for i in 0..50 {
+        for k in 0..40 {
+            let ray = camera.ray(&nalgebra::Vector2::new(26.1 * f64::from(i), 26.2 * f64::from(k))).unwrap();
+            let off = (camera.project(&ray).unwrap() - fit.camera.project(&ray).unwrap()).norm();
+            worst = worst.max(off);
+            beyond += usize::from(off > fit.worst_px * 1.01);
+        }
+    }
+    assert!(beyond == 0 && worst > 0.8 * fit.worst_px, "{worst} {fit:?}");
+    // A lens that contains the other loses nothing.
+    let brown = lens_camera(Lens::Brown, 1280, 1024, 1.0);
+    for lens in [Lens::Rational, Lens::ThinPrism] {
+        let fit = fit_lens(&brown, lens, &[0.4, 0.8]).unwrap();
+        assert!(fit.worst_px < 1e-3, "{lens:?}: {}", fit.worst_px);
+    }
+}
+
+#[test]
+fn rays_and_projections_undo_each_other_through_every_lens() {
+    for lens in Lens::ALL {
+        let camera: Camera = lens_camera(lens, 1280, 1024, 80f64.to_radians());
+        for (u, v) in [(0.0, 0.0), (640.0, 500.0), (1279.0, 12.5), (33.0, 1023.0)] {
+            let uv = nalgebra::Vector2::new(u, v);
+            // Far away, where a lens that sees the distance is as its ray says.
+            let x = camera.ray(&uv).unwrap() * 1e9;
+            assert!((camera.project(&x).unwrap() - uv).norm() < 1e-6, "{lens:?} at {u}, {v}");
+        }
+    }
+}
