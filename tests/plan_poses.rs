@@ -82,10 +82,10 @@ fn beads(c: &Capsule, frames: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
 #[test]
 fn every_planned_pose_is_inside_limits_sees_enough_and_touches_nothing() {
     for name in ["kuka_kr6_r900", "ur10e", "lbr_iiwa_14"] {
-        let request = request(name, 12);
+        let request = request(name, 30);
         let setting = &request.setting;
         let plan = plan(&request).unwrap();
-        assert_eq!(plan.legs.len(), 12);
+        assert_eq!(plan.legs.len(), 30);
         println!("{name}: {} candidates, certified {:?}", plan.pool.len(), plan.efficiency);
         assert!(plan.efficiency[0] > 0.95 && plan.efficiency[1] > 0.90);
         let capsules = Scene::new(setting, &request.scene).capsules().to_vec();
@@ -145,7 +145,7 @@ fn every_planned_pose_is_inside_limits_sees_enough_and_touches_nothing() {
                 }
             }
         }
-        assert!(per_place.iter().all(|n| *n <= 8), "{per_place:?}");
+        assert!(per_place.iter().all(|n| *n <= 20), "{per_place:?}");
         let forecast = forecast(&request, &plan).unwrap();
         assert!(forecast.flange_m < 0.05 * forecast.before_m, "{} {}", forecast.flange_m, forecast.before_m);
         assert!(

@@ -50,7 +50,7 @@ pub struct JointRange {
     pub planned: Vec<f64>,
 }
 
-/// What one planned image brings by itself, on top of what is known before all of them.
+/// What one planned image brings: on top of the images that were taken, or, where there are none, of all other planned ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gain {
     /// Index into the legs.
@@ -78,7 +78,7 @@ pub struct Forecast {
     pub curve: Vec<CurvePoint>,
     /// Chosen stops by importance (indices into the legs), the most important first.
     pub importance: Vec<usize>,
-    /// What every image brings by itself, the greatest gain first.
+    /// What every image brings, the greatest gain first.
     pub gains: Vec<Gain>,
     /// Joint ranges.
     pub ranges: Vec<JointRange>,
@@ -179,7 +179,7 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
     let ranges = ranges(request, plan);
     let mut words = words(&parameters, &ranges, plan, flange);
     words.extend(scale_word(plan, &whole, flange));
-    let gains = gains(plan);
+    let gains = gains(plan, !request.taken.is_empty());
     Ok(Forecast { before_m: before, flange_m: flange, parameters, curve, importance, gains, ranges, words })
 }
 
@@ -215,13 +215,18 @@ fn importance(plan: &Plan) -> Vec<usize> {
     out
 }
 
-fn gains(plan: &Plan) -> Vec<Gain> {
+fn gains(plan: &Plan, taken: bool) -> Vec<Gain> {
     let layout = &plan.problem.layout;
     let inverse = |m: &DMatrix<f64>| SymmetricFactor::new(m).ok().map(|f| f.inverse());
-    let Some(before) = inverse(&plan.known) else { return Vec::new() };
+    let others = |leg: usize| {
+        let rest = (0..plan.legs.len()).filter(|k| !taken && *k != leg);
+        rest.fold(plan.known.clone(), |m, k| m + &plan.information[plan.legs[k].stop])
+    };
     let sigma = |c: &DMatrix<f64>, k: usize| c[(k, k)].max(0.0).sqrt();
     let one = |leg: usize| {
-        let after = inverse(&(&plan.known + &plan.information[plan.legs[leg].stop]))?;
+        let without = others(leg);
+        let before = inverse(&without)?;
+        let after = inverse(&(without + &plan.information[plan.legs[leg].stop]))?;
         let drop = |k: usize| plan.weight[(k, k)].max(0.0).sqrt() * (sigma(&before, k) - sigma(&after, k));
         let best = (0..layout.terms.end).max_by(|&a, &b| drop(a).total_cmp(&drop(b)))?;
         Some(Gain {
@@ -233,7 +238,8 @@ fn gains(plan: &Plan) -> Vec<Gain> {
         })
     };
     let mut all: Vec<Gain> = (0..plan.legs.len()).filter_map(one).collect();
-    all.sort_by(|a, b| a.flange_m[1].total_cmp(&b.flange_m[1]));
+    let gain = |g: &Gain| g.flange_m[0] - g.flange_m[1];
+    all.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
     all
 }
 

@@ -178,7 +178,10 @@ pub(super) fn criterion(wish: &Wish, layout: &Layout, weight: &DMatrix<f64>) -> 
                     .collect();
                 if wanted.is_empty() {
                     let known = layout.columns[..robot].iter().map(|c| c.name.trim_start_matches("robot/"));
-                    let closest = crate::error::closest_name(name, known.clone());
+                    let joint = |column: &'_ str| column.split(['/', '.']).next().unwrap_or_default().to_owned();
+                    let joints: Vec<String> = known.clone().map(joint).collect();
+                    let names = joints.iter().map(String::as_str).chain(known.clone());
+                    let closest = crate::error::closest_name(name, names);
                     let remedy = match closest {
                         Some(c) => format!("did you mean \"{c}\"?"),
                         None => format!("give a joint or one of {}", known.take(8).collect::<Vec<_>>().join(", ")),

@@ -15,15 +15,12 @@ use crate::assess::{Ratio, bootstrap_ratio, flange_error_m, root_mean_square};
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
-use crate::model::joint_terms::JointTerm;
-use crate::model::robot::Robot;
 use crate::plan::candidates::{CandidateOptions, workspace};
 use crate::plan::information::flange_weight;
 use crate::plan::scene::{Scene, SceneOptions};
 use crate::plan::setting::{Setting, scale_sigma};
 use crate::plan::visibility::SightLimits;
 use crate::series::{CameraMount, Plate, PlateKind, ScaleBar};
-use crate::simulate::truth::Truth;
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
 use crate::urdf::{Chain, JointKind};
 
@@ -203,7 +200,7 @@ fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
     let visits = |s: &SimulatedSeries| -> Vec<Vec<f64>> {
         measured(s, kinds).stops.into_iter().filter_map(|s| s.readings).collect()
     };
-    let actual = true_robot(&request.chain, truth);
+    let actual = truth.robot(&request.chain)?;
     let in_workspace: Vec<(Vec<f64>, Pose)> =
         held_out.into_iter().map(|q| (q.clone(), actual.base_from_tip(&q))).collect();
     let at_plate: Vec<(Vec<f64>, Pose)> =
@@ -217,20 +214,6 @@ fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
         views_m: [planned_found[1], random_found[1]],
         efficiency: choice.efficiency,
     })
-}
-
-/// The robot of a world.
-fn true_robot(chain: &Chain, truth: &Truth) -> Robot {
-    let mut robot = Robot::nominal(chain.clone());
-    for (joint, twist) in robot.chain.joints.iter().zip(&mut robot.twists) {
-        *twist = truth.twists.get(&joint.name).map_or(Vector6::zeros(), |t| Vector6::from(*t));
-    }
-    let reading = |name: &String| chain.readings.iter().position(|r| r == name);
-    let term = |t: &crate::simulate::truth::TermRecord| {
-        Some(JointTerm { reading: reading(&t.joint)?, term: t.term, value: t.value })
-    };
-    robot.terms = truth.terms.iter().filter_map(term).collect();
-    robot
 }
 
 fn joint_sigma(chain: &Chain) -> Vec<f64> {

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! I(p)  = white(p) (1 - D) + dark(p) D            D = B_outer - B_inner
-//! B     = Phi(-(d + kappa s^2 / 2) / s)           coverage by a disc, blurred by a Gaussian of sigma s
-//! d     = (rho - 1 - h) / |grad rho|              distance to the contour, h = a3 cos 3t + b3 sin 3t
+//! B     = Phi(-(d + s^2 ln(1 + kappa d) / 2 d) / s) + C    coverage by a disc, blurred by a Gaussian of sigma s
+//! d     = e (1 + e b / 2), e = (rho - 1 - h) / |grad rho|  distance to the contour, h = a3 cos 3t + b3 sin 3t
 //! w     = N (p + s^2 grad L / L - c),  rho = |w|, t = angle of w
 //! white = l0 + gx x + gy y
 //! dark  = d0 + (d0 / l0) (gx x + gy y) + dx x + dy y
@@ -12,11 +12,16 @@
 //! `N` maps the ellipse to the unit circle. In that frame an affine map of a disc is round, and what lens distortion
 //! and perspective add to second order is a third harmonic; with it as a parameter, `c` is the area centroid of the
 //! contour's image: the integral of `rho^3 (cos t, sin t)` over `rho = 1 + h` vanishes. The first harmonic of a real
-//! contour is a shift, the second belongs to `N`. The term with `kappa`, the curvature of the contour, is the
-//! displacement of a blurred curved edge. The term `s^2 grad L / L` is what blur does to an edge in light with a
+//! contour is a shift, the second belongs to `N`. `b` is the second derivative of `rho` along the normal over the first,
+//! which makes `d` right to second order. The term with `kappa`, the curvature of the contour, is the displacement of a
+//! blurred curved edge: blur diffuses the distance, whose Laplacian is the curvature of the parallel contour, here in the
+//! mean along the normal. `C` is what is missing to the exact coverage ([`super::exact_edge`]) where the radius of
+//! curvature is not large against the blur; it is taken at a state close to the last. The term `s^2 grad L / L` is what blur does to an edge in light with a
 //! gradient: it moves every edge towards the light.
 
 use super::ellipse::Ellipse;
+use super::exact_edge::{Contour, MOMENTS, Nodes};
+use super::flat_zone::Flat;
 
 /// Parameters of a disc.
 pub(super) const DISC: usize = 14;
@@ -72,11 +77,39 @@ impl State {
         }
     }
 
+    /// The outer contour, moved by what blur makes of the gradient of the light.
+    fn outer_contour(&self) -> Contour {
+        let s2 = self.blur * self.blur;
+        let level = self.white[0].abs().max(1e-6);
+        let centre = [0, 1].map(|a| self.centre[a] - s2 * self.white[a + 1] / level);
+        Contour { centre, to_unit: self.to_unit, third: self.third, blur: self.blur }
+    }
+
+    /// A contour is hardly larger than the blur.
+    pub fn is_badly_resolved(&self) -> bool {
+        let contour = self.inner_contour().unwrap_or_else(|| self.outer_contour());
+        contour.curvature() > 0.3
+    }
+
+    /// The inner contour, moved in the same way.
+    fn inner_contour(&self) -> Option<Contour> {
+        let (centre, ratio) = self.inner?;
+        let outer = self.outer_contour();
+        let centre = [0, 1].map(|a| outer.centre[a] + centre[a] - self.centre[a]);
+        let to_unit = self.to_unit.map(|r| r.map(|v| v / ratio));
+        Some(Contour { centre, to_unit, third: self.third.map(|v| v * ratio), ..outer })
+    }
+
     /// Ellipse of the outer circle relative to the anchor.
     pub fn ellipse(&self) -> Ellipse {
         let n = self.to_unit;
         let q = |i: usize, j: usize| n[0][i] * n[0][j] + n[1][i] * n[1][j];
         Ellipse { centre: self.centre, shape: [q(0, 0), q(0, 1), q(1, 1)] }
+    }
+
+    /// Share of the paper's gradient that the ink has.
+    pub fn tie(&self) -> f64 {
+        (self.dark[0] / self.white[0]).clamp(0.0, 1.0)
     }
 
     /// Ellipse of the inner circle relative to the anchor.
@@ -108,6 +141,9 @@ pub(super) struct Pixels {
     weighted: Vec<f32>,
     /// Columns of the weighted Jacobian.
     columns: Vec<Vec<f32>>,
+    nodes: Nodes,
+    /// Even paper and ink beyond the band.
+    pub flat: Flat,
 }
 
 /// Per pixel: coverage, density of the blurred edge, and the geometry behind it.
@@ -124,12 +160,18 @@ struct EdgeTerms {
     normal_y: Vec<f32>,
     /// Derivative of the argument by ln blur.
     widen: Vec<f32>,
+    /// Exact coverage less that of the closed form, where the contour is strongly curved.
+    missing: Vec<f32>,
+    /// Exact derivatives of the coverage by the parameters of a contour, where it is strongly curved.
+    exact: Vec<Vec<f32>>,
 }
 
 impl EdgeTerms {
     fn resize(&mut self, n: usize) {
-        let EdgeTerms { coverage, density, scale, rho, cos, sin, normal_x, normal_y, widen } = self;
-        for v in [coverage, density, scale, rho, cos, sin, normal_x, normal_y, widen] {
+        let EdgeTerms { coverage, density, scale, rho, cos, sin, normal_x, normal_y, widen, missing, exact } = self;
+        missing.clear();
+        exact.clear();
+        for v in [coverage, density, scale, rho, cos, sin, normal_x, normal_y, widen, missing] {
             v.resize(n, 0.0);
         }
     }
@@ -170,16 +212,9 @@ impl Pixels {
 
     /// Evaluates residuals and Jacobian at a state; `noise` are the variances of a pixel on paper and on ink.
     pub fn evaluate(&mut self, state: &State, noise: [f64; 2]) {
-        let s2 = state.blur * state.blur;
-        let level = state.white[0].abs().max(1e-6);
-        let shift = [s2 * state.white[1] / level, s2 * state.white[2] / level];
-        let moved = |c: [f64; 2]| [c[0] - shift[0], c[1] - shift[1]];
-        let outer = Geometry::of(moved(state.centre), state.to_unit, state.third, state.blur);
-        self.outer.evaluate(&outer, &self.x, &self.y);
-        if let Some((centre, ratio)) = state.inner {
-            let to_unit = state.to_unit.map(|r| r.map(|v| v / ratio));
-            let inner = Geometry::of(moved(centre), to_unit, state.third.map(|v| v * ratio), state.blur);
-            self.inner.evaluate(&inner, &self.x, &self.y);
+        self.outer.evaluate(&Geometry::of(&state.outer_contour()), &self.x, &self.y);
+        if let Some(inner) = state.inner_contour() {
+            self.inner.evaluate(&Geometry::of(&inner), &self.x, &self.y);
         } else {
             self.inner.coverage.fill(0.0);
             self.inner.density.fill(0.0);
@@ -188,12 +223,21 @@ impl Pixels {
         self.shape_columns(state);
     }
 
+    /// Takes what the closed form misses to the exact coverage from this state on.
+    pub fn correct(&mut self, state: &State) {
+        let Self { outer, inner, x, y, nodes, .. } = self;
+        outer.correct(&state.outer_contour(), x, y, nodes);
+        if let Some(contour) = state.inner_contour() {
+            inner.correct(&contour, x, y, nodes);
+        }
+    }
+
     /// Residuals and the columns of the levels; leaves weighted densities in the edge terms.
     fn levels(&mut self, state: &State, noise: [f64; 2]) {
         let n = self.x.len();
         let [l0, gx, gy] = state.white.map(|v| v as f32);
         let [d0, dx, dy] = state.dark.map(|v| v as f32);
-        let tie = (state.dark[0] / state.white[0]).clamp(0.0, 1.0) as f32;
+        let tie = state.tie() as f32;
         let (v_white, v_dark) = (noise[0] as f32, noise[1] as f32);
         let (x, y, value, mask) = (&self.x[..n], &self.y[..n], &self.value[..n], &self.mask[..n]);
         let (bo, bi) = (&self.outer.coverage[..n], &self.inner.coverage[..n]);
@@ -235,6 +279,10 @@ impl Pixels {
                 break;
             }
             let first = edge == 0;
+            if !terms.exact.is_empty() {
+                exact_columns(terms, &mut self.columns, first, third[edge]);
+                continue;
+            }
             let (q, g, rho) = (&terms.density[..n], &terms.scale[..n], &terms.rho[..n]);
             let (c, s, widen) = (&terms.cos[..n], &terms.sin[..n], &terms.widen[..n]);
             let [_, _, e0, ec, es, a3, b3, ls, ..] = &mut self.columns[..] else { return };
@@ -289,6 +337,28 @@ impl Pixels {
     }
 }
 
+/// Columns of an edge from its exact derivatives; those that both edges share are added to for the inner one.
+fn exact_columns(terms: &EdgeTerms, columns: &mut [Vec<f32>], first: bool, third: f32) {
+    let base = if first { CENTRE } else { INNER };
+    let places = [base, base + 1, SHAPE, SHAPE + 1, SHAPE + 2, THIRD, THIRD + 1, LN_BLUR];
+    let q = &terms.density;
+    for (k, place) in places.into_iter().enumerate() {
+        let own = first || k < 2;
+        let factor = if place == THIRD || place == THIRD + 1 { -third } else { -1.0 };
+        let pairs = terms.exact[k].iter().zip(q);
+        let column = columns[place].iter_mut().zip(pairs);
+        if own {
+            column.for_each(|(c, (e, q))| *c = factor * q * e);
+        } else {
+            column.for_each(|(c, (e, q))| *c += factor * q * e);
+        }
+    }
+    if !first {
+        let pairs = terms.exact[2].iter().zip(q);
+        columns[LN_RATIO].iter_mut().zip(pairs).for_each(|(c, (e, q))| *c = q * e);
+    }
+}
+
 fn dot(a: &[f32], b: &[f32]) -> f64 {
     let mut sums = [0.0f32; LANES];
     for (p, q) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
@@ -309,23 +379,37 @@ struct Geometry {
 }
 
 impl Geometry {
-    fn of(centre: [f64; 2], n: [[f64; 2]; 2], third: [f64; 2], blur: f64) -> Self {
+    fn of(contour: &Contour) -> Self {
+        let n = contour.to_unit;
         let determinant = n[0][0] * n[1][1] - n[0][1] * n[1][0];
         Self {
-            centre: centre.map(|v| v as f32),
+            centre: contour.centre.map(|v| v as f32),
             to_unit: [n[0][0], n[0][1], n[1][0], n[1][1]].map(|v| v as f32),
-            third: third.map(|v| v as f32),
-            blur: blur as f32,
+            third: contour.third.map(|v| v as f32),
+            blur: contour.blur as f32,
             determinant2: (determinant * determinant) as f32,
         }
     }
 }
 
 impl EdgeTerms {
+    fn correct(&mut self, contour: &Contour, x: &[f32], y: &[f32], nodes: &mut Nodes) {
+        self.missing.fill(0.0);
+        self.exact.clear();
+        if !contour.is_strongly_curved() {
+            return;
+        }
+        self.evaluate(&Geometry::of(contour), x, y);
+        self.exact.resize_with(MOMENTS, || vec![0.0; x.len()]);
+        contour.coverage(x, y, nodes, &mut self.missing, &mut self.exact);
+        self.missing.iter_mut().zip(&self.coverage).for_each(|(m, c)| *m -= c);
+    }
+
     fn evaluate(&mut self, geometry: &Geometry, x: &[f32], y: &[f32]) {
         let n = x.len();
         let y = &y[..n];
-        let Self { coverage, density, scale, rho, cos, sin, normal_x, normal_y, widen } = self;
+        let Self { coverage, density, scale, rho, cos, sin, normal_x, normal_y, widen, missing, exact } = self;
+        let (missing, is_exact) = (&missing[..n], !exact.is_empty());
         let (coverage, density, scale) = (&mut coverage[..n], &mut density[..n], &mut scale[..n]);
         let (rho, cos, sin) = (&mut rho[..n], &mut cos[..n], &mut sin[..n]);
         let (normal_x, normal_y, widen) = (&mut normal_x[..n], &mut normal_y[..n], &mut widen[..n]);
@@ -344,14 +428,20 @@ impl EdgeTerms {
             let g = 1.0 / (gx * gx + gy * gy).sqrt();
             let (c2, s2) = (c * c - s * s, 2.0 * c * s);
             let h = a3 * (c * c2 - s * s2) + b3 * (s * c2 + c * s2);
-            let d = (r - 1.0 - h) * g;
-            // curvature of the contour at the foot of the pixel
-            let kappa = (geometry.determinant2 * g * g * g).min(inverse_blur);
-            let lift = kappa * half_s2;
+            let first = (r - 1.0 - h) * g;
+            let g3 = g * g * g;
+            let (tx, ty) = (n10 * c - n00 * s, n11 * c - n01 * s);
+            let across = gx * tx + gy * ty;
+            let bend = 0.5 * g3 * across * across * inverse;
+            let d = first * (1.0 + (bend * first).clamp(-0.5, 0.5));
+            // curvature of the contour at the foot of the pixel, and ln(1 + x) / x in Pade's form
+            let kappa = (geometry.determinant2 * g3).min(inverse_blur);
+            let bow = (kappa * d).max(-0.7);
+            let lift = kappa * half_s2 * (6.0 + bow) / (6.0 + 4.0 * bow);
             let u = ((d + lift) * inverse_blur).clamp(-8.0, 8.0);
             let (tail, phi) = normal_tail(u);
-            coverage[i] = tail;
-            density[i] = phi * inverse_blur;
+            coverage[i] = tail + missing[i];
+            density[i] = if is_exact { 1.0 } else { phi * inverse_blur };
             scale[i] = g;
             rho[i] = r;
             cos[i] = c;
@@ -378,7 +468,7 @@ fn normal_tail(u: f32) -> (f32, f32) {
 
 /// `exp(x)` for -80 < x <= 0 by splitting off the power of two; relative error 3e-7 + 1.2e-7 |x|.
 #[inline(always)]
-fn exp_negative(x: f32) -> f32 {
+pub(super) fn exp_negative(x: f32) -> f32 {
     const ROUND: f32 = 12_582_912.0; // 1.5 * 2^23: adding it rounds to an integer in the low bits
     let z = x * std::f32::consts::LOG2_E;
     let shifted = z + ROUND;
@@ -420,8 +510,8 @@ mod tests {
         }
     }
 
-    /// The Jacobian leaves out how the curvature term and the normalisation of the distance change with the shape,
-    /// which is second order in distance over radius; the columns of the centre and levels are nearly exact.
+    /// Columns of a strongly curved contour are exact but for the shift by the gradient of the light and, by twice its
+    /// size (1.2 %), the third harmonic.
     #[test]
     fn the_jacobian_agrees_with_differences() {
         for annulus in [false, true] {
@@ -430,6 +520,7 @@ mod tests {
             (-12..=12).for_each(|y| (-14..=14).for_each(|x| pixels.push(x as f32, y as f32, 100.0)));
             pixels.finish();
             let noise = [1.0, 1.0];
+            pixels.correct(&state);
             pixels.evaluate(&state, noise);
             let columns = pixels.columns.clone();
             for p in 0..state.parameters() {
@@ -439,6 +530,7 @@ mod tests {
                     delta[p] = sign * h;
                     let mut moved = state;
                     moved.step(&delta);
+                    pixels.correct(&moved);
                     pixels.evaluate(&moved, noise);
                     pixels.residual.clone()
                 };
@@ -448,14 +540,7 @@ mod tests {
                     .map(|i| (f64::from(minus[i] - plus[i]) / (2.0 * h) - f64::from(columns[p][i])).powi(2))
                     .sum::<f64>()
                     .sqrt();
-                let shape = (SHAPE..LN_BLUR).contains(&p) || p == LN_RATIO;
-                let tolerance = if shape {
-                    0.25
-                } else if p >= INNER {
-                    0.12
-                } else {
-                    0.08
-                };
+                let tolerance = if (WHITE..INNER).contains(&p) { 0.08 } else { 0.03 };
                 assert!(off < tolerance * norm, "parameter {p} annulus {annulus}: {off} of {norm}");
             }
         }

@@ -76,58 +76,11 @@ impl LocalMap {
     pub fn shorter_step(&self) -> f64 {
         (0..2).map(|k| self.slope[0][k].hypot(self.slope[1][k])).fold(f64::MAX, f64::min)
     }
-
-    /// How far the area centroid of the image of a circle moves per squared radius (in units of the pitch).
-    ///
-    /// To second order the mean of the map over a disc, weighted with the area that it becomes in the image, is
-    /// `origin + r^2/4 (trace(G)/2 + F h)`: G the second derivatives, F the first, `h = grad ln |det F|`.
-    pub fn centroid_shift(&self) -> [f64; 2] {
-        let f = self.slope;
-        let det = f[0][0] * f[1][1] - f[0][1] * f[1][0];
-        let inverse = [[f[1][1] / det, -f[0][1] / det], [-f[1][0] / det, f[0][0] / det]];
-        // h_k = trace(F^-1 dF/dx_k)
-        let change = |k: usize| [0, 1].map(|a| [self.bend[a][k], self.bend[a][k + 1]]);
-        let h = [0, 1].map(|k| {
-            let g = change(k);
-            inverse[0][0] * g[0][0] + inverse[0][1] * g[1][0] + inverse[1][0] * g[0][1] + inverse[1][1] * g[1][1]
-        });
-        [0, 1].map(|a| 0.25 * (0.5 * (self.bend[a][0] + self.bend[a][2]) + f[a][0] * h[0] + f[a][1] * h[1]))
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_shift_of_the_centroid_is_that_of_a_strongly_perspective_disc() {
-        // projective map with 10 % change of scale per pitch
-        let map = |[x, y]: [f64; 2]| {
-            let w = 1.0 + 0.1 * x - 0.04 * y;
-            [(50.0 * x + 3.0 * y) / w, (30.0 * y - 2.0 * x) / w]
-        };
-        let grid = |d: f64| (-2..=2).flat_map(move |i| (-2..=2).map(move |j| [f64::from(i) * d, f64::from(j) * d]));
-        let pairs: Vec<_> = grid(0.1).map(|p| (p, map(p))).collect();
-        // normal equations of a narrow stencil are judged at unit scale
-        let scaled: Vec<_> = pairs.iter().map(|(p, q)| (p.map(|v| v * 10.0), *q)).collect();
-        let shift = LocalMap::fit(&scaled).unwrap().centroid_shift().map(|v| v * 100.0);
-        let radius = 0.3;
-        let ring: Vec<[f64; 2]> = (0..720)
-            .map(|k| (f64::from(k) * 0.5f64.to_radians()).sin_cos())
-            .map(|(s, c)| map([radius * c, radius * s]))
-            .collect();
-        let (mut area, mut sum) = (0.0, [0.0; 2]);
-        for (p, q) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-            let cross = p[0] * q[1] - q[0] * p[1];
-            area += cross / 2.0;
-            (0..2).for_each(|a| sum[a] += (p[a] + q[a]) * cross / 6.0);
-        }
-        for a in 0..2 {
-            let predicted = shift[a] * radius * radius;
-            let truth = sum[a] / area;
-            assert!((predicted - truth).abs() < 0.02 * truth.abs() + 2e-3, "{predicted} {truth}");
-        }
-    }
 
     #[test]
     fn collinear_pairs_determine_nothing() {

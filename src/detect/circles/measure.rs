@@ -3,6 +3,7 @@
 use super::candidate::{Candidate, Profile, candidates, largest_marker};
 use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
+use super::lattice::Buckets;
 use super::levels::Levels;
 use super::refine::{Fit, Start, refine};
 use super::types::{Dropped, Found, Measured, Options, Reason};
@@ -17,7 +18,14 @@ pub(super) struct Camera {
     pub blur_px: f64,
     /// Variance of a pixel on paper and on ink, counts^2.
     pub noise: [f64; 2],
+    /// Typical gradient of the ink beyond its share of the paper's, as a part of the contrast, 1/px.
+    pub ink_slope: f64,
 }
+
+/// Typical gradient of the ink where nothing is known yet.
+const INK_SLOPE: f64 = 1e-3;
+/// The least that is assumed: a reflection over a few markers must not go unseen.
+const LEAST_INK_SLOPE: f64 = 1e-4;
 
 /// A marker to be measured.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +50,7 @@ impl Target {
             shape_sigma: self.shape_sigma,
             clear: self.clear,
             noise: camera.noise,
+            ink_slope: camera.ink_slope,
         }
     }
 }
@@ -52,8 +61,9 @@ const LEARNERS: usize = 40;
 /// Learns blur and noise from some of the targets.
 pub(super) fn learn(picture: &Picture, targets: &[Target], guess_blur: f64, noise: f32, pixels: &mut Pixels) -> Camera {
     let variance = f64::from(noise).powi(2);
-    let mut camera = Camera { blur_px: guess_blur, noise: [variance; 2] };
+    let mut camera = Camera { blur_px: guess_blur, noise: [variance; 2], ink_slope: INK_SLOPE };
     for _ in 0..2 {
+        camera.ink_slope = INK_SLOPE;
         let stride = targets.len().div_ceil(LEARNERS).max(1);
         let fits: Vec<Fit> = targets
             .iter()
@@ -65,7 +75,8 @@ pub(super) fn learn(picture: &Picture, targets: &[Target], guess_blur: f64, nois
         }
         let blur = median(fits.iter().map(|f| f.measured.blur_px).collect());
         let settled = (blur / camera.blur_px).ln().abs() < 0.15;
-        camera = Camera { blur_px: blur, noise: [0, 1].map(|side| plain_variance(&fits, side).unwrap_or(variance)) };
+        let noise = [0, 1].map(|side| plain_variance(&fits, side).unwrap_or(variance));
+        camera = Camera { blur_px: blur, noise, ink_slope: ink_slope(&fits) };
         if settled {
             break;
         }
@@ -73,12 +84,27 @@ pub(super) fn learn(picture: &Picture, targets: &[Target], guess_blur: f64, nois
     camera
 }
 
+/// Spread of the ink's own gradient over the markers, less what their noise makes of it.
+///
+/// With a prior of variance `p` and a posterior variance `v` an estimate is the true value times `k = 1 - v / p`, with
+/// noise of variance `k v`: its mean square is `k^2 spread^2 + k v`.
+fn ink_slope(fits: &[Fit]) -> f64 {
+    let prior = INK_SLOPE * INK_SLOPE;
+    let (mut excess, mut weight) = (0.0, 0.0);
+    for (slope, variance) in fits.iter().flat_map(|f| (0..2).map(|a| (f.ink_slope.0[a], f.ink_slope.1[a]))) {
+        let share = (1.0 - variance / prior).clamp(0.0, 1.0);
+        excess += slope * slope - share * variance;
+        weight += share * share;
+    }
+    if weight <= 0.0 { LEAST_INK_SLOPE } else { (excess / weight).max(0.0).sqrt().clamp(LEAST_INK_SLOPE, 5e-3) }
+}
+
 /// Median over markers of the mean square residual on one side of the edge.
 fn plain_variance(fits: &[Fit], side: usize) -> Option<f64> {
     let values: Vec<f64> =
         fits.iter().map(|f| f.plain[side]).filter(|(_, n)| *n >= 12.0).map(|(sum, n)| sum / n).collect();
-    // the levels and gradients of a side take about two degrees of freedom from some tens of pixels: 4 %
-    (!values.is_empty()).then(|| (1.04 * median(values)).max(1.0 / 12.0))
+    // the levels and gradients of a side take about two degrees of freedom from some hundred pixels: 2 %
+    (!values.is_empty()).then(|| (1.02 * median(values)).max(1.0 / 12.0))
 }
 
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
@@ -96,7 +122,9 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<Dropped>) {
     let levels = Levels::of(picture, largest_marker(picture, options), THRESHOLD);
     let (candidates, mut dropped) = candidates(picture, &levels, options);
-    let targets: Vec<Target> = candidates.iter().map(|c| target_of(c, None, 1.75)).collect();
+    let index = Buckets::of(&candidates);
+    let clear = |i: usize| clear_of(i, &candidates, &index);
+    let targets: Vec<Target> = candidates.iter().enumerate().map(|(i, c)| target_of(c, None, clear(i))).collect();
     let mut pixels = Pixels::default();
     let guess = median(candidates.iter().map(|c| c.blur_px).collect());
     let camera = learn(picture, &targets, guess, levels.noise, &mut pixels);
@@ -108,6 +136,21 @@ pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<Drop
         }
     }
     (measured, dropped)
+}
+
+/// Relative radius around a candidate out to which there is no other, with room for the blur of its edge.
+fn clear_of(i: usize, candidates: &[Candidate], index: &Buckets) -> f64 {
+    const FARTHEST: f64 = 3.0;
+    let own = &candidates[i];
+    let mut clear = FARTHEST;
+    index.within(own.ellipse.centre, 2.0 * FARTHEST * own.ellipse.semi_axes()[0], |j| {
+        if j != i {
+            let other = &candidates[j].ellipse;
+            let size = other.mean_radius() / own.ellipse.mean_radius();
+            clear = clear.min(own.ellipse.relative_radius(other.centre) - size);
+        }
+    });
+    (clear - 2.1 * own.blur_px / own.ellipse.semi_axes()[1]).max(1.2)
 }
 
 /// The target that a candidate makes; `ratio` is that of the plate's marker where it is known.
@@ -154,7 +197,7 @@ pub fn refine_predicted(
     noise: [f64; 2],
 ) -> (Vec<Found>, Vec<Dropped>) {
     let mut pixels = Pixels::default();
-    let camera = Camera { blur_px, noise: noise.map(|n| n * n) };
+    let camera = Camera { blur_px, noise: noise.map(|n| n * n), ink_slope: INK_SLOPE };
     let (mut found, mut dropped) = (Vec::new(), Vec::new());
     for p in predicted {
         let target = predicted_target(picture, p);

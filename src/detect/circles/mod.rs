@@ -8,11 +8,14 @@
 //!
 //! Every stage is a pure function of the picture; none knows a camera or a robot.
 
+mod agreement;
 mod candidate;
 mod code;
 mod contour;
 mod edge_model;
 mod ellipse;
+mod exact_edge;
+mod flat_zone;
 mod grid;
 mod lattice;
 mod levels;

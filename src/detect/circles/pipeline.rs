@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::agreement::{Inner, Seen, agreement};
 use super::candidate::{Candidate, candidates, largest_marker};
 use super::code::{Code, Verdict};
 use super::edge_model::Pixels;
@@ -192,7 +193,7 @@ impl Work<'_> {
     /// Relative radius out to which the neighbours leave paper, for a marker with this minor semi-axis.
     fn clear(&self, cell: (i32, i32), minor_px: f64, blur_px: f64) -> f64 {
         let own = self.marker(cell).map_or(0.3, |m| m.outer_radius_m / self.plate.pitch_m);
-        (1.0 - self.code.radii()[1]) / own - 1.8 * blur_px / minor_px
+        (1.0 - self.code.radii()[1]) / own - 2.1 * blur_px / minor_px
     }
 
     fn target(&self, cell: (i32, i32), placed: &Placed, blur_px: f64) -> Target {
@@ -269,19 +270,13 @@ impl Work<'_> {
         if off > 0.4 || size > 0.12 { Err(Reason::OutOfPlace) } else { Ok(*fit) }
     }
 
-    /// Inner and outer centre of an annulus must agree up to what perspective and distortion make of circles of
-    /// different size, which the neighbours tell.
+    /// Drops annuli whose inner and outer centre do not agree.
     fn agree(&self, entries: &mut Vec<Entry>, dropped: &mut Vec<Dropped>) -> Option<InnerOuter> {
-        let centres: BTreeMap<(i32, i32), [f64; 2]> =
-            entries.iter().map(|e| (e.cell, e.fit.measured.outer.ellipse.centre)).collect();
-        let differences: Vec<Option<Difference>> = entries.iter().map(|e| self.difference(e, &centres)).collect();
-        let mean = |a: usize| median(differences.iter().flatten().map(|d| d.value[a]).collect());
-        let common = if differences.iter().flatten().count() >= 5 { [mean(0), mean(1)] } else { [0.0; 2] };
-        let good: Vec<bool> = differences
-            .iter()
-            .map(|d| d.is_none_or(|d| (0..2).all(|a| (d.value[a] - common[a]).abs() < 5.0 * d.sigma[a] + d.slack)))
-            .collect();
-        let summary = summary(&differences, &good);
+        let seen: Vec<Seen> = entries.iter().filter_map(|e| self.seen(e)).collect();
+        if seen.len() != entries.len() {
+            return None;
+        }
+        let (good, summary) = agreement(&seen);
         let mut keep = good.iter();
         entries.retain(|e| {
             let ok = keep.next().copied().unwrap_or(true);
@@ -300,29 +295,16 @@ impl Work<'_> {
         summary
     }
 
-    fn difference(&self, entry: &Entry, centres: &BTreeMap<(i32, i32), [f64; 2]>) -> Option<Difference> {
-        let measured = &entry.fit.measured;
-        let inner = measured.inner?;
+    fn seen(&self, entry: &Entry) -> Option<Seen> {
         let marker = self.marker(entry.cell)?;
-        let pairs: Vec<([f64; 2], [f64; 2])> = (-2..=2)
-            .flat_map(|j| (-2..=2).map(move |i| (i, j)))
-            .filter_map(|(i, j)| {
-                let c = centres.get(&(entry.cell.0 + i, entry.cell.1 + j))?;
-                Some(([f64::from(i), f64::from(j)], *c))
-            })
-            .collect();
-        let map = LocalMap::fit(&pairs)?;
-        let pitch = self.plate.pitch_m;
-        let squares = (marker.outer_radius_m / pitch).powi(2) - (marker.inner_radius_m / pitch).powi(2);
-        let expected = map.centroid_shift().map(|v| -v * squares);
-        let (ci, co) = (inner.ellipse.centre, measured.outer.ellipse.centre);
-        let (vi, vo) = (inner.covariance, measured.outer.covariance);
-        let sigma = |a: usize| (vi[2 * a] + vo[2 * a] - 2.0 * entry.fit.cross[a]).max(1e-10).sqrt();
-        // the expectation is good to a tenth; a one-sided neighbourhood to a third
-        let part = if pairs.len() >= 20 { 0.1 } else { 0.35 };
-        let slack = 0.02 + part * expected[0].hypot(expected[1]);
-        let value = [0, 1].map(|a| ci[a] - co[a] - expected[a]);
-        Some(Difference { value, sigma: [sigma(0), sigma(1)], slack })
+        let (measured, cross) = (&entry.fit.measured, entry.fit.cross);
+        let inner = measured.inner.map(|i| {
+            let (vi, vo) = (i.covariance, measured.outer.covariance);
+            let sigma = [0, 1].map(|a| (vi[2 * a] + vo[2 * a] - 2.0 * cross[a]).max(1e-10).sqrt());
+            Inner { radius: marker.inner_radius_m / self.plate.pitch_m, centre: i.ellipse.centre, sigma }
+        });
+        let outer_radius = marker.outer_radius_m / self.plate.pitch_m;
+        Some(Seen { cell: entry.cell, outer_radius, outer: measured.outer.ellipse.centre, inner })
     }
 
     fn detection(&self, board: &Board, harvest: Harvest, outcome: Outcome, dropped: Vec<Dropped>) -> Detection {
@@ -357,27 +339,4 @@ pub(super) fn observations_of(found: &Found) -> Vec<Observation> {
     };
     let inner = found.measured.inner.as_ref().filter(|i| i.edge == Edge::Inner);
     std::iter::once(&found.measured.outer).chain(inner).map(one).collect()
-}
-
-/// Unexplained difference inner - outer centre of an annulus.
-#[derive(Debug, Clone, Copy)]
-struct Difference {
-    value: [f64; 2],
-    sigma: [f64; 2],
-    slack: f64,
-}
-
-fn summary(differences: &[Option<Difference>], good: &[bool]) -> Option<InnerOuter> {
-    let used: Vec<&Difference> =
-        differences.iter().zip(good).filter(|(_, g)| **g).filter_map(|(d, _)| d.as_ref()).collect();
-    if used.len() < 3 {
-        return None;
-    }
-    let weight = |a: usize| used.iter().map(|d| d.sigma[a].powi(-2)).sum::<f64>();
-    let mean = |a: usize| used.iter().map(|d| d.value[a] * d.sigma[a].powi(-2)).sum::<f64>() / weight(a);
-    Some(InnerOuter {
-        mean_px: [mean(0), mean(1)],
-        sigma_px: [weight(0).sqrt().recip(), weight(1).sqrt().recip()],
-        count: used.len(),
-    })
 }

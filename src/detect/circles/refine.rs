@@ -1,7 +1,8 @@
 //! Sub-pixel measurement of one marker: least squares of the blurred-edge model on a thin band of pixels.
 
-use super::edge_model::{ANNULUS, DARK, DISC, INNER, LN_BLUR, LN_RATIO, Pixels, SHAPE, State, THIRD, WHITE};
+use super::edge_model::{ANNULUS, CENTRE, DARK, DISC, INNER, LN_BLUR, LN_RATIO, Pixels, SHAPE, State, THIRD, WHITE};
 use super::ellipse::Ellipse;
+use super::flat_zone::{Flat, Zone};
 use super::types::{Imaged, Measured, Reason};
 use crate::detect::Picture;
 use crate::series::Edge;
@@ -23,6 +24,8 @@ pub(super) struct Start {
     pub clear: f64,
     /// Variance of a pixel on paper and on ink, counts^2.
     pub noise: [f64; 2],
+    /// Prior sigma of the ink's own gradient as a share of the contrast, 1/px.
+    pub ink_slope: f64,
 }
 
 /// A fit with what the caller needs to go on.
@@ -31,10 +34,16 @@ pub(super) struct Fit {
     pub measured: Measured,
     /// Cross-covariance of outer and inner centre per axis, px^2.
     pub cross: [f64; 2],
+    /// The ink's own gradient as a share of the contrast, 1/px, and its variance.
+    pub ink_slope: ([f64; 2], [f64; 2]),
     /// Mean square of the residuals on paper and on ink, away from the edge, with their pixel counts.
     pub plain: [(f64, f64); 2],
 }
 
+/// Half width of the band around an edge in units of the blur (and half a pixel on top).
+const REACH: f64 = 3.1;
+/// Width of the even zone beyond the band in units of the blur.
+const EVEN: f64 = 5.0;
 const ITERATIONS: usize = 14;
 /// A pixel at this part of the range or above counts as saturated.
 const SATURATED: f32 = 0.995;
@@ -73,6 +82,8 @@ fn initial(start: &Start, anchor: [f64; 2]) -> State {
 /// Weights of what is known beforehand, and the parameters accumulated since the start.
 struct Prior {
     weight: [f64; ANNULUS],
+    /// Weight of the distance between the centres of inner and outer circle, which only perspective separates.
+    concentric: f64,
 }
 
 impl Prior {
@@ -86,12 +97,35 @@ impl Prior {
         weight[THIRD..THIRD + 2].fill(inverse(third.max(1e-4)));
         weight[LN_BLUR] = inverse(start.blur_sigma);
         // a black offset changes the ink's share of the gradient by a part of it
-        weight[DARK + 1..DARK + 3].fill(inverse(1e-3 * contrast));
-        weight[LN_RATIO] = inverse(0.1);
+        weight[DARK + 1..DARK + 3].fill(inverse(start.ink_slope * contrast));
+        weight[LN_RATIO] = inverse(0.05);
         if let Some(sigma) = start.shape_sigma {
             weight[SHAPE..SHAPE + 3].fill(inverse(sigma));
         }
-        Self { weight }
+        let apart = 0.02 + 0.012 * start.ellipse.semi_axes()[0];
+        let concentric = if start.ratio.is_some() { inverse(apart) } else { 0.0 };
+        Self { weight, concentric }
+    }
+}
+
+impl Prior {
+    fn add_normal(&self, normal: &mut Normal) {
+        (0..ANNULUS).for_each(|i| normal[i][i] += self.weight[i]);
+        for a in 0..2 {
+            normal[CENTRE + a][CENTRE + a] += self.concentric;
+            normal[INNER + a][INNER + a] += self.concentric;
+            normal[INNER + a][CENTRE + a] -= self.concentric;
+        }
+    }
+
+    fn add_gradient(&self, travelled: &[f64; ANNULUS], gradient: &mut [f64; ANNULUS]) {
+        (0..ANNULUS).for_each(|i| gradient[i] -= self.weight[i] * travelled[i]);
+        for a in 0..2 {
+            // both start at the same centre
+            let apart = self.concentric * (travelled[INNER + a] - travelled[CENTRE + a]);
+            gradient[INNER + a] -= apart;
+            gradient[CENTRE + a] += apart;
+        }
     }
 }
 
@@ -105,19 +139,28 @@ fn iterate(state: &mut State, prior: &Prior, start: &Start, pixels: &mut Pixels)
     let mut fresh = 0usize;
     let mut last = f64::MAX;
     let size = start.ellipse.semi_axes()[0];
+    let mut corrected = f64::MAX;
     for iteration in 0..ITERATIONS {
+        // What the closed form misses moves with the contour: taken near the end and at the end, or always for contours
+        // hardly larger than the blur.
+        if last < 0.1 && (corrected > 0.01 || state.is_badly_resolved()) {
+            pixels.correct(state);
+            corrected = last;
+        }
         pixels.evaluate(state, start.noise);
         // A new normal matrix at the start, whenever the steps do not shrink well, and once near the end.
         let renew = iteration == 0 || last > 0.02 || (fresh < 2 && last < 0.02);
         if renew {
             pixels.normal(parameters, &mut factor);
-            (0..parameters).for_each(|i| factor[i][i] += prior.weight[i]);
+            pixels.flat.add_normal(state, start.noise, &mut factor);
+            prior.add_normal(&mut factor);
             cholesky(&mut factor, parameters).ok_or(Reason::NoConvergence)?;
             fresh = if last < 0.02 { 2 } else { 1 };
         }
         let mut delta = [0.0; ANNULUS];
         pixels.gradient(parameters, &mut delta);
-        (0..parameters).for_each(|i| delta[i] -= prior.weight[i] * travelled[i]);
+        pixels.flat.add_gradient(state, start.noise, &mut delta);
+        prior.add_gradient(&travelled, &mut delta);
         solve(&factor, parameters, &mut delta);
         let damp = limit(&delta, size, start);
         delta.iter_mut().for_each(|d| *d *= damp);
@@ -127,7 +170,7 @@ fn iterate(state: &mut State, prior: &Prior, start: &Start, pixels: &mut Pixels)
         if !last.is_finite() || out_of_bounds(state, &travelled, size) {
             return Err(Reason::NoConvergence);
         }
-        if last < 2e-4 && fresh == 2 {
+        if last < 2e-4 && fresh == 2 && corrected < 0.02 {
             return Ok(factor);
         }
     }
@@ -175,14 +218,16 @@ fn finish(
         square(i) / (start.noise[0] + (start.noise[1] - start.noise[0]) * d)
     };
     let rms = ((0..n).map(square).sum::<f64>() / n as f64).sqrt();
-    let freedom = (n - parameters) as f64;
-    let scale = (0..n).map(weighted).sum::<f64>() / freedom;
+    let even = pixels.flat.squares(state);
+    let freedom = (n - parameters) as f64 + pixels.flat.paper.count + pixels.flat.ink.count;
+    let even_weighted = even[0] / start.noise[0] + even[1] / start.noise[1];
+    let scale = ((0..n).map(weighted).sum::<f64>() + even_weighted) / freedom;
     let contrast = state.white[0] - state.dark[0];
     let expected = start.noise[0].max(start.noise[1]);
     if contrast <= 0.0 || rms * rms > 6.0 * expected + (0.03 * contrast).powi(2) {
         return Err(Reason::EdgeModel);
     }
-    let mut plain = [(0.0, 0.0); 2];
+    let mut plain = [(even[0], pixels.flat.paper.count), (even[1], pixels.flat.ink.count)];
     for i in 0..n {
         let side = if pixels.ink[i] < 0.02 { 0 } else { usize::from(pixels.ink[i] > 0.98) };
         if side == 1 || pixels.ink[i] < 0.02 {
@@ -205,7 +250,18 @@ fn finish(
         gradient: [state.white[1] / state.white[0], state.white[2] / state.white[0]],
         visible,
     };
-    Ok(Fit { measured, cross: covariance.cross(), plain })
+    let ink_slope = ink_slope(state, factor, contrast);
+    Ok(Fit { measured, cross: covariance.cross(), plain, ink_slope })
+}
+
+fn ink_slope(state: &State, factor: &Normal, contrast: f64) -> ([f64; 2], [f64; 2]) {
+    let variance = |k: usize| {
+        let mut unit = [0.0; ANNULUS];
+        unit[DARK + k] = 1.0;
+        solve(factor, state.parameters(), &mut unit);
+        unit[DARK + k] / (contrast * contrast)
+    };
+    ([state.dark[1] / contrast, state.dark[2] / contrast], [variance(1), variance(2)])
 }
 
 /// Covariance of the two centres.
@@ -238,28 +294,36 @@ impl Covariance {
     }
 }
 
-/// Collects the pixels of the band; returns how many there would be in an unlimited picture, and how many of the
+/// Where a marker is even within: ink between two ellipses, and the hole of an annulus.
+struct Zones {
+    all: [Option<Ellipse>; 3],
+}
+
+impl Zones {
+    fn of(start: &Start, reach: f64, even: f64) -> Self {
+        let ink = start.ellipse.offset(-reach);
+        let Some(ratio) = start.ratio else { return Self { all: [ink, start.ellipse.offset(-reach - even), None] } };
+        let inner = Ellipse { shape: start.ellipse.shape.map(|v| v / (ratio * ratio)), ..start.ellipse };
+        let core = inner.offset(reach);
+        let apart = ink.zip(core).is_some_and(|(i, c)| i.semi_axes()[1] > c.semi_axes()[1]);
+        let hole = inner.offset(-reach);
+        if apart { Self { all: [ink, core, hole] } } else { Self { all: [None, None, hole] } }
+    }
+}
+
+/// Collects the pixels of the band, and of the even zones beside it; returns how many there would be in an unlimited picture, and how many of the
 /// missing ones are saturated.
 fn gather(picture: &Picture, start: &Start, anchor: [f64; 2], pixels: &mut Pixels) -> (usize, usize) {
     pixels.clear();
-    let reach = 2.6 * start.blur_px + 0.8;
+    pixels.flat = Flat { paper: Zone::around(start.paper), ink: Zone::around(start.ink) };
+    let reach = REACH * start.blur_px + 0.5;
     let minor = start.ellipse.semi_axes()[1];
     let outside = reach.min((start.clear - 1.0) * minor).max(0.9);
+    let even = EVEN * start.blur_px;
+    let far = (outside + even).min((start.clear - 1.0) * minor - 0.8 * start.blur_px).max(outside);
     let (mut wanted, mut saturated) = (0, 0);
-    let outer = start.ellipse.offset(outside);
-    let [inside, core, core_inside] = match start.ratio {
-        None => [start.ellipse.offset(-reach), None, None],
-        Some(ratio) => {
-            let inner = Ellipse { shape: start.ellipse.shape.map(|v| v / (ratio * ratio)), ..start.ellipse };
-            let gap = start.ellipse.offset(-reach);
-            let core = inner.offset(reach);
-            let apart = match (&gap, &core) {
-                (Some(g), Some(c)) => g.semi_axes()[1] > c.semi_axes()[1],
-                _ => false,
-            };
-            if apart { [gap, core, inner.offset(-reach)] } else { [inner.offset(-reach), None, None] }
-        }
-    };
+    let (band, outer) = (start.ellipse.offset(outside), start.ellipse.offset(far));
+    let zones = Zones::of(start, reach, even);
     let Some(outer) = outer else { return (0, 0) };
     let half = outer.half_extent();
     let limit = SATURATED * picture.full_scale;
@@ -267,25 +331,33 @@ fn gather(picture: &Picture, start: &Start, anchor: [f64; 2], pixels: &mut Pixel
     let rows = (centre[1] - half[1]).ceil() as i64..=(centre[1] + half[1]).floor() as i64;
     for y in rows {
         let Some((first, last)) = outer.chord(y as f64) else { continue };
-        let hole = inside.as_ref().and_then(|e| e.chord(y as f64));
-        let plug = core.as_ref().and_then(|e| e.chord(y as f64));
-        let void = core_inside.as_ref().and_then(|e| e.chord(y as f64));
+        let near = band.as_ref().and_then(|e| e.chord(y as f64));
+        let [ink_outer, ink_inner, hole] = zones.all.map(|z| z.and_then(|e| e.chord(y as f64)));
         let within = |x: f64, span: Option<(f64, f64)>| span.is_some_and(|(a, b)| x >= a && x <= b);
         for x in first.ceil() as i64..=last.floor() as i64 {
             let xf = x as f64;
-            if within(xf, hole) && (!within(xf, plug) || within(xf, void)) {
+            let light = !within(xf, near) || within(xf, hole);
+            let ink = within(xf, ink_outer) && !within(xf, ink_inner);
+            let even = light || ink;
+            if start.ratio.is_none() && within(xf, ink_inner) {
                 continue;
             }
-            wanted += 1;
+            wanted += usize::from(!even);
             if x < 0 || y < 0 || x as usize >= picture.width || y as usize >= picture.height {
                 continue;
             }
             let value = picture.at(x as usize, y as usize);
             if value >= limit {
-                saturated += 1;
+                saturated += usize::from(!even);
                 continue;
             }
-            pixels.push((xf - anchor[0]) as f32, (y as f64 - anchor[1]) as f32, value);
+            let (dx, dy) = (xf - anchor[0], y as f64 - anchor[1]);
+            if even {
+                let zone = if light { &mut pixels.flat.paper } else { &mut pixels.flat.ink };
+                zone.push(dx, dy, value);
+            } else {
+                pixels.push(dx as f32, dy as f32, value);
+            }
         }
     }
     pixels.finish();

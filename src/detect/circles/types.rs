@@ -263,13 +263,17 @@ pub struct InnerOuter {
     pub mean_px: [f64; 2],
     /// Standard error of the mean per axis, px.
     pub sigma_px: [f64; 2],
+    /// Mean size of the difference that perspective and distortion explain, px.
+    pub explained_px: f64,
     /// Number of annuli.
     pub count: usize,
 }
 
 impl InnerOuter {
-    /// The difference is significant (4 sigma) and larger than 0.005 px: the point spread is asymmetric.
+    /// The difference is significant (4 sigma), larger than 0.005 px, and larger than a twentieth of what geometry explains
+    /// (which is not explained better than that): the point spread is asymmetric.
     pub fn asymmetric(&self) -> bool {
-        (0..2).any(|k| self.mean_px[k].abs() > (4.0 * self.sigma_px[k]).max(0.005))
+        let least = 0.005_f64.max(0.05 * self.explained_px);
+        (0..2).any(|k| self.mean_px[k].abs() > (4.0 * self.sigma_px[k]).max(least))
     }
 }

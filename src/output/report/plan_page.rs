@@ -87,7 +87,8 @@ fn pictures(request: &PlanRequest, plan: &Plan, forecast: &Forecast) -> Markup {
 
 fn gains(forecast: &Forecast) -> Markup {
     html! {
-        h2 { "What each pose brings by itself" }
+        h2 { "What each pose brings" }
+        p class="note" { "On top of the images that were taken already; without any, on top of all other planned ones." }
         div class="wide" { table {
             tr { th { "Image" } th class="n" { "Flange, mm" } th { "Helps most with" } th class="n" { "its sigma before" } th class="n" { "after" } }
             @for g in forecast.gains.iter().take(PARAMETERS) {

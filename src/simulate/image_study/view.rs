@@ -1,0 +1,59 @@
+//! A camera before a plate, looked at from a direction.
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+use std::f64::consts::{PI, TAU};
+
+use crate::geom::{Pose, matrix_from_rpy};
+use crate::model::camera::Camera;
+
+/// From where the plate is seen.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Direction {
+    pub distance_m: f64,
+    /// Angle between the optical axis and the plate's normal.
+    pub tilt_rad: f64,
+    /// Direction in the image of the axis of the tilt.
+    pub azimuth_rad: f64,
+    /// Turn of the plate in its plane.
+    pub roll_rad: f64,
+    /// Point of the plate on the optical axis, m.
+    pub aim_m: [f64; 2],
+}
+
+impl Direction {
+    pub fn camera_from_plate(&self) -> Pose {
+        let about_x = |a: f64| matrix_from_rpy([a, 0.0, 0.0]);
+        let about_z = |a: f64| matrix_from_rpy([0.0, 0.0, a]);
+        let tilt = about_z(self.azimuth_rad) * about_x(self.tilt_rad) * about_z(-self.azimuth_rad);
+        let rotation = tilt * about_x(PI) * about_z(self.roll_rad);
+        let aim = rotation * Vector3::new(self.aim_m[0], self.aim_m[1], 0.0);
+        Pose { rotation, translation: Vector3::new(0.0, 0.0, self.distance_m) - aim }
+    }
+}
+
+/// Image of a circle parallel to the plate, sampled; `None` where the lens does not image all of it.
+pub(super) fn ring(
+    camera: &Camera,
+    camera_from_plate: &Pose,
+    centre: &Vector3<f64>,
+    radius_m: f64,
+    samples: usize,
+) -> Option<Vec<Vector2<f64>>> {
+    let sample = |k: usize| {
+        let (sin, cos) = (k as f64 * TAU / samples as f64).sin_cos();
+        camera.project(&camera_from_plate.transform(&(centre + Vector3::new(cos, sin, 0.0) * radius_m)))
+    };
+    (0..samples).map(sample).collect()
+}
+
+/// Information on the position of a contour, 1/px^2: `(C/n)^2 / (2 sqrt(pi) s)` times the integral of `n n'` along it,
+/// with everything but the position known. For a circle its inverse is the bound `(n/C)^2 2 s / (sqrt(pi) r)` per axis.
+pub(super) fn information(ring: &[Vector2<f64>], blur_px: f64, contrast_to_noise: f64) -> Matrix2<f64> {
+    let mut sum = Matrix2::zeros();
+    for (p, q) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+        let step = q - p;
+        let normal = Vector2::new(step.y, -step.x);
+        sum += normal * normal.transpose() / step.norm().max(1e-12);
+    }
+    sum * (contrast_to_noise.powi(2) / (2.0 * PI.sqrt() * blur_px))
+}
