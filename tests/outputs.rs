@@ -312,8 +312,8 @@ fn solution_json_reads_back_with_everything_in_it() {
     // Text files are the same on every run.
     let second = robotcal::output::files(&solution, &context(&description)).unwrap();
     assert_eq!(files, second);
-    let newer = String::from_utf8(files["solution.json"].clone()).unwrap().replacen("\"format\":1", "\"format\":2", 1);
-    assert!(solution_json::read(newer.as_bytes()).unwrap_err().what.contains("format = 2"));
+    let newer = String::from_utf8(files["solution.json"].clone()).unwrap().replacen("\"format\":2", "\"format\":3", 1);
+    assert!(solution_json::read(newer.as_bytes()).unwrap_err().what.contains("format = 3"));
 }
 
 #[test]

@@ -428,7 +428,7 @@ fn one_thread_and_two_give_the_same_bits() {
         let (problem, state) = problem(&mut dice, &request);
         let run = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let options = Options { joint_noise: JointNoise::Estimated, model: RobotModel::Gear };
+            let options = Options { joint_noise: JointNoise::Estimated, model: RobotModel::Gear, ..Options::default() };
             pool.install(|| identify(state.robot.chain.clone(), &[series(&problem)], &options)).unwrap()
         };
         assert_same_bits(&run(1), &run(2));

@@ -65,6 +65,15 @@ pub fn hold_out(problem: &Problem, state: &State) -> Option<Accuracy> {
     Some(Accuracy { nominal: summary(&nominal), calibrated: summary(&calibrated), per_image_mm, folds: folds.len() })
 }
 
+/// Error of every image on the robot, predicted by fits of the free columns to the images of the other folds; `None` for too few.
+pub fn hold_out_images(problem: &Problem, state: &State) -> Option<Vec<(usize, ImageError)>> {
+    let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
+    if on_robot.len() < 2 {
+        return None;
+    }
+    predictions(problem, state, &folds(problem, &on_robot))
+}
+
 /// Squared errors of one predicted image, summed over its markers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageError {

@@ -1,13 +1,26 @@
 //! What a result is worth: hold-out, identifiability, points of another device.
 
+mod advice;
+mod clustered;
+mod flange;
 mod hold_out;
+mod identifiability;
 mod points;
 mod propagate;
 mod statistics;
+mod stops;
 mod truth;
 
-pub use hold_out::{Accuracy, Errors, ImageError, hold_out, predict_image};
+pub use advice::Advice;
+pub use clustered::clustered_covariance;
+pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
+pub use hold_out::{Accuracy, Errors, ImageError, hold_out, hold_out_images, predict_image};
+pub use identifiability::{
+    Cause, Correlation, Identifiability, Observability, UnknownDirection, frame_parameters, identifiability,
+    identifiability_of_stops,
+};
 pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
 pub use propagate::{PredictedPose, View, predict_pose};
 pub use statistics::{Ratio, bootstrap_ratio, median, root_mean_square};
+pub use stops::{Structural, ideal_stops, minimal_set, structural};
 pub use truth::{camera_errors_m, flange_error_m};

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::choices::Model;
 use super::recording::{Pictures, RecordingArgs};
 use super::{Verdict, identify, progress};
 use crate::error::{Error, Result};
@@ -42,8 +43,8 @@ pub(super) struct CompareArgs {
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
     /// Joint terms beside rigid geometry and offsets
-    #[arg(long, value_enum, default_value_t = identify::Model::Full)]
-    robot_model: identify::Model,
+    #[arg(long, value_enum, default_value_t = Model::Full)]
+    robot_model: Model,
     #[command(flatten)]
     recording: RecordingArgs,
 }

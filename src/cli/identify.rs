@@ -4,11 +4,15 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
+use super::at::AtArgs;
+use super::choices::{ChoiceArgs, in_words};
 use super::recording::{Pictures, RecordingArgs};
+use super::show::read_solution;
 use super::{Verdict, progress, summary};
 use crate::error::{Error, Notice, Result};
-use crate::output::{self, Context, Offsets, Poses};
-use crate::recipe::{self, JointNoise, MeasuredSeries, Options, RobotModel};
+use crate::output::solution_json::{self, FILE_NAME};
+use crate::output::{self, Context, Offsets, Poses, restore};
+use crate::recipe::{self, MeasuredSeries, Options};
 use crate::series::{self, InputFile, Series};
 use crate::urdf::{self, Chain, RobotDescription};
 
@@ -16,11 +20,17 @@ use crate::urdf::{self, Chain, RobotDescription};
 #[derive(Debug, Args)]
 pub(super) struct IdentifyArgs {
     /// Robot description (URDF)
-    #[arg(long, value_name = "FILE")]
-    urdf: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "from")]
+    urdf: Option<PathBuf>,
     /// Series folder or recording (.mcap, rosbag2 folder); give it several times to fit several series of the same robot together
-    #[arg(long, value_name = "FOLDER", required = true)]
+    #[arg(long, value_name = "FOLDER", required_unless_present = "from")]
     series: Vec<PathBuf>,
+    /// Solve again from an earlier solution.json alone, with other options
+    #[arg(long, value_name = "SOLUTION", conflicts_with_all = ["urdf", "series", "dry_run"], requires = "out")]
+    from: Option<PathBuf>,
+    /// Only say what the stops of the series can tell of the robot, and what to add; no image is looked at
+    #[arg(long)]
+    dry_run: bool,
     /// Folder for the results [default: reports/<series name>]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -30,12 +40,6 @@ pub(super) struct IdentifyArgs {
     /// Tip link that carries camera or plate (overrides series.toml)
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
-    /// Joint noise in rad (m for a prismatic joint) instead of the estimate; 0 takes the readings as exact
-    #[arg(long, value_name = "SIGMA")]
-    joint_noise: Option<f64>,
-    /// Joint terms beside rigid geometry and offsets
-    #[arg(long, value_enum, default_value_t = Model::Full)]
-    robot_model: Model,
     /// Lens: auto (by hold-out, says why), brown, fisheye, parallax, rational or thin_prism [default: as in series.toml, else brown]
     #[arg(long, value_name = "LENS")]
     camera: Option<String>,
@@ -46,18 +50,11 @@ pub(super) struct IdentifyArgs {
     #[arg(long)]
     poses: bool,
     #[command(flatten)]
+    choices: ChoiceArgs,
+    #[command(flatten)]
+    at: AtArgs,
+    #[command(flatten)]
     recording: RecordingArgs,
-}
-
-/// Names of the robot models.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Model {
-    /// Link geometry and joint offsets
-    Rigid,
-    /// Also gear scale and two harmonics
-    Gear,
-    /// Also gravity and backlash
-    Full,
 }
 
 /// Names of the ways for joint offsets.
@@ -78,25 +75,55 @@ impl From<OffsetsName> for Offsets {
     }
 }
 
-impl From<Model> for RobotModel {
-    fn from(model: Model) -> Self {
-        match model {
-            Model::Rigid => Self::Rigid,
-            Model::Gear => Self::Gear,
-            Model::Full => Self::Full,
-        }
-    }
+/// What is solved.
+struct Task {
+    description: RobotDescription,
+    chain: Chain,
+    measured: Vec<MeasuredSeries>,
+    notices: Vec<Notice>,
+    inputs: Vec<InputFile>,
 }
 
 pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
-    let options = Options { joint_noise: joint_noise(args.joint_noise)?, model: args.robot_model.into() };
-    let description = urdf::read(&args.urdf)?;
-    let all = read_all(&args.series)?;
-    let chain = chain(&description, &all, args.base.as_deref(), args.tip.as_deref())?;
-    let pictures = Pictures::new();
-    let all = pictures.of_recordings(all, &args.recording.options(&chain.readings)?)?;
-    let mut notices = description.notices.clone();
-    let mut measured = measure_all(&all, &chain, &mut notices)?;
+    let options = args.choices.options()?;
+    let task = match (&args.from, &args.urdf) {
+        (Some(solution), _) => again(args, solution)?,
+        (None, Some(urdf)) => {
+            let description = urdf::read(urdf)?;
+            let all = read_all(&args.series)?;
+            let chain = chain(&description, &all, args.base.as_deref(), args.tip.as_deref())?;
+            let pictures = Pictures::new();
+            let all = pictures.of_recordings(all, &args.recording.options(&chain.readings)?)?;
+            if args.dry_run {
+                print!("{}", summary::of_stops(&recipe::dry_run(chain, &all, &options)?));
+                return Ok(Verdict::Good);
+            }
+            let mut notices = description.notices.clone();
+            let measured = measure_all(&all, &chain, &mut notices)?;
+            Task { inputs: inputs(urdf, &all)?, description, chain, measured, notices }
+        }
+        (None, None) => {
+            return Err(Error::input("identify", "no robot is given", "give --urdf and --series, or --from"));
+        }
+    };
+    solve(args, &options, task)
+}
+
+/// The task of an earlier solution.
+fn again(args: &IdentifyArgs, path: &Path) -> Result<Task> {
+    let record = read_solution(path)?;
+    let description = restore::robot_description(&record)?;
+    let base = args.base.as_deref().unwrap_or(&record.robot.base);
+    let tip = args.tip.as_deref().unwrap_or(&record.robot.tip);
+    let chain = description.chain(Some(base), Some(tip))?;
+    let mut inputs = record.inputs.clone();
+    inputs.push(InputFile::of_file(path)?);
+    let notices = description.notices.clone();
+    Ok(Task { chain, measured: restore::measured_series(&record)?, notices, inputs, description })
+}
+
+fn solve(args: &IdentifyArgs, options: &Options, task: Task) -> Result<Verdict> {
+    let Task { description, chain, mut measured, mut notices, inputs } = task;
     match args.camera.as_deref() {
         None => {}
         Some("auto") => notices.extend(recipe::choose_lens(&chain, &mut measured)?),
@@ -105,53 +132,39 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
             measured.iter_mut().for_each(|s| s.lens = lens);
         }
     }
-    let mut solution = recipe::identify(chain, &measured, &options)?;
+    let mut solution = recipe::identify(chain, &measured, options)?;
     notices.append(&mut solution.notices);
     solution.notices = notices;
-    let names: Vec<String> = all.iter().map(|s| s.name.clone()).collect();
+    let names: Vec<String> = measured.iter().map(|s| s.name.clone()).collect();
     let folder = args.out.clone().unwrap_or_else(|| Path::new("reports").join(names.join("+")));
     let context = Context {
         robot: &description,
         robot_name: &description.name,
         series: names,
-        inputs: inputs(args, &all)?,
-        options: in_words(args),
+        inputs,
+        options: in_words(options),
         command: std::env::args().collect::<Vec<_>>().join(" "),
         offsets: args.offsets.into(),
         poses: if args.poses { Poses::Written } else { Poses::LeftOut },
     };
     let files = output::files(&solution, &context)?;
     output::write_all(&folder, &files)?;
-    print!("{}", summary::text(&solution, &measured));
+    // What is printed is what `show` prints: it comes from the file.
+    let record = files.get(FILE_NAME).map_or(&[][..], Vec::as_slice);
+    let record = solution_json::read(record)?;
+    print!("{}", summary::text(&record));
+    print!("{}", args.at.run(&record, &folder)?);
     println!("results   {} ({} files)", folder.display(), files.len());
     Ok(if solution.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed })
 }
 
-fn inputs(args: &IdentifyArgs, all: &[Series]) -> Result<Vec<InputFile>> {
-    let mut inputs = vec![InputFile::of_file(&args.urdf)?];
+fn inputs(urdf: &Path, all: &[Series]) -> Result<Vec<InputFile>> {
+    let mut inputs = vec![InputFile::of_file(urdf)?];
     for s in all {
         inputs.extend(s.inputs.iter().cloned());
         inputs.extend(s.image_hashes()?);
     }
     Ok(inputs)
-}
-
-fn in_words(args: &IdentifyArgs) -> Vec<(String, String)> {
-    let joint_noise = args.joint_noise.map_or("estimated".to_owned(), |s| format!("{s} rad"));
-    let robot_model = args.robot_model.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned());
-    vec![("joint noise".to_owned(), joint_noise), ("robot model".to_owned(), robot_model)]
-}
-
-fn joint_noise(sigma: Option<f64>) -> Result<JointNoise> {
-    match sigma {
-        None => Ok(JointNoise::Estimated),
-        Some(s) if (0.0..0.1).contains(&s) => Ok(JointNoise::Known(s)),
-        Some(s) => Err(Error::input(
-            "--joint-noise",
-            format!("{s} is no joint noise in rad"),
-            "give 0 for exact readings or a value like 0.00005 (0.05 mrad)",
-        )),
-    }
 }
 
 pub(super) fn read_all(folders: &[PathBuf]) -> Result<Vec<Series>> {

@@ -2,17 +2,22 @@
 //!
 //! To add a subcommand: a file with its `Args` and `run`, a variant of [`Command`] and a row in [`Command::run`].
 
+mod at;
+mod choices;
 mod compare;
 mod compensate;
 mod convert;
 mod identify;
+mod joint_table;
 mod plan;
 mod plate;
 mod progress;
 mod recording;
+mod show;
 mod simulate;
 mod summary;
 mod verify;
+mod verify_series;
 
 use std::process::ExitCode;
 
@@ -55,6 +60,8 @@ enum Command {
     Plan(Box<plan::PlanArgs>),
     /// Design a plate of coded circles and draw it for printing
     Plate(plate::PlateArgs),
+    /// Print a solution again, or compare two over the workspace
+    Show(show::ShowArgs),
     /// Make a series of a robot with known errors, with images or observations
     Simulate(Box<simulate::SimulateArgs>),
     /// Judge a corrected model by points that another device measured
@@ -79,6 +86,7 @@ impl Command {
             Self::Identify(args) => identify::run(args),
             Self::Plan(args) => plan::run(args),
             Self::Plate(args) => plate::run(args),
+            Self::Show(args) => show::run(args),
             Self::Simulate(args) => simulate::run(args),
             Self::Verify(args) => verify::run(args),
         }

@@ -7,7 +7,7 @@ use clap::Args;
 use nalgebra::Vector3;
 
 use super::Verdict;
-use super::identify::Model;
+use super::choices::Model;
 use super::plate::pair;
 use super::simulate::Mount;
 use crate::error::{Error, Result};

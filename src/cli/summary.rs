@@ -1,80 +1,108 @@
-//! What `identify` says on stdout.
+//! What `identify` and `show` say on stdout: all of it stands in solution.json.
 
 use std::fmt::Write;
 
-use crate::assess::Errors;
-use crate::problem::Problem;
-use crate::recipe::{MeasuredSeries, Solution};
+use crate::assess::{Cause, Errors, Identifiability, UnknownDirection};
+use crate::output::solution_json::SolutionRecord;
+use crate::problem::short_name;
 use crate::urdf::JointKind;
 
 /// Most lines of one kind before the rest is counted.
 const MOST_LINES: usize = 12;
 
+/// Most parameters of a direction that are named.
+const MOST_NAMED: usize = 4;
+
+/// Share of the prior variance below which a parameter counts as not determined by the data.
+const LEAST_SHARE: f64 = 0.1;
+
 /// The short table: what was read, what was left out and why, joint noise, accuracy, what could not be determined, verdict.
-pub(super) fn text(solution: &Solution, series: &[MeasuredSeries]) -> String {
+pub(super) fn text(record: &SolutionRecord) -> String {
     let mut out = String::new();
     // Writing to a String cannot fail.
-    let _ = write_all(&mut out, solution, series);
+    let _ = write_all(&mut out, record);
     out
 }
 
-fn write_all(out: &mut String, s: &Solution, series: &[MeasuredSeries]) -> std::fmt::Result {
-    let p = &s.problem;
-    let chain = &s.state.robot.chain;
+/// What stops can tell, before the solve.
+pub(super) fn of_stops(found: &Identifiability) -> String {
+    let mut out = String::new();
+    let _ = identifiability(&mut out, found, "the stops can tell");
+    let _ = limited(&mut out, "gauge", found.unknown.iter().filter(|d| d.cause != Cause::Stops).map(direction));
+    out
+}
+
+/// Every parameter with sigma, prior and share of data.
+pub(super) fn parameters(r: &SolutionRecord) -> String {
+    let shown = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.4e}"));
+    let mut out =
+        String::from("parameter, unit: value, sigma, sigma by the scatter of images, prior sigma, share of data\n");
+    for e in &r.estimates {
+        let share = e.share_of_data.map_or("-".to_owned(), |s| format!("{:.0} %", 100.0 * s));
+        let sigma = if e.free { shown(e.sigma) } else { "fixed".to_owned() };
+        let (value, clustered, prior) = (shown(e.value), shown(e.sigma_clustered), shown(e.prior_sigma));
+        out += &format!("{}, {}: {value}, {sigma}, {clustered}, {prior}, {share}\n", short_name(&e.name), e.unit);
+    }
+    out
+}
+
+fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    let robot = &r.robot;
     writeln!(
         out,
         "robot     {} ({} -> {}, {} moving joints)",
-        chain.robot,
-        chain.base,
-        chain.tip,
-        chain.readings.len()
+        robot.name,
+        robot.base,
+        robot.tip,
+        robot.readings.len()
     )?;
-    for (k, one) in series.iter().enumerate() {
-        let images: Vec<_> = p.images.iter().filter(|i| i.series == k).collect();
-        let used = images.iter().filter(|i| i.rejected.is_none()).count();
-        let observations: usize = images.iter().filter(|i| i.rejected.is_none()).map(|i| i.used().count()).sum();
+    for one in &r.series {
+        let images = || r.images.iter().filter(|i| i.series == one.name);
+        let used = || images().filter(|i| i.reason.is_none());
+        let observations: usize = used().map(|i| i.observations.reason.iter().filter(|o| o.is_none()).count()).sum();
         writeln!(
             out,
-            "series    {}: {used} of {} images used, {observations} markers observed, {}x{} px",
+            "series    {}: {} of {} images used, {observations} markers observed, {}x{} px",
             one.name,
-            images.len(),
+            used().count(),
+            images().count(),
             one.width_px,
             one.height_px
         )?;
     }
-    left_out(out, p)?;
+    limited(
+        out,
+        "left out",
+        r.images.iter().filter_map(|i| i.reason.as_ref().map(|why| format!("{}: {why}", i.name))),
+    )?;
+    if r.statistics.observations_left_out > 0 {
+        writeln!(out, "left out  {} single observations with large residuals", r.statistics.observations_left_out)?;
+    }
     limited(
         out,
         "start",
-        s.starts.iter().filter(|v| v.won).map(|v| format!("{}: {} ({})", v.of, v.origin, v.verdict)),
+        r.starts.iter().filter(|v| v.won).map(|v| format!("{}: {} ({})", v.of, v.origin, v.verdict)),
     )?;
-    for (k, name) in p.cameras.iter().enumerate() {
-        let c = &s.state.cameras[k].parameters;
-        let sigma = s.covariance.sigma(p.layout.cameras[k].start);
-        writeln!(
-            out,
-            "camera    {name}: fx {:.2} +- {sigma:.2}, fy {:.2}, centre ({:.2}, {:.2}) px; image noise {:.3} px per axis",
-            c[0],
-            c[1],
-            c[2],
-            c[3],
-            image_noise_px(s, k)
-        )?;
-    }
+    cameras(out, r)?;
     writeln!(
         out,
         "free pose {:.3} px RMS per point over {} observations",
-        s.free_poses.rms_px, s.free_poses.observations
+        r.statistics.free_pose_rms_px, r.statistics.free_pose_observations
     )?;
-    joint_noise(out, s)?;
-    accuracy(out, s)?;
-    undetermined(out, s)?;
-    limited(out, "note", s.notices.iter().map(ToString::to_string))?;
-    if s.failed_gates.is_empty() {
+    joint_noise(out, r)?;
+    evidences(out, r)?;
+    accuracy(out, r)?;
+    map(out, r)?;
+    undetermined(out, r)?;
+    if let Some(found) = &r.identifiability {
+        identifiability(out, found, "the data tell")?;
+    }
+    limited(out, "note", r.notices.iter().map(ToString::to_string))?;
+    if r.failed_gates.is_empty() {
         writeln!(out, "verdict   good")
     } else {
         writeln!(out, "verdict   NOT TO BE TRUSTED:")?;
-        s.failed_gates.iter().try_for_each(|g| writeln!(out, "          - {g}"))
+        r.failed_gates.iter().try_for_each(|g| writeln!(out, "          - {g}"))
     }
 }
 
@@ -89,72 +117,110 @@ fn limited(out: &mut String, label: &str, lines: impl Iterator<Item = String>) -
     Ok(())
 }
 
-fn left_out(out: &mut String, p: &Problem) -> std::fmt::Result {
-    let images = p.images.iter().filter_map(|i| i.rejected.as_ref().map(|r| format!("{}: {r}", i.name)));
-    limited(out, "left out", images)?;
-    let outliers: usize = p.used().map(|(_, i)| i.observations.len() - i.used().count()).sum();
-    if outliers > 0 {
-        writeln!(out, "left out  {outliers} single observations with large residuals")?;
+fn cameras(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    for (k, camera) in r.cameras.iter().enumerate() {
+        let value = |k: usize| camera.parameters.get(k).map_or(0.0, |(_, v)| *v);
+        let first = format!("camera/{}/", camera.name);
+        let sigma = r.estimates.iter().find(|e| e.name.starts_with(&first)).and_then(|e| e.sigma);
+        let sigma = sigma.map_or("fixed".to_owned(), |s| format!("+- {s:.2}"));
+        writeln!(
+            out,
+            "camera    {}: fx {:.2} {sigma}, fy {:.2}, centre ({:.2}, {:.2}) px; image noise {:.3} px per axis",
+            camera.name,
+            value(0),
+            value(1),
+            value(2),
+            value(3),
+            image_noise_px(r, k)
+        )?;
     }
     Ok(())
 }
 
 /// Typical standard deviation of an observation per axis, px: stated sigma times the estimated factor.
-fn image_noise_px(s: &Solution, camera: usize) -> f64 {
+fn image_noise_px(r: &SolutionRecord, camera: usize) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
-    for (_, image) in s.problem.used().filter(|(_, i)| i.camera == camera) {
-        for o in image.used() {
-            let determinant = o.information.determinant();
-            if determinant > 0.0 {
-                sum += determinant.powf(-0.5);
+    for image in r.images.iter().filter(|i| i.camera == camera && i.reason.is_none()) {
+        for (c, reason) in image.observations.covariance.iter().zip(&image.observations.reason) {
+            let determinant = c[0] * c[2] - c[1] * c[1];
+            if reason.is_none() && determinant > 0.0 {
+                sum += determinant.sqrt();
                 count += 1.0;
             }
         }
     }
-    (sum / f64::max(count, 1.0)).sqrt() * s.problem.noise.pixel_factor[camera]
+    (sum / f64::max(count, 1.0)).sqrt() * r.cameras[camera].pixel_factor
 }
 
-fn joint_noise(out: &mut String, s: &Solution) -> std::fmt::Result {
-    let chain = &s.state.robot.chain;
-    for k in 0..s.problem.cameras.len() {
-        let sigma = s.problem.joint_sigma(k);
-        let parts: Vec<String> = (chain.readings.iter().zip(&chain.reading_kinds).zip(&sigma))
+fn joint_noise(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    for camera in &r.cameras {
+        let parts: Vec<String> = (r.robot.readings.iter().zip(&r.robot.reading_kinds).zip(&camera.joint_noise))
             .map(|((name, kind), s)| match kind {
                 JointKind::Prismatic => format!("{name} {:.3} mm", 1e3 * s),
                 _ => format!("{name} {:.3}", 1e3 * s),
             })
             .collect();
-        let camera = if s.problem.cameras.len() > 1 { format!(" ({})", s.problem.cameras[k]) } else { String::new() };
-        let tilt = s.problem.noise.tilt.get(k).map(|t| format!("; apparent tilt of the plate {:.3}", 1e3 * t));
-        writeln!(out, "joints    noise in mrad{camera}: {}{}", parts.join(", "), tilt.unwrap_or_default())?;
+        let of = if r.cameras.len() > 1 { format!(" ({})", camera.name) } else { String::new() };
+        let tilt = Some(camera.apparent_tilt_rad).filter(|t| *t > 0.0);
+        let tilt = tilt.map(|t| format!("; apparent tilt of the plate {:.3}", 1e3 * t));
+        writeln!(out, "joints    noise in mrad{of}: {}{}", parts.join(", "), tilt.unwrap_or_default())?;
     }
     Ok(())
 }
 
-fn accuracy(out: &mut String, s: &Solution) -> std::fmt::Result {
-    let row = |e: &Errors| format!("{:>8.3} mm {:>8.3} px   worst image {:.3} mm", e.rms_mm, e.rms_px, e.worst_mm);
-    writeln!(out, "accuracy  of images that the fit had not seen ({} folds), RMS over the markers:", s.accuracy.folds)?;
-    writeln!(out, "          nominal    {}", row(&s.accuracy.nominal))?;
-    writeln!(out, "          calibrated {}", row(&s.accuracy.calibrated))
+fn evidences(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    if r.evidences.is_empty() {
+        return Ok(());
+    }
+    let all: Vec<String> = (r.evidences.iter())
+        .map(|e| format!("{:?} {:.1} ({} parameters)", e.model, e.log_evidence, e.parameters).to_lowercase())
+        .collect();
+    writeln!(out, "evidence  logarithm, relative to the best model: {}", all.join(", "))
 }
 
-/// Share of the prior variance below which a parameter counts as not determined by the data.
-const LEAST_SHARE: f64 = 0.1;
+fn accuracy(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    let row = |e: &Errors| format!("{:>8.3} mm {:>8.3} px   worst image {:.3} mm", e.rms_mm, e.rms_px, e.worst_mm);
+    writeln!(out, "accuracy  of images that the fit had not seen ({} folds), RMS over the markers:", r.accuracy.folds)?;
+    writeln!(out, "          nominal    {}", row(&r.accuracy.nominal))?;
+    writeln!(out, "          calibrated {}", row(&r.accuracy.calibrated))
+}
 
-fn undetermined(out: &mut String, s: &Solution) -> std::fmt::Result {
-    let layout = &s.problem.layout;
-    let robot = layout.robot();
-    let gauge = GaugeNames::of(s);
-    let weak: Vec<&str> = robot
-        .clone()
-        .filter(|&c| {
-            let column = &layout.columns[c];
-            column.free && 1.0 - (s.covariance.sigma(c) / column.prior_sigma).powi(2) < LEAST_SHARE
-        })
-        .map(|c| layout.columns[c].name.trim_start_matches("robot/"))
-        .filter(|name| !gauge.contains(name))
+/// Uncertainty of the flange over the workspace.
+fn map(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    let sorted = |covered: bool| {
+        let mut all: Vec<f64> = r.workspace.iter().filter(|w| w.covered || !covered).map(|w| 1e3 * w.sigma_m).collect();
+        all.sort_by(f64::total_cmp);
+        all
+    };
+    let (inside, all) = (sorted(true), sorted(false));
+    let at = |v: &[f64], share: f64| v.get(((v.len() as f64 - 1.0) * share).max(0.0) as usize).copied();
+    if let (Some(median), Some(most)) = (at(&inside, 0.5), at(&inside, 0.95)) {
+        writeln!(
+            out,
+            "flange    sigma of its position relative to the plate, by the model: {median:.3} mm (95 % below {most:.3} mm) in the region of the stops{}",
+            at(&all, 1.0).map_or(String::new(), |w| format!(", up to {w:.2} mm elsewhere"))
+        )?;
+    }
+    let Some((scatter, ratio)) = r.scatter.as_ref().and_then(|s| s.flange_ratio.map(|ratio| (s, ratio))) else {
+        return Ok(());
+    };
+    let larger = if scatter.larger_stated { "; the larger ones are stated" } else { "" };
+    writeln!(out, "scatter   the images scatter {ratio:.2} times as much as the noise model says (flange){larger}")
+}
+
+fn undetermined(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    let Some(found) = &r.identifiability else { return Ok(()) };
+    writeln!(out, "gauge     {}", gauge(found))?;
+    let robot = || r.estimates.iter().filter(|e| e.name.starts_with("robot/") && e.free && !e.name.contains(".local_"));
+    let gauge: Vec<&str> = (found.unknown.iter())
+        .filter(|d| matches!(d.cause, Cause::Base | Cause::Tip))
+        .flat_map(|d| d.parameters.iter().map(|(name, _)| name.as_str()))
         .collect();
-    writeln!(out, "gauge     {}", gauge.in_words())?;
+    let weak: Vec<String> = robot()
+        .filter(|e| e.share_of_data.is_some_and(|s| s < LEAST_SHARE))
+        .map(|e| short_name(&e.name))
+        .filter(|name| !gauge.contains(&name.as_str()))
+        .collect();
     if weak.is_empty() {
         return writeln!(out, "unknown   nothing else: the data determine every robot parameter");
     }
@@ -162,48 +228,86 @@ fn undetermined(out: &mut String, s: &Solution) -> std::fmt::Result {
         out,
         "unknown   {} of {} robot parameters stay near nominal, the data say little of them: {}",
         weak.len(),
-        robot.len(),
+        robot().count(),
         grouped(&weak)
     )
 }
 
-/// Robot parameters that no series can tell from the pose of plate and camera.
-struct GaugeNames {
-    first: Vec<String>,
-    last: Vec<String>,
-}
-
-impl GaugeNames {
-    fn of(s: &Solution) -> Self {
-        let chain = &s.state.robot.chain;
-        let moving = |j: &&crate::urdf::Joint| j.drive.is_some();
-        let before = chain.joints.iter().take_while(|j| j.drive.is_none());
-        let after = chain.joints.iter().rev().take_while(|j| j.drive.is_none());
-        let mut first: Vec<String> =
-            before.chain(chain.joints.iter().find(moving)).map(|j| format!("{}/origin", j.name)).collect();
-        let mut last: Vec<String> = after.map(|j| format!("{}/origin", j.name)).collect();
-        first.extend(chain.readings.first().map(|r| format!("{r}.offset")));
-        last.extend(chain.readings.last().map(|r| format!("{r}.offset")));
-        Self { first, last }
-    }
-
-    fn contains(&self, name: &str) -> bool {
-        self.first
-            .iter()
-            .chain(&self.last)
-            .any(|g| name == g || name.strip_prefix(g.as_str()).is_some_and(|rest| rest.starts_with('.')))
-    }
-
-    fn in_words(&self) -> String {
-        let (first, last) = (self.first.join(", "), self.last.join(", "));
-        format!(
-            "{first} cannot be told from the pose of the plate, {last} not from that of the camera: they need not be"
-        )
+/// Which parameters no series can tell from the pose of plate and camera.
+fn gauge(found: &Identifiability) -> String {
+    let of = |cause: Cause| {
+        let names = found.unknown.iter().filter(|d| d.cause == cause).flat_map(|d| d.parameters.iter());
+        let mut blocks: Vec<&str> = Vec::new();
+        for (name, _) in names {
+            let block = match name.rsplit_once('.') {
+                Some((block, _)) if block.ends_with(".origin") => block,
+                _ => name.as_str(),
+            };
+            if !blocks.contains(&block) {
+                blocks.push(block);
+            }
+        }
+        blocks.join(", ")
+    };
+    match (of(Cause::Base), of(Cause::Tip)) {
+        (base, tip) if base.is_empty() && tip.is_empty() => "no freedom is left between robot, plate and camera".into(),
+        (base, tip) => format!(
+            "{} cannot be told from the pose of the plate, {} not from that of the camera: they need not be",
+            if base.is_empty() { "nothing" } else { &base },
+            if tip.is_empty() { "nothing" } else { &tip }
+        ),
     }
 }
 
-/// `joint_1/origin.x`, `joint_1/origin.y` -> `joint_1/origin (x y)`.
-fn grouped(names: &[&str]) -> String {
+fn identifiability(out: &mut String, found: &Identifiability, who: &str) -> std::fmt::Result {
+    writeln!(
+        out,
+        "rank      {who} {} of the {} directions that any series could ({} free parameters of the robot)",
+        found.rank, found.tellable, found.parameters
+    )?;
+    if let Some(o) = found.observability {
+        writeln!(
+            out,
+            "observe   O1 {:.3}, O2 {:.2e}, O3 {:.3}, O4 {:.2e}, O5 {:.3} (over these directions, in units of the priors)",
+            o.o1, o.o2, o.o3, o.o4, o.o5
+        )?;
+    }
+    let by_stops = found.unknown.iter().filter(|d| d.cause == Cause::Stops);
+    limited(
+        out,
+        "untold",
+        by_stops.map(|d| format!("{}: {}", direction(d), d.remedy.as_deref().unwrap_or("more stops"))),
+    )?;
+    limited(
+        out,
+        "alike",
+        (found.correlations.iter())
+            .map(|c| format!("{} and {} (correlation {:.3}): {}", c.first, c.second, c.correlation, c.remedy)),
+    )?;
+    limited(
+        out,
+        "next",
+        found.next.iter().map(|a| format!("{} (takes {:.0} % off what is left)", a.words, 100.0 * a.gain)),
+    )
+}
+
+/// Parameters of a direction in words.
+fn direction(d: &UnknownDirection) -> String {
+    let names: Vec<&str> = d.parameters.iter().take(MOST_NAMED).map(|(name, _)| name.as_str()).collect();
+    let rest = d.parameters.len().saturating_sub(MOST_NAMED);
+    let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+    let what = match d.cause {
+        Cause::Base => " (against the pose of the plate)",
+        Cause::Tip => " (against that of the camera)",
+        Cause::Redundant => " (do the same to this robot)",
+        Cause::Idle => " (does nothing to this robot)",
+        Cause::Stops => "",
+    };
+    format!("{}{more}{what}", names.join(" with "))
+}
+
+/// `joint_1.origin.x`, `joint_1.origin.y` -> `joint_1.origin (x y)`.
+fn grouped(names: &[String]) -> String {
     let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
     for name in names {
         let (block, component) = name.rsplit_once('.').unwrap_or((name, ""));

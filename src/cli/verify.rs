@@ -1,58 +1,66 @@
-//! `robotcal verify`: a corrected model judged by points that another device measured.
+//! `robotcal verify`: a corrected model judged by points that another device measured, or by another series.
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use nalgebra::Vector3;
 
-use super::Verdict;
+use super::joint_table::{self, Unit};
+use super::recording::RecordingArgs;
+use super::{Verdict, verify_series};
 use crate::assess::{MeasuredPoint, fit_points};
 use crate::error::{Error, Result};
 use crate::model::robot::Robot;
 use crate::output::read_compensation;
-use crate::urdf::{self, Chain, JointKind};
+use crate::urdf::{self, Chain};
 
 /// Flags of `verify`.
 #[derive(Debug, Args)]
 pub(super) struct VerifyArgs {
     /// Robot description to judge (a corrected URDF)
     #[arg(long, value_name = "FILE")]
-    urdf: PathBuf,
+    pub(super) urdf: PathBuf,
     /// Its compensation.toml: gear scale, harmonics, gravity and backlash, which a URDF cannot hold
     #[arg(long, value_name = "FILE")]
-    compensation: Option<PathBuf>,
+    pub(super) compensation: Option<PathBuf>,
     /// Nominal robot description to compare with
     #[arg(long, value_name = "FILE")]
-    nominal: Option<PathBuf>,
+    pub(super) nominal: Option<PathBuf>,
     /// Points of one reflector on the tip: x_m, y_m, z_m and one column per joint
-    #[arg(long, value_name = "FILE")]
-    points: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "series", requires = "joint_unit")]
+    points: Option<PathBuf>,
     /// Unit of the revolute joints in that file
     #[arg(long, value_enum)]
-    joint_unit: Unit,
+    joint_unit: Option<Unit>,
+    /// Another series of the robot, in mm and px; several are judged together
+    #[arg(long, value_name = "FOLDER", conflicts_with = "points")]
+    pub(super) series: Vec<PathBuf>,
     /// Base link
     #[arg(long, value_name = "LINK")]
-    base: Option<String>,
+    pub(super) base: Option<String>,
     /// Tip link
     #[arg(long, value_name = "LINK")]
-    tip: Option<String>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Unit {
-    Rad,
-    Deg,
+    pub(super) tip: Option<String>,
+    #[command(flatten)]
+    recording: RecordingArgs,
 }
 
 pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
+    match (&args.points, args.joint_unit) {
+        (Some(file), Some(unit)) => points(args, file, unit),
+        _ => verify_series::run(args, &args.recording),
+    }
+}
+
+fn points(args: &VerifyArgs, points_file: &std::path::Path, unit: Unit) -> Result<Verdict> {
     let rms = |file: &PathBuf, compensation: Option<&PathBuf>| -> Result<(usize, f64, f64)> {
         let chain = urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?;
-        let points = read_points(&args.points, &chain, args.joint_unit)?;
+        let points = read_points(points_file, &chain, unit)?;
         let terms = compensation.map_or(Ok(Vec::new()), |c| read_compensation(c, &chain))?;
         let robot = Robot { terms, ..Robot::nominal(chain) };
         let fit = fit_points(&robot, &points).ok_or_else(|| {
             Error::unsolved(
-                args.points.display(),
+                points_file.display(),
                 "the points do not determine the frame of the device and the reflector",
                 "measure at least 10 points that differ in position and in hand orientation",
             )
@@ -61,7 +69,7 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
         Ok((points.len(), 1e3 * fit.rms_m, 1e3 * worst))
     };
     let (count, corrected, worst) = rms(&args.urdf, args.compensation.as_ref())?;
-    println!("points    {count} of {}; frame of the device and reflector fitted", args.points.display());
+    println!("points    {count} of {}; frame of the device and reflector fitted", points_file.display());
     println!("model     {}: {corrected:.3} mm RMS, worst {worst:.3} mm", args.urdf.display());
     let Some(file) = &args.nominal else { return Ok(Verdict::Good) };
     let (_, nominal, worst) = rms(file, None)?;
@@ -75,43 +83,10 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
 }
 
 fn read_points(path: &std::path::Path, chain: &Chain, unit: Unit) -> Result<Vec<MeasuredPoint>> {
-    let bad = |line: u64, what: String, remedy: &str| Error::input(format!("{}:{line}", path.display()), what, remedy);
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(|e| Error::input(path.display(), e, "check the path"))?;
-    let header = reader.headers().map_err(|e| bad(1, e.to_string(), "the first line names the columns"))?.clone();
-    let column = |name: &str| {
-        header.iter().position(|h| h == name).ok_or_else(|| {
-            let present: Vec<&str> = header.iter().collect();
-            bad(
-                1,
-                format!("no column '{name}' (present: {})", present.join(", ")),
-                "name the columns x_m, y_m, z_m and each joint as in the URDF",
-            )
-        })
+    let rows = joint_table::read(path, &["x_m", "y_m", "z_m"], &chain.readings, &chain.reading_kinds, unit)?;
+    let point = |(xyz, readings): (Vec<f64>, Vec<f64>)| MeasuredPoint {
+        position_m: Vector3::from_column_slice(&xyz),
+        readings,
     };
-    let axes = [column("x_m")?, column("y_m")?, column("z_m")?];
-    let joints: Vec<usize> = chain.readings.iter().map(|j| column(j)).collect::<Result<_>>()?;
-    let mut points = Vec::new();
-    for record in reader.records() {
-        let record =
-            record.map_err(|e| Error::input(path.display(), e, "every row has the columns of the first line"))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let number = |c: usize| {
-            let cell = record.get(c).unwrap_or("");
-            cell.parse::<f64>()
-                .ok()
-                .filter(|v| v.is_finite())
-                .ok_or_else(|| bad(line, format!("'{cell}' in column {} is no number", &header[c]), "correct the cell"))
-        };
-        let position_m = Vector3::new(number(axes[0])?, number(axes[1])?, number(axes[2])?);
-        let mut readings = Vec::with_capacity(joints.len());
-        for (c, kind) in joints.iter().zip(&chain.reading_kinds) {
-            let degrees = unit == Unit::Deg && *kind != JointKind::Prismatic;
-            readings.push(if degrees { number(*c)?.to_radians() } else { number(*c)? });
-        }
-        points.push(MeasuredPoint { position_m, readings });
-    }
-    Ok(points)
+    Ok(rows.into_iter().map(point).collect())
 }

@@ -58,6 +58,20 @@ impl Term {
         }
     }
 
+    /// The term of a name; `None` for an unknown one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match (name, name.split_once('_')) {
+            ("offset", _) => Some(Self::Offset),
+            ("gear", _) => Some(Self::Gear),
+            ("backlash", _) => Some(Self::Backlash),
+            (_, Some(("cos", k))) => k.parse().ok().map(Self::Cosine),
+            (_, Some(("sin", k))) => k.parse().ok().map(Self::Sine),
+            (_, Some(("local", at))) => at.parse().ok().map(Self::local),
+            (_, Some(("gravity", k))) => k.parse().ok().filter(|k| *k < GRAVITY_TERMS).map(Self::Gravity),
+            _ => None,
+        }
+    }
+
     /// Unit of the parameter for a joint of `kind`.
     pub fn unit(self, kind: JointKind) -> &'static str {
         match (self, kind) {

@@ -8,11 +8,11 @@ use std::io;
 
 use serde::{Deserialize, Serialize};
 
-use crate::assess::Errors;
+use crate::assess::{Errors, Identifiability, WorkspacePoint};
 use crate::error::{Error, Notice, Result};
 use crate::geom::Pose;
 use crate::model::camera::Lens;
-use crate::recipe::StartVerdict;
+use crate::recipe::{Evidence, StartVerdict};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
 use crate::urdf::JointKind;
 
@@ -20,7 +20,7 @@ use crate::urdf::JointKind;
 pub const FILE_NAME: &str = "solution.json";
 
 /// Version of the format.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 /// A pose `parent_from_child`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -124,6 +124,10 @@ pub struct EstimateRecord {
     pub prior_mean: Option<f64>,
     /// Sigma of its prior; none where there is no prior.
     pub prior_sigma: Option<f64>,
+    /// Sigma by the noise model alone.
+    pub sigma_model: Option<f64>,
+    /// Sigma by the scatter between images (sandwich, clustered by image).
+    pub sigma_clustered: Option<f64>,
     /// False where it was held fixed.
     pub free: bool,
     /// `1 - sigma^2 / prior_sigma^2`: how much of what is known comes from the data.
@@ -280,12 +284,59 @@ pub struct StatisticsRecord {
     pub rms_px: f64,
     /// The same with free poses.
     pub free_pose_rms_px: f64,
+    /// Observations that the free poses were fitted to.
+    pub free_pose_observations: usize,
     /// Largest normalised residual in use.
     pub largest_normalised: f64,
     /// Cost at the solution.
     pub cost: f64,
     /// Huber bound on normalised lengths.
     pub huber: f64,
+}
+
+/// The robot description as it was read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct UrdfRecord {
+    /// File name.
+    pub file: String,
+    /// The whole text.
+    pub text: String,
+}
+
+/// A series, apart from its images.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SeriesRecord {
+    /// Name.
+    pub name: String,
+    /// Series with the same camera share intrinsics.
+    pub camera: String,
+    /// Series with the same mounting share the hand-camera offset.
+    pub mounting: String,
+    /// Where the camera is.
+    pub camera_mount: CameraMount,
+    /// Columns of the images.
+    pub width_px: u32,
+    /// Rows.
+    pub height_px: u32,
+    /// Focal length as stated, px.
+    pub focal_px: Option<f64>,
+    /// Lens model.
+    pub lens: Lens,
+    /// True where an observation of a circle is the centroid of its image, false for its imaged centre.
+    pub centroid: bool,
+    /// Index of its plate.
+    pub plate: usize,
+    /// True where the images stand in the order of visiting.
+    pub order_known: bool,
+}
+
+/// Sigmas by the noise model against those by the scatter between images.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ScatterRecord {
+    /// Sigma of the flange by clusters of images over that by the noise model; none where the flange is not determined.
+    pub flange_ratio: Option<f64>,
+    /// True where the larger sigmas are stated in this file.
+    pub larger_stated: bool,
 }
 
 /// Accuracy on held-out images.
@@ -334,6 +385,18 @@ pub struct SolutionRecord {
     pub placements: Vec<PlacedRecord>,
     /// Plates.
     pub plates: Vec<PlateRecord>,
+    /// Robot description.
+    pub urdf: UrdfRecord,
+    /// Series.
+    pub series: Vec<SeriesRecord>,
+    /// What the data tell of the robot, and what to measure next.
+    pub identifiability: Option<Identifiability>,
+    /// Evidence of the robot models where the data chose among them.
+    pub evidences: Vec<Evidence>,
+    /// How the images scatter against the noise model; none for too few images.
+    pub scatter: Option<ScatterRecord>,
+    /// Sigma of the flange over the workspace: samples of the region of the stops, then within all joint limits.
+    pub workspace: Vec<WorkspacePoint>,
     /// All scalar estimates.
     pub estimates: Vec<EstimateRecord>,
     /// Covariance of `estimates`: lower triangle, row by row. Poses of plates are in the frame that the marker priors define.
@@ -412,7 +475,10 @@ pub fn read(bytes: &[u8]) -> Result<SolutionRecord> {
     let version: Version = serde_json::from_slice(bytes).map_err(refuse)?;
     if version.format != FORMAT {
         let what = format!("format = {}", version.format);
-        let remedy = format!("this program reads format = {FORMAT}; a newer one may be needed");
+        let remedy = match version.format < FORMAT {
+            true => "an earlier version wrote it: identify again".to_owned(),
+            false => format!("this program reads format = {FORMAT}; a newer one may be needed"),
+        };
         return Err(Error::input(FILE_NAME, what, remedy));
     }
     serde_json::from_slice(bytes).map_err(refuse)

@@ -10,13 +10,14 @@ use super::pose_files::{determined, free_rigid_covariances, placement_covariance
 use super::residuals::{poses, residuals};
 use super::solution_json::{
     AccuracyRecord, CameraRecord, FORMAT, FreePoseRecord, ImageRecord, JointRecord, ObservationColumns, PlacedRecord,
-    PlateRecord, ProgramRecord, RobotRecord, SolutionRecord, StatisticsRecord, TermRecord,
+    PlateRecord, ProgramRecord, RobotRecord, ScatterRecord, SeriesRecord, SolutionRecord, StatisticsRecord, TermRecord,
+    UrdfRecord,
 };
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::model::plate_modes;
 use crate::problem::{Image, Slack, State};
-use crate::recipe::Solution;
+use crate::recipe::{REPORT_LARGER, Solution};
 
 /// The record of a solution.
 ///
@@ -46,6 +47,18 @@ pub(super) fn record(solution: &Solution, context: &Context, files: Vec<String>)
         mountings: mountings(solution),
         placements: placements(solution)?,
         plates: plates(solution, context)?,
+        urdf: UrdfRecord {
+            file: context.robot.path.file_name().map_or_else(String::new, |f| f.to_string_lossy().into_owned()),
+            text: context.robot.text.clone(),
+        },
+        series: series(solution, context),
+        identifiability: solution.worth.identifiability.clone(),
+        evidences: solution.evidences.clone(),
+        scatter: solution.worth.clustered_sigma.as_ref().map(|_| ScatterRecord {
+            flange_ratio: solution.worth.clustered_ratio,
+            larger_stated: solution.worth.clustered_ratio.is_some_and(|r| r > REPORT_LARGER),
+        }),
+        workspace: solution.worth.workspace.clone(),
         estimates: estimates(solution, context)?,
         covariance_lower: lower_triangle(solution),
         images: images(solution, context)?,
@@ -66,6 +79,7 @@ pub(super) fn statistics(solution: &Solution) -> StatisticsRecord {
         observations_left_out: given - problem.used().map(|(_, i)| i.used().count()).sum::<usize>(),
         rms_px: (squares / used.max(1) as f64).sqrt(),
         free_pose_rms_px: solution.free_poses.rms_px,
+        free_pose_observations: solution.free_poses.observations,
         largest_normalised: all().map(|r| r.normalised).fold(0.0, f64::max),
         cost: solution.linearised.cost,
         huber: problem.huber,
@@ -101,6 +115,24 @@ fn robot(state: &State) -> RobotRecord {
         joints: joints.collect(),
         terms: terms.collect(),
     }
+}
+
+fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
+    let plate = |k: usize| solution.problem.images.iter().find(|i| i.series == k).map_or(0, |i| i.plate);
+    let record = |(k, s): (usize, &crate::recipe::MeasuredSeries)| SeriesRecord {
+        name: series_name(context, k),
+        camera: s.camera.clone(),
+        mounting: s.mounting.clone(),
+        camera_mount: s.mount,
+        width_px: s.width_px,
+        height_px: s.height_px,
+        focal_px: s.focal_px,
+        lens: s.lens,
+        centroid: s.centroid,
+        plate: plate(k),
+        order_known: s.order_known,
+    };
+    solution.series.iter().enumerate().map(record).collect()
 }
 
 fn cameras(solution: &Solution) -> Vec<CameraRecord> {

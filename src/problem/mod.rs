@@ -6,11 +6,13 @@
 mod layout;
 mod linearise;
 mod postures;
+mod select;
 mod state;
 
 pub use layout::{Column, Layout, OriginPrior};
 pub use linearise::{Chained, E, ImageTerms, MarkerTerms, Residual, Weighting, chained, linearise, predict};
 pub use postures::{common_readings, joined, posture_groups};
+pub use select::short_name;
 pub use state::{PlateShape, Slack, State, Step};
 
 use nalgebra::{Matrix2, Vector2};

@@ -176,6 +176,22 @@ impl State {
         v
     }
 
+    /// Sets the value of one column; components of poses have none and stay.
+    pub fn set_value(&mut self, layout: &Layout, column: usize, value: f64) {
+        if layout.twists.contains(&column) {
+            let k = column - layout.twists.start;
+            self.robot.twists[k / 6][k % 6] = value;
+        } else if layout.terms.contains(&column) {
+            self.robot.terms[column - layout.terms.start].value = value;
+        }
+        for (camera, range) in self.cameras.iter_mut().zip(&layout.cameras).filter(|(_, r)| r.contains(&column)) {
+            camera.parameters[column - range.start] = value;
+        }
+        for (plate, range) in self.plates.iter_mut().zip(&layout.shapes).filter(|(_, r)| r.contains(&column)) {
+            plate.modes[column - range.start] = value;
+        }
+    }
+
     /// Pose of the camera of an image as these unknowns say.
     pub fn camera_from_plate(&self, image: &Image, slack: &Slack) -> Option<Pose> {
         let exact;

@@ -4,8 +4,10 @@ use super::build::{MeasuredSeries, build};
 use super::free_poses::{FreePoses, adjust_free_poses};
 use super::gates::{gates, remarks};
 use super::moved::{Move, find_move};
+use super::selection::Selection;
 use super::solution::Solution;
 use super::start::{misfit, start_robot};
+use super::worth::judge;
 use crate::assess::hold_out;
 use crate::error::{Error, Result};
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
@@ -26,7 +28,8 @@ pub enum JointNoise {
 }
 
 /// Which joint terms are fitted beside twists.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum RobotModel {
     /// Joint offsets.
     Rigid,
@@ -34,31 +37,44 @@ pub enum RobotModel {
     Gear,
     /// All of these, gravity and backlash.
     Full,
+    /// The one of these with the largest evidence.
+    Auto,
 }
 
 /// How to identify.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// Joint noise.
     pub joint_noise: JointNoise,
     /// Joint terms.
     pub model: RobotModel,
+    /// Which parameters are estimated, and their priors.
+    pub selection: Selection,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { joint_noise: JointNoise::Estimated, model: RobotModel::Full }
+        Self { joint_noise: JointNoise::Estimated, model: RobotModel::Full, selection: Selection::default() }
     }
 }
 
 impl RobotModel {
+    /// True where this model has such a term.
+    pub fn has(self, term: Term) -> bool {
+        match term {
+            Term::Gear | Term::Cosine(_) | Term::Sine(_) => self != Self::Rigid,
+            Term::Gravity(_) | Term::Backlash => matches!(self, Self::Full | Self::Auto),
+            _ => true,
+        }
+    }
+
     /// The nominal robot with the terms of this model.
     pub fn robot(self, chain: Chain) -> Robot {
         let mut terms = vec![Term::Offset];
         if self != Self::Rigid {
             terms.extend([Term::Gear, Term::Cosine(1), Term::Sine(1), Term::Cosine(2), Term::Sine(2)]);
         }
-        if self == Self::Full {
+        if self.has(Term::Backlash) {
             terms.extend((0..GRAVITY_TERMS).map(Term::Gravity));
             terms.push(Term::Backlash);
         }
@@ -76,14 +92,11 @@ const HOPELESS_SHARE_LEFT_OUT: f64 = 0.5;
 /// Most rounds of rejection.
 const ROUNDS: usize = 12;
 
-/// Identifies robot, cameras, mountings and plates from identified series.
-///
-/// # Errors
-/// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset, or readings and images do
-/// not belong together.
-pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
+/// As [`super::identify`] with one robot model.
+pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
     let robot = options.model.robot(chain);
-    let (mut problem, state) = build(&robot, series, options.joint_noise == JointNoise::Estimated)?;
+    let (mut problem, mut state) = build(&robot, series, options.joint_noise == JointNoise::Estimated)?;
+    options.selection.apply(&mut problem.layout, &mut state)?;
     let stated: Vec<Option<f64>> = (problem.cameras.iter())
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();
@@ -104,7 +117,7 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
         ));
     };
     let state = outcome.state;
-    let covariance = covariance(&problem, &state, &linearised).map_err(|_| {
+    let mut covariance = covariance(&problem, &state, &linearised).map_err(|_| {
         Error::unsolved("joint fit", "the normal equations are singular", "take stops that move every joint")
     })?;
     let accuracy = hold_out(&problem, &state)
@@ -112,7 +125,11 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let mut failed_gates = gates(&problem, &state, &free, &accuracy, on_robot);
     failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
     remarks(&problem, &state, on_robot, &mut notices);
+    let worth = judge(&problem, &state, &linearised, &mut covariance, &mut notices);
     Ok(Solution {
+        series: series.to_vec(),
+        worth,
+        evidences: Vec::new(),
         problem,
         state,
         linearised,

@@ -4,6 +4,8 @@
 
 mod build;
 mod compare;
+mod dry_run;
+mod evidence;
 mod focus;
 mod forecast;
 mod free_poses;
@@ -18,28 +20,36 @@ mod moved;
 mod places;
 mod plan;
 mod plan_study;
+mod selection;
 mod simulated;
 mod solution;
 mod start;
 mod study;
 mod suspects;
 mod two_stage;
+mod verify;
+mod worth;
 
 pub use build::{MeasuredSeries, MeasuredStop};
 pub use compare::{Comparison, ComparisonRow, HeldOut, TruthError, compare};
+pub use dry_run::dry_run;
+pub use evidence::{Evidence, identify};
 pub use forecast::{
     CurvePoint, Forecast, Gain, JointRange, ParameterForecast, check_wish, exact_covariance, flange_m, forecast,
     image_name,
 };
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
-pub use joint::{JointNoise, Options, RobotModel, identify};
+pub use joint::{JointNoise, Options, RobotModel};
 pub use lens_choice::choose_lens;
 pub use measure::{Measured, measure};
 pub use monte_carlo::{BLOCKS, BlockResult, MonteCarloCell, MonteCarloRequest, monte_carlo};
 pub use places::{PlaceForecast, compare_places, place_words};
 pub use plan::{Budget, Choice, Plan, PlanRequest, Wish, choose, plan};
 pub use plan_study::{PlanStudy, PlanStudyRequest, PlanStudyRow, plan_study};
+pub use selection::{Config, Parameters, Selection, StatedPrior};
 pub use simulated::measured;
 pub use solution::{Solution, StartVerdict};
 pub use study::{Study, StudyCell, StudyRequest, study};
 pub use two_stage::{Estimate, Estimator, PoseStage, estimate_all, fit_joint, fit_poses, linear_step};
+pub use verify::{JudgedImage, verify_series};
+pub use worth::{REPORT_LARGER, Worth, still, stops};

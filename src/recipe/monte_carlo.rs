@@ -7,7 +7,8 @@
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use rayon::prelude::*;
 
-use super::joint::{Options, RobotModel, identify};
+use super::evidence::identify;
+use super::joint::{Options, RobotModel};
 use super::simulated::measured;
 use super::solution::Solution;
 use crate::error::Result;

@@ -6,8 +6,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
+use super::evidence::identify;
 use super::forecast::{exact_covariance, flange_m};
-use super::joint::{JointNoise, Options, RobotModel, identify};
+use super::joint::{JointNoise, Options, RobotModel};
 use super::plan::{Budget, PlanRequest, Wish, choose};
 use super::simulated::measured;
 use crate::assess::{Ratio, bootstrap_ratio, flange_error_m, root_mean_square};
@@ -234,7 +235,7 @@ fn predict(
 
 /// Flange errors after the whole identification of a series, over two sets of joint vectors.
 fn found(request: &PlanStudyRequest, series: &SimulatedSeries, sets: [&[(Vec<f64>, Pose)]; 2]) -> Result<[f64; 2]> {
-    let options = Options { joint_noise: JointNoise::Estimated, model: RobotModel::Rigid };
+    let options = Options { joint_noise: JointNoise::Estimated, model: RobotModel::Rigid, ..Options::default() };
     let solution = identify(request.chain.clone(), &[measured(series, &request.chain)], &options)?;
     let plate = solution.state.placements[0];
     let [a, b] = sets.map(|poses| flange_error_m(&solution.state.robot, &plate, poses));

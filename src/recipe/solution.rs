@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::build::MeasuredSeries;
+use super::evidence::Evidence;
 use super::free_poses::FreePoses;
+use super::worth::Worth;
 use crate::assess::Accuracy;
 use crate::error::Notice;
 use crate::problem::{Problem, State};
@@ -34,6 +37,12 @@ pub struct Solution {
     pub covariance: Covariance,
     /// The stand-alone camera poses.
     pub free_poses: FreePoses,
+    /// What the solve went from.
+    pub series: Vec<MeasuredSeries>,
+    /// Identifiability, sigmas by clusters, workspace map.
+    pub worth: Worth,
+    /// Evidence of the robot models where the data chose among them.
+    pub evidences: Vec<Evidence>,
     /// Before and after, held out.
     pub accuracy: Accuracy,
     /// Starting values with their verdicts.

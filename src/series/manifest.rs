@@ -238,7 +238,7 @@ pub(super) fn to_toml(file: &str, value: &impl Serialize) -> Result<String> {
 }
 
 /// Reads a TOML file; unknown keys and wrong values are named with their line.
-pub(super) fn read_toml<T: DeserializeOwned>(path: &Path, inputs: &mut Vec<InputFile>) -> Result<T> {
+pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path, inputs: &mut Vec<InputFile>) -> Result<T> {
     let text = read_text(path, inputs)?;
     toml::from_str(&text).map_err(|error| {
         let line = error.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count());

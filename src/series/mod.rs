@@ -17,6 +17,7 @@ mod units;
 
 pub use inputs::InputFile;
 pub use joints::{DEFAULT_PLACEMENT, Stop, Stops};
+pub(crate) use manifest::read_toml;
 pub use manifest::{
     AngleUnit, CameraMount, CameraSection, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder,
 };

@@ -36,11 +36,11 @@ fn rms(arrows: &[Arrow]) -> f64 {
 }
 
 /// The rectangle of a map and how it lies on the paper.
-struct Field {
-    low: [f64; 2],
-    high: [f64; 2],
+pub(super) struct Field {
+    pub low: [f64; 2],
+    pub high: [f64; 2],
     /// True where the second coordinate grows upwards.
-    up: bool,
+    pub up: bool,
 }
 
 impl Field {
@@ -51,7 +51,13 @@ impl Field {
         across.min((WIDTH - 2.0 * MARGIN) / h.max(f64::MIN_POSITIVE))
     }
 
-    fn place(&self, at: [f64; 2]) -> [f64; 2] {
+    /// Width and height on paper, margins included.
+    pub fn size(&self) -> (f64, f64) {
+        let side = |k: usize| self.scale() * (self.high[k] - self.low[k]) + 2.0 * MARGIN;
+        (side(0), side(1))
+    }
+
+    pub fn place(&self, at: [f64; 2]) -> [f64; 2] {
         let s = self.scale();
         let y = if self.up { self.high[1] - at[1] } else { at[1] - self.low[1] };
         [MARGIN + s * (at[0] - self.low[0]), MARGIN + s * y]

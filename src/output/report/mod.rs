@@ -3,6 +3,7 @@
 //! A new section is one function in `sections`, `parameters` or `images` and one row in [`report_html`].
 
 mod images;
+mod knowledge;
 mod maps;
 mod parameters;
 mod plan_page;
@@ -35,11 +36,13 @@ pub fn report_html(record: &SolutionRecord) -> String {
             body {
                 (sections::head(record))
                 (sections::accuracy(record))
+                (knowledge::workspace(record))
                 (sections::left_out(record))
                 (sections::joint_noise(record))
                 (sections::residuals(record))
                 (parameters::robot(record))
                 (parameters::undetermined(record))
+                (knowledge::told(record))
                 (parameters::placed(record))
                 (parameters::cameras(record))
                 (sections::plates(record))

@@ -13,12 +13,6 @@ use crate::series::CameraMount;
 /// Share of data below which a parameter stays at its nominal value.
 const LEAST_SHARE: f64 = 0.1;
 
-/// Correlation from which two parameters are hard to tell apart.
-const STRONG: f64 = 0.95;
-
-/// Most correlations that are listed.
-const MOST_PAIRS: usize = 20;
-
 /// Most corrections in the list of the strongest.
 const MOST_CORRECTIONS: usize = 12;
 
@@ -130,7 +124,6 @@ pub(super) fn undetermined(r: &SolutionRecord) -> Markup {
         .filter(|e| e.free && e.share_of_data.is_some_and(|s| s < LEAST_SHARE))
         .map(|e| e.name.as_str())
         .collect();
-    let pairs = correlations(r);
     html! {
         h2 { "What the data could not determine" }
         @if weak.is_empty() {
@@ -143,42 +136,7 @@ pub(super) fn undetermined(r: &SolutionRecord) -> Markup {
             }
             ul { @for line in grouped(weak.iter().copied()) { li { (line) } } }
         }
-        @if !pairs.is_empty() {
-            h3 { "Parameters that are hard to tell apart" }
-            p.note {
-                "The images fix a combination of the two well, and each alone badly (correlation beyond " (STRONG) "). "
-                "This does not harm the accuracy as long as both are used together."
-            }
-            ul { @for (a, b, rho) in pairs.iter().take(MOST_PAIRS) { li {
-                (parameter(&r.estimates[*a].name)) " and " (parameter(&r.estimates[*b].name)) " (" (fixed(*rho, 3)) ")"
-            } } }
-            @if pairs.len() > MOST_PAIRS { p.note { "and " (pairs.len() - MOST_PAIRS) " weaker pairs." } }
-        }
     }
-}
-
-/// Pairs with a strong correlation, strongest first.
-fn correlations(r: &SolutionRecord) -> Vec<(usize, usize, f64)> {
-    let n = r.estimates.len();
-    let at = |i: usize, j: usize| r.covariance_lower.get(i * (i + 1) / 2 + j).copied().unwrap_or(0.0);
-    let mut pairs = Vec::new();
-    for i in 0..n {
-        for j in 0..i {
-            let rho = at(i, j) / (at(i, i) * at(j, j)).sqrt();
-            if rho.abs() > STRONG && !share_a_gauge(&r.estimates[i].name, &r.estimates[j].name) {
-                pairs.push((j, i, rho));
-            }
-        }
-    }
-    pairs.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
-    pairs
-}
-
-/// Poses of two plates, or of two mountings: all hang on the same robot, which makes them move together.
-fn share_a_gauge(a: &str, b: &str) -> bool {
-    let block = |name: &str| name.rsplit_once('.').map_or(String::new(), |(block, _)| block.to_owned());
-    let both = |kind: &str| a.starts_with(kind) && b.starts_with(kind);
-    (both("plate/") || both("hand_camera/")) && block(a) != block(b)
 }
 
 /// Poses of cameras and plates.

@@ -1,0 +1,177 @@
+//! Which stop to add: the one that lowers the uncertainty of what is unknown most.
+//!
+//! Candidates take one joint of a stop that was visited to another value of its range. What a candidate is worth follows from
+//! the covariance `C` of what the stops tell: a pose with Jacobian `J` and noise `R` takes `C J' (R + J C J')^-1 J C` off it.
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use super::stops::{StopsKnowledge, Structural, range_of};
+use crate::model::robot::{Robot, Stop};
+use crate::problem::Layout;
+use crate::urdf::JointKind;
+
+/// Values of every joint that are tried.
+const VALUES: usize = 13;
+
+/// Stops of which one joint is changed.
+const BASES: usize = 4;
+
+/// Share of the variance that a stop must remove to be worth a word.
+const LEAST_GAIN: f64 = 0.02;
+
+/// Most proposals.
+const MOST_NEXT: usize = 4;
+
+/// Range of readings below which a joint stands still, rad or m.
+const STANDS_STILL: f64 = 0.02;
+
+/// A proposal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Advice {
+    /// Joint to move.
+    pub joint: String,
+    /// Where to, rad or m.
+    pub near: f64,
+    /// Where it was, rad or m.
+    pub covered: (f64, f64),
+    /// Share of the variance in question that one such stop removes.
+    pub gain: f64,
+    /// In words.
+    pub words: String,
+}
+
+struct Candidate {
+    reading: usize,
+    value: f64,
+    /// `L^-1 J C` with `L L' = R + J C J'`, 6 x parameters: its columns' squares are what the stop takes off the variances.
+    taken: DMatrix<f64>,
+}
+
+/// All candidates with what they would tell.
+pub(super) struct Adviser<'a> {
+    robot: &'a Robot,
+    never: &'a Structural,
+    covariance: DMatrix<f64>,
+    covered: Vec<(f64, f64)>,
+    candidates: Vec<Candidate>,
+}
+
+impl<'a> Adviser<'a> {
+    pub fn new(
+        robot: &'a Robot,
+        layout: &Layout,
+        stops: &[Stop],
+        known: &StopsKnowledge,
+        never: &'a Structural,
+    ) -> Self {
+        let readings = robot.chain.readings.len();
+        let n = known.columns.len();
+        let range = |r: usize| {
+            let all = stops.iter().map(|s| s.readings[r]);
+            (all.clone().fold(f64::INFINITY, f64::min), all.fold(f64::NEG_INFINITY, f64::max))
+        };
+        let mut candidates = Vec::new();
+        for base in stops.iter().step_by((stops.len() / BASES).max(1)).take(BASES) {
+            for reading in 0..readings {
+                let (low, high) = range_of(robot, reading);
+                for k in 0..VALUES {
+                    let value = low + (high - low) * k as f64 / (VALUES - 1) as f64;
+                    let mut stop = Stop::at(&base.readings);
+                    stop.readings[reading] = value;
+                    let (j, noise) = known.measurement(robot, layout, &stop);
+                    let jc = &j * &known.covariance;
+                    let total = DMatrix::from_column_slice(6, 6, noise.as_slice()) + &jc * j.transpose();
+                    let Some(factor) = total.cholesky() else { continue };
+                    let Some(taken) = factor.l().solve_lower_triangular(&jc.columns(0, n).into_owned()) else {
+                        continue;
+                    };
+                    candidates.push(Candidate { reading, value, taken });
+                }
+            }
+        }
+        Self {
+            robot,
+            never,
+            covariance: known.covariance.view((0, 0), (n, n)).into_owned(),
+            covered: (0..readings).map(range).collect(),
+            candidates,
+        }
+    }
+
+    /// Mean gain of taking a joint to a value, best first. `direction` in units of the priors; none for all that can be told.
+    fn ranked(&self, direction: Option<&DVector<f64>>) -> Vec<(usize, f64, f64)> {
+        let gain: Box<dyn Fn(&Candidate) -> f64> = match direction.map(|v| self.never.removed_from(v)) {
+            Some(v) => {
+                let before = v.dot(&(&self.covariance * &v)).max(f64::MIN_POSITIVE);
+                Box::new(move |c| (&c.taken * &v).norm_squared() / before)
+            }
+            None => {
+                let u = &self.never.directions;
+                let free = |m: &DMatrix<f64>| m - (m * u) * u.transpose();
+                let before = free(&free(&self.covariance).transpose()).trace().max(f64::MIN_POSITIVE);
+                Box::new(move |c| (&c.taken - (&c.taken * u) * u.transpose()).norm_squared() / before)
+            }
+        };
+        let mut sums: Vec<(usize, f64, f64, f64)> = Vec::new();
+        for c in &self.candidates {
+            let own = gain(c);
+            match sums.iter_mut().find(|s| s.0 == c.reading && s.1 == c.value) {
+                Some(s) => {
+                    s.2 += own;
+                    s.3 += 1.0;
+                }
+                None => sums.push((c.reading, c.value, own, 1.0)),
+            }
+        }
+        let mut means: Vec<(usize, f64, f64)> = sums.into_iter().map(|(r, v, sum, n)| (r, v, sum / n)).collect();
+        means.sort_by(|a, b| b.2.total_cmp(&a.2));
+        means
+    }
+
+    /// What to do about one direction.
+    pub fn in_words(&self, direction: Option<&DVector<f64>>) -> String {
+        match self.ranked(direction).first().filter(|(_, _, gain)| *gain > LEAST_GAIN) {
+            Some(&(reading, value, _)) => self.words(reading, value),
+            None => "no single stop helps much: take more stops over the whole range of all joints".into(),
+        }
+    }
+
+    /// What to measure next: the best value of each joint, best joint first.
+    pub fn next(&self) -> Vec<Advice> {
+        let mut next: Vec<Advice> = Vec::new();
+        for (reading, value, gain) in self.ranked(None) {
+            let joint = &self.robot.chain.readings[reading];
+            if gain < LEAST_GAIN || next.len() == MOST_NEXT {
+                break;
+            }
+            if next.iter().all(|a| a.joint != *joint) {
+                next.push(Advice {
+                    joint: joint.clone(),
+                    near: value,
+                    covered: self.covered[reading],
+                    gain,
+                    words: self.words(reading, value),
+                });
+            }
+        }
+        next
+    }
+
+    fn words(&self, reading: usize, value: f64) -> String {
+        let joint = &self.robot.chain.readings[reading];
+        let (low, high) = self.covered[reading];
+        let shown = |v: f64| match self.robot.chain.reading_kinds[reading] {
+            JointKind::Prismatic => format!("{:.0} mm", 1e3 * v),
+            _ => format!("{:.0} deg", v.to_degrees()),
+        };
+        if high - low < STANDS_STILL {
+            return format!(
+                "move {joint}, which stands at {} in all stops: add stops with {joint} near {}",
+                shown(low),
+                shown(value)
+            );
+        }
+        format!("add stops with {joint} near {} (so far {} to {})", shown(value), shown(low), shown(high))
+    }
+}

@@ -1,0 +1,169 @@
+//! Uncertainty of the flange, anywhere in the workspace.
+//!
+//! The pose of the flange is given relative to what stands still: the plate, or a fixed camera. No series can tell a constant
+//! displacement of the flange (the last origin and the last offset against the hand-camera offset), so the flange is the one that
+//! is right on average over the stops: with `J(q)` the derivative of its body twist, `J(q) - mean_j J(q_j)` counts.
+
+use nalgebra::{DMatrix, Matrix6};
+use serde::{Deserialize, Serialize};
+
+use super::stops::{halton_stops, range_of};
+use crate::geom::{Pose, adjoint};
+use crate::model::robot::{Robot, Stop};
+use crate::problem::Layout;
+
+/// Samples of the workspace: so many in the region of the stops, as many within all joint limits.
+const SAMPLES: usize = 250;
+
+/// Part of its covered range by which a joint may lie outside and still count as covered.
+const MARGIN: f64 = 0.05;
+
+/// A flange pose with its uncertainty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PredictedFlange {
+    /// Pose of the flange relative to the plate (or to a fixed camera).
+    pub pose: Pose,
+    /// Covariance of its body twist, m and rad, translation first.
+    pub covariance: Matrix6<f64>,
+    /// Names of joints outside the range of the stops.
+    pub outside: Vec<String>,
+}
+
+impl PredictedFlange {
+    /// Root of the summed variances of the three axes: position (m) and rotation (rad).
+    pub fn sigmas(&self) -> [f64; 2] {
+        [0, 3].map(|first| (first..first + 3).map(|k| self.covariance[(k, k)]).sum::<f64>().max(0.0).sqrt())
+    }
+}
+
+/// A place of the workspace map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WorkspacePoint {
+    /// Joint readings, rad or m.
+    pub readings: Vec<f64>,
+    /// Flange in the base frame, m.
+    pub xyz_m: [f64; 3],
+    /// Sigma of its position relative to the plate, root of the sum over three axes, m.
+    pub sigma_m: f64,
+    /// Sigma of its orientation, root of the sum over three axes, rad.
+    pub sigma_rad: f64,
+    /// True where every joint lies in the range of the stops.
+    pub covered: bool,
+}
+
+/// What is needed to predict.
+#[derive(Debug, Clone)]
+pub struct FlangeModel<'a> {
+    robot: &'a Robot,
+    layout: &'a Layout,
+    /// What stands still in the base frame, and its first column.
+    still: Pose,
+    still_column: usize,
+    /// Of the dense columns.
+    covariance: &'a DMatrix<f64>,
+    mean: DMatrix<f64>,
+    covered: Vec<(f64, f64)>,
+}
+
+impl<'a> FlangeModel<'a> {
+    /// `still` is the plate (or the fixed camera) in the base frame with its first column; `None` without stops, or where nothing
+    /// determines that pose.
+    pub fn new(
+        robot: &'a Robot,
+        layout: &'a Layout,
+        (still, still_column): (Pose, usize),
+        covariance: &'a DMatrix<f64>,
+        stops: &[Stop],
+    ) -> Option<Self> {
+        let known = (still_column..still_column + 6).all(|c| layout.columns[c].free && covariance[(c, c)] > 0.0);
+        if stops.is_empty() || !known {
+            return None;
+        }
+        let readings = robot.chain.readings.len();
+        let range = |r: usize| {
+            let all = stops.iter().map(|s| s.readings[r]);
+            (all.clone().fold(f64::INFINITY, f64::min), all.fold(f64::NEG_INFINITY, f64::max))
+        };
+        let mut model = Self {
+            robot,
+            layout,
+            still,
+            still_column,
+            covariance,
+            mean: DMatrix::zeros(6, layout.theta_len()),
+            covered: (0..readings).map(range).collect(),
+        };
+        let sum = stops.iter().fold(model.mean.clone(), |sum, s| sum + model.derivative(s).1);
+        model.mean = sum / stops.len() as f64;
+        Some(model)
+    }
+
+    /// Pose relative to what stands still, and `J`, 6 x columns that act through the camera poses.
+    fn derivative(&self, stop: &Stop) -> (Pose, DMatrix<f64>) {
+        let kinematics = self.robot.kinematics(stop, &vec![0.0; stop.readings.len()]);
+        let pose = self.still.inverse() * kinematics.base_from_tip;
+        let mut j = DMatrix::zeros(6, self.layout.theta_len());
+        for (k, d) in kinematics.d_twists.iter().enumerate() {
+            j.fixed_view_mut::<6, 6>(0, self.layout.twists.start + 6 * k).copy_from(d);
+        }
+        // Local errors are noise near single readings, not properties of the robot.
+        for (k, d) in kinematics.d_terms.iter().enumerate().take(self.layout.locals.start - self.layout.terms.start) {
+            j.fixed_view_mut::<6, 1>(0, self.layout.terms.start + k).copy_from(d);
+        }
+        j.fixed_view_mut::<6, 6>(0, self.still_column).copy_from(&-adjoint(&pose.inverse()));
+        (pose, j)
+    }
+
+    /// Flange at joint readings (rad or m), approach unknown.
+    pub fn at(&self, readings: &[f64]) -> PredictedFlange {
+        let (pose, j) = self.derivative(&Stop::at(readings));
+        let covariance = self.propagated(&j, self.covariance);
+        let outside = (self.covered.iter().zip(readings).zip(&self.robot.chain.readings))
+            .filter(|(((low, high), q), _)| {
+                let margin = MARGIN * (high - low);
+                **q < low - margin || **q > high + margin
+            })
+            .map(|(_, name)| name.clone())
+            .collect();
+        PredictedFlange { pose, covariance, outside }
+    }
+
+    fn propagated(&self, j: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Matrix6<f64> {
+        let j = j - &self.mean;
+        let n = j.ncols();
+        let c = &j * covariance.view((0, 0), (n, n)) * j.transpose();
+        let c = Matrix6::from_column_slice(c.as_slice());
+        (c + c.transpose()) * 0.5
+    }
+
+    /// Samples of the region of the stops, then of everything within the joint limits.
+    pub fn workspace(&self) -> Vec<WorkspacePoint> {
+        let limits: Vec<(f64, f64)> = (0..self.covered.len()).map(|r| range_of(self.robot, r)).collect();
+        let stops = halton_stops(&self.covered, SAMPLES).into_iter().chain(halton_stops(&limits, SAMPLES));
+        stops
+            .map(|stop| {
+                let found = self.at(&stop.readings);
+                let [sigma_m, sigma_rad] = found.sigmas();
+                WorkspacePoint {
+                    xyz_m: self.robot.base_from_tip(&stop.readings).xyz(),
+                    readings: stop.readings,
+                    sigma_m,
+                    sigma_rad,
+                    covered: found.outside.is_empty(),
+                }
+            })
+            .collect()
+    }
+
+    /// Ratio of the sigma of the flange's position by `other` to that by the covariance of this model, RMS over the stops' region.
+    pub fn ratio_of(&self, other: &DMatrix<f64>) -> f64 {
+        let (mut own_sum, mut other_sum) = (0.0, 0.0);
+        for stop in halton_stops(&self.covered, SAMPLES) {
+            let (_, j) = self.derivative(&stop);
+            let trace = |c: &Matrix6<f64>| (0..3).map(|k| c[(k, k)]).sum::<f64>();
+            own_sum += trace(&self.propagated(&j, self.covariance));
+            other_sum += trace(&self.propagated(&j, other));
+        }
+        (other_sum / f64::max(own_sum, f64::MIN_POSITIVE)).max(0.0).sqrt()
+    }
+}

@@ -1,0 +1,333 @@
+//! What data tell of the robot: rank, directions that stay unknown, correlations, observability, all with names.
+//!
+//! In units of the priors the posterior covariance `K` of the robot's parameters has eigenvalues `k` between 0 and 1; the data
+//! alone have the information `1/k - 1` in that direction, whose root is a singular value of the square-root factor of the
+//! reduced system. A direction counts as determined where the data make out at least a tenth (`k < 0.9`).
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use super::advice::{Advice, Adviser};
+use super::stops::{LEAST_SHARE, StopsKnowledge, Structural, structural};
+use crate::linalg::symmetric_eigen;
+use crate::model::robot::{Robot, Stop};
+use crate::problem::{Layout, short_name};
+
+/// Correlation from which two parameters are hard to tell apart.
+pub const STRONG_CORRELATION: f64 = 0.9;
+
+/// Most pairs that are kept.
+const MOST_PAIRS: usize = 60;
+
+/// Part of a direction, beside its largest, below which a parameter is not named.
+const LEAST_PART: f64 = 0.1;
+
+/// Part of a direction outside the structural ones from which it counts as one of its own.
+const OUTSIDE: f64 = 0.5;
+
+/// Why a direction is unknown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// The base of the robot against the pose of what stands in it.
+    Base,
+    /// The tip of the robot against the pose of what it carries.
+    Tip,
+    /// Parameters that do the same to this robot.
+    Redundant,
+    /// A parameter that does nothing to this robot.
+    Idle,
+    /// The stops do not show it; others would.
+    Stops,
+}
+
+/// Parameters that change together without the data noticing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct UnknownDirection {
+    /// Why.
+    pub cause: Cause,
+    /// Parameters with their part, in units of their priors, largest first.
+    pub parameters: Vec<(String, f64)>,
+    /// What to do, where there is something.
+    pub remedy: Option<String>,
+}
+
+/// Two parameters that are hard to tell apart.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Correlation {
+    /// One.
+    pub first: String,
+    /// The other.
+    pub second: String,
+    /// Correlation of the errors of the estimates.
+    pub correlation: f64,
+    /// What to do.
+    pub remedy: String,
+}
+
+/// Observability indices over the directions that the data determine, in units of the priors; none where there is none.
+///
+/// With the singular values `s_1 >= .. >= s_r` of the prior-scaled square-root factor and `n` images.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Observability {
+    /// `(s_1 .. s_r)^(1/r) / sqrt n` (J. Borm, C. Menq 1991).
+    pub o1: f64,
+    /// `s_r / s_1` (M. Driels, U. Pathre 1990).
+    pub o2: f64,
+    /// `s_r` (A. Nahvi, J. Hollerbach, V. Hayward 1994).
+    pub o3: f64,
+    /// `s_r^2 / s_1` (A. Nahvi, J. Hollerbach 1996).
+    pub o4: f64,
+    /// `1 / sum 1/s_i` (Y. Sun, J. Hollerbach 2008).
+    pub o5: f64,
+}
+
+/// What the data tell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Identifiability {
+    /// Free parameters of the robot.
+    pub parameters: usize,
+    /// Directions that stops over the whole range of the joints could tell.
+    pub tellable: usize,
+    /// Directions that these data tell.
+    pub rank: usize,
+    /// Directions that they do not tell.
+    pub unknown: Vec<UnknownDirection>,
+    /// Pairs with |correlation| > 0.9, strongest first, without those that only express an unknown direction.
+    pub correlations: Vec<Correlation>,
+    /// Indices; none where nothing is determined.
+    pub observability: Option<Observability>,
+    /// Readings of the stops: name, smallest, largest (rad or m).
+    pub covered: Vec<(String, f64, f64)>,
+    /// What to measure next, best first.
+    pub next: Vec<Advice>,
+}
+
+/// Before the solve: what `stops` can tell.
+pub fn identifiability_of_stops(robot: &Robot, layout: &Layout, stops: &[Stop]) -> Option<Identifiability> {
+    let known = StopsKnowledge::new(robot, layout, stops).ok()?;
+    let n = known.columns.len();
+    let posterior = known.covariance.view((0, 0), (n, n)).into_owned();
+    let (values, vectors) = symmetric_eigen(&known.information)?;
+    let names: Vec<String> = known.columns.iter().map(|&c| short_name(&layout.columns[c].name)).collect();
+    judge(robot, layout, stops, known, &values, &vectors, &posterior, &names)
+}
+
+/// After the solve: `covariance` of the dense columns of `layout`, m and rad.
+pub fn identifiability(
+    robot: &Robot,
+    layout: &Layout,
+    stops: &[Stop],
+    covariance: &DMatrix<f64>,
+) -> Option<Identifiability> {
+    let known = StopsKnowledge::new(robot, layout, stops).ok()?;
+    let (columns, scale) = (&known.columns, &known.scale);
+    let n = columns.len();
+    let k = DMatrix::from_fn(n, n, |i, j| covariance[(columns[i], columns[j])] / (scale[i] * scale[j]));
+    let (shares, vectors) = symmetric_eigen(&k)?;
+    // Ascending shares are descending informations.
+    let values = shares.map(|k| (1.0 / k.max(f64::MIN_POSITIVE) - 1.0).max(0.0));
+    let listed: Vec<usize> = (0..layout.len())
+        .filter(|c| layout.columns[*c].free && covariance[(*c, *c)] > 0.0 && !layout.locals.contains(c))
+        .collect();
+    let names: Vec<String> = listed.iter().map(|&c| short_name(&layout.columns[c].name)).collect();
+    let all = DMatrix::from_fn(listed.len(), listed.len(), |i, j| covariance[(listed[i], listed[j])]);
+    judge(robot, layout, stops, known, &values, &vectors, &all, &names)
+}
+
+#[allow(clippy::too_many_arguments)]
+fn judge(
+    robot: &Robot,
+    layout: &Layout,
+    stops: &[Stop],
+    known: StopsKnowledge,
+    values: &DVector<f64>,
+    vectors: &DMatrix<f64>,
+    covariance: &DMatrix<f64>,
+    covariance_names: &[String],
+) -> Option<Identifiability> {
+    let never = structural(robot, layout);
+    let least = LEAST_SHARE / (1.0 - LEAST_SHARE);
+    let names: Vec<String> = known.columns.iter().map(|&c| short_name(&layout.columns[c].name)).collect();
+    let told: Vec<f64> = values.iter().copied().filter(|v| *v >= least).map(f64::sqrt).collect();
+    let silent: Vec<usize> = (0..values.len()).filter(|&k| values[k] < least).collect();
+    let own = beyond(&never, &vectors.select_columns(&silent));
+    let adviser = Adviser::new(robot, layout, stops, &known, &never);
+    let mut unknown: Vec<UnknownDirection> = sparse(&own)
+        .into_iter()
+        .map(|v| UnknownDirection {
+            cause: Cause::Stops,
+            parameters: named(&v, &names),
+            remedy: Some(adviser.in_words(Some(&v))),
+        })
+        .collect();
+    unknown.extend(structural_in_words(robot, &never, &names));
+    Some(Identifiability {
+        parameters: names.len(),
+        tellable: names.len() - never.directions.ncols(),
+        rank: told.len(),
+        correlations: correlations(covariance, covariance_names, &names, &never, &adviser),
+        unknown,
+        observability: observability(&told, stops.len()),
+        covered: covered(robot, stops),
+        next: adviser.next(),
+    })
+}
+
+/// Smallest and largest reading of every joint.
+fn covered(robot: &Robot, stops: &[Stop]) -> Vec<(String, f64, f64)> {
+    let range = |r: usize| {
+        let readings = stops.iter().map(|s| s.readings[r]);
+        (readings.clone().fold(f64::INFINITY, f64::min), readings.fold(f64::NEG_INFINITY, f64::max))
+    };
+    let named = |(r, name): (usize, &String)| (name.clone(), range(r).0, range(r).1);
+    if stops.is_empty() { Vec::new() } else { robot.chain.readings.iter().enumerate().map(named).collect() }
+}
+
+fn observability(singular: &[f64], images: usize) -> Option<Observability> {
+    let largest = singular.iter().copied().reduce(f64::max)?;
+    let smallest = singular.iter().copied().reduce(f64::min)?;
+    let r = singular.len() as f64;
+    let mean_log = singular.iter().map(|s| s.ln()).sum::<f64>() / r;
+    Some(Observability {
+        o1: mean_log.exp() / (images.max(1) as f64).sqrt(),
+        o2: smallest / largest,
+        o3: smallest,
+        o4: smallest * smallest / largest,
+        o5: 1.0 / singular.iter().map(|s| 1.0 / s).sum::<f64>(),
+    })
+}
+
+/// Orthonormal basis of what `silent` directions hold beyond the structural ones.
+fn beyond(never: &Structural, silent: &DMatrix<f64>) -> DMatrix<f64> {
+    let rest = silent - &never.directions * (never.directions.transpose() * silent);
+    let none = DMatrix::zeros(silent.nrows(), 0);
+    if rest.ncols() == 0 {
+        return none;
+    }
+    let Some((values, vectors)) = symmetric_eigen(&(&rest * rest.transpose())) else { return none };
+    let kept: Vec<usize> = (0..values.len()).rev().filter(|&k| values[k] > OUTSIDE).collect();
+    vectors.select_columns(&kept)
+}
+
+/// The same span with few parameters in every direction: each has a pivot that the others do not have.
+fn sparse(basis: &DMatrix<f64>) -> Vec<DVector<f64>> {
+    let mut b = basis.clone();
+    let mut taken: Vec<usize> = Vec::new();
+    for done in 0..b.ncols() {
+        let mut best = (0, done, 0.0);
+        for c in done..b.ncols() {
+            for r in (0..b.nrows()).filter(|r| !taken.contains(r)) {
+                if b[(r, c)].abs() > f64::abs(best.2) {
+                    best = (r, c, b[(r, c)]);
+                }
+            }
+        }
+        let (row, column, value) = best;
+        if value == 0.0 {
+            break;
+        }
+        b.swap_columns(done, column);
+        let pivot = b.column(done) / value;
+        b.set_column(done, &pivot);
+        for c in (0..b.ncols()).filter(|c| *c != done) {
+            let factor = b[(row, c)];
+            let cleared = b.column(c) - &pivot * factor;
+            b.set_column(c, &cleared);
+        }
+        taken.push(row);
+    }
+    b.column_iter().map(|c| c.into_owned()).collect()
+}
+
+fn named(v: &DVector<f64>, names: &[String]) -> Vec<(String, f64)> {
+    let largest = v.amax();
+    let mut parts: Vec<(usize, f64)> =
+        v.iter().copied().enumerate().filter(|(_, x)| x.abs() >= LEAST_PART * largest).collect();
+    parts.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()).then(a.0.cmp(&b.0)));
+    parts.into_iter().map(|(k, x)| (names[k].clone(), x)).collect()
+}
+
+/// Names of the parameters that move the whole base, and of those that move the whole tip.
+pub fn frame_parameters(robot: &Robot) -> [Vec<String>; 2] {
+    let chain = &robot.chain;
+    let origin = |name: &str| format!("{}.origin", name.replace('/', "."));
+    let before =
+        chain.joints.iter().take_while(|j| j.drive.is_none()).chain(chain.joints.iter().find(|j| j.drive.is_some()));
+    let mut first: Vec<String> = before.map(|j| origin(&j.name)).collect();
+    let mut last: Vec<String> =
+        chain.joints.iter().rev().take_while(|j| j.drive.is_none()).map(|j| origin(&j.name)).collect();
+    first.extend(chain.readings.first().map(|r| format!("{r}.offset")));
+    last.extend(chain.readings.last().map(|r| format!("{r}.offset")));
+    [first, last]
+}
+
+fn within(name: &str, blocks: &[String]) -> bool {
+    blocks.iter().any(|b| name.strip_prefix(b.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.')))
+}
+
+fn structural_in_words(robot: &Robot, never: &Structural, names: &[String]) -> Vec<UnknownDirection> {
+    let [first, last] = frame_parameters(robot);
+    let cause = |parameters: &[(String, f64)]| {
+        let all = |blocks: &[String]| parameters.iter().all(|(name, _)| within(name, blocks));
+        match parameters.len() {
+            _ if all(&first) => Cause::Base,
+            _ if all(&last) => Cause::Tip,
+            1 => Cause::Idle,
+            _ => Cause::Redundant,
+        }
+    };
+    sparse(&never.directions)
+        .into_iter()
+        .map(|v| {
+            let parameters = named(&v, names);
+            UnknownDirection { cause: cause(&parameters), parameters, remedy: None }
+        })
+        .collect()
+}
+
+/// `covariance` with the names of its rows; `robot` names those of the directions.
+fn correlations(
+    covariance: &DMatrix<f64>,
+    all: &[String],
+    robot: &[String],
+    never: &Structural,
+    adviser: &Adviser,
+) -> Vec<Correlation> {
+    let shares = never.shares();
+    let place = |name: &String| robot.iter().position(|r| r == name);
+    let mut pairs = Vec::new();
+    for i in 0..all.len() {
+        for j in 0..i {
+            let rho = covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+            let (a, b) = (place(&all[j]), place(&all[i]));
+            let expressed = [a, b].iter().flatten().any(|&k| shares[k] > LEAST_SHARE);
+            if rho.abs() > STRONG_CORRELATION && !expressed && !share_a_frame(&all[j], &all[i]) {
+                pairs.push((j, i, rho, a, b));
+            }
+        }
+    }
+    pairs.sort_by(|x, y| y.2.abs().total_cmp(&x.2.abs()).then((x.0, x.1).cmp(&(y.0, y.1))));
+    pairs.truncate(MOST_PAIRS);
+    let in_words = |(first, second, rho, a, b): (usize, usize, f64, Option<usize>, Option<usize>)| {
+        let mut v = DVector::zeros(robot.len());
+        a.into_iter().for_each(|k| v[k] = 1.0);
+        b.into_iter().for_each(|k| v[k] = rho.signum());
+        let camera = |name: &str| name.starts_with("camera.");
+        let remedy = match (camera(&all[first]), camera(&all[second])) {
+            (true, true) => "fill the whole image, tilt by 20 to 45 degrees, and vary the distance".to_owned(),
+            _ if v.norm() > 0.0 => adviser.in_words(Some(&v)),
+            _ => "roll the camera about its axis at some stops, tilt by 20 to 45 degrees, and vary the distance"
+                .to_owned(),
+        };
+        Correlation { first: all[first].clone(), second: all[second].clone(), correlation: rho, remedy }
+    };
+    pairs.into_iter().map(in_words).collect()
+}
+
+/// Poses of two plates, or of two mountings: all hang on the same robot, which makes them move together.
+fn share_a_frame(a: &str, b: &str) -> bool {
+    let block = |name: &str| name.rsplit_once('.').map_or(String::new(), |(block, _)| block.to_owned());
+    let both = |kind: &str| a.starts_with(kind) && b.starts_with(kind);
+    (both("plate.") || both("hand_camera")) && block(a) != block(b)
+}

@@ -1,0 +1,63 @@
+//! `--at`: the flange at given joint vectors.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::joint_table::{self, Unit};
+use crate::error::{Error, Result};
+use crate::output::flange_table::{at_csv, flange_at};
+use crate::output::restore::found_model;
+use crate::output::solution_json::SolutionRecord;
+
+/// Flags of `--at`.
+#[derive(Debug, Args)]
+pub(super) struct AtArgs {
+    /// Joint vectors (CSV, columns named as the joints): pose and uncertainty of the flange relative to the plate go to at.csv
+    #[arg(long, value_name = "FILE", requires = "at_unit")]
+    at: Option<PathBuf>,
+    /// Unit of the revolute joints in that file
+    #[arg(long, value_enum)]
+    at_unit: Option<Unit>,
+}
+
+/// Most rows that are printed.
+const MOST_ROWS: usize = 20;
+
+impl AtArgs {
+    /// Predicts, writes at.csv into `folder` and says what it holds; nothing without `--at`.
+    ///
+    /// # Errors
+    /// A table that cannot be read, a solution that does not tie robot and plate, a file that cannot be written.
+    pub(super) fn run(&self, record: &SolutionRecord, folder: &Path) -> Result<String> {
+        let (Some(file), Some(unit)) = (&self.at, self.at_unit) else { return Ok(String::new()) };
+        let robot = &record.robot;
+        let rows = joint_table::read(file, &[], &robot.readings, &robot.reading_kinds, unit)?;
+        let readings: Vec<Vec<f64>> = rows.into_iter().map(|(_, q)| q).collect();
+        let model = found_model(record)?;
+        let found = flange_at(&model, &readings)?;
+        let path = folder.join("at.csv");
+        std::fs::write(&path, at_csv(&model, &readings, &found)).map_err(|e| Error::io(&path, &e))?;
+        let mut out = String::new();
+        for (k, f) in found.iter().enumerate().take(MOST_ROWS) {
+            let [position, rotation] = f.sigmas();
+            let [x, y, z] = f.pose.xyz().map(|v| 1e3 * v);
+            let outside = if f.outside.is_empty() {
+                String::new()
+            } else {
+                format!("; extrapolated: {} outside the stops", f.outside.join(", "))
+            };
+            // Writing to a String cannot fail.
+            let _ = writeln!(
+                out,
+                "at        row {}: flange at ({x:.2}, {y:.2}, {z:.2}) mm, sigma {:.3} mm, {:.3} mrad{outside}",
+                k + 1,
+                1e3 * position,
+                1e3 * rotation
+            );
+        }
+        let _ = writeln!(out, "at        {} joint vectors in {}", found.len(), path.display());
+        Ok(out)
+    }
+}

@@ -1,0 +1,107 @@
+//! Flags that choose what is estimated.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use crate::error::{Error, Result};
+use crate::recipe::{Config, JointNoise, Options, Parameters, RobotModel, Selection};
+
+/// Flags that `identify` shares with whatever solves.
+#[derive(Debug, Args)]
+pub(super) struct ChoiceArgs {
+    /// Joint noise in rad (m for a prismatic joint) instead of the estimate; 0 takes the readings as exact
+    #[arg(long, value_name = "SIGMA")]
+    joint_noise: Option<f64>,
+    /// Joint terms beside rigid geometry and offsets [default: full]
+    #[arg(long, value_enum)]
+    robot_model: Option<Model>,
+    /// Parameters of the robot to estimate: all of the model, or a set that a series can tell apart [default: all]
+    #[arg(long, value_enum)]
+    parameters: Option<Set>,
+    /// Estimate these parameters of the robot (joint_2.offset, joint_3.origin, '*.gear'): alone, or beside the minimal set
+    #[arg(long, value_name = "NAME")]
+    free: Vec<String>,
+    /// Hold these parameters at nominal (camera.front.k3, joint_2)
+    #[arg(long, value_name = "NAME")]
+    fix: Vec<String>,
+    /// File with parameters, robot_model, free, fix and [prior] (see the guide); flags win
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+}
+
+/// Names of the robot models.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Model {
+    /// Link geometry and joint offsets
+    Rigid,
+    /// Also gear scale and two harmonics
+    Gear,
+    /// Also gravity and backlash
+    Full,
+    /// The one of these that the data support best (Laplace evidence, printed)
+    Auto,
+}
+
+/// Names of the sets of parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Set {
+    /// All; priors settle what no series can tell
+    All,
+    /// As many as a series over the whole range of the joints can tell apart
+    Minimal,
+}
+
+impl From<Model> for RobotModel {
+    fn from(model: Model) -> Self {
+        match model {
+            Model::Rigid => Self::Rigid,
+            Model::Gear => Self::Gear,
+            Model::Full => Self::Full,
+            Model::Auto => Self::Auto,
+        }
+    }
+}
+
+impl ChoiceArgs {
+    /// Flags over the configuration file over defaults.
+    pub(super) fn options(&self) -> Result<Options> {
+        let config = self.config.as_deref().map_or(Ok(Config::default()), Config::read)?;
+        let parameters = self.parameters.map(|s| if s == Set::Minimal { Parameters::Minimal } else { Parameters::All });
+        let joined = |a: &[String], b: &[String]| a.iter().chain(b).cloned().collect();
+        Ok(Options {
+            joint_noise: joint_noise(self.joint_noise)?,
+            model: self.robot_model.map(Into::into).or(config.robot_model).unwrap_or(RobotModel::Full),
+            selection: Selection {
+                parameters: parameters.or(config.parameters).unwrap_or_default(),
+                free: joined(&config.free, &self.free),
+                fix: joined(&config.fix, &self.fix),
+                prior: config.prior,
+            },
+        })
+    }
+}
+
+/// Options for the record.
+pub(super) fn in_words(options: &Options) -> Vec<(String, String)> {
+    let joint_noise = match options.joint_noise {
+        JointNoise::Estimated => "estimated".to_owned(),
+        JointNoise::Known(sigma) => format!("{sigma} rad"),
+    };
+    let model = format!("{:?}", options.model).to_lowercase();
+    let mut words = vec![("joint noise".to_owned(), joint_noise), ("robot model".to_owned(), model)];
+    words.extend(options.selection.in_words());
+    words
+}
+
+fn joint_noise(sigma: Option<f64>) -> Result<JointNoise> {
+    match sigma {
+        None => Ok(JointNoise::Estimated),
+        Some(s) if (0.0..0.1).contains(&s) => Ok(JointNoise::Known(s)),
+        Some(s) => Err(Error::input(
+            "--joint-noise",
+            format!("{s} is no joint noise in rad"),
+            "give 0 for exact readings or a value like 0.00005 (0.05 mrad)",
+        )),
+    }
+}

@@ -1,0 +1,92 @@
+//! `robotcal show`: a solution printed again, or two solutions against each other.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::at::AtArgs;
+use super::{Verdict, summary};
+use crate::error::{Error, Result};
+use crate::output::difference::{Difference, compare_solutions};
+use crate::output::solution_json::{self, SolutionRecord};
+use crate::urdf::JointKind;
+
+/// Flags of `show`.
+#[derive(Debug, Args)]
+pub(super) struct ShowArgs {
+    /// solution.json; a second one is compared with it over the workspace
+    #[arg(value_name = "SOLUTION", required = true, num_args = 1..=2)]
+    solutions: Vec<PathBuf>,
+    /// Print every parameter with sigma, prior and share of data
+    #[arg(long)]
+    parameters: bool,
+    /// Folder for at.csv
+    #[arg(long, value_name = "FOLDER", default_value = ".")]
+    out: PathBuf,
+    #[command(flatten)]
+    at: AtArgs,
+}
+
+/// Reads a solution.
+pub(super) fn read_solution(path: &Path) -> Result<SolutionRecord> {
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+    solution_json::read(&bytes).map_err(|e| Error { place: path.display().to_string(), ..e })
+}
+
+pub(super) fn run(args: &ShowArgs) -> Result<Verdict> {
+    let first = read_solution(&args.solutions[0])?;
+    if let Some(second) = args.solutions.get(1) {
+        return compare(args, &first, &read_solution(second)?);
+    }
+    print!("{}", summary::text(&first));
+    if args.parameters {
+        print!("{}", summary::parameters(&first));
+    }
+    print!("{}", args.at.run(&first, &args.out)?);
+    Ok(if first.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed })
+}
+
+fn compare(args: &ShowArgs, a: &SolutionRecord, b: &SolutionRecord) -> Result<Verdict> {
+    let found = compare_solutions(a, b)?;
+    println!("first     {}", args.solutions[0].display());
+    println!("second    {}", args.solutions[1].display());
+    println!(
+        "flange    distance of the flange between the two models, base frames and a point of the flange brought together:"
+    );
+    match &found.covered {
+        Some(d) => print_difference("in the region of the stops", d, a),
+        None => println!("          their stops have no region in common"),
+    }
+    print_difference("within all joint limits", &found.everywhere, a);
+    if found.parameters.is_empty() {
+        println!("differ    no parameter of the robot differs by more than 3 sigmas");
+    }
+    for (name, x, y, sigmas) in &found.parameters {
+        println!("differ    {name}: {x:.3e} and {y:.3e}, {sigmas:.1} sigmas");
+    }
+    for (what, r) in [("first", a), ("second", b)] {
+        println!("accuracy  {what}: {:.3} mm held out ({})", r.accuracy.calibrated.rms_mm, verdict(r));
+    }
+    Ok(Verdict::Good)
+}
+
+fn verdict(r: &SolutionRecord) -> &'static str {
+    if r.failed_gates.is_empty() { "good" } else { "NOT TO BE TRUSTED" }
+}
+
+fn print_difference(region: &str, d: &Difference, a: &SolutionRecord) {
+    let stated = d.stated_m.map_or(String::new(), |s| format!(", stated sigma of both {:.3} mm", 1e3 * s));
+    println!(
+        "          {region}: {:.3} mm RMS, worst {:.3} mm over {} places{stated}",
+        1e3 * d.rms_m,
+        1e3 * d.worst_m,
+        d.places
+    );
+    let at: Vec<String> = (d.worst_at.iter().zip(&a.robot.readings).zip(&a.robot.reading_kinds))
+        .map(|((q, name), kind)| match kind {
+            JointKind::Prismatic => format!("{name} {:.0} mm", 1e3 * q),
+            _ => format!("{name} {:.0} deg", q.to_degrees()),
+        })
+        .collect();
+    println!("          worst at {}", at.join(", "));
+}

@@ -1,0 +1,78 @@
+//! `robotcal verify --series`: a corrected model judged by another series.
+
+use std::path::Path;
+
+use super::identify::{chain, measure_all, read_all};
+use super::recording::{Pictures, RecordingArgs};
+use super::verify::VerifyArgs;
+use super::{Verdict, progress};
+use crate::assess::{Ratio, bootstrap_ratio, root_mean_square};
+use crate::error::{Error, Result};
+use crate::model::robot::Robot;
+use crate::output::read_compensation;
+use crate::recipe::{JudgedImage, verify_series};
+use crate::urdf;
+
+/// Judges the model, and the nominal one where it is given, by the images that both predict.
+pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdict> {
+    let model = judged(args, &args.urdf, args.compensation.as_deref(), recording)?;
+    let Some(file) = &args.nominal else {
+        println!("{}", line("model", &args.urdf, &model.iter().collect::<Vec<_>>()));
+        return Ok(Verdict::Good);
+    };
+    let nominal = judged(args, file, None, recording)?;
+    let same = |a: &JudgedImage, b: &JudgedImage| a.series == b.series && a.name == b.name;
+    let pairs: Vec<(&JudgedImage, &JudgedImage)> =
+        model.iter().filter_map(|m| nominal.iter().find(|n| same(m, n)).map(|n| (m, n))).collect();
+    let (model, nominal): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
+    println!(
+        "images    {} that both models predict; camera, hand-camera offset and plate fitted to the others",
+        model.len()
+    );
+    println!("{}", line("model", &args.urdf, &model));
+    println!("{}", line("nominal", file, &nominal));
+    let ratio = bootstrap_ratio(&units(&model), &units(&nominal)).ok_or_else(|| {
+        Error::unsolved("verification", "the models have no image in common", "check that both URDFs are of this robot")
+    })?;
+    let Ratio { value, low, high } = ratio;
+    let share = format!("{:.0} % of the nominal error ({:.0} to {:.0} %)", 100.0 * value, 100.0 * low, 100.0 * high);
+    if value < 1.0 {
+        println!("verdict   good: {share}");
+        return Ok(Verdict::Good);
+    }
+    println!("verdict   NOT TO BE TRUSTED: {share}");
+    Ok(Verdict::GateFailed)
+}
+
+fn judged(
+    args: &VerifyArgs,
+    urdf: &Path,
+    compensation: Option<&Path>,
+    recording: &RecordingArgs,
+) -> Result<Vec<JudgedImage>> {
+    let description = urdf::read(urdf)?;
+    let all = read_all(&args.series)?;
+    let chain = chain(&description, &all, args.base.as_deref(), args.tip.as_deref())?;
+    let all = Pictures::new().of_recordings(all, &recording.options(&chain.readings)?)?;
+    let terms = compensation.map_or(Ok(Vec::new()), |c| read_compensation(c, &chain))?;
+    let measured = measure_all(&all, &chain, &mut Vec::new())?;
+    let bar = progress::bar(1, &urdf.display().to_string());
+    let found = verify_series(&Robot { terms, ..Robot::nominal(chain) }, &measured);
+    bar.finish_and_clear();
+    found
+}
+
+fn units(images: &[&JudgedImage]) -> Vec<(f64, f64)> {
+    images.iter().map(|i| (i.error.mm2, i.error.count)).collect()
+}
+
+fn line(what: &str, file: &Path, images: &[&JudgedImage]) -> String {
+    let px: Vec<(f64, f64)> = images.iter().map(|i| (i.error.px2, i.error.count)).collect();
+    let worst = images.iter().map(|i| (i.error.mm2 / i.error.count).sqrt()).fold(0.0, f64::max);
+    format!(
+        "{what:<9} {}: {:.3} mm RMS, {:.3} px RMS, worst image {worst:.3} mm",
+        file.display(),
+        root_mean_square(&units(images)),
+        root_mean_square(&px)
+    )
+}

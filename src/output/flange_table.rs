@@ -1,0 +1,40 @@
+//! at.csv: the flange at given joint vectors, with its covariance.
+
+use super::restore::FoundModel;
+use super::text::{csv, number};
+use crate::assess::PredictedFlange;
+use crate::error::{Error, Result};
+
+/// The flange at every joint vector (rad or m, in the order of the chain).
+///
+/// # Errors
+/// A solution in which robot and plate (or fixed camera) are not tied.
+pub fn flange_at(model: &FoundModel, readings: &[Vec<f64>]) -> Result<Vec<PredictedFlange>> {
+    let flange = model.flange().ok_or_else(|| {
+        Error::unsolved("flange", "nothing ties the robot to the plate", "solve with images that the robot took")
+    })?;
+    Ok(readings.iter().map(|q| flange.at(q)).collect())
+}
+
+/// Text of at.csv: readings, pose relative to the plate (a fixed camera), sigmas, joints outside the range of the stops, upper
+/// triangle of the covariance of the body twist (m, rad, translation first).
+pub fn at_csv(model: &FoundModel, readings: &[Vec<f64>], found: &[PredictedFlange]) -> String {
+    let mut head: Vec<String> = model.robot.chain.readings.clone();
+    let plain = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw", "sigma_mm", "sigma_mrad", "outside"];
+    head.extend(plain.map(String::from));
+    let upper = || (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
+    head.extend(upper().map(|(i, j)| format!("c{}{}", i + 1, j + 1)));
+    let mut rows = vec![head];
+    for (q, f) in readings.iter().zip(found) {
+        let [position, rotation] = f.sigmas();
+        let numbers = (q.iter().copied())
+            .chain(f.pose.xyz())
+            .chain(f.pose.quaternion_xyzw())
+            .chain([1e3 * position, 1e3 * rotation]);
+        let mut row: Vec<String> = numbers.map(number).collect();
+        row.push(f.outside.join(" "));
+        row.extend(upper().map(|(i, j)| number(f.covariance[(i, j)])));
+        rows.push(row);
+    }
+    csv(&rows)
+}

@@ -1,0 +1,185 @@
+//! solution.json back into what a solve goes from, and into the model that it found.
+
+use std::path::Path;
+
+use nalgebra::{DMatrix, Vector3, Vector6};
+
+use super::solution_json::{ImageRecord, PlateRecord, SolutionRecord};
+use crate::assess::FlangeModel;
+use crate::error::{Error, Result};
+use crate::geom::Pose;
+use crate::model::camera::Camera;
+use crate::model::joint_terms::{JointTerm, Term};
+use crate::model::plate_modes::MODES;
+use crate::model::robot::{Robot, Stop};
+use crate::problem::{Layout, PlateShape, Slack, State};
+use crate::recipe::{MeasuredSeries, MeasuredStop};
+use crate::series::{CameraMount, Marker, Observation, Plate};
+use crate::urdf::RobotDescription;
+
+fn damaged(what: impl std::fmt::Display) -> Error {
+    Error::input(super::solution_json::FILE_NAME, what, "give the solution.json as `robotcal identify` wrote it")
+}
+
+/// The robot as it was read.
+///
+/// # Errors
+/// A text that is no URDF.
+pub fn robot_description(record: &SolutionRecord) -> Result<RobotDescription> {
+    RobotDescription::from_text(Path::new(&record.urdf.file), record.urdf.text.clone())
+}
+
+fn plate(p: &PlateRecord) -> Result<Plate> {
+    let n = p.id.len();
+    if [p.nominal_m.len(), p.radii_m.len(), p.prior_sigma_m.len(), p.correction_m.len()].iter().any(|len| *len != n) {
+        return Err(damaged(format!("plate '{}' has columns of different lengths", p.name)));
+    }
+    let marker = |k: usize| Marker {
+        id: p.id[k],
+        position_m: Vector3::from(p.nominal_m[k]),
+        outer_radius_m: p.radii_m[k][0],
+        inner_radius_m: p.radii_m[k][1],
+        sigma_m: p.prior_sigma_m[k],
+    };
+    Ok(Plate {
+        kind: p.kind,
+        columns: p.columns,
+        rows: p.rows,
+        pitch_m: p.pitch_m,
+        tolerance_m: p.tolerance_m,
+        aruco: None,
+        scale: p.scale,
+        markers: (0..n).map(marker).collect(),
+    })
+}
+
+fn stop(image: &ImageRecord, series: &str, placements: &[String]) -> Result<MeasuredStop> {
+    let o = &image.observations;
+    if [o.edge.len(), o.uv.len(), o.covariance.len()].iter().any(|len| *len != o.marker.len()) {
+        return Err(damaged(format!("image {} has columns of different lengths", image.name)));
+    }
+    let observation =
+        |k: usize| Observation { marker: o.marker[k], edge: o.edge[k], uv: o.uv[k], covariance: Some(o.covariance[k]) };
+    let observations: Vec<Observation> = (0..o.marker.len()).map(observation).collect();
+    let placement = placements.get(image.placement);
+    let prefix = format!("{series}/");
+    Ok(MeasuredStop {
+        image: image.name.strip_prefix(&prefix).unwrap_or(&image.name).to_owned(),
+        readings: image.readings.clone(),
+        placement: placement.ok_or_else(|| damaged(format!("image {} has no placement", image.name)))?.clone(),
+        left_out: image.reason.clone().filter(|_| observations.is_empty()),
+        observations,
+    })
+}
+
+/// Everything that was measured, ready to be solved again: what the solve had left out takes part again.
+///
+/// # Errors
+/// A file that does not hang together.
+pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
+    let placements: Vec<String> = record.placements.iter().map(|p| p.name.clone()).collect();
+    let plates: Vec<Plate> = record.plates.iter().map(plate).collect::<Result<_>>()?;
+    let series = record.series.iter().map(|s| {
+        let of_plate = || damaged(format!("series {} has no plate", s.name));
+        let stops = record.images.iter().filter(|i| i.series == s.name);
+        Ok(MeasuredSeries {
+            name: s.name.clone(),
+            camera: s.camera.clone(),
+            mounting: s.mounting.clone(),
+            mount: s.camera_mount,
+            width_px: s.width_px,
+            height_px: s.height_px,
+            focal_px: s.focal_px,
+            lens: s.lens,
+            centroid: s.centroid,
+            plate: plates.get(s.plate).ok_or_else(of_plate)?.clone(),
+            plate_name: format!("{} {}", record.plates[s.plate].name, s.plate),
+            order_known: s.order_known,
+            stops: stops.map(|i| stop(i, &s.name, &placements)).collect::<Result<_>>()?,
+        })
+    });
+    series.collect()
+}
+
+/// The model that a solution found, with its covariance.
+#[derive(Debug, Clone)]
+pub struct FoundModel {
+    /// Robot with twists and joint terms.
+    pub robot: Robot,
+    /// Its columns.
+    pub layout: Layout,
+    /// What stands still in the base frame for the first image on the robot, and its first column.
+    pub still: Option<(Pose, usize)>,
+    /// Covariance of the columns of `layout`, m and rad.
+    pub covariance: DMatrix<f64>,
+    /// Stops of the images in use.
+    pub stops: Vec<Stop>,
+}
+
+/// The model of a record.
+///
+/// # Errors
+/// A file that does not hang together.
+pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
+    let chain = robot_description(record)?.chain(Some(&record.robot.base), Some(&record.robot.tip))?;
+    if chain.joints.len() != record.robot.joints.len() || chain.readings != record.robot.readings {
+        return Err(damaged("robot and URDF text do not belong together"));
+    }
+    let twists = record.robot.joints.iter().map(|j| Vector6::from(j.twist)).collect();
+    let terms = record.robot.terms.iter().map(|t| {
+        let reading = chain.readings.iter().position(|r| *r == t.reading);
+        let known = reading.zip(Term::from_name(&t.term));
+        known
+            .map(|(reading, term)| JointTerm { reading, term, value: t.value })
+            .ok_or_else(|| damaged(format!("joint term {}.{} is not known", t.reading, t.term)))
+    });
+    let terms = terms.collect::<Result<Vec<_>>>()?;
+    let robot = Robot { chain, twists, terms };
+    let camera = |c: &super::solution_json::CameraRecord| Camera {
+        parameters: c.parameters.iter().map(|(_, v)| *v).collect(),
+        ..Camera::pinhole(c.lens, c.width_px, c.height_px, 1.0)
+    };
+    let state = State {
+        robot: robot.clone(),
+        mountings: record.mountings.iter().map(|m| (&m.pose).into()).collect(),
+        placements: record.placements.iter().map(|p| (&p.pose).into()).collect(),
+        cameras: record.cameras.iter().map(camera).collect(),
+        plates: record.plates.iter().map(|p| plate(p).map(|p| PlateShape::nominal(&p))).collect::<Result<_>>()?,
+        slack: record.images.iter().map(|_| Slack::None).collect(),
+    };
+    let names = |all: &[super::solution_json::PlacedRecord]| all.iter().map(|p| p.name.clone()).collect::<Vec<_>>();
+    let cameras: Vec<String> = record.cameras.iter().map(|c| c.name.clone()).collect();
+    let plates: Vec<String> = record.plates.iter().map(|p| p.name.clone()).collect();
+    let mut layout = Layout::new(&state, &names(&record.mountings), &names(&record.placements), &cameras, &plates);
+    let n = layout.len();
+    if record.estimates.len() != n || record.covariance_lower.len() != n * (n + 1) / 2 {
+        return Err(damaged(format!("there are {} estimates for {n} parameters", record.estimates.len())));
+    }
+    debug_assert_eq!(MODES, layout.shapes.first().map_or(MODES, |r| r.len()));
+    for (column, e) in layout.columns.iter_mut().zip(&record.estimates) {
+        column.free = e.free;
+        column.prior_sigma = e.prior_sigma.unwrap_or(f64::INFINITY);
+        column.prior_mean = e.prior_mean.unwrap_or(0.0);
+    }
+    let at = |i: usize, j: usize| record.covariance_lower[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
+    let used = || record.images.iter().filter(|i| i.reason.is_none());
+    let stop = |i: &ImageRecord| i.readings.clone().map(|readings| Stop { readings, approach: i.approach.clone() });
+    let still = used().find(|i| i.readings.is_some()).map(|i| match i.camera_mount {
+        CameraMount::Hand => (state.placements[i.placement], layout.placements[i.placement].start),
+        CameraMount::Fixed => (state.mountings[i.mounting], layout.mountings[i.mounting].start),
+    });
+    Ok(FoundModel {
+        covariance: DMatrix::from_fn(n, n, at),
+        stops: used().filter_map(stop).collect(),
+        robot,
+        layout,
+        still,
+    })
+}
+
+impl FoundModel {
+    /// The flange anywhere; `None` where robot and plate (or fixed camera) are not tied.
+    pub fn flange(&self) -> Option<FlangeModel<'_>> {
+        FlangeModel::new(&self.robot, &self.layout, self.still?, &self.covariance, &self.stops)
+    }
+}

@@ -1,0 +1,61 @@
+//! Before any image is looked at: what the stops of a series can tell of the robot.
+
+use super::joint::Options;
+use crate::assess::{Identifiability, identifiability_of_stops};
+use crate::error::{Error, Result};
+use crate::geom::Pose;
+use crate::model::camera::{Camera, Lens};
+use crate::model::robot::Stop;
+use crate::problem::{Layout, PlateShape, State};
+use crate::series::{Series, StopOrder};
+use crate::urdf::Chain;
+
+/// Stops of series with the step from the stop before, in the order of the rows.
+fn stops(series: &[Series], chain: &Chain) -> Result<Vec<Stop>> {
+    let mut stops = Vec::new();
+    for s in series {
+        let known = s.manifest.robot.order == StopOrder::Visited;
+        let mut previous: Option<Vec<f64>> = None;
+        for readings in s.readings_for(chain)?.into_iter().flatten() {
+            let step = |before: &Vec<f64>| readings.iter().zip(before).map(|(b, a)| b - a).collect();
+            stops.push(Stop { approach: previous.as_ref().filter(|_| known).map(step), readings: readings.clone() });
+            previous = Some(readings);
+        }
+    }
+    Ok(stops)
+}
+
+fn layout(options: &Options, chain: Chain, series: &[Series]) -> Result<(Layout, State)> {
+    let cameras: Vec<String> = series.iter().map(|s| s.camera_name().to_owned()).collect();
+    let mountings: Vec<String> = series.iter().map(|s| s.mounting().to_owned()).collect();
+    let mut placements: Vec<String> = series.iter().flat_map(|s| &s.stops.stops).map(|s| s.placement.clone()).collect();
+    placements.sort();
+    placements.dedup();
+    let lens = |s: &Series| s.manifest.camera.model.as_deref().and_then(Lens::from_name).unwrap_or(Lens::Brown);
+    let mut state = State {
+        robot: options.model.robot(chain),
+        mountings: vec![Pose::identity(); mountings.len()],
+        placements: vec![Pose::identity(); placements.len()],
+        cameras: series.iter().map(|s| Camera::pinhole(lens(s), 1, 1, 1.0)).collect(),
+        plates: series.iter().map(|s| PlateShape::nominal(&s.plate)).collect(),
+        slack: Vec::new(),
+    };
+    let names: Vec<String> = series.iter().map(|s| s.name.clone()).collect();
+    let mut layout = Layout::new(&state, &mountings, &placements, &cameras, &names);
+    options.selection.apply(&mut layout, &mut state)?;
+    Ok((layout, state))
+}
+
+/// What the stops of `series` can tell of the robot, and what to add.
+///
+/// # Errors
+/// Joint names that do not match, unknown parameters, no stop of the robot.
+pub fn dry_run(chain: Chain, series: &[Series], options: &Options) -> Result<Identifiability> {
+    let stops = stops(series, &chain)?;
+    if stops.is_empty() {
+        return Err(Error::input("joints.csv", "no row has joint readings", "record the joints of every stop"));
+    }
+    let (layout, state) = layout(options, chain, series)?;
+    identifiability_of_stops(&state.robot, &layout, &stops)
+        .ok_or_else(|| Error::unsolved("stops", "their information is not finite", "check the readings in joints.csv"))
+}

@@ -1,0 +1,99 @@
+//! Which robot model the data support: Laplace's approximation of the evidence, at the same noise components.
+//!
+//! `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what the models share, with the whole information `N` (dense columns,
+//! slack and markers) at the optimum of each (D. MacKay, *Bayesian interpolation*, 1992).
+
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
+
+use super::joint::{Options, RobotModel, identify_model};
+use super::{MeasuredSeries, Solution};
+use crate::error::Result;
+use crate::linalg::SymmetricFactor;
+use crate::problem::{Problem, State};
+use crate::solve::{Elimination, Linearised, Settings, System, solve};
+use crate::urdf::Chain;
+
+/// Smallest prior sigma of a marker coordinate, m, as in the normal equations.
+const FIXED_MARKER_SIGMA_M: f64 = 1e-9;
+
+/// Evidence of a robot model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// The model.
+    pub model: RobotModel,
+    /// Logarithm of its evidence less that of the best model; 0 for the best.
+    pub log_evidence: f64,
+    /// Cost at its optimum.
+    pub cost: f64,
+    /// Free parameters of the robot.
+    pub parameters: usize,
+}
+
+/// Identifies robot, cameras, mountings and plates from identified series.
+///
+/// # Errors
+/// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset, or readings and images do
+/// not belong together.
+pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
+    if options.model != RobotModel::Auto {
+        return identify_model(chain, series, options);
+    }
+    let full = identify_model(chain.clone(), series, &Options { model: RobotModel::Full, ..options.clone() })?;
+    let evidences = compare_models(&full);
+    let best = evidences.iter().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence));
+    let best = best.map_or(RobotModel::Full, |e| e.model);
+    let chosen = match best {
+        RobotModel::Full => full,
+        model => identify_model(chain, series, &Options { model, ..options.clone() })?,
+    };
+    Ok(Solution { evidences, ..chosen })
+}
+
+/// Evidence of every model that a solution with the full one holds, at its noise components.
+fn compare_models(full: &Solution) -> Vec<Evidence> {
+    let mut all: Vec<Evidence> =
+        [RobotModel::Rigid, RobotModel::Gear, RobotModel::Full].into_iter().filter_map(|m| evidence(full, m)).collect();
+    let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    all.iter_mut().for_each(|e| e.log_evidence -= best);
+    all
+}
+
+fn evidence(full: &Solution, model: RobotModel) -> Option<Evidence> {
+    let (mut problem, mut state) = (full.problem.clone(), full.state.clone());
+    let first = problem.layout.terms.start;
+    for (k, t) in state.robot.terms.iter_mut().enumerate().filter(|(_, t)| !model.has(t.term)) {
+        let column = &mut problem.layout.columns[first + k];
+        // A fixed term stays at its prior mean, where its prior costs nothing.
+        t.value = column.prior_mean;
+        column.free = false;
+    }
+    let outcome = solve(&problem, state, &Settings::default());
+    let lin = outcome.linearised?;
+    let robot = problem.layout.robot();
+    let parameters = problem.layout.columns[robot].iter().filter(|c| c.free).count();
+    let log_evidence = log_evidence(&problem, &outcome.state, &lin)?;
+    Some(Evidence { model, log_evidence, cost: lin.cost, parameters })
+}
+
+fn log_evidence(problem: &Problem, state: &State, lin: &Linearised) -> Option<f64> {
+    let system = System::with(Elimination::Markers, problem, state, lin, 0.0);
+    let reduced = SymmetricFactor::new(&system.information).ok()?.log_determinant();
+    let mut markers: Vec<Vec<Matrix3<f64>>> =
+        problem.plates.iter().map(|p| vec![Matrix3::zeros(); p.markers.len()]).collect();
+    for (terms, &i) in lin.terms.iter().zip(&lin.images) {
+        terms.markers.iter().for_each(|t| markers[problem.images[i].plate][t.marker] += t.mm);
+    }
+    let mut eliminated = 0.0;
+    for (plate, blocks) in problem.plates.iter().zip(&markers) {
+        for (marker, block) in plate.markers.iter().zip(blocks) {
+            let prior = marker.sigma_m.max(FIXED_MARKER_SIGMA_M).powi(-2);
+            eliminated += (block + Matrix3::from_diagonal_element(prior)).determinant().ln();
+        }
+    }
+    let priors: f64 = (problem.layout.columns.iter())
+        .filter(|c| c.free && c.prior_sigma.is_finite())
+        .map(|c| c.prior_sigma.ln())
+        .sum();
+    Some(-lin.cost - 0.5 * (reduced + eliminated) - priors).filter(|e| e.is_finite())
+}

@@ -1,0 +1,202 @@
+//! Which parameters are estimated, and what is known of them beforehand: by name.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::RobotModel;
+use crate::assess::{minimal_set, structural};
+use crate::error::{Error, Result};
+use crate::problem::{Layout, State, short_name};
+use crate::series::read_toml;
+
+/// Which parameters of the robot are estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Parameters {
+    /// All of the robot model; priors settle what no series can tell.
+    #[default]
+    All,
+    /// As many as a series over the whole range of the joints can tell apart, the others at nominal.
+    Minimal,
+}
+
+/// A prior that the user states, in the unit of the parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StatedPrior {
+    /// Sigma, m.
+    pub sigma_m: Option<f64>,
+    /// Sigma, rad.
+    pub sigma_rad: Option<f64>,
+    /// Sigma, px.
+    pub sigma_px: Option<f64>,
+    /// Sigma of a number without unit.
+    pub sigma: Option<f64>,
+    /// Mean in that unit; 0 for robot and plate shape.
+    pub mean: Option<f64>,
+}
+
+/// What is estimated, in the order in which it is applied.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Selection {
+    /// Which set to begin with.
+    #[serde(default)]
+    pub parameters: Parameters,
+    /// Parameters of the robot that are estimated: these alone, or beside the minimal set.
+    #[serde(default)]
+    pub free: Vec<String>,
+    /// Parameters that stay at nominal (or at the mean of their prior).
+    #[serde(default)]
+    pub fix: Vec<String>,
+    /// Priors by name, stronger names later.
+    #[serde(default)]
+    pub prior: BTreeMap<String, StatedPrior>,
+}
+
+/// A configuration file (`robotcal.toml`).
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Which set of parameters.
+    pub parameters: Option<Parameters>,
+    /// Which robot model.
+    pub robot_model: Option<RobotModel>,
+    /// As `--free`.
+    #[serde(default)]
+    pub free: Vec<String>,
+    /// As `--fix`.
+    #[serde(default)]
+    pub fix: Vec<String>,
+    /// Priors by name.
+    #[serde(default)]
+    pub prior: BTreeMap<String, StatedPrior>,
+}
+
+impl Config {
+    /// Reads a configuration file.
+    ///
+    /// # Errors
+    /// Names file and line: unreadable text, unknown keys, wrong values.
+    pub fn read(path: &Path) -> Result<Self> {
+        read_toml(path, &mut Vec::new())
+    }
+}
+
+impl StatedPrior {
+    fn sigma_in(&self, place: &str, name: &str, unit: &str) -> Result<Option<f64>> {
+        let given = [("m", self.sigma_m), ("rad", self.sigma_rad), ("px", self.sigma_px), ("1", self.sigma)];
+        let key = if unit == "1" { "sigma".to_owned() } else { format!("sigma_{unit}") };
+        if let Some((other, _)) = given.iter().find(|(u, v)| *u != unit && v.is_some()) {
+            let other = if *other == "1" { "no unit".into() } else { format!("unit {other}") };
+            return Err(Error::input(
+                place,
+                format!("the prior of {} is given with {other}", short_name(name)),
+                format!(
+                    "its unit is {unit}: write {{ {key} = ... }}; name shifts and rotations apart (x y z, rx ry rz)"
+                ),
+            ));
+        }
+        let sigma = given.iter().find(|(u, _)| *u == unit).and_then(|(_, v)| *v);
+        match sigma {
+            Some(s) if !(s > 0.0 && s.is_finite()) => {
+                Err(Error::input(place, format!("{key} = {s}"), "give a positive number; --fix holds a parameter"))
+            }
+            _ => Ok(sigma),
+        }
+    }
+}
+
+impl Selection {
+    /// Sets priors, means and what is free, before the first solve.
+    ///
+    /// # Errors
+    /// Unknown names with the closest ones, units that do not belong, and poses, which nothing but the images can tell.
+    pub fn apply(&self, layout: &mut Layout, state: &mut State) -> Result<()> {
+        self.set_priors(layout, state)?;
+        let robot = layout.robot();
+        if self.parameters == Parameters::Minimal {
+            let kept = minimal_set(&state.robot, layout, &structural(&state.robot, layout));
+            robot.clone().filter(|c| !kept.contains(c)).for_each(|c| layout.columns[c].free = false);
+        } else if !self.free.is_empty() {
+            robot.clone().for_each(|c| layout.columns[c].free = false);
+        }
+        for name in &self.free {
+            let columns = layout.named("--free", name)?;
+            columns.into_iter().for_each(|c| layout.columns[c].free = true);
+        }
+        for name in &self.fix {
+            let columns = layout.named("--fix", name)?;
+            let pose = |c: &&usize| layout.mountings.iter().chain(&layout.placements).any(|r| r.contains(c));
+            if columns.iter().find(pose).is_some() {
+                return Err(Error::input(
+                    "--fix",
+                    format!("'{name}' is a pose of camera or plate, which has no nominal value"),
+                    "fix parameters of robot, camera or plate shape",
+                ));
+            }
+            columns.into_iter().for_each(|c| layout.columns[c].free = false);
+        }
+        Ok(())
+    }
+
+    fn set_priors(&self, layout: &mut Layout, state: &mut State) -> Result<()> {
+        // Names of blocks and with stars first, so that the name of a single parameter has the last word.
+        let mut ordered = Vec::new();
+        for (name, prior) in &self.prior {
+            let place = format!("[prior] \"{name}\"");
+            let columns = layout.named(&place, name)?;
+            ordered.push((columns, place, prior));
+        }
+        ordered.sort_by_key(|(columns, _, _)| std::cmp::Reverse(columns.len()));
+        for (columns, place, prior) in ordered {
+            for c in columns {
+                let column = &layout.columns[c];
+                let is_pose = layout.mountings.iter().chain(&layout.placements).any(|r| r.contains(&c));
+                if is_pose {
+                    let what = format!("{} is part of a pose, which takes no prior", short_name(&column.name));
+                    return Err(Error::input(place, what, "give priors for robot, camera or plate shape"));
+                }
+                let camera = layout.cameras.iter().any(|r| r.contains(&c));
+                if camera && (prior.mean.is_none() || prior == &StatedPrior { mean: prior.mean, ..Default::default() })
+                {
+                    let what = format!("the prior of {} needs mean and sigma", short_name(&column.name));
+                    return Err(Error::input(
+                        place,
+                        what,
+                        "a camera has no nominal values: write { mean = ..., sigma... = ... }",
+                    ));
+                }
+                let sigma = prior.sigma_in(&place, &column.name, column.unit)?;
+                if let Some(mean) = prior.mean.filter(|m| !m.is_finite()) {
+                    return Err(Error::input(place, format!("mean = {mean}"), "give a finite number"));
+                }
+                let column = &mut layout.columns[c];
+                column.prior_sigma = sigma.unwrap_or(column.prior_sigma);
+                if let Some(mean) = prior.mean {
+                    column.prior_mean = mean;
+                    state.set_value(layout, c, mean);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// In words, for the record; empty where nothing was chosen.
+    pub fn in_words(&self) -> Vec<(String, String)> {
+        let mut words = Vec::new();
+        if self.parameters == Parameters::Minimal {
+            words.push(("parameters".to_owned(), "minimal".to_owned()));
+        }
+        for (what, names) in [("free", &self.free), ("fixed", &self.fix)] {
+            if !names.is_empty() {
+                words.push((what.to_owned(), names.join(", ")));
+            }
+        }
+        if !self.prior.is_empty() {
+            words.push(("priors".to_owned(), self.prior.keys().cloned().collect::<Vec<_>>().join(", ")));
+        }
+        words
+    }
+}

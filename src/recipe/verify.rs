@@ -1,0 +1,62 @@
+//! A robot model judged by a series that it was not fitted to: camera, hand-camera offset and plate are fitted, the robot is not.
+
+use super::build::{MeasuredSeries, build};
+use super::free_poses::adjust_free_poses;
+use super::start::start_robot;
+use crate::assess::{ImageError, hold_out_images};
+use crate::error::{Error, Result};
+use crate::model::robot::Robot;
+use crate::problem::Slack;
+use crate::solve::{ComponentOptions, Status, estimate_components};
+
+/// Error of one image, predicted from its joint readings by a fit of camera and plate to the other images.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JudgedImage {
+    /// Index of its series.
+    pub series: usize,
+    /// File name.
+    pub name: String,
+    /// Its error.
+    pub error: ImageError,
+}
+
+/// Errors of all images on the robot that a fixed robot model leaves.
+///
+/// Joint noise is a variance component of its own for each model, so that a bad model does not bend camera and plate.
+///
+/// # Errors
+/// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset.
+pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<JudgedImage>> {
+    let (mut problem, state) = build(robot, series, false)?;
+    let columns = problem.layout.robot();
+    problem.layout.columns[columns].iter_mut().for_each(|c| c.free = false);
+    let stated: Vec<Option<f64>> = (problem.cameras.iter())
+        .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
+        .collect();
+    let (free, mut starts) = adjust_free_poses(&mut problem, state, &stated)?;
+    let mut state = free.state.clone();
+    start_robot(&mut problem, &mut state, &free, &mut starts)?;
+    let slack = vec![0.0; robot.chain.readings.len() + 2];
+    for (own, image) in state.slack.iter_mut().zip(&problem.images) {
+        if image.stop.is_some() {
+            *own = Slack::Joints(slack.clone());
+        }
+    }
+    let outcome = estimate_components(&mut problem, state, &ComponentOptions::default());
+    if outcome.status != Status::Converged {
+        return Err(Error::unsolved(
+            "verification",
+            format!("camera and plate do not converge with this robot ({:?})", outcome.status),
+            "check that URDF, base, tip and series belong together",
+        ));
+    }
+    let errors = hold_out_images(&problem, &outcome.state).ok_or_else(|| {
+        Error::unsolved("verification", "too few images to hold any out", "take at least 12 images of the robot")
+    })?;
+    let judged = |(i, error): (usize, ImageError)| JudgedImage {
+        series: problem.images[i].series,
+        name: problem.images[i].name.clone(),
+        error,
+    };
+    Ok(errors.into_iter().map(judged).collect())
+}

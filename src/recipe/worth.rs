@@ -1,0 +1,90 @@
+//! What a solution is worth: identifiability, the covariance by clusters of images, the workspace map.
+
+use nalgebra::DMatrix;
+
+use crate::assess::{FlangeModel, Identifiability, WorkspacePoint, clustered_covariance, identifiability};
+use crate::error::Notice;
+use crate::geom::Pose;
+use crate::model::robot::Stop;
+use crate::problem::{Layout, Problem, State};
+use crate::series::CameraMount;
+use crate::solve::{Covariance, Linearised};
+
+/// Ratio of the sigma of the flange by clusters to that by the model from which the larger one is reported.
+pub const REPORT_LARGER: f64 = 1.5;
+
+/// What a solution is worth.
+#[derive(Debug, Clone, Default)]
+pub struct Worth {
+    /// What the data tell; none without stops.
+    pub identifiability: Option<Identifiability>,
+    /// Sigmas of the dense columns by the noise model alone.
+    pub model_sigma: Vec<f64>,
+    /// Sigmas of the dense columns by clusters of images; none for too few images.
+    pub clustered_sigma: Option<Vec<f64>>,
+    /// Sigma of the flange by clusters over that by the noise model, over the region of the stops.
+    pub clustered_ratio: Option<f64>,
+    /// Workspace map; empty where plate (or fixed camera) and robot are not tied.
+    pub workspace: Vec<WorkspacePoint>,
+}
+
+/// Stops of the images in use.
+pub fn stops(problem: &Problem) -> Vec<Stop> {
+    problem.used().filter_map(|(_, i)| i.stop.clone()).collect()
+}
+
+/// What stands still in the base frame for the first image on the robot, with its first column: the plate, or a fixed camera.
+pub fn still(problem: &Problem, layout: &Layout, state: &State) -> Option<(Pose, usize)> {
+    let (_, image) = problem.used().find(|(_, i)| i.stop.is_some())?;
+    Some(match image.mount {
+        CameraMount::Hand => (state.placements[image.placement], layout.placements[image.placement].start),
+        CameraMount::Fixed => (state.mountings[image.mounting], layout.mountings[image.mounting].start),
+    })
+}
+
+/// Judges a solution. Where the scatter between images says clearly more than the noise model, `covariance` is made larger.
+pub(super) fn judge(
+    problem: &Problem,
+    state: &State,
+    lin: &Linearised,
+    covariance: &mut Covariance,
+    notices: &mut Vec<Notice>,
+) -> Worth {
+    let layout = &problem.layout;
+    let n = layout.len();
+    let stops = stops(problem);
+    let sigmas = |c: &DMatrix<f64>| (0..n).map(|k| c[(k, k)].max(0.0).sqrt()).collect::<Vec<f64>>();
+    let still = still(problem, layout, state);
+    let mut worth = Worth { model_sigma: sigmas(&covariance.reduced), ..Worth::default() };
+    if let Some(clustered) = clustered_covariance(problem, state, lin, covariance) {
+        let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops));
+        worth.clustered_ratio = model.map(|m| m.ratio_of(&clustered));
+        let by_clusters = sigmas(&clustered);
+        if let Some(ratio) = worth.clustered_ratio.filter(|r| *r > REPORT_LARGER) {
+            enlarge(covariance, &worth.model_sigma, &by_clusters, problem.layout.theta_len());
+            notices.push(Notice::new(
+                "uncertainty",
+                format!(
+                    "the images scatter {ratio:.1} times as much as the noise model says (flange, clusters of images); the larger sigmas are stated"
+                ),
+                "look for what changes from image to image: a loose camera or plate, motion, focus, light",
+            ));
+        }
+        worth.clustered_sigma = Some(by_clusters);
+    }
+    let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops));
+    worth.workspace = model.map(|m| m.workspace()).unwrap_or_default();
+    worth.identifiability = identifiability(&state.robot, layout, &stops, &covariance.reduced);
+    worth
+}
+
+/// Scales rows and columns of what acts through the camera poses so that no sigma is below that by clusters; correlations stay.
+fn enlarge(covariance: &mut Covariance, model: &[f64], clusters: &[f64], theta: usize) {
+    for k in 0..theta {
+        if model[k] > 0.0 && clusters[k] > model[k] {
+            let factor = clusters[k] / model[k];
+            covariance.reduced.row_mut(k).scale_mut(factor);
+            covariance.reduced.column_mut(k).scale_mut(factor);
+        }
+    }
+}
