@@ -45,6 +45,7 @@ fn the_page_is_complete_and_self_contained() {
     for text in [
         "Accuracy before and after",
         "What was read, and what was left out",
+        "How well the flange is known where",
         "Joint noise",
         "Residuals",
         "What was corrected on the robot",
@@ -65,9 +66,9 @@ fn the_page_is_complete_and_self_contained() {
     for broken in ["NaN", ">inf", "-inf", "Infinity"] {
         assert!(!page.contains(broken), "the page says {broken}");
     }
-    // Histogram, joint noise, residuals over image and plate, distortion, plate corrections.
+    // Histogram, workspace from above and from the side, joint noise, residuals over image and plate, distortion, plate corrections.
     let drawings = drawings(&page);
-    assert_eq!(drawings.len(), 6);
+    assert_eq!(drawings.len(), 8);
     for drawing in drawings {
         let document = roxmltree::Document::parse(drawing).unwrap();
         assert!(document.descendants().filter(|n| n.is_element()).count() > 5);

@@ -10,6 +10,9 @@ use crate::urdf::JointKind;
 /// Most lines of one kind before the rest is counted.
 const MOST_LINES: usize = 12;
 
+/// Most lines of advice of one kind: the table stays short, the report has them all.
+const MOST_ADVICE: usize = 3;
+
 /// Most parameters of a direction that are named.
 const MOST_NAMED: usize = 4;
 
@@ -107,12 +110,16 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 }
 
 fn limited(out: &mut String, label: &str, lines: impl Iterator<Item = String>) -> std::fmt::Result {
+    at_most(MOST_LINES, out, label, lines)
+}
+
+fn at_most(most: usize, out: &mut String, label: &str, lines: impl Iterator<Item = String>) -> std::fmt::Result {
     let lines: Vec<String> = lines.collect();
-    for line in lines.iter().take(MOST_LINES) {
+    for line in lines.iter().take(most) {
         writeln!(out, "{label:<9} {line}")?;
     }
-    if lines.len() > MOST_LINES {
-        writeln!(out, "{label:<9} ... and {} more (all in the report)", lines.len() - MOST_LINES)?;
+    if lines.len() > most {
+        writeln!(out, "{label:<9} ... and {} more (all in the report)", lines.len() - most)?;
     }
     Ok(())
 }
@@ -273,18 +280,21 @@ fn identifiability(out: &mut String, found: &Identifiability, who: &str) -> std:
         )?;
     }
     let by_stops = found.unknown.iter().filter(|d| d.cause == Cause::Stops);
-    limited(
+    at_most(
+        MOST_ADVICE,
         out,
         "untold",
         by_stops.map(|d| format!("{}: {}", direction(d), d.remedy.as_deref().unwrap_or("more stops"))),
     )?;
-    limited(
+    at_most(
+        MOST_ADVICE,
         out,
         "alike",
         (found.correlations.iter())
             .map(|c| format!("{} and {} (correlation {:.3}): {}", c.first, c.second, c.correlation, c.remedy)),
     )?;
-    limited(
+    at_most(
+        MOST_ADVICE,
         out,
         "next",
         found.next.iter().map(|a| format!("{} (takes {:.0} % off what is left)", a.words, 100.0 * a.gain)),

@@ -17,7 +17,7 @@ use crate::error::Result;
 use crate::geom::Pose;
 use crate::model::plate_modes;
 use crate::problem::{Image, Slack, State};
-use crate::recipe::{REPORT_LARGER, Solution};
+use crate::recipe::Solution;
 
 /// The record of a solution.
 ///
@@ -56,7 +56,7 @@ pub(super) fn record(solution: &Solution, context: &Context, files: Vec<String>)
         evidences: solution.evidences.clone(),
         scatter: solution.worth.clustered_sigma.as_ref().map(|_| ScatterRecord {
             flange_ratio: solution.worth.clustered_ratio,
-            larger_stated: solution.worth.clustered_ratio.is_some_and(|r| r > REPORT_LARGER),
+            larger_stated: solution.worth.larger_stated,
         }),
         workspace: solution.worth.workspace.clone(),
         estimates: estimates(solution, context)?,

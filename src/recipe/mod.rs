@@ -52,4 +52,4 @@ pub use solution::{Solution, StartVerdict};
 pub use study::{Study, StudyCell, StudyRequest, study};
 pub use two_stage::{Estimate, Estimator, PoseStage, estimate_all, fit_joint, fit_poses, linear_step};
 pub use verify::{JudgedImage, verify_series};
-pub use worth::{REPORT_LARGER, Worth, still, stops};
+pub use worth::{Worth, still, stops};

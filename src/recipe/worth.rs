@@ -11,7 +11,11 @@ use crate::series::CameraMount;
 use crate::solve::{Covariance, Linearised};
 
 /// Ratio of the sigma of the flange by clusters to that by the model from which the larger one is reported.
-pub const REPORT_LARGER: f64 = 1.5;
+const REPORT_LARGER: f64 = 1.5;
+
+/// Images for every direction told from which their scatter can speak against the noise model: of fewer, the sandwich is a sum of
+/// too few terms.
+const IMAGES_PER_DIRECTION: usize = 2;
 
 /// What a solution is worth.
 #[derive(Debug, Clone, Default)]
@@ -24,6 +28,8 @@ pub struct Worth {
     pub clustered_sigma: Option<Vec<f64>>,
     /// Sigma of the flange by clusters over that by the noise model, over the region of the stops.
     pub clustered_ratio: Option<f64>,
+    /// True where the sigmas by clusters are the ones stated.
+    pub larger_stated: bool,
     /// Workspace map; empty where plate (or fixed camera) and robot are not tied.
     pub workspace: Vec<WorkspacePoint>,
 }
@@ -60,7 +66,10 @@ pub(super) fn judge(
         let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops));
         worth.clustered_ratio = model.map(|m| m.ratio_of(&clustered));
         let by_clusters = sigmas(&clustered);
-        if let Some(ratio) = worth.clustered_ratio.filter(|r| *r > REPORT_LARGER) {
+        let told = identifiability(&state.robot, layout, &stops, &covariance.reduced).map_or(0, |i| i.rank);
+        let enough = lin.images.len() >= IMAGES_PER_DIRECTION * told;
+        if let Some(ratio) = worth.clustered_ratio.filter(|r| enough && *r > REPORT_LARGER) {
+            worth.larger_stated = true;
             enlarge(covariance, &worth.model_sigma, &by_clusters, problem.layout.theta_len());
             notices.push(Notice::new(
                 "uncertainty",
