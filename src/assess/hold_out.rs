@@ -40,11 +40,7 @@ const NOMINAL_JOINT_ERROR: f64 = 3e-3;
 
 /// Predicts every image on the robot by models that have not seen it.
 pub fn hold_out(problem: &Problem, state: &State) -> Option<Accuracy> {
-    let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
-    if on_robot.len() < 2 {
-        return None;
-    }
-    let folds = folds(problem, &on_robot);
+    let folds = folds(problem)?;
     let mut nominal_problem = problem.clone();
     let mut nominal_state = state.clone();
     nominal_state.robot = crate::model::robot::Robot {
@@ -67,11 +63,7 @@ pub fn hold_out(problem: &Problem, state: &State) -> Option<Accuracy> {
 
 /// Error of every image on the robot, predicted by fits of the free columns to the images of the other folds; `None` for too few.
 pub fn hold_out_images(problem: &Problem, state: &State) -> Option<Vec<(usize, ImageError)>> {
-    let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
-    if on_robot.len() < 2 {
-        return None;
-    }
-    predictions(problem, state, &folds(problem, &on_robot))
+    predictions(problem, state, &folds(problem)?)
 }
 
 /// Squared errors of one predicted image, summed over its markers.
@@ -103,16 +95,20 @@ fn summary(errors: &[(usize, ImageError)]) -> Errors {
 }
 
 /// Images that are held out together. Images that share joint readings stay together: they are off by the same local errors,
-/// and one of them would tell of the others.
-fn folds(problem: &Problem, on_robot: &[usize]) -> Vec<Vec<usize>> {
-    let mut groups = posture_groups(&problem.images, on_robot);
+/// and one of them would tell of the others. `None` for too few images on the robot.
+fn folds(problem: &Problem) -> Option<Vec<Vec<usize>>> {
+    let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
+    if on_robot.len() < 2 {
+        return None;
+    }
+    let mut groups = posture_groups(&problem.images, &on_robot);
     if groups.len() < 3 {
         groups = on_robot.iter().map(|&i| vec![i]).collect();
     }
     let mut folds = vec![Vec::new(); FOLDS.min(groups.len())];
     let count = folds.len();
     groups.into_iter().enumerate().for_each(|(k, group)| folds[k % count].extend(group));
-    folds
+    Some(folds)
 }
 
 fn predictions(problem: &Problem, state: &State, folds: &[Vec<usize>]) -> Option<Vec<(usize, ImageError)>> {

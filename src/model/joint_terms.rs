@@ -124,6 +124,14 @@ impl Term {
     }
 }
 
+impl JointTerm {
+    /// Value of the basis function of a local error at a reading; `None` for other terms.
+    pub fn local_basis(&self, reading: f64) -> Option<f64> {
+        let context = TermContext { reading, approach: None, gravity: Default::default() };
+        matches!(self.term, Term::Local(_)).then(|| self.term.basis(&context))
+    }
+}
+
 /// Two unit vectors that complete `axis` to a right-handed frame: the levers of the gravity terms.
 pub(super) fn levers(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let helper = if axis.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };

@@ -120,10 +120,8 @@ impl Robot {
     /// Local error of every reading at a stop, rad or m.
     pub fn local_errors(&self, stop: &Stop) -> Vec<f64> {
         let mut errors = vec![0.0; stop.readings.len()];
-        for t in self.terms.iter().filter(|t| matches!(t.term, Term::Local(_))) {
-            let context =
-                TermContext { reading: stop.readings[t.reading], approach: None, gravity: Default::default() };
-            errors[t.reading] += t.value * t.term.basis(&context);
+        for t in &self.terms {
+            errors[t.reading] += t.local_basis(stop.readings[t.reading]).map_or(0.0, |basis| t.value * basis);
         }
         errors
     }

@@ -14,6 +14,7 @@
 pub mod codes;
 pub mod compensate;
 pub mod field;
+mod itinerary;
 mod krl;
 pub mod program;
 mod rapid;

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::codes::Codes;
-use super::field::{Edit, Field};
+use super::field::{Edit, Field, Place};
 use crate::error::Notice;
 use crate::geom::{Pose, exp_so3, log_so3, matrix_from_rpy, rpy_from_matrix};
 
@@ -69,6 +69,21 @@ pub enum Kind {
     Joints(JointTarget),
     /// A pose of the tool.
     Pose(Box<PoseTarget>),
+}
+
+impl Kind {
+    /// Where its first number stands in its file.
+    pub(super) fn first_byte(&self) -> usize {
+        let start = |f: &Field| match &f.place {
+            Place::At(range) => range.start,
+            Place::Missing(at, _) => *at,
+        };
+        let first = match self {
+            Self::Joints(joints) => joints.fields.iter().flatten().map(start).min(),
+            Self::Pose(pose) => pose.position.iter().map(start).min(),
+        };
+        first.unwrap_or(0)
+    }
 }
 
 /// Joint values, one for every reading of the chain.

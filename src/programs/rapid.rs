@@ -6,6 +6,7 @@ use std::ops::Range;
 use super::Setting;
 use super::codes::{Code, Codes};
 use super::field::{Field, Place};
+use super::itinerary::Itinerary;
 use super::program::{
     JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, TextFile, Understood,
 };
@@ -47,22 +48,16 @@ struct Datum {
 
 /// Reads modules that belong together.
 pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
-    let mut task = Task {
-        setting,
-        data: BTreeMap::new(),
-        visited: BTreeMap::new(),
-        fresh: true,
-        program: Program { files: vec![], targets: vec![], left: vec![], edits: vec![], notices: vec![] },
-    };
+    let mut task = Task { setting, data: BTreeMap::new(), way: Itinerary::new() };
     for (index, file) in files.iter().enumerate() {
         task.declarations(Reader::new(file, index, DIALECT)?)?;
     }
     for (index, file) in files.iter().enumerate() {
-        task.fresh = true;
+        task.way.start_afresh();
         task.moves(Reader::new(file, index, DIALECT)?)?;
     }
     task.unvisited()?;
-    let mut program = task.program;
+    let mut program = task.way.program;
     program.files = files;
     Ok(program)
 }
@@ -70,10 +65,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Progra
 struct Task<'a> {
     setting: &'a Setting<'a>,
     data: BTreeMap<String, Datum>,
-    /// File and first byte of a target -> its index in the program.
-    visited: BTreeMap<(usize, usize), usize>,
-    fresh: bool,
-    program: Program,
+    way: Itinerary,
 }
 
 /// A value in the text; the reader ends behind it.
@@ -284,8 +276,7 @@ impl Task<'_> {
     }
 
     fn leave(&mut self, (file, line): (usize, usize), name: &str, why: String) {
-        self.fresh = true;
-        self.program.left.push(Left { file, line, name: name.to_owned(), why });
+        self.way.leave(Left { file, line, name: name.to_owned(), why });
     }
 
     fn visit(
@@ -310,28 +301,14 @@ impl Task<'_> {
             },
             _ => return Ok(Err("its target is computed, not written in numbers".into())),
         };
-        let follows = !self.fresh;
+        let follows = self.way.follows();
         Ok(self.kind(&value, place.0, tool.as_deref(), work).and_then(|kind| self.add(name, place, kind, follows)))
     }
 
     fn add(&mut self, name: String, (file, line): (usize, usize), kind: Kind, follows: bool) -> Understood<()> {
-        let first = first_byte(&kind);
-        self.fresh = false;
-        let Some(&known) = self.visited.get(&(file, first)) else {
-            self.visited.insert((file, first), self.program.targets.len());
-            self.program.targets.push(Target { file, line, name, follows, kind });
-            return Ok(());
-        };
-        // Visited again: the next target does not come from the one before it in the list.
-        self.fresh = true;
-        match (&self.program.targets[known].kind, &kind) {
-            (Kind::Pose(a), Kind::Pose(b))
-                if (a.flange_from_tool, a.base_from_work) != (b.flange_from_tool, b.base_from_work) =>
-            {
-                Err(format!("{name} is used with different tools or work objects; give it a robtarget for each"))
-            }
-            _ => Ok(()),
-        }
+        let clash = format!("{name} is used with different tools or work objects; give it a robtarget for each");
+        let visited = self.way.visit(Target { file, line, name, follows, kind });
+        if visited { Ok(()) } else { Err(clash) }
     }
 
     fn kind(&self, value: &Node, file: usize, tool: Option<&str>, work: Option<&Node>) -> Understood<Kind> {
@@ -444,8 +421,8 @@ impl Task<'_> {
         let all: Vec<(String, Datum)> = self.data.iter().map(|(n, d)| (n.clone(), d.clone())).collect();
         for (name, datum) in all.into_iter().filter(|(_, d)| d.kind.ends_with("TARGET")) {
             let seen =
-                self.program.targets.iter().any(|t| t.file == datum.file && t.line == datum.line && t.name == name);
-            let known = self.program.left.iter().any(|l| l.why.contains(&name));
+                self.way.program.targets.iter().any(|t| t.file == datum.file && t.line == datum.line && t.name == name);
+            let known = self.way.program.left.iter().any(|l| l.why.contains(&name));
             let Some(value) = datum.value.filter(|_| !seen && !known) else { continue };
             let place = (datum.file, datum.line);
             let done = self.kind(&value, datum.file, None, None).and_then(|k| self.add(name.clone(), place, k, false));
@@ -483,15 +460,4 @@ fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result<()> {
         }
     }
     Ok(())
-}
-
-fn first_byte(kind: &Kind) -> usize {
-    let start = |f: &Field| match &f.place {
-        Place::At(range) => range.start,
-        Place::Missing(at, _) => *at,
-    };
-    match kind {
-        Kind::Joints(joints) => joints.fields.iter().flatten().map(start).min().unwrap_or(0),
-        Kind::Pose(pose) => start(&pose.position[0]),
-    }
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use super::Setting;
 use super::field::{Field, Place};
+use super::itinerary::Itinerary;
 use super::program::{
     JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, TextFile, Understood,
 };
@@ -31,19 +32,19 @@ enum Value {
 
 /// Reads scripts; each file is a program of its own.
 pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
-    let mut program = Program { files: Vec::new(), targets: vec![], left: vec![], edits: vec![], notices: vec![] };
+    let mut way = Itinerary::new();
     for (index, file) in files.iter().enumerate() {
+        way.start_afresh();
         let script = Script {
             reader: Reader::new(file, index, DIALECT)?,
             setting,
             variables: BTreeMap::new(),
             tool: setting.tool.map(Tool::Known).unwrap_or(Tool::Unknown),
-            visited: BTreeMap::new(),
-            fresh: true,
-            program: &mut program,
+            way: &mut way,
         };
         script.read()?;
     }
+    let mut program = way.program;
     program.files = files;
     Ok(program)
 }
@@ -61,11 +62,7 @@ struct Script<'a> {
     /// Last value given to each variable.
     variables: BTreeMap<Vec<u8>, Value>,
     tool: Tool,
-    /// Byte of the first number of a target -> its index in the program.
-    visited: BTreeMap<usize, usize>,
-    /// True until the first target, and after a move whose end is not known.
-    fresh: bool,
-    program: &'a mut Program,
+    way: &'a mut Itinerary,
 }
 
 impl Script<'_> {
@@ -252,44 +249,31 @@ impl Script<'_> {
         }
         if let Err(why) = self.take(name, value, posture) {
             // Where this move ends is not known, so the next one has no known approach.
-            self.fresh = true;
-            self.program.left.push(Left { file: self.reader.index, line, name: name.to_owned(), why });
+            self.way.leave(Left { file: self.reader.index, line, name: name.to_owned(), why });
         }
         Ok(())
     }
 
     fn take(&mut self, name: &str, value: Value, posture: Posture) -> Understood<()> {
-        let (kind, line, first) = match value {
+        let (kind, line) = match value {
             Value::Joints(fields, line) => {
-                let first = first_byte(&fields);
                 let mut by_reading = vec![None; self.setting.chain.readings.len()];
                 let readings = self.readings(&fields);
                 for (field, &reading) in fields.into_iter().zip(self.setting.axes) {
                     by_reading[reading] = Some(field);
                 }
-                (Kind::Joints(JointTarget { readings, fields: by_reading }), line, first)
+                (Kind::Joints(JointTarget { readings, fields: by_reading }), line)
             }
-            Value::Pose(fields, line) => {
-                let first = first_byte(&fields[..]);
-                (Kind::Pose(Box::new(self.pose(*fields, posture)?)), line, first)
-            }
+            Value::Pose(fields, line) => (Kind::Pose(Box::new(self.pose(*fields, posture)?)), line),
             Value::Expression => return Err("its target is computed, not written in numbers".into()),
         };
-        let follows = !self.fresh;
-        self.fresh = false;
+        let follows = self.way.follows();
         let target = Target { file: self.reader.index, line, name: name.to_owned(), follows, kind };
-        let Some(&known) = self.visited.get(&first) else {
-            self.visited.insert(first, self.program.targets.len());
-            self.program.targets.push(target);
-            return Ok(());
-        };
-        // Visited again: the target after it does not come from the one before it in the list.
-        self.fresh = true;
-        let same_tool = match (&self.program.targets[known].kind, &target.kind) {
-            (Kind::Pose(a), Kind::Pose(b)) => a.flange_from_tool == b.flange_from_tool,
-            _ => true,
-        };
-        if same_tool { Ok(()) } else { Err("it is used with different tools; give it a pose for each".into()) }
+        if self.way.visit(target) {
+            Ok(())
+        } else {
+            Err("it is used with different tools; give it a pose for each".into())
+        }
     }
 
     fn pose(&self, fields: [Field; 6], posture: Posture) -> Understood<PoseTarget> {
@@ -307,13 +291,6 @@ impl Script<'_> {
             posture,
             joint_fields: vec![None; readings],
         })
-    }
-}
-
-fn first_byte(fields: &[Field]) -> usize {
-    match fields.first().map(|f| &f.place) {
-        Some(Place::At(range)) => range.start,
-        _ => 0,
     }
 }
 

@@ -1,6 +1,6 @@
 //! Local errors of the joints: one column for every reading to which a joint came back, or at which it stood still.
 
-use crate::model::joint_terms::{JointTerm, Term, TermContext};
+use crate::model::joint_terms::{JointTerm, Term};
 use crate::problem::{Image, common_readings, joined};
 
 /// Share of the stops that must have a reading in common with others before the local errors of that joint are told apart:
@@ -39,9 +39,8 @@ pub(super) fn local_terms(images: &[Image], readings: usize) -> Vec<JointTerm> {
 pub(super) fn local_share(terms: &[JointTerm], image: &Image) -> Vec<f64> {
     let Some(stop) = &image.stop else { return Vec::new() };
     let mut share = vec![0.0; stop.readings.len()];
-    for t in terms.iter().filter(|t| matches!(t.term, Term::Local(_))) {
-        let context = TermContext { reading: stop.readings[t.reading], approach: None, gravity: Default::default() };
-        share[t.reading] += t.term.basis(&context).powi(2);
+    for t in terms {
+        share[t.reading] += t.local_basis(stop.readings[t.reading]).map_or(0.0, |basis| basis * basis);
     }
     share
 }

@@ -61,16 +61,21 @@ pub(super) fn judge(
     let stops = stops(problem);
     let sigmas = |c: &DMatrix<f64>| (0..n).map(|k| c[(k, k)].max(0.0).sqrt()).collect::<Vec<f64>>();
     let still = still(problem, layout, state);
-    let mut worth = Worth { model_sigma: sigmas(&covariance.reduced), ..Worth::default() };
+    let mut worth = Worth {
+        identifiability: identifiability(&state.robot, layout, &stops, &covariance.reduced),
+        model_sigma: sigmas(&covariance.reduced),
+        ..Worth::default()
+    };
     if let Some(clustered) = clustered_covariance(problem, state, lin, covariance) {
         let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops));
         worth.clustered_ratio = model.map(|m| m.ratio_of(&clustered));
         let by_clusters = sigmas(&clustered);
-        let told = identifiability(&state.robot, layout, &stops, &covariance.reduced).map_or(0, |i| i.rank);
+        let told = worth.identifiability.as_ref().map_or(0, |i| i.rank);
         let enough = lin.images.len() >= IMAGES_PER_DIRECTION * told;
         if let Some(ratio) = worth.clustered_ratio.filter(|r| enough && *r > REPORT_LARGER) {
             worth.larger_stated = true;
             enlarge(covariance, &worth.model_sigma, &by_clusters, problem.layout.theta_len());
+            worth.identifiability = identifiability(&state.robot, layout, &stops, &covariance.reduced);
             notices.push(Notice::new(
                 "uncertainty",
                 format!(
@@ -83,7 +88,6 @@ pub(super) fn judge(
     }
     let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops));
     worth.workspace = model.map(|m| m.workspace()).unwrap_or_default();
-    worth.identifiability = identifiability(&state.robot, layout, &stops, &covariance.reduced);
     worth
 }
 

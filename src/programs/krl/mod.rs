@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use aggregate::{Aggregate, index};
 
 use super::Setting;
+use super::itinerary::Itinerary;
 use super::program::{Kind, Left, PoseTarget, Program, Target, TextFile, Understood};
 use super::scan::{Dialect, Reader, TokenKind};
 use crate::error::{Error, Result};
@@ -49,9 +50,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Progra
         declared: Vec::new(),
         tool: FrameIs::Unset,
         base: FrameIs::Unset,
-        visited: BTreeMap::new(),
-        fresh: true,
-        program: Program { files: vec![], targets: vec![], left: vec![], edits: vec![], notices: vec![] },
+        way: Itinerary::new(),
     };
     // Data first: programs use them in whatever order the files are given.
     let has_moves = |file: &TextFile| !file.name.to_ascii_lowercase().ends_with(".dat");
@@ -61,7 +60,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Progra
         }
     }
     module.unvisited();
-    let mut program = module.program;
+    let mut program = module.way.program;
     program.files = files;
     Ok(program)
 }
@@ -74,15 +73,13 @@ struct Module<'a> {
     declared: Vec<(String, usize, usize)>,
     tool: FrameIs,
     base: FrameIs,
-    /// File and byte of a target -> its index in the program.
-    visited: BTreeMap<(usize, usize), usize>,
-    fresh: bool,
-    program: Program,
+    way: Itinerary,
 }
 
 impl Module<'_> {
     fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
-        (self.tool, self.base, self.fresh) = (FrameIs::Unset, FrameIs::Unset, true);
+        (self.tool, self.base) = (FrameIs::Unset, FrameIs::Unset);
+        self.way.start_afresh();
         let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {
             let Some(word) = reader.name() else {
@@ -277,8 +274,7 @@ impl Module<'_> {
     }
 
     fn leave_at(&mut self, file: usize, line: usize, name: &str, why: String) {
-        self.fresh = true;
-        self.program.left.push(Left { file, line, name: name.to_owned(), why });
+        self.way.leave(Left { file, line, name: name.to_owned(), why });
     }
 
     fn visit(&mut self, value: &Value, motion: &str, from: (usize, usize)) -> Understood<()> {
@@ -286,28 +282,14 @@ impl Module<'_> {
         let named = name.unwrap_or(motion).to_owned();
         let kind = self.kind(aggregate, &self.tool, &self.base)?;
         let place = if name.is_some() { (aggregate.file, aggregate.line) } else { from };
-        self.add(named, place, kind, !self.fresh)?;
+        self.add(named, place, kind, self.way.follows())?;
         Ok(())
     }
 
     fn add(&mut self, name: String, (file, line): (usize, usize), kind: Kind, follows: bool) -> Understood<()> {
-        let first = first_byte(&kind);
-        self.fresh = false;
-        let Some(&known) = self.visited.get(&(file, first)) else {
-            self.visited.insert((file, first), self.program.targets.len());
-            self.program.targets.push(Target { file, line, name, follows, kind });
-            return Ok(());
-        };
-        // Visited again: the next target does not come from the one before it in the list.
-        self.fresh = true;
-        match (&self.program.targets[known].kind, &kind) {
-            (Kind::Pose(a), Kind::Pose(b))
-                if (a.flange_from_tool, a.base_from_work) != (b.flange_from_tool, b.base_from_work) =>
-            {
-                Err(format!("{name} is used with different $TOOL or $BASE; give it a position for each"))
-            }
-            _ => Ok(()),
-        }
+        let clash = format!("{name} is used with different $TOOL or $BASE; give it a position for each");
+        let visited = self.way.visit(Target { file, line, name, follows, kind });
+        if visited { Ok(()) } else { Err(clash) }
     }
 
     fn kind(&self, a: &Aggregate, tool: &FrameIs, base: &FrameIs) -> Understood<Kind> {
@@ -346,11 +328,11 @@ impl Module<'_> {
             let (tool, base) = data.unwrap_or((FrameIs::Unset, FrameIs::Unset));
             let kind = self.kind(a, &tool, &base);
             if let Ok(kind) = &kind
-                && self.visited.contains_key(&(file, first_byte(kind)))
+                && self.way.has(file, kind)
             {
                 continue;
             }
-            let visited = self.program.targets.iter().any(|t| t.file == file && t.line == line && t.name == name);
+            let visited = self.way.program.targets.iter().any(|t| t.file == file && t.line == line && t.name == name);
             if visited {
                 continue;
             }
@@ -359,18 +341,5 @@ impl Module<'_> {
                 self.leave_at(file, line, &name, format!("no motion of the files goes there, and {why}"));
             }
         }
-    }
-}
-
-/// Byte that tells a target from all others of its file.
-fn first_byte(kind: &Kind) -> usize {
-    use super::field::{Field, Place};
-    let start = |f: &Field| match &f.place {
-        Place::At(range) => range.start,
-        Place::Missing(at, _) => *at,
-    };
-    match kind {
-        Kind::Joints(joints) => joints.fields.iter().flatten().map(start).min().unwrap_or(0),
-        Kind::Pose(pose) => pose.position.iter().map(start).min().unwrap_or(0),
     }
 }
