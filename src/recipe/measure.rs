@@ -64,6 +64,7 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
             ));
         }
     };
+    require_some(series, &seen, &place())?;
     let stated = camera.width_px.zip(camera.height_px);
     let (width_px, height_px) = found_size.or(stated).ok_or_else(|| {
         Error::input(
@@ -82,7 +83,6 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
         let Seen { observations, left_out } = seen;
         stops.push(MeasuredStop { image: stop.image.clone(), readings, placement, observations, left_out });
     }
-    require_some(&stops, &place())?;
     let plate_file = series.folder.join(&series.manifest.plate);
     Ok(Measured {
         series: MeasuredSeries {
@@ -121,27 +121,15 @@ fn look(
     };
     let paths: Vec<PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.clone()).collect();
     let mut found = detect_series(&paths, bits, &series.plate, corrected, progress).into_iter();
-    let mut sizes: BTreeMap<(usize, usize), usize> = BTreeMap::new();
-    let mut results = Vec::new();
-    for stop in &series.stops.stops {
-        let result = stop.path.as_ref().and_then(|_| found.next());
-        if let Some(Ok(image)) = &result {
-            *sizes.entry(image.size).or_default() += 1;
-        }
-        results.push(result);
-    }
-    let common = sizes.iter().max_by_key(|(_, count)| **count).map(|(size, _)| *size);
+    let mut size = None;
     let mut seen = Vec::new();
-    for (stop, result) in series.stops.stops.iter().zip(results) {
-        let (observations, left_out) = match result {
+    for stop in &series.stops.stops {
+        let (observations, left_out) = match stop.path.as_ref().and_then(|_| found.next()) {
             None => (vec![], Some("the image file is missing".to_owned())),
             Some(Err(error)) => (vec![], Some(error.what)),
-            Some(Ok(image)) if Some(image.size) != common => {
-                let (w, h) = common.unwrap_or_default();
-                let text = format!("{}x{} px, while the other images have {w}x{h}", image.size.0, image.size.1);
-                (vec![], Some(text))
-            }
             Some(Ok(image)) => {
+                // The detector has refused all images of another size.
+                size = Some((image.size.0 as u32, image.size.1 as u32));
                 let named = |n: &Notice| Notice { place: format!("{}: {}", stop.image, n.place), ..n.clone() };
                 notices.extend(image.detection.notices.iter().map(named));
                 (image.detection.observations, None)
@@ -149,16 +137,15 @@ fn look(
         };
         seen.push(Seen { observations, left_out });
     }
-    let size = common.map(|(w, h)| (w as u32, h as u32));
     Ok((seen, size))
 }
 
-fn require_some(stops: &[MeasuredStop], place: &str) -> Result<()> {
-    if stops.iter().any(|s| s.left_out.is_none() && !s.observations.is_empty()) {
+fn require_some(series: &Series, seen: &[Seen], place: &str) -> Result<()> {
+    if seen.iter().any(|s| s.left_out.is_none() && !s.observations.is_empty()) {
         return Ok(());
     }
-    let reasons: Vec<String> = (stops.iter().take(3))
-        .map(|s| format!("{}: {}", s.image, s.left_out.as_deref().unwrap_or("no marker found")))
+    let reasons: Vec<String> = (series.stops.stops.iter().zip(seen).take(3))
+        .map(|(stop, s)| format!("{}: {}", stop.image, s.left_out.as_deref().unwrap_or("no marker found")))
         .collect();
     Err(Error::input(
         place,
