@@ -30,6 +30,15 @@ fn depths(solution: &Solution) -> Vec<[f64; 2]> {
     all.into_iter().map(|[near, far]| if far > 0.0 { [near, far] } else { [1.0, 1.0] }).collect()
 }
 
+/// Name in ROS of a lens that ROS has.
+fn ros_name(lens: Lens) -> &'static str {
+    match lens {
+        Lens::Fisheye => "equidistant",
+        Lens::Rational => "rational_polynomial",
+        _ => "plumb_bob",
+    }
+}
+
 /// Text of one camera_info; pixel (0, 0) is the centre of the top-left pixel, as in OpenCV and ROS.
 ///
 /// A lens that ROS has no model for is fitted by one that it has, and the text says what that costs.
@@ -39,9 +48,10 @@ fn depths(solution: &Solution) -> Vec<[f64; 2]> {
 pub(super) fn camera_yaml(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<String> {
     let (camera, remark) = match camera.lens {
         Lens::Brown | Lens::Rational | Lens::Fisheye => (camera.clone(), String::new()),
-        Lens::ThinPrism | Lens::Parallax => {
+        Lens::ThinPrism | Lens::Parallax | Lens::BrownField | Lens::FisheyeField => {
             let lens = camera.lens.name();
-            let fit = fit_lens(camera, Lens::Rational, depths_m).ok_or_else(|| {
+            let nearest = if camera.lens == Lens::FisheyeField { Lens::Fisheye } else { Lens::Rational };
+            let fit = fit_lens(camera, nearest, depths_m).ok_or_else(|| {
                 Error::unsolved(
                     format!("camera {name}"),
                     format!("no camera model of ROS comes near to its {lens} lens"),
@@ -49,20 +59,16 @@ pub(super) fn camera_yaml(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> R
                 )
             })?;
             let remark = format!(
-                "# NOT THE IDENTIFIED LENS ({lens}, see solution.json), for which ROS has no model, but the nearest rational_polynomial:\n\
+                "# NOT THE IDENTIFIED LENS ({lens}, see solution.json), for which ROS has no model, but the nearest {}:\n\
                  # loss {:.3} px RMS over the image, at most {:.3} px, for points {:.3} to {:.3} m away.\n",
-                fit.rms_px, fit.worst_px, depths_m[0], depths_m[1]
+                ros_name(nearest), fit.rms_px, fit.worst_px, depths_m[0], depths_m[1]
             );
             (fit.camera, remark)
         }
     };
     let [fx, fy, cx, cy] = [0, 1, 2, 3].map(|k| camera.parameters[k]);
     // The coefficients of these lenses stand in the order of OpenCV.
-    let model = match camera.lens {
-        Lens::Fisheye => "equidistant",
-        Lens::Rational => "rational_polynomial",
-        _ => "plumb_bob",
-    };
+    let model = ros_name(camera.lens);
     let coefficients = camera.parameters[4..].to_vec();
     let matrix = |rows: usize, columns: usize, data: &[f64]| {
         format!("\n  rows: {rows}\n  cols: {columns}\n  data: {}\n", list(data.iter().copied()))

@@ -144,7 +144,7 @@ fn cameras(solution: &Solution) -> Vec<CameraRecord> {
             lens: c.lens,
             width_px: c.width_px,
             height_px: c.height_px,
-            parameters: c.parameter_names().map(String::from).zip(c.parameters.iter().copied()).collect(),
+            parameters: c.parameter_names().map(Into::into).zip(c.parameters.iter().copied()).collect(),
             pixel_factor: problem.noise.pixel_factor[k],
             joint_noise: problem.joint_sigma(k),
             apparent_tilt_rad: problem.noise.tilt.get(k).copied().unwrap_or(0.0),

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, Vector3};
 use rayon::prelude::*;
 
-use super::system::{Carried, FIXED_MARKER_SIGMA_M, Linearised, intrinsic_columns, scatter};
+use super::system::{Carried, FIXED_MARKER_SIGMA_M, Linearised, scatter};
 use crate::linalg::product;
 use crate::model::plate_modes::MODES;
 use crate::problem::{Problem, Slack, State, Step};
@@ -154,13 +154,13 @@ fn gather_markers(problem: &Problem, state: &State, lin: &Linearised, lambda: f6
         .collect();
     for (terms, &i) in lin.terms.iter().zip(&lin.images) {
         let image = &problem.images[i];
-        let columns = intrinsic_columns(problem, image);
+        let columns = problem.layout.intrinsics(image);
         for t in &terms.markers {
             let m = &mut plates[image.plate][t.marker];
             m.seen = true;
             m.inverse += t.mm;
             m.bm += t.bm;
-            scatter(&mut m.me, 0, &t.me, &columns, theta);
+            scatter(&mut m.me, 0, t.intrinsics(), &columns, theta);
         }
     }
     for (k, plate) in plates.iter_mut().enumerate() {
@@ -202,20 +202,21 @@ impl PoseSpace {
             be: DVector::zeros(n_e),
         };
         for (k, t) in lin.terms.iter().enumerate() {
-            let columns = intrinsic_columns(problem, &problem.images[lin.images[k]]);
-            scatter(&mut space.pe, 6 * k, &t.pe, &columns, theta);
+            let columns = problem.layout.intrinsics(&problem.images[lin.images[k]]);
+            let pe = t.pe.column_iter().map(|c| c.into_owned()).enumerate();
+            scatter(&mut space.pe, 6 * k, pe, &columns, theta);
             space.bp.fixed_rows_mut::<6>(6 * k).copy_from(&t.bp);
-            for (a, row) in columns.iter().enumerate() {
-                let Some(r) = row else { continue };
-                space.be[r - theta] += t.be[a];
-                let line = t.ee.fixed_rows::<1>(a).into_owned();
-                scatter(&mut space.ee, r - theta, &line, &columns, theta);
+            for (a, row) in columns.iter().enumerate().filter_map(|(a, c)| c.map(|c| (a, c - theta))) {
+                space.be[row] += t.be[a];
+                for (b, column) in columns.iter().enumerate().filter_map(|(b, c)| c.map(|c| (b, c - theta))) {
+                    space.ee[(row, column)] += t.ee[(a, b)];
+                }
             }
         }
         for m in markers.iter().flatten().filter(|m| m.seen) {
             let v = &m.inverse;
             let ve = v * &m.me;
-            space.ee -= m.me.transpose() * &ve;
+            space.ee.gemm_tr(-1.0, &m.me, &ve, 1.0);
             space.be -= ve.transpose() * m.bm;
         }
         let rows: Vec<PoseRow> = (0..j).into_par_iter().map(|k| PoseRow::new(problem, lin, markers, k, n_e)).collect();

@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::system::{Carried, FIXED_MARKER_SIGMA_M, Linearised, intrinsic_columns};
+use super::system::{Carried, FIXED_MARKER_SIGMA_M, Linearised};
 use crate::linalg::product;
 use crate::model::plate_modes::MODES;
 use crate::problem::{Problem, Slack, State, Step};
@@ -145,7 +145,7 @@ fn add_image(
 ) -> Block {
     let (terms, chain, image) = (&lin.terms[k], &lin.chains[k], &problem.images[lin.images[k]]);
     let theta = problem.layout.theta_len();
-    let intrinsics = intrinsic_columns(problem, image);
+    let intrinsics = problem.layout.intrinsics(image);
     let used: Vec<(usize, usize)> = intrinsics.iter().enumerate().filter_map(|(e, c)| c.map(|c| (e, c))).collect();
     let seen: Vec<(usize, usize)> = (terms.markers.iter().enumerate())
         .filter_map(|(at, t)| marker_start[image.plate][t.marker].map(|s| (at, s)))
@@ -155,6 +155,8 @@ fn add_image(
     columns.extend(used.iter().map(|(_, c)| *c));
     columns.extend(seen.iter().flat_map(|(_, s)| *s..*s + 3));
     let (n, first_marker) = (columns.len(), theta + used.len());
+    // The intrinsics stand in ascending order of their index.
+    let place = |e: usize| used.binary_search_by_key(&e, |u| u.0).ok().map(|at| theta + at);
     let pp = DMatrix::from_column_slice(6, 6, terms.pp.as_slice());
     // Coupling of all of them with the pose, 6 x n, and their own block without the elimination.
     let mut p = DMatrix::zeros(6, n);
@@ -183,10 +185,11 @@ fn add_image(
         let (t, row) = (&terms.markers[*m], first_marker + 3 * at);
         own.view_mut((row, row), (3, 3)).copy_from(&t.mm);
         b.rows_mut(row, 3).copy_from(&t.bm);
-        for (i, (e, _)) in used.iter().enumerate() {
+        for (e, coupling) in t.intrinsics() {
+            let Some(i) = place(e) else { continue };
             for d in 0..3 {
-                own[(row + d, theta + i)] = t.me[(d, *e)];
-                own[(theta + i, row + d)] = t.me[(d, *e)];
+                own[(row + d, i)] = coupling[d];
+                own[(i, row + d)] = coupling[d];
             }
         }
     }

@@ -1,13 +1,12 @@
 //! Reduced normal equations: dense columns, and either the slack of the images or the markers; the other family is eliminated.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::by_markers::MarkersEliminated;
 use super::by_slack::SlackEliminated;
-use crate::model::camera::MAX_PARAMETERS;
 use crate::model::plate_modes::{MODES, basis};
-use crate::problem::{Chained, E, Image, ImageTerms, Problem, Slack, State, Step, Weighting, chained, linearise};
+use crate::problem::{Chained, ImageTerms, Problem, Slack, State, Step, Weighting, chained, linearise};
 
 /// Smallest prior sigma of a marker coordinate, m: below it a marker counts as fixed.
 pub(super) const FIXED_MARKER_SIGMA_M: f64 = 1e-9;
@@ -48,6 +47,7 @@ fn prior_cost(problem: &Problem, state: &State, images: &[usize]) -> f64 {
     let dense: f64 = (problem.layout.columns.iter().zip(values.iter()))
         .map(|(c, v)| ((v - c.prior_mean) / c.prior_sigma).powi(2))
         .sum();
+    let held: f64 = problem.families.iter().map(|f| f.squares(&values)).sum();
     let markers: f64 = (problem.plates.iter().zip(&state.plates))
         .flat_map(|(plate, shape)| plate.markers.iter().zip(&shape.corrections))
         .map(|(m, c)| c.norm_squared() / m.sigma_m.max(FIXED_MARKER_SIGMA_M).powi(2))
@@ -62,32 +62,21 @@ fn prior_cost(problem: &Problem, state: &State, images: &[usize]) -> f64 {
             _ => 0.0,
         })
         .sum();
-    0.5 * (dense + markers + slack)
+    0.5 * (dense + held + markers + slack)
 }
 
-/// Local intrinsic index to column of the dense part.
-pub(super) fn intrinsic_columns(problem: &Problem, image: &Image) -> [Option<usize>; E] {
-    let layout = &problem.layout;
-    let (camera, shape) = (&layout.cameras[image.camera], &layout.shapes[image.plate]);
-    std::array::from_fn(|k| {
-        let column = if k < MAX_PARAMETERS { camera.start + k } else { shape.start + k - MAX_PARAMETERS };
-        let inside = k >= MAX_PARAMETERS || k < camera.len();
-        inside.then_some(column)
-    })
-}
-
+/// Adds the columns of a block, each with the index of its intrinsic unknown, from row `row` on.
 pub(super) fn scatter<const R: usize>(
     into: &mut DMatrix<f64>,
     row: usize,
-    block: &SMatrix<f64, R, E>,
-    columns: &[Option<usize>; E],
+    block: impl Iterator<Item = (usize, SVector<f64, R>)>,
+    columns: &[Option<usize>],
     shift: usize,
 ) {
-    for (k, column) in columns.iter().enumerate() {
-        if let Some(c) = column {
-            for r in 0..R {
-                into[(row + r, c - shift)] += block[(r, k)];
-            }
+    for (k, values) in block {
+        if let Some(c) = columns[k] {
+            let mut slot = into.fixed_view_mut::<R, 1>(row, c - shift);
+            slot += values;
         }
     }
 }
@@ -168,6 +157,16 @@ impl System {
             if information > 0.0 {
                 self.information[(i, i)] += information;
                 self.rhs[i] += (c.prior_mean - values[i]) * information;
+            }
+        }
+        for (family, information) in problem.families.iter().filter_map(|f| Some((f, f.information()?))) {
+            let own = DVector::from_iterator(family.columns.len(), family.columns.iter().map(|&c| values[c]));
+            let pull = &information * own;
+            for (i, &row) in family.columns.iter().enumerate() {
+                self.rhs[row] -= pull[i];
+                for (k, &column) in family.columns.iter().enumerate() {
+                    self.information[(row, column)] += information[(i, k)];
+                }
             }
         }
     }
