@@ -35,9 +35,9 @@ fn beyond(uv: &Vector2<f64>) -> Vector2<f64> {
 
 /// A series whose camera is Brown-Conrady with [`beyond`] on top; the right quarter of the image shows nothing.
 fn seen(lens: Lens) -> (MeasuredSeries, Camera) {
-    let plate = design(&PlateRequest { markers: Some(200), ..PlateRequest::default() }).unwrap().plate;
+    let plate = design(&PlateRequest { markers: Some(150), ..PlateRequest::default() }).unwrap().plate;
     let request = WorldRequest {
-        images: 30,
+        images: 16,
         held_out: 2,
         pixel_sigma_px: NOISE_PX,
         seed: 11,

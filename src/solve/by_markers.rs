@@ -213,12 +213,14 @@ impl PoseSpace {
                 }
             }
         }
-        for m in markers.iter().flatten().filter(|m| m.seen) {
-            let v = &m.inverse;
-            let ve = v * &m.me;
-            space.ee.gemm_tr(-1.0, &m.me, &ve, 1.0);
-            space.be -= ve.transpose() * m.bm;
+        let seen: Vec<&Marker> = markers.iter().flatten().filter(|m| m.seen).collect();
+        let (mut me, mut ve) = (DMatrix::zeros(3 * seen.len(), n_e), DMatrix::zeros(3 * seen.len(), n_e));
+        for (k, m) in seen.iter().enumerate() {
+            me.rows_mut(3 * k, 3).copy_from(&m.me);
+            ve.rows_mut(3 * k, 3).copy_from(&(m.inverse * &m.me));
+            space.be -= m.me.tr_mul(&(m.inverse * m.bm));
         }
+        space.ee -= product(&me.transpose(), &ve);
         let rows: Vec<PoseRow> = (0..j).into_par_iter().map(|k| PoseRow::new(problem, lin, markers, k, n_e)).collect();
         for (k, row) in rows.iter().enumerate() {
             for (i, block) in row.blocks.iter().enumerate() {
