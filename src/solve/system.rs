@@ -1,6 +1,6 @@
 //! Reduced normal equations: dense columns, and either the slack of the images or the markers; the other family is eliminated.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix};
 use rayon::prelude::*;
 
 use super::by_markers::MarkersEliminated;
@@ -65,22 +65,6 @@ fn prior_cost(problem: &Problem, state: &State, images: &[usize]) -> f64 {
     0.5 * (dense + held + markers + slack)
 }
 
-/// Adds the columns of a block, each with the index of its intrinsic unknown, from row `row` on.
-pub(super) fn scatter<const R: usize>(
-    into: &mut DMatrix<f64>,
-    row: usize,
-    block: impl Iterator<Item = (usize, SVector<f64, R>)>,
-    columns: &[Option<usize>],
-    shift: usize,
-) {
-    for (k, values) in block {
-        if let Some(c) = columns[k] {
-            let mut slot = into.fixed_view_mut::<R, 1>(row, c - shift);
-            slot += values;
-        }
-    }
-}
-
 /// Which family of unknowns is eliminated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Elimination {
@@ -93,7 +77,7 @@ pub enum Elimination {
 impl Elimination {
     /// The cheaper one: the one that leaves fewer unknowns.
     pub fn cheaper(lin: &Linearised, problem: &Problem) -> Self {
-        let slack: usize = lin.chains.iter().map(|c| c.d_slack.ncols().max(6)).sum();
+        let slack: usize = lin.chains.iter().map(|c| c.d_slack.ncols()).sum();
         let markers: usize = problem.plates.iter().map(|p| 3 * p.markers.len()).sum();
         if slack > markers { Self::Slack } else { Self::Markers }
     }
@@ -208,13 +192,8 @@ impl System {
     }
 
     /// Covariance of the correction of every marker that was seen, per plate and marker.
-    pub fn marker_covariances(
-        &self,
-        problem: &Problem,
-        lin: &Linearised,
-        reduced: &DMatrix<f64>,
-    ) -> Vec<Vec<Option<Matrix3<f64>>>> {
-        self.marker_covariances_with(problem, lin, reduced, None)
+    pub fn marker_covariances(&self, reduced: &DMatrix<f64>) -> Vec<Vec<Option<Matrix3<f64>>>> {
+        self.marker_covariances_with(reduced, None)
     }
 
     /// Covariance of the position (plate modes and correction) of every marker that was seen, per plate and marker.
@@ -222,25 +201,22 @@ impl System {
         &self,
         problem: &Problem,
         state: &State,
-        lin: &Linearised,
         reduced: &DMatrix<f64>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         let carried = |plate: usize, marker: usize| {
             let shape = &state.plates[plate];
             (problem.layout.shapes[plate].start, basis(&shape.nominal[marker], shape.half_diagonal_m))
         };
-        self.marker_covariances_with(problem, lin, reduced, Some(&carried))
+        self.marker_covariances_with(reduced, Some(&carried))
     }
 
     fn marker_covariances_with(
         &self,
-        problem: &Problem,
-        lin: &Linearised,
         reduced: &DMatrix<f64>,
         carried: Option<&Carried>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         match &self.eliminated {
-            Eliminated::Markers(e) => e.marker_covariances(problem, lin, &self.slack_start, reduced, carried),
+            Eliminated::Markers(e) => e.marker_covariances(reduced, carried),
             Eliminated::Slack(e) => e.marker_covariances(reduced, carried),
         }
     }
