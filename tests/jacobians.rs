@@ -205,7 +205,10 @@ fn projection_through_a_displacement_field() {
                 }
             };
             let scale = w[0].abs().max(w[1].abs()).max(1e-3);
-            assert!((own[0] - w[0]).abs().max((own[1] - w[1]).abs()) < 1e-10 * scale, "{lens:?}, parameter {c}: {own:?} {w:?}");
+            assert!(
+                (own[0] - w[0]).abs().max((own[1] - w[1]).abs()) < 1e-10 * scale,
+                "{lens:?}, parameter {c}: {own:?} {w:?}"
+            );
         }
     }
     assert!(seen > 10 && beyond > 3, "inside {seen}, beyond the border {beyond}");

@@ -46,7 +46,10 @@ impl ProjectionMap {
     /// Place of an entry in the image, px.
     pub fn place(&self, entry: usize, width_px: u32, height_px: u32) -> Vector2<f64> {
         let along = |k: usize, n: usize, px: u32| k as f64 * (f64::from(px) - 1.0) / (n.max(2) - 1) as f64;
-        Vector2::new(along(entry % self.columns, self.columns, width_px), along(entry / self.columns, self.rows, height_px))
+        Vector2::new(
+            along(entry % self.columns, self.columns, width_px),
+            along(entry / self.columns, self.rows, height_px),
+        )
     }
 
     /// Median and largest entry, px; none for an empty map.

@@ -61,7 +61,11 @@ pub(super) fn camera_yaml(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> R
             let remark = format!(
                 "# NOT THE IDENTIFIED LENS ({lens}, see solution.json), for which ROS has no model, but the nearest {}:\n\
                  # loss {:.3} px RMS over the image, at most {:.3} px, for points {:.3} to {:.3} m away.\n",
-                ros_name(nearest), fit.rms_px, fit.worst_px, depths_m[0], depths_m[1]
+                ros_name(nearest),
+                fit.rms_px,
+                fit.worst_px,
+                depths_m[0],
+                depths_m[1]
             );
             (fit.camera, remark)
         }

@@ -326,8 +326,7 @@ impl Camera {
                 break;
             }
         }
-        let reached =
-            (image(&x).0 - target).norm() < 1e-9 && self.lens.is_monotonic_to(&p[4..], x.norm_squared(), 0.0);
+        let reached = (image(&x).0 - target).norm() < 1e-9 && self.lens.is_monotonic_to(&p[4..], x.norm_squared(), 0.0);
         reached.then(|| Vector3::new(x.x, x.y, 1.0))
     }
 
