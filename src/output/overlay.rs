@@ -278,7 +278,7 @@ impl View {
     fn number(&self, canvas: &mut Canvas, uv: [f64; 2], below: f64, marker: u32) {
         let words = marker.to_string();
         let width = text_width(&words, self.number_dot);
-        if width > self.pitch * self.scale && marker % 5 != 0 {
+        if width > self.pitch * self.scale && !marker.is_multiple_of(5) {
             return;
         }
         let [x, y] = self.place(uv);

@@ -103,12 +103,10 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     })
 }
 
-/// What the images show, and their size.
-fn look_through(
-    series: &Series,
-    progress: impl Fn(&Path) + Sync,
-    notices: &mut Vec<Notice>,
-) -> Result<(Vec<Seen>, Option<(u32, u32)>)> {
+/// What all stops show, and the size of the images.
+type Look = (Vec<Seen>, Option<(u32, u32)>);
+
+fn look_through(series: &Series, progress: impl Fn(&Path) + Sync, notices: &mut Vec<Notice>) -> Result<Look> {
     let images = look(series, progress)?;
     notices.extend(images.iter().flat_map(SeenImage::notices));
     // The detector has refused all images of another size.
