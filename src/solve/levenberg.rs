@@ -62,7 +62,7 @@ pub fn solve(problem: &Problem, start: State, settings: &Settings) -> Outcome {
     let mut status = Status::OutOfIterations;
     let mut iterations = 0;
     // Decrement of the step before, where that step was taken.
-    let mut before = f64::INFINITY;
+    let mut before: Option<f64> = None;
     while iterations < settings.iterations {
         iterations += 1;
         let system = System::new(problem, &state, &lin, lambda);
@@ -81,8 +81,8 @@ pub fn solve(problem: &Problem, start: State, settings: &Settings) -> Outcome {
         let tried = linearise_all(problem, &moved);
         let small = decrement < settings.decrement;
         // Gauss-Newton contracts at least linearly: the next step will be shorter by the same factor, or more.
-        let next = decrement * decrement / before;
-        let last = small || (decrement < 0.1 * before && next < PREDICTION_MARGIN * settings.decrement);
+        let next = before.filter(|b| decrement < 0.1 * b).map_or(f64::INFINITY, |b| decrement * decrement / b);
+        let last = small || next < PREDICTION_MARGIN * settings.decrement;
         // Where the step promises less than the cost can resolve, the gradient is the better judge.
         let below_rounding = small || decrement * decrement < 10.0 * ROUNDING * lin.cost;
         match tried {
@@ -90,7 +90,7 @@ pub fn solve(problem: &Problem, start: State, settings: &Settings) -> Outcome {
                 if better.cost <= lin.cost || (below_rounding && better.cost <= lin.cost * (1.0 + ROUNDING)) =>
             {
                 (state, lin) = (moved, better);
-                before = decrement;
+                before = Some(decrement);
                 lambda = (lambda * 0.1).max(1e-12);
                 if last {
                     status = Status::Converged;
@@ -102,7 +102,7 @@ pub fn solve(problem: &Problem, start: State, settings: &Settings) -> Outcome {
                 break;
             }
             _ => {
-                before = f64::INFINITY;
+                before = None;
                 lambda = (lambda * 10.0).max(1e-6);
             }
         }
