@@ -1,6 +1,11 @@
 //! What the image stage reaches on rendered pictures with known truth.
 
+mod identity;
+mod identity_view;
 mod precision;
 mod view;
 
+pub use identity::{
+    DISPLACED_PX, Identity, IdentityRequest, IdentityView, MirrorAnswer, Plates, Sight, identity, identity_view,
+};
 pub use precision::{Precision, PrecisionCell, precision, precision_cells};
