@@ -5,6 +5,7 @@ use super::text::{list, quoted};
 use crate::error::{Error, Result};
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::recipe::Solution;
+use crate::series::CameraInfo;
 
 /// One file for each camera, as (file name, text).
 ///
@@ -46,7 +47,30 @@ fn ros_name(lens: Lens) -> &'static str {
 /// # Errors
 /// A lens that no model of ROS comes near to.
 pub(super) fn camera_yaml(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<String> {
-    let (camera, remark) = match camera.lens {
+    let (camera, remark) = in_ros(name, camera, depths_m)?;
+    let [fx, fy, cx, cy] = [0, 1, 2, 3].map(|k| camera.parameters[k]);
+    // The coefficients of these lenses stand in the order of OpenCV.
+    let model = ros_name(camera.lens);
+    let coefficients = camera.parameters[4..].to_vec();
+    let matrix = |rows: usize, columns: usize, data: &[f64]| {
+        format!("\n  rows: {rows}\n  cols: {columns}\n  data: {}\n", list(data.iter().copied()))
+    };
+    Ok(format!(
+        "{remark}image_width: {}\nimage_height: {}\ncamera_name: {}\ncamera_matrix:{}distortion_model: {model}\n\
+         distortion_coefficients:{}rectification_matrix:{}projection_matrix:{}",
+        camera.width_px,
+        camera.height_px,
+        quoted(name),
+        matrix(3, 3, &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]),
+        matrix(1, coefficients.len(), &coefficients),
+        matrix(3, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
+        matrix(3, 4, &[fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]),
+    ))
+}
+
+/// The camera as ROS can say it, and what that loses, in words.
+fn in_ros(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<(Camera, String)> {
+    Ok(match camera.lens {
         Lens::Brown | Lens::Rational | Lens::Fisheye => (camera.clone(), String::new()),
         Lens::ThinPrism | Lens::Parallax | Lens::BrownField | Lens::FisheyeField => {
             let lens = camera.lens.name();
@@ -69,23 +93,21 @@ pub(super) fn camera_yaml(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> R
             );
             (fit.camera, remark)
         }
-    };
-    let [fx, fy, cx, cy] = [0, 1, 2, 3].map(|k| camera.parameters[k]);
-    // The coefficients of these lenses stand in the order of OpenCV.
-    let model = ros_name(camera.lens);
-    let coefficients = camera.parameters[4..].to_vec();
-    let matrix = |rows: usize, columns: usize, data: &[f64]| {
-        format!("\n  rows: {rows}\n  cols: {columns}\n  data: {}\n", list(data.iter().copied()))
-    };
-    Ok(format!(
-        "{remark}image_width: {}\nimage_height: {}\ncamera_name: {}\ncamera_matrix:{}distortion_model: {model}\n\
-         distortion_coefficients:{}rectification_matrix:{}projection_matrix:{}",
-        camera.width_px,
-        camera.height_px,
-        quoted(name),
-        matrix(3, 3, &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]),
-        matrix(1, coefficients.len(), &coefficients),
-        matrix(3, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
-        matrix(3, 4, &[fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]),
-    ))
+    })
+}
+
+/// The camera as a message of ROS, for points between two depths (m).
+///
+/// # Errors
+/// A lens that no model of ROS comes near to.
+pub(super) fn camera_info(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<CameraInfo> {
+    let (camera, _) = in_ros(name, camera, depths_m)?;
+    let p = &camera.parameters;
+    Ok(CameraInfo {
+        width_px: camera.width_px,
+        height_px: camera.height_px,
+        distortion_model: ros_name(camera.lens).into(),
+        distortion: p[4..].to_vec(),
+        intrinsics: Some([p[0], p[1], p[2], p[3]]),
+    })
 }

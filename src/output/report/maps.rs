@@ -6,6 +6,7 @@ use super::svg::{Anchor, Svg, round_below};
 use super::words::plain;
 use crate::geom::Pose;
 use crate::model::camera::Camera;
+use crate::output::restore::camera;
 use crate::output::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
 
 const WIDTH: f64 = 560.0;
@@ -222,11 +223,6 @@ pub(super) fn uncertainty(c: &CameraRecord) -> Option<Map> {
          most {largest:.3} px. Dark blue below {a} px, then to {b} px, to {c} px, orange to {d} px, dark orange beyond."
     );
     Some(Map { svg: svg.finish(), caption })
-}
-
-fn camera(c: &CameraRecord) -> Camera {
-    let parameters = c.parameters.iter().map(|(_, v)| *v).collect();
-    Camera { lens: c.lens, width_px: c.width_px, height_px: c.height_px, parameters }
 }
 
 /// d(uv) / d(x, y) of a marker in the plane of the plate, px/m.
