@@ -136,3 +136,15 @@ fn single_images_need_a_plate_and_no_series() {
         assert!(text(&output).contains(word), "{args:?}: {}", text(&output));
     }
 }
+
+#[test]
+fn a_small_study_of_identity_holds_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("reports");
+    let args = ["detect", "--study", "--part", "identity", "--views", "40", "--seed", "1", "--out", name(&out)];
+    let output = robotcal(&args);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    let report = std::fs::read_to_string(out.join("image-stage.md")).unwrap();
+    assert!(report.contains("no wrong id: 0 in 40 views") && report.contains("image-stage-identity.svg"), "{report}");
+    assert!(out.join("image-stage-identity.svg").is_file());
+}

@@ -6,6 +6,7 @@ mod precision;
 mod view;
 
 pub use identity::{
-    DISPLACED_PX, Identity, IdentityRequest, IdentityView, MirrorAnswer, Plates, Sight, identity, identity_view,
+    DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityRequest, IdentityView, MirrorAnswer, Plates, Sight, identity,
+    identity_view,
 };
 pub use precision::{Precision, PrecisionCell, precision, precision_cells};
