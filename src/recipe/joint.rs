@@ -12,7 +12,7 @@ use crate::assess::hold_out;
 use crate::error::{Error, Result};
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::robot::Robot;
-use crate::problem::{Family, Layout, Problem, Slack, State};
+use crate::problem::{Problem, Slack, State};
 use crate::solve::{
     ComponentOptions, Outcome, Status, covariance, estimate_components, reject_images, reject_observations,
 };
@@ -102,27 +102,6 @@ impl RobotModel {
     }
 }
 
-/// Terms alike, each kind with a size of its own that the data decide; those whose prior is stated keep it.
-fn families(layout: &Layout, robot: &Robot, selection: &Selection) -> Result<Vec<Family>> {
-    let mut stated = Vec::new();
-    for name in selection.prior.keys() {
-        stated.extend(layout.named("[prior]", name)?);
-    }
-    let kinds: [(&str, fn(Term) -> bool); 4] = [
-        ("gear scale", |t| t == Term::Gear),
-        ("harmonics", |t| matches!(t, Term::Cosine(_) | Term::Sine(_))),
-        ("gravity", |t| matches!(t, Term::Gravity(_))),
-        ("backlash", |t| t == Term::Backlash),
-    ];
-    let of = |(name, is): (&str, fn(Term) -> bool)| {
-        let terms = robot.terms.iter().zip(layout.terms.clone());
-        let own = terms.filter(|(t, c)| is(t.term) && layout.columns[*c].free && !stated.contains(c));
-        let columns: Vec<usize> = own.map(|(_, c)| c).collect();
-        (!columns.is_empty()).then(|| Family::new(name, layout, columns))
-    };
-    Ok(kinds.into_iter().filter_map(of).collect())
-}
-
 /// Share left out beyond which there is no result.
 const HOPELESS_SHARE_LEFT_OUT: f64 = 0.5;
 
@@ -134,8 +113,6 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let robot = options.model.robot_with(chain, options.harmonics);
     let (mut problem, mut state) = build(&robot, series, options.joint_noise == JointNoise::Estimated)?;
     options.selection.apply(&mut problem.layout, &mut state)?;
-    let families = families(&problem.layout, &state.robot, &options.selection)?;
-    problem.families.extend(families);
     let stated: Vec<Option<f64>> = (problem.cameras.iter())
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();

@@ -40,9 +40,6 @@ const SMALLEST_FACTOR: f64 = 1e-3;
 /// Determined parameters of a family below which its factor stays.
 const FEWEST_DETERMINED: f64 = 1e-6;
 
-/// Power of a step downwards of a family's factor.
-const LONGER: f64 = 1.5;
-
 /// Newton decrement between rounds: the components need no better.
 const ROUGH_DECREMENT: f64 = 0.05;
 
@@ -121,10 +118,7 @@ fn update_families(problem: &mut Problem, state: &State, cov: &Covariance) -> f6
         if determined < FEWEST_DETERMINED {
             continue;
         }
-        let ratio = (squares / determined).sqrt() / family.factor;
-        // Towards zero the fixed point creeps: a longer step keeps its place and comes sooner.
-        let ratio = if ratio < 1.0 { ratio.powf(LONGER) } else { ratio };
-        let next = (family.factor * ratio.min(2.0)).max(SMALLEST_FACTOR);
+        let next = (squares / determined).sqrt().clamp(SMALLEST_FACTOR, 2.0 * family.factor);
         if next > SMALLEST_FACTOR {
             change = change.max((next / family.factor - 1.0).abs());
         }
