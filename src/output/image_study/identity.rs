@@ -135,7 +135,7 @@ fn claims(study: &Identity, all: &Sums) -> Vec<Claim> {
 
 fn setup(study: &Identity) -> String {
     format!(
-        "Views of the standard plate of 504 markers with seeds from {}: 0.12 to 0.6 megapixels, fields of 25 to 75 degrees with distortion, every roll, tilt to 60 \
+        "Views of the standard plate of 504 markers with seeds from {}: 0.12 to 1.2 megapixels, fields of 25 to 75 degrees with distortion, every roll, tilt to 60 \
          degrees, 20 to 504 markers in view; 8 or 12 bit, uneven light, blur of 0.5 to 1.2 px, noise, and in part cables and a gripper before the \
          plate, glare up to saturation, clutter around it, motion and coma. A marker counts as visible when its whole outer contour is in the \
          picture with nothing before it, not saturated, and with a minor axis of at least {LEAST_MINOR_AXIS_PX:.0} px; views with fewer than 20 such markers \
