@@ -141,7 +141,7 @@ pub(super) struct Pixels {
     weighted: Vec<f32>,
     /// Columns of the weighted Jacobian.
     columns: Vec<Vec<f32>>,
-    nodes: Nodes,
+    pub nodes: Nodes,
     /// Even paper and ink beyond the band.
     pub flat: Flat,
 }
@@ -158,6 +158,8 @@ struct EdgeTerms {
     sin: Vec<f32>,
     normal_x: Vec<f32>,
     normal_y: Vec<f32>,
+    /// Distance to the edge in units of the blur.
+    argument: Vec<f32>,
     /// Derivative of the argument by ln blur.
     widen: Vec<f32>,
     /// Exact coverage less that of the closed form, where the contour is strongly curved.
@@ -168,10 +170,11 @@ struct EdgeTerms {
 
 impl EdgeTerms {
     fn resize(&mut self, n: usize) {
-        let EdgeTerms { coverage, density, scale, rho, cos, sin, normal_x, normal_y, widen, missing, exact } = self;
+        let EdgeTerms { coverage, density, scale, rho, cos, sin, normal_x, normal_y, argument, widen, missing, exact } =
+            self;
         missing.clear();
         exact.clear();
-        for v in [coverage, density, scale, rho, cos, sin, normal_x, normal_y, widen, missing] {
+        for v in [coverage, density, scale, rho, cos, sin, normal_x, normal_y, argument, widen, missing] {
             v.resize(n, 0.0);
         }
     }
@@ -191,6 +194,14 @@ impl Pixels {
         self.y.push(y);
         self.value.push(value);
         self.mask.push(1.0);
+    }
+
+    /// Keeps the first `count` pixels.
+    pub fn truncate(&mut self, count: usize) {
+        for v in [&mut self.x, &mut self.y, &mut self.value, &mut self.mask] {
+            v.truncate(count);
+        }
+        self.finish();
     }
 
     /// Pads to whole lanes; call once after the last `push`.
@@ -218,6 +229,8 @@ impl Pixels {
         } else {
             self.inner.coverage.fill(0.0);
             self.inner.density.fill(0.0);
+            self.inner.normal_x.fill(0.0);
+            self.inner.normal_y.fill(0.0);
         }
         self.levels(state, noise);
         self.shape_columns(state);
@@ -319,6 +332,32 @@ impl Pixels {
         }
     }
 
+    /// What the edges' lopsidedness says about the displacement of the centre, and the information on it (1/px^2).
+    ///
+    /// A point spread with the third cumulant `k` along the normal adds `k / (6 s^3) (u^2 - 1) phi(u)` to the coverage.
+    /// The fit takes the part along `phi` for a displacement `-k / (12 s^2)`; the part with `u^2 - 1/2` stays in the
+    /// residuals and tells its size.
+    pub fn skew(&self, state: &State, noise: [f64; 2]) -> ([f64; 2], [f64; 2]) {
+        let (v_white, v_dark) = (noise[0] as f32, noise[1] as f32);
+        let factor = ((state.white[0] - state.dark[0]) * 2.0 / state.blur) as f32;
+        let (mut sum, mut information) = ([0.0f32; 2], [0.0f32; 2]);
+        for i in 0..self.count {
+            let weight = 1.0 / (v_white + (v_dark - v_white) * self.ink[i]).max(0.1 * v_dark);
+            let mut columns = [0.0f32; 2];
+            for (terms, sign) in [(&self.outer, factor), (&self.inner, -factor)] {
+                let u = terms.argument[i];
+                let lobe = sign * (u * u - 0.5) * normal_tail(u).1;
+                columns[0] += lobe * terms.normal_x[i];
+                columns[1] += lobe * terms.normal_y[i];
+            }
+            for a in 0..2 {
+                sum[a] += weight * columns[a] * self.residual[i];
+                information[a] += weight * columns[a] * columns[a];
+            }
+        }
+        (sum.map(f64::from), information.map(f64::from))
+    }
+
     /// Normal matrix (lower triangle) of `parameters` columns.
     pub fn normal(&self, parameters: usize, out: &mut [[f64; ANNULUS]; ANNULUS]) {
         for (i, row) in out.iter_mut().enumerate().take(parameters) {
@@ -408,11 +447,13 @@ impl EdgeTerms {
     fn evaluate(&mut self, geometry: &Geometry, x: &[f32], y: &[f32]) {
         let n = x.len();
         let y = &y[..n];
-        let Self { coverage, density, scale, rho, cos, sin, normal_x, normal_y, widen, missing, exact } = self;
+        let Self { coverage, density, scale, rho, cos, sin, normal_x, normal_y, argument, widen, missing, exact } =
+            self;
         let (missing, is_exact) = (&missing[..n], !exact.is_empty());
         let (coverage, density, scale) = (&mut coverage[..n], &mut density[..n], &mut scale[..n]);
         let (rho, cos, sin) = (&mut rho[..n], &mut cos[..n], &mut sin[..n]);
         let (normal_x, normal_y, widen) = (&mut normal_x[..n], &mut normal_y[..n], &mut widen[..n]);
+        let argument = &mut argument[..n];
         let [n00, n01, n10, n11] = geometry.to_unit;
         let [cx, cy] = geometry.centre;
         let [a3, b3] = geometry.third;
@@ -448,6 +489,7 @@ impl EdgeTerms {
             sin[i] = s;
             normal_x[i] = gx * g;
             normal_y[i] = gy * g;
+            argument[i] = u;
             widen[i] = lift - d;
         }
     }

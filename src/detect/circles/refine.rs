@@ -3,13 +3,14 @@
 use super::edge_model::{ANNULUS, CENTRE, DARK, DISC, INNER, LN_BLUR, LN_RATIO, Pixels, SHAPE, State, THIRD, WHITE};
 use super::ellipse::Ellipse;
 use super::flat_zone::{Flat, Zone};
+use super::tails::{Tail, lift};
 use super::types::{Imaged, Measured, Reason};
 use crate::detect::Picture;
 use crate::series::Edge;
 
 /// Where to start and what to assume.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Start {
+pub(super) struct Start<'a> {
     pub ellipse: Ellipse,
     /// Inner over outer radius of an annulus.
     pub ratio: Option<f64>,
@@ -26,6 +27,12 @@ pub(super) struct Start {
     pub noise: [f64; 2],
     /// Prior sigma of the ink's own gradient as a share of the contrast, 1/px.
     pub ink_slope: f64,
+    /// Centre of the inner circle less that of the outer one, px.
+    pub apart: [f64; 2],
+    /// How well that is known per axis, px, where geometry tells it.
+    pub tie_sigma: Option<f64>,
+    /// Measured neighbours whose ink reaches the pixels of this marker.
+    pub tails: &'a [Tail],
 }
 
 /// A fit with what the caller needs to go on.
@@ -38,12 +45,22 @@ pub(super) struct Fit {
     pub ink_slope: ([f64; 2], [f64; 2]),
     /// Mean square of the residuals on paper and on ink, away from the edge, with their pixel counts.
     pub plain: [(f64, f64); 2],
+    /// Mean square of the residuals in units of the noise.
+    pub misfit: f64,
+    /// Lopsidedness of the edges and its information ([`Pixels::skew`]).
+    pub skew: ([f64; 2], [f64; 2]),
 }
 
 /// Half width of the band around an edge in units of the blur (and half a pixel on top).
 const REACH: f64 = 3.1;
+/// The same where the neighbours are taken off: with paper enough to see its level.
+const WIDE_REACH: f64 = 5.0;
 /// Width of the even zone beyond the band in units of the blur.
 const EVEN: f64 = 5.0;
+/// How far, in units of the blur, contours may be from where the band was laid.
+const SLACK: f64 = 0.5;
+/// Part of the band that must be in the picture when the shape is not known.
+pub(super) const WHOLE: f64 = 0.98;
 const ITERATIONS: usize = 14;
 /// A pixel at this part of the range or above counts as saturated.
 const SATURATED: f32 = 0.995;
@@ -51,19 +68,60 @@ const SATURATED: f32 = 0.995;
 /// Measures one marker. The work arrays `pixels` are reused from call to call.
 pub(super) fn refine(picture: &Picture, start: &Start, pixels: &mut Pixels) -> Result<Fit, Reason> {
     let anchor = start.ellipse.centre.map(f64::round);
+    let first = once(picture, start, anchor, pixels)?;
+    let slack = SLACK * first.0.blur;
+    match moved(&first.0, start, anchor).filter(|(_, by)| *by > slack) {
+        // the band was not laid where the edges are
+        Some((start, _)) => {
+            let (state, normal, visible) = once(picture, &start, anchor, pixels)?;
+            finish(&state, &start, anchor, visible, pixels, &normal)
+        }
+        None => finish(&first.0, start, anchor, first.2, pixels, &first.1),
+    }
+}
+
+/// One fit: the state, the factor of its normal matrix, and the part of the band in the picture.
+fn once(
+    picture: &Picture,
+    start: &Start,
+    anchor: [f64; 2],
+    pixels: &mut Pixels,
+) -> Result<(State, Normal, f64), Reason> {
     let (wanted, saturated) = gather(picture, start, anchor, pixels);
     let parameters = if start.ratio.is_some() { ANNULUS } else { DISC };
     if saturated * 5 > wanted {
         return Err(Reason::Saturated);
     }
     let visible = pixels.count as f64 / wanted.max(1) as f64;
-    if pixels.count < 2 * parameters || (visible < 0.98 && start.shape_sigma.is_none()) || visible < 0.35 {
+    if !start.tails.is_empty() {
+        lift(pixels, start.tails, anchor);
+    }
+    // what lies beyond the border is missed less where the neighbours are taken off: the band is wider than it must be
+    let whole = start.tails.is_empty() && start.shape_sigma.is_none();
+    if pixels.count < 2 * parameters || (whole && visible < WHOLE) || visible < 0.35 {
         return Err(Reason::CutByBorder);
     }
     let mut state = initial(start, anchor);
     let prior = Prior::of(start, picture);
     let normal = iterate(&mut state, &prior, start, pixels)?;
-    finish(&state, start, anchor, visible, pixels, &normal)
+    Ok((state, normal, visible))
+}
+
+/// The start that a state is, and by how much its contours have moved from the one before, px.
+fn moved<'a>(state: &State, start: &Start<'a>, anchor: [f64; 2]) -> Option<(Start<'a>, f64)> {
+    let length = |d: [f64; 2]| d[0].hypot(d[1]);
+    let ellipse = state.ellipse();
+    let ellipse = Ellipse { centre: [0, 1].map(|a| ellipse.centre[a] + anchor[a]), ..ellipse };
+    let (now, before) = (ellipse.semi_axes(), start.ellipse.semi_axes());
+    let outer = length([0, 1].map(|a| ellipse.centre[a] - start.ellipse.centre[a]))
+        + (now[0] - before[0]).abs().max((now[1] - before[1]).abs());
+    let inner = state.inner.zip(start.ratio).map(|((centre, ratio), old)| {
+        let apart = [0, 1].map(|a| centre[a] - state.centre[a]);
+        (apart, ratio, outer + length([0, 1].map(|a| apart[a] - start.apart[a])) + (ratio - old).abs() * now[0])
+    });
+    let (apart, ratio) = inner.map_or((start.apart, start.ratio), |(apart, ratio, _)| (apart, Some(ratio)));
+    let by = inner.map_or(outer, |(.., by)| by);
+    by.is_finite().then_some((Start { ellipse, apart, ratio, blur_px: state.blur, ..*start }, by))
 }
 
 fn initial(start: &Start, anchor: [f64; 2]) -> State {
@@ -75,7 +133,7 @@ fn initial(start: &Start, anchor: [f64; 2]) -> State {
         blur: start.blur_px,
         white: [start.paper, 0.0, 0.0],
         dark: [start.ink, 0.0, 0.0],
-        inner: start.ratio.map(|r| (centre, r)),
+        inner: start.ratio.map(|r| ([0, 1].map(|a| centre[a] + start.apart[a]), r)),
     }
 }
 
@@ -98,11 +156,11 @@ impl Prior {
         weight[LN_BLUR] = inverse(start.blur_sigma);
         // a black offset changes the ink's share of the gradient by a part of it
         weight[DARK + 1..DARK + 3].fill(inverse(start.ink_slope * contrast));
-        weight[LN_RATIO] = inverse(0.05);
+        weight[LN_RATIO] = inverse(if start.tie_sigma.is_some() { 0.02 } else { 0.05 });
         if let Some(sigma) = start.shape_sigma {
             weight[SHAPE..SHAPE + 3].fill(inverse(sigma));
         }
-        let apart = 0.02 + 0.012 * start.ellipse.semi_axes()[0];
+        let apart = start.tie_sigma.unwrap_or(0.02 + 0.012 * start.ellipse.semi_axes()[0]);
         let concentric = if start.ratio.is_some() { inverse(apart) } else { 0.0 };
         Self { weight, concentric }
     }
@@ -121,7 +179,7 @@ impl Prior {
     fn add_gradient(&self, travelled: &[f64; ANNULUS], gradient: &mut [f64; ANNULUS]) {
         (0..ANNULUS).for_each(|i| gradient[i] -= self.weight[i] * travelled[i]);
         for a in 0..2 {
-            // both start at the same centre
+            // the start is where they are expected
             let apart = self.concentric * (travelled[INNER + a] - travelled[CENTRE + a]);
             gradient[INNER + a] -= apart;
             gradient[CENTRE + a] += apart;
@@ -238,11 +296,16 @@ fn finish(
     let covariance = Covariance::of(factor, parameters, scale);
     let place = |e: Ellipse| Ellipse { centre: [0, 1].map(|a| e.centre[a] + anchor[a]), ..e };
     let outer = Imaged { edge: Edge::Outer, ellipse: place(state.ellipse()), covariance: covariance.block(0) };
-    let inner =
-        state.inner_ellipse().map(|e| Imaged { edge: Edge::Inner, ellipse: place(e), covariance: covariance.block(2) });
+    let hole = state.inner_ellipse().map(place);
+    let inner = hole.filter(|_| start.tie_sigma.is_none()).map(|ellipse| Imaged {
+        edge: Edge::Inner,
+        ellipse,
+        covariance: covariance.block(2),
+    });
     let measured = Measured {
         outer,
         inner,
+        hole,
         blur_px: state.blur,
         paper: state.white[0],
         ink: state.dark[0],
@@ -251,7 +314,14 @@ fn finish(
         visible,
     };
     let ink_slope = ink_slope(state, factor, contrast);
-    Ok(Fit { measured, cross: covariance.cross(), plain, ink_slope })
+    Ok(Fit {
+        measured,
+        cross: covariance.cross(),
+        plain,
+        ink_slope,
+        misfit: scale,
+        skew: pixels.skew(state, start.noise),
+    })
 }
 
 fn ink_slope(state: &State, factor: &Normal, contrast: f64) -> ([f64; 2], [f64; 2]) {
@@ -303,7 +373,8 @@ impl Zones {
     fn of(start: &Start, reach: f64, even: f64) -> Self {
         let ink = start.ellipse.offset(-reach);
         let Some(ratio) = start.ratio else { return Self { all: [ink, start.ellipse.offset(-reach - even), None] } };
-        let inner = Ellipse { shape: start.ellipse.shape.map(|v| v / (ratio * ratio)), ..start.ellipse };
+        let centre = [0, 1].map(|a| start.ellipse.centre[a] + start.apart[a]);
+        let inner = Ellipse { centre, shape: start.ellipse.shape.map(|v| v / (ratio * ratio)) };
         let core = inner.offset(reach);
         let apart = ink.zip(core).is_some_and(|(i, c)| i.semi_axes()[1] > c.semi_axes()[1]);
         let hole = inner.offset(-reach);
@@ -318,9 +389,13 @@ fn gather(picture: &Picture, start: &Start, anchor: [f64; 2], pixels: &mut Pixel
     pixels.flat = Flat { paper: Zone::around(start.paper), ink: Zone::around(start.ink) };
     let reach = REACH * start.blur_px + 0.5;
     let minor = start.ellipse.semi_axes()[1];
-    let outside = reach.min((start.clear - 1.0) * minor).max(0.9);
     let even = EVEN * start.blur_px;
-    let far = (outside + even).min((start.clear - 1.0) * minor - 0.8 * start.blur_px).max(outside);
+    let (outside, far) = if start.tails.is_empty() {
+        let outside = reach.min((start.clear - 1.0) * minor).max(0.9);
+        (outside, (outside + even).min((start.clear - 1.0) * minor - 0.8 * start.blur_px).max(outside))
+    } else {
+        (WIDE_REACH * start.blur_px, WIDE_REACH * start.blur_px)
+    };
     let (mut wanted, mut saturated) = (0, 0);
     let (band, outer) = (start.ellipse.offset(outside), start.ellipse.offset(far));
     let zones = Zones::of(start, reach, even);

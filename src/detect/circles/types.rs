@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use super::asymmetry::Drift;
 use super::ellipse::Ellipse;
 use crate::series::{Edge, Observation};
 use crate::{Error, Notice, Result};
@@ -134,8 +135,10 @@ pub struct Imaged {
 pub struct Measured {
     /// Outer circle.
     pub outer: Imaged,
-    /// Inner circle of an annulus.
+    /// Inner circle of an annulus, where it is measured for itself.
     pub inner: Option<Imaged>,
+    /// The light middle of an annulus, measured for itself or together with the outer circle.
+    pub hole: Option<Ellipse>,
     /// Sigma of the blur (optics and pixel aperture together), px.
     pub blur_px: f64,
     /// Brightness of the paper at the marker, counts.
@@ -199,6 +202,8 @@ pub struct Detection {
     /// Mean difference inner - outer centre that geometry does not explain, with its standard error, px;
     /// coma of the lens or motion with a changing speed shows here.
     pub inner_outer: Option<InnerOuter>,
+    /// By how much lopsided edges displace the centres; not taken off.
+    pub lopsided: Option<Drift>,
 }
 
 impl Detection {
@@ -221,10 +226,11 @@ impl Detection {
             self.dropped.iter().map(|d| crate::detect::Dropped { uv: d.uv, reason: d.reason.name() }).collect();
         let mut notices = Vec::new();
         if let Some(io) = self.inner_outer.filter(InnerOuter::asymmetric) {
-            let [u, v] = io.mean_px;
+            let [u, v] = io.drift.mean_px;
             let what = format!(
-                "inner and outer circles are off by ({u:.4}, {v:.4}) px on the mean of {} annuli: the blur is asymmetric",
-                io.count
+                "inner and outer circles are off by ({u:.4}, {v:.4}) px on the mean of {} annuli, and by {:.4} px along \
+                 the radius in the corner: the blur is asymmetric",
+                io.count, io.drift.corner_px
             );
             notices.push(Notice::new(
                 "image",
@@ -259,10 +265,8 @@ impl Detection {
 /// Mean unexplained difference between the centres of inner and outer circles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InnerOuter {
-    /// Mean difference (column, row), px.
-    pub mean_px: [f64; 2],
-    /// Standard error of the mean per axis, px.
-    pub sigma_px: [f64; 2],
+    /// The difference over the picture.
+    pub drift: Drift,
     /// Mean size of the difference that perspective and distortion explain, px.
     pub explained_px: f64,
     /// Number of annuli.
@@ -273,7 +277,6 @@ impl InnerOuter {
     /// The difference is significant (4 sigma), larger than 0.005 px, and larger than a twentieth of what geometry explains
     /// (which is not explained better than that): the point spread is asymmetric.
     pub fn asymmetric(&self) -> bool {
-        let least = 0.005_f64.max(0.05 * self.explained_px);
-        (0..2).any(|k| self.mean_px[k].abs() > (4.0 * self.sigma_px[k]).max(least))
+        self.drift.exceeds(0.005_f64.max(0.05 * self.explained_px))
     }
 }
