@@ -151,7 +151,7 @@ fn check(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
     // The rigid part is a visible one: without its subtraction the test fails.
     let rigid = relative(&whole, &read("plate_pose.yaml"), &whole);
     assert!(rigid > 2.0 * TOLERANCE, "the rigid part is {rigid:e} of the covariance only");
-    let raw = solution.covariance.positions(problem, state, &solution.linearised).swap_remove(0);
+    let raw = solution.covariance.positions(problem, state).swap_remove(0);
     for (m, row) in table(files, "plate.csv").iter().enumerate() {
         let expected = joint.position_sigmas(problem, state, m);
         for (d, column) in ["sigma_x_m", "sigma_y_m", "sigma_z_m"].iter().enumerate() {

@@ -156,7 +156,7 @@ fn check_covariance(
             assert!((got[(a, b)] - expected[(a, b)]).abs() < bound * unit, "slack of image {i}\n{got}{expected}");
         }
     }
-    let markers = &library.markers(problem, &lin)[0];
+    let markers = &library.markers()[0];
     for (m, covariance) in markers.iter().enumerate() {
         let Some(covariance) = covariance else {
             assert_eq!(m, UNSEEN, "a marker that was seen has no covariance");
@@ -446,7 +446,7 @@ fn assert_same_bits(one: &Solution, two: &Solution) {
     assert_eq!(one.accuracy, two.accuracy);
     assert_eq!(bits(one.covariance.reduced.as_slice()), bits(two.covariance.reduced.as_slice()));
     assert_eq!(one.linearised.cost.to_bits(), two.linearised.cost.to_bits());
-    let markers = |s: &Solution| s.covariance.markers(&s.problem, &s.linearised);
+    let markers = |s: &Solution| s.covariance.markers();
     assert_eq!(markers(one), markers(two));
 }
 

@@ -94,9 +94,9 @@ fn summary(errors: &[(usize, ImageError)]) -> Errors {
     }
 }
 
-/// Images that are held out together. Images that share joint readings stay together: they are off by the same local errors,
+/// Images that are held out together, fold by fold. Images that share joint readings stay together: they are off by the same local errors,
 /// and one of them would tell of the others. `None` for too few images on the robot.
-fn folds(problem: &Problem) -> Option<Vec<Vec<usize>>> {
+pub fn folds(problem: &Problem) -> Option<Vec<Vec<usize>>> {
     let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
     if on_robot.len() < 2 {
         return None;

@@ -16,6 +16,9 @@ pub(super) struct ChoiceArgs {
     /// Joint terms beside rigid geometry and offsets [default: full]
     #[arg(long, value_enum)]
     robot_model: Option<Model>,
+    /// Harmonics of every gear, up to 6 [default: 2]
+    #[arg(long, value_name = "N")]
+    harmonics: Option<u8>,
     /// Parameters of the robot to estimate: all of the model, or a set that a series can tell apart [default: all]
     #[arg(long, value_enum)]
     parameters: Option<Set>,
@@ -69,7 +72,9 @@ impl ChoiceArgs {
         let config = self.config.as_deref().map_or(Ok(Config::default()), Config::read)?;
         let parameters = self.parameters.map(|s| if s == Set::Minimal { Parameters::Minimal } else { Parameters::All });
         let joined = |a: &[String], b: &[String]| a.iter().chain(b).cloned().collect();
+        let defaults = Options::default();
         Ok(Options {
+            harmonics: harmonics(self.harmonics.or(config.harmonics))?.unwrap_or(defaults.harmonics),
             joint_noise: joint_noise(self.joint_noise)?,
             model: self.robot_model.map(Into::into).or(config.robot_model).unwrap_or(RobotModel::Full),
             selection: Selection {
@@ -88,10 +93,25 @@ pub(super) fn in_words(options: &Options) -> Vec<(String, String)> {
         JointNoise::Estimated => "estimated".to_owned(),
         JointNoise::Known(sigma) => format!("{sigma} rad"),
     };
-    let model = format!("{:?}", options.model).to_lowercase();
+    let mut model = format!("{:?}", options.model).to_lowercase();
+    if options.harmonics != Options::default().harmonics {
+        model += &format!(", {} harmonics", options.harmonics);
+    }
     let mut words = vec![("joint noise".to_owned(), joint_noise), ("robot model".to_owned(), model)];
     words.extend(options.selection.in_words());
     words
+}
+
+/// Most harmonics of a gear: beyond, they are no property of a gear that fifty stops could tell.
+const MOST_HARMONICS: u8 = 6;
+
+fn harmonics(count: Option<u8>) -> Result<Option<u8>> {
+    match count {
+        Some(k) if k > MOST_HARMONICS => {
+            Err(Error::input("harmonics", format!("{k} are too many"), format!("give 0 to {MOST_HARMONICS}")))
+        }
+        other => Ok(other),
+    }
 }
 
 fn joint_noise(sigma: Option<f64>) -> Result<JointNoise> {

@@ -33,9 +33,9 @@ pub(super) struct CompareArgs {
     /// Simulated series in every cell of the study, or for each joint noise of the Monte-Carlo test
     #[arg(long, value_name = "N", default_value_t = 30)]
     seeds: u64,
-    /// Folder for the report
-    #[arg(long, value_name = "FOLDER", default_value = "reports")]
-    out: PathBuf,
+    /// Folder for the report (default: reports for --study and --monte-carlo; a comparison on a series is only printed)
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
     /// Base link (overrides series.toml)
     #[arg(long, value_name = "LINK")]
     base: Option<String>,
@@ -47,6 +47,12 @@ pub(super) struct CompareArgs {
     robot_model: Model,
     #[command(flatten)]
     recording: RecordingArgs,
+}
+
+impl CompareArgs {
+    fn report(&self, file: &str) -> PathBuf {
+        self.out.as_deref().unwrap_or(Path::new("reports")).join(file)
+    }
 }
 
 pub(super) fn run(args: &CompareArgs) -> Result<Verdict> {
@@ -73,7 +79,15 @@ fn series(args: &CompareArgs) -> Result<Verdict> {
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
-    print!("{}", comparison_markdown(&comparison));
+    let text = comparison_markdown(&comparison);
+    print!("{text}");
+    if args.out.is_some() {
+        let series: Vec<String> = args.series.iter().map(|s| format!(" --series {}", s.display())).collect();
+        let command = format!("robotcal compare --urdf {}{}", args.urdf.display(), series.concat());
+        let path = args.report("comparison.md");
+        write(&path, &format!("# Two stages against one, on a series\n\n    {command}\n\n{text}"))?;
+        println!("report    {}", path.display());
+    }
     Ok(Verdict::Good)
 }
 
@@ -97,12 +111,13 @@ fn study(args: &CompareArgs) -> Result<Verdict> {
     })?;
     bar.finish_and_clear();
     let command = format!("robotcal compare --study --urdf {} --seeds {}", args.urdf.display(), args.seeds);
-    write(&args.out.join("two-stage-vs-joint.md"), &study_markdown(&study, &command))?;
-    write(&args.out.join("two-stage-vs-joint.html"), &study_html(&study, &command))?;
+    let page = args.report("two-stage-vs-joint.html");
+    write(&args.report("two-stage-vs-joint.md"), &study_markdown(&study, &command))?;
+    write(&page, &study_html(&study, &command))?;
     for line in study_verdict(&study) {
         println!("{line}");
     }
-    println!("report    {}", args.out.join("two-stage-vs-joint.html").display());
+    println!("report    {}", page.display());
     Ok(Verdict::Good)
 }
 
@@ -127,7 +142,7 @@ fn monte_carlo(args: &CompareArgs) -> Result<Verdict> {
     let tip = args.tip.as_deref().map(|t| format!(" --tip {t}")).unwrap_or_default();
     let command = format!("robotcal compare --monte-carlo --urdf {}{tip} --seeds {}", args.urdf.display(), args.seeds);
     let text = monte_carlo_markdown(&cells, &command);
-    let path = args.out.join("monte-carlo.md");
+    let path = args.report("monte-carlo.md");
     write(&path, &text)?;
     print!("{text}");
     println!("report    {}", path.display());

@@ -6,8 +6,9 @@ mod quadratic;
 
 pub use quadratic::{LinearRow, NotSolved, minimise_quadratic};
 
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::solvers::{Llt, Solve};
-use faer::{MatRef, Par, Side};
+use faer::{Accum, MatMut, MatRef, Par, Side};
 use nalgebra::{DMatrix, DVector};
 
 /// Cholesky factor of a symmetric positive definite matrix, with the diagonal scaled to one first.
@@ -80,6 +81,23 @@ pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     sequential();
     let c = view(a) * view(b);
     DMatrix::from_fn(a.nrows(), b.ncols(), |i, j| c[(i, j)])
+}
+
+/// `a -= y y'` in the upper triangle of `a`; what lies below the diagonal is left as it is.
+pub fn subtract_gram(a: &mut DMatrix<f64>, y: &DMatrix<f64>) {
+    let n = a.nrows();
+    let (upper, full) = (BlockStructure::TriangularUpper, BlockStructure::Rectangular);
+    let into = MatMut::from_column_major_slice_mut(a.as_mut_slice(), n, n);
+    triangular::matmul(into, upper, Accum::Add, view(y), full, view(y).transpose(), full, -1.0, Par::Seq);
+}
+
+/// Copies the upper triangle to the lower one.
+pub fn mirror_upper(a: &mut DMatrix<f64>) {
+    for j in 0..a.ncols() {
+        for i in 0..j {
+            a[(j, i)] = a[(i, j)];
+        }
+    }
 }
 
 /// Eigenvalues (ascending) and eigenvectors (columns) of a symmetric matrix; `None` when it has no finite ones.

@@ -58,7 +58,7 @@ pub(super) fn position_covariances(solution: &Solution, plate: usize) -> Result<
     let frame = rigid_covariance(problem, &seen_markers(problem, &plates_tied_to(problem, BTreeSet::from([plate]))))?;
     let start = problem.layout.shapes[plate].start;
     let modes = covariance.reduced.fixed_view::<MODES, MODES>(start, start).into_owned();
-    let all = covariance.positions(problem, &solution.state, &solution.linearised).swap_remove(plate);
+    let all = covariance.positions(problem, &solution.state).swap_remove(plate);
     let one = |(m, seen): (usize, Option<Matrix3<f64>>)| match seen {
         Some(total) => {
             let n = rigid(&shape.nominal[m]);

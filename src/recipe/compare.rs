@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Vector3};
 
 use super::solution::Solution;
 use super::two_stage::{Estimate, Estimator, estimate_all};
-use crate::assess::{Ratio, bootstrap_ratio, camera_errors_m, flange_error_m, predict_image, root_mean_square};
+use crate::assess::{Ratio, bootstrap_ratio, camera_errors_m, flange_error_m, folds, predict_image, root_mean_square};
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::linalg::symmetric_eigen;
@@ -39,7 +39,7 @@ pub struct TruthError {
 pub struct ComparisonRow {
     /// Which.
     pub estimator: Estimator,
-    /// Held out every k-th image.
+    /// Held out fold by fold; images that share joint readings stay together.
     pub by_image: Option<HeldOut>,
     /// Held out one region of the workspace after the other.
     pub by_region: Option<HeldOut>,
@@ -54,8 +54,8 @@ pub struct Comparison {
     pub rows: Vec<ComparisonRow>,
     /// Images on the robot that took part.
     pub images: usize,
-    /// Number of folds.
-    pub folds: usize,
+    /// Number of folds by image, and of slabs of the workspace.
+    pub folds: [usize; 2],
 }
 
 const FOLDS: usize = 6;
@@ -77,9 +77,8 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
             format!("take at least {FEWEST_IMAGES}, better 30"),
         ));
     }
-    let total = 2 * FOLDS + 1;
-    let by_image: Vec<Vec<usize>> =
-        (0..FOLDS).map(|f| on_robot.iter().copied().skip(f).step_by(FOLDS).collect()).collect();
+    let by_image = folds(problem).unwrap_or_default();
+    let total = by_image.len() + FOLDS + 1;
     let mut done = 0;
     let mut tick = || {
         done += 1;
@@ -99,7 +98,7 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
             truth: against_truth.as_ref().and_then(|t| t[k]),
         })
         .collect();
-    Ok(Comparison { rows, images: on_robot.len(), folds: FOLDS })
+    Ok(Comparison { rows, images: on_robot.len(), folds: [by_image.len(), FOLDS] })
 }
 
 /// Error of every held-out image by every estimator; `None` where an estimator has no solution for a fold.

@@ -33,7 +33,7 @@ fn layout(options: &Options, chain: Chain, series: &[Series]) -> Result<(Layout,
     placements.dedup();
     let lens = |s: &Series| s.manifest.camera.model.as_deref().and_then(Lens::from_name).unwrap_or(Lens::Brown);
     let mut state = State {
-        robot: options.model.robot(chain),
+        robot: options.model.robot_with(chain, options.harmonics),
         mountings: vec![Pose::identity(); mountings.len()],
         placements: vec![Pose::identity(); placements.len()],
         cameras: series.iter().map(|s| Camera::pinhole(lens(s), 1, 1, 1.0)).collect(),

@@ -41,6 +41,9 @@ pub enum RobotModel {
     Auto,
 }
 
+/// Harmonics of a gear unless asked for otherwise.
+const HARMONICS: u8 = 2;
+
 /// How to identify.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
@@ -48,13 +51,20 @@ pub struct Options {
     pub joint_noise: JointNoise,
     /// Joint terms.
     pub model: RobotModel,
+    /// Harmonics of the gear in the models that have them.
+    pub harmonics: u8,
     /// Which parameters are estimated, and their priors.
     pub selection: Selection,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { joint_noise: JointNoise::Estimated, model: RobotModel::Full, selection: Selection::default() }
+        Self {
+            joint_noise: JointNoise::Estimated,
+            model: RobotModel::Full,
+            harmonics: HARMONICS,
+            selection: Selection::default(),
+        }
     }
 }
 
@@ -70,9 +80,15 @@ impl RobotModel {
 
     /// The nominal robot with the terms of this model.
     pub fn robot(self, chain: Chain) -> Robot {
+        self.robot_with(chain, HARMONICS)
+    }
+
+    /// As [`RobotModel::robot`], with this many harmonics of every gear.
+    pub fn robot_with(self, chain: Chain, harmonics: u8) -> Robot {
         let mut terms = vec![Term::Offset];
         if self != Self::Rigid {
-            terms.extend([Term::Gear, Term::Cosine(1), Term::Sine(1), Term::Cosine(2), Term::Sine(2)]);
+            terms.push(Term::Gear);
+            terms.extend((1..=harmonics).flat_map(|k| [Term::Cosine(k), Term::Sine(k)]));
         }
         if self.has(Term::Backlash) {
             terms.extend((0..GRAVITY_TERMS).map(Term::Gravity));
@@ -94,7 +110,7 @@ const ROUNDS: usize = 12;
 
 /// As [`super::identify`] with one robot model.
 pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
-    let robot = options.model.robot(chain);
+    let robot = options.model.robot_with(chain, options.harmonics);
     let (mut problem, mut state) = build(&robot, series, options.joint_noise == JointNoise::Estimated)?;
     options.selection.apply(&mut problem.layout, &mut state)?;
     let stated: Vec<Option<f64>> = (problem.cameras.iter())

@@ -63,6 +63,8 @@ pub struct Config {
     pub parameters: Option<Parameters>,
     /// Which robot model.
     pub robot_model: Option<RobotModel>,
+    /// As `--harmonics`.
+    pub harmonics: Option<u8>,
     /// As `--free`.
     #[serde(default)]
     pub free: Vec<String>,

@@ -82,11 +82,7 @@ pub(super) fn pose_pair(robot: &Robot, mount: CameraMount, readings: &[f64], cam
 
 /// Of the solutions that single images give, the one that all images like best.
 fn closest(poses: &[PosePair], solution: impl Fn(&PosePair) -> HandEye) -> HandEye {
-    let median = |s: &HandEye| {
-        let mut e: Vec<f64> = poses.iter().map(|p| s.error(p)).map(|(a, d)| a + d).collect();
-        e.sort_by(f64::total_cmp);
-        e[e.len() / 2]
-    };
+    let median = |s: &HandEye| s.median_error(poses);
     let mut best = solution(&poses[0]);
     let mut best_error = median(&best);
     for s in poses[1..].iter().map(solution) {
@@ -158,7 +154,7 @@ fn no_fit(of: &str, what: &str) -> Error {
     Error::unsolved(
         of,
         format!("joint readings and images do not belong together: {what}"),
-        "check joint_unit, the order and signs of the joints in joints.csv, that image names stand in the right rows, base and tip, and that the plate did not move",
+        "check joint_unit, the order and signs of the joints in joints.csv, that image names stand in the right rows, that the URDF is of this robot, base and tip, and that the plate did not move",
     )
 }
 

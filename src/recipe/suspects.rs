@@ -4,10 +4,14 @@ use super::start::pose_pair;
 use crate::init::{PosePair, plate_scale, solve_hand_eye};
 use crate::model::robot::Robot;
 use crate::problem::Problem;
+use crate::series::CameraMount;
 use crate::urdf::JointKind;
 
 /// Misfit (rad + m) below which nobody is suspected: within what a robot misses nominal by.
 const UNSUSPICIOUS: f64 = 0.025;
+
+/// Median misfit of distances that no calibration of a robot explains, m.
+const WRONG_LENGTHS_M: f64 = 0.025;
 
 /// A mistake explains the misfit when undoing it leaves less than this share of it.
 const EXPLAINS: f64 = 0.25;
@@ -50,7 +54,11 @@ impl Suspects<'_> {
                 best = Some((error, cause));
             }
         }
-        best.map(|(_, cause)| cause)
+        let (error, mount) = self.wrong_mount();
+        if error < EXPLAINS * misfit && best.as_ref().is_none_or(|(e, _)| error < *e) {
+            return Some(mount);
+        }
+        best.map(|(_, cause)| cause).or_else(|| self.other_lengths())
     }
 
     fn readings(&self) -> Vec<Vec<f64>> {
@@ -59,10 +67,51 @@ impl Suspects<'_> {
     }
 
     fn misfit(&self, readings: &[Vec<f64>]) -> f64 {
+        self.misfit_mounted(readings, |mount| mount)
+    }
+
+    fn misfit_mounted(&self, readings: &[Vec<f64>], changed: impl Fn(CameraMount) -> CameraMount) -> f64 {
         let pairs: Vec<PosePair> = (self.pairs.iter().zip(readings))
-            .map(|((i, pair), q)| pose_pair(self.robot, self.problem.images[*i].mount, q, pair.camera_from_plate))
+            .map(|((i, pair), q)| {
+                pose_pair(self.robot, changed(self.problem.images[*i].mount), q, pair.camera_from_plate)
+            })
             .collect();
         solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error)
+    }
+
+    /// Camera in the hand and fixed camera exchanged.
+    fn wrong_mount(&self) -> (f64, Cause) {
+        let exchanged = |mount| match mount {
+            CameraMount::Hand => CameraMount::Fixed,
+            CameraMount::Fixed => CameraMount::Hand,
+        };
+        let stated = self.pairs.first().map_or(CameraMount::Hand, |(i, _)| self.problem.images[*i].mount);
+        let (is, word) = match exchanged(stated) {
+            CameraMount::Hand => ("the camera is in the hand and the plate stands still", "hand"),
+            CameraMount::Fixed => ("the camera stands still and the plate is in the hand", "fixed"),
+        };
+        let what = format!("{is}: read so, the images fit");
+        let remedy = format!("write camera_mount = \"{word}\" in series.toml");
+        (self.misfit_mounted(&self.readings(), exchanged), Cause { what, remedy })
+    }
+
+    /// Directions fit and distances do not: the axes of this arm with other lengths.
+    fn other_lengths(&self) -> Option<Cause> {
+        let poses: Vec<PosePair> = self.pairs.iter().map(|(_, p)| *p).collect();
+        let start = solve_hand_eye(&poses).into_iter().next()?;
+        let (mut angles, mut distances): (Vec<f64>, Vec<f64>) = poses.iter().map(|p| start.solution.error(p)).unzip();
+        angles.sort_by(f64::total_cmp);
+        distances.sort_by(f64::total_cmp);
+        let (angle, distance) = (angles[angles.len() / 2], distances[distances.len() / 2]);
+        (angle < UNSUSPICIOUS && distance > WRONG_LENGTHS_M).then(|| Cause {
+            what: format!(
+                "directions fit the joint readings (median {:.1} mrad), distances do not (median {:.0} mm): these are the axes of \
+                 such an arm with other link lengths",
+                1e3 * angle,
+                1e3 * distance
+            ),
+            remedy: "check that the URDF is of this robot and size, with lengths in metres, and that the tip link carries the camera".into(),
+        })
     }
 
     /// Readings with one mistake undone, and its name.

@@ -1,28 +1,27 @@
-//! Markers eliminated, first in the space of camera poses, then the robot enters by `dp = G dtheta + L dslack`.
+//! Markers eliminated: the dense columns and the slack of the images stay.
+//!
+//! With the information `V = F F'` of a marker (all images and the prior) and its coupling `B` with what stays, `Y = B F^-T`: the reduced
+//! information is the information without the elimination less `sum Y Y'`, one Gram product.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, Vector3};
-use rayon::prelude::*;
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::system::{Carried, FIXED_MARKER_SIGMA_M, Linearised, intrinsic_columns, scatter};
-use crate::linalg::product;
+use super::dense_rows::{FreeColumns, PoseRows};
+use super::system::{Carried, FIXED_MARKER_SIGMA_M, Linearised};
+use crate::linalg::{mirror_upper, product, subtract_gram};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Problem, Slack, State, Step};
 
-/// One marker, ready to be eliminated: data of all images and its prior.
-#[derive(Debug, Clone)]
-struct Marker {
-    inverse: Matrix3<f64>,
-    /// Coupling with the dense intrinsic columns, 3 x n_e.
-    me: DMatrix<f64>,
-    bm: Vector3<f64>,
-    seen: bool,
-}
-
-/// Every marker with its elimination.
+/// Every marker that was seen, with its elimination.
 #[derive(Debug, Clone)]
 pub(super) struct MarkersEliminated {
-    theta: usize,
-    markers: Vec<Vec<Marker>>,
+    /// Number of each marker among those that were seen, per plate.
+    number: Vec<Vec<Option<usize>>>,
+    /// `F^-1` of each that was seen.
+    inverse_factors: Vec<Matrix3<f64>>,
+    /// `Y`, unknowns that stay x 3 markers.
+    y: DMatrix<f64>,
+    /// `F^-1` times the right-hand side.
+    rhs: DVector<f64>,
 }
 
 type Reduced = (DMatrix<f64>, DVector<f64>, Vec<usize>, MarkersEliminated);
@@ -31,286 +30,160 @@ impl MarkersEliminated {
     /// Information, right-hand side and start of each image's slack; priors of slack and markers are in, those of the dense
     /// columns are not.
     pub fn build(problem: &Problem, state: &State, lin: &Linearised, lambda: f64) -> Reduced {
-        let theta = problem.layout.theta_len();
-        let markers = gather_markers(problem, state, lin, lambda);
-        let space = PoseSpace::new(problem, lin, &markers);
-        let (mut a, mut rhs, slack_start) = space.to_robot_space(problem, lin);
-        for (&start, &image) in slack_start.iter().zip(&lin.images) {
-            if let Slack::Joints(dq) = &state.slack[image] {
-                for (k, q) in dq.iter().enumerate() {
-                    let information = problem.slack_information(&problem.images[image], k);
-                    a[(start + k, start + k)] += information;
-                    rhs[start + k] -= q * information;
+        let mut n = problem.layout.len();
+        let slack_start: Vec<usize> = (lin.chains.iter())
+            .map(|c| {
+                n += c.d_slack.ncols();
+                n - c.d_slack.ncols()
+            })
+            .collect();
+        let (mut a, mut b) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let poses = PoseRows::new(problem, lin);
+        poses.add_to(problem, lin, &mut a, &mut b);
+        add_slack(problem, state, lin, &poses, &slack_start, (&mut a, &mut b));
+        let markers = Self::gather(problem, state, lin, lambda, (n, &slack_start));
+        subtract_gram(&mut a, &markers.y);
+        b.gemv(-1.0, &markers.y, &markers.rhs, 1.0);
+        mirror_upper(&mut a);
+        (a, b, slack_start, markers)
+    }
+
+    fn gather(
+        problem: &Problem,
+        state: &State,
+        lin: &Linearised,
+        lambda: f64,
+        (n, slack_start): (usize, &[usize]),
+    ) -> Self {
+        let (number, order) = number_markers(problem, lin);
+        let mut information: Vec<Matrix3<f64>> = Vec::with_capacity(order.len());
+        let mut rhs = DVector::zeros(3 * order.len());
+        for (at, &(plate, marker)) in order.iter().enumerate() {
+            let prior = problem.plates[plate].markers[marker].sigma_m.max(FIXED_MARKER_SIGMA_M).powi(-2);
+            information.push(Matrix3::from_diagonal_element(prior));
+            rhs.fixed_rows_mut::<3>(3 * at).copy_from(&(state.plates[plate].corrections[marker] * -prior));
+        }
+        let mut y = DMatrix::zeros(n, 3 * order.len());
+        for (k, (terms, &i)) in lin.terms.iter().zip(&lin.images).enumerate() {
+            let (image, chain) = (&problem.images[i], &lin.chains[k]);
+            let columns = FreeColumns::of(problem, image);
+            for t in &terms.markers {
+                let Some(at) = number[image.plate][t.marker] else { continue };
+                information[at] += t.mm;
+                let mut own = rhs.fixed_rows_mut::<3>(3 * at);
+                own += t.bm;
+                columns.add_coupling(&mut y, 3 * at, t, chain);
+                for s in 0..chain.d_slack.ncols() {
+                    let with_slack = t.mp * chain.d_slack.fixed_view::<6, 1>(0, s);
+                    (0..3).for_each(|d| y[(slack_start[k] + s, 3 * at + d)] = with_slack[d]);
                 }
             }
         }
-        (a, rhs, slack_start, Self { theta, markers })
+        let damped = |mut v: Matrix3<f64>| {
+            (0..3).for_each(|d| v[(d, d)] *= 1.0 + lambda);
+            v.cholesky().and_then(|c| c.l().try_inverse()).unwrap_or_else(Matrix3::zeros)
+        };
+        let inverse_factors: Vec<Matrix3<f64>> = information.into_iter().map(damped).collect();
+        for (at, inverse) in inverse_factors.iter().enumerate() {
+            times_right(&mut y, 3 * at, &inverse.transpose());
+            let own = inverse * rhs.fixed_rows::<3>(3 * at);
+            rhs.fixed_rows_mut::<3>(3 * at).copy_from(&own);
+        }
+        Self { number, inverse_factors, y, rhs }
     }
 
     /// The whole step from the solution `x` of the reduced system.
     pub fn step(&self, problem: &Problem, lin: &Linearised, slack_start: &[usize], x: &DVector<f64>) -> Step {
-        let dense = x.rows(0, problem.layout.len()).into_owned();
         let mut slack = vec![Vec::new(); problem.images.len()];
-        let de = dense.rows(self.theta, dense.len() - self.theta).into_owned();
-        let mut pull: Vec<Vec<Vector3<f64>>> =
-            self.markers.iter().map(|plate| plate.iter().map(|m| m.bm - &m.me * &de).collect()).collect();
         for (k, &image) in lin.images.iter().enumerate() {
-            let chain = &lin.chains[k];
-            let ds = x.rows(slack_start[k], chain.d_slack.ncols()).into_owned();
-            let dp = &chain.d_theta * dense.rows(0, self.theta) + &chain.d_slack * &ds;
-            for m in &lin.terms[k].markers {
-                pull[problem.images[image].plate][m.marker] -= m.mp * &dp;
-            }
-            slack[image] = ds.as_slice().to_vec();
+            slack[image] = x.rows(slack_start[k], lin.chains[k].d_slack.ncols()).as_slice().to_vec();
         }
-        let markers = (self.markers.iter().zip(pull))
-            .map(|(plate, pull)| {
-                let step = |(m, p): (&Marker, Vector3<f64>)| if m.seen { m.inverse * p } else { Vector3::zeros() };
-                plate.iter().zip(pull).map(step).collect()
-            })
-            .collect();
-        Step { dense, slack, markers }
+        let mut own = self.rhs.clone();
+        own.gemv_tr(-1.0, &self.y, x, 1.0);
+        let of = |at: usize| self.inverse_factors[at].transpose() * own.fixed_rows::<3>(3 * at);
+        let step = |at: &Option<usize>| at.map_or(Vector3::zeros(), of);
+        let markers = self.number.iter().map(|plate| plate.iter().map(step).collect()).collect();
+        Step { dense: x.rows(0, problem.layout.len()).into_owned(), slack, markers }
     }
 
-    /// Covariance of every marker that was seen: `V + D cov(x) D'` with `D = V * coupling`, less what moves the marker with `x`
+    /// Covariance of every marker that was seen: `V^-1 + D cov(x) D'` with `D = V^-1 B'`, less what moves the marker with `x`
     /// for a position instead of a correction.
     pub fn marker_covariances(
         &self,
-        problem: &Problem,
-        lin: &Linearised,
-        slack_start: &[usize],
         reduced: &DMatrix<f64>,
         carried: Option<&Carried>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
-        let plate = |(p, markers): (usize, &Vec<Marker>)| {
-            let seen: Vec<usize> = (0..markers.len()).filter(|&m| markers[m].seen).collect();
-            let rows: Vec<DMatrix<f64>> = seen
-                .par_iter()
-                .map(|&m| {
-                    let mut d = self.marker_coupling(problem, lin, slack_start, (p, m), reduced.nrows());
-                    if let Some((start, modes)) = carried.map(|c| c(p, m)) {
-                        let mut own = d.columns_mut(start, MODES);
-                        own -= modes;
-                    }
-                    d
-                })
-                .collect();
-            let mut d = DMatrix::zeros(3 * seen.len(), reduced.nrows());
-            for (k, rows) in rows.iter().enumerate() {
-                d.rows_mut(3 * k, 3).copy_from(rows);
+        let mut d = self.y.clone();
+        for (p, plate) in self.number.iter().enumerate() {
+            for (m, at) in plate.iter().enumerate().filter_map(|(m, at)| at.map(|at| (m, at))) {
+                times_right(&mut d, 3 * at, &self.inverse_factors[at]);
+                if let Some((start, modes)) = carried.map(|c| c(p, m)) {
+                    let mut own = d.view_mut((start, 3 * at), (MODES, 3));
+                    own -= modes.transpose();
+                }
             }
-            let dc = product(&d, reduced);
-            let mut all = vec![None; markers.len()];
-            for (k, &m) in seen.iter().enumerate() {
-                let c = dc.rows(3 * k, 3) * d.rows(3 * k, 3).transpose();
-                all[m] = Some(markers[m].inverse + Matrix3::from_column_slice(c.as_slice()));
-            }
-            all
+        }
+        let cd = product(reduced, &d);
+        let of = |at: usize| {
+            let c = d.columns(3 * at, 3).tr_mul(&cd.columns(3 * at, 3));
+            let f = self.inverse_factors[at];
+            f.transpose() * f + Matrix3::from_column_slice(c.as_slice())
         };
-        self.markers.iter().enumerate().map(plate).collect()
-    }
-
-    /// `D = V * coupling` of one marker (plate, index), 3 x unknowns: `cov(m, x) = -D cov(x)`.
-    fn marker_coupling(
-        &self,
-        problem: &Problem,
-        lin: &Linearised,
-        slack_start: &[usize],
-        (plate, marker): (usize, usize),
-        unknowns: usize,
-    ) -> DMatrix<f64> {
-        let m = &self.markers[plate][marker];
-        let mut coupling = DMatrix::zeros(3, unknowns);
-        coupling.view_mut((0, self.theta), (3, m.me.ncols())).copy_from(&m.me);
-        for k in (0..lin.images.len()).filter(|&k| problem.images[lin.images[k]].plate == plate) {
-            let terms = &lin.terms[k].markers;
-            let Ok(at) = terms.binary_search_by_key(&marker, |t| t.marker) else { continue };
-            let mp = DMatrix::from_column_slice(3, 6, terms[at].mp.as_slice());
-            let chain = &lin.chains[k];
-            let mut theta = coupling.view_mut((0, 0), (3, self.theta));
-            theta += &mp * &chain.d_theta;
-            coupling.view_mut((0, slack_start[k]), (3, chain.d_slack.ncols())).copy_from(&(&mp * &chain.d_slack));
-        }
-        for (i, c) in problem.layout.columns.iter().enumerate() {
-            if !c.free {
-                coupling.column_mut(i).fill(0.0);
-            }
-        }
-        DMatrix::from_column_slice(3, 3, m.inverse.as_slice()) * coupling
+        self.number.iter().map(|plate| plate.iter().map(|at| at.map(of)).collect()).collect()
     }
 }
 
-fn gather_markers(problem: &Problem, state: &State, lin: &Linearised, lambda: f64) -> Vec<Vec<Marker>> {
-    let theta = problem.layout.theta_len();
-    let n_e = problem.layout.len() - theta;
-    let mut plates: Vec<Vec<Marker>> = problem
-        .plates
-        .iter()
-        .map(|p| {
-            let empty =
-                Marker { inverse: Matrix3::zeros(), me: DMatrix::zeros(3, n_e), bm: Vector3::zeros(), seen: false };
-            vec![empty; p.markers.len()]
-        })
-        .collect();
+/// Multiplies three columns from `first` on by `m` from the right.
+fn times_right(y: &mut DMatrix<f64>, first: usize, m: &Matrix3<f64>) {
+    let mut columns = y.fixed_columns_mut::<3>(first);
+    for i in 0..columns.nrows() {
+        let new = columns.row(i) * m;
+        columns.row_mut(i).copy_from(&new);
+    }
+}
+
+/// Numbers the markers that were seen; returns also plate and index of each number.
+pub(super) fn number_markers(problem: &Problem, lin: &Linearised) -> (Vec<Vec<Option<usize>>>, Vec<(usize, usize)>) {
+    let mut number: Vec<Vec<Option<usize>>> = problem.plates.iter().map(|p| vec![None; p.markers.len()]).collect();
     for (terms, &i) in lin.terms.iter().zip(&lin.images) {
-        let image = &problem.images[i];
-        let columns = intrinsic_columns(problem, image);
-        for t in &terms.markers {
-            let m = &mut plates[image.plate][t.marker];
-            m.seen = true;
-            m.inverse += t.mm;
-            m.bm += t.bm;
-            scatter(&mut m.me, 0, &t.me, &columns, theta);
+        terms.markers.iter().for_each(|t| number[problem.images[i].plate][t.marker] = Some(0));
+    }
+    let mut order = Vec::new();
+    for (p, plate) in number.iter_mut().enumerate() {
+        for (m, at) in plate.iter_mut().enumerate().filter(|(_, at)| at.is_some()) {
+            *at = Some(order.len());
+            order.push((p, m));
         }
     }
-    for (k, plate) in plates.iter_mut().enumerate() {
-        for (id, m) in plate.iter_mut().enumerate() {
-            let prior = problem.plates[k].markers[id].sigma_m.max(FIXED_MARKER_SIGMA_M).powi(-2);
-            let mut information = m.inverse + Matrix3::identity() * prior;
-            for d in 0..3 {
-                information[(d, d)] *= 1.0 + lambda;
-            }
-            m.bm -= state.plates[k].corrections[id] * prior;
-            m.inverse = information.try_inverse().unwrap_or_else(Matrix3::zeros);
-        }
-    }
-    plates
+    (number, order)
 }
 
-/// Normal equations in camera poses and intrinsics, markers eliminated.
-struct PoseSpace {
-    /// 6J x 6J, symmetric.
-    pp: DMatrix<f64>,
-    /// 6J x n_e.
-    pe: DMatrix<f64>,
-    /// n_e x n_e.
-    ee: DMatrix<f64>,
-    bp: DVector<f64>,
-    be: DVector<f64>,
-}
-
-impl PoseSpace {
-    fn new(problem: &Problem, lin: &Linearised, markers: &[Vec<Marker>]) -> Self {
-        let theta = problem.layout.theta_len();
-        let n_e = problem.layout.len() - theta;
-        let j = lin.images.len();
-        let mut space = Self {
-            pp: DMatrix::zeros(6 * j, 6 * j),
-            pe: DMatrix::zeros(6 * j, n_e),
-            ee: DMatrix::zeros(n_e, n_e),
-            bp: DVector::zeros(6 * j),
-            be: DVector::zeros(n_e),
-        };
-        for (k, t) in lin.terms.iter().enumerate() {
-            let columns = intrinsic_columns(problem, &problem.images[lin.images[k]]);
-            scatter(&mut space.pe, 6 * k, &t.pe, &columns, theta);
-            space.bp.fixed_rows_mut::<6>(6 * k).copy_from(&t.bp);
-            for (a, row) in columns.iter().enumerate() {
-                let Some(r) = row else { continue };
-                space.be[r - theta] += t.be[a];
-                let line = t.ee.fixed_rows::<1>(a).into_owned();
-                scatter(&mut space.ee, r - theta, &line, &columns, theta);
+/// Slack with the dense columns and with itself, and its prior: upper triangle.
+fn add_slack(
+    problem: &Problem,
+    state: &State,
+    lin: &Linearised,
+    poses: &PoseRows,
+    slack_start: &[usize],
+    (a, rhs): (&mut DMatrix<f64>, &mut DVector<f64>),
+) {
+    let dense = problem.layout.len();
+    for (k, (chain, terms)) in lin.chains.iter().zip(&lin.terms).enumerate() {
+        let (l, start) = (&chain.d_slack, slack_start[k]);
+        if l.ncols() == 0 {
+            continue;
+        }
+        let with_dense = poses.coupling.rows(6 * k, 6).tr_mul(l);
+        a.view_mut((0, start), (dense, l.ncols())).copy_from(&with_dense);
+        a.view_mut((start, start), (l.ncols(), l.ncols())).copy_from(&l.tr_mul(&(terms.pp * l)));
+        rhs.rows_mut(start, l.ncols()).copy_from(&l.tr_mul(&terms.bp));
+        let image = &problem.images[lin.images[k]];
+        if let Slack::Joints(dq) = &state.slack[lin.images[k]] {
+            for (s, q) in dq.iter().enumerate() {
+                let information = problem.slack_information(image, s);
+                a[(start + s, start + s)] += information;
+                rhs[start + s] -= q * information;
             }
         }
-        for m in markers.iter().flatten().filter(|m| m.seen) {
-            let v = &m.inverse;
-            let ve = v * &m.me;
-            space.ee -= m.me.transpose() * &ve;
-            space.be -= ve.transpose() * m.bm;
-        }
-        let rows: Vec<PoseRow> = (0..j).into_par_iter().map(|k| PoseRow::new(problem, lin, markers, k, n_e)).collect();
-        for (k, row) in rows.iter().enumerate() {
-            for (i, block) in row.blocks.iter().enumerate() {
-                space.pp.fixed_view_mut::<6, 6>(6 * k, 6 * i).copy_from(block);
-                space.pp.fixed_view_mut::<6, 6>(6 * i, 6 * k).copy_from(&block.transpose());
-            }
-            let mut pe = space.pe.fixed_rows_mut::<6>(6 * k);
-            pe -= &row.pe;
-            let mut bp = space.bp.fixed_rows_mut::<6>(6 * k);
-            bp -= row.bp;
-        }
-        space
-    }
-
-    /// `x_pose = G theta + L slack`: the same equations in robot and slack.
-    fn to_robot_space(&self, problem: &Problem, lin: &Linearised) -> (DMatrix<f64>, DVector<f64>, Vec<usize>) {
-        let (theta, dense, j) = (problem.layout.theta_len(), problem.layout.len(), lin.images.len());
-        let mut slack_start = Vec::with_capacity(j);
-        let mut n = dense;
-        for c in &lin.chains {
-            slack_start.push(n);
-            n += c.d_slack.ncols();
-        }
-        let mut a = DMatrix::zeros(n, n);
-        let mut rhs = DVector::zeros(n);
-        let mut g = DMatrix::zeros(6 * j, theta);
-        for (k, c) in lin.chains.iter().enumerate() {
-            g.rows_mut(6 * k, 6).copy_from(&c.d_theta);
-        }
-        let gt = g.transpose();
-        let m = product(&self.pp, &g);
-        a.view_mut((0, 0), (theta, theta)).copy_from(&product(&gt, &m));
-        let e_theta = product(&gt, &self.pe);
-        a.view_mut((0, theta), e_theta.shape()).copy_from(&e_theta);
-        a.view_mut((theta, 0), (dense - theta, theta)).copy_from(&e_theta.transpose());
-        a.view_mut((theta, theta), self.ee.shape()).copy_from(&self.ee);
-        rhs.rows_mut(0, theta).copy_from(&(&gt * &self.bp));
-        rhs.rows_mut(theta, dense - theta).copy_from(&self.be);
-        for (k, chain) in lin.chains.iter().enumerate().filter(|(_, c)| c.d_slack.ncols() > 0) {
-            let lt = chain.d_slack.transpose();
-            let (start, d) = (slack_start[k], lt.nrows());
-            rhs.rows_mut(start, d).copy_from(&(&lt * self.bp.rows(6 * k, 6)));
-            let with_theta = &lt * m.rows(6 * k, 6);
-            let with_e = &lt * self.pe.rows(6 * k, 6);
-            a.view_mut((start, 0), (d, theta)).copy_from(&with_theta);
-            a.view_mut((0, start), (theta, d)).copy_from(&with_theta.transpose());
-            a.view_mut((start, theta), (d, dense - theta)).copy_from(&with_e);
-            a.view_mut((theta, start), (dense - theta, d)).copy_from(&with_e.transpose());
-            for (i, other) in lin.chains.iter().enumerate().take(k + 1) {
-                let block = &lt * self.pp.view((6 * k, 6 * i), (6, 6)) * &other.d_slack;
-                a.view_mut((start, slack_start[i]), block.shape()).copy_from(&block);
-                a.view_mut((slack_start[i], start), (block.ncols(), d)).copy_from(&block.transpose());
-            }
-        }
-        (a, rhs, slack_start)
-    }
-}
-
-/// One block row of the pose-space equations: what the elimination of the markers takes off.
-struct PoseRow {
-    blocks: Vec<Matrix6<f64>>,
-    pe: SMatrixRows,
-    bp: nalgebra::Vector6<f64>,
-}
-
-type SMatrixRows = nalgebra::OMatrix<f64, nalgebra::U6, nalgebra::Dyn>;
-
-impl PoseRow {
-    fn new(problem: &Problem, lin: &Linearised, markers: &[Vec<Marker>], k: usize, n_e: usize) -> Self {
-        let plate_of = |k: usize| problem.images[lin.images[k]].plate;
-        let plate = &markers[plate_of(k)];
-        let own = &lin.terms[k];
-        let y: Vec<(usize, SMatrix<f64, 6, 3>)> =
-            own.markers.iter().map(|t| (t.marker, t.mp.transpose() * plate[t.marker].inverse)).collect();
-        let mut row =
-            Self { blocks: vec![Matrix6::zeros(); k + 1], pe: SMatrixRows::zeros(n_e), bp: nalgebra::Vector6::zeros() };
-        for (id, y) in &y {
-            row.pe += y * &plate[*id].me;
-            row.bp += y * plate[*id].bm;
-        }
-        row.blocks[k] = own.pp;
-        for i in (0..=k).filter(|&i| plate_of(i) == plate_of(k)) {
-            let other = &lin.terms[i].markers;
-            let mut at = 0;
-            for (id, y) in &y {
-                while at < other.len() && other[at].marker < *id {
-                    at += 1;
-                }
-                if at < other.len() && other[at].marker == *id {
-                    row.blocks[i] -= y * other[at].mp;
-                }
-            }
-        }
-        row
     }
 }

@@ -1,27 +1,30 @@
-//! Slack eliminated image by image in the space of its camera pose: dense columns and markers stay.
+//! Slack eliminated image by image: the dense columns and the markers stay.
 //!
-//! With `dp = G dtheta + L dl`, information `Lambda` on the slack and `K = L (L' H_pp L + Lambda)^-1 L'`, every pair of blocks x, y of
-//! the image loses `H_xp K H_py`; this holds for pose, intrinsics and markers alike.
+//! With the information `H = F F'` of the slack of an image (pixels through `L`, and the prior) and its coupling `B` with what stays,
+//! `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use rayon::prelude::*;
 
-use super::system::{Carried, FIXED_MARKER_SIGMA_M, Linearised, intrinsic_columns};
-use crate::linalg::product;
+use super::by_markers::number_markers;
+use super::dense_rows::{FreeColumns, PoseRows};
+use super::system::{Carried, FIXED_MARKER_SIGMA_M, Linearised};
+use crate::linalg::{mirror_upper, product, subtract_gram};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Problem, Slack, State, Step};
 
-/// Parts in which images are summed; fixed, so that the sums do not depend on the number of threads.
-const PARTS: usize = 4;
+/// Images whose couplings form one Gram product.
+const IMAGES_A_PRODUCT: usize = 48;
 
 /// The slack of one image with its elimination.
 #[derive(Debug, Clone)]
 struct Block {
-    /// `(L' H_pp L + Lambda)^-1`.
-    inverse: DMatrix<f64>,
-    /// Coupling with the reduced unknowns in `columns`.
-    coupling: DMatrix<f64>,
-    columns: Vec<usize>,
+    /// `F^-1`.
+    inverse_factor: DMatrix<f64>,
+    /// Unknowns that stay and that the image touches.
+    rows: Vec<usize>,
+    /// `Y`, `rows` x slack.
+    y: DMatrix<f64>,
+    /// `F^-1` times the right-hand side.
     rhs: DVector<f64>,
 }
 
@@ -41,36 +44,39 @@ impl SlackEliminated {
         lin: &Linearised,
         lambda: f64,
     ) -> (DMatrix<f64>, DVector<f64>, Self) {
-        let (marker_start, n) = number_markers(problem, lin);
-        let all: Vec<usize> = (0..lin.images.len()).collect();
-        let size = all.len().div_ceil(PARTS).max(1);
-        let parts: Vec<(DMatrix<f64>, DVector<f64>, Vec<Block>)> = all
-            .par_chunks(size)
-            .map(|part| {
-                let (mut a, mut rhs) = (DMatrix::zeros(n, n), DVector::zeros(n));
-                let blocks = part
-                    .iter()
-                    .map(|&k| add_image(problem, state, lin, k, lambda, &marker_start, &mut a, &mut rhs))
-                    .collect();
-                (a, rhs, blocks)
-            })
-            .collect();
+        let dense = problem.layout.len();
+        let (number, order) = number_markers(problem, lin);
+        let start = |at: &Option<usize>| at.map(|at| dense + 3 * at);
+        let marker_start: Vec<Vec<Option<usize>>> =
+            number.iter().map(|plate| plate.iter().map(start).collect()).collect();
+        let n = dense + 3 * order.len();
         let (mut a, mut rhs) = (DMatrix::zeros(n, n), DVector::zeros(n));
-        let mut blocks = Vec::with_capacity(all.len());
-        for (pa, pb, part) in parts {
-            a += pa;
-            rhs += pb;
-            blocks.extend(part);
+        for (at, &(plate, marker)) in order.iter().enumerate() {
+            let prior = problem.plates[plate].markers[marker].sigma_m.max(FIXED_MARKER_SIGMA_M).powi(-2);
+            let start = dense + 3 * at;
+            a.fixed_view_mut::<3, 3>(start, start).copy_from(&Matrix3::from_diagonal_element(prior));
+            rhs.fixed_rows_mut::<3>(start).copy_from(&(state.plates[plate].corrections[marker] * -prior));
         }
-        for (p, plate) in marker_start.iter().enumerate() {
-            for (m, start) in plate.iter().enumerate().filter_map(|(m, s)| s.map(|s| (m, s))) {
-                let information = problem.plates[p].markers[m].sigma_m.max(FIXED_MARKER_SIGMA_M).powi(-2);
-                for d in 0..3 {
-                    a[(start + d, start + d)] += information;
-                    rhs[start + d] -= information * state.plates[p].corrections[m][d];
+        let poses = PoseRows::new(problem, lin);
+        poses.add_to(problem, lin, &mut a, &mut rhs);
+        let mut blocks = Vec::with_capacity(lin.images.len());
+        for k in 0..lin.images.len() {
+            add_markers(problem, lin, k, &marker_start, (&mut a, &mut rhs));
+            blocks.push(Block::new(problem, state, lin, k, lambda, (&poses, &marker_start)));
+        }
+        for part in blocks.chunks(IMAGES_A_PRODUCT) {
+            let mut y = DMatrix::zeros(n, part.iter().map(|b| b.y.ncols()).sum());
+            let mut first = 0;
+            for block in part {
+                for (at, &row) in block.rows.iter().enumerate() {
+                    (0..block.y.ncols()).for_each(|s| y[(row, first + s)] = block.y[(at, s)]);
+                    rhs[row] -= (block.y.row(at) * &block.rhs)[0];
                 }
+                first += block.y.ncols();
             }
+            subtract_gram(&mut a, &y);
         }
+        mirror_upper(&mut a);
         (a, rhs, Self { blocks, marker_start })
     }
 
@@ -78,8 +84,8 @@ impl SlackEliminated {
     pub fn step(&self, problem: &Problem, lin: &Linearised, x: &DVector<f64>) -> Step {
         let mut slack = vec![Vec::new(); problem.images.len()];
         for (block, &image) in self.blocks.iter().zip(&lin.images) {
-            let own = DVector::from_iterator(block.columns.len(), block.columns.iter().map(|&c| x[c]));
-            let dl = &block.inverse * (&block.rhs - &block.coupling * own);
+            let own = DVector::from_iterator(block.rows.len(), block.rows.iter().map(|&c| x[c]));
+            let dl = block.inverse_factor.tr_mul(&(&block.rhs - block.y.tr_mul(&own)));
             slack[image] = dl.as_slice().to_vec();
         }
         let correction = |start: &Option<usize>| start.map_or(Vector3::zeros(), |s| x.fixed_rows::<3>(s).into_owned());
@@ -87,13 +93,13 @@ impl SlackEliminated {
         Step { dense: x.rows(0, problem.layout.len()).into_owned(), slack, markers }
     }
 
-    /// `H^-1 + H^-1 C cov(x) C' H^-1`.
+    /// `H^-1 + H^-1 B' cov(x) B H^-1`.
     pub fn slack_covariance(&self, reduced: &DMatrix<f64>, k: usize) -> DMatrix<f64> {
         let block = &self.blocks[k];
-        let n = block.columns.len();
-        let own = DMatrix::from_fn(n, n, |i, j| reduced[(block.columns[i], block.columns[j])]);
-        let d = &block.inverse * &block.coupling;
-        &block.inverse + product(&d, &own) * d.transpose()
+        let n = block.rows.len();
+        let own = DMatrix::from_fn(n, n, |i, j| reduced[(block.rows[i], block.rows[j])]);
+        let d = &block.y * &block.inverse_factor;
+        block.inverse_factor.tr_mul(&block.inverse_factor) + d.tr_mul(&product(&own, &d))
     }
 
     /// Covariance of every marker that was seen; with what moves it with the dense columns for a position.
@@ -116,108 +122,66 @@ impl SlackEliminated {
     }
 }
 
-fn number_markers(problem: &Problem, lin: &Linearised) -> (Vec<Vec<Option<usize>>>, usize) {
-    let mut start: Vec<Vec<Option<usize>>> = problem.plates.iter().map(|p| vec![None; p.markers.len()]).collect();
-    for (terms, &i) in lin.terms.iter().zip(&lin.images) {
-        for t in &terms.markers {
-            start[problem.images[i].plate][t.marker] = Some(0);
-        }
-    }
-    let mut next = problem.layout.len();
-    for slot in start.iter_mut().flatten().filter(|s| s.is_some()) {
-        *slot = Some(next);
-        next += 3;
-    }
-    (start, next)
-}
-
-/// Adds one image to the reduced equations and returns its eliminated slack.
-#[allow(clippy::too_many_arguments)]
-fn add_image(
+/// Markers of an image with themselves and with the dense columns: upper triangle.
+fn add_markers(
     problem: &Problem,
-    state: &State,
     lin: &Linearised,
     k: usize,
-    lambda: f64,
     marker_start: &[Vec<Option<usize>>],
-    a: &mut DMatrix<f64>,
-    rhs: &mut DVector<f64>,
-) -> Block {
-    let (terms, chain, image) = (&lin.terms[k], &lin.chains[k], &problem.images[lin.images[k]]);
-    let theta = problem.layout.theta_len();
-    let intrinsics = intrinsic_columns(problem, image);
-    let used: Vec<(usize, usize)> = intrinsics.iter().enumerate().filter_map(|(e, c)| c.map(|c| (e, c))).collect();
-    let seen: Vec<(usize, usize)> = (terms.markers.iter().enumerate())
-        .filter_map(|(at, t)| marker_start[image.plate][t.marker].map(|s| (at, s)))
-        .collect();
-    // Rows of this image's unknowns in reduced numbering: theta, intrinsics, markers.
-    let mut columns: Vec<usize> = (0..theta).collect();
-    columns.extend(used.iter().map(|(_, c)| *c));
-    columns.extend(seen.iter().flat_map(|(_, s)| *s..*s + 3));
-    let (n, first_marker) = (columns.len(), theta + used.len());
-    let pp = DMatrix::from_column_slice(6, 6, terms.pp.as_slice());
-    // Coupling of all of them with the pose, 6 x n, and their own block without the elimination.
-    let mut p = DMatrix::zeros(6, n);
-    p.columns_mut(0, theta).copy_from(&(&pp * &chain.d_theta));
-    for (at, (e, _)) in used.iter().enumerate() {
-        p.column_mut(theta + at).copy_from(&terms.pe.column(*e));
+    (a, rhs): (&mut DMatrix<f64>, &mut DVector<f64>),
+) {
+    let image = &problem.images[lin.images[k]];
+    let columns = FreeColumns::of(problem, image);
+    for t in &lin.terms[k].markers {
+        let Some(start) = marker_start[image.plate][t.marker] else { continue };
+        columns.add_coupling(a, start, t, &lin.chains[k]);
+        let mut own = a.fixed_view_mut::<3, 3>(start, start);
+        own += t.mm;
+        let mut b = rhs.fixed_rows_mut::<3>(start);
+        b += t.bm;
     }
-    for (at, (m, _)) in seen.iter().enumerate() {
-        p.view_mut((0, first_marker + 3 * at), (6, 3)).copy_from(&terms.markers[*m].mp.transpose());
-    }
-    let gt = chain.d_theta.transpose();
-    let bp = DVector::from_column_slice(terms.bp.as_slice());
-    let mut own = DMatrix::zeros(n, n);
-    let mut b = DVector::zeros(n);
-    let with_theta = product(&gt, &p);
-    own.rows_mut(0, theta).copy_from(&with_theta);
-    own.columns_mut(0, theta).copy_from(&with_theta.transpose());
-    b.rows_mut(0, theta).copy_from(&(&gt * &bp));
-    for (i, (e, _)) in used.iter().enumerate() {
-        b[theta + i] = terms.be[*e];
-        for (j, (f, _)) in used.iter().enumerate() {
-            own[(theta + i, theta + j)] = terms.ee[(*e, *f)];
-        }
-    }
-    for (at, (m, _)) in seen.iter().enumerate() {
-        let (t, row) = (&terms.markers[*m], first_marker + 3 * at);
-        own.view_mut((row, row), (3, 3)).copy_from(&t.mm);
-        b.rows_mut(row, 3).copy_from(&t.bm);
-        for (i, (e, _)) in used.iter().enumerate() {
-            for d in 0..3 {
-                own[(row + d, theta + i)] = t.me[(d, *e)];
-                own[(theta + i, row + d)] = t.me[(d, *e)];
+}
+
+impl Block {
+    fn new(
+        problem: &Problem,
+        state: &State,
+        lin: &Linearised,
+        k: usize,
+        lambda: f64,
+        (poses, marker_start): (&PoseRows, &[Vec<Option<usize>>]),
+    ) -> Self {
+        let (terms, l, image) = (&lin.terms[k], &lin.chains[k].d_slack, &problem.images[lin.images[k]]);
+        let mut h = l.tr_mul(&(terms.pp * l));
+        let mut rhs = l.tr_mul(&terms.bp);
+        if let Slack::Joints(dq) = &state.slack[lin.images[k]] {
+            for (s, q) in dq.iter().enumerate() {
+                let information = problem.slack_information(image, s);
+                h[(s, s)] += information;
+                rhs[s] -= q * information;
             }
         }
-    }
-    // Columns that stay at their value take no part in the back-substitution either.
-    let l = &chain.d_slack;
-    let mut h = l.transpose() * &pp * l;
-    let mut slack_rhs = l.transpose() * &bp;
-    if let Slack::Joints(dq) = &state.slack[lin.images[k]] {
-        for (r, q) in dq.iter().enumerate() {
-            let information = problem.slack_information(image, r);
-            h[(r, r)] += information;
-            slack_rhs[r] -= q * information;
+        for s in 0..h.nrows() {
+            h[(s, s)] *= 1.0 + lambda;
         }
-    }
-    for r in 0..h.nrows() {
-        h[(r, r)] *= 1.0 + lambda;
-    }
-    let inverse = h.try_inverse().unwrap_or_else(|| DMatrix::zeros(l.ncols(), l.ncols()));
-    let mut coupling = l.transpose() * &p;
-    let reduction = product(&coupling.transpose(), &(&inverse * &coupling));
-    b -= coupling.transpose() * (&inverse * &slack_rhs);
-    for (j, &cj) in columns.iter().enumerate() {
-        rhs[cj] += b[j];
-        for (i, &ci) in columns.iter().enumerate() {
-            a[(ci, cj)] += own[(i, j)] - reduction[(i, j)];
+        let factor = h.cholesky().and_then(|c| c.l().try_inverse());
+        let inverse_factor = factor.unwrap_or_else(|| DMatrix::zeros(l.ncols(), l.ncols()));
+        // Columns that stay at their value take no part, nor in the back-substitution.
+        let columns = FreeColumns::of(problem, image);
+        let dense = columns.theta.iter().copied().chain(columns.intrinsic.iter().map(|(_, c)| *c));
+        let mut rows: Vec<usize> = dense.collect();
+        let first_marker = rows.len();
+        let seen = terms.markers.iter().filter_map(|t| marker_start[image.plate][t.marker]);
+        rows.extend(seen.flat_map(|s| s..s + 3));
+        let mut b = DMatrix::zeros(rows.len(), l.ncols());
+        for (at, &c) in rows[..first_marker].iter().enumerate() {
+            b.row_mut(at).copy_from(&poses.coupling.fixed_view::<6, 1>(6 * k, c).tr_mul(l));
         }
-    }
-    for (at, &c) in columns.iter().enumerate() {
-        if problem.layout.columns.get(c).is_some_and(|column| !column.free) {
-            coupling.column_mut(at).fill(0.0);
+        for (m, t) in terms.markers.iter().enumerate() {
+            b.rows_mut(first_marker + 3 * m, 3).copy_from(&(t.mp * l));
         }
+        let y = b * inverse_factor.transpose();
+        let rhs = &inverse_factor * rhs;
+        Self { inverse_factor, rows, y, rhs }
     }
-    Block { inverse, coupling, columns, rhs: slack_rhs }
 }

@@ -133,7 +133,7 @@ pub(super) fn effective_parameters(problem: &Problem, state: &State, lin: &Linea
             _ => length as f64,
         };
     }
-    let covariances = cov.markers(problem, lin);
+    let covariances = cov.markers();
     let markers: f64 = (problem.plates.iter().zip(&covariances))
         .flat_map(|(plate, covariances)| plate.markers.iter().zip(covariances))
         .filter_map(|(m, c)| c.map(|c| 3.0 - c.trace() / m.sigma_m.max(1e-9).powi(2)))

@@ -58,12 +58,12 @@ impl Covariance {
 
     /// Covariance of the correction of every marker that was seen, m^2, per plate and marker, in the frame of the priors (the
     /// plate frame that nominal markers define up to their tolerance).
-    pub fn markers(&self, problem: &Problem, lin: &Linearised) -> Vec<Vec<Option<Matrix3<f64>>>> {
-        self.system.marker_covariances(problem, lin, &self.reduced)
+    pub fn markers(&self) -> Vec<Vec<Option<Matrix3<f64>>>> {
+        self.system.marker_covariances(&self.reduced)
     }
 
     /// Covariance of the position (plate modes and correction) of every marker that was seen, as [`Covariance::markers`].
-    pub fn positions(&self, problem: &Problem, state: &State, lin: &Linearised) -> Vec<Vec<Option<Matrix3<f64>>>> {
-        self.system.position_covariances(problem, state, lin, &self.reduced)
+    pub fn positions(&self, problem: &Problem, state: &State) -> Vec<Vec<Option<Matrix3<f64>>>> {
+        self.system.position_covariances(problem, state, &self.reduced)
     }
 }

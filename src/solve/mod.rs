@@ -4,6 +4,7 @@ mod by_markers;
 mod by_slack;
 mod components;
 mod covariance;
+mod dense_rows;
 mod levenberg;
 mod snoop;
 mod system;

@@ -76,22 +76,6 @@ pub(super) fn intrinsic_columns(problem: &Problem, image: &Image) -> [Option<usi
     })
 }
 
-pub(super) fn scatter<const R: usize>(
-    into: &mut DMatrix<f64>,
-    row: usize,
-    block: &SMatrix<f64, R, E>,
-    columns: &[Option<usize>; E],
-    shift: usize,
-) {
-    for (k, column) in columns.iter().enumerate() {
-        if let Some(c) = column {
-            for r in 0..R {
-                into[(row + r, c - shift)] += block[(r, k)];
-            }
-        }
-    }
-}
-
 /// Which family of unknowns is eliminated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Elimination {
@@ -104,7 +88,7 @@ pub enum Elimination {
 impl Elimination {
     /// The cheaper one: the one that leaves fewer unknowns.
     pub fn cheaper(lin: &Linearised, problem: &Problem) -> Self {
-        let slack: usize = lin.chains.iter().map(|c| c.d_slack.ncols().max(6)).sum();
+        let slack: usize = lin.chains.iter().map(|c| c.d_slack.ncols()).sum();
         let markers: usize = problem.plates.iter().map(|p| 3 * p.markers.len()).sum();
         if slack > markers { Self::Slack } else { Self::Markers }
     }
@@ -209,13 +193,8 @@ impl System {
     }
 
     /// Covariance of the correction of every marker that was seen, per plate and marker.
-    pub fn marker_covariances(
-        &self,
-        problem: &Problem,
-        lin: &Linearised,
-        reduced: &DMatrix<f64>,
-    ) -> Vec<Vec<Option<Matrix3<f64>>>> {
-        self.marker_covariances_with(problem, lin, reduced, None)
+    pub fn marker_covariances(&self, reduced: &DMatrix<f64>) -> Vec<Vec<Option<Matrix3<f64>>>> {
+        self.marker_covariances_with(reduced, None)
     }
 
     /// Covariance of the position (plate modes and correction) of every marker that was seen, per plate and marker.
@@ -223,25 +202,22 @@ impl System {
         &self,
         problem: &Problem,
         state: &State,
-        lin: &Linearised,
         reduced: &DMatrix<f64>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         let carried = |plate: usize, marker: usize| {
             let shape = &state.plates[plate];
             (problem.layout.shapes[plate].start, basis(&shape.nominal[marker], shape.half_diagonal_m))
         };
-        self.marker_covariances_with(problem, lin, reduced, Some(&carried))
+        self.marker_covariances_with(reduced, Some(&carried))
     }
 
     fn marker_covariances_with(
         &self,
-        problem: &Problem,
-        lin: &Linearised,
         reduced: &DMatrix<f64>,
         carried: Option<&Carried>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         match &self.eliminated {
-            Eliminated::Markers(e) => e.marker_covariances(problem, lin, &self.slack_start, reduced, carried),
+            Eliminated::Markers(e) => e.marker_covariances(reduced, carried),
             Eliminated::Slack(e) => e.marker_covariances(reduced, carried),
         }
     }

@@ -1,0 +1,85 @@
+//! What both eliminations share: the dense columns among themselves, and their coupling with a marker.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::system::{Linearised, intrinsic_columns};
+use crate::linalg::product;
+use crate::problem::{Chained, E, Image, MarkerTerms, Problem};
+
+/// The pixel equations of all images in the space of their camera poses, six rows an image.
+pub(super) struct PoseRows {
+    /// `G`, 6J x theta.
+    chain: DMatrix<f64>,
+    /// `[H_pp G, H_pe]`, 6J x dense.
+    pub coupling: DMatrix<f64>,
+}
+
+impl PoseRows {
+    pub fn new(problem: &Problem, lin: &Linearised) -> Self {
+        let (theta, dense) = (problem.layout.theta_len(), problem.layout.len());
+        let rows = 6 * lin.images.len();
+        let (mut chain, mut coupling) = (DMatrix::zeros(rows, theta), DMatrix::zeros(rows, dense));
+        for (k, (terms, own)) in lin.terms.iter().zip(&lin.chains).enumerate() {
+            chain.rows_mut(6 * k, 6).copy_from(&own.d_theta);
+            coupling.view_mut((6 * k, 0), (6, theta)).copy_from(&(terms.pp * &own.d_theta));
+            for (e, c) in intrinsic_columns(problem, &problem.images[lin.images[k]]).iter().enumerate() {
+                if let Some(c) = *c {
+                    coupling.fixed_view_mut::<6, 1>(6 * k, c).copy_from(&terms.pe.column(e));
+                }
+            }
+        }
+        Self { chain, coupling }
+    }
+
+    /// Adds information (upper triangle) and right-hand side of the dense columns.
+    pub fn add_to(&self, problem: &Problem, lin: &Linearised, a: &mut DMatrix<f64>, rhs: &mut DVector<f64>) {
+        let (theta, dense) = (problem.layout.theta_len(), problem.layout.len());
+        let transposed = self.chain.transpose();
+        let mut upper = a.view_mut((0, 0), (theta, dense));
+        upper += product(&transposed, &self.coupling);
+        let poses = DVector::from_iterator(6 * lin.terms.len(), lin.terms.iter().flat_map(|t| t.bp.iter().copied()));
+        let mut of_theta = rhs.rows_mut(0, theta);
+        of_theta += transposed * poses;
+        for (terms, &i) in lin.terms.iter().zip(&lin.images) {
+            let columns = intrinsic_columns(problem, &problem.images[i]);
+            let used = || columns.iter().enumerate().filter_map(|(e, c)| c.map(|c| (e, c)));
+            for (e, c) in used() {
+                rhs[c] += terms.be[e];
+                used().filter(|(_, d)| *d <= c).for_each(|(f, d)| a[(d, c)] += terms.ee[(f, e)]);
+            }
+        }
+    }
+}
+
+/// Dense columns of an image that are free: those of theta, and the intrinsic ones with their local index.
+pub(super) struct FreeColumns {
+    pub theta: Vec<usize>,
+    pub intrinsic: Vec<(usize, usize)>,
+}
+
+impl FreeColumns {
+    pub fn of(problem: &Problem, image: &Image) -> Self {
+        let columns = &problem.layout.columns;
+        let local: [Option<usize>; E] = intrinsic_columns(problem, image);
+        let free = |(e, c): (usize, &Option<usize>)| c.filter(|c| columns[*c].free).map(|c| (e, c));
+        Self {
+            theta: (0..problem.layout.theta_len()).filter(|&c| columns[c].free).collect(),
+            intrinsic: local.iter().enumerate().filter_map(free).collect(),
+        }
+    }
+
+    /// Adds the coupling of a marker with the free dense columns to three columns of `into`, from `first` on.
+    pub fn add_coupling(&self, into: &mut DMatrix<f64>, first: usize, terms: &MarkerTerms, chain: &Chained) {
+        for d in 0..3 {
+            let mut column = into.column_mut(first + d);
+            let mp = terms.mp.row(d);
+            for &c in &self.theta {
+                let g = chain.d_theta.fixed_view::<6, 1>(0, c);
+                column[c] += (0..6).map(|k| mp[k] * g[k]).sum::<f64>();
+            }
+            for &(e, c) in &self.intrinsic {
+                column[c] += terms.me[(d, e)];
+            }
+        }
+    }
+}
