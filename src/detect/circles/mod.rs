@@ -17,6 +17,7 @@ mod edge_model;
 mod ellipse;
 mod exact_edge;
 mod flat_zone;
+mod gauss;
 mod grid;
 mod lattice;
 mod levels;

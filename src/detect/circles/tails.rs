@@ -4,7 +4,7 @@
 //! contrast at two sigma, which is some 0.03 px. Once the neighbours are measured, what they take from a pixel is known
 //! and given back; pixels that they cover by more than [`MOST`] are left out.
 
-use super::edge_model::Pixels;
+use super::edge_model::{LANES, Pixels};
 use super::ellipse::Ellipse;
 use super::exact_edge::Contour;
 use super::types::Measured;
@@ -44,11 +44,11 @@ impl Tail {
 /// Gives back to every pixel what the neighbours take, and leaves out the pixels that they cover.
 pub(super) fn lift(pixels: &mut Pixels, tails: &[Tail], anchor: [f64; 2]) {
     let n = pixels.x.len();
-    let (mut covered, mut one) = (vec![0.0f32; n], vec![0.0f32; n]);
+    let (mut covered, mut one, all) = (vec![0.0f32; n], vec![0.0f32; n], vec![true; n / LANES]);
     for tail in tails {
         let centre = [0, 1].map(|a| tail.contour.centre[a] - anchor[a]);
         let contour = Contour { centre, ..tail.contour };
-        contour.coverage(&pixels.x, &pixels.y, &mut pixels.nodes, &mut one, &mut []);
+        contour.coverage(&pixels.x, &pixels.y, &all, &mut pixels.nodes, &mut one, &mut []);
         let contrast = tail.contrast as f32;
         let ([cx, cy], [gx, gy]) = (centre.map(|v| v as f32), tail.gradient.map(|v| v as f32));
         for (i, b) in one.iter().enumerate() {
@@ -95,7 +95,8 @@ mod tests {
         (-15..=15).for_each(|y| (-15..=15).for_each(|x| pixels.push(x as f32, y as f32, 200.0)));
         pixels.finish();
         let mut covered = vec![0.0; pixels.x.len()];
-        contour.coverage(&pixels.x, &pixels.y, &mut pixels.nodes, &mut covered, &mut []);
+        let all = vec![true; pixels.x.len() / LANES];
+        contour.coverage(&pixels.x, &pixels.y, &all, &mut pixels.nodes, &mut covered, &mut []);
         pixels.value.iter_mut().zip(&covered).for_each(|(v, b)| *v -= 180.0 * b);
         let before = pixels.count;
         lift(&mut pixels, &tails, [100.0, 50.0]);
