@@ -1,11 +1,10 @@
 //! The solver alone, on the numeric series of the peers' generator, from the same start as the peers.
 //!
 //! `cargo bench --bench ceres -- FOLDER MODE [REPEATS]` with MODE `poses`, `exact` or `joint`; see `benches/README.md`.
-//! One thread; prints iterations, time of the solve, the cost reached, the RMS and the largest resident size of the process.
+//! One thread; prints iterations, processor time of the solve, the cost reached, the RMS and the largest resident size of the process.
 
 use std::error::Error;
 use std::path::Path;
-use std::time::Instant;
 
 use nalgebra::{DMatrix, Matrix2, Matrix3, Vector2, Vector3};
 use robotcal::geom::{Pose, exp_so3};
@@ -131,6 +130,13 @@ fn read(folder: &Path, mode: Mode) -> Fallible<(Problem, State)> {
     Ok((problem, state))
 }
 
+/// Time that the processor spent on this thread, s: fair on a machine that others use, too.
+fn processor_seconds() -> Fallible<f64> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat")?;
+    let nanoseconds: f64 = text.split_whitespace().next().ok_or("schedstat is empty")?.parse()?;
+    Ok(1e-9 * nanoseconds)
+}
+
 /// Largest resident size of this process so far, MB; NaN where the system does not tell.
 fn peak_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -166,12 +172,12 @@ fn main() -> Fallible<()> {
         other => return Err(format!("no mode '{other}': poses, exact or joint").into()),
     };
     let repeats: usize = rest.first().map_or(Ok(1), |r| r.parse())?;
-    rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
+    rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global()?;
     let (problem, start) = read(Path::new(folder), mode)?;
     for _ in 0..repeats.max(1) {
-        let begin = Instant::now();
+        let begin = processor_seconds()?;
         let outcome = solve(&problem, start.clone(), &Settings::default());
-        report(name, &outcome, begin.elapsed().as_secs_f64())?;
+        report(name, &outcome, processor_seconds()? - begin)?;
     }
     Ok(())
 }

@@ -40,7 +40,8 @@ fn all_corners_of_the_real_boards_are_found_with_the_right_ids() {
         images.sort();
         assert_eq!(images.len(), 24, "{series}");
         for (path, found) in images.iter().zip(detect_series(&images, None, &plate, Ok, |_| ())) {
-            let detection = found.unwrap_or_else(|e| panic!("{e}")).detection;
+            let detection = found.detection;
+            assert_eq!(detection.failure, None);
             let count = detection.observations.len();
             assert!(count >= 87, "{}: {count} corners, {:?}", path.display(), detection.dropped);
             assert!(detection.notices.is_empty(), "{}: {:?}", path.display(), detection.notices);

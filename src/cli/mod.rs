@@ -7,7 +7,9 @@ mod choices;
 mod compare;
 mod compensate;
 mod convert;
+mod detect;
 mod identify;
+mod image_study;
 mod joint_table;
 mod plan;
 mod plate;
@@ -54,6 +56,8 @@ enum Command {
     Compensate(Box<compensate::CompensateArgs>),
     /// Turn a recording (MCAP, rosbag2) into a series folder, or a series folder into a recording
     Convert(convert::ConvertArgs),
+    /// Find the plate in images and say what was found, what was dropped and why; needs no robot
+    Detect(Box<detect::DetectArgs>),
     /// Identify robot, camera, hand-camera offset and plate from one or more series
     Identify(identify::IdentifyArgs),
     /// Plan where to take images, and say what they will be worth
@@ -83,6 +87,7 @@ impl Command {
             Self::Compare(args) => compare::run(args),
             Self::Compensate(args) => compensate::run(args),
             Self::Convert(args) => convert::run(args),
+            Self::Detect(args) => detect::run(args),
             Self::Identify(args) => identify::run(args),
             Self::Plan(args) => plan::run(args),
             Self::Plate(args) => plate::run(args),

@@ -26,9 +26,9 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
     for (&key, &uv) in lattice {
         let seed = seed(lattice, key, REACH).ok_or("no neighbours");
         match seed.and_then(|seed| refine(picture, &seed, window)) {
-            _ if placement.id(key).is_none() => detection.dropped.push(Dropped { uv, reason: "off the board" }),
+            _ if placement.id(key).is_none() => detection.dropped.push(Dropped::point(uv, "off the board")),
             Ok(saddle) => drop(fitted.insert(key, saddle)),
-            Err(reason) => detection.dropped.push(Dropped { uv, reason }),
+            Err(reason) => detection.dropped.push(Dropped::point(uv, reason)),
         }
     }
     let usual = Usual::of(&fitted);
@@ -36,7 +36,7 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
     for (key, saddle) in fitted {
         match usual.fault(key, &saddle, placement) {
             None => drop(kept.insert(key, saddle)),
-            Some(reason) => detection.dropped.push(Dropped { uv: saddle.uv, reason }),
+            Some(reason) => detection.dropped.push(Dropped::point(saddle.uv, reason)),
         }
     }
     let missing = Missing { picture, lattice, placement, window, usual: &usual };

@@ -1,6 +1,6 @@
 //! Pixels to identified observations; knows no robot.
 //!
-//! A new kind of plate is one file that maps a [`Picture`] and a [`Plate`] to a [`Detection`], and one row in [`detect`].
+//! A new kind of plate is one file that maps a [`Picture`] and a [`Plate`] to a [`Detection`], and one row in `by_kind`.
 
 mod board_labels;
 pub mod charuco;
@@ -15,7 +15,7 @@ mod picture;
 mod run;
 mod saddle;
 
-pub use detection::{Detection, Dropped};
+pub use detection::{Circles, Detection, Dropped};
 pub use flat_field::FlatField;
 pub use load::{LUMA_WEIGHTS, load};
 pub use mosaic::Mosaic;
@@ -30,9 +30,22 @@ use crate::series::{Plate, PlateKind};
 /// # Errors
 /// What the detector of the plate's kind says; the place is then `image`, for the caller to fill in the name.
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
+    let detection = examine(picture, plate);
+    match detection.failure {
+        None => Ok(detection),
+        Some(error) => Err(error),
+    }
+}
+
+/// As [`detect`], but a picture in which nothing can be identified still says what was seen: see [`Detection::failure`].
+pub fn examine(picture: &Picture, plate: &Plate) -> Detection {
+    by_kind(picture, plate).unwrap_or_else(|error| Detection { failure: Some(error), ..Detection::default() })
+}
+
+fn by_kind(picture: &Picture, plate: &Plate) -> Result<Detection> {
     match plate.kind {
         PlateKind::Chessboard => chessboard::detect(picture, plate),
-        PlateKind::CodedCircles => circles::detect(picture, plate, &circles::Options::default())?.into_common(),
+        PlateKind::CodedCircles => Ok(circles::detect(picture, plate, &circles::Options::default())?.into_common()),
         PlateKind::CircleGrid => circles::detect_grid(picture, plate, &circles::Options::default()),
         PlateKind::Charuco => charuco::detect(picture, plate),
         PlateKind::Points => Err(Error::input(

@@ -5,23 +5,30 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::{Detection, Picture, detect, load};
+use super::{Detection, Picture, examine, load};
 use crate::error::{Error, Result};
 use crate::series::Plate;
 
 /// One image of a series with what was found in it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct SeriesImage {
-    /// Width and height in px.
-    pub size: (usize, usize),
-    /// What was found.
+    /// Width and height in px; `None` for an image that could not be read.
+    pub size: Option<(usize, usize)>,
+    /// What was found, or why nothing was.
     pub detection: Detection,
+}
+
+impl SeriesImage {
+    /// An image in which nothing was found, with the reason.
+    pub fn failed(reason: Error) -> Self {
+        Self { size: None, detection: Detection { failure: Some(reason), ..Detection::default() } }
+    }
 }
 
 /// Detects the plate in all images of a series.
 ///
 /// Results stand in the order of `images`, whatever the number of threads; an image that cannot be read or shows no
-/// plate is an error in its own place only, and so is one whose size differs from that of most. Each thread holds one image at a time. `prepare` is applied to every picture
+/// plate is a failure in its own place only, and so is one whose size differs from that of most. Each thread holds one image at a time. `prepare` is applied to every picture
 /// before detection (flat-field correction; identity where there is none) and `progress` is called after every image,
 /// from any thread.
 pub fn detect_series(
@@ -30,38 +37,39 @@ pub fn detect_series(
     plate: &Plate,
     prepare: impl Fn(Picture) -> Result<Picture> + Sync,
     progress: impl Fn(&Path) + Sync,
-) -> Vec<Result<SeriesImage>> {
-    let mut found: Vec<Result<SeriesImage>> = images
+) -> Vec<SeriesImage> {
+    let mut found: Vec<SeriesImage> = images
         .par_iter()
         .map(|path| {
-            let found = load(path, bits).and_then(&prepare).and_then(|picture| {
-                let detection = detect(&picture, plate)?;
-                Ok(SeriesImage { size: (picture.width, picture.height), detection })
-            });
+            let mut image = match load(path, bits).and_then(&prepare) {
+                Err(error) => SeriesImage::failed(error),
+                Ok(picture) => {
+                    SeriesImage { size: Some((picture.width, picture.height)), detection: examine(&picture, plate) }
+                }
+            };
             progress(path);
-            found.map_err(|error| in_image(error, path))
+            name_image(&mut image.detection, path);
+            image
         })
         .collect();
     refuse_odd_sizes(images, &mut found);
     found
 }
 
-/// One camera records one size: images of another than the most frequent one are errors.
-fn refuse_odd_sizes(images: &[PathBuf], found: &mut [Result<SeriesImage>]) {
+/// One camera records one size: images of another than the most frequent one are failures.
+fn refuse_odd_sizes(images: &[PathBuf], found: &mut [SeriesImage]) {
+    let identified = |i: &&SeriesImage| i.detection.failure.is_none();
     let mut counts: BTreeMap<(usize, usize), usize> = BTreeMap::new();
-    for image in found.iter().flatten() {
-        *counts.entry(image.size).or_default() += 1;
+    for size in found.iter().filter(identified).filter_map(|i| i.size) {
+        *counts.entry(size).or_default() += 1;
     }
     let Some((&usual, &count)) = counts.iter().max_by_key(|(_, count)| **count) else { return };
-    for (path, result) in images.iter().zip(found) {
-        let Ok(image) = result else { continue };
-        if image.size != usual {
-            *result = Err(Error::input(
+    for (path, image) in images.iter().zip(found) {
+        if let Some(size) = image.size.filter(|s| *s != usual && image.detection.failure.is_none()) {
+            image.detection.observations.clear();
+            image.detection.failure = Some(Error::input(
                 path.display(),
-                format!(
-                    "is {} x {} px, but {count} images are {} x {} px",
-                    image.size.0, image.size.1, usual.0, usual.1
-                ),
+                format!("is {} x {} px, but {count} images are {} x {} px", size.0, size.1, usual.0, usual.1),
                 "record a series with one camera at one resolution; put other images into a series of their own",
             ));
         }
@@ -69,6 +77,8 @@ fn refuse_odd_sizes(images: &[PathBuf], found: &mut [Result<SeriesImage>]) {
 }
 
 /// Names the image where the detector could only say `image`.
-fn in_image(error: Error, path: &Path) -> Error {
-    if error.place == "image" { Error { place: path.display().to_string(), ..error } } else { error }
+fn name_image(detection: &mut Detection, path: &Path) {
+    if let Some(failure) = detection.failure.as_mut().filter(|f| f.place == "image") {
+        failure.place = path.display().to_string();
+    }
 }

@@ -23,8 +23,8 @@ pub mod programs {}
 
 #[doc = include_str!("decisions.md")]
 pub mod decisions {
-    #[doc = include_str!("decisions/0001_pose_space.md")]
-    pub mod d0001_pose_space {}
+    #[doc = include_str!("decisions/0001_one_gram_product.md")]
+    pub mod d0001_one_gram_product {}
 
     #[doc = include_str!("decisions/0002_joint_noise.md")]
     pub mod d0002_joint_noise {}

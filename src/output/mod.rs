@@ -4,17 +4,22 @@
 //! A new exporter is one file here and one row in [`files`].
 
 mod camera_file;
+mod canvas;
 pub mod comparison;
 mod compensation;
 mod compensation_read;
 mod controller_files;
+pub mod detection_files;
 pub mod difference;
+mod dot_font;
 mod estimates;
 pub mod flange_table;
 mod gauge;
+pub mod image_study;
 pub mod monte_carlo;
 mod names;
 mod observation_table;
+pub mod overlay;
 pub mod plan_files;
 pub mod plan_programs;
 pub mod plan_start;
@@ -35,7 +40,7 @@ mod write;
 
 pub use compensation_read::read_compensation;
 pub use report::{plan_html, report_html};
-pub use write::{write_all, write_beside};
+pub use write::{NewResult, write_all, write_beside};
 
 use std::collections::BTreeMap;
 

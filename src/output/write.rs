@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::{plan_files, solution_json};
+use super::{detection_files, plan_files, solution_json};
 use crate::error::{Error, Result};
 
 /// Writes all files into `dir`, replacing an earlier result as a whole: a failure leaves `dir` as it was.
@@ -18,15 +18,61 @@ use crate::error::{Error, Result};
 /// # Errors
 /// A `dir` that is a file, or holds something else than an earlier result; anything that cannot be written or renamed.
 pub fn write_all(dir: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
-    let target = resolve(dir)?;
-    let foreign = foreign_files(&target, files)?;
-    let new = beside(&target, "new")?;
-    let written = write_files(&new, files).and_then(|()| replace(&target, &new, &foreign));
-    if written.is_err() && new.exists() {
-        // The first error is the one to report.
-        let _ = fs::remove_dir_all(&new);
+    let result = NewResult::begin(dir, files.keys().map(String::as_str))?;
+    files.iter().try_for_each(|(name, bytes)| result.put(name, bytes))?;
+    result.finish()
+}
+
+/// A result that is written file by file and takes the place of the earlier one in the end; dropped before, it leaves
+/// everything as it was.
+#[derive(Debug)]
+pub struct NewResult {
+    target: PathBuf,
+    new: PathBuf,
+    foreign: Vec<String>,
+}
+
+impl NewResult {
+    /// Begins a result in `dir` with files and folders of these names; see [`write_all`].
+    ///
+    /// # Errors
+    /// A `dir` that is a file, or holds something else than an earlier result.
+    pub fn begin<'a>(dir: &Path, names: impl Iterator<Item = &'a str>) -> Result<Self> {
+        let target = resolve(dir)?;
+        let foreign = foreign_files(&target, &names.collect())?;
+        let new = beside(&target, "new")?;
+        fs::create_dir(&new).map_err(|e| Error::io(&new, &e))?;
+        Ok(Self { target, new, foreign })
     }
-    written
+
+    /// Writes a file, from any thread; `name` may begin with a folder.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn put(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        let path = self.new.join(name);
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
+        }
+        write_synced(&path, bytes).map_err(|e| Error::io(&path, &e))
+    }
+
+    /// Puts the result in the place of the earlier one.
+    ///
+    /// # Errors
+    /// When it cannot be moved there; the earlier one is kept then.
+    pub fn finish(self) -> Result<()> {
+        replace(&self.target, &self.new, &self.foreign)
+    }
+}
+
+impl Drop for NewResult {
+    fn drop(&mut self) {
+        if self.new.exists() {
+            // The first error is the one to report.
+            let _ = fs::remove_dir_all(&self.new);
+        }
+    }
 }
 
 /// Writes files into a folder among whatever is there, each one whole or not at all; none of them may be one of `inputs`.
@@ -82,7 +128,7 @@ fn resolve(dir: &Path) -> Result<PathBuf> {
 }
 
 /// Names in the target that are not of the result that it holds.
-fn foreign_files(target: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<Vec<String>> {
+fn foreign_files(target: &Path, files: &BTreeSet<&str>) -> Result<Vec<String>> {
     if !target.exists() {
         return Ok(Vec::new());
     }
@@ -101,7 +147,7 @@ fn foreign_files(target: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<Vec
         Error::input(target.display(), what, "choose another folder for the results, or empty this one")
     })?;
     let foreign: Vec<String> = there.into_iter().filter(|name| !own.contains(name)).collect();
-    match foreign.iter().find(|name| files.contains_key(*name)) {
+    match foreign.iter().find(|name| files.contains(name.as_str())) {
         Some(name) => {
             let what = "would be overwritten, but is not of the earlier result in this folder";
             Err(Error::input(target.join(name).display(), what, "move it away, or choose another folder"))
@@ -110,7 +156,7 @@ fn foreign_files(target: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<Vec
     }
 }
 
-/// Files of the result in a folder, as its solution.json or plan.json lists them.
+/// Files of the result in a folder, as its solution.json, plan.json or detection.json lists them.
 fn earlier_files(target: &Path) -> Option<BTreeSet<String>> {
     #[derive(Deserialize)]
     struct Listed {
@@ -120,7 +166,7 @@ fn earlier_files(target: &Path) -> Option<BTreeSet<String>> {
         let bytes = fs::read(target.join(name)).ok()?;
         serde_json::from_slice::<Listed>(&bytes).ok().map(|l| l.files)
     };
-    listed(solution_json::FILE_NAME).or_else(|| listed(plan_files::FILE_NAME))
+    [solution_json::FILE_NAME, plan_files::FILE_NAME, detection_files::FILE_NAME].into_iter().find_map(listed)
 }
 
 /// A name beside the target that nothing has yet.
@@ -136,15 +182,6 @@ fn beside(target: &Path, purpose: &str) -> Result<PathBuf> {
             "remove them (names that begin with a point)",
         )
     })
-}
-
-fn write_files(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
-    fs::create_dir(folder).map_err(|e| Error::io(folder, &e))?;
-    for (name, bytes) in files {
-        let path = folder.join(name);
-        write_synced(&path, bytes).map_err(|e| Error::io(&path, &e))?;
-    }
-    Ok(())
 }
 
 /// Writes a file through to the disk, so that a full disk is noticed here.

@@ -1,10 +1,11 @@
 //! A series as read to a series as seen: detection, readings in chain order, everything left out with its reason.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::build::{MeasuredSeries, MeasuredStop};
-use crate::detect::{FlatField, Picture, detect_series};
+use super::look::{SeenImage, look, recording, require_some};
+use crate::detect::Detection;
 use crate::error::{Error, Notice, Result};
 use crate::model::camera::Lens;
 use crate::series::{CirclePoint, Observation, Series, Source, StopOrder};
@@ -30,7 +31,6 @@ struct Seen {
 /// # Errors
 /// Of the readings (unit, missing joints), of a series none of whose images can be used, and of differently sized images.
 pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(&Path) + Sync) -> Result<Measured> {
-    let place = || format!("series {}", series.name);
     let readings = series.readings_for(chain)?;
     let mut notices = series.notices.clone();
     notices.extend(series.reading_notices(chain));
@@ -46,7 +46,7 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
         })?,
     };
     let (mut seen, found_size) = match &series.source {
-        Source::Images { dark, white, .. } => look(series, dark, white, progress, &mut notices)?,
+        Source::Images { .. } => look_through(series, progress, &mut notices)?,
         Source::Observations(all) => {
             let by_name: BTreeMap<&str, &Vec<Observation>> =
                 all.iter().map(|i| (i.image.as_str(), &i.observations)).collect();
@@ -56,15 +56,13 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
             };
             (series.stops.stops.iter().map(|s| given(&s.image)).collect(), None)
         }
-        Source::Recording(path) => {
-            return Err(Error::input(
-                path.display(),
-                "is a recording, not a series folder",
-                "convert it first: robotcal convert run1.mcap run1/",
-            ));
-        }
+        Source::Recording(path) => return Err(recording(path)),
     };
-    require_some(series, &seen, &place())?;
+    let stops = series.stops.stops.iter().zip(&seen);
+    require_some(
+        &format!("series {}", series.name),
+        stops.map(|(stop, s)| (stop.image.as_str(), s.observations.len(), s.left_out.as_deref())),
+    )?;
     let stated = camera.width_px.zip(camera.height_px);
     let (width_px, height_px) = found_size.or(stated).ok_or_else(|| {
         Error::input(
@@ -94,7 +92,8 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
             height_px,
             focal_px: camera.focal_px,
             lens,
-            centroid: series.manifest.observations.point == CirclePoint::Centroid,
+            // The detector measures centroids, whatever observations would mean.
+            centroid: found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid,
             plate: series.plate.clone(),
             plate_name: plate_file.canonicalize().unwrap_or(plate_file).display().to_string(),
             order_known: series.manifest.robot.order == StopOrder::Visited,
@@ -104,52 +103,18 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     })
 }
 
+/// What all stops show, and the size of the images.
 type Look = (Vec<Seen>, Option<(u32, u32)>);
 
-fn look(
-    series: &Series,
-    dark: &[PathBuf],
-    white: &[PathBuf],
-    progress: impl Fn(&Path) + Sync,
-    notices: &mut Vec<Notice>,
-) -> Result<Look> {
-    let bits = series.manifest.camera.bits;
-    let flat_field = FlatField::from_images(dark, white, bits)?;
-    let corrected = |picture: Picture| match &flat_field {
-        Some(flat_field) => flat_field.apply(picture),
-        None => Ok(picture),
+fn look_through(series: &Series, progress: impl Fn(&Path) + Sync, notices: &mut Vec<Notice>) -> Result<Look> {
+    let images = look(series, progress)?;
+    notices.extend(images.iter().flat_map(SeenImage::notices));
+    // The detector has refused all images of another size.
+    let usable = images.iter().filter(|i| i.detection.failure.is_none());
+    let size = usable.filter_map(|i| i.size).next().map(|(w, h)| (w as u32, h as u32));
+    let seen = |image: SeenImage| {
+        let Detection { observations, failure, .. } = image.detection;
+        Seen { observations, left_out: failure.map(|error| error.what) }
     };
-    let paths: Vec<PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.clone()).collect();
-    let mut found = detect_series(&paths, bits, &series.plate, corrected, progress).into_iter();
-    let mut size = None;
-    let mut seen = Vec::new();
-    for stop in &series.stops.stops {
-        let (observations, left_out) = match stop.path.as_ref().and_then(|_| found.next()) {
-            None => (vec![], Some("the image file is missing".to_owned())),
-            Some(Err(error)) => (vec![], Some(error.what)),
-            Some(Ok(image)) => {
-                // The detector has refused all images of another size.
-                size = Some((image.size.0 as u32, image.size.1 as u32));
-                let named = |n: &Notice| Notice { place: format!("{}: {}", stop.image, n.place), ..n.clone() };
-                notices.extend(image.detection.notices.iter().map(named));
-                (image.detection.observations, None)
-            }
-        };
-        seen.push(Seen { observations, left_out });
-    }
-    Ok((seen, size))
-}
-
-fn require_some(series: &Series, seen: &[Seen], place: &str) -> Result<()> {
-    if seen.iter().any(|s| s.left_out.is_none() && !s.observations.is_empty()) {
-        return Ok(());
-    }
-    let reasons: Vec<String> = (series.stops.stops.iter().zip(seen).take(3))
-        .map(|(stop, s)| format!("{}: {}", stop.image, s.left_out.as_deref().unwrap_or("no marker found")))
-        .collect();
-    Err(Error::input(
-        place,
-        format!("no image can be used ({})", reasons.join("; ")),
-        "look at one of the images: is the plate in it, sharp, and the one that plate.toml describes?",
-    ))
+    Ok((images.into_iter().map(seen).collect(), size))
 }

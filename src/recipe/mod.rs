@@ -13,6 +13,7 @@ mod gates;
 mod joint;
 mod lens_choice;
 mod local_errors;
+mod look;
 mod loose;
 mod measure;
 mod monte_carlo;
@@ -41,6 +42,7 @@ pub use forecast::{
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
 pub use joint::{JointNoise, Options, RobotModel};
 pub use lens_choice::choose_lens;
+pub use look::{SeenImage, look, look_at, require_some};
 pub use measure::{Measured, measure};
 pub use monte_carlo::{BLOCKS, BlockResult, MonteCarloCell, MonteCarloRequest, monte_carlo};
 pub use places::{PlaceForecast, compare_places, place_words};

@@ -66,13 +66,13 @@ impl MarkersEliminated {
         let mut y = DMatrix::zeros(n, 3 * order.len());
         for (k, (terms, &i)) in lin.terms.iter().zip(&lin.images).enumerate() {
             let (image, chain) = (&problem.images[i], &lin.chains[k]);
-            let columns = FreeColumns::of(problem, image);
+            let columns = FreeColumns::of(problem, image, chain);
             for t in &terms.markers {
                 let Some(at) = number[image.plate][t.marker] else { continue };
                 information[at] += t.mm;
                 let mut own = rhs.fixed_rows_mut::<3>(3 * at);
                 own += t.bm;
-                columns.add_coupling(&mut y, 3 * at, t, chain);
+                columns.add_coupling(&mut y, 3 * at, t);
                 for s in 0..chain.d_slack.ncols() {
                     let with_slack = t.mp * chain.d_slack.fixed_view::<6, 1>(0, s);
                     (0..3).for_each(|d| y[(slack_start[k] + s, 3 * at + d)] = with_slack[d]);
@@ -135,10 +135,13 @@ impl MarkersEliminated {
 
 /// Multiplies three columns from `first` on by `m` from the right.
 fn times_right(y: &mut DMatrix<f64>, first: usize, m: &Matrix3<f64>) {
-    let mut columns = y.fixed_columns_mut::<3>(first);
-    for i in 0..columns.nrows() {
-        let new = columns.row(i) * m;
-        columns.row_mut(i).copy_from(&new);
+    let rows = y.nrows();
+    let (x, rest) = y.as_mut_slice()[first * rows..(first + 3) * rows].split_at_mut(rows);
+    let (y, z) = rest.split_at_mut(rows);
+    for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+        let old = [*x, *y, *z];
+        let new = |k: usize| old[0] * m[(0, k)] + old[1] * m[(1, k)] + old[2] * m[(2, k)];
+        (*x, *y, *z) = (new(0), new(1), new(2));
     }
 }
 

@@ -131,10 +131,10 @@ fn add_markers(
     (a, rhs): (&mut DMatrix<f64>, &mut DVector<f64>),
 ) {
     let image = &problem.images[lin.images[k]];
-    let columns = FreeColumns::of(problem, image);
+    let columns = FreeColumns::of(problem, image, &lin.chains[k]);
     for t in &lin.terms[k].markers {
         let Some(start) = marker_start[image.plate][t.marker] else { continue };
-        columns.add_coupling(a, start, t, &lin.chains[k]);
+        columns.add_coupling(a, start, t);
         let mut own = a.fixed_view_mut::<3, 3>(start, start);
         own += t.mm;
         let mut b = rhs.fixed_rows_mut::<3>(start);
@@ -167,7 +167,7 @@ impl Block {
         let factor = h.cholesky().and_then(|c| c.l().try_inverse());
         let inverse_factor = factor.unwrap_or_else(|| DMatrix::zeros(l.ncols(), l.ncols()));
         // Columns that stay at their value take no part, nor in the back-substitution.
-        let columns = FreeColumns::of(problem, image);
+        let columns = FreeColumns::of(problem, image, &lin.chains[k]);
         let dense = columns.theta.iter().copied().chain(columns.intrinsic.iter().map(|(_, c)| *c));
         let mut rows: Vec<usize> = dense.collect();
         let first_marker = rows.len();

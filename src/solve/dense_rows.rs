@@ -55,27 +55,37 @@ impl PoseRows {
 pub(super) struct FreeColumns {
     pub theta: Vec<usize>,
     pub intrinsic: Vec<(usize, usize)>,
+    /// `G'` with zeros for the columns that are not free; empty where none is.
+    chain: DMatrix<f64>,
 }
 
 impl FreeColumns {
-    pub fn of(problem: &Problem, image: &Image) -> Self {
+    pub fn of(problem: &Problem, image: &Image, chain: &Chained) -> Self {
         let columns = &problem.layout.columns;
         let local: [Option<usize>; E] = intrinsic_columns(problem, image);
         let free = |(e, c): (usize, &Option<usize>)| c.filter(|c| columns[*c].free).map(|c| (e, c));
-        Self {
-            theta: (0..problem.layout.theta_len()).filter(|&c| columns[c].free).collect(),
-            intrinsic: local.iter().enumerate().filter_map(free).collect(),
+        let theta: Vec<usize> = (0..problem.layout.theta_len()).filter(|&c| columns[c].free).collect();
+        let mut transposed = DMatrix::zeros(theta.last().map_or(0, |c| c + 1), 6);
+        for &c in &theta {
+            transposed.row_mut(c).tr_copy_from(&chain.d_theta.column(c));
         }
+        Self { theta, intrinsic: local.iter().enumerate().filter_map(free).collect(), chain: transposed }
     }
 
     /// Adds the coupling of a marker with the free dense columns to three columns of `into`, from `first` on.
-    pub fn add_coupling(&self, into: &mut DMatrix<f64>, first: usize, terms: &MarkerTerms, chain: &Chained) {
+    pub fn add_coupling(&self, into: &mut DMatrix<f64>, first: usize, terms: &MarkerTerms) {
+        let rows = self.chain.nrows();
+        let g: [&[f64]; 6] = std::array::from_fn(|k| &self.chain.as_slice()[k * rows..(k + 1) * rows]);
         for d in 0..3 {
+            let mp: [f64; 6] = std::array::from_fn(|k| terms.mp[(d, k)]);
             let mut column = into.column_mut(first + d);
-            let mp = terms.mp.row(d);
-            for &c in &self.theta {
-                let g = chain.d_theta.fixed_view::<6, 1>(0, c);
-                column[c] += (0..6).map(|k| mp[k] * g[k]).sum::<f64>();
+            for (c, x) in column.as_mut_slice()[..rows].iter_mut().enumerate() {
+                *x += mp[0] * g[0][c]
+                    + mp[1] * g[1][c]
+                    + mp[2] * g[2][c]
+                    + mp[3] * g[3][c]
+                    + mp[4] * g[4][c]
+                    + mp[5] * g[5][c];
             }
             for &(e, c) in &self.intrinsic {
                 column[c] += terms.me[(d, e)];

@@ -48,6 +48,8 @@ pub struct Outcome {
 const FIRST_LAMBDA: f64 = 1e-6;
 /// Relative rounding of a cost summed over thousands of residuals.
 const ROUNDING: f64 = 1e-12;
+/// A step that was not taken must be predicted to be this much below the bound.
+const PREDICTION_MARGIN: f64 = 0.1;
 const LARGEST_LAMBDA: f64 = 1e10;
 
 /// Minimises the cost from `start`.
@@ -59,6 +61,8 @@ pub fn solve(problem: &Problem, start: State, settings: &Settings) -> Outcome {
     let mut lambda = FIRST_LAMBDA;
     let mut status = Status::OutOfIterations;
     let mut iterations = 0;
+    // Decrement of the step before, where that step was taken.
+    let mut before: Option<f64> = None;
     while iterations < settings.iterations {
         iterations += 1;
         let system = System::new(problem, &state, &lin, lambda);
@@ -73,18 +77,22 @@ pub fn solve(problem: &Problem, start: State, settings: &Settings) -> Outcome {
         let x = factor.solve(&system.rhs);
         // Every |step| / sigma is at most the square root of step' N step = step' rhs.
         let decrement = x.dot(&system.rhs).max(0.0).sqrt();
-        let next = state.moved(&problem.layout, &system.step(problem, &lin, &x));
-        let tried = linearise_all(problem, &next);
+        let moved = state.moved(&problem.layout, &system.step(problem, &lin, &x));
+        let tried = linearise_all(problem, &moved);
         let small = decrement < settings.decrement;
+        // Gauss-Newton contracts at least linearly: the next step will be shorter by the same factor, or more.
+        let next = before.filter(|b| decrement < 0.1 * b).map_or(f64::INFINITY, |b| decrement * decrement / b);
+        let last = small || next < PREDICTION_MARGIN * settings.decrement;
         // Where the step promises less than the cost can resolve, the gradient is the better judge.
         let below_rounding = small || decrement * decrement < 10.0 * ROUNDING * lin.cost;
         match tried {
             Some(better)
                 if better.cost <= lin.cost || (below_rounding && better.cost <= lin.cost * (1.0 + ROUNDING)) =>
             {
-                (state, lin) = (next, better);
+                (state, lin) = (moved, better);
+                before = Some(decrement);
                 lambda = (lambda * 0.1).max(1e-12);
-                if small {
+                if last {
                     status = Status::Converged;
                     break;
                 }
@@ -93,7 +101,10 @@ pub fn solve(problem: &Problem, start: State, settings: &Settings) -> Outcome {
                 status = Status::Converged;
                 break;
             }
-            _ => lambda = (lambda * 10.0).max(1e-6),
+            _ => {
+                before = None;
+                lambda = (lambda * 10.0).max(1e-6);
+            }
         }
         if lambda > LARGEST_LAMBDA {
             status = Status::Stalled;

@@ -27,8 +27,8 @@ const LEAST_SEEN: f64 = 0.7;
 /// Observations are area centroids with covariance, as for coded circles. Ids are those of the plate's markers.
 ///
 /// # Errors
-/// Markers that do not lie on a square lattice or have no radius; no grid in the picture, or not all of it; a mirrored
-/// picture, where the dots show it (a grid without larger dots is mostly its own mirror image).
+/// Markers that do not lie on a square lattice or have no radius. No grid in the picture, not all of it, or a mirrored one where
+/// the dots show it (a grid without larger dots is mostly its own mirror image): see [`Detection::failure`].
 pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Result<Detection> {
     let (cells, step_m) = cells(plate).ok_or_else(no_lattice)?;
     let code = Code::of_cells(plate, &cells, step_m).ok_or_else(no_lattice)?;
@@ -39,11 +39,11 @@ pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Resul
             let outcome = if candidates.is_empty() { Outcome::NoCandidates } else { Outcome::NoLattice };
             return Ok((Board::new(), outcome));
         };
-        let (board, outcome, turned) = place(&code, &cells, lattice, candidates)?;
+        let (board, outcome, turned) = place(&code, &cells, lattice, candidates);
         symmetric = turned;
         Ok((board, outcome))
     })?;
-    let mut detection = found.into_common()?;
+    let mut detection = found.into_common();
     if symmetric {
         detection.notices.push(symmetric_notice());
     }
@@ -120,27 +120,26 @@ fn turned((i, j): Cell, turns: u8, mirrored: bool) -> Cell {
 }
 
 /// Puts the lattice on the grid; true where the grid looks the same after a turn.
-fn place(code: &Code, cells: &[Cell], lattice: &Lattice, candidates: &[Candidate]) -> Result<(Board, Outcome, bool)> {
+fn place(code: &Code, cells: &[Cell], lattice: &Lattice, candidates: &[Candidate]) -> (Board, Outcome, bool) {
     let classes = code.classes_of(lattice, candidates);
     let mut laid = ways(code, cells, &classes);
     laid.sort_by_key(|l| std::cmp::Reverse(l.score()));
-    let Some(best) = laid.first().copied() else { return Ok((Board::new(), Outcome::Ambiguous, false)) };
+    let Some(best) = laid.first().copied() else { return (Board::new(), Outcome::Ambiguous, false) };
     if (best.seen as f64) < LEAST_SEEN * cells.len() as f64 {
-        return Ok((Board::new(), Outcome::Ambiguous, false));
+        return (Board::new(), Outcome::Ambiguous, false);
     }
     // A shift of the grid loses a line of dots; half of the shortest line must make the difference.
     let margin = (shortest_line(cells) as i64 + 1) / 2;
     let middle = best.middle(cells);
     if laid.iter().take_while(|l| l.score() > best.score() - margin).any(|l| l.middle(cells) != middle) {
-        return Ok((Board::new(), Outcome::Ambiguous, false));
+        return (Board::new(), Outcome::Ambiguous, false);
     }
     // A dot of another size in the wrong place costs four: twice a cell that is not right and counts as wrong.
     let equal = laid.iter().take_while(|l| l.score() > best.score() - 2);
     let direct: Vec<&Laid> = equal.filter(|l| !l.mirrored).collect();
     let upright = direct.iter().min_by(|a, b| lean(a, lattice).total_cmp(&lean(b, lattice)));
     let Some(chosen) = upright.map(|l| **l) else {
-        let what = "the grid of dots is mirrored";
-        return Err(Error::input("image", what, "turn off mirroring in the camera or in the image export"));
+        return (Board::new(), Outcome::Mirrored, false);
     };
     let board: Board = lattice
         .cells
@@ -152,7 +151,7 @@ fn place(code: &Code, cells: &[Cell], lattice: &Lattice, candidates: &[Candidate
         .collect();
     let runner_up = laid.iter().find(|l| l.score() < best.score()).map_or(cells.len(), |l| l.wrong);
     let outcome = Outcome::Identified { agreeing: chosen.seen, disagreeing: chosen.wrong, runner_up };
-    Ok((board, outcome, direct.len() > 1))
+    (board, outcome, direct.len() > 1)
 }
 
 /// All ways in which the lattice overlaps the grid.

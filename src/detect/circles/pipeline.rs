@@ -30,14 +30,13 @@ const SMALLEST_LATTICE: usize = 9;
 ///
 /// # Errors
 ///
-/// The plate has no code (its markers are no lattice of circles); the picture is empty; the picture shows the plate in
-/// a mirror.
+/// The plate has no code (its markers are no lattice of circles); the picture is empty.
 pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<Detection> {
     let code = Code::of(plate).filter(|_| !plate.markers.is_empty()).ok_or_else(|| {
         let what = "its markers do not form a lattice of circles with a radius";
         Error::input("plate", what, "give a plate of kind coded-circles with plate.csv as made by `robotcal plate`")
     })?;
-    detect_coded(picture, plate, options, &code, |lattices, candidates| identify(&code, lattices, candidates))
+    detect_coded(picture, plate, options, &code, |lattices, candidates| Ok(identify(&code, lattices, candidates)))
 }
 
 /// The stages around the identification.
@@ -65,7 +64,7 @@ pub(super) fn detect_coded(
 }
 
 /// Puts the lattices on the plate.
-fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> Result<(Board, Outcome)> {
+fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> (Board, Outcome) {
     let mut board = Board::new();
     let mut outcome = match (candidates.is_empty(), lattices.is_empty()) {
         (true, _) => Outcome::NoCandidates,
@@ -76,10 +75,11 @@ fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> Resu
         let classes = code.classes_of(lattice, candidates);
         match code.locate(&classes) {
             Verdict::Ambiguous => {}
+            // A reflection of the plate beside the plate itself is no reason to refuse the picture.
             Verdict::Mirrored => {
-                let what = "the plate is seen in a mirror: its code is there, but left and right are exchanged";
-                let remedy = "switch off the mirroring in the camera driver, or look at the plate without a mirror";
-                return Err(Error::input("image", what, remedy));
+                if !matches!(outcome, Outcome::Identified { .. }) {
+                    outcome = Outcome::Mirrored;
+                }
             }
             Verdict::Placed { placement, agreeing, disagreeing, runner_up } => {
                 if !matches!(outcome, Outcome::Identified { .. }) {
@@ -92,7 +92,7 @@ fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> Resu
             }
         }
     }
-    Ok((board, outcome))
+    (board, outcome)
 }
 
 /// Cells of the plate next to known ones that are not on the board, with the map around each.

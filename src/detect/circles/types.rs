@@ -5,8 +5,9 @@ use std::fmt;
 
 use super::asymmetry::Drift;
 use super::ellipse::Ellipse;
+use crate::detect::Circles;
 use crate::series::{Edge, Observation};
-use crate::{Error, Notice, Result};
+use crate::{Error, Notice};
 
 /// What the detector looks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -182,6 +183,26 @@ pub enum Outcome {
     NoLattice,
     /// Too few markers, or too many in doubt, to tell where on the plate they are.
     Ambiguous,
+    /// The plate's pattern is there, but left and right are exchanged.
+    Mirrored,
+}
+
+impl Outcome {
+    /// What went wrong and what to try; `None` where markers were identified.
+    fn failure(self) -> Option<(&'static str, &'static str)> {
+        match self {
+            Self::Identified { .. } => None,
+            Self::NoCandidates => Some(("nothing looks like a marker", "check focus, exposure and view")),
+            Self::NoLattice => Some(("markers, but no lattice of them", "bring more of the plate into the view")),
+            Self::Ambiguous => {
+                Some(("the place on the plate cannot be told", "check that plate.toml is the plate in the picture"))
+            }
+            Self::Mirrored => Some((
+                "the plate is seen in a mirror: left and right are exchanged",
+                "switch off the mirroring in the camera driver, or look at the plate without a mirror",
+            )),
+        }
+    }
 }
 
 /// What was found in one picture.
@@ -217,39 +238,31 @@ impl Detection {
     }
 
     /// The form that all detectors share, with a notice when the point spread is asymmetric.
-    ///
-    /// # Errors
-    ///
-    /// Nothing was identified; the place is `image`.
-    pub fn into_common(self) -> Result<crate::detect::Detection> {
-        let dropped =
-            self.dropped.iter().map(|d| crate::detect::Dropped { uv: d.uv, reason: d.reason.name() }).collect();
-        let mut notices = Vec::new();
-        if let Some(io) = self.inner_outer.filter(InnerOuter::asymmetric) {
-            let [u, v] = io.drift.mean_px;
-            let what = format!(
-                "inner and outer circles are off by ({u:.4}, {v:.4}) px on the mean of {} annuli, and by {:.4} px along \
-                 the radius in the corner: the blur is asymmetric",
-                io.count, io.drift.corner_px
-            );
-            notices.push(Notice::new(
-                "image",
-                what,
-                "look for coma (stop the lens down) or motion during the exposure",
-            ));
-        }
-        let failure = match self.outcome {
-            Outcome::Identified { .. } => None,
-            Outcome::NoCandidates => Some(("nothing looks like a marker", "check focus, exposure and view")),
-            Outcome::NoLattice => Some(("markers, but no lattice of them", "bring more of the plate into the view")),
-            Outcome::Ambiguous => {
-                Some(("the place on the plate cannot be told", "check that plate.toml is the plate in the picture"))
-            }
+    pub fn into_common(self) -> crate::detect::Detection {
+        let rings = self.inner_outer.filter(InnerOuter::asymmetric).map(|io| io.notice());
+        let edges = self.lopsided.filter(|l| l.exceeds(LOPSIDED_PX)).map(lopsided_notice);
+        let notices = rings.into_iter().chain(edges).collect();
+        let failure = self.outcome.failure();
+        let failure =
+            failure.map(|(what, remedy)| Error::input("image", format!("{what}{}", self.dropped_summary()), remedy));
+        let dropped = |d: &Dropped| crate::detect::Dropped {
+            uv: d.uv,
+            reason: d.reason.name(),
+            ellipse: d.ellipse,
+            marker: d.marker,
         };
-        if let Some((what, remedy)) = failure {
-            return Err(Error::input("image", format!("{what}{}", self.dropped_summary()), remedy));
+        crate::detect::Detection {
+            observations: self.observations,
+            dropped: self.dropped.iter().map(dropped).collect(),
+            circles: Some(Circles {
+                found: self.found,
+                outcome: self.outcome,
+                blur_px: self.blur_px,
+                noise: self.noise,
+            }),
+            notices,
+            failure,
         }
-        Ok(crate::detect::Detection { observations: self.observations, dropped, notices })
     }
 
     fn dropped_summary(&self) -> String {
@@ -279,4 +292,27 @@ impl InnerOuter {
     pub fn asymmetric(&self) -> bool {
         self.drift.exceeds(0.005_f64.max(0.05 * self.explained_px))
     }
+
+    fn notice(&self) -> Notice {
+        let [u, v] = self.drift.mean_px;
+        let what = format!(
+            "inner and outer circles are off by ({u:.4}, {v:.4}) px on the mean of {} annuli, and by {:.4} px along the \
+             radius in the corner: the blur is asymmetric",
+            self.count, self.drift.corner_px
+        );
+        Notice::new("image", what, "look for coma (stop the lens down) or motion during the exposure")
+    }
+}
+
+/// Displacement by lopsided edges from which on it is told, px.
+const LOPSIDED_PX: f64 = 0.002;
+
+fn lopsided_notice(drift: Drift) -> Notice {
+    let [u, v] = drift.mean_px;
+    let what = format!(
+        "the edges are blurred more to one side, which displaces centres by ({u:.4}, {v:.4}) px everywhere and by {:.4} px \
+         along the radius in the corner",
+        drift.corner_px
+    );
+    Notice::new("image", what, "look for coma (stop the lens down) or motion during the exposure")
 }

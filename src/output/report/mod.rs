@@ -10,7 +10,7 @@ mod plan_page;
 mod plan_pictures;
 mod plots;
 mod sections;
-mod svg;
+pub(super) mod svg;
 mod verdict;
 mod words;
 

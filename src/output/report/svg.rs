@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 /// A drawing in user units; x to the right, y down.
-pub(super) struct Svg {
+pub(in crate::output) struct Svg {
     width: f64,
     height: f64,
     label: String,
@@ -12,7 +12,7 @@ pub(super) struct Svg {
 
 /// Where a text hangs on its point.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Anchor {
+pub(in crate::output) enum Anchor {
     Start,
     Middle,
     End,
@@ -28,7 +28,7 @@ impl Anchor {
     }
 }
 
-pub(super) fn escaped(text: &str) -> String {
+pub(in crate::output) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
@@ -101,6 +101,12 @@ impl Svg {
         self.add(format_args!("<path class=\"{class}\" d=\"{d}\"/>"));
     }
 
+    /// The drawing as a file of its own, with its style.
+    pub fn finish_alone(mut self, style: &str) -> String {
+        self.body.insert_str(0, &format!("<style>{style}</style>"));
+        self.finish()
+    }
+
     /// The whole element; it shrinks with the page and keeps its shape.
     pub fn finish(self) -> String {
         let Self { width, height, label, body } = self;
@@ -112,7 +118,7 @@ impl Svg {
 }
 
 /// A round number (1, 2 or 5 times a power of ten) at most `value`.
-pub(super) fn round_below(value: f64) -> f64 {
+pub(in crate::output) fn round_below(value: f64) -> f64 {
     if !(value > 0.0 && value.is_finite()) {
         return 1.0;
     }
@@ -121,7 +127,7 @@ pub(super) fn round_below(value: f64) -> f64 {
 }
 
 /// Round ticks from zero to at most `largest`, about five.
-pub(super) fn ticks(largest: f64) -> Vec<f64> {
+pub(in crate::output) fn ticks(largest: f64) -> Vec<f64> {
     let step = round_below(largest / 4.0);
     (0..=20).map(|k| step * f64::from(k)).take_while(|t| *t <= largest * (1.0 + 1e-9)).collect()
 }

@@ -1,0 +1,173 @@
+//! `robotcal detect`: what is seen in the images, without any robot.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use rayon::prelude::*;
+
+use super::image_study::{self, StudyArgs};
+use super::recording::{Pictures, RecordingArgs};
+use super::{Verdict, progress};
+use crate::detect::load;
+use crate::error::{Error, Notice, Result};
+use crate::output::NewResult;
+use crate::output::detection_files::{
+    DetectionContext, OVERLAY_FOLDER, detection_files, dropped_counts, marker_counts,
+};
+use crate::output::overlay::{Palette, overlay_png};
+use crate::recipe::{self, SeenImage};
+use crate::series::{self, InputFile, Plate, Series, read_plate};
+
+/// Flags of `detect`.
+#[derive(Debug, Args)]
+pub(super) struct DetectArgs {
+    /// Series folder or recording (.mcap, rosbag2 folder); its images are looked at even where it has observations
+    #[arg(long, value_name = "FOLDER", required_unless_present_any = ["images", "study"])]
+    series: Option<PathBuf>,
+    /// Single images instead of a series; they need --plate
+    #[arg(value_name = "IMAGE", conflicts_with = "series", requires = "plate")]
+    images: Vec<PathBuf>,
+    /// The plate in single images (plate.toml)
+    #[arg(long, value_name = "FILE", conflicts_with = "series")]
+    plate: Option<PathBuf>,
+    /// Also draw what was found, what was dropped and why (overlay/, a PNG for each image)
+    #[arg(long)]
+    overlay: bool,
+    /// Folder for the results [default: reports/<series name>-detected, for a study reports]
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    study: StudyArgs,
+    #[command(flatten)]
+    recording: RecordingArgs,
+}
+
+/// What was looked at.
+struct Looked {
+    series: Option<Series>,
+    plate: Plate,
+    images: Vec<SeenImage>,
+    notices: Vec<Notice>,
+    inputs: Vec<InputFile>,
+}
+
+pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
+    if args.study.wanted() {
+        return image_study::run(&args.study, args.out.as_deref().unwrap_or(Path::new("reports")), args.overlay);
+    }
+    // Pictures of a recording are needed until they have been drawn on.
+    let pictures = Pictures::new();
+    let looked = match (&args.series, &args.plate) {
+        (Some(folder), _) => of_series(args, folder, &pictures)?,
+        (None, Some(plate)) => of_images(&args.images, plate)?,
+        (None, None) => {
+            return Err(Error::input("detect", "no images are given", "give --series, or --plate and images"));
+        }
+    };
+    let name = looked.series.as_ref().map_or("images", |s| s.name.as_str());
+    let out = args.out.clone().unwrap_or_else(|| Path::new("reports").join(format!("{name}-detected")));
+    let written = write(args, &looked, &out)?;
+    print!("{}", text(&looked.images));
+    looked.notices.iter().for_each(|n| println!("note      {n}"));
+    looked.images.iter().flat_map(SeenImage::notices).for_each(|n| println!("note      {n}"));
+    println!("results   {} ({written} files)", out.display());
+    let failures: Vec<&Error> = looked.images.iter().filter_map(|i| i.detection.failure.as_ref()).collect();
+    let seen = |i: &SeenImage| (i.detection.observations.len(), i.detection.failure.as_ref().map(|f| f.what.clone()));
+    let states: Vec<_> = looked.images.iter().map(|i| (i.name.as_str(), seen(i))).collect();
+    recipe::require_some(name, states.iter().map(|(n, (count, failure))| (*n, *count, failure.as_deref())))?;
+    Ok(if failures.is_empty() { Verdict::Good } else { Verdict::GateFailed })
+}
+
+fn of_series(args: &DetectArgs, folder: &Path, pictures: &Pictures) -> Result<Looked> {
+    let mut all = pictures.of_recordings(vec![series::read_images(folder)?], &args.recording.options(&[])?)?;
+    let Some(series) = all.pop() else {
+        return Err(Error::input(folder.display(), "holds no series", "give the folder that holds series.toml"));
+    };
+    let bar = progress::bar(series.stops.stops.len(), &series.name);
+    let images = recipe::look(&series, |_| bar.inc(1))?;
+    bar.finish_and_clear();
+    let mut inputs = series.inputs.clone();
+    inputs.extend(series.image_hashes()?);
+    Ok(Looked { plate: series.plate.clone(), images, notices: series.notices.clone(), inputs, series: Some(series) })
+}
+
+fn of_images(images: &[PathBuf], plate: &Path) -> Result<Looked> {
+    let mut inputs = Vec::new();
+    let plate = read_plate(plate, &mut inputs)?;
+    let name = |path: &PathBuf| path.file_name().map(|n| n.to_owned());
+    if let Some((k, twin)) = images.iter().enumerate().find(|(k, i)| images[..*k].iter().any(|j| name(i) == name(j))) {
+        let what = format!("has the name of image {} as well", k);
+        return Err(Error::input(twin.display(), what, "images are told apart by their names: rename one"));
+    }
+    let bar = progress::bar(images.len(), "images");
+    let seen = recipe::look_at(images, &plate, |_| bar.inc(1));
+    bar.finish_and_clear();
+    let readable = images.iter().filter(|i| i.is_file());
+    inputs.extend(readable.map(|i| InputFile::of_file(i)).collect::<Result<Vec<_>>>()?);
+    Ok(Looked { series: None, plate, images: seen, notices: Vec::new(), inputs })
+}
+
+/// Writes the results; returns the number of files.
+fn write(args: &DetectArgs, looked: &Looked, out: &Path) -> Result<usize> {
+    let context = DetectionContext {
+        plate: &looked.plate,
+        series: looked.series.as_ref(),
+        inputs: looked.inputs.clone(),
+        command: std::env::args().collect::<Vec<_>>().join(" "),
+    };
+    let files = detection_files(&looked.images, &context)?;
+    let names = files.keys().map(String::as_str).chain(args.overlay.then_some(OVERLAY_FOLDER));
+    let result = NewResult::begin(out, names)?;
+    files.iter().try_for_each(|(name, bytes)| result.put(name, bytes))?;
+    let drawn = if args.overlay { draw(looked, &result)? } else { 0 };
+    result.finish()?;
+    Ok(files.len() + drawn)
+}
+
+fn draw(looked: &Looked, result: &NewResult) -> Result<usize> {
+    let palette = Palette::of(&looked.images);
+    let bits = looked.series.as_ref().and_then(|s| s.manifest.camera.bits);
+    let readable: Vec<(&SeenImage, &PathBuf)> =
+        looked.images.iter().filter(|i| i.size.is_some()).filter_map(|i| Some((i, i.path.as_ref()?))).collect();
+    let bar = progress::bar(readable.len(), "drawing");
+    readable.par_iter().try_for_each(|(image, path)| {
+        let drawn = overlay_png(&load(path, bits)?, image, &looked.plate, &palette)?;
+        bar.inc(1);
+        let name = image.name.strip_suffix(".png").unwrap_or(&image.name);
+        result.put(&format!("{OVERLAY_FOLDER}/{name}.png"), &drawn)
+    })?;
+    bar.finish_and_clear();
+    Ok(readable.len())
+}
+
+/// The table: a line for every image, and the sum.
+fn text(images: &[SeenImage]) -> String {
+    let widest = images.iter().map(|i| i.name.chars().count()).fold(5, usize::max);
+    let mut text = format!("{:widest$}  found  rescued  blur px  noise      dropped\n", "image");
+    for image in images {
+        let (found, rescued) = marker_counts(image);
+        let facts = image.detection.circles.as_ref().filter(|c| c.blur_px.is_finite());
+        let blur = facts.map_or_else(|| "-".into(), |c| format!("{:.2}", c.blur_px));
+        let noise = facts.map_or_else(|| "-".into(), |c| format!("{:.1}/{:.1}", c.noise[0], c.noise[1]));
+        let rest = match &image.detection.failure {
+            Some(failure) => format!("NOT USED: {}", failure.what),
+            None => counts(std::iter::once(image)),
+        };
+        text += &format!("{:widest$}  {found:5}  {rescued:7}  {blur:>7}  {noise:9}  {rest}\n", image.name);
+    }
+    let used = images.iter().filter(|i| i.detection.failure.is_none()).count();
+    let sum = |of: fn((usize, usize)) -> usize| images.iter().map(|i| of(marker_counts(i))).sum::<usize>();
+    let (found, rescued) = (sum(|c| c.0), sum(|c| c.1));
+    let label = "all";
+    text += &format!("{label:widest$}  {found:5}  {rescued:7}  {:>7}  {:9}  {}\n", "", "", counts(images.iter()));
+    text += &format!("images    {used} of {} used\n", images.len());
+    text
+}
+
+/// Reasons with their counts, the most frequent first.
+fn counts<'a>(images: impl Iterator<Item = &'a SeenImage>) -> String {
+    let mut counts: Vec<(&str, usize)> = dropped_counts(images).into_iter().collect();
+    counts.sort_by_key(|(reason, n)| (std::cmp::Reverse(*n), *reason));
+    let words: Vec<String> = counts.iter().map(|(reason, n)| format!("{n} {reason}")).collect();
+    if words.is_empty() { "none".into() } else { words.join(", ") }
+}

@@ -1,0 +1,102 @@
+//! The images of a series to what is seen in them; needs no robot.
+
+use std::path::{Path, PathBuf};
+
+use crate::detect::{Detection, FlatField, Picture, SeriesImage, detect_series};
+use crate::error::{Error, Notice, Result};
+use crate::series::{Plate, Series, Source};
+
+/// An image with what was seen in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeenImage {
+    /// File name, the key of joints.csv.
+    pub name: String,
+    /// The file, where it is there.
+    pub path: Option<PathBuf>,
+    /// Width and height, px; `None` for an image that could not be read.
+    pub size: Option<(usize, usize)>,
+    /// What was found, or why the image cannot be used.
+    pub detection: Detection,
+}
+
+impl SeenImage {
+    fn new(name: &str, path: Option<&Path>, seen: SeriesImage) -> Self {
+        Self { name: name.to_owned(), path: path.map(Path::to_path_buf), size: seen.size, detection: seen.detection }
+    }
+
+    /// Notices of the detector, with the name of the image.
+    pub fn notices(&self) -> impl Iterator<Item = Notice> {
+        let named = |n: &Notice| Notice { place: format!("{}: {}", self.name, n.place), ..n.clone() };
+        self.detection.notices.iter().map(named)
+    }
+}
+
+/// Looks for the plate in the images of all stops, dark and white images taken into account; in the order of the stops.
+/// `progress` is called after every image, from any thread.
+///
+/// # Errors
+/// A series without images; dark and white images that are of no use.
+pub fn look(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<Vec<SeenImage>> {
+    let (dark, white) = match &series.source {
+        Source::Images { dark, white, .. } => (dark, white),
+        Source::Recording(path) => return Err(recording(path)),
+        Source::Observations(_) => {
+            let what = "has observations and no images";
+            return Err(Error::input(series.folder.display(), what, "add the images, or use the observations"));
+        }
+    };
+    let bits = series.manifest.camera.bits;
+    let flat_field = FlatField::from_images(dark, white, bits)?;
+    let corrected = |picture: Picture| match &flat_field {
+        Some(flat_field) => flat_field.apply(picture),
+        None => Ok(picture),
+    };
+    let paths: Vec<PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.clone()).collect();
+    let mut found = detect_series(&paths, bits, &series.plate, corrected, progress).into_iter();
+    let missing = |image: &str| {
+        let remedy = "copy it into images/, or remove its row from joints.csv";
+        SeriesImage::failed(Error::input(image, "the image file is missing", remedy))
+    };
+    let seen = series.stops.stops.iter().map(|stop| {
+        let image = stop.path.as_ref().and_then(|_| found.next()).unwrap_or_else(|| missing(&stop.image));
+        SeenImage::new(&stop.image, stop.path.as_deref(), image)
+    });
+    Ok(seen.collect())
+}
+
+/// Looks for a plate in single images.
+pub fn look_at(images: &[PathBuf], plate: &Plate, progress: impl Fn(&Path) + Sync) -> Vec<SeenImage> {
+    let name = |path: &Path| path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let found = detect_series(images, None, plate, Ok, progress);
+    images.iter().zip(found).map(|(path, seen)| SeenImage::new(&name(path), Some(path), seen)).collect()
+}
+
+/// A recording must be taken apart before its images can be looked at.
+pub(super) fn recording(path: &Path) -> Error {
+    Error::input(
+        path.display(),
+        "is a recording, not a series folder",
+        "convert it first: robotcal convert run1.mcap run1/",
+    )
+}
+
+/// When none of the images can be used: what is wrong with the first ones.
+///
+/// # Errors
+/// When no image has an observation.
+pub fn require_some<'a>(place: &str, images: impl Iterator<Item = (&'a str, usize, Option<&'a str>)>) -> Result<()> {
+    let mut reasons = Vec::new();
+    for (name, observations, failure) in images {
+        if failure.is_none() && observations > 0 {
+            return Ok(());
+        }
+        if reasons.len() < 3 {
+            reasons.push(format!("{name}: {}", failure.unwrap_or("no marker found")));
+        }
+    }
+    Err(Error::input(
+        place,
+        format!("no image can be used ({})", reasons.join("; ")),
+        "look at one of the images: is the plate in it, sharp, and the one that plate.toml describes?",
+    ))
+}

@@ -1,0 +1,138 @@
+//! `robotcal detect` as a user calls it.
+
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use robotcal::detect::{detect, load};
+use robotcal::series::{Observation, Source, read};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn robotcal(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_robotcal")).args(args).output().unwrap()
+}
+
+fn text(output: &Output) -> String {
+    format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
+}
+
+fn name(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// A series with some of the shipped images, and the joints of these alone.
+fn small_series(folder: &Path, images: &[&str]) -> PathBuf {
+    let (from, to) = (root().join("datasets/kr6_small"), folder.join("run1"));
+    std::fs::create_dir_all(to.join("images")).unwrap();
+    for file in ["series.toml", "plate.toml", "plate.csv"] {
+        std::fs::copy(from.join(file), to.join(file)).unwrap();
+    }
+    let joints = std::fs::read_to_string(from.join("joints.csv")).unwrap();
+    let wanted = |line: &&str| line.starts_with("image,") || images.iter().any(|i| line.starts_with(i));
+    let rows: Vec<&str> = joints.lines().filter(wanted).collect();
+    std::fs::write(to.join("joints.csv"), rows.join("\n") + "\n").unwrap();
+    for image in images {
+        std::fs::copy(from.join("images").join(image), to.join("images").join(image)).unwrap();
+    }
+    to
+}
+
+#[test]
+fn the_result_is_a_series_with_the_observations_of_the_detector() {
+    let folder = tempfile::tempdir().unwrap();
+    let run1 = small_series(folder.path(), &["img_002.png", "img_005.png"]);
+    let out = folder.path().join("seen");
+    let output = robotcal(&["detect", "--series", name(&run1), "--overlay", "--out", name(&out)]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    let (given, made) = (read(&run1).unwrap(), read(&out).unwrap());
+    let Source::Observations(observed) = &made.source else { panic!("no observations") };
+    assert_eq!(observed.len(), 2);
+    for image in observed {
+        let picture = load(&run1.join("images").join(&image.image), None).unwrap();
+        let direct = detect(&picture, &given.plate).unwrap();
+        assert_eq!(image.observations, direct.observations, "bit by bit, covariances too");
+        assert!(image.observations.iter().all(|o: &Observation| o.covariance.is_some()));
+        let overlay = image::open(out.join("overlay").join(&image.image)).unwrap();
+        assert!(overlay.width() as usize >= picture.width && overlay.height() as usize > picture.height);
+    }
+    let raw = |s: &robotcal::series::Series| {
+        s.stops.stops.iter().map(|s| (s.image.clone(), s.raw_readings.clone())).collect::<Vec<_>>()
+    };
+    assert_eq!(raw(&given), raw(&made));
+    assert_eq!(given.plate.markers, made.plate.markers);
+    assert_eq!((made.camera_name(), made.mounting()), ("run1", "run1"));
+    assert_eq!(made.manifest.camera.width_px, Some(1280));
+    // The table and the list of what was dropped say the same.
+    let dropped = std::fs::read_to_string(out.join("dropped.csv")).unwrap();
+    let reasons: BTreeSet<&str> = dropped.lines().skip(1).filter_map(|l| l.split(',').nth(3)).collect();
+    assert!(!reasons.is_empty());
+    for reason in reasons {
+        let count = dropped.lines().filter(|l| l.contains(&format!(",{reason},"))).count();
+        assert!(text(&output).contains(&format!("{count} {reason}")), "{reason}: {}", text(&output));
+    }
+}
+
+#[test]
+fn images_that_show_nothing_or_a_mirrored_plate_are_named_and_the_others_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let run1 = small_series(folder.path(), &["img_002.png", "img_005.png", "img_013.png"]);
+    let mirrored = run1.join("images/img_005.png");
+    image::open(&mirrored).unwrap().fliph().save(&mirrored).unwrap();
+    image::GrayImage::from_pixel(1280, 1024, image::Luma([90])).save(run1.join("images/img_013.png")).unwrap();
+    let out = folder.path().join("seen");
+    let run = || robotcal(&["detect", "--series", name(&run1), "--overlay", "--out", name(&out)]);
+    let output = run();
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output));
+    let said = text(&output);
+    assert!(said.contains("mirror") && said.contains("nothing looks like a marker"), "{said}");
+    assert!(said.contains("1 of 3 used"), "{said}");
+    let Source::Observations(observed) = read(&out).unwrap().source else { panic!("no observations") };
+    assert_eq!(observed.iter().map(|i| i.image.as_str()).collect::<Vec<_>>(), ["img_002.png"]);
+    assert!(out.join("overlay/img_005.png").is_file(), "what was seen in a refused image is drawn");
+    // A second run takes the place of the first; what lies there besides is kept.
+    std::fs::write(out.join("notes.txt"), "mine").unwrap();
+    assert_eq!(run().status.code(), Some(1));
+    assert!(out.join("notes.txt").is_file());
+    // Nothing usable at all is an error, and the pictures still say why.
+    std::fs::remove_file(run1.join("images/img_002.png")).unwrap();
+    let output = run();
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(text(&output).contains("no image can be used") && text(&output).contains("missing"), "{}", text(&output));
+    assert!(out.join("overlay/img_005.png").is_file());
+}
+
+#[test]
+fn single_images_need_a_plate_and_no_series() {
+    let folder = tempfile::tempdir().unwrap();
+    let small = root().join("datasets/kr6_small");
+    let (plate, picture) = (small.join("plate.toml"), small.join("images/img_023.png"));
+    let out = folder.path().join("seen");
+    let output = robotcal(&["detect", "--plate", name(&plate), name(&picture), "--out", name(&out)]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    assert!(out.join("observations.csv").is_file() && !out.join("series.toml").exists());
+    for (args, word) in [
+        (vec!["detect", name(&picture)], "--plate"),
+        (vec!["detect"], "--series"),
+        (vec!["detect", "--plate", name(&plate), name(&picture), name(&picture)], "names"),
+        (vec!["detect", "--plate", name(&plate), "nowhere.png"], "nowhere.png"),
+        (vec!["detect", "--series", "nowhere"], "nowhere"),
+        (vec!["detect", "--series", name(&small), "--out", name(&small)], "no earlier result"),
+        (vec!["detect", "--study", "--views", "0"], "--views"),
+    ] {
+        let args: Vec<&str> = if args.contains(&"--out") {
+            args
+        } else {
+            let wrong = folder.path().join("wrong");
+            let wrong: &'static str = Box::leak(name(&wrong).to_owned().into_boxed_str());
+            [args, vec!["--out", wrong]].concat()
+        };
+        let output = robotcal(&args);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {}", text(&output));
+        assert!(text(&output).contains(word), "{args:?}: {}", text(&output));
+    }
+}
