@@ -33,7 +33,7 @@ fn a_larger_robot_of_the_same_build_is_named() {
     let series = seen(&right);
     let mut larger = right;
     // The forearm of the long version of the arm.
-    let elbow = larger.joints.iter().position(|j| j.name == "joint_a4").unwrap();
+    let elbow = larger.joints.iter().position(|j| j.name == "joint_a5").unwrap();
     larger.joints[elbow].origin.translation *= 1.6;
     let said = diagnosis(larger, series);
     assert!(said.contains("link lengths") && said.contains("URDF is of this robot"), "{said}");

@@ -15,6 +15,9 @@ pub mod capture {}
 #[doc = include_str!("reading_the_result.md")]
 pub mod reading_the_result {}
 
+#[doc = include_str!("circles.md")]
+pub mod circles {}
+
 #[doc = include_str!("planning.md")]
 pub mod planning {}
 

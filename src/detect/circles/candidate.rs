@@ -42,7 +42,7 @@ pub(super) fn candidates(picture: &Picture, levels: &Levels, options: &Options) 
 
 /// Largest diameter of a marker, px.
 pub(super) fn largest_marker(picture: &Picture, options: &Options) -> f64 {
-    options.largest_marker_px.unwrap_or(picture.width.max(picture.height) as f64 / 8.0)
+    options.largest_marker_px.unwrap_or(picture.width.max(picture.height) as f64 / 5.0)
 }
 
 fn candidate(

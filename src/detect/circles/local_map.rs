@@ -1,6 +1,7 @@
 //! The map from the plate to the image around one marker, from the markers next to it.
 
 use super::ellipse::Ellipse;
+use crate::geom::PlaneMap;
 
 /// Second-order map from the plate (in units of the pitch, relative to the marker, rows down) to the image.
 #[derive(Debug, Clone, Copy)]
@@ -52,6 +53,14 @@ impl LocalMap {
             slope: [0, 1].map(|a| [s[(1, a)], s[(2, a)]]),
             bend: [0, 1].map(|a| [term(3, a), term(4, a), term(5, a)]),
         })
+    }
+
+    /// To first order what a projective map through (plate offset, image point) pairs does at the origin; for origins beyond
+    /// the pairs, where perspective is what a polynomial gets wrong. `None` when the pairs do not determine it.
+    pub fn projective(pairs: &[([f64; 2], [f64; 2])]) -> Option<Self> {
+        let map = PlaneMap::fit(pairs)?;
+        let (origin, slope) = (map.apply([0.0; 2])?, map.jacobian([0.0; 2])?);
+        Some(Self { origin, slope, bend: [[0.0; 3]; 2] })
     }
 
     /// Image of a plate offset.

@@ -8,14 +8,13 @@ use super::candidate::{Candidate, candidates, largest_marker};
 use super::code::{Code, Verdict};
 use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
-use super::lattice::{Lattice, lattices};
+use super::lattice::{Buckets, Lattice, lattices};
 use super::levels::Levels;
-use super::local_map::LocalMap;
 use super::measure::{Camera, Predicted, THRESHOLD, Target, drop_target, learn, median, predicted_target, target_of};
 use super::refine::{Fit, refine};
 use super::second_look::{Figure, Place, second_look};
 use super::types::{Detection, Dropped, Found, InnerOuter, Options, Outcome, Reason};
-use super::vet::{Board, Placed, around, neighbourhood, vet};
+use super::vet::{Board, Placed, around, continuation, neighbourhood, vet};
 use crate::detect::Picture;
 use crate::series::{Edge, Observation, Plate};
 use crate::{Error, Result};
@@ -55,8 +54,9 @@ pub(super) fn detect_coded(
     let (candidates, mut dropped) = candidates(picture, &levels, options);
     let lattices = lattices(&candidates, SMALLEST_LATTICE);
     let (mut board, outcome) = identify(&lattices, &candidates)?;
-    let vetted = vet(&mut board, code, &candidates);
+    let mut vetted = vet(&mut board, code, &candidates);
     attach(&mut board, code, &candidates);
+    vetted.extend(vet(&mut board, code, &candidates));
     drop_unused(&board, &vetted, &lattices, &candidates, &mut dropped);
     let mut work = Work { picture, plate, code, candidates: &candidates, pixels: Pixels::default() };
     let measured = work.measure(&board, &levels, options, &mut dropped);
@@ -95,39 +95,34 @@ fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> (Boa
     (board, outcome)
 }
 
-/// Cells of the plate next to known ones that are not on the board, with the map around each.
-fn open_cells(board: &Board, code: &Code, candidates: &[Candidate]) -> Vec<((i32, i32), LocalMap)> {
-    let mut cells = BTreeSet::new();
-    for (c, r) in board.keys() {
-        for (i, j) in [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, 1), (-1, 1), (1, -1)] {
-            let cell = (c + i, r + j);
-            if !board.contains_key(&cell) && code.marker_at(cell).is_some() {
-                cells.insert(cell);
-            }
-        }
-    }
-    let map = |cell| {
-        let enough = around(board, cell, 2).count() >= 6;
-        if enough { neighbourhood(board, cell, candidates).map(|(m, _)| (cell, m)) } else { None }
-    };
-    cells.into_iter().filter_map(map).collect()
+/// Cells of the plate at most `reach` from known ones that are not on the board.
+fn open_cells(board: &Board, code: &Code, reach: i32) -> BTreeSet<(i32, i32)> {
+    let near = |&(c, r): &(i32, i32)| (-reach..=reach).flat_map(move |j| (-reach..=reach).map(move |i| (c + i, r + j)));
+    let is_open = |cell: &(i32, i32)| !board.contains_key(cell) && code.marker_at(*cell).is_some();
+    board.keys().flat_map(near).filter(is_open).collect()
 }
+
+/// How far a lattice is carried on over a gap, in cells, and how often.
+const GAP: i32 = 3;
+const ROUNDS: usize = 8;
 
 /// Takes up candidates that no lattice reached but that lie where the plate has a marker of their class.
 fn attach(board: &mut Board, code: &Code, candidates: &[Candidate]) {
     let mut used: BTreeSet<usize> = board.values().map(|p| p.candidate).collect();
-    for _ in 0..4 {
+    let index = Buckets::of(candidates);
+    for _ in 0..ROUNDS {
         let mut taken = Vec::new();
-        for (cell, map) in open_cells(board, code, candidates) {
-            let (place, step) = (map.at([0.0, 0.0]), map.shorter_step());
-            let fits = |i: &usize| {
-                let e = &candidates[*i].ellipse;
-                let off = (e.centre[0] - place[0]).hypot(e.centre[1] - place[1]);
-                let Some(unit) = map.ellipse(1.0) else { return false };
-                off < 0.2 * step
-                    && code.classify(&candidates[*i], e.mean_radius() / unit.mean_radius()) == code.class_at(cell)
-            };
-            if let Some(i) = (0..candidates.len()).filter(|i| !used.contains(i)).find(fits) {
+        for cell in open_cells(board, code, GAP) {
+            let Some(map) = continuation(board, cell, candidates) else { continue };
+            let Some(unit) = map.ellipse(1.0) else { continue };
+            let mut found = None;
+            index.within(map.at([0.0, 0.0]), 0.2 * map.shorter_step(), |i| {
+                let class = code.classify(&candidates[i], candidates[i].ellipse.mean_radius() / unit.mean_radius());
+                if !used.contains(&i) && class == code.class_at(cell) {
+                    found = found.or(Some(i));
+                }
+            });
+            if let Some(i) = found {
                 used.insert(i);
                 taken.push((cell, Placed { candidate: i, class: code.class_at(cell) }));
             }
@@ -199,9 +194,17 @@ impl Work<'_> {
         (1.0 - self.code.radii()[1]) / own - 2.1 * blur_px / minor_px
     }
 
+    /// Relative radius at which the border of the picture begins.
+    fn room(&self, ellipse: &Ellipse) -> f64 {
+        let half = ellipse.half_extent();
+        let last = [self.picture.width, self.picture.height].map(|n| n as f64 - 1.0);
+        let free = |a: usize| ellipse.centre[a].min(last[a] - ellipse.centre[a]) - half[a];
+        1.0 + free(0).min(free(1)).max(0.0) / ellipse.semi_axes()[1]
+    }
+
     fn target(&self, cell: (i32, i32), placed: &Placed, blur_px: f64) -> Target {
         let c = &self.candidates[placed.candidate];
-        let clear = self.clear(cell, c.ellipse.semi_axes()[1], blur_px);
+        let clear = self.clear(cell, c.ellipse.semi_axes()[1], blur_px).min(self.room(&c.ellipse));
         let mut target = target_of(c, self.ratio(cell), clear);
         if self.ratio(cell).is_none() {
             target.ratio = None;
@@ -262,7 +265,9 @@ impl Work<'_> {
     /// Looks where the neighbours say that a marker must be.
     fn rescue(&mut self, board: &Board, camera: &Camera, dropped: &mut Vec<Dropped>) -> Vec<Entry> {
         let mut found = Vec::new();
-        for (cell, map) in open_cells(board, self.code, self.candidates) {
+        for cell in open_cells(board, self.code, 1) {
+            let enough = around(board, cell, 2).count() >= 6;
+            let Some((map, _)) = neighbourhood(board, cell, self.candidates).filter(|_| enough) else { continue };
             let Some(marker) = self.marker(cell) else { continue };
             let Some(outer) = map.ellipse(marker.outer_radius_m / self.plate.pitch_m) else { continue };
             let half = outer.half_extent();
@@ -270,14 +275,14 @@ impl Work<'_> {
             if (0..2).any(|a| outer.centre[a] < half[a] + 1.0 || outer.centre[a] > size[a] - half[a] - 2.0) {
                 continue;
             }
-            let clear = self.clear(cell, outer.semi_axes()[1], camera.blur_px);
+            let clear = self.clear(cell, outer.semi_axes()[1], camera.blur_px).min(self.room(&outer));
             let predicted = Predicted { marker: marker.id, outer, ratio: self.ratio(cell), shape_sigma: 0.05, clear };
             let id = marker.id;
             let target = predicted_target(self.picture, &predicted);
             let result = target
                 .ok_or(Reason::LowContrast)
                 .and_then(|t| refine(self.picture, &t.start(camera, 0.2), &mut self.pixels))
-                .and_then(|fit| self.credible(&fit, &outer));
+                .and_then(|fit| credible(&fit, &outer, camera));
             match result {
                 Ok(fit) => {
                     let seen = fit.measured.outer.ellipse.centre;
@@ -291,14 +296,6 @@ impl Work<'_> {
             }
         }
         found
-    }
-
-    /// A rescued marker must look as predicted: size, place and darkness of the ink.
-    fn credible(&self, fit: &Fit, predicted: &Ellipse) -> std::result::Result<Fit, Reason> {
-        let e = &fit.measured.outer.ellipse;
-        let off = predicted.relative_radius(e.centre);
-        let size = (e.mean_radius() / predicted.mean_radius()).ln().abs();
-        if off > 0.4 || size > 0.12 { Err(Reason::OutOfPlace) } else { Ok(*fit) }
     }
 
     /// Drops annuli whose inner and outer centre do not agree.
@@ -364,6 +361,19 @@ impl Work<'_> {
         let lopsided = Drift::fit(harvest.entries.iter().map(skew), size);
         Detection { observations, found, dropped, outcome, blur_px, noise, inner_outer: harvest.inner_outer, lopsided }
     }
+}
+
+/// A rescued marker must look as predicted, size and place, and leave no more than noise: with its shape held, something that touches it
+/// from the side moves its centre without making it look wrong.
+fn credible(fit: &Fit, predicted: &Ellipse, camera: &Camera) -> std::result::Result<Fit, Reason> {
+    let m = &fit.measured;
+    let off = predicted.relative_radius(m.outer.ellipse.centre);
+    let size = (m.outer.ellipse.mean_radius() / predicted.mean_radius()).ln().abs();
+    if off > 0.4 || size > 0.12 {
+        return Err(Reason::OutOfPlace);
+    }
+    let is_noise = m.rms.powi(2) < 2.0 * camera.noise[0] + (0.02 * (m.paper - m.ink)).powi(2);
+    if is_noise { Ok(*fit) } else { Err(Reason::EdgeModel) }
 }
 
 /// The observations of a measured marker: outer, then inner.

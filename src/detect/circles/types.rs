@@ -12,7 +12,8 @@ use crate::{Error, Notice};
 /// What the detector looks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Largest diameter of a marker's image, px; `None`: an eighth of the picture's longer side.
+    /// Largest diameter of a marker's image, px; `None`: a fifth of the picture's longer side (20 markers
+    /// in view under strong perspective).
     pub largest_marker_px: Option<f64>,
     /// Smallest semi-axis of a marker's image, px.
     pub smallest_semi_axis_px: f64,

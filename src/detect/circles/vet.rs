@@ -63,18 +63,34 @@ pub(super) fn around(board: &Board, cell: Cell, reach: i32) -> impl Iterator<Ite
         .filter_map(|c| board.get(&c).map(|p| (c, p)))
 }
 
+/// Pairs (offset from a cell, place in the image) of the markers at most `reach` from it, without itself.
+fn pairs(board: &Board, cell: Cell, reach: i32, candidates: &[Candidate]) -> Vec<([f64; 2], [f64; 2])> {
+    around(board, cell, reach)
+        .filter(|(c, _)| *c != cell)
+        .map(|(c, p)| ([f64::from(c.0 - cell.0), f64::from(c.1 - cell.1)], candidates[p.candidate].ellipse.centre))
+        .collect()
+}
+
+/// Markers that a projective map is extrapolated from, and how far from the place they may be to carry on a lattice over a gap.
+const EXTRAPOLATE: usize = 9;
+const FARTHEST: i32 = 6;
+
 /// Map around a cell from its neighbours without itself, and how far (in pitches) it may be off: the eight direct
 /// neighbours interpolate closely, fewer or one-sided ones extrapolate.
 pub(super) fn neighbourhood(board: &Board, cell: Cell, candidates: &[Candidate]) -> Option<(LocalMap, f64)> {
-    let pairs = |reach: i32| -> Vec<([f64; 2], [f64; 2])> {
-        around(board, cell, reach)
-            .filter(|(c, _)| *c != cell)
-            .map(|(c, p)| ([f64::from(c.0 - cell.0), f64::from(c.1 - cell.1)], candidates[p.candidate].ellipse.centre))
-            .collect()
-    };
+    let pairs = |reach: i32| pairs(board, cell, reach, candidates);
     let close = pairs(1);
     if close.len() == 8 {
         return LocalMap::fit(&close).map(|m| (m, 0.08));
     }
-    LocalMap::fit(&pairs(2)).map(|m| (m, 0.25))
+    let wide = pairs(3);
+    let beyond = if wide.len() >= EXTRAPOLATE { LocalMap::projective(&wide) } else { None };
+    beyond.or_else(|| LocalMap::fit(&pairs(2))).map(|m| (m, 0.25))
+}
+
+/// Map around a cell from the nearest markers, which may all lie beyond a gap.
+pub(super) fn continuation(board: &Board, cell: Cell, candidates: &[Candidate]) -> Option<LocalMap> {
+    let near = (2..=FARTHEST).map(|reach| pairs(board, cell, reach, candidates)).find(|p| p.len() >= 2 * EXTRAPOLATE);
+    let near = near.unwrap_or_else(|| pairs(board, cell, FARTHEST, candidates));
+    if near.len() >= EXTRAPOLATE { LocalMap::projective(&near) } else { None }
 }

@@ -1,11 +1,12 @@
 //! The section on identity.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::{Claim, Section};
 use crate::output::report::svg::{Anchor, Svg};
 use crate::plan::plate_design::LEAST_MINOR_AXIS_PX;
-use crate::simulate::image_study::{DISPLACED_PX, Identity, IdentityView, MirrorAnswer, Sight};
+use crate::simulate::image_study::{DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityView, MirrorAnswer, Sight};
 
 /// Share of the wholly visible markers that must be found.
 const LEAST_RECALL: f64 = 0.99;
@@ -94,6 +95,7 @@ pub fn identity_section(study: &Identity) -> Section {
             );
         }
     }
+    text += &misses(&of_plate);
     text += &failures(study);
     let plots = vec![("image-stage-identity.svg".to_owned(), plot(&of_plate, &tables[..2]))];
     Section { title: "Identity".to_owned(), claims: claims(study, &all), text, plots }
@@ -133,14 +135,30 @@ fn claims(study: &Identity, all: &Sums) -> Vec<Claim> {
 
 fn setup(study: &Identity) -> String {
     format!(
-        "Views of the standard plate of 504 markers with seeds from {}: 0.12 to 0.6 megapixels, fields of 25 to 75 degrees with distortion, every roll, tilt to 60 \
+        "Views of the standard plate of 504 markers with seeds from {}: 0.12 to 1.2 megapixels, fields of 25 to 75 degrees with distortion, every roll, tilt to 60 \
          degrees, 20 to 504 markers in view; 8 or 12 bit, uneven light, blur of 0.5 to 1.2 px, noise, and in part cables and a gripper before the \
          plate, glare up to saturation, clutter around it, motion and coma. A marker counts as visible when its whole outer contour is in the \
          picture with nothing before it, not saturated, and with a minor axis of at least {LEAST_MINOR_AXIS_PX:.0} px; views with fewer than 20 such markers \
          are drawn again. An id is wrong when the observation is more than half a pitch from its marker; an observation is displaced when it is off by more than \
-         {DISPLACED_PX} px. One view in ten is also shown as its mirror image, and one in ten shows a plate with another code.\n",
+         {DISPLACED_PX} px and by more than {DISPLACED_SIGMAS} of its stated sigmas. One view in ten is also shown as its mirror image, and one in ten shows a plate with another code.\n",
         study.request.seed
     )
+}
+
+/// What became of the visible markers that were not found.
+fn misses(views: &[&IdentityView]) -> String {
+    let mut reasons: BTreeMap<&str, usize> = BTreeMap::new();
+    for (reason, count) in views.iter().flat_map(|v| &v.missed) {
+        *reasons.entry(reason).or_default() += count;
+    }
+    let mut sorted: Vec<(&str, usize)> = reasons.into_iter().collect();
+    sorted.sort_by_key(|(reason, n)| (std::cmp::Reverse(*n), *reason));
+    let words: Vec<String> = sorted.iter().map(|(reason, n)| format!("{n} {reason}")).collect();
+    if words.is_empty() {
+        String::new()
+    } else {
+        format!("\nVisible markers that were missed: {}.\n", words.join(", "))
+    }
 }
 
 /// The views with failures, with their seeds.

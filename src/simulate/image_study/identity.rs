@@ -1,5 +1,7 @@
 //! Identity of markers in random views: none may be wrong, few may be missed, a mirror and a strange plate must be seen through.
 
+use std::collections::BTreeMap;
+
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -9,7 +11,7 @@ use crate::detect::{Detection, Picture, circles};
 use crate::error::Result;
 use crate::model::circle::centroid_uv;
 use crate::plan::plate_design::{PlateRequest, design};
-use crate::series::{Edge, Observation, Plate};
+use crate::series::{Edge, Plate};
 
 /// What is wished for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,8 +63,10 @@ pub struct IdentityView {
     pub identified: bool,
     /// Observations that are not where their marker is.
     pub wrong: usize,
-    /// Observations of the right marker, but off by more than [`DISPLACED_PX`].
+    /// Observations of the right marker, but off by more than [`DISPLACED_PX`] and [`DISPLACED_SIGMAS`] of their stated sigmas.
     pub displaced: usize,
+    /// Why visible markers were not found, with counts.
+    pub missed: BTreeMap<&'static str, usize>,
     /// What was said of the mirror image, where one was shown.
     pub mirror: Option<MirrorAnswer>,
 }
@@ -80,8 +84,11 @@ pub enum MirrorAnswer {
     Accepted,
 }
 
-/// An observation of the right marker that is off by more is displaced: something else disturbed its fit.
-pub const DISPLACED_PX: f64 = 0.5;
+/// An observation of the right marker that is off by more, and by more than [`DISPLACED_SIGMAS`], is displaced: something else
+/// disturbed its fit.
+pub const DISPLACED_PX: f64 = 0.1;
+/// See [`DISPLACED_PX`].
+pub const DISPLACED_SIGMAS: f64 = 6.0;
 
 impl IdentityView {
     /// Something that must not happen happened.
@@ -154,6 +161,7 @@ pub fn identity_view(plates: &Plates, seed: u64) -> (IdentityView, Picture, Dete
         identified: !detection.observations.is_empty(),
         wrong: 0,
         displaced: 0,
+        missed: BTreeMap::new(),
         mirror: None,
     };
     if sight == Sight::OtherPlate {
@@ -161,7 +169,7 @@ pub fn identity_view(plates: &Plates, seed: u64) -> (IdentityView, Picture, Dete
         view.visible = 0;
         return (view, picture, detection);
     }
-    judge(&mut view, &truth, &plates.own, &detection.observations);
+    judge(&mut view, &truth, &plates.own, &detection);
     if sight == Sight::Mirror {
         let mirrored = mirrored(&picture);
         let seen = detect(&mirrored, &plates.own);
@@ -197,11 +205,11 @@ fn mirrored(picture: &Picture) -> Picture {
 }
 
 /// Compares observations with the truth.
-fn judge(view: &mut IdentityView, truth: &RandomView, plate: &Plate, observations: &[Observation]) {
+fn judge(view: &mut IdentityView, truth: &RandomView, plate: &Plate, detection: &Detection) {
     let place =
         |index: usize, radius: f64| centroid_uv(&truth.camera, &truth.pose, &plate.markers[index].position_m, radius);
     let mut found = vec![false; plate.markers.len()];
-    for o in observations {
+    for o in &detection.observations {
         let Some(index) = plate.index_of(o.marker) else {
             view.wrong += 1;
             continue;
@@ -214,9 +222,17 @@ fn judge(view: &mut IdentityView, truth: &RandomView, plate: &Plate, observation
         if off > half_pitch {
             view.wrong += 1;
         } else {
-            view.displaced += usize::from(off > DISPLACED_PX);
+            let sigma = o.covariance.map_or(0.0, |c| (0.5 * (c[0] + c[2])).sqrt());
+            view.displaced += usize::from(off > DISPLACED_PX.max(DISPLACED_SIGMAS * sigma));
             found[index] |= o.edge == Edge::Outer;
         }
     }
     view.found = truth.visible.iter().filter(|&&k| found[k]).count();
+    for &k in truth.visible.iter().filter(|&&k| !found[k]) {
+        let marker = &plate.markers[k];
+        let Some(uv) = place(k, marker.outer_radius_m) else { continue };
+        let near = truth.shorter_pitch_px(plate, k) * marker.outer_radius_m / plate.pitch_m;
+        let dropped = detection.dropped.iter().find(|d| (d.uv[0] - uv[0]).hypot(d.uv[1] - uv[1]) < near);
+        *view.missed.entry(dropped.map_or("no candidate", |d| d.reason)).or_default() += 1;
+    }
 }

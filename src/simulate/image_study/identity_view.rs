@@ -15,8 +15,10 @@ use crate::simulate::conditions::{Glare, ImagingConditions, Spot, bell};
 use crate::simulate::render::render;
 use crate::simulate::scenery::{cable, gripper};
 
-/// Fewest and most markers that a view is drawn for; where it lies on the plate takes some away.
-const MARKERS: [f64; 2] = [20.0, 504.0];
+/// Fewest and most markers that would fill the picture; the most are twice those of the plate, which is then seen whole.
+const MARKERS: [f64; 2] = [20.0, 1000.0];
+/// From that many on the picture is larger, so that the markers are not too small.
+const MANY: f64 = 300.0;
 const LARGEST_TILT_DEG: f64 = 60.0;
 /// Fewest markers wholly visible in a view that counts.
 const LEAST_VISIBLE: usize = 20;
@@ -50,7 +52,8 @@ impl RandomView {
     }
 
     fn draw(plate: &Plate, rng: &mut ChaCha8Rng) -> Self {
-        let width = rng.random_range(420..860_u32);
+        let markers = MARKERS[0] * (MARKERS[1] / MARKERS[0]).powf(rng.random());
+        let width = if markers < MANY { rng.random_range(420..860_u32) } else { rng.random_range(860..1180) };
         let size = [width, (f64::from(width) * rng.random_range(0.66..0.85)) as u32];
         let field = rng.random_range(25_f64..75.0).to_radians();
         let focal_px = f64::from(width) / 2.0 / (field / 2.0).tan();
@@ -62,10 +65,11 @@ impl RandomView {
         }
         // Even over the cap of directions.
         let cosine = 1.0 - (1.0 - LARGEST_TILT_DEG.to_radians().cos()) * rng.random::<f64>();
-        let markers = MARKERS[0] * (MARKERS[1] / MARKERS[0]).powf(rng.random());
         let pitch_px = (f64::from(size[0] * size[1]) / (markers * cosine)).sqrt();
         let half = |n: u32| f64::from(n) / 2.0 * plate.pitch_m;
-        let mut around = |reach: f64| rng.random_range(-0.8..0.8) * reach;
+        // The more of the plate is to be seen, the nearer to its middle.
+        let spread = 0.8 * (1.0 - markers / MARKERS[1]);
+        let mut around = |reach: f64| rng.random_range(-1.0..1.0) * spread * reach;
         let aim_m = [around(half(plate.columns)), around(half(plate.rows))];
         let direction = Direction {
             distance_m: focal_px * plate.pitch_m / pitch_px,

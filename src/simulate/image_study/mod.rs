@@ -8,6 +8,7 @@ mod view;
 
 pub use bias::{Bias, BiasCase, Cause, bias, bias_cases};
 pub use identity::{
-    DISPLACED_PX, Identity, IdentityRequest, IdentityView, MirrorAnswer, Plates, Sight, identity, identity_view,
+    DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityRequest, IdentityView, MirrorAnswer, Plates, Sight, identity,
+    identity_view,
 };
 pub use precision::{Precision, PrecisionCell, precision, precision_cells};
