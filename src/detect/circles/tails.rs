@@ -58,8 +58,8 @@ pub(super) fn lift(pixels: &mut Pixels, tails: &[Tail], anchor: [f64; 2]) {
         }
     }
     let mut keep = 0;
-    for i in 0..pixels.count {
-        if covered[i].abs() <= MOST {
+    for (i, covered) in covered.iter().enumerate().take(pixels.count) {
+        if covered.abs() <= MOST {
             pixels.x[keep] = pixels.x[i];
             pixels.y[keep] = pixels.y[i];
             pixels.value[keep] = pixels.value[i];
