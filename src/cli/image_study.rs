@@ -6,11 +6,17 @@ use clap::{Args, ValueEnum};
 
 use super::{Verdict, progress};
 use crate::error::{Error, Result};
-use crate::output::image_study::{REPORT, Section, identity_section, image_study_files};
+use crate::output::image_study::{
+    REPORT, Section, bias_section, identity_section, image_study_files, precision_section,
+};
 use crate::output::overlay::{Palette, overlay_png};
 use crate::output::write_beside;
+use crate::plan::plate_design::{PlateRequest, design};
 use crate::recipe::SeenImage;
-use crate::simulate::image_study::{Identity, IdentityRequest, Plates, identity, identity_view};
+use crate::simulate::image_study::{
+    Bias, Identity, IdentityRequest, Plates, Precision, bias, bias_cases, identity, identity_view, precision,
+    precision_cells,
+};
 
 /// Flags of the study.
 #[derive(Debug, Args)]
@@ -32,6 +38,10 @@ pub(super) struct StudyArgs {
 /// Parts of the study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Part {
+    /// Errors of the centres against the Cramer-Rao bound, and the honesty of the stated covariance
+    Precision,
+    /// Gradients, wide-angle lenses, close views, coma
+    Bias,
     /// No wrong id, few markers missed, mirror images refused
     Identity,
 }
@@ -53,6 +63,12 @@ pub(super) fn run(args: &StudyArgs, out: &Path, overlay: bool) -> Result<Verdict
     let mut sections = Vec::new();
     let mut pictures = Vec::new();
     let wants = |part: Part| args.part.is_empty() || args.part.contains(&part);
+    if wants(Part::Precision) {
+        sections.push(precision_section(&run_precision(args.seed)));
+    }
+    if wants(Part::Bias) {
+        sections.push(bias_section(&run_bias()?));
+    }
     if wants(Part::Identity) {
         let study = run_identity(args)?;
         if overlay {
@@ -78,6 +94,36 @@ fn command(args: &StudyArgs) -> String {
         }
     }
     text + &format!(" --views {} --seed {}", args.views, args.seed)
+}
+
+/// Pictures for each cell of the study of precision.
+const PICTURES: u64 = 3;
+
+fn run_precision(seed: u64) -> Vec<Precision> {
+    let cells = precision_cells(
+        &[4.0, 6.0, 10.0, 18.0, 30.0],
+        &[0.6, 1.0, 1.5],
+        &[20.0, 60.0, 200.0],
+        &[0.0, 30.0, 45.0, 60.0],
+    );
+    let bar = progress::bar(cells.len(), "cells");
+    let study = cells.into_iter().flat_map(|c| {
+        let reached = precision(c, PICTURES, seed);
+        bar.inc(1);
+        reached
+    });
+    let study = study.collect();
+    bar.finish_and_clear();
+    study
+}
+
+fn run_bias() -> Result<Vec<Bias>> {
+    let plate = design(&PlateRequest::default())?.plate;
+    let cases = bias_cases(&[0.6, 1.0, 1.5]);
+    let bar = progress::bar(cases.len(), "cases");
+    let study = cases.iter().map(|c| bias(c, &plate)).inspect(|_| bar.inc(1)).collect();
+    bar.finish_and_clear();
+    study
 }
 
 fn run_identity(args: &StudyArgs) -> Result<Identity> {

@@ -8,6 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
+use super::asymmetry::Drift;
 use super::lattice::Cell;
 use super::local_map::LocalMap;
 use super::measure::median;
@@ -32,20 +33,22 @@ pub(super) struct Inner {
     pub sigma: [f64; 2],
 }
 
-/// Which markers agree (in their order), and the mean difference that geometry does not explain.
-pub(super) fn agreement(markers: &[Seen]) -> (Vec<bool>, Option<InnerOuter>) {
+/// Which markers agree (in their order), and the difference that geometry does not explain; `size` is that of the picture.
+pub(super) fn agreement(markers: &[Seen], size: [usize; 2]) -> (Vec<bool>, Option<InnerOuter>) {
     let Some(map) = Map::of(markers) else { return (vec![true; markers.len()], None) };
     let differences: Vec<Option<Difference>> = markers.iter().map(|m| map.difference(m)).collect();
     let mean = |a: usize| median(differences.iter().flatten().map(|d| d.value[a]).collect());
     let common = if differences.iter().flatten().count() >= 5 { [mean(0), mean(1)] } else { [0.0; 2] };
     let agrees = |d: &Difference| (0..2).all(|a| (d.value[a] - common[a]).abs() < 5.0 * d.sigma[a] + d.slack);
     let good: Vec<bool> = differences.iter().map(|d| d.as_ref().is_none_or(agrees)).collect();
-    (good.clone(), summary(&differences, &good))
+    (good.clone(), summary(&differences, &good, size))
 }
 
 /// Unexplained difference inner - outer centre of an annulus.
 #[derive(Debug, Clone, Copy)]
 struct Difference {
+    /// Where, px.
+    at: [f64; 2],
     value: [f64; 2],
     sigma: [f64; 2],
     slack: f64,
@@ -120,7 +123,7 @@ impl Map {
         let part = if pairs.len() >= 20 { 0.1 } else { 0.35 };
         let explained = expected[0].hypot(expected[1]);
         let slack = 0.02 + part * explained;
-        Some(Difference { value, sigma: inner.sigma, slack, explained })
+        Some(Difference { at: marker.outer, value, sigma: inner.sigma, slack, explained })
     }
 }
 
@@ -173,7 +176,7 @@ impl Polynomial {
 }
 
 /// Area centroid of the image of a circle of `radius` about the origin.
-fn centroid(map: &impl Fn([f64; 2]) -> Option<[f64; 2]>, radius: f64) -> Option<[f64; 2]> {
+pub(super) fn centroid(map: &impl Fn([f64; 2]) -> Option<[f64; 2]>, radius: f64) -> Option<[f64; 2]> {
     let mut ring = [[0.0; 2]; RING];
     for (k, p) in ring.iter_mut().enumerate() {
         let (sin, cos) = (k as f64 * std::f64::consts::TAU / RING as f64).sin_cos();
@@ -190,20 +193,15 @@ fn centroid(map: &impl Fn([f64; 2]) -> Option<[f64; 2]>, radius: f64) -> Option<
     area.is_normal().then(|| [0, 1].map(|a| origin[a] + sum[a] / area))
 }
 
-fn summary(differences: &[Option<Difference>], good: &[bool]) -> Option<InnerOuter> {
+fn summary(differences: &[Option<Difference>], good: &[bool], size: [usize; 2]) -> Option<InnerOuter> {
     let used: Vec<&Difference> =
         differences.iter().zip(good).filter(|(_, g)| **g).filter_map(|(d, _)| d.as_ref()).collect();
     if used.len() < 3 {
         return None;
     }
-    let weight = |a: usize| used.iter().map(|d| d.sigma[a].powi(-2)).sum::<f64>();
-    let mean = |a: usize| used.iter().map(|d| d.value[a] * d.sigma[a].powi(-2)).sum::<f64>() / weight(a);
-    Some(InnerOuter {
-        mean_px: [mean(0), mean(1)],
-        sigma_px: [weight(0).sqrt().recip(), weight(1).sqrt().recip()],
-        explained_px: used.iter().map(|d| d.explained).sum::<f64>() / used.len() as f64,
-        count: used.len(),
-    })
+    let drift = Drift::fit(used.iter().map(|d| (d.at, d.value, d.sigma.map(|s| s.powi(-2)))), size)?;
+    let explained_px = used.iter().map(|d| d.explained).sum::<f64>() / used.len() as f64;
+    Some(InnerOuter { drift, explained_px, count: used.len() })
 }
 
 #[cfg(test)]
@@ -218,14 +216,20 @@ mod tests {
         [1000.0 * u * stretch, 1000.0 * v * stretch]
     }
 
-    fn seen(coma: [f64; 2]) -> Vec<Seen> {
+    const SIZE: [usize; 2] = [1000, 800];
+
+    /// Inner centres are off by `shift`, and by `corner` along the radius in the picture's corner.
+    fn seen(shift: [f64; 2], corner: f64) -> Vec<Seen> {
         let cells = (-7..=7).flat_map(|i| (-5..=5).map(move |j| (i, j)));
         let marker = |cell: Cell| {
             let at = |d: [f64; 2]| Some(image([f64::from(cell.0) + d[0], f64::from(cell.1) + d[1]]));
             let outer_radius = if (cell.0 + cell.1) % 3 == 0 { 0.2 } else { 0.3 };
-            let outer = centroid(&at, outer_radius).unwrap();
-            let inner = centroid(&at, outer_radius / 2.0).unwrap();
-            let centre = [inner[0] + coma[0], inner[1] + coma[1]];
+            let middle = SIZE.map(|n| (n as f64 - 1.0) / 2.0);
+            let place = |p: [f64; 2]| [p[0] + middle[0], p[1] + middle[1]];
+            let outer = place(centroid(&at, outer_radius).unwrap());
+            let inner = place(centroid(&at, outer_radius / 2.0).unwrap());
+            let field = [0, 1].map(|a| (outer[a] - middle[a]) / middle[0].hypot(middle[1]));
+            let centre = [0, 1].map(|a| inner[a] + shift[a] + corner * field[a]);
             let inner = Some(Inner { radius: outer_radius / 2.0, centre, sigma: [0.003; 2] });
             Seen { cell, outer_radius, outer, inner: inner.filter(|_| cell.0 % 2 == 0) }
         };
@@ -234,23 +238,32 @@ mod tests {
 
     #[test]
     fn perspective_and_distortion_are_explained_and_an_offset_is_not() {
-        let (good, summary) = agreement(&seen([0.0; 2]));
+        let (good, summary) = agreement(&seen([0.0; 2], 0.0), SIZE);
         let summary = summary.unwrap();
         assert!(good.iter().all(|g| *g));
-        assert!(summary.mean_px.iter().all(|m| m.abs() < 5e-4) && !summary.asymmetric(), "{summary:?}");
-        let (good, summary) = agreement(&seen([0.012, -0.008]));
+        assert!(summary.drift.mean_px.iter().all(|m| m.abs() < 5e-4) && !summary.asymmetric(), "{summary:?}");
+        let (good, summary) = agreement(&seen([0.012, -0.008], 0.0), SIZE);
         let summary = summary.unwrap();
         assert!(good.iter().all(|g| *g));
-        assert!(summary.asymmetric() && (summary.mean_px[0] - 0.012).abs() < 5e-4, "{summary:?}");
+        assert!(summary.asymmetric() && (summary.drift.mean_px[0] - 0.012).abs() < 5e-4, "{summary:?}");
+    }
+
+    #[test]
+    fn coma_that_grows_towards_the_corners_is_seen_though_its_mean_vanishes() {
+        let (good, summary) = agreement(&seen([0.0; 2], 0.02), SIZE);
+        let summary = summary.unwrap();
+        assert!(good.iter().all(|g| *g));
+        assert!(summary.drift.mean_px.iter().all(|m| m.abs() < 2e-3), "{summary:?}");
+        assert!(summary.asymmetric() && (summary.drift.corner_px - 0.02).abs() < 2e-3, "{summary:?}");
     }
 
     #[test]
     fn one_marker_that_disagrees_is_named() {
-        let mut markers = seen([0.0; 2]);
+        let mut markers = seen([0.0; 2], 0.0);
         let odd = markers.iter().position(|m| m.inner.is_some()).unwrap() + 22;
         let inner = markers[odd].inner.as_mut().unwrap();
         inner.centre[0] += 0.3;
-        let (good, _) = agreement(&markers);
+        let (good, _) = agreement(&markers, SIZE);
         assert_eq!(good.iter().filter(|g| !**g).count(), 1);
         assert!(!good[odd]);
     }

@@ -22,6 +22,7 @@
 use super::ellipse::Ellipse;
 use super::exact_edge::{Contour, MOMENTS, Nodes};
 use super::flat_zone::Flat;
+use super::gauss::normal_tail;
 
 /// Parameters of a disc.
 pub(super) const DISC: usize = 14;
@@ -119,6 +120,9 @@ impl State {
     }
 }
 
+/// Distance from an edge, in units of the blur, beyond which a pixel sees nothing of its shape.
+const FAR: f32 = 4.2;
+
 /// Lanes of the vectorised loops; the number of pixels is padded to a multiple.
 pub(super) const LANES: usize = 8;
 
@@ -141,7 +145,7 @@ pub(super) struct Pixels {
     weighted: Vec<f32>,
     /// Columns of the weighted Jacobian.
     columns: Vec<Vec<f32>>,
-    nodes: Nodes,
+    pub nodes: Nodes,
     /// Even paper and ink beyond the band.
     pub flat: Flat,
 }
@@ -158,6 +162,8 @@ struct EdgeTerms {
     sin: Vec<f32>,
     normal_x: Vec<f32>,
     normal_y: Vec<f32>,
+    /// Distance to the edge in units of the blur.
+    argument: Vec<f32>,
     /// Derivative of the argument by ln blur.
     widen: Vec<f32>,
     /// Exact coverage less that of the closed form, where the contour is strongly curved.
@@ -168,10 +174,11 @@ struct EdgeTerms {
 
 impl EdgeTerms {
     fn resize(&mut self, n: usize) {
-        let EdgeTerms { coverage, density, scale, rho, cos, sin, normal_x, normal_y, widen, missing, exact } = self;
+        let EdgeTerms { coverage, density, scale, rho, cos, sin, normal_x, normal_y, argument, widen, missing, exact } =
+            self;
         missing.clear();
         exact.clear();
-        for v in [coverage, density, scale, rho, cos, sin, normal_x, normal_y, widen, missing] {
+        for v in [coverage, density, scale, rho, cos, sin, normal_x, normal_y, argument, widen, missing] {
             v.resize(n, 0.0);
         }
     }
@@ -191,6 +198,14 @@ impl Pixels {
         self.y.push(y);
         self.value.push(value);
         self.mask.push(1.0);
+    }
+
+    /// Keeps the first `count` pixels.
+    pub fn truncate(&mut self, count: usize) {
+        for v in [&mut self.x, &mut self.y, &mut self.value, &mut self.mask] {
+            v.truncate(count);
+        }
+        self.finish();
     }
 
     /// Pads to whole lanes; call once after the last `push`.
@@ -319,21 +334,54 @@ impl Pixels {
         }
     }
 
-    /// Normal matrix (lower triangle) of `parameters` columns.
+    /// What the edges' lopsidedness says about the displacement of the centre, and the information on it (1/px^2).
+    ///
+    /// A point spread with the third cumulant `k` along the normal adds `k / (6 s^3) (u^2 - 1) phi(u)` to the coverage.
+    /// The fit takes the part along `phi` for a displacement `-k / (12 s^2)`; the part with `u^2 - 1/2` stays in the
+    /// residuals and tells its size.
+    pub fn skew(&self, state: &State, noise: [f64; 2]) -> ([f64; 2], [f64; 2]) {
+        let (v_white, v_dark) = (noise[0] as f32, noise[1] as f32);
+        let factor = ((state.white[0] - state.dark[0]) * 2.0 / state.blur) as f32;
+        let edges = if state.inner.is_some() { 2 } else { 1 };
+        let (mut sum, mut information) = ([0.0f32; 2], [0.0f32; 2]);
+        for i in 0..self.count {
+            let weight = 1.0 / (v_white + (v_dark - v_white) * self.ink[i]).max(0.1 * v_dark);
+            let mut columns = [0.0f32; 2];
+            for (terms, sign) in [(&self.outer, factor), (&self.inner, -factor)].into_iter().take(edges) {
+                let u = terms.argument[i];
+                let lobe = sign * (u * u - 0.5) * normal_tail(u).1;
+                columns[0] += lobe * terms.normal_x[i];
+                columns[1] += lobe * terms.normal_y[i];
+            }
+            for a in 0..2 {
+                sum[a] += weight * columns[a] * self.residual[i];
+                information[a] += weight * columns[a] * columns[a];
+            }
+        }
+        (sum.map(f64::from), information.map(f64::from))
+    }
+
+    /// Normal matrix (lower triangle) of `parameters` columns, by blocks of pixels that stay in the nearest cache.
     pub fn normal(&self, parameters: usize, out: &mut [[f64; ANNULUS]; ANNULUS]) {
-        for (i, row) in out.iter_mut().enumerate().take(parameters) {
-            for (j, v) in row.iter_mut().enumerate().take(i + 1) {
-                *v = dot(&self.columns[i], &self.columns[j]);
+        const BLOCK: usize = 16 * LANES;
+        out.iter_mut().for_each(|row| row.fill(0.0));
+        let n = self.x.len();
+        for from in (0..n).step_by(BLOCK) {
+            let to = (from + BLOCK).min(n);
+            for (i, row) in out.iter_mut().enumerate().take(parameters) {
+                let column = &self.columns[i][from..to];
+                for (v, other) in row.iter_mut().zip(&self.columns[..=i]) {
+                    *v += dot(column, &other[from..to]);
+                }
             }
         }
     }
 
-    /// Gradient of the parameters and the weighted sum of squares.
-    pub fn gradient(&self, parameters: usize, out: &mut [f64; ANNULUS]) -> f64 {
+    /// Gradient of the parameters.
+    pub fn gradient(&self, parameters: usize, out: &mut [f64; ANNULUS]) {
         for (g, column) in out.iter_mut().zip(&self.columns).take(parameters) {
             *g = dot(column, &self.weighted);
         }
-        dot(&self.weighted, &self.weighted)
     }
 }
 
@@ -359,14 +407,25 @@ fn exact_columns(terms: &EdgeTerms, columns: &mut [Vec<f32>], first: bool, third
     }
 }
 
+/// Product of two columns, whose length is a multiple of the lanes.
 fn dot(a: &[f32], b: &[f32]) -> f64 {
-    let mut sums = [0.0f32; LANES];
-    for (p, q) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
+    const WIDE: usize = 4 * LANES;
+    let mut sums = [0.0f32; WIDE];
+    let (p, q) = (a.chunks_exact(WIDE), b.chunks_exact(WIDE));
+    let (rest_p, rest_q) = (p.remainder(), q.remainder());
+    for (p, q) in p.zip(q) {
+        for k in 0..WIDE {
+            sums[k] += p[k] * q[k];
+        }
+    }
+    for (p, q) in rest_p.chunks_exact(LANES).zip(rest_q.chunks_exact(LANES)) {
         for k in 0..LANES {
             sums[k] += p[k] * q[k];
         }
     }
-    sums.iter().map(|v| f64::from(*v)).sum()
+    let (low, high) = sums.split_at(2 * LANES);
+    let halves = |k: usize| (low[k] + high[k]) + (low[k + LANES] + high[k + LANES]);
+    (0..LANES).map(|k| f64::from(halves(k))).sum()
 }
 
 /// One contour in single precision.
@@ -401,18 +460,26 @@ impl EdgeTerms {
         }
         self.evaluate(&Geometry::of(contour), x, y);
         self.exact.resize_with(MOMENTS, || vec![0.0; x.len()]);
-        contour.coverage(x, y, nodes, &mut self.missing, &mut self.exact);
-        self.missing.iter_mut().zip(&self.coverage).for_each(|(m, c)| *m -= c);
+        // far from the edge there is nothing to be missed
+        let near = self.argument.chunks_exact(LANES).map(|c| c.iter().any(|u| u.abs() < FAR));
+        let near: Vec<bool> = near.collect();
+        contour.coverage(x, y, &near, nodes, &mut self.missing, &mut self.exact);
+        let blocks = self.missing.chunks_exact_mut(LANES).zip(self.coverage.chunks_exact(LANES));
+        for ((missing, closed), near) in blocks.zip(near) {
+            missing.iter_mut().zip(closed).for_each(|(m, c)| *m = if near { *m - c } else { 0.0 });
+        }
     }
 
     fn evaluate(&mut self, geometry: &Geometry, x: &[f32], y: &[f32]) {
         let n = x.len();
         let y = &y[..n];
-        let Self { coverage, density, scale, rho, cos, sin, normal_x, normal_y, widen, missing, exact } = self;
+        let Self { coverage, density, scale, rho, cos, sin, normal_x, normal_y, argument, widen, missing, exact } =
+            self;
         let (missing, is_exact) = (&missing[..n], !exact.is_empty());
         let (coverage, density, scale) = (&mut coverage[..n], &mut density[..n], &mut scale[..n]);
         let (rho, cos, sin) = (&mut rho[..n], &mut cos[..n], &mut sin[..n]);
         let (normal_x, normal_y, widen) = (&mut normal_x[..n], &mut normal_y[..n], &mut widen[..n]);
+        let argument = &mut argument[..n];
         let [n00, n01, n10, n11] = geometry.to_unit;
         let [cx, cy] = geometry.centre;
         let [a3, b3] = geometry.third;
@@ -448,55 +515,15 @@ impl EdgeTerms {
             sin[i] = s;
             normal_x[i] = gx * g;
             normal_y[i] = gy * g;
+            argument[i] = u;
             widen[i] = lift - d;
         }
     }
 }
 
-/// Upper tail and density of the standard normal distribution, without branches.
-///
-/// Tail: M. Abramowitz and I. Stegun, Handbook of Mathematical Functions, 26.2.17 (error below 7.5e-8).
-#[inline(always)]
-fn normal_tail(u: f32) -> (f32, f32) {
-    let a = u.abs();
-    let phi = 0.398_942_3 * exp_negative(-0.5 * a * a);
-    let t = 1.0 / (1.0 + 0.231_641_9 * a);
-    let series = t * (0.319_381_53 + t * (-0.356_563_78 + t * (1.781_477_9 + t * (-1.821_255_9 + t * 1.330_274_4))));
-    let tail = phi * series;
-    (if u < 0.0 { 1.0 - tail } else { tail }, phi)
-}
-
-/// `exp(x)` for -80 < x <= 0 by splitting off the power of two; relative error 3e-7 + 1.2e-7 |x|.
-#[inline(always)]
-pub(super) fn exp_negative(x: f32) -> f32 {
-    const ROUND: f32 = 12_582_912.0; // 1.5 * 2^23: adding it rounds to an integer in the low bits
-    let z = x * std::f32::consts::LOG2_E;
-    let shifted = z + ROUND;
-    let f = (z - (shifted - ROUND)) * std::f32::consts::LN_2;
-    let power = f32::from_bits(shifted.to_bits().wrapping_add(127).wrapping_shl(23));
-    power * (1.0 + f * (1.0 + f * (0.5 + f * (1.0 / 6.0 + f * (1.0 / 24.0 + f * (1.0 / 120.0 + f / 720.0))))))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_normal_tail_is_right() {
-        // values of Q(u) from tables
-        for (u, q) in
-            [(0.0f32, 0.5f64), (1.0, 0.158_655_25), (2.0, 0.022_750_13), (-1.5, 0.933_192_8), (5.0, 2.866_5e-7)]
-        {
-            assert!((f64::from(normal_tail(u).0) - q).abs() < 2e-7, "{u}");
-        }
-        assert!((f64::from(normal_tail(1.0).1) - 0.241_970_7).abs() < 1e-7);
-        for k in 0..300 {
-            let x = -0.25 * k as f32;
-            // the polynomial, and the rounding of x log2(e) in single precision
-            let tolerance = 3e-7 + 1.2e-7 * f64::from(x.abs());
-            assert!((f64::from(exp_negative(x)) / f64::from(x).exp() - 1.0).abs() < tolerance, "{x}");
-        }
-    }
 
     fn example(annulus: bool) -> State {
         State {

@@ -12,7 +12,8 @@
 //! The closed form of [`super::edge_model`] is cheaper and as good where the radius of curvature is large against the
 //! blur; elsewhere the difference between the two is taken from here and held while the fit converges.
 
-use super::edge_model::{LANES, exp_negative};
+use super::edge_model::LANES;
+use super::gauss::exp_negative;
 
 /// Longest step along the contour in units of the blur.
 const STEP: f64 = 1.25;
@@ -98,12 +99,22 @@ impl Contour {
 
     /// Coverage of every pixel into `out`, and its derivatives into `moments` ([`MOMENTS`] columns), all as long as `x`
     /// and `y`. A displacement `dq` of the contour adds the integral of `G(p - q) dq x q'`, with the Gaussian `G`.
-    pub fn coverage(&self, x: &[f32], y: &[f32], nodes: &mut Nodes, out: &mut [f32], moments: &mut [Vec<f32>]) {
+    /// Blocks of pixels that are not `near` are left as they are.
+    pub fn coverage(
+        &self,
+        x: &[f32],
+        y: &[f32],
+        near: &[bool],
+        nodes: &mut Nodes,
+        out: &mut [f32],
+        moments: &mut [Vec<f32>],
+    ) {
         self.nodes(nodes);
         let rate = (-0.5 / (self.blur * self.blur)) as f32;
         // weights of the nodes hold 1 / 2 pi of the coverage; the Gaussian is 1 / (2 pi s^2), of which s^2 is left
         let peak = (1.0 / (self.blur * self.blur)) as f32;
-        for (chunk, (px, py)) in x.chunks_exact(LANES).zip(y.chunks_exact(LANES)).enumerate() {
+        let blocks = x.chunks_exact(LANES).zip(y.chunks_exact(LANES)).enumerate();
+        for (chunk, (px, py)) in blocks.filter(|(k, _)| near[*k]) {
             let mut sums = [[0.0f32; LANES]; MOMENTS + 1];
             for node in &nodes.all {
                 let ([qx, qy], [dx, dy]) = (node.at, node.step);
@@ -160,7 +171,7 @@ mod tests {
             let contour = Contour { centre: [0.0; 2], to_unit: [[n, 0.0], [0.0, n]], third: [0.0; 2], blur };
             let x: Vec<f32> = (0..16).map(|k| 0.5 * k as f32).collect();
             let mut out = vec![0.0; 16];
-            contour.coverage(&x, &[0.0; 16], &mut Nodes::default(), &mut out, &mut []);
+            contour.coverage(&x, &[0.0; 16], &[true; 2], &mut Nodes::default(), &mut out, &mut []);
             for (x, b) in x.iter().zip(&out) {
                 let truth = disc(f64::from(*x), radius, blur);
                 // the sum over the nodes is right to 2e-5, the plain sum over rings to 1e-6
@@ -175,7 +186,7 @@ mod tests {
             Contour { centre: [1.0, -2.0], to_unit: [[0.05, 0.02], [-0.01, 0.1]], third: [0.01, -0.02], blur: 0.8 };
         let (x, y) = ([1.0f32, 60.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0], [-2.0f32; 8]);
         let mut out = [0.0; 8];
-        contour.coverage(&x, &y, &mut Nodes::default(), &mut out, &mut []);
+        contour.coverage(&x, &y, &[true], &mut Nodes::default(), &mut out, &mut []);
         assert!((out[0] - 1.0).abs() < 1e-5 && out[1].abs() < 1e-5, "{out:?}");
     }
 }

@@ -39,7 +39,7 @@ pub(super) struct Target {
 }
 
 impl Target {
-    pub fn start(&self, camera: &Camera, blur_sigma: f64) -> Start {
+    pub fn start(&self, camera: &Camera, blur_sigma: f64) -> Start<'static> {
         Start {
             ellipse: self.ellipse,
             ratio: self.ratio,
@@ -51,6 +51,9 @@ impl Target {
             clear: self.clear,
             noise: camera.noise,
             ink_slope: camera.ink_slope,
+            apart: [0.0; 2],
+            tie_sigma: None,
+            tails: &[],
         }
     }
 }

@@ -9,6 +9,7 @@
 //! Every stage is a pure function of the picture; none knows a camera or a robot.
 
 mod agreement;
+mod asymmetry;
 mod candidate;
 mod code;
 mod contour;
@@ -16,6 +17,7 @@ mod edge_model;
 mod ellipse;
 mod exact_edge;
 mod flat_zone;
+mod gauss;
 mod grid;
 mod lattice;
 mod levels;
@@ -23,11 +25,14 @@ mod local_map;
 mod measure;
 mod pipeline;
 mod refine;
+mod second_look;
 #[cfg(test)]
 pub(crate) mod synth;
+mod tails;
 mod types;
 mod vet;
 
+pub use asymmetry::Drift;
 pub use ellipse::Ellipse;
 pub use grid::detect_grid;
 pub use measure::{Predicted, measure, refine_predicted};

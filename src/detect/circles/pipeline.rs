@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::agreement::{Inner, Seen, agreement};
+use super::asymmetry::Drift;
 use super::candidate::{Candidate, candidates, largest_marker};
 use super::code::{Code, Verdict};
 use super::edge_model::Pixels;
@@ -11,6 +12,7 @@ use super::lattice::{Buckets, Lattice, lattices};
 use super::levels::Levels;
 use super::measure::{Camera, Predicted, THRESHOLD, Target, drop_target, learn, median, predicted_target, target_of};
 use super::refine::{Fit, refine};
+use super::second_look::{Figure, Place, second_look};
 use super::types::{Detection, Dropped, Found, InnerOuter, Options, Outcome, Reason};
 use super::vet::{Board, Placed, around, continuation, neighbourhood, vet};
 use crate::detect::Picture;
@@ -216,11 +218,11 @@ impl Work<'_> {
             board.iter().map(|(cell, p)| (*cell, self.target(*cell, p, guess))).collect();
         let plain: Vec<Target> = targets.iter().map(|t| t.1).collect();
         let camera = learn(self.picture, &plain, guess, levels.noise, &mut self.pixels);
-        let mut entries = Vec::new();
-        for (cell, target) in &targets {
+        let (mut entries, mut refused) = (Vec::new(), Vec::new());
+        for (cell, target) in targets {
             match refine(self.picture, &target.start(&camera, 0.3), &mut self.pixels) {
-                Ok(fit) => entries.push(Entry { cell: *cell, fit, rescued: false }),
-                Err(reason) => dropped.push(drop_target(target, reason, self.marker(*cell).map(|m| m.id))),
+                Ok(fit) => entries.push(Entry { cell, fit, rescued: false }),
+                Err(reason) => refused.push((cell, target, reason)),
             }
         }
         if options.rescue {
@@ -229,7 +231,35 @@ impl Work<'_> {
             entries.sort_by_key(|e| e.cell);
         }
         let inner_outer = self.agree(&mut entries, dropped);
+        self.look_again(&mut entries, &mut refused, &camera);
+        let lost = |(cell, target, reason): &(_, _, _)| drop_target(target, *reason, self.marker(*cell).map(|m| m.id));
+        dropped.extend(refused.iter().map(lost));
         Harvest { entries, camera, inner_outer }
+    }
+
+    /// Measures small markers again with what their neighbours tell.
+    fn look_again(
+        &mut self,
+        entries: &mut Vec<Entry>,
+        refused: &mut Vec<((i32, i32), Target, Reason)>,
+        camera: &Camera,
+    ) {
+        let figure = |cell| {
+            let marker = self.marker(cell)?;
+            Some(Figure { radius: marker.outer_radius_m / self.plate.pitch_m, ratio: self.ratio(cell) })
+        };
+        let place = |cell, ellipse: &Ellipse, first| {
+            let clear = self.clear(cell, ellipse.semi_axes()[1], camera.blur_px);
+            Some((cell, Place { figure: figure(cell)?, first, clear }))
+        };
+        let measured = entries.iter().filter_map(|e| place(e.cell, &e.fit.measured.outer.ellipse, Ok(e.fit)));
+        let failed = refused.iter().filter_map(|(cell, target, _)| place(*cell, &target.ellipse, Err(*target)));
+        let places: BTreeMap<_, _> = measured.chain(failed).collect();
+        let fits = second_look(self.picture, camera, &places, &figure);
+        entries.retain(|e| !fits.contains_key(&e.cell));
+        refused.retain(|(cell, ..)| !fits.contains_key(cell));
+        let rescued = |cell: &(i32, i32)| places[cell].first.is_err();
+        entries.extend(fits.into_iter().map(|(cell, fit)| Entry { cell, rescued: rescued(&cell), fit }));
     }
 
     /// Looks where the neighbours say that a marker must be.
@@ -274,7 +304,7 @@ impl Work<'_> {
         if seen.len() != entries.len() {
             return None;
         }
-        let (good, summary) = agreement(&seen);
+        let (good, summary) = agreement(&seen, [self.picture.width, self.picture.height]);
         let mut keep = good.iter();
         entries.retain(|e| {
             let ok = keep.next().copied().unwrap_or(true);
@@ -323,7 +353,13 @@ impl Work<'_> {
         let observations = found.iter().flat_map(observations_of).collect();
         let blur_px = median(found.iter().map(|f| f.measured.blur_px).collect());
         let noise = harvest.camera.noise.map(f64::sqrt);
-        Detection { observations, found, dropped, outcome, blur_px, noise, inner_outer: harvest.inner_outer }
+        let skew = |e: &Entry| {
+            let (sum, information) = e.fit.skew;
+            (e.fit.measured.outer.ellipse.centre, [0, 1].map(|a| sum[a] / information[a]), information)
+        };
+        let size = [self.picture.width, self.picture.height];
+        let lopsided = Drift::fit(harvest.entries.iter().map(skew), size);
+        Detection { observations, found, dropped, outcome, blur_px, noise, inner_outer: harvest.inner_outer, lopsided }
     }
 }
 

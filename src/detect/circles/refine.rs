@@ -3,13 +3,14 @@
 use super::edge_model::{ANNULUS, CENTRE, DARK, DISC, INNER, LN_BLUR, LN_RATIO, Pixels, SHAPE, State, THIRD, WHITE};
 use super::ellipse::Ellipse;
 use super::flat_zone::{Flat, Zone};
+use super::tails::{Tail, lift};
 use super::types::{Imaged, Measured, Reason};
 use crate::detect::Picture;
 use crate::series::Edge;
 
 /// Where to start and what to assume.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Start {
+pub(super) struct Start<'a> {
     pub ellipse: Ellipse,
     /// Inner over outer radius of an annulus.
     pub ratio: Option<f64>,
@@ -26,6 +27,12 @@ pub(super) struct Start {
     pub noise: [f64; 2],
     /// Prior sigma of the ink's own gradient as a share of the contrast, 1/px.
     pub ink_slope: f64,
+    /// Centre of the inner circle less that of the outer one, px.
+    pub apart: [f64; 2],
+    /// How well that is known per axis, px, where geometry tells it.
+    pub tie_sigma: Option<f64>,
+    /// Measured neighbours whose ink reaches the pixels of this marker.
+    pub tails: &'a [Tail],
 }
 
 /// A fit with what the caller needs to go on.
@@ -38,12 +45,25 @@ pub(super) struct Fit {
     pub ink_slope: ([f64; 2], [f64; 2]),
     /// Mean square of the residuals on paper and on ink, away from the edge, with their pixel counts.
     pub plain: [(f64, f64); 2],
+    /// Mean square of the residuals in units of the noise.
+    pub misfit: f64,
+    /// Lopsidedness of the edges and its information ([`Pixels::skew`]).
+    pub skew: ([f64; 2], [f64; 2]),
 }
 
-/// Half width of the band around an edge in units of the blur (and half a pixel on top).
-const REACH: f64 = 3.1;
+/// Half width of the band around an edge in units of the blur (and 0.3 px on top); beyond it lies 0.1 % of the information
+/// on the edge.
+const REACH: f64 = 2.5;
+/// Where the picture is even, in units of the blur from an edge (and half a pixel on top).
+const EVEN_FROM: f64 = 3.1;
+/// The same where the neighbours are taken off: with paper enough to see its level.
+const WIDE_REACH: f64 = 5.0;
 /// Width of the even zone beyond the band in units of the blur.
 const EVEN: f64 = 5.0;
+/// How far, in units of the blur, contours may be from where the band was laid.
+const SLACK: f64 = 0.5;
+/// Part of the band that must be in the picture when the shape is not known.
+pub(super) const WHOLE: f64 = 0.98;
 const ITERATIONS: usize = 14;
 /// A pixel at this part of the range or above counts as saturated.
 const SATURATED: f32 = 0.995;
@@ -51,19 +71,60 @@ const SATURATED: f32 = 0.995;
 /// Measures one marker. The work arrays `pixels` are reused from call to call.
 pub(super) fn refine(picture: &Picture, start: &Start, pixels: &mut Pixels) -> Result<Fit, Reason> {
     let anchor = start.ellipse.centre.map(f64::round);
+    let first = once(picture, start, anchor, pixels)?;
+    let slack = SLACK * first.0.blur;
+    match moved(&first.0, start, anchor).filter(|(_, by)| *by > slack) {
+        // the band was not laid where the edges are
+        Some((start, _)) => {
+            let (state, normal, visible) = once(picture, &start, anchor, pixels)?;
+            finish(&state, &start, anchor, visible, pixels, &normal)
+        }
+        None => finish(&first.0, start, anchor, first.2, pixels, &first.1),
+    }
+}
+
+/// One fit: the state, the factor of its normal matrix, and the part of the band in the picture.
+fn once(
+    picture: &Picture,
+    start: &Start,
+    anchor: [f64; 2],
+    pixels: &mut Pixels,
+) -> Result<(State, Normal, f64), Reason> {
     let (wanted, saturated) = gather(picture, start, anchor, pixels);
     let parameters = if start.ratio.is_some() { ANNULUS } else { DISC };
     if saturated * 5 > wanted {
         return Err(Reason::Saturated);
     }
     let visible = pixels.count as f64 / wanted.max(1) as f64;
-    if pixels.count < 2 * parameters || (visible < 0.98 && start.shape_sigma.is_none()) || visible < 0.35 {
+    if !start.tails.is_empty() {
+        lift(pixels, start.tails, anchor);
+    }
+    // what lies beyond the border is missed less where the neighbours are taken off: the band is wider than it must be
+    let whole = start.tails.is_empty() && start.shape_sigma.is_none();
+    if pixels.count < 2 * parameters || (whole && visible < WHOLE) || visible < 0.35 {
         return Err(Reason::CutByBorder);
     }
     let mut state = initial(start, anchor);
     let prior = Prior::of(start, picture);
     let normal = iterate(&mut state, &prior, start, pixels)?;
-    finish(&state, start, anchor, visible, pixels, &normal)
+    Ok((state, normal, visible))
+}
+
+/// The start that a state is, and by how much its contours have moved from the one before, px.
+fn moved<'a>(state: &State, start: &Start<'a>, anchor: [f64; 2]) -> Option<(Start<'a>, f64)> {
+    let length = |d: [f64; 2]| d[0].hypot(d[1]);
+    let ellipse = state.ellipse();
+    let ellipse = Ellipse { centre: [0, 1].map(|a| ellipse.centre[a] + anchor[a]), ..ellipse };
+    let (now, before) = (ellipse.semi_axes(), start.ellipse.semi_axes());
+    let outer = length([0, 1].map(|a| ellipse.centre[a] - start.ellipse.centre[a]))
+        + (now[0] - before[0]).abs().max((now[1] - before[1]).abs());
+    let inner = state.inner.zip(start.ratio).map(|((centre, ratio), old)| {
+        let apart = [0, 1].map(|a| centre[a] - state.centre[a]);
+        (apart, ratio, outer + length([0, 1].map(|a| apart[a] - start.apart[a])) + (ratio - old).abs() * now[0])
+    });
+    let (apart, ratio) = inner.map_or((start.apart, start.ratio), |(apart, ratio, _)| (apart, Some(ratio)));
+    let by = inner.map_or(outer, |(.., by)| by);
+    by.is_finite().then_some((Start { ellipse, apart, ratio, blur_px: state.blur, ..*start }, by))
 }
 
 fn initial(start: &Start, anchor: [f64; 2]) -> State {
@@ -75,7 +136,7 @@ fn initial(start: &Start, anchor: [f64; 2]) -> State {
         blur: start.blur_px,
         white: [start.paper, 0.0, 0.0],
         dark: [start.ink, 0.0, 0.0],
-        inner: start.ratio.map(|r| (centre, r)),
+        inner: start.ratio.map(|r| ([0, 1].map(|a| centre[a] + start.apart[a]), r)),
     }
 }
 
@@ -98,11 +159,11 @@ impl Prior {
         weight[LN_BLUR] = inverse(start.blur_sigma);
         // a black offset changes the ink's share of the gradient by a part of it
         weight[DARK + 1..DARK + 3].fill(inverse(start.ink_slope * contrast));
-        weight[LN_RATIO] = inverse(0.05);
+        weight[LN_RATIO] = inverse(if start.tie_sigma.is_some() { 0.02 } else { 0.05 });
         if let Some(sigma) = start.shape_sigma {
             weight[SHAPE..SHAPE + 3].fill(inverse(sigma));
         }
-        let apart = 0.02 + 0.012 * start.ellipse.semi_axes()[0];
+        let apart = start.tie_sigma.unwrap_or(0.02 + 0.012 * start.ellipse.semi_axes()[0]);
         let concentric = if start.ratio.is_some() { inverse(apart) } else { 0.0 };
         Self { weight, concentric }
     }
@@ -121,7 +182,7 @@ impl Prior {
     fn add_gradient(&self, travelled: &[f64; ANNULUS], gradient: &mut [f64; ANNULUS]) {
         (0..ANNULUS).for_each(|i| gradient[i] -= self.weight[i] * travelled[i]);
         for a in 0..2 {
-            // both start at the same centre
+            // the start is where they are expected
             let apart = self.concentric * (travelled[INNER + a] - travelled[CENTRE + a]);
             gradient[INNER + a] -= apart;
             gradient[CENTRE + a] += apart;
@@ -136,26 +197,24 @@ fn iterate(state: &mut State, prior: &Prior, start: &Start, pixels: &mut Pixels)
     let parameters = state.parameters();
     let mut travelled = [0.0; ANNULUS];
     let mut factor: Normal = [[0.0; ANNULUS]; ANNULUS];
-    let mut fresh = 0usize;
     let mut last = f64::MAX;
+    // how far the contours have moved since the normal matrix and since the correction, px
+    let (mut since_factor, mut since_correction) = (f64::MAX, f64::MAX);
     let size = start.ellipse.semi_axes()[0];
-    let mut corrected = f64::MAX;
-    for iteration in 0..ITERATIONS {
-        // What the closed form misses moves with the contour: taken near the end and at the end, or always for contours
-        // hardly larger than the blur.
-        if last < 0.1 && (corrected > 0.01 || state.is_badly_resolved()) {
+    for _ in 0..ITERATIONS {
+        // What the closed form misses moves with the contour: taken near the end, and again when that moved on.
+        let stale = if state.is_badly_resolved() { 0.01 } else { 0.05 };
+        if last < 0.1 && since_correction > stale {
             pixels.correct(state);
-            corrected = last;
+            (since_correction, since_factor) = (0.0, f64::MAX);
         }
         pixels.evaluate(state, start.noise);
-        // A new normal matrix at the start, whenever the steps do not shrink well, and once near the end.
-        let renew = iteration == 0 || last > 0.02 || (fresh < 2 && last < 0.02);
-        if renew {
+        if since_factor > 0.05 {
             pixels.normal(parameters, &mut factor);
             pixels.flat.add_normal(state, start.noise, &mut factor);
             prior.add_normal(&mut factor);
             cholesky(&mut factor, parameters).ok_or(Reason::NoConvergence)?;
-            fresh = if last < 0.02 { 2 } else { 1 };
+            since_factor = 0.0;
         }
         let mut delta = [0.0; ANNULUS];
         pixels.gradient(parameters, &mut delta);
@@ -170,7 +229,9 @@ fn iterate(state: &mut State, prior: &Prior, start: &Start, pixels: &mut Pixels)
         if !last.is_finite() || out_of_bounds(state, &travelled, size) {
             return Err(Reason::NoConvergence);
         }
-        if last < 2e-4 && fresh == 2 && corrected < 0.02 {
+        since_factor += last;
+        since_correction += last;
+        if last < 1e-3 && since_correction < 0.1 {
             return Ok(factor);
         }
     }
@@ -238,11 +299,16 @@ fn finish(
     let covariance = Covariance::of(factor, parameters, scale);
     let place = |e: Ellipse| Ellipse { centre: [0, 1].map(|a| e.centre[a] + anchor[a]), ..e };
     let outer = Imaged { edge: Edge::Outer, ellipse: place(state.ellipse()), covariance: covariance.block(0) };
-    let inner =
-        state.inner_ellipse().map(|e| Imaged { edge: Edge::Inner, ellipse: place(e), covariance: covariance.block(2) });
+    let hole = state.inner_ellipse().map(place);
+    let inner = hole.filter(|_| start.tie_sigma.is_none()).map(|ellipse| Imaged {
+        edge: Edge::Inner,
+        ellipse,
+        covariance: covariance.block(2),
+    });
     let measured = Measured {
         outer,
         inner,
+        hole,
         blur_px: state.blur,
         paper: state.white[0],
         ink: state.dark[0],
@@ -251,7 +317,14 @@ fn finish(
         visible,
     };
     let ink_slope = ink_slope(state, factor, contrast);
-    Ok(Fit { measured, cross: covariance.cross(), plain, ink_slope })
+    Ok(Fit {
+        measured,
+        cross: covariance.cross(),
+        plain,
+        ink_slope,
+        misfit: scale,
+        skew: pixels.skew(state, start.noise),
+    })
 }
 
 fn ink_slope(state: &State, factor: &Normal, contrast: f64) -> ([f64; 2], [f64; 2]) {
@@ -294,74 +367,140 @@ impl Covariance {
     }
 }
 
-/// Where a marker is even within: ink between two ellipses, and the hole of an annulus.
-struct Zones {
-    all: [Option<Ellipse>; 3],
+/// What the pixels between one contour of [`rings`] and the next are used for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Use {
+    Band,
+    Paper,
+    Ink,
+    Nothing,
 }
 
-impl Zones {
-    fn of(start: &Start, reach: f64, even: f64) -> Self {
-        let ink = start.ellipse.offset(-reach);
-        let Some(ratio) = start.ratio else { return Self { all: [ink, start.ellipse.offset(-reach - even), None] } };
-        let inner = Ellipse { shape: start.ellipse.shape.map(|v| v / (ratio * ratio)), ..start.ellipse };
-        let core = inner.offset(reach);
-        let apart = ink.zip(core).is_some_and(|(i, c)| i.semi_axes()[1] > c.semi_axes()[1]);
-        let hole = inner.offset(-reach);
-        if apart { Self { all: [ink, core, hole] } } else { Self { all: [None, None, hole] } }
+/// Nested contours from the outside to the inside, each with the use of the pixels within it up to the next.
+///
+/// Between a band and the even zones lies a strip that is not used: it says little about the edge, and is not even.
+fn rings(start: &Start) -> Vec<(Ellipse, Use)> {
+    let blur = start.blur_px;
+    let (near, even) = (REACH * blur + 0.3, EVEN_FROM * blur + 0.5);
+    let minor = start.ellipse.semi_axes()[1];
+    let room = (start.clear - 1.0) * minor;
+    let mut all: Vec<(Option<Ellipse>, Use)> = Vec::with_capacity(9);
+    if start.tails.is_empty() {
+        let far = (even + EVEN * blur).min(room - 0.8 * blur);
+        if far > even {
+            all.push((start.ellipse.offset(far), Use::Paper));
+            all.push((start.ellipse.offset(even), Use::Nothing));
+        }
+        all.push((start.ellipse.offset(near.min(room).max(0.9)), Use::Band));
+    } else {
+        all.push((start.ellipse.offset(WIDE_REACH * blur), Use::Band));
     }
+    let within = (start.ellipse.offset(-near), start.ellipse.offset(-even));
+    let Some(ratio) = start.ratio else {
+        all.push((within.0, Use::Nothing));
+        all.push((within.1, Use::Ink));
+        all.push((start.ellipse.offset(-even - EVEN * blur), Use::Nothing));
+        return nested(all);
+    };
+    let centre = [0, 1].map(|a| start.ellipse.centre[a] + start.apart[a]);
+    let inner = Ellipse { centre, shape: start.ellipse.shape.map(|v| v / (ratio * ratio)) };
+    let wider = |a: Option<Ellipse>, b: Option<Ellipse>| {
+        let [a, b] = [a, b].map(|e| e.map_or(0.0, |e| e.semi_axes()[1]));
+        a > b
+    };
+    if wider(within.0, inner.offset(near)) {
+        all.push((within.0, Use::Nothing));
+        if wider(within.1, inner.offset(even)) {
+            all.push((within.1, Use::Ink));
+            all.push((inner.offset(even), Use::Nothing));
+        }
+        all.push((inner.offset(near), Use::Band));
+    }
+    all.push((inner.offset(-near), Use::Nothing));
+    all.push((inner.offset(-even), Use::Paper));
+    nested(all)
 }
 
-/// Collects the pixels of the band, and of the even zones beside it; returns how many there would be in an unlimited picture, and how many of the
-/// missing ones are saturated.
+/// The contours up to the first that has shrunk to nothing.
+fn nested(all: Vec<(Option<Ellipse>, Use)>) -> Vec<(Ellipse, Use)> {
+    all.into_iter().map_while(|(e, u)| Some((e?, u))).collect()
+}
+
+/// Collects the pixels of the band, and sums over the even zones beside it; returns how many pixels the band would have
+/// in an unlimited picture, and how many of the missing ones are saturated.
 fn gather(picture: &Picture, start: &Start, anchor: [f64; 2], pixels: &mut Pixels) -> (usize, usize) {
     pixels.clear();
     pixels.flat = Flat { paper: Zone::around(start.paper), ink: Zone::around(start.ink) };
-    let reach = REACH * start.blur_px + 0.5;
-    let minor = start.ellipse.semi_axes()[1];
-    let outside = reach.min((start.clear - 1.0) * minor).max(0.9);
-    let even = EVEN * start.blur_px;
-    let far = (outside + even).min((start.clear - 1.0) * minor - 0.8 * start.blur_px).max(outside);
-    let (mut wanted, mut saturated) = (0, 0);
-    let (band, outer) = (start.ellipse.offset(outside), start.ellipse.offset(far));
-    let zones = Zones::of(start, reach, even);
-    let Some(outer) = outer else { return (0, 0) };
-    let half = outer.half_extent();
-    let limit = SATURATED * picture.full_scale;
-    let centre = start.ellipse.centre;
-    let rows = (centre[1] - half[1]).ceil() as i64..=(centre[1] + half[1]).floor() as i64;
-    for y in rows {
-        let Some((first, last)) = outer.chord(y as f64) else { continue };
-        let near = band.as_ref().and_then(|e| e.chord(y as f64));
-        let [ink_outer, ink_inner, hole] = zones.all.map(|z| z.and_then(|e| e.chord(y as f64)));
-        let within = |x: f64, span: Option<(f64, f64)>| span.is_some_and(|(a, b)| x >= a && x <= b);
-        for x in first.ceil() as i64..=last.floor() as i64 {
-            let xf = x as f64;
-            let light = !within(xf, near) || within(xf, hole);
-            let ink = within(xf, ink_outer) && !within(xf, ink_inner);
-            let even = light || ink;
-            if start.ratio.is_none() && within(xf, ink_inner) {
-                continue;
-            }
-            wanted += usize::from(!even);
-            if x < 0 || y < 0 || x as usize >= picture.width || y as usize >= picture.height {
-                continue;
-            }
-            let value = picture.at(x as usize, y as usize);
-            if value >= limit {
-                saturated += usize::from(!even);
-                continue;
-            }
-            let (dx, dy) = (xf - anchor[0], y as f64 - anchor[1]);
-            if even {
-                let zone = if light { &mut pixels.flat.paper } else { &mut pixels.flat.ink };
-                zone.push(dx, dy, value);
-            } else {
-                pixels.push(dx as f32, dy as f32, value);
+    let rings = rings(start);
+    let Some((outermost, _)) = rings.first() else { return (0, 0) };
+    let half = outermost.half_extent()[1];
+    let first = (start.ellipse.centre[1] - half).ceil() as i64;
+    let last = first + (2.0 * half).floor() as i64;
+    let mut counts = (0, 0);
+    for y in first..=last {
+        // what is left between the contours that have been passed
+        let Some((mut low, mut high)) = outermost.chord(y as f64).map(whole) else { continue };
+        for (k, (_, used)) in rings.iter().enumerate() {
+            let next = rings.get(k + 1).and_then(|(e, _)| e.chord(y as f64)).map(whole);
+            let (from, to) = next.filter(|(a, b)| a <= b).map_or((high + 1, high), |(a, b)| (a.max(low), b.min(high)));
+            let mut strip = Strip { picture, anchor, y, used: *used, pixels, counts: &mut counts };
+            strip.take(low, from.min(high + 1));
+            strip.take(to + 1, high + 1);
+            (low, high) = (from, to);
+            if low > high {
+                break;
             }
         }
     }
     pixels.finish();
-    (wanted, saturated)
+    counts
+}
+
+/// First and last pixel of a chord.
+fn whole((from, to): (f64, f64)) -> (i64, i64) {
+    (from.ceil() as i64, to.floor() as i64)
+}
+
+/// Pixels of one row.
+struct Strip<'a> {
+    picture: &'a Picture,
+    anchor: [f64; 2],
+    y: i64,
+    used: Use,
+    pixels: &'a mut Pixels,
+    counts: &'a mut (usize, usize),
+}
+
+impl Strip<'_> {
+    /// Takes the pixels from `from` up to, not with, `to`.
+    fn take(&mut self, from: i64, to: i64) {
+        if self.used == Use::Nothing || from >= to {
+            return;
+        }
+        let in_band = self.used == Use::Band;
+        if in_band {
+            self.counts.0 += (to - from) as usize;
+        }
+        let (width, height) = (self.picture.width as i64, self.picture.height as i64);
+        let (from, to) = (from.max(0), to.min(width));
+        if self.y < 0 || self.y >= height || from >= to {
+            return;
+        }
+        let limit = SATURATED * self.picture.full_scale;
+        let base = (self.y * width) as usize;
+        let values = &self.picture.pixels[base + from as usize..base + to as usize];
+        let (x, y) = (from as f64 - self.anchor[0], self.y as f64 - self.anchor[1]);
+        for (k, value) in values.iter().enumerate() {
+            let x = x + k as f64;
+            match self.used {
+                _ if *value >= limit => self.counts.1 += usize::from(in_band),
+                Use::Band => self.pixels.push(x as f32, y as f32, *value),
+                Use::Paper => self.pixels.flat.paper.push(x, y, *value),
+                Use::Ink => self.pixels.flat.ink.push(x, y, *value),
+                Use::Nothing => {}
+            }
+        }
+    }
 }
 
 /// Cholesky factor in place (lower triangle).

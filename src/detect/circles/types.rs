@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use super::asymmetry::Drift;
 use super::ellipse::Ellipse;
 use crate::detect::Circles;
 use crate::series::{Edge, Observation};
@@ -136,8 +137,10 @@ pub struct Imaged {
 pub struct Measured {
     /// Outer circle.
     pub outer: Imaged,
-    /// Inner circle of an annulus.
+    /// Inner circle of an annulus, where it is measured for itself.
     pub inner: Option<Imaged>,
+    /// The light middle of an annulus, measured for itself or together with the outer circle.
+    pub hole: Option<Ellipse>,
     /// Sigma of the blur (optics and pixel aperture together), px.
     pub blur_px: f64,
     /// Brightness of the paper at the marker, counts.
@@ -221,6 +224,8 @@ pub struct Detection {
     /// Mean difference inner - outer centre that geometry does not explain, with its standard error, px;
     /// coma of the lens or motion with a changing speed shows here.
     pub inner_outer: Option<InnerOuter>,
+    /// By how much lopsided edges displace the centres; not taken off.
+    pub lopsided: Option<Drift>,
 }
 
 impl Detection {
@@ -235,7 +240,9 @@ impl Detection {
 
     /// The form that all detectors share, with a notice when the point spread is asymmetric.
     pub fn into_common(self) -> crate::detect::Detection {
-        let notices = self.inner_outer.filter(InnerOuter::asymmetric).map(|io| io.notice()).into_iter().collect();
+        let rings = self.inner_outer.filter(InnerOuter::asymmetric).map(|io| io.notice());
+        let edges = self.lopsided.filter(|l| l.exceeds(LOPSIDED_PX)).map(lopsided_notice);
+        let notices = rings.into_iter().chain(edges).collect();
         let failure = self.outcome.failure();
         let failure =
             failure.map(|(what, remedy)| Error::input("image", format!("{what}{}", self.dropped_summary()), remedy));
@@ -272,10 +279,8 @@ impl Detection {
 /// Mean unexplained difference between the centres of inner and outer circles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InnerOuter {
-    /// Mean difference (column, row), px.
-    pub mean_px: [f64; 2],
-    /// Standard error of the mean per axis, px.
-    pub sigma_px: [f64; 2],
+    /// The difference over the picture.
+    pub drift: Drift,
     /// Mean size of the difference that perspective and distortion explain, px.
     pub explained_px: f64,
     /// Number of annuli.
@@ -286,16 +291,29 @@ impl InnerOuter {
     /// The difference is significant (4 sigma), larger than 0.005 px, and larger than a twentieth of what geometry explains
     /// (which is not explained better than that): the point spread is asymmetric.
     pub fn asymmetric(&self) -> bool {
-        let least = 0.005_f64.max(0.05 * self.explained_px);
-        (0..2).any(|k| self.mean_px[k].abs() > (4.0 * self.sigma_px[k]).max(least))
+        self.drift.exceeds(0.005_f64.max(0.05 * self.explained_px))
     }
 
     fn notice(&self) -> Notice {
-        let [u, v] = self.mean_px;
+        let [u, v] = self.drift.mean_px;
         let what = format!(
-            "inner and outer circles are off by ({u:.4}, {v:.4}) px on the mean of {} annuli: the blur is asymmetric",
-            self.count
+            "inner and outer circles are off by ({u:.4}, {v:.4}) px on the mean of {} annuli, and by {:.4} px along the \
+             radius in the corner: the blur is asymmetric",
+            self.count, self.drift.corner_px
         );
         Notice::new("image", what, "look for coma (stop the lens down) or motion during the exposure")
     }
+}
+
+/// Displacement by lopsided edges from which on it is told, px.
+const LOPSIDED_PX: f64 = 0.002;
+
+fn lopsided_notice(drift: Drift) -> Notice {
+    let [u, v] = drift.mean_px;
+    let what = format!(
+        "the edges are blurred more to one side, which displaces centres by ({u:.4}, {v:.4}) px everywhere and by {:.4} px \
+         along the radius in the corner",
+        drift.corner_px
+    );
+    Notice::new("image", what, "look for coma (stop the lens down) or motion during the exposure")
 }

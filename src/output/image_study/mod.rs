@@ -2,12 +2,16 @@
 //!
 //! A new part is a file here that returns a [`Section`], and a row in `cli/image_study.rs`.
 
+mod bias;
 mod identity;
+mod precision;
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+pub use bias::bias_section;
 pub use identity::identity_section;
+pub use precision::precision_section;
 
 /// One part of the report.
 #[derive(Debug, Clone, PartialEq)]

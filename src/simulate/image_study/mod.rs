@@ -1,10 +1,12 @@
 //! What the image stage reaches on rendered pictures with known truth.
 
+mod bias;
 mod identity;
 mod identity_view;
 mod precision;
 mod view;
 
+pub use bias::{Bias, BiasCase, Cause, bias, bias_cases};
 pub use identity::{
     DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityRequest, IdentityView, MirrorAnswer, Plates, Sight, identity,
     identity_view,

@@ -1,0 +1,107 @@
+//! Ink of neighbours that blur carries into the pixels of a marker.
+//!
+//! Where the paper between two markers is narrow against the blur, each darkens the edge of the other: by 2 % of the
+//! contrast at two sigma, which is some 0.03 px. Once the neighbours are measured, what they take from a pixel is known
+//! and given back; pixels that they cover by more than [`MOST`] are left out.
+
+use super::edge_model::{LANES, Pixels};
+use super::ellipse::Ellipse;
+use super::exact_edge::Contour;
+use super::types::Measured;
+
+/// Largest coverage by neighbours of a pixel that is still used: one sigma of the blur from their edge. Beyond it their
+/// own uncertainty would count.
+const MOST: f32 = 0.16;
+
+/// A contour of a neighbour and what it takes from the light.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tail {
+    /// Position in the picture.
+    contour: Contour,
+    /// Paper less ink at the centre, counts; negative for the hole of an annulus.
+    contrast: f64,
+    /// Gradient of the light as a share, 1/px.
+    gradient: [f64; 2],
+}
+
+impl Tail {
+    /// The contours of a measured marker.
+    pub fn of(measured: &Measured) -> impl Iterator<Item = Self> {
+        let contrast = measured.paper - measured.ink;
+        let hole = measured.hole.map(|h| Self::at(&h, measured, -contrast));
+        std::iter::once(Self::at(&measured.outer.ellipse, measured, contrast)).chain(hole)
+    }
+
+    /// A contour under the light and the blur of `like`.
+    pub fn at(ellipse: &Ellipse, like: &Measured, contrast: f64) -> Self {
+        let s2 = like.blur_px * like.blur_px;
+        let centre = [0, 1].map(|a| ellipse.centre[a] - s2 * like.gradient[a]);
+        let contour = Contour { centre, to_unit: ellipse.normaliser(), third: [0.0; 2], blur: like.blur_px };
+        Self { contour, contrast, gradient: like.gradient }
+    }
+}
+
+/// Gives back to every pixel what the neighbours take, and leaves out the pixels that they cover.
+pub(super) fn lift(pixels: &mut Pixels, tails: &[Tail], anchor: [f64; 2]) {
+    let n = pixels.x.len();
+    let (mut covered, mut one, all) = (vec![0.0f32; n], vec![0.0f32; n], vec![true; n / LANES]);
+    for tail in tails {
+        let centre = [0, 1].map(|a| tail.contour.centre[a] - anchor[a]);
+        let contour = Contour { centre, ..tail.contour };
+        contour.coverage(&pixels.x, &pixels.y, &all, &mut pixels.nodes, &mut one, &mut []);
+        let contrast = tail.contrast as f32;
+        let ([cx, cy], [gx, gy]) = (centre.map(|v| v as f32), tail.gradient.map(|v| v as f32));
+        for (i, b) in one.iter().enumerate() {
+            let light = 1.0 + gx * (pixels.x[i] - cx) + gy * (pixels.y[i] - cy);
+            pixels.value[i] += contrast * light * b;
+            covered[i] += contrast.signum() * b;
+        }
+    }
+    let mut keep = 0;
+    for (i, covered) in covered.iter().enumerate().take(pixels.count) {
+        if covered.abs() <= MOST {
+            pixels.x[keep] = pixels.x[i];
+            pixels.y[keep] = pixels.y[i];
+            pixels.value[keep] = pixels.value[i];
+            keep += 1;
+        }
+    }
+    pixels.truncate(keep);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::circles::types::Imaged;
+    use crate::series::Edge;
+
+    #[test]
+    fn a_neighbour_is_taken_off_and_its_inside_left_out() {
+        let ellipse = Ellipse { centre: [112.0, 50.5], shape: [1.0 / 16.0, 0.0, 1.0 / 16.0] };
+        let measured = Measured {
+            outer: Imaged { edge: Edge::Outer, ellipse, covariance: [0.0; 3] },
+            inner: None,
+            hole: None,
+            blur_px: 1.2,
+            paper: 200.0,
+            ink: 20.0,
+            rms: 0.0,
+            gradient: [0.0; 2],
+            visible: 1.0,
+        };
+        let tails: Vec<Tail> = Tail::of(&measured).collect();
+        let contour = Contour { centre: [12.0, 0.5], ..tails[0].contour };
+        let mut pixels = Pixels::default();
+        (-15..=15).for_each(|y| (-15..=15).for_each(|x| pixels.push(x as f32, y as f32, 200.0)));
+        pixels.finish();
+        let mut covered = vec![0.0; pixels.x.len()];
+        let all = vec![true; pixels.x.len() / LANES];
+        contour.coverage(&pixels.x, &pixels.y, &all, &mut pixels.nodes, &mut covered, &mut []);
+        pixels.value.iter_mut().zip(&covered).for_each(|(v, b)| *v -= 180.0 * b);
+        let before = pixels.count;
+        lift(&mut pixels, &tails, [100.0, 50.0]);
+        // the disc of radius 4 px covers 34 pixels fully at this place and 16 % of those 1.2 px beyond its edge
+        assert!((50..110).contains(&(before - pixels.count)), "{}", before - pixels.count);
+        assert!(pixels.value[..pixels.count].iter().all(|v| (v - 200.0).abs() < 1e-2));
+    }
+}
