@@ -125,6 +125,7 @@ fn read(folder: &Path, mode: Mode) -> Fallible<(Problem, State)> {
         cameras: names("camera"),
         images,
         noise,
+        families: Vec::new(),
         huber: f64::INFINITY,
     };
     Ok((problem, state))

@@ -33,6 +33,7 @@ fn hold_out_tells_lenses_apart() {
     for (lens, field_deg, not) in [
         (Lens::Brown, 60.0, &[][..]),
         (Lens::Fisheye, 100.0, &[Lens::Brown, Lens::Parallax, Lens::ThinPrism][..]),
+        (Lens::Rational, 100.0, &[Lens::Brown, Lens::Parallax, Lens::ThinPrism][..]),
         (Lens::ThinPrism, 60.0, &[Lens::Brown, Lens::Fisheye, Lens::Rational, Lens::Parallax][..]),
         (Lens::Parallax, 60.0, &[Lens::Brown, Lens::Fisheye, Lens::Rational, Lens::ThinPrism][..]),
     ] {

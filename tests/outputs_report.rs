@@ -66,9 +66,10 @@ fn the_page_is_complete_and_self_contained() {
     for broken in ["NaN", ">inf", "-inf", "Infinity"] {
         assert!(!page.contains(broken), "the page says {broken}");
     }
-    // Histogram, workspace from above and from the side, joint noise, residuals over image and plate, distortion, plate corrections.
+    // Histogram, workspace from above and from the side, joint noise, residuals over image and plate, distortion and uncertainty of the
+    // camera, plate corrections.
     let drawings = drawings(&page);
-    assert_eq!(drawings.len(), 8);
+    assert_eq!(drawings.len(), 9);
     for drawing in drawings {
         let document = roxmltree::Document::parse(drawing).unwrap();
         assert!(document.descendants().filter(|n| n.is_element()).count() > 5);

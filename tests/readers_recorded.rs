@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use robotcal::geom::Pose;
 use robotcal::series::{
-    Edge, ImageObservations, Observation, RecordingOptions, Series, Shown, Source, convert_recording, extract, read,
-    write_recording,
+    CameraInfo, Edge, FramePoses, ImageMarks, ImageObservations, MarkKind, MarkLayer, Observation, RecordingOptions,
+    Series, Shown, Source, convert_recording, extract, read, write_recording,
 };
 use robotcal::urdf::{Chain, RobotDescription};
 use tempfile::TempDir;
@@ -150,12 +150,24 @@ fn a_folder_written_as_a_recording_reads_back_the_same() {
     let readings = series.readings_for(&chain).unwrap();
     let poses: Vec<_> =
         readings.iter().map(|r| r.as_ref().map(|_| Pose::from_xyz_rpy([1.0, 2.0, 3.0], [0.0; 3]))).collect();
+    let frames = [FramePoses { parent: "base".into(), child: "d".into(), poses }];
+    let camera = CameraInfo {
+        width_px: 640,
+        height_px: 480,
+        distortion_model: "plumb_bob".into(),
+        distortion: vec![-0.1, 0.01, 1e-4, 2e-4, 0.0],
+        intrinsics: Some([501.0, 502.0, 319.0, 241.0]),
+    };
     let marks = [ImageObservations {
         image: "deep.tif".into(),
         observations: vec![Observation { marker: 1, edge: Edge::Outer, uv: [3.0, 4.25], covariance: None }],
     }];
+    let mut marks = marks.each_ref().map(ImageMarks::from);
+    let residual = vec![[3.0, 4.25], [5.0, 6.0]];
+    marks[0].layers.push(MarkLayer { kind: MarkKind::Lines, colour: [1.0, 0.0, 0.0], points: residual });
+    let camera_info = Some(&camera);
     let shown =
-        Shown { joints: &chain.readings, readings: &readings, frames: Some(("base", "d", &poses)), marks: &marks };
+        Shown { joints: &chain.readings, readings: &readings, camera: camera_info, frames: &frames, marks: &marks };
     let path = folder.path().join("again.mcap");
     let notices = write_recording(&path, &series, shown).unwrap();
     assert_eq!(notices.len(), 1, "the image off the robot is told of: {notices:?}");
@@ -166,6 +178,7 @@ fn a_folder_written_as_a_recording_reads_back_the_same() {
     let again = extract(&path, &folder.path().join("pictures"), &options).unwrap();
     assert!(again.notices.is_empty(), "{:?}", again.notices);
     assert_eq!(again.stops.stops.len(), 5);
+    assert_eq!(again.camera_info.as_ref(), Some(&camera));
     for ((a, b), readings) in again.stops.stops.iter().zip(&series.stops.stops).zip(&readings) {
         assert_eq!(&a.raw_readings, readings);
         // Nanoseconds of a double of 1.7e9 s.
@@ -182,8 +195,16 @@ fn a_folder_written_as_a_recording_reads_back_the_same() {
         if message.channel.topic == "/camera/annotations" {
             let text: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
             assert_eq!(text["points"][0]["points"][0], serde_json::json!({"x": 3.5, "y": 4.75}));
+            assert_eq!(text["points"][1]["type"], 4, "a list of lines");
+            assert_eq!(text["points"][1]["points"][1], serde_json::json!({"x": 5.5, "y": 6.5}));
         }
     }
-    let expected = [("/camera/annotations", 1), ("/camera/image/compressed", 5), ("/joint_states", 255), ("/tf", 5)];
+    let expected = [
+        ("/camera/annotations", 1),
+        ("/camera/camera_info", 5),
+        ("/camera/image/compressed", 5),
+        ("/joint_states", 255),
+        ("/tf", 5),
+    ];
     assert_eq!(counts, expected.map(|(t, n)| (t.to_string(), n)).into());
 }

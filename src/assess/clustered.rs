@@ -9,7 +9,6 @@
 use nalgebra::{DMatrix, DVector, Matrix3};
 
 use crate::linalg::product;
-use crate::model::plate_modes::MODES;
 use crate::problem::{Problem, Slack, State};
 use crate::solve::{Covariance, Linearised};
 
@@ -90,7 +89,7 @@ impl Seen {
         for (k, (terms, &i)) in lin.terms.iter().zip(&lin.images).enumerate() {
             let image = &problem.images[i];
             let chain = &lin.chains[k];
-            let (camera, shape) = (&problem.layout.cameras[image.camera], &problem.layout.shapes[image.plate]);
+            let columns = problem.layout.intrinsics(image);
             for t in &terms.markers {
                 let Some(at) = self.at(image.plate, t.marker) else { continue };
                 information[at] += t.mm;
@@ -100,10 +99,12 @@ impl Seen {
                 theta += &mp * &chain.d_theta;
                 let mut slack = rows.columns_mut(slack_start[k], chain.d_slack.ncols());
                 slack += &mp * &chain.d_slack;
-                let mut pixels = rows.columns_mut(camera.start, camera.len());
-                pixels += t.me.columns(0, camera.len());
-                let mut modes = rows.columns_mut(shape.start, MODES);
-                modes += t.me.columns(t.me.ncols() - MODES, MODES);
+                for (e, values) in t.intrinsics() {
+                    if let Some(c) = columns[e] {
+                        let mut column = rows.fixed_columns_mut::<1>(c);
+                        column += values;
+                    }
+                }
             }
         }
         for (at, information) in information.iter().enumerate() {
@@ -121,12 +122,10 @@ fn score(problem: &Problem, lin: &Linearised, k: usize, markers: &Seen) -> (DVec
     let mut dense = DVector::zeros(problem.layout.len());
     let of_theta = chain.d_theta.transpose() * DVector::from_column_slice(terms.bp.as_slice());
     dense.rows_mut(0, of_theta.len()).copy_from(&of_theta);
-    let (camera, shape) = (&problem.layout.cameras[image.camera], &problem.layout.shapes[image.plate]);
-    for (e, c) in camera.clone().enumerate() {
-        dense[c] += terms.be[e];
-    }
-    for (e, c) in shape.clone().enumerate() {
-        dense[c] += terms.be[terms.be.len() - MODES + e];
+    for (e, column) in problem.layout.intrinsics(image).into_iter().enumerate() {
+        if let Some(c) = column {
+            dense[c] += terms.be[e];
+        }
     }
     let mut of_markers = DVector::zeros(3 * markers.order.len());
     for t in &terms.markers {

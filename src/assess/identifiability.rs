@@ -129,6 +129,7 @@ pub fn identifiability(
     let values = shares.map(|k| (1.0 / k.max(f64::MIN_POSITIVE) - 1.0).max(0.0));
     let listed: Vec<usize> = (0..layout.len())
         .filter(|c| layout.columns[*c].free && covariance[(*c, *c)] > 0.0 && !layout.locals.contains(c))
+        .filter(|c| !layout.fields.iter().any(|field| field.contains(c)))
         .collect();
     let names: Vec<String> = listed.iter().map(|&c| short_name(&layout.columns[c].name)).collect();
     let all = DMatrix::from_fn(listed.len(), listed.len(), |i, j| covariance[(listed[i], listed[j])]);

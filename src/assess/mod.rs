@@ -6,6 +6,7 @@ mod flange;
 mod hold_out;
 mod identifiability;
 mod points;
+mod projection;
 mod propagate;
 mod statistics;
 mod stops;
@@ -20,6 +21,7 @@ pub use identifiability::{
     identifiability_of_stops,
 };
 pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
+pub use projection::ProjectionMap;
 pub use propagate::{PredictedPose, View, predict_pose};
 pub use statistics::{Ratio, bootstrap_ratio, median, root_mean_square};
 pub use stops::{Structural, ideal_stops, minimal_set, structural};

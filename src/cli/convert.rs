@@ -6,9 +6,11 @@ use clap::Args;
 
 use super::Verdict;
 use super::recording::RecordingArgs;
+use super::show::read_solution;
 use crate::error::{Error, Result};
 use crate::model::robot::Robot;
-use crate::series::{self, Extracted, Shown, Source, convert_recording};
+use crate::output::recording::{MAGNIFIED, overlay};
+use crate::series::{self, CameraInfo, Extracted, FramePoses, ImageMarks, Series, Shown, Source, convert_recording};
 use crate::urdf::{self, Chain};
 
 /// Flags of `convert`.
@@ -29,6 +31,9 @@ pub(super) struct ConvertArgs {
     /// Tip link
     #[arg(long, value_name = "LINK", requires = "urdf")]
     tip: Option<String>,
+    /// Solution of the series (solution.json): its camera, frames and residuals go into the recording, too
+    #[arg(long, value_name = "SOLUTION", requires = "urdf")]
+    solution: Option<PathBuf>,
     #[command(flatten)]
     recording: RecordingArgs,
 }
@@ -57,21 +62,48 @@ fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<()> {
     };
     let series = series::read_images(&args.from)?;
     let readings = series.readings_for(&chain)?;
-    let robot = Robot::nominal(chain.clone());
-    let poses: Vec<_> = readings.iter().map(|r| r.as_ref().map(|q| robot.base_from_tip(q))).collect();
-    let marks = match series::read(&args.from)?.source {
-        Source::Observations(marks) => marks,
-        _ => Vec::new(),
+    let names: Vec<&str> = series.stops.stops.iter().map(|s| s.image.as_str()).collect();
+    let found = args.solution.as_deref().map(|path| overlay(&read_solution(path)?, &names, &readings)).transpose()?;
+    let (camera, frames, marks) = match &found {
+        Some(o) => (Some(o.camera.clone()), o.frames.clone(), o.marks.clone()),
+        None => as_given(args, &series, &chain, &readings)?,
     };
-    let frames = Some((chain.base.as_str(), chain.tip.as_str(), poses.as_slice()));
-    let shown = Shown { joints: &chain.readings, readings: &readings, frames, marks: &marks };
+    let shown =
+        Shown { joints: &chain.readings, readings: &readings, camera: camera.as_ref(), frames: &frames, marks: &marks };
     let notices = series::write_recording(&args.to, &series, shown)?;
     let usable = series.stops.stops.iter().zip(&readings).filter(|(s, r)| s.path.is_some() && r.is_some()).count();
-    println!("stops     {usable} with image, joints and nominal tip; {} with observations marked", marks.len());
+    let tip = if found.is_some() { "identified" } else { "nominal" };
+    println!("stops     {usable} with image, joints and {tip} tip; {} with observations marked", marks.len());
+    if found.is_some() {
+        println!("overlay   green: used, orange: left out, red: residuals, {MAGNIFIED} times their length");
+    }
     for notice in series.notices.iter().chain(&series.reading_notices(&chain)).chain(&notices) {
         println!("note      {notice}");
     }
     Ok(())
+}
+
+type Given = (Option<CameraInfo>, Vec<FramePoses>, Vec<ImageMarks>);
+
+/// What is known without a solution: the stated focal length, the nominal tip, the observations where there are any.
+fn as_given(args: &ConvertArgs, series: &Series, chain: &Chain, readings: &[Option<Vec<f64>>]) -> Result<Given> {
+    let stated = &series.manifest.camera;
+    let size = series.stops.stops.iter().find_map(|s| image::image_dimensions(s.path.as_ref()?).ok());
+    let camera = size.zip(stated.focal_px).map(|((width_px, height_px), focal)| CameraInfo {
+        width_px,
+        height_px,
+        distortion_model: "plumb_bob".into(),
+        distortion: vec![0.0; 5],
+        intrinsics: Some([focal, focal, 0.5 * (f64::from(width_px) - 1.0), 0.5 * (f64::from(height_px) - 1.0)]),
+    });
+    let robot = Robot::nominal(chain.clone());
+    let poses = readings.iter().map(|r| r.as_ref().map(|q| robot.base_from_tip(q))).collect();
+    let frames = vec![FramePoses { parent: chain.base.clone(), child: chain.tip.clone(), poses }];
+    let marks = match series::read(&args.from)?.source {
+        Source::Observations(marks) => marks.iter().map(ImageMarks::from).collect(),
+        _ => Vec::new(),
+    };
+    Ok((camera, frames, marks))
 }
 
 /// What was taken, as a person reads it.

@@ -40,7 +40,7 @@ pub(super) struct IdentifyArgs {
     /// Tip link that carries camera or plate (overrides series.toml)
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
-    /// Lens: auto (by hold-out, says why), brown, fisheye, parallax, rational or thin_prism [default: as in series.toml, else brown]
+    /// Lens: auto (by hold-out, says why), brown, fisheye, parallax, rational, thin_prism, brown+field or fisheye+field [default: as in series.toml, else brown]
     #[arg(long, value_name = "LENS")]
     camera: Option<String>,
     /// Where joint offsets go

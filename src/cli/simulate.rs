@@ -37,7 +37,7 @@ pub(super) struct SimulateArgs {
     /// Where the camera is
     #[arg(long, value_enum, default_value_t = Mount::Hand)]
     mount: Mount,
-    /// Lens: brown, fisheye, parallax, rational or thin_prism
+    /// Lens: brown, fisheye, parallax, rational, thin_prism, brown+field or fisheye+field
     #[arg(long, default_value = "brown")]
     lens: String,
     /// Number of stops

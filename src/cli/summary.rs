@@ -130,9 +130,13 @@ fn cameras(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         let first = format!("camera/{}/", camera.name);
         let sigma = r.estimates.iter().find(|e| e.name.starts_with(&first)).and_then(|e| e.sigma);
         let sigma = sigma.map_or("fixed".to_owned(), |s| format!("+- {s:.2}"));
+        let known = camera.projection.as_ref().and_then(|p| p.median_and_largest());
+        let known = known.map_or(String::new(), |[median, largest]| {
+            format!("; projection known to {median:.3} px, at worst {largest:.3} px")
+        });
         writeln!(
             out,
-            "camera    {}: fx {:.2} {sigma}, fy {:.2}, centre ({:.2}, {:.2}) px; image noise {:.3} px per axis",
+            "camera    {}: fx {:.2} {sigma}, fy {:.2}, centre ({:.2}, {:.2}) px; image noise {:.3} px per axis{known}",
             camera.name,
             value(0),
             value(1),

@@ -36,7 +36,7 @@ static SAMPLES: LazyLock<Samples> = LazyLock::new(|| {
 });
 
 /// The prediction of one observation, with derivatives.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Prediction {
     /// Column and row, px.
     pub uv: Vector2<f64>,
@@ -44,8 +44,10 @@ pub struct Prediction {
     pub d_pose: SMatrix<f64, 2, 6>,
     /// With respect to the marker's centre in the plate frame, px/m.
     pub d_marker: Matrix2x3<f64>,
-    /// With respect to the parameters of the camera.
+    /// With respect to the parameters of pinhole and lens formula.
     pub d_camera: SMatrix<f64, 2, MAX_PARAMETERS>,
+    /// With respect to the displacement field: control points that it touches, ascending, with the derivative by their u and v.
+    pub d_field: Vec<(usize, Matrix2<f64>)>,
 }
 
 /// Predicts the image of a point of the plate (plate frame, m); `None` behind the camera.
@@ -55,7 +57,8 @@ pub fn point(camera: &Camera, camera_from_plate: &Pose, x: &Vector3<f64>) -> Opt
     let mut d_pose = SMatrix::<f64, 2, 6>::zeros();
     d_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&d_marker);
     d_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-d_marker * skew(x)));
-    Some(Prediction { uv: p.uv, d_pose, d_marker, d_camera: p.d_parameters })
+    let d_field = field_columns(std::slice::from_ref(&p), &[Matrix2::identity()]);
+    Some(Prediction { uv: p.uv, d_pose, d_marker, d_camera: p.d_parameters, d_field })
 }
 
 /// Predicts the area centroid of the image of a circle of `radius_m` about `centre` (plate frame, m), parallel to the
@@ -84,7 +87,21 @@ pub fn centroid(camera: &Camera, camera_from_plate: &Pose, centre: &Vector3<f64>
     let mut d_pose = SMatrix::<f64, 2, 6>::zeros();
     d_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&d_marker);
     d_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-d_turn - d_marker * skew(centre)));
-    Some(Prediction { uv: mean, d_pose, d_marker, d_camera })
+    Some(Prediction { uv: mean, d_pose, d_marker, d_camera, d_field: field_columns(&samples, &weights) })
+}
+
+/// Derivative by the displacement field of the sum of samples, each with its weight; nothing for a lens without a field.
+fn field_columns(samples: &[Projection], weights: &[Matrix2<f64>]) -> Vec<(usize, Matrix2<f64>)> {
+    let mut columns: Vec<(usize, Matrix2<f64>)> = Vec::new();
+    for (touched, g) in samples.iter().zip(weights).filter_map(|(p, g)| p.field.as_ref().map(|t| (t, g))) {
+        for (k, b) in touched.points() {
+            match columns.binary_search_by_key(&k, |c| c.0) {
+                Ok(at) => columns[at].1 += g * b,
+                Err(at) => columns.insert(at, (k, g * b)),
+            }
+        }
+    }
+    columns
 }
 
 /// Area centroid of the image of a circle, px, without derivatives; `None` where the lens does not image all of it.

@@ -5,6 +5,7 @@ use super::text::{list, quoted};
 use crate::error::{Error, Result};
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::recipe::Solution;
+use crate::series::CameraInfo;
 
 /// One file for each camera, as (file name, text).
 ///
@@ -30,6 +31,15 @@ fn depths(solution: &Solution) -> Vec<[f64; 2]> {
     all.into_iter().map(|[near, far]| if far > 0.0 { [near, far] } else { [1.0, 1.0] }).collect()
 }
 
+/// Name in ROS of a lens that ROS has.
+fn ros_name(lens: Lens) -> &'static str {
+    match lens {
+        Lens::Fisheye => "equidistant",
+        Lens::Rational => "rational_polynomial",
+        _ => "plumb_bob",
+    }
+}
+
 /// Text of one camera_info; pixel (0, 0) is the centre of the top-left pixel, as in OpenCV and ROS.
 ///
 /// A lens that ROS has no model for is fitted by one that it has, and the text says what that costs.
@@ -37,32 +47,10 @@ fn depths(solution: &Solution) -> Vec<[f64; 2]> {
 /// # Errors
 /// A lens that no model of ROS comes near to.
 pub(super) fn camera_yaml(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<String> {
-    let (camera, remark) = match camera.lens {
-        Lens::Brown | Lens::Rational | Lens::Fisheye => (camera.clone(), String::new()),
-        Lens::ThinPrism | Lens::Parallax => {
-            let lens = camera.lens.name();
-            let fit = fit_lens(camera, Lens::Rational, depths_m).ok_or_else(|| {
-                Error::unsolved(
-                    format!("camera {name}"),
-                    format!("no camera model of ROS comes near to its {lens} lens"),
-                    "identify with --camera brown or rational",
-                )
-            })?;
-            let remark = format!(
-                "# NOT THE IDENTIFIED LENS ({lens}, see solution.json), for which ROS has no model, but the nearest rational_polynomial:\n\
-                 # loss {:.3} px RMS over the image, at most {:.3} px, for points {:.3} to {:.3} m away.\n",
-                fit.rms_px, fit.worst_px, depths_m[0], depths_m[1]
-            );
-            (fit.camera, remark)
-        }
-    };
+    let (camera, remark) = in_ros(name, camera, depths_m)?;
     let [fx, fy, cx, cy] = [0, 1, 2, 3].map(|k| camera.parameters[k]);
     // The coefficients of these lenses stand in the order of OpenCV.
-    let model = match camera.lens {
-        Lens::Fisheye => "equidistant",
-        Lens::Rational => "rational_polynomial",
-        _ => "plumb_bob",
-    };
+    let model = ros_name(camera.lens);
     let coefficients = camera.parameters[4..].to_vec();
     let matrix = |rows: usize, columns: usize, data: &[f64]| {
         format!("\n  rows: {rows}\n  cols: {columns}\n  data: {}\n", list(data.iter().copied()))
@@ -78,4 +66,48 @@ pub(super) fn camera_yaml(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> R
         matrix(3, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
         matrix(3, 4, &[fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]),
     ))
+}
+
+/// The camera as ROS can say it, and what that loses, in words.
+fn in_ros(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<(Camera, String)> {
+    Ok(match camera.lens {
+        Lens::Brown | Lens::Rational | Lens::Fisheye => (camera.clone(), String::new()),
+        Lens::ThinPrism | Lens::Parallax | Lens::BrownField | Lens::FisheyeField => {
+            let lens = camera.lens.name();
+            let nearest = if camera.lens == Lens::FisheyeField { Lens::Fisheye } else { Lens::Rational };
+            let fit = fit_lens(camera, nearest, depths_m).ok_or_else(|| {
+                Error::unsolved(
+                    format!("camera {name}"),
+                    format!("no camera model of ROS comes near to its {lens} lens"),
+                    "identify with --camera brown or rational",
+                )
+            })?;
+            let remark = format!(
+                "# NOT THE IDENTIFIED LENS ({lens}, see solution.json), for which ROS has no model, but the nearest {}:\n\
+                 # loss {:.3} px RMS over the image, at most {:.3} px, for points {:.3} to {:.3} m away.\n",
+                ros_name(nearest),
+                fit.rms_px,
+                fit.worst_px,
+                depths_m[0],
+                depths_m[1]
+            );
+            (fit.camera, remark)
+        }
+    })
+}
+
+/// The camera as a message of ROS, for points between two depths (m).
+///
+/// # Errors
+/// A lens that no model of ROS comes near to.
+pub(super) fn camera_info(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<CameraInfo> {
+    let (camera, _) = in_ros(name, camera, depths_m)?;
+    let p = &camera.parameters;
+    Ok(CameraInfo {
+        width_px: camera.width_px,
+        height_px: camera.height_px,
+        distortion_model: ros_name(camera.lens).into(),
+        distortion: p[4..].to_vec(),
+        intrinsics: Some([p[0], p[1], p[2], p[3]]),
+    })
 }

@@ -29,6 +29,7 @@ mod plate_pdf;
 mod plate_png;
 mod plate_svg;
 mod pose_files;
+pub mod recording;
 mod report;
 mod residuals;
 pub mod restore;

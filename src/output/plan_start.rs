@@ -102,6 +102,7 @@ pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -
     for (slot, (_, value)) in lens.parameters.iter_mut().zip(&camera.parameters) {
         *slot = *value;
     }
+    let lens = lens.without_field();
     let used = |i: &&ImageRecord| {
         on_robot(i) && (i.camera, i.mounting, i.plate) == (first.camera, first.mounting, first.plate)
     };

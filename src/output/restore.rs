@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::{DMatrix, Vector3, Vector6};
 
-use super::solution_json::{ImageRecord, PlateRecord, SolutionRecord};
+use super::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
 use crate::assess::FlangeModel;
 use crate::error::{Error, Result};
 use crate::geom::Pose;
@@ -101,6 +101,12 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
     series.collect()
 }
 
+/// A camera as it was found.
+pub(super) fn camera(c: &CameraRecord) -> Camera {
+    let parameters = c.parameters.iter().map(|(_, v)| *v).collect();
+    Camera { lens: c.lens, width_px: c.width_px, height_px: c.height_px, parameters }
+}
+
 /// The model that a solution found, with its covariance.
 #[derive(Debug, Clone)]
 pub struct FoundModel {
@@ -135,10 +141,6 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
     });
     let terms = terms.collect::<Result<Vec<_>>>()?;
     let robot = Robot { chain, twists, terms };
-    let camera = |c: &super::solution_json::CameraRecord| Camera {
-        parameters: c.parameters.iter().map(|(_, v)| *v).collect(),
-        ..Camera::pinhole(c.lens, c.width_px, c.height_px, 1.0)
-    };
     let state = State {
         robot: robot.clone(),
         mountings: record.mountings.iter().map(|m| (&m.pose).into()).collect(),

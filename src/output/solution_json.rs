@@ -8,7 +8,7 @@ use std::io;
 
 use serde::{Deserialize, Serialize};
 
-use crate::assess::{Errors, Identifiability, WorkspacePoint};
+use crate::assess::{Errors, Identifiability, ProjectionMap, WorkspacePoint};
 use crate::error::{Error, Notice, Result};
 use crate::geom::Pose;
 use crate::model::camera::Lens;
@@ -154,6 +154,12 @@ pub struct CameraRecord {
     /// Apparent tilt of the plate in each image, rad; 0 where it is not part of the model.
     #[serde(default)]
     pub apparent_tilt_rad: f64,
+    /// How well it is known where in the image a direction shows.
+    #[serde(default)]
+    pub projection: Option<ProjectionMap>,
+    /// Typical displacement (factor on the prior of every control point, px) of a lens with a displacement field.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field_sigma_px: Option<f64>,
 }
 
 /// A mounting or placement.

@@ -13,6 +13,7 @@ use super::solution_json::{
     PlateRecord, ProgramRecord, RobotRecord, ScatterRecord, SeriesRecord, SolutionRecord, StatisticsRecord, TermRecord,
     UrdfRecord,
 };
+use crate::assess::{ProjectionMap, median};
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::model::plate_modes;
@@ -144,13 +145,25 @@ fn cameras(solution: &Solution) -> Vec<CameraRecord> {
             lens: c.lens,
             width_px: c.width_px,
             height_px: c.height_px,
-            parameters: c.parameter_names().map(String::from).zip(c.parameters.iter().copied()).collect(),
+            parameters: c.parameter_names().map(Into::into).zip(c.parameters.iter().copied()).collect(),
             pixel_factor: problem.noise.pixel_factor[k],
             joint_noise: problem.joint_sigma(k),
             apparent_tilt_rad: problem.noise.tilt.get(k).copied().unwrap_or(0.0),
+            projection: Some(projection(solution, k)),
+            field_sigma_px: problem.layout.fields[k].clone().next().map(|c| problem.layout.columns[c].prior_sigma),
         }
     };
     problem.cameras.iter().enumerate().map(camera).collect()
+}
+
+/// The map of a camera, for points as far away as the plates were.
+fn projection(solution: &Solution, camera: usize) -> ProjectionMap {
+    let depths: Vec<f64> = (solution.problem.used().filter(|(_, i)| i.camera == camera))
+        .filter_map(|(i, _)| solution.free_poses.poses[i].as_ref().map(|p| p.camera_from_plate.translation.z))
+        .collect();
+    let range = solution.problem.layout.cameras[camera].clone();
+    let covariance = solution.covariance.reduced.view((range.start, range.start), (range.len(), range.len()));
+    ProjectionMap::new(&solution.state.cameras[camera], &covariance.into_owned(), median(&depths).unwrap_or(1.0))
 }
 
 fn flat(c: &Matrix6<f64>) -> Vec<f64> {

@@ -7,23 +7,22 @@ use super::candidates::Candidate;
 use super::setting::Setting;
 use crate::geom::skew;
 use crate::linalg::{SymmetricFactor, product};
-use crate::model::camera::MAX_PARAMETERS;
-use crate::model::plate_modes::MODES;
 use crate::model::robot::{Robot, Stop};
 use crate::problem::{E, Image, Problem, State, Weighting, chained, linearise};
 
 /// Information of an image about all columns; `None` where it shows nothing.
 ///
-/// Joint noise is eliminated (Schur complement); the corrections of single markers are taken as known.
+/// Joint noise is eliminated (Schur complement); the corrections of single markers and the displacement field of a lens are taken as
+/// known.
 pub fn image_information(problem: &Problem, setting: &Setting, state: &State, image: &Image) -> Option<DMatrix<f64>> {
     let slack = setting.slack();
     let chain = chained(problem, state, image, &slack)?;
     let terms = linearise(image, state, &chain.pose, &Weighting::of(problem, image))?;
     let mut h = DMatrix::zeros(6 + E, 6 + E);
     h.view_mut((0, 0), (6, 6)).copy_from(&terms.pp);
-    h.view_mut((0, 6), (6, E)).copy_from(&terms.pe);
-    h.view_mut((6, 0), (E, 6)).copy_from(&terms.pe.transpose());
-    h.view_mut((6, 6), (E, E)).copy_from(&terms.ee);
+    h.view_mut((0, 6), (6, E)).copy_from(&terms.pe.columns(0, E));
+    h.view_mut((6, 0), (E, 6)).copy_from(&terms.pe.columns(0, E).transpose());
+    h.view_mut((6, 6), (E, E)).copy_from(&terms.ee.view((0, 0), (E, E)));
     let n = chain.d_slack.ncols();
     let coupling = chain.d_slack.transpose() * h.rows(0, 6);
     let mut joint = coupling.columns(0, 6) * &chain.d_slack;
@@ -35,11 +34,10 @@ pub fn image_information(problem: &Problem, setting: &Setting, state: &State, im
     let layout = &problem.layout;
     let mut t = DMatrix::zeros(6 + E, layout.len());
     t.view_mut((0, 0), (6, layout.theta_len())).copy_from(&chain.d_theta);
-    for (k, column) in layout.cameras[image.camera].clone().enumerate().take(MAX_PARAMETERS) {
-        t[(6 + k, column)] = 1.0;
-    }
-    for (k, column) in layout.shapes[image.plate].clone().enumerate().take(MODES) {
-        t[(6 + MAX_PARAMETERS + k, column)] = 1.0;
+    for (k, column) in layout.intrinsics(image).into_iter().enumerate().take(E) {
+        if let Some(c) = column {
+            t[(6 + k, c)] = 1.0;
+        }
     }
     let m = product(&t.transpose(), &product(&h, &t));
     Some((&m + m.transpose()) * 0.5)

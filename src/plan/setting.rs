@@ -62,6 +62,7 @@ impl Setting {
             cameras: one("camera"),
             images: Vec::new(),
             noise: Noise { pixel_factor: vec![1.0], joint: vec![joint], local: Vec::new(), tilt: Vec::new() },
+            families: Vec::new(),
             huber: HUBER,
         };
         (problem, state)

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::State;
-use crate::model::camera::Camera;
+use super::{Image, State};
+use crate::model::camera::MAX_PARAMETERS;
 use crate::model::joint_terms::Term;
 use crate::model::plate_modes;
 
@@ -40,6 +40,8 @@ pub struct Layout {
     pub placements: Vec<Range<usize>>,
     /// Columns of each camera.
     pub cameras: Vec<Range<usize>>,
+    /// Those of them that are its displacement field, at their end; empty for a lens without one.
+    pub fields: Vec<Range<usize>>,
     /// Columns of each plate's modes.
     pub shapes: Vec<Range<usize>>,
 }
@@ -118,15 +120,18 @@ impl Layout {
         let locals = terms.end - local_count..terms.end;
         let mountings = mountings.iter().map(|m| b.pose(&named("hand_camera", m, mountings.len()))).collect();
         let placements = placements.iter().map(|p| b.pose(&format!("plate/{p}"))).collect();
-        let cameras = (cameras.iter().zip(&state.cameras))
+        let cameras: Vec<Range<usize>> = (cameras.iter().zip(&state.cameras))
             .map(|(name, camera)| {
                 b.block(|b| {
                     for (k, p) in camera.parameter_names().enumerate() {
-                        let part = if k < 4 { "pinhole" } else { "lens" };
-                        b.add(format!("camera/{name}/{part}.{p}"), Camera::parameter_unit(k), camera.prior_sigma(k));
+                        let part = camera.parameter_block(k);
+                        b.add(format!("camera/{name}/{part}.{p}"), camera.parameter_unit(k), camera.prior_sigma(k));
                     }
                 })
             })
+            .collect();
+        let fields = (cameras.iter().zip(&state.cameras))
+            .map(|(range, camera)| range.start + camera.parametric()..range.end)
             .collect();
         let shapes = plates
             .iter()
@@ -139,7 +144,7 @@ impl Layout {
                 })
             })
             .collect();
-        Self { columns: b.columns, twists, terms, locals, mountings, placements, cameras, shapes }
+        Self { columns: b.columns, twists, terms, locals, mountings, placements, cameras, fields, shapes }
     }
 
     /// Columns of what belongs to the robot: twists and joint terms, without the local errors.
@@ -160,6 +165,13 @@ impl Layout {
     /// Number of leading columns that act through the camera poses (robot, mountings, placements).
     pub fn theta_len(&self) -> usize {
         self.cameras.first().map_or(self.len(), |c| c.start)
+    }
+
+    /// Column of every intrinsic unknown of an image, in their order ([`super::E`]); `None` for padding.
+    pub fn intrinsics(&self, image: &Image) -> Vec<Option<usize>> {
+        let (camera, field) = (&self.cameras[image.camera], &self.fields[image.camera]);
+        let formula = (camera.start..field.start).map(Some).chain(std::iter::repeat(None)).take(MAX_PARAMETERS);
+        formula.chain(self.shapes[image.plate].clone().map(Some)).chain(field.clone().map(Some)).collect()
     }
 
     /// Index of a column by its full name.

@@ -4,7 +4,9 @@
 //! pose (p, 6), intrinsics (e, camera parameters then plate modes) and markers (m, 3 each); the robot enters afterwards by
 //! `dp = G dtheta + L dslack` ([`chained`]).
 
-use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, Matrix6x2, SMatrix, SVector, Vector2, Vector3, Vector6};
+use nalgebra::{
+    DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Matrix6, Matrix6x2, Matrix6xX, SMatrix, Vector2, Vector3, Vector6,
+};
 
 use super::{Image, Measured, Problem, Slack, State};
 use crate::geom::{Pose, adjoint, right_jacobian_se3};
@@ -12,7 +14,9 @@ use crate::model::camera::MAX_PARAMETERS;
 use crate::model::circle::{self, Prediction};
 use crate::model::plate_modes::{MODES, basis};
 
-/// Intrinsic unknowns of one image: camera parameters (padded), then plate modes.
+/// Intrinsic unknowns of one image before its displacement field: camera parameters (padded), then plate modes.
+///
+/// The field follows: u and v of every control point.
 pub const E: usize = MAX_PARAMETERS + MODES;
 
 /// Normal-equation blocks of one marker in one image.
@@ -24,8 +28,10 @@ pub struct MarkerTerms {
     pub mm: Matrix3<f64>,
     /// Coupling with the pose.
     pub mp: SMatrix<f64, 3, 6>,
-    /// Coupling with the intrinsics.
+    /// Coupling with the intrinsics before the field.
     pub me: SMatrix<f64, 3, E>,
+    /// Coupling with the control points of the field that it touches, ascending.
+    pub field: Vec<(usize, Matrix3x2<f64>)>,
     /// Right-hand side.
     pub bm: Vector3<f64>,
 }
@@ -50,14 +56,14 @@ pub struct ImageTerms {
     pub cost: f64,
     /// Pose block.
     pub pp: Matrix6<f64>,
-    /// Pose with intrinsics.
-    pub pe: SMatrix<f64, 6, E>,
+    /// Pose with intrinsics, 6 x (E + field).
+    pub pe: Matrix6xX<f64>,
     /// Intrinsics.
-    pub ee: SMatrix<f64, E, E>,
+    pub ee: DMatrix<f64>,
     /// Right-hand side of the pose.
     pub bp: Vector6<f64>,
     /// Right-hand side of the intrinsics.
-    pub be: SVector<f64, E>,
+    pub be: DVector<f64>,
     /// Markers that were seen, ascending.
     pub markers: Vec<MarkerTerms>,
     /// Residuals of the observations in use.
@@ -96,13 +102,15 @@ pub fn predict(image: &Image, state: &State, pose: &Pose, observation: &Measured
 
 /// Normal-equation blocks of one image at a camera pose; `None` where an observed marker is behind the camera.
 pub fn linearise(image: &Image, state: &State, pose: &Pose, weighting: &Weighting) -> Option<ImageTerms> {
+    let camera = &state.cameras[image.camera];
+    let intrinsics = E + camera.parameters.len() - camera.parametric();
     let mut t = ImageTerms {
         cost: 0.0,
         pp: Matrix6::zeros(),
-        pe: SMatrix::zeros(),
-        ee: SMatrix::zeros(),
+        pe: Matrix6xX::zeros(intrinsics),
+        ee: DMatrix::zeros(intrinsics, intrinsics),
         bp: Vector6::zeros(),
-        be: SVector::zeros(),
+        be: DVector::zeros(intrinsics),
         markers: Vec::with_capacity(image.observations.len()),
         residuals: Vec::with_capacity(image.observations.len()),
     };
@@ -134,21 +142,69 @@ impl ImageTerms {
         je.fixed_view_mut::<2, MODES>(0, MAX_PARAMETERS).copy_from(&(p.d_marker * modes));
         let (wp, we, wr) = (w * p.d_pose, w * je, w * r);
         self.pp += p.d_pose.transpose() * wp;
-        self.pe += p.d_pose.transpose() * we;
-        self.ee += je.transpose() * we;
         self.bp += p.d_pose.transpose() * wr;
-        self.be += je.transpose() * wr;
+        let mut pe = self.pe.fixed_columns_mut::<E>(0);
+        pe += p.d_pose.transpose() * we;
+        let mut ee = self.ee.fixed_view_mut::<E, E>(0, 0);
+        ee += je.transpose() * we;
+        let mut be = self.be.fixed_rows_mut::<E>(0);
+        be += je.transpose() * wr;
+        self.add_field(p, &wp, &we, &wr, w);
         let jm = p.d_marker.transpose();
         let (mm, mp, me, bm) = (jm * w * p.d_marker, jm * wp, jm * we, jm * wr);
+        let field = p.d_field.iter().map(|(k, d)| (*k, jm * w * d));
         match self.markers.last_mut().filter(|last| last.marker == marker) {
             Some(last) => {
                 last.mm += mm;
                 last.mp += mp;
                 last.me += me;
                 last.bm += bm;
+                field.for_each(|f| last.add_field(f));
             }
-            None => self.markers.push(MarkerTerms { marker, mm, mp, me, bm }),
+            None => self.markers.push(MarkerTerms { marker, mm, mp, me, bm, field: field.collect() }),
         }
+    }
+
+    fn add_field(
+        &mut self,
+        p: &Prediction,
+        wp: &SMatrix<f64, 2, 6>,
+        we: &SMatrix<f64, 2, E>,
+        wr: &Vector2<f64>,
+        w: &Matrix2<f64>,
+    ) {
+        for (k, d) in &p.d_field {
+            let (column, dt) = (E + 2 * k, d.transpose());
+            let mut pe = self.pe.fixed_columns_mut::<2>(column);
+            pe += wp.transpose() * d;
+            let mut be = self.be.fixed_rows_mut::<2>(column);
+            be += dt * wr;
+            let with_e = dt * we;
+            let mut row = self.ee.fixed_view_mut::<2, E>(column, 0);
+            row += with_e;
+            let mut transposed = self.ee.fixed_view_mut::<E, 2>(0, column);
+            transposed += with_e.transpose();
+            let dw = dt * w;
+            for (other, e) in &p.d_field {
+                let mut block = self.ee.fixed_view_mut::<2, 2>(column, E + 2 * other);
+                block += dw * e;
+            }
+        }
+    }
+}
+
+impl MarkerTerms {
+    fn add_field(&mut self, (k, coupling): (usize, Matrix3x2<f64>)) {
+        match self.field.binary_search_by_key(&k, |f| f.0) {
+            Ok(at) => self.field[at].1 += coupling,
+            Err(at) => self.field.insert(at, (k, coupling)),
+        }
+    }
+
+    /// Coupling with every intrinsic unknown that it touches: its index, and a column.
+    pub fn intrinsics(&self) -> impl Iterator<Item = (usize, Vector3<f64>)> + '_ {
+        let field = self.field.iter().flat_map(|(k, c)| [0, 1].map(|d| (E + 2 * k + d, c.column(d).into_owned())));
+        (0..E).map(|e| (e, self.me.column(e).into_owned())).chain(field)
     }
 }
 

@@ -3,12 +3,14 @@
 //! [`Problem`] holds the data and never changes during a solve; [`State`] holds every unknown; [`Layout`] is the one place
 //! that turns a name into a column. The unit of residual evaluation is one image ([`linearise`]).
 
+mod family;
 mod layout;
 mod linearise;
 mod postures;
 mod select;
 mod state;
 
+pub use family::Family;
 pub use layout::{Column, Layout, OriginPrior};
 pub use linearise::{Chained, E, ImageTerms, MarkerTerms, Residual, Weighting, chained, linearise, predict};
 pub use postures::{common_readings, joined, posture_groups};
@@ -118,6 +120,8 @@ pub struct Problem {
     pub images: Vec<Image>,
     /// Variance components.
     pub noise: Noise,
+    /// Families of parameters whose size is a variance component, too.
+    pub families: Vec<Family>,
     /// Huber bound on the normalised length of a residual.
     pub huber: f64,
 }
@@ -150,8 +154,9 @@ impl Problem {
         self.noise.local.fill(0.0);
     }
 
-    /// The priors of the local errors follow their noise component.
-    pub fn hold_local_priors(&mut self, robot: &Robot) {
+    /// The priors of local errors and of families follow their components.
+    pub fn hold_component_priors(&mut self, robot: &Robot) {
+        self.families.iter().for_each(|f| f.hold(&mut self.layout));
         let first = self.layout.terms.start;
         for c in self.layout.locals.clone() {
             self.layout.columns[c].prior_sigma = self.noise.local[robot.terms[c - first].reading];

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
 use crate::model::robot::{Robot, Stop};
-use crate::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State};
+use crate::problem::{Family, Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State};
 use crate::series::CameraMount;
 use crate::series::{Edge, Observation, Plate};
 
@@ -158,7 +158,8 @@ pub(super) fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool
         local: first_local(&state, &layout),
         tilt: vec![FIRST_TILT; cameras.len()],
     };
-    Ok((Problem { layout, plates, placements, mountings, cameras, images, noise, huber: HUBER }, state))
+    let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
+    Ok((Problem { layout, plates, placements, mountings, cameras, images, noise, families, huber: HUBER }, state))
 }
 
 /// First guess of the local error of every reading that has columns for it; 0 for the others.

@@ -19,10 +19,10 @@ const SMALLEST: f64 = 1e-3;
 fn vote(terms: &ImageTerms, fx: f64, fy: f64) -> Option<f64> {
     let mut direction = SVector::<f64, E>::zeros();
     (direction[0], direction[1]) = (fx, fy);
-    let with_pose = terms.pe * direction;
+    let with_pose = terms.pe.fixed_columns::<E>(0) * direction;
     let solved = terms.pp.cholesky()?.solve(&with_pose);
-    let information = direction.dot(&(terms.ee * direction)) - with_pose.dot(&solved);
-    let pull = direction.dot(&terms.be) - solved.dot(&terms.bp);
+    let information = direction.dot(&(terms.ee.fixed_view::<E, E>(0, 0) * direction)) - with_pose.dot(&solved);
+    let pull = direction.dot(&terms.be.fixed_rows::<E>(0)) - solved.dot(&terms.bp);
     // An image whose own sigma is above one percent says nothing.
     (information > 1e4).then(|| pull / information)
 }

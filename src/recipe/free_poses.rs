@@ -215,7 +215,8 @@ fn try_focal(
     let early = [0, 1, 4];
     for stage in 0..2 {
         for (k, c) in columns.clone().enumerate() {
-            quick.layout.columns[c].free = problem.layout.columns[c].free && (stage == 1 || early.contains(&k));
+            let wanted = early.contains(&k) || (stage == 1 && k < lens.parametric());
+            quick.layout.columns[c].free = problem.layout.columns[c].free && wanted;
         }
         let settings = Settings { iterations: 40, decrement: 0.1 };
         let outcome = solve(&quick, trial, &settings);

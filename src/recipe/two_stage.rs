@@ -482,7 +482,7 @@ pub fn fit_joint(
     if hard || noise != JointNoise::Estimated {
         own.without_local_errors(&mut state);
     } else {
-        own.hold_local_priors(&state.robot);
+        own.hold_component_priors(&state.robot);
     }
     let options = ComponentOptions {
         joint: !hard && noise == JointNoise::Estimated,

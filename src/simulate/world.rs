@@ -146,8 +146,8 @@ pub fn lens_camera(lens: Lens, width_px: u32, height_px: u32, field_rad: f64) ->
     camera.parameters[..4].copy_from_slice(&brown.parameters[..4]);
     let start: &[f64] = &brown.parameters[4..];
     let coefficients = match lens {
-        Lens::Brown => start.to_vec(),
-        Lens::Fisheye => {
+        Lens::Brown | Lens::BrownField => start.to_vec(),
+        Lens::Fisheye | Lens::FisheyeField => {
             // Equidistant: the same field takes a shorter image.
             let shorter = (field_rad / 2.0).tan() / (field_rad / 2.0);
             camera.parameters[..2].iter_mut().for_each(|f| *f *= shorter);
@@ -157,7 +157,14 @@ pub fn lens_camera(lens: Lens, width_px: u32, height_px: u32, field_rad: f64) ->
         Lens::ThinPrism => [start, &[3e-3, -2e-3, -2.5e-3, 1.5e-3]].concat(),
         Lens::Parallax => [start, &[0.012, -0.008]].concat(),
     };
-    camera.parameters[4..].copy_from_slice(&coefficients);
+    camera.parameters[4..4 + coefficients.len()].copy_from_slice(&coefficients);
+    let field = camera.parametric()..camera.parameters.len();
+    let across = camera.lattice().map_or(1, |l| l.size()[0]);
+    for (k, c) in camera.parameters[field].iter_mut().enumerate() {
+        // Waves of half a pixel, some three over the image.
+        let (i, j) = ((k / 2 % across) as f64, (k / 2 / across) as f64);
+        *c = if k % 2 == 0 { 0.5 * (1.3 * i).sin() * (0.9 * j).cos() } else { 0.5 * (1.1 * j + 0.5 * i).sin() };
+    }
     camera
 }
 

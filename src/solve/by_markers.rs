@@ -24,6 +24,9 @@ pub(super) struct MarkersEliminated {
     rhs: DVector<f64>,
 }
 
+/// Number of each marker among those that were seen, per plate.
+type Numbers = Vec<Vec<Option<usize>>>;
+
 type Reduced = (DMatrix<f64>, DVector<f64>, Vec<usize>, MarkersEliminated);
 
 impl MarkersEliminated {
@@ -146,7 +149,7 @@ fn times_right(y: &mut DMatrix<f64>, first: usize, m: &Matrix3<f64>) {
 }
 
 /// Numbers the markers that were seen; returns also plate and index of each number.
-pub(super) fn number_markers(problem: &Problem, lin: &Linearised) -> (Vec<Vec<Option<usize>>>, Vec<(usize, usize)>) {
+pub(super) fn number_markers(problem: &Problem, lin: &Linearised) -> (Numbers, Vec<(usize, usize)>) {
     let mut number: Vec<Vec<Option<usize>>> = problem.plates.iter().map(|p| vec![None; p.markers.len()]).collect();
     for (terms, &i) in lin.terms.iter().zip(&lin.images) {
         terms.markers.iter().for_each(|t| number[problem.images[i].plate][t.marker] = Some(0));

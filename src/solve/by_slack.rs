@@ -168,8 +168,7 @@ impl Block {
         let inverse_factor = factor.unwrap_or_else(|| DMatrix::zeros(l.ncols(), l.ncols()));
         // Columns that stay at their value take no part, nor in the back-substitution.
         let columns = FreeColumns::of(problem, image, &lin.chains[k]);
-        let dense = columns.theta.iter().copied().chain(columns.intrinsic.iter().map(|(_, c)| *c));
-        let mut rows: Vec<usize> = dense.collect();
+        let mut rows: Vec<usize> = columns.all().collect();
         let first_marker = rows.len();
         let seen = terms.markers.iter().filter_map(|t| marker_start[image.plate][t.marker]);
         rows.extend(seen.flat_map(|s| s..s + 3));

@@ -34,6 +34,12 @@ const SHRINKAGE: f64 = 5.0;
 /// Relative change of every component below which the rounds end.
 const CONVERGED: f64 = 0.01;
 
+/// Smallest factor of a family: with it, its parameters are as good as left out.
+const SMALLEST_FACTOR: f64 = 1e-3;
+
+/// Determined parameters of a family below which its factor stays.
+const FEWEST_DETERMINED: f64 = 1e-6;
+
 /// Newton decrement between rounds: the components need no better.
 const ROUGH_DECREMENT: f64 = 0.05;
 
@@ -93,7 +99,31 @@ fn update(problem: &mut Problem, state: &State, lin: &Linearised, cov: &Covarian
         change = change.max(update_joint(problem, state, lin, cov, &mut noise));
     }
     problem.noise = noise;
-    problem.hold_local_priors(&state.robot);
+    change = change.max(update_families(problem, state, cov));
+    problem.hold_component_priors(&state.robot);
+    change
+}
+
+/// New factors of the families, from the sums of squares of their parameters and how many of them the data determine.
+fn update_families(problem: &mut Problem, state: &State, cov: &Covariance) -> f64 {
+    let values = state.values(&problem.layout);
+    let (layout, mut change) = (&problem.layout, 0.0f64);
+    for family in &mut problem.families {
+        let (mut squares, mut determined) = (0.0, -(family.held.ncols() as f64));
+        for (&c, base) in family.columns.iter().zip(&family.base).filter(|(c, _)| layout.columns[**c].free) {
+            let prior = family.factor * base;
+            squares += ((values[c] - layout.columns[c].prior_mean) / base).powi(2);
+            determined += 1.0 - cov.reduced[(c, c)] / (prior * prior);
+        }
+        if determined < FEWEST_DETERMINED {
+            continue;
+        }
+        let next = (squares / determined).sqrt().clamp(SMALLEST_FACTOR, 2.0 * family.factor);
+        if next > SMALLEST_FACTOR {
+            change = change.max((next / family.factor - 1.0).abs());
+        }
+        family.factor = next;
+    }
     change
 }
 

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::system::{Linearised, intrinsic_columns};
+use super::system::Linearised;
 use crate::linalg::product;
-use crate::problem::{Chained, E, Image, MarkerTerms, Problem};
+use crate::problem::{Chained, Image, MarkerTerms, Problem};
 
 /// The pixel equations of all images in the space of their camera poses, six rows an image.
 pub(super) struct PoseRows {
@@ -22,7 +22,7 @@ impl PoseRows {
         for (k, (terms, own)) in lin.terms.iter().zip(&lin.chains).enumerate() {
             chain.rows_mut(6 * k, 6).copy_from(&own.d_theta);
             coupling.view_mut((6 * k, 0), (6, theta)).copy_from(&(terms.pp * &own.d_theta));
-            for (e, c) in intrinsic_columns(problem, &problem.images[lin.images[k]]).iter().enumerate() {
+            for (e, c) in problem.layout.intrinsics(&problem.images[lin.images[k]]).iter().enumerate() {
                 if let Some(c) = *c {
                     coupling.fixed_view_mut::<6, 1>(6 * k, c).copy_from(&terms.pe.column(e));
                 }
@@ -41,7 +41,7 @@ impl PoseRows {
         let mut of_theta = rhs.rows_mut(0, theta);
         of_theta += transposed * poses;
         for (terms, &i) in lin.terms.iter().zip(&lin.images) {
-            let columns = intrinsic_columns(problem, &problem.images[i]);
+            let columns = problem.layout.intrinsics(&problem.images[i]);
             let used = || columns.iter().enumerate().filter_map(|(e, c)| c.map(|c| (e, c)));
             for (e, c) in used() {
                 rhs[c] += terms.be[e];
@@ -51,10 +51,10 @@ impl PoseRows {
     }
 }
 
-/// Dense columns of an image that are free: those of theta, and the intrinsic ones with their local index.
+/// Dense columns of an image that are free: those of theta, and those of its intrinsic unknowns.
 pub(super) struct FreeColumns {
     pub theta: Vec<usize>,
-    pub intrinsic: Vec<(usize, usize)>,
+    intrinsic: Vec<Option<usize>>,
     /// `G'` with zeros for the columns that are not free; empty where none is.
     chain: DMatrix<f64>,
 }
@@ -62,14 +62,19 @@ pub(super) struct FreeColumns {
 impl FreeColumns {
     pub fn of(problem: &Problem, image: &Image, chain: &Chained) -> Self {
         let columns = &problem.layout.columns;
-        let local: [Option<usize>; E] = intrinsic_columns(problem, image);
-        let free = |(e, c): (usize, &Option<usize>)| c.filter(|c| columns[*c].free).map(|c| (e, c));
+        let intrinsic = problem.layout.intrinsics(image).into_iter();
+        let intrinsic = intrinsic.map(|c| c.filter(|c| columns[*c].free)).collect();
         let theta: Vec<usize> = (0..problem.layout.theta_len()).filter(|&c| columns[c].free).collect();
         let mut transposed = DMatrix::zeros(theta.last().map_or(0, |c| c + 1), 6);
         for &c in &theta {
             transposed.row_mut(c).tr_copy_from(&chain.d_theta.column(c));
         }
-        Self { theta, intrinsic: local.iter().enumerate().filter_map(free).collect(), chain: transposed }
+        Self { theta, intrinsic, chain: transposed }
+    }
+
+    /// All of them.
+    pub fn all(&self) -> impl Iterator<Item = usize> + '_ {
+        self.theta.iter().copied().chain(self.intrinsic.iter().flatten().copied())
     }
 
     /// Adds the coupling of a marker with the free dense columns to three columns of `into`, from `first` on.
@@ -87,8 +92,10 @@ impl FreeColumns {
                     + mp[4] * g[4][c]
                     + mp[5] * g[5][c];
             }
-            for &(e, c) in &self.intrinsic {
-                column[c] += terms.me[(d, e)];
+        }
+        for (e, values) in terms.intrinsics() {
+            if let Some(c) = self.intrinsic[e] {
+                (0..3).for_each(|d| into[(c, first + d)] += values[d]);
             }
         }
     }

@@ -5,9 +5,8 @@ use rayon::prelude::*;
 
 use super::by_markers::MarkersEliminated;
 use super::by_slack::SlackEliminated;
-use crate::model::camera::MAX_PARAMETERS;
 use crate::model::plate_modes::{MODES, basis};
-use crate::problem::{Chained, E, Image, ImageTerms, Problem, Slack, State, Step, Weighting, chained, linearise};
+use crate::problem::{Chained, ImageTerms, Problem, Slack, State, Step, Weighting, chained, linearise};
 
 /// Smallest prior sigma of a marker coordinate, m: below it a marker counts as fixed.
 pub(super) const FIXED_MARKER_SIGMA_M: f64 = 1e-9;
@@ -48,6 +47,7 @@ fn prior_cost(problem: &Problem, state: &State, images: &[usize]) -> f64 {
     let dense: f64 = (problem.layout.columns.iter().zip(values.iter()))
         .map(|(c, v)| ((v - c.prior_mean) / c.prior_sigma).powi(2))
         .sum();
+    let held: f64 = problem.families.iter().map(|f| f.squares(&values)).sum();
     let markers: f64 = (problem.plates.iter().zip(&state.plates))
         .flat_map(|(plate, shape)| plate.markers.iter().zip(&shape.corrections))
         .map(|(m, c)| c.norm_squared() / m.sigma_m.max(FIXED_MARKER_SIGMA_M).powi(2))
@@ -62,18 +62,7 @@ fn prior_cost(problem: &Problem, state: &State, images: &[usize]) -> f64 {
             _ => 0.0,
         })
         .sum();
-    0.5 * (dense + markers + slack)
-}
-
-/// Local intrinsic index to column of the dense part.
-pub(super) fn intrinsic_columns(problem: &Problem, image: &Image) -> [Option<usize>; E] {
-    let layout = &problem.layout;
-    let (camera, shape) = (&layout.cameras[image.camera], &layout.shapes[image.plate]);
-    std::array::from_fn(|k| {
-        let column = if k < MAX_PARAMETERS { camera.start + k } else { shape.start + k - MAX_PARAMETERS };
-        let inside = k >= MAX_PARAMETERS || k < camera.len();
-        inside.then_some(column)
-    })
+    0.5 * (dense + held + markers + slack)
 }
 
 /// Which family of unknowns is eliminated.
@@ -152,6 +141,16 @@ impl System {
             if information > 0.0 {
                 self.information[(i, i)] += information;
                 self.rhs[i] += (c.prior_mean - values[i]) * information;
+            }
+        }
+        for (family, information) in problem.families.iter().filter_map(|f| Some((f, f.information()?))) {
+            let own = DVector::from_iterator(family.columns.len(), family.columns.iter().map(|&c| values[c]));
+            let pull = &information * own;
+            for (i, &row) in family.columns.iter().enumerate() {
+                self.rhs[row] -= pull[i];
+                for (k, &column) in family.columns.iter().enumerate() {
+                    self.information[(row, column)] += information[(i, k)];
+                }
             }
         }
     }

@@ -200,7 +200,20 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
         local: Vec::new(),
         tilt: Vec::new(),
     };
-    (Problem { layout, plates: vec![plate], placements, mountings, cameras, images, noise, huber: 2.45 }, state)
+    (
+        Problem {
+            layout,
+            plates: vec![plate],
+            placements,
+            mountings,
+            cameras,
+            images,
+            noise,
+            families: Vec::new(),
+            huber: 2.45,
+        },
+        state,
+    )
 }
 
 /// A camera pose 0.3 m in front of the plate, tilted by up to 50 degrees.

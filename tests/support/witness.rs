@@ -197,7 +197,7 @@ pub fn project_through(lens: Lens, p: &[D], x: &[D; 3]) -> [D; 2] {
     let cubic = |k1: D, k2: D, k3: D| k1 * r2 + k2 * r2 * r2 + k3 * r2 * r2 * r2 + one;
     let tangential =
         |p1: D, p2: D| [p1 * two * a * b + p2 * (r2 + two * a * a), p1 * (r2 + two * b * b) + p2 * two * a * b];
-    let [u, v] = match lens {
+    let [u, v] = match lens.formula() {
         Lens::Fisheye => {
             let r = r2.sqrt();
             let t = r.atan();
@@ -223,6 +223,35 @@ pub fn project_through(lens: Lens, p: &[D], x: &[D; 3]) -> [D; 2] {
         }
     };
     [p[0] * u + p[2], p[1] * v + p[3]]
+}
+
+/// A displacement field on top of an image point, whose control points hold u and v in `c`, row by row; the image is divided into
+/// `cells` squares, and the field goes on beyond it as it is at the border.
+pub fn displaced(h: [D; 2], c: &[D], size_px: [f64; 2], cells: [usize; 2]) -> [D; 2] {
+    // The cubic B-spline as a piecewise polynomial of the distance from its middle.
+    let spline = |d: D| {
+        let d = if d.re < 0.0 { -d } else { d };
+        let two = constant(2.0);
+        match d.re {
+            r if r < 1.0 => constant(2.0 / 3.0) - d * d + d * d * d / two,
+            r if r < 2.0 => (two - d) * (two - d) * (two - d) / constant(6.0),
+            _ => constant(0.0),
+        }
+    };
+    let along = |axis: usize| {
+        let s = (h[axis] + constant(0.5)) * constant(cells[axis] as f64 / size_px[axis]);
+        if s.re < 0.0 || s.re > cells[axis] as f64 { constant(s.re.clamp(0.0, cells[axis] as f64)) } else { s }
+    };
+    let (s, t) = (along(0), along(1));
+    let across = cells[0] + 3;
+    let mut out = h;
+    for k in 0..c.len() / 2 {
+        let middle = |at: usize| constant(at as f64 - 1.0);
+        let b = spline(s - middle(k % across)) * spline(t - middle(k / across));
+        out[0] += b * c[2 * k];
+        out[1] += b * c[2 * k + 1];
+    }
+    out
 }
 
 /// Area centroid of the curve through `n` samples at equal steps of the angle, from its Fourier coefficients; area and moments

@@ -4,6 +4,7 @@
 //! [`Lens`] and a row to each `match` in this file (the compiler lists them), and a row to `tests/jacobians.rs`.
 
 mod brown;
+mod field;
 mod fisheye;
 mod fit;
 mod parallax;
@@ -11,16 +12,22 @@ mod radial;
 mod rational;
 mod thin_prism;
 
-use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
+use std::borrow::Cow;
+
+use nalgebra::{DMatrix, Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
+pub use field::{Lattice, Touched};
 pub use fit::{LensFit, fit_lens};
 
-/// Most parameters that any camera has.
+/// Most parameters that the formula of any camera has (pinhole and lens; a displacement field comes on top).
 pub const MAX_PARAMETERS: usize = 13;
 
 /// Derivatives of a distorted point by the coefficients of a lens, one column each.
 type Coefficients = SMatrix<f64, 2, { MAX_PARAMETERS - 4 }>;
+
+/// First guess of the displacements that a field has to make, px; the data decide.
+const FIELD_SIGMA_PX: f64 = 1.0;
 
 /// Names of the pinhole parameters, px, with which every camera starts.
 const PINHOLE: [&str; 4] = ["fx", "fy", "cx", "cy"];
@@ -39,6 +46,12 @@ pub enum Lens {
     ThinPrism,
     /// Brown-Conrady with radial coefficients that depend on the distance: k1 k2 p1 p2 k3 k1z k2z (the last two in m).
     Parallax,
+    /// Brown-Conrady and a displacement field on top: k1 k2 p1 p2 k3, then the field.
+    #[serde(rename = "brown+field")]
+    BrownField,
+    /// Kannala-Brandt and a displacement field on top: k1 k2 k3 k4, then the field.
+    #[serde(rename = "fisheye+field")]
+    FisheyeField,
 }
 
 /// A distorted point of the plane z = 1 with its derivatives.
@@ -60,7 +73,15 @@ impl Distorted {
 
 impl Lens {
     /// All lenses, the simpler ones first.
-    pub const ALL: [Self; 5] = [Self::Brown, Self::Fisheye, Self::Parallax, Self::Rational, Self::ThinPrism];
+    pub const ALL: [Self; 7] = [
+        Self::Brown,
+        Self::Fisheye,
+        Self::Parallax,
+        Self::Rational,
+        Self::ThinPrism,
+        Self::BrownField,
+        Self::FisheyeField,
+    ];
 
     /// Name in files.
     pub fn name(self) -> &'static str {
@@ -70,7 +91,23 @@ impl Lens {
             Self::Rational => "rational",
             Self::ThinPrism => "thin_prism",
             Self::Parallax => "parallax",
+            Self::BrownField => "brown+field",
+            Self::FisheyeField => "fisheye+field",
         }
+    }
+
+    /// The lens without the displacement field on top of it.
+    pub fn formula(self) -> Self {
+        match self {
+            Self::BrownField => Self::Brown,
+            Self::FisheyeField => Self::Fisheye,
+            other => other,
+        }
+    }
+
+    /// True with a displacement field on top of the formula.
+    pub fn has_field(self) -> bool {
+        self != self.formula()
     }
 
     /// The lens of a name in files.
@@ -86,8 +123,8 @@ impl Lens {
     /// Names of the lens coefficients (dimensionless), in the order of OpenCV.
     pub fn coefficient_names(self) -> &'static [&'static str] {
         match self {
-            Self::Brown => &brown::NAMES,
-            Self::Fisheye => &fisheye::NAMES,
+            Self::Brown | Self::BrownField => &brown::NAMES,
+            Self::Fisheye | Self::FisheyeField => &fisheye::NAMES,
             Self::Rational => &rational::NAMES,
             Self::ThinPrism => &thin_prism::NAMES,
             Self::Parallax => &parallax::NAMES,
@@ -107,8 +144,8 @@ impl Lens {
 
     fn distort(self, c: &[f64], x: &Vector2<f64>, inverse_depth: f64) -> Distorted {
         match self {
-            Self::Brown => brown::distort(c, x),
-            Self::Fisheye => fisheye::distort(c, x),
+            Self::Brown | Self::BrownField => brown::distort(c, x),
+            Self::Fisheye | Self::FisheyeField => fisheye::distort(c, x),
             Self::Rational => rational::distort(c, x),
             Self::ThinPrism => thin_prism::distort(c, x),
             Self::Parallax => parallax::distort(c, x, inverse_depth),
@@ -117,8 +154,8 @@ impl Lens {
 
     fn is_monotonic_to(self, c: &[f64], r2: f64, inverse_depth: f64) -> bool {
         match self {
-            Self::Brown | Self::ThinPrism => brown::is_monotonic_to(c, r2),
-            Self::Fisheye => fisheye::is_monotonic_to(c, r2),
+            Self::Brown | Self::BrownField | Self::ThinPrism => brown::is_monotonic_to(c, r2),
+            Self::Fisheye | Self::FisheyeField => fisheye::is_monotonic_to(c, r2),
             Self::Rational => rational::is_monotonic_to(c, r2),
             Self::Parallax => parallax::is_monotonic_to(c, r2, inverse_depth),
         }
@@ -134,7 +171,8 @@ pub struct Camera {
     pub width_px: u32,
     /// Rows of the image.
     pub height_px: u32,
-    /// fx, fy, cx, cy (px), then the coefficients of the lens.
+    /// fx, fy, cx, cy (px), then the coefficients of the lens, then the displacement field where there is one: u and v (px) of every
+    /// control point, row by row.
     pub parameters: Vec<f64>,
 }
 
@@ -145,8 +183,10 @@ pub struct Projection {
     pub uv: Vector2<f64>,
     /// With respect to the point in the camera frame, px/m.
     pub d_point: Matrix2x3<f64>,
-    /// With respect to the parameters of the camera; columns beyond their number are zero.
+    /// With respect to the parameters of the formula; columns beyond their number are zero.
     pub d_parameters: SMatrix<f64, 2, MAX_PARAMETERS>,
+    /// Basis functions of the displacement field: derivatives of u by its u components, and of v by its v components.
+    pub field: Option<Touched>,
 }
 
 impl Camera {
@@ -154,23 +194,64 @@ impl Camera {
     pub fn pinhole(lens: Lens, width_px: u32, height_px: u32, focal_px: f64) -> Self {
         let middle = |n: u32| (f64::from(n) - 1.0) / 2.0;
         let mut parameters = vec![focal_px, focal_px, middle(width_px), middle(height_px)];
-        parameters.resize(4 + lens.coefficient_names().len(), 0.0);
+        let field = if lens.has_field() { 2 * Lattice::over(width_px, height_px).points() } else { 0 };
+        parameters.resize(4 + lens.coefficient_names().len() + field, 0.0);
         Self { lens, width_px, height_px, parameters }
     }
 
-    /// Names of all parameters, in their order.
-    pub fn parameter_names(&self) -> impl Iterator<Item = &'static str> {
-        PINHOLE.into_iter().chain(self.lens.coefficient_names().iter().copied())
+    /// Names of all parameters, in their order: those of the field are `u_<column>_<row>` and `v_<column>_<row>` of its control points.
+    pub fn parameter_names(&self) -> impl Iterator<Item = Cow<'static, str>> {
+        let formula = PINHOLE.into_iter().chain(self.lens.coefficient_names().iter().copied()).map(Cow::Borrowed);
+        let lattice = self.lattice();
+        let points = lattice.map_or(0, |l| l.points());
+        let across = lattice.map_or(1, |l| l.size()[0]);
+        let at = move |k: usize| ["u", "v"].map(|c| Cow::Owned(format!("{c}_{}_{}", k % across, k / across)));
+        formula.chain((0..points).flat_map(at))
+    }
+
+    /// Number of parameters of pinhole and lens formula, which come first.
+    pub fn parametric(&self) -> usize {
+        PINHOLE.len() + self.lens.coefficient_names().len()
+    }
+
+    /// The lattice of the displacement field; `None` for a lens without one.
+    pub fn lattice(&self) -> Option<Lattice> {
+        self.lens.has_field().then(|| Lattice::over(self.width_px, self.height_px))
+    }
+
+    /// The camera without its displacement field.
+    pub fn without_field(&self) -> Self {
+        let parameters = self.parameters[..self.parametric()].to_vec();
+        Self { lens: self.lens.formula(), parameters, ..*self }
+    }
+
+    /// What the formula and a turn of the camera can say, as displacement fields: orthonormal columns over the parameters of the field;
+    /// `None` for a lens without one.
+    pub fn parametric_directions(&self) -> Option<DMatrix<f64>> {
+        self.lattice().map(|lattice| field::parametric_directions(&self.without_field(), &lattice))
     }
 
     /// Prior sigma of parameter `index` about zero; infinite for none.
     pub fn prior_sigma(&self, index: usize) -> f64 {
-        index.checked_sub(PINHOLE.len()).map_or(f64::INFINITY, |k| self.lens.prior_sigma(k))
+        match index.checked_sub(PINHOLE.len()) {
+            None => f64::INFINITY,
+            Some(_) if index >= self.parametric() => FIELD_SIGMA_PX,
+            Some(k) => self.lens.prior_sigma(k),
+        }
     }
 
     /// Unit of parameter `index`: "px" or "1".
-    pub fn parameter_unit(index: usize) -> &'static str {
-        if index < PINHOLE.len() { "px" } else { "1" }
+    pub fn parameter_unit(&self, index: usize) -> &'static str {
+        if (PINHOLE.len()..self.parametric()).contains(&index) { "1" } else { "px" }
+    }
+
+    /// Block of parameter `index`: "pinhole", "lens" or "field".
+    pub fn parameter_block(&self, index: usize) -> &'static str {
+        match index {
+            0..4 => "pinhole",
+            k if k < self.parametric() => "lens",
+            _ => "field",
+        }
     }
 
     /// Image (px) of a point in the camera frame (m); `None` behind the camera or where the lens model folds over.
@@ -181,7 +262,8 @@ impl Camera {
             return None;
         }
         let d = self.lens.distort(&self.parameters[4..], &x, inverse_depth);
-        Some(self.to_pixels(&d.point))
+        let h = self.to_pixels(&d.point);
+        Some(h + self.displacement(&h).0)
     }
 
     /// As [`Camera::project`], with derivatives; `None` only behind the camera, so that an adjustment can pass through a poor state.
@@ -201,26 +283,50 @@ impl Camera {
         let mut d_point = d.d_point * d_normalised;
         let mut by_depth = d_point.column_mut(2);
         by_depth -= d.d_inverse_depth * (iz * iz);
-        Some(Projection { uv: self.to_pixels(&d.point), d_point: scale * d_point, d_parameters })
+        let h = self.to_pixels(&d.point);
+        let Some(lattice) = self.lattice() else {
+            return Some(Projection { uv: h, d_point: scale * d_point, d_parameters, field: None });
+        };
+        let (shift, bend) = self.displacement(&h);
+        let by_h = Matrix2::identity() + bend;
+        Some(Projection {
+            uv: h + shift,
+            d_point: by_h * scale * d_point,
+            d_parameters: by_h * d_parameters,
+            field: Some(lattice.touched(&h)),
+        })
+    }
+
+    /// Displacement (px) on top of the formula where that images a point at `h`, and its derivative.
+    fn displacement(&self, h: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+        let lattice = self.lattice();
+        lattice.map_or_else(Default::default, |l| l.displacement(&self.parameters[self.parametric()..], h))
     }
 
     /// Direction (z = 1) in the camera frame that is imaged at `uv` px; `None` where no direction is. A lens that sees the distance is
     /// taken as it is far away.
     pub fn ray(&self, uv: &Vector2<f64>) -> Option<Vector3<f64>> {
         let p = &self.parameters;
-        let target = Vector2::new((uv.x - p[2]) / p[0], (uv.y - p[3]) / p[1]);
+        let scale = Vector2::new(p[0], p[1]);
+        let target = (uv - Vector2::new(p[2], p[3])).component_div(&scale);
+        // Image on the plane z = 1, the field included, and its derivative.
+        let image = |x: &Vector2<f64>| {
+            let d = self.lens.distort(&p[4..], x, 0.0);
+            let (shift, bend) = self.displacement(&self.to_pixels(&d.point));
+            let bend = Matrix2::from_fn(|i, k| bend[(i, k)] * scale[k] / scale[i]);
+            (d.point + shift.component_div(&scale), (Matrix2::identity() + bend) * d.d_point)
+        };
         let mut x = target;
         for _ in 0..50 {
-            let d = self.lens.distort(&p[4..], &x, 0.0);
-            let step = d.d_point.try_inverse()? * (target - d.point);
+            let (at, by_x) = image(&x);
+            let step = by_x.try_inverse()? * (target - at);
             // A bounded step keeps Newton on the inner branch of the lens.
             x += step * (0.5 / step.norm().max(0.5));
             if step.norm() < 1e-14 {
                 break;
             }
         }
-        let d = self.lens.distort(&p[4..], &x, 0.0);
-        let reached = (d.point - target).norm() < 1e-9 && self.lens.is_monotonic_to(&p[4..], x.norm_squared(), 0.0);
+        let reached = (image(&x).0 - target).norm() < 1e-9 && self.lens.is_monotonic_to(&p[4..], x.norm_squared(), 0.0);
         reached.then(|| Vector3::new(x.x, x.y, 1.0))
     }
 

@@ -1,4 +1,4 @@
-//! Maps of vectors: residuals over the image and over the plate, plate corrections, distortion.
+//! Maps: residuals over the image and over the plate, plate corrections, distortion and uncertainty of a camera.
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -6,6 +6,7 @@ use super::svg::{Anchor, Svg, round_below};
 use super::words::plain;
 use crate::geom::Pose;
 use crate::model::camera::Camera;
+use crate::output::restore::camera;
 use crate::output::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
 
 const WIDTH: f64 = 560.0;
@@ -196,9 +197,32 @@ pub(super) fn distortion(camera_record: &CameraRecord) -> Option<Map> {
     Some(Map { svg: svg.finish(), caption })
 }
 
-fn camera(c: &CameraRecord) -> Camera {
-    let parameters = c.parameters.iter().map(|(_, v)| *v).collect();
-    Camera { lens: c.lens, width_px: c.width_px, height_px: c.height_px, parameters }
+/// Bounds of the colours of the map of uncertainty, px.
+const SIGMA_BOUNDS_PX: [f64; 4] = [0.02, 0.05, 0.1, 0.3];
+
+/// How well it is known where in the image a direction shows.
+pub(super) fn uncertainty(c: &CameraRecord) -> Option<Map> {
+    let map = c.projection.as_ref()?;
+    let [median, largest] = map.median_and_largest()?;
+    let (w, h) = (f64::from(c.width_px), f64::from(c.height_px));
+    let field = Field { low: [-0.5; 2], high: [w - 0.5, h - 0.5], up: false };
+    let (width, height) = field.size();
+    let mut svg = Svg::new(width, height, &format!("Uncertainty of camera {} over the image", c.name));
+    let half = [0.5 * w / (map.columns - 1) as f64, 0.5 * h / (map.rows - 1) as f64];
+    svg.rect([MARGIN, MARGIN], [width - 2.0 * MARGIN, height - 2.0 * MARGIN], "frame");
+    for (k, sigma) in map.sigma_px.iter().enumerate().filter_map(|(k, s)| s.map(|s| (k, s))) {
+        let at = map.place(k, c.width_px, c.height_px);
+        let corner = |side: f64| [0, 1].map(|d| (at[d] + side * half[d]).clamp(field.low[d], field.high[d]));
+        let (low, high) = (field.place(corner(-1.0)), field.place(corner(1.0)));
+        let class = ["m1", "m2", "m3", "m4", "m5"][SIGMA_BOUNDS_PX.iter().filter(|b| sigma >= **b).count()];
+        svg.rect(low, [high[0] - low[0], high[1] - low[1]], class);
+    }
+    let [a, b, c, d] = SIGMA_BOUNDS_PX;
+    let caption = format!(
+        "Sigma of the place where a direction is imaged, per axis, without a turn of the camera (which the poses take up): median {median:.3} px, at \
+         most {largest:.3} px. Dark blue below {a} px, then to {b} px, to {c} px, orange to {d} px, dark orange beyond."
+    );
+    Some(Map { svg: svg.finish(), caption })
 }
 
 /// d(uv) / d(x, y) of a marker in the plane of the plate, px/m.

@@ -177,7 +177,13 @@ fn placed_row(what: &str, p: &PlacedRecord, several: usize) -> Markup {
     } }
 }
 
-/// Cameras: parameters and distortion.
+/// A parameter of pinhole or lens formula; those of a displacement field are shown as a map.
+fn is_of_formula(e: &EstimateRecord, camera: &str) -> bool {
+    let rest = e.name.strip_prefix("camera/").and_then(|n| n.strip_prefix(camera));
+    rest.is_some_and(|r| r.starts_with("/pinhole.") || r.starts_with("/lens."))
+}
+
+/// Cameras: parameters, distortion and uncertainty.
 pub(super) fn cameras(r: &SolutionRecord) -> Markup {
     html! {
         h2 { @if r.cameras.len() == 1 { "Camera" } @else { "Cameras" } }
@@ -186,13 +192,14 @@ pub(super) fn cameras(r: &SolutionRecord) -> Markup {
             div.pair {
                 div.wide { table {
                     thead { tr { th { "Parameter" } th.n { "estimate" } th { "unit" } } }
-                    tbody { @for e in r.estimates.iter().filter(|e| e.name.starts_with(&format!("camera/{}/", camera.name))) {
+                    tbody { @for e in r.estimates.iter().filter(|e| is_of_formula(e, &camera.name)) {
                         @if let Some((value, sigma)) = known(e) {
                             tr { td { (component_of(e)) } td.n { (plus_minus(value, sigma)) } td { (unit(e).1) } }
                         }
                     } }
                 } }
                 @if let Some(map) = maps::distortion(camera) { (figure(&map.svg, &map.caption)) }
+                @if let Some(map) = maps::uncertainty(camera) { (figure(&map.svg, &map.caption)) }
             }
         }
     }

@@ -17,6 +17,14 @@ pub(super) fn definition(schema: &str) -> String {
             ("std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort", &[])
         }
         super::messages::COMPRESSED_IMAGE => ("std_msgs/Header header\nstring format\nuint8[] data", &[]),
+        super::messages::CAMERA_INFO => (
+            "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\nfloat64[9] r\n\
+             float64[12] p\nuint32 binning_x\nuint32 binning_y\nsensor_msgs/RegionOfInterest roi",
+            &[(
+                "sensor_msgs/RegionOfInterest",
+                "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify",
+            )],
+        ),
         _ => (
             "geometry_msgs/TransformStamped[] transforms",
             &[

@@ -19,4 +19,4 @@ pub use extract::{Extracted, StopReport, extract};
 pub(super) use file::require_mcap;
 pub use messages::CameraInfo;
 pub use options::{Clock, Motion, Picking, RecordingOptions};
-pub use write::{Shown, write_recording};
+pub use write::{FramePoses, ImageMarks, MarkKind, MarkLayer, Shown, write_recording};

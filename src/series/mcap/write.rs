@@ -10,7 +10,7 @@ use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions, Writer};
 
 use super::interfaces::{ANNOTATIONS, ANNOTATIONS_SCHEMA, TRANSFORMS, definition};
-use super::messages::{COMPRESSED_IMAGE, JOINT_STATE};
+use super::messages::{CAMERA_INFO, COMPRESSED_IMAGE, CameraInfo, JOINT_STATE};
 use crate::geom::Pose;
 use crate::series::{ImageObservations, Series, Stop};
 use crate::{Error, Notice, Result};
@@ -22,6 +22,10 @@ const STANDING_NS: i64 = 500_000_000;
 /// Distance of images in time where the series does not tell, ns.
 const STEP_NS: i64 = 2_000_000_000;
 
+/// Types of annotations of points, as Foxglove numbers them.
+const POINTS: u32 = 1;
+const LINE_LIST: u32 = 4;
+
 /// What a recording shows beside the images.
 #[derive(Debug, Clone, Copy)]
 pub struct Shown<'a> {
@@ -29,16 +33,67 @@ pub struct Shown<'a> {
     pub joints: &'a [String],
     /// Readings of every stop, rad and m; a stop without any is left out.
     pub readings: &'a [Option<Vec<f64>>],
-    /// Base and tip link, and `base_from_tip` of every stop.
-    pub frames: Option<(&'a str, &'a str, &'a [Option<Pose>])>,
-    /// Points to mark on the images.
-    pub marks: &'a [ImageObservations],
+    /// What is known of the camera; nothing leaves its topic out.
+    pub camera: Option<&'a CameraInfo>,
+    /// Frames at every stop.
+    pub frames: &'a [FramePoses],
+    /// What to draw on the images.
+    pub marks: &'a [ImageMarks],
+}
+
+/// A frame in its parent, at every stop.
+#[derive(Debug, Clone)]
+pub struct FramePoses {
+    /// Name of the parent.
+    pub parent: String,
+    /// Name of the frame.
+    pub child: String,
+    /// `parent_from_child`; `None` where it is not known.
+    pub poses: Vec<Option<Pose>>,
+}
+
+/// What is drawn on one image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageMarks {
+    /// File name of the image.
+    pub image: String,
+    /// Drawn one over the other.
+    pub layers: Vec<MarkLayer>,
+}
+
+/// Points or lines of one colour.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MarkLayer {
+    /// Points, or lines between every two of them.
+    pub kind: MarkKind,
+    /// Red, green and blue, 0 to 1.
+    pub colour: [f64; 3],
+    /// Places, px.
+    pub points: Vec<[f64; 2]>,
+}
+
+/// How points are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MarkKind {
+    /// One by one.
+    Points,
+    /// In pairs, as ends of lines.
+    Lines,
+}
+
+impl From<&ImageObservations> for ImageMarks {
+    /// Every observation as a green point.
+    fn from(seen: &ImageObservations) -> Self {
+        let points = seen.observations.iter().map(|o| o.uv).collect();
+        let layers = vec![MarkLayer { kind: MarkKind::Points, colour: [0.0, 0.8, 0.2], points }];
+        Self { image: seen.image.clone(), layers }
+    }
 }
 
 /// Writes the stops of a series as an MCAP recording that [`super::extract`] reads back as the same series.
 ///
-/// Topics: `/joint_states`, `/camera/image/compressed` (png and jpg as they are, other formats as png), `/tf`,
-/// `/camera/annotations`. Stamps are the times of the stops; where they are missing, not in order or too dense for
+/// Topics: `/joint_states`, `/camera/image/compressed` (png and jpg as they are, other formats as png), `/camera/camera_info`,
+/// `/tf`, `/camera/annotations`. Stamps are the times of the stops; where they are missing, not in order or too dense for
 /// standstills, two seconds apart.
 ///
 /// # Errors
@@ -65,7 +120,7 @@ fn unfinished(path: &Path) -> PathBuf {
 fn write_stops(path: &Path, series: &Series, shown: Shown<'_>) -> Result<Vec<Notice>> {
     let mut recording = Recording::create(path)?;
     let mut notices = Vec::new();
-    let marks: BTreeMap<&str, &ImageObservations> = shown.marks.iter().map(|m| (m.image.as_str(), m)).collect();
+    let marks: BTreeMap<&str, &ImageMarks> = shown.marks.iter().map(|m| (m.image.as_str(), m)).collect();
     let usable: Vec<(usize, &Stop, &Vec<f64>, &PathBuf)> = series
         .stops
         .stops
@@ -90,11 +145,10 @@ fn write_stops(path: &Path, series: &Series, shown: Shown<'_>) -> Result<Vec<Not
             recording.joint_state(time + k * PERIOD_NS, shown.joints, readings)?;
             if k == 0 {
                 recording.image(time, image)?;
-                if let Some((base, tip, poses)) = shown.frames
-                    && let Some(Some(pose)) = poses.get(i)
-                {
-                    recording.transform(time, base, tip, pose)?;
+                if let Some(camera) = shown.camera {
+                    recording.camera_info(time, camera)?;
                 }
+                recording.transforms(time, i, shown.frames)?;
                 if let Some(marks) = marks.get(stop.image.as_str()) {
                     recording.marks(time, marks)?;
                 }
@@ -181,28 +235,58 @@ impl Recording {
         self.message(time_ns, "/camera/image/compressed", COMPRESSED_IMAGE, &cdr.0)
     }
 
-    fn transform(&mut self, time_ns: i64, parent: &str, child: &str, parent_from_child: &Pose) -> Result<()> {
+    fn camera_info(&mut self, time_ns: i64, camera: &CameraInfo) -> Result<()> {
+        let mut cdr = CdrWriter::with_header(time_ns, "camera");
+        cdr.u32(camera.height_px);
+        cdr.u32(camera.width_px);
+        cdr.string(&camera.distortion_model);
+        cdr.f64s(&camera.distortion);
+        // Zeros say that the camera is not calibrated.
+        let [fx, fy, cx, cy] = camera.intrinsics.unwrap_or_default();
+        let one = f64::from(u8::from(camera.intrinsics.is_some()));
+        let matrix = [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, one];
+        let rectification = [one, 0.0, 0.0, 0.0, one, 0.0, 0.0, 0.0, one];
+        let projection = [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, one, 0.0];
+        matrix.iter().chain(&rectification).chain(&projection).for_each(|v| cdr.f64(*v));
+        // Neither binned, nor cut out, nor rectified.
+        (0..6).for_each(|_| cdr.u32(0));
+        cdr.0.push(0);
+        self.message(time_ns, "/camera/camera_info", CAMERA_INFO, &cdr.0)
+    }
+
+    /// All frames that are known at a stop.
+    fn transforms(&mut self, time_ns: i64, stop: usize, frames: &[FramePoses]) -> Result<()> {
+        let known: Vec<(&FramePoses, &Pose)> =
+            frames.iter().filter_map(|f| Some((f, f.poses.get(stop)?.as_ref()?))).collect();
+        if known.is_empty() {
+            return Ok(());
+        }
         let mut cdr = CdrWriter::new();
-        cdr.u32(1);
-        cdr.header(time_ns, parent);
-        cdr.string(child);
-        parent_from_child.xyz().iter().chain(&parent_from_child.quaternion_xyzw()).for_each(|v| cdr.f64(*v));
+        cdr.u32(known.len() as u32);
+        for (frame, pose) in known {
+            cdr.header(time_ns, &frame.parent);
+            cdr.string(&frame.child);
+            pose.xyz().iter().chain(&pose.quaternion_xyzw()).for_each(|v| cdr.f64(*v));
+        }
         self.message(time_ns, "/tf", TRANSFORMS, &cdr.0)
     }
 
-    fn marks(&mut self, time_ns: i64, marks: &ImageObservations) -> Result<()> {
+    fn marks(&mut self, time_ns: i64, marks: &ImageMarks) -> Result<()> {
         let (seconds, nanoseconds) = split(time_ns);
-        // Viewers count from the corner of the top-left pixel, not from its centre.
-        let points: Vec<_> =
-            marks.observations.iter().map(|o| serde_json::json!({"x": o.uv[0] + 0.5, "y": o.uv[1] + 0.5})).collect();
-        let text = serde_json::json!({
-            "circles": [], "texts": [],
-            "points": [{
-                "timestamp": {"sec": seconds, "nsec": nanoseconds}, "type": 1, "points": points, "thickness": 2.0,
-                "outline_color": {"r": 0.0, "g": 0.8, "b": 0.2, "a": 1.0}, "outline_colors": [],
-                "fill_color": {"r": 0.0, "g": 0.8, "b": 0.2, "a": 1.0},
-            }],
-        });
+        let layer = |layer: &MarkLayer| {
+            // Viewers count from the corner of the top-left pixel, not from its centre.
+            let points: Vec<_> =
+                layer.points.iter().map(|p| serde_json::json!({"x": p[0] + 0.5, "y": p[1] + 0.5})).collect();
+            let [r, g, b] = layer.colour;
+            let colour = serde_json::json!({"r": r, "g": g, "b": b, "a": 1.0});
+            let kind = if layer.kind == MarkKind::Points { POINTS } else { LINE_LIST };
+            serde_json::json!({
+                "timestamp": {"sec": seconds, "nsec": nanoseconds}, "type": kind, "points": points, "thickness": 2.0,
+                "outline_color": colour, "outline_colors": [], "fill_color": colour,
+            })
+        };
+        let layers: Vec<_> = marks.layers.iter().map(layer).collect();
+        let text = serde_json::json!({"circles": [], "texts": [], "points": layers});
         self.message(time_ns, "/camera/annotations", ANNOTATIONS, text.to_string().as_bytes())
     }
 

@@ -1,0 +1,57 @@
+//! Families of parameters: how large they are is told by the data, not by a prior.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{Layout, State};
+
+/// Sigma with which directions of a family are held at zero, as a share of its base sigma: far below anything that counts.
+const HELD: f64 = 1e-4;
+
+/// Parameters alike whose prior sigmas have one factor in common, a variance component.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Family {
+    /// Name, for messages.
+    pub name: String,
+    /// Columns.
+    pub columns: Vec<usize>,
+    /// Prior sigma of each column at the factor 1, in its unit.
+    pub base: Vec<f64>,
+    /// The factor.
+    pub factor: f64,
+    /// Directions that are held at zero because other parameters say the same: orthonormal, one row per column of the family.
+    pub held: DMatrix<f64>,
+}
+
+impl Family {
+    /// The displacement field of camera `camera`, across what lens formula and pose can say; `None` for a lens without one.
+    pub fn of_field(layout: &Layout, state: &State, camera: usize) -> Option<Self> {
+        let held = state.cameras[camera].parametric_directions()?;
+        Some(Self { held, ..Self::new("displacement field", layout, layout.fields[camera].clone().collect()) })
+    }
+
+    /// A family of columns at their present priors.
+    pub fn new(name: &str, layout: &Layout, columns: Vec<usize>) -> Self {
+        let base = columns.iter().map(|&c| layout.columns[c].prior_sigma).collect();
+        Self { name: name.into(), held: DMatrix::zeros(columns.len(), 0), columns, base, factor: 1.0 }
+    }
+
+    /// Gives the columns the priors of the present factor.
+    pub fn hold(&self, layout: &mut Layout) {
+        for (&c, base) in self.columns.iter().zip(&self.base) {
+            layout.columns[c].prior_sigma = self.factor * base;
+        }
+    }
+
+    /// Information that holds directions at zero; nothing where there are none.
+    pub fn information(&self) -> Option<DMatrix<f64>> {
+        let sigma = HELD * self.base.first()?;
+        (self.held.ncols() > 0).then(|| &self.held * self.held.transpose() / (sigma * sigma))
+    }
+
+    /// Sum of squares of what is held, in units of its sigma, at values of all columns.
+    pub fn squares(&self, values: &DVector<f64>) -> f64 {
+        let Some(base) = self.base.first().filter(|_| self.held.ncols() > 0) else { return 0.0 };
+        let own = DVector::from_iterator(self.columns.len(), self.columns.iter().map(|&c| values[c]));
+        self.held.tr_mul(&own).norm_squared() / (HELD * base).powi(2)
+    }
+}
