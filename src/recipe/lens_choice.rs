@@ -15,8 +15,8 @@ const AS_GOOD: f64 = 0.01;
 /// Share of the largest errors that does not count: what is wrongly identified says nothing of the lens.
 const OUTLIERS: f64 = 0.02;
 
-/// Sets the lens of every camera by hold-out, and says why. Lenses with a displacement field are not among them: they cost some ten
-/// times as much, and are asked for by name.
+/// Sets the lens of every camera by hold-out, and says why. Lenses with a displacement field are not among them: they cost three
+/// to five times as much, and are asked for by name.
 ///
 /// # Errors
 /// Those of the adjustment, when no lens explains the images at all.

@@ -20,7 +20,7 @@ ROOT = HERE.parent.parent
 ROBOTS = [
     ("tests/independent/calibrated.urdf", "base_link", "tool0"),
     ("robots/ur10e/ur10e.urdf", "base_link", "tool0"),
-    ("robots/lbr_iiwa_14/lbr_iiwa_14.urdf", None, None),
+    ("robots/lbr_iiwa_14/lbr_iiwa_14.urdf", "base_link", "flange"),
 ]
 CAMERAS = {
     "plumb_bob": [-0.11, 0.09, 4e-4, -3e-4, -0.02],
@@ -35,10 +35,6 @@ def kinematics(writer, rng):
         robot = UrdfTransformManager()
         robot.load_urdf((ROOT / path).read_text())
         moving = [j for j, v in robot._joints.items() if v[5] in ("revolute", "continuous", "prismatic")]
-        children = {v[1] for v in robot._joints.values()}
-        parents = {v[0] for v in robot._joints.values()}
-        base = base or next(iter(sorted(parents - children)))
-        tip = tip or next(iter(sorted(children - parents)))
         for _ in range(8):
             q = {j: rng.uniform(*np.clip(robot.get_joint_limits(j), -3.1, 3.1)) for j in moving}
             for joint, value in q.items():
