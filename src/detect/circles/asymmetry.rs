@@ -36,10 +36,13 @@ impl Drift {
         Some(Self { mean_px: [u, v], sigma_px, corner_px, corner_sigma_px: sigma(2) })
     }
 
-    /// A part is significant (4 sigma) and larger than `least_px`.
+    /// A part of the mean is significant (4 sigma) and larger than `least_px`.
+    pub fn mean_exceeds(&self, least_px: f64) -> bool {
+        (self.mean_px.iter().zip(&self.sigma_px)).any(|(value, sigma)| value.abs() > (4.0 * sigma).max(least_px))
+    }
+
+    /// The mean or the part along the radius is significant (4 sigma) and larger than `least_px`.
     pub fn exceeds(&self, least_px: f64) -> bool {
-        let [u, v] = self.mean_px;
-        let parts = [(u, self.sigma_px[0]), (v, self.sigma_px[1]), (self.corner_px, self.corner_sigma_px)];
-        parts.iter().any(|(value, sigma)| value.abs() > (4.0 * sigma).max(least_px))
+        self.mean_exceeds(least_px) || self.corner_px.abs() > (4.0 * self.corner_sigma_px).max(least_px)
     }
 }
