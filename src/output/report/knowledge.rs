@@ -111,7 +111,9 @@ pub(super) fn workspace(r: &SolutionRecord) -> Markup {
         @if let Some(s) = &r.scatter { @if let Some(ratio) = s.flange_ratio {
             p.note {
                 "Scatter between the images against the noise model: " (significant(ratio)) " times. "
-                @if s.larger_stated { "The larger sigmas are stated." } @else { "They agree within 1.5; the noise model's sigmas are stated." }
+                @if s.larger_stated { "The larger sigmas are stated." }
+                @else if ratio <= 1.5 { "They agree within 1.5; the noise model's sigmas are stated." }
+                @else { "With so few images for what they tell, the scatter is no judge; the noise model's sigmas are stated." }
             }
         } }
         div.pair {
