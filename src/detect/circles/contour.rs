@@ -5,10 +5,13 @@
 //! two pixels pass the threshold.
 
 use super::levels::Levels;
+use super::wide::wide;
 use crate::detect::Picture;
 
 const DARK: u8 = 1;
 const SEEN: u8 = 2;
+/// Light cells in a row, where no contour starts.
+const PAPER: [u8; 16] = [0; 16];
 
 /// What a contour encloses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,6 +46,10 @@ pub(super) fn contours(picture: &Picture, levels: &Levels, shortest: usize, long
         let start = (y + 1) * map.stride;
         let mut x = 1;
         while x <= picture.width {
+            if map.cells[start + x..].first_chunk() == Some(&PAPER) {
+                x += PAPER.len();
+                continue;
+            }
             let here = map.cells[start + x];
             if here == DARK && map.cells[start + x - 1] & DARK == 0 {
                 let contour = tracer.follow(&mut map, x, y + 1);
@@ -71,12 +78,22 @@ impl DarkMap {
         for (y, line) in picture.pixels.chunks_exact(picture.width).enumerate() {
             levels.threshold_row(y, &mut nodes, &mut thresholds);
             let out = &mut cells[(y + 1) * stride + 1..(y + 1) * stride + 1 + picture.width];
-            for ((o, v), t) in out.iter_mut().zip(line).zip(&thresholds) {
-                *o = u8::from(v < t);
-            }
+            wide(
+                #[inline(always)]
+                || {
+                    for ((o, v), t) in out.iter_mut().zip(line).zip(&thresholds) {
+                        *o = u8::from(v < t);
+                    }
+                },
+            );
         }
         Self { stride, cells }
     }
+}
+
+/// The cells north-east, south-east, south-west and north-west of a corner, which has the coordinates of the second.
+fn cells_around([x, y]: [usize; 2]) -> [[usize; 2]; 4] {
+    [[x, y - 1], [x, y], [x - 1, y], [x - 1, y - 1]]
 }
 
 struct Tracer<'a> {
@@ -92,23 +109,21 @@ impl Tracer<'_> {
         const SOUTH: usize = 1;
         self.points.clear();
         let stride = map.stride;
-        let start = y * stride + x;
-        // Corner index: the top-left corner of the cell with that index. Directions: east, south, west, north.
+        let index = |[x, y]: [usize; 2]| y * stride + x;
+        let start = [x, y];
+        // Directions: east, south, west, north.
         let (mut corner, mut direction) = (start, SOUTH);
         let (mut length, mut step, mut clipped) = (0usize, 0.0f32, false);
         loop {
-            let (dark, light) = match direction {
-                0 => (corner - stride, corner),
-                1 => (corner, corner - 1),
-                2 => (corner - 1, corner - stride - 1),
-                _ => (corner - stride - 1, corner - stride),
-            };
+            let [x, y] = corner;
+            let around = cells_around(corner);
+            let (dark, light) = (around[direction], around[(direction + 1) % 4]);
             if direction == SOUTH {
-                map.cells[dark] |= SEEN;
+                map.cells[index(dark)] |= SEEN;
             }
             length += 1;
             if length <= self.longest {
-                match self.crossing(dark, light, stride) {
+                match self.crossing(dark, light) {
                     Some((point, rise)) => {
                         self.points.push(point);
                         step += rise;
@@ -117,21 +132,16 @@ impl Tracer<'_> {
                 }
             }
             corner = match direction {
-                0 => corner + 1,
-                1 => corner + stride,
-                2 => corner - 1,
-                _ => corner - stride,
+                0 => [x + 1, y],
+                1 => [x, y + 1],
+                2 => [x - 1, y],
+                _ => [x, y - 1],
             };
-            let around = [corner - stride, corner, corner - 1, corner - stride - 1]; // NE, SE, SW, NW
-            let (ahead_left, ahead_right) = match direction {
-                0 => (around[0], around[1]),
-                1 => (around[1], around[2]),
-                2 => (around[2], around[3]),
-                _ => (around[3], around[0]),
-            };
-            if map.cells[ahead_right] & DARK != 0 {
+            let ahead = cells_around(corner);
+            let is_dark = |k: usize| map.cells[index(ahead[k % 4])] & DARK != 0;
+            if is_dark(direction + 1) {
                 direction = (direction + 1) % 4;
-            } else if map.cells[ahead_left] & DARK == 0 {
+            } else if !is_dark(direction) {
                 direction = (direction + 3) % 4;
             }
             if corner == start && direction == SOUTH {
@@ -142,9 +152,8 @@ impl Tracer<'_> {
     }
 
     /// Sub-pixel point between a dark and a light cell and the rise of counts across; `None` at the frame.
-    fn crossing(&self, dark: usize, light: usize, stride: usize) -> Option<([f32; 2], f32)> {
-        let (dx, dy) = (dark % stride, dark / stride);
-        let (lx, ly) = (light % stride, light / stride);
+    fn crossing(&self, dark: [usize; 2], light: [usize; 2]) -> Option<([f32; 2], f32)> {
+        let ([dx, dy], [lx, ly]) = (dark, light);
         if lx == 0 || ly == 0 || lx > self.picture.width || ly > self.picture.height {
             return None;
         }

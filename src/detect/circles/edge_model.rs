@@ -23,6 +23,7 @@ use super::ellipse::Ellipse;
 use super::exact_edge::{Contour, MOMENTS, Nodes};
 use super::flat_zone::Flat;
 use super::gauss::normal_tail;
+use super::wide::wide;
 
 /// Parameters of a disc.
 pub(super) const DISC: usize = 14;
@@ -234,8 +235,13 @@ impl Pixels {
             self.inner.coverage.fill(0.0);
             self.inner.density.fill(0.0);
         }
-        self.levels(state, noise);
-        self.shape_columns(state);
+        wide(
+            #[inline(always)]
+            || {
+                self.levels(state, noise);
+                self.shape_columns(state);
+            },
+        );
     }
 
     /// Takes what the closed form misses to the exact coverage from this state on.
@@ -248,6 +254,7 @@ impl Pixels {
     }
 
     /// Residuals and the columns of the levels; leaves weighted densities in the edge terms.
+    #[inline(always)]
     fn levels(&mut self, state: &State, noise: [f64; 2]) {
         let n = self.x.len();
         let [l0, gx, gy] = state.white.map(|v| v as f32);
@@ -285,6 +292,7 @@ impl Pixels {
         }
     }
 
+    #[inline(always)]
     fn shape_columns(&mut self, state: &State) {
         let n = self.x.len();
         let ratio = state.inner.map_or(0.0, |(_, k)| k as f32);
@@ -363,6 +371,14 @@ impl Pixels {
 
     /// Normal matrix (lower triangle) of `parameters` columns, by blocks of pixels that stay in the nearest cache.
     pub fn normal(&self, parameters: usize, out: &mut [[f64; ANNULUS]; ANNULUS]) {
+        wide(
+            #[inline(always)]
+            || self.normal_lanes(parameters, out),
+        );
+    }
+
+    #[inline(always)]
+    fn normal_lanes(&self, parameters: usize, out: &mut [[f64; ANNULUS]; ANNULUS]) {
         const BLOCK: usize = 16 * LANES;
         out.iter_mut().for_each(|row| row.fill(0.0));
         let n = self.x.len();
@@ -379,9 +395,14 @@ impl Pixels {
 
     /// Gradient of the parameters.
     pub fn gradient(&self, parameters: usize, out: &mut [f64; ANNULUS]) {
-        for (g, column) in out.iter_mut().zip(&self.columns).take(parameters) {
-            *g = dot(column, &self.weighted);
-        }
+        wide(
+            #[inline(always)]
+            || {
+                for (g, column) in out.iter_mut().zip(&self.columns).take(parameters) {
+                    *g = dot(column, &self.weighted);
+                }
+            },
+        );
     }
 }
 
@@ -408,24 +429,26 @@ fn exact_columns(terms: &EdgeTerms, columns: &mut [Vec<f32>], first: bool, third
 }
 
 /// Product of two columns, whose length is a multiple of the lanes.
+#[inline(always)]
 fn dot(a: &[f32], b: &[f32]) -> f64 {
     const WIDE: usize = 4 * LANES;
     let mut sums = [0.0f32; WIDE];
-    let (p, q) = (a.chunks_exact(WIDE), b.chunks_exact(WIDE));
-    let (rest_p, rest_q) = (p.remainder(), q.remainder());
-    for (p, q) in p.zip(q) {
+    let whole = a.len() / WIDE * WIDE;
+    for (p, q) in a[..whole].chunks_exact(WIDE).zip(b[..whole].chunks_exact(WIDE)) {
         for k in 0..WIDE {
             sums[k] += p[k] * q[k];
         }
     }
-    for (p, q) in rest_p.chunks_exact(LANES).zip(rest_q.chunks_exact(LANES)) {
+    for (p, q) in a[whole..].chunks_exact(LANES).zip(b[whole..].chunks_exact(LANES)) {
         for k in 0..LANES {
             sums[k] += p[k] * q[k];
         }
     }
-    let (low, high) = sums.split_at(2 * LANES);
-    let halves = |k: usize| (low[k] + high[k]) + (low[k + LANES] + high[k + LANES]);
-    (0..LANES).map(|k| f64::from(halves(k))).sum()
+    let mut total = 0.0;
+    for k in 0..LANES {
+        total += f64::from((sums[k] + sums[k + 2 * LANES]) + (sums[k + LANES] + sums[k + 3 * LANES]));
+    }
+    total
 }
 
 /// One contour in single precision.
@@ -471,6 +494,14 @@ impl EdgeTerms {
     }
 
     fn evaluate(&mut self, geometry: &Geometry, x: &[f32], y: &[f32]) {
+        wide(
+            #[inline(always)]
+            || self.evaluate_lanes(geometry, x, y),
+        );
+    }
+
+    #[inline(always)]
+    fn evaluate_lanes(&mut self, geometry: &Geometry, x: &[f32], y: &[f32]) {
         let n = x.len();
         let y = &y[..n];
         let Self { coverage, density, scale, rho, cos, sin, normal_x, normal_y, argument, widen, missing, exact } =

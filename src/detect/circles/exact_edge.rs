@@ -14,6 +14,7 @@
 
 use super::edge_model::LANES;
 use super::gauss::exp_negative;
+use super::wide::wide;
 
 /// Longest step along the contour in units of the blur.
 const STEP: f64 = 1.25;
@@ -110,6 +111,14 @@ impl Contour {
         moments: &mut [Vec<f32>],
     ) {
         self.nodes(nodes);
+        wide(
+            #[inline(always)]
+            || self.sums(x, y, near, nodes, out, moments),
+        );
+    }
+
+    #[inline(always)]
+    fn sums(&self, x: &[f32], y: &[f32], near: &[bool], nodes: &Nodes, out: &mut [f32], moments: &mut [Vec<f32>]) {
         let rate = (-0.5 / (self.blur * self.blur)) as f32;
         // weights of the nodes hold 1 / 2 pi of the coverage; the Gaussian is 1 / (2 pi s^2), of which s^2 is left
         let peak = (1.0 / (self.blur * self.blur)) as f32;

@@ -27,9 +27,9 @@ impl Levels {
         let (cols, rows) = (picture.width.div_ceil(CELL), picture.height.div_ceil(CELL));
         let (mut upper, mut lower) = cell_extremes(picture, cols, rows);
         let reach = ((marker_px / 2.0 / CELL as f64).ceil() as usize).clamp(1, cols.max(rows));
-        window(&mut upper, cols, rows, reach, f32::max);
-        window(&mut upper, cols, rows, reach, f32::min);
-        window(&mut lower, cols, rows, reach, f32::min);
+        let (larger, smaller) = (|a, b| if a > b { a } else { b }, |a, b| if a < b { a } else { b });
+        upper = window(&window(&upper, cols, reach, larger), cols, reach, smaller);
+        lower = window(&lower, cols, reach, smaller);
         for _ in 0..2 {
             smooth(&mut upper, cols, rows);
             smooth(&mut lower, cols, rows);
@@ -109,25 +109,29 @@ fn cell_extremes(picture: &Picture, cols: usize, rows: usize) -> (Vec<f32>, Vec<
     (upper, lower)
 }
 
-/// Separable square window of `2 reach + 1` cells reduced by `pick` (a minimum or maximum).
-fn window(grid: &mut [f32], cols: usize, rows: usize, reach: usize, pick: fn(f32, f32) -> f32) {
-    let mut line = vec![0.0f32; cols.max(rows)];
-    for r in 0..rows {
-        let row = &mut grid[r * cols..(r + 1) * cols];
-        line[..cols].copy_from_slice(row);
-        for (c, v) in row.iter_mut().enumerate() {
-            *v = line[c.saturating_sub(reach)..(c + reach + 1).min(cols)].iter().copied().fold(line[c], pick);
-        }
+/// Square window of `2 reach + 1` cells reduced by `pick` (a minimum or maximum), first down, then across.
+fn window(grid: &[f32], cols: usize, reach: usize, pick: impl Fn(f32, f32) -> f32 + Copy) -> Vec<f32> {
+    let rows = grid.len() / cols;
+    let across = transposed(&window_down(grid, cols, reach, pick), cols);
+    transposed(&window_down(&across, rows, reach, pick), rows)
+}
+
+/// The same along the columns only, by doubling: the span that every cell has seen grows with each round.
+fn window_down(grid: &[f32], cols: usize, reach: usize, pick: impl Fn(f32, f32) -> f32) -> Vec<f32> {
+    let last = grid.len() / cols - 1;
+    let row = |k: usize| k.saturating_sub(reach).min(last) * cols;
+    let mut run: Vec<f32> = (0..=last + 2 * reach).flat_map(|k| &grid[row(k)..row(k) + cols]).copied().collect();
+    let (wanted, mut span) = (2 * reach + 1, 1);
+    while span < wanted {
+        let step = span.min(wanted - span);
+        run = run.iter().zip(&run[step * cols..]).map(|(a, b)| pick(*a, *b)).collect();
+        span += step;
     }
-    let source = grid.to_vec();
-    for r in 0..rows {
-        let (first, last) = (r.saturating_sub(reach), (r + reach + 1).min(rows));
-        let out = &mut grid[r * cols..(r + 1) * cols];
-        for k in first..last {
-            let other = &source[k * cols..(k + 1) * cols];
-            out.iter_mut().zip(other).for_each(|(v, o)| *v = pick(*v, *o));
-        }
-    }
+    run
+}
+
+fn transposed(grid: &[f32], cols: usize) -> Vec<f32> {
+    (0..cols).flat_map(|c| grid[c..].iter().step_by(cols)).copied().collect()
 }
 
 /// Binomial 3x3 smoothing.
@@ -163,6 +167,19 @@ fn noise_of(picture: &Picture) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_window_is_the_extreme_of_its_cells() {
+        let (cols, rows, reach) = (13, 9, 3);
+        let grid: Vec<f32> = (0..cols * rows).map(|i| ((i * 7919) % 101) as f32).collect();
+        let found = window(&grid, cols, reach, f32::max);
+        for (i, v) in found.iter().enumerate() {
+            let (c, r) = (i % cols, i / cols);
+            let near = |k: &usize| (k % cols).abs_diff(c) <= reach && (k / cols).abs_diff(r) <= reach;
+            let largest = (0..cols * rows).filter(near).map(|k| grid[k]).fold(0.0, f32::max);
+            assert_eq!(*v, largest, "{c} {r}");
+        }
+    }
 
     #[test]
     fn rows_and_points_agree_and_follow_a_gradient() {

@@ -31,6 +31,7 @@ pub(crate) mod synth;
 mod tails;
 mod types;
 mod vet;
+mod wide;
 
 pub use asymmetry::Drift;
 pub use ellipse::Ellipse;
