@@ -174,6 +174,12 @@ struct EdgeTerms {
 }
 
 impl EdgeTerms {
+    /// No edge: covers nothing.
+    fn clear(&mut self) {
+        let Self { coverage, density, argument, normal_x, normal_y, .. } = self;
+        [coverage, density, argument, normal_x, normal_y].into_iter().for_each(|v| v.fill(0.0));
+    }
+
     fn resize(&mut self, n: usize) {
         let EdgeTerms { coverage, density, scale, rho, cos, sin, normal_x, normal_y, argument, widen, missing, exact } =
             self;
@@ -190,32 +196,33 @@ impl Pixels {
         self.x.clear();
         self.y.clear();
         self.value.clear();
-        self.mask.clear();
         self.count = 0;
     }
 
-    pub fn push(&mut self, x: f32, y: f32, value: f32) {
-        self.x.push(x);
-        self.y.push(y);
-        self.value.push(value);
-        self.mask.push(1.0);
+    /// Adds neighbouring pixels of a row, the first of them at `x`.
+    pub fn push_row(&mut self, x: f32, y: f32, values: &[f32]) {
+        self.x.extend((0..values.len()).map(|k| x + k as f32));
+        self.y.resize(self.x.len(), y);
+        self.value.extend_from_slice(values);
     }
 
     /// Keeps the first `count` pixels.
     pub fn truncate(&mut self, count: usize) {
-        for v in [&mut self.x, &mut self.y, &mut self.value, &mut self.mask] {
+        for v in [&mut self.x, &mut self.y, &mut self.value] {
             v.truncate(count);
         }
         self.finish();
     }
 
-    /// Pads to whole lanes; call once after the last `push`.
+    /// Pads to whole lanes; call once after the last row.
     pub fn finish(&mut self) {
         self.count = self.x.len();
         let n = self.count.next_multiple_of(LANES);
         self.x.resize(n, 0.0);
         self.y.resize(n, 0.0);
         self.value.resize(n, 0.0);
+        self.mask.clear();
+        self.mask.resize(self.count, 1.0);
         self.mask.resize(n, 0.0);
         self.ink.resize(n, 0.0);
         self.residual.resize(n, 0.0);
@@ -232,8 +239,7 @@ impl Pixels {
         if let Some(inner) = state.inner_contour() {
             self.inner.evaluate(&Geometry::of(&inner), &self.x, &self.y);
         } else {
-            self.inner.coverage.fill(0.0);
-            self.inner.density.fill(0.0);
+            self.inner.clear();
         }
         wide(
             #[inline(always)]
@@ -347,26 +353,32 @@ impl Pixels {
     /// A point spread with the third cumulant `k` along the normal adds `k / (6 s^3) (u^2 - 1) phi(u)` to the coverage.
     /// The fit takes the part along `phi` for a displacement `-k / (12 s^2)`; the part with `u^2 - 1/2` stays in the
     /// residuals and tells its size.
-    pub fn skew(&self, state: &State, noise: [f64; 2]) -> ([f64; 2], [f64; 2]) {
+    /// The columns of the Jacobian are gone afterwards.
+    pub fn skew(&mut self, state: &State, noise: [f64; 2]) -> ([f64; 2], [f64; 2]) {
+        wide(
+            #[inline(always)]
+            || self.skew_lanes(state, noise),
+        )
+    }
+
+    #[inline(always)]
+    fn skew_lanes(&mut self, state: &State, noise: [f64; 2]) -> ([f64; 2], [f64; 2]) {
+        let n = self.x.len();
         let (v_white, v_dark) = (noise[0] as f32, noise[1] as f32);
         let factor = ((state.white[0] - state.dark[0]) * 2.0 / state.blur) as f32;
-        let edges = if state.inner.is_some() { 2 } else { 1 };
-        let (mut sum, mut information) = ([0.0f32; 2], [0.0f32; 2]);
-        for i in 0..self.count {
-            let weight = 1.0 / (v_white + (v_dark - v_white) * self.ink[i]).max(0.1 * v_dark);
-            let mut columns = [0.0f32; 2];
-            for (terms, sign) in [(&self.outer, factor), (&self.inner, -factor)].into_iter().take(edges) {
-                let u = terms.argument[i];
-                let lobe = sign * (u * u - 0.5) * normal_tail(u).1;
-                columns[0] += lobe * terms.normal_x[i];
-                columns[1] += lobe * terms.normal_y[i];
-            }
-            for a in 0..2 {
-                sum[a] += weight * columns[a] * self.residual[i];
-                information[a] += weight * columns[a] * columns[a];
-            }
+        let inner = if state.inner.is_some() { -factor } else { 0.0 };
+        let (ink, mask) = (&self.ink[..n], &self.mask[..n]);
+        let (outer, inner) = (self.outer.lobes(n, factor), self.inner.lobes(n, inner));
+        let [along_x, along_y, ..] = &mut self.columns[..] else { return ([0.0; 2], [0.0; 2]) };
+        let (along_x, along_y) = (&mut along_x[..n], &mut along_y[..n]);
+        for i in 0..n {
+            let root = mask[i] / (v_white + (v_dark - v_white) * ink[i]).max(0.1 * v_dark).sqrt();
+            let ([ox, oy], [ix, iy]) = (outer(i), inner(i));
+            along_x[i] = root * (ox + ix);
+            along_y[i] = root * (oy + iy);
         }
-        (sum.map(f64::from), information.map(f64::from))
+        let along = [&*along_x, &*along_y];
+        (along.map(|c| dot(c, &self.weighted)), along.map(|c| dot(c, c)))
     }
 
     /// Normal matrix (lower triangle) of `parameters` columns, by blocks of pixels that stay in the nearest cache.
@@ -379,7 +391,7 @@ impl Pixels {
 
     #[inline(always)]
     fn normal_lanes(&self, parameters: usize, out: &mut [[f64; ANNULUS]; ANNULUS]) {
-        const BLOCK: usize = 16 * LANES;
+        const BLOCK: usize = 32 * LANES;
         out.iter_mut().for_each(|row| row.fill(0.0));
         let n = self.x.len();
         for from in (0..n).step_by(BLOCK) {
@@ -475,6 +487,18 @@ impl Geometry {
 }
 
 impl EdgeTerms {
+    /// What a displacement by lopsidedness leaves in a pixel beside a plain one, along both axes.
+    #[inline(always)]
+    fn lobes(&self, n: usize, factor: f32) -> impl Fn(usize) -> [f32; 2] {
+        let (argument, normal_x, normal_y) = (&self.argument[..n], &self.normal_x[..n], &self.normal_y[..n]);
+        #[inline(always)]
+        move |i| {
+            let u = argument[i];
+            let lobe = factor * (u * u - 0.5) * normal_tail(u).1;
+            [lobe * normal_x[i], lobe * normal_y[i]]
+        }
+    }
+
     fn correct(&mut self, contour: &Contour, x: &[f32], y: &[f32], nodes: &mut Nodes) {
         self.missing.fill(0.0);
         self.exact.clear();
@@ -575,7 +599,7 @@ mod tests {
         for annulus in [false, true] {
             let state = example(annulus);
             let mut pixels = Pixels::default();
-            (-12..=12).for_each(|y| (-14..=14).for_each(|x| pixels.push(x as f32, y as f32, 100.0)));
+            (-12..=12).for_each(|y| pixels.push_row(-14.0, y as f32, &[100.0; 29]));
             pixels.finish();
             let noise = [1.0, 1.0];
             pixels.correct(&state);

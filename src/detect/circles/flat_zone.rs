@@ -33,18 +33,29 @@ impl Zone {
         Self { reference, ..Self::default() }
     }
 
-    pub fn push(&mut self, x: f64, y: f64, value: f32) {
-        let v = f64::from(value) - self.reference;
-        self.count += 1.0;
-        self.x += x;
-        self.y += y;
-        self.xx += x * x;
-        self.xy += x * y;
-        self.yy += y * y;
+    /// Adds neighbouring pixels of a row, the first of them at `x`.
+    pub fn push_row(&mut self, x: f64, y: f64, values: &[f32]) {
+        let n = values.len() as f64;
+        let (mut v, mut kv, mut vv) = (0.0, 0.0, 0.0);
+        for (k, value) in values.iter().enumerate() {
+            let value = f64::from(*value) - self.reference;
+            v += value;
+            kv += k as f64 * value;
+            vv += value * value;
+        }
+        // sums of k and k^2 over 0 .. n - 1
+        let (k, kk) = (0.5 * n * (n - 1.0), n * (n - 1.0) * (2.0 * n - 1.0) / 6.0);
+        let sum_x = n * x + k;
+        self.count += n;
+        self.x += sum_x;
+        self.y += n * y;
+        self.xx += x * (sum_x + k) + kk;
+        self.xy += sum_x * y;
+        self.yy += n * y * y;
         self.v += v;
-        self.xv += x * v;
+        self.xv += x * v + kv;
         self.yv += y * v;
-        self.vv += v * v;
+        self.vv += vv;
     }
 
     fn moments(&self) -> [[f64; 3]; 3] {
@@ -124,13 +135,17 @@ mod tests {
     fn sums_give_the_residuals_of_every_pixel() {
         let mut zone = Zone::around(200.0);
         let pixels: Vec<(f64, f64, f32)> =
-            (0..40).map(|k| (f64::from(k % 7) - 3.0, f64::from(k / 7), 195.0 + (k * k % 11) as f32)).collect();
-        pixels.iter().for_each(|(x, y, v)| zone.push(*x, *y, *v));
+            (0..42).map(|k| (f64::from(k % 7) - 3.0, f64::from(k / 7), 195.0 + (k * k % 11) as f32)).collect();
+        for row in pixels.chunks(7) {
+            zone.push_row(row[0].0, row[0].1, &[0, 1, 2, 3, 4, 5, 6].map(|k| row[k].2));
+        }
         let level = [198.0, 0.3, -0.2];
         let sums = zone.residuals(level);
         let one = |&(x, y, v): &(f64, f64, f32)| f64::from(v) - (level[0] + level[1] * x + level[2] * y);
         let square: f64 = pixels.iter().map(|p| one(p).powi(2)).sum();
         let along: f64 = pixels.iter().map(|p| one(p) * p.0).sum();
         assert!((sums.square - square).abs() < 1e-9 * square && (sums.by_term[1] - along).abs() < 1e-8);
+        let squares: f64 = pixels.iter().map(|p| p.0 * p.0).sum();
+        assert!((zone.moments()[1][1] - squares).abs() < 1e-9);
     }
 }

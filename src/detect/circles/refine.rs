@@ -268,7 +268,7 @@ fn finish(
     start: &Start,
     anchor: [f64; 2],
     visible: f64,
-    pixels: &Pixels,
+    pixels: &mut Pixels,
     factor: &Normal,
 ) -> Result<Fit, Reason> {
     let parameters = state.parameters();
@@ -490,45 +490,58 @@ impl Strip<'_> {
         let base = (self.y * width) as usize;
         let values = &self.picture.pixels[base + from as usize..base + to as usize];
         let (x, y) = (from as f64 - self.anchor[0], self.y as f64 - self.anchor[1]);
-        for (k, value) in values.iter().enumerate() {
-            let x = x + k as f64;
+        let (mut at, mut taken) = (0, 0);
+        for good in values.split(|v| *v >= limit) {
+            let x = x + at as f64;
             match self.used {
-                _ if *value >= limit => self.counts.1 += usize::from(in_band),
-                Use::Band => self.pixels.push(x as f32, y as f32, *value),
-                Use::Paper => self.pixels.flat.paper.push(x, y, *value),
-                Use::Ink => self.pixels.flat.ink.push(x, y, *value),
+                Use::Band => self.pixels.push_row(x as f32, y as f32, good),
+                Use::Paper => self.pixels.flat.paper.push_row(x, y, good),
+                Use::Ink => self.pixels.flat.ink.push_row(x, y, good),
                 Use::Nothing => {}
             }
+            at += good.len() + 1;
+            taken += good.len();
+        }
+        if in_band {
+            self.counts.1 += values.len() - taken;
         }
     }
 }
 
-/// Cholesky factor in place (lower triangle).
+/// Cholesky factor in place: from the lower triangle to the upper triangular `U` of `U' U`.
 fn cholesky(m: &mut Normal, n: usize) -> Option<()> {
+    for i in 0..n {
+        for j in 0..i {
+            m[j][i] = m[i][j];
+        }
+    }
+    let diagonal: [f64; ANNULUS] = std::array::from_fn(|i| m[i][i]);
     for j in 0..n {
-        let (pivots, below) = m[j..].split_first_mut()?;
-        let dot = |a: &[f64; ANNULUS], b: &[f64; ANNULUS]| a[..j].iter().zip(&b[..j]).map(|(x, y)| x * y).sum::<f64>();
-        let pivot = pivots[j] - dot(pivots, pivots);
-        if pivot.is_nan() || pivot <= 1e-12 * pivots[j].abs() {
+        let (done, below) = m.split_at_mut(j + 1);
+        let row = &mut done[j];
+        let pivot = row[j];
+        if pivot.is_nan() || pivot <= 1e-12 * diagonal[j].abs() {
             return None;
         }
-        let root = pivot.sqrt();
-        pivots[j] = root;
-        for row in below.iter_mut().take(n - j - 1) {
-            row[j] = (row[j] - dot(row, pivots)) / root;
+        let inverse = 1.0 / pivot.sqrt();
+        row[j..n].iter_mut().for_each(|v| *v *= inverse);
+        for (i, other) in (j + 1..n).zip(below) {
+            let factor = row[i];
+            other[i..n].iter_mut().zip(&row[i..n]).for_each(|(v, u)| *v -= factor * u);
         }
     }
     Some(())
 }
 
 /// Solves in place with a factor of [`cholesky`].
-fn solve(l: &Normal, n: usize, b: &mut [f64; ANNULUS]) {
+fn solve(u: &Normal, n: usize, b: &mut [f64; ANNULUS]) {
     for i in 0..n {
-        let known: f64 = l[i][..i].iter().zip(b.iter()).map(|(x, y)| x * y).sum();
-        b[i] = (b[i] - known) / l[i][i];
+        let v = b[i] / u[i][i];
+        b[i] = v;
+        b[i + 1..n].iter_mut().zip(&u[i][i + 1..n]).for_each(|(b, u)| *b -= v * u);
     }
     for i in (0..n).rev() {
-        let known: f64 = (i + 1..n).map(|k| l[k][i] * b[k]).sum();
-        b[i] = (b[i] - known) / l[i][i];
+        let known: f64 = u[i][i + 1..n].iter().zip(&b[i + 1..n]).map(|(u, b)| u * b).sum();
+        b[i] = (b[i] - known) / u[i][i];
     }
 }

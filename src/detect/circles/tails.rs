@@ -92,7 +92,7 @@ mod tests {
         let tails: Vec<Tail> = Tail::of(&measured).collect();
         let contour = Contour { centre: [12.0, 0.5], ..tails[0].contour };
         let mut pixels = Pixels::default();
-        (-15..=15).for_each(|y| (-15..=15).for_each(|x| pixels.push(x as f32, y as f32, 200.0)));
+        (-15..=15).for_each(|y| pixels.push_row(-15.0, y as f32, &[200.0; 31]));
         pixels.finish();
         let mut covered = vec![0.0; pixels.x.len()];
         let all = vec![true; pixels.x.len() / LANES];
