@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::detect::{Detection, FlatField, Picture, SeriesImage, detect_series};
+use super::second_pass::second_pass;
+use crate::detect::{Detection, FlatField, Picture, SeriesImage, detect_series, load};
 use crate::error::{Error, Notice, Result};
 use crate::series::{Plate, Series, Source};
 
@@ -31,7 +32,8 @@ impl SeenImage {
     }
 }
 
-/// Looks for the plate in the images of all stops, dark and white images taken into account; in the order of the stops.
+/// Looks for the plate in the images of all stops, dark and white images taken into account, then again where a first
+/// solve predicts more markers; in the order of the stops.
 /// `progress` is called after every image, from any thread.
 ///
 /// # Errors
@@ -52,7 +54,7 @@ pub fn look(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<Vec<Seen
         None => Ok(picture),
     };
     let paths: Vec<PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.clone()).collect();
-    let mut found = detect_series(&paths, bits, &series.plate, corrected, progress).into_iter();
+    let mut found = detect_series(&paths, bits, &series.plate, &corrected, progress).into_iter();
     let missing = |image: &str| {
         let remedy = "copy it into images/, or remove its row from joints.csv";
         SeriesImage::failed(Error::input(image, "the image file is missing", remedy))
@@ -61,7 +63,9 @@ pub fn look(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<Vec<Seen
         let image = stop.path.as_ref().and_then(|_| found.next()).unwrap_or_else(|| missing(&stop.image));
         SeenImage::new(&stop.image, stop.path.as_deref(), image)
     });
-    Ok(seen.collect())
+    let mut seen: Vec<SeenImage> = seen.collect();
+    second_pass(series, &mut seen, |path| load(path, bits).and_then(corrected));
+    Ok(seen)
 }
 
 /// Looks for a plate in single images.

@@ -35,16 +35,7 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     let mut notices = series.notices.clone();
     notices.extend(series.reading_notices(chain));
     let camera = &series.manifest.camera;
-    let lens = match camera.model.as_deref() {
-        None => Lens::Brown,
-        Some(name) => Lens::from_name(name).ok_or_else(|| {
-            Error::input(
-                series.folder.join("series.toml").display(),
-                format!("[camera] model = \"{name}\" is not a lens model of this program"),
-                format!("use one of: {}", Lens::names().join(", ")),
-            )
-        })?,
-    };
+    let lens = lens_of(series)?;
     let (mut seen, found_size) = match &series.source {
         Source::Images { .. } => look_through(series, progress, &mut notices)?,
         Source::Observations(all) => {
@@ -100,6 +91,18 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
             stops,
         },
         notices,
+    })
+}
+
+/// The lens model that a series states.
+pub(super) fn lens_of(series: &Series) -> Result<Lens> {
+    let Some(name) = series.manifest.camera.model.as_deref() else { return Ok(Lens::Brown) };
+    Lens::from_name(name).ok_or_else(|| {
+        Error::input(
+            series.folder.join("series.toml").display(),
+            format!("[camera] model = \"{name}\" is not a lens model of this program"),
+            format!("use one of: {}", Lens::names().join(", ")),
+        )
     })
 }
 

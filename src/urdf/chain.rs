@@ -63,3 +63,11 @@ pub struct Chain {
     /// Kept apart from `joints` because a mimic joint may be driven from outside the chain.
     pub reading_kinds: Vec<JointKind>,
 }
+
+impl Chain {
+    /// No robot at all: base and tip are one.
+    pub fn empty() -> Self {
+        let [robot, base, tip] = [const { String::new() }; 3];
+        Self { robot, base, tip, joints: Vec::new(), readings: Vec::new(), reading_kinds: Vec::new() }
+    }
+}

@@ -250,13 +250,12 @@ impl Pixels {
         );
     }
 
-    /// Takes what the closed form misses to the exact coverage from this state on.
-    pub fn correct(&mut self, state: &State) {
+    /// Takes what the closed form misses to the exact coverage from this state on; false where it misses nothing.
+    pub fn correct(&mut self, state: &State) -> bool {
         let Self { outer, inner, x, y, nodes, .. } = self;
-        outer.correct(&state.outer_contour(), x, y, nodes);
-        if let Some(contour) = state.inner_contour() {
-            inner.correct(&contour, x, y, nodes);
-        }
+        let of_outer = outer.correct(&state.outer_contour(), x, y, nodes);
+        let of_inner = state.inner_contour().is_some_and(|contour| inner.correct(&contour, x, y, nodes));
+        of_outer || of_inner
     }
 
     /// Residuals and the columns of the levels; leaves weighted densities in the edge terms.
@@ -499,11 +498,12 @@ impl EdgeTerms {
         }
     }
 
-    fn correct(&mut self, contour: &Contour, x: &[f32], y: &[f32], nodes: &mut Nodes) {
+    fn correct(&mut self, contour: &Contour, x: &[f32], y: &[f32], nodes: &mut Nodes) -> bool {
+        let had = !self.exact.is_empty();
         self.missing.fill(0.0);
         self.exact.clear();
         if !contour.is_strongly_curved() {
-            return;
+            return had;
         }
         self.evaluate(&Geometry::of(contour), x, y);
         self.exact.resize_with(MOMENTS, || vec![0.0; x.len()]);
@@ -515,6 +515,7 @@ impl EdgeTerms {
         for ((missing, closed), near) in blocks.zip(near) {
             missing.iter_mut().zip(closed).for_each(|(m, c)| *m = if near { *m - c } else { 0.0 });
         }
+        true
     }
 
     fn evaluate(&mut self, geometry: &Geometry, x: &[f32], y: &[f32]) {

@@ -1,12 +1,12 @@
 //! Measuring markers whose place is known: all candidates of a picture, or those that someone predicts.
 
-use super::candidate::{Candidate, Profile, candidates, largest_marker};
+use super::candidate::{Candidate, candidates, largest_marker};
 use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
 use super::lattice::Buckets;
 use super::levels::Levels;
 use super::refine::{Fit, Start, refine};
-use super::types::{Dropped, Found, Measured, Options, Reason};
+use super::types::{Dropped, Measured, Options, Reason};
 use crate::detect::Picture;
 
 /// Threshold between the envelopes: a little above the middle, where small blurred markers keep their size.
@@ -23,7 +23,7 @@ pub(super) struct Camera {
 }
 
 /// Typical gradient of the ink where nothing is known yet.
-const INK_SLOPE: f64 = 1e-3;
+pub(super) const INK_SLOPE: f64 = 1e-3;
 /// The least that is assumed: a reflection over a few markers must not go unseen.
 const LEAST_INK_SLOPE: f64 = 1e-4;
 
@@ -52,6 +52,7 @@ impl Target {
             noise: camera.noise,
             ink_slope: camera.ink_slope,
             apart: [0.0; 2],
+            third: None,
             tie_sigma: None,
             tails: &[],
         }
@@ -59,7 +60,7 @@ impl Target {
 }
 
 /// How many markers are measured to learn blur and noise.
-const LEARNERS: usize = 40;
+const LEARNERS: usize = 24;
 
 /// Learns blur and noise from some of the targets.
 pub(super) fn learn(picture: &Picture, targets: &[Target], guess_blur: f64, noise: f32, pixels: &mut Pixels) -> Camera {
@@ -171,60 +172,4 @@ pub(super) fn target_of(candidate: &Candidate, ratio: Option<f64>, clear: f64) -
 
 pub(super) fn drop_target(target: &Target, reason: Reason, marker: Option<u32>) -> Dropped {
     Dropped { uv: target.ellipse.centre, reason, ellipse: Some(target.ellipse), marker }
-}
-
-/// A marker whose image is predicted.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Predicted {
-    /// Identity.
-    pub marker: u32,
-    /// Ellipse of the outer circle's image.
-    pub outer: Ellipse,
-    /// Inner over outer radius; `None` for a disc.
-    pub ratio: Option<f64>,
-    /// Relative standard deviation of the predicted semi-axes.
-    pub shape_sigma: f64,
-    /// Relative radius (1 is the outer contour) out to which no other ink lies.
-    pub clear: f64,
-}
-
-/// Measures markers where they are predicted: the second pass after a first solve, for markers that were clipped by
-/// the border or missed at first.
-///
-/// The predicted centre may be wrong by about a quarter of a radius. The shape is held to the prediction within
-/// `shape_sigma`, so that a part of the contour determines the centre. `blur_px` is that of the first pass.
-pub fn refine_predicted(
-    picture: &Picture,
-    predicted: &[Predicted],
-    blur_px: f64,
-    noise: [f64; 2],
-) -> (Vec<Found>, Vec<Dropped>) {
-    let mut pixels = Pixels::default();
-    let camera = Camera { blur_px, noise: noise.map(|n| n * n), ink_slope: INK_SLOPE };
-    let (mut found, mut dropped) = (Vec::new(), Vec::new());
-    for p in predicted {
-        let target = predicted_target(picture, p);
-        let result =
-            target.ok_or(Reason::LowContrast).and_then(|t| refine(picture, &t.start(&camera, 0.2), &mut pixels));
-        match result {
-            Ok(fit) => found.push(Found { marker: p.marker, measured: fit.measured, rescued: true }),
-            Err(reason) => {
-                dropped.push(Dropped { uv: p.outer.centre, reason, ellipse: Some(p.outer), marker: Some(p.marker) })
-            }
-        }
-    }
-    (found, dropped)
-}
-
-pub(super) fn predicted_target(picture: &Picture, p: &Predicted) -> Option<Target> {
-    let profile = Profile::of(picture, &p.outer);
-    let contrast = profile.paper - profile.ring;
-    (contrast > 0.1 * profile.paper).then_some(Target {
-        ellipse: p.outer,
-        ratio: p.ratio,
-        paper: f64::from(profile.paper),
-        ink: f64::from(profile.ring),
-        clear: p.clear,
-        shape_sigma: Some(p.shape_sigma),
-    })
 }

@@ -24,6 +24,7 @@ mod levels;
 mod local_map;
 mod measure;
 mod pipeline;
+mod predicted;
 mod refine;
 mod second_look;
 #[cfg(test)]
@@ -36,6 +37,7 @@ mod wide;
 pub use asymmetry::Drift;
 pub use ellipse::Ellipse;
 pub use grid::detect_grid;
-pub use measure::{Predicted, measure, refine_predicted};
+pub use measure::measure;
 pub use pipeline::detect;
+pub use predicted::{Predicted, look_where_predicted};
 pub use types::{Detection, Dropped, Found, Imaged, InnerOuter, Measured, Options, Outcome, Reason};

@@ -10,7 +10,8 @@ use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
 use super::lattice::{Buckets, Lattice, lattices};
 use super::levels::Levels;
-use super::measure::{Camera, Predicted, THRESHOLD, Target, drop_target, learn, median, predicted_target, target_of};
+use super::measure::{Camera, THRESHOLD, Target, drop_target, learn, median, target_of};
+use super::predicted::Predicted;
 use super::refine::{Fit, refine};
 use super::second_look::{Figure, Place, second_look};
 use super::types::{Detection, Dropped, Found, InnerOuter, Options, Outcome, Reason};
@@ -276,18 +277,13 @@ impl Work<'_> {
                 continue;
             }
             let clear = self.clear(cell, outer.semi_axes()[1], camera.blur_px).min(self.room(&outer));
-            let predicted = Predicted { marker: marker.id, outer, ratio: self.ratio(cell), shape_sigma: 0.05, clear };
             let id = marker.id;
-            let target = predicted_target(self.picture, &predicted);
-            let result = target
-                .ok_or(Reason::LowContrast)
-                .and_then(|t| refine(self.picture, &t.start(camera, 0.2), &mut self.pixels))
-                .and_then(|fit| credible(&fit, &outer, camera));
+            let predicted = Predicted::at(id, outer, self.ratio(cell), clear);
+            let result = predicted.measure(self.picture, camera, &mut self.pixels);
             match result {
                 Ok(fit) => {
-                    let seen = fit.measured.outer.ellipse.centre;
                     // the candidate that lay there was dropped with a reason: it is found after all
-                    dropped.retain(|d| (d.uv[0] - seen[0]).hypot(d.uv[1] - seen[1]) > 0.5 * outer.semi_axes()[1]);
+                    dropped.retain(|d| !predicted.lies_at(d.uv));
                     found.push(Entry { cell, fit, rescued: true });
                 }
                 Err(reason) => {
@@ -361,19 +357,6 @@ impl Work<'_> {
         let lopsided = Drift::fit(harvest.entries.iter().map(skew), size);
         Detection { observations, found, dropped, outcome, blur_px, noise, inner_outer: harvest.inner_outer, lopsided }
     }
-}
-
-/// A rescued marker must look as predicted, size and place, and leave no more than noise: with its shape held, something that touches it
-/// from the side moves its centre without making it look wrong.
-fn credible(fit: &Fit, predicted: &Ellipse, camera: &Camera) -> std::result::Result<Fit, Reason> {
-    let m = &fit.measured;
-    let off = predicted.relative_radius(m.outer.ellipse.centre);
-    let size = (m.outer.ellipse.mean_radius() / predicted.mean_radius()).ln().abs();
-    if off > 0.4 || size > 0.12 {
-        return Err(Reason::OutOfPlace);
-    }
-    let is_noise = m.rms.powi(2) < 2.0 * camera.noise[0] + (0.02 * (m.paper - m.ink)).powi(2);
-    if is_noise { Ok(*fit) } else { Err(Reason::EdgeModel) }
 }
 
 /// The observations of a measured marker: outer, then inner.

@@ -29,7 +29,9 @@ pub(super) struct Start<'a> {
     pub ink_slope: f64,
     /// Centre of the inner circle less that of the outer one, px.
     pub apart: [f64; 2],
-    /// How well that is known per axis, px, where geometry tells it.
+    /// Third harmonic of the contours, where it is predicted.
+    pub third: Option<[f64; 2]>,
+    /// How well `apart` is known per axis, px, where geometry tells it.
     pub tie_sigma: Option<f64>,
     /// Measured neighbours whose ink reaches the pixels of this marker.
     pub tails: &'a [Tail],
@@ -64,6 +66,8 @@ const EVEN: f64 = 5.0;
 const SLACK: f64 = 0.5;
 /// Part of the band that must be in the picture when the shape is not known.
 pub(super) const WHOLE: f64 = 0.98;
+/// Part of a predicted third harmonic to which it is good.
+const THIRD_PART: f64 = 0.25;
 const ITERATIONS: usize = 14;
 /// A pixel at this part of the range or above counts as saturated.
 const SATURATED: f32 = 0.995;
@@ -132,7 +136,7 @@ fn initial(start: &Start, anchor: [f64; 2]) -> State {
     State {
         centre,
         to_unit: start.ellipse.normaliser(),
-        third: [0.0; 2],
+        third: start.third.unwrap_or_default(),
         blur: start.blur_px,
         white: [start.paper, 0.0, 0.0],
         dark: [start.ink, 0.0, 0.0],
@@ -153,7 +157,10 @@ impl Prior {
         let inverse = |sigma: f64| 1.0 / (sigma * sigma);
         // The third harmonic of a distorted or foreshortened circle grows with its radius: half a radius per picture
         // width is that of a strongly distorted wide-angle lens.
-        let third = 0.5 * start.ellipse.semi_axes()[0] / picture.width.max(picture.height) as f64;
+        let third = match start.third {
+            Some([a, b]) => THIRD_PART * a.hypot(b),
+            None => 0.5 * start.ellipse.semi_axes()[0] / picture.width.max(picture.height) as f64,
+        };
         let contrast = (start.paper - start.ink).abs().max(1.0);
         weight[THIRD..THIRD + 2].fill(inverse(third.max(1e-4)));
         weight[LN_BLUR] = inverse(start.blur_sigma);
@@ -205,8 +212,10 @@ fn iterate(state: &mut State, prior: &Prior, start: &Start, pixels: &mut Pixels)
         // What the closed form misses moves with the contour: taken near the end, and again when that moved on.
         let stale = if state.is_badly_resolved() { 0.01 } else { 0.05 };
         if last < 0.1 && since_correction > stale {
-            pixels.correct(state);
-            (since_correction, since_factor) = (0.0, f64::MAX);
+            if pixels.correct(state) {
+                since_factor = f64::MAX;
+            }
+            since_correction = 0.0;
         }
         pixels.evaluate(state, start.noise);
         if since_factor > 0.05 {

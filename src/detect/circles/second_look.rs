@@ -37,7 +37,7 @@ pub(super) struct Place {
 
 /// Gap to a neighbour, in units of the blur, below which its ink reaches the edge of a marker; and below which it
 /// reaches any of the pixels that are then used.
-const CROWDED: f64 = 6.0;
+pub(super) const CROWDED: f64 = 6.0;
 const WITHIN_REACH: f64 = 8.0;
 /// Width of a ring, in units of the blur, below which its edges are not told apart.
 const THIN: f64 = 4.0;

@@ -1,0 +1,101 @@
+//! The second pass over the images of a series: cameras and stand-alone poses say where every marker must be.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::build::{MeasuredSeries, MeasuredStop, build};
+use super::free_poses::adjust_free_poses;
+use super::look::SeenImage;
+use super::measure::lens_of;
+use crate::detect::Picture;
+use crate::detect::circles::{Predicted, look_where_predicted};
+use crate::error::Result;
+use crate::geom::Pose;
+use crate::model::robot::Robot;
+use crate::problem::State;
+use crate::series::{DEFAULT_PLACEMENT, Marker, Plate, PlateKind, Series};
+use crate::urdf::Chain;
+
+/// Fewest images for a first solve.
+const FEWEST_IMAGES: usize = 3;
+/// How far from the markers that were found, in pitches, camera and pose are trusted to say where others are.
+const REACH: f64 = 2.5;
+
+/// Looks again in every image for the markers that the first pass missed or that the border cuts; `picture` loads
+/// them. Images stay as they are where the first solve fails: what is wrong is for the adjustment to say.
+pub(super) fn second_pass(
+    series: &Series,
+    images: &mut [SeenImage],
+    picture: impl Fn(&Path) -> Result<Picture> + Sync,
+) {
+    if series.plate.kind != PlateKind::CodedCircles {
+        return;
+    }
+    let Some((state, poses)) = first_solve(series, images) else { return };
+    images.par_iter_mut().zip(poses).for_each(|(image, pose)| {
+        let (Some(pose), Some(path)) = (pose, &image.path) else { return };
+        let predicted = predict(&state, &series.plate, image, &pose);
+        if let Ok(picture) = picture(path).as_ref() {
+            look_where_predicted(picture, &mut image.detection, &predicted);
+        }
+    });
+}
+
+/// Cameras, plates and the stand-alone pose of every image, without a robot.
+fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Option<Pose>>)> {
+    let seen = images.iter().filter(|i| i.detection.failure.is_none() && i.detection.circles.is_some());
+    let sizes: Vec<(usize, usize)> = seen.filter_map(|i| i.size).collect();
+    let (width, height) = *sizes.first().filter(|_| sizes.len() >= FEWEST_IMAGES)?;
+    let stop = |image: &SeenImage| MeasuredStop {
+        image: image.name.clone(),
+        readings: None,
+        placement: DEFAULT_PLACEMENT.to_owned(),
+        observations: image.detection.observations.clone(),
+        left_out: image.detection.failure.as_ref().map(|e| e.what.clone()),
+    };
+    let measured = MeasuredSeries {
+        name: series.name.clone(),
+        camera: series.camera_name().to_owned(),
+        mounting: series.mounting().to_owned(),
+        mount: series.manifest.camera_mount,
+        width_px: width as u32,
+        height_px: height as u32,
+        focal_px: series.manifest.camera.focal_px,
+        lens: lens_of(series).ok()?,
+        centroid: true,
+        plate: series.plate.clone(),
+        plate_name: series.manifest.plate.clone(),
+        order_known: false,
+        stops: images.iter().map(stop).collect(),
+    };
+    let nobody = Robot::nominal(Chain::empty());
+    let (mut problem, state) = build(&nobody, &[measured], false).ok()?;
+    let (free, _) = adjust_free_poses(&mut problem, state, &[series.manifest.camera.focal_px]).ok()?;
+    let poses = free.poses.iter().map(|p| p.as_ref().map(|p| p.camera_from_plate)).collect();
+    Some((free.state, poses))
+}
+
+/// Images of all markers near those that were found.
+fn predict(state: &State, plate: &Plate, image: &SeenImage, camera_from_plate: &Pose) -> Vec<Predicted> {
+    let (camera, shape) = (&state.cameras[0], &state.plates[0]);
+    let found: BTreeSet<u32> = image.detection.observations.iter().map(|o| o.marker).collect();
+    let known: Vec<Vector3<f64>> =
+        plate.markers.iter().filter(|m| found.contains(&m.id)).map(|m| m.position_m).collect();
+    let largest = plate.markers.iter().map(|m| m.outer_radius_m).fold(0.0, f64::max);
+    let one = |(index, marker): (usize, &Marker)| {
+        let near = |k: &Vector3<f64>| (k - marker.position_m).norm() < REACH * plate.pitch_m;
+        if found.contains(&marker.id) || !known.iter().any(near) {
+            return None;
+        }
+        let centre = shape.position(index);
+        let map = |[x, y]: [f64; 2]| {
+            let p = camera.project(&camera_from_plate.transform(&(centre + Vector3::new(x, y, 0.0))))?;
+            Some([p.x, p.y])
+        };
+        Predicted::by_map(marker, plate.pitch_m - largest, map)
+    };
+    plate.markers.iter().enumerate().filter_map(one).collect()
+}

@@ -1,0 +1,53 @@
+//! The second pass over a rendered series: markers across the border of the picture against the truth.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+use robotcal::model::circle::centroid_uv;
+use robotcal::recipe;
+use robotcal::series::{Edge, read_images};
+use robotcal::simulate::truth::Truth;
+
+/// Half of a squared normalised error of two coordinates is exponentially distributed, with the median ln 2; what is allowed
+/// for a contour that is not all there is an upper bound.
+#[test]
+fn markers_across_the_border_are_found_and_their_covariance_is_true() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/kr6_small");
+    let series = read_images(&folder).unwrap();
+    let truth = Truth::read(&folder.join("truth.toml")).unwrap();
+    let seen = recipe::look(&series, |_| ()).unwrap();
+    let mut errors: Vec<(f64, f64)> = Vec::new();
+    for (image, stop) in seen.iter().zip(&truth.stops) {
+        assert_eq!(image.name, stop.image);
+        let pose = stop.camera_from_plate.pose();
+        let circles = image.detection.circles.as_ref().unwrap();
+        let across = circles.found.iter().filter(|f| f.measured.visible < 0.97);
+        for found in across {
+            let index = series.plate.index_of(found.marker).unwrap();
+            let marker = &series.plate.markers[index];
+            let centre = marker.position_m + Vector3::from(truth.marker_errors_m[index]);
+            let edges = std::iter::once(&found.measured.outer).chain(found.measured.inner.as_ref());
+            for edge in edges {
+                let outer = edge.edge == Edge::Outer;
+                let radius = if outer { marker.outer_radius_m } else { marker.inner_radius_m };
+                let off =
+                    Vector2::from(edge.ellipse.centre) - centroid_uv(&truth.camera, &pose, &centre, radius).unwrap();
+                let [uu, uv, vv] = edge.covariance;
+                let information = Matrix2::new(uu, uv, uv, vv).try_inverse().unwrap();
+                errors.push((off.dot(&(information * off)) / 2.0, off.norm()));
+            }
+        }
+    }
+    errors.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (count, median) = (errors.len(), errors[errors.len() / 2].0);
+    let largest = errors.iter().map(|e| e.1).fold(0.0, f64::max);
+    let outliers = errors.iter().filter(|e| e.0 > 8.0).count();
+    println!(
+        "{count} contours across the border, median {median:.2}, {outliers} beyond 4 sigma, largest {largest:.3} px"
+    );
+    assert!(count > 150, "{count}");
+    assert!((0.3..0.9).contains(&median), "{median}");
+    assert!(outliers * 30 < count && largest < 0.1, "{outliers} of {count}, {largest} px");
+}
