@@ -42,7 +42,7 @@ pub(super) enum Model {
     Gear,
     /// Also gravity and backlash
     Full,
-    /// The one of these that the data support best (Laplace evidence, printed)
+    /// The largest of these that no smaller one beats decisively (Laplace evidence, printed) [default]
     Auto,
 }
 
@@ -76,7 +76,7 @@ impl ChoiceArgs {
         Ok(Options {
             harmonics: harmonics(self.harmonics.or(config.harmonics))?.unwrap_or(defaults.harmonics),
             joint_noise: joint_noise(self.joint_noise)?,
-            model: self.robot_model.map(Into::into).or(config.robot_model).unwrap_or(RobotModel::Full),
+            model: self.robot_model.map(Into::into).or(config.robot_model).unwrap_or(defaults.model),
             selection: Selection {
                 parameters: parameters.or(config.parameters).unwrap_or_default(),
                 free: joined(&config.free, &self.free),

@@ -14,6 +14,10 @@ use crate::problem::{Problem, State};
 use crate::solve::{Elimination, Linearised, Settings, System, solve};
 use crate::urdf::Chain;
 
+/// Logarithm of the odds at which a smaller model takes the place of a larger one: "decisive" (H. Jeffreys, *Theory of
+/// probability*, 1961). Gears have errors and arms sag; that there is nothing of it must be plain.
+const DECISIVE: f64 = 4.605;
+
 /// Smallest prior sigma of a marker coordinate, m, as in the normal equations.
 const FIXED_MARKER_SIGMA_M: f64 = 1e-9;
 
@@ -30,7 +34,8 @@ pub struct Evidence {
     pub parameters: usize,
 }
 
-/// Identifies robot, cameras, mountings and plates from identified series.
+/// Identifies robot, cameras, mountings and plates from identified series. The automatic model is the largest that no smaller one
+/// beats decisively; whoever names a joint term wants all of them.
 ///
 /// # Errors
 /// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset, or readings and images do
@@ -39,11 +44,14 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     if options.model != RobotModel::Auto {
         return identify_model(chain, series, options);
     }
+    if options.selection.names_terms() {
+        return identify_model(chain, series, &Options { model: RobotModel::Full, ..options.clone() });
+    }
     let full = identify_model(chain.clone(), series, &Options { model: RobotModel::Full, ..options.clone() })?;
     let evidences = compare_models(&full);
-    let best = evidences.iter().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence));
-    let best = best.map_or(RobotModel::Full, |e| e.model);
-    let chosen = match best {
+    let supported = evidences.iter().filter(|e| e.log_evidence > -DECISIVE);
+    let largest = supported.max_by_key(|e| e.parameters).map_or(RobotModel::Full, |e| e.model);
+    let chosen = match largest {
         RobotModel::Full => full,
         model => identify_model(chain, series, &Options { model, ..options.clone() })?,
     };

@@ -37,7 +37,7 @@ pub enum RobotModel {
     Gear,
     /// All of these, gravity and backlash.
     Full,
-    /// The one of these with the largest evidence.
+    /// The largest of these that no smaller one beats by evidence.
     Auto,
 }
 
@@ -61,7 +61,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             joint_noise: JointNoise::Estimated,
-            model: RobotModel::Full,
+            model: RobotModel::Auto,
             harmonics: HARMONICS,
             selection: Selection::default(),
         }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::RobotModel;
 use crate::assess::{minimal_set, structural};
 use crate::error::{Error, Result};
+use crate::model::joint_terms::Term;
 use crate::problem::{Layout, State, short_name};
 use crate::series::read_toml;
 
@@ -111,6 +112,13 @@ impl StatedPrior {
 }
 
 impl Selection {
+    /// Names a joint term beyond the offsets, which not every robot model has.
+    pub fn names_terms(&self) -> bool {
+        let names = self.free.iter().chain(&self.fix).chain(self.prior.keys());
+        let mut terms = names.filter_map(|n| Term::from_name(n.rsplit('.').next()?));
+        terms.any(|t| t != Term::Offset)
+    }
+
     /// Sets priors, means and what is free, before the first solve.
     ///
     /// # Errors

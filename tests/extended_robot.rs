@@ -1,0 +1,73 @@
+//! Robots with and without errors beyond rigid geometry: the extended model helps where they are, and costs nothing where they are not.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use robotcal::assess::{flange_error_m, median};
+use robotcal::geom::Pose;
+use robotcal::recipe::{MeasuredSeries, Options, RobotModel, identify, measured};
+use robotcal::series::{Plate, PlateKind};
+use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
+use robotcal::urdf::{Chain, read};
+
+fn chain() -> Chain {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    read(&path).unwrap().chain(None, None).unwrap()
+}
+
+fn world(errors: RobotErrors, seed: u64) -> SimulatedSeries {
+    let plate = Plate::lattice(PlateKind::Points, 8, 6, 0.03, 0.03e-3);
+    let request = WorldRequest { images: 40, held_out: 60, errors, seed, ..WorldRequest::typical(chain(), plate) };
+    series(&request).unwrap()
+}
+
+/// RMS error of the flange over readings that no image was taken at, mm; and what the evidence said.
+fn error_mm(world: &SimulatedSeries, seen: &MeasuredSeries, model: RobotModel) -> (f64, String) {
+    let options = Options { model, ..Options::default() };
+    let s = identify(chain(), std::slice::from_ref(seen), &options).unwrap();
+    let poses: Vec<(Vec<f64>, Pose)> =
+        world.truth.held_out.iter().map(|h| (h.readings.clone(), h.base_from_tip.pose())).collect();
+    let evidences: Vec<String> = s.evidences.iter().map(|e| format!("{:?} {:.1}", e.model, e.log_evidence)).collect();
+    (1e3 * flange_error_m(&s.state.robot, &s.state.placements[0], &poses).unwrap(), evidences.join(", "))
+}
+
+fn ratios(errors: RobotErrors, seeds: std::ops::RangeInclusive<u64>) -> Vec<f64> {
+    let of = |seed: u64| {
+        let world = world(errors, seed);
+        let seen = measured(&world, &chain());
+        let (rigid, _) = error_mm(&world, &seen, RobotModel::Rigid);
+        let (extended, evidences) = error_mm(&world, &seen, RobotModel::Auto);
+        let ratio = extended / rigid;
+        println!("seed {seed}: rigid {rigid:.4} mm, extended {extended:.4} mm, ratio {ratio:.3}; {evidences}");
+        ratio
+    };
+    seeds.map(of).collect()
+}
+
+/// Worlds of each kind; more by `SEEDS`.
+fn seeds() -> u64 {
+    std::env::var("SEEDS").ok().and_then(|s| s.parse().ok()).unwrap_or(3)
+}
+
+#[test]
+fn terms_that_are_absent_cost_nothing() {
+    let all = ratios(RobotErrors::default(), 1..=seeds());
+    let mean = all.iter().map(|r| r.ln()).sum::<f64>() / all.len() as f64;
+    println!("absent: geometric mean {:.4}, median {:.4}", mean.exp(), median(&all).unwrap());
+    assert!(mean.exp() < 1.02, "{all:?}");
+}
+
+#[test]
+fn terms_that_are_present_are_found() {
+    let errors = RobotErrors {
+        gear: 3e-4,
+        harmonic_rad: 0.1e-3,
+        gravity_rad: 0.2e-3,
+        backlash_rad: 0.1e-3,
+        ..RobotErrors::default()
+    };
+    let all = ratios(errors, 1..=seeds());
+    println!("present: {all:?}");
+    assert!(all.iter().all(|r| *r < 1.0 / 3.0), "{all:?}");
+}
