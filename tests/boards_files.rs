@@ -167,7 +167,7 @@ fn one_bad_image_does_not_fail_the_series() {
         let count = |_: &Path| {
             seen.fetch_add(1, Ordering::Relaxed);
         };
-        pool.install(|| detect_series(&paths, Some(8), &plate, Ok, count))
+        pool.install(|| detect_series(&paths, &plate, |path| load(path, Some(8)), count))
     };
     let (one, two) = (run(1), run(2));
     assert_eq!(one, two, "the same bits with one thread and with two");

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use robotcal::detect::{Detection, detect_series};
+use robotcal::detect::{Detection, detect_series, load};
 use robotcal::geom::PlaneMap;
 use robotcal::series::{Plate, PlateKind};
 
@@ -39,7 +39,7 @@ fn all_corners_of_the_real_boards_are_found_with_the_right_ids() {
             std::fs::read_dir(root.join(series).join("images")).unwrap().map(|e| e.unwrap().path()).collect();
         images.sort();
         assert_eq!(images.len(), 24, "{series}");
-        for (path, found) in images.iter().zip(detect_series(&images, None, &plate, Ok, |_| ())) {
+        for (path, found) in images.iter().zip(detect_series(&images, &plate, |path| load(path, None), |_| ())) {
             let detection = found.detection;
             assert_eq!(detection.failure, None);
             let count = detection.observations.len();

@@ -126,12 +126,13 @@ fn write(args: &DetectArgs, looked: &Looked, out: &Path) -> Result<usize> {
 
 fn draw(looked: &Looked, result: &NewResult) -> Result<usize> {
     let palette = Palette::of(&looked.images);
-    let bits = looked.series.as_ref().and_then(|s| s.manifest.camera.bits);
+    let corrected = looked.series.as_ref().map(recipe::pictures).transpose()?;
+    let picture = |path: &Path| corrected.as_ref().map_or_else(|| load(path, None), |read| read(path));
     let readable: Vec<(&SeenImage, &PathBuf)> =
         looked.images.iter().filter(|i| i.size.is_some()).filter_map(|i| Some((i, i.path.as_ref()?))).collect();
     let bar = progress::bar(readable.len(), "drawing");
     readable.par_iter().try_for_each(|(image, path)| {
-        let drawn = overlay_png(&load(path, bits)?, image, &looked.plate, &palette)?;
+        let drawn = overlay_png(&picture(path)?, image, &looked.plate, &palette)?;
         bar.inc(1);
         let name = image.name.strip_suffix(".png").unwrap_or(&image.name);
         result.put(&format!("{OVERLAY_FOLDER}/{name}.png"), &drawn)

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::{Detection, Picture, examine, load};
+use super::{Detection, Picture, examine};
 use crate::error::{Error, Result};
 use crate::series::Plate;
 
@@ -28,20 +28,18 @@ impl SeriesImage {
 /// Detects the plate in all images of a series.
 ///
 /// Results stand in the order of `images`, whatever the number of threads; an image that cannot be read or shows no
-/// plate is a failure in its own place only, and so is one whose size differs from that of most. Each thread holds one image at a time. `prepare` is applied to every picture
-/// before detection (flat-field correction; identity where there is none) and `progress` is called after every image,
-/// from any thread.
+/// plate is a failure in its own place only, and so is one whose size differs from that of most. Each thread holds one image at a
+/// time, which `picture` reads; `progress` is called after every image, from any thread.
 pub fn detect_series(
     images: &[PathBuf],
-    bits: Option<u32>,
     plate: &Plate,
-    prepare: impl Fn(Picture) -> Result<Picture> + Sync,
+    picture: impl Fn(&Path) -> Result<Picture> + Sync,
     progress: impl Fn(&Path) + Sync,
 ) -> Vec<SeriesImage> {
     let mut found: Vec<SeriesImage> = images
         .par_iter()
         .map(|path| {
-            let mut image = match load(path, bits).and_then(&prepare) {
+            let mut image = match picture(path) {
                 Err(error) => SeriesImage::failed(error),
                 Ok(picture) => {
                     SeriesImage { size: Some((picture.width, picture.height)), detection: examine(&picture, plate) }

@@ -39,6 +39,27 @@ impl SeenImage {
 /// # Errors
 /// A series without images; dark and white images that are of no use.
 pub fn look(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<Vec<SeenImage>> {
+    let picture = pictures(series)?;
+    let paths: Vec<PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.clone()).collect();
+    let mut found = detect_series(&paths, &series.plate, &picture, progress).into_iter();
+    let missing = |image: &str| {
+        let remedy = "copy it into images/, or remove its row from joints.csv";
+        SeriesImage::failed(Error::input(image, "the image file is missing", remedy))
+    };
+    let seen = series.stops.stops.iter().map(|stop| {
+        let image = stop.path.as_ref().and_then(|_| found.next()).unwrap_or_else(|| missing(&stop.image));
+        SeenImage::new(&stop.image, stop.path.as_deref(), image)
+    });
+    let mut seen: Vec<SeenImage> = seen.collect();
+    second_pass(series, &mut seen, picture);
+    Ok(seen)
+}
+
+/// Reads the images of a series as the detector sees them: dark and white images taken into account.
+///
+/// # Errors
+/// A series without images; dark and white images that are of no use.
+pub fn pictures(series: &Series) -> Result<impl Fn(&Path) -> Result<Picture> + Sync> {
     let (dark, white) = match &series.source {
         Source::Images { dark, white, .. } => (dark, white),
         Source::Recording(path) => return Err(recording(path)),
@@ -49,29 +70,19 @@ pub fn look(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<Vec<Seen
     };
     let bits = series.manifest.camera.bits;
     let flat_field = FlatField::from_images(dark, white, bits)?;
-    let corrected = |picture: Picture| match &flat_field {
-        Some(flat_field) => flat_field.apply(picture),
-        None => Ok(picture),
-    };
-    let paths: Vec<PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.clone()).collect();
-    let mut found = detect_series(&paths, bits, &series.plate, &corrected, progress).into_iter();
-    let missing = |image: &str| {
-        let remedy = "copy it into images/, or remove its row from joints.csv";
-        SeriesImage::failed(Error::input(image, "the image file is missing", remedy))
-    };
-    let seen = series.stops.stops.iter().map(|stop| {
-        let image = stop.path.as_ref().and_then(|_| found.next()).unwrap_or_else(|| missing(&stop.image));
-        SeenImage::new(&stop.image, stop.path.as_deref(), image)
-    });
-    let mut seen: Vec<SeenImage> = seen.collect();
-    second_pass(series, &mut seen, |path| load(path, bits).and_then(corrected));
-    Ok(seen)
+    Ok(move |path: &Path| {
+        let picture = load(path, bits)?;
+        match &flat_field {
+            Some(flat_field) => flat_field.apply(picture),
+            None => Ok(picture),
+        }
+    })
 }
 
 /// Looks for a plate in single images.
 pub fn look_at(images: &[PathBuf], plate: &Plate, progress: impl Fn(&Path) + Sync) -> Vec<SeenImage> {
     let name = |path: &Path| path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let found = detect_series(images, None, plate, Ok, progress);
+    let found = detect_series(images, plate, |path| load(path, None), progress);
     images.iter().zip(found).map(|(path, seen)| SeenImage::new(&name(path), Some(path), seen)).collect()
 }
 

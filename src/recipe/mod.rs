@@ -43,7 +43,7 @@ pub use forecast::{
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
 pub use joint::{JointNoise, Options, RobotModel};
 pub use lens_choice::choose_lens;
-pub use look::{SeenImage, look, look_at, require_some};
+pub use look::{SeenImage, look, look_at, pictures, require_some};
 pub use measure::{Measured, measure};
 pub use monte_carlo::{BLOCKS, BlockResult, MonteCarloCell, MonteCarloRequest, monte_carlo};
 pub use places::{PlaceForecast, compare_places, place_words};

@@ -40,4 +40,4 @@ pub use grid::detect_grid;
 pub use measure::measure;
 pub use pipeline::detect;
 pub use predicted::{Predicted, look_where_predicted};
-pub use types::{Detection, Dropped, Found, Imaged, InnerOuter, Measured, Options, Outcome, Reason};
+pub use types::{Detection, Dropped, Found, Imaged, InnerOuter, LOPSIDED_PX, Measured, Options, Outcome, Reason};

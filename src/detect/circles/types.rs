@@ -306,7 +306,7 @@ impl InnerOuter {
 }
 
 /// Displacement by lopsided edges from which on it is told, px.
-const LOPSIDED_PX: f64 = 0.002;
+pub const LOPSIDED_PX: f64 = 0.002;
 
 fn lopsided_notice(drift: Drift) -> Notice {
     let [u, v] = drift.mean_px;

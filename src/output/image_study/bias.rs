@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::{Claim, Section};
+use crate::detect::circles::LOPSIDED_PX;
 use crate::simulate::image_study::{Bias, Cause};
 
 /// Largest distance to the true centroid that is allowed, px.
@@ -58,8 +59,9 @@ fn claims(plain: &[&Bias], coma: &[&Bias]) -> Vec<Claim> {
     let missed: usize = plain.iter().map(|b| b.wanted - b.markers.min(b.wanted)).sum();
     let wanted: usize = plain.iter().map(|b| b.wanted).sum();
     let displaced: Vec<&&Bias> = coma.iter().filter(|b| b.largest_px > COMA_TOLD_PX).collect();
-    let is_told =
-        |b: &&&&Bias| b.lopsided.is_some_and(|l| l.exceeds(0.002)) || b.inner_outer.is_some_and(|io| io.asymmetric());
+    let is_told = |b: &&&&Bias| {
+        b.lopsided.is_some_and(|l| l.exceeds(LOPSIDED_PX)) || b.inner_outer.is_some_and(|io| io.asymmetric())
+    };
     let told = displaced.iter().filter(is_told).count();
     vec![
         Claim {
