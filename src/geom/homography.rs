@@ -40,6 +40,11 @@ impl PlaneMap {
         map.iter().all(|x| x.is_finite()).then_some(Self(map))
     }
 
+    /// Homogeneous matrix.
+    pub fn matrix(&self) -> Matrix3<f64> {
+        self.0
+    }
+
     /// Image of a point; `None` on or beyond the line that maps to infinity.
     pub fn apply(&self, point: [f64; 2]) -> Option<[f64; 2]> {
         let q = transform(&self.0, point);

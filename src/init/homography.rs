@@ -1,9 +1,8 @@
 //! Plane-to-image homographies and the camera pose that one gives.
 
-use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2};
 
-use crate::geom::{Pose, project_to_so3};
-use crate::linalg::symmetric_eigen;
+use crate::geom::{PlaneMap, Pose, project_to_so3};
 
 /// Map from plate coordinates (x, y in m, 1) to homogeneous pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,54 +17,12 @@ pub struct PlanarPose {
     pub from_behind: bool,
 }
 
-/// Similarity that brings points to mean 0 and mean distance sqrt(2).
-fn normaliser(points: &[Vector2<f64>]) -> Option<Matrix3<f64>> {
-    let n = points.len() as f64;
-    let mean = points.iter().sum::<Vector2<f64>>() / n;
-    let spread = points.iter().map(|p| (p - mean).norm()).sum::<f64>() / n;
-    if !(spread > 0.0 && spread.is_finite()) {
-        return None;
-    }
-    let s = 2f64.sqrt() / spread;
-    Some(Matrix3::new(s, 0.0, -s * mean.x, 0.0, s, -s * mean.y, 0.0, 0.0, 1.0))
-}
-
-fn apply(m: &Matrix3<f64>, p: &Vector2<f64>) -> Vector3<f64> {
-    m * Vector3::new(p.x, p.y, 1.0)
-}
-
 impl Homography {
-    /// Normalised direct linear transform; `None` for fewer than four points or a degenerate set (all on a line).
+    /// Normalised direct linear transform ([`PlaneMap::fit`]); `None` for fewer than four points or a degenerate set (all on a
+    /// line).
     pub fn fit(plane_m: &[Vector2<f64>], pixels: &[Vector2<f64>]) -> Option<Self> {
-        if plane_m.len() < 4 || plane_m.len() != pixels.len() {
-            return None;
-        }
-        let (tp, ti) = (normaliser(plane_m)?, normaliser(pixels)?);
-        let mut ata = DMatrix::<f64>::zeros(9, 9);
-        for (p, q) in plane_m.iter().zip(pixels) {
-            let (x, u) = (apply(&tp, p), apply(&ti, q));
-            let mut rows = [[0.0; 9]; 2];
-            for k in 0..3 {
-                rows[0][k] = -x[k];
-                rows[0][6 + k] = u.x * x[k];
-                rows[1][3 + k] = -x[k];
-                rows[1][6 + k] = u.y * x[k];
-            }
-            for row in &rows {
-                for i in 0..9 {
-                    for j in 0..9 {
-                        ata[(i, j)] += row[i] * row[j];
-                    }
-                }
-            }
-        }
-        let (values, vectors) = symmetric_eigen(&ata)?;
-        if values[1] < 1e-9 * values[8] {
-            return None;
-        }
-        let h = vectors.column(0);
-        let normalised = Matrix3::from_row_slice(h.as_slice());
-        let full = ti.try_inverse()? * normalised * tp;
+        let pairs: Vec<_> = plane_m.iter().zip(pixels).map(|(p, q)| ((*p).into(), (*q).into())).collect();
+        let full = PlaneMap::fit(&pairs)?.matrix();
         Some(Self(full / full.norm()))
     }
 
