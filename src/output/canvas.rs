@@ -8,6 +8,9 @@ use super::dot_font::glyph;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Colour(pub u8, pub u8, pub u8);
 
+/// Where nothing is drawn.
+pub(super) const GROUND: Colour = Colour(20, 20, 24);
+
 /// Dots from one letter to the next.
 const ADVANCE: f64 = 6.0;
 
@@ -20,10 +23,11 @@ pub(super) fn text_width(text: &str, dot: f64) -> f64 {
 pub(super) struct Canvas(Pixmap);
 
 impl Canvas {
-    /// A black picture; `None` when it is empty or too large.
+    /// An empty picture; `None` when it is empty or too large.
     pub fn new(size: [u32; 2]) -> Option<Self> {
         let mut pixmap = Pixmap::new(size[0], size[1])?;
-        pixmap.fill(tiny_skia::Color::from_rgba8(20, 20, 24, 255));
+        let Colour(r, g, b) = GROUND;
+        pixmap.fill(tiny_skia::Color::from_rgba8(r, g, b, 255));
         Some(Self(pixmap))
     }
 

@@ -36,7 +36,7 @@ pub fn dropped_counts<'a>(images: impl Iterator<Item = &'a SeenImage>) -> BTreeM
     counts
 }
 
-/// Markers that were identified in an image: all, and those found by looking where their neighbours said.
+/// Markers that were identified in an image: all, and those found by looking where they were predicted.
 pub fn marker_counts(image: &SeenImage) -> (usize, usize) {
     let outer = image.detection.observations.iter().filter(|o| o.edge == Edge::Outer).count();
     let found = image.detection.circles.iter().flat_map(|c| &c.found);
@@ -130,7 +130,7 @@ struct ImageRecord {
     name: String,
     width_px: Option<usize>,
     height_px: Option<usize>,
-    /// Identified markers, and how many of them were found where their neighbours said.
+    /// Identified markers, and how many of them were found where they were predicted.
     markers: usize,
     rescued: usize,
     observations: usize,

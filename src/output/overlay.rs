@@ -6,7 +6,7 @@ use std::io::Cursor;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::canvas::{Canvas, Colour, text_width};
+use super::canvas::{Canvas, Colour, GROUND, text_width};
 use super::detection_files::{dropped_counts, marker_counts};
 use crate::detect::Picture;
 use crate::detect::circles::{Ellipse, Found, Outcome};
@@ -79,15 +79,17 @@ pub fn overlay_png(picture: &Picture, image: &SeenImage, plate: &Plate, palette:
     let size = [width as u32, (picture.height as f64 * scale + head) as u32];
     let mut canvas = Canvas::new(size).ok_or_else(too_large)?;
     paint_picture(&mut canvas, picture, scale as usize, head as usize);
+    let view = View { scale, head, number_dot: (0.047 * pitch * scale).floor().clamp(1.0, 4.0), pitch };
+    view.draw(&mut canvas, image, palette);
+    view.axes(&mut canvas, image, plate, [picture.width, picture.height]);
+    // last: contours may reach beyond the border of the picture
+    canvas.rectangle([0.0; 2], [width, head], GROUND);
     for (row, line) in lines.iter().enumerate() {
         let mut at = [3.0 * dot, 3.0 * dot + line_height * row as f64];
         for item in line {
             at[0] += item.draw(&mut canvas, at, dot);
         }
     }
-    let view = View { scale, head, number_dot: (0.047 * pitch * scale).floor().clamp(1.0, 4.0), pitch };
-    view.draw(&mut canvas, image, palette);
-    view.axes(&mut canvas, image, plate, [picture.width, picture.height]);
     let mut bytes = Cursor::new(Vec::new());
     let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub);
     let encoded = encoder.write_image(&canvas.rgb(), size[0], size[1], ExtendedColorType::Rgb8);
@@ -187,7 +189,7 @@ fn legend(image: &SeenImage, palette: &Palette, plate: &Plate) -> Vec<Vec<Item>>
         second.push(Item::sign(INNER, format!("{inner} inner edges")));
     }
     if rescued > 0 {
-        second.push(Item::sign(RESCUED, format!("{rescued} found where their neighbours said")));
+        second.push(Item::sign(RESCUED, format!("{rescued} found where predicted")));
     }
     let dropped = dropped_counts(std::iter::once(image)).into_iter();
     second.extend(dropped.map(|(reason, n)| Item::sign(palette.colour(reason), format!("{n} {reason}"))));

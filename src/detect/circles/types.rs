@@ -162,7 +162,7 @@ pub struct Found {
     pub marker: u32,
     /// Measurement.
     pub measured: Measured,
-    /// It was found by looking where its neighbours said.
+    /// It was found by looking where its neighbours or a first solve said.
     pub rescued: bool,
 }
 
