@@ -44,6 +44,7 @@ fn request(name: &str, count: usize) -> PlanRequest {
         wish: Wish::Workspace,
         budget: Budget { most_per_placement: Some(count * 2 / 3), ..Budget::default() },
         candidates: CandidateOptions { count: 160, ..CandidateOptions::default() },
+        rounds: 4,
         scene: SceneOptions::default(),
     }
 }

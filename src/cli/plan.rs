@@ -15,6 +15,7 @@ use crate::geom::{OrientedBox, Pose};
 use crate::model::camera::Camera;
 use crate::output::{plan_files, plan_html, plan_programs, plan_start, solution_json, write_all};
 use crate::plan::candidates::CandidateOptions;
+use crate::plan::refine::USUAL_ROUNDS;
 use crate::plan::scene::{self, SceneOptions, arm_length_m};
 use crate::plan::setting::Setting;
 use crate::plan::viewpoint::ViewRange;
@@ -105,6 +106,9 @@ pub(super) struct PlanArgs {
     /// Candidates to choose from
     #[arg(long, value_name = "N", default_value_t = 1000)]
     candidates: usize,
+    /// Rounds of search for further candidates near the best, at most (fewer when they gain little)
+    #[arg(long, value_name = "N", default_value_t = USUAL_ROUNDS)]
+    rounds: usize,
     /// Images at most with the plate at one place
     #[arg(long, value_name = "N")]
     per_placement: Option<usize>,
@@ -228,7 +232,7 @@ const STUDIED: [usize; 2] = [30, 60];
 fn study(args: &PlanArgs, chain: Chain, seeds: u64) -> Result<Verdict> {
     let robot = chain.robot.clone();
     let [planned, random] = STUDIED;
-    let request = PlanStudyRequest { chain, seeds, planned, random, candidates: args.candidates };
+    let request = PlanStudyRequest { chain, seeds, planned, random, candidates: args.candidates, rounds: args.rounds };
     let study = plan_study(&request, |seed| tracing::info!("world {seed} done"))?;
     let text = plan_files::study_table(&robot, &request, &study);
     std::fs::create_dir_all(&args.out).map_err(|e| Error::io(&args.out, &e))?;
@@ -295,6 +299,7 @@ fn request(args: &PlanArgs, chain: Chain) -> Result<PlanRequest> {
             seed: args.seed,
             ..CandidateOptions::default()
         },
+        rounds: args.rounds,
         scene: SceneOptions {
             link_radius_m: args.link_radius_mm.map(|mm| mm / 1e3),
             camera_radius_m: args.camera_radius_mm / 1e3,

@@ -1,13 +1,16 @@
 //! Workable poses: views of the plate that the robot reaches inside its limits, sees enough in, and can stand in.
 
-use rand::{RngExt, SeedableRng};
+use std::ops::Range;
+
+use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
 use super::inverse::{random_readings, reading_limits, solve_from};
 use super::scene::{Scene, arm_length_m};
 use super::setting::Setting;
-use super::viewpoint::{ViewRange, random_view};
+use super::viewpoint::{View, ViewRange};
 use super::visibility::{SightLimits, seen_markers};
 use crate::error::{Error, Result};
 use crate::geom::Pose;
@@ -19,6 +22,8 @@ pub struct Candidate {
     pub readings: Vec<f64>,
     /// Where the plate stands.
     pub placement: usize,
+    /// The view.
+    pub view: View,
     /// The camera.
     pub camera_from_plate: Pose,
     /// Markers seen.
@@ -70,7 +75,8 @@ pub struct Tally {
 }
 
 impl Tally {
-    fn add(&mut self, other: &Self) {
+    /// Adds the counts of other views.
+    pub fn add(&mut self, other: &Self) {
         self.views += other.views;
         self.unseen += other.unseen;
         self.most_markers = self.most_markers.max(other.most_markers);
@@ -87,6 +93,11 @@ const CONFIGURATIONS: usize = 3;
 const SAME: f64 = 0.2;
 /// Views that are tried together.
 const ROUND: usize = 256;
+/// Least and greatest step to a view near another one, as shares of the ranges; even in their logarithm.
+const NEAREST: f64 = 0.005;
+const FARTHEST: f64 = 0.2;
+/// Share of the poses near others for which the arm starts anywhere.
+const ANEW: f64 = 0.2;
 /// Views tried for each candidate wanted before the search ends.
 const VIEWS_PER_CANDIDATE: usize = 12;
 
@@ -96,72 +107,124 @@ pub fn narrowed_limits(setting: &Setting, margin: f64) -> Vec<(f64, f64)> {
     limits.iter().map(|&(l, h)| if h - l > 4.0 * margin { (l + margin, h - margin) } else { (l, h) }).collect()
 }
 
+/// A robot with its surroundings, and what a pose has to fulfil there.
+#[derive(Debug)]
+pub struct Search<'a> {
+    setting: &'a Setting,
+    scene: &'a Scene,
+    options: &'a CandidateOptions,
+    limits: Vec<(f64, f64)>,
+}
+
 /// Workable poses, spread over all placements; the same options give the same poses with any number of threads.
 ///
 /// # Errors
 /// Where there are none: which condition excludes them, and what to change.
 pub fn candidates(setting: &Setting, scene: &Scene, options: &CandidateOptions) -> Result<(Vec<Candidate>, Tally)> {
-    let limits = narrowed_limits(setting, options.limit_margin);
+    let search = Search::new(setting, scene, options);
     let (mut found, mut tally) = (Vec::new(), Tally::default());
     let mut first = 0;
     while found.len() < options.count && first < VIEWS_PER_CANDIDATE * options.count {
-        let round: Vec<(Vec<Candidate>, Tally)> =
-            (first..first + ROUND).into_par_iter().map(|k| one_view(setting, scene, options, &limits, k)).collect();
-        for (some, counted) in round {
-            found.extend(some);
-            tally.add(&counted);
-        }
+        let (some, counted) = search.drawn(first..first + ROUND);
+        found.extend(some);
+        tally.add(&counted);
         first += ROUND;
     }
     found.truncate(options.count);
     if found.is_empty() { Err(impossible(setting, scene, options, &tally)) } else { Ok((found, tally)) }
 }
 
-fn one_view(
-    setting: &Setting,
-    scene: &Scene,
-    options: &CandidateOptions,
-    limits: &[(f64, f64)],
-    index: usize,
-) -> (Vec<Candidate>, Tally) {
-    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
-    rng.set_stream(index as u64);
-    let mut tally = Tally { views: 1, ..Tally::default() };
-    let placement = index % setting.placements.len();
-    let view = random_view(&setting.plate, &options.views, &mut rng);
-    let camera_from_plate = view.inverse();
-    let seen = seen_markers(&setting.plate, &setting.camera, &camera_from_plate);
-    tally.most_markers = seen.len();
-    if !options.sight.allow(&setting.plate, &camera_from_plate, &seen) {
-        tally.unseen = 1;
-        return (Vec::new(), tally);
+impl<'a> Search<'a> {
+    /// A search under these conditions.
+    pub fn new(setting: &'a Setting, scene: &'a Scene, options: &'a CandidateOptions) -> Self {
+        Self { setting, scene, options, limits: narrowed_limits(setting, options.limit_margin) }
     }
-    let wanted = setting.base_from_tip(&view, placement);
-    let mut solutions: Vec<Vec<f64>> = Vec::new();
-    for _ in 0..STARTS {
-        let start = random_readings(limits, &setting.robot.chain.reading_kinds, &mut rng);
-        let Some(q) = solve_from(&setting.robot, limits, &wanted, &start) else { continue };
-        let inside = q.iter().zip(limits).all(|(q, (l, h))| q >= l && q <= h);
-        let known = |s: &Vec<f64>| s.iter().zip(&q).all(|(a, b)| (a - b).abs() < SAME);
-        if inside && !solutions.iter().any(known) {
-            solutions.push(q);
+
+    /// Workable poses of the random views with these numbers, each in several configurations of the arm.
+    pub fn drawn(&self, views: Range<usize>) -> (Vec<Candidate>, Tally) {
+        let one = |index: usize| {
+            let mut rng = self.rng(index as u64);
+            let placement = index % self.setting.placements.len();
+            let view = View::random(&self.setting.plate, &self.options.views, &mut rng);
+            let starts: Vec<Vec<f64>> = (0..STARTS).map(|_| self.random_start(&mut rng)).collect();
+            let (mut found, tally) = self.workable(view, placement, &starts);
+            while found.len() > CONFIGURATIONS {
+                found.swap_remove(rng.random_range(0..found.len()));
+            }
+            (found, tally)
+        };
+        let each: Vec<(Vec<Candidate>, Tally)> = views.into_par_iter().map(one).collect();
+        let (mut found, mut tally) = (Vec::new(), Tally::default());
+        for (some, counted) in each {
+            found.extend(some);
+            tally.add(&counted);
         }
+        (found, tally)
     }
-    tally.out_of_reach = usize::from(solutions.is_empty());
-    let before = solutions.len();
-    solutions.retain(|q| scene.collision(q, placement).is_none());
-    tally.colliding = before - solutions.len();
-    while solutions.len() > CONFIGURATIONS {
-        solutions.swap_remove(rng.random_range(0..solutions.len()));
+
+    /// A workable pose near another one: the view moved by little or much, the arm by as much before the inverse kinematics
+    /// (which turns redundant axes), or in another configuration. `None` where the view that was tried is not workable.
+    pub fn near(&self, other: &Candidate, rng: &mut impl Rng) -> Option<Candidate> {
+        let size = NEAREST * (FARTHEST / NEAREST).powf(rng.random::<f64>());
+        let view = other.view.near(size, &self.setting.plate, &self.options.views, rng);
+        let start = if rng.random_bool(ANEW) {
+            self.random_start(rng)
+        } else {
+            let shifted = |(q, (low, high)): (&f64, &(f64, f64))| {
+                (q + size * (high - low) * rng.sample::<f64, _>(StandardNormal)).clamp(*low, *high)
+            };
+            other.readings.iter().zip(&self.limits).map(shifted).collect()
+        };
+        self.workable(view, other.placement, &[start]).0.pop()
     }
-    let made = solutions.into_iter().map(|readings| Candidate {
-        posture: posture(&readings, limits),
-        readings,
-        placement,
-        camera_from_plate,
-        markers: seen.len(),
-    });
-    (made.collect(), tally)
+
+    /// Random numbers of one view or pose; streams below 2^32 belong to [`Self::drawn`].
+    pub fn rng(&self, stream: u64) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.options.seed);
+        rng.set_stream(stream);
+        rng
+    }
+
+    fn random_start(&self, rng: &mut impl Rng) -> Vec<f64> {
+        random_readings(&self.limits, &self.setting.robot.chain.reading_kinds, rng)
+    }
+
+    /// The poses that bring about a view from these starts, if it is workable: every condition is checked here.
+    fn workable(&self, view: View, placement: usize, starts: &[Vec<f64>]) -> (Vec<Candidate>, Tally) {
+        let Self { setting, scene, options, limits } = self;
+        let mut tally = Tally { views: 1, ..Tally::default() };
+        let plate_from_camera = view.plate_from_camera();
+        let camera_from_plate = plate_from_camera.inverse();
+        let seen = seen_markers(&setting.plate, &setting.camera, &camera_from_plate);
+        tally.most_markers = seen.len();
+        if !options.sight.allow(&setting.plate, &camera_from_plate, &seen) {
+            tally.unseen = 1;
+            return (Vec::new(), tally);
+        }
+        let wanted = setting.base_from_tip(&plate_from_camera, placement);
+        let mut solutions: Vec<Vec<f64>> = Vec::new();
+        for start in starts {
+            let Some(q) = solve_from(&setting.robot, limits, &wanted, start) else { continue };
+            let inside = q.iter().zip(limits).all(|(q, (l, h))| q >= l && q <= h);
+            let known = |s: &Vec<f64>| s.iter().zip(&q).all(|(a, b)| (a - b).abs() < SAME);
+            if inside && !solutions.iter().any(known) {
+                solutions.push(q);
+            }
+        }
+        tally.out_of_reach = usize::from(solutions.is_empty());
+        let before = solutions.len();
+        solutions.retain(|q| scene.collision(q, placement).is_none());
+        tally.colliding = before - solutions.len();
+        let made = solutions.into_iter().map(|readings| Candidate {
+            posture: posture(&readings, limits),
+            readings,
+            placement,
+            view,
+            camera_from_plate,
+            markers: seen.len(),
+        });
+        (made.collect(), tally)
+    }
 }
 
 fn posture(readings: &[f64], limits: &[(f64, f64)]) -> u32 {

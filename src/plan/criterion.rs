@@ -1,6 +1,7 @@
 //! What a design is judged by: a convex function of its information matrix, with derivatives.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use crate::linalg::{NotPositiveDefinite, SymmetricFactor, product, symmetric_eigen};
 
@@ -124,11 +125,11 @@ impl Evaluated {
         // tr(A M_i C M_j) as products of rows of (A M_i)' with rows of C M_j.
         let flat = |left: &DMatrix<f64>, transposed: bool| {
             let mut all = DMatrix::zeros(p * p, of.len());
-            for (k, m) in of.iter().enumerate() {
+            all.as_mut_slice().par_chunks_mut(p * p).zip(of).for_each(|(column, m)| {
                 let x = product(left, m);
                 let x = if transposed { x.transpose() } else { x };
-                all.set_column(k, &DVector::from_column_slice(x.as_slice()));
-            }
+                column.copy_from_slice(x.as_slice());
+            });
             all
         };
         let right = flat(&self.covariance, false);

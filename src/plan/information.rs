@@ -1,7 +1,6 @@
 //! What one more image would tell: its information about the columns, joint noise eliminated.
 
 use nalgebra::{DMatrix, Vector3};
-use rayon::prelude::*;
 
 use super::candidates::Candidate;
 use super::setting::Setting;
@@ -43,19 +42,16 @@ pub fn image_information(problem: &Problem, setting: &Setting, state: &State, im
     Some((&m + m.transpose()) * 0.5)
 }
 
-/// Information of every candidate, in their order; zero where an image would show nothing.
-pub fn all_information(
+/// Information of a candidate; zero where its image would show nothing.
+pub fn candidate_information(
     problem: &Problem,
     setting: &Setting,
     state: &State,
-    candidates: &[Candidate],
-) -> Vec<DMatrix<f64>> {
-    let of = |c: &Candidate| {
-        let image = setting.image(state, "", &c.readings, c.placement)?;
-        image_information(problem, setting, state, &image)
-    };
+    candidate: &Candidate,
+) -> DMatrix<f64> {
+    let image = setting.image(state, "", &candidate.readings, candidate.placement);
     let n = problem.layout.len();
-    candidates.par_iter().map(|c| of(c).unwrap_or_else(|| DMatrix::zeros(n, n))).collect()
+    image.and_then(|image| image_information(problem, setting, state, &image)).unwrap_or_else(|| DMatrix::zeros(n, n))
 }
 
 /// `W = (P D)' (P D) / K`: the mean squared error of the flange's position over the targets is `tr(W cov)`, m^2.

@@ -1,7 +1,7 @@
 //! What to print and where to look: the design of the plate, the choice of poses.
 //!
 //! Poses: [`setting`] (what is roughly known) -> [`candidates`] (workable poses, with [`scene`] and [`visibility`]) ->
-//! [`information`] -> [`relax`] (optimal weights with certificate) -> [`rounding`] -> [`order`].
+//! [`information`] -> [`relax`] (optimal weights with certificate), [`refine`] (further poses where they pay) -> [`rounding`] -> [`order`].
 
 pub mod candidates;
 pub mod criterion;
@@ -10,6 +10,7 @@ pub mod inverse;
 pub mod order;
 pub mod plate_code;
 pub mod plate_design;
+pub mod refine;
 pub mod relax;
 pub mod rounding;
 pub mod scene;

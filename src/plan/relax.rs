@@ -1,6 +1,7 @@
 //! Optimal weights of candidates: Newton steps on the active ones, each a quadratic programme, with a bound from the linear one.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::criterion::{Criterion, Evaluated};
 use crate::linalg::{LinearRow, NotSolved, minimise_quadratic};
@@ -47,11 +48,13 @@ pub enum NoDesign {
 }
 
 /// Certified share at which the search ends.
-const GOOD_ENOUGH: f64 = 1.0 - 1e-6;
+pub(super) const GOOD_ENOUGH: f64 = 1.0 - 1e-6;
 /// Newton steps at most.
 const STEPS: usize = 80;
 /// Weight below which a candidate is not active.
 const ACTIVE: f64 = 1e-7;
+/// Weight that is rounded to none.
+const NOTHING: f64 = 1e-10;
 /// Inactive candidates that join the active ones in a step, at most.
 const JOINING: usize = 40;
 
@@ -89,8 +92,9 @@ impl Design<'_> {
         Ok(v)
     }
 
-    fn gradient(&self, at: &Evaluated) -> Vec<f64> {
-        self.candidates.iter().map(|m| at.gradient(m)).collect()
+    /// Derivatives of the criterion by all weights.
+    pub(super) fn gradient(&self, at: &Evaluated) -> Vec<f64> {
+        self.candidates.par_iter().map(|m| at.gradient(m)).collect()
     }
 
     /// Optimal weights.
@@ -103,17 +107,24 @@ impl Design<'_> {
             return Err(NoDesign::TooFew);
         }
         let even = vec![self.count as f64 / n as f64; n];
-        let mut at = self.evaluate(&even)?;
-        let mut weights = self.vertex(&self.gradient(&at))?;
+        let at = self.evaluate(&even)?;
+        self.relax_from(self.vertex(&self.gradient(&at))?, GOOD_ENOUGH)
+    }
+
+    /// Optimal weights, found from others that keep to the rows; ends at the certified share `good_enough`.
+    ///
+    /// # Errors
+    /// As [`Self::relax`].
+    pub fn relax_from(&self, mut weights: Vec<f64>, good_enough: f64) -> Result<Relaxed, NoDesign> {
         let mut best_bound = f64::NEG_INFINITY;
         for step in 0..=STEPS {
-            at = self.evaluate(&weights)?;
+            let at = self.evaluate(&weights)?;
             let gradient = self.gradient(&at);
             let vertex = self.vertex(&gradient)?;
             let gap: f64 = gradient.iter().zip(weights.iter().zip(&vertex)).map(|(g, (w, v))| g * (w - v)).sum();
             best_bound = best_bound.max(self.criterion.bound(at.value, gap));
             let efficiency = self.criterion.share(best_bound, at.value).min(1.0);
-            let moved = if efficiency < GOOD_ENOUGH && step < STEPS {
+            let moved = if efficiency < good_enough && step < STEPS {
                 self.newton(&at, &weights, &gradient, &vertex)?
             } else {
                 None
@@ -188,7 +199,8 @@ impl Design<'_> {
         while length > 1e-4 {
             let mut next = weights.to_vec();
             for (&k, a) in active.iter().zip(aim.iter()) {
-                next[k] = (weights[k] + length * (a - weights[k])).clamp(0.0, 1.0);
+                let w = weights[k] + length * (a - weights[k]);
+                next[k] = if w < NOTHING { 0.0 } else { w.min(1.0) };
             }
             let reached = self.criterion.value(&self.information(&next));
             if reached.is_ok_and(|f| f < value + 1e-3 * length * slope) {

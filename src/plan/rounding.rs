@@ -1,6 +1,7 @@
 //! From weights to whole images: the heaviest candidates, then single exchanges while they gain.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::relax::{Design, Relaxed};
 use crate::linalg::LinearRow;
@@ -20,6 +21,8 @@ pub struct Rounded {
 
 /// Candidates with the best slope that are tried exactly for each place.
 const TRIED: usize = 6;
+/// Candidates on the shortlist for each image.
+const SHORTLIST: usize = 8;
 /// Sweeps over all places.
 const SWEEPS: usize = 12;
 /// Relative gain below which an exchange is not worth making.
@@ -48,11 +51,12 @@ pub fn round(design: &Design, relaxed: &Relaxed) -> Option<Rounded> {
     repair(design, &mut chosen, &order)?;
     let mut information = design.information(&indicator(&chosen, order.len()));
     let mut value = design.criterion.value(&information).ok()?;
+    let newcomers = shortlist(design, relaxed)?;
     let mut exchanges = 0;
     for _ in 0..SWEEPS {
         let before = exchanges;
         for place in 0..chosen.len() {
-            if let Some((better, m, f)) = exchange(design, &chosen, place, &information, value) {
+            if let Some((better, m, f)) = exchange(design, &chosen, place, &newcomers, &information, value) {
                 (chosen[place], information, value) = (better, m, f);
                 exchanges += 1;
             }
@@ -64,6 +68,18 @@ pub fn round(design: &Design, relaxed: &Relaxed) -> Option<Rounded> {
     chosen.sort_unstable();
     let efficiency = design.criterion.share(relaxed.bound, value).min(1.0);
     Some(Rounded { chosen, value, efficiency, exchanges })
+}
+
+/// Candidates that may come in: all of them where rows weigh them differently, else those with the best slopes at the weights.
+fn shortlist(design: &Design, relaxed: &Relaxed) -> Option<Vec<usize>> {
+    let mut all: Vec<usize> = (0..relaxed.weights.len()).collect();
+    if design.rows.is_empty() {
+        let at = design.criterion.evaluate(&design.information(&relaxed.weights)).ok()?;
+        let slopes = design.gradient(&at);
+        all.sort_by(|&a, &b| slopes[a].total_cmp(&slopes[b]).then(a.cmp(&b)));
+        all.truncate(SHORTLIST * design.count);
+    }
+    Some(all)
 }
 
 fn indicator(chosen: &[usize], n: usize) -> Vec<f64> {
@@ -99,6 +115,7 @@ fn exchange(
     design: &Design,
     chosen: &[usize],
     place: usize,
+    newcomers: &[usize],
     information: &DMatrix<f64>,
     value: f64,
 ) -> Option<(usize, DMatrix<f64>, f64)> {
@@ -110,10 +127,9 @@ fn exchange(
         let with: Vec<f64> = partial.iter().zip(design.rows).map(|(s, r)| s + r.coefficients[k]).collect();
         violation(design.rows, &with) == 0.0
     };
-    let mut ranked: Vec<(f64, usize)> = (0..design.candidates.len())
-        .filter(|k| !chosen.contains(k) && fits(*k))
-        .map(|k| (at.gradient(&design.candidates[k]), k))
-        .collect();
+    let fitting: Vec<usize> = newcomers.iter().copied().filter(|k| !chosen.contains(k) && fits(*k)).collect();
+    let mut ranked: Vec<(f64, usize)> =
+        fitting.into_par_iter().map(|k| (at.gradient(&design.candidates[k]), k)).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut best: Option<(usize, DMatrix<f64>, f64)> = None;
     for &(_, k) in ranked.iter().take(TRIED) {

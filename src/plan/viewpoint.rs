@@ -2,6 +2,7 @@
 
 use nalgebra::{Rotation3, Vector3};
 use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
 use std::f64::consts::{PI, TAU};
 
 use crate::geom::Pose;
@@ -29,21 +30,70 @@ impl Default for ViewRange {
     }
 }
 
-/// A random view, `plate_from_camera`: log-uniform in distance, even over the cap of directions, every roll.
-pub fn random_view(plate: &Plate, range: &ViewRange, rng: &mut impl Rng) -> Pose {
-    let half = |n: u32| f64::from(n.max(1) - 1) / 2.0 * plate.pitch_m * range.spread;
-    let mut around = |size: f64| if size > 0.0 { rng.random_range(-size..size) } else { 0.0 };
-    let target = Vector3::new(around(half(plate.columns)), around(half(plate.rows)), 0.0);
-    let [aside_x, aside_y] = [around(range.aside_rad), around(range.aside_rad)];
-    let distance = range.near_m * (range.far_m / range.near_m).powf(rng.random());
-    let cosine = 1.0 - (1.0 - range.tilt_rad.cos()) * rng.random::<f64>();
-    let (azimuth, roll) = (rng.random_range(0.0..TAU), rng.random_range(0.0..TAU));
-    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-    let direction = Vector3::new(sine * azimuth.cos(), sine * azimuth.sin(), cosine);
-    // Looking straight down on the plate with its x to the right, then swung along the direction, rolled, turned aside.
-    let down = Rotation3::from_axis_angle(&Vector3::x_axis(), PI);
-    let swing = Rotation3::rotation_between(&Vector3::z(), &direction).unwrap_or_else(Rotation3::identity);
-    let aside = Rotation3::from_euler_angles(aside_x, aside_y, 0.0);
-    let rotation = swing * down * Rotation3::from_axis_angle(&Vector3::z_axis(), roll) * aside;
-    Pose::new(*rotation.matrix(), target + direction * distance)
+/// A view by what a photographer would set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// The point looked at, in the plate frame, m.
+    pub target_m: [f64; 2],
+    /// Where the optical axis points beside it, about the camera's x and y, rad.
+    pub aside_rad: [f64; 2],
+    /// Distance from camera to that point, m.
+    pub distance_m: f64,
+    /// Angle between line of sight and the plate's normal, rad.
+    pub tilt_rad: f64,
+    /// Direction of the tilt about the plate's normal, rad.
+    pub azimuth_rad: f64,
+    /// Turn about the optical axis, rad.
+    pub roll_rad: f64,
+}
+
+impl ViewRange {
+    /// How far the point looked at may lie from the middle of the plate, m.
+    fn half_size_m(&self, plate: &Plate) -> [f64; 2] {
+        [plate.columns, plate.rows].map(|n| f64::from(n.max(1) - 1) / 2.0 * plate.pitch_m * self.spread)
+    }
+}
+
+impl View {
+    /// A random view: log-uniform in distance, even over the cap of directions, every roll.
+    pub fn random(plate: &Plate, range: &ViewRange, rng: &mut impl Rng) -> Self {
+        let mut around = |size: f64| if size > 0.0 { rng.random_range(-size..size) } else { 0.0 };
+        let target_m = range.half_size_m(plate).map(&mut around);
+        let aside_rad = [range.aside_rad; 2].map(&mut around);
+        let distance_m = range.near_m * (range.far_m / range.near_m).powf(rng.random());
+        let cosine = 1.0 - (1.0 - range.tilt_rad.cos()) * rng.random::<f64>();
+        let (azimuth_rad, roll_rad) = (rng.random_range(0.0..TAU), rng.random_range(0.0..TAU));
+        Self { target_m, aside_rad, distance_m, tilt_rad: cosine.acos(), azimuth_rad, roll_rad }
+    }
+
+    /// A view near this one and inside the range; `size` is the standard deviation of every setting as a share of its range.
+    pub fn near(&self, size: f64, plate: &Plate, range: &ViewRange, rng: &mut impl Rng) -> Self {
+        let mut step = |width: f64| size * width * rng.sample::<f64, _>(StandardNormal);
+        let half = range.half_size_m(plate);
+        let shifted = |at: f64, by: f64, most: f64| (at + by).clamp(-most, most);
+        let target_m = [0, 1].map(|k| shifted(self.target_m[k], step(2.0 * half[k]), half[k]));
+        let aside_rad = self.aside_rad.map(|at| shifted(at, step(2.0 * range.aside_rad), range.aside_rad));
+        let stretch = step((range.far_m / range.near_m).ln()).exp();
+        Self {
+            target_m,
+            aside_rad,
+            distance_m: (self.distance_m * stretch).clamp(range.near_m, range.far_m),
+            tilt_rad: (self.tilt_rad + step(range.tilt_rad)).abs().min(range.tilt_rad),
+            azimuth_rad: self.azimuth_rad + step(TAU),
+            roll_rad: self.roll_rad + step(TAU),
+        }
+    }
+
+    /// The pose of the camera.
+    pub fn plate_from_camera(&self) -> Pose {
+        let (sine, cosine) = self.tilt_rad.sin_cos();
+        let direction = Vector3::new(sine * self.azimuth_rad.cos(), sine * self.azimuth_rad.sin(), cosine);
+        // Looking straight down on the plate with its x to the right, then swung along the direction, rolled, turned aside.
+        let down = Rotation3::from_axis_angle(&Vector3::x_axis(), PI);
+        let swing = Rotation3::rotation_between(&Vector3::z(), &direction).unwrap_or_else(Rotation3::identity);
+        let aside = Rotation3::from_euler_angles(self.aside_rad[0], self.aside_rad[1], 0.0);
+        let rotation = swing * down * Rotation3::from_axis_angle(&Vector3::z_axis(), self.roll_rad) * aside;
+        let target = Vector3::new(self.target_m[0], self.target_m[1], 0.0);
+        Pose::new(*rotation.matrix(), target + direction * self.distance_m)
+    }
 }

@@ -33,7 +33,7 @@ pub struct CurvePoint {
     pub images: usize,
     /// RMS error of the flange over the targets, m.
     pub planned_m: f64,
-    /// The same for as many of the candidates taken as they come, m.
+    /// The same for as many of the candidates drawn at random, taken as they come, m.
     pub random_m: f64,
 }
 
@@ -157,7 +157,7 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
     let whole = exact(&(0..n).collect::<Vec<_>>())?;
     let random = |count: usize| {
         let mut images = request.taken.clone();
-        let step = plan.pool.len() as f64 / count as f64;
+        let step = plan.drawn as f64 / count as f64;
         images.extend((0..count).filter_map(|k| {
             let c = &plan.pool[(k as f64 * step) as usize];
             setting.image(&plan.state, "", &c.readings, c.placement)

@@ -4,10 +4,11 @@ use nalgebra::DMatrix;
 
 use crate::error::{Error, Result};
 use crate::linalg::LinearRow;
-use crate::plan::candidates::{Candidate, CandidateOptions, Tally, candidates, workspace};
+use crate::plan::candidates::{Candidate, CandidateOptions, Search, Tally, candidates, workspace};
 use crate::plan::criterion::Criterion;
-use crate::plan::information::{all_information, flange_weight, image_information};
+use crate::plan::information::{candidate_information, flange_weight, image_information};
 use crate::plan::order::{Leg, imbalance, tour};
+use crate::plan::refine::{Refined, Refinement};
 use crate::plan::relax::{Design, NoDesign};
 use crate::plan::rounding::round;
 use crate::plan::scene::{Scene, SceneOptions};
@@ -55,6 +56,8 @@ pub struct PlanRequest {
     pub budget: Budget,
     /// Candidates.
     pub candidates: CandidateOptions,
+    /// Rounds of search for further candidates where they pay.
+    pub rounds: usize,
     /// What must not be touched.
     pub scene: SceneOptions,
 }
@@ -84,8 +87,12 @@ const TARGETS: usize = 250;
 /// The choice before it is put in order.
 #[derive(Debug, Clone)]
 pub struct Choice {
-    /// All candidates.
+    /// All candidates: those drawn at random, then those found near the best.
     pub pool: Vec<Candidate>,
+    /// How many of them were drawn at random.
+    pub drawn: usize,
+    /// Criterion of the relaxed weights before the first round of search and after each.
+    pub values: Vec<f64>,
     /// Their information about all columns.
     pub information: Vec<DMatrix<f64>>,
     /// What fell out.
@@ -117,7 +124,6 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
     let scene = Scene::new(setting, &request.scene);
     let (pool, tally) = candidates(setting, &scene, &request.candidates)?;
     let (problem, state) = setting.problem();
-    let information = all_information(&problem, setting, &state, &pool);
     let mut known = rough_knowledge(&problem, &setting.camera);
     for image in &request.taken {
         if let Some(m) = image_information(&problem, setting, &state, image) {
@@ -132,12 +138,23 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
     let targets = if targets.is_empty() { pool.iter().map(|c| c.readings.clone()).collect() } else { targets };
     let weight = flange_weight(&problem, &setting.robot, &targets);
     let criterion = criterion(&request.wish, &problem.layout, &weight)?;
-    let rows = rows(&request.budget, &pool, setting.placements.len());
-    let design =
-        Design { known: &known, candidates: &information, criterion: &criterion, count: request.count, rows: &rows };
-    let relaxed = design.relax().map_err(|reason| no_plan(reason, request, pool.len()))?;
+    let (drawn, count) = (pool.len(), request.count);
+    let refinement = Refinement {
+        search: &Search::new(setting, &scene, &request.candidates),
+        inform: &|candidate| candidate_information(&problem, setting, &state, candidate),
+        rows: &|pool| rows(&request.budget, pool, drawn, setting.placements.len()),
+        known: &known,
+        criterion: &criterion,
+        count,
+        rounds: request.rounds,
+    };
+    let refined = refinement.refine(pool, tally).map_err(|reason| no_plan(reason, request, drawn))?;
+    let Refined { pool, information, rows, relaxed, tally, values, .. } = refined;
+    let design = Design { known: &known, candidates: &information, criterion: &criterion, count, rows: &rows };
     let rounded = round(&design, &relaxed).ok_or_else(|| no_plan(NoDesign::Contradiction, request, pool.len()))?;
     Ok(Choice {
+        drawn,
+        values,
         tally,
         weights: relaxed.weights,
         chosen: rounded.chosen,
@@ -198,8 +215,8 @@ pub(super) fn criterion(wish: &Wish, layout: &Layout, weight: &DMatrix<f64>) -> 
     }
 }
 
-/// Rows of the polytope.
-fn rows(budget: &Budget, pool: &[Candidate], placements: usize) -> Vec<LinearRow> {
+/// Rows of the polytope over candidates, the first `drawn` of them random.
+fn rows(budget: &Budget, pool: &[Candidate], drawn: usize, placements: usize) -> Vec<LinearRow> {
     let mut rows = Vec::new();
     let mut group = |low: f64, high: f64, inside: &dyn Fn(&Candidate) -> f64| {
         rows.push(LinearRow { coefficients: pool.iter().map(inside).collect(), low, high });
@@ -223,7 +240,7 @@ fn rows(budget: &Budget, pool: &[Candidate], placements: usize) -> Vec<LinearRow
         let joints = pool.first().map_or(0, |c| c.readings.len());
         let middle: Vec<f64> = (0..joints)
             .map(|j| {
-                let mut all: Vec<f64> = pool.iter().map(|c| c.readings[j]).collect();
+                let mut all: Vec<f64> = pool[..drawn].iter().map(|c| c.readings[j]).collect();
                 all.sort_by(f64::total_cmp);
                 all[all.len() / 2]
             })

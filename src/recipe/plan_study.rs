@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, Vector6};
 use rand::SeedableRng;
+use rand::seq::index::sample;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
@@ -15,7 +16,7 @@ use crate::assess::{Ratio, bootstrap_ratio, flange_error_m, root_mean_square};
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
-use crate::plan::candidates::{CandidateOptions, workspace};
+use crate::plan::candidates::{CandidateOptions, candidates, workspace};
 use crate::plan::information::flange_weight;
 use crate::plan::scene::{Scene, SceneOptions};
 use crate::plan::setting::{Setting, scale_sigma};
@@ -37,6 +38,8 @@ pub struct PlanStudyRequest {
     pub random: usize,
     /// Candidates of every plan.
     pub candidates: usize,
+    /// Rounds of search for further ones.
+    pub rounds: usize,
 }
 
 /// One world.
@@ -72,6 +75,10 @@ const BAR_SIGMA_M: f64 = 0.002e-3;
 /// Held-out joint vectors of the workspace, and the first seed of their draw (those of plans are small).
 const HELD_OUT: usize = 150;
 const HELD_OUT_SEED: u64 = 1_000_000;
+/// First seeds of the random poses and of the held-out ones that see the plate, and how many are drawn for each of them.
+const RANDOM_SEED: u64 = 2_000_000;
+const VIEWS_SEED: u64 = 3_000_000;
+const DRAWN_PER_RANDOM: usize = 4;
 /// Noise of an observation, px.
 const PIXEL_SIGMA_PX: f64 = 0.05;
 /// Joint noise, rad.
@@ -152,11 +159,10 @@ fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
     let mut printed = believed.clone();
     printed.markers.iter_mut().for_each(|m| m.position_m *= scale);
     let mut wanted = world_request(request, printed, seed);
-    wanted.images = request.random;
-    let mut random = series(&wanted)?;
-    random.plate = believed.clone();
+    wanted.images = 1;
+    let world = series(&wanted)?;
     let mut rough = || Vector6::from_fn(|k, _| normal() * if k < 3 { ROUGH.0 } else { ROUGH.1 });
-    let truth = &random.truth;
+    let truth = &world.truth;
     let setting = Setting {
         robot: RobotModel::Rigid.robot(request.chain.clone()),
         camera: Camera::pinhole(
@@ -185,14 +191,18 @@ fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
             seed,
             ..CandidateOptions::default()
         },
+        rounds: request.rounds,
         scene: SceneOptions::default(),
     };
     let choice = choose(&chosen)?;
-    wanted.images = request.planned;
-    wanted.postures = Some(choice.chosen.iter().map(|&k| choice.pool[k].readings.clone()).collect());
-    let mut planned = series(&wanted)?;
-    planned.plate = believed;
     let scene = Scene::new(&chosen.setting, &chosen.scene);
+    let mut visited = |postures: Vec<Vec<f64>>| -> Result<SimulatedSeries> {
+        wanted.images = postures.len();
+        wanted.postures = Some(postures);
+        Ok(SimulatedSeries { plate: believed.clone(), ..series(&wanted)? })
+    };
+    let planned = visited(choice.chosen.iter().map(|&k| choice.pool[k].readings.clone()).collect())?;
+    let random = visited(random_postures(&chosen, &scene, request.random, RANDOM_SEED + seed)?)?;
     let held_out = workspace(&chosen.setting, &scene, HELD_OUT, 0.0, HELD_OUT_SEED + seed);
     let weight = flange_weight(&choice.problem, &chosen.setting.robot, &held_out);
     let predicted = |visits: &[Vec<f64>]| predict(&chosen, &choice.problem, &choice.state, visits, &weight);
@@ -201,10 +211,11 @@ fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
         measured(s, kinds).stops.into_iter().filter_map(|s| s.readings).collect()
     };
     let actual = truth.robot(&request.chain)?;
-    let in_workspace: Vec<(Vec<f64>, Pose)> =
-        held_out.into_iter().map(|q| (q.clone(), actual.base_from_tip(&q))).collect();
-    let at_plate: Vec<(Vec<f64>, Pose)> =
-        truth.held_out.iter().map(|h| (h.readings.clone(), h.base_from_tip.pose())).collect();
+    let found_at = |all: Vec<Vec<f64>>| -> Vec<(Vec<f64>, Pose)> {
+        all.into_iter().map(|q| (q.clone(), actual.base_from_tip(&q))).collect()
+    };
+    let in_workspace = found_at(held_out);
+    let at_plate = found_at(random_postures(&chosen, &scene, HELD_OUT, VIEWS_SEED + seed)?);
     let [planned_found, random_found] = [&planned, &random].map(|s| found(request, s, [&in_workspace, &at_plate]));
     let (planned_found, random_found) = (planned_found?, random_found?);
     Ok(PlanStudyRow {
@@ -214,6 +225,14 @@ fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
         views_m: [planned_found[1], random_found[1]],
         efficiency: choice.efficiency,
     })
+}
+
+/// Workable poses as they come: by the conditions of the plan, of views of their own.
+fn random_postures(plan: &PlanRequest, scene: &Scene, count: usize, seed: u64) -> Result<Vec<Vec<f64>>> {
+    let options = CandidateOptions { count: DRAWN_PER_RANDOM * count, seed, ..plan.candidates.clone() };
+    let (drawn, _) = candidates(&plan.setting, scene, &options)?;
+    let taken = sample(&mut ChaCha8Rng::seed_from_u64(seed), drawn.len(), count.min(drawn.len()));
+    Ok(taken.iter().map(|k| drawn[k].readings.clone()).collect())
 }
 
 fn joint_sigma(chain: &Chain) -> Vec<f64> {

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::robot::Robot;
 use crate::plan::inverse;
-use crate::plan::viewpoint::random_view;
+use crate::plan::viewpoint::View;
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
 
@@ -155,7 +155,7 @@ impl Setup {
         placement: usize,
         rng: &mut impl Rng,
     ) -> Option<Vec<f64>> {
-        let plate_from_camera = random_view(&request.plate, &request.views, rng);
+        let plate_from_camera = View::random(&request.plate, &request.views, rng).plate_from_camera();
         let plate = &self.plates[placement];
         let base_from_tip = match request.mount {
             CameraMount::Hand => *plate * plate_from_camera * self.camera.inverse(),
