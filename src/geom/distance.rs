@@ -21,7 +21,11 @@ impl OrientedBox {
 
     /// Distance of a point, m; zero inside.
     pub fn distance_m(&self, point: &Vector3<f64>) -> f64 {
-        let local = self.pose.inverse().transform(point);
+        self.distance_within_m(&self.pose.inverse().transform(point))
+    }
+
+    /// Distance of a point of the box's own frame, m.
+    fn distance_within_m(&self, local: &Vector3<f64>) -> f64 {
         local.abs().zip_map(&self.half_m, |x, h| (x - h).max(0.0)).norm()
     }
 
@@ -31,7 +35,9 @@ impl OrientedBox {
     pub fn distance_to_segment_m(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         const ROUNDS: usize = 30;
-        let at = |t: f64| self.distance_m(&(a + (b - a) * t));
+        let box_from_frame = self.pose.inverse();
+        let [a, b] = [a, b].map(|x| box_from_frame.transform(x));
+        let at = |t: f64| self.distance_within_m(&(a + (b - a) * t));
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..ROUNDS {
             let (s, t) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));

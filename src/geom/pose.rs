@@ -128,6 +128,9 @@ impl Mul for Pose {
 
 /// Right Jacobian of SE(3): `Exp(x + d) = Exp(x) Exp(J_r(x) d)` to first order, by its power series (exact to rounding for rotations up to pi).
 pub fn right_jacobian_se3(twist: &Vector6<f64>) -> Matrix6<f64> {
+    if *twist == Vector6::zeros() {
+        return Matrix6::identity();
+    }
     let rho = skew(&twist.fixed_rows::<3>(0).into_owned());
     let phi = skew(&twist.fixed_rows::<3>(3).into_owned());
     let mut ad = Matrix6::zeros();

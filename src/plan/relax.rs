@@ -54,7 +54,7 @@ const STEPS: usize = 80;
 /// Weight below which a candidate is not active.
 const ACTIVE: f64 = 1e-7;
 /// Weight that is rounded to none.
-const NOTHING: f64 = 1e-10;
+const NOTHING: f64 = 1e-8;
 /// Inactive candidates that join the active ones in a step, at most.
 const JOINING: usize = 40;
 

@@ -1,5 +1,7 @@
 //! Planning: candidates, choice, order, and what the chosen images will be worth.
 
+use std::time::Instant;
+
 use nalgebra::DMatrix;
 
 use crate::error::{Error, Result};
@@ -115,6 +117,14 @@ pub struct Choice {
     pub state: State,
 }
 
+/// Does something and logs how long it took.
+fn timed<T>(phase: &str, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let done = work();
+    tracing::info!("{phase}: {:.2} s", start.elapsed().as_secs_f64());
+    done
+}
+
 /// Chooses poses.
 ///
 /// # Errors
@@ -122,7 +132,7 @@ pub struct Choice {
 pub fn choose(request: &PlanRequest) -> Result<Choice> {
     let setting = &request.setting;
     let scene = Scene::new(setting, &request.scene);
-    let (pool, tally) = candidates(setting, &scene, &request.candidates)?;
+    let (pool, tally) = timed("candidates", || candidates(setting, &scene, &request.candidates))?;
     let (problem, state) = setting.problem();
     let mut known = rough_knowledge(&problem, &setting.camera);
     for image in &request.taken {
@@ -148,10 +158,12 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
         count,
         rounds: request.rounds,
     };
-    let refined = refinement.refine(pool, tally).map_err(|reason| no_plan(reason, request, drawn))?;
+    let refined = timed("weights and further candidates", || refinement.refine(pool, tally))
+        .map_err(|reason| no_plan(reason, request, drawn))?;
     let Refined { pool, information, rows, relaxed, tally, values, .. } = refined;
     let design = Design { known: &known, candidates: &information, criterion: &criterion, count, rows: &rows };
-    let rounded = round(&design, &relaxed).ok_or_else(|| no_plan(NoDesign::Contradiction, request, pool.len()))?;
+    let rounded = timed("whole images", || round(&design, &relaxed))
+        .ok_or_else(|| no_plan(NoDesign::Contradiction, request, pool.len()))?;
     Ok(Choice {
         drawn,
         values,
@@ -176,7 +188,7 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
 pub fn plan(request: &PlanRequest) -> Result<Plan> {
     let choice = choose(request)?;
     let scene = Scene::new(&request.setting, &request.scene);
-    let legs = legs(&choice.pool, &choice.chosen, &scene, request.setting.placements.len());
+    let legs = timed("order", || legs(&choice.pool, &choice.chosen, &scene, request.setting.placements.len()));
     let visited: Vec<&[f64]> = legs.iter().map(|l| choice.pool[l.stop].readings.as_slice()).collect();
     let imbalance = imbalance(&visited);
     Ok(Plan { choice, legs, imbalance })
