@@ -13,7 +13,7 @@ use super::simulate::Mount;
 use crate::error::{Error, Result};
 use crate::geom::{OrientedBox, Pose};
 use crate::model::camera::Camera;
-use crate::output::{plan_files, plan_html, plan_programs, plan_start, solution_json, write_all};
+use crate::output::{plan_files, plan_html, plan_programs, plan_start, sigma_text, solution_json, write_all};
 use crate::plan::candidates::CandidateOptions;
 use crate::plan::refine::USUAL_ROUNDS;
 use crate::plan::scene::{self, SceneOptions, arm_length_m};
@@ -45,7 +45,8 @@ pub(super) struct PlanArgs {
     #[arg(long, default_value_t = 50)]
     count: usize,
     /// Plan further images for this result: camera, poses and noise are taken from it
-    #[arg(long, value_name = "solution.json", conflicts_with_all = ["plate", "camera", "camera_fov_deg", "hand_camera"])]
+    #[arg(long, value_name = "solution.json", conflicts_with_all = [
+        "plate", "camera", "camera_fov_deg", "image", "mount", "hand_camera", "pixel_noise_px", "joint_noise_mrad"])]
     from: Option<PathBuf>,
     /// Base link
     #[arg(long, value_name = "LINK")]
@@ -171,6 +172,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     let mut request = request(args, chain)?;
     request.scene.described = described;
     let mut words = settle_place(args, &mut request)?;
+    words.extend(noise_word(&request));
     if meshes > 0 {
         words.push(format!(
             "{meshes} collision meshes of the URDF were not read: their links are capsules from joint to joint \
@@ -192,6 +194,21 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     write_all(&args.out, &files)?;
     print!("{}", summary(&request, &plan, &forecast, &files, &args.out));
     Ok(Verdict::Good)
+}
+
+/// Says from which noise further images are planned: that of the result.
+fn noise_word(request: &PlanRequest) -> Option<String> {
+    let setting = &request.setting;
+    let range = setting.joint_sigma.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), s| (l.min(*s), h.max(*s)));
+    (!request.taken.is_empty()).then(|| {
+        format!(
+            "planned on top of {} images, with the noise found in them: joints {:.4} to {:.4} mrad (or mm), images {:.3} px",
+            request.taken.len(),
+            1e3 * range.0,
+            1e3 * range.1,
+            setting.pixel_sigma_px
+        )
+    })
 }
 
 /// Candidates when places are compared before the plan.
@@ -232,7 +249,15 @@ const STUDIED: [usize; 2] = [30, 60];
 fn study(args: &PlanArgs, chain: Chain, seeds: u64) -> Result<Verdict> {
     let robot = chain.robot.clone();
     let [planned, random] = STUDIED;
-    let request = PlanStudyRequest { chain, seeds, planned, random, candidates: args.candidates, rounds: args.rounds };
+    let request = PlanStudyRequest {
+        chain,
+        mount: args.mount.into(),
+        seeds,
+        planned,
+        random,
+        candidates: args.candidates,
+        rounds: args.rounds,
+    };
     let study = plan_study(&request, |seed| tracing::info!("world {seed} done"))?;
     let text = plan_files::study_table(&robot, &request, &study);
     std::fs::create_dir_all(&args.out).map_err(|e| Error::io(&args.out, &e))?;
@@ -414,11 +439,12 @@ fn summary(
     folder: &Path,
 ) -> String {
     let mut text = format!(
-        "plan      {} images of {} candidates ({} views tried)\n\
+        "plan      {} images of {} candidates, {} of them searched near the best ({} views tried)\n\
          certified {:.1} % of the best weights, {:.1} % after rounding\n\
          flange    {:.3} mm before, {:.3} mm expected (RMS over {} joint vectors)\n",
         plan.legs.len(),
         plan.pool.len(),
+        plan.pool.len() - plan.drawn,
         plan.tally.views,
         1e2 * plan.efficiency[0],
         1e2 * plan.efficiency[1],
@@ -448,11 +474,14 @@ fn summary(
     if !request.taken.is_empty() {
         for g in forecast.gains.iter().take(GAINS_SHOWN) {
             text += &format!(
-                "helps     {}: flange {:.4} -> {:.4} mm, most by {}\n",
+                "helps     {} by itself: flange {:.4} -> {:.4} mm, {:.4} mm better; most by {}: sigma {} -> {}\n",
                 image_name(g.leg),
                 1e3 * g.flange_m[0],
                 1e3 * g.flange_m[1],
-                g.parameter
+                1e3 * g.gain_m(),
+                g.parameter,
+                sigma_text(g.sigma[0], g.unit),
+                sigma_text(g.sigma[1], g.unit),
             );
         }
     }

@@ -40,7 +40,7 @@ mod text;
 mod write;
 
 pub use compensation_read::read_compensation;
-pub use report::{plan_html, report_html};
+pub use report::{plan_html, report_html, sigma_text};
 pub use write::{NewResult, write_all, write_beside};
 
 use std::collections::BTreeMap;

@@ -14,6 +14,7 @@ use super::viewpoint::{View, ViewRange};
 use super::visibility::{SightLimits, seen_markers};
 use crate::error::{Error, Result};
 use crate::geom::Pose;
+use crate::series::CameraMount;
 
 /// A pose that could be planned.
 #[derive(Debug, Clone, PartialEq)]
@@ -235,6 +236,11 @@ fn posture(readings: &[f64], limits: &[(f64, f64)]) -> u32 {
 /// Why there is no candidate at all.
 fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tally: &Tally) -> Error {
     let sight = &options.sight;
+    let markers = setting.plate.markers.len();
+    if markers < sight.least_markers {
+        let what = format!("every view shall show {} markers, the plate has {markers}", sight.least_markers);
+        return Error::input("plan: --markers", what, "ask for fewer markers, or give a plate with more");
+    }
     if tally.unseen == tally.views {
         let what = format!(
             "no view from {:.2} to {:.2} m shows {} sharp markers at most {:.0} degrees obliquely (most seen in any: {})",
@@ -250,17 +256,33 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
     }
     let arm = arm_length_m(&setting.robot);
     if tally.out_of_reach + tally.unseen == tally.views {
-        let farthest = setting.placements.iter().map(|p| p.1.translation.norm()).fold(0.0, f64::max);
+        let (thing, distance, remedy) = match setting.mount {
+            CameraMount::Hand => (
+                "plate",
+                setting.placements.iter().map(|p| p.1.translation.norm()).fold(0.0, f64::max),
+                format!(
+                    "put the plate (--plate-pose) nearer, about {:.2} m from the base with its face up and towards the robot, \
+                     or check --hand-camera",
+                    0.55 * arm
+                ),
+            ),
+            CameraMount::Fixed => (
+                "camera",
+                setting.mounting.translation.norm(),
+                format!(
+                    "put the camera (--hand-camera) where its view, {:.2} to {:.2} m long, ends about {:.2} m from the base (its z \
+                     looks along the view), allow other distances (--distance-m), or check --plate-pose on the flange",
+                    options.views.near_m,
+                    options.views.far_m,
+                    0.55 * arm
+                ),
+            ),
+        };
         let what = format!(
-            "none of {} workable views is in reach: the plate stands {farthest:.2} m from the base, the arm is {arm:.2} m long",
+            "none of {} workable views is in reach: the {thing} stands {distance:.2} m from the base, the arm is {arm:.2} m long",
             tally.out_of_reach
         );
-        let remedy = format!(
-            "put the plate (--plate-pose) nearer, about {:.2} m from the base with its face up and towards the robot, \
-             or check --hand-camera",
-            0.55 * arm
-        );
-        return Error::unsolved("plan: plate", what, remedy);
+        return Error::unsolved(format!("plan: {thing}"), what, remedy);
     }
     let example = (0..64).find_map(|k| {
         let mut rng = ChaCha8Rng::seed_from_u64(k);

@@ -75,8 +75,8 @@ pub struct Scene {
     boxes: Vec<(String, OrientedBox)>,
     /// Plates that stand still, one for each placement; empty for a plate in the hand.
     plates: Vec<OrientedBox>,
-    /// Plate in the tip frame.
-    plate_in_hand: Option<OrientedBox>,
+    /// Plates in the tip frame, one for each placement; empty for a camera in the hand.
+    plates_in_hand: Vec<OrientedBox>,
     table_z_m: f64,
     clearance_m: f64,
 }
@@ -146,7 +146,8 @@ impl Scene {
         let last = robot.chain.joints.len() - 1;
         let moving = robot.chain.joints.iter().filter(|j| j.kind != JointKind::Fixed).count();
         let plate = plate_box(&setting.plate);
-        let (mut boxes, mut plates, mut plate_in_hand) = (Vec::new(), Vec::new(), None);
+        let placed = setting.placements.iter().map(|p| plate.placed(&p.1)).collect();
+        let (mut boxes, mut plates, mut plates_in_hand) = (Vec::new(), Vec::new(), Vec::new());
         match setting.mount {
             CameraMount::Hand => {
                 let ends_m = [Vector3::zeros(), setting.mounting.translation];
@@ -157,12 +158,12 @@ impl Scene {
                     ends_m,
                     radius_m: options.camera_radius_m,
                 });
-                plates = setting.placements.iter().map(|p| plate.placed(&p.1)).collect();
+                plates = placed;
             }
             CameraMount::Fixed => {
                 let half_m = Vector3::repeat(options.camera_radius_m);
                 boxes.push(("camera".to_owned(), OrientedBox { pose: setting.mounting, half_m }));
-                plate_in_hand = setting.placements.first().map(|p| plate.placed(&p.1));
+                plates_in_hand = placed;
             }
         }
         boxes.extend(options.boxes.iter().enumerate().map(|(k, b)| (format!("box {}", k + 1), *b)));
@@ -174,7 +175,7 @@ impl Scene {
             capsules,
             boxes,
             plates,
-            plate_in_hand,
+            plates_in_hand,
             table_z_m: options.table_z_m.unwrap_or(lowest - options.clearance_m),
             clearance_m: options.clearance_m,
         }
@@ -212,12 +213,12 @@ impl Scene {
                 return Some(format!("{} and table", c.name));
             }
         }
-        self.plate_in_hand_collides(&links, &ends, table)
+        let carried = self.plates_in_hand.get(placement)?.placed(links.last()?);
+        self.plate_in_hand_collides(&carried, &ends, table)
     }
 
     /// The plate in the hand against table, boxes and all links but the two that carry it.
-    fn plate_in_hand_collides(&self, links: &[Pose], ends: &[[Vector3<f64>; 2]], table: f64) -> Option<String> {
-        let plate = self.plate_in_hand?.placed(links.last()?);
+    fn plate_in_hand_collides(&self, plate: &OrientedBox, ends: &[[Vector3<f64>; 2]], table: f64) -> Option<String> {
         if plate.corners().iter().any(|c| c.z < table) {
             return Some("plate and table".into());
         }

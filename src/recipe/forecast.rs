@@ -1,13 +1,16 @@
 //! What planned images will be worth: predicted accuracy of the flange and of every parameter.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::plan::{Plan, PlanRequest, Wish};
+use crate::assess::root_mean_square;
 use crate::error::{Error, Result};
 use crate::linalg::SymmetricFactor;
 use crate::plan::criterion::Criterion;
 use crate::plan::setting::Setting;
 use crate::problem::{Image, Problem, State};
+use crate::series::CameraMount;
 use crate::solve::{covariance, linearise_all};
 use crate::urdf::JointKind;
 
@@ -33,7 +36,7 @@ pub struct CurvePoint {
     pub images: usize,
     /// RMS error of the flange over the targets, m.
     pub planned_m: f64,
-    /// The same for as many of the candidates drawn at random, taken as they come, m.
+    /// The same for as many of the candidates drawn at random, RMS over several choices, m.
     pub random_m: f64,
 }
 
@@ -88,6 +91,8 @@ pub struct Forecast {
 
 /// Share of a prior variance that must go before a parameter counts as known.
 pub(super) const KNOWN_SHARE: f64 = 0.75;
+/// Random choices over which the curve of random images is the mean.
+const RANDOM_DRAWS: usize = 5;
 /// Share below which a parameter asked for counts as not found.
 const LEAST_SHARE: f64 = 0.3;
 /// Range of a joint that is called small, rad.
@@ -155,31 +160,43 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
         exact_covariance(&plan.problem, &plan.state, setting, images)
     };
     let whole = exact(&(0..n).collect::<Vec<_>>())?;
-    let random = |count: usize| {
-        let mut images = request.taken.clone();
+    let random = |count: usize| -> Option<f64> {
         let step = plan.drawn as f64 / count as f64;
-        images.extend((0..count).filter_map(|k| {
-            let c = &plan.pool[(k as f64 * step) as usize];
-            setting.image(&plan.state, "", &c.readings, c.placement)
-        }));
-        exact_covariance(&plan.problem, &plan.state, setting, images)
+        let one = |draw: usize| {
+            let mut images = request.taken.clone();
+            images.extend((0..count).filter_map(|k| {
+                let shift = draw as f64 / RANDOM_DRAWS as f64;
+                let c = &plan.pool[((k as f64 + shift) * step) as usize];
+                setting.image(&plan.state, "", &c.readings, c.placement)
+            }));
+            let covariance = exact_covariance(&plan.problem, &plan.state, setting, images).ok()?;
+            Some((flange_m(&plan.weight, &covariance).powi(2), 1.0))
+        };
+        let squares: Vec<(f64, f64)> = (0..RANDOM_DRAWS).into_par_iter().filter_map(one).collect();
+        (!squares.is_empty()).then(|| root_mean_square(&squares))
     };
     let mut curve = Vec::new();
     for count in counts(n) {
-        let (Ok(planned), Ok(random)) = (exact(&importance[..count]), random(count)) else { continue };
-        let [planned_m, random_m] = [planned, random].map(|c| flange_m(&plan.weight, &c));
-        curve.push(CurvePoint { images: count, planned_m, random_m });
+        let (Ok(planned), Some(random_m)) = (exact(&importance[..count]), random(count)) else { continue };
+        curve.push(CurvePoint { images: count, planned_m: flange_m(&plan.weight, &planned), random_m });
     }
-    let before = match request.taken.is_empty() {
-        true => Criterion::weighted(&plan.weight).value(&plan.known).map_or(f64::NAN, f64::sqrt),
-        false => flange_m(&plan.weight, &exact(&[])?),
+    let start = match request.taken.is_empty() {
+        true => None,
+        false => Some(exact(&[])?),
+    };
+    let before = match &start {
+        None => Criterion::weighted(&plan.weight).value(&plan.known).map_or(f64::NAN, f64::sqrt),
+        Some(covariance) => flange_m(&plan.weight, covariance),
     };
     let flange = flange_m(&plan.weight, &whole);
     let parameters = parameters(plan, &whole);
     let ranges = ranges(request, plan);
-    let mut words = words(&parameters, &ranges, plan, flange);
+    let mut words = words(&parameters, &ranges, plan, flange, setting.mount);
     words.extend(scale_word(plan, &whole, flange));
-    let gains = gains(plan, !request.taken.is_empty());
+    let gains = match &start {
+        Some(start) => gains(plan, |leg| Some([start.clone(), exact(&[leg]).ok()?])),
+        None => gains(plan, |leg| among_others(plan, leg)),
+    };
     Ok(Forecast { before_m: before, flange_m: flange, parameters, curve, importance, gains, ranges, words })
 }
 
@@ -215,18 +232,20 @@ fn importance(plan: &Plan) -> Vec<usize> {
     out
 }
 
-fn gains(plan: &Plan, taken: bool) -> Vec<Gain> {
-    let layout = &plan.problem.layout;
+/// Covariance without one planned image and with it, all others taken.
+fn among_others(plan: &Plan, leg: usize) -> Option<[DMatrix<f64>; 2]> {
+    let own = |k: usize| &plan.information[plan.legs[k].stop];
+    let others = (0..plan.legs.len()).filter(|k| *k != leg).fold(plan.known.clone(), |m, k| m + own(k));
     let inverse = |m: &DMatrix<f64>| SymmetricFactor::new(m).ok().map(|f| f.inverse());
-    let others = |leg: usize| {
-        let rest = (0..plan.legs.len()).filter(|k| !taken && *k != leg);
-        rest.fold(plan.known.clone(), |m, k| m + &plan.information[plan.legs[k].stop])
-    };
+    Some([inverse(&others)?, inverse(&(others + own(leg)))?])
+}
+
+/// Gains of all stops, the greatest first; `covariances` are those without an image and with it.
+fn gains(plan: &Plan, covariances: impl Fn(usize) -> Option<[DMatrix<f64>; 2]> + Sync) -> Vec<Gain> {
+    let layout = &plan.problem.layout;
     let sigma = |c: &DMatrix<f64>, k: usize| c[(k, k)].max(0.0).sqrt();
     let one = |leg: usize| {
-        let without = others(leg);
-        let before = inverse(&without)?;
-        let after = inverse(&(without + &plan.information[plan.legs[leg].stop]))?;
+        let [before, after] = covariances(leg)?;
         let drop = |k: usize| plan.weight[(k, k)].max(0.0).sqrt() * (sigma(&before, k) - sigma(&after, k));
         let best = (0..layout.terms.end).max_by(|&a, &b| drop(a).total_cmp(&drop(b)))?;
         Some(Gain {
@@ -237,9 +256,8 @@ fn gains(plan: &Plan, taken: bool) -> Vec<Gain> {
             sigma: [sigma(&before, best), sigma(&after, best)],
         })
     };
-    let mut all: Vec<Gain> = (0..plan.legs.len()).filter_map(one).collect();
-    let gain = |g: &Gain| g.flange_m[0] - g.flange_m[1];
-    all.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    let mut all: Vec<Gain> = (0..plan.legs.len()).into_par_iter().filter_map(one).collect();
+    all.sort_by(|a, b| b.gain_m().total_cmp(&a.gain_m()));
     all
 }
 
@@ -248,10 +266,14 @@ fn scale_word(plan: &Plan, covariance: &DMatrix<f64>, flange: f64) -> Option<Str
     let scale = plan.problem.layout.shapes.first()?.start;
     let column = covariance.column(scale);
     let part = (column.dot(&(&plan.weight * column)) / covariance[(scale, scale)]).max(0.0).sqrt();
+    let measured = plan.problem.plates.first().is_some_and(|p| p.scale.is_some());
+    let remedy = match measured {
+        true => "measure the distance in [scale] of plate.toml more exactly, or that of markers farther apart",
+        false => "measure the distance of two far markers and put it into [scale] of plate.toml",
+    };
     (part > WORTH_NAMING * flange).then(|| {
         format!(
-            "{:.3} mm of the expected {:.3} mm come from the scale of the plate, known to {:.1e}: no further image helps there; \
-             measure the distance of two far markers and put it into [scale] of plate.toml",
+            "{:.3} mm of the expected {:.3} mm come from the scale of the plate, known to {:.1e}: no further image helps there; {remedy}",
             1e3 * part,
             1e3 * flange,
             covariance[(scale, scale)].sqrt()
@@ -308,6 +330,13 @@ fn parameters(plan: &Plan, covariance: &DMatrix<f64>) -> Vec<ParameterForecast> 
     (0..layout.terms.end).map(one).collect()
 }
 
+impl Gain {
+    /// By how much the RMS error of the flange shrinks, m.
+    pub fn gain_m(&self) -> f64 {
+        self.flange_m[0] - self.flange_m[1]
+    }
+}
+
 impl ParameterForecast {
     /// `1 - sigma^2 / prior^2`.
     pub fn share_of_data(&self) -> f64 {
@@ -340,7 +369,13 @@ impl JointRange {
     }
 }
 
-fn words(parameters: &[ParameterForecast], ranges: &[JointRange], plan: &Plan, flange: f64) -> Vec<String> {
+fn words(
+    parameters: &[ParameterForecast],
+    ranges: &[JointRange],
+    plan: &Plan,
+    flange: f64,
+    mount: CameraMount,
+) -> Vec<String> {
     let mut words = Vec::new();
     let terms = &parameters[plan.problem.layout.terms.clone()];
     for range in ranges {
@@ -365,9 +400,13 @@ fn words(parameters: &[ParameterForecast], ranges: &[JointRange], plan: &Plan, f
         }
     }
     let known = parameters.iter().filter(|p| p.is_known()).count();
+    let places = match mount {
+        CameraMount::Hand => "base against plate, flange against camera",
+        CameraMount::Fixed => "base against camera, flange against plate",
+    };
     words.push(format!(
         "{known} of {} parameters of the robot are determined one by one; of the others only sums matter to the flange \
-         (base against plate, flange against camera, neighbouring links), and these are in the predicted error",
+         ({places}, neighbouring links), and these are in the predicted error",
         parameters.len()
     ));
     words

@@ -30,6 +30,8 @@ use crate::urdf::{Chain, JointKind};
 pub struct PlanStudyRequest {
     /// The nominal robot.
     pub chain: Chain,
+    /// Where the camera is.
+    pub mount: CameraMount,
     /// Worlds.
     pub seeds: u64,
     /// Planned images.
@@ -143,6 +145,7 @@ pub fn plan_study(request: &PlanStudyRequest, progress: impl Fn(u64) + Sync) -> 
 fn world_request(request: &PlanStudyRequest, plate: Plate, seed: u64) -> WorldRequest {
     let mut world = WorldRequest::typical(request.chain.clone(), plate);
     world.errors = RobotErrors { translation_m: 1e-3, rotation_rad: 2e-3, offset_rad: 10e-3, ..RobotErrors::default() };
+    world.mount = request.mount;
     world.joint_noise_rad = JOINT_SIGMA_RAD;
     world.pixel_sigma_px = PIXEL_SIGMA_PX;
     world.marker_sigma_m = MARKER_SIGMA_M;
@@ -171,7 +174,7 @@ fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
             truth.camera.height_px,
             truth.camera.parameters[0].round(),
         ),
-        mount: CameraMount::Hand,
+        mount: request.mount,
         mounting: truth.camera_pose.pose().perturbed(&rough()),
         placements: truth.plate_poses.iter().map(|(n, p)| (n.clone(), p.pose().perturbed(&rough()))).collect(),
         plate: believed.clone(),
@@ -256,8 +259,8 @@ fn predict(
 fn found(request: &PlanStudyRequest, series: &SimulatedSeries, sets: [&[(Vec<f64>, Pose)]; 2]) -> Result<[f64; 2]> {
     let options = Options { joint_noise: JointNoise::Estimated, model: RobotModel::Rigid, ..Options::default() };
     let solution = identify(request.chain.clone(), &[measured(series, &request.chain)], &options)?;
-    let plate = solution.state.placements[0];
-    let [a, b] = sets.map(|poses| flange_error_m(&solution.state.robot, &plate, poses));
+    // The frame in which the flange is measured is fitted: any will do.
+    let [a, b] = sets.map(|poses| flange_error_m(&solution.state.robot, &Pose::identity(), poses));
     a.zip(b).map(|(a, b)| [a, b]).ok_or_else(|| {
         crate::error::Error::unsolved("study", "the held-out joint vectors determine no error", "take more of them")
     })

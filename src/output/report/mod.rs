@@ -14,7 +14,7 @@ pub(super) mod svg;
 mod verdict;
 mod words;
 
-pub use plan_page::plan_html;
+pub use plan_page::{plan_html, sigma_text};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

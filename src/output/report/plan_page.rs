@@ -14,6 +14,7 @@ const PLAN_STYLE: &str = "\
 svg .arm{stroke:#9aa4b0;stroke-width:1;fill:none;stroke-opacity:.55}\
 svg .cone{stroke:#1f6feb;stroke-width:.8;fill:none;stroke-opacity:.7}\
 svg .plate{stroke:#e8590c;stroke-width:2;fill:none}\
+svg .carried{stroke:#e8590c;stroke-width:.8;fill:none;stroke-opacity:.7}\
 svg .planned{stroke:#1f6feb;stroke-width:2;fill:none}\
 svg .random{stroke:#9aa4b0;stroke-width:2;fill:none;stroke-dasharray:5 3}\
 svg .tick{stroke:#1f6feb;stroke-width:1.5;stroke-opacity:.7}\
@@ -34,11 +35,12 @@ pub fn plan_html(request: &PlanRequest, plan: &Plan, forecast: &Forecast, comman
             }
             body {
                 h1 { "Plan for " (robot) }
-                p class="sub" { (plan.legs.len()) " images, chosen from " (plan.pool.len()) " workable poses" }
+                p class="sub" { (plan.legs.len()) " images, chosen from " (plan.pool.len()) " workable poses: " (plan.drawn) " drawn at random, "
+                    (plan.pool.len() - plan.drawn) " searched near the best" }
                 (numbers(plan, forecast))
                 (words(forecast))
                 (pictures(request, plan, forecast))
-                (gains(forecast))
+                (gains(forecast, request.taken.len()))
                 (parameters(forecast))
                 (stops(request, plan))
                 h2 { "Command" }
@@ -58,7 +60,7 @@ fn numbers(plan: &Plan, forecast: &Forecast) -> Markup {
             div { b { (format!("{:.3} mm", 1e3 * forecast.before_m)) } span { "before" } }
             div { b { (format!("{:.1} %", 1e2 * plan.efficiency[1])) } span { "certified share of what any choice could reach" } }
             div { b { (format!("{:.0} %", 1e2 * worst)) } span { "largest one-sidedness of the approach of a joint" } }
-            div { b { (taught) } span { "ways between stops that must be taught" } }
+            @if taught > 0 { div { b { (taught) } span { "ways between stops that must be taught" } } }
         }
     }
 }
@@ -70,8 +72,8 @@ fn words(forecast: &Forecast) -> Markup {
 fn pictures(request: &PlanRequest, plan: &Plan, forecast: &Forecast) -> Markup {
     html! {
         h2 { "Accuracy over the number of images" }
-        (figure(&curve(forecast), "Expected error of the flange: the best images of this plan (solid), as many workable poses as \
-                 they come (dashed). Where the solid line is flat, more images help little."))
+        (figure(&curve(forecast), "Expected error of the flange: the best images of this plan (solid), as many workable poses at \
+                 random (dashed). Where the solid line is flat, more images help little."))
         h2 { "Robot and views" }
         div class="pair" {
             (figure(&scene(request, plan, View::Side), "From the side: arm (grey), view of the camera (blue), plate (orange); metres."))
@@ -85,19 +87,23 @@ fn pictures(request: &PlanRequest, plan: &Plan, forecast: &Forecast) -> Markup {
     }
 }
 
-fn gains(forecast: &Forecast) -> Markup {
+fn gains(forecast: &Forecast, taken: usize) -> Markup {
     html! {
         h2 { "What each pose brings" }
-        p class="note" { "On top of the images that were taken already; without any, on top of all other planned ones." }
+        p class="note" {
+            @if taken > 0 { "By itself, on top of the " (taken) " images that were taken already." }
+            @else { "On top of all other planned images." }
+        }
         div class="wide" { table {
-            tr { th { "Image" } th class="n" { "Flange, mm" } th { "Helps most with" } th class="n" { "its sigma before" } th class="n" { "after" } }
+            tr { th { "Image" } th class="n" { "Flange, mm" } th class="n" { "better by, µm" } th { "Helps most with" } th class="n" { "its sigma before" } th class="n" { "after" } }
             @for g in forecast.gains.iter().take(PARAMETERS) {
                 tr {
                     td { (image_name(g.leg)) }
                     td class="n" { (format!("{:.4} → {:.4}", 1e3 * g.flange_m[0], 1e3 * g.flange_m[1])) }
+                    td class="n" { (format!("{:.2}", 1e6 * g.gain_m())) }
                     td { (g.parameter) }
-                    td class="n" { (sigma(g.sigma[0], g.unit)) }
-                    td class="n" { (sigma(g.sigma[1], g.unit)) }
+                    td class="n" { (sigma_text(g.sigma[0], g.unit)) }
+                    td class="n" { (sigma_text(g.sigma[1], g.unit)) }
                 }
             }
         } }
@@ -105,7 +111,7 @@ fn gains(forecast: &Forecast) -> Markup {
 }
 
 /// A sigma in the units of reports.
-fn sigma(value: f64, unit: &str) -> String {
+pub fn sigma_text(value: f64, unit: &str) -> String {
     match unit {
         "m" => format!("{:.4} mm", 1e3 * value),
         "rad" => format!("{:.4} mrad", 1e3 * value),
@@ -122,7 +128,7 @@ fn parameters(forecast: &Forecast) -> Markup {
         div class="wide" { table {
             tr { th { "Parameter" } th class="n" { "tolerance" } th class="n" { "expected sigma" } }
             @for p in known {
-                tr { td { (p.name) } td class="n" { (sigma(p.prior_sigma, p.unit)) } td class="n" { (sigma(p.sigma, p.unit)) } }
+                tr { td { (p.name) } td class="n" { (sigma_text(p.prior_sigma, p.unit)) } td class="n" { (sigma_text(p.sigma, p.unit)) } }
             }
         } }
     }

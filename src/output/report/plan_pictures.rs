@@ -50,9 +50,9 @@ pub(super) fn scene(request: &PlanRequest, plan: &Plan, view: View) -> String {
         joints.windows(2).for_each(|w| add(&w[0], &w[1], "arm"));
         let tip = links.last().copied().unwrap_or(Pose::identity());
         let placed = setting.placements[stop.placement].1;
-        let (camera, plate) = match setting.mount {
-            CameraMount::Hand => (tip * setting.mounting, placed),
-            CameraMount::Fixed => (setting.mounting, tip * placed),
+        let (camera, plate, outline) = match setting.mount {
+            CameraMount::Hand => (tip * setting.mounting, placed, "plate"),
+            CameraMount::Fixed => (setting.mounting, tip * placed, "carried"),
         };
         let reach = CONE * stop.camera_from_plate.translation.norm();
         let corners = frustum(setting, reach).map(|c| camera.transform(&c));
@@ -61,7 +61,7 @@ pub(super) fn scene(request: &PlanRequest, plan: &Plan, view: View) -> String {
             add(&corners[k], &corners[(k + 1) % 4], "cone");
         }
         let edges = plate_corners(setting).map(|c| plate.transform(&c));
-        (0..4).for_each(|k| add(&edges[k], &edges[(k + 1) % 4], "plate"));
+        (0..4).for_each(|k| add(&edges[k], &edges[(k + 1) % 4], outline));
     }
     drawn(&segments, view)
 }
@@ -104,7 +104,7 @@ fn drawn(segments: &[Segment], view: View) -> String {
     }
     let ground = at([0.0, 0.0])[1];
     svg.line([MARGIN / 2.0, ground], [WIDTH - MARGIN / 2.0, ground], "axis");
-    for class in ["arm", "cone", "plate"] {
+    for class in ["arm", "carried", "cone", "plate"] {
         let own = segments.iter().filter(|s| s.2 == class);
         let vectors = own.map(|s| {
             let (a, b) = (at(s.0), at(s.1));
