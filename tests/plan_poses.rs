@@ -7,9 +7,10 @@ use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use robotcal::geom::Pose;
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::plan::candidates::CandidateOptions;
+use robotcal::plan::criterion::Criterion;
 use robotcal::plan::scene::{Capsule, Scene, SceneOptions, arm_length_m};
 use robotcal::plan::setting::Setting;
-use robotcal::recipe::{Budget, PlanRequest, RobotModel, Wish, forecast, plan};
+use robotcal::recipe::{Budget, Choice, Plan, PlanRequest, RobotModel, Wish, choose, forecast, plan};
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::urdf::{Chain, JointKind};
 
@@ -49,6 +50,19 @@ fn request(name: &str, count: usize) -> PlanRequest {
     }
 }
 
+/// A camera on a stand that looks back at the robot, the plate on the flange in two ways.
+fn fixed_request(name: &str, count: usize) -> PlanRequest {
+    let mut request = request(name, count);
+    let arm = arm_length_m(&request.setting.robot);
+    request.setting.mount = CameraMount::Fixed;
+    request.setting.mounting = Pose::from_xyz_rpy([0.9 * arm, 0.05, 0.45 * arm], [-1.7, 0.05, 1.5]);
+    request.setting.placements = vec![
+        ("flat".into(), Pose::from_xyz_rpy([0.01, 0.02, 0.05], [0.02, -0.03, 0.3])),
+        ("tilted".into(), Pose::from_xyz_rpy([0.0, 0.05, 0.12], [0.5, 0.0, 1.0])),
+    ];
+    request
+}
+
 fn isometry(pose: &Pose) -> Isometry3<f64> {
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(pose.rotation));
     Isometry3::from_parts(Translation3::from(pose.translation), rotation)
@@ -80,73 +94,118 @@ fn beads(c: &Capsule, frames: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
         .collect()
 }
 
+/// Checks every stop of a plan with kinematics, projection and distances of its own.
+fn check_stops(name: &str, request: &PlanRequest, plan: &Plan) {
+    let setting = &request.setting;
+    let chain = &setting.robot.chain;
+    let capsules = Scene::new(setting, &request.scene).capsules().to_vec();
+    let mut per_place = [0; 2];
+    let mut seen_stops = std::collections::BTreeSet::new();
+    for leg in &plan.legs {
+        assert!(seen_stops.insert(leg.stop), "a stop is visited twice");
+        let stop = &plan.pool[leg.stop];
+        per_place[stop.placement] += 1;
+        for (joint, drive) in chain.joints.iter().filter_map(|j| j.drive.map(|d| (j, d))) {
+            let value = drive.multiplier * stop.readings[drive.reading] + drive.offset;
+            let (low, high) = joint.limits.unwrap_or((-10.0, 10.0));
+            assert!((low..=high).contains(&value), "{name} {}: {value}", joint.name);
+        }
+        let frames = frames(chain, &stop.readings);
+        let tip = *frames.last().unwrap();
+        let [mounting, placed] = [&setting.mounting, &setting.placements[stop.placement].1].map(isometry);
+        let (camera, plate) = match setting.mount {
+            CameraMount::Hand => (tip * mounting, placed),
+            CameraMount::Fixed => (mounting, tip * placed),
+        };
+        check_sight(name, request, &(camera.inverse() * plate));
+        check_collisions(name, request, &capsules, &frames, &plate);
+    }
+    assert!(per_place.iter().all(|n| *n <= 20), "{per_place:?}");
+}
+
+/// Centres of markers inside the image, from the front, inside the range of views, not too oblique.
+fn check_sight(name: &str, request: &PlanRequest, camera_from_plate: &Isometry3<f64>) {
+    let eye = camera_from_plate.inverse().translation.vector;
+    // The point looked at lies in the plane of the plate.
+    let views = &request.candidates.views;
+    assert!(eye.z > views.near_m * views.tilt_rad.cos() - 1e-9, "{name}: too near or behind the plate: {eye}");
+    let shown: Vec<Vector3<f64>> = (request.setting.plate.markers.iter())
+        .map(|m| (m.position_m, (camera_from_plate * nalgebra::Point3::from(m.position_m)).coords))
+        .filter(|(_, x)| {
+            let (u, v) = (1100.0 * x.x / x.z + 639.5, 1100.0 * x.y / x.z + 511.5);
+            x.z > 0.0 && (0.0..=1279.0).contains(&u) && (0.0..=1023.0).contains(&v)
+        })
+        .map(|(marker, _)| marker)
+        .collect();
+    assert!(shown.len() >= request.candidates.sight.least_markers, "{name}: {} markers", shown.len());
+    for marker in shown {
+        let sight = eye - marker;
+        let incidence = (sight.z / sight.norm()).acos();
+        assert!(incidence <= request.candidates.sight.incidence_rad + 1e-9, "{name}: {incidence} rad oblique");
+    }
+    // The point looked at lies on the plate: the distance from its middle differs by half a plate at most.
+    let half = 0.5 * (0.27_f64.hypot(0.18));
+    let range = views.near_m - half..=views.far_m + half;
+    assert!(range.contains(&eye.norm()), "{name}: {} m away", eye.norm());
+}
+
+/// Beads on all capsules; links with little between them are neighbours in a wrist.
+fn check_collisions(
+    name: &str,
+    request: &PlanRequest,
+    capsules: &[Capsule],
+    frames: &[Isometry3<f64>],
+    plate: &Isometry3<f64>,
+) {
+    let strings: Vec<Vec<Vector3<f64>>> = capsules.iter().map(|c| beads(c, frames)).collect();
+    let between = |a: usize, b: usize| -> f64 {
+        let (low, high) = (capsules[a].order.min(capsules[b].order), capsules[a].order.max(capsules[b].order));
+        let inner = capsules.iter().filter(|c| low < c.order && c.order < high);
+        inner.map(|c| (c.ends_m[1] - c.ends_m[0]).norm()).sum()
+    };
+    // A plate in the hand touches the two links that carry it.
+    let last = capsules.iter().map(|c| c.order).max().unwrap();
+    let carriers = if request.setting.mount == CameraMount::Fixed { 2 } else { 0 };
+    for a in 0..capsules.len() {
+        for b in 0..a {
+            let radii = capsules[a].radius_m + capsules[b].radius_m;
+            if between(a, b) <= radii + 0.011 {
+                continue;
+            }
+            let all = strings[a].iter().flat_map(|x| strings[b].iter().map(move |y| (x - y).norm()));
+            let nearest = all.fold(f64::INFINITY, f64::min);
+            assert!(nearest > radii, "{name}: {} and {}: {nearest}", capsules[a].name, capsules[b].name);
+        }
+        if capsules[a].order <= 1 {
+            continue;
+        }
+        for x in &strings[a] {
+            assert!(x.z - capsules[a].radius_m > -0.3, "{name}: {} below every table", capsules[a].name);
+            if request.setting.mount == CameraMount::Fixed {
+                let distance = (x - request.setting.mounting.translation).norm();
+                assert!(distance > capsules[a].radius_m, "{name}: {} in the camera", capsules[a].name);
+            }
+            let local = plate.inverse() * nalgebra::Point3::from(*x);
+            let beside = local.x.abs() > 0.15 || local.y.abs() > 0.105;
+            let above = local.z > capsules[a].radius_m;
+            let carries = capsules[a].order + carriers > last;
+            assert!(carries || beside || above || local.z < -0.1, "{name}: {} in the plate", capsules[a].name);
+        }
+    }
+}
+
 #[test]
 fn every_planned_pose_is_inside_limits_sees_enough_and_touches_nothing() {
-    for name in ["kuka_kr6_r900", "ur10e", "lbr_iiwa_14"] {
-        let request = request(name, 30);
-        let setting = &request.setting;
+    let in_hand = ["kuka_kr6_r900", "ur10e", "lbr_iiwa_14"].map(|name| (name, request(name, 30)));
+    let fixed = ["kuka_kr6_r900", "lbr_iiwa_14"].map(|name| (name, fixed_request(name, 30)));
+    for (name, request) in in_hand.into_iter().chain(fixed) {
         let plan = plan(&request).unwrap();
         assert_eq!(plan.legs.len(), 30);
-        println!("{name}: {} candidates, certified {:?}", plan.pool.len(), plan.efficiency);
+        println!("{name}: {} candidates, certified {:?}, {:?}", plan.pool.len(), plan.efficiency, plan.values);
         assert!(plan.efficiency[0] > 0.95 && plan.efficiency[1] > 0.90);
-        let capsules = Scene::new(setting, &request.scene).capsules().to_vec();
-        let mut per_place = [0; 2];
-        let mut seen_stops = std::collections::BTreeSet::new();
-        for leg in &plan.legs {
-            assert!(seen_stops.insert(leg.stop), "a stop is visited twice");
-            let stop = &plan.pool[leg.stop];
-            per_place[stop.placement] += 1;
-            let chain = &setting.robot.chain;
-            for (joint, drive) in chain.joints.iter().filter_map(|j| j.drive.map(|d| (j, d))) {
-                let value = drive.multiplier * stop.readings[drive.reading] + drive.offset;
-                let (low, high) = joint.limits.unwrap_or((-10.0, 10.0));
-                assert!((low..=high).contains(&value), "{name} {}: {value}", joint.name);
-            }
-            let frames = frames(chain, &stop.readings);
-            let plate = isometry(&setting.placements[stop.placement].1);
-            let camera = frames.last().unwrap() * isometry(&setting.mounting);
-            // Visibility: centres of markers inside the image, from the front, not too oblique.
-            let eye = plate.inverse() * camera.translation.vector;
-            let eye = eye + plate.inverse().translation.vector;
-            assert!(eye.z > 0.1, "behind the plate or on it: {eye}");
-            let camera_from_plate = camera.inverse() * plate;
-            let inside = |m: &&robotcal::series::Marker| {
-                let x = camera_from_plate * nalgebra::Point3::from(m.position_m);
-                let (u, v) = (1100.0 * x.x / x.z + 639.5, 1100.0 * x.y / x.z + 511.5);
-                x.z > 0.0 && (0.0..=1279.0).contains(&u) && (0.0..=1023.0).contains(&v)
-            };
-            let seen = setting.plate.markers.iter().filter(inside).count();
-            assert!(seen >= request.candidates.sight.least_markers, "{name}: {seen} markers");
-            assert!(eye.z / eye.norm() > 0.3, "{name}: too oblique");
-            // Collisions: beads on all capsules; the two next links up and down are neighbours in a wrist.
-            let strings: Vec<Vec<Vector3<f64>>> = capsules.iter().map(|c| beads(c, &frames)).collect();
-            let between = |a: usize, b: usize| -> f64 {
-                let (low, high) = (capsules[a].order.min(capsules[b].order), capsules[a].order.max(capsules[b].order));
-                let inner = capsules.iter().filter(|c| low < c.order && c.order < high);
-                inner.map(|c| (c.ends_m[1] - c.ends_m[0]).norm()).sum()
-            };
-            for a in 0..capsules.len() {
-                for b in 0..a {
-                    let radii = capsules[a].radius_m + capsules[b].radius_m;
-                    if between(a, b) <= radii + 0.011 {
-                        continue;
-                    }
-                    let all = strings[a].iter().flat_map(|x| strings[b].iter().map(move |y| (x - y).norm()));
-                    let nearest = all.fold(f64::INFINITY, f64::min);
-                    assert!(nearest > radii, "{name}: {} and {}: {nearest}", capsules[a].name, capsules[b].name);
-                }
-                if capsules[a].order > 1 {
-                    for x in &strings[a] {
-                        assert!(x.z - capsules[a].radius_m > -0.3, "{name}: {} below every table", capsules[a].name);
-                        let local = plate.inverse() * nalgebra::Point3::from(*x);
-                        let beside = local.x.abs() > 0.15 || local.y.abs() > 0.105;
-                        let above = local.z > capsules[a].radius_m;
-                        assert!(beside || above || local.z < -0.1, "{name}: {} in the plate", capsules[a].name);
-                    }
-                }
-            }
-        }
-        assert!(per_place.iter().all(|n| *n <= 20), "{per_place:?}");
+        let searched = plan.legs.iter().filter(|l| l.stop >= plan.drawn).count();
+        assert!(searched > 0, "no pose that was searched near the best is in the plan");
+        check_stops(name, &request, &plan);
         let forecast = forecast(&request, &plan).unwrap();
         assert!(forecast.flange_m < 0.05 * forecast.before_m, "{} {}", forecast.flange_m, forecast.before_m);
         assert!(
@@ -154,6 +213,30 @@ fn every_planned_pose_is_inside_limits_sees_enough_and_touches_nothing() {
             "more images cannot hurt"
         );
     }
+}
+
+#[test]
+fn rounds_of_search_only_improve_and_are_the_same_with_any_number_of_threads() {
+    let mut request = request("ur10e", 12);
+    request.budget = Budget::default();
+    let drawn = choose(&PlanRequest { rounds: 0, ..request.clone() }).unwrap();
+    request.rounds = 5;
+    let [one, two] = [1, 2].map(|threads| {
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        threads.install(|| choose(&request).unwrap())
+    });
+    assert_eq!(one.pool, two.pool);
+    assert_eq!((&one.weights, &one.chosen), (&two.weights, &two.chosen));
+    assert_eq!(one.pool[..one.drawn], drawn.pool[..]);
+    assert!(one.values.len() > 2 && one.values[0] == drawn.values[0], "{:?}", one.values);
+    // Prices are known to the share at which a round is content.
+    assert!(one.values.windows(2).all(|w| w[1] <= w[0] * 1.002), "{:?}", one.values);
+    // The bound that was certified for the drawn candidates alone is beaten by whole images: the search found what they lack.
+    let value = |c: &Choice| c.chosen.iter().fold(c.known.clone(), |m, &k| m + &c.information[k]);
+    let variance = |c: &Choice| Criterion::weighted(&c.weight).value(&value(c)).unwrap();
+    let (before, after) = (variance(&drawn), variance(&two));
+    println!("{before:.3e} {after:.3e}");
+    assert!(after < before * drawn.efficiency[1], "{before} {after}");
 }
 
 /// Plate of few points, written as a user would.
@@ -214,9 +297,15 @@ fn impossible_wishes_say_why_and_what_to_change() {
     let (urdf, out) = (urdf("kuka_kr6_r900"), folder.path().join("plan"));
     let base = ["plan", "--urdf", urdf.to_str().unwrap(), "--plate", plate.to_str().unwrap(), "--candidates", "60"];
     let base = [&base[..], &["--count", "8", "--out", out.to_str().unwrap()]].concat();
-    let cases: [(&[&str], i32, &[&str]); 7] = [
+    let cases: [(&[&str], i32, &[&str]); 9] = [
         (&["--plate-pose", "3,0,0,0,0,0"], 3, &["in reach", "3.00 m", "--plate-pose"]),
-        (&["--markers", "500", "--plate-pose", "0.5,0,0,0,0,0"], 3, &["500 sharp markers", "most seen", "--markers"]),
+        (&["--markers", "500", "--plate-pose", "0.5,0,0,0,0,0"], 2, &["500 markers", "plate has 70", "--markers"]),
+        (
+            &["--markers", "70", "--distance-m", "0.1x0.11", "--plate-pose", "0.5,0,0,0,0,0"],
+            3,
+            &["70 sharp markers", "most seen", "--distance-m", "--markers"],
+        ),
+        (&["--mount", "fixed", "--hand-camera", "3,0,0.5,-90,0,90"], 3, &["camera stands 3.04 m", "--hand-camera"]),
         (&["--focus-m", "3x4", "--plate-pose", "0.5,0,0,0,0,0"], 3, &["sharp", "--focus-m"]),
         (&["--box", "0.5,0,0.4,3,3,1", "--plate-pose", "0.5,0,0,0,0,0"], 3, &["collide", "--box"]),
         (&["--parameters", "joint_a9", "--plate-pose", "0.5,0,0,0,0,0"], 2, &["joint_a9", "did you mean"]),
@@ -247,4 +336,35 @@ fn impossible_wishes_say_why_and_what_to_change() {
     let (code, _, error) = run(&[&arguments[..], &more].concat());
     assert_eq!(code, 3, "{error}");
     assert!(error.contains("joint_a2.gear") && error.contains("degrees only") && error.contains("widen"), "{error}");
+}
+
+#[test]
+fn further_poses_are_planned_from_a_result_with_its_noise() {
+    let folder = tempfile::tempdir().unwrap();
+    let solution = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/kr6_small/solution.json");
+    let (urdf, out) = (urdf("kuka_kr6_r900"), folder.path().join("more"));
+    let base = ["plan", "--urdf", urdf.to_str().unwrap(), "--from", solution.to_str().unwrap(), "--count", "3"];
+    let base = [&base[..], &["--candidates", "80", "--rounds", "2", "--out", out.to_str().unwrap()]].concat();
+    let (code, said, error) = run(&base);
+    assert_eq!(code, 0, "{error}");
+    let record: serde_json::Value = serde_json::from_slice(&std::fs::read(&solution).unwrap()).unwrap();
+    let noise: Vec<f64> =
+        record["cameras"][0]["joint_noise"].as_array().unwrap().iter().map(|s| 1e3 * s.as_f64().unwrap()).collect();
+    let (low, high) = noise.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), s| (l.min(*s), h.max(*s)));
+    assert!(said.contains(&format!("joints {low:.4} to {high:.4} mrad")), "{said}");
+    // Which pose, by how many mm, for which parameter; the greatest gain first, and all together gain more than the best alone.
+    let gains: Vec<&str> = said.lines().filter(|l| l.starts_with("helps")).collect();
+    assert_eq!(gains.len(), 3, "{said}");
+    let number = |text: &str, before: &str, after: &str| -> f64 {
+        text.split_once(before).unwrap().1.split_once(after).unwrap().0.trim().parse().unwrap()
+    };
+    let alone: Vec<f64> = gains.iter().map(|g| number(g, "mm, ", " mm better")).collect();
+    assert!(alone.windows(2).all(|w| w[0] >= w[1]) && alone[2] > 0.0, "{alone:?}");
+    assert!(gains.iter().all(|g| g.contains("most by joint_a") && g.contains("sigma")), "{gains:?}");
+    let flange = said.lines().find(|l| l.starts_with("flange")).unwrap();
+    let together = number(flange, "flange", "mm before") - number(flange, "before,", "mm expected");
+    assert!(together > alone[0], "{together} {alone:?}");
+    // Noise given by hand would be ignored: it is refused.
+    let (code, _, error) = run(&[&base[..], &["--joint-noise-mrad", "0.5"]].concat());
+    assert!(code == 2 && error.contains("--joint-noise-mrad") && error.contains("--from"), "{code}: {error}");
 }
