@@ -234,6 +234,7 @@ fn settle_place(args: &PlanArgs, request: &mut PlanRequest) -> Result<Vec<String
     let mut trial = request.clone();
     trial.candidates.count = TRIAL_CANDIDATES.max(8 * trial.count);
     trial.budget = Budget::default();
+    trial.rounds = 0;
     let places = compare_places(&trial, &choose(&trial)?)?;
     let error = |p: &&PlaceForecast| p.flange_m.unwrap_or(f64::INFINITY);
     let best = places.iter().min_by(|a, b| error(a).total_cmp(&error(b))).map_or(0, |p| p.placement);

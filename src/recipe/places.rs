@@ -24,14 +24,16 @@ pub struct PlaceForecast {
     pub known: Vec<String>,
 }
 
-/// Every placement of the request by itself, from the candidates of a choice over all of them.
+/// Every placement of the request by itself, from the candidates drawn for a choice over all of them: those searched near the
+/// best would favour the places that this choice prefers.
 ///
 /// # Errors
 /// Where a parameter asked for is unknown.
 pub fn compare_places(request: &PlanRequest, choice: &Choice) -> Result<Vec<PlaceForecast>> {
     let criterion = criterion(&request.wish, &choice.problem.layout, &choice.weight)?;
     let one = |(placement, (name, _)): (usize, &(String, crate::geom::Pose))| {
-        let here = choice.pool.iter().zip(&choice.information).filter(|(c, _)| c.placement == placement);
+        let drawn = choice.pool.iter().zip(&choice.information).take(choice.drawn);
+        let here = drawn.filter(|(c, _)| c.placement == placement);
         let candidates: Vec<DMatrix<f64>> = here.map(|(_, m)| m.clone()).collect();
         let design = Design {
             known: &choice.known,
