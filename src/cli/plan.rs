@@ -202,7 +202,7 @@ fn noise_word(request: &PlanRequest) -> Option<String> {
     let range = setting.joint_sigma.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), s| (l.min(*s), h.max(*s)));
     (!request.taken.is_empty()).then(|| {
         format!(
-            "planned on top of {} images, with the noise found in them: joints {:.4} to {:.4} mrad (or mm), images {:.3} px",
+            "planned on top of {} images, with the noise found in them: joints {:.4} to {:.4} mrad (or mm), images {:.4} px",
             request.taken.len(),
             1e3 * range.0,
             1e3 * range.1,
