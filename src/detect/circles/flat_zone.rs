@@ -4,7 +4,7 @@
 //! light, and it is the uncertainty of the gradient that costs most of the precision of a centre (a gradient and a shift
 //! look alike along an edge). They enter the normal equations as sums that are taken once.
 
-use super::edge_model::{ANNULUS, DARK, State, WHITE};
+use super::edge_state::{ANNULUS, DARK, State, WHITE};
 
 /// Sums over the pixels of a zone; `x`, `y` relative to the anchor, values relative to `reference`.
 #[derive(Debug, Clone, Copy, Default)]

@@ -14,6 +14,7 @@ mod candidate;
 mod code;
 mod contour;
 mod edge_model;
+mod edge_state;
 mod ellipse;
 mod exact_edge;
 mod flat_zone;

@@ -1,6 +1,7 @@
 //! Sub-pixel measurement of one marker: least squares of the blurred-edge model on a thin band of pixels.
 
-use super::edge_model::{ANNULUS, CENTRE, DARK, DISC, INNER, LN_BLUR, LN_RATIO, Pixels, SHAPE, State, THIRD, WHITE};
+use super::edge_model::Pixels;
+use super::edge_state::{ANNULUS, CENTRE, DARK, DISC, INNER, LN_BLUR, LN_RATIO, SHAPE, State, THIRD, WHITE};
 use super::ellipse::Ellipse;
 use super::flat_zone::{Flat, Zone};
 use super::tails::{Tail, lift};
@@ -520,9 +521,8 @@ impl Strip<'_> {
 /// Cholesky factor in place: from the lower triangle to the upper triangular `U` of `U' U`.
 fn cholesky(m: &mut Normal, n: usize) -> Option<()> {
     for i in 0..n {
-        for j in 0..i {
-            m[j][i] = m[i][j];
-        }
+        let (above, below) = m.split_at_mut(i);
+        above.iter_mut().zip(&below[0]).for_each(|(row, v)| row[i] = *v);
     }
     let diagonal: [f64; ANNULUS] = std::array::from_fn(|i| m[i][i]);
     for j in 0..n {
