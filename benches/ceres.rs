@@ -1,6 +1,7 @@
 //! The solver alone, on the numeric series of the peers' generator, from the same start as the peers.
 //!
-//! `cargo bench --bench ceres -- FOLDER MODE [REPEATS]` with MODE `poses`, `exact` or `joint`; see `benches/README.md`.
+//! `cargo bench --bench ceres -- FOLDER MODE [START]` with MODE `poses`, `exact` or `joint` and START `guess` (as stated in the folder) or `images`
+//! (free camera poses, then closed forms); see `benches/README.md`.
 //! One thread; prints iterations, processor time of the solve, the cost reached, the RMS and the largest resident size of the process.
 
 use std::error::Error;
@@ -8,9 +9,11 @@ use std::path::Path;
 
 use nalgebra::{DMatrix, Matrix2, Matrix3, Vector2, Vector3};
 use robotcal::geom::{Pose, exp_so3};
+use robotcal::init::{PosePair, solve_hand_eye};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::{Robot, Stop};
 use robotcal::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State};
+use robotcal::recipe::{FreePose, adjust_free_poses};
 use robotcal::series::{CameraMount, Edge, Marker, Plate, PlateKind};
 use robotcal::solve::{Outcome, Settings, solve};
 
@@ -131,6 +134,19 @@ fn read(folder: &Path, mode: Mode) -> Fallible<(Problem, State)> {
     Ok((problem, state))
 }
 
+/// Starting values from the images alone: free camera poses, then hand-camera and plate pose in closed form.
+fn start_from_images(problem: &Problem, guess: State) -> Fallible<State> {
+    let focal_px = guess.cameras[0].parameters[0];
+    let (free, _) = adjust_free_poses(&mut problem.clone(), guess.clone(), &[Some(focal_px)])?;
+    let pair = |(image, free): (&Image, &Option<FreePose>)| {
+        let chain = guess.robot.base_from_tip(&image.stop.as_ref()?.readings).inverse();
+        Some(PosePair { camera_from_plate: free.as_ref()?.camera_from_plate, chain })
+    };
+    let pairs: Vec<PosePair> = problem.images.iter().zip(&free.poses).filter_map(pair).collect();
+    let best = solve_hand_eye(&pairs).first().ok_or("no closed form has a solution")?.solution;
+    Ok(State { mountings: vec![best.camera], placements: vec![best.plate], cameras: free.state.cameras, ..guess })
+}
+
 /// Time that the processor spent on this thread, s: fair on a machine that others use, too.
 fn processor_seconds() -> Fallible<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat")?;
@@ -163,7 +179,7 @@ fn report(mode: &str, outcome: &Outcome, seconds: f64) -> Fallible<()> {
 fn main() -> Fallible<()> {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let [folder, name, rest @ ..] = arguments.as_slice() else {
-        println!("usage: cargo bench --bench ceres -- FOLDER poses|exact|joint [REPEATS]");
+        println!("usage: cargo bench --bench ceres -- FOLDER poses|exact|joint [guess|images]");
         return Ok(());
     };
     let mode = match name.as_str() {
@@ -172,13 +188,14 @@ fn main() -> Fallible<()> {
         "joint" => Mode::Joint,
         other => return Err(format!("no mode '{other}': poses, exact or joint").into()),
     };
-    let repeats: usize = rest.first().map_or(Ok(1), |r| r.parse())?;
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global()?;
-    let (problem, start) = read(Path::new(folder), mode)?;
-    for _ in 0..repeats.max(1) {
-        let begin = processor_seconds()?;
-        let outcome = solve(&problem, start.clone(), &Settings::default());
-        report(name, &outcome, processor_seconds()? - begin)?;
-    }
-    Ok(())
+    let (problem, guess) = read(Path::new(folder), mode)?;
+    let begin = processor_seconds()?;
+    let start = match rest.first().map(String::as_str) {
+        None | Some("guess") => guess,
+        Some("images") => start_from_images(&problem, guess)?,
+        Some(other) => return Err(format!("no start '{other}': guess or images").into()),
+    };
+    let outcome = solve(&problem, start, &Settings::default());
+    report(name, &outcome, processor_seconds()? - begin)
 }

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 use robotcal::geom::{Pose, exp_so3, log_so3, right_jacobian_se3, right_jacobian_so3};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::circle;
-use robotcal::problem::{E, Image, Problem, Slack, State, Weighting, chained, linearise, predict};
+use robotcal::problem::{E, Image, Problem, Slack, State, Weighting, chained, equations, linearise, predict};
 use robotcal::series::CameraMount;
 use robotcal::urdf::JointKind;
 use std::f64::consts::PI;
@@ -374,8 +374,10 @@ fn check_image(problem: &Problem, state: &State, image: &Image, slack: &Slack) {
         (Matrix6::<f64>::zeros(), SMatrix::<f64, 6, E>::zeros(), SMatrix::<f64, E, E>::zeros());
     let (mut bp, mut be) = (Vector6::zeros(), SMatrix::<f64, E, 1>::zeros());
     let mut cost = 0.0;
+    let couplings = equations(image, state, pose, &weighting).unwrap().marker_couplings();
     assert_eq!(library.markers.len(), image.used().count());
-    for (o, terms) in image.used().zip(&library.markers) {
+    assert_eq!(couplings.len(), library.markers.len());
+    for ((o, terms), coupling) in image.used().zip(&library.markers).zip(&couplings) {
         let by = |seed| {
             let d = witness::predict(state, layout, image, slack, o, Some(seed));
             [d[0].eps, d[1].eps]
@@ -409,10 +411,10 @@ fn check_image(problem: &Problem, state: &State, image: &Image, slack: &Slack) {
         ee += je.transpose() * w * je;
         bp += jp.transpose() * w * r;
         be += je.transpose() * w * r;
-        assert_eq!(terms.marker, o.marker);
+        assert_eq!([terms.marker, coupling.marker], [o.marker; 2]);
         assert_same("mm", &terms.mm, &(jm.transpose() * w * jm), CIRCLE);
-        assert_same("mp", &terms.mp, &(jm.transpose() * w * jp), CIRCLE);
-        assert_same("me", &terms.me, &(jm.transpose() * w * je), CIRCLE);
+        assert_same("mp", &coupling.mp, &(jm.transpose() * w * jp), CIRCLE);
+        assert_same("me", &coupling.me, &(jm.transpose() * w * je), CIRCLE);
         assert_same("bm", &terms.bm, &(jm.transpose() * w * r), CIRCLE.max(1e-9 / r.norm()));
     }
     assert!((library.cost - cost).abs() < 1e-8 * cost.max(1.0), "{} {cost}", library.cost);

@@ -51,14 +51,15 @@ impl Bordered {
             h.view_mut((6, 0), (e, 6)).copy_from(&terms.pe.transpose());
             h.view_mut((6, 6), (e, e)).copy_from(&terms.ee);
             a += j.transpose() * h * &j;
-            for t in &terms.markers {
+            let couplings = lin.equations(problem, state, k).unwrap().marker_couplings();
+            for (own_terms, t) in terms.markers.iter().zip(&couplings) {
                 let mut c = DMatrix::<f64>::zeros(3, 6 + e);
                 c.view_mut((0, 0), (3, 6)).copy_from(&t.mp);
                 c.view_mut((0, 6), (3, e)).copy_from(&t.me);
                 let row = c * &j;
                 let at = marker_start + 3 * t.marker;
                 let mut own = a.view_mut((at, at), (3, 3));
-                own += t.mm;
+                own += own_terms.mm;
                 let mut rows = a.rows_mut(at, 3);
                 rows += &row;
                 let mut columns = a.columns_mut(at, 3);

@@ -12,9 +12,6 @@ use crate::linalg::product;
 use crate::problem::{Problem, Slack, State};
 use crate::solve::{Covariance, Linearised};
 
-/// Smallest prior sigma of a marker coordinate, m, as in the normal equations.
-const FIXED_MARKER_SIGMA_M: f64 = 1e-9;
-
 /// Largest correction of the scatter of one image: beyond it the image alone decides what it is compared with.
 const MOST_CORRECTION: f64 = 5.0;
 
@@ -34,7 +31,7 @@ pub fn clustered_covariance(
     let dense = problem.layout.len();
     let of_dense = covariance.reduced.view((0, 0), (dense, dense)).into_owned();
     let markers = Seen::new(problem, lin);
-    let with_markers = markers.covariance_with_dense(problem, lin, covariance);
+    let with_markers = markers.covariance_with_dense(problem, state, lin, covariance);
     let mut sum = DMatrix::zeros(dense, dense);
     for k in 0..lin.images.len() {
         let (of_image, of_markers) = score(problem, lin, k, &markers);
@@ -45,8 +42,7 @@ pub fn clustered_covariance(
     let by_priors = &of_dense * DMatrix::from_diagonal(&priors);
     let mut by_markers = with_markers.clone();
     for (at, &(plate, marker)) in markers.order.iter().enumerate() {
-        let sigma = problem.plates[plate].markers[marker].sigma_m.max(FIXED_MARKER_SIGMA_M);
-        by_markers.columns_mut(3 * at, 3).scale_mut(1.0 / sigma);
+        by_markers.columns_mut(3 * at, 3).scale_mut(problem.marker_information(plate, marker).sqrt());
     }
     sum += product(&by_priors, &by_priors.transpose()) + product(&by_markers, &by_markers.transpose());
     Some((&sum + sum.transpose()) * 0.5)
@@ -72,7 +68,13 @@ impl Seen {
     }
 
     /// Dense columns x 3 markers.
-    fn covariance_with_dense(&self, problem: &Problem, lin: &Linearised, covariance: &Covariance) -> DMatrix<f64> {
+    fn covariance_with_dense(
+        &self,
+        problem: &Problem,
+        state: &State,
+        lin: &Linearised,
+        covariance: &Covariance,
+    ) -> DMatrix<f64> {
         let dense = problem.layout.len();
         let reduced = &covariance.reduced;
         let slack_start = &covariance.system.slack_start;
@@ -82,17 +84,16 @@ impl Seen {
         }
         let mut coupling = DMatrix::zeros(3 * self.order.len(), reduced.nrows());
         let mut information: Vec<Matrix3<f64>> = (self.order.iter())
-            .map(|&(p, m)| {
-                Matrix3::from_diagonal_element(problem.plates[p].markers[m].sigma_m.max(FIXED_MARKER_SIGMA_M).powi(-2))
-            })
+            .map(|&(p, m)| Matrix3::from_diagonal_element(problem.marker_information(p, m)))
             .collect();
         for (k, (terms, &i)) in lin.terms.iter().zip(&lin.images).enumerate() {
             let image = &problem.images[i];
             let chain = &lin.chains[k];
             let columns = problem.layout.intrinsics(image);
-            for t in &terms.markers {
+            let couplings = lin.equations(problem, state, k).map_or_else(Vec::new, |e| e.marker_couplings());
+            for (own, t) in terms.markers.iter().zip(&couplings) {
                 let Some(at) = self.at(image.plate, t.marker) else { continue };
-                information[at] += t.mm;
+                information[at] += own.mm;
                 let mp = DMatrix::from_column_slice(3, 6, t.mp.as_slice());
                 let mut rows = coupling.rows_mut(3 * at, 3);
                 let mut theta = rows.columns_mut(0, chain.d_theta.ncols());

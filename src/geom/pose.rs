@@ -133,18 +133,22 @@ pub fn right_jacobian_se3(twist: &Vector6<f64>) -> Matrix6<f64> {
     }
     let rho = skew(&twist.fixed_rows::<3>(0).into_owned());
     let phi = skew(&twist.fixed_rows::<3>(3).into_owned());
-    let mut ad = Matrix6::zeros();
-    ad.fixed_view_mut::<3, 3>(0, 0).copy_from(&phi);
-    ad.fixed_view_mut::<3, 3>(3, 3).copy_from(&phi);
-    ad.fixed_view_mut::<3, 3>(0, 3).copy_from(&rho);
-    let mut term = Matrix6::identity();
-    let mut sum = Matrix6::identity();
+    // Every term is [[own, cross], [0, own]].
+    let (mut own, mut cross) = (Matrix3::<f64>::identity(), Matrix3::<f64>::zeros());
+    let (mut own_sum, mut cross_sum) = (own, cross);
     for n in 1..60 {
-        term = -term * ad / f64::from(n + 1);
-        sum += term;
-        if term.amax() < 1e-18 {
+        let factor = -1.0 / f64::from(n + 1);
+        cross = (own * rho + cross * phi) * factor;
+        own = own * phi * factor;
+        own_sum += own;
+        cross_sum += cross;
+        if own.amax().max(cross.amax()) < 1e-18 {
             break;
         }
     }
+    let mut sum = Matrix6::zeros();
+    sum.fixed_view_mut::<3, 3>(0, 0).copy_from(&own_sum);
+    sum.fixed_view_mut::<3, 3>(3, 3).copy_from(&own_sum);
+    sum.fixed_view_mut::<3, 3>(0, 3).copy_from(&cross_sum);
     sum
 }

@@ -6,6 +6,9 @@ mod quadratic;
 
 pub use quadratic::{LinearRow, NotSolved, minimise_quadratic};
 
+use std::ops::Range;
+
+use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::solvers::{Llt, Solve};
 use faer::{Accum, MatMut, MatRef, Par, Side};
@@ -39,7 +42,7 @@ impl SymmetricFactor {
         }
         let scale = m.diagonal().map(|d| 1.0 / d.sqrt());
         let scaled = DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * scale[i] * scale[j]);
-        if !scaled.lower_triangle().iter().all(|x| x.is_finite()) {
+        if !scaled.iter().all(|x| x.is_finite()) {
             return Err(NotPositiveDefinite);
         }
         match Llt::new(view(&scaled), Side::Lower) {
@@ -78,9 +81,24 @@ impl SymmetricFactor {
 
 /// Product of dense matrices.
 pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    sequential();
-    let c = view(a) * view(b);
-    DMatrix::from_fn(a.nrows(), b.ncols(), |i, j| c[(i, j)])
+    multiply(view(a), view(b))
+}
+
+/// Product of `a` with some rows of `b`.
+pub fn product_with_rows(a: &DMatrix<f64>, b: &DMatrix<f64>, rows: Range<usize>) -> DMatrix<f64> {
+    multiply(view(a), view(b).get(rows, ..))
+}
+
+fn multiply(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
+    let mut c = DMatrix::zeros(a.nrows(), b.ncols());
+    let into = MatMut::from_column_major_slice_mut(c.as_mut_slice(), a.nrows(), b.ncols());
+    matmul(into, Accum::Replace, a, b, 1.0, Par::Seq);
+    c
+}
+
+/// `y y'`.
+pub fn gram(y: &DMatrix<f64>) -> DMatrix<f64> {
+    multiply(view(y), view(y).transpose())
 }
 
 /// `a -= y y'` in the upper triangle of `a`; what lies below the diagonal is left as it is.

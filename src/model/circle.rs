@@ -51,22 +51,36 @@ pub struct Prediction {
 }
 
 /// Predicts the image of a point of the plate (plate frame, m); `None` behind the camera.
+#[inline(always)]
 pub fn point(camera: &Camera, camera_from_plate: &Pose, x: &Vector3<f64>) -> Option<Prediction> {
     let p = camera.project_with_jacobian(&camera_from_plate.transform(x))?;
     let d_marker = p.d_point * camera_from_plate.rotation;
     let mut d_pose = SMatrix::<f64, 2, 6>::zeros();
     d_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&d_marker);
     d_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-d_marker * skew(x)));
-    let d_field = field_columns(std::slice::from_ref(&p), &[Matrix2::identity()]);
+    let d_field = match p.field {
+        Some(_) => field_columns(std::slice::from_ref(&p), &[Matrix2::identity()]),
+        None => Vec::new(),
+    };
     Some(Prediction { uv: p.uv, d_pose, d_marker, d_camera: p.d_parameters, d_field })
 }
 
 /// Predicts the area centroid of the image of a circle of `radius_m` about `centre` (plate frame, m), parallel to the
 /// plate; `None` where part of it lies behind the camera. Radius 0 is a point.
+#[inline(always)]
 pub fn centroid(camera: &Camera, camera_from_plate: &Pose, centre: &Vector3<f64>, radius_m: f64) -> Option<Prediction> {
-    if radius_m == 0.0 {
-        return point(camera, camera_from_plate, centre);
+    match radius_m {
+        0.0 => point(camera, camera_from_plate, centre),
+        _ => centroid_of_contour(camera, camera_from_plate, centre, radius_m),
     }
+}
+
+fn centroid_of_contour(
+    camera: &Camera,
+    camera_from_plate: &Pose,
+    centre: &Vector3<f64>,
+    radius_m: f64,
+) -> Option<Prediction> {
     let mut samples = [Projection::default(); N];
     let mut uv = [Vector2::zeros(); N];
     for (k, [c, s]) in SAMPLES.cos_sin.iter().enumerate() {

@@ -16,13 +16,13 @@ pub const PRIOR_SIGMA: [f64; MODES] = [1e-4, 1e-4, 1e-4, 3e-4, 3e-4, 3e-4];
 /// `half_diagonal_m` is the largest distance of a marker from the centre of the plate.
 pub fn basis(nominal: &Vector3<f64>, half_diagonal_m: f64) -> SMatrix<f64, 3, MODES> {
     let (x, y) = (nominal.x, nominal.y);
-    let h = half_diagonal_m.max(1e-9);
+    let per_square = half_diagonal_m.max(1e-9).powi(-2);
     let mut b = SMatrix::<f64, 3, MODES>::zeros();
     b.set_column(0, nominal);
     b.set_column(1, &(Vector3::new(x, -y, 0.0) / 2.0));
     b.set_column(2, &(Vector3::new(y, x, 0.0) / 2.0));
-    b[(2, 3)] = x * x / (h * h);
-    b[(2, 4)] = x * y / (h * h);
-    b[(2, 5)] = y * y / (h * h);
+    b[(2, 3)] = x * x * per_square;
+    b[(2, 4)] = x * y * per_square;
+    b[(2, 5)] = y * y * per_square;
     b
 }

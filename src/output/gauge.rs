@@ -14,9 +14,6 @@ use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
 use crate::error::{Error, Result};
 use crate::problem::{Image, Problem};
 
-/// Smallest prior sigma of a marker coordinate, m, as in the normal equations.
-const FIXED_MARKER_SIGMA_M: f64 = 1e-9;
-
 /// `[I, -skew(x)]`: motion of a marker by a rigid motion of all.
 pub(super) fn rigid(x: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
     let mut n = SMatrix::<f64, 3, 6>::zeros();
@@ -32,9 +29,8 @@ pub(super) fn rigid(x: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
 pub(super) fn rigid_covariance(problem: &Problem, seen: &BTreeSet<(usize, usize)>) -> Result<Matrix6<f64>> {
     let mut information = Matrix6::zeros();
     for &(plate, marker) in seen {
-        let m = &problem.plates[plate].markers[marker];
-        let n = rigid(&m.position_m);
-        information += n.transpose() * n / m.sigma_m.max(FIXED_MARKER_SIGMA_M).powi(2);
+        let n = rigid(&problem.plates[plate].markers[marker].position_m);
+        information += n.transpose() * n * problem.marker_information(plate, marker);
     }
     // The unit of length is chosen so that both halves of the diagonal have the same size.
     let diagonal = information.diagonal();

@@ -9,7 +9,7 @@ use super::gauge::{plates_tied_to, rigid, rigid_covariance, seen_markers};
 use super::names::{file_names, plate_name};
 use super::text::csv;
 use crate::error::Result;
-use crate::model::plate_modes::{MODES, basis};
+use crate::model::plate_modes::MODES;
 use crate::recipe::Solution;
 use crate::series::plate_toml;
 
@@ -65,7 +65,7 @@ pub(super) fn position_covariances(solution: &Solution, plate: usize) -> Result<
             total - n * frame * n.transpose()
         }
         None => {
-            let b = basis(&shape.nominal[m], shape.half_diagonal_m);
+            let b = shape.modes_at(m);
             let tolerance = problem.plates[plate].markers[m].sigma_m;
             b * modes * b.transpose() + Matrix3::identity() * tolerance.powi(2)
         }

@@ -4,37 +4,19 @@
 //! pose (p, 6), intrinsics (e, camera parameters then plate modes) and markers (m, 3 each); the robot enters afterwards by
 //! `dp = G dtheta + L dslack` ([`chained`]).
 
-use nalgebra::{
-    DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Matrix6, Matrix6x2, Matrix6xX, SMatrix, Vector2, Vector3, Vector6,
-};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, Matrix6x2, Matrix6xX, Vector2, Vector3, Vector6};
 
+use super::equations::{Collector, Equations, MarkerTerms};
 use super::{Image, Measured, Problem, Slack, State};
 use crate::geom::{Pose, adjoint, right_jacobian_se3};
 use crate::model::camera::MAX_PARAMETERS;
 use crate::model::circle::{self, Prediction};
-use crate::model::plate_modes::{MODES, basis};
+use crate::model::plate_modes::MODES;
 
 /// Intrinsic unknowns of one image before its displacement field: camera parameters (padded), then plate modes.
 ///
 /// The field follows: u and v of every control point.
 pub const E: usize = MAX_PARAMETERS + MODES;
-
-/// Normal-equation blocks of one marker in one image.
-#[derive(Debug, Clone)]
-pub struct MarkerTerms {
-    /// Index of the marker on its plate.
-    pub marker: usize,
-    /// 3x3 information.
-    pub mm: Matrix3<f64>,
-    /// Coupling with the pose.
-    pub mp: SMatrix<f64, 3, 6>,
-    /// Coupling with the intrinsics before the field.
-    pub me: SMatrix<f64, 3, E>,
-    /// Coupling with the control points of the field that it touches, ascending.
-    pub field: Vec<(usize, Matrix3x2<f64>)>,
-    /// Right-hand side.
-    pub bm: Vector3<f64>,
-}
 
 /// One residual with what the robust weighting made of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,7 +46,7 @@ pub struct ImageTerms {
     pub bp: Vector6<f64>,
     /// Right-hand side of the intrinsics.
     pub be: DVector<f64>,
-    /// Markers that were seen, ascending.
+    /// Markers that were seen, ascending, by themselves; how they are coupled with the rest is told by [`equations`].
     pub markers: Vec<MarkerTerms>,
     /// Residuals of the observations in use.
     pub residuals: Vec<Residual>,
@@ -77,12 +59,19 @@ pub struct Weighting {
     pub pixel_factor: f64,
     /// Huber bound on the normalised length.
     pub huber: f64,
+    /// Every how many-th of the observations in use counts.
+    pub every: usize,
 }
 
 impl Weighting {
     /// Of an image of `problem`.
     pub fn of(problem: &Problem, image: &Image) -> Self {
-        Self { pixel_factor: problem.noise.pixel_factor[image.camera], huber: problem.huber }
+        Self { pixel_factor: problem.noise.pixel_factor[image.camera], huber: problem.huber, every: 1 }
+    }
+
+    /// With about `enough` of the observations of the image.
+    pub fn thinned(self, image: &Image, enough: usize) -> Self {
+        Self { every: (image.observations.len() / enough).max(1), ..self }
     }
 
     fn huber(&self, length: f64) -> (f64, f64) {
@@ -102,109 +91,98 @@ pub fn predict(image: &Image, state: &State, pose: &Pose, observation: &Measured
 
 /// Normal-equation blocks of one image at a camera pose; `None` where an observed marker is behind the camera.
 pub fn linearise(image: &Image, state: &State, pose: &Pose, weighting: &Weighting) -> Option<ImageTerms> {
+    let mut cost = 0.0;
+    let mut residuals = Vec::with_capacity(image.observations.len());
+    let equations = whitened(image, state, pose, weighting, |share, residual| {
+        cost += share;
+        residuals.push(residual);
+    })?;
     let camera = &state.cameras[image.camera];
-    let intrinsics = E + camera.parameters.len() - camera.parametric();
-    let mut t = ImageTerms {
-        cost: 0.0,
-        pp: Matrix6::zeros(),
-        pe: Matrix6xX::zeros(intrinsics),
-        ee: DMatrix::zeros(intrinsics, intrinsics),
-        bp: Vector6::zeros(),
-        be: DVector::zeros(intrinsics),
-        markers: Vec::with_capacity(image.observations.len()),
-        residuals: Vec::with_capacity(image.observations.len()),
-    };
-    let plate = &state.plates[image.plate];
-    for (index, o) in image.observations.iter().enumerate().filter(|(_, o)| o.rejected.is_none()) {
-        let p = predict(image, state, pose, o)?;
-        let r = o.uv - p.uv;
-        let information = o.information / (weighting.pixel_factor * weighting.pixel_factor);
-        let normalised = (r.dot(&(information * r))).max(0.0).sqrt();
+    let field = camera.parameters.len() - camera.parametric();
+    Some(ImageTerms::new(cost, &equations, field, residuals))
+}
+
+/// The equations that [`linearise`] sums up.
+pub fn equations(image: &Image, state: &State, pose: &Pose, weighting: &Weighting) -> Option<Equations> {
+    whitened(image, state, pose, weighting, |_, _| ())
+}
+
+/// `tell` hears of every observation in use, with its robust cost.
+fn whitened(
+    image: &Image,
+    state: &State,
+    pose: &Pose,
+    weighting: &Weighting,
+    mut tell: impl FnMut(f64, Residual),
+) -> Option<Equations> {
+    let (plate, camera) = (&state.plates[image.plate], &state.cameras[image.camera]);
+    let precision = 1.0 / weighting.pixel_factor;
+    let used = image.observations.iter().enumerate().filter(|(_, o)| o.rejected.is_none());
+    let most = image.observations.len().div_ceil(weighting.every);
+    let mut equations = Collector::new(most, camera.parametric());
+    let mut stated = (Matrix2::zeros(), Matrix2::zeros());
+    for (observation, o) in used.step_by(weighting.every) {
+        let modes = plate.modes_at(o.marker);
+        let p = circle::centroid(camera, pose, &plate.position_by(&modes, o.marker), o.radius_m)?;
+        let duv = o.uv - p.uv;
+        // Observations one after the other are often alike.
+        if stated.0 != o.information {
+            stated = (o.information, square_root(&o.information) * precision);
+        }
+        let root = stated.1;
+        let normalised = (root * duv).norm();
         let (cost, weight) = weighting.huber(normalised);
-        t.cost += cost;
-        t.residuals.push(Residual { observation: index, duv: r, normalised, weight });
-        t.add(o.marker, &p, &basis(&plate.nominal[o.marker], plate.half_diagonal_m), &r, &(information * weight));
+        let weighted = if weight < 1.0 { root * weight.sqrt() } else { root };
+        equations.add(o.marker, &p, &modes, &duv, &weighted);
+        tell(cost, Residual { observation, duv, normalised, weight });
     }
-    Some(t)
+    Some(equations.finish())
+}
+
+/// `F'` of a positive semidefinite matrix `F F'`, upper triangular.
+fn square_root(m: &Matrix2<f64>) -> Matrix2<f64> {
+    let a = m[(0, 0)].max(0.0).sqrt();
+    let b = if a > 0.0 { m[(0, 1)] / a } else { 0.0 };
+    Matrix2::new(a, b, 0.0, (m[(1, 1)] - b * b).max(0.0).sqrt())
 }
 
 impl ImageTerms {
-    fn add(
-        &mut self,
-        marker: usize,
-        p: &Prediction,
-        modes: &SMatrix<f64, 3, MODES>,
-        r: &Vector2<f64>,
-        w: &Matrix2<f64>,
-    ) {
-        let mut je = SMatrix::<f64, 2, E>::zeros();
-        je.fixed_view_mut::<2, MAX_PARAMETERS>(0, 0).copy_from(&p.d_camera);
-        je.fixed_view_mut::<2, MODES>(0, MAX_PARAMETERS).copy_from(&(p.d_marker * modes));
-        let (wp, we, wr) = (w * p.d_pose, w * je, w * r);
-        self.pp += p.d_pose.transpose() * wp;
-        self.bp += p.d_pose.transpose() * wr;
-        let mut pe = self.pe.fixed_columns_mut::<E>(0);
-        pe += p.d_pose.transpose() * we;
-        let mut ee = self.ee.fixed_view_mut::<E, E>(0, 0);
-        ee += je.transpose() * we;
-        let mut be = self.be.fixed_rows_mut::<E>(0);
-        be += je.transpose() * wr;
-        self.add_field(p, &wp, &we, &wr, w);
-        let jm = p.d_marker.transpose();
-        let (mm, mp, me, bm) = (jm * w * p.d_marker, jm * wp, jm * we, jm * wr);
-        let field = p.d_field.iter().map(|(k, d)| (*k, jm * w * d));
-        match self.markers.last_mut().filter(|last| last.marker == marker) {
-            Some(last) => {
-                last.mm += mm;
-                last.mp += mp;
-                last.me += me;
-                last.bm += bm;
-                field.for_each(|f| last.add_field(f));
-            }
-            None => self.markers.push(MarkerTerms { marker, mm, mp, me, bm, field: field.collect() }),
+    /// Of equations with `field` unknowns of a displacement field behind those that all lenses have.
+    fn new(cost: f64, equations: &Equations, field: usize, residuals: Vec<Residual>) -> Self {
+        let products = equations.products();
+        let mut pe = Matrix6xX::zeros(E + field);
+        pe.fixed_columns_mut::<E>(0).copy_from(&products.pose_with_intrinsics());
+        let mut ee = DMatrix::zeros(E + field, E + field);
+        ee.fixed_view_mut::<E, E>(0, 0).copy_from(&products.intrinsics());
+        let mut be = DVector::zeros(E + field);
+        be.fixed_rows_mut::<E>(0).copy_from(&products.intrinsics_with_residual());
+        let (pp, bp) = (products.pose(), products.pose_with_residual());
+        let mut terms = Self { cost, pp, pe, ee, bp, be, markers: equations.marker_terms(), residuals };
+        if field > 0 {
+            terms.add_field(equations);
         }
+        terms
     }
 
-    fn add_field(
-        &mut self,
-        p: &Prediction,
-        wp: &SMatrix<f64, 2, 6>,
-        we: &SMatrix<f64, 2, E>,
-        wr: &Vector2<f64>,
-        w: &Matrix2<f64>,
-    ) {
-        for (k, d) in &p.d_field {
-            let (column, dt) = (E + 2 * k, d.transpose());
-            let mut pe = self.pe.fixed_columns_mut::<2>(column);
-            pe += wp.transpose() * d;
-            let mut be = self.be.fixed_rows_mut::<2>(column);
-            be += dt * wr;
-            let with_e = dt * we;
-            let mut row = self.ee.fixed_view_mut::<2, E>(column, 0);
-            row += with_e;
-            let mut transposed = self.ee.fixed_view_mut::<E, 2>(0, column);
-            transposed += with_e.transpose();
-            let dw = dt * w;
-            for (other, e) in &p.d_field {
-                let mut block = self.ee.fixed_view_mut::<2, 2>(column, E + 2 * other);
-                block += dw * e;
+    fn add_field(&mut self, equations: &Equations) {
+        for sight in equations.sights() {
+            for (k, d) in sight.by_field() {
+                let (column, dt) = (E + 2 * k, d.transpose());
+                let mut pe = self.pe.fixed_columns_mut::<2>(column);
+                pe += sight.by_pose() * d;
+                let mut be = self.be.fixed_rows_mut::<2>(column);
+                be += dt * sight.residual();
+                let with_e = sight.by_intrinsics() * d;
+                let mut row = self.ee.fixed_view_mut::<2, E>(column, 0);
+                row += with_e.transpose();
+                let mut transposed = self.ee.fixed_view_mut::<E, 2>(0, column);
+                transposed += with_e;
+                for (other, e) in sight.by_field() {
+                    let mut block = self.ee.fixed_view_mut::<2, 2>(column, E + 2 * other);
+                    block += dt * e;
+                }
             }
         }
-    }
-}
-
-impl MarkerTerms {
-    fn add_field(&mut self, (k, coupling): (usize, Matrix3x2<f64>)) {
-        match self.field.binary_search_by_key(&k, |f| f.0) {
-            Ok(at) => self.field[at].1 += coupling,
-            Err(at) => self.field.insert(at, (k, coupling)),
-        }
-    }
-
-    /// Coupling with every intrinsic unknown that it touches: its index, and a column.
-    pub fn intrinsics(&self) -> impl Iterator<Item = (usize, Vector3<f64>)> + '_ {
-        let field = self.field.iter().flat_map(|(k, c)| [0, 1].map(|d| (E + 2 * k + d, c.column(d).into_owned())));
-        (0..E).map(|e| (e, self.me.column(e).into_owned())).chain(field)
     }
 }
 

@@ -3,6 +3,7 @@
 //! [`Problem`] holds the data and never changes during a solve; [`State`] holds every unknown; [`Layout`] is the one place
 //! that turns a name into a column. The unit of residual evaluation is one image ([`linearise`]).
 
+mod equations;
 mod family;
 mod layout;
 mod linearise;
@@ -10,9 +11,10 @@ mod postures;
 mod select;
 mod state;
 
+pub use equations::{Equations, MarkerCoupling, MarkerTerms, Sight};
 pub use family::Family;
 pub use layout::{Column, Layout, OriginPrior};
-pub use linearise::{Chained, E, ImageTerms, MarkerTerms, Residual, Weighting, chained, linearise, predict};
+pub use linearise::{Chained, E, ImageTerms, Residual, Weighting, chained, equations, linearise, predict};
 pub use postures::{common_readings, joined, posture_groups};
 pub use select::short_name;
 pub use state::{PlateShape, Slack, State, Step};
@@ -103,6 +105,9 @@ impl Noise {
     }
 }
 
+/// Smallest prior sigma of a marker coordinate, m: below it a marker counts as fixed.
+const FIXED_MARKER_SIGMA_M: f64 = 1e-9;
+
 /// Everything that is given.
 #[derive(Debug, Clone)]
 pub struct Problem {
@@ -173,6 +178,11 @@ impl Problem {
     pub fn joint_sigma(&self, camera: usize) -> Vec<f64> {
         let local = self.noise.local.iter().chain(std::iter::repeat(&0.0));
         self.noise.joint[camera].iter().zip(local).map(|(own, local)| own.hypot(*local)).collect()
+    }
+
+    /// Information of the prior of a marker's correction, per coordinate, 1/m^2.
+    pub fn marker_information(&self, plate: usize, marker: usize) -> f64 {
+        self.plates[plate].markers[marker].sigma_m.max(FIXED_MARKER_SIGMA_M).powi(-2)
     }
 
     /// Images that take part.

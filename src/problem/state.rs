@@ -1,6 +1,6 @@
 //! Every unknown, with its value.
 
-use nalgebra::{DVector, Vector2, Vector3, Vector6};
+use nalgebra::{DVector, SMatrix, SVector, Vector2, Vector3, Vector6};
 
 use super::linearise::{seen_centre, tilt_axes};
 use super::{Image, Layout};
@@ -87,10 +87,20 @@ impl PlateShape {
         }
     }
 
+    /// How a marker moves with the modes.
+    pub fn modes_at(&self, marker: usize) -> SMatrix<f64, 3, MODES> {
+        basis(&self.nominal[marker], self.half_diagonal_m)
+    }
+
     /// Position of a marker in the plate frame, m.
     pub fn position(&self, marker: usize) -> Vector3<f64> {
-        let x = &self.nominal[marker];
-        x + basis(x, self.half_diagonal_m) * nalgebra::SVector::from(self.modes) + self.corrections[marker]
+        self.position_by(&self.modes_at(marker), marker)
+    }
+
+    /// The same, where what the modes do is at hand.
+    #[inline]
+    pub fn position_by(&self, modes: &SMatrix<f64, 3, MODES>, marker: usize) -> Vector3<f64> {
+        self.nominal[marker] + modes * SVector::from(self.modes) + self.corrections[marker]
     }
 }
 

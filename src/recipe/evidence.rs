@@ -18,9 +18,6 @@ use crate::urdf::Chain;
 /// probability*, 1961). Gears have errors and arms sag; that there is nothing of it must be plain.
 const DECISIVE: f64 = 4.605;
 
-/// Smallest prior sigma of a marker coordinate, m, as in the normal equations.
-const FIXED_MARKER_SIGMA_M: f64 = 1e-9;
-
 /// Evidence of a robot model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
@@ -93,9 +90,9 @@ fn log_evidence(problem: &Problem, state: &State, lin: &Linearised) -> Option<f6
         terms.markers.iter().for_each(|t| markers[problem.images[i].plate][t.marker] += t.mm);
     }
     let mut eliminated = 0.0;
-    for (plate, blocks) in problem.plates.iter().zip(&markers) {
-        for (marker, block) in plate.markers.iter().zip(blocks) {
-            let prior = marker.sigma_m.max(FIXED_MARKER_SIGMA_M).powi(-2);
+    for (plate, blocks) in markers.iter().enumerate() {
+        for (marker, block) in blocks.iter().enumerate() {
+            let prior = problem.marker_information(plate, marker);
             eliminated += (block + Matrix3::from_diagonal_element(prior)).determinant().ln();
         }
     }

@@ -5,12 +5,14 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::by_markers::number_markers;
-use super::dense_rows::{FreeColumns, PoseRows};
-use super::system::{Carried, FIXED_MARKER_SIGMA_M, Linearised};
+use super::blocks::{
+    DenseCoupling, PoseRows, SeenMarkers, dense_gradient, free_columns, slack_gradient, slack_information,
+    slack_with_markers,
+};
+use super::system::{Carried, Linearised};
 use crate::linalg::{mirror_upper, product, subtract_gram};
 use crate::model::plate_modes::MODES;
-use crate::problem::{Problem, Slack, State, Step};
+use crate::problem::{Equations, Problem, State, Step};
 
 /// Images whose couplings form one Gram product.
 const IMAGES_A_PRODUCT: usize = 48;
@@ -32,52 +34,66 @@ struct Block {
 #[derive(Debug, Clone)]
 pub(super) struct SlackEliminated {
     blocks: Vec<Block>,
-    /// First unknown of every marker that was seen, per plate.
-    marker_start: Vec<Vec<Option<usize>>>,
+    seen: SeenMarkers,
+    /// Number of dense columns: the first unknown of the markers.
+    dense: usize,
 }
 
 impl SlackEliminated {
-    /// Information and right-hand side; priors of slack and markers are in, those of the dense columns are not.
+    /// Information with the priors of slack and markers, without those of the dense columns; markers that are not among those `seen` stay
+    /// where they are.
     pub fn build(
         problem: &Problem,
         state: &State,
         lin: &Linearised,
         lambda: f64,
-    ) -> (DMatrix<f64>, DVector<f64>, Self) {
+        seen: SeenMarkers,
+    ) -> (DMatrix<f64>, Self) {
         let dense = problem.layout.len();
-        let (number, order) = number_markers(problem, lin);
-        let start = |at: &Option<usize>| at.map(|at| dense + 3 * at);
-        let marker_start: Vec<Vec<Option<usize>>> =
-            number.iter().map(|plate| plate.iter().map(start).collect()).collect();
-        let n = dense + 3 * order.len();
-        let (mut a, mut rhs) = (DMatrix::zeros(n, n), DVector::zeros(n));
-        for (at, &(plate, marker)) in order.iter().enumerate() {
-            let prior = problem.plates[plate].markers[marker].sigma_m.max(FIXED_MARKER_SIGMA_M).powi(-2);
-            let start = dense + 3 * at;
-            a.fixed_view_mut::<3, 3>(start, start).copy_from(&Matrix3::from_diagonal_element(prior));
-            rhs.fixed_rows_mut::<3>(start).copy_from(&(state.plates[plate].corrections[marker] * -prior));
-        }
+        let n = dense + 3 * seen.order.len();
+        let mut a = DMatrix::zeros(n, n);
         let poses = PoseRows::new(problem, lin);
-        poses.add_to(problem, lin, &mut a, &mut rhs);
+        poses.add_to(problem, lin, &mut a);
+        for (at, information) in seen.information(problem, lin).iter().enumerate() {
+            a.fixed_view_mut::<3, 3>(dense + 3 * at, dense + 3 * at).copy_from(information);
+        }
+        let mut coupling = DenseCoupling::new(problem, &seen);
         let mut blocks = Vec::with_capacity(lin.images.len());
         for k in 0..lin.images.len() {
-            add_markers(problem, lin, k, &marker_start, (&mut a, &mut rhs));
-            blocks.push(Block::new(problem, state, lin, k, lambda, (&poses, &marker_start)));
+            let equations = if seen.order.is_empty() { None } else { lin.equations(problem, state, k) };
+            equations.iter().for_each(|e| coupling.add(problem, lin, k, &seen, e));
+            blocks.push(Block::new(problem, state, lin, k, lambda, (&poses, &seen, equations.as_ref())));
         }
+        coupling.copy_to(&mut a, dense);
         for part in blocks.chunks(IMAGES_A_PRODUCT) {
             let mut y = DMatrix::zeros(n, part.iter().map(|b| b.y.ncols()).sum());
-            let mut first = 0;
-            for block in part {
-                for (at, &row) in block.rows.iter().enumerate() {
-                    (0..block.y.ncols()).for_each(|s| y[(row, first + s)] = block.y[(at, s)]);
-                    rhs[row] -= (block.y.row(at) * &block.rhs)[0];
-                }
-                first += block.y.ncols();
+            let mut into = y.column_iter_mut();
+            for column in part.iter().flat_map(|b| b.y.column_iter().map(|column| (&b.rows, column))) {
+                let Some(mut into) = into.next() else { break };
+                column.0.iter().zip(column.1.iter()).for_each(|(&row, value)| into[row] = *value);
             }
             subtract_gram(&mut a, &y);
         }
         mirror_upper(&mut a);
-        (a, rhs, Self { blocks, marker_start })
+        (a, Self { blocks, seen, dense })
+    }
+
+    /// Takes over the right-hand sides of the slack at a linearisation; returns the reduced one, without the priors of the dense columns.
+    pub fn reduce_gradient(&mut self, problem: &Problem, state: &State, lin: &Linearised) -> DVector<f64> {
+        let dense = problem.layout.len();
+        let mut reduced = dense_gradient(problem, lin).resize_vertically(dense + 3 * self.seen.order.len(), 0.0);
+        reduced.rows_range_mut(dense..).copy_from(&self.seen.gradient(problem, state, lin));
+        for (k, block) in self.blocks.iter_mut().enumerate() {
+            block.rhs = &block.inverse_factor * slack_gradient(problem, state, lin, k);
+            let taken = &block.y * &block.rhs;
+            block.rows.iter().zip(taken.iter()).for_each(|(&row, value)| reduced[row] -= value);
+        }
+        reduced
+    }
+
+    /// `b' H^-1 b` of the right-hand sides of the slack.
+    pub fn squares(&self) -> f64 {
+        self.blocks.iter().map(|b| b.rhs.norm_squared()).sum()
     }
 
     /// The whole step from the solution `x` of the reduced system.
@@ -88,9 +104,10 @@ impl SlackEliminated {
             let dl = block.inverse_factor.tr_mul(&(&block.rhs - block.y.tr_mul(&own)));
             slack[image] = dl.as_slice().to_vec();
         }
-        let correction = |start: &Option<usize>| start.map_or(Vector3::zeros(), |s| x.fixed_rows::<3>(s).into_owned());
-        let markers = self.marker_start.iter().map(|plate| plate.iter().map(correction).collect()).collect();
-        Step { dense: x.rows(0, problem.layout.len()).into_owned(), slack, markers }
+        let of = |at: usize| x.fixed_rows::<3>(self.dense + 3 * at).into_owned();
+        let step = |at: &Option<usize>| at.map_or(Vector3::zeros(), of);
+        let markers = self.seen.number.iter().map(|plate| plate.iter().map(step).collect()).collect();
+        Step { dense: x.rows(0, self.dense).into_owned(), slack, markers }
     }
 
     /// `H^-1 + H^-1 B' cov(x) B H^-1`.
@@ -115,30 +132,10 @@ impl SlackEliminated {
             let of_modes = modes * reduced.fixed_view::<MODES, MODES>(modes_start, modes_start) * modes.transpose();
             own + with_modes + with_modes.transpose() + of_modes
         };
-        let plate = |(p, starts): (usize, &Vec<Option<usize>>)| {
-            starts.iter().enumerate().map(|(m, start)| start.map(|s| of(p, m, s))).collect()
+        let plate = |(p, number): (usize, &Vec<Option<usize>>)| {
+            number.iter().enumerate().map(|(m, at)| at.map(|at| of(p, m, self.dense + 3 * at))).collect()
         };
-        self.marker_start.iter().enumerate().map(plate).collect()
-    }
-}
-
-/// Markers of an image with themselves and with the dense columns: upper triangle.
-fn add_markers(
-    problem: &Problem,
-    lin: &Linearised,
-    k: usize,
-    marker_start: &[Vec<Option<usize>>],
-    (a, rhs): (&mut DMatrix<f64>, &mut DVector<f64>),
-) {
-    let image = &problem.images[lin.images[k]];
-    let columns = FreeColumns::of(problem, image, &lin.chains[k]);
-    for t in &lin.terms[k].markers {
-        let Some(start) = marker_start[image.plate][t.marker] else { continue };
-        columns.add_coupling(a, start, t);
-        let mut own = a.fixed_view_mut::<3, 3>(start, start);
-        own += t.mm;
-        let mut b = rhs.fixed_rows_mut::<3>(start);
-        b += t.bm;
+        self.seen.number.iter().enumerate().map(plate).collect()
     }
 }
 
@@ -149,38 +146,27 @@ impl Block {
         lin: &Linearised,
         k: usize,
         lambda: f64,
-        (poses, marker_start): (&PoseRows, &[Vec<Option<usize>>]),
+        (poses, seen, equations): (&PoseRows, &SeenMarkers, Option<&Equations>),
     ) -> Self {
-        let (terms, l, image) = (&lin.terms[k], &lin.chains[k].d_slack, &problem.images[lin.images[k]]);
-        let mut h = l.tr_mul(&(terms.pp * l));
-        let mut rhs = l.tr_mul(&terms.bp);
-        if let Slack::Joints(dq) = &state.slack[lin.images[k]] {
-            for (s, q) in dq.iter().enumerate() {
-                let information = problem.slack_information(image, s);
-                h[(s, s)] += information;
-                rhs[s] -= q * information;
-            }
-        }
-        for s in 0..h.nrows() {
-            h[(s, s)] *= 1.0 + lambda;
-        }
+        let l = &lin.chains[k].d_slack;
+        let mut h = slack_information(problem, state, lin, k);
+        (0..h.nrows()).for_each(|s| h[(s, s)] *= 1.0 + lambda);
         let factor = h.cholesky().and_then(|c| c.l().try_inverse());
         let inverse_factor = factor.unwrap_or_else(|| DMatrix::zeros(l.ncols(), l.ncols()));
         // Columns that stay at their value take no part, nor in the back-substitution.
-        let columns = FreeColumns::of(problem, image, &lin.chains[k]);
-        let mut rows: Vec<usize> = columns.all().collect();
-        let first_marker = rows.len();
-        let seen = terms.markers.iter().filter_map(|t| marker_start[image.plate][t.marker]);
-        rows.extend(seen.flat_map(|s| s..s + 3));
-        let mut b = DMatrix::zeros(rows.len(), l.ncols());
-        for (at, &c) in rows[..first_marker].iter().enumerate() {
-            b.row_mut(at).copy_from(&poses.coupling.fixed_view::<6, 1>(6 * k, c).tr_mul(l));
+        let mut rows = free_columns(problem, lin, k);
+        let columns = rows.iter().map(|&c| l.tr_mul(&poses.coupling.fixed_view::<6, 1>(6 * k, c)));
+        let mut coupling = DMatrix::from_iterator(l.ncols(), rows.len(), columns.flat_map(|c| c.as_slice().to_vec()));
+        if let Some(equations) = equations {
+            let number = &seen.number[problem.images[lin.images[k]].plate];
+            let (markers, with_markers) = slack_with_markers(lin, k, equations);
+            let first = rows.len();
+            let starts = markers.iter().filter_map(|&m| number[m].map(|at| problem.layout.len() + 3 * at));
+            rows.extend(starts.flat_map(|start| start..start + 3));
+            coupling = coupling.resize_horizontally(rows.len(), 0.0);
+            coupling.columns_range_mut(first..).copy_from(&with_markers);
         }
-        for (m, t) in terms.markers.iter().enumerate() {
-            b.rows_mut(first_marker + 3 * m, 3).copy_from(&(t.mp * l));
-        }
-        let y = b * inverse_factor.transpose();
-        let rhs = &inverse_factor * rhs;
-        Self { inverse_factor, rows, y, rhs }
+        let y = product(&coupling.transpose(), &inverse_factor.transpose());
+        Self { inverse_factor, rows, y, rhs: DVector::zeros(l.ncols()) }
     }
 }

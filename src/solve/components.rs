@@ -3,6 +3,8 @@
 //! `s^2 = sum r^2 / (redundancy)`: every group of residuals is divided by the number of them that the parameters did not use up.
 //! For joint noise the redundancy of one latent is `1 - C / sigma^2` with its posterior variance C. Started from above.
 
+use nalgebra::Matrix3;
+
 use super::covariance::{Covariance, covariance};
 use super::levenberg::{Outcome, Settings, Status, solve};
 use super::system::Linearised;
@@ -129,6 +131,9 @@ fn update_families(problem: &mut Problem, state: &State, cov: &Covariance) -> f6
 
 /// Huber's weights take a little off the sum of squares of clean Gaussian data (two components); this gives it back.
 fn huber_consistency(k: f64) -> f64 {
+    if k.is_infinite() {
+        return 1.0;
+    }
     let tail = (-0.5 * k * k).exp();
     let q = normal_upper_tail(k);
     let lost = (k * k + 2.0) * tail - k * (k * tail + (std::f64::consts::TAU).sqrt() * q);
@@ -164,10 +169,11 @@ pub(super) fn effective_parameters(problem: &Problem, state: &State, lin: &Linea
         };
     }
     let covariances = cov.markers();
-    let markers: f64 = (problem.plates.iter().zip(&covariances))
-        .flat_map(|(plate, covariances)| plate.markers.iter().zip(covariances))
-        .filter_map(|(m, c)| c.map(|c| 3.0 - c.trace() / m.sigma_m.max(1e-9).powi(2)))
-        .sum();
+    let of_plate = |(p, covariances): (usize, &Vec<Option<Matrix3<f64>>>)| -> f64 {
+        let of = |(m, c): (usize, &Option<Matrix3<f64>>)| c.map(|c| 3.0 - c.trace() * problem.marker_information(p, m));
+        covariances.iter().enumerate().filter_map(of).sum()
+    };
+    let markers: f64 = covariances.iter().enumerate().map(of_plate).sum();
     dense + slack + markers
 }
 

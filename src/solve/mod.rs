@@ -1,10 +1,10 @@
 //! The solver: block elimination, Levenberg-Marquardt, variance components, rejection.
 
+mod blocks;
 mod by_markers;
 mod by_slack;
 mod components;
 mod covariance;
-mod dense_rows;
 mod levenberg;
 mod snoop;
 mod system;

@@ -1,15 +1,15 @@
 //! Reduced normal equations: dense columns, and either the slack of the images or the markers; the other family is eliminated.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 use rayon::prelude::*;
 
+use super::blocks::SeenMarkers;
 use super::by_markers::MarkersEliminated;
 use super::by_slack::SlackEliminated;
-use crate::model::plate_modes::{MODES, basis};
-use crate::problem::{Chained, ImageTerms, Problem, Slack, State, Step, Weighting, chained, linearise};
-
-/// Smallest prior sigma of a marker coordinate, m: below it a marker counts as fixed.
-pub(super) const FIXED_MARKER_SIGMA_M: f64 = 1e-9;
+use crate::model::plate_modes::MODES;
+use crate::problem::{
+    Chained, Equations, ImageTerms, Problem, Slack, State, Step, Weighting, chained, equations, linearise,
+};
 
 /// All images linearised at one state.
 #[derive(Debug, Clone)]
@@ -24,15 +24,29 @@ pub struct Linearised {
     pub cost: f64,
 }
 
+impl Linearised {
+    /// Equations of the k-th image in use at the state that was linearised; `None` only at another one.
+    pub fn equations(&self, problem: &Problem, state: &State, k: usize) -> Option<Equations> {
+        let image = &problem.images[self.images[k]];
+        equations(image, state, &self.chains[k].pose, &Weighting::of(problem, image))
+    }
+}
+
 /// Linearises every image in use; `None` where a marker lies behind a camera.
 pub fn linearise_all(problem: &Problem, state: &State) -> Option<Linearised> {
+    linearise_some(problem, state, usize::MAX)
+}
+
+/// As [`linearise_all`] with about `enough` observations of every image, evenly chosen.
+pub(super) fn linearise_some(problem: &Problem, state: &State, enough: usize) -> Option<Linearised> {
     let images: Vec<usize> = problem.used().map(|(i, _)| i).collect();
     let parts: Option<Vec<(ImageTerms, Chained)>> = images
         .par_iter()
         .map(|&i| {
             let image = &problem.images[i];
             let chain = chained(problem, state, image, &state.slack[i])?;
-            let terms = linearise(image, state, &chain.pose, &Weighting::of(problem, image))?;
+            let weighting = Weighting::of(problem, image).thinned(image, enough);
+            let terms = linearise(image, state, &chain.pose, &weighting)?;
             Some((terms, chain))
         })
         .collect();
@@ -48,10 +62,11 @@ fn prior_cost(problem: &Problem, state: &State, images: &[usize]) -> f64 {
         .map(|(c, v)| ((v - c.prior_mean) / c.prior_sigma).powi(2))
         .sum();
     let held: f64 = problem.families.iter().map(|f| f.squares(&values)).sum();
-    let markers: f64 = (problem.plates.iter().zip(&state.plates))
-        .flat_map(|(plate, shape)| plate.markers.iter().zip(&shape.corrections))
-        .map(|(m, c)| c.norm_squared() / m.sigma_m.max(FIXED_MARKER_SIGMA_M).powi(2))
-        .sum();
+    let corrections = state.plates.iter().enumerate().flat_map(|(p, shape)| {
+        let of = move |(m, c): (usize, &Vector3<f64>)| c.norm_squared() * problem.marker_information(p, m);
+        shape.corrections.iter().enumerate().map(of)
+    });
+    let markers: f64 = corrections.sum();
     let slack: f64 = images
         .iter()
         .map(|&i| match &state.slack[i] {
@@ -72,6 +87,8 @@ pub enum Elimination {
     Markers,
     /// Slack, image by image: the markers stay. Cheaper for many images.
     Slack,
+    /// Slack, and no marker moves: costs next to nothing beside the others.
+    SlackMarkersHeld,
 }
 
 impl Elimination {
@@ -115,39 +132,58 @@ impl System {
 
     /// As [`System::new`] by a given elimination.
     pub fn with(which: Elimination, problem: &Problem, state: &State, lin: &Linearised, lambda: f64) -> Self {
-        let (information, rhs, slack_start, eliminated) = match which {
+        let (information, eliminated) = match which {
             Elimination::Markers => {
-                let (a, b, start, rest) = MarkersEliminated::build(problem, state, lin, lambda);
-                (a, b, start, Eliminated::Markers(rest))
+                let (a, rest) = MarkersEliminated::build(problem, state, lin, lambda);
+                (a, Eliminated::Markers(rest))
             }
-            Elimination::Slack => {
-                let (a, b, rest) = SlackEliminated::build(problem, state, lin, lambda);
-                (a, b, Vec::new(), Eliminated::Slack(rest))
+            Elimination::Slack | Elimination::SlackMarkersHeld => {
+                let held = which == Elimination::SlackMarkersHeld;
+                let seen = if held { SeenMarkers::none(problem) } else { SeenMarkers::of(problem, lin) };
+                let (a, rest) = SlackEliminated::build(problem, state, lin, lambda, seen);
+                (a, Eliminated::Slack(rest))
             }
         };
+        let slack_start = if let Eliminated::Markers(e) = &eliminated { e.slack_start.clone() } else { Vec::new() };
+        let rhs = DVector::zeros(information.nrows());
         let mut system = Self { information, rhs, slack_start, touched: Vec::new(), eliminated };
-        system.add_priors(problem, state);
+        system.add_priors(problem);
         for i in 0..system.rhs.len() {
             system.information[(i, i)] *= 1.0 + lambda;
         }
         system.hold_fixed(problem);
+        system.take_gradient(problem, state, lin);
         system
     }
 
-    fn add_priors(&mut self, problem: &Problem, state: &State) {
+    /// Takes over the right-hand sides at another linearisation; the information stays.
+    pub fn take_gradient(&mut self, problem: &Problem, state: &State, lin: &Linearised) {
+        self.rhs = match &mut self.eliminated {
+            Eliminated::Markers(e) => e.reduce_gradient(problem, state, lin),
+            Eliminated::Slack(e) => e.reduce_gradient(problem, state, lin),
+        };
         let values = state.values(&problem.layout);
         for (i, c) in problem.layout.columns.iter().enumerate() {
-            let information = c.prior_sigma.powi(-2);
-            if information > 0.0 {
-                self.information[(i, i)] += information;
-                self.rhs[i] += (c.prior_mean - values[i]) * information;
-            }
+            self.rhs[i] += (c.prior_mean - values[i]) * c.prior_sigma.powi(-2);
         }
         for (family, information) in problem.families.iter().filter_map(|f| Some((f, f.information()?))) {
             let own = DVector::from_iterator(family.columns.len(), family.columns.iter().map(|&c| values[c]));
             let pull = &information * own;
+            family.columns.iter().zip(pull.iter()).for_each(|(&row, pull)| self.rhs[row] -= pull);
+        }
+        for (i, c) in problem.layout.columns.iter().enumerate() {
+            if !c.free || !self.touched[i] {
+                self.rhs[i] = 0.0;
+            }
+        }
+    }
+
+    fn add_priors(&mut self, problem: &Problem) {
+        for (i, c) in problem.layout.columns.iter().enumerate() {
+            self.information[(i, i)] += c.prior_sigma.powi(-2);
+        }
+        for (family, information) in problem.families.iter().filter_map(|f| Some((f, f.information()?))) {
             for (i, &row) in family.columns.iter().enumerate() {
-                self.rhs[row] -= pull[i];
                 for (k, &column) in family.columns.iter().enumerate() {
                     self.information[(row, column)] += information[(i, k)];
                 }
@@ -163,7 +199,6 @@ impl System {
                 self.information.row_mut(i).fill(0.0);
                 self.information.column_mut(i).fill(0.0);
                 self.information[(i, i)] = 1.0;
-                self.rhs[i] = 0.0;
             }
         }
     }
@@ -176,9 +211,18 @@ impl System {
     /// The whole step from the solution `x` of the reduced system.
     pub fn step(&self, problem: &Problem, lin: &Linearised, x: &DVector<f64>) -> Step {
         match &self.eliminated {
-            Eliminated::Markers(e) => e.step(problem, lin, &self.slack_start, x),
+            Eliminated::Markers(e) => e.step(problem, lin, x),
             Eliminated::Slack(e) => e.step(problem, lin, x),
         }
+    }
+
+    /// Newton decrement of the step that belongs to `x`: the square root of `step' rhs` of all unknowns, those eliminated included.
+    pub fn decrement(&self, x: &DVector<f64>) -> f64 {
+        let eliminated = match &self.eliminated {
+            Eliminated::Markers(e) => e.squares(),
+            Eliminated::Slack(e) => e.squares(),
+        };
+        (x.dot(&self.rhs) + eliminated).max(0.0).sqrt()
     }
 
     /// Covariance of the slack of the k-th image in use, from the covariance of the reduced unknowns.
@@ -205,7 +249,7 @@ impl System {
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         let carried = |plate: usize, marker: usize| {
             let shape = &state.plates[plate];
-            (problem.layout.shapes[plate].start, basis(&shape.nominal[marker], shape.half_diagonal_m))
+            (problem.layout.shapes[plate].start, shape.modes_at(marker))
         };
         self.marker_covariances_with(reduced, Some(&carried))
     }

@@ -267,31 +267,34 @@ impl Camera {
     }
 
     /// As [`Camera::project`], with derivatives; `None` only behind the camera, so that an adjustment can pass through a poor state.
+    #[inline(always)]
     pub fn project_with_jacobian(&self, x_camera: &Vector3<f64>) -> Option<Projection> {
         let x = normalised(x_camera)?;
-        let d = self.lens.distort(&self.parameters[4..], &x, 1.0 / x_camera.z);
-        let (fx, fy) = (self.parameters[0], self.parameters[1]);
-        let scale = Matrix2::new(fx, 0.0, 0.0, fy);
         let iz = 1.0 / x_camera.z;
-        let d_normalised = Matrix2x3::new(iz, 0.0, -x.x * iz, 0.0, iz, -x.y * iz);
+        let d = self.lens.distort(&self.parameters[4..], &x, iz);
+        let scale = [self.parameters[0], self.parameters[1]];
         let mut d_parameters = SMatrix::<f64, 2, MAX_PARAMETERS>::zeros();
-        d_parameters[(0, 0)] = d.point.x;
-        d_parameters[(1, 1)] = d.point.y;
-        d_parameters[(0, 2)] = 1.0;
-        d_parameters[(1, 3)] = 1.0;
-        d_parameters.fixed_view_mut::<2, { MAX_PARAMETERS - 4 }>(0, 4).copy_from(&(scale * d.d_coefficients));
-        let mut d_point = d.d_point * d_normalised;
-        let mut by_depth = d_point.column_mut(2);
-        by_depth -= d.d_inverse_depth * (iz * iz);
+        let mut d_point = Matrix2x3::zeros();
+        for (c, focal) in scale.into_iter().enumerate() {
+            d_parameters[(c, c)] = d.point[c];
+            d_parameters[(c, 2 + c)] = 1.0;
+            for k in 0..MAX_PARAMETERS - 4 {
+                d_parameters[(c, 4 + k)] = focal * d.d_coefficients[(c, k)];
+            }
+            let [by_x, by_y] = [focal * iz * d.d_point[(c, 0)], focal * iz * d.d_point[(c, 1)]];
+            d_point[(c, 0)] = by_x;
+            d_point[(c, 1)] = by_y;
+            d_point[(c, 2)] = -by_x * x.x - by_y * x.y - focal * iz * iz * d.d_inverse_depth[c];
+        }
         let h = self.to_pixels(&d.point);
         let Some(lattice) = self.lattice() else {
-            return Some(Projection { uv: h, d_point: scale * d_point, d_parameters, field: None });
+            return Some(Projection { uv: h, d_point, d_parameters, field: None });
         };
         let (shift, bend) = self.displacement(&h);
         let by_h = Matrix2::identity() + bend;
         Some(Projection {
             uv: h + shift,
-            d_point: by_h * scale * d_point,
+            d_point: by_h * d_point,
             d_parameters: by_h * d_parameters,
             field: Some(lattice.touched(&h)),
         })

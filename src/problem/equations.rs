@@ -1,0 +1,272 @@
+//! The observations of one image as whitened equations, and how markers are coupled with the other unknowns through them.
+//!
+//! An observation with the weight `W = F F'` gives two equations `F' [J_p, J_e, r]`; all sums of the normal equations are products of
+//! them. A marker moves its image as a shift of the whole plate does, so its derivatives are those of the first three components of the pose.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix3x2, Matrix6x2, SMatrix, SVector, Vector2, Vector3};
+
+use super::linearise::E;
+use crate::linalg::{gram, product_with_rows};
+use crate::model::camera::MAX_PARAMETERS;
+use crate::model::circle::Prediction;
+use crate::model::plate_modes::MODES;
+
+// Rows of an equation: derivatives by the pose and by the modes of the plate, residual, derivatives by the parameters of the formula
+// that the camera has.
+const POSE: usize = 0;
+const P: usize = 6;
+const MODE: usize = POSE + P;
+const RESIDUAL: usize = MODE + MODES;
+const FORMULA: usize = RESIDUAL + 1;
+
+/// Control points of the displacement field that an observation touches, ascending, with the derivative by their u and v.
+type Field = Vec<(usize, Matrix2<f64>)>;
+
+/// Whitened equations of one image, two an observation.
+#[derive(Debug, Clone)]
+pub struct Equations {
+    /// One column an equation.
+    columns: DMatrix<f64>,
+    /// Marker of every observation.
+    pub markers: Vec<usize>,
+    /// Of every observation; empty for a lens without a field.
+    field: Vec<Field>,
+}
+
+/// One observation in the equations of its image.
+#[derive(Debug, Clone, Copy)]
+pub struct Sight<'a> {
+    equations: [&'a [f64]; 2],
+    field: &'a [(usize, Matrix2<f64>)],
+}
+
+/// Collects the equations of one image.
+pub(super) struct Collector {
+    columns: DMatrix<f64>,
+    markers: Vec<usize>,
+    field: Vec<Field>,
+}
+
+impl Collector {
+    /// For at most so many observations, with a lens formula of `formula` parameters.
+    pub fn new(most: usize, formula: usize) -> Self {
+        let columns = DMatrix::zeros(FORMULA + formula, 2 * most);
+        Self { columns, markers: Vec::with_capacity(most), field: Vec::new() }
+    }
+
+    /// Adds an observation with its residual and the square root `F'` of its weight.
+    #[inline(always)]
+    pub fn add(
+        &mut self,
+        marker: usize,
+        p: &Prediction,
+        modes: &SMatrix<f64, 3, MODES>,
+        r: &Vector2<f64>,
+        root: &Matrix2<f64>,
+    ) {
+        let rows = self.columns.nrows();
+        let pair = self.columns.as_mut_slice().chunks_exact_mut(2 * rows).nth(self.markers.len());
+        for (first, second) in pair.into_iter().map(|pair| pair.split_at_mut(rows)) {
+            whiten(&mut first[POSE..], &mut second[POSE..], root, &p.d_pose);
+            whiten(&mut first[MODE..], &mut second[MODE..], root, &(p.d_marker * modes));
+            whiten(&mut first[RESIDUAL..], &mut second[RESIDUAL..], root, r);
+            whiten(&mut first[FORMULA..], &mut second[FORMULA..], root, &p.d_camera);
+        }
+        self.markers.push(marker);
+        if !p.d_field.is_empty() {
+            self.field.push(p.d_field.iter().map(|(k, d)| (*k, root * d)).collect());
+        }
+    }
+
+    pub fn finish(self) -> Equations {
+        let columns = self.columns.resize_horizontally(2 * self.markers.len(), 0.0);
+        Equations { columns, markers: self.markers, field: self.field }
+    }
+}
+
+/// Puts columns, as far as there are rows for them, into both equations.
+#[inline(always)]
+fn whiten<const N: usize>(first: &mut [f64], second: &mut [f64], root: &Matrix2<f64>, columns: &SMatrix<f64, 2, N>) {
+    for ((first, second), uv) in first.iter_mut().zip(second).zip(columns.column_iter()) {
+        *first = root[(0, 0)] * uv[0] + root[(0, 1)] * uv[1];
+        *second = root[(1, 1)] * uv[1];
+    }
+}
+
+/// Row of the equations that belongs to an intrinsic unknown before the field.
+const fn intrinsic_row(e: usize) -> usize {
+    if e < MAX_PARAMETERS { FORMULA + e } else { MODE + e - MAX_PARAMETERS }
+}
+
+impl Equations {
+    /// Every observation, in their order.
+    pub fn sights(&self) -> impl Iterator<Item = Sight<'_>> {
+        let rows = self.columns.nrows();
+        let pairs = self.columns.as_slice().chunks_exact(2 * rows).map(move |pair| pair.split_at(rows));
+        pairs.enumerate().map(|(k, (first, second))| Sight {
+            equations: [first, second],
+            field: self.field.get(k).map_or(&[], Vec::as_slice),
+        })
+    }
+
+    /// Derivatives by unknowns that move the pose as `pose_by` says (unknowns x 6), one column an equation.
+    pub fn through_pose(&self, pose_by: &DMatrix<f64>) -> DMatrix<f64> {
+        product_with_rows(pose_by, &self.columns, POSE..POSE + P)
+    }
+
+    /// Row of an intrinsic unknown before the field; `None` for padding.
+    pub fn intrinsic_row(&self, e: usize) -> Option<usize> {
+        Some(intrinsic_row(e)).filter(|row| *row < self.columns.nrows())
+    }
+
+    /// Sums of products of all rows.
+    pub(super) fn products(&self) -> Products {
+        Products(gram(&self.columns))
+    }
+
+    /// Blocks of every marker that was seen, by itself; observations of one marker stand together.
+    pub(super) fn marker_terms(&self) -> Vec<MarkerTerms> {
+        let mut all: Vec<MarkerTerms> = Vec::with_capacity(self.markers.len());
+        for (&marker, sight) in self.markers.iter().zip(self.sights()) {
+            let by_marker = sight.by_marker();
+            let (mm, bm) = (by_marker * by_marker.transpose(), by_marker * sight.residual());
+            match all.last_mut().filter(|last| last.marker == marker) {
+                Some(last) => {
+                    last.mm += mm;
+                    last.bm += bm;
+                }
+                None => all.push(MarkerTerms { marker, mm, bm }),
+            }
+        }
+        all
+    }
+
+    /// Coupling of every marker that was seen with the other unknowns of the image.
+    pub fn marker_couplings(&self) -> Vec<MarkerCoupling> {
+        let mut all: Vec<MarkerCoupling> = Vec::new();
+        for (&marker, sight) in self.markers.iter().zip(self.sights()) {
+            if all.last().is_none_or(|last| last.marker != marker) {
+                all.push(MarkerCoupling { marker, mp: SMatrix::zeros(), me: SMatrix::zeros(), field: Vec::new() });
+            }
+            all.iter_mut().last().into_iter().for_each(|last| last.add(&sight));
+        }
+        all
+    }
+}
+
+/// `sum w w'` over the equations `w` of an image.
+pub(super) struct Products(DMatrix<f64>);
+
+impl Products {
+    pub fn pose(&self) -> SMatrix<f64, P, P> {
+        self.0.fixed_view::<P, P>(POSE, POSE).into_owned()
+    }
+
+    pub fn pose_with_residual(&self) -> SVector<f64, P> {
+        self.0.fixed_view::<P, 1>(POSE, RESIDUAL).into_owned()
+    }
+
+    pub fn pose_with_intrinsics(&self) -> SMatrix<f64, P, E> {
+        SMatrix::from_fn(|p, e| self.of(POSE + p, intrinsic_row(e)))
+    }
+
+    pub fn intrinsics(&self) -> SMatrix<f64, E, E> {
+        SMatrix::from_fn(|e, f| self.of(intrinsic_row(e), intrinsic_row(f)))
+    }
+
+    pub fn intrinsics_with_residual(&self) -> SVector<f64, E> {
+        SVector::from_fn(|e, _| self.of(intrinsic_row(e), RESIDUAL))
+    }
+
+    /// Zero for what is padding.
+    fn of(&self, row: usize, column: usize) -> f64 {
+        self.0.get((row, column)).copied().unwrap_or(0.0)
+    }
+}
+
+impl<'a> Sight<'a> {
+    fn rows<const N: usize>(&self, first: usize) -> SMatrix<f64, N, 2> {
+        let [a, b] = self.equations;
+        let of = |equation: &[f64]| SVector::from_column_slice(&equation[first..first + N]);
+        SMatrix::from_columns(&[of(a), of(b)])
+    }
+
+    /// Derivatives by the position of the marker, one column an equation.
+    pub fn by_marker(&self) -> Matrix3x2<f64> {
+        self.rows(POSE)
+    }
+
+    /// Derivatives by the pose, one column an equation.
+    pub fn by_pose(&self) -> Matrix6x2<f64> {
+        self.rows(POSE)
+    }
+
+    /// Derivatives by the intrinsics before the field, one column an equation.
+    pub fn by_intrinsics(&self) -> SMatrix<f64, E, 2> {
+        SMatrix::from_fn(|e, k| self.equations[k].get(intrinsic_row(e)).copied().unwrap_or(0.0))
+    }
+
+    /// Derivatives by the field: control points, each with one row an equation.
+    pub fn by_field(&self) -> &'a [(usize, Matrix2<f64>)] {
+        self.field
+    }
+
+    /// Rows of both equations; see [`Equations::intrinsic_row`].
+    pub fn row_range(&self, rows: Range<usize>) -> [&'a [f64]; 2] {
+        let [a, b] = self.equations;
+        [&a[rows.clone()], &b[rows]]
+    }
+
+    /// Residuals.
+    pub fn residual(&self) -> Vector2<f64> {
+        let [a, b] = self.equations;
+        Vector2::new(a[RESIDUAL], b[RESIDUAL])
+    }
+}
+
+/// Normal-equation blocks of one marker in one image, by itself.
+#[derive(Debug, Clone)]
+pub struct MarkerTerms {
+    /// Index of the marker on its plate.
+    pub marker: usize,
+    /// 3x3 information.
+    pub mm: Matrix3<f64>,
+    /// Right-hand side.
+    pub bm: Vector3<f64>,
+}
+
+/// Normal-equation blocks of one marker with the other unknowns of one image.
+#[derive(Debug, Clone)]
+pub struct MarkerCoupling {
+    /// Index of the marker on its plate.
+    pub marker: usize,
+    /// With the pose.
+    pub mp: SMatrix<f64, 3, P>,
+    /// With the intrinsics before the field.
+    pub me: SMatrix<f64, 3, E>,
+    /// With the control points of the field that it touches, ascending.
+    pub field: Vec<(usize, Matrix3x2<f64>)>,
+}
+
+impl MarkerCoupling {
+    fn add(&mut self, sight: &Sight) {
+        let by_marker = sight.by_marker();
+        self.mp += by_marker * sight.by_pose().transpose();
+        self.me += by_marker * sight.by_intrinsics().transpose();
+        for (k, d) in sight.by_field() {
+            let coupling = by_marker * d;
+            match self.field.binary_search_by_key(k, |f| f.0) {
+                Ok(at) => self.field[at].1 += coupling,
+                Err(at) => self.field.insert(at, (*k, coupling)),
+            }
+        }
+    }
+
+    /// With every intrinsic unknown that it touches: its index, and a column.
+    pub fn intrinsics(&self) -> impl Iterator<Item = (usize, Vector3<f64>)> + '_ {
+        let field = self.field.iter().flat_map(|(k, c)| [0, 1].map(|d| (E + 2 * k + d, c.column(d).into_owned())));
+        (0..E).map(|e| (e, self.me.column(e).into_owned())).chain(field)
+    }
+}

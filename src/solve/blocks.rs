@@ -1,0 +1,272 @@
+//! Blocks of the normal equations that both eliminations are made of, and their right-hand sides.
+
+use nalgebra::{DMatrix, DVector, Matrix3};
+
+use super::system::Linearised;
+use crate::linalg::product;
+use crate::problem::{E, Equations, Problem, Slack, State};
+
+/// Markers that images in use show.
+#[derive(Debug, Clone)]
+pub(super) struct SeenMarkers {
+    /// Number of each marker among those that were seen, per plate.
+    pub number: Vec<Vec<Option<usize>>>,
+    /// Plate and index of each that was seen.
+    pub order: Vec<(usize, usize)>,
+}
+
+impl SeenMarkers {
+    /// None, so that all stay where they are.
+    pub fn none(problem: &Problem) -> Self {
+        Self { number: problem.plates.iter().map(|p| vec![None; p.markers.len()]).collect(), order: Vec::new() }
+    }
+
+    /// Numbered by plate and index.
+    pub fn of(problem: &Problem, lin: &Linearised) -> Self {
+        let mut seen = Self::none(problem);
+        for (terms, &i) in lin.terms.iter().zip(&lin.images) {
+            let number = &mut seen.number[problem.images[i].plate];
+            terms.markers.iter().for_each(|m| number[m.marker] = Some(0));
+        }
+        for (p, plate) in seen.number.iter_mut().enumerate() {
+            for (m, at) in plate.iter_mut().enumerate().filter(|(_, at)| at.is_some()) {
+                *at = Some(seen.order.len());
+                seen.order.push((p, m));
+            }
+        }
+        seen
+    }
+
+    /// Information of each, prior included.
+    pub fn information(&self, problem: &Problem, lin: &Linearised) -> Vec<Matrix3<f64>> {
+        let prior = |&(p, m): &(usize, usize)| Matrix3::from_diagonal_element(problem.marker_information(p, m));
+        let mut information: Vec<Matrix3<f64>> = self.order.iter().map(prior).collect();
+        for (terms, &i) in lin.terms.iter().zip(&lin.images) {
+            let number = &self.number[problem.images[i].plate];
+            for own in &terms.markers {
+                number[own.marker].iter().for_each(|&at| information[at] += own.mm);
+            }
+        }
+        information
+    }
+
+    /// Right-hand side of each, prior included.
+    pub fn gradient(&self, problem: &Problem, state: &State, lin: &Linearised) -> DVector<f64> {
+        let mut gradient = DVector::zeros(3 * self.order.len());
+        for (at, &(p, m)) in self.order.iter().enumerate() {
+            let pull = state.plates[p].corrections[m] * -problem.marker_information(p, m);
+            gradient.fixed_rows_mut::<3>(3 * at).copy_from(&pull);
+        }
+        for (terms, &i) in lin.terms.iter().zip(&lin.images) {
+            let number = &self.number[problem.images[i].plate];
+            for own in &terms.markers {
+                if let Some(at) = number[own.marker] {
+                    let mut sum = gradient.fixed_rows_mut::<3>(3 * at);
+                    sum += own.bm;
+                }
+            }
+        }
+        gradient
+    }
+}
+
+/// Coupling of the free dense columns with the markers that were seen.
+pub(super) struct DenseCoupling {
+    /// The free columns.
+    free: Vec<usize>,
+    /// How many of them act through the camera poses.
+    theta: usize,
+    /// Free columns x 3 markers.
+    values: DMatrix<f64>,
+}
+
+impl DenseCoupling {
+    /// Of no image yet.
+    pub fn new(problem: &Problem, seen: &SeenMarkers) -> Self {
+        let columns = &problem.layout.columns;
+        let free: Vec<usize> = (0..columns.len()).filter(|&c| columns[c].free).collect();
+        let theta = free.partition_point(|&c| c < problem.layout.theta_len());
+        let values = DMatrix::zeros(free.len(), 3 * seen.order.len());
+        Self { free, theta, values }
+    }
+
+    /// Adds the k-th image in use.
+    pub fn add(&mut self, problem: &Problem, lin: &Linearised, k: usize, seen: &SeenMarkers, equations: &Equations) {
+        let (image, theta) = (&problem.images[lin.images[k]], self.theta);
+        let by_theta = equations.through_pose(&lin.chains[k].d_theta.select_columns(&self.free[..theta]).transpose());
+        let intrinsics = problem.layout.intrinsics(image).into_iter();
+        let intrinsics: Vec<_> = intrinsics.map(|c| c.and_then(|c| self.free.binary_search(&c).ok())).collect();
+        let runs = runs((0..E).filter_map(|e| Some((equations.intrinsic_row(e)?, intrinsics[e]?))));
+        for (o, (&marker, sight)) in equations.markers.iter().zip(equations.sights()).enumerate() {
+            let Some(at) = seen.number[image.plate][marker] else { continue };
+            let by_marker = sight.by_marker();
+            let (t0, t1) = (by_theta.column(2 * o), by_theta.column(2 * o + 1));
+            for (d, w) in by_marker.row_iter().enumerate() {
+                let mut column = self.values.column_mut(3 * at + d);
+                let into = column.as_mut_slice();
+                add_combination(&mut into[..theta], [t0.as_slice(), t1.as_slice()], [w[0], w[1]]);
+                for run in &runs {
+                    let of = sight.row_range(run.from..run.from + run.length);
+                    add_combination(&mut into[run.into..run.into + run.length], of, [w[0], w[1]]);
+                }
+            }
+            for (point, d) in sight.by_field() {
+                let own = by_marker * d;
+                for (component, column) in own.column_iter().enumerate() {
+                    if let Some(row) = intrinsics[E + 2 * point + component] {
+                        (0..3).for_each(|d| self.values[(row, 3 * at + d)] += column[d]);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Multiplies the columns of every marker from the right by a matrix of its own.
+    pub fn times_right(&mut self, matrices: impl Iterator<Item = Matrix3<f64>>) {
+        matrices.enumerate().for_each(|(at, m)| times_right(&mut self.values, 3 * at, &m));
+    }
+
+    /// Copies the columns to those of `into` from `first` on.
+    pub fn copy_to(&self, into: &mut DMatrix<f64>, first: usize) {
+        for (mut into, from) in into.columns_range_mut(first..).column_iter_mut().zip(self.values.column_iter()) {
+            self.free.iter().zip(from.iter()).for_each(|(&row, value)| into[row] = *value);
+        }
+    }
+}
+
+/// Multiplies three columns from `first` on by `m` from the right.
+pub(super) fn times_right(y: &mut DMatrix<f64>, first: usize, m: &Matrix3<f64>) {
+    let rows = y.nrows();
+    let (x, rest) = y.as_mut_slice()[first * rows..(first + 3) * rows].split_at_mut(rows);
+    let (y, z) = rest.split_at_mut(rows);
+    for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+        let old = [*x, *y, *z];
+        let new = |k: usize| old[0] * m[(0, k)] + old[1] * m[(1, k)] + old[2] * m[(2, k)];
+        (*x, *y, *z) = (new(0), new(1), new(2));
+    }
+}
+
+/// Places one after the other that go to places one after the other.
+struct Run {
+    from: usize,
+    into: usize,
+    length: usize,
+}
+
+fn runs(places: impl Iterator<Item = (usize, usize)>) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    for (from, into) in places {
+        match runs.last_mut().filter(|r| (r.from + r.length, r.into + r.length) == (from, into)) {
+            Some(run) => run.length += 1,
+            None => runs.push(Run { from, into, length: 1 }),
+        }
+    }
+    runs
+}
+
+/// `into += a s + b t`.
+fn add_combination(into: &mut [f64], [a, b]: [&[f64]; 2], [s, t]: [f64; 2]) {
+    for ((x, a), b) in into.iter_mut().zip(a).zip(b) {
+        *x += a * s + b * t;
+    }
+}
+
+/// Markers of the k-th image in use, each once, and their coupling with its slack: slack x 3 markers.
+pub(super) fn slack_with_markers(lin: &Linearised, k: usize, equations: &Equations) -> (Vec<usize>, DMatrix<f64>) {
+    let l = &lin.chains[k].d_slack;
+    let by_slack = equations.through_pose(&l.transpose());
+    let mut markers = equations.markers.clone();
+    markers.dedup();
+    let mut coupling = DMatrix::zeros(l.ncols(), 3 * markers.len());
+    let mut at = 0;
+    for (o, (&marker, sight)) in equations.markers.iter().zip(equations.sights()).enumerate() {
+        at += usize::from(markers[at] != marker);
+        let (a, b) = (by_slack.column(2 * o), by_slack.column(2 * o + 1));
+        for (d, w) in sight.by_marker().row_iter().enumerate() {
+            let mut column = coupling.column_mut(3 * at + d);
+            add_combination(column.as_mut_slice(), [a.as_slice(), b.as_slice()], [w[0], w[1]]);
+        }
+    }
+    (markers, coupling)
+}
+
+/// Information of the slack of the k-th image in use, prior included.
+pub(super) fn slack_information(problem: &Problem, state: &State, lin: &Linearised, k: usize) -> DMatrix<f64> {
+    let (l, i) = (&lin.chains[k].d_slack, lin.images[k]);
+    let mut information = l.tr_mul(&(lin.terms[k].pp * l));
+    if let Slack::Joints(dq) = &state.slack[i] {
+        (0..dq.len()).for_each(|s| information[(s, s)] += problem.slack_information(&problem.images[i], s));
+    }
+    information
+}
+
+/// Right-hand side of the slack of the k-th image in use, prior included.
+pub(super) fn slack_gradient(problem: &Problem, state: &State, lin: &Linearised, k: usize) -> DVector<f64> {
+    let i = lin.images[k];
+    let mut gradient = lin.chains[k].d_slack.tr_mul(&lin.terms[k].bp);
+    if let Slack::Joints(dq) = &state.slack[i] {
+        for (s, q) in dq.iter().enumerate() {
+            gradient[s] -= q * problem.slack_information(&problem.images[i], s);
+        }
+    }
+    gradient
+}
+
+/// Right-hand side of the dense columns, without their priors.
+pub(super) fn dense_gradient(problem: &Problem, lin: &Linearised) -> DVector<f64> {
+    let mut gradient = DVector::zeros(problem.layout.len());
+    for (k, (terms, chain)) in lin.terms.iter().zip(&lin.chains).enumerate() {
+        gradient.rows_mut(0, problem.layout.theta_len()).gemv_tr(1.0, &chain.d_theta, &terms.bp, 1.0);
+        for (e, c) in problem.layout.intrinsics(&problem.images[lin.images[k]]).iter().enumerate() {
+            c.iter().for_each(|&c| gradient[c] += terms.be[e]);
+        }
+    }
+    gradient
+}
+
+/// The pixel equations of all images in the space of their camera poses, six rows an image.
+pub(super) struct PoseRows {
+    /// `G`, 6J x theta.
+    chain: DMatrix<f64>,
+    /// `[H_pp G, H_pe]`, 6J x dense.
+    pub coupling: DMatrix<f64>,
+}
+
+impl PoseRows {
+    pub fn new(problem: &Problem, lin: &Linearised) -> Self {
+        let (theta, dense) = (problem.layout.theta_len(), problem.layout.len());
+        let rows = 6 * lin.images.len();
+        let (mut chain, mut coupling) = (DMatrix::zeros(rows, theta), DMatrix::zeros(rows, dense));
+        for (k, (terms, own)) in lin.terms.iter().zip(&lin.chains).enumerate() {
+            chain.rows_mut(6 * k, 6).copy_from(&own.d_theta);
+            coupling.view_mut((6 * k, 0), (6, theta)).copy_from(&(terms.pp * &own.d_theta));
+            for (e, c) in problem.layout.intrinsics(&problem.images[lin.images[k]]).iter().enumerate() {
+                if let Some(c) = *c {
+                    coupling.fixed_view_mut::<6, 1>(6 * k, c).copy_from(&terms.pe.column(e));
+                }
+            }
+        }
+        Self { chain, coupling }
+    }
+
+    /// Adds the information of the dense columns: upper triangle.
+    pub fn add_to(&self, problem: &Problem, lin: &Linearised, a: &mut DMatrix<f64>) {
+        let (theta, dense) = (problem.layout.theta_len(), problem.layout.len());
+        let mut upper = a.view_mut((0, 0), (theta, dense));
+        upper += product(&self.chain.transpose(), &self.coupling);
+        for (terms, &i) in lin.terms.iter().zip(&lin.images) {
+            let columns = problem.layout.intrinsics(&problem.images[i]);
+            let used = || columns.iter().enumerate().filter_map(|(e, c)| c.map(|c| (e, c)));
+            for (e, c) in used() {
+                used().filter(|(_, d)| *d <= c).for_each(|(f, d)| a[(d, c)] += terms.ee[(f, e)]);
+            }
+        }
+    }
+}
+
+/// Dense columns that the k-th image in use depends on and that are free.
+pub(super) fn free_columns(problem: &Problem, lin: &Linearised, k: usize) -> Vec<usize> {
+    let intrinsics = problem.layout.intrinsics(&problem.images[lin.images[k]]);
+    let all = (0..problem.layout.theta_len()).chain(intrinsics.into_iter().flatten());
+    all.filter(|&c| problem.layout.columns[c].free).collect()
+}
