@@ -3,8 +3,10 @@
 //! Everything runs on one thread: parallelism lies outside, over images.
 
 mod quadratic;
+mod wide;
 
 pub use quadratic::{LinearRow, NotSolved, minimise_quadratic};
+pub use wide::wide;
 
 use std::ops::Range;
 

@@ -14,6 +14,7 @@ pub const PRIOR_SIGMA: [f64; MODES] = [1e-4, 1e-4, 1e-4, 3e-4, 3e-4, 3e-4];
 /// Displacement of a marker (m) per unit of each mode, one column a mode.
 ///
 /// `half_diagonal_m` is the largest distance of a marker from the centre of the plate.
+#[inline(always)]
 pub fn basis(nominal: &Vector3<f64>, half_diagonal_m: f64) -> SMatrix<f64, 3, MODES> {
     let (x, y) = (nominal.x, nominal.y);
     let per_square = half_diagonal_m.max(1e-9).powi(-2);

@@ -46,6 +46,10 @@ pub struct Kinematics {
     pub d_terms: Vec<Vector6<f64>>,
 }
 
+/// What all stops of a robot share: `origin_i Exp(xi_i)` of every joint, and the right Jacobian of its twist.
+#[derive(Debug, Clone)]
+pub struct MovedOrigins(Vec<(Pose, Matrix6<f64>)>);
+
 fn motion(joint: &Joint, position: f64) -> Pose {
     match joint.kind {
         JointKind::Fixed => Pose::identity(),
@@ -96,8 +100,20 @@ impl Robot {
         self.chain.joints.iter().enumerate().map(behind).collect()
     }
 
+    /// What the kinematics of all stops share.
+    pub fn moved_origins(&self) -> MovedOrigins {
+        let moved =
+            |(joint, twist): (&Joint, &Vector6<f64>)| (joint.origin.perturbed(twist), right_jacobian_se3(twist));
+        MovedOrigins(self.chain.joints.iter().zip(&self.twists).map(moved).collect())
+    }
+
     /// As [`Robot::pose_at`], with all derivatives.
     pub fn kinematics(&self, stop: &Stop, noise: &[f64]) -> Kinematics {
+        self.kinematics_from(&self.moved_origins(), stop, noise)
+    }
+
+    /// As [`Robot::kinematics`], where the origins of this robot are at hand.
+    pub fn kinematics_from(&self, origins: &MovedOrigins, stop: &Stop, noise: &[f64]) -> Kinematics {
         let (positions, contexts) = self.positions(stop, noise);
         let joints = &self.chain.joints;
         let mut d_twists = vec![Matrix6::zeros(); joints.len()];
@@ -110,8 +126,9 @@ impl Robot {
                 d_readings[drive.reading] += column * drive.multiplier;
             }
             rest_from_tip = motion(joint, positions[i]) * rest_from_tip;
-            d_twists[i] = adjoint(&rest_from_tip.inverse()) * right_jacobian_se3(&self.twists[i]);
-            rest_from_tip = joint.origin * Pose::exp(&self.twists[i]) * rest_from_tip;
+            let (origin, d_twist) = &origins.0[i];
+            d_twists[i] = adjoint(&rest_from_tip.inverse()) * d_twist;
+            rest_from_tip = origin * &rest_from_tip;
         }
         let d_terms = self.terms.iter().map(|t| d_readings[t.reading] * t.term.basis(&contexts[t.reading])).collect();
         Kinematics { base_from_tip: rest_from_tip, d_twists, d_readings, d_terms }

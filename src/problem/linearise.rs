@@ -9,9 +9,11 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, Matrix6x2, Matrix6xX, Vector2
 use super::equations::{Collector, Equations, MarkerTerms};
 use super::{Image, Measured, Problem, Slack, State};
 use crate::geom::{Pose, adjoint, right_jacobian_se3};
+use crate::linalg::wide;
 use crate::model::camera::MAX_PARAMETERS;
 use crate::model::circle::{self, Prediction};
 use crate::model::plate_modes::MODES;
+use crate::model::robot::MovedOrigins;
 
 /// Intrinsic unknowns of one image before its displacement field: camera parameters (padded), then plate modes.
 ///
@@ -74,6 +76,7 @@ impl Weighting {
         Self { every: (image.observations.len() / enough).max(1), ..self }
     }
 
+    #[inline(always)]
     fn huber(&self, length: f64) -> (f64, f64) {
         if length <= self.huber {
             (0.5 * length * length, 1.0)
@@ -93,10 +96,14 @@ pub fn predict(image: &Image, state: &State, pose: &Pose, observation: &Measured
 pub fn linearise(image: &Image, state: &State, pose: &Pose, weighting: &Weighting) -> Option<ImageTerms> {
     let mut cost = 0.0;
     let mut residuals = Vec::with_capacity(image.observations.len());
-    let equations = whitened(image, state, pose, weighting, |share, residual| {
+    let tell = |share, residual| {
         cost += share;
         residuals.push(residual);
-    })?;
+    };
+    let equations = wide(
+        #[inline(always)]
+        || whitened(image, state, pose, weighting, tell),
+    )?;
     let camera = &state.cameras[image.camera];
     let field = camera.parameters.len() - camera.parametric();
     Some(ImageTerms::new(cost, &equations, field, residuals))
@@ -104,10 +111,14 @@ pub fn linearise(image: &Image, state: &State, pose: &Pose, weighting: &Weightin
 
 /// The equations that [`linearise`] sums up.
 pub fn equations(image: &Image, state: &State, pose: &Pose, weighting: &Weighting) -> Option<Equations> {
-    whitened(image, state, pose, weighting, |_, _| ())
+    wide(
+        #[inline(always)]
+        || whitened(image, state, pose, weighting, |_, _| ()),
+    )
 }
 
 /// `tell` hears of every observation in use, with its robust cost.
+#[inline(always)]
 fn whitened(
     image: &Image,
     state: &State,
@@ -140,6 +151,7 @@ fn whitened(
 }
 
 /// `F'` of a positive semidefinite matrix `F F'`, upper triangular.
+#[inline(always)]
 fn square_root(m: &Matrix2<f64>) -> Matrix2<f64> {
     let a = m[(0, 0)].max(0.0).sqrt();
     let b = if a > 0.0 { m[(0, 1)] / a } else { 0.0 };
@@ -216,6 +228,17 @@ pub(super) fn tilt_axes(centre: &Vector3<f64>) -> Matrix6x2<f64> {
 
 /// Pose of an image and its derivatives as body twists; `None` for an image off the robot that has no free pose.
 pub fn chained(problem: &Problem, state: &State, image: &Image, slack: &Slack) -> Option<Chained> {
+    chained_from(&state.robot.moved_origins(), problem, state, image, slack)
+}
+
+/// As [`chained`], where the origins of the robot are at hand.
+pub fn chained_from(
+    origins: &MovedOrigins,
+    problem: &Problem,
+    state: &State,
+    image: &Image,
+    slack: &Slack,
+) -> Option<Chained> {
     let theta = problem.layout.theta_len();
     if let Slack::Pose(pose) = slack {
         return Some(Chained { pose: *pose, d_theta: DMatrix::zeros(6, theta), d_slack: DMatrix::identity(6, 6) });
@@ -223,7 +246,7 @@ pub fn chained(problem: &Problem, state: &State, image: &Image, slack: &Slack) -
     let stop = image.stop.as_ref()?;
     let zero = vec![0.0; stop.readings.len()];
     let noise = if let Slack::Joints(dq) = slack { dq } else { &zero };
-    let kinematics = state.robot.kinematics(stop, noise);
+    let kinematics = state.robot.kinematics_from(origins, stop, noise);
     let mounted = image.mount.linearised(
         &state.mountings[image.mounting],
         &kinematics.base_from_tip,

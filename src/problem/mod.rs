@@ -14,7 +14,9 @@ mod state;
 pub use equations::{Equations, MarkerCoupling, MarkerTerms, Sight};
 pub use family::Family;
 pub use layout::{Column, Layout, OriginPrior};
-pub use linearise::{Chained, E, ImageTerms, Residual, Weighting, chained, equations, linearise, predict};
+pub use linearise::{
+    Chained, E, ImageTerms, Residual, Weighting, chained, chained_from, equations, linearise, predict,
+};
 pub use postures::{common_readings, joined, posture_groups};
 pub use select::short_name;
 pub use state::{PlateShape, Slack, State, Step};

@@ -88,6 +88,7 @@ impl PlateShape {
     }
 
     /// How a marker moves with the modes.
+    #[inline(always)]
     pub fn modes_at(&self, marker: usize) -> SMatrix<f64, 3, MODES> {
         basis(&self.nominal[marker], self.half_diagonal_m)
     }
@@ -98,7 +99,7 @@ impl PlateShape {
     }
 
     /// The same, where what the modes do is at hand.
-    #[inline]
+    #[inline(always)]
     pub fn position_by(&self, modes: &SMatrix<f64, 3, MODES>, marker: usize) -> Vector3<f64> {
         self.nominal[marker] + modes * SVector::from(self.modes) + self.corrections[marker]
     }

@@ -53,7 +53,7 @@ const PREDICTION_MARGIN: f64 = 0.1;
 const LARGEST_LAMBDA: f64 = 1e10;
 
 /// Observations an image that are enough to come close.
-const ENOUGH: usize = 64;
+const ENOUGH: usize = 32;
 /// The approach goes on while its next step promises to take this share off the cost.
 const WORTH_A_STEP: f64 = 0.1;
 /// A model serves for the next step, too, while steps shrink at least this much from one to the next.

@@ -8,7 +8,7 @@ use super::by_markers::MarkersEliminated;
 use super::by_slack::SlackEliminated;
 use crate::model::plate_modes::MODES;
 use crate::problem::{
-    Chained, Equations, ImageTerms, Problem, Slack, State, Step, Weighting, chained, equations, linearise,
+    Chained, Equations, ImageTerms, Problem, Slack, State, Step, Weighting, chained_from, equations, linearise,
 };
 
 /// All images linearised at one state.
@@ -40,11 +40,12 @@ pub fn linearise_all(problem: &Problem, state: &State) -> Option<Linearised> {
 /// As [`linearise_all`] with about `enough` observations of every image, evenly chosen.
 pub(super) fn linearise_some(problem: &Problem, state: &State, enough: usize) -> Option<Linearised> {
     let images: Vec<usize> = problem.used().map(|(i, _)| i).collect();
+    let origins = state.robot.moved_origins();
     let parts: Option<Vec<(ImageTerms, Chained)>> = images
         .par_iter()
         .map(|&i| {
             let image = &problem.images[i];
-            let chain = chained(problem, state, image, &state.slack[i])?;
+            let chain = chained_from(&origins, problem, state, image, &state.slack[i])?;
             let weighting = Weighting::of(problem, image).thinned(image, enough);
             let terms = linearise(image, state, &chain.pose, &weighting)?;
             Some((terms, chain))

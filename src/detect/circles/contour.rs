@@ -5,8 +5,8 @@
 //! two pixels pass the threshold.
 
 use super::levels::Levels;
-use super::wide::wide;
 use crate::detect::Picture;
+use crate::linalg::wide;
 
 const DARK: u8 = 1;
 const SEEN: u8 = 2;

@@ -23,7 +23,7 @@ use super::edge_state::{ANNULUS, CENTRE, INNER, LN_BLUR, LN_RATIO, SHAPE, State,
 use super::exact_edge::{Contour, MOMENTS, Nodes};
 use super::flat_zone::Flat;
 use super::gauss::normal_tail;
-use super::wide::wide;
+use crate::linalg::wide;
 
 /// Distance from an edge, in units of the blur, beyond which a pixel sees nothing of its shape.
 const FAR: f32 = 4.2;

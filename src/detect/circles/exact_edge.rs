@@ -14,7 +14,7 @@
 
 use super::edge_model::LANES;
 use super::gauss::exp_negative;
-use super::wide::wide;
+use crate::linalg::wide;
 
 /// Longest step along the contour in units of the blur.
 const STEP: f64 = 1.25;

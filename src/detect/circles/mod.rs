@@ -33,7 +33,6 @@ pub(crate) mod synth;
 mod tails;
 mod types;
 mod vet;
-mod wide;
 
 pub use asymmetry::Drift;
 pub use ellipse::Ellipse;

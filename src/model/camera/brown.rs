@@ -8,6 +8,7 @@ use super::{Coefficients, Distorted};
 pub(super) const NAMES: [&str; 5] = ["k1", "k2", "p1", "p2", "k3"];
 
 /// Distorts a point of the plane z = 1; `c` = k1 k2 p1 p2 k3.
+#[inline(always)]
 pub(super) fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
     let (x, y) = (point.x, point.y);
     let [k1, k2, p1, p2, k3] = [c[0], c[1], c[2], c[3], c[4]];

@@ -66,6 +66,7 @@ pub(super) struct Distorted {
 
 impl Distorted {
     /// Of a lens that does not see the distance.
+    #[inline(always)]
     fn flat(point: Vector2<f64>, d_point: Matrix2<f64>, d_coefficients: Coefficients) -> Self {
         Self { point, d_point, d_coefficients, d_inverse_depth: Vector2::zeros() }
     }
@@ -142,6 +143,7 @@ impl Lens {
         }
     }
 
+    #[inline(always)]
     fn distort(self, c: &[f64], x: &Vector2<f64>, inverse_depth: f64) -> Distorted {
         match self {
             Self::Brown | Self::BrownField => brown::distort(c, x),
@@ -339,12 +341,14 @@ impl Camera {
         inside(uv.x, self.width_px) && inside(uv.y, self.height_px)
     }
 
+    #[inline(always)]
     fn to_pixels(&self, x: &Vector2<f64>) -> Vector2<f64> {
         let p = &self.parameters;
         Vector2::new(p[0] * x.x + p[2], p[1] * x.y + p[3])
     }
 }
 
+#[inline(always)]
 fn normalised(x: &Vector3<f64>) -> Option<Vector2<f64>> {
     (x.z > 1e-6).then(|| Vector2::new(x.x / x.z, x.y / x.z))
 }

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 /// `x radial + tangential` and its derivative; `slope` is twice the derivative of the radial factor by r^2.
+#[inline(always)]
 pub(super) fn radial_tangential(
     x: &Vector2<f64>,
     radial: f64,
@@ -24,6 +25,7 @@ pub(super) fn radial_tangential(
 }
 
 /// Derivatives by p1 and p2.
+#[inline(always)]
 pub(super) fn tangential_columns(x: f64, y: f64) -> [[f64; 2]; 2] {
     let r2 = x * x + y * y;
     [[2.0 * x * y, r2 + 2.0 * y * y], [r2 + 2.0 * x * x, 2.0 * x * y]]
