@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector2};
 
 use crate::geom::{PlaneMap, Pose, project_to_so3};
 
-/// Map from plate coordinates (x, y in m, 1) to homogeneous pixels.
+/// Map from plate coordinates (x, y in m, 1) to homogeneous pixels, positive where the points are that it was fitted to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Homography(pub Matrix3<f64>);
 
@@ -23,7 +23,10 @@ impl Homography {
     pub fn fit(plane_m: &[Vector2<f64>], pixels: &[Vector2<f64>]) -> Option<Self> {
         let pairs: Vec<_> = plane_m.iter().zip(pixels).map(|(p, q)| ((*p).into(), (*q).into())).collect();
         let full = PlaneMap::fit(&pairs)?.matrix();
-        Some(Self(full / full.norm()))
+        // What is seen lies in front of the camera; the origin of the plate need not.
+        let middle = plane_m.iter().sum::<Vector2<f64>>() / plane_m.len() as f64;
+        let sign = (full * middle.push(1.0)).z.signum();
+        Some(Self(full * (sign / full.norm())))
     }
 
     /// Pose of a camera with square pixels: focal length and principal point in px. `None` where the matrix is degenerate.
@@ -41,10 +44,7 @@ impl Homography {
         );
         let m = to_rays * self.0;
         let (mut r1, mut r2, mut t) = (m.column(0).into_owned(), m.column(1).into_owned(), m.column(2).into_owned());
-        let mut scale = 2.0 / (r1.norm() + r2.norm());
-        if t.z < 0.0 {
-            scale = -scale;
-        }
+        let scale = 2.0 / (r1.norm() + r2.norm());
         (r1, r2, t) = (r1 * scale, r2 * scale, t * scale);
         let rotation = project_to_so3(&Matrix3::from_columns(&[r1, r2, r1.cross(&r2)]))?;
         let from_behind = rotation.column(2).dot(&t) > 0.0;
