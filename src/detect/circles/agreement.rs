@@ -137,6 +137,7 @@ struct Polynomial {
 
 /// Highest degree; markers that are needed for each coefficient.
 const DEGREE: usize = 5;
+const TERMS: usize = (DEGREE + 1) * (DEGREE + 2) / 2;
 const MARKERS_PER_TERM: usize = 3;
 
 impl Polynomial {
@@ -151,7 +152,7 @@ impl Polynomial {
             let count = (degree + 1) * (degree + 2) / 2;
             let (mut normal, mut right) = (DMatrix::zeros(count, count), DMatrix::zeros(count, 2));
             for (at, value) in pairs {
-                let terms = DVector::from_vec(zero.terms(*at, degree));
+                let terms = DVector::from_row_slice(&zero.terms(*at, degree)[..count]);
                 normal.syger(1.0, &terms, &terms, 1.0);
                 (0..2).for_each(|a| right.column_mut(a).axpy(value[a], &terms, 1.0));
             }
@@ -163,15 +164,23 @@ impl Polynomial {
         (2..=DEGREE).rev().filter(allowed).find_map(solve).unwrap_or(zero)
     }
 
-    fn terms(&self, at: [f64; 2], degree: usize) -> Vec<f64> {
+    /// Products of powers up to a degree, by rising degree; zero beyond.
+    fn terms(&self, at: [f64; 2], degree: usize) -> [f64; TERMS] {
         let [x, y] = [0, 1].map(|a| (at[a] - self.middle[a]) * self.scale);
-        let one = |i: usize, d: usize| x.powi((d - i) as i32) * y.powi(i as i32);
-        (0..=degree).flat_map(|d| (0..=d).map(move |i| one(i, d))).collect()
+        let (mut px, mut py, mut terms) = ([1.0; DEGREE + 1], [1.0; DEGREE + 1], [0.0; TERMS]);
+        for k in 1..=degree {
+            (px[k], py[k]) = (px[k - 1] * x, py[k - 1] * y);
+        }
+        let mut place = terms.iter_mut();
+        for d in 0..=degree {
+            (0..=d).zip(&mut place).for_each(|(i, term)| *term = px[d - i] * py[i]);
+        }
+        terms
     }
 
     fn at(&self, at: [f64; 2]) -> [f64; 2] {
         let terms = self.terms(at, self.degree);
-        [0, 1].map(|a| terms.iter().zip(self.coefficients.column(a).iter()).map(|(t, c)| t * c).sum())
+        [0, 1].map(|a| self.coefficients.column(a).iter().zip(&terms).map(|(c, t)| c * t).sum())
     }
 }
 

@@ -30,23 +30,29 @@ pub(super) fn vet(board: &mut Board, code: &Code, candidates: &[Candidate]) -> V
             dropped.push(entry);
         }
     };
-    judge(board, &|_, cell, _| code.marker_at(cell).is_none().then_some(Reason::OffPlate), &mut dropped);
-    judge(board, &|board, cell, _| disputed(board, cell, code).then_some(Reason::NeighboursDisagree), &mut dropped);
-    judge(board, &|_, cell, p| (p.class != code.class_at(cell)).then_some(Reason::WrongClass), &mut dropped);
     let out_of_place = |board: &Board, cell: Cell, p: &Placed| {
         let (map, tolerance) = neighbourhood(board, cell, candidates)?;
         let (expected, seen) = (map.at([0.0, 0.0]), candidates[p.candidate].ellipse.centre);
         let off = (seen[0] - expected[0]).hypot(seen[1] - expected[1]);
         (off > tolerance * map.shorter_step() + 0.5).then_some(Reason::OutOfPlace)
     };
-    judge(board, &out_of_place, &mut dropped);
-    dropped
+    judge(board, &|_, cell, _| code.marker_at(cell).is_none().then_some(Reason::OffPlate), &mut dropped);
+    // what goes takes its word for the others with it
+    loop {
+        let before = dropped.len();
+        judge(board, &|board, cell, _| disputed(board, cell, code).then_some(Reason::NeighboursDisagree), &mut dropped);
+        judge(board, &|_, cell, p| (p.class != code.class_at(cell)).then_some(Reason::WrongClass), &mut dropped);
+        judge(board, &out_of_place, &mut dropped);
+        if dropped.len() == before {
+            return dropped;
+        }
+    }
 }
 
 /// Too few of the markers around have the class of their cell: the lattice has slipped here.
 fn disputed(board: &Board, cell: Cell, code: &Code) -> bool {
     let (mut agree, mut differ) = (0, 0);
-    for (c, p) in around(board, cell, 2) {
+    for (c, p) in around(board, cell, 2).filter(|(c, _)| *c != cell) {
         match p.class {
             Some(k) if code.class_at(c) == Some(k) => agree += 1,
             Some(_) => differ += 1,
