@@ -25,7 +25,7 @@ use robotcal::simulate::render::render;
 
 type Fallible<T> = Result<T, Box<dyn Error>>;
 
-/// The plate from 0.43 m, tilted by 20 degrees: some 450 markers lie wholly in the picture.
+/// The plate from 0.43 m, tilted by 20 degrees: some 490 markers lie wholly in the picture.
 fn picture(plate: &Plate, width: u32, height: u32) -> Picture {
     let mut camera = Camera::pinhole(Lens::Brown, width, height, 0.86 * f64::from(width));
     camera.parameters[4] = -0.08;
