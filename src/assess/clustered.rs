@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 
 use crate::linalg::product;
 use crate::problem::{Problem, Slack, State};
-use crate::solve::{Covariance, Linearised};
+use crate::solve::{Covariance, Linearised, SeenMarkers};
 
 /// Largest correction of the scatter of one image: beyond it the image alone decides what it is compared with.
 const MOST_CORRECTION: f64 = 5.0;
@@ -30,8 +30,8 @@ pub fn clustered_covariance(
     }
     let dense = problem.layout.len();
     let of_dense = covariance.reduced.view((0, 0), (dense, dense)).into_owned();
-    let markers = Seen::new(problem, lin);
-    let with_markers = markers.covariance_with_dense(problem, state, lin, covariance);
+    let markers = SeenMarkers::of(problem, lin);
+    let with_markers = covariance_with_dense(&markers, problem, state, lin, covariance);
     let mut sum = DMatrix::zeros(dense, dense);
     for k in 0..lin.images.len() {
         let (of_image, of_markers) = score(problem, lin, k, &markers);
@@ -48,77 +48,53 @@ pub fn clustered_covariance(
     Some((&sum + sum.transpose()) * 0.5)
 }
 
-/// Markers that images in use show, ascending by plate and marker.
-struct Seen {
-    order: Vec<(usize, usize)>,
-}
-
-impl Seen {
-    fn new(problem: &Problem, lin: &Linearised) -> Self {
-        let shown = lin.terms.iter().zip(&lin.images);
-        let mut order: Vec<(usize, usize)> =
-            shown.flat_map(|(t, &i)| t.markers.iter().map(move |m| (problem.images[i].plate, m.marker))).collect();
-        order.sort_unstable();
-        order.dedup();
-        Self { order }
+/// Dense columns x 3 markers.
+fn covariance_with_dense(
+    markers: &SeenMarkers,
+    problem: &Problem,
+    state: &State,
+    lin: &Linearised,
+    covariance: &Covariance,
+) -> DMatrix<f64> {
+    let dense = problem.layout.len();
+    let reduced = &covariance.reduced;
+    let slack_start = &covariance.system.slack_start;
+    if slack_start.is_empty() {
+        // The slack was eliminated: markers follow the dense columns in this order.
+        return reduced.view((0, dense), (dense, 3 * markers.order.len())).into_owned();
     }
-
-    fn at(&self, plate: usize, marker: usize) -> Option<usize> {
-        self.order.binary_search(&(plate, marker)).ok()
-    }
-
-    /// Dense columns x 3 markers.
-    fn covariance_with_dense(
-        &self,
-        problem: &Problem,
-        state: &State,
-        lin: &Linearised,
-        covariance: &Covariance,
-    ) -> DMatrix<f64> {
-        let dense = problem.layout.len();
-        let reduced = &covariance.reduced;
-        let slack_start = &covariance.system.slack_start;
-        if slack_start.is_empty() {
-            // The slack was eliminated: markers follow the dense columns in this order.
-            return reduced.view((0, dense), (dense, 3 * self.order.len())).into_owned();
-        }
-        let mut coupling = DMatrix::zeros(3 * self.order.len(), reduced.nrows());
-        let mut information: Vec<Matrix3<f64>> = (self.order.iter())
-            .map(|&(p, m)| Matrix3::from_diagonal_element(problem.marker_information(p, m)))
-            .collect();
-        for (k, (terms, &i)) in lin.terms.iter().zip(&lin.images).enumerate() {
-            let image = &problem.images[i];
-            let chain = &lin.chains[k];
-            let columns = problem.layout.intrinsics(image);
-            let couplings = lin.equations(problem, state, k).map_or_else(Vec::new, |e| e.marker_couplings());
-            for (own, t) in terms.markers.iter().zip(&couplings) {
-                let Some(at) = self.at(image.plate, t.marker) else { continue };
-                information[at] += own.mm;
-                let mp = DMatrix::from_column_slice(3, 6, t.mp.as_slice());
-                let mut rows = coupling.rows_mut(3 * at, 3);
-                let mut theta = rows.columns_mut(0, chain.d_theta.ncols());
-                theta += &mp * &chain.d_theta;
-                let mut slack = rows.columns_mut(slack_start[k], chain.d_slack.ncols());
-                slack += &mp * &chain.d_slack;
-                for (e, values) in t.intrinsics() {
-                    if let Some(c) = columns[e] {
-                        let mut column = rows.fixed_columns_mut::<1>(c);
-                        column += values;
-                    }
+    let mut coupling = DMatrix::zeros(3 * markers.order.len(), reduced.nrows());
+    for (k, &i) in lin.images.iter().enumerate() {
+        let image = &problem.images[i];
+        let chain = &lin.chains[k];
+        let columns = problem.layout.intrinsics(image);
+        let couplings = lin.equations(problem, state, k).map_or_else(Vec::new, |e| e.marker_couplings());
+        for t in &couplings {
+            let Some(at) = markers.number[image.plate][t.marker] else { continue };
+            let mp = DMatrix::from_column_slice(3, 6, t.mp.as_slice());
+            let mut rows = coupling.rows_mut(3 * at, 3);
+            let mut theta = rows.columns_mut(0, chain.d_theta.ncols());
+            theta += &mp * &chain.d_theta;
+            let mut slack = rows.columns_mut(slack_start[k], chain.d_slack.ncols());
+            slack += &mp * &chain.d_slack;
+            for (e, values) in t.intrinsics() {
+                if let Some(c) = columns[e] {
+                    let mut column = rows.fixed_columns_mut::<1>(c);
+                    column += values;
                 }
             }
         }
-        for (at, information) in information.iter().enumerate() {
-            let inverse = information.try_inverse().unwrap_or_else(Matrix3::zeros);
-            let rows = DMatrix::from_column_slice(3, 3, inverse.as_slice()) * coupling.rows(3 * at, 3);
-            coupling.rows_mut(3 * at, 3).copy_from(&rows);
-        }
-        -product(&reduced.rows(0, dense).into_owned(), &coupling.transpose())
     }
+    for (at, information) in markers.information(problem, lin).iter().enumerate() {
+        let inverse = information.try_inverse().unwrap_or_else(Matrix3::zeros);
+        let rows = DMatrix::from_column_slice(3, 3, inverse.as_slice()) * coupling.rows(3 * at, 3);
+        coupling.rows_mut(3 * at, 3).copy_from(&rows);
+    }
+    -product(&reduced.rows(0, dense).into_owned(), &coupling.transpose())
 }
 
 /// Gradient of the k-th image in use: dense columns, and markers.
-fn score(problem: &Problem, lin: &Linearised, k: usize, markers: &Seen) -> (DVector<f64>, DVector<f64>) {
+fn score(problem: &Problem, lin: &Linearised, k: usize, markers: &SeenMarkers) -> (DVector<f64>, DVector<f64>) {
     let (terms, chain, image) = (&lin.terms[k], &lin.chains[k], &problem.images[lin.images[k]]);
     let mut dense = DVector::zeros(problem.layout.len());
     let of_theta = chain.d_theta.transpose() * DVector::from_column_slice(terms.bp.as_slice());
@@ -130,7 +106,7 @@ fn score(problem: &Problem, lin: &Linearised, k: usize, markers: &Seen) -> (DVec
     }
     let mut of_markers = DVector::zeros(3 * markers.order.len());
     for t in &terms.markers {
-        if let Some(at) = markers.at(image.plate, t.marker) {
+        if let Some(at) = markers.number[image.plate][t.marker] {
             of_markers.fixed_rows_mut::<3>(3 * at).copy_from(&t.bm);
         }
     }

@@ -3,7 +3,6 @@
 //! `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what the models share, with the whole information `N` (dense columns,
 //! slack and markers) at the optimum of each (D. MacKay, *Bayesian interpolation*, 1992).
 
-use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use super::joint::{Options, RobotModel, identify_model};
@@ -11,7 +10,7 @@ use super::{MeasuredSeries, Solution};
 use crate::error::Result;
 use crate::linalg::SymmetricFactor;
 use crate::problem::{Problem, State};
-use crate::solve::{Elimination, Linearised, Settings, System, solve};
+use crate::solve::{Elimination, Linearised, SeenMarkers, Settings, System, solve};
 use crate::urdf::Chain;
 
 /// Logarithm of the odds at which a smaller model takes the place of a larger one: "decisive" (H. Jeffreys, *Theory of
@@ -84,18 +83,8 @@ fn evidence(full: &Solution, model: RobotModel) -> Option<Evidence> {
 fn log_evidence(problem: &Problem, state: &State, lin: &Linearised) -> Option<f64> {
     let system = System::with(Elimination::Markers, problem, state, lin, 0.0);
     let reduced = SymmetricFactor::new(&system.information).ok()?.log_determinant();
-    let mut markers: Vec<Vec<Matrix3<f64>>> =
-        problem.plates.iter().map(|p| vec![Matrix3::zeros(); p.markers.len()]).collect();
-    for (terms, &i) in lin.terms.iter().zip(&lin.images) {
-        terms.markers.iter().for_each(|t| markers[problem.images[i].plate][t.marker] += t.mm);
-    }
-    let mut eliminated = 0.0;
-    for (plate, blocks) in markers.iter().enumerate() {
-        for (marker, block) in blocks.iter().enumerate() {
-            let prior = problem.marker_information(plate, marker);
-            eliminated += (block + Matrix3::from_diagonal_element(prior)).determinant().ln();
-        }
-    }
+    let markers = SeenMarkers::of(problem, lin).information(problem, lin);
+    let eliminated: f64 = markers.iter().map(|block| block.determinant().ln()).sum();
     let priors: f64 = (problem.layout.columns.iter())
         .filter(|c| c.free && c.prior_sigma.is_finite())
         .map(|c| c.prior_sigma.ln())

@@ -72,26 +72,35 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
         let Seen { observations, left_out } = seen;
         stops.push(MeasuredStop { image: stop.image.clone(), readings, placement, observations, left_out });
     }
+    // The detector measures centroids, whatever observations would mean.
+    let centroid = found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid;
+    Ok(Measured { series: measured_series(series, lens, (width_px, height_px), centroid, stops), notices })
+}
+
+/// A series with what its stops show.
+pub(super) fn measured_series(
+    series: &Series,
+    lens: Lens,
+    (width_px, height_px): (u32, u32),
+    centroid: bool,
+    stops: Vec<MeasuredStop>,
+) -> MeasuredSeries {
     let plate_file = series.folder.join(&series.manifest.plate);
-    Ok(Measured {
-        series: MeasuredSeries {
-            name: series.name.clone(),
-            camera: series.camera_name().to_owned(),
-            mounting: series.mounting().to_owned(),
-            mount: series.manifest.camera_mount,
-            width_px,
-            height_px,
-            focal_px: camera.focal_px,
-            lens,
-            // The detector measures centroids, whatever observations would mean.
-            centroid: found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid,
-            plate: series.plate.clone(),
-            plate_name: plate_file.canonicalize().unwrap_or(plate_file).display().to_string(),
-            order_known: series.manifest.robot.order == StopOrder::Visited,
-            stops,
-        },
-        notices,
-    })
+    MeasuredSeries {
+        name: series.name.clone(),
+        camera: series.camera_name().to_owned(),
+        mounting: series.mounting().to_owned(),
+        mount: series.manifest.camera_mount,
+        width_px,
+        height_px,
+        focal_px: series.manifest.camera.focal_px,
+        lens,
+        centroid,
+        plate: series.plate.clone(),
+        plate_name: plate_file.canonicalize().unwrap_or(plate_file).display().to_string(),
+        order_known: series.manifest.robot.order == StopOrder::Visited,
+        stops,
+    }
 }
 
 /// The lens model that a series states.

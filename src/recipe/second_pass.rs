@@ -6,10 +6,10 @@ use std::path::Path;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::build::{MeasuredSeries, MeasuredStop, build};
+use super::build::{MeasuredStop, build};
 use super::free_poses::adjust_free_poses;
 use super::look::SeenImage;
-use super::measure::lens_of;
+use super::measure::{lens_of, measured_series};
 use crate::detect::Picture;
 use crate::detect::circles::{Predicted, look_where_predicted};
 use crate::error::Result;
@@ -56,21 +56,8 @@ fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Opti
         observations: image.detection.observations.clone(),
         left_out: image.detection.failure.as_ref().map(|e| e.what.clone()),
     };
-    let measured = MeasuredSeries {
-        name: series.name.clone(),
-        camera: series.camera_name().to_owned(),
-        mounting: series.mounting().to_owned(),
-        mount: series.manifest.camera_mount,
-        width_px: width as u32,
-        height_px: height as u32,
-        focal_px: series.manifest.camera.focal_px,
-        lens: lens_of(series).ok()?,
-        centroid: true,
-        plate: series.plate.clone(),
-        plate_name: series.manifest.plate.clone(),
-        order_known: false,
-        stops: images.iter().map(stop).collect(),
-    };
+    let stops = images.iter().map(stop).collect();
+    let measured = measured_series(series, lens_of(series).ok()?, (width as u32, height as u32), true, stops);
     let nobody = Robot::nominal(Chain::empty());
     let (mut problem, state) = build(&nobody, &[measured], false).ok()?;
     let (free, _) = adjust_free_poses(&mut problem, state, &[series.manifest.camera.focal_px]).ok()?;

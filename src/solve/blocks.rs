@@ -8,7 +8,7 @@ use crate::problem::{E, Equations, Problem, Slack, State};
 
 /// Markers that images in use show.
 #[derive(Debug, Clone)]
-pub(super) struct SeenMarkers {
+pub struct SeenMarkers {
     /// Number of each marker among those that were seen, per plate.
     pub number: Vec<Vec<Option<usize>>>,
     /// Plate and index of each that was seen.

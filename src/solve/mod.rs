@@ -9,6 +9,7 @@ mod levenberg;
 mod snoop;
 mod system;
 
+pub use blocks::SeenMarkers;
 pub use components::{ComponentOptions, Tally, estimate_components, joint_noise_sigmas, share_out};
 pub use covariance::{Covariance, covariance, covariance_by};
 pub use levenberg::{Outcome, Settings, Status, solve};

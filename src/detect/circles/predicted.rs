@@ -7,7 +7,7 @@ use super::ellipse::Ellipse;
 use super::measure::{Camera, INK_SLOPE, Target};
 use super::pipeline::observations_of;
 use super::refine::{Fit, Start, refine};
-use super::second_look::CROWDED;
+use super::second_look::{CROWDED, tie_sigma};
 use super::types::{Found, Measured, Reason};
 use crate::detect::{Circles, Detection, Picture};
 use crate::series::Marker;
@@ -127,14 +127,15 @@ impl Predicted {
         }
     }
 
-    /// The centres of inner and outer edge are as far apart as predicted, within four sigma and what two circles of a
-    /// marker are printed apart.
+    /// The centres of inner and outer edge are as far apart as predicted, within four sigma of measurement and
+    /// prediction.
     fn edges_agree(&self, fit: &Fit) -> bool {
         let Some(inner) = &fit.measured.inner else { return true };
         let outer = &fit.measured.outer;
-        let printed = 5e-4 * self.outer.semi_axes()[0] + 0.1 * self.apart[0].hypot(self.apart[1]);
+        let predicted = tie_sigma(self.apart, self.outer.semi_axes()[0]);
         (0..2).all(|a| {
-            let variance = outer.covariance[2 * a] + inner.covariance[2 * a] - 2.0 * fit.cross[a] + printed * printed;
+            let variance =
+                outer.covariance[2 * a] + inner.covariance[2 * a] - 2.0 * fit.cross[a] + predicted * predicted;
             let off = inner.ellipse.centre[a] - outer.ellipse.centre[a] - self.apart[a];
             off * off < 16.0 * variance
         })

@@ -210,6 +210,10 @@ fn tie(map: &LocalMap, figure: &Figure, major_px: f64) -> Option<([f64; 2], f64)
     let to = |p: [f64; 2]| Some(map.at(p));
     let (outer, inner) = (centroid(&to, figure.radius)?, centroid(&to, figure.radius * figure.ratio?)?);
     let offset = [0, 1].map(|a| inner[a] - outer[a]);
-    let sigma = ECCENTRIC * major_px + TIE_PART * offset[0].hypot(offset[1]);
-    Some((offset, sigma))
+    Some((offset, tie_sigma(offset, major_px)))
+}
+
+/// Standard deviation per axis of what geometry says about the distance of inner and outer centre, px.
+pub(super) fn tie_sigma(apart: [f64; 2], major_px: f64) -> f64 {
+    ECCENTRIC * major_px + TIE_PART * apart[0].hypot(apart[1])
 }
