@@ -10,6 +10,27 @@ use robotcal::recipe;
 use robotcal::series::{Edge, read_images};
 use robotcal::simulate::truth::Truth;
 
+fn copied(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let (path, to) = entry.map(|e| (e.path(), to.join(e.file_name()))).unwrap();
+        if path.is_dir() { copied(&path, &to) } else { std::fs::copy(&path, &to).map(|_| ()).unwrap() }
+    }
+}
+
+/// Two images that are the same must be seen as the same, or nobody can call one of them a duplicate.
+#[test]
+fn an_image_and_its_copy_show_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    copied(&Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/kr6_small"), folder.path());
+    let image = |k: u32| folder.path().join(format!("images/img_{k:03}.png"));
+    std::fs::copy(image(4), image(5)).unwrap();
+    let seen = recipe::look(&read_images(folder.path()).unwrap(), |_| ()).unwrap();
+    let rescued = seen[4].detection.circles.iter().flat_map(|c| &c.found).filter(|f| f.measured.visible < 0.97).count();
+    assert!(rescued > 0, "the second pass found nothing");
+    assert_eq!(seen[4].detection.observations, seen[5].detection.observations);
+}
+
 /// Half of a squared normalised error of two coordinates is exponentially distributed, with the median ln 2; what is allowed
 /// for a contour that is not all there is an upper bound.
 #[test]

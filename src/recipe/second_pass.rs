@@ -61,7 +61,11 @@ fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Opti
     let nobody = Robot::nominal(Chain::empty());
     let (mut problem, state) = build(&nobody, &[measured], false).ok()?;
     let (free, _) = adjust_free_poses(&mut problem, state, &[series.manifest.camera.focal_px]).ok()?;
-    let poses = free.poses.iter().map(|p| p.as_ref().map(|p| p.camera_from_plate)).collect();
+    let pose = |k: usize| free.poses[k].as_ref().map(|p| p.camera_from_plate);
+    // The adjustment takes one of two images that show the same; they stay the same when both have its pose.
+    let original =
+        |k: usize| images[..k].iter().position(|i| i.detection.observations == images[k].detection.observations);
+    let poses = (0..images.len()).map(|k| pose(k).or_else(|| pose(original(k)?))).collect();
     Some((free.state, poses))
 }
 
