@@ -1,6 +1,6 @@
 //! Flags, progress, one thin file per subcommand; the only room that prints.
 //!
-//! To add a subcommand: a file with its `Args` and `run`, a variant of [`Command`] and a row in [`Command::run`].
+//! To add a subcommand: a file with its `Args` and `run`, a variant of `Command` and a row in `Command::run`.
 
 mod at;
 mod choices;

@@ -1,6 +1,6 @@
 //! Drawings of a plate: exact millimetres in PDF and SVG, and a PNG for looking at it.
 //!
-//! The drawing is first a list of [`Figure`]s in metres (origin at the sheet's centre, x right, y up), then written by one file
+//! The drawing is first a list of `Figure`s in metres (origin at the sheet's centre, x right, y up), then written by one file
 //! per format. Everything but markers stays outside the quiet field, a pitch away from the outermost markers.
 
 use crate::plan::plate_design::{Sheet, quiet_field_m};

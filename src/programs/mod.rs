@@ -5,7 +5,7 @@
 //! | [`field`] | one number in the text, and its replacement |
 //! | [`program`] | targets: joints or a pose, made of fields |
 //! | [`codes`] | status and turn, confdata: which posture a pose means |
-//! | [`compensate`] | targets of one robot to targets of another |
+//! | [`mod@compensate`] | targets of one robot to targets of another |
 //! | `scan` | tokens that all languages share |
 //! | `table`, `krl`, `rapid`, `urscript` | text -> targets |
 //!

@@ -1,6 +1,6 @@
 //! The planned stops as programs of robot controllers, with dwell and trigger marks.
 //!
-//! All writers go through the same list of [`Visit`]s. A new language is one file and one row in [`programs`].
+//! All writers go through the same list of `Visit`s. A new language is one file and one row in [`programs`].
 
 mod krl;
 mod rapid;

@@ -44,7 +44,7 @@ pub struct Precision {
     pub inner: usize,
     /// Rms error per axis of the outer contours, px.
     pub rms_px: f64,
-    /// Rms of the error in units of the formula `(n/C) sqrt(2 s / (sqrt(pi) r))`, generalised to any contour ([`information`]).
+    /// Rms of the error in units of the formula `(n/C) sqrt(2 s / (sqrt(pi) r))`, generalised to any contour (`information`).
     pub to_formula: f64,
     /// Rms of the error in units of the exact bound: position from the blurred coverage, everything else known; the inner
     /// centre unknown where it is measured for itself.
