@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 use robotcal::geom::{Pose, exp_so3, log_so3, right_jacobian_se3, right_jacobian_so3};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::circle;
+use robotcal::model::joint_terms::Term;
 use robotcal::problem::{E, Image, Problem, Slack, State, Weighting, chained, equations, linearise, predict};
 use robotcal::series::CameraMount;
 use robotcal::urdf::JointKind;
@@ -294,7 +295,7 @@ fn problems(mount: CameraMount, deviation: f64, dice: &mut Dice) -> Vec<(Problem
             // Gravity of a reading that moves several joints is defined by the first of them; it has its own test.
             let mimic = parts.iter().any(|p| matches!(p, Part::Mimic(_)));
             let mut terms = all_terms();
-            terms.retain(|t| !(mimic && matches!(t, robotcal::model::joint_terms::Term::Gravity(_))));
+            terms.retain(|t| !(mimic && matches!(t, Term::Gravity(_) | Term::Sag)));
             let request = Request {
                 parts,
                 terms,

@@ -231,6 +231,7 @@ fn compensation_has_every_term_but_the_offset() {
             Term::Gear => joint.gear_scale.unwrap(),
             Term::Cosine(k) => joint.harmonics.as_ref().unwrap()[2 * usize::from(k) - 2],
             Term::Sine(k) => joint.harmonics.as_ref().unwrap()[2 * usize::from(k) - 1],
+            Term::Sag => unreachable!("this URDF states no masses"),
             Term::Gravity(k) => joint.gravity.as_ref().unwrap()[usize::from(k)],
             Term::Backlash => joint.backlash_rad.unwrap(),
         };

@@ -28,10 +28,10 @@ fn reread(files: &Files) -> Robot {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("compensation.toml");
     std::fs::write(&path, text(files, "compensation.toml")).unwrap();
-    let mut terms = read_compensation(&path, &chain).unwrap();
+    let mut robot = read_compensation(&path, chain).unwrap();
     // Gravity is a function of the posture by readings, which mastering shifts; the rest is the same to rounding.
-    terms.retain(|t| !t.term.name().starts_with("gravity"));
-    Robot { terms, ..Robot::nominal(chain) }
+    robot.terms.retain(|t| !t.term.name().starts_with("gravity"));
+    robot
 }
 
 /// Rows of a table behind its remarks.

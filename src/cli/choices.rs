@@ -83,6 +83,7 @@ impl ChoiceArgs {
                 fix: joined(&config.fix, &self.fix),
                 prior: config.prior,
             },
+            payload: config.payload,
         })
     }
 }
@@ -99,6 +100,11 @@ pub(super) fn in_words(options: &Options) -> Vec<(String, String)> {
     }
     let mut words = vec![("joint noise".to_owned(), joint_noise), ("robot model".to_owned(), model)];
     words.extend(options.selection.in_words());
+    words.extend(
+        options
+            .payload
+            .map(|p| ("payload".to_owned(), format!("{} kg at {:?} m of the tip link", p.mass_kg, p.centre_m))),
+    );
     words
 }
 

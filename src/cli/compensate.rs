@@ -8,9 +8,9 @@ use clap::{Args, ValueEnum};
 use super::Verdict;
 use crate::error::{Error, Result};
 use crate::geom::{Pose, exp_so3};
-use crate::model::joint_terms::{JointTerm, Term};
+use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
-use crate::output::{read_compensation, write_beside};
+use crate::output::{compensated, write_beside};
 use crate::programs::program::Posture;
 use crate::programs::{
     self, Correction, Kind, Language, Left, Models, Outcome, Postures, Program, Setting, Target, TextFile,
@@ -109,9 +109,9 @@ impl From<LanguageName> for Language {
 pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     let robot = |file: &Path, compensation: Option<&PathBuf>| -> Result<Robot> {
         let chain = urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?;
-        let terms = compensation.map_or(Ok(Vec::new()), |c| read_compensation(c, &chain))?;
-        let counts = |t: &JointTerm| !args.unordered || t.term != Term::Backlash;
-        Ok(Robot { terms: terms.into_iter().filter(counts).collect(), ..Robot::nominal(chain) })
+        let mut robot = compensated(chain, compensation.map(PathBuf::as_path))?;
+        robot.terms.retain(|t| !args.unordered || t.term != Term::Backlash);
+        Ok(robot)
     };
     let nominal = args.nominal.as_ref().or(args.from.as_ref()).unwrap_or(&args.urdf);
     let controller = robot(nominal, None)?;

@@ -10,8 +10,7 @@ use super::recording::RecordingArgs;
 use super::{Verdict, verify_series};
 use crate::assess::{MeasuredPoint, fit_points};
 use crate::error::{Error, Result};
-use crate::model::robot::Robot;
-use crate::output::read_compensation;
+use crate::output::compensated;
 use crate::urdf::{self, Chain};
 
 /// Flags of `verify`.
@@ -56,8 +55,7 @@ fn points(args: &VerifyArgs, points_file: &std::path::Path, unit: Unit) -> Resul
     let rms = |file: &PathBuf, compensation: Option<&PathBuf>| -> Result<(usize, f64, f64)> {
         let chain = urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?;
         let points = read_points(points_file, &chain, unit)?;
-        let terms = compensation.map_or(Ok(Vec::new()), |c| read_compensation(c, &chain))?;
-        let robot = Robot { terms, ..Robot::nominal(chain) };
+        let robot = compensated(chain, compensation.map(PathBuf::as_path))?;
         let fit = fit_points(&robot, &points).ok_or_else(|| {
             Error::unsolved(
                 points_file.display(),

@@ -8,8 +8,7 @@ use super::verify::VerifyArgs;
 use super::{Verdict, progress};
 use crate::assess::{Ratio, bootstrap_ratio, root_mean_square};
 use crate::error::{Error, Result};
-use crate::model::robot::Robot;
-use crate::output::read_compensation;
+use crate::output::compensated;
 use crate::recipe::{JudgedImage, verify_series};
 use crate::urdf;
 
@@ -54,10 +53,10 @@ fn judged(
     let all = read_all(&args.series)?;
     let chain = chain(&description, &all, args.base.as_deref(), args.tip.as_deref())?;
     let all = Pictures::new().of_recordings(all, &recording.options(&chain.readings)?)?;
-    let terms = compensation.map_or(Ok(Vec::new()), |c| read_compensation(c, &chain))?;
     let measured = measure_all(&all, &chain, &mut Vec::new())?;
+    let robot = compensated(chain, compensation)?;
     let bar = progress::bar(1, &urdf.display().to_string());
-    let found = verify_series(&Robot { terms, ..Robot::nominal(chain) }, &measured);
+    let found = verify_series(&robot, &measured);
     bar.finish_and_clear();
     found
 }

@@ -32,6 +32,9 @@ pub enum Term {
     /// Sag under gravity: the moment about the axis of a unit weight on a unit lever. Levers 0 and 1 are fixed in the
     /// joint's own link, levers 2 and 3 in the link after the next moving joint of the chain.
     Gravity(u8),
+    /// Sag under gravity where the masses are known: the moment about the axis, over the largest that it can be
+    /// ([`crate::urdf::Chain::largest_moment`]). The parameter is the sag at that moment.
+    Sag,
     /// Backlash: `b tanh(dq / 2 mrad)` of the step from the previous stop.
     Backlash,
     /// What the joint is off by near one reading (given in urad or um) to which it came back for several stops: whatever it
@@ -53,6 +56,7 @@ impl Term {
             Self::Cosine(k) => format!("cos_{k}"),
             Self::Sine(k) => format!("sin_{k}"),
             Self::Gravity(k) => format!("gravity_{k}"),
+            Self::Sag => "sag".into(),
             Self::Backlash => "backlash".into(),
             Self::Local(at) => format!("local_{:.4}", 1e-6 * f64::from(at)),
         }
@@ -63,6 +67,7 @@ impl Term {
         match (name, name.split_once('_')) {
             ("offset", _) => Some(Self::Offset),
             ("gear", _) => Some(Self::Gear),
+            ("sag", _) => Some(Self::Sag),
             ("backlash", _) => Some(Self::Backlash),
             (_, Some(("cos", k))) => k.parse().ok().map(Self::Cosine),
             (_, Some(("sin", k))) => k.parse().ok().map(Self::Sine),
@@ -89,6 +94,7 @@ impl Term {
             Self::Gear => 5e-4,
             Self::Cosine(_) | Self::Sine(_) => 0.1e-3 * per_metre,
             Self::Gravity(_) | Self::Backlash => 0.3e-3 * per_metre,
+            Self::Sag => 1e-3 * per_metre,
             // A variance component: the data decide.
             Self::Local(_) => 3e-3 * per_metre,
         }
@@ -104,6 +110,8 @@ pub struct TermContext {
     pub approach: Option<f64>,
     /// Moment of the unit weight about the axis for the four gravity levers, dimensionless.
     pub gravity: [f64; GRAVITY_TERMS as usize],
+    /// Moment of the masses behind the joint about its axis over the largest that it can be, -1 to 1; 0 where masses are not known.
+    pub moment: f64,
 }
 
 impl Term {
@@ -115,6 +123,7 @@ impl Term {
             Self::Cosine(k) => (f64::from(k) * context.reading).cos(),
             Self::Sine(k) => (f64::from(k) * context.reading).sin(),
             Self::Gravity(k) => context.gravity[usize::from(k)],
+            Self::Sag => context.moment,
             Self::Backlash => context.approach.map_or(0.0, |step| (step / BACKLASH_STEP).tanh()),
             Self::Local(at) => {
                 let distance = (context.reading - 1e-6 * f64::from(at)) / LOCAL_RANGE;
@@ -127,7 +136,7 @@ impl Term {
 impl JointTerm {
     /// Value of the basis function of a local error at a reading; `None` for other terms.
     pub fn local_basis(&self, reading: f64) -> Option<f64> {
-        let context = TermContext { reading, approach: None, gravity: Default::default() };
+        let context = TermContext { reading, approach: None, gravity: Default::default(), moment: 0.0 };
         matches!(self.term, Term::Local(_)).then(|| self.term.basis(&context))
     }
 }

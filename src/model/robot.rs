@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::joint_terms::{GRAVITY_TERMS, JointTerm, Term, TermContext, levers};
 use crate::geom::{Pose, adjoint, exp_so3, right_jacobian_se3};
-use crate::urdf::{Chain, Joint, JointKind};
+use crate::urdf::{CarriedMass, Chain, Joint, JointKind};
 
 /// Where the robot stood: readings in the order of [`Chain::readings`], rad or m.
 #[derive(Debug, Clone, PartialEq)]
@@ -187,9 +187,10 @@ impl Robot {
                 reading: stop.readings[r],
                 approach: stop.approach.as_ref().map(|a| a[r]),
                 gravity: [0.0; GRAVITY_TERMS as usize],
+                moment: 0.0,
             })
             .collect();
-        if self.terms.iter().any(|t| matches!(t.term, Term::Gravity(_))) {
+        if self.terms.iter().any(|t| matches!(t.term, Term::Gravity(_) | Term::Sag)) {
             self.fill_gravity(&mut contexts);
         }
         let mut moved: Vec<f64> = stop.readings.iter().zip(noise).map(|(q, dq)| q + dq).collect();
@@ -204,14 +205,33 @@ impl Robot {
     fn fill_gravity(&self, contexts: &mut [TermContext]) {
         let weight = Vector3::new(0.0, 0.0, -1.0);
         let mut pose = Pose::identity();
-        // Axis and link rotation behind every driven joint, base frame.
-        let mut links = Vec::new();
+        // Pose behind every joint; kind, axis and link rotation behind every driven one, base frame.
+        let (mut poses, mut links, mut moments) = (Vec::with_capacity(self.chain.joints.len()), Vec::new(), Vec::new());
         for joint in &self.chain.joints {
             let position = joint.drive.map_or(0.0, |d| d.multiplier * contexts[d.reading].reading + d.offset);
             pose = pose * joint.origin * motion(joint, position);
             if let Some(drive) = joint.drive {
                 links.push((drive.reading, joint.kind, joint.axis, pose.rotation));
+                let largest = self.chain.largest_moment(poses.len());
+                if largest > 0.0 {
+                    moments.push((drive.reading, poses.len(), largest));
+                }
             }
+            poses.push(pose);
+        }
+        for (reading, index, largest) in moments {
+            let (joint, axis) = (&self.chain.joints[index], poses[index].rotation * self.chain.joints[index].axis);
+            let of = |m: &CarriedMass| {
+                let lever = poses[m.joint].transform(&m.centre_m) - poses[index].translation;
+                m.mass_kg
+                    * if joint.kind == JointKind::Prismatic {
+                        axis.dot(&weight)
+                    } else {
+                        axis.dot(&lever.cross(&weight))
+                    }
+            };
+            contexts[reading].moment =
+                self.chain.masses.iter().filter(|m| m.joint >= index).map(of).sum::<f64>() / largest;
         }
         for (k, (reading, kind, axis, rotation)) in links.iter().enumerate() {
             let base_axis = rotation * axis;

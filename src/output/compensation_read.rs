@@ -5,13 +5,16 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use super::compensation::largest_nm;
 use crate::error::{Error, Result};
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
-use crate::urdf::Chain;
+use crate::model::robot::Robot;
+use crate::urdf::{Chain, Payload};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
+    payload: Option<Payload>,
     #[serde(default)]
     joint: BTreeMap<String, Joint>,
 }
@@ -24,17 +27,33 @@ struct Joint {
     harmonics: Vec<f64>,
     #[serde(default)]
     gravity: Vec<f64>,
+    compliance_rad_per_nm: Option<f64>,
     backlash_rad: Option<f64>,
 }
 
-/// Joint terms of a compensation.toml for a chain, joints matched by name.
+/// The robot of a chain, with the joint terms of a compensation.toml where there is one.
 ///
 /// # Errors
-/// Names the file, and the line or joint: unreadable text, unknown keys, a joint that the chain does not have, wrong counts.
-pub fn read_compensation(path: &Path, chain: &Chain) -> Result<Vec<JointTerm>> {
+/// Those of [`read_compensation`].
+pub fn compensated(chain: Chain, path: Option<&Path>) -> Result<Robot> {
+    match path {
+        Some(path) => read_compensation(path, chain),
+        None => Ok(Robot::nominal(chain)),
+    }
+}
+
+/// The robot of a chain with the joint terms of a compensation.toml, joints matched by name.
+///
+/// # Errors
+/// Names the file, and the line or joint: unreadable text, unknown keys, a joint that the chain does not have, wrong counts,
+/// a compliance where the URDF states no masses.
+pub fn read_compensation(path: &Path, mut chain: Chain) -> Result<Robot> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
     let file: File = toml::from_str(&text)
         .map_err(|e| Error::input(path.display(), e, "use the compensation.toml that identify wrote"))?;
+    if let Some(payload) = &file.payload {
+        chain = chain.with_payload(payload).map_err(|e| Error::input(path.display(), e.what, e.remedy))?;
+    }
     let mut terms = Vec::new();
     for (name, joint) in &file.joint {
         let place = || format!("{}: [joint.{name}]", path.display());
@@ -59,7 +78,14 @@ pub fn read_compensation(path: &Path, chain: &Chain) -> Result<Vec<JointTerm>> {
             add(Term::Sine(k), pair[1]);
         }
         (0..GRAVITY_TERMS).zip(&joint.gravity).for_each(|(k, v)| add(Term::Gravity(k), *v));
+        if let Some(compliance) = joint.compliance_rad_per_nm {
+            if chain.masses.is_empty() {
+                let what = "has a compliance_rad_per_nm, and the URDF states no masses";
+                return Err(Error::input(place(), what, "give the calibrated URDF that was written beside it"));
+            }
+            add(Term::Sag, compliance * largest_nm(&chain, reading));
+        }
         joint.backlash_rad.into_iter().for_each(|v| add(Term::Backlash, v));
     }
-    Ok(terms)
+    Ok(Robot { terms, ..Robot::nominal(chain) })
 }

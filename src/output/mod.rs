@@ -39,7 +39,7 @@ mod solution_record;
 mod text;
 mod write;
 
-pub use compensation_read::read_compensation;
+pub use compensation_read::{compensated, read_compensation};
 pub use report::{plan_html, report_html, sigma_text};
 pub use write::{NewResult, write_all, write_beside};
 

@@ -15,7 +15,7 @@ use crate::model::robot::{Robot, Stop};
 use crate::problem::{Layout, PlateShape, Slack, State};
 use crate::recipe::{MeasuredSeries, MeasuredStop};
 use crate::series::{CameraMount, Marker, Observation, Plate};
-use crate::urdf::RobotDescription;
+use crate::urdf::{Chain, RobotDescription};
 
 fn damaged(what: impl std::fmt::Display) -> Error {
     Error::input(super::solution_json::FILE_NAME, what, "give the solution.json as `robotcal identify` wrote it")
@@ -27,6 +27,18 @@ fn damaged(what: impl std::fmt::Display) -> Error {
 /// A text that is no URDF.
 pub fn robot_description(record: &SolutionRecord) -> Result<RobotDescription> {
     RobotDescription::from_text(Path::new(&record.urdf.file), record.urdf.text.clone())
+}
+
+/// The chain that was solved for.
+///
+/// # Errors
+/// Links that the URDF does not have.
+pub fn chain(record: &SolutionRecord, base: &str, tip: &str) -> Result<Chain> {
+    let chain = robot_description(record)?.chain(Some(base), Some(tip))?;
+    match &record.robot.payload {
+        Some(payload) => chain.with_payload(payload),
+        None => Ok(chain),
+    }
 }
 
 fn plate(p: &PlateRecord) -> Result<Plate> {
@@ -127,7 +139,7 @@ pub struct FoundModel {
 /// # Errors
 /// A file that does not hang together.
 pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
-    let chain = robot_description(record)?.chain(Some(&record.robot.base), Some(&record.robot.tip))?;
+    let chain = chain(record, &record.robot.base, &record.robot.tip)?;
     if chain.joints.len() != record.robot.joints.len() || chain.readings != record.robot.readings {
         return Err(damaged("robot and URDF text do not belong together"));
     }

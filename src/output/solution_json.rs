@@ -14,7 +14,7 @@ use crate::geom::Pose;
 use crate::model::camera::Lens;
 use crate::recipe::{Comparison, Evidence, StartVerdict};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
-use crate::urdf::JointKind;
+use crate::urdf::{JointKind, Payload};
 
 /// Name of the file.
 pub const FILE_NAME: &str = "solution.json";
@@ -107,6 +107,8 @@ pub struct RobotRecord {
     pub joints: Vec<JointRecord>,
     /// Joint terms.
     pub terms: Vec<TermRecord>,
+    /// What the tip carries, where it was stated.
+    pub payload: Option<Payload>,
 }
 
 /// One scalar estimate of the dense part, in the order of the covariance.

@@ -116,6 +116,7 @@ fn robot(state: &State) -> RobotRecord {
         reading_kinds: chain.reading_kinds.clone(),
         joints: joints.collect(),
         terms: terms.collect(),
+        payload: chain.payload(),
     }
 }
 

@@ -16,7 +16,7 @@ use crate::problem::{Problem, Slack, State};
 use crate::solve::{
     ComponentOptions, Outcome, Status, covariance, estimate_components, reject_images, reject_observations,
 };
-use crate::urdf::Chain;
+use crate::urdf::{Chain, Payload};
 
 /// What is assumed of the joint readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +55,8 @@ pub struct Options {
     pub harmonics: u8,
     /// Which parameters are estimated, and their priors.
     pub selection: Selection,
+    /// What the tip carries; none where the chain says it or nobody does.
+    pub payload: Option<Payload>,
 }
 
 impl Default for Options {
@@ -64,6 +66,20 @@ impl Default for Options {
             model: RobotModel::Auto,
             harmonics: HARMONICS,
             selection: Selection::default(),
+            payload: None,
+        }
+    }
+}
+
+impl Options {
+    /// The chain with the payload that is stated here.
+    ///
+    /// # Errors
+    /// A payload of a robot whose masses are not known.
+    pub(super) fn loaded(&self, chain: Chain) -> Result<Chain> {
+        match &self.payload {
+            Some(payload) => chain.with_payload(payload),
+            None => Ok(chain),
         }
     }
 }
@@ -73,7 +89,7 @@ impl RobotModel {
     pub fn has(self, term: Term) -> bool {
         match term {
             Term::Gear | Term::Cosine(_) | Term::Sine(_) => self != Self::Rigid,
-            Term::Gravity(_) | Term::Backlash => matches!(self, Self::Full | Self::Auto),
+            Term::Gravity(_) | Term::Sag | Term::Backlash => matches!(self, Self::Full | Self::Auto),
             _ => true,
         }
     }
@@ -91,7 +107,10 @@ impl RobotModel {
             terms.extend((1..=harmonics).flat_map(|k| [Term::Cosine(k), Term::Sine(k)]));
         }
         if self.has(Term::Backlash) {
-            terms.extend((0..GRAVITY_TERMS).map(Term::Gravity));
+            match chain.masses.is_empty() {
+                true => terms.extend((0..GRAVITY_TERMS).map(Term::Gravity)),
+                false => terms.push(Term::Sag),
+            }
             terms.push(Term::Backlash);
         }
         let readings = 0..chain.readings.len();

@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::model::joint_terms::Term;
 use crate::problem::{Layout, State, short_name};
 use crate::series::read_toml;
+use crate::urdf::Payload;
 
 /// Which parameters of the robot are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -75,6 +76,8 @@ pub struct Config {
     /// Priors by name.
     #[serde(default)]
     pub prior: BTreeMap<String, StatedPrior>,
+    /// What the tip carries.
+    pub payload: Option<Payload>,
 }
 
 impl Config {

@@ -20,7 +20,7 @@ use crate::detect::Picture;
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
-use crate::model::joint_terms::{JointTerm, Term};
+use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::plate_modes::{PRIOR_SIGMA, basis};
 use crate::model::robot::{Robot, Stop as Visit};
 use crate::plan::viewpoint::ViewRange;
@@ -239,8 +239,9 @@ fn true_robot(request: &WorldRequest, rng: &mut impl Rng) -> Robot {
             add(Term::Cosine(k), scaled(e.harmonic_rad, kind));
             add(Term::Sine(k), scaled(e.harmonic_rad, kind));
         }
-        for k in 0..4 {
-            add(Term::Gravity(k), scaled(e.gravity_rad, kind));
+        match request.chain.masses.is_empty() {
+            true => (0..GRAVITY_TERMS).for_each(|k| add(Term::Gravity(k), scaled(e.gravity_rad, kind))),
+            false => add(Term::Sag, scaled(e.gravity_rad, kind)),
         }
         add(Term::Backlash, scaled(e.backlash_rad, kind));
     }

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::masses::CarriedMass;
 use crate::geom::Pose;
 
 /// How a joint moves.
@@ -62,12 +63,22 @@ pub struct Chain {
     /// How the joint of each reading moves (fixes its unit: rad or m), same length as `readings`.
     /// Kept apart from `joints` because a mimic joint may be driven from outside the chain.
     pub reading_kinds: Vec<JointKind>,
+    /// What the joints carry, where the URDF states it.
+    pub masses: Vec<CarriedMass>,
 }
 
 impl Chain {
     /// No robot at all: base and tip are one.
     pub fn empty() -> Self {
         let [robot, base, tip] = [const { String::new() }; 3];
-        Self { robot, base, tip, joints: Vec::new(), readings: Vec::new(), reading_kinds: Vec::new() }
+        Self {
+            robot,
+            base,
+            tip,
+            joints: Vec::new(),
+            readings: Vec::new(),
+            reading_kinds: Vec::new(),
+            masses: Vec::new(),
+        }
     }
 }

@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 use roxmltree::Node;
+use serde::{Deserialize, Serialize};
 
-use super::chain::Chain;
+use super::chain::{Chain, JointKind};
 use super::elements::{Source, child, numbers};
 use super::read::RobotDescription;
 use crate::geom::Pose;
@@ -31,7 +32,88 @@ pub struct CarriedMass {
     pub centre_m: Vector3<f64>,
 }
 
+/// What the tip carries beside the links of the URDF: tool, camera, workpiece.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Payload {
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Centre of mass in the frame of the tip link, m.
+    pub centre_m: [f64; 3],
+}
+
+/// Name of the payload among the carried masses.
+const PAYLOAD: &str = "payload";
+
+/// Mass (kg) that the joints of an arm carry at least; a URDF that states less leaves its masses out.
+const LEAST_CARRIED_KG: f64 = 1.0;
+
+/// Fewest links whose masses, all the same, are placeholders.
+const ALIKE: usize = 3;
+
+impl Chain {
+    /// The chain with a payload in place of the one that it had.
+    ///
+    /// # Errors
+    /// A mass or a centre that is none, and a URDF that states no masses: the payload alone says little of the moments.
+    pub fn with_payload(mut self, payload: &Payload) -> Result<Self> {
+        let refuse = |what: String, remedy: &str| Err(Error::input("payload", what, remedy));
+        if !(payload.mass_kg >= 0.0 && payload.mass_kg.is_finite()) || payload.centre_m.iter().any(|x| !x.is_finite()) {
+            return refuse(
+                format!("{} kg at {:?} m", payload.mass_kg, payload.centre_m),
+                "give a mass and three numbers",
+            );
+        }
+        self.masses.retain(|m| m.link != PAYLOAD);
+        let Some(joint) = self.joints.len().checked_sub(1).filter(|_| !self.masses.is_empty()) else {
+            let what =
+                "the URDF states no masses of its links, without which a payload does not give the moments of gravity";
+            return refuse(what.into(), "leave the payload out, or add <inertial> to the links");
+        };
+        self.masses.push(CarriedMass {
+            link: PAYLOAD.into(),
+            joint,
+            mass_kg: payload.mass_kg,
+            centre_m: payload.centre_m.into(),
+        });
+        Ok(self)
+    }
+
+    /// The payload, where one was stated.
+    pub fn payload(&self) -> Option<Payload> {
+        let stated = self.masses.iter().find(|m| m.link == PAYLOAD)?;
+        Some(Payload { mass_kg: stated.mass_kg, centre_m: stated.centre_m.into() })
+    }
+
+    /// Largest moment of gravity about joint `index` of the chain, whatever the posture, as a mass on a lever (kg m; kg for a
+    /// prismatic joint): the masses behind it, each as far away as the links between allow.
+    pub fn largest_moment(&self, index: usize) -> f64 {
+        let behind = self.masses.iter().filter(|m| m.joint >= index);
+        let lever = |m: &CarriedMass| {
+            let links: f64 = self.joints[index + 1..=m.joint].iter().map(|j| j.origin.translation.norm()).sum();
+            if self.joints[index].kind == JointKind::Prismatic { 1.0 } else { links + m.centre_m.norm() }
+        };
+        behind.map(|m| m.mass_kg * lever(m)).sum()
+    }
+}
+
 impl RobotDescription {
+    /// The mass that the URDF has for all links alike, kg: a placeholder.
+    pub(super) fn placeholder_mass(&self) -> Option<f64> {
+        let mut masses = self.inertials.values().map(|i| i.mass_kg).filter(|m| *m > 0.0);
+        let first = masses.next()?;
+        (masses.clone().count() + 1 >= ALIKE && masses.all(|m| m == first)).then_some(first)
+    }
+
+    /// The masses of a chain where the URDF states them in earnest; else none.
+    pub(super) fn stated_masses(&self, chain: &Chain) -> Vec<CarriedMass> {
+        let Some(first) = chain.joints.iter().position(|j| j.drive.is_some()) else { return Vec::new() };
+        let mut carried = self.carried_masses(chain);
+        carried.retain(|m| m.joint >= first);
+        let total: f64 = carried.iter().map(|m| m.mass_kg).sum();
+        if self.placeholder_mass().is_some() || total < LEAST_CARRIED_KG { Vec::new() } else { carried }
+    }
+
     /// Every mass that the joints of a chain of this robot carry, grippers and other side branches included (their own
     /// joints at position zero). Links before the first joint of the chain carry nothing and are left out.
     pub fn carried_masses(&self, chain: &Chain) -> Vec<CarriedMass> {

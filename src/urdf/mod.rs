@@ -10,6 +10,6 @@ mod tree;
 
 pub use chain::{Chain, Drive, Joint, JointKind};
 pub use collisions::CarriedCapsule;
-pub use masses::{CarriedMass, Inertial};
+pub use masses::{CarriedMass, Inertial, Payload};
 pub use patch::patch_origins;
 pub use read::{RobotDescription, read};

@@ -81,9 +81,14 @@ impl RobotDescription {
                 inertials.insert(link.name.clone(), found);
             }
         }
-        let description =
+        let mut description =
             Self { path: path.to_path_buf(), name: read.name, notices, links, joints, inertials, text: String::new() };
         description.check_tree()?;
+        if let Some(mass) = description.placeholder_mass() {
+            let what =
+                format!("all links have the same mass ({mass} kg): a placeholder, not used for the sag of the joints");
+            description.notices.push(Notice::new(path.display(), what, "state the true masses and centres, or none"));
+        }
         Ok(Self { text, ..description })
     }
 

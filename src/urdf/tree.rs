@@ -40,6 +40,7 @@ impl RobotDescription {
             joints: Vec::new(),
             readings: Vec::new(),
             reading_kinds: Vec::new(),
+            masses: Vec::new(),
         };
         for element in self.path(base, tip)? {
             let joint = self.chain_joint(element, &mut chain)?;
@@ -49,6 +50,7 @@ impl RobotDescription {
             let what = format!("no joint moves between \"{base}\" and \"{tip}\"");
             return Err(Error::input(self.path.display(), what, "choose another base or tip link"));
         }
+        chain.masses = self.stated_masses(&chain);
         Ok(chain)
     }
 

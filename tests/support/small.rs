@@ -11,7 +11,7 @@ use robotcal::model::robot::{Robot, Stop};
 use robotcal::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State, predict};
 use robotcal::recipe::{MeasuredSeries, MeasuredStop};
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
-use robotcal::urdf::{Chain, Drive, Joint, JointKind};
+use robotcal::urdf::{CarriedMass, Chain, Drive, Joint, JointKind};
 
 /// Random numbers of a printed seed.
 pub struct Dice(ChaCha8Rng);
@@ -80,7 +80,16 @@ pub fn chain(dice: &mut Dice, parts: &[Part]) -> Chain {
             Joint { name, kind, origin: dice.pose(0.4, std::f64::consts::PI), axis, limits: None, drive }
         })
         .collect();
-    Chain { robot: "test".into(), base: "base".into(), tip: "tip".into(), joints, readings, reading_kinds: kinds }
+    let masses = masses(parts.len());
+    Chain {
+        robot: "test".into(),
+        base: "base".into(),
+        tip: "tip".into(),
+        joints,
+        readings,
+        reading_kinds: kinds,
+        masses,
+    }
 }
 
 /// What a random problem contains.
@@ -118,13 +127,25 @@ impl Default for Request {
     }
 }
 
+/// A mass behind every joint.
+fn masses(joints: usize) -> Vec<CarriedMass> {
+    let mut dice = Dice::new(joints as u64);
+    let mut mass = |joint| CarriedMass {
+        link: format!("link_{joint}"),
+        joint,
+        mass_kg: dice.between(0.5, 20.0),
+        centre_m: dice.direction() * dice.between(0.0, 0.3),
+    };
+    (0..joints).map(&mut mass).collect()
+}
+
 pub fn all_terms() -> Vec<Term> {
     let mut terms = vec![Term::Offset, Term::Gear, Term::Backlash];
     for k in 1..=3 {
         terms.extend([Term::Cosine(k), Term::Sine(k)]);
     }
     terms.extend((0..GRAVITY_TERMS).map(Term::Gravity));
-    terms.push(Term::local(0.2));
+    terms.extend([Term::Sag, Term::local(0.2)]);
     terms
 }
 

@@ -119,6 +119,30 @@ fn gravity(chain: &Chain, stop: &Stop, reading: usize, which: usize) -> f64 {
     if chain.joints[own].kind == JointKind::Prismatic { -height.eps } else { -arm.z.eps }
 }
 
+/// Moment of the masses behind a joint over the largest that it can be: how fast they come down together.
+fn sag(chain: &Chain, stop: &Stop, reading: usize) -> f64 {
+    let own = chain.joints.iter().position(|j| j.drive.is_some_and(|d| d.reading == reading)).unwrap();
+    let mut pose = D4::identity();
+    let (mut falls, mut largest) = (0.0, 0.0);
+    let mut reach = 0.0;
+    for (k, joint) in chain.joints.iter().enumerate() {
+        let q = joint
+            .drive
+            .map_or(constant(0.0), |d| variable(stop.readings[d.reading] * d.multiplier + d.offset, k == own));
+        pose = pose * lift(&joint.origin.matrix()) * motion(joint.kind, &joint.axis, q);
+        if k > own {
+            reach += joint.origin.translation.norm();
+        }
+        for mass in chain.masses.iter().filter(|m| m.joint == k && k >= own) {
+            let at = pose * mass.centre_m.push(1.0).map(constant);
+            falls -= mass.mass_kg * at.z.eps;
+            let lever = if chain.joints[own].kind == JointKind::Prismatic { 1.0 } else { reach + mass.centre_m.norm() };
+            largest += mass.mass_kg * lever;
+        }
+    }
+    falls / largest
+}
+
 fn phi(robot: &Robot, stop: &Stop, reading: usize, term: Term) -> f64 {
     let q = stop.readings[reading];
     match term {
@@ -127,6 +151,7 @@ fn phi(robot: &Robot, stop: &Stop, reading: usize, term: Term) -> f64 {
         Term::Cosine(k) => (f64::from(k) * q).cos(),
         Term::Sine(k) => (f64::from(k) * q).sin(),
         Term::Gravity(k) => gravity(&robot.chain, stop, reading, k.into()),
+        Term::Sag => sag(&robot.chain, stop, reading),
         Term::Local(at) => (-((q - 1e-6 * f64::from(at)) / 3e-3).powi(2) / 2.0).exp(),
         Term::Backlash => stop.approach.as_ref().map_or(0.0, |a| (a[reading] / 2e-3).tanh()),
     }

@@ -1,0 +1,143 @@
+//! Sag of the joints by the masses that a URDF states, and by a payload.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+
+use robotcal::model::joint_terms::{JointTerm, Term};
+use robotcal::model::robot::Robot;
+use robotcal::output::read_compensation;
+use robotcal::recipe::{Options, RobotModel, identify, measured};
+use robotcal::series::{Plate, PlateKind};
+use robotcal::simulate::{RobotErrors, WorldRequest, series};
+use robotcal::urdf::{Chain, Payload, RobotDescription, read};
+
+fn chain(name: &str) -> Chain {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("robots/{name}/{name}.urdf"));
+    read(&path).unwrap().chain(None, None).unwrap()
+}
+
+const PAYLOAD: Payload = Payload { mass_kg: 8.0, centre_m: [0.02, 0.0, 0.11] };
+
+fn terms_of(robot: &Robot, term: Term) -> Vec<f64> {
+    robot.terms.iter().filter(|t| t.term == term).map(|t| t.value).collect()
+}
+
+#[test]
+fn a_stretched_arm_has_the_moment_of_its_masses() {
+    let loaded = chain("ur10e").with_payload(&PAYLOAD).unwrap();
+    assert_eq!(loaded.payload(), Some(PAYLOAD));
+    // The masses of the URDF as they hang behind the shoulder, with the arm stretched out level.
+    let sag = |reading, value| Robot {
+        terms: vec![JointTerm { reading, term: Term::Sag, value }],
+        ..Robot::nominal(loaded.clone())
+    };
+    let level = [0.0; 6];
+    let poses = Robot::nominal(loaded.clone()).link_poses(&level);
+    let shoulder = loaded.joints.iter().position(|j| j.name == "shoulder_lift_joint").unwrap();
+    let axis = poses[shoulder].rotation * loaded.joints[shoulder].axis;
+    let down = nalgebra::Vector3::new(0.0, 0.0, -1.0);
+    let behind = loaded.masses.iter().filter(|m| m.joint >= shoulder);
+    let moment: f64 = behind
+        .map(|m| {
+            axis.dot(&(poses[m.joint].transform(&m.centre_m) - poses[shoulder].translation).cross(&down)) * m.mass_kg
+        })
+        .sum();
+    let relative = moment / loaded.largest_moment(shoulder);
+    assert!((0.7..1.0).contains(&relative.abs()), "a stretched arm is near its largest moment: {relative}");
+    let reading = loaded.readings.iter().position(|r| r == "shoulder_lift_joint").unwrap();
+    let expected = {
+        let mut q = level;
+        q[reading] += 1e-3 * relative;
+        Robot::nominal(loaded.clone()).base_from_tip(&q)
+    };
+    assert!((sag(reading, 1e-3).base_from_tip(&level).matrix() - expected.matrix()).amax() < 1e-12);
+    // The first axis is vertical: nothing pulls.
+    let vertical = sag(0, 1e-3).base_from_tip(&[0.3; 6]);
+    assert!((vertical.matrix() - Robot::nominal(loaded).base_from_tip(&[0.3; 6]).matrix()).amax() < 1e-12);
+}
+
+#[test]
+fn sag_is_found_with_known_masses_and_needs_one_parameter_a_joint() {
+    let loaded = chain("ur10e").with_payload(&PAYLOAD).unwrap();
+    let plate = Plate::lattice(PlateKind::Points, 8, 6, 0.03, 0.03e-3);
+    let errors = RobotErrors { gravity_rad: 0.5e-3, ..RobotErrors::default() };
+    let request =
+        WorldRequest { images: 40, held_out: 10, errors, seed: 3, ..WorldRequest::typical(loaded.clone(), plate) };
+    let world = series(&request).unwrap();
+    let seen = measured(&world, &loaded);
+    let options = Options { model: RobotModel::Full, payload: Some(PAYLOAD), ..Options::default() };
+    let solution = identify(chain("ur10e"), &[seen], &options).unwrap();
+    let robot = &solution.state.robot;
+    assert_eq!(robot.chain.payload(), Some(PAYLOAD));
+    assert!(terms_of(robot, Term::Gravity(0)).is_empty());
+    assert_eq!(terms_of(robot, Term::Sag).len(), 6);
+    let first = solution.problem.layout.terms.start;
+    let mut told = 0;
+    for (k, t) in robot.terms.iter().enumerate().filter(|(_, t)| t.term == Term::Sag) {
+        let truth =
+            world.truth.terms.iter().find(|w| w.joint == robot.chain.readings[t.reading] && w.term == Term::Sag);
+        let sigma = solution.covariance.reduced[(first + k, first + k)].sqrt();
+        let off = (t.value - truth.unwrap().value).abs();
+        println!(
+            "{}: {:.4} mrad, off by {:.4}, sigma {:.4}",
+            robot.chain.readings[t.reading],
+            1e3 * t.value,
+            1e3 * off,
+            1e3 * sigma
+        );
+        assert!(off < 4.0 * sigma, "{}: {off} with sigma {sigma}", robot.chain.readings[t.reading]);
+        told += usize::from(sigma < 0.2e-3);
+    }
+    assert!(told >= 2, "only {told} of the sags are known better than their prior says");
+}
+
+#[test]
+fn compliance_and_payload_survive_their_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |text: &str| -> PathBuf {
+        let path = folder.path().join("compensation.toml");
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let text = "[payload]\nmass_kg = 8.0\ncentre_m = [0.02, 0.0, 0.11]\n[joint.shoulder_lift_joint]\ncompliance_rad_per_nm = 2e-6\n";
+    let robot = read_compensation(&write(text), chain("ur10e")).unwrap();
+    assert_eq!(robot.chain.payload(), Some(PAYLOAD));
+    let shoulder = robot.chain.joints.iter().position(|j| j.name == "shoulder_lift_joint").unwrap();
+    let value = terms_of(&robot, Term::Sag)[0];
+    assert!((value - 2e-6 * 9.80665 * robot.chain.largest_moment(shoulder)).abs() < 1e-15);
+
+    let refused = read_compensation(&write(text), chain("kuka_kr6_r900")).unwrap_err();
+    assert!(refused.place.ends_with("compensation.toml") && refused.what.contains("no masses"), "{refused}");
+    let without = "[joint.joint_a2]\ncompliance_rad_per_nm = 2e-6\n";
+    let refused = read_compensation(&write(without), chain("kuka_kr6_r900")).unwrap_err();
+    assert!(refused.place.contains("joint_a2") && refused.what.contains("no masses"), "{refused}");
+    let heavy = chain("ur10e").with_payload(&Payload { mass_kg: f64::NAN, ..PAYLOAD }).unwrap_err();
+    assert!(heavy.remedy.contains("three numbers"), "{heavy}");
+}
+
+#[test]
+fn masses_that_are_all_the_same_are_placeholders() {
+    let link = |name: &str| {
+        format!(
+            "<link name=\"{name}\"><inertial><mass value=\"2\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial></link>"
+        )
+    };
+    let joint = |name: &str, parent: &str, child: &str| {
+        format!(
+            "<joint name=\"{name}\" type=\"continuous\"><parent link=\"{parent}\"/><child link=\"{child}\"/><axis xyz=\"0 1 0\"/></joint>"
+        )
+    };
+    let text = [
+        "<robot name=\"r\">",
+        &link("a"),
+        &link("b"),
+        &link("c"),
+        &joint("j", "a", "b"),
+        &joint("k", "b", "c"),
+        "</robot>",
+    ];
+    let robot = RobotDescription::from_text(Path::new("r.urdf"), text.concat()).unwrap();
+    assert!(robot.chain(None, None).unwrap().masses.is_empty());
+    assert!(robot.notices.iter().any(|n| n.what.contains("placeholder")), "{:?}", robot.notices);
+}
