@@ -311,6 +311,13 @@ pub fn centroid(samples: &[[D; 2]]) -> [D; 2] {
     [mean[0] + mx / area, mean[1] + my / area]
 }
 
+/// Samples of a contour that the library takes: fewer where the circle is more than fifty radii away.
+pub fn samples(camera_from_plate: &D4, centre: &[D; 3], radius_m: f64) -> usize {
+    let at = camera_from_plate * SMatrix::<D, 4, 1>::new(centre[0], centre[1], centre[2], constant(1.0));
+    let distance = (at[0].re.powi(2) + at[1].re.powi(2) + at[2].re.powi(2)).sqrt();
+    if distance > 50.0 * radius_m { 8 } else { 12 }
+}
+
 /// Image of a circle with `samples` points of its contour; radius 0 is a point.
 pub fn circle(parameters: &[D], camera_from_plate: &D4, centre: &[D; 3], radius_m: f64, samples: usize) -> [D; 2] {
     let image = |x: [D; 3]| {
@@ -364,5 +371,6 @@ pub fn predict(
     let parameters: Vec<D> = (state.cameras[image.camera].parameters.iter().zip(range))
         .map(|(p, c)| variable(*p, seed == Some(Seed::Column(c))))
         .collect();
-    circle(&parameters, &pose, &centre, observation.radius_m, 12)
+    let samples = samples(&pose, &centre, observation.radius_m);
+    circle(&parameters, &pose, &centre, observation.radius_m, samples)
 }
