@@ -180,13 +180,12 @@ fn joint_noise(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
             .enumerate()
             .map(|(k, ((name, kind), s))| {
                 let unit = if *kind == JointKind::Prismatic { " mm" } else { "" };
-                match camera.joint_noise_interval.get(k) {
-                    Some([Some(low), Some(high)]) if *low == 0.0 => format!("{name} below {:.3}{unit}", 1e3 * high),
-                    Some([Some(low), Some(high)]) => {
-                        format!("{name} {:.3}{unit} ({:.3} to {:.3})", 1e3 * s, 1e3 * low, 1e3 * high)
-                    }
-                    _ => format!("{name} {:.3}{unit}", 1e3 * s),
-                }
+                let told = match camera.joint_noise_interval.get(k) {
+                    Some([Some(low), Some(high)]) if *low == 0.0 => format!(" (below {:.3})", 1e3 * high),
+                    Some([Some(low), Some(high)]) => format!(" ({:.3} to {:.3})", 1e3 * low, 1e3 * high),
+                    _ => String::new(),
+                };
+                format!("{name} {:.3}{unit}{told}", 1e3 * s)
             })
             .collect();
         let of = if r.cameras.len() > 1 { format!(" ({})", camera.name) } else { String::new() };
