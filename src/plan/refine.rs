@@ -53,11 +53,11 @@ pub struct Refined {
 
 /// Rounds at most, where nothing else is wanted.
 pub const USUAL_ROUNDS: usize = 12;
-/// Images visited at most in the sweeps that make whole images better, these sweeps at least, and the relative gain of one below which
-/// they end.
+/// Images visited at most in the sweeps that make whole images better, these sweeps at least, and the relative gain for every visit
+/// below which they end.
 const POLISH_VISITS: usize = 300;
 const POLISH_SWEEPS: usize = 10;
-const POLISHED: f64 = 1e-3;
+const POLISHED: f64 = 1e-3 / 30.0;
 /// Ways tried for all images of a sweep, those for one image at least, and the poses on each.
 const POLISH_WAYS: usize = 60;
 const LEAST_WAYS: usize = 2;
@@ -215,7 +215,7 @@ impl Refinement<'_> {
                     }
                 }
             }
-            if before - rounded.value < POLISHED * before.abs() {
+            if before - rounded.value < POLISHED * self.count as f64 * before.abs() {
                 break;
             }
         }
