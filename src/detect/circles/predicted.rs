@@ -46,10 +46,6 @@ pub(super) struct Surroundings<'a> {
 /// Relative sigma of a shape that the neighbours predict, and of one that camera and pose predict.
 const BY_NEIGHBOURS: f64 = 0.05;
 const BY_CAMERA: f64 = 0.01;
-/// Smallest minor semi-axis of a marker that is measured, px.
-const SMALLEST_PX: f64 = 1.5;
-/// The same in the second pass over a series, px.
-const SMALLEST_IN_SERIES_PX: f64 = 2.5;
 /// How well the blur of the picture is that of a marker (of its logarithm).
 const BLUR_SIGMA: f64 = 0.2;
 /// Samples of a contour.
@@ -204,11 +200,11 @@ impl Predicted {
     }
 
     /// So much of the marker is in the picture that a look is worth it: its centre, and room for a part of its contour.
-    pub(super) fn is_in(&self, picture: &Picture) -> bool {
+    pub(super) fn is_in(&self, picture: &Picture, smallest_px: f64) -> bool {
         let size = [picture.width as f64, picture.height as f64];
         let [major, minor] = self.outer.semi_axes();
         let inside = (0..2).all(|a| self.outer.centre[a] > 0.0 && self.outer.centre[a] < size[a] - 1.0);
-        inside && minor > SMALLEST_PX && major < 0.25 * size[0]
+        inside && minor > smallest_px && major < 0.25 * size[0]
     }
 }
 
@@ -243,8 +239,7 @@ pub fn look_where_predicted(picture: &Picture, detection: &mut Detection, predic
     let known: Vec<Measured> = found.iter().map(|f| f.measured).collect();
     let fits = measure_beside(picture, camera, &known, &missing);
     for (p, fit) in missing.iter().zip(fits) {
-        let large = p.outer.semi_axes()[1] > SMALLEST_IN_SERIES_PX;
-        let Some(new) = fit.filter(|_| large).and_then(|f| p.accepted(f)) else { continue };
+        let Some(new) = fit.and_then(|f| p.accepted(f)) else { continue };
         dropped.retain(|d| !p.lies_at(d.uv));
         observations.extend(observations_of(&new));
         found.push(new);

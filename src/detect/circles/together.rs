@@ -18,6 +18,8 @@ use crate::detect::Picture;
 /// Most rounds, and the movement of the centres from one to the next at which they rest, px.
 const ROUNDS: usize = 20;
 const AT_REST_PX: f64 = 5e-4;
+/// Smallest minor semi-axis of a marker that is measured beside others, and of one in a picture without any that are larger, px.
+const SMALLEST_PX: [f64; 2] = [2.5, 1.5];
 /// Blur to start from where nothing is known of it, px.
 const USUAL_BLUR_PX: f64 = 1.0;
 
@@ -29,7 +31,7 @@ pub(super) fn measure_beside(
     known: &[Measured],
     predicted: &[Predicted],
 ) -> Vec<Option<Fit>> {
-    let mut all = Together::of(picture, camera, known, predicted);
+    let mut all = Together::of(picture, camera, SMALLEST_PX[0], known, predicted);
     all.settle(false);
     all.finish()
 }
@@ -38,10 +40,11 @@ pub(super) fn measure_beside(
 pub(super) fn measure_alone(picture: &Picture, predicted: &[Predicted]) -> Vec<Option<Fit>> {
     let variance = f64::from(noise_of(picture)).powi(2);
     let camera = Camera { blur_px: USUAL_BLUR_PX, noise: [variance; 2], ink_slope: INK_SLOPE };
-    let mut first = Together::of(picture, camera, &[], predicted);
+    let mut first = Together::of(picture, camera, SMALLEST_PX[1], &[], predicted);
     first.settle(true);
     let fits: Vec<Fit> = first.fits.iter().flatten().copied().collect();
-    let mut all = Together::of(picture, Camera { ink_slope: ink_slope(&fits), ..first.camera }, &[], predicted);
+    let camera = Camera { ink_slope: ink_slope(&fits), ..first.camera };
+    let mut all = Together::of(picture, camera, SMALLEST_PX[1], &[], predicted);
     (all.believed, all.fits) = (first.believed, first.fits);
     all.settle(true);
     all.finish()
@@ -62,10 +65,16 @@ struct Together<'a> {
 }
 
 impl<'a> Together<'a> {
-    fn of(picture: &'a Picture, camera: Camera, known: &[Measured], predicted: &'a [Predicted]) -> Self {
+    fn of(
+        picture: &'a Picture,
+        camera: Camera,
+        smallest_px: f64,
+        known: &[Measured],
+        predicted: &'a [Predicted],
+    ) -> Self {
         let mut believed: Vec<Measured> = known.to_vec();
         believed.extend(predicted.iter().map(|p| p.presumed(picture, &camera)));
-        let inside: Vec<bool> = predicted.iter().map(|p| p.is_in(picture)).collect();
+        let inside: Vec<bool> = predicted.iter().map(|p| p.is_in(picture, smallest_px)).collect();
         let count = known.len();
         let around = |k: usize| Neighbours::of(count + k, &believed, camera.blur_px);
         let neighbours = (0..predicted.len()).map(around).collect();

@@ -307,6 +307,19 @@ mod tests {
         assert!((0.9..1.1).contains(&root_mean_square(&all, |p| p.normalised)));
     }
 
+    /// Where the blur is as large as the markers nobody can read their code: a map tells where they are.
+    #[test]
+    fn unreadable_markers_are_measured_where_a_map_puts_them() {
+        for cell in precision_cells(&[4.0], &[1.5], &[60.0], &[0.0, 60.0]) {
+            assert_eq!(cell.is_designed_for(), cell.tilt_deg == 0.0);
+            for p in precision(cell, 2, 7) {
+                println!("{p:?}");
+                assert!(p.second_pass == p.markers && p.markers == p.wanted, "{p:?}");
+                assert!(p.to_bound < 1.3 * 1.24 && (0.7..1.3).contains(&p.normalised), "{p:?}");
+            }
+        }
+    }
+
     #[test]
     fn without_noise_strongly_curved_contours_have_no_bias() {
         for cell in precision_cells(&[6.0, 10.0], &[0.6, 1.0], &[f64::INFINITY], &[0.0]) {
