@@ -5,7 +5,7 @@
 mod boards_scene;
 
 use boards_scene::{Scene, View};
-use robotcal::detect::{Detection, Mosaic, Picture, detect};
+use robotcal::detect::{Detection, Picture, detect};
 use robotcal::series::{Plate, PlateKind};
 
 fn plate(columns: u32, rows: u32) -> Plate {
@@ -183,25 +183,4 @@ fn another_board_than_the_plate_file_says_is_refused_or_noted() {
     let empty = Picture { pixels: vec![80.0; picture.pixels.len()], ..picture };
     let error = detect(&empty, &plate(9, 6)).expect_err("nothing there");
     assert!(error.what.contains("no chessboard"), "{error}");
-}
-
-#[test]
-fn balancing_a_mosaic_moves_no_corner() {
-    let scene = Scene { dark: 300.0, light: 2400.0, full_scale: 4095.0, ..tilted(9, 6, 0.25) };
-    let grey = scene.render(0);
-    let sensitivity = |x: usize, y: usize| [0.55, 1.0, 1.0, 0.7][2 * (y % 2) + x % 2];
-    let pixels = (0..grey.pixels.len())
-        .map(|k| (grey.pixels[k] * sensitivity(k % grey.width, k / grey.width)).round())
-        .collect();
-    let raw = Picture { pixels, ..grey.clone() };
-    let balanced = Mosaic::Rggb.to_grey(raw).expect("an exposed picture");
-    let (a, b) = (detect(&grey, &plate(9, 6)), detect(&balanced, &plate(9, 6)));
-    let (a, b) = (a.expect("grey"), b.expect("balanced"));
-    let shifts: Vec<[f64; 2]> =
-        a.observations.iter().zip(&b.observations).map(|(p, q)| [p.uv[0] - q.uv[0], p.uv[1] - q.uv[1]]).collect();
-    assert_eq!(shifts.len(), 54);
-    // Rounding to whole counts (0.3 of 2100) leaves about 1e-4 px.
-    assert!(rms(&shifts) < 1e-3, "{}", rms(&shifts));
-    assert_eq!(Mosaic::from_ros_encoding("bayer_gbrg16"), Some(Mosaic::Gbrg));
-    assert_eq!(Mosaic::from_ros_encoding("rgb8"), None);
 }

@@ -4,12 +4,13 @@ mod outputs_support;
 
 use outputs_support::{context, robot, solved};
 use robotcal::output::{files, report_html, solution_json};
-use robotcal::recipe::RobotModel;
+use robotcal::recipe::{Estimator, RobotModel, beside_two_stages};
 use robotcal::series::CameraMount;
 
 fn record() -> solution_json::SolutionRecord {
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
+    let mut solution = solved(CameraMount::Hand, RobotModel::Full, &description);
+    solution.two_stage = beside_two_stages(&solution);
     let files = files(&solution, &context(&description)).unwrap();
     let record = solution_json::read(&files["solution.json"]).unwrap();
     // The page is made from the record alone: what it says is in solution.json.
@@ -46,6 +47,7 @@ fn the_page_is_complete_and_self_contained() {
         "Accuracy before and after",
         "What was read, and what was left out",
         "How well the flange is known where",
+        "Two stages against one",
         "Joint noise",
         "Residuals",
         "What was corrected on the robot",
@@ -66,13 +68,33 @@ fn the_page_is_complete_and_self_contained() {
     for broken in ["NaN", ">inf", "-inf", "Infinity"] {
         assert!(!page.contains(broken), "the page says {broken}");
     }
-    // Histogram, workspace from above and from the side, joint noise, residuals over image and plate, distortion and uncertainty of the
+    // Histogram, workspace from above and from the side, two stages against one, joint noise, residuals over image and plate, distortion and uncertainty of the
     // camera, plate corrections.
     let drawings = drawings(&page);
-    assert_eq!(drawings.len(), 9);
+    assert_eq!(drawings.len(), 10);
     for drawing in drawings {
         let document = roxmltree::Document::parse(drawing).unwrap();
         assert!(document.descendants().filter(|n| n.is_element()).count() > 5);
+    }
+}
+
+#[test]
+fn the_fits_in_two_stages_stand_beside_the_joint_one() {
+    let record = record();
+    let comparison = record.two_stage.as_ref().unwrap();
+    let estimators: Vec<Estimator> = comparison.rows.iter().map(|r| r.estimator).collect();
+    let two_stage =
+        [Estimator::Isotropic, Estimator::Blocks, Estimator::BlocksAndRepeatability, Estimator::FullAndRepeatability];
+    assert_eq!(estimators, [&two_stage[..], &[Estimator::Joint]].concat());
+    let held = |k: usize| comparison.rows[k].by_image.unwrap();
+    // The joint fit of the folds is the one that the accuracy is judged by.
+    assert!((held(4).rms_mm / record.accuracy.calibrated.rms_mm - 1.0).abs() < 1e-9);
+    // Full covariance with joint noise is one linearisation away from the joint fit; the worst weights cannot be better than it beyond doubt.
+    assert!((held(3).rms_mm / held(4).rms_mm - 1.0).abs() < 0.05, "{} against {}", held(3).rms_mm, held(4).rms_mm);
+    for k in 0..4 {
+        let ratio = held(k).to_joint.unwrap();
+        assert!(ratio.low <= ratio.value && ratio.value <= ratio.high && ratio.high > 0.95, "{ratio:?}");
+        assert!((ratio.value - held(k).rms_mm / held(4).rms_mm).abs() < 1e-9);
     }
 }
 

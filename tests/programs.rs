@@ -124,8 +124,8 @@ fn urscript_keeps_every_other_byte_and_meets_every_target() {
         list(&[p.xyz(), v.into()].concat())
     };
     let mut text = SCRIPT.replace("{Q0}", &list(&q[0])).replace("{Q1}", &list(&q[1]));
-    for k in 1..5 {
-        text = text.replace(&format!("{{P{k}}}"), &pose(&q[k]));
+    for (k, q) in q.iter().enumerate().take(5).skip(1) {
+        text = text.replace(&format!("{{P{k}}}"), &pose(q));
     }
     let file = cell.write("welding.script", text.as_bytes());
     let run = cell.compensate(&[&file], &["--unordered"]).expect(0);

@@ -114,15 +114,25 @@ pub fn folds(problem: &Problem) -> Option<Vec<Vec<usize>>> {
 fn predictions(problem: &Problem, state: &State, folds: &[Vec<usize>]) -> Option<Vec<(usize, ImageError)>> {
     let mut errors = Vec::new();
     for held in folds {
-        let mut rest = problem.clone();
-        held.iter().for_each(|&i| rest.images[i].rejected = Some("held out".into()));
-        let outcome = solve(&rest, state.clone(), &Settings { iterations: 30, decrement: 1e-2 });
+        let fitted = refitted(&without_images(problem, held), state);
         for &i in held {
-            errors.push((i, predict_image(problem, &outcome.state, i)?));
+            errors.push((i, predict_image(problem, &fitted, i)?));
         }
     }
     errors.sort_by_key(|(i, _)| *i);
     Some(errors)
+}
+
+/// The problem with some of its images held out.
+pub fn without_images(problem: &Problem, held: &[usize]) -> Problem {
+    let mut rest = problem.clone();
+    held.iter().for_each(|&i| rest.images[i].rejected = Some("held out".into()));
+    rest
+}
+
+/// The free columns fitted to the images in use, from `state`, at the noise of the problem.
+pub fn refitted(problem: &Problem, state: &State) -> State {
+    solve(problem, state.clone(), &Settings { iterations: 30, decrement: 1e-2 }).state
 }
 
 /// Error of an image that `state` was not fitted to, predicted from its joint readings alone; `None` off the robot, or where

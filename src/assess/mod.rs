@@ -15,7 +15,9 @@ mod truth;
 pub use advice::Advice;
 pub use clustered::clustered_covariance;
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
-pub use hold_out::{Accuracy, Errors, ImageError, folds, hold_out, hold_out_images, predict_image};
+pub use hold_out::{
+    Accuracy, Errors, ImageError, folds, hold_out, hold_out_images, predict_image, refitted, without_images,
+};
 pub use identifiability::{
     Cause, Correlation, Identifiability, Observability, UnknownDirection, frame_parameters, identifiability,
     identifiability_of_stops,

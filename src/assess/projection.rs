@@ -52,11 +52,23 @@ impl ProjectionMap {
         )
     }
 
-    /// Median and largest entry, px; none for an empty map.
-    pub fn median_and_largest(&self) -> Option<[f64; 2]> {
-        let mut all: Vec<f64> = self.sigma_px.iter().flatten().copied().collect();
-        all.sort_by(f64::total_cmp);
-        Some([*all.get(all.len() / 2)?, *all.last()?])
+    /// Largest entry, px; none for an empty map.
+    pub fn largest(&self) -> Option<f64> {
+        self.sigma_px.iter().flatten().copied().reduce(f64::max)
+    }
+
+    /// Root mean square, px, of the entries nearest to places (px) in an image of this size; none without places.
+    pub fn rms_at(&self, places: impl Iterator<Item = [f64; 2]>, width_px: u32, height_px: u32) -> Option<f64> {
+        let nearest = |at: f64, px: u32, n: usize| {
+            let step = (f64::from(px) - 1.0) / (n.max(2) - 1) as f64;
+            (at / step).round().clamp(0.0, n as f64 - 1.0) as usize
+        };
+        let entry = |[u, v]: [f64; 2]| {
+            let k = nearest(v, height_px, self.rows) * self.columns + nearest(u, width_px, self.columns);
+            self.sigma_px.get(k).copied().flatten()
+        };
+        let (sum, count) = places.filter_map(entry).fold((0.0, 0.0), |(s, n), sigma| (s + sigma * sigma, n + 1.0));
+        (count > 0.0).then(|| (sum / count).sqrt())
     }
 }
 

@@ -13,7 +13,7 @@ pub(super) struct ChoiceArgs {
     /// Joint noise in rad (m for a prismatic joint) instead of the estimate; 0 takes the readings as exact
     #[arg(long, value_name = "SIGMA")]
     joint_noise: Option<f64>,
-    /// Joint terms beside rigid geometry and offsets [default: full]
+    /// Joint terms beside rigid geometry and offsets [default: auto]
     #[arg(long, value_enum)]
     robot_model: Option<Model>,
     /// Harmonics of every gear, up to 6 [default: 2]

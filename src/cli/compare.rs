@@ -43,7 +43,7 @@ pub(super) struct CompareArgs {
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
     /// Joint terms beside rigid geometry and offsets
-    #[arg(long, value_enum, default_value_t = Model::Full)]
+    #[arg(long, value_enum, default_value_t = Model::Auto)]
     robot_model: Model,
     #[command(flatten)]
     recording: RecordingArgs,

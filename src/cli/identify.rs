@@ -133,6 +133,7 @@ fn solve(args: &IdentifyArgs, options: &Options, task: Task) -> Result<Verdict> 
         }
     }
     let mut solution = recipe::identify(chain, &measured, options)?;
+    solution.two_stage = recipe::beside_two_stages(&solution);
     notices.append(&mut solution.notices);
     solution.notices = notices;
     let names: Vec<String> = measured.iter().map(|s| s.name.clone()).collect();

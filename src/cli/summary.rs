@@ -5,6 +5,7 @@ use std::fmt::Write;
 use crate::assess::{Cause, Errors, Identifiability, UnknownDirection};
 use crate::output::solution_json::SolutionRecord;
 use crate::problem::short_name;
+use crate::recipe::Comparison;
 use crate::urdf::JointKind;
 
 /// Most lines of one kind before the rest is counted.
@@ -95,6 +96,7 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     joint_noise(out, r)?;
     evidences(out, r)?;
     accuracy(out, r)?;
+    two_stage(out, r)?;
     map(out, r)?;
     undetermined(out, r)?;
     if let Some(found) = &r.identifiability {
@@ -130,9 +132,9 @@ fn cameras(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         let first = format!("camera/{}/", camera.name);
         let sigma = r.estimates.iter().find(|e| e.name.starts_with(&first)).and_then(|e| e.sigma);
         let sigma = sigma.map_or("fixed".to_owned(), |s| format!("+- {s:.2}"));
-        let known = camera.projection.as_ref().and_then(|p| p.median_and_largest());
-        let known = known.map_or(String::new(), |[median, largest]| {
-            format!("; projection known to {median:.3} px, at worst {largest:.3} px")
+        let known = camera.projection_known(r.seen_by(k).map(|(uv, _)| uv));
+        let known = known.map_or(String::new(), |[seen, largest]| {
+            format!("; projection known to {seen:.3} px where markers were seen, at worst {largest:.3} px")
         });
         writeln!(
             out,
@@ -150,16 +152,8 @@ fn cameras(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 
 /// Typical standard deviation of an observation per axis, px: stated sigma times the estimated factor.
 fn image_noise_px(r: &SolutionRecord, camera: usize) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for image in r.images.iter().filter(|i| i.camera == camera && i.reason.is_none()) {
-        for (c, reason) in image.observations.covariance.iter().zip(&image.observations.reason) {
-            let determinant = c[0] * c[2] - c[1] * c[1];
-            if reason.is_none() && determinant > 0.0 {
-                sum += determinant.sqrt();
-                count += 1.0;
-            }
-        }
-    }
+    let determinants = r.seen_by(camera).map(|(_, c)| c[0] * c[2] - c[1] * c[1]).filter(|d| *d > 0.0);
+    let (sum, count) = determinants.fold((0.0, 0.0), |(s, n), d| (s + d.sqrt(), n + 1.0));
     (sum / f64::max(count, 1.0)).sqrt() * r.cameras[camera].pixel_factor
 }
 
@@ -194,6 +188,20 @@ fn accuracy(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     writeln!(out, "accuracy  of images that the fit had not seen ({} folds), RMS over the markers:", r.accuracy.folds)?;
     writeln!(out, "          nominal    {}", row(&r.accuracy.nominal))?;
     writeln!(out, "          calibrated {}", row(&r.accuracy.calibrated))
+}
+
+/// Two-stage fits beside the joint one.
+fn two_stage(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    let comparison = r.two_stage.as_ref();
+    let Some((row, ratio)) = comparison.and_then(Comparison::best_two_stage) else { return Ok(()) };
+    writeln!(
+        out,
+        "stages    the best two-stage fit of the same images ({}) has {:.3} ({:.3} to {:.3}) times the error of the joint fit",
+        row.estimator.title(),
+        ratio.value,
+        ratio.low,
+        ratio.high
+    )
 }
 
 /// Uncertainty of the flange over the workspace.

@@ -10,7 +10,6 @@ mod corners;
 mod detection;
 mod flat_field;
 mod load;
-mod mosaic;
 mod picture;
 mod run;
 mod saddle;
@@ -18,7 +17,6 @@ mod saddle;
 pub use detection::{Circles, Detection, Dropped};
 pub use flat_field::FlatField;
 pub use load::{LUMA_WEIGHTS, load};
-pub use mosaic::Mosaic;
 pub use picture::Picture;
 pub use run::{SeriesImage, detect_series};
 

@@ -2,7 +2,8 @@
 //!
 //! The contour is sampled at N points of the 3-D circle, each projected through the whole camera model. The samples define a
 //! trigonometric polynomial; Green's theorem and the spectral derivative give area and first moments. The harmonics of the
-//! contour fall off geometrically with (radius / distance), so N = 12 is exact to 1e-7 px for every plate that can be imaged.
+//! contour fall off geometrically with (radius / distance), so N = 12 is exact to 1e-7 px for every plate that can be imaged, and
+//! N = 8 where the distance is at least fifty radii.
 
 use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
 use std::f64::consts::TAU;
@@ -11,29 +12,41 @@ use std::sync::LazyLock;
 use super::camera::{Camera, MAX_PARAMETERS, Projection};
 use crate::geom::{Pose, skew};
 
-/// Samples of the contour.
-const N: usize = 12;
-
-struct Samples {
+/// Where the contour is sampled.
+struct Samples<const N: usize> {
     cos_sin: [[f64; 2]; N],
     /// Spectral derivative with respect to the angle; antisymmetric.
     derivative: [[f64; N]; N],
 }
 
-static SAMPLES: LazyLock<Samples> = LazyLock::new(|| {
-    let angle = |k: usize| TAU * k as f64 / N as f64;
-    let mut s = Samples { cos_sin: [[0.0; 2]; N], derivative: [[0.0; N]; N] };
-    for i in 0..N {
-        s.cos_sin[i] = [angle(i).cos(), angle(i).sin()];
-        for j in 0..N {
-            if i != j {
-                let sign = if (i + j) % 2 == 0 { 0.5 } else { -0.5 };
-                s.derivative[i][j] = sign / ((angle(i) - angle(j)) / 2.0).tan();
+/// Distance of a circle, in radii, from which the fewer samples do.
+const FAR: f64 = 50.0;
+
+static NEAR_SAMPLES: LazyLock<Samples<12>> = LazyLock::new(Samples::new);
+static FAR_SAMPLES: LazyLock<Samples<8>> = LazyLock::new(Samples::new);
+
+impl<const N: usize> Samples<N> {
+    fn new() -> Self {
+        let angle = |k: usize| TAU * k as f64 / N as f64;
+        let mut s = Self { cos_sin: [[0.0; 2]; N], derivative: [[0.0; N]; N] };
+        for i in 0..N {
+            s.cos_sin[i] = [angle(i).cos(), angle(i).sin()];
+            for j in 0..N {
+                if i != j {
+                    let sign = if (i + j) % 2 == 0 { 0.5 } else { -0.5 };
+                    s.derivative[i][j] = sign / ((angle(i) - angle(j)) / 2.0).tan();
+                }
             }
         }
+        s
     }
-    s
-});
+}
+
+/// True where the fewer samples do.
+#[inline(always)]
+fn is_far(camera_from_plate: &Pose, centre: &Vector3<f64>, radius_m: f64) -> bool {
+    camera_from_plate.transform(centre).norm() > FAR * radius_m
+}
 
 /// The prediction of one observation, with derivatives.
 #[derive(Debug, Clone)]
@@ -71,11 +84,16 @@ pub fn point(camera: &Camera, camera_from_plate: &Pose, x: &Vector3<f64>) -> Opt
 pub fn centroid(camera: &Camera, camera_from_plate: &Pose, centre: &Vector3<f64>, radius_m: f64) -> Option<Prediction> {
     match radius_m {
         0.0 => point(camera, camera_from_plate, centre),
-        _ => centroid_of_contour(camera, camera_from_plate, centre, radius_m),
+        r if is_far(camera_from_plate, centre, r) => {
+            centroid_of_contour(&FAR_SAMPLES, camera, camera_from_plate, centre, r)
+        }
+        r => centroid_of_contour(&NEAR_SAMPLES, camera, camera_from_plate, centre, r),
     }
 }
 
-fn centroid_of_contour(
+#[inline(always)]
+fn centroid_of_contour<const N: usize>(
+    at: &Samples<N>,
     camera: &Camera,
     camera_from_plate: &Pose,
     centre: &Vector3<f64>,
@@ -83,16 +101,16 @@ fn centroid_of_contour(
 ) -> Option<Prediction> {
     let mut samples = [Projection::default(); N];
     let mut uv = [Vector2::zeros(); N];
-    for (k, [c, s]) in SAMPLES.cos_sin.iter().enumerate() {
+    for (k, [c, s]) in at.cos_sin.iter().enumerate() {
         let x = centre + Vector3::new(c * radius_m, s * radius_m, 0.0);
         samples[k] = camera.project_with_jacobian(&camera_from_plate.transform(&x))?;
         uv[k] = samples[k].uv;
     }
-    let (mean, weights) = centroid_weights(&uv);
+    let (mean, weights) = centroid_weights(at, &uv);
     // With K_k = g_k d_point_k R: d_marker = sum K_k and d_phi = -sum K_k [centre + offset_k]x.
     let (mut d_marker, mut d_turn) = (Matrix2x3::zeros(), Matrix2x3::zeros());
     let mut d_camera = SMatrix::<f64, 2, MAX_PARAMETERS>::zeros();
-    for ((p, g), [c, s]) in samples.iter().zip(&weights).zip(&SAMPLES.cos_sin) {
+    for ((p, g), [c, s]) in samples.iter().zip(&weights).zip(&at.cos_sin) {
         let k = g * p.d_point * camera_from_plate.rotation;
         d_marker += k;
         d_turn += k * skew(&Vector3::new(c * radius_m, s * radius_m, 0.0));
@@ -125,25 +143,39 @@ pub fn centroid_uv(
     centre: &Vector3<f64>,
     radius_m: f64,
 ) -> Option<Vector2<f64>> {
-    if radius_m == 0.0 {
-        return camera.project(&camera_from_plate.transform(centre));
+    match radius_m {
+        0.0 => camera.project(&camera_from_plate.transform(centre)),
+        r if is_far(camera_from_plate, centre, r) => {
+            centroid_of_samples(&FAR_SAMPLES, camera, camera_from_plate, centre, r)
+        }
+        r => centroid_of_samples(&NEAR_SAMPLES, camera, camera_from_plate, centre, r),
     }
+}
+
+fn centroid_of_samples<const N: usize>(
+    at: &Samples<N>,
+    camera: &Camera,
+    camera_from_plate: &Pose,
+    centre: &Vector3<f64>,
+    radius_m: f64,
+) -> Option<Vector2<f64>> {
     let mut uv = [Vector2::zeros(); N];
-    for (k, [c, s]) in SAMPLES.cos_sin.iter().enumerate() {
+    for (k, [c, s]) in at.cos_sin.iter().enumerate() {
         let x = centre + Vector3::new(c * radius_m, s * radius_m, 0.0);
         uv[k] = camera.project(&camera_from_plate.transform(&x))?;
     }
-    Some(centroid_weights(&uv).0)
+    Some(centroid_weights(at, &uv).0)
 }
 
 /// Area centroid of a closed contour of samples, and its derivative with respect to each sample.
-fn centroid_weights(uv: &[Vector2<f64>; N]) -> (Vector2<f64>, [Matrix2<f64>; N]) {
+#[inline(always)]
+fn centroid_weights<const N: usize>(at: &Samples<N>, uv: &[Vector2<f64>; N]) -> (Vector2<f64>, [Matrix2<f64>; N]) {
     let origin = uv.iter().sum::<Vector2<f64>>() / N as f64;
     let x: [f64; N] = std::array::from_fn(|k| uv[k].x - origin.x);
     let y: [f64; N] = std::array::from_fn(|k| uv[k].y - origin.y);
     let d = |f: &[f64; N]| -> [f64; N] {
         let mut out = [0.0; N];
-        for (column, f) in SAMPLES.derivative.iter().zip(f) {
+        for (column, f) in at.derivative.iter().zip(f) {
             for (o, c) in out.iter_mut().zip(column) {
                 *o -= c * f;
             }
@@ -206,6 +238,19 @@ mod tests {
             let spectral = centroid(&camera, &pose, &centre, 0.0054).unwrap().uv;
             // The polygon itself is right to (2 pi / n)^2 r ~ 1e-6 px of shape, far less in its centroid.
             assert!((spectral - truth).norm() < 2e-7, "{centre}: {}", (spectral - truth).norm());
+        }
+    }
+
+    #[test]
+    fn eight_samples_do_from_fifty_radii_on() {
+        let (camera, mut pose) = close_wide_view();
+        let radius = 0.0054;
+        pose.translation *= 1.01 * FAR * radius / pose.translation.norm();
+        for centre in [[0.0, 0.0], [0.08, 0.06], [-0.12, 0.1], [0.1, -0.08]] {
+            let centre = Vector3::new(centre[0], centre[1], 0.0);
+            let fewer = centroid_of_contour(&FAR_SAMPLES, &camera, &pose, &centre, radius).unwrap().uv;
+            let more = centroid_of_contour(&NEAR_SAMPLES, &camera, &pose, &centre, radius).unwrap().uv;
+            assert!((fewer - more).norm() < 1e-7, "{centre}: {:e}", (fewer - more).norm());
         }
     }
 

@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 
+use super::report::page::page;
 use crate::assess::Ratio;
 use crate::recipe::{Comparison, Estimator, HeldOut, Study, StudyCell};
 
@@ -146,6 +147,11 @@ pub fn study_markdown(study: &Study, command: &str) -> String {
     out
 }
 
+const STYLE: &str = "\
+body{font:15px/1.5 sans-serif;max-width:62em;margin:2em auto;padding:0 1em}\
+table{border-collapse:collapse;font-size:12px}\
+td,th{border:1px solid #ccc;padding:3px 6px;text-align:right}small{color:#555}";
+
 const COLOURS: [&str; 6] = ["#8c8c8c", "#b8860b", "#2a8f5b", "#1f5fbf", "#c0392b", "#000000"];
 
 /// One panel for each plate: error over that of F, logarithmic, against the ratio.
@@ -219,26 +225,16 @@ pub fn study_html(study: &Study, command: &str) -> String {
             panel(&cells, &format!("{m} markers an image: flange error over that of F"))
         })
         .collect();
-    let page: Markup = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                title { "Two stages against one" }
-                style { (PreEscaped("body{font:15px/1.5 sans-serif;max-width:62em;margin:2em auto;padding:0 1em}table{border-collapse:collapse;font-size:12px}td,th{border:1px solid #ccc;padding:3px 6px;text-align:right}small{color:#555}")) }
-            }
-            body {
-                h1 { "Two stages against one" }
-                p { code { (command) } }
-                p { (study_setup(study)) }
-                ul { @for line in study_verdict(study) { li { (line) } } }
-                p { @for (line, colour) in legend().iter().zip(COLOURS) { span style=(format!("color:{colour}")) { "\u{25A0} " } (line) br; } }
-                div { @for p in &panels { (PreEscaped(p)) } }
-                (table(study))
-            }
-        }
+    let body = html! {
+        h1 { "Two stages against one" }
+        p { code { (command) } }
+        p { (study_setup(study)) }
+        ul { @for line in study_verdict(study) { li { (line) } } }
+        p { @for (line, colour) in legend().iter().zip(COLOURS) { span style=(format!("color:{colour}")) { "\u{25A0} " } (line) br; } }
+        div { @for p in &panels { (PreEscaped(p)) } }
+        (table(study))
     };
-    page.into_string()
+    page("Two stages against one", STYLE, &body)
 }
 
 fn table(study: &Study) -> Markup {

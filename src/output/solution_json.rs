@@ -12,7 +12,7 @@ use crate::assess::{Errors, Identifiability, ProjectionMap, WorkspacePoint};
 use crate::error::{Error, Notice, Result};
 use crate::geom::Pose;
 use crate::model::camera::Lens;
-use crate::recipe::{Evidence, StartVerdict};
+use crate::recipe::{Comparison, Evidence, StartVerdict};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
 use crate::urdf::JointKind;
 
@@ -399,6 +399,8 @@ pub struct SolutionRecord {
     pub identifiability: Option<Identifiability>,
     /// Evidence of the robot models where the data chose among them.
     pub evidences: Vec<Evidence>,
+    /// Two-stage fits beside the joint one, on images that neither had seen; none for too few images.
+    pub two_stage: Option<Comparison>,
     /// How the images scatter against the noise model; none for too few images.
     pub scatter: Option<ScatterRecord>,
     /// Sigma of the flange over the workspace: samples of the region of the stops, then within all joint limits.
@@ -409,6 +411,30 @@ pub struct SolutionRecord {
     pub covariance_lower: Vec<f64>,
     /// Images with their observations.
     pub images: Vec<ImageRecord>,
+}
+
+impl SolutionRecord {
+    /// Observations in use of a camera: measured place (px) and stated covariance uu, uv, vv (px^2).
+    pub fn seen_by(&self, camera: usize) -> impl Iterator<Item = ([f64; 2], [f64; 3])> {
+        let images = self.images.iter().filter(move |i| i.camera == camera && i.reason.is_none());
+        images.flat_map(|i| {
+            let o = &i.observations;
+            let used = o.reason.iter().map(Option::is_none);
+            o.uv.iter()
+                .copied()
+                .zip(o.covariance.iter().copied())
+                .zip(used)
+                .filter_map(|(seen, used)| used.then_some(seen))
+        })
+    }
+}
+
+impl CameraRecord {
+    /// How well the projection is known, px: root mean square over the places (px) that were seen, and the worst of the image.
+    pub fn projection_known(&self, seen: impl Iterator<Item = [f64; 2]>) -> Option<[f64; 2]> {
+        let map = self.projection.as_ref()?;
+        Some([map.rms_at(seen, self.width_px, self.height_px)?, map.largest()?])
+    }
 }
 
 /// Bytes of solution.json: one line for each field of [`SolutionRecord`].

@@ -1,10 +1,15 @@
 //! All estimators side by side: against truth where it is known, on held-out images where it is not.
 
 use nalgebra::{DMatrix, Vector3};
+use serde::{Deserialize, Serialize};
 
+use super::joint::JointNoise;
 use super::solution::Solution;
-use super::two_stage::{Estimate, Estimator, estimate_all};
-use crate::assess::{Ratio, bootstrap_ratio, camera_errors_m, flange_error_m, folds, predict_image, root_mean_square};
+use super::two_stage::{Estimator, PoseStage, estimate_all, fit_poses};
+use crate::assess::{
+    Ratio, bootstrap_ratio, camera_errors_m, flange_error_m, folds, predict_image, refitted, root_mean_square,
+    without_images,
+};
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::linalg::symmetric_eigen;
@@ -13,7 +18,7 @@ use crate::series::CameraMount;
 use crate::simulate::truth::Truth;
 
 /// Errors on images that the estimator did not see.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// RMS distance between measured and predicted markers, px.
     pub rms_px: f64,
@@ -26,7 +31,7 @@ pub struct HeldOut {
 }
 
 /// Errors against what was put in.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TruthError {
     /// RMS error of the flange relative to the plate over held-out readings, gauge aligned, mm.
     pub flange_mm: f64,
@@ -35,7 +40,7 @@ pub struct TruthError {
 }
 
 /// One estimator.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ComparisonRow {
     /// Which.
     pub estimator: Estimator,
@@ -48,14 +53,27 @@ pub struct ComparisonRow {
 }
 
 /// The comparison.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
-    /// Rows in the order A to F.
+    /// Rows in the order A to F, of the estimators that took part.
     pub rows: Vec<ComparisonRow>,
     /// Images on the robot that took part.
     pub images: usize,
     /// Number of folds by image, and of slabs of the workspace.
     pub folds: [usize; 2],
+}
+
+impl Comparison {
+    /// The two-stage fits that predicted held-out images, with their error over that of the joint fit.
+    pub fn two_stage(&self) -> impl Iterator<Item = (&ComparisonRow, Ratio)> {
+        let staged = |row: &&ComparisonRow| !matches!(row.estimator, Estimator::HardJoint | Estimator::Joint);
+        self.rows.iter().filter(staged).filter_map(|row| Some((row, row.by_image?.to_joint?)))
+    }
+
+    /// The one of them with the smallest error.
+    pub fn best_two_stage(&self) -> Option<(&ComparisonRow, Ratio)> {
+        self.two_stage().min_by(|a, b| a.1.value.total_cmp(&b.1.value))
+    }
 }
 
 const FOLDS: usize = 6;
@@ -84,8 +102,10 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
         done += 1;
         progress(done, total);
     };
-    let image_errors = held_out(problem, state, &by_image, &mut tick);
-    let region_errors = held_out(problem, state, &regions(problem, state, &on_robot), &mut tick);
+    let all =
+        |p: &Problem, s: &State| estimate_all(p, s).into_iter().map(|(e, found)| (e, found.map(|f| f.state))).collect();
+    let image_errors = held_out(problem, state, &by_image, all, &mut tick);
+    let region_errors = held_out(problem, state, &regions(problem, state, &on_robot), all, &mut tick);
     let against_truth = truth.map(|t| truth_errors(problem, state, t)).transpose()?;
     tick();
     let rows = Estimator::ALL
@@ -101,19 +121,46 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
     Ok(Comparison { rows, images: on_robot.len(), folds: [by_image.len(), FOLDS] })
 }
 
+/// The two-stage estimators beside the joint fit, held out by image: what the report of every solution says. `None` for too few images.
+///
+/// The joint fit keeps the noise components of the solution; those of the two-stage estimators are from the images that are left.
+pub fn beside_two_stages(solution: &Solution) -> Option<Comparison> {
+    let (problem, state) = (&solution.problem, &solution.state);
+    let images = problem.used().filter(|(_, i)| i.stop.is_some()).count();
+    let folds = folds(problem).filter(|_| images >= FEWEST_IMAGES)?;
+    let errors = held_out(problem, state, &folds, two_stages_and_joint, &mut || ());
+    let taking_part = Estimator::ALL.into_iter().enumerate().filter(|(_, e)| *e != Estimator::HardJoint);
+    let rows = taking_part
+        .map(|(k, estimator)| ComparisonRow { estimator, by_image: summary(&errors, k), by_region: None, truth: None })
+        .collect();
+    Some(Comparison { rows, images, folds: [folds.len(), 0] })
+}
+
+fn two_stages_and_joint(problem: &Problem, state: &State) -> Vec<(Estimator, Option<State>)> {
+    let stage = PoseStage::adjusted(problem, state);
+    let found = |estimator| match estimator {
+        Estimator::HardJoint => None,
+        Estimator::Joint => Some(refitted(problem, state)),
+        _ => Some(fit_poses(problem, stage.as_ref()?, state, estimator, JointNoise::Estimated)?.state),
+    };
+    Estimator::ALL.map(|estimator| (estimator, found(estimator))).into()
+}
+
 /// Error of every held-out image by every estimator; `None` where an estimator has no solution for a fold.
 type Errors = Vec<[Option<crate::assess::ImageError>; 6]>;
 
-fn held_out(problem: &Problem, state: &State, folds: &[Vec<usize>], tick: &mut dyn FnMut()) -> Errors {
+fn held_out(
+    problem: &Problem,
+    state: &State,
+    folds: &[Vec<usize>],
+    estimate: impl Fn(&Problem, &State) -> Vec<(Estimator, Option<State>)>,
+    tick: &mut dyn FnMut(),
+) -> Errors {
     let mut errors = Vec::new();
     for fold in folds {
-        let mut rest = problem.clone();
-        fold.iter().for_each(|&i| rest.images[i].rejected = Some("held out".into()));
-        let found = estimate_all(&rest, state);
+        let found = estimate(&without_images(problem, fold), state);
         for &i in fold {
-            let of = |(_, estimate): &(Estimator, Option<Estimate>)| {
-                estimate.as_ref().and_then(|e| predict_image(problem, &e.state, i))
-            };
+            let of = |(_, state): &(Estimator, Option<State>)| predict_image(problem, state.as_ref()?, i);
             errors.push(std::array::from_fn(|k| found.get(k).and_then(of)));
         }
         tick();

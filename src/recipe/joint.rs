@@ -151,6 +151,7 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
         linearised,
         covariance,
         free_poses: free,
+        two_stage: None,
         accuracy,
         starts,
         notices,

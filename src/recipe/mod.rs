@@ -33,7 +33,7 @@ mod verify;
 mod worth;
 
 pub use build::{MeasuredSeries, MeasuredStop};
-pub use compare::{Comparison, ComparisonRow, HeldOut, TruthError, compare};
+pub use compare::{Comparison, ComparisonRow, HeldOut, TruthError, beside_two_stages, compare};
 pub use dry_run::dry_run;
 pub use evidence::{Evidence, identify};
 pub use forecast::{

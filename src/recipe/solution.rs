@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::build::MeasuredSeries;
+use super::compare::Comparison;
 use super::evidence::Evidence;
 use super::free_poses::FreePoses;
 use super::worth::Worth;
@@ -45,6 +46,8 @@ pub struct Solution {
     pub evidences: Vec<Evidence>,
     /// Before and after, held out.
     pub accuracy: Accuracy,
+    /// Two-stage fits beside the joint one, where asked for ([`super::beside_two_stages`]).
+    pub two_stage: Option<Comparison>,
     /// Starting values with their verdicts.
     pub starts: Vec<StartVerdict>,
     /// What the user should know.

@@ -7,7 +7,9 @@
 //! taken at the joint solution, gives the joint solution again.
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use serde::{Deserialize, Serialize};
 
+use crate::assess::refitted;
 use crate::geom::{Pose, right_jacobian_se3};
 use crate::linalg::{SymmetricFactor, product};
 use crate::problem::{Chained, Problem, Slack, State, Step, chained};
@@ -19,7 +21,8 @@ use crate::solve::{
 use super::joint::JointNoise;
 
 /// The estimators that are compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Estimator {
     /// Two stages; one variance for positions and one for rotations, from the data.
     Isotropic,
@@ -76,7 +79,8 @@ impl Estimator {
 pub struct Estimate {
     /// Which.
     pub estimator: Estimator,
-    /// All unknowns; cameras and plates of the two-stage estimators are those of the first stage.
+    /// All unknowns. Cameras and plates of the two-stage estimators are those of the first stage; the full covariance, which tells how they go
+    /// with the poses, gives those that belong to the robot found.
     pub state: State,
     /// Covariance of the columns that act through the camera poses (robot, mountings, placements).
     pub covariance: DMatrix<f64>,
@@ -412,6 +416,9 @@ pub fn fit_poses(
         let covariance = SymmetricFactor::new(&normal.information).ok()?.inverse();
         if standing {
             let covariance = zero_fixed(problem, covariance);
+            if estimator == Estimator::FullAndRepeatability {
+                state = with_cameras_for_the_robot(problem, state, &model.sizes);
+            }
             return Some(Estimate { estimator, state, covariance, components: model.sizes });
         }
         let taken = product(&product(&normal.weighted_jacobian, &covariance), &normal.weighted_jacobian.transpose());
@@ -420,6 +427,28 @@ pub fn fit_poses(
         standing = change < STANDING || round >= ROUNDS;
     }
     None
+}
+
+/// Cameras and plates at their optimum given robot, mountings and placements: what their covariance with the poses makes of them.
+fn with_cameras_for_the_robot(problem: &Problem, mut state: State, sizes: &[f64]) -> State {
+    let mut given = problem.clone();
+    let theta = given.layout.theta_len();
+    given.layout.columns[..theta].iter_mut().for_each(|c| c.free = false);
+    let per_camera = sizes_per_camera(problem);
+    for (camera, joint) in given.noise.joint.iter_mut().enumerate() {
+        let own = sizes[camera * per_camera..].iter().map(|s| s.max(f64::MIN_POSITIVE));
+        joint.iter_mut().zip(own).for_each(|(s, own)| *s = own);
+    }
+    for (camera, tilt) in given.noise.tilt.iter_mut().enumerate() {
+        *tilt = sizes[(camera + 1) * per_camera - 1].max(f64::MIN_POSITIVE);
+    }
+    let hard = sizes.iter().all(|s| *s == 0.0);
+    for (slack, image) in state.slack.iter_mut().zip(&given.images) {
+        if image.stop.is_some() {
+            *slack = if hard { Slack::None } else { given.exact_slack(image) };
+        }
+    }
+    refitted(&given, &state)
 }
 
 fn zero_fixed(problem: &Problem, mut covariance: DMatrix<f64>) -> DMatrix<f64> {

@@ -118,7 +118,7 @@ pub(super) fn workspace(r: &SolutionRecord) -> Markup {
         } }
         div.pair {
             (figure(&map(r, &bounds, "Workspace from above: sigma of the flange", |p| [p[0], p[1]], ["x", "y"]), "From above, base frame, m."))
-            (figure(&map(r, &bounds, "Workspace from the side: sigma of the flange", |p| [p[0].hypot(p[1]), p[2]], ["distance from the axis of the base", "z"]), "From the side, m. Ringed: region of the stops."))
+            (figure(&map(r, &bounds, "Workspace from the side: sigma of the flange", |p| [p[0].hypot(p[1]), p[2]], ["r", "z"]), "From the side (r: distance from the axis of the base), m. Ringed: region of the stops."))
         }
         p.note { @for (k, class) in CLASSES.iter().enumerate() {
             span class={ "key " (class) } {}

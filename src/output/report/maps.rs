@@ -201,9 +201,10 @@ pub(super) fn distortion(camera_record: &CameraRecord) -> Option<Map> {
 const SIGMA_BOUNDS_PX: [f64; 4] = [0.02, 0.05, 0.1, 0.3];
 
 /// How well it is known where in the image a direction shows.
-pub(super) fn uncertainty(c: &CameraRecord) -> Option<Map> {
+pub(super) fn uncertainty(r: &SolutionRecord, camera: usize) -> Option<Map> {
+    let c = &r.cameras[camera];
     let map = c.projection.as_ref()?;
-    let [median, largest] = map.median_and_largest()?;
+    let [seen, largest] = c.projection_known(r.seen_by(camera).map(|(uv, _)| uv))?;
     let (w, h) = (f64::from(c.width_px), f64::from(c.height_px));
     let field = Field { low: [-0.5; 2], high: [w - 0.5, h - 0.5], up: false };
     let (width, height) = field.size();
@@ -219,8 +220,8 @@ pub(super) fn uncertainty(c: &CameraRecord) -> Option<Map> {
     }
     let [a, b, c, d] = SIGMA_BOUNDS_PX;
     let caption = format!(
-        "Sigma of the place where a direction is imaged, per axis, without a turn of the camera (which the poses take up): median {median:.3} px, at \
-         most {largest:.3} px. Dark blue below {a} px, then to {b} px, to {c} px, orange to {d} px, dark orange beyond."
+        "Sigma of the place where a direction is imaged, per axis, without a turn of the camera (which the poses take up): {seen:.3} px (RMS) where \
+         markers were seen, at most {largest:.3} px. Dark blue below {a} px, then to {b} px, to {c} px, orange to {d} px, dark orange beyond."
     );
     Some(Map { svg: svg.finish(), caption })
 }

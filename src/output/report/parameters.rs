@@ -187,7 +187,7 @@ fn is_of_formula(e: &EstimateRecord, camera: &str) -> bool {
 pub(super) fn cameras(r: &SolutionRecord) -> Markup {
     html! {
         h2 { @if r.cameras.len() == 1 { "Camera" } @else { "Cameras" } }
-        @for camera in &r.cameras {
+        @for (k, camera) in r.cameras.iter().enumerate() {
             h3 { (camera.name) ", " (camera.lens.name()) " lens, " (camera.width_px) " × " (camera.height_px) " px" }
             div.pair {
                 div.wide { table {
@@ -199,7 +199,7 @@ pub(super) fn cameras(r: &SolutionRecord) -> Markup {
                     } }
                 } }
                 @if let Some(map) = maps::distortion(camera) { (figure(&map.svg, &map.caption)) }
-                @if let Some(map) = maps::uncertainty(camera) { (figure(&map.svg, &map.caption)) }
+                @if let Some(map) = maps::uncertainty(r, k) { (figure(&map.svg, &map.caption)) }
             }
         }
     }

@@ -1,7 +1,8 @@
 //! plan.html: the planned poses, what they will be worth, and pictures of both.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 
+use super::page::page;
 use super::plan_pictures::{View, coverage, curve, joint_ranges, scene};
 use super::{STYLE, figure};
 use crate::output::plan_files::written;
@@ -24,31 +25,20 @@ svg .h3{fill:#1f6feb;fill-opacity:.6}svg .h4{fill:#1f6feb;fill-opacity:.9}";
 /// The page.
 pub fn plan_html(request: &PlanRequest, plan: &Plan, forecast: &Forecast, command: &str) -> String {
     let robot = &request.setting.robot.chain.robot;
-    let page: Markup = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "Plan for " (robot) }
-                style { (PreEscaped(STYLE)) (PreEscaped(PLAN_STYLE)) }
-            }
-            body {
-                h1 { "Plan for " (robot) }
-                p class="sub" { (plan.legs.len()) " images, chosen from " (plan.pool.len()) " workable poses: " (plan.drawn) " drawn at random, "
-                    (plan.pool.len() - plan.drawn) " searched near the best" }
-                (numbers(plan, forecast))
-                (words(forecast))
-                (pictures(request, plan, forecast))
-                (gains(forecast, request.taken.len()))
-                (parameters(forecast))
-                (stops(request, plan))
-                h2 { "Command" }
-                p { code { (command) } }
-            }
-        }
+    let body = html! {
+        h1 { "Plan for " (robot) }
+        p class="sub" { (plan.legs.len()) " images, chosen from " (plan.pool.len()) " workable poses: " (plan.drawn) " drawn at random, "
+            (plan.pool.len() - plan.drawn) " searched near the best" }
+        (numbers(plan, forecast))
+        (words(forecast))
+        (pictures(request, plan, forecast))
+        (gains(forecast, request.taken.len()))
+        (parameters(forecast))
+        (stops(request, plan))
+        h2 { "Command" }
+        p { code { (command) } }
     };
-    page.into_string()
+    page(&format!("Plan for {robot}"), &[STYLE, PLAN_STYLE].concat(), &body)
 }
 
 fn numbers(plan: &Plan, forecast: &Forecast) -> Markup {
