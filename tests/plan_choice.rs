@@ -8,8 +8,9 @@ use clarabel::solver::{
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use robotcal::linalg::LinearRow;
+use robotcal::linalg::{LinearRow, SymmetricFactor};
 use robotcal::plan::criterion::Criterion;
+use robotcal::plan::information::Told;
 use robotcal::plan::relax::{Design, NoDesign};
 use robotcal::plan::rounding::round;
 
@@ -252,6 +253,42 @@ fn derivatives_of_the_criteria_are_those_of_differences() {
             }
         }
     }
+}
+
+#[test]
+fn what_no_image_tells_is_left_out_without_changing_the_criterion() {
+    const COLUMNS: usize = 12;
+    const SEEN: usize = 7;
+    let mut rng = ChaCha8Rng::seed_from_u64(41);
+    // Images see seven sums of twelve columns in units of their own.
+    let sigma: Vec<f64> = (0..COLUMNS).map(|k| 10f64.powi(k as i32 % 5 - 3)).collect();
+    let sums = DMatrix::from_fn(COLUMNS, SEEN, |i, _| 30.0 * rng.random_range(-1.0..1.0) / sigma[i]);
+    let candidates: Vec<DMatrix<f64>> =
+        factors(41, 19, SEEN, 3).iter().map(|f| &sums * f).map(|f| &f * f.transpose()).collect();
+    let prior: Vec<f64> = sigma.iter().map(|s| s * s).collect();
+    let known = DMatrix::from_fn(COLUMNS, COLUMNS, |i, j| if i == j { 1.0 / prior[i] } else { 0.0 });
+    let whole = candidates.iter().fold(DMatrix::zeros(COLUMNS, COLUMNS), |sum, m| sum + m);
+    let told = Told::of(&whole, &prior);
+    assert_eq!(told.rows(), SEEN + 1);
+    let b = DMatrix::from_fn(COLUMNS, 4, |i, _| rng.random_range(-1.0..1.0) / sigma[i]);
+    let criterion = Criterion::MeanVariance(b);
+    let reduced = told.criterion(&criterion);
+    let sum = |start: DMatrix<f64>, of: &dyn Fn(&DMatrix<f64>) -> DMatrix<f64>| {
+        candidates.iter().step_by(3).fold(start, |sum, m| sum + of(m))
+    };
+    let (full, small) = (sum(known.clone(), &|m| m.clone()), sum(told.known(&known), &|m| told.information(m)));
+    let (at, within) = (criterion.evaluate(&full).unwrap(), reduced.evaluate(&small).unwrap());
+    assert!((at.value / within.value - 1.0).abs() < 1e-9, "{} {}", at.value, within.value);
+    for m in &candidates {
+        let (a, b) = (at.gradient(m), within.gradient(&told.information(m)));
+        // The full form cancels: large variances of what is not seen against large information beside it.
+        assert!((a - b).abs() < 1e-6 * a.abs(), "{a} {b}");
+    }
+    let covariance = told.covariance(&SymmetricFactor::new(&small).unwrap().inverse());
+    let off =
+        DMatrix::from_fn(COLUMNS, COLUMNS, |i, j| (covariance[(i, j)] - at.covariance[(i, j)]) / (sigma[i] * sigma[j]));
+    assert!(off.amax() < 1e-9, "{}", off.amax());
+    assert_eq!(Told::everything(COLUMNS).information(&candidates[0]), candidates[0]);
 }
 
 #[test]

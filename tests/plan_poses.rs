@@ -235,10 +235,13 @@ fn rounds_of_search_only_improve_and_are_the_same_with_any_number_of_threads() {
     assert!(one.values.windows(2).all(|w| w[1] <= w[0] * 1.002), "{:?}", one.values);
     // The bound that was certified for the drawn candidates alone is beaten by whole images: the search found what they lack.
     let value = |c: &Choice| c.chosen.iter().fold(c.known.clone(), |m, &k| m + &c.information[k]);
-    let variance = |c: &Choice| Criterion::weighted(&c.weight).value(&value(c)).unwrap();
+    let variance = |c: &Choice| c.told.criterion(&Criterion::weighted(&c.weight)).value(&value(c)).unwrap();
     let (before, after) = (variance(&drawn), variance(&two));
     println!("{before:.3e} {after:.3e}");
     assert!(after < before * drawn.efficiency[1], "{before} {after}");
+    // Whole images are made better past the choice among the candidates of the search.
+    assert!(one.chosen.iter().any(|&k| k >= one.drawn), "{:?}", one.chosen);
+    assert!(one.efficiency[0] > 0.999 && one.efficiency[1] <= 1.0, "{:?}", one.efficiency);
 }
 
 /// Plate of few points, written as a user would.

@@ -134,7 +134,7 @@ pub(super) struct PlanArgs {
     /// Radius of the camera's body, mm
     #[arg(long, value_name = "MM", default_value_t = 30.0)]
     camera_radius_mm: f64,
-    /// Seed of the candidates
+    /// Seed of the candidates; of the first world of a study
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Study instead of a plan: 30 planned against 60 random poses in as many simulated worlds; writes study.md
@@ -253,6 +253,7 @@ fn study(args: &PlanArgs, chain: Chain, seeds: u64) -> Result<Verdict> {
     let request = PlanStudyRequest {
         chain,
         mount: args.mount.into(),
+        first: args.seed,
         seeds,
         planned,
         random,

@@ -205,6 +205,12 @@ pub fn study_table(robot: &str, request: &PlanStudyRequest, study: &PlanStudy) -
     text += &format!("Over held-out views of the plate: {planned:.4} mm planned, {drawn:.4} mm random.\n");
     let least = |k: usize| study.rows.iter().map(|r| r.efficiency[k]).fold(1.0, f64::min);
     text += &format!("Least certified efficiency: relaxation {:.4}, whole images {:.4}.\n", least(0), least(1));
+    text += "\n| world | planned, found mm | predicted | random, found mm | predicted |\n|---|---|---|---|---|\n";
+    for r in &study.rows {
+        let [a, b] = r.planned_m.map(|m| 1e3 * m);
+        let [c, d] = r.random_m.map(|m| 1e3 * m);
+        text += &format!("| {} | {a:.4} | {b:.4} | {c:.4} | {d:.4} |\n", r.seed);
+    }
     for (seed, reason) in &study.failed {
         text += &format!("World {seed} was left out: {}\n", reason.replace('\n', " "));
     }

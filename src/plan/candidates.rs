@@ -94,9 +94,6 @@ const CONFIGURATIONS: usize = 3;
 const SAME: f64 = 0.2;
 /// Views that are tried together.
 const ROUND: usize = 256;
-/// Least and greatest step to a view near another one, as shares of the ranges; even in their logarithm.
-const NEAREST: f64 = 0.005;
-const FARTHEST: f64 = 0.2;
 /// Share of the poses near others for which the arm starts anywhere.
 const ANEW: f64 = 0.2;
 /// Views tried for each candidate wanted before the search ends.
@@ -163,10 +160,9 @@ impl<'a> Search<'a> {
         (found, tally)
     }
 
-    /// A workable pose near another one: the view moved by little or much, the arm by as much before the inverse kinematics
-    /// (which turns redundant axes), or in another configuration. `None` where the view that was tried is not workable.
-    pub fn near(&self, other: &Candidate, rng: &mut impl Rng) -> Option<Candidate> {
-        let size = NEAREST * (FARTHEST / NEAREST).powf(rng.random::<f64>());
+    /// A workable pose near another one: the view moved by `size` of its ranges (standard deviation), the arm by as much before the
+    /// inverse kinematics (which turns redundant axes), or in another configuration. `None` where the view that was tried is not workable.
+    pub fn near(&self, other: &Candidate, size: f64, rng: &mut impl Rng) -> Option<Candidate> {
         let view = other.view.near(size, &self.setting.plate, &self.options.views, rng);
         let start = if rng.random_bool(ANEW) {
             self.random_start(rng)

@@ -3,9 +3,10 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::candidates::Candidate;
+use super::criterion::Criterion;
 use super::setting::Setting;
 use crate::geom::skew;
-use crate::linalg::{SymmetricFactor, product};
+use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
 use crate::model::robot::{Robot, Stop};
 use crate::problem::{E, Image, Problem, State, Weighting, chained, linearise};
 
@@ -14,6 +15,23 @@ use crate::problem::{E, Image, Problem, State, Weighting, chained, linearise};
 /// Joint noise is eliminated (Schur complement); the corrections of single markers and the displacement field of a lens are taken as
 /// known.
 pub fn image_information(problem: &Problem, setting: &Setting, state: &State, image: &Image) -> Option<DMatrix<f64>> {
+    let (h, t) = condensed(problem, setting, state, image)?;
+    Some(carried(&h, &t))
+}
+
+/// `T' H T`, symmetric to the last bit.
+fn carried(h: &DMatrix<f64>, t: &DMatrix<f64>) -> DMatrix<f64> {
+    let m = product(&t.transpose(), &product(h, t));
+    (&m + m.transpose()) * 0.5
+}
+
+/// Information `H` of an image about its camera pose and intrinsics, and their derivatives `T` by all columns.
+fn condensed(
+    problem: &Problem,
+    setting: &Setting,
+    state: &State,
+    image: &Image,
+) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let slack = setting.slack();
     let chain = chained(problem, state, image, &slack)?;
     let terms = linearise(image, state, &chain.pose, &Weighting::of(problem, image))?;
@@ -38,8 +56,105 @@ pub fn image_information(problem: &Problem, setting: &Setting, state: &State, im
             t[(6 + k, c)] = 1.0;
         }
     }
-    let m = product(&t.transpose(), &product(&h, &t));
-    Some((&m + m.transpose()) * 0.5)
+    Some((h, t))
+}
+
+/// Directions in the space of the columns about which images tell something, and those about which none does.
+///
+/// Frames that lie fixed one behind the other, and all that is gauge, make up a third of the columns and more. With the prior scaled to
+/// one, `U' D^-1/2 (sum M_i) D^-1/2 U` diagonal and `V = D^-1/2 U`, nothing is coupled with the columns `V_0` of vanishing eigenvalues:
+///
+/// ```text
+/// tr(W M^-1) = tr(V_1' W V_1 (V_1' M V_1)^-1) + tr(V_0' W V_0)
+/// ```
+///
+/// The second part stands in a last row of its own, of which the information is always one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Told {
+    /// `V_1`, columns by directions.
+    told: DMatrix<f64>,
+    /// `V_0`; without columns where all directions count as told.
+    untold: DMatrix<f64>,
+}
+
+/// Share of its prior variance that all candidates together must take from a direction for it to count as told.
+const TOLD: f64 = 1e-3;
+
+impl Told {
+    /// All columns as they are.
+    pub fn everything(columns: usize) -> Self {
+        Self { told: DMatrix::identity(columns, columns), untold: DMatrix::zeros(columns, 0) }
+    }
+
+    /// What images of the information `sum` tell beside the variances `prior` of the columns.
+    pub fn of(sum: &DMatrix<f64>, prior: &[f64]) -> Self {
+        let n = prior.len();
+        let scaled = DMatrix::from_fn(n, n, |i, j| sum[(i, j)] * (prior[i] * prior[j]).sqrt());
+        let Some((values, vectors)) = symmetric_eigen(&scaled) else { return Self::everything(n) };
+        let columns = |is_told: bool| {
+            let which: Vec<usize> = (0..n).filter(|&k| (values[k] > TOLD) == is_told).collect();
+            DMatrix::from_fn(n, which.len(), |i, k| vectors[(i, which[k])] * prior[i].sqrt())
+        };
+        Self { told: columns(true), untold: columns(false) }
+    }
+
+    /// Number of rows of what is given back here.
+    pub fn rows(&self) -> usize {
+        self.told.ncols() + usize::from(self.untold.ncols() > 0)
+    }
+
+    fn with_last(&self, told: &DMatrix<f64>, last: f64) -> DMatrix<f64> {
+        let (n, r) = (self.rows(), self.told.ncols());
+        DMatrix::from_fn(n, n, |i, j| match (i < r, j < r) {
+            (true, true) => told[(i, j)],
+            (false, false) => last,
+            _ => 0.0,
+        })
+    }
+
+    /// Information before the first image, from that of the columns.
+    pub fn known(&self, known: &DMatrix<f64>) -> DMatrix<f64> {
+        self.with_last(&carried(known, &self.told), 1.0)
+    }
+
+    /// Information of an image, from that of the columns.
+    pub fn information(&self, information: &DMatrix<f64>) -> DMatrix<f64> {
+        self.with_last(&carried(information, &self.told), 0.0)
+    }
+
+    /// Information of a candidate; zero where its image would show nothing.
+    pub fn of_candidate(
+        &self,
+        problem: &Problem,
+        setting: &Setting,
+        state: &State,
+        candidate: &Candidate,
+    ) -> DMatrix<f64> {
+        let image = setting.image(state, "", &candidate.readings, candidate.placement);
+        let condensed = image.and_then(|image| condensed(problem, setting, state, &image));
+        condensed.map_or_else(
+            || DMatrix::zeros(self.rows(), self.rows()),
+            |(h, t)| self.with_last(&carried(&h, &product(&t, &self.told)), 0.0),
+        )
+    }
+
+    /// A criterion of the columns; volumes need all columns told.
+    pub fn criterion(&self, criterion: &Criterion) -> Criterion {
+        match criterion {
+            Criterion::MeanVariance(b) => {
+                let [told, untold] = [&self.told, &self.untold].map(|v| product(&v.transpose(), b));
+                Criterion::weighted(&self.with_last(&product(&told, &told.transpose()), untold.norm_squared()))
+            }
+            volume => volume.clone(),
+        }
+    }
+
+    /// Covariance of the columns.
+    pub fn covariance(&self, covariance: &DMatrix<f64>) -> DMatrix<f64> {
+        let r = self.told.ncols();
+        let told = carried(&covariance.view((0, 0), (r, r)).into_owned(), &self.told.transpose());
+        told + product(&self.untold, &self.untold.transpose())
+    }
 }
 
 /// Information of a candidate; zero where its image would show nothing.

@@ -185,7 +185,7 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
         false => Some(exact(&[])?),
     };
     let before = match &start {
-        None => Criterion::weighted(&plan.weight).value(&plan.known).map_or(f64::NAN, f64::sqrt),
+        None => flange_criterion(plan).value(&plan.known).map_or(f64::NAN, f64::sqrt),
         Some(covariance) => flange_m(&plan.weight, covariance),
     };
     let flange = flange_m(&plan.weight, &whole);
@@ -206,9 +206,14 @@ fn counts(n: usize) -> Vec<usize> {
     grid.into_iter().filter(|k| *k < n).chain([n]).collect()
 }
 
+/// Mean squared error of the flange, of what images tell.
+fn flange_criterion(plan: &Plan) -> Criterion {
+    plan.told.criterion(&Criterion::weighted(&plan.weight))
+}
+
 /// Stops by importance: the one that is missed least is taken out first.
 fn importance(plan: &Plan) -> Vec<usize> {
-    let criterion = Criterion::weighted(&plan.weight);
+    let criterion = flange_criterion(plan);
     let of = |leg: usize| &plan.information[plan.legs[leg].stop];
     let mut left: Vec<usize> = (0..plan.legs.len()).collect();
     let mut m = left.iter().fold(plan.known.clone(), |m, &k| m + of(k));
@@ -236,7 +241,7 @@ fn importance(plan: &Plan) -> Vec<usize> {
 fn among_others(plan: &Plan, leg: usize) -> Option<[DMatrix<f64>; 2]> {
     let own = |k: usize| &plan.information[plan.legs[k].stop];
     let others = (0..plan.legs.len()).filter(|k| *k != leg).fold(plan.known.clone(), |m, k| m + own(k));
-    let inverse = |m: &DMatrix<f64>| SymmetricFactor::new(m).ok().map(|f| f.inverse());
+    let inverse = |m: &DMatrix<f64>| SymmetricFactor::new(m).ok().map(|f| plan.told.covariance(&f.inverse()));
     Some([inverse(&others)?, inverse(&(others + own(leg)))?])
 }
 

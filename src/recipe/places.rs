@@ -30,7 +30,7 @@ pub struct PlaceForecast {
 /// # Errors
 /// Where a parameter asked for is unknown.
 pub fn compare_places(request: &PlanRequest, choice: &Choice) -> Result<Vec<PlaceForecast>> {
-    let criterion = criterion(&request.wish, &choice.problem.layout, &choice.weight)?;
+    let criterion = choice.told.criterion(&criterion(&request.wish, &choice.problem.layout, &choice.weight)?);
     let one = |(placement, (name, _)): (usize, &(String, crate::geom::Pose))| {
         let drawn = choice.pool.iter().zip(&choice.information).take(choice.drawn);
         let here = drawn.filter(|(c, _)| c.placement == placement);
@@ -45,7 +45,7 @@ pub fn compare_places(request: &PlanRequest, choice: &Choice) -> Result<Vec<Plac
         let chosen = design.relax().ok().and_then(|r| round(&design, &r)).map(|r| r.chosen);
         let covariance = chosen.and_then(|chosen| {
             let m = chosen.iter().fold(choice.known.clone(), |m, &k| m + &candidates[k]);
-            SymmetricFactor::new(&m).ok().map(|f| f.inverse())
+            SymmetricFactor::new(&m).ok().map(|f| choice.told.covariance(&f.inverse()))
         });
         PlaceForecast {
             placement,

@@ -3,12 +3,13 @@
 use std::time::Instant;
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::linalg::LinearRow;
 use crate::plan::candidates::{Candidate, CandidateOptions, Search, Tally, candidates, workspace};
 use crate::plan::criterion::Criterion;
-use crate::plan::information::{candidate_information, flange_weight, image_information};
+use crate::plan::information::{Told, candidate_information, flange_weight, image_information};
 use crate::plan::order::{Leg, imbalance, tour};
 use crate::plan::refine::{Refined, Refinement};
 use crate::plan::relax::{Design, NoDesign};
@@ -95,7 +96,7 @@ pub struct Choice {
     pub drawn: usize,
     /// Criterion of the relaxed weights before the first round of search and after each.
     pub values: Vec<f64>,
-    /// Their information about all columns.
+    /// Their information, as [`Choice::told`] has it.
     pub information: Vec<DMatrix<f64>>,
     /// What fell out.
     pub tally: Tally,
@@ -109,8 +110,10 @@ pub struct Choice {
     pub targets: Vec<Vec<f64>>,
     /// Its weight: the mean squared error is `tr(W cov)`.
     pub weight: DMatrix<f64>,
-    /// Information before the first image.
+    /// Information before the first image, as [`Choice::told`] has it.
     pub known: DMatrix<f64>,
+    /// What images tell.
+    pub told: Told,
     /// The problem without images.
     pub problem: Problem,
     /// The state about which it is linearised.
@@ -135,6 +138,7 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
     let (pool, tally) = timed("candidates", || candidates(setting, &scene, &request.candidates))?;
     let (problem, state) = setting.problem();
     let mut known = rough_knowledge(&problem, &setting.camera);
+    let prior: Vec<f64> = known.diagonal().iter().map(|m| 1.0 / m).collect();
     for image in &request.taken {
         if let Some(m) = image_information(&problem, setting, &state, image) {
             known += m;
@@ -149,21 +153,34 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
     let weight = flange_weight(&problem, &setting.robot, &targets);
     let criterion = criterion(&request.wish, &problem.layout, &weight)?;
     let (drawn, count) = (pool.len(), request.count);
+    let (told, known, information) = timed("information", || {
+        let whole: Vec<DMatrix<f64>> =
+            pool.par_iter().map(|c| candidate_information(&problem, setting, &state, c)).collect();
+        let told = told(&criterion, &prior, &known, &whole);
+        let information: Vec<DMatrix<f64>> = whole.par_iter().map(|m| told.information(m)).collect();
+        let known = told.known(&known);
+        (told, known, information)
+    });
+    let criterion = told.criterion(&criterion);
     let refinement = Refinement {
         search: &Search::new(setting, &scene, &request.candidates),
-        inform: &|candidate| candidate_information(&problem, setting, &state, candidate),
+        inform: &|candidate| told.of_candidate(&problem, setting, &state, candidate),
         rows: &|pool| rows(&request.budget, pool, drawn, setting.placements.len()),
         known: &known,
         criterion: &criterion,
         count,
         rounds: request.rounds,
     };
-    let refined = timed("weights and further candidates", || refinement.refine(pool, tally))
+    let mut refined = timed("weights and further candidates", || refinement.refine(pool, information, tally))
         .map_err(|reason| no_plan(reason, request, drawn))?;
-    let Refined { pool, information, rows, relaxed, tally, values, .. } = refined;
-    let design = Design { known: &known, candidates: &information, criterion: &criterion, count, rows: &rows };
-    let rounded = timed("whole images", || round(&design, &relaxed))
-        .ok_or_else(|| no_plan(NoDesign::Contradiction, request, pool.len()))?;
+    let rounded = timed("whole images", || {
+        let Refined { information, rows, relaxed, .. } = &refined;
+        round(&Design { known: &known, candidates: information, criterion: &criterion, count, rows }, relaxed)
+    });
+    let mut rounded = rounded.ok_or_else(|| no_plan(NoDesign::Contradiction, request, drawn))?;
+    timed("whole images made better", || refinement.polish(&mut refined, &mut rounded))
+        .map_err(|reason| no_plan(reason, request, drawn))?;
+    let Refined { pool, information, relaxed, tally, values, .. } = refined;
     Ok(Choice {
         drawn,
         values,
@@ -178,6 +195,7 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
         pool,
         information,
         known,
+        told,
     })
 }
 
@@ -192,6 +210,18 @@ pub fn plan(request: &PlanRequest) -> Result<Plan> {
     let visited: Vec<&[f64]> = legs.iter().map(|l| choice.pool[l.stop].readings.as_slice()).collect();
     let imbalance = imbalance(&visited);
     Ok(Plan { choice, legs, imbalance })
+}
+
+/// What the images tell that were taken (they are in `known`) and those that could be; all columns where the criterion needs them.
+fn told(criterion: &Criterion, prior: &[f64], known: &DMatrix<f64>, all: &[DMatrix<f64>]) -> Told {
+    match criterion {
+        Criterion::Volume(_) => Told::everything(prior.len()),
+        Criterion::MeanVariance(_) => {
+            let mut sum = all.iter().fold(known.clone(), |sum, m| sum + m);
+            (0..prior.len()).for_each(|k| sum[(k, k)] -= 1.0 / prior[k]);
+            Told::of(&sum, prior)
+        }
+    }
 }
 
 pub(super) fn criterion(wish: &Wish, layout: &Layout, weight: &DMatrix<f64>) -> Result<Criterion> {

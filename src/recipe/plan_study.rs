@@ -32,6 +32,8 @@ pub struct PlanStudyRequest {
     pub chain: Chain,
     /// Where the camera is.
     pub mount: CameraMount,
+    /// Seed of the first world.
+    pub first: u64,
     /// Worlds.
     pub seeds: u64,
     /// Planned images.
@@ -122,7 +124,7 @@ fn plate() -> Plate {
 /// # Errors
 /// Where no world can be made at all.
 pub fn plan_study(request: &PlanStudyRequest, progress: impl Fn(u64) + Sync) -> Result<PlanStudy> {
-    let all: Vec<(u64, Result<PlanStudyRow>)> = (1..=request.seeds)
+    let all: Vec<(u64, Result<PlanStudyRow>)> = (request.first..request.first + request.seeds)
         .into_par_iter()
         .map(|seed| {
             let row = one_world(request, seed);

@@ -6,7 +6,7 @@ use super::svg::{Anchor, Svg};
 use super::words::plain;
 use crate::geom::Pose;
 use crate::plan::visibility::seen_markers;
-use crate::recipe::{Forecast, Plan, PlanRequest};
+use crate::recipe::{Forecast, JointRange, Plan, PlanRequest};
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
 
@@ -152,9 +152,15 @@ pub(super) fn coverage(request: &PlanRequest, plan: &Plan) -> String {
     svg.finish()
 }
 
+/// Letters of a joint's name at most, and the width of one.
+const LONGEST_NAME: usize = 24;
+const LETTER: f64 = 7.0;
+
 /// Limits and planned readings of every joint.
 pub(super) fn joint_ranges(forecast: &Forecast) -> String {
-    let (left, row) = (120.0, 30.0);
+    let name = |range: &JointRange| range.name.chars().take(LONGEST_NAME).collect::<String>();
+    let longest = forecast.ranges.iter().map(|r| name(r).len()).max().unwrap_or(0);
+    let (left, row) = (16.0 + LETTER * longest as f64, 36.0);
     let height = row * forecast.ranges.len() as f64 + 6.0;
     let mut svg = Svg::new(WIDTH, height, "Joint ranges with planned readings");
     let reach = WIDTH - left - 12.0;
@@ -162,7 +168,7 @@ pub(super) fn joint_ranges(forecast: &Forecast) -> String {
         let top = 4.0 + row * k as f64;
         let (low, high) = range.limits;
         let x = |q: f64| left + reach * ((q - low) / (high - low).max(1e-9)).clamp(0.0, 1.0);
-        svg.text([left - 8.0, top + 13.0], Anchor::End, &range.name.chars().take(16).collect::<String>());
+        svg.text([left - 8.0, top + 13.0], Anchor::End, &name(range));
         svg.rect([left, top], [reach, 14.0], "frame");
         range.planned.iter().for_each(|q| svg.line([x(*q), top], [x(*q), top + 14.0], "tick"));
         let shown = |q: f64| match range.kind {
