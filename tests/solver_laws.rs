@@ -481,6 +481,27 @@ fn one_thread_and_two_give_the_same_bits() {
     }
 }
 
+#[test]
+fn joint_noise_has_an_interval_where_it_is_estimated_and_none_where_it_is_given() {
+    let mut dice = Dice::new(52);
+    let request = Request { images: 14, lattice: (7, 6), radius_m: 0.0, joint_noise: 3e-4, ..Request::default() };
+    let (problem, state) = problem(&mut dice, &request);
+    let run = |joint_noise: JointNoise| {
+        let options = Options { joint_noise, model: RobotModel::Rigid, ..Options::default() };
+        identify(state.robot.chain.clone(), &[series(&problem)], &options).unwrap()
+    };
+    let estimated = run(JointNoise::Estimated);
+    let sigma = estimated.problem.joint_sigma(0);
+    assert_eq!(estimated.worth.joint_noise.len(), 1);
+    assert_eq!(estimated.worth.joint_noise[0].len(), sigma.len());
+    for (s, [low, high]) in sigma.iter().zip(&estimated.worth.joint_noise[0]) {
+        assert!(low < s && s < high && high.is_finite(), "{low:e} {s:e} {high:e}");
+    }
+    let given = run(JointNoise::Known(3e-4));
+    assert_eq!(given.problem.joint_sigma(0), vec![3e-4; sigma.len()]);
+    assert!(given.worth.joint_noise.is_empty());
+}
+
 fn assert_same_bits(one: &Solution, two: &Solution) {
     let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<u64>>();
     // Comparison of numbers takes 0 for -0, nothing else; none of these is NaN in a converged solution.

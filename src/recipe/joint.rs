@@ -175,7 +175,11 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let mut failed_gates = gates(&problem, &state, &free, &accuracy, on_robot);
     failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
     remarks(&problem, &state, on_robot, &mut notices);
-    let worth = judge(&problem, &state, &linearised, &mut covariance, &mut notices);
+    let mut worth = judge(&problem, &state, &linearised, &mut covariance, &mut notices);
+    if options.joint_noise != JointNoise::Estimated {
+        // What was given has no interval.
+        worth.joint_noise.clear();
+    }
     Ok(Solution {
         series: series.to_vec(),
         worth,
