@@ -119,7 +119,7 @@ fn read(folder: &Path, mode: Mode) -> Fallible<(Problem, State)> {
     }
     let stated = number("joint_sigma")?;
     let joint = vec![vec![if stated > 0.0 { stated } else { DEFAULT_JOINT_SIGMA }; readings]];
-    let noise = Noise { pixel_factor: vec![1.0], joint, local: Vec::new(), tilt: Vec::new() };
+    let noise = Noise { pixel_factor: vec![1.0], joint, ..Noise::default() };
     let problem = Problem {
         layout,
         plates: vec![plate],

@@ -25,12 +25,12 @@ use robotcal::simulate::render::render;
 
 type Fallible<T> = Result<T, Box<dyn Error>>;
 
-/// The plate from 0.43 m, tilted by 20 degrees: some 490 markers lie wholly in the picture.
+/// The plate from so near, tilted by 20 degrees, that 450 of its markers are found.
 fn picture(plate: &Plate, width: u32, height: u32) -> Picture {
     let mut camera = Camera::pinhole(Lens::Brown, width, height, 0.86 * f64::from(width));
     camera.parameters[4] = -0.08;
     let rotation = matrix_from_rpy([0.35, 0.0, 0.0]) * matrix_from_rpy([std::f64::consts::PI, 0.0, 0.1]);
-    let pose = Pose::new(rotation, Vector3::new(0.0, 0.0, 0.43));
+    let pose = Pose::new(rotation, Vector3::new(0.0, 0.0, 0.389));
     render(plate, &camera, &pose, &ImagingConditions::default(), &mut ChaCha8Rng::seed_from_u64(1))
 }
 

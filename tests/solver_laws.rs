@@ -13,7 +13,7 @@ use robotcal::recipe::{JointNoise, Options, RobotModel, Solution, adjust_free_po
 use robotcal::series::CameraMount;
 use robotcal::solve::{
     ComponentOptions, Elimination, Outcome, Settings, Status, System, covariance, covariance_by, estimate_components,
-    linearise_all, solve,
+    linearise_all, noise_information, solve,
 };
 use support::dense::{Dense, Unknown};
 use support::small::{Dice, Part, Request, problem, series};
@@ -377,6 +377,53 @@ fn poses_mode_is_the_free_pose_adjustment() {
     }
 }
 
+/// Redundancy of the latents of every reading at a linearisation, for other sizes of the joint noise.
+fn redundancies(problem: &Problem, outcome: &Outcome, sigma: &[f64]) -> Vec<f64> {
+    let mut problem = problem.clone();
+    problem.noise.joint = vec![sigma.to_vec()];
+    let lin = outcome.linearised.as_ref().unwrap();
+    let cov = covariance(&problem, &outcome.state, lin).unwrap();
+    let of = |k: usize, r: usize| 1.0 - cov.slack(k, sigma.len())[(r, r)] / sigma[r].powi(2);
+    (0..sigma.len()).map(|r| (0..lin.images.len()).map(|k| of(k, r)).sum()).collect()
+}
+
+#[test]
+fn the_information_on_the_joint_noise_is_the_slope_of_the_redundancies() {
+    // rho_b = tr(P V_b) has the slope d rho_b / d ln v_a = delta_ab rho_b - tr(P V_a P V_b) = delta_ab rho_b - 2 F_ab.
+    let mut dice = Dice::new(34);
+    let (mut problem, state) = problem(&mut dice, &Request { images: 12, lattice: (5, 4), ..Request::default() });
+    let sigma = [2e-4, 5e-5, 1e-4, 3e-4, 1e-5, 8e-5];
+    problem.noise.joint = vec![sigma.to_vec()];
+    let outcome = converged(&problem, state, &TIGHT);
+    let at = redundancies(&problem, &outcome, &sigma);
+    let h: f64 = 1e-4;
+    let shifted = |a: usize, by: f64| {
+        let mut moved = sigma;
+        moved[a] *= (0.5 * by).exp();
+        redundancies(&problem, &outcome, &moved)
+    };
+    let slopes: Vec<(Vec<f64>, Vec<f64>)> = (0..6).map(|a| (shifted(a, h), shifted(a, -h))).collect();
+    let information = nalgebra::Matrix6::from_fn(|a, b| {
+        let slope = (slopes[a].0[b] - slopes[a].1[b]) / (2.0 * h);
+        // Joints are drawn together with the weight of five observations.
+        0.5 * (f64::from(a == b) * at[b] - slope) + 2.5 * (f64::from(a == b) - 1.0 / 6.0)
+    });
+    let lin = outcome.linearised.as_ref().unwrap();
+    let cov = covariance(&problem, &outcome.state, lin).unwrap();
+    let told = noise_information(&problem, &outcome.state, lin, &cov).unwrap();
+    let expected = information.try_inverse().unwrap();
+    for readings in [vec![0], vec![1], vec![4], vec![0, 3], vec![0, 1, 2, 3, 4, 5]] {
+        let v = nalgebra::Vector6::from_fn(|r, _| {
+            if readings.contains(&r) { sigma[r].powi(2) / readings.len() as f64 } else { 0.0 }
+        });
+        let spread = told.mean_variance(0, &readings);
+        let ratio = spread.sigma / (expected * v).dot(&v).sqrt();
+        // Central differences with h = 1e-4 of redundancies good to some 1e-9.
+        assert!((ratio - 1.0).abs() < 1e-4, "{readings:?}: {ratio}");
+        assert!((spread.variance / v.sum() - 1.0).abs() < 1e-12);
+    }
+}
+
 #[test]
 fn variance_components_recover_pixel_and_joint_noise() {
     // Sum of squared normalised errors of log sigma over seeds: each is chi-squared with one degree of freedom.
@@ -403,16 +450,15 @@ fn variance_components_recover_pixel_and_joint_noise() {
         let lin = outcome.linearised.as_ref().unwrap();
         let cov = covariance(&problem, &outcome.state, lin).unwrap();
         let sigma = &problem.noise.joint[0];
-        // Redundancy of the latents: what the data say of them; the relative sigma of a sigma is 1 / sqrt(2 r).
-        let redundancy: f64 = (0..lin.images.len())
-            .map(|k| (0..6).map(|r| 1.0 - cov.slack(k, 6)[(r, r)] / sigma[r].powi(2)).sum::<f64>())
-            .sum();
+        let told = noise_information(&problem, &outcome.state, lin, &cov).unwrap();
+        let spread = told.mean_variance(0, &[0, 1, 2, 3, 4, 5]);
         let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / 6.0).sqrt();
+        assert!((spread.variance.sqrt() / mean - 1.0).abs() < 1e-12);
         let observations = 2.0 * lin.terms.iter().map(|t| t.residuals.len() as f64).sum::<f64>();
         let used = 70.0 + 6.0 * lin.images.len() as f64;
-        println!("pixel {} joint {mean:e} redundancy {redundancy:.0}", problem.noise.pixel_factor[0]);
+        println!("pixel {} joint {mean:e} +- {:e}", problem.noise.pixel_factor[0], spread.of_root());
         pixel += (problem.noise.pixel_factor[0] / 1.3).ln().powi(2) * 2.0 * (observations - used);
-        joint += (mean / truth).ln().powi(2) * 2.0 * redundancy;
+        joint += ((spread.variance - truth * truth) / spread.sigma).powi(2);
     }
     // 99.9 % point of chi-squared with 6 degrees of freedom.
     assert!(pixel < 22.5, "pixel noise is off: chi-squared {pixel:.1} of {seeds}");
@@ -433,6 +479,27 @@ fn one_thread_and_two_give_the_same_bits() {
         };
         assert_same_bits(&run(1), &run(2));
     }
+}
+
+#[test]
+fn joint_noise_has_an_interval_where_it_is_estimated_and_none_where_it_is_given() {
+    let mut dice = Dice::new(52);
+    let request = Request { images: 14, lattice: (7, 6), radius_m: 0.0, joint_noise: 3e-4, ..Request::default() };
+    let (problem, state) = problem(&mut dice, &request);
+    let run = |joint_noise: JointNoise| {
+        let options = Options { joint_noise, model: RobotModel::Rigid, ..Options::default() };
+        identify(state.robot.chain.clone(), &[series(&problem)], &options).unwrap()
+    };
+    let estimated = run(JointNoise::Estimated);
+    let sigma = estimated.problem.joint_sigma(0);
+    assert_eq!(estimated.worth.joint_noise.len(), 1);
+    assert_eq!(estimated.worth.joint_noise[0].len(), sigma.len());
+    for (s, [low, high]) in sigma.iter().zip(&estimated.worth.joint_noise[0]) {
+        assert!(low < s && s < high && high.is_finite(), "{low:e} {s:e} {high:e}");
+    }
+    let given = run(JointNoise::Known(3e-4));
+    assert_eq!(given.problem.joint_sigma(0), vec![3e-4; sigma.len()]);
+    assert!(given.worth.joint_noise.is_empty());
 }
 
 fn assert_same_bits(one: &Solution, two: &Solution) {

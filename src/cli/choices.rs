@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use crate::error::{Error, Result};
-use crate::recipe::{Config, JointNoise, Options, Parameters, RobotModel, Selection};
+use crate::recipe::{Config, JointNoise, MarkerTolerance, Options, Parameters, RobotModel, Selection};
 
 /// Flags that `identify` shares with whatever solves.
 #[derive(Debug, Args)]
@@ -13,6 +13,9 @@ pub(super) struct ChoiceArgs {
     /// Joint noise in rad (m for a prismatic joint) instead of the estimate; 0 takes the readings as exact
     #[arg(long, value_name = "SIGMA")]
     joint_noise: Option<f64>,
+    /// How far the markers are from nominal [default: stated]
+    #[arg(long, value_enum)]
+    marker_tolerance: Option<Tolerance>,
     /// Joint terms beside rigid geometry and offsets [default: auto]
     #[arg(long, value_enum)]
     robot_model: Option<Model>,
@@ -31,6 +34,15 @@ pub(super) struct ChoiceArgs {
     /// File with parameters, robot_model, free, fix and [prior] (see the guide); flags win
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+}
+
+/// Where the tolerance of the markers comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Tolerance {
+    /// As plate.toml says
+    Stated,
+    /// From the data, with image noise and joint noise, where they tell 50 coordinates of markers or more
+    Estimated,
 }
 
 /// Names of the robot models.
@@ -76,6 +88,10 @@ impl ChoiceArgs {
         Ok(Options {
             harmonics: harmonics(self.harmonics.or(config.harmonics))?.unwrap_or(defaults.harmonics),
             joint_noise: joint_noise(self.joint_noise)?,
+            marker_tolerance: match self.marker_tolerance {
+                Some(Tolerance::Estimated) => MarkerTolerance::Estimated,
+                _ => defaults.marker_tolerance,
+            },
             model: self.robot_model.map(Into::into).or(config.robot_model).unwrap_or(defaults.model),
             selection: Selection {
                 parameters: parameters.or(config.parameters).unwrap_or_default(),
@@ -98,6 +114,9 @@ pub(super) fn in_words(options: &Options) -> Vec<(String, String)> {
         model += &format!(", {} harmonics", options.harmonics);
     }
     let mut words = vec![("joint noise".to_owned(), joint_noise), ("robot model".to_owned(), model)];
+    if options.marker_tolerance == MarkerTolerance::Estimated {
+        words.push(("marker tolerance".to_owned(), "estimated".to_owned()));
+    }
     words.extend(options.selection.in_words());
     words
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::assess::{Cause, Errors, Identifiability, UnknownDirection};
+use crate::assess::{Cause, Errors, Identifiability, UnknownDirection, median};
 use crate::output::solution_json::SolutionRecord;
 use crate::problem::short_name;
 use crate::recipe::Comparison;
@@ -93,6 +93,7 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         "free pose {:.3} px RMS per point over {} observations",
         r.statistics.free_pose_rms_px, r.statistics.free_pose_observations
     )?;
+    marker_tolerance(out, r)?;
     joint_noise(out, r)?;
     evidences(out, r)?;
     accuracy(out, r)?;
@@ -157,18 +158,34 @@ fn image_noise_px(r: &SolutionRecord, camera: usize) -> f64 {
     (sum / f64::max(count, 1.0)).sqrt() * r.cameras[camera].pixel_factor
 }
 
+fn marker_tolerance(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    for plate in r.plates.iter().filter(|p| p.tolerance_factor != 1.0) {
+        let stated = 1e3 * median(&plate.prior_sigma_m).unwrap_or(plate.tolerance_m);
+        let found = plate.tolerance_factor * stated;
+        writeln!(out, "plate     {}: markers are off by {found:.3} mm per axis, {stated:.3} mm stated", plate.name)?;
+    }
+    Ok(())
+}
+
 fn joint_noise(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     for camera in &r.cameras {
-        let parts: Vec<String> = (r.robot.readings.iter().zip(&r.robot.reading_kinds).zip(&camera.joint_noise))
-            .map(|((name, kind), s)| match kind {
-                JointKind::Prismatic => format!("{name} {:.3} mm", 1e3 * s),
-                _ => format!("{name} {:.3}", 1e3 * s),
+        let readings = r.robot.readings.iter().zip(&r.robot.reading_kinds).zip(&camera.joint_noise);
+        let parts: Vec<String> = readings
+            .enumerate()
+            .map(|(k, ((name, kind), s))| {
+                let unit = if *kind == JointKind::Prismatic { " mm" } else { "" };
+                let told = match camera.joint_noise_interval.get(k) {
+                    Some([Some(low), Some(high)]) if *low == 0.0 => format!(" (below {:.3})", 1e3 * high),
+                    Some([Some(low), Some(high)]) => format!(" ({:.3} to {:.3})", 1e3 * low, 1e3 * high),
+                    _ => String::new(),
+                };
+                format!("{name} {:.3}{unit}{told}", 1e3 * s)
             })
             .collect();
         let of = if r.cameras.len() > 1 { format!(" ({})", camera.name) } else { String::new() };
         let tilt = Some(camera.apparent_tilt_rad).filter(|t| *t > 0.0);
         let tilt = tilt.map(|t| format!("; apparent tilt of the plate {:.3}", 1e3 * t));
-        writeln!(out, "joints    noise in mrad{of}: {}{}", parts.join(", "), tilt.unwrap_or_default())?;
+        writeln!(out, "joints    noise in mrad (95 %){of}: {}{}", parts.join(", "), tilt.unwrap_or_default())?;
     }
     Ok(())
 }

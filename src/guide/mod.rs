@@ -37,4 +37,7 @@ pub mod decisions {
 
     #[doc = include_str!("decisions/0004_boards.md")]
     pub mod d0004_boards {}
+
+    #[doc = include_str!("decisions/0005_marker_tolerance.md")]
+    pub mod d0005_marker_tolerance {}
 }

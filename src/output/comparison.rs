@@ -104,8 +104,15 @@ pub fn study_verdict(study: &Study) -> Vec<String> {
             extreme(k, f64::max, 0.0)
         ));
     }
-    let worst = study.cells.iter().map(StudyCell::joint_over_best).fold(0.0, f64::max);
-    words.push(format!("In its worst cell the error of F is {worst:.3} times that of the best of A to F."));
+    let worst = |least_noise: f64| {
+        let cells = study.cells.iter().filter(|c| c.joint_noise_rad >= least_noise);
+        cells.map(StudyCell::joint_over_best).fold(0.0, f64::max)
+    };
+    words.push(format!(
+        "In its worst cell the error of F is {:.3} times that of the best of A to F; {:.3} times where there is joint noise.",
+        worst(0.0),
+        worst(f64::MIN_POSITIVE)
+    ));
     words
 }
 

@@ -66,8 +66,7 @@ pub(super) fn position_covariances(solution: &Solution, plate: usize) -> Result<
         }
         None => {
             let b = shape.modes_at(m);
-            let tolerance = problem.plates[plate].markers[m].sigma_m;
-            b * modes * b.transpose() + Matrix3::identity() * tolerance.powi(2)
+            b * modes * b.transpose() + Matrix3::identity() / problem.marker_information(plate, m)
         }
     };
     Ok(all.into_iter().enumerate().map(one).collect())

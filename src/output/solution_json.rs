@@ -151,6 +151,9 @@ pub struct CameraRecord {
     pub pixel_factor: f64,
     /// Joint noise of each reading with this camera, rad or m.
     pub joint_noise: Vec<f64>,
+    /// 95 % interval of each of them; empty where the data do not tell it. The upper end is absent where it is not told.
+    #[serde(default)]
+    pub joint_noise_interval: Vec<[Option<f64>; 2]>,
     /// Apparent tilt of the plate in each image, rad; 0 where it is not part of the model.
     #[serde(default)]
     pub apparent_tilt_rad: f64,
@@ -198,8 +201,11 @@ pub struct PlateRecord {
     pub nominal_m: Vec<[f64; 3]>,
     /// Outer and inner radii, m.
     pub radii_m: Vec<[f64; 2]>,
-    /// Prior sigmas, m.
+    /// Prior sigmas as stated, m.
     pub prior_sigma_m: Vec<f64>,
+    /// Estimated factor on them; 1 where the data do not tell it.
+    #[serde(default = "one")]
+    pub tolerance_factor: f64,
     /// Corrections beside the modes, m.
     pub correction_m: Vec<[f64; 3]>,
     /// Corrected positions, m.
@@ -514,4 +520,8 @@ pub fn read(bytes: &[u8]) -> Result<SolutionRecord> {
         return Err(Error::input(FILE_NAME, what, remedy));
     }
     serde_json::from_slice(bytes).map_err(refuse)
+}
+
+fn one() -> f64 {
+    1.0
 }

@@ -141,6 +141,7 @@ fn cameras(solution: &Solution) -> Vec<CameraRecord> {
     let problem = &solution.problem;
     let camera = |(k, name): (usize, &String)| {
         let c = &solution.state.cameras[k];
+        let told = solution.worth.joint_noise.get(k);
         CameraRecord {
             name: name.clone(),
             lens: c.lens,
@@ -149,6 +150,11 @@ fn cameras(solution: &Solution) -> Vec<CameraRecord> {
             parameters: c.parameter_names().map(Into::into).zip(c.parameters.iter().copied()).collect(),
             pixel_factor: problem.noise.pixel_factor[k],
             joint_noise: problem.joint_sigma(k),
+            joint_noise_interval: told
+                .into_iter()
+                .flatten()
+                .map(|i| i.map(|v| Some(v).filter(|v| v.is_finite())))
+                .collect(),
             apparent_tilt_rad: problem.noise.tilt.get(k).copied().unwrap_or(0.0),
             projection: Some(projection(solution, k)),
             field_sigma_px: problem.layout.fields[k].clone().next().map(|c| problem.layout.columns[c].prior_sigma),
@@ -211,6 +217,7 @@ fn plates(solution: &Solution, context: &Context) -> Result<Vec<PlateRecord>> {
             nominal_m: p.markers.iter().map(|m| m.position_m.into()).collect(),
             radii_m: p.markers.iter().map(|m| [m.outer_radius_m, m.inner_radius_m]).collect(),
             prior_sigma_m: p.markers.iter().map(|m| m.sigma_m).collect(),
+            tolerance_factor: problem.noise.marker.get(k).copied().unwrap_or(1.0),
             correction_m: shape.corrections.iter().map(|c| (*c).into()).collect(),
             position_m: (0..p.markers.len()).map(|m| shape.position(m).into()).collect(),
             sigma_m: sigmas.iter().map(|c| [0, 1, 2].map(|d| c[(d, d)].max(0.0).sqrt())).collect(),

@@ -61,7 +61,7 @@ impl Setting {
             mountings: one("hand_camera"),
             cameras: one("camera"),
             images: Vec::new(),
-            noise: Noise { pixel_factor: vec![1.0], joint: vec![joint], local: Vec::new(), tilt: Vec::new() },
+            noise: Noise { pixel_factor: vec![1.0], joint: vec![joint], ..Noise::default() },
             families: Vec::new(),
             huber: HUBER,
         };

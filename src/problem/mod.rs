@@ -73,7 +73,7 @@ pub struct Image {
 }
 
 /// Standard deviations that the data themselves decide (variance components).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Noise {
     /// Factor on the stated standard deviations of the observations, per camera.
     pub pixel_factor: Vec<f64>,
@@ -83,6 +83,8 @@ pub struct Noise {
     pub local: Vec<f64>,
     /// Apparent tilt of the plate in every image, rad: per camera. Empty where it is not part of the slack.
     pub tilt: Vec<f64>,
+    /// Factor on the stated tolerances of the markers, per plate. Empty where they are taken as stated.
+    pub marker: Vec<f64>,
 }
 
 impl Noise {
@@ -184,7 +186,8 @@ impl Problem {
 
     /// Information of the prior of a marker's correction, per coordinate, 1/m^2.
     pub fn marker_information(&self, plate: usize, marker: usize) -> f64 {
-        self.plates[plate].markers[marker].sigma_m.max(FIXED_MARKER_SIGMA_M).powi(-2)
+        let factor = self.noise.marker.get(plate).copied().unwrap_or(1.0);
+        (factor * self.plates[plate].markers[marker].sigma_m).max(FIXED_MARKER_SIGMA_M).powi(-2)
     }
 
     /// Images that take part.

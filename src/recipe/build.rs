@@ -157,6 +157,7 @@ pub(super) fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool
         joint: vec![vec![FIRST_JOINT_NOISE; readings]; cameras.len()],
         local: first_local(&state, &layout),
         tilt: vec![FIRST_TILT; cameras.len()],
+        marker: Vec::new(),
     };
     let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
     Ok((Problem { layout, plates, placements, mountings, cameras, images, noise, families, huber: HUBER }, state))

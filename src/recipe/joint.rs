@@ -41,6 +41,15 @@ pub enum RobotModel {
     Auto,
 }
 
+/// What is assumed of how far the markers are from nominal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MarkerTolerance {
+    /// As the plate says.
+    Stated,
+    /// A factor on it per plate, estimated from the data where they tell enough.
+    Estimated,
+}
+
 /// Harmonics of a gear unless asked for otherwise.
 const HARMONICS: u8 = 2;
 
@@ -49,6 +58,8 @@ const HARMONICS: u8 = 2;
 pub struct Options {
     /// Joint noise.
     pub joint_noise: JointNoise,
+    /// Tolerance of the markers.
+    pub marker_tolerance: MarkerTolerance,
     /// Joint terms.
     pub model: RobotModel,
     /// Harmonics of the gear in the models that have them.
@@ -61,6 +72,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             joint_noise: JointNoise::Estimated,
+            marker_tolerance: MarkerTolerance::Stated,
             model: RobotModel::Auto,
             harmonics: HARMONICS,
             selection: Selection::default(),
@@ -113,6 +125,9 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let robot = options.model.robot_with(chain, options.harmonics);
     let (mut problem, mut state) = build(&robot, series, options.joint_noise == JointNoise::Estimated)?;
     options.selection.apply(&mut problem.layout, &mut state)?;
+    if options.marker_tolerance == MarkerTolerance::Estimated {
+        problem.noise.marker = vec![1.0; problem.plates.len()];
+    }
     let stated: Vec<Option<f64>> = (problem.cameras.iter())
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();
@@ -141,7 +156,11 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let mut failed_gates = gates(&problem, &state, &free, &accuracy, on_robot);
     failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
     remarks(&problem, &state, on_robot, &mut notices);
-    let worth = judge(&problem, &state, &linearised, &mut covariance, &mut notices);
+    let mut worth = judge(&problem, &state, &linearised, &mut covariance, &mut notices);
+    if options.joint_noise != JointNoise::Estimated {
+        // What was given has no interval.
+        worth.joint_noise.clear();
+    }
     Ok(Solution {
         series: series.to_vec(),
         worth,

@@ -34,6 +34,7 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     let readings = series.readings_for(chain)?;
     let mut notices = series.notices.clone();
     notices.extend(series.reading_notices(chain));
+    notices.extend(unused_repeatability(series));
     let camera = &series.manifest.camera;
     let lens = lens_of(series)?;
     let (mut seen, found_size) = match &series.source {
@@ -117,6 +118,16 @@ pub(super) fn lens_of(series: &Series) -> Result<Lens> {
 
 /// What all stops show, and the size of the images.
 type Look = (Vec<Seen>, Option<(u32, u32)>);
+
+/// The joint noise is estimated: what a data sheet states says nothing of what the robot model lacks, which is part of it.
+fn unused_repeatability(series: &Series) -> Option<Notice> {
+    let stated = series.manifest.robot.repeatability_m?;
+    Some(Notice::new(
+        "series.toml",
+        format!("robot.repeatability_m = {stated} is not used: the joint noise is estimated from the images"),
+        "give --joint-noise where it is known",
+    ))
+}
 
 fn look_through(series: &Series, progress: impl Fn(&Path) + Sync, notices: &mut Vec<Notice>) -> Result<Look> {
     let images = look(series, progress)?;

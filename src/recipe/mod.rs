@@ -41,7 +41,7 @@ pub use forecast::{
     image_name,
 };
 pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
-pub use joint::{JointNoise, Options, RobotModel};
+pub use joint::{JointNoise, MarkerTolerance, Options, RobotModel};
 pub use lens_choice::choose_lens;
 pub use look::{SeenImage, look, look_at, pictures, require_some};
 pub use measure::{Measured, measure};

@@ -2,7 +2,13 @@
 //! the estimates in units of their stated covariance.
 //!
 //! The normalised squared error `e' C^-1 e` of a block of `n` parameters has the mean `n`. Over `N` worlds the mean of
-//! `e' C^-1 e / n` lies within `1 +- 2.576 sqrt(2 / (n N))` with a probability of 99 %.
+//! `e' C^-1 e / n` lies within `1 +- 2.576 sqrt(2 / (n N))` with a probability of 99 %. Single parameters with the correlations `rho`, each by
+//! itself, have `sum rho^2` in the place of `n` in the variance: `1 +- 2.576 sqrt(2 sum rho^2 / (n^2 N))`.
+//!
+//! The parameters of the robot are known a thousand times better in some directions than in others, and the good directions turn
+//! along the bad ones. The covariance is that of the tangent at the estimate; the truth lies many good sigmas beside that tangent.
+//! A chord of a parabola is parallel to its tangent half-way: to second order, `e` has the covariance that the same formula gives
+//! half-way between estimate and truth. Both are listed.
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use rayon::prelude::*;
@@ -11,14 +17,15 @@ use super::evidence::identify;
 use super::joint::{Options, RobotModel};
 use super::simulated::measured;
 use super::solution::Solution;
+use super::worth::NORMAL_95;
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::linalg::SymmetricFactor;
-use crate::model::robot::Stop;
+use crate::model::robot::{Robot, Stop};
 use crate::problem::{Slack, chained};
 use crate::series::{Plate, PlateKind};
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
-use crate::solve::joint_noise_sigmas;
+use crate::solve::{Settings, covariance, linearise_all, noise_information, solve};
 use crate::urdf::{Chain, JointKind};
 
 /// What is tried.
@@ -35,7 +42,16 @@ pub struct MonteCarloRequest {
 }
 
 /// Blocks of parameters that are judged.
-pub const BLOCKS: [&str; 6] = ["robot", "camera", "hand-camera", "plate", "free pose", "flange"];
+pub const BLOCKS: [&str; 8] = [
+    "robot",
+    "robot, tangent at the estimate",
+    "robot, single parameters",
+    "camera",
+    "hand-camera",
+    "plate",
+    "free pose",
+    "flange",
+];
 
 /// Normalised squared error of one block over all worlds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,13 +79,17 @@ pub struct MonteCarloCell {
     /// Worlds without a solution.
     pub failed: usize,
     /// In the order of [`BLOCKS`].
-    pub blocks: [BlockResult; 6],
+    pub blocks: [BlockResult; BLOCKS.len()],
     /// Joint noise found, RMS over the joints, mean over the worlds, rad.
     pub found_rad: f64,
     /// Its standard deviation over the worlds, rad.
     pub found_spread_rad: f64,
     /// Its standard deviation as the program states it, mean over the worlds, rad.
     pub stated_spread_rad: f64,
+    /// Worlds in which the noise put in lies within the stated 95 % interval of the RMS over the joints.
+    pub within: usize,
+    /// Share of the joints of all worlds for which it lies within the stated 95 % interval of their own.
+    pub joints_within: f64,
 }
 
 /// Size of a marker, m; how far it may be from nominal, and is; noise of an observation, px.
@@ -105,12 +125,23 @@ fn errors_of_the_priors() -> RobotErrors {
     }
 }
 
-/// Squared normalised errors and dimensions of the blocks in one world; joint noise found and its stated sigma.
+/// One world.
 #[derive(Debug, Clone, Copy)]
 struct World {
-    squared: [(f64, usize); 6],
+    blocks: [Normalised; BLOCKS.len()],
+    /// Joint noise found, RMS over the joints; its stated sigma, rad.
     found: f64,
     stated: f64,
+    within: bool,
+    joints_within: f64,
+}
+
+/// Sum of squared normalised errors; its expectation and half its variance where the covariance is true.
+#[derive(Debug, Clone, Copy, Default)]
+struct Normalised {
+    sum: f64,
+    mean: f64,
+    half_variance: f64,
 }
 
 fn world(request: &MonteCarloRequest, joint_noise_rad: f64, seed: u64) -> Result<Option<World>> {
@@ -138,65 +169,104 @@ fn world(request: &MonteCarloRequest, joint_noise_rad: f64, seed: u64) -> Result
 
 fn judged(s: &Solution, world: &SimulatedSeries, chain: &Chain) -> Result<Option<World>> {
     let truth = world.truth.robot(chain)?;
+    let columns = robot_columns(s, &truth);
     let blocks = [
-        robot_error(s, &truth),
-        camera_error(s, world),
-        mounting_error(s, world),
-        plate_error(s, world),
-        free_pose_error(s, world),
-        flange_error(s, world, &truth),
+        half_way_covariance(s, &columns).and_then(|c| normalised(&robot_error(s, &columns, &c))),
+        normalised(&robot_error(s, &columns, &s.covariance.reduced)),
+        Some(single(&robot_error(s, &columns, &s.covariance.reduced))),
+        normalised(&camera_error(s, world)),
+        normalised(&mounting_error(s, world)),
+        plate_error(s, world).and_then(|e| normalised(&e)),
+        free_pose_error(s, world).and_then(|e| normalised(&e)),
+        flange_error(s, world, &truth).and_then(|e| normalised(&e)),
     ];
-    let mut squared = [(0.0, 0); 6];
-    for (slot, block) in squared.iter_mut().zip(blocks) {
-        let Some(found) = block.and_then(|(e, c)| normalised(&e, &c)) else { return Ok(None) };
-        *slot = found;
+    let Some(told) = noise_information(&s.problem, &s.state, &s.linearised, &s.covariance) else { return Ok(None) };
+    let mut found = [Normalised::default(); BLOCKS.len()];
+    for (slot, block) in found.iter_mut().zip(blocks) {
+        let Some(block) = block else { return Ok(None) };
+        *slot = block;
     }
-    let noise = s.problem.joint_sigma(0);
-    let sigmas = joint_noise_sigmas(&s.problem, &s.state, &s.linearised, &s.covariance);
-    let n = noise.len() as f64;
-    let found = (noise.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
-    // Each joint's sigma moves the RMS by sigma_i / (n rms).
-    let stated = (noise.iter().zip(&sigmas[0]).map(|(v, s)| (v * s / (n * found)).powi(2)).sum::<f64>()).sqrt();
-    Ok(Some(World { squared, found, stated }))
+    let sigmas = &world.truth.joint_noise_sigma;
+    let holds = |readings: &[usize], sigma: f64| {
+        let [low, high] = told.mean_variance(0, readings).interval(NORMAL_95);
+        (low..=high).contains(&sigma)
+    };
+    let n = sigmas.len() as f64;
+    let all: Vec<usize> = (0..sigmas.len()).collect();
+    let together = told.mean_variance(0, &all);
+    Ok(Some(World {
+        blocks: found,
+        found: together.variance.sqrt(),
+        stated: together.of_root(),
+        within: holds(&all, (sigmas.iter().map(|s| s * s).sum::<f64>() / n).sqrt()),
+        joints_within: all.iter().filter(|&&r| holds(&[r], sigmas[r])).count() as f64 / n,
+    }))
 }
 
-type ErrorWithCovariance = Option<(DVector<f64>, DMatrix<f64>)>;
+type ErrorWithCovariance = (DVector<f64>, DMatrix<f64>);
 
-fn normalised(error: &DVector<f64>, covariance: &DMatrix<f64>) -> Option<(f64, usize)> {
+fn normalised((error, covariance): &ErrorWithCovariance) -> Option<Normalised> {
+    let n = error.len() as f64;
     let factor = SymmetricFactor::new(covariance).ok()?;
-    Some((error.dot(&factor.solve(error)), error.len()))
+    Some(Normalised { sum: error.dot(&factor.solve(error)), mean: n, half_variance: n })
 }
 
-fn robot_error(s: &Solution, truth: &crate::model::robot::Robot) -> ErrorWithCovariance {
+/// Every parameter by itself.
+fn single((error, covariance): &ErrorWithCovariance) -> Normalised {
+    let n = error.len();
+    let squared_correlation =
+        |i: usize, k: usize| covariance[(i, k)].powi(2) / (covariance[(i, i)] * covariance[(k, k)]);
+    Normalised {
+        sum: (0..n).map(|i| error[i].powi(2) / covariance[(i, i)]).sum(),
+        mean: n as f64,
+        half_variance: (0..n).flat_map(|i| (0..n).map(move |k| squared_correlation(i, k))).sum(),
+    }
+}
+
+/// Columns of the robot with their true values.
+fn robot_columns(s: &Solution, truth: &Robot) -> Vec<(usize, f64)> {
     let layout = &s.problem.layout;
-    let estimates = s.state.values(layout);
-    let mut columns = Vec::new();
-    for (k, joint) in truth.chain.joints.iter().enumerate().filter(|(_, j)| j.kind != JointKind::Fixed) {
-        debug_assert!(joint.drive.is_some());
-        for a in 0..6 {
-            columns.push((layout.twists.start + 6 * k + a, truth.twists[k][a]));
-        }
-    }
-    for (k, t) in s.state.robot.terms.iter().enumerate().take(layout.locals.start - layout.terms.start) {
+    let moving = truth.chain.joints.iter().enumerate().filter(|(_, j)| j.kind != JointKind::Fixed);
+    let twists = moving.flat_map(|(k, _)| (0..6).map(move |a| (k, a)));
+    let twists = twists.map(|(k, a)| (layout.twists.start + 6 * k + a, truth.twists[k][a]));
+    let terms = s.state.robot.terms.iter().take(layout.locals.start - layout.terms.start).enumerate();
+    let terms = terms.map(|(k, t)| {
         let value = truth.terms.iter().find(|u| (u.reading, u.term) == (t.reading, t.term)).map_or(0.0, |u| u.value);
-        columns.push((layout.terms.start + k, value));
+        (layout.terms.start + k, value)
+    });
+    twists.chain(terms).collect()
+}
+
+fn robot_error(s: &Solution, columns: &[(usize, f64)], reduced: &DMatrix<f64>) -> ErrorWithCovariance {
+    let estimates = s.state.values(&s.problem.layout);
+    let n = columns.len();
+    let error = DVector::from_iterator(n, columns.iter().map(|&(c, value)| estimates[c] - value));
+    (error, DMatrix::from_fn(n, n, |i, k| reduced[(columns[i].0, columns[k].0)]))
+}
+
+/// Covariance by the formula of the program with the robot half-way to the truth, and everything else adjusted to that.
+fn half_way_covariance(s: &Solution, columns: &[(usize, f64)]) -> Option<DMatrix<f64>> {
+    let (mut held, mut state) = (s.problem.clone(), s.state.clone());
+    let estimates = state.values(&held.layout);
+    for &(c, value) in columns {
+        state.set_value(&held.layout, c, 0.5 * (estimates[c] + value));
+        held.layout.columns[c].free = false;
     }
-    let error = DVector::from_iterator(columns.len(), columns.iter().map(|&(c, value)| estimates[c] - value));
-    let reduced = &s.covariance.reduced;
-    let covariance = DMatrix::from_fn(columns.len(), columns.len(), |i, j| reduced[(columns[i].0, columns[j].0)]);
-    Some((error, covariance))
+    let state = solve(&held, state, &Settings::default()).state;
+    let lin = linearise_all(&s.problem, &state)?;
+    covariance(&s.problem, &state, &lin).ok().map(|c| c.reduced)
 }
 
 fn camera_error(s: &Solution, world: &SimulatedSeries) -> ErrorWithCovariance {
     let columns = s.problem.layout.cameras[0].clone();
     let off = s.state.cameras[0].parameters.iter().zip(&world.truth.camera.parameters).map(|(a, b)| a - b);
     let covariance = s.covariance.reduced.view((columns.start, columns.start), (columns.len(), columns.len()));
-    Some((DVector::from_iterator(columns.len(), off), covariance.into_owned()))
+    (DVector::from_iterator(columns.len(), off), covariance.into_owned())
 }
 
 fn pose_error(estimate: &Pose, truth: &Pose, covariance: &Matrix6<f64>) -> ErrorWithCovariance {
     let error = (truth.inverse() * *estimate).log();
-    Some((DVector::from_column_slice(error.as_slice()), DMatrix::from_column_slice(6, 6, covariance.as_slice())))
+    (DVector::from_column_slice(error.as_slice()), DMatrix::from_column_slice(6, 6, covariance.as_slice()))
 }
 
 fn mounting_error(s: &Solution, world: &SimulatedSeries) -> ErrorWithCovariance {
@@ -204,21 +274,21 @@ fn mounting_error(s: &Solution, world: &SimulatedSeries) -> ErrorWithCovariance 
     pose_error(&s.state.mountings[0], &world.truth.camera_pose.pose(), &block)
 }
 
-fn plate_error(s: &Solution, world: &SimulatedSeries) -> ErrorWithCovariance {
+fn plate_error(s: &Solution, world: &SimulatedSeries) -> Option<ErrorWithCovariance> {
     let block = s.covariance.block(s.problem.layout.placements[0].start);
-    pose_error(&s.state.placements[0], &world.truth.plate_poses.values().next()?.pose(), &block)
+    Some(pose_error(&s.state.placements[0], &world.truth.plate_poses.values().next()?.pose(), &block))
 }
 
 /// The free-pose adjustment states `camera_from_plate` for the plate frame of its priors, as the truth does.
-fn free_pose_error(s: &Solution, world: &SimulatedSeries) -> ErrorWithCovariance {
+fn free_pose_error(s: &Solution, world: &SimulatedSeries) -> Option<ErrorWithCovariance> {
     let k = s.free_poses.poses.iter().position(Option::is_some)?;
     let free = s.free_poses.poses[k].as_ref()?;
-    pose_error(&free.camera_from_plate, &world.truth.stops[k].camera_from_plate.pose(), &free.covariance)
+    Some(pose_error(&free.camera_from_plate, &world.truth.stops[k].camera_from_plate.pose(), &free.covariance))
 }
 
 /// The flange in the plate frame at a joint vector that was not measured: the camera of the solution, as if it were exact, on
 /// the robot and plate of the solution against the same camera on the true ones.
-fn flange_error(s: &Solution, world: &SimulatedSeries, truth: &crate::model::robot::Robot) -> ErrorWithCovariance {
+fn flange_error(s: &Solution, world: &SimulatedSeries, truth: &Robot) -> Option<ErrorWithCovariance> {
     let mut image = s.problem.images.iter().find(|i| i.stop.is_some())?.clone();
     let readings = &world.truth.held_out.first()?.readings;
     image.stop = Some(Stop::at(readings));
@@ -238,10 +308,12 @@ fn cell(joint_noise_rad: f64, worlds: &[Option<World>]) -> MonteCarloCell {
     let solved: Vec<&World> = worlds.iter().flatten().collect();
     let n = solved.len().max(1) as f64;
     let blocks = std::array::from_fn(|k| {
-        let sum: f64 = solved.iter().map(|w| w.squared[k].0).sum();
-        let all: usize = solved.iter().map(|w| w.squared[k].1).sum();
-        let all = all.max(1) as f64;
-        BlockResult { mean: sum / all, half_width: 2.576 * (2.0 / all).sqrt() }
+        let total = |of: fn(&Normalised) -> f64| solved.iter().map(|w| of(&w.blocks[k])).sum::<f64>();
+        let all = total(|b| b.mean).max(1.0);
+        BlockResult {
+            mean: total(|b| b.sum) / all,
+            half_width: 2.576 * (2.0 * total(|b| b.half_variance)).sqrt() / all,
+        }
     });
     let found_rad = solved.iter().map(|w| w.found).sum::<f64>() / n;
     let spread = solved.iter().map(|w| (w.found - found_rad).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
@@ -253,5 +325,7 @@ fn cell(joint_noise_rad: f64, worlds: &[Option<World>]) -> MonteCarloCell {
         found_rad,
         found_spread_rad: spread.sqrt(),
         stated_spread_rad: solved.iter().map(|w| w.stated).sum::<f64>() / n,
+        within: solved.iter().filter(|w| w.within).count(),
+        joints_within: solved.iter().map(|w| w.joints_within).sum::<f64>() / n,
     }
 }

@@ -515,6 +515,7 @@ pub fn fit_joint(
     }
     let options = ComponentOptions {
         joint: !hard && noise == JointNoise::Estimated,
+        tilt: !hard && noise == JointNoise::Estimated,
         settings: Settings { decrement: 1e-4, ..Settings::default() },
         ..ComponentOptions::default()
     };

@@ -8,7 +8,7 @@ use crate::geom::Pose;
 use crate::model::robot::Stop;
 use crate::problem::{Layout, Problem, State};
 use crate::series::CameraMount;
-use crate::solve::{Covariance, Linearised};
+use crate::solve::{Covariance, Linearised, noise_information};
 
 /// Ratio of the sigma of the flange by clusters to that by the model from which the larger one is reported.
 const REPORT_LARGER: f64 = 1.5;
@@ -16,6 +16,9 @@ const REPORT_LARGER: f64 = 1.5;
 /// Images for every direction told from which their scatter can speak against the noise model: of fewer, the sandwich is a sum of
 /// too few terms.
 const IMAGES_PER_DIRECTION: usize = 2;
+
+/// Sigmas of a 95 % interval.
+pub(super) const NORMAL_95: f64 = 1.96;
 
 /// What a solution is worth.
 #[derive(Debug, Clone, Default)]
@@ -30,6 +33,8 @@ pub struct Worth {
     pub clustered_ratio: Option<f64>,
     /// True where the sigmas by clusters are the ones stated.
     pub larger_stated: bool,
+    /// 95 % interval of the joint noise of every camera and reading, rad or m; empty where it is not told.
+    pub joint_noise: Vec<Vec<[f64; 2]>>,
     /// Workspace map; empty where plate (or fixed camera) and robot are not tied.
     pub workspace: Vec<WorkspacePoint>,
 }
@@ -64,6 +69,7 @@ pub(super) fn judge(
     let mut worth = Worth {
         identifiability: identifiability(&state.robot, layout, &stops, &covariance.reduced),
         model_sigma: sigmas(&covariance.reduced),
+        joint_noise: joint_noise(problem, state, lin, covariance),
         ..Worth::default()
     };
     if let Some(clustered) = clustered_covariance(problem, state, lin, covariance) {
@@ -89,6 +95,13 @@ pub(super) fn judge(
     let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops));
     worth.workspace = model.map(|m| m.workspace()).unwrap_or_default();
     worth
+}
+
+fn joint_noise(problem: &Problem, state: &State, lin: &Linearised, covariance: &Covariance) -> Vec<Vec<[f64; 2]>> {
+    let Some(told) = noise_information(problem, state, lin, covariance) else { return Vec::new() };
+    let interval = |camera: usize, reading: usize| told.mean_variance(camera, &[reading]).interval(NORMAL_95);
+    let readings = state.robot.chain.readings.len();
+    (0..problem.cameras.len()).map(|c| (0..readings).map(|r| interval(c, r)).collect()).collect()
 }
 
 /// Scales rows and columns of what acts through the camera poses so that no sigma is below that by clusters; correlations stay.

@@ -108,7 +108,7 @@ pub struct ObservationsSection {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RobotSection {
-    /// Repeatability at the flange, m: a prior for the joint noise.
+    /// Repeatability at the flange as stated, m; for the record, the joint noise is estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub repeatability_m: Option<f64>,
     /// Meaning of the order of rows.

@@ -15,6 +15,8 @@ use crate::problem::{Noise, Problem, Slack, State};
 pub struct ComponentOptions {
     /// Estimate the joint noise; else it stays as given in the problem.
     pub joint: bool,
+    /// Estimate the apparent tilt of the plate; else it stays as given in the problem.
+    pub tilt: bool,
     /// Most rounds.
     pub rounds: usize,
     /// Bounds of each inner solve.
@@ -23,15 +25,15 @@ pub struct ComponentOptions {
 
 impl Default for ComponentOptions {
     fn default() -> Self {
-        Self { joint: true, rounds: 60, settings: Settings::default() }
+        Self { joint: true, tilt: true, rounds: 60, settings: Settings::default() }
     }
 }
 
-/// Smallest joint noise, rad or m: below it nothing that a camera sees changes.
-pub const JOINT_NOISE_FLOOR: f64 = 1e-6;
+/// Smallest joint noise, rad or m: a tenth of what forty images of a good camera can tell from none.
+pub const JOINT_NOISE_FLOOR: f64 = 1e-7;
 
 /// Weight, in observations, with which the noise of a single joint is drawn to that of all joints together.
-const SHRINKAGE: f64 = 5.0;
+pub(super) const SHRINKAGE: f64 = 5.0;
 
 /// Relative change of every component below which the rounds end.
 const CONVERGED: f64 = 0.01;
@@ -41,6 +43,9 @@ const SMALLEST_FACTOR: f64 = 1e-3;
 
 /// Determined parameters of a family below which its factor stays.
 const FEWEST_DETERMINED: f64 = 1e-6;
+
+/// Coordinates of markers that the data must tell before they decide how far markers are off: the deviation is then known to a tenth.
+const FEWEST_MARKER_COORDINATES: f64 = 50.0;
 
 /// Newton decrement between rounds: the components need no better.
 const ROUGH_DECREMENT: f64 = 0.05;
@@ -56,7 +61,7 @@ pub fn estimate_components(problem: &mut Problem, start: State, options: &Compon
             outcome.status = Status::Stalled;
             break;
         };
-        let change = update(problem, &outcome.state, lin, &cov, options.joint);
+        let change = update(problem, &outcome.state, lin, &cov, options);
         tracing::debug!(round, change, pixel = ?problem.noise.pixel_factor, joint = ?problem.noise.joint, "variance components");
         outcome = solve(problem, outcome.state, &rough);
         iterations += outcome.iterations;
@@ -76,10 +81,11 @@ pub fn estimate_components(problem: &mut Problem, start: State, options: &Compon
 }
 
 /// One round; returns the largest relative change.
-fn update(problem: &mut Problem, state: &State, lin: &Linearised, cov: &Covariance, joint: bool) -> f64 {
+fn update(problem: &mut Problem, state: &State, lin: &Linearised, cov: &Covariance, options: &ComponentOptions) -> f64 {
     let mut noise = problem.noise.clone();
-    let taken = effective_parameters(problem, state, lin, cov);
-    let mut change: f64 = 0.0;
+    let markers = marker_tallies(problem, state, cov);
+    let taken = effective_parameters(problem, state, lin, cov, markers.iter().map(|[_, told]| told).sum());
+    let mut change = update_markers(&markers, &mut noise);
     let counts = lin.terms.iter().map(|t| 2.0 * t.residuals.len() as f64);
     let total: f64 = counts.clone().sum();
     for (camera, factor) in noise.pixel_factor.iter_mut().enumerate() {
@@ -97,8 +103,14 @@ fn update(problem: &mut Problem, state: &State, lin: &Linearised, cov: &Covarian
         *factor *= ratio;
         change = change.max((ratio - 1.0).abs());
     }
-    if joint {
-        change = change.max(update_joint(problem, state, lin, cov, &mut noise));
+    if options.joint || options.tilt {
+        let found = tallies(problem, state, lin, cov);
+        if options.tilt {
+            change = change.max(update_tilt(&found.tilt, &mut noise));
+        }
+        if options.joint {
+            change = change.max(update_joint(problem, state, &found, &mut noise));
+        }
     }
     problem.noise = noise;
     change = change.max(update_families(problem, state, cov));
@@ -149,8 +161,40 @@ fn normal_upper_tail(k: f64) -> f64 {
     (-0.5 * k * k).exp() / std::f64::consts::TAU.sqrt() / mills
 }
 
-/// Number of parameters that the pixels (and not the priors) determine.
-pub(super) fn effective_parameters(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance) -> f64 {
+/// Of every plate: sum of squares of the corrections of its markers in units of their prior, and how many coordinates the data tell.
+pub(super) fn marker_tallies(problem: &Problem, state: &State, cov: &Covariance) -> Vec<[f64; 2]> {
+    let of_plate = |(p, covariances): (usize, &Vec<Option<Matrix3<f64>>>)| {
+        let seen = covariances.iter().enumerate().filter_map(|(m, c)| c.map(|c| (m, c)));
+        seen.fold([0.0; 2], |[squares, told], (m, c)| {
+            let information = problem.marker_information(p, m);
+            let square = state.plates[p].corrections[m].norm_squared() * information;
+            [squares + square, told + 3.0 - c.trace() * information]
+        })
+    };
+    cov.markers().iter().enumerate().map(of_plate).collect()
+}
+
+/// New factors on the tolerances of the markers. A factor goes down by halves at most, so that it stays where the data stop telling.
+fn update_markers(tallies: &[[f64; 2]], noise: &mut Noise) -> f64 {
+    let mut change: f64 = 0.0;
+    for (factor, [squares, told]) in noise.marker.iter_mut().zip(tallies) {
+        if *told >= FEWEST_MARKER_COORDINATES {
+            let ratio = (squares / told).sqrt().clamp(0.5, 2.0);
+            *factor *= ratio;
+            change = change.max((ratio - 1.0).abs());
+        }
+    }
+    change
+}
+
+/// Number of parameters that the pixels (and not the priors) determine, with so many `markers` coordinates among them.
+pub(super) fn effective_parameters(
+    problem: &Problem,
+    state: &State,
+    lin: &Linearised,
+    cov: &Covariance,
+    markers: f64,
+) -> f64 {
     let columns = &problem.layout.columns;
     let dense: f64 = (columns.iter().enumerate())
         .filter(|(i, c)| c.free && cov.system.touched(*i))
@@ -168,12 +212,6 @@ pub(super) fn effective_parameters(problem: &Problem, state: &State, lin: &Linea
             _ => length as f64,
         };
     }
-    let covariances = cov.markers();
-    let of_plate = |(p, covariances): (usize, &Vec<Option<Matrix3<f64>>>)| -> f64 {
-        let of = |(m, c): (usize, &Option<Matrix3<f64>>)| c.map(|c| 3.0 - c.trace() * problem.marker_information(p, m));
-        covariances.iter().enumerate().filter_map(of).sum()
-    };
-    let markers: f64 = covariances.iter().enumerate().map(of_plate).sum();
     dense + slack + markers
 }
 
@@ -256,38 +294,24 @@ fn tallies(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance)
     Tallies { own, local, tilt }
 }
 
-/// Standard deviation of the joint noise of every camera and reading, rad or m: `sigma / sqrt(2 r)` with the redundancy `r` of
-/// its latents and the weight that the other joints lend it.
-pub fn joint_noise_sigmas(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance) -> Vec<Vec<f64>> {
-    let t = tallies(problem, state, lin, cov);
-    let of_camera = |(camera, own): (usize, &Tally)| {
-        let all: f64 = own.redundancy.iter().chain(&t.local.redundancy).sum();
-        let sigma = problem.joint_sigma(camera);
-        let one = |(r, s): (usize, &f64)| {
-            let redundancy = own.redundancy[r] + t.local.redundancy[r] + SHRINKAGE.min(all);
-            s / (2.0 * redundancy.max(0.5)).sqrt()
-        };
-        sigma.iter().enumerate().map(one).collect()
-    };
-    t.own.iter().enumerate().map(of_camera).collect()
+fn update_tilt(tilt: &Tally, noise: &mut Noise) -> f64 {
+    let of = |camera: usize| share_out(&[camera], tilt, tilt.common(&[camera]), &mut noise.tilt);
+    (0..tilt.squares.len()).map(of).fold(0.0, f64::max)
 }
 
-/// Noise of the stops by themselves, local errors where stops share readings, and apparent tilt.
-fn update_joint(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance, noise: &mut Noise) -> f64 {
+/// Noise of the stops by themselves, and local errors where stops share readings.
+fn update_joint(problem: &Problem, state: &State, found: &Tallies, noise: &mut Noise) -> f64 {
     let kinds = &state.robot.chain.reading_kinds;
     let n = kinds.len();
-    let Tallies { own, local, tilt } = tallies(problem, state, lin, cov);
+    let Tallies { own, local, .. } = found;
     let mut change: f64 = 0.0;
-    for camera in 0..noise.tilt.len() {
-        change = change.max(share_out(&[camera], &tilt, tilt.common(&[camera]), &mut noise.tilt));
-    }
     for group in problem.noise.groups(kinds) {
         if noise.local.get(group[0]).is_some_and(|s| *s > 0.0) {
             // A few postures tell little of their local errors: they are drawn to the noise of all joints of the kind.
             let alike: Vec<usize> = (0..n).filter(|&r| kinds[r] == kinds[group[0]]).collect();
             let whole = own.iter().fold(local.clone(), |sum, tally| sum.with(tally, |r| noise.local[r] == 0.0));
             let common = whole.common(&alike);
-            change = change.max(share_out(&group, &local, common, &mut noise.local));
+            change = change.max(share_out(&group, local, common, &mut noise.local));
         }
         for (tally, sigma) in own.iter().zip(&mut noise.joint) {
             change = change.max(share_out(&group, tally, tally.common(&group), sigma));

@@ -6,12 +6,14 @@ mod by_slack;
 mod components;
 mod covariance;
 mod levenberg;
+mod noise_information;
 mod snoop;
 mod system;
 
 pub use blocks::SeenMarkers;
-pub use components::{ComponentOptions, Tally, estimate_components, joint_noise_sigmas, share_out};
+pub use components::{ComponentOptions, Tally, estimate_components, share_out};
 pub use covariance::{Covariance, covariance, covariance_by};
 pub use levenberg::{Outcome, Settings, Status, solve};
+pub use noise_information::{NoiseInformation, Spread, noise_information};
 pub use snoop::{reject_images, reject_observations};
 pub use system::{Elimination, Linearised, System, linearise_all};

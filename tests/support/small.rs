@@ -199,6 +199,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
         joint: vec![vec![request.joint_noise.max(1e-6); readings]],
         local: Vec::new(),
         tilt: Vec::new(),
+        marker: Vec::new(),
     };
     (
         Problem {

@@ -1,6 +1,6 @@
 //! Identity: where on the plate a lattice of classes lies.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::candidate::Candidate;
 use super::lattice::{Cell, Lattice};
@@ -68,6 +68,9 @@ pub(super) enum Verdict {
 const FALSE_ALARMS: f64 = 1e-6;
 /// The next best position must disagree in at least this many cells more.
 const MARGIN: usize = 3;
+/// Side of the parts that a lattice is taken into, from one to the next half of it, and the fewest cells of one.
+const PART: i32 = 6;
+const LEAST_PART: usize = 12;
 
 impl Code {
     /// Code of a plate of circles; `None` when its markers do not form a lattice.
@@ -163,6 +166,27 @@ impl Code {
 
     /// Finds the position of the classes on the plate in any of four rotations, and the mirrored ones.
     pub fn locate(&self, classes: &BTreeMap<Cell, Option<u8>>) -> Verdict {
+        self.locate_one_of(1, classes)
+    }
+
+    /// Positions of the parts of a lattice that slipped where it grew: as a whole it fits nowhere, or in two places.
+    ///
+    /// All parts together raise a false alarm as seldom as one whole lattice.
+    pub fn locate_parts(&self, classes: &BTreeMap<Cell, Option<u8>>) -> Vec<(BTreeMap<Cell, Option<u8>>, Verdict)> {
+        let corner = |(i, j): &Cell| (i.div_euclid(PART / 2), j.div_euclid(PART / 2));
+        let corners: BTreeSet<Cell> = classes.keys().map(corner).collect();
+        let part = |(a, b): Cell| {
+            let within = |v: i32, from: i32| (from * PART / 2..from * PART / 2 + PART).contains(&v);
+            let inside = classes.iter().filter(|((i, j), c)| c.is_some() && within(*i, a) && within(*j, b));
+            inside.map(|(cell, class)| (*cell, *class)).collect::<BTreeMap<_, _>>()
+        };
+        let parts: Vec<_> = corners.into_iter().map(part).filter(|p| p.len() >= LEAST_PART).collect();
+        let count = parts.len();
+        let placed = parts.into_iter().map(|p| (self.locate_one_of(count, &p), p)).map(|(verdict, p)| (p, verdict));
+        placed.filter(|(_, verdict)| *verdict != Verdict::Ambiguous).collect()
+    }
+
+    fn locate_one_of(&self, count: usize, classes: &BTreeMap<Cell, Option<u8>>) -> Verdict {
         let known: Vec<(Cell, u8)> = classes.iter().filter_map(|(cell, c)| c.map(|c| (*cell, c))).collect();
         let mut best = [(usize::MAX, None), (usize::MAX, None)];
         let mut tried = 0usize;
@@ -180,7 +204,7 @@ impl Code {
             }
         }
         let [(wrong, Some(placement)), (runner_up, _)] = best else { return Verdict::Ambiguous };
-        let chance = tried as f64 * binomial_tail(known.len(), wrong, 1.0 - self.coincidence);
+        let chance = (count * tried) as f64 * binomial_tail(known.len(), wrong, 1.0 - self.coincidence);
         if chance > FALSE_ALARMS || runner_up.saturating_sub(wrong) < MARGIN {
             return Verdict::Ambiguous;
         }
@@ -284,6 +308,23 @@ mod tests {
         let other = Code::of(&random_plate(28, 18, 0.018, 8)).unwrap();
         assert_eq!(code.locate(&window(&other, |(i, j)| (i + 3, j + 4), 7, 6)), Verdict::Ambiguous);
         assert_eq!(code.locate(&BTreeMap::new()), Verdict::Ambiguous);
+    }
+
+    #[test]
+    fn a_lattice_that_slipped_is_placed_in_parts() {
+        let code = Code::of(&random_plate(28, 18, 0.018, 7)).unwrap();
+        // the right half lies one row too low
+        let truth = |(i, j): Cell| (i + 5, j + if i < 7 { 2 } else { 3 });
+        let cells = window(&code, truth, 14, 9);
+        let parts = code.locate_parts(&cells);
+        assert!(parts.len() >= 6, "{}", parts.len());
+        for (part, verdict) in &parts {
+            let Verdict::Placed { placement, .. } = verdict else { panic!("{verdict:?}") };
+            let right = part.keys().filter(|c| placement.apply(**c) == truth(**c)).count();
+            assert!(2 * right >= part.len(), "{right} of {}", part.len());
+        }
+        let other = Code::of(&random_plate(28, 18, 0.018, 8)).unwrap();
+        assert!(other.locate_parts(&cells).is_empty());
     }
 
     #[test]

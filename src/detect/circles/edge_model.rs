@@ -50,9 +50,18 @@ pub(super) struct Pixels {
     weighted: Vec<f32>,
     /// Columns of the weighted Jacobian.
     columns: Vec<Vec<f32>>,
+    /// Weighted residuals that a lopsidedness along either axis leaves.
+    lobes: [Vec<f32>; 2],
     pub nodes: Nodes,
     /// Even paper and ink beyond the band.
     pub flat: Flat,
+}
+
+/// What lopsided edges leave in the residuals, along both axes ([`Pixels::skew`]).
+pub(super) struct Lopsided {
+    pub gradient: [f64; 2],
+    pub square: [f64; 2],
+    pub shared: [[f64; ANNULUS]; 2],
 }
 
 /// Per pixel: coverage, density of the blurred edge, and the geometry behind it.
@@ -132,7 +141,7 @@ impl Pixels {
         self.residual.resize(n, 0.0);
         self.weighted.resize(n, 0.0);
         self.columns.resize_with(ANNULUS, Vec::new);
-        self.columns.iter_mut().for_each(|c| c.resize(n, 0.0));
+        self.columns.iter_mut().chain(&mut self.lobes).for_each(|c| c.resize(n, 0.0));
         self.outer.resize(n);
         self.inner.resize(n);
     }
@@ -255,9 +264,9 @@ impl Pixels {
     ///
     /// A point spread with the third cumulant `k` along the normal adds `k / (6 s^3) (u^2 - 1) phi(u)` to the coverage.
     /// The fit takes the part along `phi` for a displacement `-k / (12 s^2)`; the part with `u^2 - 1/2` stays in the
-    /// residuals and tells its size.
-    /// The columns of the Jacobian are gone afterwards.
-    pub fn skew(&mut self, state: &State, noise: [f64; 2]) -> ([f64; 2], [f64; 2]) {
+    /// residuals and tells its size. Returns the gradient `L' r` of the two amplitudes, `L' L`, and `J' L` with the columns `J` of all
+    /// parameters: they take a part of `L` for themselves.
+    pub fn skew(&mut self, state: &State, noise: [f64; 2]) -> Lopsided {
         wide(
             #[inline(always)]
             || self.skew_lanes(state, noise),
@@ -265,14 +274,14 @@ impl Pixels {
     }
 
     #[inline(always)]
-    fn skew_lanes(&mut self, state: &State, noise: [f64; 2]) -> ([f64; 2], [f64; 2]) {
+    fn skew_lanes(&mut self, state: &State, noise: [f64; 2]) -> Lopsided {
         let n = self.x.len();
         let (v_white, v_dark) = (noise[0] as f32, noise[1] as f32);
         let factor = ((state.white[0] - state.dark[0]) * 2.0 / state.blur) as f32;
         let inner = if state.inner.is_some() { -factor } else { 0.0 };
         let (ink, mask) = (&self.ink[..n], &self.mask[..n]);
         let (outer, inner) = (self.outer.lobes(n, factor), self.inner.lobes(n, inner));
-        let [along_x, along_y, ..] = &mut self.columns[..] else { return ([0.0; 2], [0.0; 2]) };
+        let [along_x, along_y] = &mut self.lobes;
         let (along_x, along_y) = (&mut along_x[..n], &mut along_y[..n]);
         for i in 0..n {
             let root = mask[i] / (v_white + (v_dark - v_white) * ink[i]).max(0.1 * v_dark).sqrt();
@@ -281,7 +290,17 @@ impl Pixels {
             along_y[i] = root * (oy + iy);
         }
         let along = [&*along_x, &*along_y];
-        (along.map(|c| dot(c, &self.weighted)), along.map(|c| dot(c, c)))
+        let shared = |c: &[f32]| {
+            let mut products = [0.0; ANNULUS];
+            let used = products.iter_mut().zip(&self.columns).take(state.parameters());
+            used.for_each(|(p, column)| *p = dot(c, column));
+            products
+        };
+        Lopsided {
+            gradient: along.map(|c| dot(c, &self.weighted)),
+            square: along.map(|c| dot(c, c)),
+            shared: along.map(shared),
+        }
     }
 
     /// Normal matrix (lower triangle) of `parameters` columns, by blocks of pixels that stay in the nearest cache.

@@ -65,6 +65,19 @@ impl Ellipse {
         [self.centre[0] + (n[1][1] * c - n[0][1] * s) / det, self.centre[1] + (n[0][0] * s - n[1][0] * c) / det]
     }
 
+    /// What lies at least between this ellipse and one of the same shape, `size` times as large, around another centre, px;
+    /// negative where they overlap.
+    ///
+    /// The sum of the two is the ellipse scaled by `1 + size`; the relative radius is a convex function, so that its
+    /// value over its slope at the other centre is no more than the distance.
+    pub fn gap(&self, centre: [f64; 2], size: f64) -> f64 {
+        let [x, y] = [0, 1].map(|a| centre[a] - self.centre[a]);
+        let [xx, xy, yy] = self.shape;
+        let slope = [xx * x + xy * y, xy * x + yy * y];
+        let relative = (slope[0] * x + slope[1] * y).max(0.0).sqrt();
+        (relative - 1.0 - size) * relative / slope[0].hypot(slope[1]).max(f64::MIN_POSITIVE)
+    }
+
     /// Half width and half height of the bounding box, px.
     pub fn half_extent(&self) -> [f64; 2] {
         let det = self.determinant();

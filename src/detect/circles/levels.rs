@@ -148,7 +148,7 @@ fn smooth(grid: &mut [f32], cols: usize, rows: usize) {
 }
 
 /// Noise of a pixel from the median difference of horizontal neighbours; edges are a small part of all pairs.
-fn noise_of(picture: &Picture) -> f32 {
+pub(super) fn noise_of(picture: &Picture) -> f32 {
     let step = (picture.height / 64).max(1);
     let mut differences: Vec<f32> = Vec::new();
     for y in (step / 2..picture.height).step_by(step) {

@@ -92,7 +92,7 @@ pub(super) fn learn(picture: &Picture, targets: &[Target], guess_blur: f64, nois
 ///
 /// With a prior of variance `p` and a posterior variance `v` an estimate is the true value times `k = 1 - v / p`, with
 /// noise of variance `k v`: its mean square is `k^2 spread^2 + k v`.
-fn ink_slope(fits: &[Fit]) -> f64 {
+pub(super) fn ink_slope(fits: &[Fit]) -> f64 {
     let prior = INK_SLOPE * INK_SLOPE;
     let (mut excess, mut weight) = (0.0, 0.0);
     for (slope, variance) in fits.iter().flat_map(|f| (0..2).map(|a| (f.ink_slope.0[a], f.ink_slope.1[a]))) {

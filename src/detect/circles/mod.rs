@@ -31,6 +31,7 @@ mod second_look;
 #[cfg(test)]
 pub(crate) mod synth;
 mod tails;
+mod together;
 mod types;
 mod vet;
 
@@ -39,5 +40,5 @@ pub use ellipse::Ellipse;
 pub use grid::detect_grid;
 pub use measure::measure;
 pub use pipeline::detect;
-pub use predicted::{Predicted, look_where_predicted};
+pub use predicted::{Predicted, look_where_predicted, measure_predicted};
 pub use types::{Detection, Dropped, Found, Imaged, InnerOuter, LOPSIDED_PX, Measured, Options, Outcome, Reason};

@@ -64,7 +64,7 @@ pub(super) fn detect_coded(
     Ok(work.detection(&board, measured, outcome, dropped))
 }
 
-/// Puts the lattices on the plate.
+/// Puts the lattices on the plate; where none fits as a whole, their parts.
 fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> (Board, Outcome) {
     let mut board = Board::new();
     let mut outcome = match (candidates.is_empty(), lattices.is_empty()) {
@@ -72,28 +72,45 @@ fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> (Boa
         (false, true) => Outcome::NoLattice,
         _ => Outcome::Ambiguous,
     };
-    for lattice in lattices {
-        let classes = code.classes_of(lattice, candidates);
-        match code.locate(&classes) {
-            Verdict::Ambiguous => {}
-            // A reflection of the plate beside the plate itself is no reason to refuse the picture.
-            Verdict::Mirrored => {
-                if !matches!(outcome, Outcome::Identified { .. }) {
-                    outcome = Outcome::Mirrored;
-                }
-            }
-            Verdict::Placed { placement, agreeing, disagreeing, runner_up } => {
-                if !matches!(outcome, Outcome::Identified { .. }) {
-                    outcome = Outcome::Identified { agreeing, disagreeing, runner_up };
-                }
-                for (cell, site) in &lattice.cells {
-                    let class = classes.get(cell).copied().flatten();
-                    board.entry(placement.apply(*cell)).or_insert(Placed { candidate: site.candidate, class });
-                }
+    let seen: Vec<(&Lattice, Classes)> = lattices.iter().map(|l| (l, code.classes_of(l, candidates))).collect();
+    for (lattice, classes) in &seen {
+        put(lattice, classes, code.locate(classes), &mut board, &mut outcome);
+    }
+    if outcome == Outcome::Ambiguous {
+        for (lattice, classes) in &seen {
+            for (part, verdict) in code.locate_parts(classes) {
+                put(lattice, &part, verdict, &mut board, &mut outcome);
             }
         }
     }
     (board, outcome)
+}
+
+/// Classes of the cells of a lattice.
+type Classes = BTreeMap<(i32, i32), Option<u8>>;
+
+/// Puts the cells of a lattice that have an entry in `classes` on the plate.
+fn put(lattice: &Lattice, classes: &Classes, verdict: Verdict, board: &mut Board, outcome: &mut Outcome) {
+    let identified = matches!(outcome, Outcome::Identified { .. });
+    match verdict {
+        Verdict::Ambiguous => {}
+        // A reflection of the plate beside the plate itself is no reason to refuse the picture.
+        Verdict::Mirrored => {
+            if !identified {
+                *outcome = Outcome::Mirrored;
+            }
+        }
+        Verdict::Placed { placement, agreeing, disagreeing, runner_up } => {
+            if !identified {
+                *outcome = Outcome::Identified { agreeing, disagreeing, runner_up };
+            }
+            for (cell, class) in classes {
+                if let Some(site) = lattice.cells.get(cell) {
+                    board.entry(placement.apply(*cell)).or_insert(Placed { candidate: site.candidate, class: *class });
+                }
+            }
+        }
+    }
 }
 
 /// Cells of the plate at most `reach` from known ones that are not on the board.

@@ -7,10 +7,12 @@ use super::ellipse::Ellipse;
 use super::measure::{Camera, INK_SLOPE, Target};
 use super::pipeline::observations_of;
 use super::refine::{Fit, Start, refine};
-use super::second_look::{CROWDED, tie_sigma};
-use super::types::{Found, Measured, Reason};
+use super::second_look::{is_thin, tie_sigma};
+use super::tails::Tail;
+use super::together::{measure_alone, measure_beside};
+use super::types::{Found, Imaged, Measured, Reason};
 use crate::detect::{Circles, Detection, Picture};
-use crate::series::Marker;
+use crate::series::{Edge, Marker};
 
 /// A marker whose image is predicted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,9 +35,19 @@ pub struct Predicted {
     pub rest_px: f64,
 }
 
+/// What is known of the surroundings of a predicted marker.
+pub(super) struct Surroundings<'a> {
+    /// Contours of neighbours whose ink reaches its pixels.
+    pub tails: &'a [Tail],
+    /// Its centre and the light as they are believed to be.
+    pub believed: &'a Measured,
+}
+
 /// Relative sigma of a shape that the neighbours predict, and of one that camera and pose predict.
 const BY_NEIGHBOURS: f64 = 0.05;
 const BY_CAMERA: f64 = 0.01;
+/// How well the blur of the picture is that of a marker (of its logarithm).
+const BLUR_SIGMA: f64 = 0.2;
 /// Samples of a contour.
 const RING: usize = 24;
 /// Part of its band that a marker must have in the picture, where camera and pose tell its shape.
@@ -74,33 +86,72 @@ impl Predicted {
         })
     }
 
-    fn start(&self, picture: &Picture, camera: &Camera) -> Option<Start<'static>> {
+    /// What is believed of the marker before it is measured.
+    pub(super) fn presumed(&self, picture: &Picture, camera: &Camera) -> Measured {
         let profile = Profile::of(picture, &self.outer);
-        let contrast = profile.paper - profile.ring;
-        let target = Target {
-            ellipse: self.outer,
-            ratio: self.ratio,
+        let hole = |k: f64| Ellipse {
+            centre: [0, 1].map(|a| self.outer.centre[a] + self.apart[a]),
+            shape: self.outer.shape.map(|v| v / (k * k)),
+        };
+        Measured {
+            outer: Imaged { edge: Edge::Outer, ellipse: self.outer, covariance: [0.0; 3] },
+            inner: None,
+            hole: self.ratio.map(hole),
+            blur_px: camera.blur_px,
             paper: f64::from(profile.paper),
             ink: f64::from(profile.ring),
-            clear: self.clear,
-            shape_sigma: Some(self.shape_sigma),
-        };
-        let start = Start { apart: self.apart, third: self.third, ..target.start(camera, 0.2) };
-        (contrast > 0.1 * profile.paper).then_some(start)
+            rms: 0.0,
+            gradient: [0.0; 2],
+            visible: 0.0,
+        }
     }
 
     /// Measures the marker where it is predicted. The predicted centre may be wrong by about a quarter of a radius; the
     /// shape is held to the prediction, so that a part of the contour determines the centre.
     pub(super) fn measure(&self, picture: &Picture, camera: &Camera, pixels: &mut Pixels) -> Result<Fit, Reason> {
-        let start = self.start(picture, camera).ok_or(Reason::LowContrast)?;
-        let fit = refine(picture, &start, pixels)?;
+        let believed = self.presumed(picture, camera);
+        let surroundings = Surroundings { tails: &[], believed: &believed };
+        let fit = self.measure_among(picture, camera, &surroundings, pixels)?;
         self.credible(&fit, camera)?;
         Ok(fit)
     }
 
+    /// The same with what is known of the surroundings, whether it is credible or not.
+    pub(super) fn measure_among(
+        &self,
+        picture: &Picture,
+        camera: &Camera,
+        surroundings: &Surroundings,
+        pixels: &mut Pixels,
+    ) -> Result<Fit, Reason> {
+        let profile = Profile::of(picture, &self.outer);
+        if profile.paper - profile.ring <= 0.1 * profile.paper {
+            return Err(Reason::LowContrast);
+        }
+        let light = surroundings.believed;
+        let target = Target {
+            ellipse: Ellipse { centre: light.outer.ellipse.centre, ..self.outer },
+            ratio: self.ratio,
+            paper: light.paper,
+            ink: light.ink,
+            clear: self.clear,
+            shape_sigma: Some(self.shape_sigma),
+        };
+        let [major, minor] = self.outer.semi_axes();
+        let thin = self.third.is_some() && self.ratio.is_some_and(|k| is_thin(k, minor, camera.blur_px));
+        let start = Start {
+            apart: self.apart,
+            third: self.third,
+            tie_sigma: thin.then(|| tie_sigma(self.apart, major)),
+            tails: surroundings.tails,
+            ..target.start(camera, BLUR_SIGMA)
+        };
+        refine(picture, &start, pixels)
+    }
+
     /// It must look as predicted, size and place, and leave no more than noise: with its shape held, something that
     /// touches it from the side moves its centre without making it look wrong.
-    fn credible(&self, fit: &Fit, camera: &Camera) -> Result<(), Reason> {
+    pub(super) fn credible(&self, fit: &Fit, camera: &Camera) -> Result<(), Reason> {
         let m = &fit.measured;
         let off = self.outer.relative_radius(m.outer.ellipse.centre);
         let size = (m.outer.ellipse.mean_radius() / self.outer.mean_radius()).ln().abs();
@@ -141,17 +192,19 @@ impl Predicted {
         })
     }
 
-    /// Ink of a neighbour reaches the edge.
-    fn is_crowded(&self, blur_px: f64) -> bool {
-        (self.clear - 1.0) * self.outer.semi_axes()[1] < CROWDED * blur_px
+    /// What is kept of a fit: enough of the marker was seen, and its edges are where they are predicted.
+    fn accepted(&self, mut fit: Fit) -> Option<Found> {
+        self.allow_for_rest(&mut fit.measured);
+        let sound = fit.measured.visible >= ENOUGH && self.edges_agree(&fit);
+        sound.then_some(Found { marker: self.marker, measured: fit.measured, rescued: true })
     }
 
     /// So much of the marker is in the picture that a look is worth it: its centre, and room for a part of its contour.
-    fn is_in(&self, picture: &Picture) -> bool {
+    pub(super) fn is_in(&self, picture: &Picture, smallest_px: f64) -> bool {
         let size = [picture.width as f64, picture.height as f64];
         let [major, minor] = self.outer.semi_axes();
         let inside = (0..2).all(|a| self.outer.centre[a] > 0.0 && self.outer.centre[a] < size[a] - 1.0);
-        inside && minor > 2.5 && major < 0.25 * size[0]
+        inside && minor > smallest_px && major < 0.25 * size[0]
     }
 }
 
@@ -173,30 +226,32 @@ fn third_harmonic(ellipse: &Ellipse, ring: &[[f64; 2]]) -> ([f64; 2], f64) {
 
 /// The second pass: looks for the markers that are predicted and were not found. What is found is added to the detection.
 ///
-/// Markers across the border of the picture are measured from the part that is in it. Those with neighbours within the reach
-/// of the blur are left to the first pass.
+/// Markers across the border of the picture are measured from the part that is in it; those with neighbours within the reach
+/// of the blur together with them.
 pub fn look_where_predicted(picture: &Picture, detection: &mut Detection, predicted: &[Predicted]) {
     let Detection { observations, dropped, circles: Some(Circles { found, blur_px, noise, .. }), .. } = detection
     else {
         return;
     };
     let camera = Camera { blur_px: *blur_px, noise: noise.map(|n| n * n), ink_slope: INK_SLOPE };
-    let mut pixels = Pixels::default();
-    for p in predicted {
-        let known = found.iter().any(|f| f.marker == p.marker);
-        if known || p.is_crowded(camera.blur_px) || !p.is_in(picture) {
-            continue;
-        }
-        let Ok(mut fit) = p.measure(picture, &camera, &mut pixels) else { continue };
-        p.allow_for_rest(&mut fit.measured);
-        if fit.measured.visible < ENOUGH || !p.edges_agree(&fit) {
-            continue;
-        }
+    let is_known = |p: &&Predicted| found.iter().any(|f| f.marker == p.marker);
+    let missing: Vec<Predicted> = predicted.iter().filter(|p| !is_known(p)).copied().collect();
+    let known: Vec<Measured> = found.iter().map(|f| f.measured).collect();
+    let fits = measure_beside(picture, camera, &known, &missing);
+    for (p, fit) in missing.iter().zip(fits) {
+        let Some(new) = fit.and_then(|f| p.accepted(f)) else { continue };
         dropped.retain(|d| !p.lies_at(d.uv));
-        let new = Found { marker: p.marker, measured: fit.measured, rescued: true };
         observations.extend(observations_of(&new));
         found.push(new);
     }
     found.sort_by_key(|f| f.marker);
     observations.sort_by_key(|o| (o.marker, o.edge));
+}
+
+/// Measures markers in a picture of which nothing is known but where they are; blur and noise are learned from them.
+///
+/// For pictures in which no marker can be identified because all are too small against the blur: precision does not need
+/// what identity needs. The contours must be predicted to about a quarter of a radius, the shape to 1 %.
+pub fn measure_predicted(picture: &Picture, predicted: &[Predicted]) -> Vec<Found> {
+    predicted.iter().zip(measure_alone(picture, predicted)).filter_map(|(p, fit)| p.accepted(fit?)).collect()
 }

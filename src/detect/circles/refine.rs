@@ -1,6 +1,6 @@
 //! Sub-pixel measurement of one marker: least squares of the blurred-edge model on a thin band of pixels.
 
-use super::edge_model::Pixels;
+use super::edge_model::{Lopsided, Pixels};
 use super::edge_state::{ANNULUS, CENTRE, DARK, DISC, INNER, LN_BLUR, LN_RATIO, SHAPE, State, THIRD, WHITE};
 use super::ellipse::Ellipse;
 use super::flat_zone::{Flat, Zone};
@@ -52,6 +52,17 @@ pub(super) struct Fit {
     pub misfit: f64,
     /// Lopsidedness of the edges and its information ([`Pixels::skew`]).
     pub skew: ([f64; 2], [f64; 2]),
+}
+
+impl Fit {
+    /// Standard deviation of the distance of inner and outer centre, px (the larger of both axes); infinite where the
+    /// inner circle is not measured for itself.
+    pub fn apart_sigma(&self) -> f64 {
+        let outer = self.measured.outer.covariance;
+        let variance = |inner: [f64; 3], a: usize| outer[2 * a] + inner[2 * a] - 2.0 * self.cross[a];
+        let of = |inner: Imaged| variance(inner.covariance, 0).max(variance(inner.covariance, 1)).max(0.0).sqrt();
+        self.measured.inner.map_or(f64::INFINITY, of)
+    }
 }
 
 /// Half width of the band around an edge in units of the blur (and 0.3 px on top); beyond it lies 0.1 % of the information
@@ -209,10 +220,12 @@ fn iterate(state: &mut State, prior: &Prior, start: &Start, pixels: &mut Pixels)
     // how far the contours have moved since the normal matrix and since the correction, px
     let (mut since_factor, mut since_correction) = (f64::MAX, f64::MAX);
     let size = start.ellipse.semi_axes()[0];
+    // a predicted contour is near the end from the beginning
+    let near = if start.shape_sigma.is_some() { f64::MAX } else { 0.1 };
     for _ in 0..ITERATIONS {
         // What the closed form misses moves with the contour: taken near the end, and again when that moved on.
         let stale = if state.is_badly_resolved() { 0.01 } else { 0.05 };
-        if last < 0.1 && since_correction > stale {
+        if last <= near && since_correction > stale {
             if pixels.correct(state) {
                 since_factor = f64::MAX;
             }
@@ -333,8 +346,19 @@ fn finish(
         plain,
         ink_slope,
         misfit: scale,
-        skew: pixels.skew(state, start.noise),
+        skew: skew(&pixels.skew(state, start.noise), factor, parameters),
     })
+}
+
+/// The gradient of the lopsidedness along both axes, and the information that is left on it beside all parameters.
+fn skew(lopsided: &Lopsided, factor: &Normal, parameters: usize) -> ([f64; 2], [f64; 2]) {
+    let left = |a: usize| {
+        let mut solved = lopsided.shared[a];
+        solve(factor, parameters, &mut solved);
+        let taken: f64 = lopsided.shared[a].iter().zip(&solved).take(parameters).map(|(s, v)| s * v).sum();
+        (lopsided.square[a] - taken).max(1e-3 * lopsided.square[a])
+    };
+    (lopsided.gradient, [left(0), left(1)])
 }
 
 fn ink_slope(state: &State, factor: &Normal, contrast: f64) -> ([f64; 2], [f64; 2]) {

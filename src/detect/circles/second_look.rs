@@ -38,7 +38,7 @@ pub(super) struct Place {
 /// Gap to a neighbour, in units of the blur, below which its ink reaches the edge of a marker; and below which it
 /// reaches any of the pixels that are then used.
 pub(super) const CROWDED: f64 = 6.0;
-const WITHIN_REACH: f64 = 8.0;
+pub(super) const WITHIN_REACH: f64 = 8.0;
 /// Width of a ring, in units of the blur, below which its edges are not told apart.
 const THIN: f64 = 4.0;
 /// What two circles of one marker are printed apart, as a part of the outer radius.
@@ -74,6 +74,9 @@ pub(super) fn second_look(
             break;
         }
     }
+    // judged at the end: neighbours that are not free of theirs yet leave something of them
+    let is_worse = |cell: &Cell, fit: &Fit| places[cell].first.is_ok_and(|f| fit.misfit > WORSE * f.misfit.max(1.0));
+    renewed.retain(|cell, fit| !is_worse(cell, fit));
     renewed
 }
 
@@ -102,21 +105,25 @@ impl<F: Fn(Cell) -> Option<Figure>> Around<'_, F> {
         let blur_px = old.map_or(camera.blur_px, |f| f.measured.blur_px);
         let gaps = self.gaps(cell, &own, place.figure.radius);
         let crowded = gaps.iter().any(|(_, gap)| *gap < CROWDED * blur_px);
-        let thin = place.figure.ratio.is_some_and(|k| {
-            let minor = own.semi_axes()[1];
-            (1.0 - k) * minor < THIN * blur_px || 2.0 * k * minor < THIN * blur_px
-        });
+        let [major, minor] = own.semi_axes();
+        let thin = place.figure.ratio.is_some_and(|k| is_thin(k, minor, blur_px));
         if !(crowded || thin || place.first.is_err()) {
             return None;
         }
         let map = self.map(cell)?;
+        let apart = if thin { tie(&map, &place.figure, major) } else { None };
+        // what the picture tells better than geometry is left to the picture
+        let tie =
+            apart.filter(|(_, sigma)| place.first.is_err() || place.first.is_ok_and(|f| f.apart_sigma() > *sigma));
+        if tie.is_none() && !crowded && place.first.is_ok() {
+            return None;
+        }
         let tails: Vec<Tail> = if crowded {
             let near = gaps.iter().filter(|(_, gap)| *gap < WITHIN_REACH * blur_px);
             near.flat_map(|(c, _)| self.tails(*c, cell, &map)).collect()
         } else {
             Vec::new()
         };
-        let tie = if thin { tie(&map, &place.figure, own.semi_axes()[0]) } else { None };
         let mut start = self.start(cell, place, camera)?;
         if old.is_none_or(|f| f.measured.visible < WHOLE) {
             let predicted = map.ellipse(place.figure.radius)?;
@@ -127,8 +134,7 @@ impl<F: Fn(Cell) -> Option<Figure>> Around<'_, F> {
             (start.apart, start.tie_sigma) = (apart, Some(sigma));
         }
         let fit = refine(picture, &Start { tails: &tails, ..start }, pixels).ok()?;
-        let is_worse = place.first.is_ok_and(|f| fit.misfit > WORSE * f.misfit.max(1.0));
-        (!is_worse).then_some((fit, crowded))
+        Some((fit, crowded))
     }
 
     fn start(&self, cell: Cell, place: &Place, camera: &Camera) -> Option<Start<'static>> {
@@ -181,9 +187,7 @@ impl<F: Fn(Cell) -> Option<Figure>> Around<'_, F> {
                 .known
                 .get(&c)
                 .map_or_else(|| map.at([f64::from(a), f64::from(b)]), |f| f.measured.outer.ellipse.centre);
-            let relative = own.relative_radius(centre);
-            let unit = (centre[0] - own.centre[0]).hypot(centre[1] - own.centre[1]) / relative;
-            Some((c, (relative - 1.0 - other.radius / radius) * unit))
+            Some((c, own.gap(centre, other.radius / radius)))
         };
         steps.filter_map(gap).collect()
     }
@@ -195,14 +199,18 @@ impl<F: Fn(Cell) -> Option<Figure>> Around<'_, F> {
         }
         let Some((like, figure)) = self.typical(neighbour).zip((self.figure)(neighbour)) else { return Vec::new() };
         let centre = map.at([f64::from(neighbour.0 - cell.0), f64::from(neighbour.1 - cell.1)]);
-        let contrast = like.paper - like.ink;
-        let circles = [(1.0, contrast), (figure.ratio.unwrap_or(0.0), -contrast)];
-        let one = |(ratio, contrast): (f64, f64)| {
+        let one = |(ratio, sign): (f64, f64)| {
             let ellipse = map.ellipse(figure.radius * ratio).filter(|_| ratio > 0.0)?;
-            Some(Tail::at(&Ellipse { centre, ..ellipse }, like, contrast))
+            Some(Tail::at(&Ellipse { centre, ..ellipse }, like, sign))
         };
+        let circles = [(1.0, 1.0), (figure.ratio.unwrap_or(0.0), -1.0)];
         circles.into_iter().filter_map(one).collect()
     }
+}
+
+/// A ring whose edges the blur does not tell apart, or whose middle it fills; `ratio` is inner over outer radius.
+pub(super) fn is_thin(ratio: f64, minor_px: f64, blur_px: f64) -> bool {
+    (1.0 - ratio) * minor_px < THIN * blur_px || 2.0 * ratio * minor_px < THIN * blur_px
 }
 
 /// The distance of inner and outer centre by the map around the marker, and its standard deviation per axis, px.

@@ -12,6 +12,8 @@ use super::types::Measured;
 /// Largest coverage by neighbours of a pixel that is still used: one sigma of the blur from their edge. Beyond it their
 /// own uncertainty would count.
 const MOST: f32 = 0.16;
+/// The same for a neighbour that is not measured, whose place is known to a tenth of a pixel: two sigma from its edge.
+const MOST_UNSEEN: f32 = 0.023;
 
 /// A contour of a neighbour and what it takes from the light.
 #[derive(Debug, Clone, Copy)]
@@ -22,22 +24,28 @@ pub(super) struct Tail {
     contrast: f64,
     /// Gradient of the light as a share, 1/px.
     gradient: [f64; 2],
+    /// Largest coverage of a pixel that is still used.
+    most: f32,
 }
 
 impl Tail {
     /// The contours of a measured marker.
     pub fn of(measured: &Measured) -> impl Iterator<Item = Self> {
-        let contrast = measured.paper - measured.ink;
-        let hole = measured.hole.map(|h| Self::at(&h, measured, -contrast));
-        std::iter::once(Self::at(&measured.outer.ellipse, measured, contrast)).chain(hole)
+        let one = |ellipse: &Ellipse, sign| Self { most: MOST, ..Self::at(ellipse, measured, sign) };
+        std::iter::once(one(&measured.outer.ellipse, 1.0)).chain(measured.hole.map(|h| one(&h, -1.0)))
     }
 
-    /// A contour under the light and the blur of `like`.
-    pub fn at(ellipse: &Ellipse, like: &Measured, contrast: f64) -> Self {
+    /// A contour that is not measured, in the light around `like` and with its blur; `sign` is 1 for ink and -1 for a hole in it.
+    pub fn at(ellipse: &Ellipse, like: &Measured, sign: f64) -> Self {
         let s2 = like.blur_px * like.blur_px;
-        let centre = [0, 1].map(|a| ellipse.centre[a] - s2 * like.gradient[a]);
+        let from = like.outer.ellipse.centre;
+        let along = |a: usize| like.gradient[a] * (ellipse.centre[a] - from[a]);
+        // the light where the contour is, as a share of that at `like`
+        let light = (1.0 + along(0) + along(1)).max(0.1);
+        let gradient = like.gradient.map(|g| g / light);
+        let centre = [0, 1].map(|a| ellipse.centre[a] - s2 * gradient[a]);
         let contour = Contour { centre, to_unit: ellipse.normaliser(), third: [0.0; 2], blur: like.blur_px };
-        Self { contour, contrast, gradient: like.gradient }
+        Self { contour, contrast: sign * light * (like.paper - like.ink), gradient, most: MOST_UNSEEN }
     }
 }
 
@@ -54,12 +62,12 @@ pub(super) fn lift(pixels: &mut Pixels, tails: &[Tail], anchor: [f64; 2]) {
         for (i, b) in one.iter().enumerate() {
             let light = 1.0 + gx * (pixels.x[i] - cx) + gy * (pixels.y[i] - cy);
             pixels.value[i] += contrast * light * b;
-            covered[i] += contrast.signum() * b;
+            covered[i] += contrast.signum() * b / tail.most;
         }
     }
     let mut keep = 0;
     for (i, covered) in covered.iter().enumerate().take(pixels.count) {
-        if covered.abs() <= MOST {
+        if covered.abs() <= 1.0 {
             pixels.x[keep] = pixels.x[i];
             pixels.y[keep] = pixels.y[i];
             pixels.value[keep] = pixels.value[i];

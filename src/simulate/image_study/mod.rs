@@ -6,9 +6,9 @@ mod identity_view;
 mod precision;
 mod view;
 
-pub use bias::{Bias, BiasCase, Cause, bias, bias_cases};
+pub use bias::{Bias, BiasCase, COMA_CONTRAST_TO_NOISE, Cause, bias, bias_cases};
 pub use identity::{
     DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityRequest, IdentityView, MirrorAnswer, Plates, Sight, identity,
     identity_view,
 };
-pub use precision::{Precision, PrecisionCell, precision, precision_cells};
+pub use precision::{MAP_OFF_PX, Precision, PrecisionCell, precision, precision_cells};

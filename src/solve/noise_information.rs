@@ -1,0 +1,185 @@
+//! How well the data tell the sizes of the joint noise: the information of restricted maximum likelihood on its variances.
+//!
+//! With the latents `l ~ N(0, D)`, their posterior covariance `C` over all images and `R = 1 - D^-1/2 C D^-1/2`, the information
+//! on the logarithms of two variances is `F_ab = 1/2 sum_ij p_ia R_ij^2 p_jb`, where `p_ia` is the share of variance `a` in the
+//! latent `i` (D. Harville, *Maximum likelihood approaches to variance component estimation*, 1977). See the formulation.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::components::SHRINKAGE;
+use super::covariance::{Covariance, covariance_by};
+use super::system::{Elimination, Linearised};
+use crate::linalg::SymmetricFactor;
+use crate::problem::{Problem, Slack, State};
+
+/// Latents up to which those of different images are taken together; of more, their coupling through the parameters is
+/// a small part, and leaving it out states too large a spread.
+const MOST_COUPLED: usize = 1200;
+
+/// Covariance of the variances of the joint noise.
+#[derive(Debug, Clone)]
+pub struct NoiseInformation {
+    readings: usize,
+    cameras: usize,
+    locals: usize,
+    /// Of the joint noise per camera and reading, of the local errors per reading, of the tilts per camera; rad^2 or m^2.
+    variances: Vec<f64>,
+    /// Covariance of the logarithms of those that the data touch, with their indices.
+    covariance: DMatrix<f64>,
+    touched: Vec<usize>,
+}
+
+/// A standard deviation with what the data leave open.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    /// Estimated variance.
+    pub variance: f64,
+    /// Standard deviation of it.
+    pub sigma: f64,
+}
+
+impl Spread {
+    /// Interval of the standard deviation: that of the variance at `z` of its sigmas, which is normal down to zero.
+    pub fn interval(&self, z: f64) -> [f64; 2] {
+        [self.variance - z * self.sigma, self.variance + z * self.sigma].map(|v| v.max(0.0).sqrt())
+    }
+
+    /// Standard deviation of the standard deviation: half its one-sigma interval.
+    pub fn of_root(&self) -> f64 {
+        let [low, high] = self.interval(1.0);
+        0.5 * (high - low)
+    }
+}
+
+/// One latent: row in the covariance, standard deviation, components with their shares of its variance.
+struct Latent {
+    row: usize,
+    sigma: f64,
+    parts: [(usize, f64); 2],
+}
+
+/// The information at a solution; `None` without joint noise, or where the data do not tell it at all.
+pub fn noise_information(
+    problem: &Problem,
+    state: &State,
+    lin: &Linearised,
+    cov: &Covariance,
+) -> Option<NoiseInformation> {
+    let (readings, cameras) = (state.robot.chain.readings.len(), problem.noise.joint.len());
+    let coupled;
+    let slack: usize = lin.images.iter().map(|&i| state.slack[i].len()).sum();
+    let cov = if cov.system.slack_start.is_empty() && slack <= MOST_COUPLED {
+        coupled = covariance_by(Elimination::Markers, problem, state, lin).ok()?;
+        &coupled
+    } else {
+        cov
+    };
+    let own = problem.noise.joint.iter().flatten();
+    let variances: Vec<f64> = own.chain(&problem.noise.local).chain(&problem.noise.tilt).map(|s| s * s).collect();
+    let mut information = DMatrix::zeros(variances.len(), variances.len());
+    let mut add = |a: &Latent, b: &Latent, covariance: f64| {
+        let r = f64::from(a.row == b.row) - covariance / (a.sigma * b.sigma);
+        for (ca, pa) in a.parts {
+            b.parts.iter().for_each(|(cb, pb)| information[(ca, *cb)] += 0.5 * pa * r * r * pb);
+        }
+    };
+    let first = cameras * readings;
+    let locals = local_latents(problem, state, cov, first);
+    for a in &locals {
+        locals.iter().for_each(|b| add(a, b, cov.reduced[(a.row, b.row)]));
+    }
+    let of_images: Vec<Vec<Latent>> = (0..lin.images.len()).map(|k| image_latents(problem, state, lin, k)).collect();
+    if cov.system.slack_start.is_empty() {
+        for (k, own) in of_images.iter().enumerate() {
+            let c = cov.slack(k, own.len());
+            own.iter().for_each(|a| own.iter().for_each(|b| add(a, b, c[(a.row, b.row)])));
+        }
+    } else {
+        let starts = cov.system.slack_start.iter();
+        let placed = of_images.into_iter().zip(starts);
+        let all: Vec<Latent> = (placed.flat_map(|(own, start)| own.into_iter().map(move |l| (l, *start))))
+            .map(|(l, start)| Latent { row: start + l.row, ..l })
+            .collect();
+        for a in &all {
+            all.iter().for_each(|b| add(a, b, cov.reduced[(a.row, b.row)]));
+            locals.iter().for_each(|b| {
+                add(a, b, cov.reduced[(a.row, b.row)]);
+                add(b, a, cov.reduced[(b.row, a.row)]);
+            });
+        }
+    }
+    let touched: Vec<usize> = (0..variances.len()).filter(|&c| information[(c, c)] > 0.0).collect();
+    draw_together(problem, state, &touched, &mut information);
+    let of_touched = DMatrix::from_fn(touched.len(), touched.len(), |a, b| information[(touched[a], touched[b])]);
+    let covariance = SymmetricFactor::new(&of_touched).ok().filter(|_| !touched.is_empty())?.inverse();
+    let locals = problem.noise.local.len();
+    Some(NoiseInformation { readings, cameras, locals, variances, covariance, touched })
+}
+
+fn local_latents(problem: &Problem, state: &State, cov: &Covariance, first: usize) -> Vec<Latent> {
+    let terms = problem.layout.terms.start;
+    let used = problem.layout.locals.clone().filter(|&c| cov.system.touched(c) && problem.layout.columns[c].free);
+    let latent = |c: usize| {
+        let reading = state.robot.terms[c - terms].reading;
+        Latent { row: c, sigma: problem.noise.local[reading], parts: [(first + reading, 1.0), (first + reading, 0.0)] }
+    };
+    used.map(latent).filter(|l| l.sigma > 0.0).collect()
+}
+
+/// Latents of the k-th image in use, numbered within it.
+fn image_latents(problem: &Problem, state: &State, lin: &Linearised, k: usize) -> Vec<Latent> {
+    let image = &problem.images[lin.images[k]];
+    let Slack::Joints(dq) = &state.slack[lin.images[k]] else { return Vec::new() };
+    let n = state.robot.chain.readings.len();
+    let first = problem.noise.joint.len() * n;
+    let latent = |row: usize| {
+        let [own, local] = problem.slack_variance(image, row);
+        let a = if row < n { image.camera * n + row } else { first + problem.noise.local.len() + image.camera };
+        let b = if local > 0.0 { first + row } else { a };
+        Latent { row, sigma: (own + local).sqrt(), parts: [(a, own / (own + local)), (b, local / (own + local))] }
+    };
+    (0..dq.len()).map(latent).collect()
+}
+
+/// The readings of a group are drawn to their common variance as by so many observations.
+fn draw_together(problem: &Problem, state: &State, touched: &[usize], information: &mut DMatrix<f64>) {
+    let n = state.robot.chain.readings.len();
+    let groups = problem.noise.groups(&state.robot.chain.reading_kinds);
+    let blocks = problem.noise.joint.len() + usize::from(!problem.noise.local.is_empty());
+    for block in 0..blocks {
+        for group in &groups {
+            let of_block: Vec<usize> = group.iter().map(|r| block * n + r).filter(|c| touched.contains(c)).collect();
+            let mean = 1.0 / of_block.len().max(1) as f64;
+            for &a in &of_block {
+                for &b in &of_block {
+                    information[(a, b)] += 0.5 * SHRINKAGE * (f64::from(a == b) - mean);
+                }
+            }
+        }
+    }
+}
+
+impl NoiseInformation {
+    /// Mean variance of some readings with a camera (the noise of the stops and local errors together).
+    pub fn mean_variance(&self, camera: usize, readings: &[usize]) -> Spread {
+        let mut gradient = DVector::zeros(self.touched.len());
+        let (mut variance, mut told) = (0.0, true);
+        let first = self.cameras * self.readings;
+        for &r in readings {
+            let parts = [
+                Some(camera * self.readings + r),
+                Some(first + r).filter(|c| r < self.locals && self.variances[*c] > 0.0),
+            ];
+            for c in parts.into_iter().flatten() {
+                let part = self.variances[c] / readings.len() as f64;
+                variance += part;
+                match self.touched.iter().position(|t| *t == c) {
+                    Some(at) => gradient[at] += part,
+                    None => told = false,
+                }
+            }
+        }
+        let sigma = (&self.covariance * &gradient).dot(&gradient).max(0.0).sqrt();
+        Spread { variance, sigma: if told { sigma } else { f64::INFINITY } }
+    }
+}
