@@ -18,7 +18,7 @@ const HEADER: &str = "\
 # m_1, m_2: moment about the axis of a unit weight (along -z of the root) at unit levers u and axis x u of the joint's own link;
 # m_3, m_4: the same about this axis for levers u' and axis' x u' of the link after the next moving joint.
 # T: moment of gravity about the axis, N m (force along it, N, for a prismatic joint), of the masses in the URDF and the [payload]
-# (centre in the frame of the tip link); it takes the place of the m_i where the URDF states masses.
+# (centre in the frame of the tip link).
 # u is the unit vector along x (along y where |axis_x| >= 0.9) without its part along the axis.
 ";
 

@@ -119,9 +119,9 @@ impl RobotModel {
             terms.extend((1..=harmonics).flat_map(|k| [Term::Cosine(k), Term::Sine(k)]));
         }
         if self.has(Term::Backlash) {
-            match chain.masses.is_empty() {
-                true => terms.extend((0..GRAVITY_TERMS).map(Term::Gravity)),
-                false => terms.push(Term::Sag),
+            terms.extend((0..GRAVITY_TERMS).map(Term::Gravity));
+            if !chain.masses.is_empty() {
+                terms.push(Term::Sag);
             }
             terms.push(Term::Backlash);
         }
