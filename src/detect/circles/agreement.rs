@@ -7,6 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 use super::asymmetry::Drift;
 use super::lattice::Cell;
@@ -132,7 +133,7 @@ struct Polynomial {
     middle: [f64; 2],
     scale: f64,
     degree: usize,
-    coefficients: DMatrix<f64>,
+    coefficients: [[f64; 2]; TERMS],
 }
 
 /// Highest degree; markers that are needed for each coefficient.
@@ -147,7 +148,7 @@ impl Polynomial {
         let (low, high) = ([0, 1].map(|a| bound(a, f64::min)), [0, 1].map(|a| bound(a, f64::max)));
         let middle = [0, 1].map(|a| 0.5 * (low[a] + high[a]));
         let scale = 2.0 / (high[0] - low[0]).max(high[1] - low[1]).max(1.0);
-        let zero = Self { middle, scale, degree: 0, coefficients: DMatrix::zeros(1, 2) };
+        let zero = Self { middle, scale, degree: 0, coefficients: [[0.0; 2]; TERMS] };
         let solve = |degree: usize| {
             let count = (degree + 1) * (degree + 2) / 2;
             let (mut normal, mut right) = (DMatrix::zeros(count, count), DMatrix::zeros(count, 2));
@@ -158,7 +159,10 @@ impl Polynomial {
             }
             // a part in 1e9 of the largest pivot holds what the markers do not determine at zero
             (0..count).for_each(|k| normal[(k, k)] += 1e-9 * pairs.len() as f64);
-            Some(Self { degree, coefficients: normal.cholesky()?.solve(&right), ..zero })
+            let solved = normal.cholesky()?.solve(&right);
+            let mut coefficients = zero.coefficients;
+            coefficients.iter_mut().zip(solved.row_iter()).for_each(|(c, row)| *c = [row[0], row[1]]);
+            Some(Self { degree, coefficients, ..zero })
         };
         let allowed = |d: &usize| (d + 1) * (d + 2) / 2 * MARKERS_PER_TERM <= pairs.len();
         (2..=DEGREE).rev().filter(allowed).find_map(solve).unwrap_or(zero)
@@ -180,15 +184,22 @@ impl Polynomial {
 
     fn at(&self, at: [f64; 2]) -> [f64; 2] {
         let terms = self.terms(at, self.degree);
-        [0, 1].map(|a| self.coefficients.column(a).iter().zip(&terms).map(|(c, t)| c * t).sum())
+        self.coefficients.iter().zip(&terms).fold([0.0; 2], |[u, v], (c, t)| [u + c[0] * t, v + c[1] * t])
     }
 }
+
+/// Points of the unit circle.
+static UNIT_RING: LazyLock<[[f64; 2]; RING]> = LazyLock::new(|| {
+    std::array::from_fn(|k| {
+        let (sin, cos) = (k as f64 * std::f64::consts::TAU / RING as f64).sin_cos();
+        [cos, sin]
+    })
+});
 
 /// Area centroid of the image of a circle of `radius` about the origin.
 pub(super) fn centroid(map: &impl Fn([f64; 2]) -> Option<[f64; 2]>, radius: f64) -> Option<[f64; 2]> {
     let mut ring = [[0.0; 2]; RING];
-    for (k, p) in ring.iter_mut().enumerate() {
-        let (sin, cos) = (k as f64 * std::f64::consts::TAU / RING as f64).sin_cos();
+    for (p, [cos, sin]) in ring.iter_mut().zip(UNIT_RING.iter()) {
         *p = map([radius * cos, radius * sin])?;
     }
     let origin = ring[0];

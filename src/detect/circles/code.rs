@@ -123,6 +123,12 @@ impl Code {
         self.at(cell).map(|(m, _)| m)
     }
 
+    /// All cells with a marker, by columns.
+    pub fn occupied(&self) -> impl Iterator<Item = Cell> {
+        let cells = (0..self.columns).flat_map(|column| (0..self.rows).map(move |row| (column, row)));
+        cells.filter(|cell| self.at(*cell).is_some())
+    }
+
     /// Class of a cell of the plate.
     pub fn class_at(&self, cell: Cell) -> Option<u8> {
         self.at(cell).map(|(_, c)| c)

@@ -10,8 +10,8 @@ use crate::linalg::wide;
 
 const DARK: u8 = 1;
 const SEEN: u8 = 2;
-/// Light cells in a row, where no contour starts.
-const PAPER: [u8; 16] = [0; 16];
+/// [`DARK`] in each of eight cells.
+const ALL_DARK: u64 = u64::from_le_bytes([DARK; 8]);
 
 /// What a contour encloses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,21 +43,17 @@ pub(super) fn contours(picture: &Picture, levels: &Levels, shortest: usize, long
     let mut found = Vec::new();
     let mut tracer = Tracer { picture, levels, longest, points: Vec::new() };
     for y in 0..picture.height {
-        let start = (y + 1) * map.stride;
         let mut x = 1;
-        while x <= picture.width {
-            if map.cells[start + x..].first_chunk() == Some(&PAPER) {
-                x += PAPER.len();
-                continue;
-            }
-            let here = map.cells[start + x];
-            if here == DARK && map.cells[start + x - 1] & DARK == 0 {
-                let contour = tracer.follow(&mut map, x, y + 1);
+        while let Some(dark) = map.next(y + 1, x, |cells| cells & ALL_DARK) {
+            if map.cells[(y + 1) * map.stride + dark] & SEEN == 0 {
+                let contour = tracer.follow(&mut map, dark, y + 1);
                 if contour.too_long || contour.points.len() >= shortest {
                     found.push(contour);
                 }
             }
-            x += 1;
+            // the frame ends every row with a light cell
+            let Some(light) = map.next(y + 1, dark, |cells| !cells & ALL_DARK) else { break };
+            x = light;
         }
     }
     found
@@ -88,6 +84,19 @@ impl DarkMap {
             );
         }
         Self { stride, cells }
+    }
+
+    /// First column of a row, from `x` on, whose cell `pick` leaves something of; `pick` sees eight cells at once.
+    fn next(&self, row: usize, mut x: usize, pick: impl Fn(u64) -> u64) -> Option<usize> {
+        let cells = &self.cells[row * self.stride..(row + 1) * self.stride];
+        while let Some(eight) = cells.get(x..)?.first_chunk() {
+            let picked = pick(u64::from_le_bytes(*eight));
+            if picked != 0 {
+                return Some(x + picked.trailing_zeros() as usize / 8);
+            }
+            x += 8;
+        }
+        (x..self.stride).find(|&x| pick(u64::from(cells[x])) & u64::from(DARK) != 0)
     }
 }
 

@@ -313,7 +313,7 @@ impl Pixels {
 
     #[inline(always)]
     fn normal_lanes(&self, parameters: usize, out: &mut [[f64; ANNULUS]; ANNULUS]) {
-        const BLOCK: usize = 32 * LANES;
+        const BLOCK: usize = 64 * LANES;
         out.iter_mut().for_each(|row| row.fill(0.0));
         let n = self.x.len();
         for from in (0..n).step_by(BLOCK) {

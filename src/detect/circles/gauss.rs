@@ -21,7 +21,7 @@ pub(super) fn exp_negative(x: f32) -> f32 {
     let shifted = z + ROUND;
     let f = (z - (shifted - ROUND)) * std::f32::consts::LN_2;
     let power = f32::from_bits(shifted.to_bits().wrapping_add(127).wrapping_shl(23));
-    power * (1.0 + f * (1.0 + f * (0.5 + f * (1.0 / 6.0 + f * (1.0 / 24.0 + f * (1.0 / 120.0 + f / 720.0))))))
+    power * (1.0 + f * (1.0 + f * (0.5 + f * (1.0 / 6.0 + f * (1.0 / 24.0 + f * (1.0 / 120.0 + f * (1.0 / 720.0)))))))
 }
 
 #[cfg(test)]

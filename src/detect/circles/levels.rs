@@ -99,11 +99,13 @@ fn cell_extremes(picture: &Picture, cols: usize, rows: usize) -> (Vec<f32>, Vec<
         }
         let height = lines.len() / picture.width;
         let row = band * BLOCK / CELL * cols;
-        for (block, values) in sums.chunks(BLOCK).enumerate() {
-            let mean = values.iter().sum::<f32>() / (values.len() * height) as f32;
-            let cell = row + block * BLOCK / CELL;
-            upper[cell] = upper[cell].max(mean);
-            lower[cell] = lower[cell].min(mean);
+        let cells = upper[row..row + cols].iter_mut().zip(&mut lower[row..row + cols]);
+        for ((upper, lower), values) in cells.zip(sums.chunks(CELL)) {
+            for block in values.chunks(BLOCK) {
+                let mean = block.iter().sum::<f32>() / (block.len() * height) as f32;
+                *upper = upper.max(mean);
+                *lower = lower.min(mean);
+            }
         }
     }
     (upper, lower)
@@ -120,7 +122,8 @@ fn window(grid: &[f32], cols: usize, reach: usize, pick: impl Fn(f32, f32) -> f3
 fn window_down(grid: &[f32], cols: usize, reach: usize, pick: impl Fn(f32, f32) -> f32) -> Vec<f32> {
     let last = grid.len() / cols - 1;
     let row = |k: usize| k.saturating_sub(reach).min(last) * cols;
-    let mut run: Vec<f32> = (0..=last + 2 * reach).flat_map(|k| &grid[row(k)..row(k) + cols]).copied().collect();
+    let mut run = Vec::with_capacity((last + 2 * reach + 1) * cols);
+    (0..=last + 2 * reach).for_each(|k| run.extend_from_slice(&grid[row(k)..row(k) + cols]));
     let (wanted, mut span) = (2 * reach + 1, 1);
     while span < wanted {
         let step = span.min(wanted - span);
@@ -131,18 +134,30 @@ fn window_down(grid: &[f32], cols: usize, reach: usize, pick: impl Fn(f32, f32) 
 }
 
 fn transposed(grid: &[f32], cols: usize) -> Vec<f32> {
-    (0..cols).flat_map(|c| grid[c..].iter().step_by(cols)).copied().collect()
+    let rows = grid.len() / cols;
+    let mut out = vec![0.0; grid.len()];
+    for (r, line) in grid.chunks_exact(cols).enumerate() {
+        out[r..].iter_mut().step_by(rows).zip(line).for_each(|(to, from)| *to = *from);
+    }
+    out
 }
 
-/// Binomial 3x3 smoothing.
+/// Binomial 3x3 smoothing, first along the rows.
 fn smooth(grid: &mut [f32], cols: usize, rows: usize) {
-    let source = grid.to_vec();
-    for r in 0..rows {
-        let (up, down) = (r.saturating_sub(1), (r + 1).min(rows - 1));
-        for c in 0..cols {
-            let (left, right) = (c.saturating_sub(1), (c + 1).min(cols - 1));
-            let line = |q: usize| source[q * cols + left] + 2.0 * source[q * cols + c] + source[q * cols + right];
-            grid[r * cols + c] = (line(up) + 2.0 * line(r) + line(down)) / 16.0;
+    let mut across = grid.to_vec();
+    for (out, line) in across.chunks_exact_mut(cols).zip(grid.chunks_exact(cols)) {
+        for (o, three) in out[1..].iter_mut().zip(line.windows(3)) {
+            *o = three[0] + 2.0 * three[1] + three[2];
+        }
+        let last = cols - 1;
+        out[0] = line[0] + 2.0 * line[0] + line[last.min(1)];
+        out[last] = line[last.saturating_sub(1)] + 2.0 * line[last] + line[last];
+    }
+    let row = |r: usize| &across[r * cols..(r + 1) * cols];
+    for (r, out) in grid.chunks_exact_mut(cols).enumerate() {
+        let (up, middle, down) = (row(r.saturating_sub(1)), row(r), row((r + 1).min(rows - 1)));
+        for ((o, u), (m, d)) in out.iter_mut().zip(up).zip(middle.iter().zip(down)) {
+            *o = (u + 2.0 * m + d) / 16.0;
         }
     }
 }

@@ -33,7 +33,8 @@ impl LocalMap {
         for ([x, y], image) in pairs {
             let terms = [1.0, *x, *y, 0.5 * x * x, x * y, 0.5 * y * y];
             for i in 0..N {
-                for j in 0..N {
+                // the lower triangle is all that its factor needs
+                for j in 0..=i {
                     normal[(i, j)] += terms[i] * terms[j];
                 }
                 for a in 0..2 {

@@ -28,6 +28,7 @@ mod pipeline;
 mod predicted;
 mod refine;
 mod second_look;
+mod squares;
 #[cfg(test)]
 pub(crate) mod synth;
 mod tails;

@@ -8,7 +8,7 @@ use super::candidate::{Candidate, candidates, largest_marker};
 use super::code::{Code, Verdict};
 use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
-use super::lattice::{Buckets, Lattice, lattices};
+use super::lattice::{Buckets, Cell, Lattice, lattices};
 use super::levels::Levels;
 use super::measure::{Camera, THRESHOLD, Target, drop_target, learn, median, target_of};
 use super::predicted::Predicted;
@@ -87,7 +87,7 @@ fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> (Boa
 }
 
 /// Classes of the cells of a lattice.
-type Classes = BTreeMap<(i32, i32), Option<u8>>;
+type Classes = BTreeMap<Cell, Option<u8>>;
 
 /// Puts the cells of a lattice that have an entry in `classes` on the plate.
 fn put(lattice: &Lattice, classes: &Classes, verdict: Verdict, board: &mut Board, outcome: &mut Outcome) {
@@ -114,10 +114,9 @@ fn put(lattice: &Lattice, classes: &Classes, verdict: Verdict, board: &mut Board
 }
 
 /// Cells of the plate at most `reach` from known ones that are not on the board.
-fn open_cells(board: &Board, code: &Code, reach: i32) -> BTreeSet<(i32, i32)> {
-    let near = |&(c, r): &(i32, i32)| (-reach..=reach).flat_map(move |j| (-reach..=reach).map(move |i| (c + i, r + j)));
-    let is_open = |cell: &(i32, i32)| !board.contains_key(cell) && code.marker_at(*cell).is_some();
-    board.keys().flat_map(near).filter(is_open).collect()
+fn open_cells(board: &Board, code: &Code, reach: i32) -> impl Iterator<Item = Cell> {
+    let is_open = move |cell: &Cell| !board.contains_key(cell) && around(board, *cell, reach).next().is_some();
+    code.occupied().filter(is_open)
 }
 
 /// How far a lattice is carried on over a gap, in cells, and how often.
@@ -154,7 +153,7 @@ fn attach(board: &mut Board, code: &Code, candidates: &[Candidate]) {
 
 fn drop_unused(
     board: &Board,
-    vetted: &[((i32, i32), usize, Reason)],
+    vetted: &[(Cell, usize, Reason)],
     lattices: &[Lattice],
     candidates: &[Candidate],
     dropped: &mut Vec<Dropped>,
@@ -177,7 +176,7 @@ fn drop_unused(
 
 /// One measured marker with its cell.
 struct Entry {
-    cell: (i32, i32),
+    cell: Cell,
     fit: Fit,
     rescued: bool,
 }
@@ -198,16 +197,16 @@ struct Harvest {
 }
 
 impl Work<'_> {
-    fn marker(&self, cell: (i32, i32)) -> Option<&crate::series::Marker> {
+    fn marker(&self, cell: Cell) -> Option<&crate::series::Marker> {
         self.code.marker_at(cell).map(|i| &self.plate.markers[i])
     }
 
-    fn ratio(&self, cell: (i32, i32)) -> Option<f64> {
+    fn ratio(&self, cell: Cell) -> Option<f64> {
         self.marker(cell).map(|m| m.inner_radius_m / m.outer_radius_m).filter(|r| *r > 0.0)
     }
 
     /// Relative radius out to which the neighbours leave paper, for a marker with this minor semi-axis.
-    fn clear(&self, cell: (i32, i32), minor_px: f64, blur_px: f64) -> f64 {
+    fn clear(&self, cell: Cell, minor_px: f64, blur_px: f64) -> f64 {
         let own = self.marker(cell).map_or(0.3, |m| m.outer_radius_m / self.plate.pitch_m);
         (1.0 - self.code.radii()[1]) / own - 2.1 * blur_px / minor_px
     }
@@ -220,7 +219,7 @@ impl Work<'_> {
         1.0 + free(0).min(free(1)).max(0.0) / ellipse.semi_axes()[1]
     }
 
-    fn target(&self, cell: (i32, i32), placed: &Placed, blur_px: f64) -> Target {
+    fn target(&self, cell: Cell, placed: &Placed, blur_px: f64) -> Target {
         let c = &self.candidates[placed.candidate];
         let clear = self.clear(cell, c.ellipse.semi_axes()[1], blur_px).min(self.room(&c.ellipse));
         let mut target = target_of(c, self.ratio(cell), clear);
@@ -232,7 +231,7 @@ impl Work<'_> {
 
     fn measure(&mut self, board: &Board, levels: &Levels, options: &Options, dropped: &mut Vec<Dropped>) -> Harvest {
         let guess = median(board.values().map(|p| self.candidates[p.candidate].blur_px).collect());
-        let targets: Vec<((i32, i32), Target)> =
+        let targets: Vec<(Cell, Target)> =
             board.iter().map(|(cell, p)| (*cell, self.target(*cell, p, guess))).collect();
         let plain: Vec<Target> = targets.iter().map(|t| t.1).collect();
         let camera = learn(self.picture, &plain, guess, levels.noise, &mut self.pixels);
@@ -256,12 +255,7 @@ impl Work<'_> {
     }
 
     /// Measures small markers again with what their neighbours tell.
-    fn look_again(
-        &mut self,
-        entries: &mut Vec<Entry>,
-        refused: &mut Vec<((i32, i32), Target, Reason)>,
-        camera: &Camera,
-    ) {
+    fn look_again(&mut self, entries: &mut Vec<Entry>, refused: &mut Vec<(Cell, Target, Reason)>, camera: &Camera) {
         let figure = |cell| {
             let marker = self.marker(cell)?;
             Some(Figure { radius: marker.outer_radius_m / self.plate.pitch_m, ratio: self.ratio(cell) })
@@ -276,7 +270,7 @@ impl Work<'_> {
         let fits = second_look(self.picture, camera, &places, &figure);
         entries.retain(|e| !fits.contains_key(&e.cell));
         refused.retain(|(cell, ..)| !fits.contains_key(cell));
-        let rescued = |cell: &(i32, i32)| places[cell].first.is_err();
+        let rescued = |cell: &Cell| places[cell].first.is_err();
         entries.extend(fits.into_iter().map(|(cell, fit)| Entry { cell, rescued: rescued(&cell), fit }));
     }
 

@@ -4,6 +4,7 @@ use super::edge_model::{Lopsided, Pixels};
 use super::edge_state::{ANNULUS, CENTRE, DARK, DISC, INNER, LN_BLUR, LN_RATIO, SHAPE, State, THIRD, WHITE};
 use super::ellipse::Ellipse;
 use super::flat_zone::{Flat, Zone};
+use super::squares::Squares;
 use super::tails::{Tail, lift};
 use super::types::{Imaged, Measured, Reason};
 use crate::detect::Picture;
@@ -296,29 +297,21 @@ fn finish(
 ) -> Result<Fit, Reason> {
     let parameters = state.parameters();
     let n = pixels.count;
-    let square = |i: usize| f64::from(pixels.residual[i]).powi(2);
-    let weighted = |i: usize| {
-        let d = f64::from(pixels.ink[i]);
-        square(i) / (start.noise[0] + (start.noise[1] - start.noise[0]) * d)
-    };
-    let rms = ((0..n).map(square).sum::<f64>() / n as f64).sqrt();
+    let left = Squares::of(pixels, start.noise);
+    let rms = (left.plain / n as f64).sqrt();
     let even = pixels.flat.squares(state);
     let freedom = (n - parameters) as f64 + pixels.flat.paper.count + pixels.flat.ink.count;
     let even_weighted = even[0] / start.noise[0] + even[1] / start.noise[1];
-    let scale = ((0..n).map(weighted).sum::<f64>() + even_weighted) / freedom;
+    let scale = (left.weighted + even_weighted) / freedom;
     let contrast = state.white[0] - state.dark[0];
     let expected = start.noise[0].max(start.noise[1]);
     if contrast <= 0.0 || rms * rms > 6.0 * expected + (0.03 * contrast).powi(2) {
         return Err(Reason::EdgeModel);
     }
-    let mut plain = [(even[0], pixels.flat.paper.count), (even[1], pixels.flat.ink.count)];
-    for i in 0..n {
-        let side = if pixels.ink[i] < 0.02 { 0 } else { usize::from(pixels.ink[i] > 0.98) };
-        if side == 1 || pixels.ink[i] < 0.02 {
-            plain[side].0 += square(i);
-            plain[side].1 += 1.0;
-        }
-    }
+    let plain = [
+        (even[0] + left.off_edge[0].0, pixels.flat.paper.count + left.off_edge[0].1),
+        (even[1] + left.off_edge[1].0, pixels.flat.ink.count + left.off_edge[1].1),
+    ];
     let covariance = Covariance::of(factor, parameters, scale);
     let place = |e: Ellipse| Ellipse { centre: [0, 1].map(|a| e.centre[a] + anchor[a]), ..e };
     let outer = Imaged { edge: Edge::Outer, ellipse: place(state.ellipse()), covariance: covariance.block(0) };
@@ -524,20 +517,26 @@ impl Strip<'_> {
         let base = (self.y * width) as usize;
         let values = &self.picture.pixels[base + from as usize..base + to as usize];
         let (x, y) = (from as f64 - self.anchor[0], self.y as f64 - self.anchor[1]);
-        let (mut at, mut taken) = (0, 0);
+        let saturated = values.iter().filter(|v| **v >= limit).count();
+        if saturated == 0 {
+            return self.push([x, y], values);
+        }
+        let mut at = 0;
         for good in values.split(|v| *v >= limit) {
-            let x = x + at as f64;
-            match self.used {
-                Use::Band => self.pixels.push_row(x as f32, y as f32, good),
-                Use::Paper => self.pixels.flat.paper.push_row(x, y, good),
-                Use::Ink => self.pixels.flat.ink.push_row(x, y, good),
-                Use::Nothing => {}
-            }
+            self.push([x + at as f64, y], good);
             at += good.len() + 1;
-            taken += good.len();
         }
         if in_band {
-            self.counts.1 += values.len() - taken;
+            self.counts.1 += saturated;
+        }
+    }
+
+    fn push(&mut self, [x, y]: [f64; 2], values: &[f32]) {
+        match self.used {
+            Use::Band => self.pixels.push_row(x as f32, y as f32, values),
+            Use::Paper => self.pixels.flat.paper.push_row(x, y, values),
+            Use::Ink => self.pixels.flat.ink.push_row(x, y, values),
+            Use::Nothing => {}
         }
     }
 }

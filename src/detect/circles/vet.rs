@@ -64,9 +64,8 @@ fn disputed(board: &Board, cell: Cell, code: &Code) -> bool {
 
 /// The cells of a square window.
 pub(super) fn around(board: &Board, cell: Cell, reach: i32) -> impl Iterator<Item = (Cell, &Placed)> {
-    (-reach..=reach)
-        .flat_map(move |j| (-reach..=reach).map(move |i| (cell.0 + i, cell.1 + j)))
-        .filter_map(|c| board.get(&c).map(|p| (c, p)))
+    let column = move |i: i32| board.range((cell.0 + i, cell.1 - reach)..=(cell.0 + i, cell.1 + reach));
+    (-reach..=reach).flat_map(column).map(|(c, p)| (*c, p))
 }
 
 /// Pairs (offset from a cell, place in the image) of the markers at most `reach` from it, without itself.
