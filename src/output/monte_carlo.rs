@@ -18,8 +18,10 @@ pub fn monte_carlo_markdown(cells: &[MonteCarloCell], command: &str) -> String {
          where the stated uncertainty is true, above 1 where it is too small. In brackets: the 99 % interval about 1 for this number of worlds; \
          **bold** where the mean lies outside. \"flange\" is the pose of the flange in the plate frame at a joint vector that was not measured.\n\n\
          The robot's parameters are known a thousand times better in some directions than in others, and the good directions turn along the bad \
-         ones. \"robot\" takes `C` half-way between estimate and truth, where the tangent is parallel to the error; the next column takes \
-         it at the estimate, as solution.json states it. What it misses is the curvature, not the size of any parameter (\"single \
+         ones. \"robot\" takes `C` half-way between estimate and truth, where the tangent is parallel to the error. It contains the estimated \
+         joint noise, which has an uncertainty of its own (the mean of `1 / estimate` is above `1 / truth`) and cannot be below zero (it is \
+         too large on average where there is none): the second column takes the noise that was put in, and judges the covariance \
+         alone. The third takes `C` at the estimate, as solution.json states it. What it misses is the curvature, not the size of any parameter (\"single \
          parameters\": mean of `e^2 / sigma^2` of each by itself) and not the flange.\n\n"
     );
     let _ = writeln!(out, "| joint noise, mrad | worlds | {} |", BLOCKS.join(" | "));

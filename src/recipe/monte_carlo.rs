@@ -9,6 +9,9 @@
 //! along the bad ones. The covariance is that of the tangent at the estimate; the truth lies many good sigmas beside that tangent.
 //! A chord of a parabola is parallel to its tangent half-way: to second order, `e` has the covariance that the same formula gives
 //! half-way between estimate and truth. Both are listed.
+//!
+//! The covariance contains the estimated joint noise, which has an uncertainty of its own (`E[1 / estimate] > 1 / truth`) and cannot be
+//! below zero (`E[estimate] > 0` where there is none). The half-way covariance with the joint noise that was put in has neither.
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use rayon::prelude::*;
@@ -22,10 +25,10 @@ use crate::error::Result;
 use crate::geom::Pose;
 use crate::linalg::SymmetricFactor;
 use crate::model::robot::{Robot, Stop};
-use crate::problem::{Slack, chained};
+use crate::problem::{Problem, Slack, State, chained};
 use crate::series::{Plate, PlateKind};
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
-use crate::solve::{Settings, covariance, linearise_all, noise_information, solve};
+use crate::solve::{JOINT_NOISE_FLOOR, Settings, covariance, linearise_all, noise_information, solve};
 use crate::urdf::{Chain, JointKind};
 
 /// What is tried.
@@ -42,8 +45,9 @@ pub struct MonteCarloRequest {
 }
 
 /// Blocks of parameters that are judged.
-pub const BLOCKS: [&str; 8] = [
+pub const BLOCKS: [&str; 9] = [
     "robot",
+    "robot, joint noise as put in",
     "robot, tangent at the estimate",
     "robot, single parameters",
     "camera",
@@ -170,8 +174,15 @@ fn world(request: &MonteCarloRequest, joint_noise_rad: f64, seed: u64) -> Result
 fn judged(s: &Solution, world: &SimulatedSeries, chain: &Chain) -> Result<Option<World>> {
     let truth = world.truth.robot(chain)?;
     let columns = robot_columns(s, &truth);
+    let half_way = half_way_to_truth(s, &columns);
+    let robot_by = |state: &State, problem: &Problem| {
+        let lin = linearise_all(problem, state)?;
+        let stated = covariance(problem, state, &lin).ok()?;
+        normalised(&robot_error(s, &columns, &stated.reduced))
+    };
     let blocks = [
-        half_way_covariance(s, &columns).and_then(|c| normalised(&robot_error(s, &columns, &c))),
+        robot_by(&half_way, &s.problem),
+        robot_by(&half_way, &with_joint_noise(&s.problem, &world.truth.joint_noise_sigma)),
         normalised(&robot_error(s, &columns, &s.covariance.reduced)),
         Some(single(&robot_error(s, &columns, &s.covariance.reduced))),
         normalised(&camera_error(s, world)),
@@ -244,17 +255,24 @@ fn robot_error(s: &Solution, columns: &[(usize, f64)], reduced: &DMatrix<f64>) -
     (error, DMatrix::from_fn(n, n, |i, k| reduced[(columns[i].0, columns[k].0)]))
 }
 
-/// Covariance by the formula of the program with the robot half-way to the truth, and everything else adjusted to that.
-fn half_way_covariance(s: &Solution, columns: &[(usize, f64)]) -> Option<DMatrix<f64>> {
+/// The robot half-way to the truth, and everything else adjusted to that.
+fn half_way_to_truth(s: &Solution, columns: &[(usize, f64)]) -> State {
     let (mut held, mut state) = (s.problem.clone(), s.state.clone());
     let estimates = state.values(&held.layout);
     for &(c, value) in columns {
         state.set_value(&held.layout, c, 0.5 * (estimates[c] + value));
         held.layout.columns[c].free = false;
     }
-    let state = solve(&held, state, &Settings::default()).state;
-    let lin = linearise_all(&s.problem, &state)?;
-    covariance(&s.problem, &state, &lin).ok().map(|c| c.reduced)
+    solve(&held, state, &Settings::default()).state
+}
+
+/// The problem with another joint noise, rad or m per reading.
+fn with_joint_noise(problem: &Problem, sigma: &[f64]) -> Problem {
+    let mut problem = problem.clone();
+    for of_camera in &mut problem.noise.joint {
+        of_camera.iter_mut().zip(sigma).for_each(|(known, s)| *known = s.max(JOINT_NOISE_FLOOR));
+    }
+    problem
 }
 
 fn camera_error(s: &Solution, world: &SimulatedSeries) -> ErrorWithCovariance {

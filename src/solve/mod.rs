@@ -11,7 +11,7 @@ mod snoop;
 mod system;
 
 pub use blocks::SeenMarkers;
-pub use components::{ComponentOptions, Tally, estimate_components, share_out};
+pub use components::{ComponentOptions, JOINT_NOISE_FLOOR, Tally, estimate_components, share_out};
 pub use covariance::{Covariance, covariance, covariance_by};
 pub use levenberg::{Outcome, Settings, Status, solve};
 pub use noise_information::{NoiseInformation, Spread, noise_information};
