@@ -27,7 +27,7 @@ fn terms_of(robot: &Robot, term: Term) -> Vec<f64> {
 
 #[test]
 fn a_stretched_arm_has_the_moment_of_its_masses() {
-    let loaded = chain("ur10e").with_payload(&PAYLOAD).unwrap();
+    let loaded = chain("ur10e").carrying(Some(&PAYLOAD)).unwrap();
     assert_eq!(loaded.payload(), Some(PAYLOAD));
     // The masses of the URDF as they hang behind the shoulder, with the arm stretched out level.
     let sag = |reading, value| Robot {
@@ -61,7 +61,7 @@ fn a_stretched_arm_has_the_moment_of_its_masses() {
 
 #[test]
 fn sag_of_the_loaded_arm_is_found() {
-    let loaded = chain("ur10e").with_payload(&PAYLOAD).unwrap();
+    let loaded = chain("ur10e").carrying(Some(&PAYLOAD)).unwrap();
     let plate = Plate::lattice(PlateKind::Points, 8, 6, 0.03, 0.03e-3);
     let errors = RobotErrors { gravity_rad: 0.5e-3, ..RobotErrors::default() };
     let request =
@@ -103,7 +103,7 @@ fn compliance_and_payload_survive_their_file() {
     let without = "[joint.joint_a2]\ncompliance_rad_per_nm = 2e-6\n";
     let refused = read_compensation(&write(without), chain("kuka_kr6_r900")).unwrap_err();
     assert!(refused.place.contains("joint_a2") && refused.what.contains("no masses"), "{refused}");
-    let heavy = chain("ur10e").with_payload(&Payload { mass_kg: f64::NAN, ..PAYLOAD }).unwrap_err();
+    let heavy = chain("ur10e").carrying(Some(&Payload { mass_kg: f64::NAN, ..PAYLOAD })).unwrap_err();
     assert!(heavy.remedy.contains("three numbers"), "{heavy}");
 }
 

@@ -15,6 +15,12 @@ pub struct Ratio {
     pub high: f64,
 }
 
+impl std::fmt::Display for Ratio {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{:.3} ({:.3} to {:.3})", self.value, self.low, self.high)
+    }
+}
+
 /// Resamplings of a bootstrap.
 const RESAMPLINGS: usize = 2000;
 

@@ -115,7 +115,7 @@ fn again(args: &IdentifyArgs, path: &Path) -> Result<Task> {
     let description = restore::robot_description(&record)?;
     let base = args.base.as_deref().unwrap_or(&record.robot.base);
     let tip = args.tip.as_deref().unwrap_or(&record.robot.tip);
-    let chain = restore::chain(&record, base, tip)?;
+    let chain = restore::chain(&record, &description, base, tip)?;
     let mut inputs = record.inputs.clone();
     inputs.push(InputFile::of_file(path)?);
     let notices = description.notices.clone();

@@ -213,11 +213,8 @@ fn two_stage(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     let Some((row, ratio)) = comparison.and_then(Comparison::best_two_stage) else { return Ok(()) };
     writeln!(
         out,
-        "stages    the best two-stage fit of the same images ({}) has {:.3} ({:.3} to {:.3}) times the error of the joint fit",
-        row.estimator.title(),
-        ratio.value,
-        ratio.low,
-        ratio.high
+        "stages    the best two-stage fit of the same images ({}) has {ratio} times the error of the joint fit",
+        row.estimator.title()
     )
 }
 

@@ -14,7 +14,8 @@ use crate::geom::{Pose, skew};
 
 /// Where the contour is sampled.
 struct Samples<const N: usize> {
-    cos_sin: [[f64; 2]; N],
+    /// On the circle of radius one in the plane of the plate.
+    unit: [Vector3<f64>; N],
     /// Spectral derivative with respect to the angle; antisymmetric.
     derivative: [[f64; N]; N],
 }
@@ -28,9 +29,9 @@ static FAR_SAMPLES: LazyLock<Samples<8>> = LazyLock::new(Samples::new);
 impl<const N: usize> Samples<N> {
     fn new() -> Self {
         let angle = |k: usize| TAU * k as f64 / N as f64;
-        let mut s = Self { cos_sin: [[0.0; 2]; N], derivative: [[0.0; N]; N] };
+        let mut s = Self { unit: [Vector3::zeros(); N], derivative: [[0.0; N]; N] };
         for i in 0..N {
-            s.cos_sin[i] = [angle(i).cos(), angle(i).sin()];
+            s.unit[i] = Vector3::new(angle(i).cos(), angle(i).sin(), 0.0);
             for j in 0..N {
                 if i != j {
                     let sign = if (i + j) % 2 == 0 { 0.5 } else { -0.5 };
@@ -101,8 +102,8 @@ fn centroid_of_contour<const N: usize>(
 ) -> Option<Prediction> {
     let mut samples = [Projection::default(); N];
     let mut uv = [Vector2::zeros(); N];
-    for (k, [c, s]) in at.cos_sin.iter().enumerate() {
-        let x = centre + Vector3::new(c * radius_m, s * radius_m, 0.0);
+    for (k, unit) in at.unit.iter().enumerate() {
+        let x = centre + unit * radius_m;
         samples[k] = camera.project_with_jacobian(&camera_from_plate.transform(&x))?;
         uv[k] = samples[k].uv;
     }
@@ -110,10 +111,10 @@ fn centroid_of_contour<const N: usize>(
     // With K_k = g_k d_point_k R: d_marker = sum K_k and d_phi = -sum K_k [centre + offset_k]x.
     let (mut d_marker, mut d_turn) = (Matrix2x3::zeros(), Matrix2x3::zeros());
     let mut d_camera = SMatrix::<f64, 2, MAX_PARAMETERS>::zeros();
-    for ((p, g), [c, s]) in samples.iter().zip(&weights).zip(&at.cos_sin) {
+    for ((p, g), unit) in samples.iter().zip(&weights).zip(&at.unit) {
         let k = g * p.d_point * camera_from_plate.rotation;
         d_marker += k;
-        d_turn += k * skew(&Vector3::new(c * radius_m, s * radius_m, 0.0));
+        d_turn += k * skew(&(unit * radius_m));
         d_camera += g * p.d_parameters;
     }
     let mut d_pose = SMatrix::<f64, 2, 6>::zeros();
@@ -160,8 +161,8 @@ fn centroid_of_samples<const N: usize>(
     radius_m: f64,
 ) -> Option<Vector2<f64>> {
     let mut uv = [Vector2::zeros(); N];
-    for (k, [c, s]) in at.cos_sin.iter().enumerate() {
-        let x = centre + Vector3::new(c * radius_m, s * radius_m, 0.0);
+    for (k, unit) in at.unit.iter().enumerate() {
+        let x = centre + unit * radius_m;
         uv[k] = camera.project(&camera_from_plate.transform(&x))?;
     }
     Some(centroid_weights(at, &uv).0)

@@ -203,47 +203,33 @@ impl Robot {
 
     /// Gravity moments in the nominal posture, gravity along -z of the base; a sagging joint turns the way its moment pulls.
     fn fill_gravity(&self, contexts: &mut [TermContext]) {
-        let weight = Vector3::new(0.0, 0.0, -1.0);
-        let mut pose = Pose::identity();
-        // Pose behind every joint; kind, axis and link rotation behind every driven one, base frame.
-        let (mut poses, mut links, mut moments) = (Vec::with_capacity(self.chain.joints.len()), Vec::new(), Vec::new());
-        for joint in &self.chain.joints {
+        let joints = &self.chain.joints;
+        // Pose behind every joint, base frame; the driven ones with their readings.
+        let (mut pose, mut poses, mut driven) = (Pose::identity(), Vec::with_capacity(joints.len()), Vec::new());
+        for (index, joint) in joints.iter().enumerate() {
             let position = joint.drive.map_or(0.0, |d| d.multiplier * contexts[d.reading].reading + d.offset);
             pose = pose * joint.origin * motion(joint, position);
-            if let Some(drive) = joint.drive {
-                links.push((drive.reading, joint.kind, joint.axis, pose.rotation));
-                let largest = self.chain.largest_moment(poses.len());
-                if largest > 0.0 {
-                    moments.push((drive.reading, poses.len(), largest));
-                }
-            }
+            driven.extend(joint.drive.map(|d| (index, d.reading)));
             poses.push(pose);
         }
-        for (reading, index, largest) in moments {
-            let (joint, axis) = (&self.chain.joints[index], poses[index].rotation * self.chain.joints[index].axis);
-            let of = |m: &CarriedMass| {
-                let lever = poses[m.joint].transform(&m.centre_m) - poses[index].translation;
-                m.mass_kg
-                    * if joint.kind == JointKind::Prismatic {
-                        axis.dot(&weight)
-                    } else {
-                        axis.dot(&lever.cross(&weight))
-                    }
+        let weight = Vector3::new(0.0, 0.0, -1.0);
+        let levers = |index: usize| levers(&joints[index].axis).map(|l| poses[index].rotation * l);
+        for (k, &(index, reading)) in driven.iter().enumerate() {
+            let axis = poses[index].rotation * joints[index].axis;
+            let moment = |lever: Vector3<f64>| match joints[index].kind {
+                JointKind::Prismatic => axis.dot(&weight),
+                _ => axis.dot(&lever.cross(&weight)),
             };
-            contexts[reading].moment =
-                self.chain.masses.iter().filter(|m| m.joint >= index).map(of).sum::<f64>() / largest;
-        }
-        for (k, (reading, kind, axis, rotation)) in links.iter().enumerate() {
-            let base_axis = rotation * axis;
-            let moment = |lever: Vector3<f64>| match kind {
-                JointKind::Prismatic => base_axis.dot(&weight),
-                _ => base_axis.dot(&lever.cross(&weight)),
-            };
-            let own = levers(axis).map(|l| moment(rotation * l));
-            let next = links.get(k + 1).map_or([0.0; 2], |(_, _, next_axis, next_rotation)| {
-                levers(next_axis).map(|l| moment(next_rotation * l))
-            });
-            contexts[*reading].gravity = [own[0], own[1], next[0], next[1]];
+            let of_mass =
+                |m: &CarriedMass| m.mass_kg * moment(poses[m.joint].transform(&m.centre_m) - poses[index].translation);
+            let largest = self.chain.largest_moment(index);
+            if largest > 0.0 {
+                let carried = self.chain.masses.iter().filter(|m| m.joint >= index);
+                contexts[reading].moment = carried.map(of_mass).sum::<f64>() / largest;
+            }
+            let own = levers(index).map(moment);
+            let next = driven.get(k + 1).map_or([0.0; 2], |&(next, _)| levers(next).map(moment));
+            contexts[reading].gravity = [own[0], own[1], next[0], next[1]];
         }
     }
 }

@@ -14,7 +14,7 @@ fn legend() -> Vec<String> {
 }
 
 fn ratio_text(ratio: Option<Ratio>) -> String {
-    ratio.map_or_else(|| "-".into(), |r| format!("{:.3} ({:.3} to {:.3})", r.value, r.low, r.high))
+    ratio.map_or_else(|| "-".into(), |r| r.to_string())
 }
 
 /// A comparison as a Markdown table.

@@ -47,13 +47,11 @@ pub fn compensated(chain: Chain, path: Option<&Path>) -> Result<Robot> {
 /// # Errors
 /// Names the file, and the line or joint: unreadable text, unknown keys, a joint that the chain does not have, wrong counts,
 /// a compliance where the URDF states no masses.
-pub fn read_compensation(path: &Path, mut chain: Chain) -> Result<Robot> {
+pub fn read_compensation(path: &Path, chain: Chain) -> Result<Robot> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
     let file: File = toml::from_str(&text)
         .map_err(|e| Error::input(path.display(), e, "use the compensation.toml that identify wrote"))?;
-    if let Some(payload) = &file.payload {
-        chain = chain.with_payload(payload).map_err(|e| Error::input(path.display(), e.what, e.remedy))?;
-    }
+    let chain = chain.carrying(file.payload.as_ref()).map_err(|e| Error::input(path.display(), e.what, e.remedy))?;
     let mut terms = Vec::new();
     for (name, joint) in &file.joint {
         let place = || format!("{}: [joint.{name}]", path.display());

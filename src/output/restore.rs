@@ -33,12 +33,8 @@ pub fn robot_description(record: &SolutionRecord) -> Result<RobotDescription> {
 ///
 /// # Errors
 /// Links that the URDF does not have.
-pub fn chain(record: &SolutionRecord, base: &str, tip: &str) -> Result<Chain> {
-    let chain = robot_description(record)?.chain(Some(base), Some(tip))?;
-    match &record.robot.payload {
-        Some(payload) => chain.with_payload(payload),
-        None => Ok(chain),
-    }
+pub fn chain(record: &SolutionRecord, description: &RobotDescription, base: &str, tip: &str) -> Result<Chain> {
+    description.chain(Some(base), Some(tip))?.carrying(record.robot.payload.as_ref())
 }
 
 fn plate(p: &PlateRecord) -> Result<Plate> {
@@ -139,7 +135,7 @@ pub struct FoundModel {
 /// # Errors
 /// A file that does not hang together.
 pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
-    let chain = chain(record, &record.robot.base, &record.robot.tip)?;
+    let chain = chain(record, &robot_description(record)?, &record.robot.base, &record.robot.tip)?;
     if chain.joints.len() != record.robot.joints.len() || chain.readings != record.robot.readings {
         return Err(damaged("robot and URDF text do not belong together"));
     }

@@ -59,6 +59,16 @@ fn condensed(
     Some((h, t))
 }
 
+fn condensed_candidate(
+    problem: &Problem,
+    setting: &Setting,
+    state: &State,
+    candidate: &Candidate,
+) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    let image = setting.image(state, "", &candidate.readings, candidate.placement)?;
+    condensed(problem, setting, state, &image)
+}
+
 /// Directions in the space of the columns about which images tell something, and those about which none does.
 ///
 /// Frames that lie fixed one behind the other, and all that is gauge, make up a third of the columns and more. With the prior scaled to
@@ -130,9 +140,7 @@ impl Told {
         state: &State,
         candidate: &Candidate,
     ) -> DMatrix<f64> {
-        let image = setting.image(state, "", &candidate.readings, candidate.placement);
-        let condensed = image.and_then(|image| condensed(problem, setting, state, &image));
-        condensed.map_or_else(
+        condensed_candidate(problem, setting, state, candidate).map_or_else(
             || DMatrix::zeros(self.rows(), self.rows()),
             |(h, t)| self.with_last(&carried(&h, &product(&t, &self.told)), 0.0),
         )
@@ -164,9 +172,9 @@ pub fn candidate_information(
     state: &State,
     candidate: &Candidate,
 ) -> DMatrix<f64> {
-    let image = setting.image(state, "", &candidate.readings, candidate.placement);
     let n = problem.layout.len();
-    image.and_then(|image| image_information(problem, setting, state, &image)).unwrap_or_else(|| DMatrix::zeros(n, n))
+    condensed_candidate(problem, setting, state, candidate)
+        .map_or_else(|| DMatrix::zeros(n, n), |(h, t)| carried(&h, &t))
 }
 
 /// `W = (P D)' (P D) / K`: the mean squared error of the flange's position over the targets is `tr(W cov)`, m^2.

@@ -178,6 +178,13 @@ impl Problem {
         Slack::exact(readings, !self.noise.tilt.is_empty())
     }
 
+    /// Starts all stops of the robot at right readings: [`Problem::exact_slack`], or none at all for readings that count as exact.
+    pub fn start_slack(&self, state: &mut State, readings_are_exact: bool) {
+        for (slack, image) in state.slack.iter_mut().zip(&self.images).filter(|(_, i)| i.stop.is_some()) {
+            *slack = if readings_are_exact { Slack::None } else { self.exact_slack(image) };
+        }
+    }
+
     /// Standard deviation of the whole joint noise of a camera's stops, per reading, rad or m.
     pub fn joint_sigma(&self, camera: usize) -> Vec<f64> {
         let local = self.noise.local.iter().chain(std::iter::repeat(&0.0));

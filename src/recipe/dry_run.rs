@@ -51,7 +51,7 @@ fn layout(options: &Options, chain: Chain, series: &[Series]) -> Result<(Layout,
 /// # Errors
 /// Joint names that do not match, unknown parameters, no stop of the robot.
 pub fn dry_run(chain: Chain, series: &[Series], options: &Options) -> Result<Identifiability> {
-    let chain = options.loaded(chain)?;
+    let chain = chain.carrying(options.payload.as_ref())?;
     let stops = stops(series, &chain)?;
     if stops.is_empty() {
         return Err(Error::input("joints.csv", "no row has joint readings", "record the joints of every stop"));

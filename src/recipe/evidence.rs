@@ -37,7 +37,7 @@ pub struct Evidence {
 /// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset, or readings and images do
 /// not belong together.
 pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
-    let chain = options.loaded(chain)?;
+    let chain = chain.carrying(options.payload.as_ref())?;
     if options.model != RobotModel::Auto {
         return identify_model(chain, series, options);
     }

@@ -83,19 +83,6 @@ impl Default for Options {
     }
 }
 
-impl Options {
-    /// The chain with the payload that is stated here.
-    ///
-    /// # Errors
-    /// A payload of a robot whose masses are not known.
-    pub(super) fn loaded(&self, chain: Chain) -> Result<Chain> {
-        match &self.payload {
-            Some(payload) => chain.with_payload(payload),
-            None => Ok(chain),
-        }
-    }
-}
-
 impl RobotModel {
     /// True where this model has such a term.
     pub fn has(self, term: Term) -> bool {
@@ -200,12 +187,7 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
 }
 
 fn fit(problem: &mut Problem, mut state: State, options: &Options) -> Outcome {
-    let exact = options.joint_noise == JointNoise::Known(0.0);
-    for (slack, image) in state.slack.iter_mut().zip(&problem.images) {
-        if image.stop.is_some() {
-            *slack = if exact { Slack::None } else { problem.exact_slack(image) };
-        }
-    }
+    problem.start_slack(&mut state, options.joint_noise == JointNoise::Known(0.0));
     if let JointNoise::Known(sigma) = options.joint_noise {
         problem.noise.joint.iter_mut().flatten().for_each(|s| *s = sigma.max(f64::MIN_POSITIVE));
     }

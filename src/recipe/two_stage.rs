@@ -443,11 +443,7 @@ fn with_cameras_for_the_robot(problem: &Problem, mut state: State, sizes: &[f64]
         *tilt = sizes[(camera + 1) * per_camera - 1].max(f64::MIN_POSITIVE);
     }
     let hard = sizes.iter().all(|s| *s == 0.0);
-    for (slack, image) in state.slack.iter_mut().zip(&given.images) {
-        if image.stop.is_some() {
-            *slack = if hard { Slack::None } else { given.exact_slack(image) };
-        }
-    }
+    given.start_slack(&mut state, hard);
     refitted(&given, &state)
 }
 
@@ -501,11 +497,7 @@ pub fn fit_joint(
     let mut own = problem.clone();
     let mut state = start.clone();
     let hard = estimator == Estimator::HardJoint || noise == JointNoise::Known(0.0);
-    for (slack, image) in state.slack.iter_mut().zip(&own.images) {
-        if image.stop.is_some() {
-            *slack = if hard { Slack::None } else { problem.exact_slack(image) };
-        }
-    }
+    own.start_slack(&mut state, hard);
     let first = if let JointNoise::Known(sigma) = noise { sigma } else { FIRST_JOINT_NOISE };
     own.noise.start_at(first.max(f64::MIN_POSITIVE));
     if hard || noise != JointNoise::Estimated {

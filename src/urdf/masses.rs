@@ -52,11 +52,12 @@ const LEAST_CARRIED_KG: f64 = 1.0;
 const ALIKE: usize = 3;
 
 impl Chain {
-    /// The chain with a payload in place of the one that it had.
+    /// The chain with a payload in place of the one that it had; as it is where none is stated.
     ///
     /// # Errors
     /// A mass or a centre that is none, and a URDF that states no masses: the payload alone says little of the moments.
-    pub fn with_payload(mut self, payload: &Payload) -> Result<Self> {
+    pub fn carrying(mut self, payload: Option<&Payload>) -> Result<Self> {
+        let Some(payload) = payload else { return Ok(self) };
         let refuse = |what: String, remedy: &str| Err(Error::input("payload", what, remedy));
         if !(payload.mass_kg >= 0.0 && payload.mass_kg.is_finite()) || payload.centre_m.iter().any(|x| !x.is_finite()) {
             return refuse(

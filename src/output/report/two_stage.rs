@@ -5,7 +5,6 @@ use maud::{Markup, html};
 use super::figure;
 use super::svg::{Anchor, Svg, round_below};
 use super::words::{count, fixed, significant};
-use crate::assess::Ratio;
 use crate::output::solution_json::SolutionRecord;
 use crate::recipe::{Comparison, Estimator};
 
@@ -29,7 +28,7 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
                     None => { td.n { "no solution" } td {} td {} },
                     Some(held) => {
                         td.n { (significant(held.rms_mm)) } td.n { (significant(held.rms_px)) }
-                        td.n { @if let Some(ratio) = held.to_joint.filter(|_| row.estimator != Estimator::Joint) { (ratio_words(ratio)) } }
+                        td.n { @if let Some(ratio) = held.to_joint.filter(|_| row.estimator != Estimator::Joint) { (ratio) } }
                     }
                 }
             } } }
@@ -39,10 +38,6 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
         }
         p.note { "With the joint fit that takes the readings as exact, and regions of the workspace held out: " code { "robotcal compare" } "." }
     }
-}
-
-fn ratio_words(ratio: Ratio) -> String {
-    format!("{} ({} to {})", fixed(ratio.value, 3), fixed(ratio.low, 3), fixed(ratio.high, 3))
 }
 
 fn verdict(comparison: &Comparison) -> String {
