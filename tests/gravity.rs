@@ -108,6 +108,15 @@ fn compliance_and_payload_survive_their_file() {
 }
 
 #[test]
+fn a_payload_in_grams_or_millimetres_is_refused() {
+    let refused = |payload: Payload| chain("ur10e").carrying(Some(&payload)).unwrap_err();
+    let grams = refused(Payload { mass_kg: 8000.0, ..PAYLOAD });
+    assert!(grams.what.contains("8000 kg") && grams.remedy.contains("not grams"), "{grams}");
+    let millimetres = refused(Payload { centre_m: [20.0, 0.0, 110.0], ..PAYLOAD });
+    assert!(millimetres.remedy.contains("not millimetres"), "{millimetres}");
+}
+
+#[test]
 fn masses_that_are_all_the_same_are_placeholders() {
     let link = |name: &str| {
         format!(

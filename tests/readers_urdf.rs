@@ -232,3 +232,15 @@ fn masses_are_carried_by_the_last_joint_of_the_chain_before_them() {
     // Rounding of cos(pi/2).
     assert!((by_link["gripper"].centre_m - Vector3::new(0.0, 0.1, 1.0)).norm() < 1e-15);
 }
+
+#[test]
+fn an_arm_in_millimetres_is_refused_wherever_it_stands() {
+    let arm = |stand: f64, link: f64| {
+        let at = |x: f64| format!("{Z}<origin xyz=\"{x} 0 0\"/>");
+        let joints = [joint("j1", "revolute", "hall", "a", &at(stand)), joint("j2", "revolute", "a", "b", &at(link))];
+        robot(&wrap(&["hall", "a", "b"], &joints)).chain(None, None)
+    };
+    assert!(arm(80.0, 0.4).is_ok());
+    let error = arm(80.0, 400.0).unwrap_err();
+    assert!(error.what.contains("400 m long") && error.remedy.contains("millimetres"), "{error}");
+}

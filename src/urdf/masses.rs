@@ -48,6 +48,9 @@ const PAYLOAD: &str = "payload";
 /// Mass (kg) that the joints of an arm carry at least; a URDF that states less leaves its masses out.
 const LEAST_CARRIED_KG: f64 = 1.0;
 
+/// How far a centre of mass may be from the tip link, m.
+const FARTHEST_PAYLOAD_M: f64 = 3.0;
+
 /// Fewest links whose masses, all the same, are placeholders.
 const ALIKE: usize = 3;
 
@@ -55,7 +58,7 @@ impl Chain {
     /// The chain with a payload in place of the one that it had; as it is where none is stated.
     ///
     /// # Errors
-    /// A mass or a centre that is none, and a URDF that states no masses: the payload alone says little of the moments.
+    /// A mass or a centre that is none or in other units, and a URDF that states no masses: the payload alone says little of the moments.
     pub fn carrying(mut self, payload: Option<&Payload>) -> Result<Self> {
         let Some(payload) = payload else { return Ok(self) };
         let refuse = |what: String, remedy: &str| Err(Error::input("payload", what, remedy));
@@ -65,12 +68,21 @@ impl Chain {
                 "give a mass and three numbers",
             );
         }
+        if Vector3::from(payload.centre_m).norm() > FARTHEST_PAYLOAD_M {
+            let what = format!("its centre of mass lies at {:?} m in the frame of the tip link", payload.centre_m);
+            return refuse(what, "give centre_m in metres, not millimetres");
+        }
         self.masses.retain(|m| m.link != PAYLOAD);
         let Some(joint) = self.joints.len().checked_sub(1).filter(|_| !self.masses.is_empty()) else {
             let what =
                 "the URDF states no masses of its links, without which a payload does not give the moments of gravity";
             return refuse(what.into(), "leave the payload out, or add <inertial> to the links");
         };
+        let links: f64 = self.masses.iter().map(|m| m.mass_kg).sum();
+        if payload.mass_kg > links {
+            let what = format!("{} kg, more than the moving links of the arm ({links:.1} kg)", payload.mass_kg);
+            return refuse(what, "give mass_kg in kilograms, not grams; or correct the masses in the URDF");
+        }
         self.masses.push(CarriedMass {
             link: PAYLOAD.into(),
             joint,

@@ -10,6 +10,9 @@ use super::elements::JointElement;
 use super::read::{RobotDescription, suggest};
 use crate::{Error, Result};
 
+/// Links of an arm together are shorter, m; the smallest arms in millimetres are longer.
+const LONGEST_ARM_M: f64 = 50.0;
+
 impl RobotDescription {
     /// Names of all links, in the order of the file.
     pub fn links(&self) -> impl Iterator<Item = &str> + Clone {
@@ -23,7 +26,7 @@ impl RobotDescription {
     ///
     /// # Errors
     /// Unknown links, several roots or leaves without a choice, a base that is not above the tip, joints of a type
-    /// that has no single reading (floating, planar, spherical), mimic joints that lead nowhere.
+    /// that has no single reading (floating, planar, spherical), mimic joints that lead nowhere, lengths in millimetres.
     pub fn chain(&self, base: Option<&str>, tip: Option<&str>) -> Result<Chain> {
         let base = match base {
             Some(name) => self.known_link(name, "base")?,
@@ -50,8 +53,23 @@ impl RobotDescription {
             let what = format!("no joint moves between \"{base}\" and \"{tip}\"");
             return Err(Error::input(self.path.display(), what, "choose another base or tip link"));
         }
+        self.refuse_millimetres(&chain)?;
         chain.masses = self.stated_masses(&chain);
         Ok(chain)
+    }
+
+    /// The first joint that moves may stand anywhere in a hall; from there on it is the arm.
+    fn refuse_millimetres(&self, chain: &Chain) -> Result<()> {
+        let arm = chain.joints.iter().skip_while(|j| j.drive.is_none()).skip(1);
+        let length: f64 = arm.map(|j| j.origin.translation.norm()).sum();
+        if length < LONGEST_ARM_M {
+            return Ok(());
+        }
+        let what =
+            format!("the links between \"{}\" and \"{}\" are {length:.0} m long together", chain.base, chain.tip);
+        let remedy =
+            "a URDF has metres: if these are millimetres, divide the xyz of all origins by 1000 (and scale the meshes)";
+        Err(Error::input(self.path.display(), what, remedy))
     }
 
     /// The joint above a link.
