@@ -16,7 +16,8 @@ use robotcal::output::restore::{found_model, measured_series, robot_description}
 use robotcal::output::{files, solution_json};
 use robotcal::problem::{Layout, State, short_name};
 use robotcal::recipe::{
-    Config, Options, Parameters, RobotModel, Selection, Solution, StatedPrior, identify, measured, verify_series,
+    Config, JointNoise, Options, Parameters, RobotModel, Selection, Solution, StatedPrior, identify, measured,
+    verify_series,
 };
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{WorldRequest, series};
@@ -240,15 +241,19 @@ fn world(seed: u64, joint_noise_rad: f64) -> robotcal::recipe::MeasuredSeries {
 }
 
 #[test]
-fn clusters_do_not_contradict_a_right_noise_model() {
-    const SEEDS: u64 = 6;
-    let right = Options { model: RobotModel::Rigid, ..Options::default() };
-    let ratios: Vec<f64> = (1..=SEEDS)
-        .map(|seed| identify(chain(), &[world(seed, 1e-4)], &right).unwrap().worth.clustered_ratio.unwrap())
+fn clusters_contradict_a_wrong_noise_model_and_no_right_one() {
+    let ratio = |seed: u64, model: RobotModel, joint_noise: JointNoise| {
+        let options = Options { model, joint_noise, ..Options::default() };
+        identify(chain(), &[world(seed, 1e-4)], &options).unwrap().worth
+    };
+    let right: Vec<f64> = (1..=4)
+        .flat_map(|seed| [RobotModel::Rigid, RobotModel::Full].map(|m| ratio(seed, m, JointNoise::Estimated)))
+        .map(|worth| worth.clustered_ratio.unwrap())
         .collect();
-    println!("right noise model: {ratios:?}");
-    // The sandwich is somewhat cautious (1.21 on average over these worlds), and must not contradict a right model.
-    assert!(ratios.iter().all(|r| (0.8..1.5).contains(r)), "{ratios:?}");
+    let wrong = ratio(1, RobotModel::Rigid, JointNoise::Known(0.0));
+    println!("right noise model {right:?}, readings taken as exact {:?}", wrong.clustered_ratio);
+    assert!(right.iter().all(|r| (0.8..1.15).contains(r)), "{right:?}");
+    assert!(wrong.larger_stated && wrong.clustered_ratio.unwrap() > 1.5, "{:?}", wrong.clustered_ratio);
 }
 
 #[test]

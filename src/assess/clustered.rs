@@ -1,139 +1,120 @@
 //! Covariance that trusts the scatter between images more than the model of the noise.
 //!
-//! With the score `g_j` of image `j` (slack of the image included, whose own score is zero at the optimum), the covariance `C` and
-//! the prior information `P`, the sandwich is `C (sum f_j^2 g_j g_j' + P) C`; priors count as the observations that they stand for.
-//! `f_j` gives back what the fit took of the scatter of an image: with the information `S_j` of its pose and the covariance `Q_j`
-//! of the predicted one, `f^2 = tr QS / (tr QS - tr QSQS)` (after R. Bell, D. McCaffrey 2002, in the trace). Where noise is as the
-//! model says the sandwich has the expectation `C` (K.-Y. Liang, S. Zeger 1986).
+//! Markers count as known here: every one is told by many images, and a shift of all of them is none of the plate. With the
+//! information `S = R R'` of an image about its pose and intrinsics, joint noise eliminated, and their derivatives `T` by the
+//! columns, the covariance is `K = (sum T' S T + P)^-1` with the prior information `P`. With the scores `b` of the images (the slack
+//! included, whose own score is zero at the optimum) the sandwich is `K (sum T' b b' T + P) K`; priors count as the observations that
+//! they stand for.
+//!
+//! The fit has taken a part of the scatter of every image: `b` has the covariance `S - S Q S`, `Q = T K T'`, in the place of `S`.
+//! `R (1 - R' Q R)^-1/2 R^-1 b` has `S` again (R. Bell, D. McCaffrey 2002). Where noise is as the model says the sandwich has the
+//! expectation `K` (K.-Y. Liang, S. Zeger 1986).
 
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, DVector};
 
-use crate::linalg::product;
-use crate::problem::{Problem, Slack, State};
-use crate::solve::{Covariance, Linearised, SeenMarkers};
+use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
+use crate::problem::{E, Problem, Slack, State, by_columns, condensed};
+use crate::solve::Linearised;
 
-/// Largest correction of the scatter of one image: beyond it the image alone decides what it is compared with.
-const MOST_CORRECTION: f64 = 5.0;
+/// Largest part of the scatter of one image that counts as taken: beyond it the image alone decides what it is compared with.
+const MOST_TAKEN: f64 = 0.8;
 
 /// Fewest images whose scatter says anything.
 const FEWEST_IMAGES: usize = 10;
 
-/// Covariance of the dense columns by clusters of images; `None` for too few images.
-pub fn clustered_covariance(
-    problem: &Problem,
-    state: &State,
-    lin: &Linearised,
-    covariance: &Covariance,
-) -> Option<DMatrix<f64>> {
+/// Covariances of the dense columns with known markers.
+#[derive(Debug, Clone)]
+pub struct Clustered {
+    /// By the model of the noise, `K`.
+    pub model: DMatrix<f64>,
+    /// By the scatter between images.
+    pub sandwich: DMatrix<f64>,
+}
+
+impl Clustered {
+    /// Sigma of every column by the scatter between images over that by the model; 1 where there is nothing to compare.
+    pub fn ratios(&self) -> impl Iterator<Item = f64> {
+        let pairs =
+            self.model.diagonal().iter().zip(&self.sandwich.diagonal()).map(|(m, s)| (*m, *s)).collect::<Vec<_>>();
+        pairs.into_iter().map(|(model, sandwich)| if model > 0.0 { (sandwich / model).max(0.0).sqrt() } else { 1.0 })
+    }
+}
+
+/// Both covariances; `None` for too few images.
+pub fn clustered_covariance(problem: &Problem, state: &State, lin: &Linearised) -> Option<Clustered> {
     if lin.images.len() < FEWEST_IMAGES {
         return None;
     }
-    let dense = problem.layout.len();
-    let of_dense = covariance.reduced.view((0, 0), (dense, dense)).into_owned();
-    let markers = SeenMarkers::of(problem, lin);
-    let with_markers = covariance_with_dense(&markers, problem, state, lin, covariance);
-    let mut sum = DMatrix::zeros(dense, dense);
-    for k in 0..lin.images.len() {
-        let (of_image, of_markers) = score(problem, lin, k, &markers);
-        let influence = &of_dense * of_image + &with_markers * of_markers;
-        sum += &influence * influence.transpose() * correction(problem, state, lin, k, &of_dense);
+    let (n, columns) = (problem.layout.len(), &problem.layout.columns);
+    let images: Vec<Told> = (0..lin.images.len()).filter_map(|k| Told::of(problem, state, lin, k)).collect();
+    let free: Vec<usize> = (0..n).filter(|&c| columns[c].free).collect();
+    let prior = DVector::from_iterator(free.len(), free.iter().map(|&c| columns[c].prior_sigma.recip()));
+    let mut information = DMatrix::from_diagonal(&prior.component_mul(&prior));
+    let derivatives: Vec<DMatrix<f64>> = images.iter().map(|t| t.by_root.select_columns(&free)).collect();
+    for d in &derivatives {
+        information += product(&d.transpose(), d);
     }
-    let priors = DVector::from_iterator(dense, problem.layout.columns.iter().map(|c| c.prior_sigma.recip()));
-    let by_priors = &of_dense * DMatrix::from_diagonal(&priors);
-    let mut by_markers = with_markers.clone();
-    for (at, &(plate, marker)) in markers.order.iter().enumerate() {
-        by_markers.columns_mut(3 * at, 3).scale_mut(problem.marker_information(plate, marker).sqrt());
+    let model = SymmetricFactor::new(&information).ok()?.inverse();
+    let by_prior = &model * DMatrix::from_diagonal(&prior);
+    let mut sandwich = product(&by_prior, &by_prior.transpose());
+    for (told, d) in images.iter().zip(&derivatives) {
+        let influence = &model * d.tr_mul(&told.restored(&product(d, &product(&model, &d.transpose())))?);
+        sandwich.ger(1.0, &influence, &influence, 1.0);
     }
-    sum += product(&by_priors, &by_priors.transpose()) + product(&by_markers, &by_markers.transpose());
-    Some((&sum + sum.transpose()) * 0.5)
-}
-
-/// Dense columns x 3 markers.
-fn covariance_with_dense(
-    markers: &SeenMarkers,
-    problem: &Problem,
-    state: &State,
-    lin: &Linearised,
-    covariance: &Covariance,
-) -> DMatrix<f64> {
-    let dense = problem.layout.len();
-    let reduced = &covariance.reduced;
-    let slack_start = &covariance.system.slack_start;
-    if slack_start.is_empty() {
-        // The slack was eliminated: markers follow the dense columns in this order.
-        return reduced.view((0, dense), (dense, 3 * markers.order.len())).into_owned();
-    }
-    let mut coupling = DMatrix::zeros(3 * markers.order.len(), reduced.nrows());
-    for (k, &i) in lin.images.iter().enumerate() {
-        let image = &problem.images[i];
-        let chain = &lin.chains[k];
-        let columns = problem.layout.intrinsics(image);
-        let couplings = lin.equations(problem, state, k).map_or_else(Vec::new, |e| e.marker_couplings());
-        for t in &couplings {
-            let Some(at) = markers.number[image.plate][t.marker] else { continue };
-            let mp = DMatrix::from_column_slice(3, 6, t.mp.as_slice());
-            let mut rows = coupling.rows_mut(3 * at, 3);
-            let mut theta = rows.columns_mut(0, chain.d_theta.ncols());
-            theta += &mp * &chain.d_theta;
-            let mut slack = rows.columns_mut(slack_start[k], chain.d_slack.ncols());
-            slack += &mp * &chain.d_slack;
-            for (e, values) in t.intrinsics() {
-                if let Some(c) = columns[e] {
-                    let mut column = rows.fixed_columns_mut::<1>(c);
-                    column += values;
-                }
-            }
+    let whole = |part: &DMatrix<f64>| {
+        let mut whole = DMatrix::zeros(n, n);
+        for (i, &row) in free.iter().enumerate() {
+            free.iter().enumerate().for_each(|(k, &column)| whole[(row, column)] = part[(i, k)]);
         }
-    }
-    for (at, information) in markers.information(problem, lin).iter().enumerate() {
-        let inverse = information.try_inverse().unwrap_or_else(Matrix3::zeros);
-        let rows = DMatrix::from_column_slice(3, 3, inverse.as_slice()) * coupling.rows(3 * at, 3);
-        coupling.rows_mut(3 * at, 3).copy_from(&rows);
-    }
-    -product(&reduced.rows(0, dense).into_owned(), &coupling.transpose())
-}
-
-/// Gradient of the k-th image in use: dense columns, and markers.
-fn score(problem: &Problem, lin: &Linearised, k: usize, markers: &SeenMarkers) -> (DVector<f64>, DVector<f64>) {
-    let (terms, chain, image) = (&lin.terms[k], &lin.chains[k], &problem.images[lin.images[k]]);
-    let mut dense = DVector::zeros(problem.layout.len());
-    let of_theta = chain.d_theta.transpose() * DVector::from_column_slice(terms.bp.as_slice());
-    dense.rows_mut(0, of_theta.len()).copy_from(&of_theta);
-    for (e, column) in problem.layout.intrinsics(image).into_iter().enumerate() {
-        if let Some(c) = column {
-            dense[c] += terms.be[e];
-        }
-    }
-    let mut of_markers = DVector::zeros(3 * markers.order.len());
-    for t in &terms.markers {
-        if let Some(at) = markers.number[image.plate][t.marker] {
-            of_markers.fixed_rows_mut::<3>(3 * at).copy_from(&t.bm);
-        }
-    }
-    (dense, of_markers)
-}
-
-/// `f_j^2` of the k-th image in use.
-fn correction(problem: &Problem, state: &State, lin: &Linearised, k: usize, of_dense: &DMatrix<f64>) -> f64 {
-    let (terms, chain, i) = (&lin.terms[k], &lin.chains[k], lin.images[k]);
-    let pp = DMatrix::from_column_slice(6, 6, terms.pp.as_slice());
-    let s = match &state.slack[i] {
-        Slack::Pose(_) => return 1.0,
-        Slack::None => pp,
-        Slack::Joints(dq) => {
-            let l = &chain.d_slack;
-            let mut h = l.transpose() * &pp * l;
-            for r in 0..dq.len() {
-                h[(r, r)] += problem.slack_information(&problem.images[i], r);
-            }
-            let Some(inverse) = h.try_inverse() else { return 1.0 };
-            let pl = &pp * l;
-            &pp - &pl * inverse * pl.transpose()
-        }
+        whole
     };
-    let theta = chain.d_theta.ncols();
-    let q = &chain.d_theta * of_dense.view((0, 0), (theta, theta)) * chain.d_theta.transpose();
-    let qs = q * s;
-    let (first, second) = (qs.trace(), (&qs * &qs).trace());
-    if first > 0.0 && first > second { (first / (first - second)).clamp(1.0, MOST_CORRECTION) } else { MOST_CORRECTION }
+    Some(Clustered { model: whole(&model), sandwich: whole(&sandwich) })
+}
+
+/// What one image tells.
+struct Told {
+    /// `R^-1 b`.
+    score: DVector<f64>,
+    /// `R' T`.
+    by_root: DMatrix<f64>,
+}
+
+impl Told {
+    /// Of the k-th image in use.
+    fn of(problem: &Problem, state: &State, lin: &Linearised, k: usize) -> Option<Self> {
+        let (terms, chain, i) = (&lin.terms[k], &lin.chains[k], lin.images[k]);
+        let image = &problem.images[i];
+        let known = |r: usize| match &state.slack[i] {
+            Slack::Joints(_) => problem.slack_information(image, r),
+            _ => 0.0,
+        };
+        let slack: Vec<f64> = (0..state.slack[i].len()).map(known).collect();
+        let (root, inverse) = roots(&condensed(terms, &chain.d_slack, &slack)?)?;
+        let score = DVector::from_iterator(6 + E, terms.bp.iter().chain(terms.be.iter().take(E)).copied());
+        let by_root = product(&root.transpose(), &by_columns(&problem.layout, image, chain));
+        Some(Self { score: inverse * score, by_root })
+    }
+
+    /// The score with what the fit took of its scatter, of which `taken` is `R' Q R`.
+    fn restored(&self, taken: &DMatrix<f64>) -> Option<DVector<f64>> {
+        let (taken, directions) = symmetric_eigen(taken)?;
+        let back = taken.map(|h| (1.0 - h.clamp(0.0, MOST_TAKEN)).sqrt().recip());
+        Some(&directions * back.component_mul(&directions.tr_mul(&self.score)))
+    }
+}
+
+/// Smallest eigenvalue of an information in units of its diagonal that counts.
+const SINGULAR: f64 = 1e-10;
+
+/// A root `R` of `S = R R'` and its inverse, which is zero where nothing is told.
+fn roots(s: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    let n = s.nrows();
+    let unit = s.diagonal().map(|v| v.max(0.0).sqrt());
+    let inverse = unit.map(|u| if u > 0.0 { 1.0 / u } else { 0.0 });
+    let (values, vectors) = symmetric_eigen(&DMatrix::from_fn(n, n, |i, j| s[(i, j)] * inverse[i] * inverse[j]))?;
+    let told = |v: f64, f: fn(f64) -> f64| if v > SINGULAR { f(v) } else { 0.0 };
+    let of = |scale: &DVector<f64>, f: fn(f64) -> f64| {
+        DMatrix::from_fn(n, n, |i, k| scale[i] * vectors[(i, k)] * told(values[k], f))
+    };
+    Some((of(&unit, f64::sqrt), of(&inverse, |v| v.sqrt().recip()).transpose()))
 }

@@ -13,7 +13,7 @@ mod stops;
 mod truth;
 
 pub use advice::Advice;
-pub use clustered::clustered_covariance;
+pub use clustered::{Clustered, clustered_covariance};
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
 pub use hold_out::{
     Accuracy, Errors, ImageError, folds, hold_out, hold_out_images, predict_image, refitted, without_images,

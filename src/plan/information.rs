@@ -6,9 +6,9 @@ use super::candidates::Candidate;
 use super::criterion::Criterion;
 use super::setting::Setting;
 use crate::geom::skew;
-use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
+use crate::linalg::{product, symmetric_eigen};
 use crate::model::robot::{Robot, Stop};
-use crate::problem::{E, Image, Problem, State, Weighting, chained, linearise};
+use crate::problem::{self, Image, Problem, State, Weighting, by_columns, chained, linearise};
 
 /// Information of an image about all columns; `None` where it shows nothing.
 ///
@@ -35,27 +35,9 @@ fn condensed(
     let slack = setting.slack();
     let chain = chained(problem, state, image, &slack)?;
     let terms = linearise(image, state, &chain.pose, &Weighting::of(problem, image))?;
-    let mut h = DMatrix::zeros(6 + E, 6 + E);
-    h.view_mut((0, 0), (6, 6)).copy_from(&terms.pp);
-    h.view_mut((0, 6), (6, E)).copy_from(&terms.pe.columns(0, E));
-    h.view_mut((6, 0), (E, 6)).copy_from(&terms.pe.columns(0, E).transpose());
-    h.view_mut((6, 6), (E, E)).copy_from(&terms.ee.view((0, 0), (E, E)));
-    let n = chain.d_slack.ncols();
-    let coupling = chain.d_slack.transpose() * h.rows(0, 6);
-    let mut joint = coupling.columns(0, 6) * &chain.d_slack;
-    for k in 0..n {
-        joint[(k, k)] += problem.noise.joint[image.camera][k].powi(-2);
-    }
-    h -= coupling.transpose() * SymmetricFactor::new(&joint).ok()?.solve_many(&coupling);
-    // Columns of the layout by the pose and the intrinsics: T = [G 0; 0 1].
-    let layout = &problem.layout;
-    let mut t = DMatrix::zeros(6 + E, layout.len());
-    t.view_mut((0, 0), (6, layout.theta_len())).copy_from(&chain.d_theta);
-    for (k, column) in layout.intrinsics(image).into_iter().enumerate().take(E) {
-        if let Some(c) = column {
-            t[(6 + k, c)] = 1.0;
-        }
-    }
+    let slack: Vec<f64> = problem.noise.joint[image.camera].iter().map(|s| s.powi(-2)).collect();
+    let h = problem::condensed(&terms, &chain.d_slack, &slack)?;
+    let t = by_columns(&problem.layout, image, &chain);
     Some((h, t))
 }
 

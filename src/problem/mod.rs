@@ -3,6 +3,7 @@
 //! [`Problem`] holds the data and never changes during a solve; [`State`] holds every unknown; [`Layout`] is the one place
 //! that turns a name into a column. The unit of residual evaluation is one image ([`linearise`]).
 
+mod condensed;
 mod equations;
 mod family;
 mod layout;
@@ -11,6 +12,7 @@ mod postures;
 mod select;
 mod state;
 
+pub use condensed::{by_columns, condensed};
 pub use equations::{Equations, MarkerCoupling, MarkerTerms, Sight};
 pub use family::Family;
 pub use layout::{Column, Layout, OriginPrior};

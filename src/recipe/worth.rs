@@ -13,10 +13,6 @@ use crate::solve::{Covariance, Linearised, noise_information};
 /// Ratio of the sigma of the flange by clusters to that by the model from which the larger one is reported.
 const REPORT_LARGER: f64 = 1.5;
 
-/// Images for every direction told from which their scatter can speak against the noise model: of fewer, the sandwich is a sum of
-/// too few terms.
-const IMAGES_PER_DIRECTION: usize = 2;
-
 /// Sigmas of a 95 % interval.
 pub(super) const NORMAL_95: f64 = 1.96;
 
@@ -72,13 +68,11 @@ pub(super) fn judge(
         joint_noise: joint_noise(problem, state, lin, covariance),
         ..Worth::default()
     };
-    if let Some(clustered) = clustered_covariance(problem, state, lin, covariance) {
-        let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops));
-        worth.clustered_ratio = model.map(|m| m.ratio_of(&clustered));
-        let by_clusters = sigmas(&clustered);
-        let told = worth.identifiability.as_ref().map_or(0, |i| i.rank);
-        let enough = lin.images.len() >= IMAGES_PER_DIRECTION * told;
-        if let Some(ratio) = worth.clustered_ratio.filter(|r| enough && *r > REPORT_LARGER) {
+    if let Some(clustered) = clustered_covariance(problem, state, lin) {
+        let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &clustered.model, &stops));
+        worth.clustered_ratio = model.map(|m| m.ratio_of(&clustered.sandwich));
+        let by_clusters: Vec<f64> = worth.model_sigma.iter().zip(clustered.ratios()).map(|(s, r)| s * r).collect();
+        if let Some(ratio) = worth.clustered_ratio.filter(|r| *r > REPORT_LARGER) {
             worth.larger_stated = true;
             enlarge(covariance, &worth.model_sigma, &by_clusters, problem.layout.theta_len());
             worth.identifiability = identifiability(&state.robot, layout, &stops, &covariance.reduced);

@@ -5,6 +5,7 @@
 mod bias;
 mod identity;
 mod precision;
+mod precision_plot;
 
 use std::collections::BTreeMap;
 use std::fmt::Write;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Claim, Section};
+use super::{Claim, Section, precision_plot};
 use crate::plan::plate_design::LEAST_MINOR_AXIS_PX;
 use crate::simulate::image_study::{MAP_OFF_PX, Precision};
 
@@ -37,7 +37,8 @@ pub fn precision_section(study: &[Precision]) -> Section {
             writeln!(text, " {:.5} | {:.2} | {:.2} | {:.2} |", p.rms_px, p.to_formula, p.to_bound, p.normalised)
         };
     }
-    Section { title: "Precision".to_owned(), claims: claims(study), text, plots: Vec::new() }
+    let plots = vec![("image-stage-precision.svg".to_owned(), precision_plot::plot(study, LARGEST_RATIO))];
+    Section { title: "Precision".to_owned(), claims: claims(study), text, plots }
 }
 
 fn setup() -> String {
