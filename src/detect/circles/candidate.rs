@@ -127,8 +127,7 @@ impl Profile {
                     count += 1;
                 }
             }
-            values[..count].sort_by(f32::total_cmp);
-            if count == 0 { 0.0 } else { values[count / 2] }
+            if count == 0 { 0.0 } else { *values[..count].select_nth_unstable_by(count / 2, f32::total_cmp).1 }
         };
         let mean = |a: f32, b: f32| 0.5 * (a + b);
         Self { centre: mean(at(0.0), at(0.2)), ring: at(0.76), paper: at(beyond) }

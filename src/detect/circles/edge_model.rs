@@ -47,11 +47,11 @@ pub(super) struct Pixels {
     /// Residual of every pixel, counts (unweighted).
     pub residual: Vec<f32>,
     /// Weighted residuals.
-    weighted: Vec<f32>,
+    pub weighted: Vec<f32>,
     /// Columns of the weighted Jacobian.
     columns: Vec<Vec<f32>>,
-    /// Weighted residuals that a lopsidedness along either axis leaves.
-    lobes: [Vec<f32>; 2],
+    /// Whatever is summed up last: the weighted residuals that a lopsidedness along either axis leaves, or those off the edge.
+    pub work: [Vec<f32>; 2],
     pub nodes: Nodes,
     /// Even paper and ink beyond the band.
     pub flat: Flat,
@@ -141,7 +141,7 @@ impl Pixels {
         self.residual.resize(n, 0.0);
         self.weighted.resize(n, 0.0);
         self.columns.resize_with(ANNULUS, Vec::new);
-        self.columns.iter_mut().chain(&mut self.lobes).for_each(|c| c.resize(n, 0.0));
+        self.columns.iter_mut().chain(&mut self.work).for_each(|c| c.resize(n, 0.0));
         self.outer.resize(n);
         self.inner.resize(n);
     }
@@ -281,7 +281,7 @@ impl Pixels {
         let inner = if state.inner.is_some() { -factor } else { 0.0 };
         let (ink, mask) = (&self.ink[..n], &self.mask[..n]);
         let (outer, inner) = (self.outer.lobes(n, factor), self.inner.lobes(n, inner));
-        let [along_x, along_y] = &mut self.lobes;
+        let [along_x, along_y] = &mut self.work;
         let (along_x, along_y) = (&mut along_x[..n], &mut along_y[..n]);
         for i in 0..n {
             let root = mask[i] / (v_white + (v_dark - v_white) * ink[i]).max(0.1 * v_dark).sqrt();
@@ -364,7 +364,7 @@ fn exact_columns(terms: &EdgeTerms, columns: &mut [Vec<f32>], first: bool, third
 
 /// Product of two columns, whose length is a multiple of the lanes.
 #[inline(always)]
-fn dot(a: &[f32], b: &[f32]) -> f64 {
+pub(super) fn dot(a: &[f32], b: &[f32]) -> f64 {
     const WIDE: usize = 4 * LANES;
     let mut sums = [0.0f32; WIDE];
     let whole = a.len() / WIDE * WIDE;

@@ -297,7 +297,7 @@ fn finish(
 ) -> Result<Fit, Reason> {
     let parameters = state.parameters();
     let n = pixels.count;
-    let left = Squares::of(pixels, start.noise);
+    let left = Squares::of(pixels);
     let rms = (left.plain / n as f64).sqrt();
     let even = pixels.flat.squares(state);
     let freedom = (n - parameters) as f64 + pixels.flat.paper.count + pixels.flat.ink.count;

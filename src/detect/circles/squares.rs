@@ -1,6 +1,6 @@
 //! How well the blurred-edge model fits: sums of squared residuals over the pixels of a band.
 
-use super::edge_model::{LANES, Pixels};
+use super::edge_model::{Pixels, dot};
 use crate::linalg::wide;
 
 /// Sums over the pixels of a band.
@@ -18,42 +18,33 @@ pub(super) struct Squares {
 const OFF_EDGE: f32 = 0.02;
 
 impl Squares {
-    /// Of the residuals of the last evaluation; `noise` are the variances of a pixel on paper and on ink.
-    pub fn of(pixels: &Pixels, noise: [f64; 2]) -> Self {
+    /// Of the residuals of the last evaluation.
+    pub fn of(pixels: &mut Pixels) -> Self {
         wide(
             #[inline(always)]
-            || Self::lanes(pixels, noise),
+            || Self::lanes(pixels),
         )
     }
 
     #[inline(always)]
-    fn lanes(pixels: &Pixels, noise: [f64; 2]) -> Self {
+    fn lanes(pixels: &mut Pixels) -> Self {
         let n = pixels.x.len();
-        let (v_white, v_step) = (noise[0] as f32, (noise[1] - noise[0]) as f32);
         let (ink, mask, residual) = (&pixels.ink[..n], &pixels.mask[..n], &pixels.residual[..n]);
-        let (mut plain, mut weighted) = ([0.0f32; LANES], [0.0f32; LANES]);
-        let (mut on_paper, mut on_ink) = ([0.0f32; LANES], [0.0f32; LANES]);
-        let (mut papers, mut inks) = ([0.0f32; LANES], [0.0f32; LANES]);
-        for from in (0..n).step_by(LANES) {
-            let lanes = from..from + LANES;
-            let (ink, mask, residual) = (&ink[lanes.clone()], &mask[lanes.clone()], &residual[lanes]);
-            for k in 0..LANES {
-                let square = residual[k] * residual[k];
-                let paper = if ink[k] < OFF_EDGE { mask[k] } else { 0.0 };
-                let dark = if ink[k] > 1.0 - OFF_EDGE { mask[k] } else { 0.0 };
-                plain[k] += square;
-                weighted[k] += square / (v_white + v_step * ink[k]);
-                on_paper[k] += paper * square;
-                papers[k] += paper;
-                on_ink[k] += dark * square;
-                inks[k] += dark;
-            }
+        let [on_paper, on_ink] = &mut pixels.work;
+        let (on_paper, on_ink) = (&mut on_paper[..n], &mut on_ink[..n]);
+        for i in 0..n {
+            on_paper[i] = if ink[i] < OFF_EDGE { mask[i] } else { 0.0 };
+            on_ink[i] = if ink[i] > 1.0 - OFF_EDGE { mask[i] } else { 0.0 };
         }
-        let sum = |lanes: [f32; LANES]| lanes.iter().map(|v| f64::from(*v)).sum();
+        let counts = [dot(on_paper, on_paper), dot(on_ink, on_ink)];
+        for i in 0..n {
+            on_paper[i] *= residual[i];
+            on_ink[i] *= residual[i];
+        }
         Self {
-            plain: sum(plain),
-            weighted: sum(weighted),
-            off_edge: [(sum(on_paper), sum(papers)), (sum(on_ink), sum(inks))],
+            plain: dot(residual, residual),
+            weighted: dot(&pixels.weighted, &pixels.weighted),
+            off_edge: [(dot(on_paper, on_paper), counts[0]), (dot(on_ink, on_ink), counts[1])],
         }
     }
 }
