@@ -34,9 +34,8 @@ pub struct Clustered {
 impl Clustered {
     /// Sigma of every column by the scatter between images over that by the model; 1 where there is nothing to compare.
     pub fn ratios(&self) -> impl Iterator<Item = f64> {
-        let pairs =
-            self.model.diagonal().iter().zip(&self.sandwich.diagonal()).map(|(m, s)| (*m, *s)).collect::<Vec<_>>();
-        pairs.into_iter().map(|(model, sandwich)| if model > 0.0 { (sandwich / model).max(0.0).sqrt() } else { 1.0 })
+        let variances = (0..self.model.nrows()).map(|k| (self.model[(k, k)], self.sandwich[(k, k)]));
+        variances.map(|(model, sandwich)| if model > 0.0 { (sandwich / model).max(0.0).sqrt() } else { 1.0 })
     }
 }
 

@@ -6,7 +6,6 @@ use super::start::start_robot;
 use crate::assess::{ImageError, hold_out_images};
 use crate::error::{Error, Result};
 use crate::model::robot::Robot;
-use crate::problem::Slack;
 use crate::solve::{ComponentOptions, Status, estimate_components};
 
 /// Error of one image, predicted from its joint readings by a fit of camera and plate to the other images.
@@ -36,12 +35,7 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
     let (free, mut starts) = adjust_free_poses(&mut problem, state, &stated)?;
     let mut state = free.state.clone();
     start_robot(&mut problem, &mut state, &free, &mut starts)?;
-    let slack = vec![0.0; robot.chain.readings.len() + 2];
-    for (own, image) in state.slack.iter_mut().zip(&problem.images) {
-        if image.stop.is_some() {
-            *own = Slack::Joints(slack.clone());
-        }
-    }
+    problem.start_slack(&mut state, false);
     let outcome = estimate_components(&mut problem, state, &ComponentOptions::default());
     if outcome.status != Status::Converged {
         return Err(Error::unsolved(

@@ -100,14 +100,9 @@ impl DarkMap {
     }
 }
 
-/// Steps along the cracks: east, south, west, north.
-const STEPS: [[isize; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
 /// The cells north-east, south-east, south-west and north-west of a corner, which has the coordinates of the second.
-const AROUND: [[isize; 2]; 4] = [[0, -1], [0, 0], [-1, 0], [-1, -1]];
-
-/// A place in a grid that is stored row by row.
-fn offsets(of: [[isize; 2]; 4], stride: usize) -> [isize; 4] {
-    of.map(|[x, y]| y * stride as isize + x)
+fn cells_around([x, y]: [usize; 2]) -> [[usize; 2]; 4] {
+    [[x, y - 1], [x, y], [x - 1, y], [x - 1, y - 1]]
 }
 
 struct Tracer<'a> {
@@ -122,18 +117,22 @@ impl Tracer<'_> {
     fn follow(&mut self, map: &mut DarkMap, x: usize, y: usize) -> Contour {
         const SOUTH: usize = 1;
         self.points.clear();
-        let (steps, around) = (offsets(STEPS, map.stride), offsets(AROUND, map.stride));
-        let start = y * map.stride + x;
-        let (mut at, mut direction, mut corner) = (start, SOUTH, [x as isize, y as isize]);
+        let stride = map.stride;
+        let index = |[x, y]: [usize; 2]| y * stride + x;
+        let start = [x, y];
+        // Directions: east, south, west, north.
+        let (mut corner, mut direction) = (start, SOUTH);
         let (mut length, mut step, mut clipped) = (0usize, 0.0f32, false);
         loop {
+            let [x, y] = corner;
+            let around = cells_around(corner);
+            let (dark, light) = (around[direction], around[(direction + 1) % 4]);
             if direction == SOUTH {
-                map.cells[at.wrapping_add_signed(around[SOUTH])] |= SEEN;
+                map.cells[index(dark)] |= SEEN;
             }
             length += 1;
             if length <= self.longest {
-                let cell = |k: usize| [0, 1].map(|a| corner[a] + AROUND[k][a]);
-                match self.crossing(cell(direction), cell((direction + 1) % 4)) {
+                match self.crossing(dark, light) {
                     Some((point, rise)) => {
                         self.points.push(point);
                         step += rise;
@@ -141,15 +140,20 @@ impl Tracer<'_> {
                     None => clipped = true,
                 }
             }
-            at = at.wrapping_add_signed(steps[direction]);
-            corner = [0, 1].map(|a| corner[a] + STEPS[direction][a]);
-            let is_dark = |k: usize| map.cells[at.wrapping_add_signed(around[k % 4])] & DARK != 0;
+            corner = match direction {
+                0 => [x + 1, y],
+                1 => [x, y + 1],
+                2 => [x - 1, y],
+                _ => [x, y - 1],
+            };
+            let ahead = cells_around(corner);
+            let is_dark = |k: usize| map.cells[index(ahead[k % 4])] & DARK != 0;
             if is_dark(direction + 1) {
                 direction = (direction + 1) % 4;
             } else if !is_dark(direction) {
                 direction = (direction + 3) % 4;
             }
-            if at == start && direction == SOUTH {
+            if corner == start && direction == SOUTH {
                 break;
             }
         }
@@ -157,19 +161,18 @@ impl Tracer<'_> {
     }
 
     /// Sub-pixel point between a dark and a light cell and the rise of counts across; `None` at the frame.
-    fn crossing(&self, dark: [isize; 2], light: [isize; 2]) -> Option<([f32; 2], f32)> {
+    fn crossing(&self, dark: [usize; 2], light: [usize; 2]) -> Option<([f32; 2], f32)> {
         let ([dx, dy], [lx, ly]) = (dark, light);
-        let (width, height) = (self.picture.width as isize, self.picture.height as isize);
-        if lx == 0 || ly == 0 || lx > width || ly > height {
+        if lx == 0 || ly == 0 || lx > self.picture.width || ly > self.picture.height {
             return None;
         }
-        let value = |x: isize, y: isize| self.picture.pixels[((y - 1) * width + x - 1) as usize];
-        let (below, above) = (value(dx, dy), value(lx, ly));
+        let below = self.picture.at(dx - 1, dy - 1);
+        let above = self.picture.at(lx - 1, ly - 1);
         let (fx, fy) = ((dx - 1) as f32, (dy - 1) as f32);
         let rise = above - below;
         let t = ((self.levels.threshold_at(fx, fy) - below) / rise).clamp(0.0, 1.0);
         let t = if t.is_finite() { t } else { 0.5 };
-        Some(([fx + t * (lx - dx) as f32, fy + t * (ly - dy) as f32], rise))
+        Some(([fx + t * (lx as f32 - dx as f32), fy + t * (ly as f32 - dy as f32)], rise))
     }
 
     fn contour(&self, length: usize, step: f32, clipped: bool) -> Contour {
