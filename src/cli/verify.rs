@@ -51,6 +51,9 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
     }
 }
 
+/// How far, RMS, points may be from where a robot puts them, m: robots miss by millimetres.
+const FARTHEST_M: f64 = 0.05;
+
 fn points(args: &VerifyArgs, points_file: &std::path::Path, unit: Unit) -> Result<Verdict> {
     let rms = |file: &PathBuf, compensation: Option<&PathBuf>| -> Result<(usize, f64, f64)> {
         let chain = urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?;
@@ -63,6 +66,15 @@ fn points(args: &VerifyArgs, points_file: &std::path::Path, unit: Unit) -> Resul
                 "measure at least 10 points that differ in position and in hand orientation",
             )
         })?;
+        if fit.rms_m > FARTHEST_M {
+            let what = format!(
+                "the points are {:.0} mm RMS from where {} puts them: no error of a robot, but another robot or other readings",
+                1e3 * fit.rms_m,
+                file.display()
+            );
+            let remedy = "check --joint-unit, the order of the joint columns, and the unit of the points (m)";
+            return Err(Error::unsolved(points_file.display(), what, remedy));
+        }
         let worst = fit.residuals_m.iter().map(Vector3::norm).fold(0.0, f64::max);
         Ok((points.len(), 1e3 * fit.rms_m, 1e3 * worst))
     };
