@@ -4,6 +4,7 @@ mod circles_support;
 
 use circles_support::{View, errors, report, scene};
 use robotcal::detect::circles::{Options, Outcome, detect};
+use robotcal::simulate::image_study::{MirrorAnswer, Plates, identity_view};
 
 #[test]
 fn a_whole_plate_is_found_and_measured() {
@@ -18,4 +19,12 @@ fn a_whole_plate_is_found_and_measured() {
     report(&scene, &found, &e);
     assert_eq!(e.wrong, 0);
     assert!(e.found as f64 >= 0.99 * e.visible as f64);
+}
+
+/// View 14330 shows 25 markers from 6 to 80 px, steeply: the lattice of its mirror image grows in another order, and slips.
+#[test]
+fn a_mirror_image_is_named_where_its_lattice_slips() {
+    let (view, ..) = identity_view(&Plates::standard().unwrap(), 14330);
+    assert!(view.identified && view.wrong == 0);
+    assert_eq!(view.mirror, Some(MirrorAnswer::Named));
 }

@@ -42,6 +42,12 @@ impl Ellipse {
         self.shape[0] * self.shape[2] - self.shape[1] * self.shape[1]
     }
 
+    /// The ellipse in a picture whose columns run the other way, from the one at `last` px.
+    pub fn mirrored(&self, last: f64) -> Self {
+        let [xx, xy, yy] = self.shape;
+        Self { centre: [last - self.centre[0], self.centre[1]], shape: [xx, -xy, yy] }
+    }
+
     /// Symmetric square root of `Q`: maps offsets from the centre to the unit circle.
     pub fn normaliser(&self) -> [[f64; 2]; 2] {
         let [xx, xy, yy] = self.shape;

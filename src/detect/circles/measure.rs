@@ -62,21 +62,29 @@ impl Target {
 /// How many markers are measured to learn blur and noise.
 const LEARNERS: usize = 24;
 
-/// Learns blur and noise from some of the targets.
-pub(super) fn learn(picture: &Picture, targets: &[Target], guess_blur: f64, noise: f32, pixels: &mut Pixels) -> Camera {
+/// Learns blur and noise from some of the targets, and how far contours lie beside the edges: all of them are moved there.
+pub(super) fn learn(
+    picture: &Picture,
+    targets: &mut [Target],
+    guess_blur: f64,
+    noise: f32,
+    pixels: &mut Pixels,
+) -> Camera {
     let variance = f64::from(noise).powi(2);
     let mut camera = Camera { blur_px: guess_blur, noise: [variance; 2], ink_slope: INK_SLOPE };
+    let mut beside_px = 0.0;
     for _ in 0..2 {
         camera.ink_slope = INK_SLOPE;
         let stride = targets.len().div_ceil(LEARNERS).max(1);
-        let fits: Vec<Fit> = targets
-            .iter()
-            .step_by(stride)
-            .filter_map(|t| refine(picture, &t.start(&camera, 0.7), pixels).ok())
-            .collect();
+        let learners = targets.iter().step_by(stride);
+        let (started, fits): (Vec<&Target>, Vec<Fit>) =
+            learners.filter_map(|t| Some((t, refine(picture, &t.start(&camera, 0.7), pixels).ok()?))).unzip();
         if fits.is_empty() {
             return camera;
         }
+        let size = |e: &Ellipse| e.semi_axes().iter().sum::<f64>() / 2.0;
+        let beside = started.iter().zip(&fits).map(|(t, f)| size(&f.measured.outer.ellipse) - size(&t.ellipse));
+        beside_px = median(beside.collect());
         let blur = median(fits.iter().map(|f| f.measured.blur_px).collect());
         let settled = (blur / camera.blur_px).ln().abs() < 0.15;
         let noise = [0, 1].map(|side| plain_variance(&fits, side).unwrap_or(variance));
@@ -85,6 +93,7 @@ pub(super) fn learn(picture: &Picture, targets: &[Target], guess_blur: f64, nois
             break;
         }
     }
+    targets.iter_mut().for_each(|t| t.ellipse = t.ellipse.offset(beside_px).unwrap_or(t.ellipse));
     camera
 }
 
@@ -128,10 +137,11 @@ pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<Drop
     let (candidates, mut dropped) = candidates(picture, &levels, options);
     let index = Buckets::of(&candidates);
     let clear = |i: usize| clear_of(i, &candidates, &index);
-    let targets: Vec<Target> = candidates.iter().enumerate().map(|(i, c)| target_of(c, None, clear(i))).collect();
+    let mut targets: Vec<Target> =
+        candidates.iter().enumerate().map(|(i, c)| target_of(c, None, clear(i))).collect();
     let mut pixels = Pixels::default();
     let guess = median(candidates.iter().map(|c| c.blur_px).collect());
-    let camera = learn(picture, &targets, guess, levels.noise, &mut pixels);
+    let camera = learn(picture, &mut targets, guess, levels.noise, &mut pixels);
     let mut measured = Vec::new();
     for target in &targets {
         match refine(picture, &target.start(&camera, 0.3), &mut pixels) {

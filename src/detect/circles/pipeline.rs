@@ -83,7 +83,24 @@ fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> (Boa
             }
         }
     }
+    if outcome == Outcome::Ambiguous && upright_in_a_mirror(code, candidates) {
+        outcome = Outcome::Mirrored;
+    }
     (board, outcome)
+}
+
+/// Whether the plate is found where the picture is turned over.
+///
+/// Lattices grow in an order that has a handedness, so that a mirror image may slip where its original does not.
+fn upright_in_a_mirror(code: &Code, candidates: &[Candidate]) -> bool {
+    let last = candidates.iter().map(|c| c.ellipse.centre[0]).fold(0.0, f64::max);
+    let turned = |c: &Candidate| Candidate { ellipse: c.ellipse.mirrored(last), ..*c };
+    let turned: Vec<Candidate> = candidates.iter().map(turned).collect();
+    lattices(&turned, SMALLEST_LATTICE).iter().any(|lattice| {
+        let classes = code.classes_of(lattice, &turned);
+        let parts = || code.locate_parts(&classes).into_iter().map(|(_, verdict)| verdict);
+        std::iter::once(code.locate(&classes)).chain(parts()).any(|v| matches!(v, Verdict::Placed { .. }))
+    })
 }
 
 /// Classes of the cells of a lattice.
@@ -231,12 +248,10 @@ impl Work<'_> {
 
     fn measure(&mut self, board: &Board, levels: &Levels, options: &Options, dropped: &mut Vec<Dropped>) -> Harvest {
         let guess = median(board.values().map(|p| self.candidates[p.candidate].blur_px).collect());
-        let targets: Vec<(Cell, Target)> =
-            board.iter().map(|(cell, p)| (*cell, self.target(*cell, p, guess))).collect();
-        let plain: Vec<Target> = targets.iter().map(|t| t.1).collect();
-        let camera = learn(self.picture, &plain, guess, levels.noise, &mut self.pixels);
+        let mut targets: Vec<Target> = board.iter().map(|(cell, p)| self.target(*cell, p, guess)).collect();
+        let camera = learn(self.picture, &mut targets, guess, levels.noise, &mut self.pixels);
         let (mut entries, mut refused) = (Vec::new(), Vec::new());
-        for (cell, target) in targets {
+        for (&cell, target) in board.keys().zip(targets) {
             match refine(self.picture, &target.start(&camera, 0.3), &mut self.pixels) {
                 Ok(fit) => entries.push(Entry { cell, fit, rescued: false }),
                 Err(reason) => refused.push((cell, target, reason)),

@@ -233,7 +233,7 @@ fn iterate(state: &mut State, prior: &Prior, start: &Start, pixels: &mut Pixels)
             since_correction = 0.0;
         }
         pixels.evaluate(state, start.noise);
-        if since_factor > 0.05 {
+        if since_factor > 0.1 {
             pixels.normal(parameters, &mut factor);
             pixels.flat.add_normal(state, start.noise, &mut factor);
             prior.add_normal(&mut factor);
