@@ -12,8 +12,8 @@ use robotcal::problem::{Image, Problem, Slack, State, Step};
 use robotcal::recipe::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::series::CameraMount;
 use robotcal::solve::{
-    ComponentOptions, Elimination, Outcome, Settings, Status, System, covariance, covariance_by, estimate_components,
-    linearise_all, noise_information, solve,
+    ComponentOptions, Elimination, NoiseUncertainty, Outcome, Settings, Status, System, covariance, covariance_by,
+    estimate_components, linearise_all, noise_information, solve,
 };
 use support::dense::{Dense, Unknown};
 use support::small::{Dice, Part, Request, problem, series};
@@ -422,6 +422,56 @@ fn the_information_on_the_joint_noise_is_the_slope_of_the_redundancies() {
         assert!((ratio - 1.0).abs() < 1e-4, "{readings:?}: {ratio}");
         assert!((spread.variance / v.sum() - 1.0).abs() < 1e-12);
     }
+}
+
+#[test]
+fn what_the_uncertainty_of_the_joint_noise_adds_is_the_curvature_of_the_covariance() {
+    // C + sum_ab W_ab (C_a C^-1 C_b - C_ab), with the derivatives of C by the variances and the scatter W of those.
+    let mut dice = Dice::new(35);
+    let (mut problem, state) = problem(&mut dice, &Request { images: 12, lattice: (5, 4), ..Request::default() });
+    let sigma = [2e-4, 5e-5, 1e-4, 3e-4, 2e-5, 8e-5];
+    problem.noise.joint = vec![sigma.to_vec()];
+    let outcome = converged(&problem, state, &TIGHT);
+    let lin = outcome.linearised.as_ref().unwrap();
+    let cov = covariance(&problem, &outcome.state, lin).unwrap();
+    let told = noise_information(&problem, &outcome.state, lin, &cov).unwrap();
+    let variance = |readings: &[usize]| told.mean_variance(0, readings).sigma.powi(2);
+    let w = nalgebra::Matrix6::from_fn(|a, b| match a == b {
+        true => variance(&[a]),
+        false => 0.5 * (4.0 * variance(&[a, b]) - variance(&[a]) - variance(&[b])),
+    });
+    // What is found scatters less where joints are drawn together with the weight of five observations.
+    let drawn =
+        nalgebra::Matrix6::from_fn(|a, b| 2.5 * (f64::from(a == b) - 1.0 / 6.0) / (sigma[a] * sigma[b]).powi(2));
+    let w = w - w * drawn * w;
+    let free: Vec<usize> = (0..problem.layout.len()).filter(|&c| cov.reduced[(c, c)] > 0.0).collect();
+    let dense = |m: &DMatrix<f64>| DMatrix::from_fn(free.len(), free.len(), |i, k| m[(free[i], free[k])]);
+    let at = |step: nalgebra::Vector6<f64>| {
+        let mut moved = problem.clone();
+        moved.noise.joint[0].iter_mut().zip(step.iter()).for_each(|(s, by)| *s = (*s * *s + by).sqrt());
+        dense(&covariance(&moved, &outcome.state, lin).unwrap().reduced)
+    };
+    let here = dense(&cov.reduced);
+    let inverse = here.clone().try_inverse().unwrap();
+    let directions = w.symmetric_eigen();
+    let mut expected = DMatrix::zeros(free.len(), free.len());
+    for k in 0..6 {
+        let direction = directions.eigenvectors.column(k) * directions.eigenvalues[k].sqrt();
+        let h = 0.02 * (0..6).map(|a| sigma[a].powi(2) / direction[a].abs()).fold(f64::MAX, f64::min);
+        let (above, below) = (at(direction * h), at(-direction * h));
+        let slope = (&above - &below) / (2.0 * h);
+        let curvature = (&above + &below - 2.0 * &here) / (h * h);
+        expected += &slope * &inverse * &slope - curvature;
+    }
+    let added = dense(&NoiseUncertainty::of(&told, &problem, &cov).unwrap().added());
+    let whitened = |m: &DMatrix<f64>| {
+        DMatrix::from_fn(free.len(), free.len(), |i, k| m[(i, k)] / (here[(i, i)] * here[(k, k)]).sqrt())
+    };
+    let (added, expected) = (whitened(&added), whitened(&expected));
+    println!("adds {:.4} of a variance at most; off by {:e}", added.max(), (&added - &expected).abs().max());
+    assert!(added.diagonal().min() >= -1e-12 && added.max() > 0.01);
+    // Second differences with steps of 2 %: the fourth derivative makes out some 1e-4 of them.
+    assert!((&added - &expected).abs().max() < 3e-3 * added.max());
 }
 
 #[test]

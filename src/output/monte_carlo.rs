@@ -18,9 +18,8 @@ pub fn monte_carlo_markdown(cells: &[MonteCarloCell], command: &str) -> String {
          where the stated uncertainty is true, above 1 where it is too small. In brackets: the 99 % interval about 1 for this number of worlds; \
          **bold** where the mean lies outside. \"flange\" is the pose of the flange in the plate frame at a joint vector that was not measured.\n\n\
          The robot's parameters are known a thousand times better in some directions than in others, and the good directions turn along the bad \
-         ones. \"robot\" takes `C` half-way between estimate and truth, where the tangent is parallel to the error. It contains the estimated \
-         joint noise, which has an uncertainty of its own (the mean of `1 / estimate` is above `1 / truth`) and cannot be below zero (it is \
-         too large on average where there is none): the second column takes the noise that was put in, and judges the covariance \
+         ones. \"robot\" takes `C` half-way between estimate and truth, where the tangent is parallel to the error. It contains what the \
+         uncertainty of the estimated joint noise adds, which also widens the interval (it is common to all parameters of a world); the second column takes the noise that was put in, and judges the covariance \
          alone. The third takes `C` at the estimate, as solution.json states it. What it misses is the curvature, not the size of any parameter (\"single \
          parameters\": mean of `e^2 / sigma^2` of each by itself) and not the flange.\n\n"
     );
@@ -36,7 +35,8 @@ pub fn monte_carlo_markdown(cells: &[MonteCarloCell], command: &str) -> String {
     }
     out += "\n## Joint noise\n\nRMS over the joints: mean over the worlds, its spread over the worlds, and the spread that the program states (half \
             its one-sigma interval). Then how often the noise put in lies within the stated 95 % interval: of the RMS, and of single joints. The data \
-            tell a variance, with an error that is normal down to zero; where there is no noise, half of the estimates are zero and the other half above.\n\n\
+            tell a variance, with an error that is normal down to zero. What is not told from none (one-sided 1 %) counts as none: a noise of 0.0025 mrad seldom is, and its \
+            sigmas are too small by as much as the table above says.\n\n\
             | put in, mrad | found, mrad | spread, mrad | stated spread, mrad | within 95 %, RMS | within 95 %, joints |\n\
             |---|---|---|---|---|---|\n";
     for c in cells {

@@ -15,6 +15,7 @@ use crate::model::robot::Robot;
 use crate::problem::{Problem, Slack, State};
 use crate::solve::{
     ComponentOptions, Outcome, Status, covariance, estimate_components, reject_images, reject_observations,
+    without_untold_noise,
 };
 use crate::urdf::{Chain, Payload};
 
@@ -162,11 +163,8 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let mut failed_gates = gates(&problem, &state, &free, &accuracy, on_robot);
     failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
     remarks(&problem, &state, on_robot, &mut notices);
-    let mut worth = judge(&problem, &state, &linearised, &mut covariance, &mut notices);
-    if options.joint_noise != JointNoise::Estimated {
-        // What was given has no interval.
-        worth.joint_noise.clear();
-    }
+    let estimated = options.joint_noise == JointNoise::Estimated;
+    let worth = judge(&problem, &state, &linearised, &mut covariance, estimated, &mut notices);
     Ok(Solution {
         series: series.to_vec(),
         worth,
@@ -201,7 +199,7 @@ fn fit(problem: &mut Problem, mut state: State, options: &Options) -> Outcome {
         }
         outcome = estimate_components(problem, outcome.state, &components);
     }
-    outcome
+    if components.joint { without_untold_noise(problem, outcome, &components.settings) } else { outcome }
 }
 
 /// Adds to every wrongly paired image by how much its readings miss, and whose readings would fit it.

@@ -10,8 +10,9 @@
 //! A chord of a parabola is parallel to its tangent half-way: to second order, `e` has the covariance that the same formula gives
 //! half-way between estimate and truth. Both are listed.
 //!
-//! The covariance contains the estimated joint noise, which has an uncertainty of its own (`E[1 / estimate] > 1 / truth`) and cannot be
-//! below zero (`E[estimate] > 0` where there is none). The half-way covariance with the joint noise that was put in has neither.
+//! The covariance contains what the uncertainty of the estimated joint noise adds. That uncertainty is common to all parameters of
+//! a world, and makes the interval wider. The half-way covariance with the joint noise that was put in needs neither, and is
+//! judged beside.
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use rayon::prelude::*;
@@ -28,7 +29,9 @@ use crate::model::robot::{Robot, Stop};
 use crate::problem::{Problem, Slack, State, chained};
 use crate::series::{Plate, PlateKind};
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
-use crate::solve::{JOINT_NOISE_FLOOR, Settings, covariance, linearise_all, noise_information, solve};
+use crate::solve::{
+    JOINT_NOISE_FLOOR, NoiseUncertainty, Settings, covariance, linearise_all, noise_information, solve,
+};
 use crate::urdf::{Chain, JointKind};
 
 /// What is tried.
@@ -175,14 +178,23 @@ fn judged(s: &Solution, world: &SimulatedSeries, chain: &Chain) -> Result<Option
     let truth = world.truth.robot(chain)?;
     let columns = robot_columns(s, &truth);
     let half_way = half_way_to_truth(s, &columns);
-    let robot_by = |state: &State, problem: &Problem| {
-        let lin = linearise_all(problem, state)?;
-        let stated = covariance(problem, state, &lin).ok()?;
-        normalised(&robot_error(s, &columns, &stated.reduced))
+    let robot_by = |problem: &Problem, joint_noise_is_estimated: bool| {
+        let lin = linearise_all(problem, &half_way)?;
+        let mut stated = covariance(problem, &half_way, &lin).ok()?;
+        if !joint_noise_is_estimated {
+            return normalised(&robot_error(s, &columns, &stated.reduced));
+        }
+        let told = noise_information(problem, &half_way, &lin, &stated)?;
+        let uncertainty = NoiseUncertainty::of(&told, problem, &stated);
+        uncertainty.iter().for_each(|u| stated.add(&u.added()));
+        let error = robot_error(s, &columns, &stated.reduced);
+        let places: Vec<usize> = columns.iter().map(|(c, _)| *c).collect();
+        let common = uncertainty.map_or(Some(0.0), |u| u.of_normalised(&places, &error.1))?;
+        normalised(&error).map(|n| Normalised { half_variance: n.half_variance + 0.5 * common, ..n })
     };
     let blocks = [
-        robot_by(&half_way, &s.problem),
-        robot_by(&half_way, &with_joint_noise(&s.problem, &world.truth.joint_noise_sigma)),
+        robot_by(&s.problem, true),
+        robot_by(&with_joint_noise(&s.problem, &world.truth.joint_noise_sigma), false),
         normalised(&robot_error(s, &columns, &s.covariance.reduced)),
         Some(single(&robot_error(s, &columns, &s.covariance.reduced))),
         normalised(&camera_error(s, world)),

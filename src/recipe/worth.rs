@@ -8,7 +8,7 @@ use crate::geom::Pose;
 use crate::model::robot::Stop;
 use crate::problem::{Layout, Problem, State};
 use crate::series::CameraMount;
-use crate::solve::{Covariance, Linearised, noise_information};
+use crate::solve::{Covariance, Linearised, NoiseInformation, NoiseUncertainty, noise_information};
 
 /// Ratio of the sigma of the flange by clusters to that by the model from which the larger one is reported.
 const REPORT_LARGER: f64 = 1.5;
@@ -49,12 +49,14 @@ pub fn still(problem: &Problem, layout: &Layout, state: &State) -> Option<(Pose,
     })
 }
 
-/// Judges a solution. Where the scatter between images says clearly more than the noise model, `covariance` is made larger.
+/// Judges a solution. `covariance` is made larger by what the uncertainty of an estimated joint noise adds, and where the scatter
+/// between images says clearly more than the noise model.
 pub(super) fn judge(
     problem: &Problem,
     state: &State,
     lin: &Linearised,
     covariance: &mut Covariance,
+    joint_noise_is_estimated: bool,
     notices: &mut Vec<Notice>,
 ) -> Worth {
     let layout = &problem.layout;
@@ -64,10 +66,14 @@ pub(super) fn judge(
     let still = still(problem, layout, state);
     let mut worth = Worth {
         identifiability: identifiability(&state.robot, layout, &stops, &covariance.reduced),
-        model_sigma: sigmas(&covariance.reduced),
-        joint_noise: joint_noise(problem, state, lin, covariance),
         ..Worth::default()
     };
+    if joint_noise_is_estimated && let Some(told) = noise_information(problem, state, lin, covariance) {
+        let uncertainty = NoiseUncertainty::of(&told, problem, covariance);
+        uncertainty.iter().for_each(|u| covariance.add(&u.added()));
+        worth.joint_noise = intervals(problem, state, &told);
+    }
+    worth.model_sigma = sigmas(&covariance.reduced);
     if let Some(clustered) = clustered_covariance(problem, state, lin) {
         let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &clustered.model, &stops));
         worth.clustered_ratio = model.map(|m| m.ratio_of(&clustered.sandwich));
@@ -91,8 +97,7 @@ pub(super) fn judge(
     worth
 }
 
-fn joint_noise(problem: &Problem, state: &State, lin: &Linearised, covariance: &Covariance) -> Vec<Vec<[f64; 2]>> {
-    let Some(told) = noise_information(problem, state, lin, covariance) else { return Vec::new() };
+fn intervals(problem: &Problem, state: &State, told: &NoiseInformation) -> Vec<Vec<[f64; 2]>> {
     let interval = |camera: usize, reading: usize| told.mean_variance(camera, &[reading]).interval(NORMAL_95);
     let readings = state.robot.chain.readings.len();
     (0..problem.cameras.len()).map(|c| (0..readings).map(|r| interval(c, r)).collect()).collect()

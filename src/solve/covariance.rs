@@ -46,6 +46,12 @@ impl Covariance {
         self.reduced[(column, column)].max(0.0).sqrt()
     }
 
+    /// Adds to the covariance of the dense columns, in their units.
+    pub fn add(&mut self, added: &DMatrix<f64>) {
+        let mut dense = self.reduced.view_mut((0, 0), added.shape());
+        dense += added;
+    }
+
     /// 6x6 block of six dense columns from `start`.
     pub fn block(&self, start: usize) -> Matrix6<f64> {
         self.reduced.fixed_view::<6, 6>(start, start).into_owned()

@@ -7,13 +7,17 @@ mod components;
 mod covariance;
 mod levenberg;
 mod noise_information;
+mod noise_uncertainty;
 mod snoop;
 mod system;
+mod untold;
 
 pub use blocks::SeenMarkers;
 pub use components::{ComponentOptions, JOINT_NOISE_FLOOR, Tally, estimate_components, share_out};
 pub use covariance::{Covariance, covariance, covariance_by};
 pub use levenberg::{Outcome, Settings, Status, solve};
 pub use noise_information::{NoiseInformation, Spread, noise_information};
+pub use noise_uncertainty::NoiseUncertainty;
 pub use snoop::{reject_images, reject_observations};
 pub use system::{Elimination, Linearised, System, linearise_all};
+pub use untold::without_untold_noise;

@@ -23,10 +23,16 @@ pub struct NoiseInformation {
     cameras: usize,
     locals: usize,
     /// Of the joint noise per camera and reading, of the local errors per reading, of the tilts per camera; rad^2 or m^2.
-    variances: Vec<f64>,
+    pub(super) variances: Vec<f64>,
     /// Covariance of the logarithms of those that the data touch, with their indices.
     covariance: DMatrix<f64>,
-    touched: Vec<usize>,
+    pub(super) touched: Vec<usize>,
+    /// Covariance of what is found of joints that are alike: drawing them together then takes scatter away and adds no bias.
+    pub(super) scatter: DMatrix<f64>,
+    /// Latents of all images, where they are taken together, with the covariance that has them among its unknowns, where it is
+    /// not the given one.
+    pub(super) together: Vec<Latent>,
+    pub(super) coupled: Option<Covariance>,
 }
 
 /// A standard deviation with what the data leave open.
@@ -52,10 +58,11 @@ impl Spread {
 }
 
 /// One latent: row in the covariance, standard deviation, components with their shares of its variance.
-struct Latent {
-    row: usize,
-    sigma: f64,
-    parts: [(usize, f64); 2],
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Latent {
+    pub row: usize,
+    pub sigma: f64,
+    pub parts: [(usize, f64); 2],
 }
 
 /// The information at a solution; `None` without joint noise, or where the data do not tell it at all.
@@ -66,14 +73,13 @@ pub fn noise_information(
     cov: &Covariance,
 ) -> Option<NoiseInformation> {
     let (readings, cameras) = (state.robot.chain.readings.len(), problem.noise.joint.len());
-    let coupled;
     let slack: usize = lin.images.iter().map(|&i| state.slack[i].len()).sum();
-    let cov = if cov.system.slack_start.is_empty() && slack <= MOST_COUPLED {
-        coupled = covariance_by(Elimination::Markers, problem, state, lin).ok()?;
-        &coupled
+    let coupled = if cov.system.slack_start.is_empty() && slack <= MOST_COUPLED {
+        Some(covariance_by(Elimination::Markers, problem, state, lin).ok()?)
     } else {
-        cov
+        None
     };
+    let cov = coupled.as_ref().unwrap_or(cov);
     let own = problem.noise.joint.iter().flatten();
     let variances: Vec<f64> = own.chain(&problem.noise.local).chain(&problem.noise.tilt).map(|s| s * s).collect();
     let mut information = DMatrix::zeros(variances.len(), variances.len());
@@ -88,6 +94,7 @@ pub fn noise_information(
     for a in &locals {
         locals.iter().for_each(|b| add(a, b, cov.reduced[(a.row, b.row)]));
     }
+    let mut together = Vec::new();
     let of_images: Vec<Vec<Latent>> = (0..lin.images.len()).map(|k| image_latents(problem, state, lin, k)).collect();
     if cov.system.slack_start.is_empty() {
         for (k, own) in of_images.iter().enumerate() {
@@ -107,13 +114,18 @@ pub fn noise_information(
                 add(b, a, cov.reduced[(b.row, a.row)]);
             });
         }
+        together = locals.into_iter().chain(all).collect();
     }
     let touched: Vec<usize> = (0..variances.len()).filter(|&c| information[(c, c)] > 0.0).collect();
+    let of_touched =
+        |m: &DMatrix<f64>| DMatrix::from_fn(touched.len(), touched.len(), |a, b| m[(touched[a], touched[b])]);
+    let from_data = of_touched(&information);
     draw_together(problem, state, &touched, &mut information);
-    let of_touched = DMatrix::from_fn(touched.len(), touched.len(), |a, b| information[(touched[a], touched[b])]);
-    let covariance = SymmetricFactor::new(&of_touched).ok().filter(|_| !touched.is_empty())?.inverse();
+    let factor = SymmetricFactor::new(&of_touched(&information)).ok().filter(|_| !touched.is_empty())?;
+    let covariance = factor.inverse();
+    let scatter = &covariance * from_data * &covariance;
     let locals = problem.noise.local.len();
-    Some(NoiseInformation { readings, cameras, locals, variances, covariance, touched })
+    Some(NoiseInformation { readings, cameras, locals, variances, covariance, touched, scatter, together, coupled })
 }
 
 fn local_latents(problem: &Problem, state: &State, cov: &Covariance, first: usize) -> Vec<Latent> {

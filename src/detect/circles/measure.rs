@@ -137,8 +137,7 @@ pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<Drop
     let (candidates, mut dropped) = candidates(picture, &levels, options);
     let index = Buckets::of(&candidates);
     let clear = |i: usize| clear_of(i, &candidates, &index);
-    let mut targets: Vec<Target> =
-        candidates.iter().enumerate().map(|(i, c)| target_of(c, None, clear(i))).collect();
+    let mut targets: Vec<Target> = candidates.iter().enumerate().map(|(i, c)| target_of(c, None, clear(i))).collect();
     let mut pixels = Pixels::default();
     let guess = median(candidates.iter().map(|c| c.blur_px).collect());
     let camera = learn(picture, &mut targets, guess, levels.noise, &mut pixels);
