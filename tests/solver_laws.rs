@@ -12,8 +12,8 @@ use robotcal::problem::{Image, Problem, Slack, State, Step};
 use robotcal::recipe::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::series::CameraMount;
 use robotcal::solve::{
-    ComponentOptions, Elimination, NoiseUncertainty, Outcome, Settings, Status, System, covariance, covariance_by,
-    estimate_components, linearise_all, noise_information, solve,
+    ComponentOptions, Elimination, JOINT_NOISE_FLOOR, NoiseUncertainty, Outcome, Settings, Status, System, covariance,
+    covariance_by, estimate_components, linearise_all, noise_information, solve,
 };
 use support::dense::{Dense, Unknown};
 use support::small::{Dice, Part, Request, problem, series};
@@ -550,6 +550,25 @@ fn joint_noise_has_an_interval_where_it_is_estimated_and_none_where_it_is_given(
     let given = run(JointNoise::Known(3e-4));
     assert_eq!(given.problem.joint_sigma(0), vec![3e-4; sigma.len()]);
     assert!(given.worth.joint_noise.is_empty());
+}
+
+#[test]
+fn joint_noise_that_is_not_told_from_none_counts_as_none() {
+    let found = |seed: u64, joint_noise: f64| {
+        let mut dice = Dice::new(60 + seed);
+        let request = Request { images: 14, lattice: (7, 6), radius_m: 0.0, joint_noise, ..Request::default() };
+        let (problem, state) = problem(&mut dice, &request);
+        let options = Options { joint_noise: JointNoise::Estimated, model: RobotModel::Rigid, ..Options::default() };
+        let solution = identify(state.robot.chain.clone(), &[series(&problem)], &options).unwrap();
+        solution.problem.noise.joint[0].clone()
+    };
+    let seeds = 0..8;
+    // One of a hundred gets past: two of eight with a probability of 0.3 %.
+    let told = seeds.clone().filter(|&s| found(s, 0.0).iter().any(|s| *s > JOINT_NOISE_FLOOR)).count();
+    assert!(told <= 1, "joint noise was found in {told} of 8 robots without");
+    for sigmas in seeds.map(|s| found(s, 3e-4)) {
+        assert!(sigmas.iter().all(|s| (5e-5..2e-3).contains(s)), "{sigmas:?}");
+    }
 }
 
 fn assert_same_bits(one: &Solution, two: &Solution) {

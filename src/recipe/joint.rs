@@ -14,8 +14,8 @@ use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::robot::Robot;
 use crate::problem::{Problem, Slack, State};
 use crate::solve::{
-    ComponentOptions, Outcome, Status, covariance, estimate_components, reject_images, reject_observations,
-    without_untold_noise,
+    ComponentOptions, NoiseInformation, Outcome, Status, covariance, estimate_components, reject_images,
+    reject_observations, without_untold_noise,
 };
 use crate::urdf::{Chain, Payload};
 
@@ -142,7 +142,7 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let mut state = free.state.clone();
     let on_robot = problem.used().filter(|(_, i)| i.stop.is_some()).count();
     start_robot(&mut problem, &mut state, &free, &mut starts)?;
-    let outcome = fit(&mut problem, state, options);
+    let (outcome, before) = fit(&mut problem, state, options);
     let mut notices = Vec::new();
     name_wrong_pairs(&mut problem, &outcome.state, &free);
     let moves: Vec<Move> = (0..series.len()).filter_map(|k| find_move(&problem, &outcome.state, &free, k)).collect();
@@ -164,7 +164,10 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
     remarks(&problem, &state, on_robot, &mut notices);
     let estimated = options.joint_noise == JointNoise::Estimated;
-    let worth = judge(&problem, &state, &linearised, &mut covariance, estimated, &mut notices);
+    let mut worth = judge(&problem, &state, &linearised, &mut covariance, estimated, &mut notices);
+    if let Some(before) = before {
+        worth.tell_joint_noise(&problem, &state, before);
+    }
     Ok(Solution {
         series: series.to_vec(),
         worth,
@@ -184,7 +187,8 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     })
 }
 
-fn fit(problem: &mut Problem, mut state: State, options: &Options) -> Outcome {
+/// The fit, and what was known of the joint noise before some of it was set to none.
+fn fit(problem: &mut Problem, mut state: State, options: &Options) -> (Outcome, Option<NoiseInformation>) {
     problem.start_slack(&mut state, options.joint_noise == JointNoise::Known(0.0));
     if let JointNoise::Known(sigma) = options.joint_noise {
         problem.noise.joint.iter_mut().flatten().for_each(|s| *s = sigma.max(f64::MIN_POSITIVE));
@@ -199,7 +203,7 @@ fn fit(problem: &mut Problem, mut state: State, options: &Options) -> Outcome {
         }
         outcome = estimate_components(problem, outcome.state, &components);
     }
-    if components.joint { without_untold_noise(problem, outcome, &components.settings) } else { outcome }
+    if components.joint { without_untold_noise(problem, outcome, &components.settings) } else { (outcome, None) }
 }
 
 /// Adds to every wrongly paired image by how much its readings miss, and whose readings would fit it.

@@ -8,7 +8,7 @@ use crate::geom::Pose;
 use crate::model::robot::Stop;
 use crate::problem::{Layout, Problem, State};
 use crate::series::CameraMount;
-use crate::solve::{Covariance, Linearised, NoiseInformation, NoiseUncertainty, noise_information};
+use crate::solve::{Covariance, JOINT_NOISE_FLOOR, Linearised, NoiseInformation, NoiseUncertainty, noise_information};
 
 /// Ratio of the sigma of the flange by clusters to that by the model from which the larger one is reported.
 const REPORT_LARGER: f64 = 1.5;
@@ -31,6 +31,8 @@ pub struct Worth {
     pub larger_stated: bool,
     /// 95 % interval of the joint noise of every camera and reading, rad or m; empty where it is not told.
     pub joint_noise: Vec<Vec<[f64; 2]>>,
+    /// What the data tell of the joint noise, also of that which counts as none; none where it was given.
+    pub told: Option<NoiseInformation>,
     /// Workspace map; empty where plate (or fixed camera) and robot are not tied.
     pub workspace: Vec<WorkspacePoint>,
 }
@@ -71,7 +73,7 @@ pub(super) fn judge(
     if joint_noise_is_estimated && let Some(told) = noise_information(problem, state, lin, covariance) {
         let uncertainty = NoiseUncertainty::of(&told, problem, covariance);
         uncertainty.iter().for_each(|u| covariance.add(&u.added()));
-        worth.joint_noise = intervals(problem, state, &told);
+        worth.tell_joint_noise(problem, state, told.of_sizes());
     }
     worth.model_sigma = sigmas(&covariance.reduced);
     if let Some(clustered) = clustered_covariance(problem, state, lin) {
@@ -97,10 +99,18 @@ pub(super) fn judge(
     worth
 }
 
-fn intervals(problem: &Problem, state: &State, told: &NoiseInformation) -> Vec<Vec<[f64; 2]>> {
-    let interval = |camera: usize, reading: usize| told.mean_variance(camera, &[reading]).interval(NORMAL_95);
-    let readings = state.robot.chain.readings.len();
-    (0..problem.cameras.len()).map(|c| (0..readings).map(|r| interval(c, r)).collect()).collect()
+impl Worth {
+    /// Takes over what is known of the joint noise. The interval of what counts as none starts at none.
+    pub(super) fn tell_joint_noise(&mut self, problem: &Problem, state: &State, told: NoiseInformation) {
+        let interval = |camera: usize, reading: usize| {
+            let [low, high] = told.mean_variance(camera, &[reading]).interval(NORMAL_95);
+            [if problem.noise.joint[camera][reading] > JOINT_NOISE_FLOOR { low } else { 0.0 }, high]
+        };
+        let readings = state.robot.chain.readings.len();
+        self.joint_noise =
+            (0..problem.cameras.len()).map(|c| (0..readings).map(|r| interval(c, r)).collect()).collect();
+        self.told = Some(told);
+    }
 }
 
 /// Scales rows and columns of what acts through the camera poses so that no sigma is below that by clusters; correlations stay.

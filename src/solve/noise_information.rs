@@ -172,6 +172,11 @@ fn draw_together(problem: &Problem, state: &State, touched: &[usize], informatio
 }
 
 impl NoiseInformation {
+    /// Without what it would need for [`super::NoiseUncertainty`].
+    pub fn of_sizes(self) -> Self {
+        Self { together: Vec::new(), coupled: None, ..self }
+    }
+
     /// Mean variance of some readings with a camera (the noise of the stops and local errors together).
     pub fn mean_variance(&self, camera: usize, readings: &[usize]) -> Spread {
         let mut gradient = DVector::zeros(self.touched.len());

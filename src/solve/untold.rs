@@ -19,30 +19,34 @@ const PLAIN: f64 = 3.0;
 /// Readings of one kind with one camera.
 type Group = (usize, Vec<usize>);
 
-/// The outcome with such noise at its floor; the problem keeps it so.
-pub fn without_untold_noise(problem: &mut Problem, outcome: Outcome, settings: &Settings) -> Outcome {
-    let Some(told) = information(problem, &outcome) else { return outcome };
+/// The outcome with such noise at its floor, and what was known of all noise before, where that changed; the problem keeps it so.
+pub fn without_untold_noise(
+    problem: &mut Problem,
+    outcome: Outcome,
+    settings: &Settings,
+) -> (Outcome, Option<NoiseInformation>) {
+    let Some(told) = information(problem, &outcome) else { return (outcome, None) };
     let in_doubt: Vec<Group> = groups(problem, &outcome.state)
         .filter(|(camera, group)| told.mean_variance(*camera, group).interval(PLAIN)[0] == 0.0)
         .filter(|(camera, group)| group.iter().any(|&r| problem.noise.joint[*camera][r] > JOINT_NOISE_FLOOR))
         .collect();
     if in_doubt.is_empty() {
-        return outcome;
+        return (outcome, None);
     }
     let (without, at_none) = solved_without(problem, &outcome.state, &in_doubt, settings);
-    let Some(spread) = information(&without, &at_none) else { return outcome };
+    let Some(spread) = information(&without, &at_none) else { return (outcome, None) };
     let is_told = |(camera, group): &Group| {
         let found = told.mean_variance(*camera, group).variance;
         found > TOLD * spread.mean_variance(*camera, group).sigma
     };
     let (kept, untold): (Vec<Group>, Vec<Group>) = in_doubt.into_iter().partition(is_told);
     let (mended, outcome) = match (kept.is_empty(), untold.is_empty()) {
-        (_, true) => return outcome,
+        (_, true) => return (outcome, None),
         (true, _) => (without, at_none),
         _ => solved_without(problem, &outcome.state, &untold, settings),
     };
     *problem = mended;
-    outcome
+    (outcome, Some(told.of_sizes()))
 }
 
 /// Groups whose noise is that of single stops alone.
