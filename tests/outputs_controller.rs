@@ -110,7 +110,7 @@ fn mdh_parameters_say_what_they_leave() {
     let mdh = text(&files, "mdh.csv");
     assert!(mdh.contains("WARNING: nearly parallel axes") && mdh.contains("joint_a2 and joint_a3"), "{mdh}");
     let numbers = |line: &str| -> Vec<f64> {
-        let parts = line.split(|c: char| c == ' ' || c == ',');
+        let parts = line.split([' ', ',']);
         parts.filter_map(|p| p.parse().ok()).collect()
     };
     let line = |start: &str| numbers(mdh.lines().find(|l| l.starts_with(start)).unwrap());

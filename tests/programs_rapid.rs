@@ -4,7 +4,7 @@
 
 mod programs_support;
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
 use programs_support::{Cell, assert_meets, numbers, shape, status_turn};
 use robotcal::geom::Pose;
@@ -54,7 +54,8 @@ fn rapid_keeps_every_other_byte_and_meets_every_target() {
     let mut cell = Cell::kuka(31);
     let frame = |v: [f64; 7]| pose(&v);
     let tool = frame([97.4, 0.0, 223.1, 0.924, 0.0, 0.382389, 0.0]);
-    let base = frame([300.0, -60.0, 20.5, 0.707107, 0.0, 0.0, 0.707107]) * frame([0.0, 20.25, 3.0, 1.0, 0.0, 0.0, 0.0]);
+    let base = frame([300.0, -60.0, 20.5, FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2])
+        * frame([0.0, 20.25, 3.0, 1.0, 0.0, 0.0, 0.0]);
     let q: Vec<Vec<f64>> = (0..5).map(|_| cell.readings()).collect();
     let mut text = MODULE.to_owned();
     let home: Vec<String> = q[0].iter().map(|v| format!("{:.3}", v.to_degrees())).collect();
@@ -95,7 +96,7 @@ fn rapid_keeps_every_other_byte_and_meets_every_target() {
     let limits = inverse::reading_limits(&cell.nominal.chain);
     for (k, key) in [(1, "p10:="), (2, "p20 :="), (3, "MoveC "), (4, "]],\r\n")] {
         let find = |t: &str| match k {
-            4 => target(&t[t.find("MoveC ").unwrap()..], "]],[").iter().copied().skip(0).collect::<Vec<f64>>(),
+            4 => target(&t[t.find("MoveC ").unwrap()..], "]],["),
             _ => target(t, key),
         };
         let (old, new) = (find(&text), find(&new));

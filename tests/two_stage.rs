@@ -5,7 +5,8 @@
 mod support;
 
 use nalgebra::Vector3;
-use robotcal::problem::{Problem, Slack, State};
+use robotcal::model::joint_terms::{JointTerm, Term};
+use robotcal::problem::{Layout, Problem, Slack, State};
 use robotcal::recipe::{Estimator, JointNoise, PoseStage, estimate_all, fit_poses, linear_step};
 use robotcal::series::CameraMount;
 use robotcal::solve::{Settings, Status, covariance, linearise_all, solve};
@@ -107,4 +108,21 @@ fn estimators_find_the_truth_within_their_sigma_where_their_noise_model_is_true(
     }
     let stage = PoseStage::adjusted(&problem, &start).unwrap();
     assert!(fit_poses(&problem, &stage, &start, Estimator::Joint, JointNoise::Estimated).is_none());
+}
+
+#[test]
+fn every_estimator_has_a_solution_where_joints_came_back_to_readings() {
+    let mut dice = Dice::new(76);
+    let (mut problem, mut state) = problem(&mut dice, &Request { images: 12, ..Request::default() });
+    for image in &problem.images {
+        let reading = image.stop.as_ref().unwrap().readings[0];
+        state.robot.terms.push(JointTerm { reading: 0, term: Term::local(reading), value: 0.0 });
+    }
+    let (mountings, placements, cameras) = (&problem.mountings, &problem.placements, &problem.cameras);
+    problem.layout = Layout::new(&state, mountings, placements, cameras, &["plate".to_owned()]);
+    assert_eq!(problem.layout.locals.len(), 12);
+    problem.noise.local = vec![1e-3, 0.0, 0.0, 0.0, 0.0, 0.0];
+    for (estimator, found) in estimate_all(&problem, &state) {
+        assert!(found.is_some(), "{}", estimator.title());
+    }
 }

@@ -94,16 +94,27 @@ fn summary(errors: &[(usize, ImageError)]) -> Errors {
     }
 }
 
-/// Images that are held out together, fold by fold. Images that share joint readings stay together: they are off by the same local errors,
-/// and one of them would tell of the others. `None` for too few images on the robot.
-pub fn folds(problem: &Problem) -> Option<Vec<Vec<usize>>> {
+/// Images on the robot that share joint readings: they are off by the same local errors, and one of them would tell of the others.
+/// Each by itself where there are not three such sets to compare.
+fn clusters(problem: &Problem) -> Vec<Vec<usize>> {
     let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
-    if on_robot.len() < 2 {
+    let groups = posture_groups(&problem.images, &on_robot);
+    if groups.len() < 3 { on_robot.into_iter().map(|i| vec![i]).collect() } else { groups }
+}
+
+/// Index of the set of every image whose errors are its own: images on the robot that share joint readings have one set.
+pub fn cluster_of_images(problem: &Problem) -> Vec<usize> {
+    let clusters = clusters(problem);
+    let mut found: Vec<usize> = (clusters.len()..).take(problem.images.len()).collect();
+    clusters.iter().enumerate().for_each(|(k, images)| images.iter().for_each(|&i| found[i] = k));
+    found
+}
+
+/// Images that are held out together, fold by fold; those that share joint readings stay together. `None` for too few images on the robot.
+pub fn folds(problem: &Problem) -> Option<Vec<Vec<usize>>> {
+    let groups = clusters(problem);
+    if groups.len() < 2 {
         return None;
-    }
-    let mut groups = posture_groups(&problem.images, &on_robot);
-    if groups.len() < 3 {
-        groups = on_robot.iter().map(|&i| vec![i]).collect();
     }
     let mut folds = vec![Vec::new(); FOLDS.min(groups.len())];
     let count = folds.len();

@@ -16,7 +16,8 @@ pub use advice::Advice;
 pub use clustered::{Clustered, clustered_covariance};
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
 pub use hold_out::{
-    Accuracy, Errors, ImageError, folds, hold_out, hold_out_images, predict_image, refitted, without_images,
+    Accuracy, Errors, ImageError, cluster_of_images, folds, hold_out, hold_out_images, predict_image, refitted,
+    without_images,
 };
 pub use identifiability::{
     Cause, Correlation, Identifiability, Observability, UnknownDirection, frame_parameters, identifiability,
@@ -25,6 +26,6 @@ pub use identifiability::{
 pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
 pub use projection::ProjectionMap;
 pub use propagate::{PredictedPose, View, predict_pose};
-pub use statistics::{Ratio, bootstrap_ratio, median, root_mean_square};
+pub use statistics::{Ratio, bootstrap_ratio, by_cluster, median, root_mean_square};
 pub use stops::{Structural, ideal_stops, minimal_set, structural};
 pub use truth::{camera_errors_m, flange_error_m};

@@ -1,5 +1,7 @@
 //! Small statistics of comparisons.
 
+use std::collections::BTreeMap;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -24,7 +26,7 @@ impl std::fmt::Display for Ratio {
 /// Resamplings of a bootstrap.
 const RESAMPLINGS: usize = 2000;
 
-/// Ratio of the RMS of `a` to that of `b`, paired by unit (an image or a seed): `(sum of squares, weight)` each, with the
+/// Ratio of the RMS of `a` to that of `b`, paired by unit (a seed, or images that share joint readings): `(sum of squares, weight)` each, with the
 /// percentile bootstrap interval over units. The same input gives the same interval. `None` without units or where b is zero.
 pub fn bootstrap_ratio(a: &[(f64, f64)], b: &[(f64, f64)]) -> Option<Ratio> {
     let n = a.len();
@@ -48,6 +50,18 @@ pub fn bootstrap_ratio(a: &[(f64, f64)], b: &[(f64, f64)]) -> Option<Ratio> {
     all.sort_by(f64::total_cmp);
     let at = |p: f64| all.get(((all.len() as f64 - 1.0) * p).round().max(0.0) as usize).copied();
     Some(Ratio { value, low: at(0.025)?, high: at(0.975)? }).filter(|r| r.value.is_finite())
+}
+
+/// Units of one cluster each, from units that are alike within clusters: an interval over these is wide enough.
+///
+/// `clusters` names the cluster of every unit.
+pub fn by_cluster(clusters: &[usize], units: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut sums: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+    for (cluster, unit) in clusters.iter().zip(units) {
+        let sum = sums.entry(*cluster).or_default();
+        *sum = (sum.0 + unit.0, sum.1 + unit.1);
+    }
+    sums.into_values().collect()
 }
 
 /// Root of the mean square of `(sum of squares, weight)` units.
@@ -83,5 +97,22 @@ mod tests {
         assert!(many < 0.4 * few, "{few} {many}");
         assert_eq!(bootstrap_ratio(&[], &[]), None);
         assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
+    }
+
+    #[test]
+    fn units_that_say_the_same_thing_four_times_count_once() {
+        let units = |count: usize, repeats: usize, shift: f64| -> Vec<(f64, f64)> {
+            (0..count * repeats).map(|k| (1.0 + 0.8 * ((k / repeats) as f64 * 2.4 + shift).sin(), 1.0)).collect()
+        };
+        let clusters: Vec<usize> = (0..48).map(|k| k / 4).collect();
+        let (a, b) = (units(12, 4, 0.0), units(12, 4, 1.0));
+        let once = bootstrap_ratio(&units(12, 1, 0.0), &units(12, 1, 1.0)).unwrap();
+        let clustered = bootstrap_ratio(&by_cluster(&clusters, &a), &by_cluster(&clusters, &b)).unwrap();
+        assert!((clustered.low - once.low).abs() < 1e-12 && (clustered.high - once.high).abs() < 1e-12);
+        let as_if_apart = bootstrap_ratio(&a, &b).unwrap();
+        assert!(
+            as_if_apart.high - as_if_apart.low < 0.7 * (clustered.high - clustered.low),
+            "{as_if_apart} {clustered}"
+        );
     }
 }

@@ -6,7 +6,7 @@ use super::identify::{chain, measure_all, read_all};
 use super::recording::{Pictures, RecordingArgs};
 use super::verify::VerifyArgs;
 use super::{Verdict, progress};
-use crate::assess::{Ratio, bootstrap_ratio, root_mean_square};
+use crate::assess::{Ratio, bootstrap_ratio, by_cluster, root_mean_square};
 use crate::error::{Error, Result};
 use crate::output::compensated;
 use crate::recipe::{JudgedImage, verify_series};
@@ -30,7 +30,9 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     );
     println!("{}", line("model", &args.urdf, &model));
     println!("{}", line("nominal", file, &nominal));
-    let ratio = bootstrap_ratio(&units(&model), &units(&nominal)).ok_or_else(|| {
+    let postures: Vec<usize> = model.iter().map(|i| i.posture).collect();
+    let of_postures = |images: &[&JudgedImage]| by_cluster(&postures, &units(images));
+    let ratio = bootstrap_ratio(&of_postures(&model), &of_postures(&nominal)).ok_or_else(|| {
         Error::unsolved("verification", "the models have no image in common", "check that both URDFs are of this robot")
     })?;
     let Ratio { value, low, high } = ratio;

@@ -23,7 +23,7 @@ pub fn comparison_markdown(comparison: &Comparison) -> String {
         "{} images of the robot; each held out once, in {} folds (images that share joint readings stay together) and in {} slabs of the workspace.\n\
          The same observations, outliers, priors and gauge for all estimators.\n\
          mm: RMS distance at the plate between where an unseen image shows the markers and where the joint readings put them.\n\
-         to F: its ratio to the joint fit, with the 95 % bootstrap interval over images.\n\n",
+         to F: its ratio to the joint fit, with the 95 % bootstrap interval over images (those that share joint readings count once).\n\n",
         comparison.images, comparison.folds[0], comparison.folds[1]
     );
     let with_truth = comparison.rows.iter().any(|r| r.truth.is_some());

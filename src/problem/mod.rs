@@ -165,12 +165,15 @@ impl Problem {
         self.noise.local.fill(0.0);
     }
 
-    /// The priors of local errors and of families follow their components.
+    /// The priors of local errors and of families follow their components; local errors that are left out keep theirs.
     pub fn hold_component_priors(&mut self, robot: &Robot) {
         self.families.iter().for_each(|f| f.hold(&mut self.layout));
         let first = self.layout.terms.start;
         for c in self.layout.locals.clone() {
-            self.layout.columns[c].prior_sigma = self.noise.local[robot.terms[c - first].reading];
+            let column = &mut self.layout.columns[c];
+            if column.free {
+                column.prior_sigma = self.noise.local[robot.terms[c - first].reading];
+            }
         }
     }
 

@@ -7,8 +7,8 @@ use super::joint::JointNoise;
 use super::solution::Solution;
 use super::two_stage::{Estimator, PoseStage, estimate_all, fit_poses};
 use crate::assess::{
-    Ratio, bootstrap_ratio, camera_errors_m, flange_error_m, folds, predict_image, refitted, root_mean_square,
-    without_images,
+    Ratio, bootstrap_ratio, by_cluster, camera_errors_m, cluster_of_images, flange_error_m, folds, predict_image,
+    refitted, root_mean_square, without_images,
 };
 use crate::error::{Error, Result};
 use crate::geom::Pose;
@@ -24,7 +24,7 @@ pub struct HeldOut {
     pub rms_px: f64,
     /// RMS distance in space at the plate, mm.
     pub rms_mm: f64,
-    /// RMS in mm over that of the joint estimator, with bootstrap interval over images.
+    /// RMS in mm over that of the joint estimator, with bootstrap interval over images; those that share joint readings count once.
     pub to_joint: Option<Ratio>,
     /// Number of images predicted.
     pub images: usize,
@@ -102,6 +102,7 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
         done += 1;
         progress(done, total);
     };
+    let clusters = cluster_of_images(problem);
     let all =
         |p: &Problem, s: &State| estimate_all(p, s).into_iter().map(|(e, found)| (e, found.map(|f| f.state))).collect();
     let image_errors = held_out(problem, state, &by_image, all, &mut tick);
@@ -113,8 +114,8 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
         .enumerate()
         .map(|(k, estimator)| ComparisonRow {
             estimator,
-            by_image: summary(&image_errors, k),
-            by_region: summary(&region_errors, k),
+            by_image: summary(&image_errors, &clusters, k),
+            by_region: summary(&region_errors, &clusters, k),
             truth: against_truth.as_ref().and_then(|t| t[k]),
         })
         .collect();
@@ -129,9 +130,13 @@ pub fn beside_two_stages(solution: &Solution) -> Option<Comparison> {
     let images = problem.used().filter(|(_, i)| i.stop.is_some()).count();
     let folds = folds(problem).filter(|_| images >= FEWEST_IMAGES)?;
     let errors = held_out(problem, state, &folds, two_stages_and_joint, &mut || ());
+    let clusters = cluster_of_images(problem);
     let taking_part = Estimator::ALL.into_iter().enumerate().filter(|(_, e)| *e != Estimator::HardJoint);
     let rows = taking_part
-        .map(|(k, estimator)| ComparisonRow { estimator, by_image: summary(&errors, k), by_region: None, truth: None })
+        .map(|(k, estimator)| {
+            let by_image = summary(&errors, &clusters, k);
+            ComparisonRow { estimator, by_image, by_region: None, truth: None }
+        })
         .collect();
     Some(Comparison { rows, images, folds: [folds.len(), 0] })
 }
@@ -146,8 +151,8 @@ fn two_stages_and_joint(problem: &Problem, state: &State) -> Vec<(Estimator, Opt
     Estimator::ALL.map(|estimator| (estimator, found(estimator))).into()
 }
 
-/// Error of every held-out image by every estimator; `None` where an estimator has no solution for a fold.
-type Errors = Vec<[Option<crate::assess::ImageError>; 6]>;
+/// Error of every held-out image, with its index, by every estimator; `None` where an estimator has no solution for a fold.
+type Errors = Vec<(usize, [Option<crate::assess::ImageError>; 6])>;
 
 fn held_out(
     problem: &Problem,
@@ -161,23 +166,24 @@ fn held_out(
         let found = estimate(&without_images(problem, fold), state);
         for &i in fold {
             let of = |(_, state): &(Estimator, Option<State>)| predict_image(problem, state.as_ref()?, i);
-            errors.push(std::array::from_fn(|k| found.get(k).and_then(of)));
+            errors.push((i, std::array::from_fn(|k| found.get(k).and_then(of))));
         }
         tick();
     }
     errors
 }
 
-fn summary(errors: &Errors, k: usize) -> Option<HeldOut> {
+fn summary(errors: &Errors, clusters: &[usize], k: usize) -> Option<HeldOut> {
     let joint = Estimator::ALL.len() - 1;
-    let own: Vec<_> = errors.iter().map(|e| e[k]).collect::<Option<_>>()?;
+    let of_images: Vec<usize> = errors.iter().map(|(i, _)| clusters[*i]).collect();
+    let own: Vec<_> = errors.iter().map(|(_, e)| e[k]).collect::<Option<_>>()?;
     let px: Vec<(f64, f64)> = own.iter().map(|e| (e.px2, e.count)).collect();
     let mm: Vec<(f64, f64)> = own.iter().map(|e| (e.mm2, e.count)).collect();
-    let reference: Option<Vec<(f64, f64)>> = errors.iter().map(|e| e[joint].map(|e| (e.mm2, e.count))).collect();
+    let reference: Option<Vec<(f64, f64)>> = errors.iter().map(|(_, e)| e[joint].map(|e| (e.mm2, e.count))).collect();
     Some(HeldOut {
         rms_px: root_mean_square(&px),
         rms_mm: root_mean_square(&mm),
-        to_joint: reference.and_then(|r| bootstrap_ratio(&mm, &r)),
+        to_joint: reference.and_then(|r| bootstrap_ratio(&by_cluster(&of_images, &mm), &by_cluster(&of_images, &r))),
         images: own.len(),
     })
 }

@@ -164,10 +164,7 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
     remarks(&problem, &state, on_robot, &mut notices);
     let estimated = options.joint_noise == JointNoise::Estimated;
-    let mut worth = judge(&problem, &state, &linearised, &mut covariance, estimated, &mut notices);
-    if let Some(before) = before {
-        worth.tell_joint_noise(&problem, &state, before);
-    }
+    let worth = judge(&problem, &state, &linearised, &mut covariance, estimated, before, &mut notices);
     Ok(Solution {
         series: series.to_vec(),
         worth,

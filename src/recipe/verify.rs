@@ -3,7 +3,7 @@
 use super::build::{MeasuredSeries, build};
 use super::free_poses::adjust_free_poses;
 use super::start::start_robot;
-use crate::assess::{ImageError, hold_out_images};
+use crate::assess::{ImageError, cluster_of_images, hold_out_images};
 use crate::error::{Error, Result};
 use crate::model::robot::Robot;
 use crate::solve::{ComponentOptions, Status, estimate_components};
@@ -15,6 +15,8 @@ pub struct JudgedImage {
     pub series: usize,
     /// File name.
     pub name: String,
+    /// Images of the same posture share joint readings, and their errors.
+    pub posture: usize,
     /// Its error.
     pub error: ImageError,
 }
@@ -47,9 +49,11 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
     let errors = hold_out_images(&problem, &outcome.state).ok_or_else(|| {
         Error::unsolved("verification", "too few images to hold any out", "take at least 12 images of the robot")
     })?;
+    let postures = cluster_of_images(&problem);
     let judged = |(i, error): (usize, ImageError)| JudgedImage {
         series: problem.images[i].series,
         name: problem.images[i].name.clone(),
+        posture: postures[i],
         error,
     };
     Ok(errors.into_iter().map(judged).collect())

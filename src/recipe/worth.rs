@@ -52,13 +52,14 @@ pub fn still(problem: &Problem, layout: &Layout, state: &State) -> Option<(Pose,
 }
 
 /// Judges a solution. `covariance` is made larger by what the uncertainty of an estimated joint noise adds, and where the scatter
-/// between images says clearly more than the noise model.
+/// between images says clearly more than the noise model. What was `told_before` some joint noise was set to none is what is stated.
 pub(super) fn judge(
     problem: &Problem,
     state: &State,
     lin: &Linearised,
     covariance: &mut Covariance,
     joint_noise_is_estimated: bool,
+    told_before: Option<NoiseInformation>,
     notices: &mut Vec<Notice>,
 ) -> Worth {
     let layout = &problem.layout;
@@ -70,9 +71,12 @@ pub(super) fn judge(
         identifiability: identifiability(&state.robot, layout, &stops, &covariance.reduced),
         ..Worth::default()
     };
-    if joint_noise_is_estimated && let Some(told) = noise_information(problem, state, lin, covariance) {
-        let uncertainty = NoiseUncertainty::of(&told, problem, covariance);
+    let told = if joint_noise_is_estimated { noise_information(problem, state, lin, covariance) } else { None };
+    if let Some(told) = &told {
+        let uncertainty = NoiseUncertainty::of(told, problem, covariance);
         uncertainty.iter().for_each(|u| covariance.add(&u.added()));
+    }
+    if let Some(told) = told_before.or(told) {
         worth.tell_joint_noise(problem, state, told.of_sizes());
     }
     worth.model_sigma = sigmas(&covariance.reduced);
@@ -101,7 +105,7 @@ pub(super) fn judge(
 
 impl Worth {
     /// Takes over what is known of the joint noise. The interval of what counts as none starts at none.
-    pub(super) fn tell_joint_noise(&mut self, problem: &Problem, state: &State, told: NoiseInformation) {
+    fn tell_joint_noise(&mut self, problem: &Problem, state: &State, told: NoiseInformation) {
         let interval = |camera: usize, reading: usize| {
             let [low, high] = told.mean_variance(camera, &[reading]).interval(NORMAL_95);
             [if problem.noise.joint[camera][reading] > JOINT_NOISE_FLOOR { low } else { 0.0 }, high]

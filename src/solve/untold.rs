@@ -46,7 +46,7 @@ pub fn without_untold_noise(
         _ => solved_without(problem, &outcome.state, &untold, settings),
     };
     *problem = mended;
-    (outcome, Some(told.of_sizes()))
+    (outcome, Some(told))
 }
 
 /// Groups whose noise is that of single stops alone.

@@ -64,8 +64,25 @@ pub(super) fn detect_coded(
     Ok(work.detection(&board, measured, outcome, dropped))
 }
 
+/// As [`place`]; a picture that nothing fits is looked at once more turned over: what is placed then is a mirror image.
+///
+/// Lattices grow in an order that has a handedness, so that a mirror image may slip where its original does not.
+fn identify(code: &Code, grown: &[Lattice], candidates: &[Candidate]) -> (Board, Outcome) {
+    let (board, outcome) = place(code, grown, candidates);
+    if outcome != Outcome::Ambiguous {
+        return (board, outcome);
+    }
+    let last = candidates.iter().map(|c| c.ellipse.centre[0]).fold(0.0, f64::max);
+    let turned = |c: &Candidate| Candidate { ellipse: c.ellipse.mirrored(last), ..*c };
+    let turned: Vec<Candidate> = candidates.iter().map(turned).collect();
+    match place(code, &lattices(&turned, SMALLEST_LATTICE), &turned).1 {
+        Outcome::Identified { .. } => (board, Outcome::Mirrored),
+        _ => (board, outcome),
+    }
+}
+
 /// Puts the lattices on the plate; where none fits as a whole, their parts.
-fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> (Board, Outcome) {
+fn place(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> (Board, Outcome) {
     let mut board = Board::new();
     let mut outcome = match (candidates.is_empty(), lattices.is_empty()) {
         (true, _) => Outcome::NoCandidates,
@@ -83,24 +100,7 @@ fn identify(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> (Boa
             }
         }
     }
-    if outcome == Outcome::Ambiguous && upright_in_a_mirror(code, candidates) {
-        outcome = Outcome::Mirrored;
-    }
     (board, outcome)
-}
-
-/// Whether the plate is found where the picture is turned over.
-///
-/// Lattices grow in an order that has a handedness, so that a mirror image may slip where its original does not.
-fn upright_in_a_mirror(code: &Code, candidates: &[Candidate]) -> bool {
-    let last = candidates.iter().map(|c| c.ellipse.centre[0]).fold(0.0, f64::max);
-    let turned = |c: &Candidate| Candidate { ellipse: c.ellipse.mirrored(last), ..*c };
-    let turned: Vec<Candidate> = candidates.iter().map(turned).collect();
-    lattices(&turned, SMALLEST_LATTICE).iter().any(|lattice| {
-        let classes = code.classes_of(lattice, &turned);
-        let parts = || code.locate_parts(&classes).into_iter().map(|(_, verdict)| verdict);
-        std::iter::once(code.locate(&classes)).chain(parts()).any(|v| matches!(v, Verdict::Placed { .. }))
-    })
 }
 
 /// Classes of the cells of a lattice.

@@ -34,7 +34,7 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
             } } }
         } }
         @if let Some(svg) = intervals(comparison) {
-            (figure(&svg, "Error of each two-stage fit over that of the joint fit, with its 95 % interval over the images; right of the line the joint fit is better."))
+            (figure(&svg, "Error of each two-stage fit over that of the joint fit, with its 95 % interval over the images (those that share joint readings count once); right of the line the joint fit is better."))
         }
         p.note { "With the joint fit that takes the readings as exact, and regions of the workspace held out: " code { "robotcal compare" } "." }
     }
