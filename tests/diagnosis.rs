@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use robotcal::recipe::{MeasuredSeries, Options, identify, measured};
+use robotcal::assess::WorkspacePoint;
+use robotcal::recipe::{JointNoise, MeasuredSeries, Options, identify, measured};
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{WorldRequest, series};
 use robotcal::urdf::Chain;
@@ -13,12 +14,14 @@ fn chain() -> Chain {
     robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap()
 }
 
-fn seen(chain: &Chain) -> MeasuredSeries {
+fn request(chain: &Chain) -> WorldRequest {
     let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.1e-3);
     plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.01);
-    let request =
-        WorldRequest { images: 16, least_markers: 12, seed: 5, ..WorldRequest::typical(chain.clone(), plate) };
-    measured(&series(&request).unwrap(), chain)
+    WorldRequest { images: 16, least_markers: 12, seed: 5, ..WorldRequest::typical(chain.clone(), plate) }
+}
+
+fn seen(chain: &Chain) -> MeasuredSeries {
+    measured(&series(&request(chain)).unwrap(), chain)
 }
 
 fn diagnosis(chain: Chain, series: MeasuredSeries) -> String {
@@ -46,4 +49,58 @@ fn an_exchanged_camera_mount_is_named() {
     series.mount = CameraMount::Fixed;
     let said = diagnosis(chain, series);
     assert!(said.contains("camera_mount = \"hand\""), "{said}");
+}
+
+#[test]
+fn mistakes_in_single_columns_are_named() {
+    let chain = chain();
+    let with = |change: &dyn Fn(&mut Vec<f64>)| {
+        let mut series = seen(&chain);
+        series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(change);
+        diagnosis(chain.clone(), series)
+    };
+    let said = with(&|q| q[4] = q[4].to_radians());
+    assert!(said.contains("joint_a5 alone are radians"), "{said}");
+    let said = with(&|q| (q[3], q[5]) = (-q[3], -q[5]));
+    assert!(said.contains("joint_a4 and joint_a6 have the wrong sign"), "{said}");
+    let said = with(&|q| (q[3], q[4], q[5]) = (q[4], q[5], q[3]));
+    assert!(said.contains("columns joint_a4, joint_a6, joint_a5 taken for joint_a5, joint_a4, joint_a6"), "{said}");
+}
+
+#[test]
+fn images_that_fit_the_robot_found_are_not_left_out_for_missing_the_nominal_one() {
+    let chain = chain();
+    let mut series = seen(&chain);
+    // Mastering off by five degrees: some images miss the nominal robot by far more than others.
+    series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(|q| q[1] += 5f64.to_radians());
+    let solution = identify(chain, &[series], &Options::default()).unwrap();
+    let left_out: Vec<_> = solution.problem.images.iter().filter_map(|i| i.rejected.as_ref()).collect();
+    assert!(left_out.is_empty(), "{left_out:?}");
+    let said: Vec<String> = solution.notices.iter().map(ToString::to_string).collect();
+    assert!(said.iter().any(|n| n.contains("joint_a2.offset") && n.contains("mastering")), "{said:?}");
+}
+
+#[test]
+fn joints_that_never_moved_do_not_make_the_others_uncertain() {
+    let chain = chain();
+    let from = seen(&chain).stops[0].readings.clone().unwrap();
+    // The wrist turns about a stop of the usual world; the arm stands still.
+    let turned = |k: usize| {
+        let angle = |joint: usize, size: f64| from[joint] + size * (1.7 * (k * (joint + 1)) as f64).sin();
+        vec![from[0], from[1], from[2], angle(3, 0.8), angle(4, 0.4), angle(5, 2.0)]
+    };
+    let postures = Some((0..30).map(turned).collect());
+    let world = series(&WorldRequest { images: 30, postures, ..request(&chain) }).unwrap();
+    let sigmas = |joint_noise: JointNoise| {
+        let options = Options { joint_noise, ..Options::default() };
+        let solution = identify(chain.clone(), &[measured(&world, &chain)], &options).unwrap();
+        let inside = |w: &&WorkspacePoint| w.covered;
+        let mut inside: Vec<f64> = solution.worth.workspace.iter().filter(inside).map(|w| w.sigma_m).collect();
+        inside.sort_by(f64::total_cmp);
+        let outside = solution.worth.workspace.iter().filter(|w| !w.covered).map(|w| w.sigma_m).fold(0.0, f64::max);
+        (inside[inside.len() / 2], outside)
+    };
+    let (known, estimated) = (sigmas(JointNoise::Known(2e-5)), sigmas(JointNoise::Estimated));
+    assert!(estimated.0 < 2.0 * known.0 && estimated.0 < 1e-3, "{} m, with known noise {} m", estimated.0, known.0);
+    assert!(estimated.1 > 10.0 * estimated.0, "{} m where the arm never was", estimated.1);
 }

@@ -99,6 +99,7 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     accuracy(out, r)?;
     two_stage(out, r)?;
     map(out, r)?;
+    scales(out, r)?;
     undetermined(out, r)?;
     if let Some(found) = &r.identifiability {
         identifiability(out, found, "the data tell")?;
@@ -216,6 +217,25 @@ fn two_stage(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         "stages    the best two-stage fit of the same images ({}) has {ratio} times the error of the joint fit",
         row.estimator.title()
     )
+}
+
+/// What the lengths of the robot hang on.
+fn scales(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    let scales = r.estimates.iter().filter(|e| e.name.starts_with("plate_shape") && e.name.ends_with(".scale"));
+    for (e, plate) in scales.zip(&r.plates).filter(|(e, _)| e.free) {
+        let (Some(prior), Some(sigma)) = (e.prior_sigma, e.sigma) else { continue };
+        let known =
+            format!("scale     the robot's lengths follow the plate, whose size is known to {:.3} %", 100.0 * sigma);
+        let links = e.share_of_data.filter(|s| *s > 0.0).map(|s| 100.0 * prior / s.sqrt());
+        match (plate.scale, links) {
+            (None, Some(links)) => writeln!(
+                out,
+                "{known} if its file is right (nobody measured it, and the links tell {links:.2} %); 0.1 % is 1 mm a metre: give [scale]"
+            )?,
+            _ => writeln!(out, "{known}")?,
+        }
+    }
+    Ok(())
 }
 
 /// Uncertainty of the flange over the workspace.

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::local_errors::{local_share, local_terms};
+use super::plate_size::hold_scale_bars;
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
@@ -148,10 +149,7 @@ pub(super) fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool
         slack: vec![Slack::Pose(Pose::identity()); images.len()],
         cameras: lenses,
     };
-    let mut layout = Layout::new(&state, &mountings, &placements, &cameras, &plate_names);
-    for (range, plate) in layout.shapes.clone().iter().zip(&plates) {
-        apply_scale_bar(&mut layout, range.start, plate);
-    }
+    let layout = Layout::new(&state, &mountings, &placements, &cameras, &plate_names);
     let noise = Noise {
         pixel_factor: vec![1.0; cameras.len()],
         joint: vec![vec![FIRST_JOINT_NOISE; readings]; cameras.len()],
@@ -160,7 +158,9 @@ pub(super) fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool
         marker: Vec::new(),
     };
     let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
-    Ok((Problem { layout, plates, placements, mountings, cameras, images, noise, families, huber: HUBER }, state))
+    let mut problem = Problem { layout, plates, placements, mountings, cameras, images, noise, families, huber: HUBER };
+    hold_scale_bars(&mut problem, &state);
+    Ok((problem, state))
 }
 
 /// First guess of the local error of every reading that has columns for it; 0 for the others.
@@ -198,17 +198,4 @@ fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<Measured>> {
     }
     observations.sort_by_key(|o| (o.marker, o.edge));
     Ok(observations)
-}
-
-/// A measured distance fixes the scale mode; the two markers' own tolerance is part of its uncertainty.
-fn apply_scale_bar(layout: &mut Layout, scale_column: usize, plate: &Plate) {
-    let Some(bar) = plate.scale else { return };
-    let (Some(a), Some(b)) = (plate.index_of(bar.from), plate.index_of(bar.to)) else { return };
-    let (a, b) = (&plate.markers[a], &plate.markers[b]);
-    let nominal = (a.position_m - b.position_m).norm();
-    if nominal > 0.0 {
-        let variance = bar.sigma_m.powi(2) + a.sigma_m.powi(2) + b.sigma_m.powi(2);
-        layout.columns[scale_column].prior_mean = bar.distance_m / nominal - 1.0;
-        layout.columns[scale_column].prior_sigma = variance.sqrt() / nominal;
-    }
 }

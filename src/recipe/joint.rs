@@ -2,11 +2,12 @@
 
 use super::build::{MeasuredSeries, build};
 use super::free_poses::{FreePoses, adjust_free_poses};
-use super::gates::{gates, remarks};
+use super::gates::{gates, remarks, undetermined};
 use super::moved::{Move, find_move};
+use super::plate_size::{doubted_sizes, hold_scale_bars};
 use super::selection::Selection;
 use super::solution::Solution;
-use super::start::{misfit, start_robot};
+use super::start::{misfit, start_robot, take_back};
 use super::worth::judge;
 use crate::assess::hold_out;
 use crate::error::{Error, Result};
@@ -141,8 +142,9 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let (free, mut starts) = adjust_free_poses(&mut problem, state, &stated)?;
     let mut state = free.state.clone();
     let on_robot = problem.used().filter(|(_, i)| i.stop.is_some()).count();
-    start_robot(&mut problem, &mut state, &free, &mut starts)?;
-    let (outcome, before) = fit(&mut problem, state, options);
+    hold_scale_bars(&mut problem, &state);
+    let aside = start_robot(&mut problem, &mut state, &free, &mut starts)?;
+    let (outcome, before) = fit(&mut problem, state, &free, &aside, options);
     let mut notices = Vec::new();
     name_wrong_pairs(&mut problem, &outcome.state, &free);
     let moves: Vec<Move> = (0..series.len()).filter_map(|k| find_move(&problem, &outcome.state, &free, k)).collect();
@@ -161,10 +163,12 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let accuracy = hold_out(&problem, &state)
         .ok_or_else(|| Error::unsolved("hold-out", "too few images to hold any out", "take more images"))?;
     let mut failed_gates = gates(&problem, &state, &free, &accuracy, on_robot);
+    failed_gates.extend(doubted_sizes(&problem, &state, &covariance));
     failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
     remarks(&problem, &state, on_robot, &mut notices);
     let estimated = options.joint_noise == JointNoise::Estimated;
     let worth = judge(&problem, &state, &linearised, &mut covariance, estimated, before, &mut notices);
+    failed_gates.extend(undetermined(&worth, &accuracy));
     Ok(Solution {
         series: series.to_vec(),
         worth,
@@ -185,7 +189,15 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
 }
 
 /// The fit, and what was known of the joint noise before some of it was set to none.
-fn fit(problem: &mut Problem, mut state: State, options: &Options) -> (Outcome, Option<NoiseInformation>) {
+///
+/// Images that were set `aside` before take part where the fit says that they belong.
+fn fit(
+    problem: &mut Problem,
+    mut state: State,
+    free: &FreePoses,
+    aside: &[usize],
+    options: &Options,
+) -> (Outcome, Option<NoiseInformation>) {
     problem.start_slack(&mut state, options.joint_noise == JointNoise::Known(0.0));
     if let JointNoise::Known(sigma) = options.joint_noise {
         problem.noise.joint.iter_mut().flatten().for_each(|s| *s = sigma.max(f64::MIN_POSITIVE));
@@ -193,6 +205,9 @@ fn fit(problem: &mut Problem, mut state: State, options: &Options) -> (Outcome, 
     let components =
         ComponentOptions { joint: options.joint_noise == JointNoise::Estimated, ..ComponentOptions::default() };
     let mut outcome = estimate_components(problem, state, &components);
+    if take_back(problem, &outcome.state, free, aside) {
+        outcome = estimate_components(problem, outcome.state, &components);
+    }
     for _ in 0..ROUNDS {
         let images = reject_images(problem, &outcome);
         if images.is_none() && reject_observations(problem, &outcome) == 0 {

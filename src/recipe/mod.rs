@@ -21,6 +21,7 @@ mod moved;
 mod places;
 mod plan;
 mod plan_study;
+mod plate_size;
 mod second_pass;
 mod selection;
 mod simulated;

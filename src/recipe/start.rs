@@ -31,13 +31,14 @@ const FEWEST_IMAGES: usize = 5;
 /// Closed forms whose pixel cost is compared.
 const COMPARED: usize = 4;
 
-/// Fills in mountings and placements of `state`; sets images aside that do not fit their readings.
+/// Fills in mountings and placements of `state`; sets images aside that do not fit their readings, and returns which.
 pub(super) fn start_robot(
     problem: &mut Problem,
     state: &mut State,
     free: &FreePoses,
     verdicts: &mut Vec<StartVerdict>,
-) -> Result<()> {
+) -> Result<Vec<usize>> {
+    let mut aside = Vec::new();
     let mut groups: BTreeMap<(usize, usize), Vec<(usize, PosePair)>> = BTreeMap::new();
     for (i, image) in problem.used() {
         let (Some(stop), Some(pose)) = (&image.stop, &free.poses[i]) else { continue };
@@ -63,7 +64,7 @@ pub(super) fn start_robot(
         };
         cameras.insert(*mounting, solution.camera);
         plates.insert(*placement, solution.plate);
-        set_aside(problem, pairs, &solution);
+        aside.extend(set_aside(problem, pairs, &solution));
     }
     for (k, pose) in state.mountings.iter_mut().enumerate() {
         *pose = cameras.get(&k).copied().unwrap_or(*pose);
@@ -71,7 +72,7 @@ pub(super) fn start_robot(
     for (k, pose) in state.placements.iter_mut().enumerate() {
         *pose = plates.get(&k).copied().unwrap_or(*pose);
     }
-    Ok(())
+    Ok(aside)
 }
 
 /// What one image says, for the closed forms.
@@ -204,7 +205,8 @@ fn check_rotations(of: &str, poses: &[PosePair]) -> Result<()> {
     ))
 }
 
-fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &HandEye) {
+fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &HandEye) -> Vec<usize> {
+    let mut aside = Vec::new();
     let mut sizes: Vec<f64> = pairs.iter().map(|(_, p)| solution.error(p)).map(|(a, d)| a + d).collect();
     sizes.sort_by(f64::total_cmp);
     let bound = (SET_ASIDE_FACTOR * sizes[sizes.len() / 2]).max(SET_ASIDE_FLOOR);
@@ -216,8 +218,26 @@ fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &Hand
                 1e3 * distance,
                 1e3 * angle
             ));
+            aside.push(*i);
         }
     }
+    aside
+}
+
+/// Takes images back that were set `aside` with the nominal robot, and fit the robot that was found as the others do. True where there are some.
+pub(super) fn take_back(problem: &mut Problem, state: &State, free: &FreePoses, aside: &[usize]) -> bool {
+    let size = |i: usize| {
+        let (angle, distance) = misfit(state, problem, &free.poses[i].as_ref()?.camera_from_plate, i)?;
+        Some(angle + distance)
+    };
+    let mut usual: Vec<f64> =
+        problem.used().filter(|(_, image)| image.stop.is_some()).filter_map(|(i, _)| size(i)).collect();
+    usual.sort_by(f64::total_cmp);
+    let Some(median) = usual.get(usual.len() / 2) else { return false };
+    let fits = |i: &usize| size(*i).is_some_and(|s| s < SET_ASIDE_FACTOR * median);
+    let back: Vec<usize> = aside.iter().copied().filter(fits).collect();
+    back.iter().for_each(|&i| problem.images[i].rejected = None);
+    !back.is_empty()
 }
 
 /// Pose error of the readings of an image against its free pose, for messages.

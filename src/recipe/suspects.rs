@@ -139,6 +139,36 @@ impl Suspects<'_> {
                     format!("the joints stand in another order: with {name} and {other_name} exchanged the images fit"),
                     format!("exchange the column names {name} and {other_name} in joints.csv"),
                 );
+                add(
+                    &|q| (q[k], q[other]) = (-q[k], -q[other]),
+                    format!(
+                        "the readings of {name} and {other_name} have the wrong sign: with both negated the images fit"
+                    ),
+                    format!("negate the columns {name} and {other_name} of joints.csv, or these axes in the URDF"),
+                );
+                for (third, third_name) in names.iter().enumerate().skip(other + 1) {
+                    for (a, b) in [(other, third), (third, other)] {
+                        add(
+                            &|q| (q[k], q[a], q[b]) = (q[a], q[b], q[k]),
+                            format!(
+                                "the joints stand in another order: with the columns {name}, {}, {} taken for {}, {name}, {} the images fit",
+                                names[a], names[b], names[b], names[a]
+                            ),
+                            format!("correct the column names {name}, {other_name}, {third_name} in joints.csv"),
+                        );
+                    }
+                }
+            }
+            if kinds[k] == JointKind::Revolute {
+                for (factor, is, read_as) in
+                    [(1f64.to_radians(), "degrees", "radians"), (1f64.to_degrees(), "radians", "degrees")]
+                {
+                    add(
+                        &|q| q[k] *= factor,
+                        format!("the readings of {name} alone are {is}, read as {read_as}: converted, the images fit"),
+                        format!("bring the column {name} of joints.csv to the unit of the others"),
+                    );
+                }
             }
         }
         let turned = |factor: f64| {
@@ -201,15 +231,17 @@ impl Suspects<'_> {
         let error = solve_hand_eye(&scaled).first()?.median_error;
         let plate = &self.problem.plates[self.problem.images[self.pairs.first()?.0].plate];
         let what = format!(
-            "the plate is {scale:.3} times as large as plate.toml says, judged by the robot's link lengths: a pitch of {:.3} mm instead of {:.3} mm fits",
+            "the plate is {scale:.3} times as large as plate.toml says, judged by the link lengths in the URDF (a pitch of {:.3} mm instead of {:.3} mm fits), \
+             or else the robot is {:.3} times as large as the URDF",
             1e3 * scale * plate.pitch_m,
-            1e3 * plate.pitch_m
+            1e3 * plate.pitch_m,
+            1.0 / scale
         );
         Some((
             error,
             Cause {
                 what,
-                remedy: "measure the pitch of the plate with a ruler and correct pitch_m in plate.toml".into(),
+                remedy: "measure the pitch of the plate with a ruler and correct pitch_m in plate.toml; if it is right, the URDF is of another size of this robot".into(),
             },
         ))
     }

@@ -120,7 +120,7 @@ pub fn noise_information(
     let of_touched =
         |m: &DMatrix<f64>| DMatrix::from_fn(touched.len(), touched.len(), |a, b| m[(touched[a], touched[b])]);
     let from_data = of_touched(&information);
-    draw_together(problem, state, &touched, &mut information);
+    draw_together(problem, state, &variances, &touched, &mut information);
     let factor = SymmetricFactor::new(&of_touched(&information)).ok().filter(|_| !touched.is_empty())?;
     let covariance = factor.inverse();
     let scatter = &covariance * from_data * &covariance;
@@ -153,20 +153,41 @@ fn image_latents(problem: &Problem, state: &State, lin: &Linearised, k: usize) -
     (0..dq.len()).map(latent).collect()
 }
 
-/// The readings of a group are drawn to their common variance as by so many observations.
-fn draw_together(problem: &Problem, state: &State, touched: &[usize], information: &mut DMatrix<f64>) {
-    let n = state.robot.chain.readings.len();
-    let groups = problem.noise.groups(&state.robot.chain.reading_kinds);
-    let blocks = problem.noise.joint.len() + usize::from(!problem.noise.local.is_empty());
-    for block in 0..blocks {
-        for group in &groups {
-            let of_block: Vec<usize> = group.iter().map(|r| block * n + r).filter(|c| touched.contains(c)).collect();
-            let mean = 1.0 / of_block.len().max(1) as f64;
-            for &a in &of_block {
-                for &b in &of_block {
-                    information[(a, b)] += 0.5 * SHRINKAGE * (f64::from(a == b) - mean);
-                }
-            }
+/// Every variance is drawn to a common one as by so many observations, as in the estimate: joint noise to that of the readings of its group, local errors to
+/// that of all readings of the kind, in which every variance counts with its size and its information.
+fn draw_together(
+    problem: &Problem,
+    state: &State,
+    variances: &[f64],
+    touched: &[usize],
+    information: &mut DMatrix<f64>,
+) {
+    let kinds = &state.robot.chain.reading_kinds;
+    let (n, cameras) = (kinds.len(), problem.noise.joint.len());
+    let is_local = |r: usize| problem.noise.local.get(r).is_some_and(|s| *s > 0.0);
+    let weight: Vec<f64> = variances.iter().enumerate().map(|(c, v)| v * information[(c, c)]).collect();
+    let mut draw = |drawn: &[usize], common: &[(usize, f64)]| {
+        let common: Vec<_> = common.iter().filter(|(c, _)| touched.contains(c)).collect();
+        let whole: f64 = common.iter().map(|(_, w)| w).sum();
+        for &a in drawn.iter().filter(|a| whole > 0.0 && touched.contains(a)) {
+            let mut contrast = DVector::zeros(information.nrows());
+            contrast[a] = 1.0;
+            common.iter().for_each(|(c, w)| contrast[*c] -= w / whole);
+            information.ger(0.5 * SHRINKAGE, &contrast, &contrast, 1.0);
+        }
+    };
+    for group in problem.noise.groups(kinds) {
+        for camera in 0..cameras {
+            let own: Vec<usize> = group.iter().map(|r| camera * n + r).collect();
+            draw(&own, &own.iter().map(|&c| (c, 1.0)).collect::<Vec<_>>());
+        }
+        if is_local(group[0]) {
+            let alike = (0..n).filter(|&r| kinds[r] == kinds[group[0]]);
+            let (local, others): (Vec<usize>, Vec<usize>) = alike.partition(|&r| is_local(r));
+            let local: Vec<usize> = local.iter().map(|r| cameras * n + r).collect();
+            let own = (0..cameras).flat_map(|c| others.iter().map(move |r| c * n + r));
+            let common: Vec<_> = local.iter().copied().chain(own).map(|c| (c, weight[c])).collect();
+            draw(&local, &common);
         }
     }
 }

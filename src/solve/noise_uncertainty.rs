@@ -51,11 +51,8 @@ impl NoiseUncertainty {
             let products = parts[i].iter().flat_map(|(a, p)| parts[k].iter().map(move |(b, q)| (*a, *b, p * q)));
             products.map(|(a, b, weight)| weight * told.scatter[(a, b)]).sum::<f64>()
         };
-        let is_latent = |c: usize| latents.iter().any(|l| l.row == c);
-        let columns = DMatrix::from_fn(problem.layout.len(), n, |c, i| match is_latent(c) {
-            true => 0.0,
-            false => cov.reduced[(c, latents[i].row)] / latents[i].sigma,
-        });
+        let columns =
+            DMatrix::from_fn(problem.layout.len(), n, |c, i| cov.reduced[(c, latents[i].row)] / latents[i].sigma);
         Some(Self { columns, shared: DMatrix::from_fn(n, n, shared), left: scaled(&cov.reduced, -1) + at_known })
     }
 

@@ -1,0 +1,126 @@
+//! Whether a plate has the size that its file states. The lengths of the robot's links are the only others there are.
+
+use std::collections::BTreeSet;
+
+use nalgebra::Vector3;
+
+use crate::assess::refitted;
+use crate::problem::{PlateShape, Problem, State};
+use crate::series::Plate;
+use crate::solve::Covariance;
+
+/// Standard deviations from which on plate and links contradict each other.
+const CONTRADICTION: f64 = 3.0;
+
+/// Prior sigma of a scale of which nothing is known.
+const UNKNOWN_SCALE: f64 = 0.1;
+
+/// Prior sigmas of the x/y scale beyond which a plate was not made to size.
+const NOT_TO_SIZE: f64 = 5.0;
+
+/// Indices among the modes of a plate; "aspect" is the x/y scale.
+const SCALE: usize = 0;
+const ASPECT: usize = 1;
+
+/// Gives the scale of every plate with a measured distance the prior that the distance makes, on a plate of the shape in `state`.
+pub(super) fn hold_scale_bars(problem: &mut Problem, state: &State) {
+    for (k, (columns, shape)) in problem.layout.shapes.clone().iter().zip(&state.plates).enumerate() {
+        if let Some((mean, sigma)) = bar_scale(&problem.plates[k], shape, &seen_markers(problem, k)) {
+            let column = &mut problem.layout.columns[columns.start + SCALE];
+            (column.prior_mean, column.prior_sigma) = (mean, sigma);
+        }
+    }
+}
+
+/// Scale by the measured distance of two markers, with its standard deviation: `distance = nominal (scale + shape)`, where everything
+/// but the scale makes the shape. A marker that was not seen may be off by its tolerance.
+fn bar_scale(plate: &Plate, shape: &PlateShape, seen: &BTreeSet<usize>) -> Option<(f64, f64)> {
+    let bar = plate.scale?;
+    let [a, b] = [plate.index_of(bar.from)?, plate.index_of(bar.to)?];
+    let nominal = plate.markers[a].position_m - plate.markers[b].position_m;
+    let shaped = (shape.position(a) - shape.position(b) - shape.modes[SCALE] * nominal).norm();
+    let unseen = [a, b].into_iter().filter(|m| !seen.contains(m));
+    let variance = bar.sigma_m.powi(2) + unseen.map(|m| plate.markers[m].sigma_m.powi(2)).sum::<f64>();
+    let nominal = nominal.norm();
+    (nominal > 0.0).then(|| ((bar.distance_m - shaped) / nominal, variance.sqrt() / nominal))
+}
+
+fn seen_markers(problem: &Problem, plate: usize) -> BTreeSet<usize> {
+    let images = problem.used().map(|(_, image)| image).filter(|image| image.plate == plate);
+    images.flat_map(|image| image.used().map(|o| o.marker)).collect()
+}
+
+/// Reasons not to believe the size of a plate, in words with what to do.
+pub(super) fn doubted_sizes(problem: &Problem, state: &State, covariance: &Covariance) -> Vec<String> {
+    let mut doubts = Vec::new();
+    for (k, (columns, shape)) in problem.layout.shapes.iter().zip(&state.plates).enumerate() {
+        let plate = &problem.plates[k];
+        let of = |mode: usize| &problem.layout.columns[columns.start + mode];
+        let free_scale =
+            || with_free_scale(problem, state, columns.start).plates[k].modes[SCALE] - of(SCALE).prior_mean;
+        let contradicted = contradicted(problem, columns.start, shape.modes[SCALE], covariance);
+        let far =
+            contradicted.map(|sigma| (free_scale(), sigma)).filter(|(off, sigma)| off.abs() > CONTRADICTION * sigma);
+        if let Some((off, sigma)) = far {
+            let (word, remedy) = match plate.scale {
+                Some(_) => ("[scale]", "check that distance, and that the lengths in the URDF are those of this robot"),
+                None => (
+                    "its file",
+                    "measure two far markers and give [scale] in plate.toml, or correct pitch_m; if the plate is right, the URDF is of another robot or size",
+                ),
+            };
+            doubts.push(format!(
+                "plate: the links of the robot say that it is {:.2} % (+- {:.2} %) {} than {word} says; every length goes wrong with it; {remedy}",
+                100.0 * off.abs(),
+                100.0 * sigma,
+                if off > 0.0 { "larger" } else { "smaller" },
+            ));
+        }
+        if plate.scale.is_none()
+            && let Some((uneven, tolerance)) = x_y_scale(problem, state, k)
+            && uneven.abs() > NOT_TO_SIZE * tolerance
+        {
+            doubts.push(format!(
+                "plate: its rows and columns differ in scale by {:.2} %, so it was not made to size, and all lengths of the robot hang on its size; \
+                 measure two far markers and give [scale] in plate.toml",
+                100.0 * uneven.abs()
+            ));
+        }
+    }
+    doubts
+}
+
+/// Standard deviation of the scale without its prior, where what the data say of it is too far from the prior; `None` where it is not, or where
+/// they say nothing.
+fn contradicted(problem: &Problem, column: usize, scale: f64, covariance: &Covariance) -> Option<f64> {
+    let (mean, prior) = (problem.layout.columns[column].prior_mean, problem.layout.columns[column].prior_sigma.powi(2));
+    let left = covariance.reduced[(column, column)];
+    let told = 1.0 / left - 1.0 / prior;
+    if !problem.layout.columns[column].free || told <= 0.0 {
+        return None;
+    }
+    let (off, sigma) = ((scale - mean) / (left * told), (1.0 / told + prior).sqrt());
+    (off.abs() > CONTRADICTION * sigma).then_some(sigma)
+}
+
+/// The x/y scale of the markers that were seen, corrections included, and its prior sigma.
+fn x_y_scale(problem: &Problem, state: &State, plate: usize) -> Option<(f64, f64)> {
+    let (nominal, shape) = (&problem.plates[plate], &state.plates[plate]);
+    let (mut along, mut size, mut loose) = (0.0, 0.0, 0.0);
+    for m in seen_markers(problem, plate) {
+        let from = nominal.markers[m].position_m;
+        let stretch = Vector3::new(from.x, -from.y, 0.0) / 2.0;
+        along += stretch.dot(&(shape.position(m) - from));
+        size += stretch.norm_squared();
+        loose += stretch.norm_squared() / problem.marker_information(plate, m);
+    }
+    let prior = problem.layout.columns[problem.layout.shapes[plate].start + ASPECT].prior_sigma;
+    (size > 0.0).then(|| (along / size, prior.hypot(loose.sqrt() / size)))
+}
+
+/// The fit with a scale that nothing but images and links tells: where it is far off, the linear answer need not hold.
+fn with_free_scale(problem: &Problem, state: &State, column: usize) -> State {
+    let mut loose = problem.clone();
+    loose.layout.columns[column].prior_sigma = UNKNOWN_SCALE;
+    refitted(&loose, state)
+}

@@ -1,0 +1,76 @@
+//! A plate that is not of the size that its file states: the robot would take the error over, so that it must be named.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use robotcal::recipe::{MeasuredSeries, Options, Solution, identify, measured};
+use robotcal::series::{Plate, PlateKind, ScaleBar};
+use robotcal::simulate::{WorldRequest, series};
+use robotcal::urdf::Chain;
+
+fn chain() -> Chain {
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap()
+}
+
+fn seen(chain: &Chain) -> MeasuredSeries {
+    let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.1e-3);
+    plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.01);
+    let request =
+        WorldRequest { images: 24, least_markers: 12, seed: 9, ..WorldRequest::typical(chain.clone(), plate) };
+    measured(&series(&request).unwrap(), chain)
+}
+
+/// The solution where the file states a plate larger by these factors along x and y.
+fn stated(x: f64, y: f64, bar: Option<(u32, u32)>) -> Solution {
+    let chain = chain();
+    let mut series = seen(&chain);
+    // The bar is measured on the plate as it is.
+    series.plate.scale = bar.map(|(from, to)| {
+        let of = |id| series.plate.markers[series.plate.index_of(id).unwrap()].position_m;
+        ScaleBar { from, to, distance_m: (of(from) - of(to)).norm(), sigma_m: 2e-5 }
+    });
+    for m in &mut series.plate.markers {
+        (m.position_m.x, m.position_m.y) = (x * m.position_m.x, y * m.position_m.y);
+    }
+    identify(chain, &[series], &Options::default()).unwrap()
+}
+
+fn about_the_plate(solution: &Solution) -> Vec<&String> {
+    solution.failed_gates.iter().filter(|g| g.starts_with("plate:")).collect()
+}
+
+fn scale(solution: &Solution) -> f64 {
+    solution.state.plates[0].modes[0]
+}
+
+#[test]
+fn a_plate_as_stated_is_not_doubted() {
+    assert_eq!(stated(1.0, 1.0, None).failed_gates, Vec::<String>::new());
+}
+
+#[test]
+fn a_plate_two_percent_off_is_doubted_and_a_measured_distance_mends_it() {
+    for (factor, word) in [(1.02, "smaller"), (0.98, "larger")] {
+        let wrong = stated(factor, factor, None);
+        let said = about_the_plate(&wrong);
+        assert!(said.len() == 1 && said[0].contains(word) && said[0].contains("[scale]"), "{said:?}");
+        let measured = stated(factor, factor, Some((0, 7)));
+        assert_eq!(measured.failed_gates, Vec::<String>::new());
+        assert!((scale(&measured) - (1.0 / factor - 1.0)).abs() < 3e-4, "{}", scale(&measured));
+    }
+}
+
+#[test]
+fn a_plate_that_a_printer_stretched_is_doubted_and_a_measured_distance_mends_it_in_any_direction() {
+    let wrong = stated(1.004, 1.0, None);
+    let said = about_the_plate(&wrong);
+    assert!(said.iter().any(|s| s.contains("rows and columns differ in scale by 0.")), "{said:?}");
+    for bar in [(0, 7), (0, 40), (0, 47)] {
+        let measured = stated(1.004, 1.0, Some(bar));
+        println!("{bar:?} {:?} {}", measured.failed_gates, scale(&measured));
+        assert_eq!(measured.failed_gates, Vec::<String>::new());
+        assert!((scale(&measured) + 0.002).abs() < 3e-4, "{bar:?}: {}", scale(&measured));
+    }
+}
