@@ -23,6 +23,7 @@ mod plan;
 mod plan_study;
 mod second_pass;
 mod selection;
+mod shift;
 mod simulated;
 mod solution;
 mod start;
