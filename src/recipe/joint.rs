@@ -10,7 +10,7 @@ use super::solution::Solution;
 use super::start::{misfit, start_robot};
 use super::worth::judge;
 use crate::assess::hold_out;
-use crate::error::{Error, Result};
+use crate::error::{Error, Notice, Result};
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::robot::Robot;
 use crate::problem::{Problem, Slack, State};

@@ -28,9 +28,6 @@ const LEAST_SHARE: f64 = 0.6;
 /// Probability, over all steps that are looked at, with which Gaussian noise may look like one.
 const FALSE_ALARMS: f64 = 1e-4;
 
-/// Sigmas of its own that a displacement must have.
-const LEAST_SIGMAS: f64 = 5.0;
-
 /// Displacements from which a result is not to be trusted: as far as a good robot repeats. m, rad.
 const MATTERS: (f64, f64) = (0.05e-3, 0.1e-3);
 
@@ -64,11 +61,11 @@ pub(super) struct Shift {
     behind: Vec<usize>,
     /// Displacement as a twist of the body: m, rad.
     twist: Vector6<f64>,
-    /// Its covariance.
+    /// Its covariance by the joint noise that was estimated without it.
     covariance: Matrix6<f64>,
     /// Fall of the cost, `D`.
     fall: f64,
-    /// Share of the squares of the slack that it explains.
+    /// Share of the squares of the slack that this and the other steps explain.
     share: f64,
 }
 
@@ -98,32 +95,37 @@ impl Row {
     }
 }
 
-/// Steps that explain most of the joint noise, the one that explains most first.
+/// Steps that explain most of the joint noise, in the order of the images.
 pub(super) fn find_shifts(problem: &Problem, state: &State, lin: &Linearised) -> Vec<Shift> {
     let mut linear = Linear::of(problem, state, lin);
-    let mut squares = slack_squares(problem, state, &linear);
-    let (mut found, mut good) = (Vec::new(), 0);
+    let columns = linear.information.ncols();
+    let all = slack_squares(problem, state, &linear);
+    let (mut left, mut found, mut good) = (all, Vec::<Shift>::new(), Vec::new());
     while found.len() < MOST_STEPS {
         let tried = candidates(problem, &linear);
         let Some(mut best) = linear.best(&tried) else { break };
-        best.share = best.fall / squares;
-        let chance = (tried.len() as f64) * chance(best.share, squares);
+        best.share = best.fall / left;
+        let chance = tried.len() as f64 * chance(best.share, left);
         tracing::debug!(?best.body, ?best.order, first = %problem.images[best.behind[0]].name, behind = best.behind.len(),
-            fall = best.fall, squares, share = best.share, chance, sigmas = best.sigmas(), twist = ?best.twist, "step of a body");
-        if chance > FALSE_ALARMS || best.sigmas() < LEAST_SIGMAS {
+            fall = best.fall, left, share = best.share, chance, twist = ?best.twist, "step of a body");
+        if chance > FALSE_ALARMS {
             break;
         }
-        let Some(next) = linear.with(&best) else { break };
-        linear = next;
-        squares = (squares - best.fall).max(0.0);
+        let Some((next, step)) = linear.with(&best) else { break };
         let enough = best.share > LEAST_SHARE;
+        (linear, left) = (next, (left - best.fall).max(0.0));
+        best.twist.fill(0.0);
         found.push(best);
+        for (k, shift) in found.iter_mut().enumerate() {
+            shift.twist += step.fixed_rows::<6>(columns + 6 * k);
+            shift.share = 1.0 - left / all;
+        }
         if enough {
-            good = found.len();
+            good.clone_from(&found);
         }
     }
-    found.truncate(good);
-    found
+    good.sort_by_key(|s| (s.order != Order::Time, s.behind[0]));
+    good
 }
 
 /// Squares of the slack in units of their variances.
@@ -253,8 +255,8 @@ impl Linear {
         Some(Shift { series: *series, body: *body, order: *order, behind, twist, covariance, fall, share: 0.0 })
     }
 
-    /// With the pose of the body behind the step as six more columns, at the optimum.
-    fn with(&self, shift: &Shift) -> Option<Self> {
+    /// With the pose of the body behind the step as six more columns, at the optimum; and the way there.
+    fn with(&self, shift: &Shift) -> Option<(Self, DVector<f64>)> {
         let n = self.information.ncols();
         let mut information = self.information.clone().resize(n + 6, n + 6, 0.0);
         let mut gradient = DVector::zeros(n + 6);
@@ -285,7 +287,7 @@ impl Linear {
                 up: row.up,
             })
             .collect();
-        Some(Self { images, information })
+        Some((Self { images, information }, step))
     }
 }
 
@@ -321,11 +323,6 @@ impl Sums {
 }
 
 impl Shift {
-    /// Length of the displacement in its own sigmas, of the six numbers together.
-    fn sigmas(&self) -> f64 {
-        self.fall.max(0.0).sqrt()
-    }
-
     fn distance_m(&self) -> f64 {
         self.twist.fixed_rows::<3>(0).norm()
     }
@@ -356,25 +353,32 @@ impl Shift {
             (true, false) => ("camera on its stand", "stands"),
         };
         let sigma = |from: usize| {
-            let trace: f64 = (from..from + 3).map(|k| self.covariance[(k, k)]).sum();
-            1e3 * (trace / 3.0 * (1.0 - self.share).clamp(0.0, 1.0)).sqrt()
+            let variance: f64 = (from..from + 3).map(|k| self.covariance[(k, k)]).sum();
+            1e3 * (variance / 3.0).sqrt()
         };
         let size = format!(
-            "{:.2} mm, {:.2} mrad (sigma {:.2} mm, {:.2} mrad per axis)",
+            "{:.2} mm, {:.2} mrad (sigma at most {:.2} mm, {:.2} mrad per axis)",
             1e3 * self.distance_m(),
             1e3 * self.angle_rad(),
             sigma(0),
             sigma(3)
         );
-        let gain = format!("this alone explains {:.0} % of the squares of the joint noise", 100.0 * self.share.min(1.0));
+        let gain = format!("what moved explains {:.0} % of the squares of the joint noise", 100.0 * self.share);
         let first = &image.name;
+        let why = if camera { "it was moved, creeps, or its lens was touched" } else { "it was moved, or creeps" };
         match self.order {
             Order::Time => {
-                let what = format!("series {series}: from {first} on the {body} {place} {size} elsewhere than before: it was moved; {gain}");
+                let what = format!(
+                    "series {series}: from {first} on the {body} {place} {size} elsewhere than before: {why}; {gain}"
+                );
                 let remedy = if camera {
-                    format!("fasten the camera, and take the series again, or put the images from {first} on into a series of their own with the same [camera] name and another mounting")
+                    format!(
+                        "fasten the camera, and take the series again, or put the images from {first} on into a series of their own with the same [camera] name and another mounting"
+                    )
                 } else {
-                    format!("write a column placement in joints.csv that differs from {first} on, or fasten the plate and take the series again")
+                    format!(
+                        "write a column placement in joints.csv that differs from {first} on, or fasten the plate and take the series again"
+                    )
                 };
                 (what, remedy)
             }
@@ -391,5 +395,26 @@ impl Shift {
                 (what, "fasten it, and take the series again".into())
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::chance;
+
+    #[test]
+    fn the_chance_is_that_of_a_beta_distribution() {
+        // Of eight squares six are explained: the share has the density 3 x^2.
+        for x in [0.1, 0.5, 0.9] {
+            assert!((chance(x, 8.0) - (1.0 - x * x * x)).abs() < 1e-12);
+        }
+        assert!((chance(0.0, 100.0) - 1.0).abs() < 1e-12 && chance(1.0, 100.0) == 0.0);
+        assert!((chance(0.999, 6.0) - 1.0).abs() < 1e-12, "nothing is left to compare with");
+    }
+
+    #[test]
+    fn many_squares_make_it_chi_squared() {
+        // The 99.9 % point of chi-squared with six degrees of freedom is 22.458.
+        assert!((chance(22.458 / 1e6, 1e6) - 1e-3).abs() < 1e-5);
     }
 }
