@@ -106,6 +106,17 @@ fn a_camera_turned_once_is_not_called_loose() {
 }
 
 #[test]
+fn a_camera_that_its_weight_shifts_is_named() {
+    let mut series = seen(CameraMount::Hand, 24, 7);
+    let plate = series.truth.plate_poses[&series.stops.stops[0].placement].pose();
+    let up = |pose: Pose| (plate * pose.inverse()).rotation[(2, 0)];
+    change(&mut series, 0..24, |pose| if up(pose) > 0.0 { by(1e-3, 0.0, 0.0) * pose } else { pose });
+    let (said, mm) = told(&solved(&series));
+    assert!(said.contains("x axis points up the camera on its mount") && said.contains("loose"), "{said}");
+    assert!((mm - 1.0).abs() < 0.1, "{said}");
+}
+
+#[test]
 fn a_plate_that_slips_in_the_hand_is_named() {
     let mut series = seen(CameraMount::Fixed, 24, 6);
     change(&mut series, 8..24, |pose| pose * by(0.0, 1e-3, 0.0));
