@@ -71,16 +71,17 @@ pub fn clustered_covariance(problem: &Problem, state: &State, lin: &Linearised) 
 }
 
 /// What one image tells.
-struct Told {
+#[derive(Debug, Clone)]
+pub struct Told {
     /// `R^-1 b`.
-    score: DVector<f64>,
+    pub score: DVector<f64>,
     /// `R' T`.
-    by_root: DMatrix<f64>,
+    pub by_root: DMatrix<f64>,
 }
 
 impl Told {
     /// Of the k-th image in use.
-    fn of(problem: &Problem, state: &State, lin: &Linearised, k: usize) -> Option<Self> {
+    pub fn of(problem: &Problem, state: &State, lin: &Linearised, k: usize) -> Option<Self> {
         let (terms, chain, i) = (&lin.terms[k], &lin.chains[k], lin.images[k]);
         let image = &problem.images[i];
         let known = |r: usize| match &state.slack[i] {

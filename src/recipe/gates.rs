@@ -3,6 +3,7 @@
 use super::free_poses::FreePoses;
 use super::joint::left_out;
 use super::loose::loose_mountings;
+use super::shift::Shift;
 use super::worth::Worth;
 use crate::assess::Accuracy;
 use crate::error::Notice;
@@ -38,6 +39,7 @@ pub(super) fn gates(
     state: &State,
     free: &FreePoses,
     accuracy: &Accuracy,
+    shifts: &[Shift],
     on_robot: usize,
 ) -> Vec<String> {
     let mut failed: Vec<String> = free.focus_change.iter().map(|f| format!("{f}; fix focus and zoom")).collect();
@@ -57,7 +59,7 @@ pub(super) fn gates(
             ));
         }
     }
-    failed.extend(loose_mountings(problem, state));
+    failed.extend(loose_mountings(problem, state, shifts));
     let out = left_out(problem, on_robot);
     if out as f64 > WORST_SHARE_LEFT_OUT * on_robot as f64 {
         failed.push(format!("images: {out} of {on_robot} do not fit their joint readings"));

@@ -6,11 +6,12 @@ use super::gates::{gates, remarks, undetermined};
 use super::moved::{Move, find_move};
 use super::plate_size::{doubted_sizes, hold_scale_bars};
 use super::selection::Selection;
+use super::shift::find_shifts;
 use super::solution::Solution;
 use super::start::{misfit, start_robot, take_back};
 use super::worth::judge;
 use crate::assess::hold_out;
-use crate::error::{Error, Result};
+use crate::error::{Error, Notice, Result};
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::robot::Robot;
 use crate::problem::{Problem, Slack, State};
@@ -162,7 +163,17 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     })?;
     let accuracy = hold_out(&problem, &state)
         .ok_or_else(|| Error::unsolved("hold-out", "too few images to hold any out", "take more images"))?;
-    let mut failed_gates = gates(&problem, &state, &free, &accuracy, on_robot);
+    let shifts = if free.focus_change.is_some() { Vec::new() } else { find_shifts(&problem, &state, &linearised) };
+    let mut failed_gates = Vec::new();
+    for shift in &shifts {
+        let (what, remedy) = shift.in_words(&problem, &series[shift.series].name);
+        if shift.matters() {
+            failed_gates.push(format!("{what}; {remedy}"));
+        } else {
+            notices.push(Notice::new("series", what, remedy));
+        }
+    }
+    failed_gates.extend(gates(&problem, &state, &free, &accuracy, &shifts, on_robot));
     failed_gates.extend(doubted_sizes(&problem, &state, &covariance));
     failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
     remarks(&problem, &state, on_robot, &mut notices);

@@ -1,5 +1,6 @@
 //! A camera that sits loosely on its mount: it tips over between two positions, and the joint noise shows two heaps.
 
+use super::shift::Shift;
 use crate::problem::{Problem, Slack, State};
 
 /// Fewest images, in all and in the smaller heap, that tell two heaps from chance.
@@ -51,8 +52,11 @@ fn split(values: &[f64]) -> Option<Split> {
 }
 
 /// Names every mounting whose camera turned between two positions; with what to do.
-pub(super) fn loose_mountings(problem: &Problem, state: &State) -> Vec<String> {
-    (0..problem.mountings.len()).filter_map(|m| loose(problem, state, m)).collect()
+///
+/// Mountings whose images a displacement explains already are left out.
+pub(super) fn loose_mountings(problem: &Problem, state: &State, shifts: &[Shift]) -> Vec<String> {
+    let open = |m: &usize| !shifts.iter().any(|s| s.explains(problem, *m));
+    (0..problem.mountings.len()).filter(open).filter_map(|m| loose(problem, state, m)).collect()
 }
 
 fn loose(problem: &Problem, state: &State, mounting: usize) -> Option<String> {

@@ -24,6 +24,7 @@ mod plan_study;
 mod plate_size;
 mod second_pass;
 mod selection;
+mod shift;
 mod simulated;
 mod solution;
 mod start;

@@ -10,6 +10,10 @@ use super::noise_information::{Latent, NoiseInformation};
 use crate::linalg::{SymmetricFactor, product};
 use crate::problem::Problem;
 
+/// Standard deviation of the logarithm of a variance up to which terms of second order mean anything; what the data do not tell at all, as
+/// the local error of a joint that never moved, would else be stated as an error of any size.
+const MOST_SPREAD: f64 = 2.0;
+
 /// The latents of all images, and how the estimated variances of each two of them scatter together.
 #[derive(Debug, Clone)]
 pub struct NoiseUncertainty {
@@ -47,9 +51,10 @@ impl NoiseUncertainty {
             })
         };
         let at_known = SymmetricFactor::new(&scaled(&cov.system.information, 1)).ok()?.inverse();
+        let bounded = |a: usize| (MOST_SPREAD / told.scatter[(a, a)].sqrt()).min(1.0);
         let shared = |i: usize, k: usize| {
             let products = parts[i].iter().flat_map(|(a, p)| parts[k].iter().map(move |(b, q)| (*a, *b, p * q)));
-            products.map(|(a, b, weight)| weight * told.scatter[(a, b)]).sum::<f64>()
+            products.map(|(a, b, weight)| weight * bounded(a) * bounded(b) * told.scatter[(a, b)]).sum::<f64>()
         };
         let columns =
             DMatrix::from_fn(problem.layout.len(), n, |c, i| cov.reduced[(c, latents[i].row)] / latents[i].sigma);

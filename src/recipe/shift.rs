@@ -1,0 +1,420 @@
+//! A plate or a camera that stands elsewhere from some image on, by too little for any image to be left out.
+//!
+//! Rao's score test on the linearised fit: what an image tells of its pose, joint noise eliminated, has the root score `s` and the
+//! derivatives `T` by all columns ([`Told`]). Let the pose of one body differ by a constant `x` in the images of a part `P` of a
+//! series, `A` its columns of `T`. With `K` the covariance of all columns, `g = sum_P A' s` and
+//! `J = sum_P A' A - V' K V`, `V = sum_P T' A`, the cost falls by `D = g' J^-1 g`, chi-squared with six degrees of freedom where nothing
+//! moved, and `x = J^-1 g` with the covariance `J^-1`.
+//!
+//! The estimated joint noise has grown with the fault, so that `D` is small beside what the sizes say; it is compared with the squares
+//! `R` of the slack, which are as many as the degrees of freedom that the robot left. `D / R` has a beta distribution where noise
+//! is Gaussian. Real robots err alike in postures that are alike, so that chance alone does not acquit them: the step must also
+//! explain most of `R`.
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+
+use crate::assess::Told;
+use crate::linalg::{SymmetricFactor, product};
+use crate::problem::{Problem, Slack, State};
+use crate::series::CameraMount;
+use crate::solve::Linearised;
+
+/// Fewest images on either side of a step.
+const FEWEST: usize = 3;
+
+/// Share of the squares of the slack that a step must explain.
+const LEAST_SHARE: f64 = 0.6;
+
+/// Probability, over all steps that are looked at, with which Gaussian noise may look like one.
+const FALSE_ALARMS: f64 = 1e-4;
+
+/// Displacements from which a result is not to be trusted: as far as a good robot repeats. m, rad.
+const MATTERS: (f64, f64) = (0.05e-3, 0.1e-3);
+
+/// Most steps in all.
+const MOST_STEPS: usize = 3;
+
+/// What stands elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Body {
+    Placement(usize),
+    Mounting(usize),
+}
+
+/// How the images are divided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Order {
+    /// By rows: moved once.
+    Time,
+    /// By how far this axis of what the robot carries points up: held by its weight only.
+    Up(usize),
+}
+
+/// A step of one body between two parts of a series.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Shift {
+    /// Index of the series.
+    pub series: usize,
+    body: Body,
+    order: Order,
+    /// Images behind the step, in this order.
+    behind: Vec<usize>,
+    /// Displacement as a twist of the body: m, rad.
+    twist: Vector6<f64>,
+    /// Its covariance by the joint noise that was estimated without it.
+    covariance: Matrix6<f64>,
+    /// Fall of the cost, `D`.
+    fall: f64,
+    /// Share of the squares of the slack that this and the other steps explain.
+    share: f64,
+}
+
+/// The fit, linearised.
+struct Linear {
+    /// Index of the image, its root score, derivatives by the free columns, derivatives by placement and mounting.
+    images: Vec<Row>,
+    information: DMatrix<f64>,
+}
+
+struct Row {
+    image: usize,
+    score: DVector<f64>,
+    by_free: DMatrix<f64>,
+    by_placement: DMatrix<f64>,
+    by_mounting: DMatrix<f64>,
+    /// Up in the axes of what the robot carries.
+    up: [f64; 3],
+}
+
+impl Row {
+    fn by(&self, body: Body) -> &DMatrix<f64> {
+        match body {
+            Body::Placement(_) => &self.by_placement,
+            Body::Mounting(_) => &self.by_mounting,
+        }
+    }
+}
+
+/// Steps that explain most of the joint noise, in the order of the images.
+pub(super) fn find_shifts(problem: &Problem, state: &State, lin: &Linearised) -> Vec<Shift> {
+    let mut linear = Linear::of(problem, state, lin);
+    let columns = linear.information.ncols();
+    let all = slack_squares(problem, state, &linear);
+    let (mut left, mut found, mut good) = (all, Vec::<Shift>::new(), Vec::new());
+    while found.len() < MOST_STEPS {
+        let tried = candidates(problem, &linear);
+        let Some(mut best) = linear.best(&tried) else { break };
+        best.share = best.fall / left;
+        let chance = tried.len() as f64 * chance(best.share, left);
+        tracing::debug!(?best.body, ?best.order, first = %problem.images[best.behind[0]].name, behind = best.behind.len(),
+            fall = best.fall, left, share = best.share, chance, twist = ?best.twist, "step of a body");
+        if chance > FALSE_ALARMS {
+            break;
+        }
+        let Some((next, step)) = linear.with(&best) else { break };
+        let enough = best.share > LEAST_SHARE;
+        (linear, left) = (next, (left - best.fall).max(0.0));
+        best.twist.fill(0.0);
+        found.push(best);
+        for (k, shift) in found.iter_mut().enumerate() {
+            shift.twist += step.fixed_rows::<6>(columns + 6 * k);
+            shift.share = 1.0 - left / all;
+        }
+        if enough {
+            good.clone_from(&found);
+        }
+    }
+    good.sort_by_key(|s| (s.order != Order::Time, s.behind[0]));
+    good
+}
+
+/// Squares of the slack in units of their variances.
+fn slack_squares(problem: &Problem, state: &State, linear: &Linear) -> f64 {
+    let of = |row: &Row| match &state.slack[row.image] {
+        Slack::Joints(dq) => {
+            let image = &problem.images[row.image];
+            dq.iter().enumerate().map(|(r, q)| q * q * problem.slack_information(image, r)).sum()
+        }
+        _ => 0.0,
+    };
+    linear.images.iter().map(of).sum()
+}
+
+/// Probability that six parameters explain this share of so many squares or more, of Gaussian noise.
+fn chance(share: f64, squares: f64) -> f64 {
+    let b = 0.5 * (squares - 6.0);
+    if b <= 0.0 {
+        return 1.0;
+    }
+    let x = share.clamp(0.0, 1.0);
+    (1.0 - x).powf(b) * (1.0 + b * x + 0.5 * b * (b + 1.0) * x * x)
+}
+
+/// Every way to divide the images of a series: the rows of [`Linear`] behind the step, from the last on.
+struct Candidate {
+    series: usize,
+    body: Body,
+    order: Order,
+    /// Rows in order; the step lies before `from`.
+    rows: std::rc::Rc<Vec<usize>>,
+    from: usize,
+}
+
+fn candidates(problem: &Problem, linear: &Linear) -> Vec<Candidate> {
+    let mut all = Vec::new();
+    let mut divide = |series, body, order, rows: Vec<usize>| {
+        let rows = std::rc::Rc::new(rows);
+        for from in (FEWEST..=rows.len().saturating_sub(FEWEST)).rev() {
+            all.push(Candidate { series, body, order, rows: rows.clone(), from });
+        }
+    };
+    let count = problem.images.iter().map(|i| i.series + 1).max().unwrap_or(0);
+    for series in 0..count {
+        let of_series = |body: Body| -> Vec<usize> {
+            let belongs = |r: &usize| {
+                let image = &problem.images[linear.images[*r].image];
+                let same = match body {
+                    Body::Placement(p) => image.placement == p,
+                    Body::Mounting(m) => image.mounting == m,
+                };
+                image.series == series && same
+            };
+            (0..linear.images.len()).filter(belongs).collect()
+        };
+        let placements = (0..problem.placements.len()).map(Body::Placement);
+        for body in placements.chain((0..problem.mountings.len()).map(Body::Mounting)) {
+            let rows = of_series(body);
+            let Some(&first) = rows.first() else { continue };
+            let in_hand = problem.images[linear.images[first].image].mount == CameraMount::Hand;
+            if in_hand == matches!(body, Body::Mounting(_)) {
+                for axis in 0..3 {
+                    let mut rows = rows.clone();
+                    rows.sort_by(|a, b| linear.images[*a].up[axis].total_cmp(&linear.images[*b].up[axis]));
+                    divide(series, body, Order::Up(axis), rows);
+                }
+            }
+            divide(series, body, Order::Time, rows);
+        }
+    }
+    all
+}
+
+impl Linear {
+    fn of(problem: &Problem, state: &State, lin: &Linearised) -> Self {
+        let layout = &problem.layout;
+        let free: Vec<usize> = (0..layout.len()).filter(|&c| layout.columns[c].free).collect();
+        let prior = DVector::from_iterator(free.len(), free.iter().map(|&c| layout.columns[c].prior_sigma.powi(-2)));
+        let mut information = DMatrix::from_diagonal(&prior);
+        let mut images = Vec::new();
+        for (k, &i) in lin.images.iter().enumerate() {
+            let image = &problem.images[i];
+            let Some(told) = Told::of(problem, state, lin, k) else { continue };
+            let by_free = told.by_root.select_columns(&free);
+            information += product(&by_free.transpose(), &by_free);
+            if !matches!(state.slack[i], Slack::Joints(_)) {
+                continue;
+            }
+            let camera_from_plate = lin.chains[k].pose;
+            let carried = match image.mount {
+                CameraMount::Hand => state.placements[image.placement] * camera_from_plate.inverse(),
+                CameraMount::Fixed => state.mountings[image.mounting] * camera_from_plate,
+            };
+            let columns = |range: &std::ops::Range<usize>| told.by_root.columns(range.start, 6).into_owned();
+            images.push(Row {
+                image: i,
+                by_placement: columns(&layout.placements[image.placement]),
+                by_mounting: columns(&layout.mountings[image.mounting]),
+                score: told.score,
+                by_free,
+                up: [0, 1, 2].map(|axis| carried.rotation[(2, axis)]),
+            });
+        }
+        Self { images, information }
+    }
+
+    /// The step with the largest fall of the cost; where several are alike, the first, which is one in time.
+    fn best(&self, tried: &[Candidate]) -> Option<Shift> {
+        let covariance = SymmetricFactor::new(&self.information).ok()?.inverse();
+        let mut best: Option<(f64, usize, Vector6<f64>, Matrix6<f64>)> = None;
+        let mut sums = Sums::new(self.information.ncols());
+        for (c, candidate) in tried.iter().enumerate() {
+            let rows = &candidate.rows;
+            if candidate.from + FEWEST == rows.len() {
+                sums = Sums::new(self.information.ncols());
+                rows[candidate.from + 1..].iter().for_each(|&r| sums.add(&self.images[r], candidate.body));
+            }
+            sums.add(&self.images[rows[candidate.from]], candidate.body);
+            let Some((fall, twist, own)) = sums.step(&covariance) else { continue };
+            if best.as_ref().is_none_or(|b| fall > b.0) {
+                best = Some((fall, c, twist, own));
+            }
+        }
+        let (fall, c, twist, covariance) = best?;
+        let Candidate { series, body, order, rows, from } = &tried[c];
+        let behind = rows[*from..].iter().map(|&r| self.images[r].image).collect();
+        Some(Shift { series: *series, body: *body, order: *order, behind, twist, covariance, fall, share: 0.0 })
+    }
+
+    /// With the pose of the body behind the step as six more columns, at the optimum; and the way there.
+    fn with(&self, shift: &Shift) -> Option<(Self, DVector<f64>)> {
+        let n = self.information.ncols();
+        let mut information = self.information.clone().resize(n + 6, n + 6, 0.0);
+        let mut gradient = DVector::zeros(n + 6);
+        let mut images = Vec::with_capacity(self.images.len());
+        for row in &self.images {
+            let mut by_free = row.by_free.clone().resize_horizontally(n + 6, 0.0);
+            if shift.behind.contains(&row.image) {
+                by_free.columns_mut(n, 6).copy_from(row.by(shift.body));
+                let own = by_free.columns(n, 6).into_owned();
+                let coupling = by_free.tr_mul(&own);
+                let mut right = information.columns_mut(n, 6);
+                right += &coupling;
+                let mut below = information.view_mut((n, 0), (6, n));
+                below += coupling.rows(0, n).transpose();
+                let mut rest = gradient.rows_mut(n, 6);
+                rest += own.tr_mul(&row.score);
+            }
+            images.push(by_free);
+        }
+        let step = SymmetricFactor::new(&information).ok()?.solve(&gradient);
+        let images = (self.images.iter().zip(images))
+            .map(|(row, by_free)| Row {
+                image: row.image,
+                score: &row.score - &by_free * &step,
+                by_free,
+                by_placement: row.by_placement.clone(),
+                by_mounting: row.by_mounting.clone(),
+                up: row.up,
+            })
+            .collect();
+        Some((Self { images, information }, step))
+    }
+}
+
+/// Sums over the images behind a step.
+struct Sums {
+    score: Vector6<f64>,
+    own: Matrix6<f64>,
+    coupling: DMatrix<f64>,
+}
+
+impl Sums {
+    fn new(columns: usize) -> Self {
+        Self { score: Vector6::zeros(), own: Matrix6::zeros(), coupling: DMatrix::zeros(columns, 6) }
+    }
+
+    fn add(&mut self, row: &Row, body: Body) {
+        let by = row.by(body);
+        let (score, own) = (by.tr_mul(&row.score), by.tr_mul(by));
+        self.score += score.fixed_rows::<6>(0);
+        self.own += own.fixed_view::<6, 6>(0, 0);
+        self.coupling += row.by_free.tr_mul(by);
+    }
+
+    /// Fall of the cost, displacement, and its covariance.
+    fn step(&self, covariance: &DMatrix<f64>) -> Option<(f64, Vector6<f64>, Matrix6<f64>)> {
+        let taken = self.coupling.tr_mul(&product(covariance, &self.coupling));
+        let left = DMatrix::from_column_slice(6, 6, (self.own - taken.fixed_view::<6, 6>(0, 0)).as_slice());
+        let own = SymmetricFactor::new(&left).ok()?.inverse();
+        let own = Matrix6::from_column_slice(own.as_slice());
+        let twist = own * self.score;
+        Some((self.score.dot(&twist), twist, own))
+    }
+}
+
+impl Shift {
+    fn distance_m(&self) -> f64 {
+        self.twist.fixed_rows::<3>(0).norm()
+    }
+
+    fn angle_rad(&self) -> f64 {
+        self.twist.fixed_rows::<3>(3).norm()
+    }
+
+    /// True where it is beyond what a good robot repeats to.
+    pub(super) fn matters(&self) -> bool {
+        self.distance_m() > MATTERS.0 || self.angle_rad() > MATTERS.1
+    }
+
+    /// True where it happened once, in images of this mounting.
+    pub(super) fn explains(&self, problem: &Problem, mounting: usize) -> bool {
+        self.order == Order::Time && problem.images[self.behind[0]].mounting == mounting
+    }
+
+    /// What stands where, and what to do, in words.
+    pub(super) fn in_words(&self, problem: &Problem, series: &str) -> (String, String) {
+        let image = &problem.images[self.behind[0]];
+        let camera = matches!(self.body, Body::Mounting(_));
+        let in_hand = image.mount == CameraMount::Hand;
+        let (body, place) = match (camera, in_hand) {
+            (false, true) => ("plate", "stands"),
+            (false, false) => ("plate in the hand", "sits"),
+            (true, true) => ("camera on its mount", "sits"),
+            (true, false) => ("camera on its stand", "stands"),
+        };
+        let sigma = |from: usize| {
+            let variance: f64 = (from..from + 3).map(|k| self.covariance[(k, k)]).sum();
+            1e3 * (variance / 3.0).sqrt()
+        };
+        let size = format!(
+            "{:.2} mm, {:.2} mrad (sigma at most {:.2} mm, {:.2} mrad per axis)",
+            1e3 * self.distance_m(),
+            1e3 * self.angle_rad(),
+            sigma(0),
+            sigma(3)
+        );
+        let gain = format!("what moved explains {:.0} % of the squares of the joint noise", 100.0 * self.share);
+        let first = &image.name;
+        let why = if camera { "it was moved, creeps, or its lens was touched" } else { "it was moved, or creeps" };
+        match self.order {
+            Order::Time => {
+                let what = format!(
+                    "series {series}: from {first} on the {body} {place} {size} elsewhere than before: {why}; {gain}"
+                );
+                let remedy = if camera {
+                    format!(
+                        "fasten the camera, and take the series again, or put the images from {first} on into a series of their own with the same [camera] name and another mounting"
+                    )
+                } else {
+                    format!(
+                        "write a column placement in joints.csv that differs from {first} on, or fasten the plate and take the series again"
+                    )
+                };
+                (what, remedy)
+            }
+            Order::Up(axis) => {
+                let names: Vec<&str> = self.behind.iter().take(5).map(|&i| problem.images[i].name.as_str()).collect();
+                let more = self.behind.len() - names.len();
+                let what = format!(
+                    "series {series}: where its {} axis points up the {body} sits {size} elsewhere ({} images: {}{}): it is loose, or bends under its weight; {gain}",
+                    ["x", "y", "z"][axis],
+                    self.behind.len(),
+                    names.join(", "),
+                    if more > 0 { format!(" and {more} more") } else { String::new() }
+                );
+                (what, "fasten it, and take the series again".into())
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::chance;
+
+    #[test]
+    fn the_chance_is_that_of_a_beta_distribution() {
+        // Of eight squares six are explained: the share has the density 3 x^2.
+        for x in [0.1, 0.5, 0.9] {
+            assert!((chance(x, 8.0) - (1.0 - x * x * x)).abs() < 1e-12);
+        }
+        assert!((chance(0.0, 100.0) - 1.0).abs() < 1e-12 && chance(1.0, 100.0) == 0.0);
+        assert!((chance(0.999, 6.0) - 1.0).abs() < 1e-12, "nothing is left to compare with");
+    }
+
+    #[test]
+    fn many_squares_make_it_chi_squared() {
+        // The 99.9 % point of chi-squared with six degrees of freedom is 22.458.
+        assert!((chance(22.458 / 1e6, 1e6) - 1e-3).abs() < 1e-5);
+    }
+}
