@@ -198,9 +198,9 @@ fn beyond_limits(
         .collect();
     let (stop, worst) = outside.iter().max_by(|a, b| beyond(a.1).total_cmp(&beyond(b.1)))?;
     let shown = if revolute { unit.name() } else { "m" };
-    let [worst, low, high] = [*worst, low, high].map(|q| q / factor);
+    let [worst, low, high] = [*worst, low, high].map(|q| (1e4 * q / factor).round() / 1e4);
     let what = format!(
-        "{} reads {worst:.4} {shown}, beyond its limits {low:.4} to {high:.4} in the URDF ({} of {} images)",
+        "{} reads {worst} {shown}, beyond its limits {low} to {high} in the URDF ({} of {} images)",
         chain.readings[reading],
         outside.len(),
         stops.stops.len()
