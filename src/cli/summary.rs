@@ -226,11 +226,11 @@ fn scales(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         let (Some(prior), Some(sigma)) = (e.prior_sigma, e.sigma) else { continue };
         let known =
             format!("scale     the robot's lengths follow the plate, whose size is known to {:.3} %", 100.0 * sigma);
-        let links = e.share_of_data.filter(|s| *s > 0.0).map(|s| 100.0 * prior / s.sqrt());
-        match (plate.scale, links) {
-            (None, Some(links)) => writeln!(
+        let all_else = e.share_of_data.filter(|s| *s > 0.0).map(|s| 100.0 * prior / s.sqrt());
+        match (plate.scale, all_else) {
+            (None, Some(all_else)) => writeln!(
                 out,
-                "{known} if its file is right (nobody measured it, and the links tell {links:.2} %); 0.1 % is 1 mm a metre: give [scale]"
+                "{known} if its file is right (nobody measured it, and all else tells {all_else:.2} %); 0.1 % is 1 mm a metre: give [scale]"
             )?,
             _ => writeln!(out, "{known}")?,
         }
