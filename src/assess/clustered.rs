@@ -44,19 +44,13 @@ pub fn clustered_covariance(problem: &Problem, state: &State, lin: &Linearised) 
     if lin.images.len() < FEWEST_IMAGES {
         return None;
     }
-    let (n, columns) = (problem.layout.len(), &problem.layout.columns);
-    let images: Vec<Told> = (0..lin.images.len()).filter_map(|k| Told::of(problem, state, lin, k)).collect();
-    let free: Vec<usize> = (0..n).filter(|&c| columns[c].free).collect();
-    let prior = DVector::from_iterator(free.len(), free.iter().map(|&c| columns[c].prior_sigma.recip()));
-    let mut information = DMatrix::from_diagonal(&prior.component_mul(&prior));
-    let derivatives: Vec<DMatrix<f64>> = images.iter().map(|t| t.by_root.select_columns(&free)).collect();
-    for d in &derivatives {
-        information += product(&d.transpose(), d);
-    }
+    let n = problem.layout.len();
+    let TellingImages { images, free, prior, information } = TellingImages::of(problem, state, lin);
     let model = SymmetricFactor::new(&information).ok()?.inverse();
     let by_prior = &model * DMatrix::from_diagonal(&prior);
     let mut sandwich = product(&by_prior, &by_prior.transpose());
-    for (told, d) in images.iter().zip(&derivatives) {
+    for told in &images {
+        let d = &told.by_free;
         let influence = &model * d.tr_mul(&told.restored(&product(d, &product(&model, &d.transpose())))?);
         sandwich.ger(1.0, &influence, &influence, 1.0);
     }
@@ -70,18 +64,51 @@ pub fn clustered_covariance(problem: &Problem, state: &State, lin: &Linearised) 
     Some(Clustered { model: whole(&model), sandwich: whole(&sandwich) })
 }
 
+/// What all images tell of the free columns together, markers known and joint noise eliminated.
+#[derive(Debug, Clone)]
+pub struct TellingImages {
+    /// The images.
+    pub images: Vec<Told>,
+    /// Free columns.
+    free: Vec<usize>,
+    /// Inverse prior sigma of each.
+    prior: DVector<f64>,
+    /// Information on them, priors included.
+    pub information: DMatrix<f64>,
+}
+
+impl TellingImages {
+    /// At a linearised fit.
+    pub fn of(problem: &Problem, state: &State, lin: &Linearised) -> Self {
+        let columns = &problem.layout.columns;
+        let free: Vec<usize> = (0..columns.len()).filter(|&c| columns[c].free).collect();
+        let prior = DVector::from_iterator(free.len(), free.iter().map(|&c| columns[c].prior_sigma.recip()));
+        let mut information = DMatrix::from_diagonal(&prior.component_mul(&prior));
+        let told = |k| Told::of(problem, state, lin, k, &free);
+        let images: Vec<Told> = (0..lin.images.len()).filter_map(told).collect();
+        for d in images.iter().map(|told| &told.by_free) {
+            information += product(&d.transpose(), d);
+        }
+        Self { images, free, prior, information }
+    }
+}
+
 /// What one image tells.
 #[derive(Debug, Clone)]
 pub struct Told {
+    /// Its place among the images in use.
+    pub place: usize,
     /// `R^-1 b`.
     pub score: DVector<f64>,
     /// `R' T`.
     pub by_root: DMatrix<f64>,
+    /// Its free columns.
+    pub by_free: DMatrix<f64>,
 }
 
 impl Told {
     /// Of the k-th image in use.
-    pub fn of(problem: &Problem, state: &State, lin: &Linearised, k: usize) -> Option<Self> {
+    fn of(problem: &Problem, state: &State, lin: &Linearised, k: usize, free: &[usize]) -> Option<Self> {
         let (terms, chain, i) = (&lin.terms[k], &lin.chains[k], lin.images[k]);
         let image = &problem.images[i];
         let known = |r: usize| match &state.slack[i] {
@@ -92,7 +119,8 @@ impl Told {
         let (root, inverse) = roots(&condensed(terms, &chain.d_slack, &slack)?)?;
         let score = DVector::from_iterator(6 + E, terms.bp.iter().chain(terms.be.iter().take(E)).copied());
         let by_root = product(&root.transpose(), &by_columns(&problem.layout, image, chain));
-        Some(Self { score: inverse * score, by_root })
+        let by_free = by_root.select_columns(free);
+        Some(Self { place: k, score: inverse * score, by_root, by_free })
     }
 
     /// The score with what the fit took of its scatter, of which `taken` is `R' Q R`.

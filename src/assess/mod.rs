@@ -13,7 +13,7 @@ mod stops;
 mod truth;
 
 pub use advice::Advice;
-pub use clustered::{Clustered, Told, clustered_covariance};
+pub use clustered::{Clustered, TellingImages, Told, clustered_covariance};
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
 pub use hold_out::{
     Accuracy, Errors, ImageError, cluster_of_images, folds, hold_out, hold_out_images, predict_image, refitted,

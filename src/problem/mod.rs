@@ -155,6 +155,14 @@ impl Problem {
         1.0 / (own + local)
     }
 
+    /// Squares of the slack of a stop in units of their variances; none for a free pose.
+    pub fn slack_squares(&self, image: &Image, slack: &Slack) -> f64 {
+        match slack {
+            Slack::Joints(dq) => dq.iter().enumerate().map(|(r, q)| q * q * self.slack_information(image, r)).sum(),
+            _ => 0.0,
+        }
+    }
+
     /// Leaves the local errors out: their columns stay at zero.
     pub fn without_local_errors(&mut self, state: &mut State) {
         let first = self.layout.terms.start;

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix6, Vector2};
 
 use super::focus::find_focus_change;
+use super::plate_size::hold_scale_bars;
 use super::solution::StartVerdict;
 use crate::error::{Error, Result};
 use crate::geom::Pose;
@@ -73,7 +74,9 @@ pub fn adjust_free_poses(
     for (column, free) in problem.layout.columns.iter_mut().zip(free_before) {
         column.free = free;
     }
-    Ok((result?, verdicts))
+    let free = result?;
+    hold_scale_bars(problem, &free.state);
+    Ok((free, verdicts))
 }
 
 fn fit_homographies(problem: &mut Problem, state: &State) -> Result<Vec<Option<Homography>>> {

@@ -5,7 +5,7 @@ use super::joint::left_out;
 use super::loose::loose_mountings;
 use super::shift::Shift;
 use super::worth::Worth;
-use crate::assess::Accuracy;
+use crate::assess::{Accuracy, median};
 use crate::error::Notice;
 use crate::problem::{Problem, State};
 
@@ -76,9 +76,8 @@ pub(super) fn gates(
 
 /// Where the corrected robot is known less well than the nominal one misses, in words; up to [`NO_MISS_MM`] it may be.
 pub(super) fn undetermined(worth: &Worth, accuracy: &Accuracy) -> Option<String> {
-    let mut sigmas: Vec<f64> = worth.workspace.iter().filter(|w| w.covered).map(|w| 1e3 * w.sigma_m).collect();
-    sigmas.sort_by(f64::total_cmp);
-    let usual = *sigmas.get(sigmas.len() / 2)?;
+    let covered = worth.workspace.iter().filter(|w| w.covered);
+    let usual = 1e3 * median(&covered.map(|w| w.sigma_m).collect::<Vec<f64>>())?;
     (usual > accuracy.nominal.rms_mm.max(NO_MISS_MM)).then(|| {
         format!(
             "flange: its place is known to {usual:.1} mm only in the region of the stops, and the nominal robot is off by {:.2} mm: these stops do \

@@ -4,7 +4,7 @@ use super::build::{MeasuredSeries, build};
 use super::free_poses::{FreePoses, adjust_free_poses};
 use super::gates::{gates, remarks, undetermined};
 use super::moved::{Move, find_move};
-use super::plate_size::{doubted_sizes, hold_scale_bars};
+use super::plate_size::doubted_sizes;
 use super::selection::Selection;
 use super::shift::find_shifts;
 use super::solution::Solution;
@@ -143,7 +143,6 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let (free, mut starts) = adjust_free_poses(&mut problem, state, &stated)?;
     let mut state = free.state.clone();
     let on_robot = problem.used().filter(|(_, i)| i.stop.is_some()).count();
-    hold_scale_bars(&mut problem, &state);
     let aside = start_robot(&mut problem, &mut state, &free, &mut starts)?;
     let (outcome, before) = fit(&mut problem, state, &free, &aside, options);
     let mut notices = Vec::new();

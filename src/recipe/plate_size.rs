@@ -2,8 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::Vector3;
-
 use crate::assess::refitted;
 use crate::problem::{PlateShape, Problem, State};
 use crate::series::Plate;
@@ -105,12 +103,12 @@ fn contradicted(problem: &Problem, column: usize, scale: f64, covariance: &Covar
 
 /// The x/y scale of the markers that were seen, corrections included, and its prior sigma.
 fn x_y_scale(problem: &Problem, state: &State, plate: usize) -> Option<(f64, f64)> {
-    let (nominal, shape) = (&problem.plates[plate], &state.plates[plate]);
+    let shape = &state.plates[plate];
     let (mut along, mut size, mut loose) = (0.0, 0.0, 0.0);
     for m in seen_markers(problem, plate) {
-        let from = nominal.markers[m].position_m;
-        let stretch = Vector3::new(from.x, -from.y, 0.0) / 2.0;
-        along += stretch.dot(&(shape.position(m) - from));
+        let modes = shape.modes_at(m);
+        let stretch = modes.column(ASPECT);
+        along += stretch.dot(&(shape.position(m) - shape.nominal[m]));
         size += stretch.norm_squared();
         loose += stretch.norm_squared() / problem.marker_information(plate, m);
     }

@@ -1,7 +1,7 @@
 //! A plate or a camera that stands elsewhere from some image on, by too little for any image to be left out.
 //!
 //! Rao's score test on the linearised fit: what an image tells of its pose, joint noise eliminated, has the root score `s` and the
-//! derivatives `T` by all columns ([`Told`]). Let the pose of one body differ by a constant `x` in the images of a part `P` of a
+//! derivatives `T` by all columns ([`TellingImages`]). Let the pose of one body differ by a constant `x` in the images of a part `P` of a
 //! series, `A` its columns of `T`. With `K` the covariance of all columns, `g = sum_P A' s` and
 //! `J = sum_P A' A - V' K V`, `V = sum_P T' A`, the cost falls by `D = g' J^-1 g`, chi-squared with six degrees of freedom where nothing
 //! moved, and `x = J^-1 g` with the covariance `J^-1`.
@@ -13,7 +13,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
-use crate::assess::Told;
+use crate::assess::TellingImages;
 use crate::linalg::{SymmetricFactor, product};
 use crate::problem::{Problem, Slack, State};
 use crate::series::CameraMount;
@@ -99,7 +99,8 @@ impl Row {
 pub(super) fn find_shifts(problem: &Problem, state: &State, lin: &Linearised) -> Vec<Shift> {
     let mut linear = Linear::of(problem, state, lin);
     let columns = linear.information.ncols();
-    let all = slack_squares(problem, state, &linear);
+    let squares = |row: &Row| problem.slack_squares(&problem.images[row.image], &state.slack[row.image]);
+    let all: f64 = linear.images.iter().map(squares).sum();
     let (mut left, mut found, mut good) = (all, Vec::<Shift>::new(), Vec::new());
     while found.len() < MOST_STEPS {
         let tried = candidates(problem, &linear);
@@ -126,18 +127,6 @@ pub(super) fn find_shifts(problem: &Problem, state: &State, lin: &Linearised) ->
     }
     good.sort_by_key(|s| (s.order != Order::Time, s.behind[0]));
     good
-}
-
-/// Squares of the slack in units of their variances.
-fn slack_squares(problem: &Problem, state: &State, linear: &Linear) -> f64 {
-    let of = |row: &Row| match &state.slack[row.image] {
-        Slack::Joints(dq) => {
-            let image = &problem.images[row.image];
-            dq.iter().enumerate().map(|(r, q)| q * q * problem.slack_information(image, r)).sum()
-        }
-        _ => 0.0,
-    };
-    linear.images.iter().map(of).sum()
 }
 
 /// Probability that six parameters explain this share of so many squares or more, of Gaussian noise.
@@ -202,19 +191,15 @@ fn candidates(problem: &Problem, linear: &Linear) -> Vec<Candidate> {
 impl Linear {
     fn of(problem: &Problem, state: &State, lin: &Linearised) -> Self {
         let layout = &problem.layout;
-        let free: Vec<usize> = (0..layout.len()).filter(|&c| layout.columns[c].free).collect();
-        let prior = DVector::from_iterator(free.len(), free.iter().map(|&c| layout.columns[c].prior_sigma.powi(-2)));
-        let mut information = DMatrix::from_diagonal(&prior);
+        let TellingImages { images: all, information, .. } = TellingImages::of(problem, state, lin);
         let mut images = Vec::new();
-        for (k, &i) in lin.images.iter().enumerate() {
+        for told in all {
+            let i = lin.images[told.place];
             let image = &problem.images[i];
-            let Some(told) = Told::of(problem, state, lin, k) else { continue };
-            let by_free = told.by_root.select_columns(&free);
-            information += product(&by_free.transpose(), &by_free);
             if !matches!(state.slack[i], Slack::Joints(_)) {
                 continue;
             }
-            let camera_from_plate = lin.chains[k].pose;
+            let camera_from_plate = lin.chains[told.place].pose;
             let carried = match image.mount {
                 CameraMount::Hand => state.placements[image.placement] * camera_from_plate.inverse(),
                 CameraMount::Fixed => state.mountings[image.mounting] * camera_from_plate,
@@ -225,7 +210,7 @@ impl Linear {
                 by_placement: columns(&layout.placements[image.placement]),
                 by_mounting: columns(&layout.mountings[image.mounting]),
                 score: told.score,
-                by_free,
+                by_free: told.by_free,
                 up: [0, 1, 2].map(|axis| carried.rotation[(2, axis)]),
             });
         }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::free_poses::FreePoses;
 use super::solution::StartVerdict;
 use super::suspects::Suspects;
+use crate::assess::median;
 use crate::error::{Error, Result};
 use crate::geom::{Pose, log_so3};
 use crate::init::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
@@ -230,11 +231,9 @@ pub(super) fn take_back(problem: &mut Problem, state: &State, free: &FreePoses, 
         let (angle, distance) = misfit(state, problem, &free.poses[i].as_ref()?.camera_from_plate, i)?;
         Some(angle + distance)
     };
-    let mut usual: Vec<f64> =
-        problem.used().filter(|(_, image)| image.stop.is_some()).filter_map(|(i, _)| size(i)).collect();
-    usual.sort_by(f64::total_cmp);
-    let Some(median) = usual.get(usual.len() / 2) else { return false };
-    let fits = |i: &usize| size(*i).is_some_and(|s| s < SET_ASIDE_FACTOR * median);
+    let on_robot = problem.used().filter(|(_, image)| image.stop.is_some());
+    let Some(usual) = median(&on_robot.filter_map(|(i, _)| size(i)).collect::<Vec<f64>>()) else { return false };
+    let fits = |i: &usize| size(*i).is_some_and(|s| s < SET_ASIDE_FACTOR * usual);
     let back: Vec<usize> = aside.iter().copied().filter(fits).collect();
     back.iter().for_each(|&i| problem.images[i].rejected = None);
     !back.is_empty()

@@ -2,7 +2,6 @@
 
 use super::build::{MeasuredSeries, build};
 use super::free_poses::adjust_free_poses;
-use super::plate_size::hold_scale_bars;
 use super::start::start_robot;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
 use crate::error::{Error, Result};
@@ -36,7 +35,6 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();
     let (free, mut starts) = adjust_free_poses(&mut problem, state, &stated)?;
-    hold_scale_bars(&mut problem, &free.state);
     let mut state = free.state.clone();
     start_robot(&mut problem, &mut state, &free, &mut starts)?;
     problem.start_slack(&mut state, false);

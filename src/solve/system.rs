@@ -8,7 +8,7 @@ use super::by_markers::MarkersEliminated;
 use super::by_slack::SlackEliminated;
 use crate::model::plate_modes::MODES;
 use crate::problem::{
-    Chained, Equations, ImageTerms, Problem, Slack, State, Step, Weighting, chained_from, equations, linearise,
+    Chained, Equations, ImageTerms, Problem, State, Step, Weighting, chained_from, equations, linearise,
 };
 
 /// All images linearised at one state.
@@ -68,16 +68,7 @@ fn prior_cost(problem: &Problem, state: &State, images: &[usize]) -> f64 {
         shape.corrections.iter().enumerate().map(of)
     });
     let markers: f64 = corrections.sum();
-    let slack: f64 = images
-        .iter()
-        .map(|&i| match &state.slack[i] {
-            Slack::Joints(dq) => {
-                let image = &problem.images[i];
-                dq.iter().enumerate().map(|(r, q)| q * q * problem.slack_information(image, r)).sum()
-            }
-            _ => 0.0,
-        })
-        .sum();
+    let slack: f64 = images.iter().map(|&i| problem.slack_squares(&problem.images[i], &state.slack[i])).sum();
     0.5 * (dense + held + markers + slack)
 }
 
