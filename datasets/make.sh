@@ -7,7 +7,7 @@ robotcal=target/release/robotcal
 kr6=robots/kuka_kr6_r900/kuka_kr6_r900.urdf
 
 rm -rf datasets/kr6_small datasets/ur10e_observations
-$robotcal simulate --urdf $kr6 --out datasets/kr6_small --images 24 --seed 1 --conditions datasets/kr6_small.conditions.toml
+$robotcal simulate --urdf $kr6 --out datasets/kr6_small --images 24 --seed 1
 $robotcal simulate --urdf robots/ur10e/ur10e.urdf --out datasets/ur10e_observations --images 50 --seed 10 \
     --errors full --observations --outer-only
 
