@@ -63,7 +63,7 @@ impl Error {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}\n  try: {}", self.place, self.what, self.remedy)
+        write!(f, "{}", shown(&format!("{}: {}\n  try: {}", self.place, self.what, self.remedy)))
     }
 }
 
@@ -83,7 +83,8 @@ pub struct Notice {
 impl Notice {
     /// A notice about `place`.
     pub fn new(place: impl fmt::Display, what: impl fmt::Display, remedy: impl fmt::Display) -> Self {
-        Self { place: place.to_string(), what: what.to_string(), remedy: remedy.to_string() }
+        let [place, what, remedy] = [place.to_string(), what.to_string(), remedy.to_string()].map(|t| shown(&t));
+        Self { place, what, remedy }
     }
 }
 
@@ -94,6 +95,32 @@ impl fmt::Display for Notice {
             write!(f, " ({})", self.remedy)?;
         }
         Ok(())
+    }
+}
+
+/// Characters that change a terminal or end a line of a program: control characters, line and paragraph separators, changes of direction.
+fn is_hidden(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// A name as it was read, where every character of it can be seen: names go into programs, file names and the terminal.
+///
+/// # Errors
+/// A name with control characters; they are shown escaped.
+pub fn plain_name<'a>(kind: &str, name: &'a str, place: impl fmt::Display) -> Result<&'a str> {
+    if !name.contains(is_hidden) {
+        return Ok(name);
+    }
+    let what = format!("the name of a {kind} has control characters: \"{}\"", name.escape_debug());
+    Err(Error::input(place, what, "give it a name of letters, digits, - and _"))
+}
+
+/// Text of files for the terminal: what cannot be seen is escaped, line ends and tabs stay.
+fn shown(text: &str) -> String {
+    let escaped = |c: char| is_hidden(c) && !matches!(c, '\n' | '\t');
+    match text.contains(escaped) {
+        false => text.to_owned(),
+        true => text.chars().map(|c| if escaped(c) { c.escape_unicode().to_string() } else { c.to_string() }).collect(),
     }
 }
 
@@ -129,7 +156,22 @@ fn edit_distance(a: &[char], b: &[char]) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::closest_name;
+    use super::{Error, Notice, closest_name, plain_name};
+
+    #[test]
+    fn names_with_control_characters_are_refused_and_never_shown_raw() {
+        for bad in ["a\nb", "a\u{1b}[2Jb", "a\u{85}b", "a\u{7f}", "a\rb", "a\tb", "a\u{2028}b", "a\u{202e}b"] {
+            let error = plain_name("joint", bad, "robot.urdf:3").unwrap_err();
+            assert_eq!((error.exit_code(), error.place.as_str()), (2, "robot.urdf:3"));
+            assert!(!error.what.contains(bad) && error.what.is_ascii(), "{}", error.what);
+        }
+        for good in ["joint_a1", "Gelenk 1", "schön", "a;b\"c"] {
+            assert_eq!(plain_name("joint", good, "x"), Ok(good));
+        }
+        let raw = "\u{1b}]0;x\u{7}";
+        assert!(!Error::input(raw, raw, raw).to_string().contains(['\u{1b}', '\u{7}']));
+        assert!(!Notice::new(raw, raw, raw).what.contains('\u{1b}'));
+    }
 
     #[test]
     fn a_misspelt_name_is_recognised_and_a_strange_one_is_not() {

@@ -35,4 +35,4 @@ pub mod simulate;
 pub mod solve;
 pub mod urdf;
 
-pub use error::{Error, ErrorKind, Notice, Result, closest_name};
+pub use error::{Error, ErrorKind, Notice, Result, closest_name, plain_name};

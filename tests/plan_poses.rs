@@ -373,3 +373,33 @@ fn further_poses_are_planned_from_a_result_with_its_noise() {
     let (code, _, error) = run(&[&base[..], &["--joint-noise-mrad", "0.5"]].concat());
     assert!(code == 2 && error.contains("--joint-noise-mrad") && error.contains("--from"), "{code}: {error}");
 }
+
+#[test]
+fn names_cannot_become_statements_of_the_planned_programs() {
+    let mut request = request("ur10e", 4);
+    let hostile = "b\", blocking=False)\n  movej([0,0,0,0,0,0])\nPTP {A1 0}\nMoveAbsJ [[0],[0]],v1,z1,tool0; \\ \u{e9}";
+    let mut chosen = plan(&request).unwrap();
+    request.setting.placements[0].0 = hostile.into();
+    request.setting.placements[1].0 = hostile.into();
+    request.setting.robot.chain.readings[1] = hostile.into();
+    // The plate moves once at least.
+    let (first, last) = (chosen.legs[0].stop, chosen.legs.last().unwrap().stop);
+    chosen.pool[first].placement = 0;
+    chosen.pool[last].placement = 1;
+    let files = robotcal::output::plan_programs::programs(&request, &chosen);
+    let text = |name: &str| String::from_utf8(files[&format!("robotcal_plan.{name}")].clone()).unwrap();
+    let visits = text("dat").matches("E6AXIS").count();
+    assert_eq!(text("src").lines().filter(|l| l.starts_with("PTP ")).count(), visits);
+    assert_eq!(text("mod").matches("    MoveAbsJ ").count(), visits);
+    assert_eq!(text("script").lines().filter(|l| l.starts_with("  movej(")).count(), visits);
+    assert!(text("script").lines().filter(|l| l.contains("popup(")).count() >= 1);
+    for name in ["src", "dat", "mod", "script"] {
+        for line in text(name).lines() {
+            assert!(line.is_ascii() && line.matches('"').count() % 2 == 0 && line.len() < 300, "{name}: {line}");
+        }
+    }
+    for line in text("mod").lines().filter(|l| l.contains("TPWrite")) {
+        let literal = line.split('"').nth(1).unwrap();
+        assert!(line.matches('"').count() == 2 && literal.len() <= 80 && !literal.contains('\\'), "{line}");
+    }
+}

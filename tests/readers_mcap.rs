@@ -274,3 +274,20 @@ fn wrong_bytes_never_panic() {
         }
     }
 }
+
+#[test]
+fn topics_and_joints_with_control_characters_are_refused() {
+    let whole = fs::read(recording("mono8/mono8.mcap")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    for (plain, hidden) in [("/joint_states", "/joint\u{1b}[2Jtes"), ("joint_2", "joint\n2")] {
+        let mut bytes = whole.clone();
+        let places: Vec<usize> =
+            (0..bytes.len() - plain.len()).filter(|&k| bytes[k..].starts_with(plain.as_bytes())).collect();
+        assert!(!places.is_empty(), "{plain}");
+        places.iter().for_each(|&k| bytes[k..k + plain.len()].copy_from_slice(hidden.as_bytes()));
+        let path = folder.path().join("hidden.mcap");
+        fs::write(&path, bytes).unwrap();
+        let message = refusal(&path, &RecordingOptions::default());
+        assert!(message.contains("control characters") && !message.contains(hidden), "{message:?}");
+    }
+}

@@ -315,3 +315,29 @@ fn what_is_written_reads_back_the_same() {
     assert_eq!(read.stops, stops);
     assert_eq!(read.source, Source::Observations(observations));
 }
+
+#[test]
+fn names_with_control_characters_are_refused_wherever_they_are_read() {
+    let manifest = |line: &str| format!("{MANIFEST}[camera]\n{line}\n");
+    let header = JOINTS.replace("j2", "j\u{1b}[2J2");
+    let quoted = JOINTS.replace("j2", "\"j\n; HALT\"");
+    let stop = JOINTS.replace("b.png", "\"b\n.png\"");
+    let placed = "image,j1,j2,x,placement\na.png,0,0,0,\"p\u{7}\"\nb.png,0,0,0,q\noff.png,,,,q\n";
+    let cases: [(&str, String, &str); 7] = [
+        ("series.toml", manifest("name = \"left\\u001b[2J\""), "series.toml:6"),
+        ("series.toml", manifest("mounting = \"a\\nb\""), "series.toml:6"),
+        ("joints.csv", header, "joints.csv:1"),
+        ("joints.csv", quoted, "joints.csv:1"),
+        ("joints.csv", stop, "joints.csv:3"),
+        ("joints.csv", placed.into(), "joints.csv:2"),
+        ("images/c\u{1b}[2J.png", String::new(), "images"),
+    ];
+    for (name, text, place) in cases {
+        let folder = series_with(&[(name, &text)]);
+        let error = read(folder.path()).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.place.ends_with(place), "{name}: {}", error.place);
+        assert!(!error.to_string().contains(|c: char| c.is_control() && c != '\n'), "{error:?}");
+        assert!(!error.what.contains('\n'), "{error:?}");
+    }
+}

@@ -244,3 +244,19 @@ fn an_arm_in_millimetres_is_refused_wherever_it_stands() {
     let error = arm(80.0, 400.0).unwrap_err();
     assert!(error.what.contains("400 m long") && error.remedy.contains("millimetres"), "{error}");
 }
+
+#[test]
+fn names_that_would_break_a_program_or_a_terminal_are_refused_with_their_line() {
+    let text = |robot: &str, link: &str, name: &str| {
+        wrap(&["a", link], &[joint(name, "revolute", "a", link, Z)]).replace("name=\"r\"", &format!("name=\"{robot}\""))
+    };
+    assert_eq!(robot(&text("r", "b", "j;1 \u{e9}")).chain(None, None).unwrap().readings, ["j;1 \u{e9}"]);
+    for hidden in ["&#10;HALT&#10;", "&#13;", "&#9;", "&#x9b;2J", "&#x7f;", "&#x2028;", "&#x202e;"] {
+        let bad = format!("j{hidden}1");
+        for (file, place) in [(text(&bad, "b", "j"), 1), (text("r", &bad, "j"), 3), (text("r", "b", &bad), 4)] {
+            let error = RobotDescription::from_text(Path::new("r.urdf"), file.clone()).unwrap_err();
+            assert_eq!((error.exit_code(), error.place), (2, format!("r.urdf:{place}")), "{file}");
+            assert!(!error.what.contains(|c: char| c.is_control() || !c.is_ascii()), "{:?}", error.what);
+        }
+    }
+}

@@ -9,7 +9,7 @@ use std::io;
 use serde::{Deserialize, Serialize};
 
 use crate::assess::{Errors, Identifiability, ProjectionMap, WorkspacePoint};
-use crate::error::{Error, Notice, Result};
+use crate::error::{Error, Notice, Result, plain_name};
 use crate::geom::Pose;
 use crate::model::camera::Lens;
 use crate::recipe::{Comparison, Evidence, StartVerdict};
@@ -422,6 +422,20 @@ pub struct SolutionRecord {
 }
 
 impl SolutionRecord {
+    /// Names go into programs, file names and the terminal.
+    fn plain_names(&self) -> Result<()> {
+        let robot = &self.robot;
+        let plain = |kind: &str, name: &String| plain_name(kind, name, FILE_NAME).map(|_| ());
+        [&robot.name, &robot.base, &robot.tip].into_iter().try_for_each(|n| plain("robot or link", n))?;
+        robot.readings.iter().try_for_each(|n| plain("joint", n))?;
+        robot.joints.iter().try_for_each(|j| plain("joint", &j.name))?;
+        self.cameras.iter().try_for_each(|c| plain("camera", &c.name))?;
+        self.mountings.iter().chain(&self.placements).try_for_each(|p| plain("mounting or placement", &p.name))?;
+        self.plates.iter().try_for_each(|p| plain("plate", &p.name))?;
+        self.series.iter().try_for_each(|s| plain("series", &s.name))?;
+        self.images.iter().try_for_each(|i| plain("image", &i.name))
+    }
+
     /// Observations in use of a camera: measured place (px) and stated covariance uu, uv, vv (px^2).
     pub fn seen_by(&self, camera: usize) -> impl Iterator<Item = ([f64; 2], [f64; 3])> {
         let images = self.images.iter().filter(move |i| i.camera == camera && i.reason.is_none());
@@ -521,7 +535,9 @@ pub fn read(bytes: &[u8]) -> Result<SolutionRecord> {
         };
         return Err(Error::input(FILE_NAME, what, remedy));
     }
-    serde_json::from_slice(bytes).map_err(refuse)
+    let record: SolutionRecord = serde_json::from_slice(bytes).map_err(refuse)?;
+    record.plain_names()?;
+    Ok(record)
 }
 
 fn one() -> f64 {

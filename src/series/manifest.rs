@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::inputs::{InputFile, read_text};
-use crate::{Error, Result, closest_name};
+use crate::{Error, Result, closest_name, plain_name};
 
 /// Unit of the revolute columns of joints.csv.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -240,13 +240,35 @@ pub(super) fn to_toml(file: &str, value: &impl Serialize) -> Result<String> {
 /// Reads a TOML file; unknown keys and wrong values are named with their line.
 pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path, inputs: &mut Vec<InputFile>) -> Result<T> {
     let text = read_text(path, inputs)?;
-    toml::from_str(&text).map_err(|error| {
+    let value = toml::from_str(&text).map_err(|error| {
         let line = error.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count());
         let place = line.map_or_else(|| path.display().to_string(), |l| format!("{}:{l}", path.display()));
         let message = error.message().trim().replace('\n', "; ");
         let remedy = toml_remedy(&message);
         Error::input(place, message, remedy)
-    })
+    })?;
+    plain_toml(path, &text)?;
+    Ok(value)
+}
+
+/// Keys and strings of a TOML file without control characters; the line is that of the innermost key.
+fn plain_toml(path: &Path, text: &str) -> Result<()> {
+    fn walk(value: &toml::Value, key: &str, place: &dyn Fn(&str) -> String) -> Result<()> {
+        match value {
+            toml::Value::String(text) => plain_name(key, text, place(key)).map(|_| ()),
+            toml::Value::Array(all) => all.iter().try_for_each(|v| walk(v, key, place)),
+            toml::Value::Table(all) => all.iter().try_for_each(|(k, v)| {
+                plain_name("key", k, place(key))?;
+                walk(v, k, place)
+            }),
+            _ => Ok(()),
+        }
+    }
+    let place = |key: &str| {
+        let line = text.lines().position(|l| l.trim_start().starts_with(key) && l.contains('\\'));
+        line.map_or_else(|| path.display().to_string(), |l| format!("{}:{}", path.display(), l + 1))
+    };
+    toml::from_str::<toml::Value>(text).map_or(Ok(()), |value| walk(&value, "", &place))
 }
 
 /// What to try after a message of the TOML reader, which quotes names in backticks: the offender, then what it knows.

@@ -16,7 +16,7 @@ use super::plate_file::read_plate;
 use super::recorded::{is_recording, manifest_beside};
 use super::units;
 use crate::urdf::Chain;
-use crate::{Error, Notice, Result};
+use crate::{Error, Notice, Result, plain_name};
 
 const IMAGE_EXTENSIONS: [&str; 9] = ["png", "tif", "tiff", "pgm", "pnm", "ppm", "jpg", "jpeg", "bmp"];
 
@@ -93,6 +93,7 @@ fn read_recording(path: &Path) -> Result<Series> {
     manifest.mcap = Some(file_name(path));
     let plate = read_plate(&folder.join(&manifest.plate), &mut inputs)?;
     let name = path.file_stem().map_or_else(|| "series".into(), |n| n.to_string_lossy().into_owned());
+    plain_name("series", &name, path.display())?;
     let source = Source::Recording(path.to_path_buf());
     Ok(Series { name, folder, manifest, plate, stops: Stops::default(), source, notices: Vec::new(), inputs })
 }
@@ -127,7 +128,9 @@ fn folder_name(folder: &Path) -> Result<String> {
         let remedy = "give the folder that holds series.toml";
         return Err(Error::input(folder.display(), "is not a series folder", remedy));
     }
-    Ok(full.file_name().map_or_else(|| "series".into(), |n| n.to_string_lossy().into_owned()))
+    let name = full.file_name().map_or_else(|| "series".into(), |n| n.to_string_lossy().into_owned());
+    plain_name("series", &name, folder.display())?;
+    Ok(name)
 }
 
 fn observed(
@@ -224,6 +227,7 @@ fn image_files(folder: &Path) -> Result<Vec<PathBuf>> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         let hidden = file_name(&path).starts_with('.');
         if extension.is_some_and(|e| IMAGE_EXTENSIONS.contains(&e.as_str())) && !hidden {
+            plain_name("image", &file_name(&path), folder.display())?;
             files.push(path);
         }
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::inputs::{InputFile, read_text};
-use crate::{Error, Result, closest_name};
+use crate::{Error, Result, closest_name, plain_name};
 
 /// One data row.
 #[derive(Debug)]
@@ -61,6 +61,7 @@ impl Table {
 
     fn check(&self) -> Result<()> {
         for (i, name) in self.headers.iter().enumerate() {
+            plain_name("column", name, self.place_of_header())?;
             if name.is_empty() {
                 let what = format!("column {} has no name", i + 1);
                 return Err(Error::input(self.place_of_header(), what, "name it or remove the extra comma"));
@@ -75,6 +76,9 @@ impl Table {
                 let what = format!("{} cells under {} column names", row.cells.len(), self.headers.len());
                 let remedy = "give every row all cells; numbers need a decimal point, not a comma";
                 return Err(Error::input(self.place(row), what, remedy));
+            }
+            for (cell, column) in row.cells.iter().zip(&self.headers) {
+                plain_name(column, cell, self.place(row))?;
             }
         }
         Ok(())

@@ -7,7 +7,7 @@ use roxmltree::{Document, Node};
 
 use super::elements::{JointElement, Source};
 use super::masses::{Inertial, inertial};
-use crate::{Error, Notice, Result, closest_name};
+use crate::{Error, Notice, Result, closest_name, plain_name};
 
 /// A robot as its URDF describes it, with the text it came from.
 #[derive(Debug, Clone)]
@@ -56,6 +56,7 @@ impl RobotDescription {
             let what = format!("the root element is <{}>, not <robot>", robot.tag_name().name());
             return Err(Error::input(source.place(robot), what, "give a URDF file"));
         }
+        plain_name("robot", robot.attribute("name").unwrap_or_default(), source.place(robot))?;
         let links = named(&source, robot, "link")?;
         let joint_nodes: Vec<_> = elements(robot, "joint").collect();
         named(&source, robot, "joint")?;
@@ -151,6 +152,7 @@ fn named(source: &Source<'_>, robot: Node<'_, '_>, tag: &'static str) -> Result<
         if name.trim().is_empty() {
             return Err(Error::input(source.place(node), format!("a <{tag}> without a name"), "give it a name"));
         }
+        plain_name(tag, name, source.place(node))?;
         if !seen.insert(name) {
             let what = format!("a second {tag} named \"{name}\"");
             return Err(Error::input(source.place(node), what, "rename one of them"));

@@ -1,6 +1,6 @@
 //! KUKA KRL: a .src with the motions and a .dat with the axis positions.
 
-use super::{EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S};
+use super::{EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S, harmless};
 
 /// Axes that KRL names A1.. and E1..
 const AXES: usize = 6;
@@ -15,11 +15,11 @@ pub(super) fn source(route: &Route<'_>) -> Option<String> {
     let mut text = format!(
         "&ACCESS RVP\nDEF {NAME}()\n; Joints in order: {}\n; Trigger: output 1. Slowly: 10 percent.\n\
          BAS(#INITMOV,0)\nBAS(#VEL_PTP,10)\n",
-        route.joints.join(", ")
+        route.joint_list()
     );
     for (k, visit) in route.visits.iter().enumerate() {
         if let Purpose::MovePlate(place, _) = &visit.purpose {
-            text += &format!("; Move the plate to {place}, then continue\nHALT\n");
+            text += &format!("; Move the plate to {}, then continue\nHALT\n", harmless(place));
         }
         text += &format!("PTP XP{k}\n");
         if let Purpose::Image(image) | Purpose::MovePlate(_, image) = &visit.purpose {

@@ -23,6 +23,8 @@ const EXPOSE_S: f64 = 0.5;
 const PULSE_S: f64 = 0.2;
 /// Greatest joint speed, rad/s (or m/s).
 const SPEED: f64 = 0.5;
+/// Letters of a name in a text in quotes; RAPID allows 80 in all.
+const LONGEST_NAME: usize = 40;
 /// Shortest time of a motion, s.
 const LEAST_TIME_S: f64 = 1.0;
 
@@ -78,6 +80,11 @@ fn route<'a>(request: &'a PlanRequest, plan: &Plan) -> Route<'a> {
 }
 
 impl Route<'_> {
+    /// Names of the joints for a comment.
+    fn joint_list(&self) -> String {
+        self.joints.iter().map(|j| harmless(j)).collect::<Vec<_>>().join(", ")
+    }
+
     /// Readings as teach pendants show them: degrees, or mm.
     fn shown(&self, readings: &[f64]) -> Vec<f64> {
         let one = |(q, kind): (&f64, &JointKind)| match kind {
@@ -86,6 +93,13 @@ impl Route<'_> {
         };
         readings.iter().zip(self.kinds).map(one).collect()
     }
+}
+
+/// A name inside a comment or a text in quotes of any controller: printable ASCII, without quotes, escapes and marks that begin or
+/// end a comment; short, since controllers limit the length of texts.
+fn harmless(name: &str) -> String {
+    let safe = |c: char| if (c.is_ascii_graphic() && !"\"'\\;!#&%{}".contains(c)) || c == ' ' { c } else { '_' };
+    name.chars().take(LONGEST_NAME).map(safe).collect()
 }
 
 /// Programs in all languages that can express the plan: file name -> bytes.

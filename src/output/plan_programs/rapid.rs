@@ -1,6 +1,6 @@
 //! ABB RAPID: one module with joint targets.
 
-use super::{EXPOSE_S, PULSE_S, Purpose, Route, SETTLE_S};
+use super::{EXPOSE_S, PULSE_S, Purpose, Route, SETTLE_S, harmless};
 
 /// Axes of the arm in a joint target.
 const AXES: usize = 6;
@@ -21,6 +21,7 @@ pub(super) fn module(route: &Route<'_>) -> Option<String> {
         let (arm, external) = cells.split_at(AXES);
         targets += &format!("  CONST jointtarget p{k} := [[{}],[{}]];\n", arm.join(","), external.join(","));
         if let Purpose::MovePlate(place, _) = &visit.purpose {
+            let place = harmless(place);
             body += &format!("    TPWrite \"Move the plate to {place}, then start\";\n    Stop;\n");
         }
         body += &format!("    MoveAbsJ p{k}\\NoEOffs, v100, fine, tool0;\n");
@@ -31,7 +32,7 @@ pub(super) fn module(route: &Route<'_>) -> Option<String> {
             );
         }
     }
-    let joints = route.joints.join(", ");
+    let joints = route.joint_list();
     Some(format!(
         "MODULE RobotcalPlan\n  ! Joints in order: {joints}\n{targets}  PROC robotcal_plan()\n{body}  ENDPROC\nENDMODULE\n"
     ))

@@ -1,6 +1,6 @@
 //! Universal Robots URScript.
 
-use super::{EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S, SPEED};
+use super::{EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S, SPEED, harmless};
 use crate::urdf::JointKind;
 
 /// Joints of every arm of this maker.
@@ -11,10 +11,11 @@ pub(super) fn script(route: &Route<'_>) -> Option<String> {
     if route.joints.len() != AXES || route.kinds.contains(&JointKind::Prismatic) {
         return None;
     }
-    let mut text = format!("def {NAME}():\n  # Joints in order: {}\n", route.joints.join(", "));
+    let mut text = format!("def {NAME}():\n  # Joints in order: {}\n", route.joint_list());
     for visit in &route.visits {
         let q: Vec<String> = visit.readings.iter().map(|q| format!("{q:.7}")).collect();
         if let Purpose::MovePlate(place, _) = &visit.purpose {
+            let place = harmless(place);
             text += &format!("  popup(\"Move the plate to {place}\", blocking=True)\n");
         }
         text += &format!("  movej([{}], a=0.5, v={SPEED:?})\n", q.join(", "));

@@ -10,7 +10,7 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use sha2::{Digest, Sha256};
 
 use crate::series::InputFile;
-use crate::{Error, Notice, Result};
+use crate::{Error, Notice, Result, plain_name};
 
 /// No record of a camera is as long as this; a longer one is a damaged length, bytes.
 const LONGEST_RECORD: usize = 1 << 30;
@@ -138,6 +138,7 @@ pub(super) fn for_each(path: &Path, mut visit: impl FnMut(Message<'_>) -> Result
                 schemas.insert(header.id, header.name);
             }
             Ok(Record::Channel(c)) => {
+                plain_name("topic", &c.topic, path.display())?;
                 let channel = Channel { topic: c.topic, schema: c.schema_id, encoding: c.message_encoding };
                 channels.insert(c.id, channel);
             }

@@ -9,7 +9,7 @@ use super::file::{Message, files_of, for_each, hash};
 use super::messages::{self, CameraInfo, JointState};
 use super::options::{Clock, RecordingOptions};
 use crate::series::InputFile;
-use crate::{Error, Notice, Result};
+use crate::{Error, Notice, Result, plain_name};
 
 /// Some joints at one time.
 #[derive(Debug, Clone)]
@@ -206,6 +206,8 @@ impl Scan {
         let asked = options.joint_topic.as_deref();
         let topic = self.choose(asked, &candidates, "joint states", "--joint-topic")?.to_string();
         let names = names_of(&topic);
+        let place = || format!("{}, topic {topic}", self.recording.display());
+        names.iter().try_for_each(|n| plain_name("joint", n, place()).map(|_| ()))?;
         let missing: Vec<&str> = options.joints.iter().filter(|j| !names.contains(j)).map(String::as_str).collect();
         let place = format!("{}, topic {topic}", self.recording.display());
         if names.is_empty() {
