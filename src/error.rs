@@ -86,6 +86,52 @@ impl Notice {
         let [place, what, remedy] = [place.to_string(), what.to_string(), remedy.to_string()].map(|t| shown(&t));
         Self { place, what, remedy }
     }
+
+    /// Notices that say the same of several places, in the order of the first of each.
+    pub fn alike(all: &[Self]) -> Vec<Vec<&Self>> {
+        let mut groups: Vec<Vec<&Self>> = Vec::new();
+        for notice in all {
+            match groups.iter_mut().find(|g| notice.says_the_same_as(g[0])) {
+                Some(group) => group.push(notice),
+                None => groups.push(vec![notice]),
+            }
+        }
+        groups
+    }
+
+    /// The same notices with those that say the same of several places made into one.
+    pub fn said_once(all: &[Self]) -> Vec<Self> {
+        Self::alike(all).into_iter().map(|group| Self::of_group(&group)).collect()
+    }
+
+    /// Apart from numbers that stand by themselves.
+    fn says_the_same_as(&self, other: &Self) -> bool {
+        let alike = self.place != other.place && without_numbers(&self.what) == without_numbers(&other.what);
+        self.remedy == other.remedy && (self.what == other.what || alike)
+    }
+
+    fn of_group(group: &[&Self]) -> Self {
+        let first = group[0];
+        let mut places: Vec<&str> = group.iter().map(|n| n.place.as_str()).collect();
+        places.dedup();
+        if places.len() < 2 {
+            return first.clone();
+        }
+        let differ = if group.iter().any(|n| n.what != first.what) { " (numbers of the first)" } else { "" };
+        Self {
+            place: format!("{} and {} more", first.place, places.len() - 1),
+            what: format!("{}{differ}", first.what),
+            ..first.clone()
+        }
+    }
+}
+
+/// Words of a text, numbers with their brackets and signs left out.
+fn without_numbers(text: &str) -> Vec<&str> {
+    let is_number = |w: &&str| {
+        w.trim_matches(|c: char| !c.is_ascii_digit()).parse::<f64>().is_ok() && !w.contains(char::is_alphabetic)
+    };
+    text.split_whitespace().filter(|w| !is_number(w)).collect()
 }
 
 impl fmt::Display for Notice {
@@ -171,6 +217,17 @@ mod tests {
         let raw = "\u{1b}]0;x\u{7}";
         assert!(!Error::input(raw, raw, raw).to_string().contains(['\u{1b}', '\u{7}']));
         assert!(!Notice::new(raw, raw, raw).what.contains('\u{1b}'));
+    }
+
+    #[test]
+    fn what_is_said_of_several_places_is_said_once_with_their_number() {
+        let of = |place: &str, px: f64| Notice::new(place, format!("off by ({px:.4}, 0.1) px"), "look");
+        let joint = |name: &str| Notice::new("joints.csv", format!("{name} is 2 deg beyond"), "look");
+        let all = [of("a.png", 0.1), joint("joint_1"), of("b.png", 0.2), of("c.png", -0.1), joint("joint_2")];
+        let said = Notice::said_once(&all);
+        assert_eq!(said.len(), 3, "{said:?}");
+        assert_eq!(said[0].place, "a.png and 2 more");
+        assert_eq!(said[1..], [joint("joint_1"), joint("joint_2")]);
     }
 
     #[test]

@@ -89,7 +89,8 @@ pub struct Identifiability {
     pub parameters: usize,
     /// Directions that stops over the whole range of the joints could tell.
     pub tellable: usize,
-    /// Directions that these data tell.
+    /// How many of these the data tell: without the directions of [`Cause::Stops`]. What priors and a precise camera tell beyond
+    /// is not counted.
     pub rank: usize,
     /// Directions that they do not tell.
     pub unknown: Vec<UnknownDirection>,
@@ -163,10 +164,11 @@ fn judge(
         })
         .collect();
     unknown.extend(structural_in_words(robot, &never, &names));
+    let tellable = names.len() - never.directions.ncols();
     Some(Identifiability {
         parameters: names.len(),
-        tellable: names.len() - never.directions.ncols(),
-        rank: told.len(),
+        tellable,
+        rank: tellable - own.ncols(),
         correlations: correlations(covariance, covariance_names, &names, &never, &adviser),
         unknown,
         observability: observability(&told, stops.len()),

@@ -7,6 +7,7 @@ mod hold_out;
 mod identifiability;
 mod points;
 mod projection;
+mod promise;
 mod propagate;
 mod statistics;
 mod stops;
@@ -25,6 +26,7 @@ pub use identifiability::{
 };
 pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
 pub use projection::ProjectionMap;
+pub use promise::{FlangeErrors, usual_joint_sigma};
 pub use propagate::{PredictedPose, View, predict_pose};
 pub use statistics::{Ratio, bootstrap_ratio, by_cluster, median, root_mean_square};
 pub use stops::{Structural, ideal_stops, minimal_set, structural};

@@ -37,6 +37,7 @@ impl AtArgs {
         let readings: Vec<Vec<f64>> = rows.into_iter().map(|(_, q)| q).collect();
         let model = found_model(record)?;
         let found = flange_at(&model, &readings)?;
+        std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
         let path = folder.join("at.csv");
         std::fs::write(&path, at_csv(&model, &readings, &found)).map_err(|e| Error::io(&path, &e))?;
         let mut out = String::new();

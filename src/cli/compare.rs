@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::choices::Model;
 use super::recording::{Pictures, RecordingArgs};
+use super::say::{say, say_line};
 use super::{Verdict, identify, progress};
 use crate::error::{Error, Result};
 use crate::output::comparison::{comparison_markdown, study_html, study_markdown, study_verdict};
@@ -80,13 +81,13 @@ fn series(args: &CompareArgs) -> Result<Verdict> {
     })?;
     bar.finish_and_clear();
     let text = comparison_markdown(&comparison);
-    print!("{text}");
+    say!("{text}");
     if args.out.is_some() {
         let series: Vec<String> = args.series.iter().map(|s| format!(" --series {}", s.display())).collect();
         let command = format!("robotcal compare --urdf {}{}", args.urdf.display(), series.concat());
         let path = args.report("comparison.md");
         write(&path, &format!("# Two stages against one, on a series\n\n    {command}\n\n{text}"))?;
-        println!("report    {}", path.display());
+        say_line!("report    {}", path.display());
     }
     Ok(Verdict::Good)
 }
@@ -115,9 +116,9 @@ fn study(args: &CompareArgs) -> Result<Verdict> {
     write(&args.report("two-stage-vs-joint.md"), &study_markdown(&study, &command))?;
     write(&page, &study_html(&study, &command))?;
     for line in study_verdict(&study) {
-        println!("{line}");
+        say_line!("{line}");
     }
-    println!("report    {}", page.display());
+    say_line!("report    {}", page.display());
     Ok(Verdict::Good)
 }
 
@@ -144,8 +145,8 @@ fn monte_carlo(args: &CompareArgs) -> Result<Verdict> {
     let text = monte_carlo_markdown(&cells, &command);
     let path = args.report("monte-carlo.md");
     write(&path, &text)?;
-    print!("{text}");
-    println!("report    {}", path.display());
+    say!("{text}");
+    say_line!("report    {}", path.display());
     Ok(Verdict::Good)
 }
 

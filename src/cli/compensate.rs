@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 
 use super::Verdict;
+use super::say::{say, say_line};
 use crate::error::{Error, Result};
 use crate::geom::{Pose, exp_so3};
 use crate::model::joint_terms::Term;
@@ -157,8 +158,8 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     }
     written.push((REPORT.to_owned(), report.as_bytes()));
     write_beside(&args.out, &written, &args.programs)?;
-    print!("{}", text(&program, &done.outcomes, &left, &controller.chain));
-    println!("results   {} ({} files)", args.out.display(), written.len());
+    say!("{}", text(&program, &done.outcomes, &left, &controller.chain));
+    say_line!("results   {} ({} files)", args.out.display(), written.len());
     Ok(if left.is_empty() { Verdict::Good } else { Verdict::GateFailed })
 }
 

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::Verdict;
 use super::recording::RecordingArgs;
+use super::say::{say, say_line};
 use super::show::read_solution;
 use crate::error::{Error, Result};
 use crate::model::robot::Robot;
@@ -48,9 +49,9 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Verdict> {
     } else {
         let joints = chain.map_or_else(Vec::new, |c| c.readings);
         let extracted = convert_recording(&args.from, &args.to, &args.recording.options(&joints)?)?;
-        print!("{}", text(&extracted));
+        say!("{}", text(&extracted));
     }
-    println!("written   {}", args.to.display());
+    say_line!("written   {}", args.to.display());
     Ok(Verdict::Good)
 }
 
@@ -73,12 +74,12 @@ fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<()> {
     let notices = series::write_recording(&args.to, &series, shown)?;
     let usable = series.stops.stops.iter().zip(&readings).filter(|(s, r)| s.path.is_some() && r.is_some()).count();
     let tip = if found.is_some() { "identified" } else { "nominal" };
-    println!("stops     {usable} with image, joints and {tip} tip; {} with observations marked", marks.len());
+    say_line!("stops     {usable} with image, joints and {tip} tip; {} with observations marked", marks.len());
     if found.is_some() {
-        println!("overlay   green: used, orange: left out, red: residuals, {MAGNIFIED} times their length");
+        say_line!("overlay   green: used, orange: left out, red: residuals, {MAGNIFIED} times their length");
     }
     for notice in series.notices.iter().chain(&series.reading_notices(&chain)).chain(&notices) {
-        println!("note      {notice}");
+        say_line!("note      {notice}");
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::image_study::{self, StudyArgs};
 use super::recording::{Pictures, RecordingArgs};
+use super::say::{say, say_line};
 use super::{Verdict, progress};
 use crate::detect::load;
 use crate::error::{Error, Notice, Result};
@@ -67,10 +68,11 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
     let name = looked.series.as_ref().map_or("images", |s| s.name.as_str());
     let out = args.out.clone().unwrap_or_else(|| Path::new("reports").join(format!("{name}-detected")));
     let written = write(args, &looked, &out)?;
-    print!("{}", text(&looked.images));
-    looked.notices.iter().for_each(|n| println!("note      {n}"));
-    looked.images.iter().flat_map(SeenImage::notices).for_each(|n| println!("note      {n}"));
-    println!("results   {} ({written} files)", out.display());
+    say!("{}", text(&looked.images));
+    let notices: Vec<Notice> =
+        looked.notices.iter().cloned().chain(looked.images.iter().flat_map(SeenImage::notices)).collect();
+    Notice::said_once(&notices).iter().for_each(|n| say_line!("note      {n}"));
+    say_line!("results   {} ({written} files)", out.display());
     let failures: Vec<&Error> = looked.images.iter().filter_map(|i| i.detection.failure.as_ref()).collect();
     let seen = |i: &SeenImage| (i.detection.observations.len(), i.detection.failure.as_ref().map(|f| f.what.clone()));
     let states: Vec<_> = looked.images.iter().map(|i| (i.name.as_str(), seen(i))).collect();

@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use super::at::AtArgs;
 use super::choices::{ChoiceArgs, in_words};
 use super::recording::{Pictures, RecordingArgs};
+use super::say::{say, say_line};
 use super::show::read_solution;
 use super::{Verdict, progress, summary};
 use crate::error::{Error, Notice, Result};
@@ -95,7 +96,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
             let pictures = Pictures::new();
             let all = pictures.of_recordings(all, &args.recording.options(&chain.readings)?)?;
             if args.dry_run {
-                print!("{}", summary::of_stops(&recipe::dry_run(chain, &all, &options)?));
+                say!("{}", summary::of_stops(&recipe::dry_run(chain, &all, &options)?));
                 return Ok(Verdict::Good);
             }
             let mut notices = description.notices.clone();
@@ -153,9 +154,9 @@ fn solve(args: &IdentifyArgs, options: &Options, task: Task) -> Result<Verdict> 
     // What is printed is what `show` prints: it comes from the file.
     let record = files.get(FILE_NAME).map_or(&[][..], Vec::as_slice);
     let record = solution_json::read(record)?;
-    print!("{}", summary::text(&record));
-    print!("{}", args.at.run(&record, &folder)?);
-    println!("results   {} ({} files)", folder.display(), files.len());
+    say!("{}", summary::text(&record));
+    say!("{}", args.at.run(&record, &folder)?);
+    say_line!("results   {} ({} files)", folder.display(), files.len());
     Ok(if solution.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed })
 }
 

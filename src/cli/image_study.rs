@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
+use super::say::say_line;
 use super::{Verdict, progress};
 use crate::error::{Error, Result};
 use crate::output::image_study::{
@@ -81,8 +82,8 @@ pub(super) fn run(args: &StudyArgs, out: &Path, overlay: bool) -> Result<Verdict
     let listed: Vec<(String, &[u8])> = files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
     write_beside(out, &listed, &[])?;
     let claims = || sections.iter().flat_map(|s: &Section| &s.claims);
-    claims().for_each(|c| println!("{}", c.line()));
-    println!("report    {}", out.join(REPORT).display());
+    claims().for_each(|c| say_line!("{}", c.line()));
+    say_line!("report    {}", out.join(REPORT).display());
     Ok(if claims().all(|c| c.holds) { Verdict::Good } else { Verdict::GateFailed })
 }
 

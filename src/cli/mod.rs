@@ -15,17 +15,21 @@ mod plan;
 mod plate;
 mod progress;
 mod recording;
+mod say;
 mod show;
 mod simulate;
 mod summary;
 mod verify;
 mod verify_series;
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use tracing_subscriber::filter::filter_fn;
+use tracing_subscriber::prelude::*;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// Calibrates a robot, its camera and a plate of markers in one problem, directly from images.
 #[derive(Parser)]
@@ -106,11 +110,18 @@ pub fn main() -> ExitCode {
         // Fails only where a pool exists already, which then serves as well.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     }
-    match cli.command.run() {
+    let ended = cli.command.run().and_then(|verdict| match say::failure() {
+        Some(error) => {
+            Err(Error::input("stdout", error, "check where the output goes; results that were named are written"))
+        }
+        None => Ok(verdict),
+    });
+    match ended {
         Ok(Verdict::Good) => ExitCode::SUCCESS,
         Ok(Verdict::GateFailed) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {error}");
+            // Nobody is left to hear that stderr is closed.
+            let _ = writeln!(std::io::stderr(), "error: {error}");
             ExitCode::from(error.exit_code())
         }
     }
@@ -122,10 +133,12 @@ fn start_log(verbose: u8) {
         1 => tracing::Level::INFO,
         _ => tracing::Level::DEBUG,
     };
-    tracing_subscriber::fmt()
-        .with_max_level(level)
-        .with_writer(std::io::stderr)
-        .with_target(false)
-        .without_time()
-        .init();
+    let from = move |m: &tracing::Metadata| m.level() <= &level && (verbose > 1 || is_own(m.target()));
+    let words = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_target(verbose > 1).without_time();
+    tracing_subscriber::registry().with(words.with_filter(filter_fn(from))).init();
+}
+
+/// What libraries say among themselves is no word to the user: they decide nothing here.
+fn is_own(target: &str) -> bool {
+    target.split("::").next() == Some(env!("CARGO_CRATE_NAME"))
 }

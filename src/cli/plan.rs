@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 use super::Verdict;
 use super::choices::Model;
 use super::plate::pair;
+use super::say::say;
 use super::simulate::Mount;
 use crate::error::{Error, Result};
 use crate::geom::{OrientedBox, Pose};
@@ -77,7 +78,7 @@ pub(super) struct PlanArgs {
     /// Joint terms that shall be found
     #[arg(long, value_enum, default_value_t = Model::Rigid)]
     robot_model: Model,
-    /// Accuracy is meant at these joint vectors (columns as in joints.csv, degrees), not over the workspace
+    /// Accuracy is meant at these joint vectors (ten or more; columns as in joints.csv, degrees), not over the workspace
     #[arg(long, value_name = "FILE", conflicts_with_all = ["d_optimal", "parameters"])]
     targets: Option<PathBuf>,
     /// All parameters of the robot alike, not the flange
@@ -192,7 +193,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     more.insert("plan.html".into(), plan_html(&request, &plan, &forecast, &command).into_bytes());
     let files = plan_files::plan_files(&request, &plan, &forecast, &command, more)?;
     write_all(&args.out, &files)?;
-    print!("{}", summary(&request, &plan, &forecast, &files, &args.out));
+    say!("{}", summary(&request, &plan, &forecast, &files, &args.out));
     Ok(Verdict::Good)
 }
 
@@ -265,7 +266,7 @@ fn study(args: &PlanArgs, chain: Chain, seeds: u64) -> Result<Verdict> {
     std::fs::create_dir_all(&args.out).map_err(|e| Error::io(&args.out, &e))?;
     let path = args.out.join("study.md");
     std::fs::write(&path, &text).map_err(|e| Error::io(&path, &e))?;
-    print!("{text}");
+    say!("{text}");
     Ok(Verdict::Good)
 }
 
@@ -350,6 +351,9 @@ fn wish(args: &PlanArgs, chain: &Chain) -> Result<Wish> {
     })
 }
 
+/// Fewest targets whose error says something: the nine numbers of the frames take up less than a third of theirs.
+const LEAST_TARGETS: usize = 10;
+
 /// Joint vectors of a file, in degrees (m for prismatic joints), as rad and m in the order of the chain.
 fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
     let stops = Stops::read(path, &mut Vec::new())?;
@@ -366,7 +370,19 @@ fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
         };
         columns.iter().zip(&chain.reading_kinds).map(one).collect()
     };
-    Ok(stops.stops.iter().filter_map(|s| s.raw_readings.as_ref()).map(in_si).collect())
+    let targets: Vec<Vec<f64>> = stops.stops.iter().filter_map(|s| s.raw_readings.as_ref()).map(in_si).collect();
+    if targets.len() < LEAST_TARGETS {
+        let what = format!(
+            "{} targets are too few: base frame and a point of the flange are brought together there, which three fit exactly",
+            targets.len()
+        );
+        return Err(Error::input(
+            path.display(),
+            what,
+            format!("give at least {LEAST_TARGETS}, spread over where the robot works"),
+        ));
+    }
+    Ok(targets)
 }
 
 fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<Image>)> {

@@ -6,6 +6,7 @@ use clap::Args;
 use sha2::{Digest, Sha256};
 
 use super::Verdict;
+use super::say::say;
 use crate::error::{Error, Result};
 use crate::output::plate_drawing::{Caption, pdf, png, svg};
 use crate::plan::plate_design::{PlateDesign, PlateRequest, Sheet, Viewing, design};
@@ -85,7 +86,7 @@ pub(super) fn run(args: &PlateArgs) -> Result<Verdict> {
         seed: args.seed,
     })?;
     let name = write(&args.out, &made, args.dpi)?;
-    print!("{}", summary(&made, &name, &args.out));
+    say!("{}", summary(&made, &name, &args.out));
     Ok(Verdict::Good)
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::at::AtArgs;
+use super::say::{say, say_line};
 use super::{Verdict, summary};
 use crate::error::{Error, Result};
 use crate::output::difference::{Difference, compare_solutions};
@@ -38,34 +39,34 @@ pub(super) fn run(args: &ShowArgs) -> Result<Verdict> {
     if let Some(second) = args.solutions.get(1) {
         return compare(args, &first, &read_solution(second)?);
     }
-    print!("{}", summary::text(&first));
+    say!("{}", summary::text(&first));
     if args.parameters {
-        print!("{}", summary::parameters(&first));
+        say!("{}", summary::parameters(&first));
     }
-    print!("{}", args.at.run(&first, &args.out)?);
+    say!("{}", args.at.run(&first, &args.out)?);
     Ok(if first.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed })
 }
 
 fn compare(args: &ShowArgs, a: &SolutionRecord, b: &SolutionRecord) -> Result<Verdict> {
     let found = compare_solutions(a, b)?;
-    println!("first     {}", args.solutions[0].display());
-    println!("second    {}", args.solutions[1].display());
-    println!(
+    say_line!("first     {}", args.solutions[0].display());
+    say_line!("second    {}", args.solutions[1].display());
+    say_line!(
         "flange    distance of the flange between the two models, base frames and a point of the flange brought together:"
     );
     match &found.covered {
         Some(d) => print_difference("in the region of the stops", d, a),
-        None => println!("          their stops have no region in common"),
+        None => say_line!("          their stops have no region in common"),
     }
     print_difference("within all joint limits", &found.everywhere, a);
     if found.parameters.is_empty() {
-        println!("differ    no parameter of the robot differs by more than 3 sigmas");
+        say_line!("differ    no parameter of the robot differs by more than 3 sigmas");
     }
     for (name, x, y, sigmas) in &found.parameters {
-        println!("differ    {name}: {x:.3e} and {y:.3e}, {sigmas:.1} sigmas");
+        say_line!("differ    {name}: {x:.3e} and {y:.3e}, {sigmas:.1} sigmas");
     }
     for (what, r) in [("first", a), ("second", b)] {
-        println!("accuracy  {what}: {:.3} mm held out ({})", r.accuracy.calibrated.rms_mm, verdict(r));
+        say_line!("accuracy  {what}: {:.3} mm held out ({})", r.accuracy.calibrated.rms_mm, verdict(r));
     }
     Ok(Verdict::Good)
 }
@@ -76,7 +77,7 @@ fn verdict(r: &SolutionRecord) -> &'static str {
 
 fn print_difference(region: &str, d: &Difference, a: &SolutionRecord) {
     let stated = d.stated_m.map_or(String::new(), |s| format!(", stated sigma of both {:.3} mm", 1e3 * s));
-    println!(
+    say_line!(
         "          {region}: {:.3} mm RMS, worst {:.3} mm over {} places{stated}",
         1e3 * d.rms_m,
         1e3 * d.worst_m,
@@ -88,5 +89,5 @@ fn print_difference(region: &str, d: &Difference, a: &SolutionRecord) {
             _ => format!("{name} {:.0} deg", q.to_degrees()),
         })
         .collect();
-    println!("          worst at {}", at.join(", "));
+    say_line!("          worst at {}", at.join(", "));
 }

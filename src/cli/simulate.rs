@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
+use super::say::{say, say_line};
 use super::{Verdict, progress};
 use crate::error::{Error, Result};
 use crate::model::camera::Lens;
@@ -149,7 +150,7 @@ impl From<Errors> for RobotErrors {
 pub(super) fn run(args: &SimulateArgs) -> Result<Verdict> {
     let fault = match args.fault.as_deref() {
         Some("list") => {
-            FAULTS.iter().for_each(|e| println!("{}", e.name));
+            FAULTS.iter().for_each(|e| say_line!("{}", e.name));
             return Ok(Verdict::Good);
         }
         name => name.map(named_fault).transpose()?,
@@ -173,7 +174,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Verdict> {
     if let Some(fault) = fault {
         fault.apply_to_folder(&args.out)?;
     }
-    print!("{}", summary(&made, &args.out));
+    say!("{}", summary(&made, &args.out));
     Ok(Verdict::Good)
 }
 

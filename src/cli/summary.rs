@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use crate::assess::{Cause, Errors, Identifiability, UnknownDirection, median};
+use crate::error::Notice;
 use crate::output::solution_json::SolutionRecord;
 use crate::problem::short_name;
 use crate::recipe::Comparison;
@@ -17,9 +18,6 @@ const MOST_ADVICE: usize = 3;
 /// Most parameters of a direction that are named.
 const MOST_NAMED: usize = 4;
 
-/// Share of the prior variance below which a parameter counts as not determined by the data.
-const LEAST_SHARE: f64 = 0.1;
-
 /// The short table: what was read, what was left out and why, joint noise, accuracy, what could not be determined, verdict.
 pub(super) fn text(record: &SolutionRecord) -> String {
     let mut out = String::new();
@@ -31,8 +29,10 @@ pub(super) fn text(record: &SolutionRecord) -> String {
 /// What stops can tell, before the solve.
 pub(super) fn of_stops(found: &Identifiability) -> String {
     let mut out = String::new();
-    let _ = identifiability(&mut out, found, "the stops can tell");
-    let _ = limited(&mut out, "gauge", found.unknown.iter().filter(|d| d.cause != Cause::Stops).map(direction));
+    // No report holds the rest.
+    let _ = identifiability(&mut out, found, "the stops can tell", usize::MAX);
+    let gauge = found.unknown.iter().filter(|d| d.cause != Cause::Stops).map(direction);
+    let _ = at_most(usize::MAX, &mut out, "gauge", gauge);
     out
 }
 
@@ -51,6 +51,9 @@ pub(super) fn parameters(r: &SolutionRecord) -> String {
 }
 
 fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    verdict(out, r)?;
+    flange(out, r)?;
+    accuracy(out, r)?;
     let robot = &r.robot;
     writeln!(
         out,
@@ -96,21 +99,39 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     marker_tolerance(out, r)?;
     joint_noise(out, r)?;
     evidences(out, r)?;
-    accuracy(out, r)?;
     two_stage(out, r)?;
     map(out, r)?;
     scales(out, r)?;
     undetermined(out, r)?;
     if let Some(found) = &r.identifiability {
-        identifiability(out, found, "the data tell")?;
+        identifiability(out, found, "the data tell", MOST_ADVICE)?;
     }
-    limited(out, "note", r.notices.iter().map(ToString::to_string))?;
+    limited(out, "note", Notice::said_once(&r.notices).iter().map(ToString::to_string))
+}
+
+fn verdict(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     if r.failed_gates.is_empty() {
         writeln!(out, "verdict   good")
     } else {
         writeln!(out, "verdict   NOT TO BE TRUSTED:")?;
         r.failed_gates.iter().try_for_each(|g| writeln!(out, "          - {g}"))
     }
+}
+
+/// What may be promised of the corrected robot: by model and covariance.
+fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    let Some(e) = &r.flange else { return Ok(()) };
+    let mm = |m: f64| format!("{:>8.3} mm", 1e3 * m);
+    writeln!(
+        out,
+        "flange    expected error of its position at a stop in the region of the stops, by model and covariance, RMS, base and tool aligned:"
+    )?;
+    writeln!(out, "          nominal    {}", mm(e.nominal_m))?;
+    writeln!(out, "          calibrated {}   corrected URDF alone", mm(e.urdf_m))?;
+    if r.beyond_urdf() {
+        writeln!(out, "          calibrated {}   with compensation.toml", mm(e.model_m))?;
+    }
+    writeln!(out, "          {:.3} mm of each is noise from stop to stop, which no model takes away", 1e3 * e.scatter_m)
 }
 
 fn limited(out: &mut String, label: &str, lines: impl Iterator<Item = String>) -> std::fmt::Result {
@@ -203,7 +224,11 @@ fn evidences(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 
 fn accuracy(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     let row = |e: &Errors| format!("{:>8.3} mm {:>8.3} px   worst image {:.3} mm", e.rms_mm, e.rms_px, e.worst_mm);
-    writeln!(out, "accuracy  of images that the fit had not seen ({} folds), RMS over the markers:", r.accuracy.folds)?;
+    writeln!(
+        out,
+        "held out  images that the fit had not seen ({} folds), where the plate stood, repeatability included, RMS over the markers:",
+        r.accuracy.folds
+    )?;
     writeln!(out, "          nominal    {}", row(&r.accuracy.nominal))?;
     writeln!(out, "          calibrated {}", row(&r.accuracy.calibrated))
 }
@@ -250,7 +275,7 @@ fn map(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     if let (Some(median), Some(most)) = (at(&inside, 0.5), at(&inside, 0.95)) {
         writeln!(
             out,
-            "flange    sigma of its position relative to the plate, by the model: {median:.3} mm (95 % below {most:.3} mm) in the region of the stops{}",
+            "map       sigma of the flange relative to the plate, by the model: {median:.3} mm (95 % below {most:.3} mm) in the region of the stops{}",
             at(&all, 1.0).map_or(String::new(), |w| format!(", up to {w:.2} mm elsewhere"))
         )?;
     }
@@ -264,16 +289,7 @@ fn map(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 fn undetermined(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     let Some(found) = &r.identifiability else { return Ok(()) };
     writeln!(out, "gauge     {}", gauge(found))?;
-    let robot = || r.estimates.iter().filter(|e| e.name.starts_with("robot/") && e.free && !e.name.contains(".local_"));
-    let gauge: Vec<&str> = (found.unknown.iter())
-        .filter(|d| matches!(d.cause, Cause::Base | Cause::Tip))
-        .flat_map(|d| d.parameters.iter().map(|(name, _)| name.as_str()))
-        .collect();
-    let weak: Vec<String> = robot()
-        .filter(|e| e.share_of_data.is_some_and(|s| s < LEAST_SHARE))
-        .map(|e| short_name(&e.name))
-        .filter(|name| !gauge.contains(&name.as_str()))
-        .collect();
+    let weak: Vec<String> = r.undetermined().iter().map(|e| short_name(&e.name)).collect();
     if weak.is_empty() {
         return writeln!(out, "unknown   nothing else: the data determine every robot parameter");
     }
@@ -281,7 +297,7 @@ fn undetermined(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         out,
         "unknown   {} of {} robot parameters stay near nominal, the data say little of them: {}",
         weak.len(),
-        robot().count(),
+        r.robot_parameters().count(),
         grouped(&weak)
     )
 }
@@ -312,7 +328,7 @@ fn gauge(found: &Identifiability) -> String {
     }
 }
 
-fn identifiability(out: &mut String, found: &Identifiability, who: &str) -> std::fmt::Result {
+fn identifiability(out: &mut String, found: &Identifiability, who: &str, most: usize) -> std::fmt::Result {
     writeln!(
         out,
         "rank      {who} {} of the {} directions that any series could ({} free parameters of the robot)",
@@ -327,20 +343,20 @@ fn identifiability(out: &mut String, found: &Identifiability, who: &str) -> std:
     }
     let by_stops = found.unknown.iter().filter(|d| d.cause == Cause::Stops);
     at_most(
-        MOST_ADVICE,
+        most,
         out,
         "untold",
         by_stops.map(|d| format!("{}: {}", direction(d), d.remedy.as_deref().unwrap_or("more stops"))),
     )?;
     at_most(
-        MOST_ADVICE,
+        most,
         out,
         "alike",
         (found.correlations.iter())
             .map(|c| format!("{} and {} (correlation {:.3}): {}", c.first, c.second, c.correlation, c.remedy)),
     )?;
     at_most(
-        MOST_ADVICE,
+        most,
         out,
         "next",
         found.next.iter().map(|a| format!("{} (takes {:.0} % off what is left)", a.words, 100.0 * a.gain)),

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 use super::joint_table::{self, Unit};
 use super::recording::RecordingArgs;
+use super::say::say_line;
 use super::{Verdict, verify_series};
 use crate::assess::{MeasuredPoint, fit_points};
 use crate::error::{Error, Result};
@@ -79,16 +80,16 @@ fn points(args: &VerifyArgs, points_file: &std::path::Path, unit: Unit) -> Resul
         Ok((points.len(), 1e3 * fit.rms_m, 1e3 * worst))
     };
     let (count, corrected, worst) = rms(&args.urdf, args.compensation.as_ref())?;
-    println!("points    {count} of {}; frame of the device and reflector fitted", points_file.display());
-    println!("model     {}: {corrected:.3} mm RMS, worst {worst:.3} mm", args.urdf.display());
+    say_line!("points    {count} of {}; frame of the device and reflector fitted", points_file.display());
+    say_line!("model     {}: {corrected:.3} mm RMS, worst {worst:.3} mm", args.urdf.display());
     let Some(file) = &args.nominal else { return Ok(Verdict::Good) };
     let (_, nominal, worst) = rms(file, None)?;
-    println!("nominal   {}: {nominal:.3} mm RMS, worst {worst:.3} mm", file.display());
+    say_line!("nominal   {}: {nominal:.3} mm RMS, worst {worst:.3} mm", file.display());
     if corrected < nominal {
-        println!("verdict   good: {:.0} % of the nominal error", 100.0 * corrected / nominal);
+        say_line!("verdict   good: {:.0} % of the nominal error", 100.0 * corrected / nominal);
         return Ok(Verdict::Good);
     }
-    println!("verdict   NOT TO BE TRUSTED: the corrected model is no better than the nominal one");
+    say_line!("verdict   NOT TO BE TRUSTED: the corrected model is no better than the nominal one");
     Ok(Verdict::GateFailed)
 }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::identify::{chain, measure_all, read_all};
 use super::recording::{Pictures, RecordingArgs};
+use super::say::say_line;
 use super::verify::VerifyArgs;
 use super::{Verdict, progress};
 use crate::assess::{Ratio, bootstrap_ratio, by_cluster, root_mean_square};
@@ -16,7 +17,7 @@ use crate::urdf;
 pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdict> {
     let model = judged(args, &args.urdf, args.compensation.as_deref(), recording)?;
     let Some(file) = &args.nominal else {
-        println!("{}", line("model", &args.urdf, &model.iter().collect::<Vec<_>>()));
+        say_line!("{}", line("model", &args.urdf, &model.iter().collect::<Vec<_>>()));
         return Ok(Verdict::Good);
     };
     let nominal = judged(args, file, None, recording)?;
@@ -24,12 +25,12 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let pairs: Vec<(&JudgedImage, &JudgedImage)> =
         model.iter().filter_map(|m| nominal.iter().find(|n| same(m, n)).map(|n| (m, n))).collect();
     let (model, nominal): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
-    println!(
+    say_line!(
         "images    {} that both models predict; camera, hand-camera offset and plate fitted to the others",
         model.len()
     );
-    println!("{}", line("model", &args.urdf, &model));
-    println!("{}", line("nominal", file, &nominal));
+    say_line!("{}", line("model", &args.urdf, &model));
+    say_line!("{}", line("nominal", file, &nominal));
     let postures: Vec<usize> = model.iter().map(|i| i.posture).collect();
     let of_postures = |images: &[&JudgedImage]| by_cluster(&postures, &units(images));
     let ratio = bootstrap_ratio(&of_postures(&model), &of_postures(&nominal)).ok_or_else(|| {
@@ -38,10 +39,10 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let Ratio { value, low, high } = ratio;
     let share = format!("{:.0} % of the nominal error ({:.0} to {:.0} %)", 100.0 * value, 100.0 * low, 100.0 * high);
     if value < 1.0 {
-        println!("verdict   good: {share}");
+        say_line!("verdict   good: {share}");
         return Ok(Verdict::Good);
     }
-    println!("verdict   NOT TO BE TRUSTED: {share}");
+    say_line!("verdict   NOT TO BE TRUSTED: {share}");
     Ok(Verdict::GateFailed)
 }
 

@@ -52,6 +52,19 @@ pub(super) fn xacro(solution: &Solution, context: &Context) -> String {
     out + "</robot>\n"
 }
 
+/// Sigma of an offset that is worth entering whatever the offset is: half a millimetre at a metre.
+const USEFUL_SIGMA_RAD: f64 = 0.5e-3;
+const USEFUL_SIGMA_M: f64 = 0.05e-3;
+/// Sigmas by which a less well known offset must differ from none.
+const LEAST_SIGMAS: f64 = 2.0;
+
+/// An offset that the data decide (they say at least as much as the tolerance that was assumed), and whose entry makes the
+/// robot better: known well, or far larger than its sigma.
+fn is_determined(offset: f64, sigma: f64, prior: f64, prismatic: bool) -> bool {
+    let useful = if prismatic { USEFUL_SIGMA_M } else { USEFUL_SIGMA_RAD };
+    sigma < 0.5 * prior && (sigma <= useful || offset.abs() > LEAST_SIGMAS * sigma)
+}
+
 /// Joint offsets for the controller: one row for every joint.
 pub(super) fn mastering_csv(solution: &Solution, context: &Context) -> String {
     let robot = &solution.state.robot;
@@ -63,8 +76,7 @@ pub(super) fn mastering_csv(solution: &Solution, context: &Context) -> String {
         let column = solution.problem.layout.find(&format!("robot/{name}.offset"));
         let sigma = column.map_or(f64::NAN, |c| solution.covariance.reduced[(c, c)].max(0.0).sqrt());
         let prior = column.map_or(f64::NAN, |c| solution.problem.layout.columns[c].prior_sigma);
-        // Half of the prior: the data say at least as much as the tolerance that was assumed.
-        let determined = if sigma < 0.5 * prior { "yes" } else { "no" };
+        let determined = if is_determined(offsets[reading], sigma, prior, prismatic) { "yes" } else { "no" };
         let folded = if context.offsets == Offsets::Folded { "yes" } else { "no" };
         let numbers = [offsets[reading], sigma].map(|v| format!("{:.6}", v * factor + 0.0));
         let [offset, sigma] = numbers;
@@ -80,7 +92,8 @@ pub(super) fn mastering_csv(solution: &Solution, context: &Context) -> String {
     };
     format!(
         "# Joint offsets for the mastering (zero point) table of the controller: where it shows the angle q, the joint stands at q + offset,\n\
-         # so that after the correction it has to show q + offset. Not determined (no): known only together with base or tool; leave it.\n{note}{}",
+         # so that after the correction it has to show q + offset. Not determined (no): known only together with base, tool\n\
+         # or the origins beside it, or within twice its sigma of none and that sigma beyond 0.5 mrad (0.05 mm); leave it.\n{note}{}",
         csv(&rows)
     )
 }

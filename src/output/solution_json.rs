@@ -3,15 +3,16 @@
 //! The file has its own structures, apart from those of the solver, so that it keeps its shape when they change. A change of
 //! meaning raises [`FORMAT`]. Units stand in the names; poses are `a_from_b`, perturbations body-fixed with translation first.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use serde::{Deserialize, Serialize};
 
-use crate::assess::{Errors, Identifiability, ProjectionMap, WorkspacePoint};
+use crate::assess::{Cause, Errors, FlangeErrors, Identifiability, ProjectionMap, WorkspacePoint};
 use crate::error::{Error, Notice, Result, plain_name};
 use crate::geom::Pose;
 use crate::model::camera::Lens;
+use crate::problem::short_name;
 use crate::recipe::{Comparison, Evidence, StartVerdict};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
 use crate::urdf::{JointKind, Payload};
@@ -407,6 +408,9 @@ pub struct SolutionRecord {
     pub identifiability: Option<Identifiability>,
     /// Evidence of the robot models where the data chose among them.
     pub evidences: Vec<Evidence>,
+    /// Expected error of the flange where the stops were, before and after; none without stops, and in files of earlier versions.
+    #[serde(default)]
+    pub flange: Option<FlangeErrors>,
     /// Two-stage fits beside the joint one, on images that neither had seen; none for too few images.
     pub two_stage: Option<Comparison>,
     /// How the images scatter against the noise model; none for too few images.
@@ -421,6 +425,9 @@ pub struct SolutionRecord {
     pub images: Vec<ImageRecord>,
 }
 
+/// Share of the prior variance below which a parameter counts as not determined by the data.
+pub const LEAST_SHARE: f64 = 0.1;
+
 impl SolutionRecord {
     /// Names go into programs, file names and the terminal.
     fn plain_names(&self) -> Result<()> {
@@ -434,6 +441,29 @@ impl SolutionRecord {
         self.plates.iter().try_for_each(|p| plain("plate", &p.name))?;
         self.series.iter().try_for_each(|s| plain("series", &s.name))?;
         self.images.iter().try_for_each(|i| plain("image", &i.name))
+    }
+
+    /// Free parameters of the robot, without local errors, which are noise.
+    pub fn robot_parameters(&self) -> impl Iterator<Item = &EstimateRecord> {
+        let of_robot = |e: &&EstimateRecord| e.name.starts_with("robot/") && !e.name.contains(".local_");
+        self.estimates.iter().filter(move |e| e.free && of_robot(e))
+    }
+
+    /// True where the robot model has terms that a URDF cannot hold.
+    pub fn beyond_urdf(&self) -> bool {
+        self.robot.terms.iter().any(|t| t.term != "offset" && !t.term.starts_with("local_"))
+    }
+
+    /// Robot parameters that stay near nominal for want of data, without those that no series can tell from base and tip.
+    pub fn undetermined(&self) -> Vec<&EstimateRecord> {
+        let told = self.identifiability.iter().flat_map(|found| &found.unknown);
+        let frames: BTreeSet<&str> = (told.filter(|d| matches!(d.cause, Cause::Base | Cause::Tip)))
+            .flat_map(|d| d.parameters.iter().map(|(name, _)| name.as_str()))
+            .collect();
+        (self.robot_parameters())
+            .filter(|e| e.share_of_data.is_some_and(|s| s < LEAST_SHARE))
+            .filter(|e| !frames.contains(short_name(&e.name).as_str()))
+            .collect()
     }
 
     /// Observations in use of a camera: measured place (px) and stated covariance uu, uv, vv (px^2).

@@ -55,6 +55,7 @@ pub(super) fn record(solution: &Solution, context: &Context, files: Vec<String>)
         series: series(solution, context),
         identifiability: solution.worth.identifiability.clone(),
         evidences: solution.evidences.clone(),
+        flange: solution.worth.flange,
         two_stage: solution.two_stage.clone(),
         scatter: solution.worth.clustered_sigma.as_ref().map(|_| ScatterRecord {
             flange_ratio: solution.worth.clustered_ratio,

@@ -260,6 +260,28 @@ fn check_views(problem: &Problem, state: &State) -> Result<()> {
     Ok(())
 }
 
+/// Largest tilt of the plate against the image below which all images of a camera face it, rad.
+const LEAST_TILT: f64 = 0.14;
+
+/// Names a camera that looked at the plate from straight ahead only, whatever its distance and roll: a longer focal length and a
+/// greater distance show the same.
+fn facing(problem: &Problem, state: &State) -> Option<Error> {
+    let tilt = |pose: &Pose| pose.rotation[(2, 2)].abs().min(1.0).acos();
+    problem.cameras.iter().enumerate().find_map(|(camera, name)| {
+        let own = problem.images.iter().zip(&state.slack).filter(|(i, _)| i.camera == camera && i.rejected.is_none());
+        let tilts: Vec<f64> = own.filter_map(|(_, s)| if let Slack::Pose(pose) = s { Some(tilt(pose)) } else { None }).collect();
+        let largest = tilts.iter().copied().reduce(f64::max)?;
+        (largest < LEAST_TILT).then(|| {
+            undetermined(&format!(
+                "all {} images of {name} look straight at the plate (tilted by {:.1} degrees at most), so that focal length and distance \
+                 cannot be told apart",
+                tilts.len(),
+                largest.to_degrees()
+            ))
+        })
+    })
+}
+
 fn finish(problem: &mut Problem, start: State) -> Result<FreePoses> {
     check_views(problem, &start)?;
     let options = ComponentOptions { joint: false, rounds: 20, ..ComponentOptions::default() };
@@ -271,11 +293,13 @@ fn finish(problem: &mut Problem, start: State) -> Result<FreePoses> {
         outcome = estimate_components(problem, outcome.state, &options);
     }
     let (Status::Converged, Some(lin)) = (outcome.status, &outcome.linearised) else {
-        return Err(Error::unsolved(
-            "free camera poses",
-            format!("the adjustment ended without converging ({:?})", outcome.status),
-            "look at the images for a wrong plate, motion blur or changed focus",
-        ));
+        return Err(facing(problem, &outcome.state).unwrap_or_else(|| {
+            Error::unsolved(
+                "free camera poses",
+                format!("the adjustment ended without converging ({:?})", outcome.status),
+                "look at the images for a wrong plate, motion blur or changed focus",
+            )
+        }));
     };
     let cov =
         covariance(problem, &outcome.state, lin).map_err(|_| undetermined("the normal equations are singular"))?;
@@ -298,7 +322,7 @@ fn check_focal(problem: &Problem, state: &State, cov: &Covariance) -> Result<()>
             let relative = cov.sigma(c) / focal.abs();
             if problem.layout.columns[c].free && (relative.is_nan() || relative > WORST_FOCAL_SIGMA || focal <= 0.0) {
                 let what = format!("{axis} of {} is known to {:.1} % only", problem.cameras[k], 100.0 * relative);
-                return Err(undetermined(&what));
+                return Err(facing(problem, state).unwrap_or_else(|| undetermined(&what)));
             }
         }
     }

@@ -30,6 +30,12 @@ const WORST_SHARE_REJECTED: f64 = 0.05;
 /// Times the median held-out error from which an image stands out.
 const STANDS_OUT: f64 = 2.5;
 
+/// Times the median sigma of a marker from which an image is badly seen.
+const BLURRED: f64 = 2.0;
+
+/// Most images that are named.
+const MOST_IMAGES: usize = 4;
+
 /// Prior sigmas beyond which a deviation is no longer within tolerance.
 const BEYOND_TOLERANCE: f64 = 5.0;
 
@@ -96,19 +102,42 @@ fn noisiest_joint<'a>(problem: &Problem, state: &'a State, camera: usize) -> Opt
 
 /// Images that the others predict far worse than usual, in words; empty where none stands out.
 fn worst_predicted(problem: &Problem, accuracy: &Accuracy) -> String {
-    let mut errors: Vec<(f64, &str)> = (problem.images.iter().zip(&accuracy.per_image_mm))
-        .filter_map(|(image, e)| e.map(|[_, calibrated]| (calibrated, image.name.as_str())))
-        .collect();
-    errors.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let usual = errors.get(errors.len() / 2).map_or(0.0, |e| e.0);
-    let standing_out: Vec<String> = (errors.iter().take_while(|e| e.0 > STANDS_OUT * usual).take(4))
+    let errors = |i: usize| accuracy.per_image_mm[i].map(|[_, calibrated]| calibrated);
+    let standing_out: Vec<String> = standing_out(problem, errors, STANDS_OUT)
+        .into_iter()
         .map(|(mm, name)| format!("{name} ({mm:.1} mm)"))
         .collect();
-    if standing_out.is_empty() {
-        String::new()
-    } else {
-        format!("; the others predict worst {}", standing_out.join(", "))
-    }
+    in_words("; the others predict worst", &standing_out)
+}
+
+/// Images whose markers are known far less well than usual: blurred, badly lit, far away.
+fn worst_seen(problem: &Problem) -> String {
+    let sigma = |i: usize| {
+        let sigmas: Vec<f64> = problem.images[i].used().map(|o| o.information.determinant().powf(-0.25)).collect();
+        median(&sigmas)
+    };
+    let standing_out: Vec<String> = standing_out(problem, sigma, BLURRED)
+        .into_iter()
+        .map(|(px, name)| format!("{name} (sigma {px:.3} px)"))
+        .collect();
+    in_words("; blurred or badly seen", &standing_out)
+}
+
+fn in_words(what: &str, images: &[String]) -> String {
+    let more = images.len().saturating_sub(MOST_IMAGES);
+    let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let named: Vec<&str> = images.iter().take(MOST_IMAGES).map(String::as_str).collect();
+    if named.is_empty() { String::new() } else { format!("{what} {}{rest}", named.join(", ")) }
+}
+
+/// Images of which something is more than so many times its median, the largest first.
+fn standing_out(problem: &Problem, of: impl Fn(usize) -> Option<f64>, times: f64) -> Vec<(f64, &str)> {
+    let mut all: Vec<(f64, &str)> =
+        problem.used().filter_map(|(i, image)| of(i).map(|value| (value, image.name.as_str()))).collect();
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let usual = all.get(all.len() / 2).map_or(0.0, |e| e.0);
+    all.retain(|e| e.0 > times * usual);
+    all
 }
 
 fn rejected_observations(problem: &Problem) -> Option<String> {
@@ -133,7 +162,13 @@ fn rejected_observations(problem: &Problem) -> Option<String> {
 }
 
 /// What the user should know, though the result stands.
-pub(super) fn remarks(problem: &Problem, state: &State, on_robot: usize, notices: &mut Vec<Notice>) {
+pub(super) fn remarks(
+    problem: &Problem,
+    state: &State,
+    accuracy: &Accuracy,
+    on_robot: usize,
+    notices: &mut Vec<Notice>,
+) {
     if on_robot < 20 {
         notices.push(Notice::new(
             "series",
@@ -149,8 +184,10 @@ pub(super) fn remarks(problem: &Problem, state: &State, on_robot: usize, notices
             notices.push(Notice::new(
                 format!("camera {camera}"),
                 format!(
-                    "the joint noise is {:.2} mrad ({joint} most); robots repeat to some 0.1 mrad",
-                    1e3 * sigma
+                    "the joint noise is {:.2} mrad ({joint} most); robots repeat to some 0.1 mrad{}{}",
+                    1e3 * sigma,
+                    worst_predicted(problem, accuracy),
+                    worst_seen(problem)
                 ),
                 "did plate or camera move, were images taken before the arm stood still, are readings rounded? the stated sigmas contain it",
             ));

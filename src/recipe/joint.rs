@@ -143,6 +143,7 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let (free, mut starts) = adjust_free_poses(&mut problem, state, &stated)?;
     let mut state = free.state.clone();
     let on_robot = problem.used().filter(|(_, i)| i.stop.is_some()).count();
+    check_on_robot(&problem, on_robot)?;
     let aside = start_robot(&mut problem, &mut state, &free, &mut starts)?;
     let (outcome, before) = fit(&mut problem, state, &free, &aside, options);
     let mut notices = Vec::new();
@@ -175,7 +176,7 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     failed_gates.extend(gates(&problem, &state, &free, &accuracy, &shifts, on_robot));
     failed_gates.extend(doubted_sizes(&problem, &state, &covariance));
     failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
-    remarks(&problem, &state, on_robot, &mut notices);
+    remarks(&problem, &state, &accuracy, on_robot, &mut notices);
     let estimated = options.joint_noise == JointNoise::Estimated;
     let worth = judge(&problem, &state, &linearised, &mut covariance, estimated, before, &mut notices);
     failed_gates.extend(undetermined(&worth, &accuracy));
@@ -208,7 +209,11 @@ fn fit(
     aside: &[usize],
     options: &Options,
 ) -> (Outcome, Option<NoiseInformation>) {
-    problem.start_slack(&mut state, options.joint_noise == JointNoise::Known(0.0));
+    let exact = options.joint_noise == JointNoise::Known(0.0);
+    if exact {
+        problem.noise.tilt.clear();
+    }
+    problem.start_slack(&mut state, exact);
     if let JointNoise::Known(sigma) = options.joint_noise {
         problem.noise.joint.iter_mut().flatten().for_each(|s| *s = sigma.max(f64::MIN_POSITIVE));
     }
@@ -258,6 +263,26 @@ fn name_wrong_pairs(problem: &mut Problem, state: &State, free: &FreePoses) {
     }
     for (i, text) in remarks {
         problem.images[i].rejected = Some(text);
+    }
+}
+
+/// Without images of the robot there is no robot to fit.
+fn check_on_robot(problem: &Problem, on_robot: usize) -> Result<()> {
+    let all = problem.images.len();
+    match problem.images.iter().filter(|i| i.stop.is_some()).count() {
+        _ if on_robot > 0 => Ok(()),
+        0 => Err(Error::input(
+            "joints.csv",
+            format!(
+                "no row has joint readings: all {all} images were taken off the robot, and tell of the camera and the plate only"
+            ),
+            "record the joints of every stop; a row with empty joint cells is an image off the robot",
+        )),
+        given => Err(Error::unsolved(
+            "images",
+            format!("none of the {given} images of the robot can be used, {all} images in all"),
+            "look at them with `robotcal detect`: is the plate in view, sharp, and the one of plate.toml?",
+        )),
     }
 }
 

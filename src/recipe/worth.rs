@@ -2,7 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use crate::assess::{FlangeModel, Identifiability, WorkspacePoint, clustered_covariance, identifiability};
+use crate::assess::{
+    FlangeErrors, FlangeModel, Identifiability, WorkspacePoint, clustered_covariance, identifiability,
+    usual_joint_sigma,
+};
 use crate::error::Notice;
 use crate::geom::Pose;
 use crate::model::robot::Stop;
@@ -33,6 +36,8 @@ pub struct Worth {
     pub joint_noise: Vec<Vec<[f64; 2]>>,
     /// What the data tell of the joint noise, also of that which counts as none; none where it was given.
     pub told: Option<NoiseInformation>,
+    /// Expected error of the flange where the stops were, before and after; none without stops.
+    pub flange: Option<FlangeErrors>,
     /// Workspace map; empty where plate (or fixed camera) and robot are not tied.
     pub workspace: Vec<WorkspacePoint>,
 }
@@ -99,6 +104,9 @@ pub(super) fn judge(
         worth.clustered_sigma = Some(by_clusters);
     }
     let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops));
+    let noise: Vec<Vec<f64>> =
+        problem.used().filter(|(_, i)| i.stop.is_some()).map(|(_, i)| problem.joint_sigma(i.camera)).collect();
+    worth.flange = FlangeErrors::new(&state.robot, &covariance.reduced, &usual_joint_sigma(&noise), &stops);
     worth.workspace = model.map(|m| m.workspace()).unwrap_or_default();
     worth
 }

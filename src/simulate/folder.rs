@@ -8,6 +8,7 @@ use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
 
 use super::conditions::ImagingConditions;
+use super::render::check_drawable;
 use super::world::SimulatedSeries;
 use crate::detect::Picture;
 use crate::error::{Error, Result};
@@ -30,11 +31,14 @@ pub enum Content<'a> {
 /// Writes the series into `folder`, which must be new or empty.
 ///
 /// # Errors
-/// A folder with something in it, and whatever the disk refuses.
+/// A folder with something in it, pictures of a plate that cannot be drawn, and whatever the disk refuses.
 pub fn write(folder: &Path, series: &SimulatedSeries, content: Content<'_>) -> Result<()> {
     let is_used = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     if is_used {
         return Err(Error::input(folder.display(), "is not empty", "give a new folder, or remove this one"));
+    }
+    if matches!(content, Content::Images { .. }) {
+        check_drawable(&series.plate)?;
     }
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
     let mut manifest = series.manifest.clone();

@@ -12,6 +12,7 @@ use super::psf::Psf;
 use super::raster::{Patch, PixelRect, Plane, Rasteriser};
 use super::{scenery, sensor};
 use crate::detect::Picture;
+use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::series::{Marker, Plate, PlateKind};
@@ -20,6 +21,25 @@ use crate::series::{Marker, Plate, PlateKind};
 const OUTLINE_TOLERANCE_PX: f64 = 0.004;
 /// Samples along each side of a chessboard's square.
 const SIDE_SAMPLES: usize = 16;
+
+/// Refuses plates whose print cannot be drawn: a picture without it would be one of another plate.
+///
+/// # Errors
+/// ChArUco boards, whose markers are not drawn; dots without a radius; points, which no print is described for.
+pub fn check_drawable(plate: &Plate) -> Result<()> {
+    let (what, remedy) = match plate.kind {
+        PlateKind::Chessboard => return Ok(()),
+        PlateKind::Charuco => {
+            ("the markers of a ChArUco board cannot be drawn", "give --observations, or a chessboard")
+        }
+        _ if plate.markers.iter().all(|m| m.outer_radius_m > 0.0) => return Ok(()),
+        _ => (
+            "dots without a radius cannot be drawn",
+            "give radius_m or a table of markers with radii, or --observations",
+        ),
+    };
+    Err(Error::input("plate.toml", what, remedy))
+}
 
 /// Renders the whole picture of `plate` seen by `camera` at `camera_from_plate`.
 pub fn render(
@@ -176,7 +196,7 @@ struct Marks<'a> {
 
 impl Marks<'_> {
     fn is_chessboard(&self) -> bool {
-        matches!(self.plate.kind, PlateKind::Chessboard | PlateKind::Charuco)
+        self.plate.kind == PlateKind::Chessboard
     }
 
     fn count(&self) -> usize {

@@ -7,11 +7,8 @@ use maud::{Markup, html};
 use super::words::{fixed, grouped, parameter, plus_minus, short, significant, unit};
 use super::{figure, maps};
 use crate::geom::Pose;
-use crate::output::solution_json::{EstimateRecord, PlacedRecord, SolutionRecord};
+use crate::output::solution_json::{EstimateRecord, LEAST_SHARE, PlacedRecord, SolutionRecord};
 use crate::series::CameraMount;
-
-/// Share of data below which a parameter stays at its nominal value.
-const LEAST_SHARE: f64 = 0.1;
 
 /// Most corrections in the list of the strongest.
 const MOST_CORRECTIONS: usize = 12;
@@ -120,21 +117,24 @@ fn cell(e: &EstimateRecord, head: &EstimateRecord) -> Markup {
 
 /// What the data do not determine, and what they cannot tell apart.
 pub(super) fn undetermined(r: &SolutionRecord) -> Markup {
-    let weak: Vec<&str> = (r.estimates.iter())
-        .filter(|e| e.free && e.share_of_data.is_some_and(|s| s < LEAST_SHARE))
-        .map(|e| e.name.as_str())
-        .collect();
+    let weak: Vec<&str> = r.undetermined().iter().map(|e| e.name.as_str()).collect();
+    let others = || r.estimates.iter().filter(|e| e.free && !e.name.starts_with("robot/"));
+    let silent: Vec<&str> =
+        others().filter(|e| e.share_of_data.is_some_and(|s| s < LEAST_SHARE)).map(|e| e.name.as_str()).collect();
     html! {
         h2 { "What the data could not determine" }
         @if weak.is_empty() {
-            p { "Nothing: the data say something about every parameter." }
+            p { "Nothing: the data say something about every parameter of the robot." }
         } @else {
             p {
-                (weak.len()) " of " (r.estimates.len()) " parameters stay near nominal, because the data decide less than 10 % of them. "
-                "Some of this is in the nature of things (the pose of the base is that of the plate, the last joint's that of the camera); "
-                "the rest asks for stops that move the joint further."
+                (weak.len()) " of " (r.robot_parameters().count()) " robot parameters stay near nominal, because the data decide less than 10 % of them: "
+                "stops that move these joints further would. What only the pose of the plate or of the camera takes up is not among them."
             }
             ul { @for line in grouped(weak.iter().copied()) { li { (line) } } }
+        }
+        @if !silent.is_empty() {
+            p { (silent.len()) " of " (others().count()) " parameters of cameras and plates stay near their priors, too:" }
+            ul { @for line in grouped(silent.iter().copied()) { li { (line) } } }
         }
     }
 }

@@ -6,6 +6,7 @@ use super::figure;
 use super::verdict::verdict;
 use super::words::{count, fixed, plus_minus, significant, unit};
 use super::{maps, plots};
+use crate::error::Notice;
 use crate::output::solution_json::SolutionRecord;
 
 /// Title, verdict and the numbers that matter most.
@@ -24,11 +25,31 @@ pub(super) fn head(r: &SolutionRecord) -> Markup {
             @if !v.reasons.is_empty() { ul { @for reason in &v.reasons { li { (reason) } } } }
         }
         p { (next_step(r)) }
+        (promise(r))
         div.big {
-            div { b { (significant(before.rms_mm)) " → " (significant(after.rms_mm)) " mm" } span { "position error, before → after" } }
-            div { b { (fixed(before.rms_mm / after.rms_mm, 1)) " times" } span { "better on images the fit had not seen" } }
+            div { b { (significant(before.rms_mm)) " → " (significant(after.rms_mm)) " mm" } span { "images the fit had not seen, where the plate stood, before → after" } }
+            div { b { (fixed(before.rms_mm / after.rms_mm, 1)) " times" } span { "better on these images" } }
             div { b { (significant(after.worst_mm)) " mm" } span { "worst single image after" } }
             div { b { (significant(r.statistics.rms_px)) " px" } span { "what is left in the images (RMS per point)" } }
+        }
+    }
+}
+
+/// The expected error of the flange: what may be promised.
+fn promise(r: &SolutionRecord) -> Markup {
+    let Some(e) = &r.flange else { return html! {} };
+    let mm = |m: f64| significant(1e3 * m);
+    html! {
+        div.big {
+            div { b { (mm(e.nominal_m)) " → " (mm(e.urdf_m)) " mm" } span { "expected error of the flange, corrected URDF alone" } }
+            @if r.beyond_urdf() {
+                div { b { (mm(e.nominal_m)) " → " (mm(e.model_m)) " mm" } span { "the same with compensation.toml" } }
+            }
+            div { b { (mm(e.scatter_m)) " mm" } span { "of each is noise from stop to stop" } }
+        }
+        p.note {
+            "By model and covariance, RMS in the region of the stops, base frame and tool found: what a tracker would find there. "
+            "The second row is measured on images of the same series; it says less, because the stops all look at one plate."
         }
     }
 }
@@ -38,13 +59,8 @@ fn next_step(r: &SolutionRecord) -> Markup {
     let urdf = r.files.iter().find(|f| f.ends_with(".calibrated.urdf"));
     html! {
         @if let Some(urdf) = urdf { "The corrected robot is " code { (urdf) } ", joint offsets included. " }
-        @if beyond_urdf(r) { "What a URDF cannot say (gear, sag, backlash) is in " code { "compensation.toml" } ". " }
+        @if r.beyond_urdf() { "What a URDF cannot say (gear, sag, backlash) is in " code { "compensation.toml" } ". " }
     }
-}
-
-/// True where the robot model has terms beside the joint offsets.
-fn beyond_urdf(r: &SolutionRecord) -> bool {
-    r.robot.terms.iter().any(|t| t.term != "offset" && !t.term.starts_with("local_"))
 }
 
 /// Before and after on held-out images.
@@ -55,9 +71,10 @@ pub(super) fn accuracy(r: &SolutionRecord) -> Markup {
         p {
             "How well do the joint readings alone say where the plate appears? The images were put aside in "
             (r.accuracy.folds) " groups in turn; a model fitted to the other groups had to predict them. "
-            "In millimetres this is the distance between where the image shows the markers and where the robot model puts them; "
+            "The images look at one plate: this is no figure for the whole workspace, and smaller than what the robot is off elsewhere. "
+            "In millimetres it is the distance between where the image shows the markers and where the robot model puts them; "
             "it includes how well the robot repeats. "
-            @if beyond_urdf(r) { "The calibrated robot is the whole model, corrected URDF and compensation.toml together." }
+            @if r.beyond_urdf() { "The calibrated robot is the whole model, corrected URDF and compensation.toml together." }
         }
         div.wide { table {
             thead { tr { th { "Model" } th.n { "error, mm RMS" } th.n { "in the image, px RMS" } th.n { "worst image, mm" } th.n { "images" } } }
@@ -105,9 +122,20 @@ pub(super) fn left_out(r: &SolutionRecord) -> Markup {
         }
         @if !r.notices.is_empty() {
             h3 { "Notes" }
-            ul { @for n in &r.notices { li {
-                code { (n.place) } " " (n.what) @if !n.remedy.is_empty() { span.note { " (" (n.remedy) ")" } }
-            } } }
+            ul { @for group in Notice::alike(&r.notices) { (notes(&group)) } }
+        }
+    }
+}
+
+/// Notices that say the same: all places, then once what; each by itself where their numbers differ.
+fn notes(group: &[&Notice]) -> Markup {
+    let remedy = |n: &Notice| html! { @if !n.remedy.is_empty() { span.note { " (" (n.remedy) ")" } } };
+    let first = group[0];
+    html! {
+        @if group.iter().all(|n| n.what == first.what) {
+            li { @for n in group { code { (n.place) } " " } (first.what) (remedy(first)) }
+        } @else {
+            @for n in group { li { code { (n.place) } " " (n.what) (remedy(n)) } }
         }
     }
 }

@@ -1,0 +1,36 @@
+//! What is said on stdout. A reader that has seen enough (`robotcal show .. | head`) ends the output, not the work.
+
+use std::fmt;
+use std::io::{self, ErrorKind, Write};
+use std::sync::OnceLock;
+
+/// Why nothing more is said.
+static ENDED: OnceLock<io::Error> = OnceLock::new();
+
+/// Writes text to stdout, unless an earlier piece could not be written.
+pub(super) fn text(words: fmt::Arguments) {
+    if ENDED.get().is_some() {
+        return;
+    }
+    let mut out = io::stdout().lock();
+    if let Err(error) = out.write_fmt(words).and_then(|()| out.flush()) {
+        let _ = ENDED.set(error);
+    }
+}
+
+/// Why the output did not reach its reader; none where the reader closed it.
+pub(super) fn failure() -> Option<&'static io::Error> {
+    ENDED.get().filter(|e| e.kind() != ErrorKind::BrokenPipe)
+}
+
+/// As `print!`, without a panic where stdout is closed.
+macro_rules! say {
+    ($($words:tt)*) => { $crate::cli::say::text(format_args!($($words)*)) };
+}
+
+/// As `println!`, without a panic where stdout is closed.
+macro_rules! say_line {
+    ($($words:tt)*) => { $crate::cli::say::text(format_args!("{}\n", format_args!($($words)*))) };
+}
+
+pub(super) use {say, say_line};
