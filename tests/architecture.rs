@@ -118,3 +118,16 @@ fn only_the_command_line_prints() {
     }
     assert!(wrong.is_empty(), "printing outside cli: {wrong:?}");
 }
+
+/// `println!` panics where the reader has gone.
+#[test]
+fn the_command_line_prints_in_one_place() {
+    let mut wrong = Vec::new();
+    for path in all_sources().into_iter().filter(|p| room(p) == "cli" && !p.ends_with("say.rs")) {
+        let text = fs::read_to_string(&path).unwrap();
+        if ["println!(", "print!("].iter().any(|w| text.contains(w)) {
+            wrong.push(path.display().to_string());
+        }
+    }
+    assert!(wrong.is_empty(), "use say! and say_line!: {wrong:?}");
+}

@@ -6,10 +6,15 @@ mod outputs_support;
 
 use nalgebra::{DMatrix, DVector, Vector6};
 use outputs_support::{context, robot, solved};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use robotcal::assess::{Cause, Identifiability, ideal_stops, identifiability_of_stops, minimal_set, structural};
+use robotcal::ErrorKind;
+use robotcal::assess::{
+    Cause, Identifiability, MeasuredPoint, fit_points, ideal_stops, identifiability_of_stops, minimal_set, structural,
+};
+use robotcal::geom::Pose;
+use robotcal::model::joint_terms::{JointTerm, Term};
 use robotcal::model::robot::{Robot, Stop};
 use robotcal::output::difference::compare_solutions;
 use robotcal::output::restore::{found_model, measured_series, robot_description};
@@ -20,7 +25,8 @@ use robotcal::recipe::{
     verify_series,
 };
 use robotcal::series::{CameraMount, Plate, PlateKind};
-use robotcal::simulate::{WorldRequest, series};
+use robotcal::simulate::truth::{TermRecord, Truth};
+use robotcal::simulate::{RobotErrors, WorldRequest, series};
 use robotcal::urdf::Chain;
 
 fn chain() -> Chain {
@@ -226,9 +232,9 @@ fn the_flange_scatters_as_its_covariance_says() {
     }
 }
 
-fn world(seed: u64, joint_noise_rad: f64) -> robotcal::recipe::MeasuredSeries {
+fn request(seed: u64, joint_noise_rad: f64) -> WorldRequest {
     let plate = Plate::lattice(PlateKind::Points, 6, 5, 0.05, 0.05e-3);
-    let wanted = WorldRequest {
+    WorldRequest {
         joint_noise_rad,
         pixel_sigma_px: 0.05,
         marker_sigma_m: 0.05e-3,
@@ -236,8 +242,152 @@ fn world(seed: u64, joint_noise_rad: f64) -> robotcal::recipe::MeasuredSeries {
         least_markers: 12,
         seed,
         ..WorldRequest::typical(chain(), plate)
+    }
+}
+
+fn world(seed: u64, joint_noise_rad: f64) -> robotcal::recipe::MeasuredSeries {
+    measured(&series(&request(seed, joint_noise_rad)).unwrap(), &chain())
+}
+
+/// The robot of a simulated world.
+fn true_robot(truth: &Truth) -> Robot {
+    let mut robot = Robot::nominal(chain());
+    for (joint, twist) in robot.chain.joints.iter().zip(&mut robot.twists) {
+        *twist = truth.twists.get(&joint.name).map_or_else(Vector6::zeros, |t| Vector6::from_column_slice(t));
+    }
+    let readings = &robot.chain.readings;
+    let term = |t: &TermRecord| JointTerm {
+        reading: readings.iter().position(|r| *r == t.joint).unwrap(),
+        term: t.term,
+        value: t.value,
     };
-    measured(&series(&wanted).unwrap(), &chain())
+    robot.terms = truth.terms.iter().map(term).collect();
+    robot
+}
+
+/// Error of the flange relative to the plate at `q`, right on average over the stops, RMS, m; `still` is the plate in the base.
+fn relative_error_m(found: (&Robot, &Pose), truth: (&Robot, &Pose), stops: &[Stop], q: &[(Stop, Vec<f64>)]) -> f64 {
+    let error = |stop: &Stop, noise: &[f64]| {
+        let model = found.1.inverse() * found.0.pose_at(stop, &[0.0; 6]);
+        (model.inverse() * (truth.1.inverse() * truth.0.pose_at(stop, noise))).log()
+    };
+    let mean = stops.iter().map(|s| error(s, &[0.0; 6])).sum::<Vector6<f64>>() / stops.len() as f64;
+    let sum: f64 = q.iter().map(|(s, noise)| (error(s, noise) - mean).fixed_rows::<3>(0).norm_squared()).sum();
+    (sum / q.len() as f64).sqrt()
+}
+
+/// What is stated of the flange is what is found of it: nominal, URDF alone, whole model.
+#[test]
+fn what_is_promised_of_the_flange_is_what_is_found() {
+    const SIGMA: f64 = 1e-4;
+    let full = Options { model: RobotModel::Full, ..Options::default() };
+    let (mut found, mut stated) = ([0.0; 3], [0.0; 3]);
+    for seed in 11..=14 {
+        let errors = RobotErrors { gear: 5e-4, gravity_rad: 0.2e-3, ..RobotErrors::default() };
+        let made = series(&WorldRequest { errors, ..request(seed, SIGMA) }).unwrap();
+        let solution = identify(chain(), &[measured(&made, &chain())], &full).unwrap();
+        let truth = true_robot(&made.truth);
+        let plate = Pose::from(made.truth.plate_poses.values().next().unwrap());
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let covered = &solution.worth.identifiability.as_ref().unwrap().covered;
+        let places: Vec<(Stop, Vec<f64>)> = (0..400)
+            .map(|_| {
+                let readings: Vec<f64> = covered.iter().map(|(_, low, high)| rng.random_range(*low..*high)).collect();
+                let noise = (0..6)
+                    .map(|_| {
+                        let x: f64 = StandardNormal.sample(&mut rng);
+                        x * SIGMA
+                    })
+                    .collect();
+                (Stop::at(&readings), noise)
+            })
+            .collect();
+        let whole = Robot {
+            terms: solution.state.robot.terms.iter().copied().filter(|t| !matches!(t.term, Term::Local(_))).collect(),
+            ..solution.state.robot.clone()
+        };
+        let mut urdf = whole.clone();
+        urdf.terms.retain(|t| t.term == Term::Offset);
+        let point = |(s, noise): &(Stop, Vec<f64>)| MeasuredPoint {
+            position_m: truth.pose_at(s, noise).translation,
+            readings: s.readings.clone(),
+        };
+        let points: Vec<MeasuredPoint> = places.iter().map(point).collect();
+        let stops: Vec<Stop> = solution.problem.used().filter_map(|(_, i)| i.stop.clone()).collect();
+        let of =
+            |robot: &Robot| relative_error_m((robot, &solution.state.placements[0]), (&truth, &plate), &stops, &places);
+        let left = [fit_points(&Robot::nominal(chain()), &points).unwrap().rms_m, of(&urdf), of(&whole)];
+        let e = solution.worth.flange.unwrap();
+        println!("seed {seed}: found {left:?}, stated {e:?}");
+        for (k, (f, s)) in left.into_iter().zip([e.nominal_m, e.urdf_m, e.model_m]).enumerate() {
+            (found[k], stated[k]) = (found[k] + f * f, stated[k] + s * s);
+        }
+        assert!(e.scatter_m < e.model_m && e.model_m < e.urdf_m && e.model_m < e.nominal_m, "{e:?}");
+    }
+    for k in 0..3 {
+        // Four worlds with some twenty directions each that matter.
+        let ratio = (stated[k] / found[k]).sqrt();
+        println!("{k}: stated over found {ratio:.3}");
+        assert!((0.75..1.35).contains(&ratio), "{k}: stated over found {ratio}");
+    }
+}
+
+/// Data that know everything tell all that any series could, and no more.
+#[test]
+fn no_more_directions_are_told_than_any_series_could_tell() {
+    let (robot, layout) = layout(RobotModel::Rigid);
+    let known = DMatrix::from_diagonal(&DVector::from_iterator(
+        layout.len(),
+        layout.columns.iter().map(|c| (1e-3 * c.prior_sigma).powi(2)),
+    ));
+    let stops = ideal_stops(&robot);
+    let found = robotcal::assess::identifiability(&robot, &layout, &stops, &known).unwrap();
+    assert_eq!((found.rank, found.tellable), (18, 18));
+    let little = told(&stops[..4], RobotModel::Full);
+    let untold = little.unknown.iter().filter(|d| d.cause == Cause::Stops).count();
+    assert!(untold > 0 && little.rank + untold == little.tellable, "{} {untold} {}", little.rank, little.tellable);
+}
+
+#[test]
+fn exact_readings_leave_no_tilt_to_be_stated() {
+    let exact = Options { joint_noise: JointNoise::Known(0.0), model: RobotModel::Rigid, ..Options::default() };
+    let record = record_of(&identify(chain(), &[world(2, 0.0)], &exact).unwrap());
+    assert_eq!(record.cameras[0].apparent_tilt_rad, 0.0);
+}
+
+#[test]
+fn images_off_the_robot_alone_are_no_robot() {
+    let mut off = world(2, 2e-5);
+    off.stops.iter_mut().for_each(|s| s.readings = None);
+    let error = identify(chain(), &[off], &Options::default()).unwrap_err();
+    assert_eq!((error.kind, error.place.as_str()), (ErrorKind::Input, "joints.csv"));
+    assert!(error.what.contains("40"), "{error}");
+}
+
+#[test]
+fn a_camera_that_looked_straight_ahead_only_is_named() {
+    let mut wanted = request(3, 2e-5);
+    wanted.views.tilt_rad = 0.0;
+    let straight = measured(&series(&wanted).unwrap(), &chain());
+    let error = identify(chain(), &[straight], &Options::default()).unwrap_err();
+    assert_eq!((error.kind, error.place.as_str()), (ErrorKind::Unsolved, "camera"), "{error}");
+}
+
+/// A robot that did not stand still: joint noise, and images that are blurred and off.
+#[test]
+fn blurred_images_of_a_moving_robot_are_named() {
+    let mut moving = world(5, 1e-3);
+    for k in [7, 19] {
+        for o in &mut moving.stops[k].observations {
+            o.covariance = Some([9e-2, 0.0, 9e-2]);
+        }
+    }
+    let solution =
+        identify(chain(), &[moving.clone()], &Options { model: RobotModel::Rigid, ..Options::default() }).unwrap();
+    let noise = solution.notices.iter().find(|n| n.place == "camera camera").unwrap();
+    for k in [7, 19] {
+        assert!(noise.what.contains(&moving.stops[k].image), "{noise}");
+    }
 }
 
 #[test]

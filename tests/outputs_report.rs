@@ -79,6 +79,23 @@ fn the_page_is_complete_and_self_contained() {
 }
 
 #[test]
+fn what_may_be_promised_stands_first() {
+    let record = record();
+    let e = record.flange.unwrap();
+    let page = report_html(&record);
+    let at = |mm: f64| {
+        let decimals = (2.0 - mm.log10().floor()) as usize;
+        let shown = format!("{mm:.decimals$} mm");
+        page.find(&shown).unwrap_or_else(|| panic!("{shown} is not in the page"))
+    };
+    let held_out = page.find("had not seen").unwrap();
+    assert!(at(1e3 * e.urdf_m) < held_out && at(1e3 * e.model_m) < held_out);
+    let [weak, all] = [record.undetermined().len(), record.robot_parameters().count()];
+    assert!(all == record.identifiability.as_ref().unwrap().parameters, "{all}");
+    assert!(weak > 0 && page.contains(&format!("{weak} of {all} robot parameters")));
+}
+
+#[test]
 fn the_fits_in_two_stages_stand_beside_the_joint_one() {
     let record = record();
     let comparison = record.two_stage.as_ref().unwrap();

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use robotcal::assess::{MeasuredPoint, fit_points};
+use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::Robot;
 use robotcal::recipe::{Options, identify, measure};
 
@@ -57,6 +58,15 @@ fn the_tracker_confirms_model_and_stated_uncertainty() {
             1e3 * expected.model_m,
             1e3 * expected.with_joint_noise_m
         );
+        let flange = s.worth.flange.unwrap();
+        let mut urdf = s.state.robot.clone();
+        urdf.terms.retain(|t| t.term == Term::Offset);
+        let urdf = fit_points(&urdf, &points).unwrap().rms_m;
+        println!("  stated in the region of the stops {flange:?}; URDF alone on the tracker {:.3} mm", 1e3 * urdf);
+        // Four fifths of the tracker's points lie outside that region.
+        for (stated, found) in [(flange.model_m, fit.rms_m), (flange.urdf_m, urdf)] {
+            assert!((0.7..1.4).contains(&(stated / found)), "{names:?}: stated {stated}, found {found}");
+        }
         assert!(fit.rms_m < 0.62e-3 && fit.rms_m < nominal, "{names:?}: {}", fit.rms_m);
         let ratio = fit.rms_m / expected.with_joint_noise_m;
         assert!((0.6..2.0).contains(&ratio), "{names:?}: actual over expected {ratio}");

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use robotcal::series::{Plate, read_plate};
 
@@ -65,4 +65,133 @@ fn wrong_wishes_of_a_simulation_are_refused() {
         assert!(text(&output).contains(word), "{flags:?}: {}", text(&output));
         assert!(!out.exists(), "{flags:?}");
     }
+}
+
+fn root(path: &str) -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path).to_str().unwrap().to_owned()
+}
+
+/// As [`robotcal`], with stdout somewhere else.
+fn robotcal_into(stdout: impl Into<Stdio>, args: &[&str]) -> Output {
+    let child = Command::new(env!("CARGO_BIN_EXE_robotcal")).args(args).stdout(stdout).stderr(Stdio::piped()).spawn();
+    child.unwrap().wait_with_output().unwrap()
+}
+
+#[test]
+fn a_reader_that_has_seen_enough_ends_the_output_and_nothing_else() {
+    let solution = root("reports/kr6_small/solution.json");
+    for args in [
+        &["show", &solution][..],
+        &["show", "--parameters", &solution, &solution],
+        &["simulate", "--fault", "list", "--urdf", "-", "--out", "-"],
+    ] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let output = robotcal_into(writer, args);
+        assert_eq!((output.status.code(), text(&output).as_str()), (Some(0), ""), "{args:?}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn output_that_cannot_be_written_is_an_error() {
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let output = robotcal_into(full, &["show", &root("reports/kr6_small/solution.json")]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(text(&output).starts_with("error: stdout"), "{}", text(&output));
+}
+
+#[test]
+fn the_verdict_stands_first_and_the_flange_after_it() {
+    let output = robotcal(&["show", &root("reports/kr6_small/solution.json")]);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.starts_with("verdict   good\n"), "{said}");
+    assert_eq!(said.lines().filter(|l| l.starts_with("verdict")).count(), 1);
+}
+
+#[test]
+fn the_folder_of_predicted_flanges_is_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path().join("points.csv");
+    std::fs::write(&at, "joint_a1,joint_a2,joint_a3,joint_a4,joint_a5,joint_a6\n10,-80,110,5,50,20\n").unwrap();
+    let out = folder.path().join("new/deeper");
+    let solution = root("reports/kr6_small/solution.json");
+    let args = ["show", &solution, "--at", at.to_str().unwrap(), "--at-unit", "deg", "--out", out.to_str().unwrap()];
+    let output = robotcal(&args);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    assert_eq!(std::fs::read_to_string(out.join("at.csv")).unwrap().lines().filter(|l| !l.starts_with('#')).count(), 2);
+}
+
+#[test]
+fn a_dry_run_says_all_that_it_counts() {
+    let (urdf, run) = (root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf"), root("datasets/bad/too-few-images"));
+    let output = robotcal(&["identify", "--dry-run", "--robot-model", "full", "--urdf", &urdf, "--series", &run]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let numbers: Vec<usize> =
+        said.lines().find(|l| l.starts_with("rank")).unwrap().split(' ').filter_map(|w| w.parse().ok()).collect();
+    let untold = said.lines().filter(|l| l.starts_with("untold")).count();
+    assert!(untold > 12, "{said}");
+    assert_eq!(untold, numbers[1] - numbers[0], "{said}");
+}
+
+#[test]
+fn boards_that_cannot_be_drawn_are_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let common = "format = 1\ncolumns = 9\nrows = 6\npitch_m = 0.03\ntolerance_m = 0.0001\n";
+    for kind in ["charuco", "circle-grid"] {
+        let plate = folder.path().join(format!("{kind}.toml"));
+        std::fs::write(&plate, format!("{common}kind = \"{kind}\"\n")).unwrap();
+        let out = folder.path().join(kind);
+        let args = [
+            "simulate",
+            "--urdf",
+            &urdf,
+            "--plate",
+            plate.to_str().unwrap(),
+            "--images",
+            "6",
+            "--out",
+            out.to_str().unwrap(),
+        ];
+        let output = robotcal(&args);
+        assert_eq!(output.status.code(), Some(2), "{kind}: {}", text(&output));
+        assert!(text(&output).contains("plate.toml") && !out.exists(), "{kind}: {}", text(&output));
+        // Observations need no print.
+        let output = robotcal(&[&args[..], &["--observations"]].concat());
+        assert_eq!(output.status.code(), Some(0), "{kind}: {}", text(&output));
+    }
+}
+
+#[test]
+fn too_few_targets_of_a_plan_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, made) = plate(folder.path(), &["--sheet", "A4", "--markers", "100"]);
+    assert!(made.is_some());
+    let targets = folder.path().join("targets.csv");
+    let rows = "10,-80,110,5,50,20\n20,-70,100,15,40,30\n-10,-60,90,-5,60,10\n";
+    std::fs::write(
+        &targets,
+        format!(
+            "image,joint_a1,joint_a2,joint_a3,joint_a4,joint_a5,joint_a6\n{}",
+            rows.lines().enumerate().map(|(k, r)| format!("t{k},{r}\n")).collect::<String>()
+        ),
+    )
+    .unwrap();
+    let (urdf, out) = (root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf"), folder.path().join("plan"));
+    let plate = folder.path().join("plate/plate.toml");
+    let output = robotcal(&[
+        "plan",
+        "--urdf",
+        &urdf,
+        "--plate",
+        plate.to_str().unwrap(),
+        "--targets",
+        targets.to_str().unwrap(),
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(text(&output).contains("targets.csv") && !out.exists(), "{}", text(&output));
 }

@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, Matrix6};
 use serde::{Deserialize, Serialize};
 
+use super::root_mean_square;
 use super::stops::{halton_stops, range_of};
 use crate::geom::{Pose, adjoint};
 use crate::model::robot::{Robot, Stop};
@@ -134,6 +135,20 @@ impl<'a> FlangeModel<'a> {
         let c = &j * covariance.view((0, 0), (n, n)) * j.transpose();
         let c = Matrix6::from_column_slice(c.as_slice());
         (c + c.transpose()) * 0.5
+    }
+
+    /// Samples of the region of the stops.
+    pub(super) fn region(&self) -> Vec<Stop> {
+        halton_stops(&self.covered, SAMPLES)
+    }
+
+    /// Sigma of the position over samples, RMS of the length, m.
+    pub(super) fn sigma_m(&self, samples: &[Stop]) -> f64 {
+        let square = |s: &Stop| {
+            let c = self.propagated(&self.derivative(s).1, self.covariance);
+            (0..3).map(|k| c[(k, k)]).sum::<f64>().max(0.0)
+        };
+        root_mean_square(&samples.iter().map(|s| (square(s), 1.0)).collect::<Vec<_>>())
     }
 
     /// Samples of the region of the stops, then of everything within the joint limits.

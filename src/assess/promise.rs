@@ -1,21 +1,18 @@
 //! What can be promised of the flange: its expected error where the stops were, by the model and its covariance.
 //!
-//! The error is that of a single stop at readings of its own, base frame and a point of the flange brought together: what a user
-//! measures who has found base and tool frames, and what points of a tracker leave. Of the calibrated robot it is what the
-//! covariance says, and what no model removes: joint noise and local errors. A description that holds less of the model is
-//! displaced against it besides, by so much RMS over the region; both parts add as squares.
+//! The error is that of the position relative to what stands still (the plate, or a fixed camera) at a stop of its own. Of the
+//! calibrated robot it is what the covariance says ([`FlangeModel`]: right on average over the stops), and what no model removes:
+//! joint noise and local errors. A description that holds less of the model is displaced against it besides, by so much RMS over
+//! the region; both parts add as squares. The nominal robot is given the base and the tool that fit it best.
 
-use nalgebra::DMatrix;
+use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
+use super::flange::FlangeModel;
 use super::points::{MeasuredPoint, fit_points};
 use super::root_mean_square;
-use super::stops::halton_stops;
 use crate::model::joint_terms::Term;
 use crate::model::robot::{Robot, Stop};
-
-/// Samples of the region of the stops.
-const SAMPLES: usize = 250;
 
 /// Expected error of the position of the flange in the region of the stops, RMS of the length, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -31,48 +28,50 @@ pub struct FlangeErrors {
 }
 
 impl FlangeErrors {
-    /// `covariance` is that of the dense columns, twists and terms first; `joint_sigma` that of the readings at a stop, rad or m.
-    /// `None` without stops, or where they are so much alike that no frame can be fitted.
-    pub fn new(robot: &Robot, covariance: &DMatrix<f64>, joint_sigma: &[f64], stops: &[Stop]) -> Option<Self> {
-        let samples = halton_stops(&ranges(stops)?, SAMPLES);
+    /// `joint_sigma` is that of the readings at a stop, rad or m; `None` where the nominal robot cannot be laid over the model.
+    pub fn new(model: &FlangeModel, robot: &Robot, joint_sigma: &[f64], stops: &[Stop]) -> Option<Self> {
+        let samples = model.region();
         // Local errors belong to single readings of the series: at others they are noise.
-        let with = |kept: fn(Term) -> bool| {
-            let mut robot = robot.clone();
-            robot.terms.retain(|t| kept(t.term));
-            robot
-        };
-        let whole = with(|t| !matches!(t, Term::Local(_)));
-        let positions = |approach: bool| {
-            let at = |s: &Stop| {
-                let stop = if approach { s.clone() } else { Stop::at(&s.readings) };
-                let pose = whole.pose_at(&stop, &vec![0.0; s.readings.len()]);
-                MeasuredPoint { position_m: pose.translation, readings: s.readings.clone() }
-            };
-            samples.iter().map(at).collect::<Vec<_>>()
-        };
-        let still = positions(false);
-        let columns = 6 * whole.twists.len() + whole.terms.len();
-        let of_robot = covariance.view((0, 0), (columns, columns)).into_owned();
-        let expected = fit_points(&whole, &still)?.expected(&whole, &still, &of_robot, joint_sigma)?;
-        let approached = positions(true);
-        let displaced = |robot: &Robot| Some(fit_points(robot, &approached)?.rms_m);
-        let own = expected.with_joint_noise_m;
-        Some(Self {
-            nominal_m: own.hypot(displaced(&Robot::nominal(robot.chain.clone()))?),
-            urdf_m: own.hypot(displaced(&with(|t| t == Term::Offset))?),
-            model_m: own,
-            scatter_m: (own.powi(2) - expected.model_m.powi(2)).max(0.0).sqrt(),
-        })
+        let whole = with(robot, |t| !matches!(t, Term::Local(_)));
+        let points: Vec<MeasuredPoint> = samples
+            .iter()
+            .map(|s| MeasuredPoint { position_m: exact(&whole, s).translation, readings: s.readings.clone() })
+            .collect();
+        let misfit = fit_points(&Robot::nominal(robot.chain.clone()), &points)?.rms_m;
+        let lacking = displacement(&whole, &with(robot, |t| t == Term::Offset), &samples, stops);
+        let scatter_m = scatter_m(&whole, joint_sigma, &samples);
+        let model_m = model.sigma_m(&samples).hypot(scatter_m);
+        Some(Self { nominal_m: model_m.hypot(misfit), urdf_m: model_m.hypot(lacking), model_m, scatter_m })
     }
 }
 
-/// Smallest and largest reading of every joint.
-fn ranges(stops: &[Stop]) -> Option<Vec<(f64, f64)>> {
-    let range = |r: usize| {
-        let all = stops.iter().map(|s| s.readings[r]);
-        (all.clone().fold(f64::INFINITY, f64::min), all.fold(f64::NEG_INFINITY, f64::max))
+/// The robot with some of its terms.
+fn with(robot: &Robot, kept: impl Fn(Term) -> bool) -> Robot {
+    let mut robot = robot.clone();
+    robot.terms.retain(|t| kept(t.term));
+    robot
+}
+
+fn exact(robot: &Robot, stop: &Stop) -> crate::geom::Pose {
+    robot.pose_at(stop, &vec![0.0; stop.readings.len()])
+}
+
+/// Distance of the flange between two robots, RMS over samples, right on average over the stops, m.
+fn displacement(a: &Robot, b: &Robot, samples: &[Stop], stops: &[Stop]) -> f64 {
+    let twist = |s: &Stop| (exact(a, s).inverse() * exact(b, s)).log();
+    let mean = stops.iter().map(twist).sum::<Vector6<f64>>() / stops.len().max(1) as f64;
+    let squares: Vec<(f64, f64)> =
+        samples.iter().map(|s| ((twist(s) - mean).fixed_rows::<3>(0).norm_squared(), 1.0)).collect();
+    root_mean_square(&squares)
+}
+
+/// What the noise of a stop does to the position of the flange, RMS over samples, m.
+fn scatter_m(robot: &Robot, joint_sigma: &[f64], samples: &[Stop]) -> f64 {
+    let square = |s: &Stop| {
+        let by_readings = robot.kinematics(s, &vec![0.0; s.readings.len()]).d_readings;
+        by_readings.iter().zip(joint_sigma).map(|(d, sigma)| d.fixed_rows::<3>(0).norm_squared() * sigma * sigma).sum()
     };
-    stops.first().map(|s| (0..s.readings.len()).map(range).collect())
+    root_mean_square(&samples.iter().map(|s| (square(s), 1.0)).collect::<Vec<_>>())
 }
 
 /// Joint noise of a stop, RMS over stops with different noise, rad or m.

@@ -124,9 +124,9 @@ fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     let mm = |m: f64| format!("{:>8.3} mm", 1e3 * m);
     writeln!(
         out,
-        "flange    expected error of its position at a stop in the region of the stops, by model and covariance, RMS, base and tool aligned:"
+        "flange    expected error of its position relative to the plate in the region of the stops, by model and covariance, RMS:"
     )?;
-    writeln!(out, "          nominal    {}", mm(e.nominal_m))?;
+    writeln!(out, "          nominal    {}   base and tool that fit it best", mm(e.nominal_m))?;
     writeln!(out, "          calibrated {}   corrected URDF alone", mm(e.urdf_m))?;
     if r.beyond_urdf() {
         writeln!(out, "          calibrated {}   with compensation.toml", mm(e.model_m))?;

@@ -154,3 +154,18 @@ pub(super) fn mdh_csv(solution: &Solution, context: &Context) -> String {
     }
     out + &csv(&rows)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::is_determined;
+
+    #[test]
+    fn an_offset_is_determined_where_entering_it_helps() {
+        let determined = |offset: f64, sigma: f64| is_determined(offset.to_radians(), sigma.to_radians(), 10e-3, false);
+        assert!(!determined(-0.0094, 0.132), "nothing beside its sigma");
+        assert!(!determined(0.0, 0.57), "the prior alone");
+        assert!(!determined(1.5, 0.5), "far from none, but the data say too little");
+        assert!(determined(0.4, 0.13));
+        assert!(determined(0.001, 0.02), "known to be none");
+    }
+}

@@ -106,7 +106,8 @@ pub(super) fn judge(
     let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops));
     let noise: Vec<Vec<f64>> =
         problem.used().filter(|(_, i)| i.stop.is_some()).map(|(_, i)| problem.joint_sigma(i.camera)).collect();
-    worth.flange = FlangeErrors::new(&state.robot, &covariance.reduced, &usual_joint_sigma(&noise), &stops);
+    let promise = |m: &FlangeModel| FlangeErrors::new(m, &state.robot, &usual_joint_sigma(&noise), &stops);
+    worth.flange = model.as_ref().and_then(promise);
     worth.workspace = model.map(|m| m.workspace()).unwrap_or_default();
     worth
 }

@@ -48,7 +48,7 @@ fn promise(r: &SolutionRecord) -> Markup {
             div { b { (mm(e.scatter_m)) " mm" } span { "of each is noise from stop to stop" } }
         }
         p.note {
-            "By model and covariance, RMS in the region of the stops, base frame and tool found: what a tracker would find there. "
+            "Position relative to the plate, by model and covariance, RMS in the region of the stops; the nominal robot with the base and the tool that fit it best. "
             "The second row is measured on images of the same series; it says less, because the stops all look at one plate."
         }
     }
