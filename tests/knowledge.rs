@@ -287,7 +287,7 @@ fn what_is_promised_of_the_flange_is_what_is_found() {
         let made = series(&WorldRequest { errors, ..request(seed, SIGMA) }).unwrap();
         let solution = identify(chain(), &[measured(&made, &chain())], &full).unwrap();
         let truth = true_robot(&made.truth);
-        let plate = Pose::from(made.truth.plate_poses.values().next().unwrap());
+        let plate = made.truth.plate_poses.values().next().unwrap().pose();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let covered = &solution.worth.identifiability.as_ref().unwrap().covered;
         let places: Vec<(Stop, Vec<f64>)> = (0..400)
