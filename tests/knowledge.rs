@@ -24,7 +24,7 @@ use robotcal::recipe::{
     Config, JointNoise, Options, Parameters, RobotModel, Selection, Solution, StatedPrior, identify, measured,
     verify_series,
 };
-use robotcal::series::{CameraMount, Plate, PlateKind};
+use robotcal::series::{CameraMount, Marker, Observation, Plate, PlateKind};
 use robotcal::simulate::truth::{TermRecord, Truth};
 use robotcal::simulate::{RobotErrors, WorldRequest, series};
 use robotcal::urdf::Chain;
@@ -366,11 +366,25 @@ fn images_off_the_robot_alone_are_no_robot() {
 
 #[test]
 fn a_camera_that_looked_straight_ahead_only_is_named() {
-    let mut wanted = request(3, 2e-5);
-    wanted.views.tilt_rad = 0.0;
-    let straight = measured(&series(&wanted).unwrap(), &chain());
+    let mut straight = world(3, 2e-5);
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let markers = straight.plate.markers.clone();
+    for stop in &mut straight.stops {
+        let camera_from_plate = Pose::from_xyz_rpy(
+            [rng.random_range(-0.03..0.03), rng.random_range(-0.03..0.03), rng.random_range(0.3..0.6)],
+            [std::f64::consts::PI, 0.0, rng.random_range(-3.0..3.0)],
+        );
+        let seen = stop.observations[0].clone();
+        let observation = |m: &Marker| {
+            let x = camera_from_plate.transform(&m.position_m);
+            let uv = [640.0 + 1000.0 * x.x / x.z, 512.0 + 1000.0 * x.y / x.z];
+            Observation { marker: m.id, uv: uv.map(|v| v + rng.random_range(-0.05..0.05)), ..seen.clone() }
+        };
+        stop.observations = markers.iter().map(observation).collect();
+    }
     let error = identify(chain(), &[straight], &Options::default()).unwrap_err();
     assert_eq!((error.kind, error.place.as_str()), (ErrorKind::Unsolved, "camera"), "{error}");
+    assert!(error.what.contains("40 images"), "{error}");
 }
 
 /// A robot that did not stand still: joint noise, and images that are blurred and off.
