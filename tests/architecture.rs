@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// Rooms from the bottom up; rooms on one level are peers and do not import each other, but for the pairs in `PEERS`.
 const LEVELS: [&[&str]; 13] = [
@@ -104,6 +105,39 @@ fn only_linalg_knows_the_factorisation_libraries() {
         }
     }
     assert!(wrong.is_empty(), "faer or clarabel outside linalg: {wrong:?}");
+}
+
+/// "1.89" -> [1, 89, 0].
+fn version(text: &str) -> Vec<u32> {
+    let mut parts: Vec<u32> = text.split('.').map(|part| part.parse().unwrap()).collect();
+    parts.resize(3, 0);
+    parts
+}
+
+#[test]
+fn the_stated_rust_version_suffices_for_all_dependencies() {
+    let cargo = || Command::new(env!("CARGO"));
+    let told = String::from_utf8(cargo().arg("-vV").output().unwrap().stdout).unwrap();
+    let host = told.lines().find_map(|l| l.strip_prefix("host: ")).unwrap();
+    let out = cargo()
+        .args(["metadata", "--locked", "--offline", "--format-version", "1", "--filter-platform", host])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let metadata: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    let packages = metadata["packages"].as_array().unwrap();
+    assert!(packages.len() > 50, "only {} packages", packages.len());
+    let stated = env!("CARGO_PKG_RUST_VERSION");
+    let newer: Vec<String> = packages
+        .iter()
+        .filter_map(|p| p["rust_version"].as_str().map(|v| (p["name"].as_str().unwrap(), v)))
+        .filter(|(_, v)| version(v) > version(stated))
+        .map(|(name, v)| format!("{name} {v}"))
+        .collect();
+    assert!(newer.is_empty(), "Cargo.toml states Rust {stated}; newer ones are demanded by {}", newer.join(", "));
+    let readme = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
+    assert!(readme.contains(&format!("{stated} or later")), "README.md does not state Rust {stated}");
 }
 
 #[test]

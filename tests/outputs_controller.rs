@@ -7,13 +7,17 @@ mod outputs_support;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use nalgebra::Matrix4;
-use outputs_support::{context, robot, solved};
+use nalgebra::{Matrix4, Vector3, Vector6};
+use outputs_support::{context, robot, series_in_postures, solved};
+use robotcal::geom::{Pose, exp_so3};
 use robotcal::model::robot::Robot;
-use robotcal::output::{Offsets, files, read_compensation};
-use robotcal::recipe::RobotModel;
+use robotcal::output::flange_table::flange_at;
+use robotcal::output::restore::found_model;
+use robotcal::output::{Offsets, files, kinematics_xacro, kinematics_yaml, read_compensation, solution_json};
+use robotcal::recipe::{Options, RobotModel, identify};
 use robotcal::series::CameraMount;
-use robotcal::urdf::RobotDescription;
+use robotcal::urdf::{RobotDescription, patch_origins};
+use serde::Deserialize;
 
 type Files = BTreeMap<String, Vec<u8>>;
 
@@ -102,6 +106,246 @@ fn xacro_properties_are_the_origins_of_the_urdf() {
     }
     for name in ["kinematics.yaml", "kinematics.xacro", "mdh.csv", "mastering.csv", "compensation.toml"] {
         assert!(text(&files, name).contains("for ") || text(&files, name).contains("reads"), "{name} names no reader");
+    }
+}
+
+/// A joint of a URDF: name, type, parent, child, xyz, rpy.
+type JointRow<'a> = (&'a str, &'a str, &'a str, &'a str, &'a str, &'a str);
+
+/// A URDF of these joints, all axes along `axis`.
+fn urdf(joints: &[JointRow], axis: &str) -> RobotDescription {
+    let mut links: Vec<&str> = joints.iter().flat_map(|j| [j.2, j.3]).collect();
+    links.sort_unstable();
+    links.dedup();
+    let links: String = links.iter().map(|l| format!("<link name=\"{l}\"/>")).collect();
+    let joint = |(name, kind, parent, child, xyz, rpy): &JointRow| {
+        format!(
+            "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+             <origin xyz=\"{xyz}\" rpy=\"{rpy}\"/><axis xyz=\"{axis}\"/></joint>"
+        )
+    };
+    let joints: String = joints.iter().map(joint).collect();
+    let text = format!("<robot name=\"r\">{links}{joints}</robot>");
+    RobotDescription::from_text(Path::new("r.urdf"), text).unwrap()
+}
+
+const HALF: &str = "1.5707963267948966";
+
+/// The links and joints of ur_description, dimensions of a UR5e.
+fn ur(axis: &str, prefix: &str) -> RobotDescription {
+    let (down, turned) = (format!("{HALF} 0 0"), "0 0 3.141592653589793");
+    let (flange, tool) = (format!("0 -{HALF} -{HALF}"), format!("{HALF} 0 {HALF}"));
+    let p = |name: &str| format!("{prefix}{name}");
+    let names = |j: &(&str, &str, &str, &str, &str, &str)| [p(j.0), p(j.2), p(j.3)];
+    let rows: Vec<JointRow> = vec![
+        ("base_link-base_link_inertia", "fixed", "base_link", "base_link_inertia", "0 0 0", turned),
+        ("base_link-base_fixed_joint", "fixed", "base_link", "base", "0 0 0", turned),
+        ("shoulder_pan_joint", "continuous", "base_link_inertia", "shoulder_link", "0 0 0.1625", "0 0 0"),
+        ("shoulder_lift_joint", "continuous", "shoulder_link", "upper_arm_link", "0 0 0", &down),
+        ("elbow_joint", "continuous", "upper_arm_link", "forearm_link", "-0.425 0 0", "0 0 0"),
+        ("wrist_1_joint", "continuous", "forearm_link", "wrist_1_link", "-0.3922 0 0.1333", "0 0 0"),
+        ("wrist_2_joint", "continuous", "wrist_1_link", "wrist_2_link", "0 -0.0997 0", &down),
+        (
+            "wrist_3_joint",
+            "continuous",
+            "wrist_2_link",
+            "wrist_3_link",
+            "0 0.0996 0",
+            "1.5707963267948966 3.141592653589793 3.141592653589793",
+        ),
+        ("wrist_3-flange", "fixed", "wrist_3_link", "flange", "0 0 0", &flange),
+        ("flange-tool0", "fixed", "flange", "tool0", "0 0 0", &tool),
+    ];
+    let named: Vec<[String; 3]> = rows.iter().map(names).collect();
+    let rows: Vec<JointRow> =
+        rows.iter().zip(&named).map(|(r, n)| (n[0].as_str(), r.1, n[1].as_str(), n[2].as_str(), r.4, r.5)).collect();
+    urdf(&rows, axis)
+}
+
+/// A robot whose moving joints, and the fixed ones before them, are off by some tenths of a millimetre and milliradians.
+fn off(description: &RobotDescription, base: Option<&str>) -> Robot {
+    let mut robot = Robot::nominal(description.chain(base, None).unwrap());
+    let last = robot.chain.joints.iter().rposition(|j| j.drive.is_some()).unwrap();
+    for (k, twist) in robot.twists.iter_mut().enumerate().take(last + 1) {
+        *twist = Vector6::from_fn(|i, _| if i < 3 { 5e-4 } else { 2e-3 } * ((7 * k + i) as f64).sin());
+    }
+    robot
+}
+
+/// Flange of the corrected URDF.
+fn exported(robot: &Robot, description: &RobotDescription, q: &[f64]) -> Pose {
+    let origins = robot.urdf_origins().into_iter().map(|(name, o)| (name.to_owned(), o)).collect();
+    let text = patch_origins(&description.text, &origins).unwrap();
+    let chain = RobotDescription::from_text(Path::new("c.urdf"), text).unwrap();
+    Robot::nominal(chain.chain(Some(&robot.chain.base), None).unwrap()).base_from_tip(q)
+}
+
+#[derive(Debug, Deserialize, Clone, Copy)]
+#[serde(deny_unknown_fields)]
+struct Origin {
+    x: f64,
+    y: f64,
+    z: f64,
+    roll: f64,
+    pitch: f64,
+    yaw: f64,
+}
+
+impl Origin {
+    /// The origin, then a turn about z.
+    fn turned(&self, q: f64) -> Pose {
+        let turn = Pose::new(exp_so3(&(Vector3::z() * q)), Vector3::zeros());
+        Pose::from_xyz_rpy([self.x, self.y, self.z], [self.roll, self.pitch, self.yaw]) * turn
+    }
+}
+
+fn assert_same(what: &str, one: Pose, other: Pose) {
+    let (rad, m) = one.distance(&other);
+    assert!(rad < 1e-9 && m < 1e-9, "{what}: {m:e} m, {rad:e} rad");
+}
+
+#[test]
+fn kinematics_yaml_of_a_ur_is_what_ur_description_reads() {
+    #[derive(Deserialize)]
+    struct File {
+        kinematics: Links,
+    }
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Links {
+        shoulder: Origin,
+        upper_arm: Origin,
+        forearm: Origin,
+        wrist_1: Origin,
+        wrist_2: Origin,
+        wrist_3: Origin,
+        hash: String,
+    }
+    let q = [0.3, -1.2, 0.9, 2.0, -0.7, 1.4];
+    let mut hashes = Vec::new();
+    for (prefix, base) in [("", None), ("left_", None), ("", Some("base"))] {
+        let description = ur("0 0 1", prefix);
+        let robot = off(&description, base);
+        let file: File = serde_saphyr::from_str(&kinematics_yaml(&robot, &description, "")).unwrap();
+        let k = file.kinematics;
+        let links = [k.shoulder, k.upper_arm, k.forearm, k.wrist_1, k.wrist_2, k.wrist_3];
+        // base_link_inertia is turned by half a turn in base_link, and stands as base does; tool0 is wrist_3_link.
+        let half = Pose::from_xyz_rpy([0.0; 3], [0.0, 0.0, std::f64::consts::PI]);
+        let before = if base.is_none() { half } else { Pose::identity() };
+        let read = links.iter().zip(q).fold(before, |pose, (link, q)| pose * link.turned(q));
+        assert_same("ur", read, exported(&robot, &description, &q));
+        hashes.push(k.hash);
+    }
+    assert!(!hashes[0].is_empty() && hashes[0] == hashes[1] && hashes[0] != hashes[2], "{hashes:?}");
+    // The older description of the same joint names has other axes, and reads no such file.
+    let older = ur("0 1 0", "");
+    let text = kinematics_yaml(&off(&older, None), &older, "");
+    assert!(text.contains("shoulder_pan_joint:") && !text.contains("hash:"), "{text}");
+}
+
+#[test]
+fn kinematics_yaml_of_a_franka_and_of_an_xarm_is_what_their_descriptions_read() {
+    #[derive(Deserialize)]
+    struct Joint {
+        kinematic: Origin,
+    }
+    let bent = format!("{HALF} 0 0");
+    let arm = |prefix: &str, base: &str, count: usize| -> Vec<[String; 3]> {
+        let link = |k: usize| if k == 0 { format!("{prefix}{base}") } else { format!("{prefix}link{k}") };
+        (1..=count).map(|k| [format!("{prefix}joint{k}"), link(k - 1), link(k)]).collect()
+    };
+    let rows = |names: &[[String; 3]]| -> Vec<(String, String, String)> {
+        names.iter().map(|[a, b, c]| (a.clone(), b.clone(), c.clone())).collect()
+    };
+    let built = |names: &[(String, String, String)], fixed: usize| {
+        let kind = |k: usize| if k < names.len() - fixed { "continuous" } else { "fixed" };
+        let rows: Vec<JointRow> = names
+            .iter()
+            .enumerate()
+            .map(|(k, n)| (n.0.as_str(), kind(k), n.1.as_str(), n.2.as_str(), "0.1 0.02 0.3", bent.as_str()))
+            .collect();
+        urdf(&rows, "0 0 1")
+    };
+    let q = [0.3, -1.2, 0.9, 2.0, -0.7, 1.4, -2.2];
+    let description = built(&rows(&arm("panda_", "link0", 8)), 1);
+    let robot = off(&description, None);
+    let file: BTreeMap<String, Joint> = serde_saphyr::from_str(&kinematics_yaml(&robot, &description, "")).unwrap();
+    assert_eq!(file.len(), 8);
+    let turns = q.iter().copied().chain([0.0]).enumerate();
+    let read = turns.fold(Pose::identity(), |pose, (k, q)| pose * file[&format!("joint{}", k + 1)].kinematic.turned(q));
+    assert_same("franka", read, exported(&robot, &description, &q));
+    for count in [5, 6, 7] {
+        let description = built(&rows(&arm("", "link_base", count)), 0);
+        let robot = off(&description, None);
+        let text = kinematics_yaml(&robot, &description, "");
+        let file: BTreeMap<String, BTreeMap<String, Origin>> = serde_saphyr::from_str(&text).unwrap();
+        assert!(text.contains("xarm_description reads"), "{text}");
+        let joints = &file["kinematics"];
+        assert_eq!(joints.len(), count);
+        let turns = q[..count].iter().enumerate();
+        let read = turns.fold(Pose::identity(), |pose, (k, q)| pose * joints[&format!("joint{}", k + 1)].turned(*q));
+        assert_same("xarm", read, exported(&robot, &description, &q[..count]));
+    }
+}
+
+#[test]
+fn every_joint_has_properties_of_its_own_in_the_xacro_and_the_element_that_uses_them() {
+    let rows = [
+        ("a-b", "continuous", "base", "one", "0.1 0 0", "0 0 0"),
+        ("a_b", "continuous", "one", "two", "0.2 0 0", "0 0 0"),
+        ("3--axis", "continuous", "two", "three", "0.3 0 0", "0 0 0"),
+    ];
+    let description = urdf(&rows, "0 0 1");
+    let text = kinematics_xacro(&Robot::nominal(description.chain(None, None).unwrap()), "");
+    let document = roxmltree::Document::parse(&text).unwrap();
+    let value = |name: &str| {
+        document.descendants().find(|n| n.attribute("name") == Some(name)).and_then(|n| n.attribute("value"))
+    };
+    let comments: Vec<&str> = document.descendants().filter(|n| n.is_comment()).filter_map(|n| n.text()).collect();
+    for (joint, x) in [("a-b:", "0.1"), ("a_b:", "0.2"), ("3- -axis:", "0.3")] {
+        let recipe =
+            comments.iter().find(|c| c.trim().starts_with(joint)).unwrap_or_else(|| panic!("{joint} {comments:?}"));
+        let (_, rest) = recipe.split_once("xyz=\"${").unwrap();
+        let name = rest.split_once('}').unwrap().0;
+        let letter_first = name.starts_with(|c: char| c.is_ascii_alphabetic());
+        assert!(
+            letter_first && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_'),
+            "{name} is no name in Python"
+        );
+        assert!(value(name).unwrap().starts_with(x), "{joint} {name}");
+    }
+}
+
+#[test]
+fn what_is_stated_of_the_flange_is_what_the_exported_files_give() {
+    let description = robot();
+    let series = series_in_postures(CameraMount::Hand, &description, 4);
+    let chain = description.chain(None, None).unwrap();
+    let options = Options { model: RobotModel::Full, ..Options::default() };
+    let solution = identify(chain, std::slice::from_ref(&series), &options).unwrap();
+    let files = files(&solution, &context(&description)).unwrap();
+    let record = solution_json::read(&files[solution_json::FILE_NAME]).unwrap();
+    assert!(!record.robot.local_errors.is_empty(), "no local errors, no test");
+    assert!(record.robot.terms.iter().all(|t| !t.term.starts_with("local")));
+    // The robot as others have it: corrected URDF and compensation.toml.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("compensation.toml");
+    std::fs::write(&path, text(&files, "compensation.toml")).unwrap();
+    let urdf = text(&files, "kuka_kr6_r900.calibrated.urdf");
+    let chain = RobotDescription::from_text(Path::new("c.urdf"), urdf).unwrap().chain(None, None).unwrap();
+    let exported = read_compensation(&path, chain).unwrap();
+    let plate = Pose::from(&record.placements[0].pose);
+    let readings: Vec<Vec<f64>> = series.stops.iter().filter_map(|s| s.readings.clone()).collect();
+    let found = flange_at(&found_model(&record).unwrap(), &readings).unwrap();
+    let mut most_local = 0.0f64;
+    for (q, at) in readings.iter().zip(&found) {
+        assert_same("--at", at.pose, plate.inverse() * exported.base_from_tip(q));
+        most_local = most_local.max(solution.state.robot.base_from_tip(q).distance(&exported.base_from_tip(q)).1);
+    }
+    assert!(most_local > 1e-5, "the local errors of this series are too small to be missed: {most_local:e} m");
+    for place in &record.workspace {
+        let xyz = exported.base_from_tip(&place.readings).translation;
+        assert!((xyz - Vector3::from(place.xyz_m)).norm() < 1e-9, "workspace map");
     }
 }
 

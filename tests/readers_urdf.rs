@@ -5,7 +5,8 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 use robotcal::geom::Pose;
-use robotcal::urdf::{JointKind, RobotDescription, read};
+use robotcal::model::robot::Robot;
+use robotcal::urdf::{JointKind, RobotDescription, patch_origins, read};
 
 fn robot(text: &str) -> RobotDescription {
     RobotDescription::from_text(Path::new("r.urdf"), text.to_string()).unwrap()
@@ -78,26 +79,79 @@ fn a_mimic_driver_outside_the_chain_is_a_reading_with_its_own_kind() {
 
 #[test]
 fn several_leaves_are_listed_and_unknown_names_get_a_suggestion() {
-    let text = wrap(
-        &["base", "a", "tool0", "camera"],
-        &[
-            joint("j1", "revolute", "base", "a", Z),
-            joint("t", "fixed", "a", "tool0", ""),
-            joint("c", "fixed", "a", "camera", ""),
-        ],
-    );
-    let robot = robot(&text);
-    let error = robot.chain(None, None).unwrap_err();
+    let text = |tool: &str| {
+        wrap(
+            &["base", "a", tool, "camera"],
+            &[
+                joint("j1", "revolute", "base", "a", Z),
+                joint("t", "fixed", "a", tool, ""),
+                joint("c", "fixed", "a", "camera", ""),
+            ],
+        )
+    };
+    let error = robot(&text("spindle")).chain(None, None).unwrap_err();
     assert_eq!(error.exit_code(), 2);
-    assert!(error.to_string().contains("tool0, camera"), "{error}");
+    assert!(error.to_string().contains("spindle, camera"), "{error}");
+    let robot = robot(&text("tool0"));
     let error = robot.chain(None, Some("tool_0")).unwrap_err().to_string();
     assert!(error.contains("tool_0") && error.contains("\"tool0\" is there"), "{error}");
     let error = robot.chain(Some("tool0"), Some("camera")).unwrap_err().to_string();
-    assert!(error.contains("does not hang below") && error.contains("a, base"), "{error}");
+    assert!(error.contains("no joint moves"), "{error}");
     let error = robot.chain(Some("a"), Some("base")).unwrap_err().to_string();
     assert!(error.contains("exchanged"), "{error}");
     let error = robot.chain(Some("a"), Some("tool0")).unwrap_err().to_string();
     assert!(error.contains("no joint moves"), "{error}");
+}
+
+/// Joints as in a URDF of ROS-Industrial: tool0 behind the arm, base (the frame of the controller) on base_link.
+fn industrial(extra_links: &[&str], extra: &[String]) -> RobotDescription {
+    let links = [&["base_link", "link_1", "link_2", "tool0", "base"], extra_links].concat();
+    let arm = [
+        joint("a1", "revolute", "base_link", "link_1", &format!("{Z}<origin xyz=\"0 0 0.4\"/>")),
+        joint("a2", "revolute", "link_1", "link_2", &format!("{Z}<origin xyz=\"0.3 0 0\" rpy=\"1.2 0 0\"/>")),
+        joint("t", "fixed", "link_2", "tool0", "<origin xyz=\"0 0 0.1\"/>"),
+        joint("base_link-base", "fixed", "base_link", "base", "<origin xyz=\"0 0.1 0.2\" rpy=\"0 0 3\"/>"),
+    ];
+    robot(&wrap(&links, &[&arm, extra].concat()))
+}
+
+#[test]
+fn of_several_leaves_the_one_behind_all_moving_joints_is_the_tip() {
+    let fixed = |name: &str, child: &str| joint(name, "fixed", "link_2", child, "");
+    let plain = industrial(&[], &[]);
+    assert_eq!(plain.chain(None, None).unwrap().tip, "tool0");
+    assert!(plain.tip_notice(None, None).unwrap().what.contains("base"));
+    assert!(plain.tip_notice(None, Some("tool0")).is_none(), "the user named it");
+    let several = industrial(&["flange", "ft_frame"], &[fixed("f", "flange"), fixed("s", "ft_frame")]);
+    assert_eq!(several.chain(None, None).unwrap().tip, "tool0");
+    let branch = joint("finger", "prismatic", "link_2", "finger_tip", Z);
+    let error = industrial(&["finger_tip"], std::slice::from_ref(&branch)).chain(None, None);
+    assert_eq!(error.unwrap().tip, "finger_tip", "it is behind all joints that move");
+    let other = joint("other", "prismatic", "link_2", "other_tip", Z);
+    let error = industrial(&["finger_tip", "other_tip"], &[branch, other]).chain(None, None).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    assert!(error.remedy.contains("\"tool0\" is there"), "{error}");
+}
+
+#[test]
+fn a_base_that_hangs_on_the_root_by_fixed_joints_is_a_base() {
+    let description = industrial(&[], &[]);
+    let (root, base) = (description.chain(None, None).unwrap(), description.chain(Some("base"), None).unwrap());
+    assert_eq!((base.base.as_str(), base.tip.as_str(), &base.readings), ("base", "tool0", &root.readings));
+    let q = [0.4, -1.1];
+    let base_from_root =
+        Robot::nominal(base.clone()).base_from_tip(&q) * Robot::nominal(root).base_from_tip(&q).inverse();
+    let stated = description.fixed_joint("base_link-base").unwrap();
+    let (angle, distance) = base_from_root.inverse().distance(&stated);
+    assert!(angle < 1e-12 && distance < 1e-12, "{angle:e} {distance:e}");
+    // What the URDF states stays what it is.
+    let origins = Robot::nominal(base).urdf_origins().into_iter().map(|(n, o)| (n.to_owned(), o)).collect();
+    let again =
+        RobotDescription::from_text(Path::new("again.urdf"), patch_origins(&description.text, &origins).unwrap());
+    let (angle, distance) = again.unwrap().fixed_joint("base_link-base").unwrap().distance(&stated);
+    assert!(angle < 1e-12 && distance < 1e-12, "{angle:e} {distance:e}");
+    let error = description.chain(Some("tool0"), Some("base")).unwrap_err();
+    assert!(error.what.contains("does not hang below"), "joints that move are not climbed: {error}");
 }
 
 #[test]

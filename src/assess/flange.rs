@@ -3,6 +3,8 @@
 //! The pose of the flange is given relative to what stands still: the plate, or a fixed camera. No series can tell a constant
 //! displacement of the flange (the last origin and the last offset against the hand-camera offset), so the flange is the one that
 //! is right on average over the stops: with `J(q)` the derivative of its body twist, `J(q) - mean_j J(q_j)` counts.
+//!
+//! The robot is that of the exported files, corrected URDF and compensation.toml: local errors are left out.
 
 use nalgebra::{DMatrix, Matrix6};
 use serde::{Deserialize, Serialize};
@@ -55,7 +57,7 @@ pub struct WorkspacePoint {
 /// What is needed to predict.
 #[derive(Debug, Clone)]
 pub struct FlangeModel<'a> {
-    robot: &'a Robot,
+    robot: Robot,
     layout: &'a Layout,
     /// What stands still in the base frame, and its first column.
     still: Pose,
@@ -70,7 +72,7 @@ impl<'a> FlangeModel<'a> {
     /// `still` is the plate (or the fixed camera) in the base frame with its first column; `None` without stops, or where nothing
     /// determines that pose.
     pub fn new(
-        robot: &'a Robot,
+        robot: &Robot,
         layout: &'a Layout,
         (still, still_column): (Pose, usize),
         covariance: &'a DMatrix<f64>,
@@ -80,6 +82,7 @@ impl<'a> FlangeModel<'a> {
         if stops.is_empty() || !known {
             return None;
         }
+        let robot = robot.without_local_errors();
         let readings = robot.chain.readings.len();
         let range = |r: usize| {
             let all = stops.iter().map(|s| s.readings[r]);
@@ -107,8 +110,8 @@ impl<'a> FlangeModel<'a> {
         for (k, d) in kinematics.d_twists.iter().enumerate() {
             j.fixed_view_mut::<6, 6>(0, self.layout.twists.start + 6 * k).copy_from(d);
         }
-        // Local errors are noise near single readings, not properties of the robot.
-        for (k, d) in kinematics.d_terms.iter().enumerate().take(self.layout.locals.start - self.layout.terms.start) {
+        // Local errors, the last terms, are not in this robot.
+        for (k, d) in kinematics.d_terms.iter().enumerate() {
             j.fixed_view_mut::<6, 1>(0, self.layout.terms.start + k).copy_from(d);
         }
         j.fixed_view_mut::<6, 6>(0, self.still_column).copy_from(&-adjoint(&pose.inverse()));
@@ -153,7 +156,7 @@ impl<'a> FlangeModel<'a> {
 
     /// Samples of the region of the stops, then of everything within the joint limits.
     pub fn workspace(&self) -> Vec<WorkspacePoint> {
-        let limits: Vec<(f64, f64)> = (0..self.covered.len()).map(|r| range_of(self.robot, r)).collect();
+        let limits: Vec<(f64, f64)> = (0..self.covered.len()).map(|r| range_of(&self.robot, r)).collect();
         let stops = halton_stops(&self.covered, SAMPLES).into_iter().chain(halton_stops(&limits, SAMPLES));
         stops
             .map(|stop| {

@@ -14,7 +14,7 @@ use crate::output::solution_json::SolutionRecord;
 /// Flags of `--at`.
 #[derive(Debug, Args)]
 pub(super) struct AtArgs {
-    /// Joint vectors (CSV, columns named as the joints): pose and uncertainty of the flange relative to the plate go to at.csv
+    /// Joint vectors (CSV, columns named as the joints): pose and uncertainty of the flange relative to the plate, by the corrected URDF with compensation.toml, go to at.csv
     #[arg(long, value_name = "FILE", requires = "at_unit")]
     at: Option<PathBuf>,
     /// Unit of the revolute joints in that file
@@ -58,7 +58,12 @@ impl AtArgs {
                 1e3 * rotation
             );
         }
-        let _ = writeln!(out, "at        {} joint vectors in {}", found.len(), path.display());
+        let _ = writeln!(
+            out,
+            "at        {} joint vectors in {}; the robot is the corrected URDF with compensation.toml",
+            found.len(),
+            path.display()
+        );
         Ok(out)
     }
 }

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::choices::Model;
 use super::recording::{Pictures, RecordingArgs};
+use super::robot::read_chain;
 use super::say::{say, say_line};
 use super::{Verdict, identify, progress};
 use crate::error::{Error, Result};
@@ -100,7 +101,7 @@ fn truth_of(all: &[Series]) -> Result<Option<Truth>> {
 }
 
 fn study(args: &CompareArgs) -> Result<Verdict> {
-    let chain = urdf::read(&args.urdf)?.chain(args.base.as_deref(), args.tip.as_deref())?;
+    let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
     if args.seeds < 2 {
         return Err(Error::input("--seeds", "fewer than 2 worlds give no interval", "give 30 or more"));
     }
@@ -127,7 +128,7 @@ const MONTE_CARLO_NOISE: [f64; 5] = [0.0, 2.5e-6, 5e-6, 2e-5, 1e-4];
 const MONTE_CARLO_IMAGES: usize = 40;
 
 fn monte_carlo(args: &CompareArgs) -> Result<Verdict> {
-    let chain = urdf::read(&args.urdf)?.chain(args.base.as_deref(), args.tip.as_deref())?;
+    let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
     let request = MonteCarloRequest {
         chain,
         seeds: args.seeds,

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 
 use super::Verdict;
+use super::robot::read_chain;
 use super::say::{say, say_line};
 use crate::error::{Error, Result};
 use crate::geom::{Pose, exp_so3};
@@ -16,7 +17,7 @@ use crate::programs::program::Posture;
 use crate::programs::{
     self, Correction, Kind, Language, Left, Models, Outcome, Postures, Program, Setting, Target, TextFile,
 };
-use crate::urdf::{self, Chain, JointKind};
+use crate::urdf::{Chain, JointKind};
 
 /// Flags of `compensate`.
 #[derive(Debug, Args)]
@@ -109,7 +110,7 @@ impl From<LanguageName> for Language {
 
 pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     let robot = |file: &Path, compensation: Option<&PathBuf>| -> Result<Robot> {
-        let chain = urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?;
+        let chain = read_chain(file, args.base.as_deref(), args.tip.as_deref())?;
         let mut robot = compensated(chain, compensation.map(PathBuf::as_path))?;
         robot.terms.retain(|t| !args.unordered || t.term != Term::Backlash);
         Ok(robot)

@@ -6,13 +6,14 @@ use clap::Args;
 
 use super::Verdict;
 use super::recording::RecordingArgs;
+use super::robot::read_chain;
 use super::say::{say, say_line};
 use super::show::read_solution;
 use crate::error::{Error, Result};
 use crate::model::robot::Robot;
 use crate::output::recording::{MAGNIFIED, overlay};
 use crate::series::{self, CameraInfo, Extracted, FramePoses, ImageMarks, Series, Shown, Source, convert_recording};
-use crate::urdf::{self, Chain};
+use crate::urdf::Chain;
 
 /// Flags of `convert`.
 #[derive(Debug, Args)]
@@ -41,7 +42,7 @@ pub(super) struct ConvertArgs {
 
 pub(super) fn run(args: &ConvertArgs) -> Result<Verdict> {
     let chain = match &args.urdf {
-        Some(file) => Some(urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?),
+        Some(file) => Some(read_chain(file, args.base.as_deref(), args.tip.as_deref())?),
         None => None,
     };
     if args.to.extension().is_some_and(|e| e == "mcap") {

@@ -96,10 +96,14 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
             let pictures = Pictures::new();
             let all = pictures.of_recordings(all, &args.recording.options(&chain.readings)?)?;
             if args.dry_run {
+                if let Some(notice) = tip_notice(&description, &all, args.base.as_deref(), args.tip.as_deref())? {
+                    say_line!("note      {notice}");
+                }
                 say!("{}", summary::of_stops(&recipe::dry_run(chain, &all, &options)?));
                 return Ok(Verdict::Good);
             }
             let mut notices = description.notices.clone();
+            notices.extend(tip_notice(&description, &all, args.base.as_deref(), args.tip.as_deref())?);
             let measured = measure_all(&all, &chain, &mut notices)?;
             Task { inputs: inputs(urdf, &all)?, description, chain, measured, notices }
         }
@@ -194,6 +198,18 @@ pub(super) fn chain(
     let base = agreed("base", base, all, |s| s.manifest.base.as_deref())?;
     let tip = agreed("tip", tip, all, |s| s.manifest.tip.as_deref())?;
     description.chain(base, tip)
+}
+
+/// What to say where the tip was chosen among several leaves.
+fn tip_notice(
+    description: &RobotDescription,
+    all: &[Series],
+    base: Option<&str>,
+    tip: Option<&str>,
+) -> Result<Option<Notice>> {
+    let base = agreed("base", base, all, |s| s.manifest.base.as_deref())?;
+    let tip = agreed("tip", tip, all, |s| s.manifest.tip.as_deref())?;
+    Ok(description.tip_notice(base, tip))
 }
 
 /// A link that the flag or the manifests name; they must agree.

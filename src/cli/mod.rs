@@ -15,6 +15,7 @@ mod plan;
 mod plate;
 mod progress;
 mod recording;
+mod robot;
 mod say;
 mod show;
 mod simulate;

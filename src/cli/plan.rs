@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 use super::Verdict;
 use super::choices::Model;
 use super::plate::pair;
+use super::robot::noted_chain;
 use super::say::say;
 use super::simulate::Mount;
 use crate::error::{Error, Result};
@@ -164,7 +165,7 @@ fn pose(flag: &str, text: &str) -> Result<Pose> {
 pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     check(args)?;
     let description = urdf::read(&args.urdf)?;
-    let chain = description.chain(args.base.as_deref(), args.tip.as_deref())?;
+    let chain = noted_chain(&description, args.base.as_deref(), args.tip.as_deref())?;
     if let Some(seeds) = args.study {
         return study(args, chain, seeds);
     }

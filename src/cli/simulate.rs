@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
+use super::robot::read_chain;
 use super::say::{say, say_line};
 use super::{Verdict, progress};
 use crate::error::{Error, Result};
@@ -15,7 +16,6 @@ use crate::simulate::conditions::ImagingConditions;
 use crate::simulate::faults::{FAULTS, Fault};
 use crate::simulate::folder::{Content, write};
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series};
-use crate::urdf;
 
 /// Flags of `simulate`.
 #[derive(Debug, Args)]
@@ -222,7 +222,7 @@ fn request(args: &SimulateArgs) -> Result<WorldRequest> {
         let remedy = "near-m > 0, far-m >= near-m, tilt below 85 degrees, field of 5 to 140 degrees, at least 64x64 px";
         return Err(Error::input("simulate", "the camera or its views cannot be", remedy));
     }
-    let chain = urdf::read(&args.urdf)?.chain(args.base.as_deref(), args.tip.as_deref())?;
+    let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
     Ok(WorldRequest {
         camera: lens_camera(lens(&args.lens)?, args.width_px, args.height_px, args.field_deg.to_radians()),
         mount: args.mount.into(),

@@ -7,12 +7,13 @@ use nalgebra::Vector3;
 
 use super::joint_table::{self, Unit};
 use super::recording::RecordingArgs;
+use super::robot::read_chain;
 use super::say::say_line;
 use super::{Verdict, verify_series};
 use crate::assess::{MeasuredPoint, fit_points};
 use crate::error::{Error, Result};
 use crate::output::compensated;
-use crate::urdf::{self, Chain};
+use crate::urdf::Chain;
 
 /// Flags of `verify`.
 #[derive(Debug, Args)]
@@ -57,7 +58,7 @@ const FARTHEST_M: f64 = 0.05;
 
 fn points(args: &VerifyArgs, points_file: &std::path::Path, unit: Unit) -> Result<Verdict> {
     let rms = |file: &PathBuf, compensation: Option<&PathBuf>| -> Result<(usize, f64, f64)> {
-        let chain = urdf::read(file)?.chain(args.base.as_deref(), args.tip.as_deref())?;
+        let chain = read_chain(file, args.base.as_deref(), args.tip.as_deref())?;
         let points = read_points(points_file, &chain, unit)?;
         let robot = compensated(chain, compensation.map(PathBuf::as_path))?;
         let fit = fit_points(&robot, &points).ok_or_else(|| {

@@ -156,6 +156,20 @@ impl Robot {
         self.chain.joints.iter().zip(&self.twists).map(corrected).collect()
     }
 
+    /// Names of the joints of the chain, each with the corrected `<origin>` that the URDF states for it.
+    pub fn urdf_origins(&self) -> Vec<(&str, Pose)> {
+        let stated = |j: &Joint, origin: Pose| if j.upwards { origin.inverse() } else { origin };
+        self.chain.joints.iter().zip(self.corrected_origins()).map(|(j, o)| (j.name.as_str(), stated(j, o))).collect()
+    }
+
+    /// The robot that a result states: without the local errors, which are noise near readings of one series, not properties of
+    /// the robot, and stand in no exported file.
+    pub fn without_local_errors(&self) -> Self {
+        let mut robot = self.clone();
+        robot.terms.retain(|t| !matches!(t.term, Term::Local(_)));
+        robot
+    }
+
     /// This robot under a controller whose zero points have been corrected, and these corrections (added to every reading), rad or m.
     ///
     /// Offsets are gone; the terms are those of the new readings (exact for gears and harmonics, gravity as before).

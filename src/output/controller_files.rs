@@ -5,11 +5,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::text::{csv, number};
 use super::{Context, Offsets};
+use crate::geom::Pose;
 use crate::model::mdh::{Mdh, Unfit};
 use crate::model::robot::Robot;
 use crate::plan::inverse;
 use crate::recipe::Solution;
-use crate::urdf::JointKind;
+use crate::urdf::{Chain, JointKind};
 
 /// The robot as the files of this result describe it: offsets folded into origins, or left to the controller.
 pub(super) fn exported(solution: &Solution, context: &Context) -> Robot {
@@ -29,23 +30,46 @@ pub(super) fn offsets_in_words(context: &Context) -> &'static str {
     }
 }
 
-/// Part of a property's name: letters, digits and `_`.
-fn identifier(name: &str) -> String {
-    name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+/// Names of properties for joints: letters, digits and `_`, a letter first, no two alike.
+fn identifiers(joints: &[(&str, Pose)]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::with_capacity(joints.len());
+    for (joint, _) in joints {
+        let mut name: String = joint.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+        if !name.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            name.insert_str(0, "joint_");
+        }
+        while names.contains(&name) {
+            name.push('_');
+        }
+        names.push(name);
+    }
+    names
 }
 
-/// Origins as xacro properties `NAME_origin_xyz` and `NAME_origin_rpy`.
+/// A name as it may stand in a comment of XML.
+fn in_comment(name: &str) -> String {
+    name.replace("--", "- -")
+}
+
+/// Origins as xacro properties `NAME_origin_xyz` and `NAME_origin_rpy`, each under the element in which they are to be used.
 pub(super) fn xacro(solution: &Solution, context: &Context) -> String {
-    let robot = exported(solution, context);
+    kinematics_xacro(&exported(solution, context), offsets_in_words(context))
+}
+
+/// As kinematics.xacro; `offsets` says for the head how joint offsets are dealt with.
+pub fn kinematics_xacro(robot: &Robot, offsets: &str) -> String {
     let mut out = format!(
-        "<?xml version=\"1.0\"?>\n<!-- Corrected joint origins (m, rad) as properties, for robot descriptions written in xacro (ROS): include this file and write\n\
-         \x20    <origin xyz=\"${{NAME_origin_xyz}}\" rpy=\"${{NAME_origin_rpy}}\"/> in the joint NAME. {} -->\n\
-         <robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\">\n",
-        offsets_in_words(context)
+        "<?xml version=\"1.0\"?>\n<!-- Corrected joint origins (m, rad) as properties, for robot descriptions written in xacro (ROS): include this file, and write\n\
+         \x20    in every joint the origin that stands here above its properties. {offsets} -->\n\
+         <robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\">\n"
     );
-    for (joint, origin) in robot.chain.joints.iter().zip(robot.corrected_origins()) {
-        let name = identifier(&joint.name);
+    let origins = robot.urdf_origins();
+    for ((joint, origin), name) in origins.iter().zip(identifiers(&origins)) {
         let list = |v: [f64; 3]| v.map(number).join(" ");
+        out += &format!(
+            "  <!-- {}: <origin xyz=\"${{{name}_origin_xyz}}\" rpy=\"${{{name}_origin_rpy}}\"/> -->\n",
+            in_comment(joint)
+        );
         out += &format!("  <xacro:property name=\"{name}_origin_xyz\" value=\"{}\"/>\n", list(origin.xyz()));
         out += &format!("  <xacro:property name=\"{name}_origin_rpy\" value=\"{}\"/>\n", list(origin.rpy()));
     }
@@ -103,6 +127,13 @@ const POSTURES: usize = 500;
 /// Seed of these postures.
 const SEED: u64 = 8;
 
+/// Postures within the limits of the joints.
+pub(super) fn postures(chain: &Chain) -> impl Iterator<Item = Vec<f64>> {
+    let limits = inverse::reading_limits(chain);
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    (0..POSTURES).map(move |_| inverse::random_readings(&limits, &chain.reading_kinds, &mut rng))
+}
+
 /// Modified Denavit-Hartenberg parameters, or why there are none.
 pub(super) fn mdh_csv(solution: &Solution, context: &Context) -> String {
     let mut robot = exported(solution, context);
@@ -118,12 +149,8 @@ pub(super) fn mdh_csv(solution: &Solution, context: &Context) -> String {
         Ok(mdh) => mdh,
         Err(Unfit(why)) => return format!("{head}# No table: {why}. Use the URDF or kinematics.yaml.\n"),
     };
-    let limits = inverse::reading_limits(&robot.chain);
-    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-    let errors: Vec<(f64, f64)> = (0..POSTURES)
-        .map(|_| inverse::random_readings(&limits, &robot.chain.reading_kinds, &mut rng))
-        .map(|q| mdh.base_from_tip(&q).distance(&robot.base_from_tip(&q)))
-        .collect();
+    let errors: Vec<(f64, f64)> =
+        postures(&robot.chain).map(|q| mdh.base_from_tip(&q).distance(&robot.base_from_tip(&q))).collect();
     let worst = |of: fn(&(f64, f64)) -> f64| 1e3 * errors.iter().map(of).fold(0.0, f64::max);
     let rms = 1e3 * (errors.iter().map(|e| e.1 * e.1).sum::<f64>() / POSTURES as f64).sqrt();
     let mut out = head;
@@ -140,7 +167,7 @@ pub(super) fn mdh_csv(solution: &Solution, context: &Context) -> String {
         worst(|e| e.1),
         worst(|e| e.0)
     );
-    let pose = |name: &str, p: &crate::geom::Pose| {
+    let pose = |name: &str, p: &Pose| {
         let words = |v: [f64; 3]| v.map(number).join(" ");
         format!("# {name}: xyz_m {}, rpy_rad {}\n", words(p.xyz()), words(p.rpy()))
     };

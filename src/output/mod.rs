@@ -16,6 +16,7 @@ mod estimates;
 pub mod flange_table;
 mod gauge;
 pub mod image_study;
+mod kinematics_file;
 pub mod monte_carlo;
 mod names;
 mod observation_table;
@@ -40,6 +41,8 @@ mod text;
 mod write;
 
 pub use compensation_read::{compensated, read_compensation};
+pub use controller_files::kinematics_xacro;
+pub use kinematics_file::kinematics_yaml;
 pub use report::{plan_html, report_html, sigma_text};
 pub use write::{NewResult, write_all, write_beside};
 
@@ -97,7 +100,7 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
     let mut files = BTreeMap::new();
     let mut add = |name: String, text: String| files.insert(name, text.into_bytes());
     add(robot_files::urdf_name(context), robot_files::urdf(solution, context)?);
-    add("kinematics.yaml".into(), robot_files::kinematics_yaml(solution, context));
+    add("kinematics.yaml".into(), kinematics_file::of_solution(solution, context));
     add("kinematics.xacro".into(), controller_files::xacro(solution, context));
     add("mdh.csv".into(), controller_files::mdh_csv(solution, context));
     add("mastering.csv".into(), controller_files::mastering_csv(solution, context));

@@ -118,9 +118,9 @@ pub(super) fn camera(c: &CameraRecord) -> Camera {
 /// The model that a solution found, with its covariance.
 #[derive(Debug, Clone)]
 pub struct FoundModel {
-    /// Robot with twists and joint terms.
+    /// The robot that is stated, that of the corrected URDF with compensation.toml: twists and joint terms, no local errors.
     pub robot: Robot,
-    /// Its columns.
+    /// All columns, those of local errors among them.
     pub layout: Layout,
     /// What stands still in the base frame for the first image on the robot, and its first column.
     pub still: Option<(Pose, usize)>,
@@ -140,7 +140,7 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
         return Err(damaged("robot and URDF text do not belong together"));
     }
     let twists = record.robot.joints.iter().map(|j| Vector6::from(j.twist)).collect();
-    let terms = record.robot.terms.iter().map(|t| {
+    let terms = record.robot.terms.iter().chain(&record.robot.local_errors).map(|t| {
         let reading = chain.readings.iter().position(|r| *r == t.reading);
         let known = reading.zip(Term::from_name(&t.term));
         known
@@ -181,7 +181,7 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
     Ok(FoundModel {
         covariance: DMatrix::from_fn(n, n, at),
         stops: used().filter_map(stop).collect(),
-        robot,
+        robot: robot.without_local_errors(),
         layout,
         still,
     })

@@ -12,6 +12,7 @@ use crate::assess::{Cause, Errors, FlangeErrors, Identifiability, ProjectionMap,
 use crate::error::{Error, Notice, Result, plain_name};
 use crate::geom::Pose;
 use crate::model::camera::Lens;
+use crate::model::joint_terms::Term;
 use crate::problem::short_name;
 use crate::recipe::{Comparison, Evidence, StartVerdict};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
@@ -76,6 +77,9 @@ pub struct JointRecord {
     pub limits: Option<(f64, f64)>,
     /// Reading that drives it, with factor and offset (rad or m).
     pub drive: Option<(String, f64, f64)>,
+    /// True where the chain passes it from child to parent: its origins are `joint_from_parent` then.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub upwards: bool,
 }
 
 /// One joint term.
@@ -106,8 +110,12 @@ pub struct RobotRecord {
     pub reading_kinds: Vec<JointKind>,
     /// The chain.
     pub joints: Vec<JointRecord>,
-    /// Joint terms.
+    /// Joint terms: with the twists the robot that is stated, and that of the corrected URDF with compensation.toml.
     pub terms: Vec<TermRecord>,
+    /// Local errors of joints near readings that the series visited several times: latent noise of this series, needed to solve
+    /// again, no part of the robot that is stated. Older files have them at the end of `terms`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub local_errors: Vec<TermRecord>,
     /// What the tip carries, where it was stated.
     pub payload: Option<Payload>,
 }
@@ -565,8 +573,11 @@ pub fn read(bytes: &[u8]) -> Result<SolutionRecord> {
         };
         return Err(Error::input(FILE_NAME, what, remedy));
     }
-    let record: SolutionRecord = serde_json::from_slice(bytes).map_err(refuse)?;
+    let mut record: SolutionRecord = serde_json::from_slice(bytes).map_err(refuse)?;
     record.plain_names()?;
+    let of_older = |t: &mut TermRecord| matches!(Term::from_name(&t.term), Some(Term::Local(_)));
+    let older: Vec<TermRecord> = record.robot.terms.extract_if(.., of_older).collect();
+    record.robot.local_errors.extend(older);
     Ok(record)
 }
 

@@ -16,6 +16,7 @@ use super::solution_json::{
 use crate::assess::{ProjectionMap, median};
 use crate::error::Result;
 use crate::geom::Pose;
+use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes;
 use crate::problem::{Image, Slack, State};
 use crate::recipe::Solution;
@@ -102,13 +103,16 @@ fn robot(state: &State) -> RobotRecord {
         corrected_origin: (&corrected[k]).into(),
         limits: j.limits,
         drive: j.drive.map(|d| (chain.readings[d.reading].clone(), d.multiplier, d.offset)),
+        upwards: j.upwards,
     });
-    let terms = robot.terms.iter().map(|t| TermRecord {
+    let record = |t: &JointTerm| TermRecord {
         reading: chain.readings[t.reading].clone(),
         term: t.term.name(),
         value: t.value,
         unit: t.term.unit(chain.reading_kinds[t.reading]).into(),
-    });
+    };
+    let (local, stated): (Vec<&JointTerm>, Vec<&JointTerm>) =
+        robot.terms.iter().partition(|t| matches!(t.term, Term::Local(_)));
     RobotRecord {
         name: chain.robot.clone(),
         base: chain.base.clone(),
@@ -116,7 +120,8 @@ fn robot(state: &State) -> RobotRecord {
         readings: chain.readings.clone(),
         reading_kinds: chain.reading_kinds.clone(),
         joints: joints.collect(),
-        terms: terms.collect(),
+        terms: stated.into_iter().map(record).collect(),
+        local_errors: local.into_iter().map(record).collect(),
         payload: chain.payload(),
     }
 }

@@ -37,7 +37,7 @@ pub struct Joint {
     pub name: String,
     /// How it moves.
     pub kind: JointKind,
-    /// Nominal `parent_from_joint` at zero position.
+    /// Nominal `parent_from_joint` at zero position (`joint_from_parent` where `upwards`).
     pub origin: Pose,
     /// Unit axis in the joint frame; zero for a fixed joint.
     pub axis: Vector3<f64>,
@@ -45,6 +45,8 @@ pub struct Joint {
     pub limits: Option<(f64, f64)>,
     /// What drives it; `None` for a fixed joint.
     pub drive: Option<Drive>,
+    /// True where the chain passes it from child to parent: a fixed joint between the base and the first link above the tip.
+    pub upwards: bool,
 }
 
 /// All joints from `base` to `tip`, in order.

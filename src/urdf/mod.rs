@@ -6,6 +6,7 @@ mod elements;
 mod masses;
 mod patch;
 mod read;
+mod tips;
 mod tree;
 
 pub use chain::{Chain, Drive, Joint, JointKind};

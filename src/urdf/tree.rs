@@ -8,6 +8,8 @@ use urdf_rs::JointType;
 use super::chain::{Chain, Drive, Joint, JointKind};
 use super::elements::JointElement;
 use super::read::{RobotDescription, suggest};
+use super::tips::listed;
+use crate::geom::Pose;
 use crate::{Error, Result};
 
 /// Links of an arm together are shorter, m; the smallest arms in millimetres are longer.
@@ -19,22 +21,26 @@ impl RobotDescription {
         self.links.iter().map(String::as_str)
     }
 
-    /// The chain of joints from `base` (default: the root) to `tip` (default: the only leaf below the base).
+    /// The chain of joints from `base` (default: the root) to `tip` (default: the only leaf; of several the one that all
+    /// moving joints lie before, `tool0` before `flange` before others, see [`RobotDescription::tip_notice`]).
+    ///
+    /// The base need not be above the tip: a link that hangs on one by fixed joints, as `base` of ur_description does on
+    /// `base_link`, will do ([`Joint::upwards`]).
     ///
     /// A mimic joint is driven by the joint that it follows, inside the chain or not: `Chain::readings` has the
     /// name of that joint.
     ///
     /// # Errors
-    /// Unknown links, several roots or leaves without a choice, a base that is not above the tip, joints of a type
+    /// Unknown links, several roots or leaves without a choice, a base that is not rigidly above the tip, joints of a type
     /// that has no single reading (floating, planar, spherical), mimic joints that lead nowhere, lengths in millimetres.
     pub fn chain(&self, base: Option<&str>, tip: Option<&str>) -> Result<Chain> {
         let base = match base {
             Some(name) => self.known_link(name, "base")?,
-            None => self.only("base", self.roots(), "root")?,
+            None => self.only_root()?,
         };
         let tip = match tip {
             Some(name) => self.known_link(name, "tip")?,
-            None => self.only("tip", self.leaves_below(base), "leaf")?,
+            None => self.default_tip(base)?,
         };
         let mut chain = Chain {
             robot: self.name.clone(),
@@ -45,7 +51,9 @@ impl RobotDescription {
             reading_kinds: Vec::new(),
             masses: Vec::new(),
         };
-        for element in self.path(base, tip)? {
+        let (up, down) = self.path(base, tip)?;
+        chain.joints.extend(up.into_iter().map(upwards));
+        for element in down {
             let joint = self.chain_joint(element, &mut chain)?;
             chain.joints.push(joint);
         }
@@ -75,6 +83,29 @@ impl RobotDescription {
     /// The joint above a link.
     pub(super) fn joint_to(&self, link: &str) -> Option<&JointElement> {
         self.joints.iter().find(|j| j.child == link)
+    }
+
+    /// Parent and child link of a joint.
+    pub fn joint_links(&self, joint: &str) -> Option<(&str, &str)> {
+        self.joints.iter().find(|j| j.name == joint).map(|j| (j.parent.as_str(), j.child.as_str()))
+    }
+
+    /// `parent_from_joint` of a joint that is fixed.
+    pub fn fixed_joint(&self, joint: &str) -> Option<Pose> {
+        self.joints.iter().find(|j| j.name == joint && j.joint_type == JointType::Fixed).map(|j| j.origin)
+    }
+
+    /// `above_from_link` of a link that hangs on another by fixed joints.
+    pub fn rigid_pose(&self, above: &str, link: &str) -> Option<Pose> {
+        let mut pose = Pose::identity();
+        let mut current = link;
+        let mut fixed = self.fixed_ancestors(link);
+        while current != above {
+            let joint = fixed.next()?;
+            pose = joint.origin * pose;
+            current = &joint.parent;
+        }
+        Some(pose)
     }
 
     /// Known links, one parent each, no loops.
@@ -121,49 +152,47 @@ impl RobotDescription {
         })
     }
 
-    fn only<'a>(&self, role: &str, candidates: Vec<&'a str>, noun: &str) -> Result<&'a str> {
-        if let [one] = candidates[..] {
+    fn only_root(&self) -> Result<&str> {
+        let roots = self.roots();
+        if let [one] = roots[..] {
             return Ok(one);
         }
-        let what = format!("has {} {noun} links: {}", candidates.len(), candidates.join(", "));
-        let remedy = format!("name one: {role} = \"...\" in series.toml or --{role}");
-        Err(Error::input(self.path.display(), what, remedy))
+        let what = format!("has {} root links: {}", roots.len(), listed(&roots));
+        Err(Error::input(self.path.display(), what, "name one: base = \"...\" in series.toml or --base"))
     }
 
-    fn roots(&self) -> Vec<&str> {
+    pub(super) fn roots(&self) -> Vec<&str> {
         self.links().filter(|l| self.joint_to(l).is_none()).collect()
     }
 
-    fn leaves_below(&self, base: &str) -> Vec<&str> {
-        let is_leaf = |link: &str| self.joints.iter().all(|j| j.parent != link);
-        self.links().filter(|l| *l != base && is_leaf(l) && self.ancestors(l).contains(&base)).collect()
-    }
-
     /// Links above `link`, nearest first.
-    fn ancestors<'a>(&'a self, link: &'a str) -> Vec<&'a str> {
+    pub(super) fn ancestors<'a>(&'a self, link: &'a str) -> Vec<&'a str> {
         let up = |l: &&'a str| self.joint_to(l).map(|j| j.parent.as_str());
         std::iter::successors(up(&link), up).collect()
     }
 
-    /// Joints from `base` down to `tip`.
-    fn path<'a>(&'a self, base: &str, tip: &'a str) -> Result<Vec<&'a JointElement>> {
-        let mut joints = Vec::new();
-        let mut current = tip;
-        while current != base {
-            let Some(joint) = self.joint_to(current) else {
-                let above = self.ancestors(tip);
-                let what = format!("tip \"{tip}\" does not hang below base \"{base}\"");
-                let remedy = match above[..] {
-                    [] => format!("\"{tip}\" is the root itself; are base and tip exchanged?"),
-                    _ => format!("links above the tip are: {}", above.join(", ")),
-                };
-                return Err(Error::input(self.path.display(), what, remedy));
+    /// Fixed joints from `base` up to the first link that is above the tip, then joints down to `tip`.
+    fn path<'a>(&'a self, base: &'a str, tip: &'a str) -> Result<(Vec<&'a JointElement>, Vec<&'a JointElement>)> {
+        let above = self.ancestors(tip);
+        let reaches = |link: &str| link == tip || above.contains(&link);
+        let fixed: Vec<&JointElement> = self.fixed_ancestors(base).collect();
+        let links: Vec<&str> = std::iter::once(base).chain(fixed.iter().map(|j| j.parent.as_str())).collect();
+        let Some(climbed) = links.iter().position(|l| reaches(l)) else {
+            let what = format!("tip \"{tip}\" does not hang below base \"{base}\"");
+            let remedy = match above[..] {
+                [] => format!("\"{tip}\" is the root itself; are base and tip exchanged?"),
+                _ => format!("links above the tip are: {}", above.join(", ")),
             };
-            joints.push(joint);
+            return Err(Error::input(self.path.display(), what, remedy));
+        };
+        let mut down = Vec::new();
+        let mut current = tip;
+        while let Some(joint) = self.joint_to(current).filter(|_| current != links[climbed]) {
+            down.push(joint);
             current = &joint.parent;
         }
-        joints.reverse();
-        Ok(joints)
+        down.reverse();
+        Ok((fixed[..climbed].to_vec(), down))
     }
 
     fn chain_joint(&self, element: &JointElement, chain: &mut Chain) -> Result<Joint> {
@@ -176,6 +205,7 @@ impl RobotDescription {
             axis: if kind == JointKind::Fixed { Vector3::zeros() } else { element.axis },
             limits: element.limits,
             drive,
+            upwards: false,
         })
     }
 
@@ -211,6 +241,19 @@ impl RobotDescription {
             chain.readings.len() - 1
         });
         Ok(Drive { reading, multiplier, offset })
+    }
+}
+
+/// A fixed joint of the way up from the base.
+fn upwards(element: &JointElement) -> Joint {
+    Joint {
+        name: element.name.clone(),
+        kind: JointKind::Fixed,
+        origin: element.origin.inverse(),
+        axis: Vector3::zeros(),
+        limits: None,
+        drive: None,
+        upwards: true,
     }
 }
 

@@ -72,6 +72,11 @@ fn stops(mount: CameraMount) -> usize {
 
 /// A series of a robot with 0.3 mm, 1 mrad, 3 mrad errors; 0.05 px, 0.02 mrad of noise; a plate of 48 points.
 pub fn series(mount: CameraMount, description: &RobotDescription) -> MeasuredSeries {
+    series_in_postures(mount, description, 1)
+}
+
+/// As [`series`], the first three joints at the same readings, and off by the same, in so many stops one after the other.
+pub fn series_in_postures(mount: CameraMount, description: &RobotDescription, stops_each: usize) -> MeasuredSeries {
     let mut noise = Normal(ChaCha8Rng::seed_from_u64(SEED));
     println!("seed {SEED}");
     let chain = description.chain(None, None).unwrap();
@@ -95,8 +100,15 @@ pub fn series(mount: CameraMount, description: &RobotDescription) -> MeasuredSer
     let mut stops: Vec<MeasuredStop> = Vec::new();
     while stops.len() < wanted {
         let reach = [0.5, 0.5, 0.5, 1.2, 0.8, 2.5];
-        let q: Vec<f64> = (0..6).map(|i| scene.middle[i] + reach[i] * range.sample(&mut rng)).collect();
-        let moved: Vec<f64> = q.iter().map(|v| v + noise.draw(2e-5)).collect();
+        let mut q: Vec<f64> = (0..6).map(|i| scene.middle[i] + reach[i] * range.sample(&mut rng)).collect();
+        let before = stops.last().and_then(|s: &MeasuredStop| s.readings.as_ref());
+        if let Some(before) = before.filter(|_| stops.len() % stops_each > 0) {
+            q[..3].copy_from_slice(&before[..3]);
+        }
+        let posture = (stops.len() / stops_each) as f64;
+        let local =
+            |i: usize| if stops_each > 1 && i < 3 { 4e-4 * (3.0 * posture + 5.0 * i as f64).sin() } else { 0.0 };
+        let moved: Vec<f64> = q.iter().enumerate().map(|(i, v)| v + noise.draw(2e-5) + local(i)).collect();
         let pose = mount.camera_from_plate(&scene.camera, &truth.base_from_tip(&moved), &scene.plate);
         let distance = pose.translation.norm();
         if pose.rotation.column(2).dot(&pose.translation) > -0.6 * distance || !(0.15..0.6).contains(&distance) {

@@ -77,7 +77,15 @@ pub fn chain(dice: &mut Dice, parts: &[Part]) -> Chain {
                 Part::Mimic(kind) => (kind, Some(Drive { reading: 0, multiplier: -0.7, offset: 0.2 })),
             };
             let axis = if kind == JointKind::Fixed { Vector3::zeros() } else { dice.direction() };
-            Joint { name, kind, origin: dice.pose(0.4, std::f64::consts::PI), axis, limits: None, drive }
+            Joint {
+                name,
+                kind,
+                origin: dice.pose(0.4, std::f64::consts::PI),
+                axis,
+                limits: None,
+                drive,
+                upwards: false,
+            }
         })
         .collect();
     let masses = masses(parts.len());

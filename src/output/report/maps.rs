@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::svg::{Anchor, Svg, round_below};
-use super::words::plain;
+use super::words::{ordinal, plain};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::output::restore::camera;
@@ -89,7 +89,7 @@ impl Field {
 
 fn selection(all: usize) -> String {
     let step = all.div_ceil(MOST_VECTORS).max(1);
-    if step == 1 { format!("all {all} vectors") } else { format!("every {step}th of {all} vectors") }
+    if step == 1 { format!("all {all} vectors") } else { format!("every {} of {all} vectors", ordinal(step)) }
 }
 
 fn used(image: &ImageRecord) -> impl Iterator<Item = (usize, [f64; 2])> + '_ {

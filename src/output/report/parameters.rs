@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 
-use super::words::{fixed, grouped, parameter, plus_minus, short, significant, unit};
+use super::words::{fixed, grouped, is_local, parameter, plus_minus, short, significant, split, unit};
 use super::{figure, maps};
 use crate::geom::Pose;
 use crate::output::solution_json::{EstimateRecord, LEAST_SHARE, PlacedRecord, SolutionRecord};
@@ -42,7 +42,34 @@ pub(super) fn robot(r: &SolutionRecord) -> Markup {
         (grid(r, "Joint", |block, c| other(block, !c.contains('_'))))
         (grid(r, "Gear harmonics of the reading q", |block, c| other(block, c.starts_with("cos_") || c.starts_with("sin_"))))
         (grid(r, "Sag under gravity", |block, c| other(block, c.starts_with("gravity_"))))
+        (local_errors(r))
     }
+}
+
+/// Local errors of the joints, summed up: they are noise of the series.
+fn local_errors(r: &SolutionRecord) -> Markup {
+    let mut rows: Vec<(&str, Vec<f64>)> = Vec::new();
+    for t in &r.robot.local_errors {
+        match rows.iter_mut().find(|(joint, _)| *joint == t.reading) {
+            Some((_, values)) => values.push(t.value),
+            None => rows.push((&t.reading, vec![t.value])),
+        }
+    }
+    let rms = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() / v.len().max(1) as f64).sqrt();
+    let largest = |v: &[f64]| v.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    html! { @if !rows.is_empty() {
+        h3 { "Local errors of the joints" }
+        p.note {
+            "What a joint was off by, again and again, at readings that several stops have in common. It is noise of this series, as far as it repeats: "
+            "in none of the files, and no part of the uncertainty of the flange."
+        }
+        div.wide { table {
+            thead { tr { th { "Joint" } th.n { "readings" } th.n { "RMS, mrad (mm)" } th.n { "largest, mrad (mm)" } } }
+            tbody { @for (joint, values) in &rows { tr {
+                td { (joint) } td.n { (values.len()) } td.n { (significant(1e3 * rms(values))) } td.n { (significant(1e3 * largest(values))) }
+            } } }
+        } }
+    } }
 }
 
 /// The joint of a block that is not its origin.
@@ -55,7 +82,7 @@ fn known(e: &EstimateRecord) -> Option<(f64, f64)> {
 }
 
 fn strongest(r: &SolutionRecord) -> Vec<(&EstimateRecord, f64, f64)> {
-    let of_robot = r.estimates.iter().filter(|e| e.name.starts_with("robot/"));
+    let of_robot = r.estimates.iter().filter(|e| e.name.starts_with("robot/") && !is_local(&e.name));
     let mut all: Vec<_> = of_robot.filter_map(|e| known(e).map(|(v, s)| (e, v, s))).collect();
     all.retain(|(_, value, sigma)| value.abs() > 3.0 * sigma);
     all.sort_by(|a, b| (b.1 / b.2).abs().total_cmp(&(a.1 / a.2).abs()));
@@ -67,8 +94,8 @@ fn strongest(r: &SolutionRecord) -> Vec<(&EstimateRecord, f64, f64)> {
 fn grid<'a>(r: &'a SolutionRecord, head: &str, row: impl Fn(&'a str, &'a str) -> Option<&'a str>) -> Markup {
     let mut rows: Vec<(&str, BTreeMap<&str, &EstimateRecord>)> = Vec::new();
     let mut columns: Vec<&EstimateRecord> = Vec::new();
-    for e in &r.estimates {
-        let Some((block, component)) = e.name.strip_prefix("robot/").and_then(|n| n.rsplit_once('.')) else { continue };
+    for e in r.estimates.iter().filter(|e| !is_local(&e.name)) {
+        let Some((block, component)) = e.name.strip_prefix("robot/").map(split) else { continue };
         let Some(name) = row(block, component) else { continue };
         match rows.iter_mut().find(|(n, _)| *n == name) {
             Some((_, cells)) => {
@@ -93,7 +120,7 @@ fn grid<'a>(r: &'a SolutionRecord, head: &str, row: impl Fn(&'a str, &'a str) ->
 }
 
 fn component_of(e: &EstimateRecord) -> &str {
-    e.name.rsplit_once('.').map_or("", |(_, c)| c)
+    split(&e.name).1
 }
 
 fn column_head(e: &EstimateRecord) -> Markup {

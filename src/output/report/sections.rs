@@ -197,9 +197,13 @@ fn of_several(r: &SolutionRecord, plate: &str) -> String {
 /// The plates as found.
 pub(super) fn plates(r: &SolutionRecord) -> Markup {
     let modes: Vec<_> = r.estimates.iter().filter(|e| e.name.starts_with("plate_shape")).collect();
+    let tables = || r.files.iter().filter(|f| f.starts_with("plate") && f.ends_with(".csv"));
     html! {
         h2 { "Plate" }
-        p { "The plate is part of what is estimated: corrected positions with sigmas are in plate.csv." }
+        p {
+            "The plate is part of what is estimated: corrected positions with sigmas are in "
+            @for (k, f) in tables().enumerate() { @if k > 0 { ", " } code { (f) } } "."
+        }
         @if !modes.is_empty() {
             div.wide { table {
                 thead { tr { th { "Shape of the whole plate" } th.n { "estimate" } th { "unit" } th.n { "tolerance" } th.n { "share of data" } } }

@@ -2,9 +2,23 @@
 
 use crate::output::solution_json::EstimateRecord;
 
+/// Block and component of a parameter's name; the component of a local error has a point of its own (`local_0.3298`).
+pub(super) fn split(name: &str) -> (&str, &str) {
+    let local = name.find(LOCAL).map(|at| (&name[..at], &name[at + 1..]));
+    local.or_else(|| name.rsplit_once('.')).unwrap_or((name, ""))
+}
+
+/// True for the local error of a joint near a reading: noise of the series, no property of the robot.
+pub(super) fn is_local(name: &str) -> bool {
+    name.starts_with("robot/") && name.contains(LOCAL)
+}
+
+/// What the component of a local error begins with, with the point before it.
+const LOCAL: &str = ".local_";
+
 /// Name of a parameter in words: `robot/joint_3/origin.rx` -> "joint_3 origin, rotation about x".
 pub(super) fn parameter(name: &str) -> String {
-    let (block, component) = name.rsplit_once('.').unwrap_or((name, ""));
+    let (block, component) = split(name);
     let part = component_words(component);
     let mut levels = block.splitn(2, '/');
     match (levels.next().unwrap_or_default(), levels.next()) {
@@ -35,6 +49,7 @@ fn component_words(component: &str) -> String {
             Some(("cos", k)) => format!("gear harmonic {k} (cosine)"),
             Some(("sin", k)) => format!("gear harmonic {k} (sine)"),
             Some(("gravity", k)) => format!("sag term {k}"),
+            Some(("local", at)) => format!("local error near the reading {at}"),
             Some(("bow", axes)) => format!("bow {axes}"),
             _ => component.to_owned(),
         },
@@ -45,7 +60,7 @@ fn component_words(component: &str) -> String {
 pub(super) fn grouped<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
     for name in names {
-        let (block, component) = name.rsplit_once('.').unwrap_or((name, ""));
+        let (block, component) = split(name);
         match groups.iter_mut().find(|(b, _)| *b == block) {
             Some((_, components)) => components.push(component),
             None => groups.push((block, vec![component])),
@@ -135,6 +150,18 @@ pub(super) fn plain(value: f64) -> String {
     format!("{value:.d$}")
 }
 
+/// "2nd", "11th".
+pub(super) fn ordinal(n: usize) -> String {
+    let ending = match (n % 10, n % 100) {
+        (_, 11..=13) => "th",
+        (1, _) => "st",
+        (2, _) => "nd",
+        (3, _) => "rd",
+        _ => "th",
+    };
+    format!("{n}{ending}")
+}
+
 /// "1 image", "3 images".
 pub(super) fn count(n: usize, what: &str) -> String {
     if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
@@ -150,6 +177,7 @@ mod tests {
             ("robot/joint_3/origin.rx", "joint_3 origin, rotation about x"),
             ("robot/a/b.offset", "a/b offset"),
             ("robot/joint_3.cos_2", "joint_3 gear harmonic 2 (cosine)"),
+            ("robot/joint_3.local_-0.3298", "joint_3 local error near the reading -0.3298"),
             ("hand_camera.rz", "hand-camera offset, rotation about z"),
             ("plate/placement_0.z", "plate pose (placement_0), shift along z"),
             ("camera/front/lens.k1", "k1 of camera front"),
@@ -159,6 +187,12 @@ mod tests {
         }
         let names = ["robot/a/origin.x", "robot/a/origin.rz", "robot/a.gear", "robot/a.cos_2", "plate_shape.bow_xx"];
         assert_eq!(grouped(names.into_iter()), ["a origin: x, rz", "a: gear, cos 2q", "plate: bow xx"]);
+    }
+
+    #[test]
+    fn ordinals_end_as_they_are_spoken() {
+        let all = [1, 2, 3, 4, 11, 12, 13, 21, 22, 103, 111].map(ordinal);
+        assert_eq!(all, ["1st", "2nd", "3rd", "4th", "11th", "12th", "13th", "21st", "22nd", "103rd", "111th"]);
     }
 
     #[test]
