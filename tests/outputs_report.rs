@@ -163,3 +163,39 @@ fn a_result_without_robot_terms_plots_or_covariances_still_has_a_page() {
     assert!(page.contains("The readings were taken as exact."));
     assert!(!page.contains("NaN"));
 }
+
+#[test]
+fn local_errors_are_summed_up_and_make_no_columns() {
+    let mut record = record();
+    let heads = |page: &str| page.matches("<th class=\"n\">").count();
+    let before = heads(&report_html(&record));
+    let joint = record.robot.readings[0].clone();
+    for (at, value) in [("0.3298", 3e-4), ("-0.2237", -4e-4), ("1.5000", 0.0)] {
+        let like = record.estimates.iter().find(|e| e.name.ends_with(".offset")).unwrap().clone();
+        let name = format!("robot/{joint}.local_{at}");
+        record.estimates.push(solution_json::EstimateRecord { name, value: Some(value), sigma: Some(1e-5), ..like });
+        let term = format!("local_{at}");
+        record.robot.local_errors.push(solution_json::TermRecord {
+            reading: joint.clone(),
+            term,
+            value,
+            unit: "rad".into(),
+        });
+    }
+    let page = report_html(&record);
+    assert_eq!(heads(&page), before + 3, "one small table: readings, RMS, largest");
+    assert!(!page.contains("local_"));
+    assert!(page.contains(">0.400<"), "largest, mrad");
+    let text = serde_json::to_vec(&record).unwrap();
+    assert_eq!(solution_json::read(&text).unwrap().robot, record.robot);
+}
+
+#[test]
+fn the_page_names_the_files_that_are_there() {
+    let mut record = record();
+    assert!(record.files.iter().any(|f| f == "plate.csv"));
+    record.files.retain(|f| f != "plate.csv");
+    record.files.extend(["plate.run1.csv".into(), "plate.run2.csv".into()]);
+    let page = report_html(&record);
+    assert!(!page.contains("plate.csv") && page.contains("plate.run1.csv") && page.contains("plate.run2.csv"));
+}
