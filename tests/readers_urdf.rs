@@ -134,6 +134,34 @@ fn of_several_leaves_the_one_behind_all_moving_joints_is_the_tip() {
 }
 
 #[test]
+fn the_tip_of_one_of_two_arms_is_found_from_its_base() {
+    let arm = |side: &str| {
+        let link = |name: &str| format!("{side}_{name}");
+        [
+            joint(&link("mount"), "fixed", "world", &link("base_link"), ""),
+            joint(&link("b"), "fixed", &link("base_link"), &link("base"), ""),
+            joint(&link("a1"), "revolute", &link("base_link"), &link("arm"), Z),
+            joint(&link("t"), "fixed", &link("arm"), &link("tool0"), ""),
+            joint(&link("f"), "fixed", &link("arm"), &link("flange"), ""),
+        ]
+    };
+    let sides = ["left", "right"];
+    let links: Vec<String> = sides
+        .iter()
+        .flat_map(|s| ["base_link", "base", "arm", "tool0", "flange"].map(|l| format!("{s}_{l}")))
+        .collect();
+    let links: Vec<&str> = std::iter::once("world").chain(links.iter().map(String::as_str)).collect();
+    let cell = robot(&wrap(&links, &[arm("left"), arm("right")].concat()));
+    for base in ["left_base_link", "left_base"] {
+        let chain = cell.chain(Some(base), None).unwrap();
+        assert_eq!((chain.tip.as_str(), chain.readings.len()), ("left_tool0", 1), "{base}");
+    }
+    let error = cell.chain(None, None).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    assert!(error.what.contains("6 leaf links"), "{error}");
+}
+
+#[test]
 fn a_base_that_hangs_on_the_root_by_fixed_joints_is_a_base() {
     let description = industrial(&[], &[]);
     let (root, base) = (description.chain(None, None).unwrap(), description.chain(Some("base"), None).unwrap());

@@ -38,12 +38,14 @@ impl RobotDescription {
     }
 
     fn choose_tip<'a>(&'a self, base: &'a str) -> Result<Choice<'a>> {
-        let top = self.fixed_ancestors(base).last().map_or(base, |j| j.parent.as_str());
-        let is_leaf = |link: &str| self.joints.iter().all(|j| j.parent != link);
-        let leaves: Vec<&str> =
-            self.links().filter(|l| *l != base && is_leaf(l) && self.ancestors(l).contains(&top)).collect();
-        let below = |link: &str| link == top || self.ancestors(link).contains(&top);
         let moving = |joint: &&JointElement| joint.joint_type != JointType::Fixed;
+        let is_below = |link: &str, top: &str| link == top || self.ancestors(link).contains(&top);
+        let moves_below = |top: &&str| self.joints.iter().filter(moving).any(|j| is_below(&j.parent, top));
+        let above = self.fixed_ancestors(base).map(|j| j.parent.as_str());
+        let top = std::iter::once(base).chain(above).find(moves_below).unwrap_or(base);
+        let below = |link: &str| is_below(link, top);
+        let is_leaf = |link: &str| self.joints.iter().all(|j| j.parent != link);
+        let leaves: Vec<&str> = self.links().filter(|l| *l != base && *l != top && is_leaf(l) && below(l)).collect();
         let all = self.joints.iter().filter(moving).filter(|j| below(&j.parent)).count();
         let before = |leaf: &str| self.joints_above(leaf).take_while(|j| below(&j.parent)).filter(moving).count();
         let rank = |leaf: &str| USUAL.iter().position(|name| is_called(leaf, name)).unwrap_or(USUAL.len());
