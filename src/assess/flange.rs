@@ -57,7 +57,9 @@ pub struct WorkspacePoint {
 /// What is needed to predict.
 #[derive(Debug, Clone)]
 pub struct FlangeModel<'a> {
+    /// The robot whose derivatives count, without local errors, and what is exported of it, whose poses are stated.
     robot: Robot,
+    exported: Robot,
     layout: &'a Layout,
     /// What stands still in the base frame, and its first column.
     still: Pose,
@@ -89,6 +91,7 @@ impl<'a> FlangeModel<'a> {
             (all.clone().fold(f64::INFINITY, f64::min), all.fold(f64::NEG_INFINITY, f64::max))
         };
         let mut model = Self {
+            exported: robot.as_exported(),
             robot,
             layout,
             still,
@@ -105,7 +108,7 @@ impl<'a> FlangeModel<'a> {
     /// Pose relative to what stands still, and `J`, 6 x columns that act through the camera poses.
     fn derivative(&self, stop: &Stop) -> (Pose, DMatrix<f64>) {
         let kinematics = self.robot.kinematics(stop, &vec![0.0; stop.readings.len()]);
-        let pose = self.still.inverse() * kinematics.base_from_tip;
+        let pose = self.still.inverse() * self.exported.pose_at(stop, &vec![0.0; stop.readings.len()]);
         let mut j = DMatrix::zeros(6, self.layout.theta_len());
         for (k, d) in kinematics.d_twists.iter().enumerate() {
             j.fixed_view_mut::<6, 6>(0, self.layout.twists.start + 6 * k).copy_from(d);
@@ -163,7 +166,7 @@ impl<'a> FlangeModel<'a> {
                 let found = self.at(&stop.readings);
                 let [sigma_m, sigma_rad] = found.sigmas();
                 WorkspacePoint {
-                    xyz_m: self.robot.base_from_tip(&stop.readings).xyz(),
+                    xyz_m: self.exported.base_from_tip(&stop.readings).xyz(),
                     readings: stop.readings,
                     sigma_m,
                     sigma_rad,

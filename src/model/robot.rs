@@ -170,6 +170,25 @@ impl Robot {
         robot
     }
 
+    /// The robot as others have it from corrected URDF and compensation.toml: its origins are the corrected ones, in which moments of
+    /// gravity are taken, too; offsets are in them, local errors are gone.
+    pub fn as_exported(&self) -> Self {
+        let mut chain = self.chain.clone();
+        chain.joints.iter_mut().zip(self.corrected_origins()).for_each(|(j, o)| j.origin = o);
+        let largest = |chain: &Chain, reading: usize| {
+            let joint = chain.joints.iter().rposition(|j| j.drive.is_some_and(|d| d.reading == reading));
+            joint.map_or(0.0, |j| chain.largest_moment(j))
+        };
+        let mut terms = self.terms.clone();
+        terms.retain(|t| !matches!(t.term, Term::Offset | Term::Local(_)));
+        // The parameter is the sag at the largest moment, the file has the compliance.
+        for t in terms.iter_mut().filter(|t| t.term == Term::Sag) {
+            let (before, after) = (largest(&self.chain, t.reading), largest(&chain, t.reading));
+            t.value *= if before > 0.0 { after / before } else { 0.0 };
+        }
+        Self { terms, ..Self::nominal(chain) }
+    }
+
     /// This robot under a controller whose zero points have been corrected, and these corrections (added to every reading), rad or m.
     ///
     /// Offsets are gone; the terms are those of the new readings (exact for gears and harmonics, gravity as before).
