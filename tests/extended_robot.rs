@@ -6,7 +6,8 @@ use std::path::Path;
 
 use robotcal::assess::{flange_error_m, median};
 use robotcal::geom::Pose;
-use robotcal::recipe::{MeasuredSeries, Options, RobotModel, identify, measured};
+use robotcal::problem::OriginPrior;
+use robotcal::recipe::{MeasuredSeries, Options, RobotModel, Selection, StatedPrior, identify, measured};
 use robotcal::series::{Plate, PlateKind};
 use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
 use robotcal::urdf::{Chain, read};
@@ -70,4 +71,34 @@ fn terms_that_are_present_are_found() {
     let all = ratios(errors, 1..=seeds());
     println!("present: {all:?}");
     assert!(all.iter().all(|r| *r < 1.0 / 3.0), "{all:?}");
+}
+
+/// Of a robot whose origins are off by a quarter of what robots usually are, by as much, and by three times as much.
+#[test]
+fn how_far_origins_are_off_is_told_by_the_robot_itself() {
+    let factor = |errors: RobotErrors, selection: Selection| {
+        let seen = measured(&world(errors, 3), &chain());
+        let options = Options { model: RobotModel::Rigid, selection, ..Options::default() };
+        identify(chain(), &[seen], &options).unwrap().problem
+    };
+    let usual = OriginPrior::default();
+    let times = |f: f64| RobotErrors {
+        translation_m: f * usual.translation_m,
+        rotation_rad: f * usual.rotation_rad,
+        ..RobotErrors::default()
+    };
+    for (made, low, high) in [(0.25, 0.2, 0.55), (1.0, 0.7, 1.4), (3.0, 1.8, 4.2)] {
+        let found = factor(times(made), Selection::default()).twist_factor();
+        println!("{made} times: {found:.3}");
+        assert!((low..high).contains(&found), "{made} times as made, {found} as found");
+    }
+    // What is stated by the user holds.
+    let stated = StatedPrior { sigma_m: Some(0.4e-3), ..StatedPrior::default() };
+    let prior = ["x", "y", "z"].map(|axis| (format!("*.origin.{axis}"), stated)).into();
+    let problem = factor(times(0.25), Selection { prior, ..Selection::default() });
+    for c in problem.layout.twists.clone() {
+        let column = &problem.layout.columns[c];
+        let expected = if column.unit == "m" { 0.4e-3 } else { problem.twist_factor() * usual.rotation_rad };
+        assert!((column.prior_sigma / expected - 1.0).abs() < 1e-9, "{}: {}", column.name, column.prior_sigma);
+    }
 }

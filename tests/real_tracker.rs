@@ -8,9 +8,12 @@ use nalgebra::Vector3;
 use robotcal::assess::{MeasuredPoint, fit_points};
 use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::Robot;
-use robotcal::recipe::{Options, identify, measure};
+use robotcal::recipe::{MeasuredSeries, Options, Solution, identify, measure};
 
 const SERIES: [&str; 3] = ["nachi-2025-01-17", "nachi-2025-02-04", "nachi-2025-02-19"];
+
+/// Error of a laser tracker on points of a machine's reach, per axis, m.
+const DEVICE_M: f64 = 0.03e-3;
 
 fn real() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/real");
@@ -28,6 +31,82 @@ fn tracker_points(path: &Path) -> Vec<MeasuredPoint> {
     };
     let point = |v: Vec<f64>| MeasuredPoint { position_m: Vector3::new(v[0], v[1], v[2]), readings: v[3..].to_vec() };
     reader.records().map(|r| point(row(r))).collect()
+}
+
+/// What a solution states, judged by tracker points.
+struct Judged {
+    rms_mm: f64,
+    expected_mm: f64,
+    /// Log density of the points with joint noise of every point by itself, and with local errors common to points at one reading.
+    log_density: [f64; 2],
+    /// The largest over how much noise the points have of either sort: another day, other postures.
+    best: f64,
+}
+
+/// The robot as it is exported: without the local errors, which are latent noise of the series.
+fn judged(s: &Solution, points: &[MeasuredPoint]) -> Judged {
+    let columns = s.problem.layout.robot();
+    let mut robot = s.state.robot.clone();
+    robot.terms.truncate(columns.end - s.problem.layout.terms.start);
+    let fit = fit_points(&robot, points).unwrap();
+    let covariance = s.covariance.reduced.view((0, 0), (columns.end, columns.end)).into_owned();
+    let (own, local) = (&s.problem.noise.joint[0], &s.problem.noise.local);
+    let none = vec![0.0; own.len()];
+    let local = if local.is_empty() { &none } else { local };
+    let together = s.problem.joint_sigma(0);
+    let density = |noise: [&[f64]; 2]| fit.log_density(&robot, points, &covariance, noise, DEVICE_M).unwrap();
+    let sized = |share: f64| together.iter().map(|s| s * share).collect::<Vec<f64>>();
+    let noises = [0.25, 0.5, 1.0, 2.0].map(|a| [0.0, 0.25, 0.5, 1.0, 2.0].map(|b| density([&sized(a), &sized(b)])));
+    Judged {
+        best: noises.into_iter().flatten().fold(f64::NEG_INFINITY, f64::max),
+        rms_mm: 1e3 * fit.rms_m,
+        expected_mm: 1e3 * fit.expected(&robot, points, &covariance, &together).unwrap().with_joint_noise_m,
+        log_density: [density([&together, &none]), density([own, local])],
+    }
+}
+
+#[test]
+#[ignore = "a study of minutes: every choice of real series, by RMS and by density on the tracker"]
+fn study_of_series_on_the_tracker() {
+    let Some(real) = real() else { return };
+    let singles = (0..3).map(|k| vec![SERIES[k]]);
+    let pairs = [[0, 1], [0, 2], [1, 2]].map(|p| p.map(|k| SERIES[k]).to_vec());
+    let nachi: Vec<Vec<&str>> = singles.chain(pairs).chain([SERIES.to_vec()]).collect();
+    for (tracker, choices) in
+        [("tracker-nachi-2025-01-15.csv", nachi), ("tracker-aubo-2024-12-16.csv", vec![vec!["aubo-2024-12-16"]])]
+    {
+        let points = tracker_points(&real.join(tracker));
+        let urdf = robotcal::urdf::read(&real.join(choices[0][0]).join("robot.urdf")).unwrap();
+        let series = robotcal::series::read(&real.join(choices[0][0])).unwrap();
+        let chain = urdf.chain(series.manifest.base.as_deref(), series.manifest.tip.as_deref()).unwrap();
+        let measured = |names: &[&str]| -> Vec<MeasuredSeries> {
+            let one = |n: &&str| {
+                measure(&robotcal::series::read(&real.join(n)).unwrap(), &chain, true, |_| {}).unwrap().series
+            };
+            names.iter().map(one).collect()
+        };
+        let all = measured(&if choices.len() > 1 { SERIES.to_vec() } else { choices[0].clone() });
+        for chosen in choices {
+            let taken: Vec<MeasuredSeries> =
+                all.iter().filter(|m| chosen.contains(&m.name.as_str())).cloned().collect();
+            let start = std::time::Instant::now();
+            let s = identify(chain.clone(), &taken, &Options::default()).unwrap();
+            let j = judged(&s, &points);
+            println!(
+                "{}: {:.3} mm, expected {:.3}, log density {:.1?}, best {:.1}, twists {:.2}, model {:?}, cost {:.1}, held out {:.3}, {:.0} s",
+                chosen.join(" + "),
+                j.rms_mm,
+                j.expected_mm,
+                j.log_density,
+                j.best,
+                s.problem.families.iter().find(|f| f.is_of_twists()).map_or(1.0, |f| f.factor),
+                s.evidences.iter().map(|e| (e.model, e.log_evidence)).collect::<Vec<_>>(),
+                s.linearised.cost,
+                s.accuracy.calibrated.rms_mm,
+                start.elapsed().as_secs_f64()
+            );
+        }
+    }
 }
 
 #[test]

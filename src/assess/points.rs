@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3x6, Vector3, Vector6};
 
 use crate::geom::{Pose, skew};
 use crate::linalg::{SymmetricFactor, product};
+use crate::model::joint_terms::LOCAL_RANGE;
 use crate::model::robot::{Robot, Stop};
 
 /// One point as a tracker saw it.
@@ -93,6 +94,22 @@ pub struct ExpectedRms {
     pub with_joint_noise_m: f64,
 }
 
+/// Derivatives of all points, three rows each.
+struct Derivatives {
+    /// By the robot's columns.
+    by_model: DMatrix<f64>,
+    /// By the noise of every reading of every point, in its sigmas.
+    by_noise: DMatrix<f64>,
+    /// By frame and reflector.
+    fitted: DMatrix<f64>,
+}
+
+/// Every two points, with every reading.
+fn pairs(points: usize, readings: usize) -> impl Iterator<Item = (usize, usize, usize)> {
+    let all = (0..points).flat_map(move |a| (0..points).map(move |b| (a, b)));
+    all.flat_map(move |(a, b)| (0..readings).map(move |r| (a, b, r)))
+}
+
 impl PointFit {
     /// Expected RMS of the residuals: the model's errors at the points, less what the fit of frame and reflector takes up.
     ///
@@ -104,7 +121,58 @@ impl PointFit {
         covariance: &DMatrix<f64>,
         joint_sigma: &[f64],
     ) -> Option<ExpectedRms> {
-        let (n, columns, readings) = (points.len(), covariance.nrows(), joint_sigma.len());
+        let d = self.derivatives(robot, points, covariance.nrows(), joint_sigma);
+        let normal = SymmetricFactor::new(&(d.fitted.transpose() * &d.fitted)).ok()?;
+        let left = |j: &DMatrix<f64>| j - &d.fitted * normal.solve_many(&(d.fitted.transpose() * j));
+        let (model, noise) = (left(&d.by_model), left(&d.by_noise));
+        let n = points.len() as f64;
+        let of_model = product(&model, covariance).component_mul(&model).sum() / n;
+        let of_noise = noise.norm_squared() / n;
+        Some(ExpectedRms {
+            model_m: of_model.max(0.0).sqrt(),
+            with_joint_noise_m: (of_model + of_noise).max(0.0).sqrt(),
+        })
+    }
+
+    /// Logarithm of the density of the points under what is stated, frame and reflector unknown (restricted likelihood: of the contrasts
+    /// that frame and reflector leave). A model that is right within its sigmas has a larger one than a model that is as right, or
+    /// righter, and promises more than it holds.
+    ///
+    /// `covariance` and `own` as for [`PointFit::expected`], `local` the local errors of the readings (common to points at the same
+    /// reading), `device_m` the error of the device per axis.
+    pub fn log_density(
+        &self,
+        robot: &Robot,
+        points: &[MeasuredPoint],
+        covariance: &DMatrix<f64>,
+        [own, local]: [&[f64]; 2],
+        device_m: f64,
+    ) -> Option<f64> {
+        let d = self.derivatives(robot, points, covariance.nrows(), &vec![1.0; own.len()]);
+        let (rows, readings) = (3 * points.len(), own.len());
+        let mut all = product(&product(&d.by_model, covariance), &d.by_model.transpose());
+        for (a, b, r) in pairs(points.len(), readings) {
+            let apart = (points[a].readings[r] - points[b].readings[r]) / LOCAL_RANGE;
+            let variance = f64::from(a == b) * own[r].powi(2) + local[r].powi(2) * (-0.5 * apart * apart).exp();
+            let by = |k: usize| d.by_noise.fixed_view::<3, 1>(3 * k, k * readings + r);
+            let mut block = all.fixed_view_mut::<3, 3>(3 * a, 3 * b);
+            block += variance * by(a) * by(b).transpose();
+        }
+        (0..rows).for_each(|k| all[(k, k)] += device_m * device_m);
+        let factor = SymmetricFactor::new(&all).ok()?;
+        let weighted = factor.solve_many(&d.fitted);
+        let normal = SymmetricFactor::new(&d.fitted.tr_mul(&weighted)).ok()?;
+        let plain = SymmetricFactor::new(&d.fitted.tr_mul(&d.fitted)).ok()?;
+        let residuals = DVector::from_iterator(rows, self.residuals_m.iter().flat_map(|r| r.iter().copied()));
+        let pull = weighted.tr_mul(&residuals);
+        let square = residuals.dot(&factor.solve(&residuals)) - pull.dot(&normal.solve(&pull));
+        let determinants = factor.log_determinant() + normal.log_determinant() - plain.log_determinant();
+        let contrasts = (rows - d.fitted.ncols()) as f64;
+        Some(-0.5 * (contrasts * std::f64::consts::TAU.ln() + determinants + square))
+    }
+
+    fn derivatives(&self, robot: &Robot, points: &[MeasuredPoint], columns: usize, joint_sigma: &[f64]) -> Derivatives {
+        let (n, readings) = (points.len(), joint_sigma.len());
         let mut by_model = DMatrix::zeros(3 * n, columns);
         let mut by_noise = DMatrix::zeros(3 * n, n * readings);
         let mut fitted = DMatrix::zeros(3 * n, 9);
@@ -130,14 +198,6 @@ impl PointFit {
             fitted.fixed_view_mut::<3, 3>(3 * k, 3).copy_from(&(-self.device_from_base.rotation * skew(&y)));
             fitted.fixed_view_mut::<3, 3>(3 * k, 6).copy_from(&turned);
         }
-        let normal = SymmetricFactor::new(&(fitted.transpose() * &fitted)).ok()?;
-        let left = |j: &DMatrix<f64>| j - &fitted * normal.solve_many(&(fitted.transpose() * j));
-        let (model, noise) = (left(&by_model), left(&by_noise));
-        let of_model = product(&model, covariance).component_mul(&model).sum() / n as f64;
-        let of_noise = noise.norm_squared() / n as f64;
-        Some(ExpectedRms {
-            model_m: of_model.max(0.0).sqrt(),
-            with_joint_noise_m: (of_model + of_noise).max(0.0).sqrt(),
-        })
+        Derivatives { by_model, by_noise, fitted }
     }
 }

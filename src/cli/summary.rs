@@ -5,7 +5,7 @@ use std::fmt::Write;
 use crate::assess::{Cause, Errors, Identifiability, UnknownDirection, median};
 use crate::error::Notice;
 use crate::output::solution_json::SolutionRecord;
-use crate::problem::short_name;
+use crate::problem::{OriginPrior, short_name};
 use crate::recipe::Comparison;
 use crate::urdf::JointKind;
 
@@ -98,6 +98,7 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     )?;
     marker_tolerance(out, r)?;
     joint_noise(out, r)?;
+    twists(out, r)?;
     evidences(out, r)?;
     two_stage(out, r)?;
     map(out, r)?;
@@ -210,6 +211,21 @@ fn joint_noise(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         writeln!(out, "joints    noise in mrad (95 %){of}: {}{}", parts.join(", "), tilt.unwrap_or_default())?;
     }
     Ok(())
+}
+
+/// How far the origins of this robot are from nominal, beside what is assumed of robots.
+fn twists(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    let (factor, usual) = (r.robot.twist_factor, OriginPrior::default());
+    if factor == 1.0 {
+        return Ok(());
+    }
+    let [mm, mrad] = [usual.translation_m, usual.rotation_rad].map(|size| 1e3 * size);
+    writeln!(
+        out,
+        "origins   of the joints are off by {:.2} mm and {:.2} mrad per axis ({factor:.2} times {mm} mm and {mrad} mrad)",
+        factor * mm,
+        factor * mrad
+    )
 }
 
 fn evidences(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {

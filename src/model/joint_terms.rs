@@ -12,7 +12,7 @@ use crate::urdf::JointKind;
 const BACKLASH_STEP: f64 = 2e-3;
 
 /// Range of readings (rad or m, one sigma) over which the local error of a joint is the same.
-const LOCAL_RANGE: f64 = 3e-3;
+pub const LOCAL_RANGE: f64 = 3e-3;
 
 /// Number of gravity basis functions of a joint.
 pub const GRAVITY_TERMS: u8 = 4;

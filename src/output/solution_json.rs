@@ -118,6 +118,9 @@ pub struct RobotRecord {
     pub local_errors: Vec<TermRecord>,
     /// What the tip carries, where it was stated.
     pub payload: Option<Payload>,
+    /// Factor that the data ask for on the stated sizes of the twists (1 mm, 2 mrad), drawn towards 1.
+    #[serde(default = "one")]
+    pub twist_factor: f64,
 }
 
 /// One scalar estimate of the dense part, in the order of the covariance.

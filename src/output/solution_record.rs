@@ -44,7 +44,7 @@ pub(super) fn record(solution: &Solution, context: &Context, files: Vec<String>)
         statistics: statistics(solution),
         notices: solution.notices.clone(),
         starts: solution.starts.clone(),
-        robot: robot(&solution.state),
+        robot: robot(&solution.state, solution.problem.twist_factor()),
         cameras: cameras(solution),
         mountings: mountings(solution),
         placements: placements(solution)?,
@@ -90,7 +90,7 @@ pub(super) fn statistics(solution: &Solution) -> StatisticsRecord {
     }
 }
 
-fn robot(state: &State) -> RobotRecord {
+fn robot(state: &State, twist_factor: f64) -> RobotRecord {
     let robot = &state.robot;
     let chain = &robot.chain;
     let corrected = robot.corrected_origins();
@@ -123,6 +123,7 @@ fn robot(state: &State) -> RobotRecord {
         terms: stated.into_iter().map(record).collect(),
         local_errors: local.into_iter().map(record).collect(),
         payload: chain.payload(),
+        twist_factor,
     }
 }
 

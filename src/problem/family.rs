@@ -7,6 +7,13 @@ use super::{Layout, State};
 /// Sigma with which directions of a family are held at zero, as a share of its base sigma: far below anything that counts.
 const HELD: f64 = 1e-4;
 
+/// Weight, in parameters, with which the size of twists is drawn to what is stated: a scaled inverse chi-squared prior with so many
+/// degrees of freedom has 95 % of the factor between 1/2 and 2 (`1.96 / sqrt(2 n) = ln 2`).
+const TWISTS_DRAWN: f64 = 4.0;
+
+/// Name of the family of the twists.
+const TWISTS: &str = "origins of the joints";
+
 /// Parameters alike whose prior sigmas have one factor in common, a variance component.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Family {
@@ -18,6 +25,8 @@ pub struct Family {
     pub base: Vec<f64>,
     /// The factor.
     pub factor: f64,
+    /// Weight, in parameters, with which the factor is drawn to 1; 0 leaves it to the data alone.
+    pub drawn: f64,
     /// Directions that are held at zero because other parameters say the same: orthonormal, one row per column of the family.
     pub held: DMatrix<f64>,
 }
@@ -29,10 +38,26 @@ impl Family {
         Some(Self { held, ..Self::new("displacement field", layout, layout.fields[camera].clone().collect()) })
     }
 
+    /// The twists of the joints whose priors nobody has stated: how far robots are from nominal is known to a factor of two.
+    pub fn of_twists(layout: &Layout, is_stated: impl Fn(usize) -> bool) -> Option<Self> {
+        let columns: Vec<usize> = layout.twists.clone().filter(|c| !is_stated(*c)).collect();
+        (!columns.is_empty()).then(|| Self { drawn: TWISTS_DRAWN, ..Self::new(TWISTS, layout, columns) })
+    }
+
+    /// True for the family of the twists.
+    pub fn is_of_twists(&self) -> bool {
+        self.name == TWISTS
+    }
+
+    /// The factor that sums of squares and the number of determined parameters ask for.
+    pub fn asked(&self, squares: f64, determined: f64) -> f64 {
+        ((squares + self.drawn) / (determined + self.drawn)).sqrt()
+    }
+
     /// A family of columns at their present priors.
     pub fn new(name: &str, layout: &Layout, columns: Vec<usize>) -> Self {
         let base = columns.iter().map(|&c| layout.columns[c].prior_sigma).collect();
-        Self { name: name.into(), held: DMatrix::zeros(columns.len(), 0), columns, base, factor: 1.0 }
+        Self { name: name.into(), held: DMatrix::zeros(columns.len(), 0), columns, base, factor: 1.0, drawn: 0.0 }
     }
 
     /// Gives the columns the priors of the present factor.

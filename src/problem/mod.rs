@@ -191,6 +191,17 @@ impl Problem {
         Slack::exact(readings, !self.noise.tilt.is_empty())
     }
 
+    /// Factor on the stated sizes of the twists; 1 where they are held at what is stated.
+    pub fn twist_factor(&self) -> f64 {
+        self.families.iter().find(|f| f.is_of_twists()).map_or(1.0, |f| f.factor)
+    }
+
+    /// Sigma of a column before the data changed it: what robots usually deviate by.
+    pub fn stated_sigma(&self, column: usize) -> f64 {
+        let of = |f: &Family| f.columns.iter().position(|c| *c == column).map(|k| f.base[k]);
+        self.families.iter().find_map(of).unwrap_or(self.layout.columns[column].prior_sigma)
+    }
+
     /// Starts all stops of the robot at right readings: [`Problem::exact_slack`], or none at all for readings that count as exact.
     pub fn start_slack(&self, state: &mut State, readings_are_exact: bool) {
         for (slack, image) in state.slack.iter_mut().zip(&self.images).filter(|(_, i)| i.stop.is_some()) {

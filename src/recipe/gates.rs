@@ -210,7 +210,7 @@ pub(super) fn remarks(
     let values = state.values(&problem.layout);
     for c in problem.layout.robot() {
         let column = &problem.layout.columns[c];
-        let sigmas = ((values[c] - column.prior_mean) / column.prior_sigma).abs();
+        let sigmas = ((values[c] - column.prior_mean) / problem.stated_sigma(c)).abs();
         if sigmas > BEYOND_TOLERANCE {
             notices.push(Notice::new(
                 &column.name,

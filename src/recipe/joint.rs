@@ -14,7 +14,7 @@ use crate::assess::hold_out;
 use crate::error::{Error, Notice, Result};
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::robot::Robot;
-use crate::problem::{Problem, Slack, State};
+use crate::problem::{Family, Problem, Slack, State};
 use crate::solve::{
     ComponentOptions, NoiseInformation, Outcome, Status, covariance, estimate_components, reject_images,
     reject_observations, without_untold_noise,
@@ -134,6 +134,8 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let robot = options.model.robot_with(chain, options.harmonics);
     let (mut problem, mut state) = build(&robot, series, options.joint_noise == JointNoise::Estimated)?;
     options.selection.apply(&mut problem.layout, &mut state)?;
+    let stated = options.selection.with_priors(&problem.layout)?;
+    problem.families.extend(Family::of_twists(&problem.layout, |c| stated.contains(&c)));
     if options.marker_tolerance == MarkerTolerance::Estimated {
         problem.noise.marker = vec![1.0; problem.plates.len()];
     }

@@ -154,6 +154,18 @@ impl Selection {
         Ok(())
     }
 
+    /// Columns whose prior sigma is stated.
+    ///
+    /// # Errors
+    /// Unknown names.
+    pub fn with_priors(&self, layout: &Layout) -> Result<Vec<usize>> {
+        let stated = self.prior.iter().filter(|(_, p)| p.sigma_m.or(p.sigma_rad).is_some());
+        stated
+            .map(|(name, _)| layout.named(&format!("[prior] \"{name}\""), name))
+            .collect::<Result<Vec<_>>>()
+            .map(|c| c.concat())
+    }
+
     fn set_priors(&self, layout: &mut Layout, state: &mut State) -> Result<()> {
         // Names of blocks and with stars first, so that the name of a single parameter has the last word.
         let mut ordered = Vec::new();

@@ -132,7 +132,7 @@ fn update_families(problem: &mut Problem, state: &State, cov: &Covariance) -> f6
         if determined < FEWEST_DETERMINED {
             continue;
         }
-        let next = (squares / determined).sqrt().clamp(SMALLEST_FACTOR, 2.0 * family.factor);
+        let next = family.asked(squares, determined).clamp(SMALLEST_FACTOR, 2.0 * family.factor);
         if next > SMALLEST_FACTOR {
             change = change.max((next / family.factor - 1.0).abs());
         }
