@@ -6,7 +6,7 @@ use std::path::Path;
 
 use robotcal::model::camera::{Camera, Lens, fit_lens};
 use robotcal::plan::plate_design::{PlateRequest, design};
-use robotcal::recipe::{choose_lens, measured};
+use robotcal::recipe::{Options, RobotModel, Solution, choose_lens, depths_m, identify, measured};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::urdf::{Chain, read};
 
@@ -40,7 +40,7 @@ fn hold_out_tells_lenses_apart() {
         let made = world(lens, field_deg);
         let mut seen = vec![measured(&made, &chain())];
         seen[0].lens = Lens::Brown;
-        let notices = choose_lens(&chain(), &mut seen).unwrap();
+        let notices = choose_lens(&chain(), &mut seen, &["camera".into()]).unwrap();
         println!("{lens:?}: {}", notices[0]);
         let chosen = seen[0].lens;
         assert!(!not.contains(&chosen), "{lens:?} taken for {chosen:?}: {}", notices[0]);
@@ -84,4 +84,41 @@ fn rays_and_projections_undo_each_other_through_every_lens() {
             assert!((camera.project(&x).unwrap() - uv).norm() < 1e-6, "{lens:?} at {u}, {v}");
         }
     }
+}
+
+/// The camera of a world as the joint fit finds it.
+fn found(made: &SimulatedSeries, lens: Lens, open: bool) -> Solution {
+    let mut seen = vec![measured(made, &chain())];
+    seen[0].lens = lens;
+    let open_lenses = if open { vec![seen[0].camera.clone()] } else { Vec::new() };
+    let options = Options { model: RobotModel::Rigid, open_lenses, ..Options::default() };
+    identify(chain(), &seen, &options).unwrap()
+}
+
+#[test]
+fn the_joint_fit_tells_lenses_apart_and_states_what_ros_cannot_express() {
+    for (lens, field_deg) in [(Lens::Brown, 60.0), (Lens::Fisheye, 100.0), (Lens::Parallax, 60.0)] {
+        let s = found(&world(lens, field_deg), Lens::Brown, true);
+        let taken: Vec<Lens> = s.lenses.iter().filter(|l| l.taken).map(|l| l.lens).collect();
+        println!("{lens:?}: {:?}", s.lenses);
+        assert_eq!((taken, s.state.cameras[0].lens), (vec![lens], lens));
+        let loss = s.state.cameras[0].in_ros(&depths_m(&s)[0]);
+        assert_eq!(loss.is_some(), lens == Lens::Parallax);
+        let said = s.notices.iter().filter(|n| n.what.contains("camera.yaml")).count();
+        assert_eq!(said, usize::from(loss.is_some()));
+    }
+}
+
+/// A prism says nearly what a shift of the principal point with a turn does; it must not take the principal point along.
+#[test]
+fn prism_and_principal_point_are_kept_apart() {
+    let made = world(Lens::Brown, 60.0);
+    let sigma = |lens: Lens| {
+        let s = found(&made, lens, false);
+        let first = s.problem.layout.cameras[0].start;
+        [2, 3].map(|k| s.covariance.sigma(first + k))
+    };
+    let (brown, prism) = (sigma(Lens::Brown), sigma(Lens::ThinPrism));
+    println!("principal point known to {brown:?} px, with a prism to {prism:?} px");
+    assert!(prism.iter().zip(&brown).all(|(p, b)| *p < 5.0 * b + 0.5), "{prism:?} {brown:?}");
 }

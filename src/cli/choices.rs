@@ -99,6 +99,7 @@ impl ChoiceArgs {
                 fix: joined(&config.fix, &self.fix),
                 prior: config.prior,
             },
+            open_lenses: defaults.open_lenses,
             payload: config.payload,
         })
     }

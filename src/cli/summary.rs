@@ -6,7 +6,7 @@ use crate::assess::{Cause, Errors, Identifiability, UnknownDirection, median};
 use crate::error::Notice;
 use crate::output::solution_json::SolutionRecord;
 use crate::problem::{OriginPrior, short_name};
-use crate::recipe::Comparison;
+use crate::recipe::{Comparison, LensEvidence};
 use crate::urdf::JointKind;
 
 /// Most lines of one kind before the rest is counted.
@@ -100,6 +100,7 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     joint_noise(out, r)?;
     twists(out, r)?;
     evidences(out, r)?;
+    lenses(out, r)?;
     two_stage(out, r)?;
     map(out, r)?;
     scales(out, r)?;
@@ -160,9 +161,12 @@ fn cameras(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         let known = known.map_or(String::new(), |[seen, largest]| {
             format!("; projection known to {seen:.3} px where markers were seen, at worst {largest:.3} px")
         });
+        let loss = camera.ros_loss_px.map_or(String::new(), |[rms, most]| {
+            format!("; {} lens, which camera.yaml misses by {rms:.3} px RMS, at most {most:.3} px", camera.lens.name())
+        });
         writeln!(
             out,
-            "camera    {}: fx {:.2} {sigma}, fy {:.2}, centre ({:.2}, {:.2}) px; image noise {:.3} px per axis{known}",
+            "camera    {}: fx {:.2} {sigma}, fy {:.2}, centre ({:.2}, {:.2}) px; image noise {:.3} px per axis{known}{loss}",
             camera.name,
             value(0),
             value(1),
@@ -236,6 +240,17 @@ fn evidences(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         .map(|e| format!("{:?} {:.1} ({} parameters)", e.model, e.log_evidence, e.parameters).to_lowercase())
         .collect();
     writeln!(out, "evidence  logarithm, relative to the best model: {}", all.join(", "))
+}
+
+fn lenses(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    for camera in &r.cameras {
+        let all: Vec<&LensEvidence> = r.lenses.iter().filter(|l| l.camera == camera.name).collect();
+        let Some(taken) = all.iter().find(|l| l.taken) else { continue };
+        let each: Vec<String> = all.iter().map(|l| format!("{} {:.1}", l.lens.name(), l.log_evidence)).collect();
+        let (lens, each) = (taken.lens.name(), each.join(", "));
+        writeln!(out, "lens      of {}: {lens}; evidence, logarithm, relative to the best: {each}", camera.name)?;
+    }
+    Ok(())
 }
 
 fn accuracy(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {

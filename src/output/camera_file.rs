@@ -3,8 +3,8 @@
 use super::names::file_names;
 use super::text::{list, quoted};
 use crate::error::{Error, Result};
-use crate::model::camera::{Camera, Lens, fit_lens};
-use crate::recipe::Solution;
+use crate::model::camera::{Camera, Lens};
+use crate::recipe::{Solution, depths_m};
 use crate::series::CameraInfo;
 
 /// One file for each camera, as (file name, text).
@@ -13,22 +13,10 @@ use crate::series::CameraInfo;
 /// A lens that camera_info cannot express.
 pub(super) fn cameras(solution: &Solution) -> Result<Vec<(String, String)>> {
     let names = &solution.problem.cameras;
-    let depths = depths(solution);
+    let depths = depths_m(solution);
     let cameras = names.iter().zip(&solution.state.cameras).zip(&depths);
     let texts = cameras.map(|((name, camera), depths)| camera_yaml(name, camera, depths));
     file_names("camera", "yaml", names).into_iter().zip(texts).map(|(file, text)| Ok((file, text?))).collect()
-}
-
-/// Nearest and farthest plate centre that each camera saw, m.
-fn depths(solution: &Solution) -> Vec<[f64; 2]> {
-    let mut all = vec![[f64::INFINITY, 0.0f64]; solution.problem.cameras.len()];
-    for (i, image) in solution.problem.used() {
-        let Some(pose) = &solution.free_poses.poses[i] else { continue };
-        let z = pose.camera_from_plate.translation.z;
-        let range = &mut all[image.camera];
-        *range = [range[0].min(z), range[1].max(z)];
-    }
-    all.into_iter().map(|[near, far]| if far > 0.0 { [near, far] } else { [1.0, 1.0] }).collect()
 }
 
 /// Name in ROS of a lens that ROS has.
@@ -70,30 +58,42 @@ pub(super) fn camera_yaml(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> R
 
 /// The camera as ROS can say it, and what that loses, in words.
 fn in_ros(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<(Camera, String)> {
-    Ok(match camera.lens {
-        Lens::Brown | Lens::Rational | Lens::Fisheye => (camera.clone(), String::new()),
-        Lens::ThinPrism | Lens::Parallax | Lens::BrownField | Lens::FisheyeField => {
-            let lens = camera.lens.name();
-            let nearest = if camera.lens == Lens::FisheyeField { Lens::Fisheye } else { Lens::Rational };
-            let fit = fit_lens(camera, nearest, depths_m).ok_or_else(|| {
-                Error::unsolved(
-                    format!("camera {name}"),
-                    format!("no camera model of ROS comes near to its {lens} lens"),
-                    "identify with --camera brown or rational",
-                )
-            })?;
-            let remark = format!(
-                "# NOT THE IDENTIFIED LENS ({lens}, see solution.json), for which ROS has no model, but the nearest {}:\n\
-                 # loss {:.3} px RMS over the image, at most {:.3} px, for points {:.3} to {:.3} m away.\n",
-                ros_name(nearest),
-                fit.rms_px,
-                fit.worst_px,
-                depths_m[0],
-                depths_m[1]
-            );
-            (fit.camera, remark)
-        }
-    })
+    if matches!(camera.lens, Lens::Brown | Lens::Rational | Lens::Fisheye) {
+        return Ok((camera.clone(), String::new()));
+    }
+    let lens = camera.lens.name();
+    let fit = camera.in_ros(depths_m).ok_or_else(|| {
+        Error::unsolved(
+            format!("camera {name}"),
+            format!("no camera model of ROS comes near to its {lens} lens"),
+            "identify with --camera brown or rational",
+        )
+    })?;
+    let remark = format!(
+        "# NOT THE IDENTIFIED LENS ({lens}, see solution.json), for which ROS has no model, but the nearest {}:\n\
+         # loss {:.3} px RMS over the image, at most {:.3} px, for points {:.3} to {:.3} m away.\n{}",
+        ros_name(fit.camera.lens),
+        fit.rms_px,
+        fit.worst_px,
+        depths_m[0],
+        depths_m[1],
+        for_opencv(camera)
+    );
+    Ok((fit.camera, remark))
+}
+
+/// The lens itself where OpenCV has it and ROS has not, as comments: `cv::projectPoints` takes these twelve coefficients.
+fn for_opencv(camera: &Camera) -> String {
+    if camera.lens != Lens::ThinPrism {
+        return String::new();
+    }
+    let p = &camera.parameters;
+    let coefficients = p[4..9].iter().chain(&[0.0; 3]).chain(&p[9..13]);
+    format!(
+        "# The lens itself in OpenCV: fx, fy, cx, cy = {},\n# distCoeffs (k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4) = {}\n",
+        list(p[..4].iter().copied()),
+        list(coefficients.copied())
+    )
 }
 
 /// The camera as a message of ROS, for points between two depths (m).

@@ -14,7 +14,7 @@ use crate::geom::Pose;
 use crate::model::camera::Lens;
 use crate::model::joint_terms::Term;
 use crate::problem::short_name;
-use crate::recipe::{Comparison, Evidence, StartVerdict};
+use crate::recipe::{Comparison, Evidence, LensEvidence, StartVerdict};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
 use crate::urdf::{JointKind, Payload};
 
@@ -177,6 +177,9 @@ pub struct CameraRecord {
     /// Typical displacement (factor on the prior of every control point, px) of a lens with a displacement field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_sigma_px: Option<f64>,
+    /// What camera.yaml loses of a lens that ROS has no model for: RMS over the image and the most, px.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ros_loss_px: Option<[f64; 2]>,
 }
 
 /// A mounting or placement.
@@ -422,6 +425,9 @@ pub struct SolutionRecord {
     /// Expected error of the flange where the stops were, before and after; none without stops, and in files of earlier versions.
     #[serde(default)]
     pub flange: Option<FlangeErrors>,
+    /// Evidence of the lenses of cameras whose lens was open.
+    #[serde(default)]
+    pub lenses: Vec<LensEvidence>,
     /// Two-stage fits beside the joint one, on images that neither had seen; none for too few images.
     pub two_stage: Option<Comparison>,
     /// How the images scatter against the noise model; none for too few images.

@@ -19,7 +19,7 @@ use crate::geom::Pose;
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes;
 use crate::problem::{Image, Slack, State};
-use crate::recipe::Solution;
+use crate::recipe::{Solution, depths_m};
 
 /// The record of a solution.
 ///
@@ -57,6 +57,7 @@ pub(super) fn record(solution: &Solution, context: &Context, files: Vec<String>)
         identifiability: solution.worth.identifiability.clone(),
         evidences: solution.evidences.clone(),
         flange: solution.worth.flange,
+        lenses: solution.lenses.clone(),
         two_stage: solution.two_stage.clone(),
         scatter: solution.worth.clustered_sigma.as_ref().map(|_| ScatterRecord {
             flange_ratio: solution.worth.clustered_ratio,
@@ -147,6 +148,7 @@ fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
 
 fn cameras(solution: &Solution) -> Vec<CameraRecord> {
     let problem = &solution.problem;
+    let depths = depths_m(solution);
     let camera = |(k, name): (usize, &String)| {
         let c = &solution.state.cameras[k];
         let told = solution.worth.joint_noise.get(k);
@@ -164,6 +166,7 @@ fn cameras(solution: &Solution) -> Vec<CameraRecord> {
                 .map(|i| i.map(|v| Some(v).filter(|v| v.is_finite())))
                 .collect(),
             apparent_tilt_rad: problem.noise.tilt.get(k).copied().unwrap_or(0.0),
+            ros_loss_px: c.in_ros(&depths[k]).map(|fit| [fit.rms_px, fit.worst_px]),
             projection: Some(projection(solution, k)),
             field_sigma_px: problem.layout.fields[k].clone().next().map(|c| problem.layout.columns[c].prior_sigma),
         }

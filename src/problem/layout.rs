@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::{Image, State};
-use crate::model::camera::MAX_PARAMETERS;
+use crate::model::camera::{Camera, MAX_PARAMETERS};
 use crate::model::joint_terms::Term;
 use crate::model::plate_modes;
 
@@ -79,6 +79,15 @@ impl Builder {
         start..self.columns.len()
     }
 
+    fn camera(&mut self, name: &str, camera: &Camera) -> Range<usize> {
+        self.block(|b| {
+            for (k, p) in camera.parameter_names().enumerate() {
+                let part = camera.parameter_block(k);
+                b.add(format!("camera/{name}/{part}.{p}"), camera.parameter_unit(k), camera.prior_sigma(k));
+            }
+        })
+    }
+
     fn pose(&mut self, block: &str) -> Range<usize> {
         self.block(|b| TWIST.iter().for_each(|(c, unit)| b.add(format!("{block}.{c}"), unit, f64::INFINITY)))
     }
@@ -120,16 +129,8 @@ impl Layout {
         let locals = terms.end - local_count..terms.end;
         let mountings = mountings.iter().map(|m| b.pose(&named("hand_camera", m, mountings.len()))).collect();
         let placements = placements.iter().map(|p| b.pose(&format!("plate/{p}"))).collect();
-        let cameras: Vec<Range<usize>> = (cameras.iter().zip(&state.cameras))
-            .map(|(name, camera)| {
-                b.block(|b| {
-                    for (k, p) in camera.parameter_names().enumerate() {
-                        let part = camera.parameter_block(k);
-                        b.add(format!("camera/{name}/{part}.{p}"), camera.parameter_unit(k), camera.prior_sigma(k));
-                    }
-                })
-            })
-            .collect();
+        let cameras: Vec<Range<usize>> =
+            (cameras.iter().zip(&state.cameras)).map(|(name, camera)| b.camera(name, camera)).collect();
         let fields = (cameras.iter().zip(&state.cameras))
             .map(|(range, camera)| range.start + camera.parametric()..range.end)
             .collect();
@@ -145,6 +146,28 @@ impl Layout {
             })
             .collect();
         Self { columns: b.columns, twists, terms, locals, mountings, placements, cameras, fields, shapes }
+    }
+
+    /// The columns with those of camera `index` for another lens, and where and by how many columns those behind it moved. Parameters that
+    /// both lenses have stay free or fixed as they were.
+    pub fn with_camera(&self, index: usize, name: &str, camera: &Camera) -> (Self, usize, isize) {
+        let mut own = Builder::default();
+        own.camera(name, camera);
+        let mut next = self.clone();
+        let old = self.cameras[index].clone();
+        for column in &mut own.columns {
+            let before = self.columns[old.clone()].iter().find(|c| c.name == column.name);
+            column.free = before.is_none_or(|c| c.free);
+        }
+        let moved = own.columns.len() as isize - old.len() as isize;
+        next.columns.splice(old.clone(), own.columns);
+        let behind = next.cameras.iter_mut().chain(&mut next.fields).chain(&mut next.shapes);
+        for range in behind.filter(|r| r.start >= old.end) {
+            *range = range.start.saturating_add_signed(moved)..range.end.saturating_add_signed(moved);
+        }
+        next.cameras[index] = old.start..old.end.saturating_add_signed(moved);
+        next.fields[index] = old.start + camera.parametric()..next.cameras[index].end;
+        (next, old.end, moved)
     }
 
     /// Columns of what belongs to the robot: twists and joint terms, without the local errors.

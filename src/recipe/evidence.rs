@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::joint::{Options, RobotModel, identify_model};
+use super::lens_choice::{self, with_lenses};
 use super::{MeasuredSeries, Solution};
 use crate::error::Result;
 use crate::linalg::SymmetricFactor;
@@ -15,7 +16,7 @@ use crate::urdf::Chain;
 
 /// Logarithm of the odds at which a smaller model takes the place of a larger one: "decisive" (H. Jeffreys, *Theory of
 /// probability*, 1961). Gears have errors and arms sag; that there is nothing of it must be plain.
-const DECISIVE: f64 = 4.605;
+pub(super) const DECISIVE: f64 = 4.605;
 
 /// Evidence of a robot model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,21 +39,30 @@ pub struct Evidence {
 /// not belong together.
 pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
     let chain = chain.carrying(options.payload.as_ref())?;
-    if options.model != RobotModel::Auto {
-        return identify_model(chain, series, options);
-    }
-    if options.selection.names_terms() {
-        return identify_model(chain, series, &Options { model: RobotModel::Full, ..options.clone() });
-    }
-    let full = identify_model(chain.clone(), series, &Options { model: RobotModel::Full, ..options.clone() })?;
+    let model = match options.model {
+        RobotModel::Auto => RobotModel::Full,
+        other => other,
+    };
+    let (full, series) = with_lenses(&chain, series, &Options { model, ..options.clone() })?;
+    let mut solution = match options.model == RobotModel::Auto && !options.selection.names_terms() {
+        true => best_model(chain, &series, options, full)?,
+        false => full,
+    };
+    solution.notices.extend(lens_choice::losses(&solution));
+    Ok(solution)
+}
+
+/// The solution with the smallest robot model that the evidence supports, from that with the full one.
+fn best_model(chain: Chain, series: &[MeasuredSeries], options: &Options, full: Solution) -> Result<Solution> {
     let evidences = compare_models(&full);
     let supported = evidences.iter().filter(|e| e.log_evidence > -DECISIVE);
     let largest = supported.max_by_key(|e| e.parameters).map_or(RobotModel::Full, |e| e.model);
+    let lenses = full.lenses.clone();
     let chosen = match largest {
         RobotModel::Full => full,
         model => identify_model(chain, series, &Options { model, ..options.clone() })?,
     };
-    Ok(Solution { evidences, ..chosen })
+    Ok(Solution { evidences, lenses, ..chosen })
 }
 
 /// Evidence of every model that a solution with the full one holds, at its noise components.
@@ -81,7 +91,7 @@ fn evidence(full: &Solution, model: RobotModel) -> Option<Evidence> {
     Some(Evidence { model, log_evidence, cost: lin.cost, parameters })
 }
 
-fn log_evidence(problem: &Problem, state: &State, lin: &Linearised) -> Option<f64> {
+pub(super) fn log_evidence(problem: &Problem, state: &State, lin: &Linearised) -> Option<f64> {
     let system = System::with(Elimination::Markers, problem, state, lin, 0.0);
     let reduced = SymmetricFactor::new(&system.information).ok()?.log_determinant();
     let markers = SeenMarkers::of(problem, lin).information(problem, lin);

@@ -69,6 +69,8 @@ pub struct Options {
     pub harmonics: u8,
     /// Which parameters are estimated, and their priors.
     pub selection: Selection,
+    /// Cameras whose lens is chosen by evidence; that of the others is as their series say.
+    pub open_lenses: Vec<String>,
     /// What the tip carries; none where the chain says it or nobody does.
     pub payload: Option<Payload>,
 }
@@ -81,6 +83,7 @@ impl Default for Options {
             model: RobotModel::Auto,
             harmonics: HARMONICS,
             selection: Selection::default(),
+            open_lenses: Vec::new(),
             payload: None,
         }
     }
@@ -186,6 +189,7 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
         series: series.to_vec(),
         worth,
         evidences: Vec::new(),
+        lenses: Vec::new(),
         problem,
         state,
         linearised,

@@ -1,11 +1,17 @@
-//! Which lens: that which predicts observations best that the adjustment has not seen.
+//! Which lens: that which the joint fit supports by evidence, as the robot model is; see the formulation.
+
+use serde::{Deserialize, Serialize};
 
 use super::build::{MeasuredSeries, build};
+use super::evidence::{DECISIVE, log_evidence};
 use super::free_poses::adjust_free_poses;
+use super::joint::{Options, identify_model};
+use super::solution::Solution;
 use crate::error::{Error, Notice, Result};
-use crate::model::camera::Lens;
+use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
-use crate::problem::predict;
+use crate::problem::{Problem, State, predict};
+use crate::solve::{ComponentOptions, Linearised, Status, estimate_components};
 use crate::urdf::Chain;
 
 /// One observation of so many is kept aside, in every image and of every marker in other images.
@@ -14,13 +20,160 @@ const KEPT_ASIDE: usize = 4;
 const AS_GOOD: f64 = 0.01;
 /// Share of the largest errors that does not count: what is wrongly identified says nothing of the lens.
 const OUTLIERS: f64 = 0.02;
+/// Tangent of the angle off the axis at the corner of the image from which on a fisheye is tried: nearer to the axis the series of its formula and
+/// of the radial ones converge to the same functions, and it only lacks decentring, which real lenses have.
+const FISHEYE_FROM: f64 = 1.0;
+/// Rounds in which image noise and fit follow the lens.
+const ROUNDS: usize = 3;
 
-/// Sets the lens of every camera by hold-out, and says why. Lenses with a displacement field are not among them: they cost three
+/// Evidence of a lens for one camera.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LensEvidence {
+    /// Camera.
+    pub camera: String,
+    /// The lens.
+    pub lens: Lens,
+    /// Logarithm of its evidence less that of the best lens of this camera; 0 for the best.
+    pub log_evidence: f64,
+    /// Principal point, px.
+    pub centre_px: [f64; 2],
+    /// True for the one that was taken: the simplest that none beats decisively.
+    pub taken: bool,
+}
+
+/// The solution with one robot model and, for cameras whose lens is open, the lens that its evidence supports; and the series with these
+/// lenses.
+///
+/// # Errors
+/// As of [`identify_model`]; where no fit with the first lens exists, a lens by hold-out of free poses stands in for it.
+pub(super) fn with_lenses(
+    chain: &Chain,
+    series: &[MeasuredSeries],
+    options: &Options,
+) -> Result<(Solution, Vec<MeasuredSeries>)> {
+    let mut series = series.to_vec();
+    let open: &[String] = if options.selection.names_cameras() { &[] } else { &options.open_lenses };
+    let mut notices = Vec::new();
+    let mut solution = match identify_model(chain.clone(), &series, options) {
+        Err(error) if !open.is_empty() => {
+            notices = choose_lens(chain, &mut series, open).map_err(|_| error)?;
+            identify_model(chain.clone(), &series, options)?
+        }
+        other => other?,
+    };
+    let lenses: Vec<LensEvidence> = open.iter().flat_map(|camera| compare_lenses(&solution, camera)).collect();
+    let mut better = series.clone();
+    for chosen in lenses.iter().filter(|l| l.taken) {
+        better.iter_mut().filter(|s| s.camera == chosen.camera).for_each(|s| s.lens = chosen.lens);
+    }
+    if better.iter().zip(&series).any(|(a, b)| a.lens != b.lens) {
+        solution = identify_model(chain.clone(), &better, options)?;
+        series = better;
+    }
+    solution.notices.extend(notices);
+    Ok((Solution { lenses, ..solution }, series))
+}
+
+/// Evidence of every lens formula for a camera, from the fit with its present one.
+fn compare_lenses(solution: &Solution, camera: &str) -> Vec<LensEvidence> {
+    let Some(k) = solution.problem.cameras.iter().position(|c| c == camera) else { return Vec::new() };
+    let is_wide = solution.state.cameras[k].corner() > FISHEYE_FROM;
+    let formulas = Lens::ALL.into_iter().filter(|l| !l.has_field() && (*l != Lens::Fisheye || is_wide));
+    let mut all: Vec<LensEvidence> = formulas.filter_map(|lens| evidence(solution, k, lens)).collect();
+    let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    all.iter_mut().for_each(|e| e.log_evidence -= best);
+    if let Some(simplest) = all.iter_mut().find(|e| e.log_evidence > -DECISIVE) {
+        simplest.taken = true;
+    }
+    all
+}
+
+fn evidence(solution: &Solution, camera: usize, lens: Lens) -> Option<LensEvidence> {
+    let (mut problem, state) = with_lens(solution, camera, lens)?;
+    // Image noise follows the lens; joint noise, tilt and the sizes of families stay.
+    problem.families.retain(|f| f.held.ncols() > 0);
+    let options = ComponentOptions { joint: false, tilt: false, rounds: ROUNDS, ..ComponentOptions::default() };
+    let outcome = estimate_components(&mut problem, state, &options);
+    let lin = outcome.linearised.filter(|_| outcome.status == Status::Converged)?;
+    let found = &outcome.state.cameras[camera];
+    let log_evidence = log_evidence(&problem, &outcome.state, &lin)? + of_noise(&problem, &lin) + of_formula(found);
+    let centre_px = [found.parameters[2], found.parameters[3]];
+    Some(LensEvidence { camera: problem.cameras[camera].clone(), lens, log_evidence, centre_px, taken: false })
+}
+
+/// The problem with another lens for one camera, which images as the present one does.
+fn with_lens(solution: &Solution, camera: usize, lens: Lens) -> Option<(Problem, State)> {
+    let (mut problem, mut state) = (solution.problem.clone(), solution.state.clone());
+    let present = &state.cameras[camera];
+    let next = match present.extended(lens) {
+        Some(extended) => extended,
+        None => fit_lens(present, lens, &depths_m(solution)[camera])?.camera,
+    };
+    let (layout, from, moved) = problem.layout.with_camera(camera, &problem.cameras[camera], &next);
+    problem.layout = layout;
+    let columns = problem.families.iter_mut().flat_map(|f| &mut f.columns);
+    columns.filter(|c| **c >= from).for_each(|c| *c = c.saturating_add_signed(moved));
+    state.cameras[camera] = next;
+    Some((problem, state))
+}
+
+/// What the size of the image noise adds to the logarithm of the density of the observations.
+fn of_noise(problem: &Problem, lin: &Linearised) -> f64 {
+    let images = lin.images.iter().zip(&lin.terms);
+    -images
+        .map(|(&i, t)| 2.0 * t.residuals.len() as f64 * problem.noise.pixel_factor[problem.images[i].camera].ln())
+        .sum::<f64>()
+}
+
+/// Logarithm of the density of coefficients that the fit has no prior for: evidences of formulas need one.
+fn of_formula(camera: &Camera) -> f64 {
+    let improper = (4..camera.parametric()).filter(|&k| camera.prior_sigma(k).is_infinite());
+    improper
+        .map(|k| {
+            let sigma = camera.lens.typical(k - 4);
+            -0.5 * (camera.parameters[k] / sigma).powi(2) - sigma.ln()
+        })
+        .sum()
+}
+
+/// Nearest and farthest plate centre that each camera saw, m.
+pub fn depths_m(solution: &Solution) -> Vec<[f64; 2]> {
+    let mut all = vec![[f64::INFINITY, 0.0f64]; solution.problem.cameras.len()];
+    for (i, image) in solution.problem.used() {
+        let Some(pose) = &solution.free_poses.poses[i] else { continue };
+        let z = pose.camera_from_plate.translation.z;
+        let range = &mut all[image.camera];
+        *range = [range[0].min(z), range[1].max(z)];
+    }
+    all.into_iter().map(|[near, far]| if far > 0.0 { [near, far] } else { [1.0, 1.0] }).collect()
+}
+
+/// What the cameras of ROS cannot say of the lenses that were identified.
+pub(super) fn losses(solution: &Solution) -> Vec<Notice> {
+    let named = solution.problem.cameras.iter().zip(&solution.state.cameras).zip(depths_m(solution));
+    let notice = |((name, camera), depths): ((&String, &Camera), [f64; 2])| {
+        let fit = camera.in_ros(&depths)?;
+        let what = format!(
+            "camera.yaml cannot express its {} lens: it is off by {:.3} px RMS over the image, at most {:.3} px",
+            camera.lens.name(),
+            fit.rms_px,
+            fit.worst_px
+        );
+        Some(Notice::new(
+            format!("camera {name}"),
+            what,
+            "solution.json has the lens itself; --camera brown identifies one that camera.yaml can express",
+        ))
+    };
+    named.filter_map(notice).collect()
+}
+
+/// Sets the lens of `open` cameras by hold-out of free poses, and says why. Lenses with a displacement field are not among them: they cost three
 /// to five times as much, and are asked for by name.
 ///
 /// # Errors
 /// Those of the adjustment, when no lens explains the images at all.
-pub fn choose_lens(chain: &Chain, series: &mut [MeasuredSeries]) -> Result<Vec<Notice>> {
+pub fn choose_lens(chain: &Chain, series: &mut [MeasuredSeries], open: &[String]) -> Result<Vec<Notice>> {
     let mut trials: Vec<(Lens, Vec<(String, f64)>)> = Vec::new();
     let mut last_error = None;
     for lens in Lens::ALL.into_iter().filter(|l| !l.has_field()) {
@@ -34,7 +187,7 @@ pub fn choose_lens(chain: &Chain, series: &mut [MeasuredSeries]) -> Result<Vec<N
     }
     let mut notices = Vec::new();
     let names: Vec<String> = trials.first().map_or_else(Vec::new, |t| t.1.iter().map(|e| e.0.clone()).collect());
-    for (camera, name) in names.iter().enumerate() {
+    for (camera, name) in names.iter().enumerate().filter(|(_, name)| open.contains(name)) {
         let errors: Vec<(Lens, f64)> = trials.iter().map(|(lens, e)| (*lens, e[camera].1)).collect();
         let best = errors.iter().fold(f64::INFINITY, |m, e| m.min(e.1));
         let Some((lens, error)) = errors.iter().find(|e| e.1 <= (1.0 + AS_GOOD) * best) else {

@@ -122,6 +122,11 @@ impl Selection {
         terms.any(|t| t != Term::Offset)
     }
 
+    /// Names a parameter of a camera, which not every lens has.
+    pub fn names_cameras(&self) -> bool {
+        self.free.iter().chain(&self.fix).chain(self.prior.keys()).any(|name| name.starts_with("camera"))
+    }
+
     /// Sets priors, means and what is free, before the first solve.
     ///
     /// # Errors

@@ -6,6 +6,7 @@ use super::build::MeasuredSeries;
 use super::compare::Comparison;
 use super::evidence::Evidence;
 use super::free_poses::FreePoses;
+use super::lens_choice::LensEvidence;
 use super::worth::Worth;
 use crate::assess::Accuracy;
 use crate::error::Notice;
@@ -44,6 +45,8 @@ pub struct Solution {
     pub worth: Worth,
     /// Evidence of the robot models where the data chose among them.
     pub evidences: Vec<Evidence>,
+    /// Evidence of the lenses of cameras whose lens was open.
+    pub lenses: Vec<LensEvidence>,
     /// Before and after, held out.
     pub accuracy: Accuracy,
     /// Two-stage fits beside the joint one, where asked for ([`super::beside_two_stages`]).
