@@ -2,9 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
-use robotcal::output::write_all;
+use robotcal::output::{NewFolder, Place, recover, write_all, write_beside};
 
 type Files = BTreeMap<String, Vec<u8>>;
 
@@ -85,7 +88,11 @@ fn a_file_of_the_user_in_an_earlier_result_is_not_overwritten() {
     let before = found(&out);
     let error = write_all(&out, &result(&["camera.yaml", "poses.csv"], "new")).unwrap_err();
     assert!(error.place.ends_with("poses.csv"), "{error}");
+    assert_eq!(error.exit_code(), 2);
     assert_eq!(found(&out), before);
+    // The work is not lost either.
+    assert_eq!(found(&root.path().join("out-2")), result(&["camera.yaml", "poses.csv"], "new"));
+    assert_eq!(names(root.path()), ["out", "out-2"]);
 }
 
 #[test]
@@ -131,4 +138,383 @@ fn a_folder_without_permission_is_named() {
     assert!(error.remedy.contains("permissions"), "{error}");
     fs::set_permissions(&locked, fs::Permissions::from_mode(0o755)).unwrap();
     assert_eq!(names(&locked), Vec::<String>::new());
+}
+
+/// Files and folders below, with a mark where the user's are.
+fn all_below(folder: &Path) -> Files {
+    let mut all = Files::new();
+    for (name, bytes) in found(folder) {
+        let path = folder.join(&name);
+        match path.symlink_metadata().unwrap().is_dir() {
+            true => all.extend(all_below(&path).into_iter().map(|(n, b)| (format!("{name}/{n}"), b))),
+            false => drop(all.insert(name, bytes)),
+        }
+    }
+    all
+}
+
+/// Two results that share some names, with a folder.
+fn two_results() -> [Files; 2] {
+    let with_folder = |names: &[&str], content: &str| result(names, &content.repeat(5000));
+    [
+        with_folder(&["camera.yaml", "only_a.csv", "robot.urdf", "overlay/1.png", "overlay/2.png"], "a"),
+        with_folder(&["camera.yaml", "only_b.csv", "robot.urdf", "overlay/2.png", "overlay/3.png"], "b"),
+    ]
+}
+
+/// Not a test by itself: another process that writes results, one after the other, until it is killed.
+#[test]
+#[ignore = "run by other tests"]
+fn child() {
+    let Ok(out) = std::env::var("RESULTS_GO_TO") else { return };
+    let rounds = std::env::var("ROUNDS").map_or(u32::MAX, |r| r.parse().unwrap());
+    let [a, b] = two_results();
+    for k in 0..rounds {
+        println!("round {k}");
+        write_all(Path::new(&out), if k % 2 == 0 { &a } else { &b }).unwrap();
+    }
+}
+
+fn child_command(out: &Path) -> Command {
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    command.args(["--ignored", "--exact", "child", "--nocapture", "--test-threads=1"]).env("RESULTS_GO_TO", out);
+    command
+}
+
+fn writing(out: &Path) -> Child {
+    let mut child = child_command(out).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut said = Vec::new();
+    let mut stdout = child.stdout.take().unwrap();
+    while !said.ends_with(b"round 1") {
+        let mut byte = [0];
+        assert_eq!(stdout.read(&mut byte).unwrap(), 1, "the child ended: {}", String::from_utf8_lossy(&said));
+        said.push(byte[0]);
+    }
+    // Nobody reads on, and nobody blocks: the rounds are few before the kill.
+    std::mem::forget(stdout);
+    child
+}
+
+const KILLS: u64 = 50;
+
+/// Kills a writing process at moments that differ, and looks what is there.
+fn kill_again_and_again(out: &Path, users: &Files, look: impl Fn(u64)) {
+    for kill in 0..KILLS {
+        let mut child = writing(out);
+        std::thread::sleep(Duration::from_micros(1 + kill * 7919 % 20_011));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        look(kill);
+        let mut there = all_below(out);
+        for (name, bytes) in users {
+            assert_eq!(there.remove(name).as_ref(), Some(bytes), "kill {kill}: {name}");
+        }
+        there.retain(|name, _| !name.starts_with(".robotcal-unfinished"));
+        assert!(two_results().contains(&there), "kill {kill}: {:?}", there.keys());
+    }
+}
+
+#[test]
+fn killed_at_any_moment_the_earlier_or_the_new_result_is_whole() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    write_all(&out, &two_results()[0]).unwrap();
+    // Nothing is brought in order before the look: the folder itself is whole at every moment.
+    kill_again_and_again(&out, &Files::new(), |_| {});
+    write_all(&out, &two_results()[1]).unwrap();
+    assert_eq!(all_below(&out), two_results()[1]);
+    assert_eq!(names(root.path()), ["out"], "what the killed runs left is swept up");
+}
+
+#[test]
+fn killed_while_replacing_file_by_file_the_next_look_finds_a_whole_result() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    write_all(&out, &two_results()[0]).unwrap();
+    // A folder of the user cannot change places with the result.
+    fs::create_dir(out.join("pictures")).unwrap();
+    fs::write(out.join("pictures/mine.png"), "picture").unwrap();
+    let users = Files::from([("pictures/mine.png".to_owned(), b"picture".to_vec())]);
+    kill_again_and_again(&out, &users, |_| recover(&out.join("solution.json")).unwrap());
+    write_all(&out, &two_results()[1]).unwrap();
+    assert_eq!(names(root.path()), ["out"]);
+    assert_eq!(names(&out), ["camera.yaml", "only_b.csv", "overlay", "pictures", "robot.urdf", "solution.json"]);
+}
+
+#[test]
+fn an_earlier_result_that_a_killed_run_moved_away_comes_back() {
+    let root = tempfile::tempdir().unwrap();
+    let (out, old) = (root.path().join("out"), root.path().join(".out.old-4711-0"));
+    let earlier = result(&["camera.yaml"], "earlier");
+    let killed = || {
+        write_all(&out, &earlier).unwrap();
+        fs::write(out.join("notes.txt"), "mine").unwrap();
+        fs::rename(&out, &old).unwrap();
+    };
+    killed();
+    recover(&out.join("solution.json")).unwrap();
+    assert_eq!(fs::read(out.join("solution.json")).unwrap(), earlier["solution.json"]);
+    fs::remove_dir_all(&out).unwrap();
+    killed();
+    // The next run fails: the earlier result is there again.
+    let broken = Files::from([("x".repeat(300), Vec::new())]);
+    assert_eq!(write_all(&out, &broken).unwrap_err().exit_code(), 2);
+    assert_eq!(fs::read(out.join("camera.yaml")).unwrap(), b"earlier");
+    assert_eq!(fs::read(out.join("notes.txt")).unwrap(), b"mine");
+    assert_eq!(names(root.path()), ["out"]);
+}
+
+#[test]
+fn what_the_user_puts_there_meanwhile_stays() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    write_all(&out, &two_results()[0]).unwrap();
+    let place = Place::claim(&out).unwrap();
+    let new = place.begin().unwrap();
+    two_results()[1].iter().for_each(|(name, bytes)| new.put(name, bytes).unwrap());
+    fs::write(out.join("overlay/mine.txt"), "mine").unwrap();
+    fs::write(out.join("notes.txt"), "mine").unwrap();
+    new.finish().unwrap();
+    let mut expected = two_results()[1].clone();
+    expected.insert("overlay/mine.txt".into(), b"mine".to_vec());
+    expected.insert("notes.txt".into(), b"mine".to_vec());
+    assert_eq!(all_below(&out), expected);
+    assert_eq!(names(root.path()), ["out"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn names_that_are_no_text_stay() {
+    use std::os::unix::ffi::OsStrExt;
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    write_all(&out, &two_results()[0]).unwrap();
+    let strange = out.join(std::ffi::OsStr::from_bytes(b"notes-\xff.txt"));
+    fs::write(&strange, "mine").unwrap();
+    write_all(&out, &two_results()[1]).unwrap();
+    assert_eq!(fs::read(&strange).unwrap(), b"mine");
+    fs::remove_file(&strange).unwrap();
+    assert_eq!(all_below(&out), two_results()[1]);
+}
+
+#[cfg(unix)]
+#[test]
+fn the_current_folder_stays_the_current_folder() {
+    use std::os::unix::fs::MetadataExt;
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    write_all(&out, &two_results()[0]).unwrap();
+    let id = fs::metadata(&out).unwrap().ino();
+    for here in [".", "overlay/..", "../out"] {
+        let ended = child_command(Path::new(here)).env("ROUNDS", "2").current_dir(&out).output().unwrap();
+        assert!(ended.status.success(), "{here}: {}", String::from_utf8_lossy(&ended.stderr));
+        assert_eq!(
+            fs::metadata(&out).unwrap().ino(),
+            id,
+            "{here}: whoever stands in it would stand in a removed folder"
+        );
+        assert_eq!(all_below(&out), two_results()[1]);
+    }
+    assert_eq!(names(root.path()), ["out"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_to_a_folder_is_followed_and_stays_a_link() {
+    let root = tempfile::tempdir().unwrap();
+    let (real, link) = (root.path().join("real"), root.path().join("link"));
+    fs::create_dir(&real).unwrap();
+    std::os::unix::fs::symlink(&real, &link).unwrap();
+    two_results().iter().for_each(|files| write_all(&link, files).unwrap());
+    assert!(link.symlink_metadata().unwrap().is_symlink());
+    assert_eq!(all_below(&real), two_results()[1]);
+    for (name, target) in [("round", "round"), ("nowhere", "missing")] {
+        std::os::unix::fs::symlink(target, root.path().join(name)).unwrap();
+        let error = write_all(&root.path().join(name), &two_results()[0]).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.place.ends_with(name), "{error}");
+    }
+    assert_eq!(names(root.path()), ["link", "nowhere", "real", "round"]);
+}
+
+#[test]
+fn of_two_runs_into_one_folder_the_second_is_refused_at_once() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    let first = Place::claim(&out).unwrap();
+    let second = Place::claim(&out).unwrap_err();
+    assert_eq!(second.exit_code(), 2);
+    assert_eq!(NewFolder::begin(&out).unwrap_err().exit_code(), 2);
+    first.write_all(&two_results()[0]).unwrap();
+    assert_eq!(all_below(&out), two_results()[0]);
+    Place::claim(&out).unwrap().write_all(&two_results()[1]).unwrap();
+    assert_eq!(all_below(&out), two_results()[1]);
+}
+
+#[test]
+fn many_processes_in_one_folder_leave_one_whole_result() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    write_all(&out, &two_results()[0]).unwrap();
+    let start = |_| child_command(&out).env("ROUNDS", "6").stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let children: Vec<Child> = (0..4).map(start).collect();
+    for mut child in children {
+        child.wait().unwrap();
+    }
+    assert!(two_results().contains(&all_below(&out)), "{:?}", all_below(&out).keys());
+    assert_eq!(names(root.path()), ["out"]);
+}
+
+#[test]
+fn a_folder_made_for_nothing_goes_again() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("reports/2026/run1");
+    drop(Place::claim(&out).unwrap());
+    drop(NewFolder::begin(&out).unwrap());
+    assert_eq!(names(root.path()), Vec::<String>::new());
+    let folder = NewFolder::begin(&out).unwrap();
+    fs::create_dir(folder.path().join("images")).unwrap();
+    fs::write(folder.path().join("images/1.png"), "1").unwrap();
+    assert_eq!(names(&out), Vec::<String>::new(), "it appears when it is complete");
+    folder.finish().unwrap();
+    assert_eq!(all_below(&out), Files::from([("images/1.png".to_owned(), b"1".to_vec())]));
+    assert_eq!(NewFolder::begin(&out).unwrap_err().exit_code(), 2);
+}
+
+#[test]
+fn files_among_others_come_together() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("reports");
+    let files = |content: &'static str| ["a.md", "b.html"].map(|n| (n.to_owned(), content.as_bytes()));
+    write_beside(&out, &files("old"), &[]).unwrap();
+    fs::write(out.join("mine.md"), "mine").unwrap();
+    // The second cannot be a file: neither of them is changed.
+    let error = write_beside(&out, &[("a.md".into(), &b"new"[..]), ("x".repeat(300), &b"new"[..])], &[]).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    assert_eq!(fs::read(out.join("a.md")).unwrap(), b"old");
+    write_beside(&out, &files("new"), &[]).unwrap();
+    let expected = [("a.md", "new"), ("b.html", "new"), ("mine.md", "mine")];
+    assert_eq!(all_below(&out), expected.map(|(n, c)| (n.to_owned(), c.into())).into());
+}
+
+#[test]
+fn a_record_that_names_files_elsewhere_does_no_harm() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    fs::create_dir(&out).unwrap();
+    fs::write(root.path().join("mine.txt"), "mine").unwrap();
+    fs::write(out.join("solution.json"), r#"{"files": ["../mine.txt", "solution.json"]}"#).unwrap();
+    write_all(&out, &two_results()[0]).unwrap();
+    let unfinished = out.join(".robotcal-unfinished");
+    fs::create_dir(&unfinished).unwrap();
+    fs::write(unfinished.join("commit.json"), r#"{"move_in": [], "remove": ["../mine.txt"]}"#).unwrap();
+    assert_eq!(recover(&out.join("solution.json")).unwrap_err().exit_code(), 2);
+    assert_eq!(fs::read(root.path().join("mine.txt")).unwrap(), b"mine");
+}
+
+/// Runs a shell script in a mount namespace of its own; `None` where the system does not allow that.
+#[cfg(target_os = "linux")]
+fn with_mounts(script: &str, folder: &Path) -> Option<std::process::Output> {
+    let allowed = Command::new("unshare").args(["-rm", "true"]).output().is_ok_and(|o| o.status.success());
+    let exe = std::env::current_exe().unwrap();
+    let run = || {
+        let mut command = Command::new("unshare");
+        command.args(["-rm", "sh", "-ec", script]).current_dir(folder).env("ROUNDS", "2");
+        command.env("CHILD", format!("{} --ignored --exact child --test-threads=1", exe.display()));
+        command.output().unwrap()
+    };
+    if !allowed {
+        println!("skipped: no mount namespaces here");
+    }
+    allowed.then(run)
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_mount_point_gets_the_result_file_by_file() {
+    let root = tempfile::tempdir().unwrap();
+    fs::create_dir(root.path().join("out")).unwrap();
+    let script = "mount -t tmpfs none out; RESULTS_GO_TO=out $CHILD >&2; cp -a out copy; umount out; \
+                  mkdir kept; mount --bind kept out; RESULTS_GO_TO=out $CHILD >&2";
+    let Some(ended) = with_mounts(script, root.path()) else { return };
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    assert_eq!(all_below(&root.path().join("copy")), two_results()[1]);
+    assert_eq!(all_below(&root.path().join("kept")), two_results()[1]);
+    assert_eq!(names(root.path()), ["copy", "kept", "out"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_keeps_the_earlier_result() {
+    let root = tempfile::tempdir().unwrap();
+    fs::create_dir(root.path().join("disk")).unwrap();
+    // Room for one result and a half; once on a disk with the folder, once as the folder.
+    for out in ["disk/out", "disk"] {
+        let script = format!(
+            "mount -t tmpfs -o size=64k none disk; ROUNDS=1 RESULTS_GO_TO={out} $CHILD >&2; \
+             if RESULTS_GO_TO={out} $CHILD >&2; then exit 7; fi; cp -a {out} copy; ls -a disk > listed"
+        );
+        let Some(ended) = with_mounts(&script, root.path()) else { return };
+        assert!(ended.status.success(), "{out}: {}", String::from_utf8_lossy(&ended.stderr));
+        assert_eq!(all_below(&root.path().join("copy")), two_results()[0]);
+        fs::remove_dir_all(root.path().join("copy")).unwrap();
+        let listed = fs::read_to_string(root.path().join("listed")).unwrap();
+        assert!(!listed.contains(".out") && !listed.contains("unfinished"), "{listed}");
+    }
+}
+
+fn robotcal(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
+    let ended = Command::new(env!("CARGO_BIN_EXE_robotcal")).args(args).current_dir(folder).output().unwrap();
+    (ended.status.code(), String::from_utf8_lossy(&ended.stderr).into_owned())
+}
+
+#[test]
+fn every_command_tries_its_folder_before_it_reads_anything() {
+    let root = tempfile::tempdir().unwrap();
+    fs::write(root.path().join("file"), "a file").unwrap();
+    let before = all_below(root.path());
+    // All inputs are missing, too: the folder is complained of first.
+    for args in [
+        "identify --urdf missing --series missing",
+        "identify --from missing",
+        "detect --series missing",
+        "detect --plate missing missing.png",
+        "detect --study --part identity --views 1",
+        "compare --urdf missing --series missing",
+        "compare --urdf missing --study",
+        "compare --urdf missing --monte-carlo",
+        "plan --urdf missing --plate missing",
+        "plan --urdf missing --study 1",
+        "simulate --urdf missing",
+        "compensate missing.src --nominal missing --urdf missing",
+        "plate",
+    ] {
+        for out in ["file", "file/below"] {
+            let args: Vec<&str> = args.split(' ').chain(["--out", out]).collect();
+            let (code, said) = robotcal(root.path(), &args);
+            assert_eq!(code, Some(2), "{args:?}: {said}");
+            assert!(said.starts_with(&format!("error: {out}")), "{args:?}: {said}");
+        }
+    }
+    let (code, said) = robotcal(root.path(), &["convert", "missing.mcap", "file"]);
+    assert!(code == Some(2) && said.starts_with("error: file"), "{said}");
+    assert_eq!(all_below(root.path()), before);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_read_only_disk_is_named_before_the_work() {
+    let root = tempfile::tempdir().unwrap();
+    fs::create_dir(root.path().join("disk")).unwrap();
+    let exe = PathBuf::from(env!("CARGO_BIN_EXE_robotcal"));
+    let script = format!(
+        "mount -t tmpfs -o ro none disk; {} plan --urdf missing --plate missing --out $PLACE || echo $? > code",
+        exe.display()
+    );
+    for out in ["disk", "disk/below"] {
+        let Some(ended) = with_mounts(&script.replace("$PLACE", out), root.path()) else { return };
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert!(ended.status.success() && said.contains(out) && !said.contains("missing"), "{said}");
+        assert_eq!(fs::read_to_string(root.path().join("code")).unwrap().trim(), "2");
+    }
 }

@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::joint_table::{self, Unit};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::output::flange_table::{at_csv, flange_at};
 use crate::output::restore::found_model;
 use crate::output::solution_json::SolutionRecord;
+use crate::output::write_beside;
 
 /// Flags of `--at`.
 #[derive(Debug, Args)]
@@ -37,9 +38,9 @@ impl AtArgs {
         let readings: Vec<Vec<f64>> = rows.into_iter().map(|(_, q)| q).collect();
         let model = found_model(record)?;
         let found = flange_at(&model, &readings)?;
-        std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
         let path = folder.join("at.csv");
-        std::fs::write(&path, at_csv(&model, &readings, &found)).map_err(|e| Error::io(&path, &e))?;
+        let table = at_csv(&model, &readings, &found);
+        write_beside(folder, &[("at.csv".to_owned(), table.as_bytes())], std::slice::from_ref(file))?;
         let mut out = String::new();
         for (k, f) in found.iter().enumerate().take(MOST_ROWS) {
             let [position, rotation] = f.sigmas();

@@ -10,6 +10,7 @@ use super::robot::read_chain;
 use super::say::{say, say_line};
 use super::{Verdict, identify, progress};
 use crate::error::{Error, Result};
+use crate::output::Place;
 use crate::output::comparison::{comparison_markdown, study_html, study_markdown, study_verdict};
 use crate::output::monte_carlo::monte_carlo_markdown;
 use crate::recipe::{self, MonteCarloRequest, Options, StudyRequest};
@@ -52,8 +53,9 @@ pub(super) struct CompareArgs {
 }
 
 impl CompareArgs {
-    fn report(&self, file: &str) -> PathBuf {
-        self.out.as_deref().unwrap_or(Path::new("reports")).join(file)
+    /// The folder for reports, tried before the work.
+    fn place(&self) -> Result<Place> {
+        Place::among(self.out.as_deref().unwrap_or(Path::new("reports")))
     }
 }
 
@@ -66,6 +68,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<Verdict> {
 }
 
 fn series(args: &CompareArgs) -> Result<Verdict> {
+    let place = args.out.as_deref().map(Place::among).transpose()?;
     let description = urdf::read(&args.urdf)?;
     let all = identify::read_all(&args.series)?;
     let chain = identify::chain(&description, &all, args.base.as_deref(), args.tip.as_deref())?;
@@ -83,12 +86,11 @@ fn series(args: &CompareArgs) -> Result<Verdict> {
     bar.finish_and_clear();
     let text = comparison_markdown(&comparison);
     say!("{text}");
-    if args.out.is_some() {
+    if let Some(place) = place {
         let series: Vec<String> = args.series.iter().map(|s| format!(" --series {}", s.display())).collect();
         let command = format!("robotcal compare --urdf {}{}", args.urdf.display(), series.concat());
-        let path = args.report("comparison.md");
-        write(&path, &format!("# Two stages against one, on a series\n\n    {command}\n\n{text}"))?;
-        say_line!("report    {}", path.display());
+        let report = format!("# Two stages against one, on a series\n\n    {command}\n\n{text}");
+        write(&place, [("comparison.md", report)])?;
     }
     Ok(Verdict::Good)
 }
@@ -101,6 +103,7 @@ fn truth_of(all: &[Series]) -> Result<Option<Truth>> {
 }
 
 fn study(args: &CompareArgs) -> Result<Verdict> {
+    let place = args.place()?;
     let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
     if args.seeds < 2 {
         return Err(Error::input("--seeds", "fewer than 2 worlds give no interval", "give 30 or more"));
@@ -113,13 +116,12 @@ fn study(args: &CompareArgs) -> Result<Verdict> {
     })?;
     bar.finish_and_clear();
     let command = format!("robotcal compare --study --urdf {} --seeds {}", args.urdf.display(), args.seeds);
-    let page = args.report("two-stage-vs-joint.html");
-    write(&args.report("two-stage-vs-joint.md"), &study_markdown(&study, &command))?;
-    write(&page, &study_html(&study, &command))?;
-    for line in study_verdict(&study) {
-        say_line!("{line}");
-    }
-    say_line!("report    {}", page.display());
+    study_verdict(&study).iter().for_each(|line| say_line!("{line}"));
+    let files = [
+        ("two-stage-vs-joint.md", study_markdown(&study, &command)),
+        ("two-stage-vs-joint.html", study_html(&study, &command)),
+    ];
+    write(&place, files)?;
     Ok(Verdict::Good)
 }
 
@@ -128,6 +130,7 @@ const MONTE_CARLO_NOISE: [f64; 5] = [0.0, 2.5e-6, 5e-6, 2e-5, 1e-4];
 const MONTE_CARLO_IMAGES: usize = 40;
 
 fn monte_carlo(args: &CompareArgs) -> Result<Verdict> {
+    let place = args.place()?;
     let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
     let request = MonteCarloRequest {
         chain,
@@ -144,17 +147,17 @@ fn monte_carlo(args: &CompareArgs) -> Result<Verdict> {
     let tip = args.tip.as_deref().map(|t| format!(" --tip {t}")).unwrap_or_default();
     let command = format!("robotcal compare --monte-carlo --urdf {}{tip} --seeds {}", args.urdf.display(), args.seeds);
     let text = monte_carlo_markdown(&cells, &command);
-    let path = args.report("monte-carlo.md");
-    write(&path, &text)?;
     say!("{text}");
-    say_line!("report    {}", path.display());
+    write(&place, [("monte-carlo.md", text)])?;
     Ok(Verdict::Good)
 }
 
-fn write(path: &Path, text: &str) -> Result<()> {
-    let io = |e: std::io::Error| Error::io(path, &e);
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder).map_err(io)?;
+/// Writes the files of a report and names the last of them.
+fn write<const N: usize>(place: &Place, files: [(&str, String); N]) -> Result<()> {
+    let listed = files.each_ref().map(|(name, text)| ((*name).to_owned(), text.as_bytes()));
+    place.write_beside(&listed, &[])?;
+    if let Some((name, _)) = files.last() {
+        say_line!("report    {}", place.path().join(name).display());
     }
-    std::fs::write(path, text).map_err(io)
+    Ok(())
 }

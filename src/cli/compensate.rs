@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::geom::{Pose, exp_so3};
 use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
-use crate::output::{compensated, write_beside};
+use crate::output::{Place, compensated};
 use crate::programs::program::Posture;
 use crate::programs::{
     self, Correction, Kind, Language, Left, Models, Outcome, Postures, Program, Setting, Target, TextFile,
@@ -109,6 +109,7 @@ impl From<LanguageName> for Language {
 }
 
 pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
+    let place = Place::among(&args.out)?;
     let robot = |file: &Path, compensation: Option<&PathBuf>| -> Result<Robot> {
         let chain = read_chain(file, args.base.as_deref(), args.tip.as_deref())?;
         let mut robot = compensated(chain, compensation.map(PathBuf::as_path))?;
@@ -158,7 +159,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
         written.push((name, bytes));
     }
     written.push((REPORT.to_owned(), report.as_bytes()));
-    write_beside(&args.out, &written, &args.programs)?;
+    place.write_beside(&written, &args.programs)?;
     say!("{}", text(&program, &done.outcomes, &left, &controller.chain));
     say_line!("results   {} ({} files)", args.out.display(), written.len());
     Ok(if left.is_empty() { Verdict::Good } else { Verdict::GateFailed })

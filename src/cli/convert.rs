@@ -11,6 +11,7 @@ use super::say::{say, say_line};
 use super::show::read_solution;
 use crate::error::{Error, Result};
 use crate::model::robot::Robot;
+use crate::output::NewFolder;
 use crate::output::recording::{MAGNIFIED, overlay};
 use crate::series::{self, CameraInfo, Extracted, FramePoses, ImageMarks, Series, Shown, Source, convert_recording};
 use crate::urdf::Chain;
@@ -41,16 +42,20 @@ pub(super) struct ConvertArgs {
 }
 
 pub(super) fn run(args: &ConvertArgs) -> Result<Verdict> {
+    let is_recording = args.to.extension().is_some_and(|e| e == "mcap");
+    let new = (!is_recording).then(|| NewFolder::begin(&args.to)).transpose()?;
     let chain = match &args.urdf {
         Some(file) => Some(read_chain(file, args.base.as_deref(), args.tip.as_deref())?),
         None => None,
     };
-    if args.to.extension().is_some_and(|e| e == "mcap") {
-        to_recording(args, chain)?;
-    } else {
-        let joints = chain.map_or_else(Vec::new, |c| c.readings);
-        let extracted = convert_recording(&args.from, &args.to, &args.recording.options(&joints)?)?;
-        say!("{}", text(&extracted));
+    match new {
+        None => to_recording(args, chain)?,
+        Some(new) => {
+            let joints = chain.map_or_else(Vec::new, |c| c.readings);
+            let extracted = convert_recording(&args.from, new.path(), &args.recording.options(&joints)?)?;
+            new.finish()?;
+            say!("{}", text(&extracted));
+        }
     }
     say_line!("written   {}", args.to.display());
     Ok(Verdict::Good)

@@ -5,17 +5,16 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use rayon::prelude::*;
 
+use super::identify::require_unchanged;
 use super::image_study::{self, StudyArgs};
 use super::recording::{Pictures, RecordingArgs};
 use super::say::{say, say_line};
 use super::{Verdict, progress};
 use crate::detect::load;
 use crate::error::{Error, Notice, Result};
-use crate::output::NewResult;
-use crate::output::detection_files::{
-    DetectionContext, OVERLAY_FOLDER, detection_files, dropped_counts, marker_counts,
-};
+use crate::output::detection_files::{DetectionContext, detection_files, dropped_counts, marker_counts, picture_names};
 use crate::output::overlay::{Palette, overlay_png};
+use crate::output::{NewResult, Place, folder_name};
 use crate::recipe::{self, SeenImage};
 use crate::series::{self, InputFile, Plate, Series, read_plate};
 
@@ -58,16 +57,21 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
     }
     // Pictures of a recording are needed until they have been drawn on.
     let pictures = Pictures::new();
-    let looked = match (&args.series, &args.plate) {
-        (Some(folder), _) => of_series(args, folder, &pictures)?,
+    let series = args.series.as_deref().map(series::read_images).transpose()?;
+    let name = series.as_ref().map_or("images", |s| s.name.as_str()).to_owned();
+    let out = args
+        .out
+        .clone()
+        .unwrap_or_else(|| Path::new("reports").join(format!("{}-detected", folder_name(std::slice::from_ref(&name)))));
+    let place = Place::claim(&out)?;
+    let looked = match (series, &args.plate) {
+        (Some(series), _) => of_series(args, series, &pictures)?,
         (None, Some(plate)) => of_images(&args.images, plate)?,
         (None, None) => {
             return Err(Error::input("detect", "no images are given", "give --series, or --plate and images"));
         }
     };
-    let name = looked.series.as_ref().map_or("images", |s| s.name.as_str());
-    let out = args.out.clone().unwrap_or_else(|| Path::new("reports").join(format!("{name}-detected")));
-    let written = write(args, &looked, &out)?;
+    let written = write(args, &looked, place)?;
     say!("{}", text(&looked.images));
     let notices: Vec<Notice> =
         looked.notices.iter().cloned().chain(looked.images.iter().flat_map(SeenImage::notices)).collect();
@@ -76,20 +80,21 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
     let failures: Vec<&Error> = looked.images.iter().filter_map(|i| i.detection.failure.as_ref()).collect();
     let seen = |i: &SeenImage| (i.detection.observations.len(), i.detection.failure.as_ref().map(|f| f.what.clone()));
     let states: Vec<_> = looked.images.iter().map(|i| (i.name.as_str(), seen(i))).collect();
-    recipe::require_some(name, states.iter().map(|(n, (count, failure))| (*n, *count, failure.as_deref())))?;
+    recipe::require_some(&name, states.iter().map(|(n, (count, failure))| (*n, *count, failure.as_deref())))?;
     Ok(if failures.is_empty() { Verdict::Good } else { Verdict::GateFailed })
 }
 
-fn of_series(args: &DetectArgs, folder: &Path, pictures: &Pictures) -> Result<Looked> {
-    let mut all = pictures.of_recordings(vec![series::read_images(folder)?], &args.recording.options(&[])?)?;
+fn of_series(args: &DetectArgs, series: Series, pictures: &Pictures) -> Result<Looked> {
+    let mut all = pictures.of_recordings(vec![series], &args.recording.options(&[])?)?;
     let Some(series) = all.pop() else {
-        return Err(Error::input(folder.display(), "holds no series", "give the folder that holds series.toml"));
+        return Err(Error::input("detect", "the series was lost", "report this"));
     };
+    let mut inputs = series.inputs.clone();
+    inputs.extend(series.image_hashes()?);
     let bar = progress::bar(series.stops.stops.len(), &series.name);
     let images = recipe::look(&series, |_| bar.inc(1))?;
     bar.finish_and_clear();
-    let mut inputs = series.inputs.clone();
-    inputs.extend(series.image_hashes()?);
+    require_unchanged(&inputs, &series.image_hashes()?)?;
     Ok(Looked { plate: series.plate.clone(), images, notices: series.notices.clone(), inputs, series: Some(series) })
 }
 
@@ -101,46 +106,52 @@ fn of_images(images: &[PathBuf], plate: &Path) -> Result<Looked> {
         let what = format!("has the name of image {} as well", k);
         return Err(Error::input(twin.display(), what, "images are told apart by their names: rename one"));
     }
+    let hashes = || images.iter().filter(|i| i.is_file()).map(|i| InputFile::of_file(i)).collect::<Result<Vec<_>>>();
+    inputs.extend(hashes()?);
     let bar = progress::bar(images.len(), "images");
     let seen = recipe::look_at(images, &plate, |_| bar.inc(1));
     bar.finish_and_clear();
-    let readable = images.iter().filter(|i| i.is_file());
-    inputs.extend(readable.map(|i| InputFile::of_file(i)).collect::<Result<Vec<_>>>()?);
+    require_unchanged(&inputs, &hashes()?)?;
     Ok(Looked { series: None, plate, images: seen, notices: Vec::new(), inputs })
 }
 
 /// Writes the results; returns the number of files.
-fn write(args: &DetectArgs, looked: &Looked, out: &Path) -> Result<usize> {
+fn write(args: &DetectArgs, looked: &Looked, place: Place) -> Result<usize> {
+    let names = if args.overlay { picture_names(&looked.images) } else { Vec::new() };
+    let drawable: Vec<(&SeenImage, &PathBuf, &String)> = looked
+        .images
+        .iter()
+        .zip(&names)
+        .filter(|(image, _)| image.size.is_some())
+        .filter_map(|(image, name)| Some((image, image.path.as_ref()?, name)))
+        .collect();
     let context = DetectionContext {
         plate: &looked.plate,
         series: looked.series.as_ref(),
         inputs: looked.inputs.clone(),
         command: std::env::args().collect::<Vec<_>>().join(" "),
+        pictures: drawable.iter().map(|(_, _, name)| (*name).clone()).collect(),
     };
     let files = detection_files(&looked.images, &context)?;
-    let names = files.keys().map(String::as_str).chain(args.overlay.then_some(OVERLAY_FOLDER));
-    let result = NewResult::begin(out, names)?;
+    let result = place.begin()?;
     files.iter().try_for_each(|(name, bytes)| result.put(name, bytes))?;
-    let drawn = if args.overlay { draw(looked, &result)? } else { 0 };
+    draw(looked, &drawable, &result)?;
     result.finish()?;
-    Ok(files.len() + drawn)
+    Ok(files.len() + drawable.len())
 }
 
-fn draw(looked: &Looked, result: &NewResult) -> Result<usize> {
+fn draw(looked: &Looked, drawable: &[(&SeenImage, &PathBuf, &String)], result: &NewResult) -> Result<()> {
     let palette = Palette::of(&looked.images);
     let corrected = looked.series.as_ref().map(recipe::pictures).transpose()?;
     let picture = |path: &Path| corrected.as_ref().map_or_else(|| load(path, None), |read| read(path));
-    let readable: Vec<(&SeenImage, &PathBuf)> =
-        looked.images.iter().filter(|i| i.size.is_some()).filter_map(|i| Some((i, i.path.as_ref()?))).collect();
-    let bar = progress::bar(readable.len(), "drawing");
-    readable.par_iter().try_for_each(|(image, path)| {
+    let bar = progress::bar(drawable.len(), "drawing");
+    drawable.par_iter().try_for_each(|(image, path, name)| {
         let drawn = overlay_png(&picture(path)?, image, &looked.plate, &palette)?;
         bar.inc(1);
-        let name = image.name.strip_suffix(".png").unwrap_or(&image.name);
-        result.put(&format!("{OVERLAY_FOLDER}/{name}.png"), &drawn)
+        result.put(name, &drawn)
     })?;
     bar.finish_and_clear();
-    Ok(readable.len())
+    Ok(())
 }
 
 /// The table: a line for every image, and the sum.

@@ -13,7 +13,7 @@ use super::{Verdict, progress, summary};
 use crate::error::{Error, Notice, Result};
 use crate::model::camera::Lens;
 use crate::output::solution_json::{self, FILE_NAME};
-use crate::output::{self, Context, Offsets, Poses, restore};
+use crate::output::{self, Context, Offsets, Place, Poses, folder_name, recover, restore};
 use crate::recipe::{self, MeasuredSeries, Options};
 use crate::series::{self, InputFile, Series};
 use crate::urdf::{self, Chain, RobotDescription};
@@ -88,12 +88,18 @@ struct Task {
 
 pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let options = args.choices.options()?;
+    // Tried before the work that the result costs.
+    let mut place = args.out.as_deref().filter(|_| !args.dry_run).map(Place::claim).transpose()?;
     let task = match (&args.from, &args.urdf) {
         (Some(solution), _) => again(args, solution)?,
         (None, Some(urdf)) => {
             let description = urdf::read(urdf)?;
             let all = read_all(&args.series)?;
             let chain = chain(&description, &all, args.base.as_deref(), args.tip.as_deref())?;
+            if place.is_none() && !args.dry_run {
+                let names: Vec<String> = all.iter().map(|s| s.name.clone()).collect();
+                place = Some(Place::claim(&Path::new("reports").join(folder_name(&names)))?);
+            }
             let pictures = Pictures::new();
             let all = pictures.of_recordings(all, &args.recording.options(&chain.readings)?)?;
             if args.dry_run {
@@ -105,14 +111,17 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
             }
             let mut notices = description.notices.clone();
             notices.extend(tip_notice(&description, &all, args.base.as_deref(), args.tip.as_deref())?);
+            let inputs = inputs(urdf, &description, &all)?;
             let measured = measure_all(&all, &chain, &mut notices)?;
-            Task { inputs: inputs(urdf, &all)?, description, chain, measured, notices }
+            all.iter().try_for_each(|s| require_unchanged(&inputs, &s.image_hashes()?))?;
+            Task { inputs, description, chain, measured, notices }
         }
         (None, None) => {
             return Err(Error::input("identify", "no robot is given", "give --urdf and --series, or --from"));
         }
     };
-    solve(args, &options, task)
+    let place = place.ok_or_else(|| Error::input("identify", "no folder for the results is given", "give --out"))?;
+    solve(args, &options, task, place)
 }
 
 /// The task of an earlier solution.
@@ -128,7 +137,7 @@ fn again(args: &IdentifyArgs, path: &Path) -> Result<Task> {
     Ok(Task { chain, measured: restore::measured_series(&record)?, notices, inputs, description })
 }
 
-fn solve(args: &IdentifyArgs, options: &Options, task: Task) -> Result<Verdict> {
+fn solve(args: &IdentifyArgs, options: &Options, task: Task, place: Place) -> Result<Verdict> {
     let Task { description, chain, mut measured, mut notices, inputs } = task;
     let mut open_lenses = Vec::new();
     if let Some(name) = args.camera.as_deref() {
@@ -146,7 +155,6 @@ fn solve(args: &IdentifyArgs, options: &Options, task: Task) -> Result<Verdict> 
     notices.append(&mut solution.notices);
     solution.notices = notices;
     let names: Vec<String> = measured.iter().map(|s| s.name.clone()).collect();
-    let folder = args.out.clone().unwrap_or_else(|| Path::new("reports").join(names.join("+")));
     let context = Context {
         robot: &description,
         robot_name: &description.name,
@@ -158,7 +166,8 @@ fn solve(args: &IdentifyArgs, options: &Options, task: Task) -> Result<Verdict> 
         poses: if args.poses { Poses::Written } else { Poses::LeftOut },
     };
     let files = output::files(&solution, &context)?;
-    output::write_all(&folder, &files)?;
+    let folder = place.path().to_path_buf();
+    place.write_all(&files)?;
     // What is printed is what `show` prints: it comes from the file.
     let record = files.get(FILE_NAME).map_or(&[][..], Vec::as_slice);
     let record = solution_json::read(record)?;
@@ -168,8 +177,9 @@ fn solve(args: &IdentifyArgs, options: &Options, task: Task) -> Result<Verdict> 
     Ok(if solution.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed })
 }
 
-fn inputs(urdf: &Path, all: &[Series]) -> Result<Vec<InputFile>> {
-    let mut inputs = vec![InputFile::of_file(urdf)?];
+/// All files with the hashes of what was read, or is about to be.
+fn inputs(urdf: &Path, description: &RobotDescription, all: &[Series]) -> Result<Vec<InputFile>> {
+    let mut inputs = vec![InputFile::of_bytes(urdf, description.text.as_bytes())];
     for s in all {
         inputs.extend(s.inputs.iter().cloned());
         inputs.extend(s.image_hashes()?);
@@ -177,9 +187,19 @@ fn inputs(urdf: &Path, all: &[Series]) -> Result<Vec<InputFile>> {
     Ok(inputs)
 }
 
+/// The hashes in a result are those of what was looked at: a file must be the same before and after.
+pub(super) fn require_unchanged(before: &[InputFile], after: &[InputFile]) -> Result<()> {
+    let is_changed = |a: &&InputFile| before.iter().any(|b| b.path == a.path && b.sha256 != a.sha256);
+    after.iter().find(is_changed).map_or(Ok(()), |changed| {
+        let remedy = "wait until nothing writes to the series any more, then run again";
+        Err(Error::input(changed.path.display(), "changed while it was looked at", remedy))
+    })
+}
+
 pub(super) fn read_all(folders: &[PathBuf]) -> Result<Vec<Series>> {
     let mut all: Vec<Series> = Vec::new();
     for folder in folders {
+        recover(&folder.join("series.toml"))?;
         let s = series::read(folder)?;
         if let Some(twin) = all.iter().find(|a| a.name == s.name) {
             return Err(Error::input(

@@ -7,11 +7,11 @@ use clap::{Args, ValueEnum};
 use super::say::say_line;
 use super::{Verdict, progress};
 use crate::error::{Error, Result};
+use crate::output::Place;
 use crate::output::image_study::{
     REPORT, Section, bias_section, identity_section, image_study_files, precision_section,
 };
 use crate::output::overlay::{Palette, overlay_png};
-use crate::output::write_beside;
 use crate::plan::plate_design::{PlateRequest, design};
 use crate::recipe::SeenImage;
 use crate::simulate::image_study::{
@@ -61,6 +61,7 @@ pub(super) fn run(args: &StudyArgs, out: &Path, overlay: bool) -> Result<Verdict
     if args.views == 0 {
         return Err(Error::input("--views", "0 views show nothing", "give 1 or more"));
     }
+    let place = Place::among(out)?;
     let mut sections = Vec::new();
     let mut pictures = Vec::new();
     let wants = |part: Part| args.part.is_empty() || args.part.contains(&part);
@@ -80,7 +81,7 @@ pub(super) fn run(args: &StudyArgs, out: &Path, overlay: bool) -> Result<Verdict
     let mut files = image_study_files(&sections, &command(args));
     files.extend(pictures);
     let listed: Vec<(String, &[u8])> = files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
-    write_beside(out, &listed, &[])?;
+    place.write_beside(&listed, &[])?;
     let claims = || sections.iter().flat_map(|s: &Section| &s.claims);
     claims().for_each(|c| say_line!("{}", c.line()));
     say_line!("report    {}", out.join(REPORT).display());

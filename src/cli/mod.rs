@@ -11,6 +11,7 @@ mod detect;
 mod identify;
 mod image_study;
 mod joint_table;
+mod memory;
 mod plan;
 mod plate;
 mod progress;
@@ -106,11 +107,11 @@ impl Command {
 /// Runs the program with the arguments of the process.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
-    start_log(cli.verbose);
-    if let Some(threads) = cli.threads {
-        // Fails only where a pool exists already, which then serves as well.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    if let Some(code) = memory::in_a_child() {
+        return code;
     }
+    start_log(cli.verbose);
+    memory::set_threads(cli.threads);
     let ended = cli.command.run().and_then(|verdict| match say::failure() {
         Some(error) => {
             Err(Error::input("stdout", error, "check where the output goes; results that were named are written"))

@@ -9,13 +9,14 @@ use nalgebra::Vector3;
 use super::Verdict;
 use super::choices::Model;
 use super::plate::pair;
-use super::robot::noted_chain;
+use super::robot::{noted_chain, read_chain};
 use super::say::say;
+use super::show::read_solution;
 use super::simulate::Mount;
 use crate::error::{Error, Result};
 use crate::geom::{OrientedBox, Pose};
 use crate::model::camera::Camera;
-use crate::output::{plan_files, plan_html, plan_programs, plan_start, sigma_text, solution_json, write_all};
+use crate::output::{Place, plan_files, plan_html, plan_programs, plan_start, sigma_text};
 use crate::plan::candidates::CandidateOptions;
 use crate::plan::refine::USUAL_ROUNDS;
 use crate::plan::scene::{self, SceneOptions, arm_length_m};
@@ -164,11 +165,12 @@ fn pose(flag: &str, text: &str) -> Result<Pose> {
 
 pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     check(args)?;
+    if let Some(worlds) = args.study {
+        return study(args, worlds);
+    }
+    let place = Place::claim(&args.out)?;
     let description = urdf::read(&args.urdf)?;
     let chain = noted_chain(&description, args.base.as_deref(), args.tip.as_deref())?;
-    if let Some(seeds) = args.study {
-        return study(args, chain, seeds);
-    }
     let (capsules, meshes) = description.carried_capsules(&chain);
     let described = scene::described(&capsules, &chain);
     let mut request = request(args, chain)?;
@@ -193,7 +195,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     let mut more = plan_programs::programs(&request, &plan);
     more.insert("plan.html".into(), plan_html(&request, &plan, &forecast, &command).into_bytes());
     let files = plan_files::plan_files(&request, &plan, &forecast, &command, more)?;
-    write_all(&args.out, &files)?;
+    place.write_all(&files)?;
     say!("{}", summary(&request, &plan, &forecast, &files, &args.out));
     Ok(Verdict::Good)
 }
@@ -249,7 +251,9 @@ fn settle_place(args: &PlanArgs, request: &mut PlanRequest) -> Result<Vec<String
 /// Images planned and drawn in a study.
 const STUDIED: [usize; 2] = [30, 60];
 
-fn study(args: &PlanArgs, chain: Chain, seeds: u64) -> Result<Verdict> {
+fn study(args: &PlanArgs, seeds: u64) -> Result<Verdict> {
+    let place = Place::among(&args.out)?;
+    let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
     let robot = chain.robot.clone();
     let [planned, random] = STUDIED;
     let request = PlanStudyRequest {
@@ -264,9 +268,7 @@ fn study(args: &PlanArgs, chain: Chain, seeds: u64) -> Result<Verdict> {
     };
     let study = plan_study(&request, |seed| tracing::info!("world {seed} done"))?;
     let text = plan_files::study_table(&robot, &request, &study);
-    std::fs::create_dir_all(&args.out).map_err(|e| Error::io(&args.out, &e))?;
-    let path = args.out.join("study.md");
-    std::fs::write(&path, &text).map_err(|e| Error::io(&path, &e))?;
+    place.write_beside(&[("study.md".to_owned(), text.as_bytes())], std::slice::from_ref(&args.urdf))?;
     say!("{text}");
     Ok(Verdict::Good)
 }
@@ -389,8 +391,7 @@ fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
 fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<Image>)> {
     let model: RobotModel = args.robot_model.into();
     if let Some(path) = &args.from {
-        let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
-        let record = solution_json::read(&bytes)?;
+        let record = read_solution(path)?;
         let (mut setting, taken) = plan_start::from_solution(&record, chain, model)?;
         for (k, text) in args.plate_pose.iter().enumerate() {
             setting.placements.push((format!("new_{k}"), pose("--plate-pose", text)?));

@@ -7,7 +7,8 @@ use sha2::{Digest, Sha256};
 
 use super::Verdict;
 use super::say::say;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::output::Place;
 use crate::output::plate_drawing::{Caption, pdf, png, svg};
 use crate::plan::plate_design::{PlateDesign, PlateRequest, Sheet, Viewing, design};
 use crate::series::{plate_csv, plate_toml};
@@ -68,6 +69,7 @@ fn sheet(text: &str) -> std::result::Result<Sheet, String> {
 }
 
 pub(super) fn run(args: &PlateArgs) -> Result<Verdict> {
+    let place = Place::among(&args.out)?;
     let viewing = args.focal_px.zip(args.distance_m).map(|(focal_px, [near_m, far_m])| Viewing {
         focal_px,
         width_px: args.image[0],
@@ -85,13 +87,13 @@ pub(super) fn run(args: &PlateArgs) -> Result<Verdict> {
         tolerance_m: args.tolerance_mm / 1e3,
         seed: args.seed,
     })?;
-    let name = write(&args.out, &made, args.dpi)?;
+    let name = write(&place, &made, args.dpi)?;
     say!("{}", summary(&made, &name, &args.out));
     Ok(Verdict::Good)
 }
 
 /// Writes the files and returns the name of the plate, which ends in four digits of the hash of its markers.
-fn write(folder: &Path, made: &PlateDesign, dpi: f64) -> Result<String> {
+fn write(place: &Place, made: &PlateDesign, dpi: f64) -> Result<String> {
     let plate = &made.plate;
     let table = plate_csv(plate);
     let hash = Sha256::digest(table.as_bytes());
@@ -105,11 +107,7 @@ fn write(folder: &Path, made: &PlateDesign, dpi: f64) -> Result<String> {
         ("plate.svg", svg(plate, &caption)),
         ("plate.png", png(plate, &caption, dpi)?),
     ];
-    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
-    for (file, bytes) in files {
-        let path = folder.join(file);
-        std::fs::write(&path, bytes).map_err(|e| Error::io(&path, &e))?;
-    }
+    place.write_beside(&files.each_ref().map(|(file, bytes)| ((*file).to_owned(), bytes.as_slice())), &[])?;
     Ok(name)
 }
 

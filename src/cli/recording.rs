@@ -1,6 +1,7 @@
 //! Flags for recordings, and the place where their pictures wait while a command runs.
 
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use clap::{Args, ValueEnum};
 
@@ -67,7 +68,9 @@ pub(super) struct Pictures(PathBuf);
 impl Pictures {
     /// A folder of this process alone; nothing is created before it is needed.
     pub(super) fn new() -> Self {
-        Self(std::env::temp_dir().join(format!("robotcal-{}", std::process::id())))
+        // Processes that share the folder for temporary files need not share their numbers.
+        let time = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_nanos());
+        Self(std::env::temp_dir().join(format!("robotcal-{}-{time:x}", std::process::id())))
     }
 
     /// Takes the stops out of the recordings among `all`; the other series stay as they are.

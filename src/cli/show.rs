@@ -9,6 +9,7 @@ use super::say::{say, say_line};
 use super::{Verdict, summary};
 use crate::error::{Error, Result};
 use crate::output::difference::{Difference, compare_solutions};
+use crate::output::recover;
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::urdf::JointKind;
 
@@ -30,6 +31,7 @@ pub(super) struct ShowArgs {
 
 /// Reads a solution.
 pub(super) fn read_solution(path: &Path) -> Result<SolutionRecord> {
+    recover(path)?;
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
     solution_json::read(&bytes).map_err(|e| Error { place: path.display().to_string(), ..e })
 }

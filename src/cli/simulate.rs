@@ -9,6 +9,7 @@ use super::say::{say, say_line};
 use super::{Verdict, progress};
 use crate::error::{Error, Result};
 use crate::model::camera::Lens;
+use crate::output::NewFolder;
 use crate::plan::plate_design::{PlateRequest, design};
 use crate::plan::viewpoint::ViewRange;
 use crate::series::{AngleUnit, CameraMount, Edge, Plate, read_plate};
@@ -155,6 +156,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Verdict> {
         }
         name => name.map(named_fault).transpose()?,
     };
+    let new = NewFolder::begin(&args.out)?;
     let conditions = conditions(args)?;
     let mut made = series(&request(args)?)?;
     if args.outer_only {
@@ -170,10 +172,11 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Verdict> {
             made.observations.iter_mut().for_each(|i| i.observations.retain(|o| o.edge == Edge::Outer));
         }
     }
-    save(args, &made, &conditions)?;
+    save(args, new.path(), &made, &conditions)?;
     if let Some(fault) = fault {
-        fault.apply_to_folder(&args.out)?;
+        fault.apply_to_folder(new.path())?;
     }
+    new.finish()?;
     say!("{}", summary(&made, &args.out));
     Ok(Verdict::Good)
 }
@@ -257,13 +260,13 @@ fn plate(args: &SimulateArgs) -> Result<Plate> {
     }
 }
 
-fn save(args: &SimulateArgs, made: &SimulatedSeries, conditions: &ImagingConditions) -> Result<()> {
+fn save(args: &SimulateArgs, folder: &Path, made: &SimulatedSeries, conditions: &ImagingConditions) -> Result<()> {
     if args.observations {
-        return write(&args.out, made, Content::Observations);
+        return write(folder, made, Content::Observations);
     }
     let bar = progress::bar(made.truth.stops.len(), "rendering");
     let progress = |_: &str| bar.inc(1);
-    let written = write(&args.out, made, Content::Images { conditions, progress: &progress });
+    let written = write(folder, made, Content::Images { conditions, progress: &progress });
     bar.finish_and_clear();
     written
 }

@@ -40,4 +40,7 @@ pub mod decisions {
 
     #[doc = include_str!("decisions/0005_marker_tolerance.md")]
     pub mod d0005_marker_tolerance {}
+
+    #[doc = include_str!("decisions/0006_writing_results.md")]
+    pub mod d0006_writing_results {}
 }

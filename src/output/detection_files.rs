@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
+use super::names::file_parts;
 use super::text::csv;
 use crate::error::{Error, Result};
 use crate::recipe::SeenImage;
@@ -27,6 +28,14 @@ pub struct DetectionContext<'a> {
     pub inputs: Vec<InputFile>,
     /// The command line.
     pub command: String,
+    /// Names of the pictures that are drawn; see [`picture_names`].
+    pub pictures: Vec<String>,
+}
+
+/// Names of the pictures in the folder of the result, one for every image.
+pub fn picture_names(images: &[SeenImage]) -> Vec<String> {
+    let stems = images.iter().map(|i| i.name.strip_suffix(".png").unwrap_or(&i.name));
+    file_parts(stems).iter().map(|part| format!("{OVERLAY_FOLDER}/{part}.png")).collect()
 }
 
 /// Dropped candidates for every reason.
@@ -65,7 +74,8 @@ pub fn detection_files(images: &[SeenImage], context: &DetectionContext) -> Resu
         }
     }
     let mut names: BTreeSet<String> = files.keys().cloned().collect();
-    names.extend([FILE_NAME.to_owned(), OVERLAY_FOLDER.to_owned()]);
+    names.extend(context.pictures.iter().cloned());
+    names.insert(FILE_NAME.to_owned());
     let record = Record {
         format: 1,
         program: concat!("robotcal ", env!("CARGO_PKG_VERSION")),

@@ -43,8 +43,9 @@ mod write;
 pub use compensation_read::{compensated, read_compensation};
 pub use controller_files::kinematics_xacro;
 pub use kinematics_file::kinematics_yaml;
+pub use names::folder_name;
 pub use report::{plan_html, report_html, sigma_text};
-pub use write::{NewResult, write_all, write_beside};
+pub use write::{NewFolder, NewResult, Place, recover, write_all, write_beside};
 
 use std::collections::BTreeMap;
 

@@ -63,13 +63,18 @@ fn fill_camera(manifest: &mut Manifest, info: Option<&CameraInfo>) {
 }
 
 /// Writes the stops of a recording as a series folder: `series.toml`, `joints.csv`, `images/`. A manifest beside the
-/// recording is carried over, and so is the plate that it names.
+/// recording is carried over, and so is the plate that it names. A new folder appears when it is complete; an empty one is
+/// filled.
 ///
 /// # Errors
-/// As [`extract`]; a folder that exists already; files that cannot be written.
+/// As [`extract`]; a folder that exists already and is not empty; files that cannot be written.
 pub fn convert_recording(recording: &Path, folder: &Path, options: &RecordingOptions) -> Result<Extracted> {
-    if folder.exists() {
+    let is_empty = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
+    if folder.exists() && !is_empty {
         return Err(Error::input(folder.display(), "exists already", "name a new folder, or remove this one"));
+    }
+    if is_empty {
+        return write_folder(recording, folder, folder, options);
     }
     let unfinished = folder.with_file_name(format!(".{}.unfinished", file_name(folder)));
     if unfinished.exists() {
@@ -89,7 +94,9 @@ fn write_folder(recording: &Path, unfinished: &Path, folder: &Path, options: &Re
     let manifest = carried_manifest(recording, unfinished, &mut extracted)?;
     write(&unfinished.join("series.toml"), manifest.to_toml()?.as_bytes())?;
     write(&unfinished.join("joints.csv"), extracted.stops.to_csv().as_bytes())?;
-    std::fs::rename(unfinished, folder).map_err(|e| Error::io(folder, &e))?;
+    if unfinished != folder {
+        std::fs::rename(unfinished, folder).map_err(|e| Error::io(folder, &e))?;
+    }
     for stop in &mut extracted.stops.stops {
         stop.path = Some(folder.join("images").join(&stop.image));
     }

@@ -1,0 +1,68 @@
+//! A limited address space (`ulimit -v`, batch systems).
+//!
+//! Memory that cannot be had ends a process at once. Where the address space is limited, the work is therefore done by
+//! a child, whose end can be told of; and before that, with a single thread, since every thread that multiplies
+//! matrices reserves room in proportion to the caches of the processor.
+
+use std::io::Write;
+use std::process::{Command, ExitCode, ExitStatus};
+
+use crate::error::Error;
+
+/// Tells a child how many threads it may have: as many as it likes, or one.
+const CHILD: &str = "ROBOTCAL_IN_LIMITED_MEMORY";
+const ONE_THREAD: &str = "one thread";
+
+/// Runs the program in a child where the address space is limited; `None` where the caller is to do the work.
+pub(super) fn in_a_child() -> Option<ExitCode> {
+    let limit = limit_bytes()?;
+    if std::env::var_os(CHILD).is_some() {
+        return None;
+    }
+    for threads in ["all threads", ONE_THREAD] {
+        let child = std::env::current_exe()
+            .and_then(|program| Command::new(program).args(std::env::args_os().skip(1)).env(CHILD, threads).status());
+        let ended = child.ok()?;
+        if !lacked_memory(ended) {
+            return Some(ended.code().and_then(|c| u8::try_from(c).ok()).map_or(ExitCode::FAILURE, ExitCode::from));
+        }
+    }
+    let what = format!("the address space is limited to {} MB, and that was not enough", limit / 1_000_000);
+    let error = Error::input("memory", what, "raise the limit (ulimit -v), or give fewer or smaller images");
+    let _ = writeln!(std::io::stderr(), "error: {error}");
+    Some(ExitCode::from(error.exit_code()))
+}
+
+/// Number of threads: that of the user; where memory is short only the present one.
+pub(super) fn set_threads(wanted: Option<usize>) {
+    let pool = rayon::ThreadPoolBuilder::new();
+    // Fails only where a pool exists already, which then serves as well.
+    let _ = match (std::env::var(CHILD).is_ok_and(|c| c == ONE_THREAD), wanted) {
+        (true, _) => pool.num_threads(1).use_current_thread().build_global(),
+        (false, Some(threads)) => pool.num_threads(threads).build_global(),
+        (false, None) => Ok(()),
+    };
+}
+
+/// Limit of the address space, where there is one.
+fn limit_bytes() -> Option<u64> {
+    let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
+    let line = limits.lines().find_map(|l| l.strip_prefix("Max address space"))?;
+    line.split_whitespace().next()?.parse().ok()
+}
+
+/// Ended by an allocation, a stack or a thread that could not be had.
+#[cfg(unix)]
+fn lacked_memory(ended: ExitStatus) -> bool {
+    use std::os::unix::process::ExitStatusExt;
+    const ABORT: i32 = 6;
+    const BUS: i32 = 7;
+    const SEGMENT: i32 = 11;
+    const PANIC: i32 = 101;
+    ended.signal().is_some_and(|s| [ABORT, BUS, SEGMENT].contains(&s)) || ended.code() == Some(PANIC)
+}
+
+#[cfg(not(unix))]
+fn lacked_memory(_: ExitStatus) -> bool {
+    false
+}

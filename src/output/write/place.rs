@@ -1,0 +1,220 @@
+//! The folder that results go to, tried before the work that they cost.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use super::strays::{bring_back, part_name, sweep_beside};
+use super::{NewResult, Staging, journal, tree, write_synced};
+use crate::error::{Error, Result};
+
+/// A folder that can be written, for as long as this lives; folders that were made for it go again when nothing was written.
+#[derive(Debug)]
+pub struct Place {
+    given: PathBuf,
+    pub(super) target: PathBuf,
+    made: Vec<PathBuf>,
+    /// Held against other runs.
+    lock: Option<fs::File>,
+}
+
+impl Place {
+    /// Claims a folder for a result: it is made, or is empty, or holds an earlier result, and no other run writes to it.
+    /// What a run that was cut short left there is brought in order.
+    ///
+    /// # Errors
+    /// A `dir` that is a file, holds something else than an earlier result, cannot be written, or belongs to another run.
+    pub fn claim(dir: &Path) -> Result<Self> {
+        let place = Self::locked(dir)?;
+        if place.holds_something()? && tree::earlier_files(&place.target).is_none() {
+            let what = "is not empty and holds no earlier result of this program";
+            let remedy = "choose another folder for the results, or empty this one";
+            return Err(Error::input(place.target.display(), what, remedy));
+        }
+        Ok(place)
+    }
+
+    /// Claims a folder that is new or empty.
+    ///
+    /// # Errors
+    /// As [`Place::claim`]; a folder with something in it.
+    pub(super) fn empty(dir: &Path) -> Result<Self> {
+        let place = Self::locked(dir)?;
+        match place.holds_something()? {
+            true => Err(Error::input(dir.display(), "is not empty", "give a new folder, or remove this one")),
+            false => Ok(place),
+        }
+    }
+
+    /// Tries a folder for files that go there among others.
+    ///
+    /// # Errors
+    /// A `dir` that is a file or cannot be written.
+    pub fn among(dir: &Path) -> Result<Self> {
+        let place = Self::made(dir)?;
+        place.try_writing()?;
+        Ok(place)
+    }
+
+    /// The folder as it was given.
+    pub fn path(&self) -> &Path {
+        &self.given
+    }
+
+    fn made(dir: &Path) -> Result<Self> {
+        let missing = missing(dir)?;
+        let mut place = Self { given: dir.to_path_buf(), target: PathBuf::new(), made: Vec::new(), lock: None };
+        for folder in missing {
+            fs::create_dir(&folder).map_err(|e| Error::io(&folder, &e))?;
+            place.made.push(folder);
+        }
+        place.target = dir.canonicalize().map_err(|e| Error::io(dir, &e))?;
+        Ok(place)
+    }
+
+    fn locked(dir: &Path) -> Result<Self> {
+        bring_back(dir);
+        let mut place = Self::made(dir)?;
+        place.lock = lock(&place.target)?;
+        if place.lock.is_some() {
+            journal::complete(&place.target)?;
+            journal::sweep(&place.target);
+            sweep_beside(&place.target);
+        }
+        place.try_writing()?;
+        Ok(place)
+    }
+
+    fn holds_something(&self) -> Result<bool> {
+        let mut entries = fs::read_dir(&self.target).map_err(|e| Error::io(&self.target, &e))?;
+        Ok(entries.next().is_some())
+    }
+
+    fn try_writing(&self) -> Result<()> {
+        let probe = self.target.join(format!("{}-{}", journal::UNFINISHED, std::process::id()));
+        let tried = write_synced(&probe, b"tried").and_then(|()| fs::remove_file(&probe));
+        tried.map_err(|e| {
+            let _ = fs::remove_file(&probe);
+            Error::io(&self.target, &e)
+        })
+    }
+
+    /// Writes a whole result.
+    ///
+    /// # Errors
+    /// As [`write_all`](super::write_all).
+    pub fn write_all(self, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
+        let result = self.begin()?;
+        files.iter().try_for_each(|(name, bytes)| result.put(name, bytes))?;
+        result.finish()
+    }
+
+    /// Begins a result.
+    ///
+    /// # Errors
+    /// A folder that went away and cannot be made again.
+    pub fn begin(self) -> Result<NewResult> {
+        Ok(NewResult { staging: self.stage()?, names: Mutex::default(), place: self })
+    }
+
+    /// A folder for new files, beside the target where it can change places with it.
+    pub(super) fn stage(&self) -> Result<Staging> {
+        let target = &self.target;
+        fs::create_dir_all(target).map_err(|e| Error::io(target, &e))?;
+        let here = std::env::current_dir().and_then(|d| d.canonicalize()).unwrap_or_default();
+        let part = part_name(target).filter(|_| !here.starts_with(target));
+        match part.filter(|part| fs::create_dir(part).is_ok()) {
+            Some(part) => Ok(Staging::Beside(part)),
+            None => journal::stage(target).map(Staging::Inside).map_err(|e| Error::io(target, &e)),
+        }
+    }
+
+    /// Writes files among what is there; see [`write_beside`](super::write_beside).
+    ///
+    /// # Errors
+    /// As [`write_beside`](super::write_beside).
+    pub fn write_beside(&self, files: &[(String, &[u8])], inputs: &[PathBuf]) -> Result<()> {
+        let target = &self.target;
+        fs::create_dir_all(target).map_err(|e| Error::io(target, &e))?;
+        for (k, (name, _)) in files.iter().enumerate() {
+            self.require_its_own(name, inputs)?;
+            if files[..k].iter().any(|(other, _)| other == name) {
+                let path = target.join(name);
+                return Err(Error::input(
+                    path.display(),
+                    "is the name of two files",
+                    "correct them one after the other",
+                ));
+            }
+        }
+        // Other runs may put other files here.
+        let lock = fs::File::open(target).inspect(|f| drop(f.lock()));
+        journal::complete(target)?;
+        journal::sweep(target);
+        let staging = Staging::Inside(journal::stage(target).map_err(|e| Error::io(target, &e))?);
+        for (name, bytes) in files {
+            write_synced(&staging.path().join(name), bytes).map_err(|e| Error::io(&target.join(name), &e))?;
+        }
+        journal::commit(target, &files.iter().map(|(name, _)| name.clone()).collect(), &[])?;
+        drop(lock);
+        Ok(())
+    }
+
+    fn require_its_own(&self, name: &str, inputs: &[PathBuf]) -> Result<()> {
+        let path = self.target.join(name);
+        let real = path.canonicalize().unwrap_or_else(|_| path.clone());
+        if !tree::is_inside(Path::new(name)) || path.is_dir() {
+            return Err(Error::input(path.display(), "cannot be a file", "rename it"));
+        }
+        if inputs.iter().any(|i| i.canonicalize().is_ok_and(|i| i == real)) {
+            return Err(Error::input(path.display(), "is the input itself", "choose another folder with --out"));
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        // Only folders in which nothing is go.
+        self.made.iter().rev().all(|folder| fs::remove_dir(folder).is_ok());
+    }
+}
+
+/// Folders that have to be made, the outermost first.
+fn missing(dir: &Path) -> Result<Vec<PathBuf>> {
+    let bad = |what: &str| Error::input(dir.display(), what, "name a folder for the results");
+    if dir.as_os_str().is_empty() {
+        return Err(Error::input("results folder", "has no name", "name a folder for the results"));
+    }
+    if dir.is_dir() {
+        return Ok(Vec::new());
+    }
+    match dir.symlink_metadata() {
+        Ok(m) if m.is_symlink() => return Err(bad("is a link that leads nowhere")),
+        Ok(_) => return Err(bad("is a file, not a folder")),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {}
+        Err(e) => return Err(Error::io(dir, &e)),
+    }
+    if dir.file_name().is_none() {
+        return Err(bad("does not name a folder"));
+    }
+    let is_missing = |p: &&Path| !p.as_os_str().is_empty() && p.symlink_metadata().is_err();
+    let mut missing: Vec<PathBuf> = dir.ancestors().take_while(is_missing).map(Path::to_path_buf).collect();
+    missing.reverse();
+    Ok(missing)
+}
+
+/// Holds a folder against other runs; `None` where the file system knows no such thing.
+fn lock(folder: &Path) -> Result<Option<fs::File>> {
+    let Ok(file) = fs::File::open(folder) else { return Ok(None) };
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(fs::TryLockError::Error(_)) => Ok(None),
+        Err(fs::TryLockError::WouldBlock) => {
+            let remedy = "wait until it is done, or choose another folder";
+            Err(Error::input(folder.display(), "another run is writing its results here", remedy))
+        }
+    }
+}
