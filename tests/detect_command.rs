@@ -156,3 +156,71 @@ fn a_small_study_of_identity_finds_no_wrong_id() {
     assert!(report.contains("no wrong id: 0 in 40 views") && report.contains("image-stage-identity.svg"), "{report}");
     assert!(out.join("image-stage-identity.svg").is_file());
 }
+
+/// What `detect` needs for single images.
+fn plate_and_image() -> (PathBuf, PathBuf) {
+    let dataset = root().join("datasets/kr6_small");
+    (dataset.join("plate.toml"), dataset.join("images/img_002.png"))
+}
+
+#[test]
+fn files_of_the_user_among_the_pictures_stay_and_stale_pictures_go() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plate, image) = plate_and_image();
+    let (first, second) = (folder.path().join("first.png"), folder.path().join("second.png"));
+    [&first, &second].into_iter().for_each(|to| drop(std::fs::copy(&image, to).unwrap()));
+    let out = folder.path().join("seen");
+    let run = |image: &Path| {
+        let output = robotcal(&["detect", "--plate", name(&plate), name(image), "--overlay", "--out", name(&out)]);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    };
+    run(&first);
+    std::fs::write(out.join("overlay/mine.txt"), "mine").unwrap();
+    std::fs::write(out.join("notes.txt"), "mine").unwrap();
+    run(&second);
+    assert_eq!(std::fs::read(out.join("overlay/mine.txt")).unwrap(), b"mine");
+    assert_eq!(std::fs::read(out.join("notes.txt")).unwrap(), b"mine");
+    let there = |n: &str| out.join("overlay").join(n).exists();
+    assert!(there("second.png") && !there("first.png"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_hostile_name_of_an_image_gives_a_harmless_name_of_its_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plate, image) = plate_and_image();
+    let strange = folder.path().join("a\u{1b}[31m:b .png");
+    std::fs::copy(&image, &strange).unwrap();
+    let out = folder.path().join("seen");
+    let output = robotcal(&["detect", "--plate", name(&plate), name(&strange), "--overlay", "--out", name(&out)]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    let pictures: Vec<_> = std::fs::read_dir(out.join("overlay")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(pictures, ["a__31m_b_.png"]);
+}
+
+#[test]
+fn an_image_that_changes_while_it_is_looked_at_is_named() {
+    use std::io::Write;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    let folder = tempfile::tempdir().unwrap();
+    let (plate, image) = plate_and_image();
+    let growing = folder.path().join("growing.png");
+    std::fs::copy(&image, &growing).unwrap();
+    let out = folder.path().join("seen");
+    let done = AtomicBool::new(false);
+    let output = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            // A picture with something behind its end can be read at every moment.
+            let mut file = std::fs::OpenOptions::new().append(true).open(&growing).unwrap();
+            while !done.load(Ordering::Relaxed) {
+                file.write_all(&[0; 16]).unwrap();
+                std::thread::sleep(std::time::Duration::from_micros(200));
+            }
+        });
+        let output = robotcal(&["detect", "--plate", name(&plate), name(&growing), "--out", name(&out)]);
+        done.store(true, Ordering::Relaxed);
+        output
+    });
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(text(&output).contains("growing.png") && !out.exists());
+}

@@ -328,3 +328,21 @@ fn nothing_names_a_folder_of_the_machine() {
         assert!(!String::from_utf8_lossy(bytes).contains("/somewhere/"), "{name}");
     }
 }
+
+#[test]
+fn show_brings_back_the_result_that_a_killed_run_moved_away() {
+    let root = tempfile::tempdir().unwrap();
+    let (out, old) = (root.path().join("run1"), root.path().join(".run1.old-4711-0"));
+    let robot = robot();
+    let made = files(&solved(CameraMount::Hand, RobotModel::Rigid), &context(&robot)).unwrap();
+    robotcal::output::write_all(&out, &made).unwrap();
+    let show = || {
+        let file = out.join("solution.json");
+        let ended = std::process::Command::new(env!("CARGO_BIN_EXE_robotcal")).arg("show").arg(file).output().unwrap();
+        (ended.status.code(), ended.stdout)
+    };
+    let shown = show();
+    std::fs::rename(&out, &old).unwrap();
+    assert_eq!(show(), shown);
+    assert!(out.is_dir() && !old.exists());
+}

@@ -398,6 +398,22 @@ fn files_among_others_come_together() {
 }
 
 #[test]
+fn a_folder_that_vanishes_is_made_again() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("reports/out");
+    let place = Place::claim(&out).unwrap();
+    fs::remove_dir_all(root.path().join("reports")).unwrap();
+    place.write_all(&two_results()[0]).unwrap();
+    assert_eq!(all_below(&out), two_results()[0]);
+    let new = Place::claim(&out).unwrap().begin().unwrap();
+    two_results()[1].iter().for_each(|(name, bytes)| new.put(name, bytes).unwrap());
+    fs::remove_dir_all(&out).unwrap();
+    new.finish().unwrap();
+    assert_eq!(all_below(&out), two_results()[1]);
+    assert_eq!(names(&root.path().join("reports")), ["out"]);
+}
+
+#[test]
 fn a_record_that_names_files_elsewhere_does_no_harm() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
@@ -517,4 +533,32 @@ fn a_read_only_disk_is_named_before_the_work() {
         assert!(ended.status.success() && said.contains(out) && !said.contains("missing"), "{said}");
         assert_eq!(fs::read_to_string(root.path().join("code")).unwrap().trim(), "2");
     }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn with_little_memory_the_answer_is_the_same_or_the_error_is_clear() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let run = |limit: &str| {
+        let script = format!("ulimit -v {limit} && exec \"$@\"");
+        let args = ["--urdf", "robots/ur10e/ur10e.urdf", "--series", "datasets/ur10e_observations"];
+        let mut command = Command::new("sh");
+        command.args(["-c", &script, "sh", env!("CARGO_BIN_EXE_robotcal"), "identify", "--dry-run"]).args(args);
+        command.current_dir(root).output().unwrap()
+    };
+    let free = run("unlimited");
+    assert_eq!(free.status.code(), Some(0));
+    let mut short = 0;
+    for limit_kb in [1_048_576, 300_000, 150_000, 100_000, 70_000, 40_000, 25_000] {
+        let limited = run(&limit_kb.to_string());
+        let said = String::from_utf8_lossy(&limited.stderr);
+        match limited.status.code() {
+            Some(0) => assert_eq!(limited.stdout, free.stdout, "{limit_kb} kB"),
+            code => {
+                assert_eq!(code, Some(2), "{limit_kb} kB: {said}");
+                short += 1;
+            }
+        }
+    }
+    assert!(short > 0, "no limit was a limit");
 }

@@ -102,7 +102,9 @@ impl NewResult {
         let Self { place, names, staging } = self;
         let names = names.into_inner().unwrap_or_else(PoisonError::into_inner);
         let target = &place.target;
-        let there = tree::there(target, &names).map_err(|e| Error::io(target, &e))?;
+        let io = |e: io::Error| Error::io(target, &e);
+        fs::create_dir_all(target).map_err(io)?;
+        let there = tree::there(target, &names).map_err(io)?;
         if let Some(file) = there.in_the_way(&names) {
             return Err(set_aside(&staging, target, file));
         }
