@@ -334,7 +334,7 @@ fn show_brings_back_the_result_that_a_killed_run_moved_away() {
     let root = tempfile::tempdir().unwrap();
     let (out, old) = (root.path().join("run1"), root.path().join(".run1.old-4711-0"));
     let robot = robot();
-    let made = files(&solved(CameraMount::Hand, RobotModel::Rigid), &context(&robot)).unwrap();
+    let made = files(&solved(CameraMount::Hand, RobotModel::Rigid, &robot), &context(&robot)).unwrap();
     robotcal::output::write_all(&out, &made).unwrap();
     let show = || {
         let file = out.join("solution.json");

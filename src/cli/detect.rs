@@ -57,13 +57,11 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
     }
     // Pictures of a recording are needed until they have been drawn on.
     let pictures = Pictures::new();
+    let claimed = args.out.as_deref().map(Place::claim).transpose()?;
     let series = args.series.as_deref().map(series::read_images).transpose()?;
     let name = series.as_ref().map_or("images", |s| s.name.as_str()).to_owned();
-    let out = args
-        .out
-        .clone()
-        .unwrap_or_else(|| Path::new("reports").join(format!("{}-detected", folder_name(std::slice::from_ref(&name)))));
-    let place = Place::claim(&out)?;
+    let folder = format!("{}-detected", folder_name(std::slice::from_ref(&name)));
+    let place = claimed.map_or_else(|| Place::claim(&Path::new("reports").join(folder)), Ok)?;
     let looked = match (series, &args.plate) {
         (Some(series), _) => of_series(args, series, &pictures)?,
         (None, Some(plate)) => of_images(&args.images, plate)?,
@@ -71,6 +69,7 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
             return Err(Error::input("detect", "no images are given", "give --series, or --plate and images"));
         }
     };
+    let out = place.path().to_path_buf();
     let written = write(args, &looked, place)?;
     say!("{}", text(&looked.images));
     let notices: Vec<Notice> =
