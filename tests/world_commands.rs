@@ -195,3 +195,16 @@ fn too_few_targets_of_a_plan_are_refused() {
     assert_eq!(output.status.code(), Some(2), "{}", text(&output));
     assert!(text(&output).contains("targets.csv") && !out.exists(), "{}", text(&output));
 }
+
+/// What a library says while it looks for the board is no word to the user.
+#[test]
+fn a_board_that_is_not_there_takes_two_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    let plate = folder.path().join("plate.toml");
+    let board = "format = 1\nkind = \"charuco\"\ncolumns = 9\nrows = 6\npitch_m = 0.03\ntolerance_m = 0.0001\n";
+    std::fs::write(&plate, board).unwrap();
+    let (out, image) = (folder.path().join("seen"), root("datasets/kr6_small/images/img_001.png"));
+    let output = robotcal(&["detect", "--plate", plate.to_str().unwrap(), "--out", out.to_str().unwrap(), &image]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert_eq!(String::from_utf8_lossy(&output.stderr).lines().count(), 2, "{}", text(&output));
+}
