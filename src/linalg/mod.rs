@@ -81,6 +81,15 @@ impl SymmetricFactor {
     }
 }
 
+/// Orthonormal basis of the columns.
+pub fn orthonormal(mut columns: DMatrix<f64>) -> DMatrix<f64> {
+    for mut column in columns.column_iter_mut() {
+        let length = column.norm();
+        column.unscale_mut(if length > 0.0 { length } else { 1.0 });
+    }
+    columns.qr().q()
+}
+
 /// Product of dense matrices.
 pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     multiply(view(a), view(b))

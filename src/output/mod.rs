@@ -98,6 +98,7 @@ pub enum Poses {
 /// # Errors
 /// A camera that a ROS camera_info cannot express, a URDF that cannot be patched, estimates that are not finite.
 pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, Vec<u8>>> {
+    let gauge = gauge::Gauge::of(solution)?;
     let mut files = BTreeMap::new();
     let mut add = |name: String, text: String| files.insert(name, text.into_bytes());
     add(robot_files::urdf_name(context), robot_files::urdf(solution, context)?);
@@ -109,20 +110,20 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
     for (name, text) in camera_file::cameras(solution)? {
         add(name, text);
     }
-    for (name, text) in pose_files::mountings(solution).into_iter().chain(pose_files::placements(solution)?) {
+    for (name, text) in pose_files::mountings(solution).into_iter().chain(pose_files::placements(solution, &gauge)) {
         add(name, text);
     }
-    for (name, text) in plate_files::plates(solution, context)? {
+    for (name, text) in plate_files::plates(solution, context, &gauge)? {
         add(name, text);
     }
     if context.poses == Poses::Written {
-        add("poses.csv".into(), pose_files::poses_csv(solution, context)?);
+        add("poses.csv".into(), pose_files::poses_csv(solution, context));
     }
     add("observations.csv".into(), observation_table::observations_csv(solution, context));
     let mut names: Vec<String> = files.keys().cloned().collect();
     names.extend([REPORT.to_owned(), solution_json::FILE_NAME.to_owned()]);
     names.sort();
-    let record = solution_record::record(solution, context, names)?;
+    let record = solution_record::record(solution, context, &gauge, names)?;
     files.insert(REPORT.into(), report::report_html(&record).into_bytes());
     files.insert(solution_json::FILE_NAME.into(), solution_json::to_bytes(&record)?);
     Ok(files)

@@ -1,17 +1,14 @@
 //! hand_camera.yaml, plate_pose.yaml and poses.csv.
 
-use std::collections::BTreeSet;
-
 use nalgebra::Matrix6;
 
 use super::Context;
-use super::gauge::{markers_of, plates_in, plates_tied_to, rigid_covariance, seen_markers};
+use super::gauge::Gauge;
 use super::names::{ImageNames, file_names};
 use super::text::{csv, list, quoted};
-use crate::error::Result;
-use crate::geom::{Pose, adjoint};
+use crate::geom::Pose;
 use crate::problem::Image;
-use crate::recipe::{FreePose, Solution};
+use crate::recipe::{PlacedCamera, Solution};
 use crate::series::CameraMount;
 
 const PERTURBATION: &str = "\
@@ -87,16 +84,8 @@ pub(super) fn mountings(solution: &Solution) -> Vec<(String, String)> {
     out
 }
 
-/// Covariance of the pose of a plate in the frame of its nominal markers.
-pub(super) fn placement_covariance(solution: &Solution, placement: usize) -> Result<Matrix6<f64>> {
-    let problem = &solution.problem;
-    let plates = plates_tied_to(problem, plates_in(problem, placement));
-    let rigid = rigid_covariance(problem, &seen_markers(problem, &plates))?;
-    Ok(solution.covariance.block(problem.layout.placements[placement].start) - rigid)
-}
-
 /// `base_from_plate` (or `flange_from_plate`) of every placement that the robot's images determine.
-pub(super) fn placements(solution: &Solution) -> Result<Vec<(String, String)>> {
+pub(super) fn placements(solution: &Solution, gauge: &Gauge) -> Vec<(String, String)> {
     let problem = &solution.problem;
     let chain = &solution.state.robot.chain;
     let mut out = Vec::new();
@@ -113,51 +102,29 @@ pub(super) fn placements(solution: &Solution) -> Result<Vec<(String, String)>> {
             parent,
             child: if problem.placements.len() == 1 { "plate" } else { &problem.placements[k] },
             pose: &solution.state.placements[k],
-            covariance: placement_covariance(solution, k)?,
+            covariance: gauge.placement(solution, k),
             remark: INNER,
         };
         out.push((file, text.text()));
     }
-    Ok(out)
-}
-
-/// Stand-alone poses: `plate_from_camera` with the covariance of its body twist, one for each image.
-///
-/// The inverse of `T Exp(x)` is `T^-1 Exp(-Ad_T x)`.
-pub(super) fn plate_from_camera(free: &FreePose, rigid: &Matrix6<f64>) -> (Pose, Matrix6<f64>) {
-    let ad = adjoint(&free.camera_from_plate);
-    let covariance = ad * (free.covariance - rigid) * ad.transpose();
-    (free.camera_from_plate.inverse(), 0.5 * (covariance + covariance.transpose()))
-}
-
-/// `(N' P N)^-1` of every plate in the adjustment of the free poses; `None` for a plate without any pose.
-pub(super) fn free_rigid_covariances(solution: &Solution) -> Result<Vec<Option<Matrix6<f64>>>> {
-    let problem = &solution.problem;
-    let free = &solution.free_poses.poses;
-    (0..problem.plates.len())
-        .map(|plate| {
-            let images = problem.images.iter().zip(free).filter(|(i, f)| i.plate == plate && f.is_some());
-            let seen: BTreeSet<(usize, usize)> = markers_of(images.map(|(i, _)| i));
-            if seen.is_empty() { Ok(None) } else { rigid_covariance(problem, &seen).map(Some) }
-        })
-        .collect()
+    out
 }
 
 /// Text of poses.csv.
-pub(super) fn poses_csv(solution: &Solution, context: &Context) -> Result<String> {
+pub(super) fn poses_csv(solution: &Solution, context: &Context) -> String {
     let names = ImageNames::new(&solution.problem, context);
     let upper = || (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
     let mut header: Vec<String> = ["image", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"].map(String::from).to_vec();
     header.extend(upper().map(|(i, j)| format!("c{}{}", i + 1, j + 1)));
     let mut rows = vec![header];
-    let rigid = free_rigid_covariances(solution)?;
     for (k, free) in solution.free_poses.poses.iter().enumerate() {
-        let (Some(free), Some(rigid)) = (free, &rigid[solution.problem.images[k].plate]) else { continue };
-        let (pose, covariance) = plate_from_camera(free, rigid);
+        let Some(PlacedCamera { plate_from_camera: pose, covariance }) = free.as_ref().map(|f| &f.in_frame) else {
+            continue;
+        };
         let mut row = vec![names.of(k).to_owned()];
         row.extend(pose.xyz().iter().chain(&pose.quaternion_xyzw()).map(|v| format!("{v:?}")));
         row.extend(upper().map(|at| format!("{:?}", covariance[at])));
         rows.push(row);
     }
-    Ok(csv(&rows))
+    csv(&rows)
 }

@@ -16,6 +16,7 @@ use crate::model::joint_terms::Term;
 use crate::problem::short_name;
 use crate::recipe::{Comparison, Evidence, LensEvidence, StartVerdict};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
+use crate::solve::PlateScale;
 use crate::urdf::{JointKind, Payload};
 
 /// Name of the file.
@@ -227,8 +228,31 @@ pub struct PlateRecord {
     pub correction_m: Vec<[f64; 3]>,
     /// Corrected positions, m.
     pub position_m: Vec<[f64; 3]>,
-    /// Their sigmas in the frame of the nominal markers, m.
+    /// Their sigmas in the frame of the nominal markers, m; that of the scale of all of them is not in them.
     pub sigma_m: Vec<[f64; 3]>,
+    /// Size of the markers as a whole, as in `position_m`, plate.csv and plate_pose.yaml; none where no image shows the plate.
+    #[serde(default)]
+    pub relative_scale: Option<ScaleRecord>,
+    /// Size that the stand-alone poses (poses.csv, `free_pose`) are given for: nominal, or as measured ([scale]). The robot takes no part
+    /// in them, nor in this scale.
+    #[serde(default)]
+    pub relative_scale_of_poses: Option<ScaleRecord>,
+}
+
+/// Size of the markers of a plate as a whole. Lengths `d` in files in which the scale is held have a further standard deviation of
+/// `sigma d`, common to all.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ScaleRecord {
+    /// Size over nominal, less one.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+}
+
+impl From<PlateScale> for ScaleRecord {
+    fn from(scale: PlateScale) -> Self {
+        Self { value: scale.relative, sigma: scale.sigma }
+    }
 }
 
 /// A stand-alone camera pose.
@@ -236,7 +260,7 @@ pub struct PlateRecord {
 pub struct FreePoseRecord {
     /// `plate_from_camera`.
     pub plate_from_camera: PoseRecord,
-    /// Covariance of its body twist in the frame of the nominal markers, 36 numbers.
+    /// Covariance of its body twist in the frame of the nominal markers, their scale held, 36 numbers.
     pub covariance: Vec<f64>,
     /// RMS of the lengths of its residuals, px.
     pub rms_px: f64,

@@ -4,9 +4,9 @@ use nalgebra::Matrix6;
 
 use super::Context;
 use super::estimates::{estimates, lower_triangle};
+use super::gauge::Gauge;
 use super::names::{ImageNames, plate_name, series_name};
-use super::plate_files::position_covariances;
-use super::pose_files::{determined, free_rigid_covariances, placement_covariance, plate_from_camera};
+use super::pose_files::determined;
 use super::residuals::{poses, residuals};
 use super::solution_json::{
     AccuracyRecord, CameraRecord, FORMAT, FreePoseRecord, ImageRecord, JointRecord, ObservationColumns, PlacedRecord,
@@ -25,7 +25,12 @@ use crate::recipe::{Solution, depths_m};
 ///
 /// # Errors
 /// Estimates that are not finite, markers that define no frame.
-pub(super) fn record(solution: &Solution, context: &Context, files: Vec<String>) -> Result<SolutionRecord> {
+pub(super) fn record(
+    solution: &Solution,
+    context: &Context,
+    gauge: &Gauge,
+    files: Vec<String>,
+) -> Result<SolutionRecord> {
     let accuracy = &solution.accuracy;
     Ok(SolutionRecord {
         format: FORMAT,
@@ -47,8 +52,8 @@ pub(super) fn record(solution: &Solution, context: &Context, files: Vec<String>)
         robot: robot(&solution.state, solution.problem.twist_factor()),
         cameras: cameras(solution),
         mountings: mountings(solution),
-        placements: placements(solution)?,
-        plates: plates(solution, context)?,
+        placements: placements(solution, gauge),
+        plates: plates(solution, context, gauge),
         urdf: UrdfRecord {
             file: context.robot.path.file_name().map_or_else(String::new, |f| f.to_string_lossy().into_owned()),
             text: context.robot.text.clone(),
@@ -66,7 +71,7 @@ pub(super) fn record(solution: &Solution, context: &Context, files: Vec<String>)
         workspace: solution.worth.workspace.clone(),
         estimates: estimates(solution, context)?,
         covariance_lower: lower_triangle(solution),
-        images: images(solution, context)?,
+        images: images(solution, context),
     })
 }
 
@@ -198,24 +203,22 @@ fn mountings(solution: &Solution) -> Vec<PlacedRecord> {
     problem.mountings.iter().enumerate().map(placed).collect()
 }
 
-fn placements(solution: &Solution) -> Result<Vec<PlacedRecord>> {
+fn placements(solution: &Solution, gauge: &Gauge) -> Vec<PlacedRecord> {
     let problem = &solution.problem;
     let placed = |(k, name): (usize, &String)| {
-        let covariance = match determined(solution, problem.layout.placements[k].start) {
-            true => Some(flat(&placement_covariance(solution, k)?)),
-            false => None,
-        };
-        Ok(PlacedRecord { name: name.clone(), pose: (&solution.state.placements[k]).into(), covariance })
+        let determined = determined(solution, problem.layout.placements[k].start);
+        let covariance = determined.then(|| flat(&gauge.placement(solution, k)));
+        PlacedRecord { name: name.clone(), pose: (&solution.state.placements[k]).into(), covariance }
     };
     problem.placements.iter().enumerate().map(placed).collect()
 }
 
-fn plates(solution: &Solution, context: &Context) -> Result<Vec<PlateRecord>> {
+fn plates(solution: &Solution, context: &Context, gauge: &Gauge) -> Vec<PlateRecord> {
     let problem = &solution.problem;
     let plate = |(k, p): (usize, &crate::series::Plate)| {
         let shape = &solution.state.plates[k];
-        let sigmas = position_covariances(solution, k)?;
-        Ok(PlateRecord {
+        let sigmas = &gauge.positions[k];
+        PlateRecord {
             name: plate_name(problem, context, k),
             kind: p.kind,
             columns: p.columns,
@@ -232,18 +235,18 @@ fn plates(solution: &Solution, context: &Context) -> Result<Vec<PlateRecord>> {
             correction_m: shape.corrections.iter().map(|c| (*c).into()).collect(),
             position_m: (0..p.markers.len()).map(|m| shape.position(m).into()).collect(),
             sigma_m: sigmas.iter().map(|c| [0, 1, 2].map(|d| c[(d, d)].max(0.0).sqrt())).collect(),
-        })
+            relative_scale: gauge.scales[k].map(Into::into),
+            relative_scale_of_poses: solution.free_poses.scales[k].map(Into::into),
+        }
     };
     problem.plates.iter().enumerate().map(plate).collect()
 }
 
-fn images(solution: &Solution, context: &Context) -> Result<Vec<ImageRecord>> {
+fn images(solution: &Solution, context: &Context) -> Vec<ImageRecord> {
     let problem = &solution.problem;
     let names = ImageNames::new(problem, context);
     let poses = poses(solution);
-    let rigid = free_rigid_covariances(solution)?;
     let image = |(k, i): (usize, &Image)| {
-        let free = solution.free_poses.poses[k].as_ref().zip(rigid[i.plate].as_ref());
         let joint_noise = match (&solution.state.slack[k], &i.rejected, &i.stop) {
             (Slack::Joints(dq), None, Some(_)) => Some(dq[..solution.state.robot.chain.readings.len()].to_vec()),
             _ => None,
@@ -261,9 +264,10 @@ fn images(solution: &Solution, context: &Context) -> Result<Vec<ImageRecord>> {
             approach: i.stop.as_ref().and_then(|s| s.approach.clone()),
             joint_noise,
             camera_from_plate: poses[k].as_ref().map(Into::into),
-            free_pose: free.map(|(free, rigid)| {
-                let (pose, covariance) = plate_from_camera(free, rigid);
-                FreePoseRecord { plate_from_camera: (&pose).into(), covariance: flat(&covariance), rms_px: free.rms_px }
+            free_pose: solution.free_poses.poses[k].as_ref().map(|free| FreePoseRecord {
+                plate_from_camera: (&free.in_frame.plate_from_camera).into(),
+                covariance: flat(&free.in_frame.covariance),
+                rms_px: free.rms_px,
             }),
             rms_px: rms_px(solution, k),
             held_out_mm: solution.accuracy.per_image_mm.get(k).copied().flatten(),
@@ -271,7 +275,7 @@ fn images(solution: &Solution, context: &Context) -> Result<Vec<ImageRecord>> {
             observations,
         }
     };
-    Ok(problem.images.iter().enumerate().map(image).collect())
+    problem.images.iter().enumerate().map(image).collect()
 }
 
 /// RMS of the lengths of the residuals of an image in use, px.

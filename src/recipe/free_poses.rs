@@ -3,16 +3,16 @@
 use nalgebra::{Matrix6, Vector2};
 
 use super::focus::find_focus_change;
-use super::plate_size::hold_scale_bars;
+use super::plate_size::{hold_scale_bars, size_by_bar};
 use super::solution::StartVerdict;
 use crate::error::{Error, Result};
-use crate::geom::Pose;
+use crate::geom::{Pose, adjoint};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
 use crate::problem::{Problem, Slack, State, Weighting};
 use crate::solve::{
-    ComponentOptions, Covariance, Linearised, Settings, Status, covariance, estimate_components, reject_observations,
-    solve,
+    ComponentOptions, Covariance, Linearised, PlateScale, Settings, Similarity, Status, covariance,
+    estimate_components, frames, in_frame, linearise_all, reject_observations, solve,
 };
 
 /// Stand-alone pose of one image.
@@ -20,10 +20,22 @@ use crate::solve::{
 pub struct FreePose {
     /// `camera_from_plate`.
     pub camera_from_plate: Pose,
-    /// Covariance of its body twist [rho, phi], m and rad.
+    /// Covariance of its body twist [rho, phi], m and rad, with the tolerances of the markers.
     pub covariance: Matrix6<f64>,
+    /// The pose in the plate frame that the nominal markers define, with the scale of [`FreePoses::scales`]; the sigma of the scale is not
+    /// in its covariance.
+    pub in_frame: PlacedCamera,
     /// RMS of the lengths of its residuals, px.
     pub rms_px: f64,
+}
+
+/// A camera in the frame of a plate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlacedCamera {
+    /// The pose.
+    pub plate_from_camera: Pose,
+    /// Covariance of its body twist [rho, phi], m and rad.
+    pub covariance: Matrix6<f64>,
 }
 
 /// The adjusted free poses.
@@ -37,6 +49,9 @@ pub struct FreePoses {
     pub observations: usize,
     /// Cameras and plates of this adjustment.
     pub state: State,
+    /// Scale of every plate, in which the poses in its frame are given: as it was made, or as it was measured (`[scale]`). None for a
+    /// plate that no image shows.
+    pub scales: Vec<Option<PlateScale>>,
     /// Pixel factors found.
     pub pixel_factor: Vec<f64>,
     /// A change of focus or zoom within the images of a camera, in words.
@@ -304,7 +319,7 @@ fn finish(problem: &mut Problem, start: State) -> Result<FreePoses> {
     let cov =
         covariance(problem, &outcome.state, lin).map_err(|_| undetermined("the normal equations are singular"))?;
     check_focal(problem, &outcome.state, &cov)?;
-    Ok(collect(problem, &outcome.state, lin, &cov))
+    collect(problem, &outcome.state, lin, &cov)
 }
 
 fn undetermined(what: &str) -> Error {
@@ -329,23 +344,65 @@ fn check_focal(problem: &Problem, state: &State, cov: &Covariance) -> Result<()>
     Ok(())
 }
 
-fn collect(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance) -> FreePoses {
+fn collect(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance) -> Result<FreePoses> {
+    let (placed, scales) = placed_cameras(problem, state, cov)?;
     let mut poses = vec![None; problem.images.len()];
-    for (k, &i) in lin.images.iter().enumerate() {
+    for ((k, &i), in_frame) in lin.images.iter().enumerate().zip(placed) {
         let squares: f64 = lin.terms[k].residuals.iter().map(|r| r.duv.norm_squared()).sum();
         let c = cov.slack(k, 6);
         poses[i] = Some(FreePose {
             camera_from_plate: lin.chains[k].pose,
             covariance: Matrix6::from_column_slice(c.as_slice()),
+            in_frame,
             rms_px: (squares / lin.terms[k].residuals.len().max(1) as f64).sqrt(),
         });
     }
-    FreePoses {
+    Ok(FreePoses {
         poses,
         rms_px: rms_px(lin),
         observations: lin.terms.iter().map(|t| t.residuals.len()).sum(),
         state: state.clone(),
+        scales,
         pixel_factor: problem.noise.pixel_factor.clone(),
         focus_change: find_focus_change(problem, state, lin),
+    })
+}
+
+/// The cameras of the images in use in the frames of their plates, and the scales of the plates.
+fn placed_cameras(
+    problem: &Problem,
+    state: &State,
+    cov: &Covariance,
+) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale>>)> {
+    let mut moved = state.clone();
+    let mut scales = vec![None; problem.plates.len()];
+    for frame in frames(problem, state)? {
+        for &plate in &frame.plates {
+            let similarity = Similarity::of(problem, &frame.seen, plate, &state.plates[plate])?;
+            let as_made = similarity.shape(&state.plates[plate], 1.0);
+            let (size, sigma) = size_by_bar(&problem.plates[plate], &as_made, &frame.seen, plate)
+                .unwrap_or_else(|| (1.0, frame.scale_sigma_of_priors(problem, plate)));
+            moved.plates[plate] = similarity.shape(&state.plates[plate], size);
+            for (i, _) in problem.used().filter(|(_, image)| image.plate == plate) {
+                if let Slack::Pose(pose) = &mut moved.slack[i] {
+                    *pose = similarity.pose(pose, size);
+                }
+            }
+            scales[plate] = Some(PlateScale { relative: size - 1.0, sigma });
+        }
+    }
+    let lin = linearise_all(problem, &moved).ok_or_else(|| undetermined("a marker lies behind its camera"))?;
+    let covariance = in_frame(problem, &moved, &lin, cov)?;
+    let placed = lin.chains.iter().enumerate().map(|(k, c)| PlacedCamera::of(&c.pose, &covariance.pose(k)));
+    Ok((placed.collect(), scales))
+}
+
+impl PlacedCamera {
+    /// From `camera_from_plate`: the inverse of `T Exp(x)` is `T^-1 Exp(-Ad_T x)`.
+    fn of(camera_from_plate: &Pose, covariance: &Matrix6<f64>) -> Self {
+        let ad = adjoint(camera_from_plate);
+        let covariance = ad * covariance * ad.transpose();
+        let covariance = 0.5 * (covariance + covariance.transpose());
+        Self { plate_from_camera: camera_from_plate.inverse(), covariance }
     }
 }

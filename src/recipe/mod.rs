@@ -42,7 +42,7 @@ pub use forecast::{
     CurvePoint, Forecast, Gain, JointRange, ParameterForecast, check_wish, exact_covariance, flange_m, forecast,
     image_name,
 };
-pub use free_poses::{FreePose, FreePoses, adjust_free_poses};
+pub use free_poses::{FreePose, FreePoses, PlacedCamera, adjust_free_poses};
 pub use joint::{JointNoise, MarkerTolerance, Options, RobotModel};
 pub use lens_choice::{LensEvidence, choose_lens, depths_m};
 pub use look::{SeenImage, look, look_at, pictures, require_some};

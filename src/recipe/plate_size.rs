@@ -43,6 +43,21 @@ fn bar_scale(plate: &Plate, shape: &PlateShape, seen: &BTreeSet<usize>) -> Optio
     (nominal > 0.0).then(|| ((bar.distance_m - shaped) / nominal, variance.sqrt() / nominal))
 }
 
+/// Size of a plate by its measured distance, over that of a shape, with its standard deviation.
+pub(super) fn size_by_bar(
+    plate: &Plate,
+    shape: &PlateShape,
+    seen: &BTreeSet<(usize, usize)>,
+    index: usize,
+) -> Option<(f64, f64)> {
+    let bar = plate.scale?;
+    let [a, b] = [plate.index_of(bar.from)?, plate.index_of(bar.to)?];
+    let length = (shape.position(a) - shape.position(b)).norm();
+    let unseen = [a, b].into_iter().filter(|m| !seen.contains(&(index, *m)));
+    let variance = bar.sigma_m.powi(2) + unseen.map(|m| plate.markers[m].sigma_m.powi(2)).sum::<f64>();
+    (length > 0.0).then(|| (bar.distance_m / length, variance.sqrt() / length))
+}
+
 fn seen_markers(problem: &Problem, plate: usize) -> BTreeSet<usize> {
     let images = problem.used().map(|(_, image)| image).filter(|image| image.plate == plate);
     images.flat_map(|image| image.used().map(|o| o.marker)).collect()

@@ -130,9 +130,7 @@ impl Worth {
 fn enlarge(covariance: &mut Covariance, model: &[f64], clusters: &[f64], theta: usize) {
     for k in 0..theta {
         if model[k] > 0.0 && clusters[k] > model[k] {
-            let factor = clusters[k] / model[k];
-            covariance.reduced.row_mut(k).scale_mut(factor);
-            covariance.reduced.column_mut(k).scale_mut(factor);
+            covariance.enlarge(k, clusters[k] / model[k]);
         }
     }
 }

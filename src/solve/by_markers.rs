@@ -10,7 +10,7 @@ use super::blocks::{
     times_right,
 };
 use super::system::{Carried, Linearised};
-use crate::linalg::{mirror_upper, product, subtract_gram};
+use crate::linalg::{mirror_upper, orthonormal, product, subtract_gram};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Problem, State, Step};
 
@@ -22,8 +22,10 @@ pub(super) struct MarkersEliminated {
     pub slack_start: Vec<usize>,
     /// `F^-1` of each that was seen.
     inverse_factors: Vec<Matrix3<f64>>,
-    /// `Y`, unknowns that stay x 3 markers.
+    /// `Y`, unknowns that stay x 3 markers; without what is held.
     y: DMatrix<f64>,
+    /// Orthonormal combinations of the whitened markers that are held, 3 markers x held.
+    held: DMatrix<f64>,
     /// `F^-1` times the right-hand side.
     rhs: DVector<f64>,
 }
@@ -57,7 +59,29 @@ impl MarkersEliminated {
         subtract_gram(&mut a, &y);
         mirror_upper(&mut a);
         let rhs = DVector::zeros(3 * seen.order.len());
-        (a, Self { seen, slack_start, inverse_factors, y, rhs })
+        let held = DMatrix::zeros(rhs.len(), 0);
+        (a, Self { seen, slack_start, inverse_factors, y, held, rhs })
+    }
+
+    /// Holds combinations of markers (3 markers x held): `Y` becomes `Y (1 - O O')` with the orthonormal basis `O` of `F^-1` times the
+    /// combinations. Returns `Y O`, by whose Gram product the reduced information grows.
+    pub fn hold(&mut self, combinations: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut whitened = combinations.clone();
+        for (at, inverse) in self.inverse_factors.iter().enumerate() {
+            let own = inverse * whitened.rows(3 * at, 3);
+            whitened.rows_mut(3 * at, 3).copy_from(&own);
+        }
+        self.held = orthonormal(whitened);
+        let taken = product(&self.y, &self.held);
+        self.y -= product(&taken, &self.held.transpose());
+        taken
+    }
+
+    /// Takes the rows from `from` on times `by` to those from `to` on: unknowns `to` move those `from` along.
+    pub fn carry(&mut self, from: usize, to: usize, by: &DMatrix<f64>) {
+        let carried = by.tr_mul(&self.y.rows(from, by.nrows()));
+        let mut rows = self.y.rows_mut(to, by.ncols());
+        rows += carried;
     }
 
     /// Takes over the right-hand side of the markers at a linearisation; returns the reduced one, without the priors of the dense columns.
@@ -106,7 +130,7 @@ impl MarkersEliminated {
         for (p, plate) in self.seen.number.iter().enumerate() {
             for (m, at) in plate.iter().enumerate().filter_map(|(m, at)| at.map(|at| (m, at))) {
                 times_right(&mut d, 3 * at, &self.inverse_factors[at]);
-                if let Some((start, modes)) = carried.map(|c| c(p, m)) {
+                for (start, modes) in carried.into_iter().flat_map(|c| c(p, m)) {
                     let mut own = d.view_mut((start, 3 * at), (MODES, 3));
                     own -= modes.transpose();
                 }
@@ -115,8 +139,9 @@ impl MarkersEliminated {
         let cd = product(reduced, &d);
         let of = |at: usize| {
             let c = d.columns(3 * at, 3).tr_mul(&cd.columns(3 * at, 3));
-            let f = self.inverse_factors[at];
-            f.transpose() * f + Matrix3::from_column_slice(c.as_slice())
+            let (f, held) = (self.inverse_factors[at], self.held.rows(3 * at, 3));
+            let left = Matrix3::identity() - Matrix3::from_column_slice((held * held.transpose()).as_slice());
+            f.transpose() * left * f + Matrix3::from_column_slice(c.as_slice())
         };
         self.seen.number.iter().map(|plate| plate.iter().map(|at| at.map(of)).collect()).collect()
     }

@@ -3,16 +3,19 @@
 //! With the information `H = F F'` of the slack of an image (pixels through `L`, and the prior) and its coupling `B` with what stays,
 //! `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 use super::blocks::{
     DenseCoupling, PoseRows, SeenMarkers, dense_gradient, free_columns, slack_gradient, slack_information,
     slack_with_markers,
 };
 use super::system::{Carried, Linearised};
-use crate::linalg::{mirror_upper, product, subtract_gram};
+use crate::linalg::{gram, mirror_upper, orthonormal, product, subtract_gram};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Equations, Problem, State, Step};
+
+/// What moves a marker with the modes of a plate.
+type Modes = SMatrix<f64, 3, MODES>;
 
 /// Images whose couplings form one Gram product.
 const IMAGES_A_PRODUCT: usize = 48;
@@ -91,6 +94,37 @@ impl SlackEliminated {
         reduced
     }
 
+    /// Holds combinations of markers (3 markers x held) in the information of what stays; returns their orthonormal basis.
+    pub fn hold(&self, combinations: DMatrix<f64>, information: &mut DMatrix<f64>) -> DMatrix<f64> {
+        let held = orthonormal(combinations);
+        let stiff = information.diagonal().rows_range(self.dense..).mean();
+        self.project(&held, information);
+        let mut markers = information.view_range_mut(self.dense.., self.dense..);
+        markers += gram(&held) * stiff;
+        held
+    }
+
+    /// `Q m Q` with what takes the orthonormal combinations of markers out of the unknowns.
+    pub fn project(&self, held: &DMatrix<f64>, m: &mut DMatrix<f64>) {
+        let taken = product(held, &held.tr_mul(&m.rows_range(self.dense..)));
+        let mut rows = m.rows_range_mut(self.dense..);
+        rows -= taken;
+        let taken = product(&(m.columns_range(self.dense..) * held), &held.transpose());
+        let mut columns = m.columns_range_mut(self.dense..);
+        columns -= taken;
+    }
+
+    /// Takes what moves the slack of the k-th image in use along with the unknowns from `to` on out of it.
+    pub fn carry(&mut self, k: usize, to: usize, by: &DMatrix<f64>) {
+        let block = &mut self.blocks[k];
+        let Some(factor) = block.inverse_factor.clone().try_inverse() else { return };
+        let carried = by.tr_mul(&factor);
+        for (at, row) in block.rows.iter().enumerate().filter(|(_, r)| (to..to + by.ncols()).contains(r)) {
+            let mut own = block.y.row_mut(at);
+            own += carried.row(row - to);
+        }
+    }
+
     /// `b' H^-1 b` of the right-hand sides of the slack.
     pub fn squares(&self) -> f64 {
         self.blocks.iter().map(|b| b.rhs.norm_squared()).sum()
@@ -127,10 +161,13 @@ impl SlackEliminated {
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         let of = |p: usize, m: usize, start: usize| {
             let own = reduced.fixed_view::<3, 3>(start, start).into_owned();
-            let Some((modes_start, modes)) = carried.map(|c| c(p, m)) else { return own };
-            let with_modes = reduced.fixed_view::<3, MODES>(start, modes_start) * modes.transpose();
-            let of_modes = modes * reduced.fixed_view::<MODES, MODES>(modes_start, modes_start) * modes.transpose();
-            own + with_modes + with_modes.transpose() + of_modes
+            let carried: Vec<_> = carried.into_iter().flat_map(|c| c(p, m)).collect();
+            let of_two = |(i, a): &(usize, Modes)| -> Matrix3<f64> {
+                let with = |(k, b): &(usize, Modes)| a * reduced.fixed_view::<MODES, MODES>(*i, *k) * b.transpose();
+                let with_marker = reduced.fixed_view::<3, MODES>(start, *i) * a.transpose();
+                with_marker + with_marker.transpose() + carried.iter().map(with).sum::<Matrix3<f64>>()
+            };
+            own + carried.iter().map(of_two).sum::<Matrix3<f64>>()
         };
         let plate = |(p, number): (usize, &Vec<Option<usize>>)| {
             number.iter().enumerate().map(|(m, at)| at.map(|at| of(p, m, self.dense + 3 * at))).collect()

@@ -15,6 +15,10 @@ pub struct Covariance {
     pub system: System,
     /// Natural logarithm of the determinant of the reduced information.
     pub log_determinant: f64,
+    /// What was added to the dense columns.
+    pub(super) added: Option<DMatrix<f64>>,
+    /// Factors by which the sigmas of dense columns were enlarged after that.
+    pub(super) enlarged: Vec<(usize, f64)>,
 }
 
 /// Covariance at a solution; an error where the information is not positive definite.
@@ -32,12 +36,16 @@ pub fn covariance_by(
     let system = System::with(which, problem, state, lin, 0.0);
     let factor = SymmetricFactor::new(&system.information)?;
     let mut reduced = factor.inverse();
-    for (i, c) in problem.layout.columns.iter().enumerate() {
-        if !c.free {
-            reduced[(i, i)] = 0.0;
-        }
+    fixed_are_known(problem, &mut reduced);
+    let log_determinant = factor.log_determinant();
+    Ok(Covariance { reduced, log_determinant, system, added: None, enlarged: Vec::new() })
+}
+
+/// Fixed columns have no variance.
+pub(super) fn fixed_are_known(problem: &Problem, reduced: &mut DMatrix<f64>) {
+    for (i, _) in problem.layout.columns.iter().enumerate().filter(|(_, c)| !c.free) {
+        reduced[(i, i)] = 0.0;
     }
-    Ok(Covariance { reduced, log_determinant: factor.log_determinant(), system })
 }
 
 impl Covariance {
@@ -50,6 +58,17 @@ impl Covariance {
     pub fn add(&mut self, added: &DMatrix<f64>) {
         let mut dense = self.reduced.view_mut((0, 0), added.shape());
         dense += added;
+        match &mut self.added {
+            Some(all) => *all += added,
+            None => self.added = Some(added.clone()),
+        }
+    }
+
+    /// Enlarges the sigma of a dense column by a factor; correlations stay.
+    pub fn enlarge(&mut self, column: usize, factor: f64) {
+        self.reduced.row_mut(column).scale_mut(factor);
+        self.reduced.column_mut(column).scale_mut(factor);
+        self.enlarged.push((column, factor));
     }
 
     /// 6x6 block of six dense columns from `start`.

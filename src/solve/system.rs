@@ -92,12 +92,12 @@ impl Elimination {
     }
 }
 
-/// What moves a marker (plate, index) with the dense columns beside its correction: first column, 3 x modes.
-pub(super) type Carried<'a> = dyn Fn(usize, usize) -> (usize, SMatrix<f64, 3, MODES>) + Sync + 'a;
+/// What moves a marker (plate, index) with the dense columns beside its correction: first columns, 3 x modes.
+pub(super) type Carried<'a> = dyn Fn(usize, usize) -> Vec<(usize, SMatrix<f64, 3, MODES>)> + Sync + 'a;
 
 /// What is needed to get the eliminated family back.
 #[derive(Debug, Clone)]
-enum Eliminated {
+pub(super) enum Eliminated {
     Markers(MarkersEliminated),
     Slack(SlackEliminated),
 }
@@ -112,7 +112,7 @@ pub struct System {
     /// First unknown of the slack of each image in use; empty where the slack was eliminated.
     pub slack_start: Vec<usize>,
     touched: Vec<bool>,
-    eliminated: Eliminated,
+    pub(super) eliminated: Eliminated,
 }
 
 impl System {
@@ -241,12 +241,12 @@ impl System {
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         let carried = |plate: usize, marker: usize| {
             let shape = &state.plates[plate];
-            (problem.layout.shapes[plate].start, shape.modes_at(marker))
+            vec![(problem.layout.shapes[plate].start, shape.modes_at(marker))]
         };
         self.marker_covariances_with(reduced, Some(&carried))
     }
 
-    fn marker_covariances_with(
+    pub(super) fn marker_covariances_with(
         &self,
         reduced: &DMatrix<f64>,
         carried: Option<&Carried>,

@@ -1,0 +1,239 @@
+//! Covariances in the plate frame that the nominal markers define ([`super::frame`]).
+//!
+//! Nothing is subtracted from a covariance with priors, of which so little would remain that rounding decides. Instead the frame is held in
+//! the normal equations. (1) `N' P c = 0` for the corrections: of markers with the information `V = F F'`, eliminated as `Y = B F^-T`,
+//! the part `Y O` is put back, `O` the orthonormal basis of `F^-1 P N`; the information grows by `Y O O' Y'`. Where markers stay, the
+//! combinations are projected out. Images do not see this motion, so to hold it is to transform to it. They hardly see the scale, and a robot does: what the
+//! tolerances leave open of it becomes a part of the mode that is scale. (2) Poses `T = T' + A s` follow what the modes `s` move
+//! of the frame, a congruence of the information. What is left is known from images, as positive definite as they make it.
+
+use nalgebra::{DMatrix, Matrix3, Matrix6};
+
+use super::blocks::SeenMarkers;
+use super::covariance::{Covariance, fixed_are_known};
+use super::frame::{Frame, frames};
+use super::system::{Eliminated, Elimination, Linearised, System};
+use crate::error::{Error, Result};
+use crate::linalg::SymmetricFactor;
+use crate::model::plate_modes::MODES;
+use crate::problem::{Problem, Slack, State};
+
+/// Index of the mode that is scale.
+const SCALE: usize = 0;
+
+/// Covariance with the plates held in their frames.
+#[derive(Debug, Clone)]
+pub struct InFrame {
+    /// The frames, of all plates that were seen.
+    pub frames: Vec<Frame>,
+    covariance: Covariance,
+}
+
+/// Six unknowns of a pose that follow the modes of plates.
+struct Following {
+    /// First unknown; of the slack of an image in use where it was eliminated.
+    pose: Place,
+    /// First column of the modes.
+    modes: usize,
+    /// `A`, six x modes.
+    by: DMatrix<f64>,
+}
+
+#[derive(Clone, Copy)]
+enum Place {
+    Reduced(usize),
+    Slack(usize),
+}
+
+/// Covariance with the plates in their frames, at the linearisation of `stated`, with what was added to that.
+///
+/// # Errors
+/// Markers that define no frame; normal equations that are singular.
+pub fn in_frame(problem: &Problem, state: &State, lin: &Linearised, stated: &Covariance) -> Result<InFrame> {
+    in_frame_by(Elimination::cheaper(lin, problem), problem, state, lin, stated)
+}
+
+/// As [`in_frame`] by a given elimination.
+///
+/// # Errors
+/// As [`in_frame`].
+pub fn in_frame_by(
+    which: Elimination,
+    problem: &Problem,
+    state: &State,
+    lin: &Linearised,
+    stated: &Covariance,
+) -> Result<InFrame> {
+    let frames = frames(problem, state)?;
+    let mut system = System::with(which, problem, state, lin, 0.0);
+    let following = following(problem, state, lin, &system, &frames);
+    widen_scales(problem, &frames, &mut system);
+    let combinations = combinations(problem, lin, &frames);
+    let held = hold(&mut system, combinations, &following);
+    let singular =
+        |_| Error::unsolved("plate", "the normal equations are singular", "take images of more of the plate");
+    let factor = SymmetricFactor::new(&system.information).map_err(singular)?;
+    let mut reduced = factor.inverse();
+    if let (Eliminated::Slack(e), Some(held)) = (&system.eliminated, &held) {
+        e.project(held, &mut reduced);
+    }
+    fixed_are_known(problem, &mut reduced);
+    let log_determinant = factor.log_determinant();
+    let mut covariance = Covariance { reduced, system, log_determinant, added: None, enlarged: Vec::new() };
+    if let Some(added) = &stated.added {
+        covariance.add(&followed(added.clone(), &following));
+    }
+    stated.enlarged.iter().for_each(|&(column, factor)| covariance.enlarge(column, factor));
+    Ok(InFrame { frames, covariance })
+}
+
+/// Poses that follow, of placements and of images without a tie to the robot.
+fn following(problem: &Problem, state: &State, lin: &Linearised, system: &System, frames: &[Frame]) -> Vec<Following> {
+    let layout = &problem.layout;
+    let mut all = Vec::new();
+    let mut placements_done = vec![false; problem.placements.len()];
+    for (k, &i) in lin.images.iter().enumerate() {
+        let image = &problem.images[i];
+        let Some(frame) = frames.iter().find(|f| f.plates.contains(&image.plate)) else { continue };
+        let (pose, by) = if let Slack::Pose(pose) = &state.slack[i] {
+            let place = system.slack_start.get(k).map_or(Place::Slack(k), |s| Place::Reduced(*s));
+            (place, frame.pose_by_modes(image.plate, pose))
+        } else {
+            let start = layout.placements[image.placement].start;
+            let moves = (start..start + 6).all(|c| layout.columns[c].free && system.touched(c));
+            if std::mem::replace(&mut placements_done[image.placement], true) || !moves {
+                continue;
+            }
+            (Place::Reduced(start), frame.placement_by_modes())
+        };
+        for (p, &plate) in frame.plates.iter().enumerate() {
+            let modes = layout.shapes[plate].start;
+            let mut by = by.columns(MODES * p, MODES).into_owned();
+            let fixed = (0..MODES).filter(|m| !layout.columns[modes + m].free);
+            fixed.for_each(|m| by.column_mut(m).fill(0.0));
+            all.push(Following { pose, modes, by });
+        }
+    }
+    all
+}
+
+/// What the tolerances of markers leave open of the scale of a plate goes to its mode.
+fn widen_scales(problem: &Problem, frames: &[Frame], system: &mut System) {
+    for (frame, &plate) in frames.iter().flat_map(|f| f.plates.iter().map(move |p| (f, p))) {
+        let at = problem.layout.shapes[plate].start + SCALE;
+        let column = &problem.layout.columns[at];
+        if column.free {
+            let prior = column.prior_sigma.powi(2);
+            system.information[(at, at)] += 1.0 / (prior + frame.scale_variance(plate)) - 1.0 / prior;
+        }
+    }
+}
+
+/// The combinations of corrections that the frames hold, 3 markers x motions.
+fn combinations(problem: &Problem, lin: &Linearised, frames: &[Frame]) -> DMatrix<f64> {
+    let seen = SeenMarkers::of(problem, lin);
+    let motions = frames.iter().map(|f| f.by_modes.nrows()).sum();
+    let mut combinations = DMatrix::zeros(3 * seen.order.len(), motions);
+    let mut first = 0;
+    for frame in frames {
+        for (at, &(plate, marker)) in seen.order.iter().enumerate().filter(|(_, m)| frame.seen.contains(m)) {
+            let own = frame.held(problem, plate, marker);
+            combinations.view_mut((3 * at, first), own.shape()).copy_from(&own);
+        }
+        first += frame.by_modes.nrows();
+    }
+    combinations
+}
+
+/// Holds the combinations and lets poses follow; returns the orthonormal combinations where markers stay in the system.
+fn hold(system: &mut System, combinations: DMatrix<f64>, following: &[Following]) -> Option<DMatrix<f64>> {
+    let held = match &mut system.eliminated {
+        Eliminated::Markers(e) => {
+            let taken = e.hold(&combinations);
+            system.information += &taken * taken.transpose();
+            None
+        }
+        Eliminated::Slack(e) => Some(e.hold(combinations, &mut system.information)),
+    };
+    for Following { pose, modes, by } in following {
+        match (pose, &mut system.eliminated) {
+            (Place::Reduced(pose), eliminated) => {
+                let a = &mut system.information;
+                let columns = a.columns(*pose, by.nrows()) * by;
+                let mut into = a.columns_mut(*modes, by.ncols());
+                into += columns;
+                let rows = by.tr_mul(&a.rows(*pose, by.nrows()));
+                let mut into = a.rows_mut(*modes, by.ncols());
+                into += rows;
+                if let Eliminated::Markers(e) = eliminated {
+                    e.carry(*pose, *modes, by);
+                }
+            }
+            (Place::Slack(k), Eliminated::Slack(e)) => e.carry(*k, *modes, by),
+            (Place::Slack(_), Eliminated::Markers(_)) => {}
+        }
+    }
+    held
+}
+
+/// A covariance of the dense columns after poses have followed.
+fn followed(mut added: DMatrix<f64>, following: &[Following]) -> DMatrix<f64> {
+    for Following { pose, modes, by } in following {
+        let Place::Reduced(pose) = *pose else { continue };
+        if pose + by.nrows() > added.nrows() {
+            continue;
+        }
+        let rows = by * added.rows(*modes, by.ncols());
+        let mut from = added.rows_mut(pose, by.nrows());
+        from -= rows;
+        let columns = added.columns(*modes, by.ncols()) * by.transpose();
+        let mut from = added.columns_mut(pose, by.nrows());
+        from -= columns;
+    }
+    added
+}
+
+impl InFrame {
+    /// The frame of a plate; none where no image shows it.
+    pub fn frame(&self, plate: usize) -> Option<&Frame> {
+        self.frames.iter().find(|f| f.plates.contains(&plate))
+    }
+
+    /// Covariance of a placement.
+    pub fn placement(&self, start: usize) -> Matrix6<f64> {
+        self.covariance.block(start)
+    }
+
+    /// Covariance of the free camera pose of the k-th image in use.
+    pub fn pose(&self, k: usize) -> Matrix6<f64> {
+        let c = Matrix6::from_column_slice(self.covariance.slack(k, 6).as_slice());
+        0.5 * (c + c.transpose())
+    }
+
+    /// Sigma of the scale of a plate.
+    pub fn scale_sigma(&self, problem: &Problem, plate: usize) -> Option<f64> {
+        self.frame(plate).map(|f| f.scale_sigma(problem, &self.covariance.reduced, plate))
+    }
+
+    /// Covariance of the position (modes and correction, without the scale of the plate) of every marker, per plate. A marker that no
+    /// image shows keeps its tolerance; a plate that no image shows its modes, too.
+    pub fn positions(&self, problem: &Problem, state: &State) -> Vec<Vec<Matrix3<f64>>> {
+        let carried = |plate: usize, marker: usize| match self.frame(plate) {
+            Some(frame) => frame.moved_by_modes(problem, state, (plate, marker)),
+            None => vec![(problem.layout.shapes[plate].start, state.plates[plate].modes_at(marker))],
+        };
+        let reduced = &self.covariance.reduced;
+        let unseen = |plate: usize, marker: usize| -> Matrix3<f64> {
+            let all = carried(plate, marker);
+            let of = |(i, a): &(usize, _)| -> Matrix3<f64> {
+                all.iter().map(|(k, b)| a * reduced.fixed_view::<MODES, MODES>(*i, *k) * b.transpose()).sum()
+            };
+            all.iter().map(of).sum::<Matrix3<f64>>() + Matrix3::identity() / problem.marker_information(plate, marker)
+        };
+        let seen = self.covariance.system.marker_covariances_with(reduced, Some(&carried));
+        let plate = |(p, markers): (usize, Vec<Option<Matrix3<f64>>>)| {
+            markers.into_iter().enumerate().map(|(m, c)| c.unwrap_or_else(|| unseen(p, m))).collect()
+        };
+        seen.into_iter().enumerate().map(plate).collect()
+    }
+}
