@@ -1,29 +1,44 @@
-//! Covariances of plate, placement and stand-alone poses against a solve with explicit inner constraints.
+//! Covariances of plate, placement and stand-alone poses in the frame of the nominal markers: against the whole covariance brought there by the
+//! formula, and against the truth of simulated worlds.
 
 mod outputs_support;
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, Matrix6};
-use outputs_support::{context, robot, solved};
+use nalgebra::{DMatrix, Matrix6, Vector3};
+use outputs_support::truth_frame::{Alignment, Judged, judged, least_eigenvalue, pose_row, result, template, world};
+use outputs_support::{context, robot, series};
+use rayon::prelude::*;
 use robotcal::geom::{Pose, adjoint, skew};
 use robotcal::model::camera::MAX_PARAMETERS;
 use robotcal::model::plate_modes::{MODES, basis};
 use robotcal::output::files;
+use robotcal::output::restore::measured_series;
+use robotcal::output::solution_json;
 use robotcal::problem::{Problem, Slack, State};
-use robotcal::recipe::{RobotModel, Solution};
+use robotcal::recipe::{JointNoise, Options, RobotModel, Solution, identify};
 use robotcal::series::CameraMount;
 use robotcal::solve::{Linearised, linearise_all};
 
-/// Covariance of all unknowns (dense columns, slack of each image, markers) under `N' P m = 0` on the marker corrections, from the
-/// bordered normal equations: nothing is eliminated and nothing subtracted.
-struct Bordered {
+/// Covariance of all unknowns (dense columns, slack of each image, markers) with the priors: nothing is eliminated. It is brought into the
+/// frame of the nominal markers by the formula: `x - G g` with `g = (N' P G)^-1 N' P (x - n)`, poses following.
+struct Whole {
     covariance: DMatrix<f64>,
     slack_start: Vec<usize>,
     marker_start: usize,
+    /// `g` by all unknowns.
+    off_frame: DMatrix<f64>,
 }
 
-impl Bordered {
+/// `[I, -skew(x), x]`.
+fn motions(x: &Vector3<f64>) -> DMatrix<f64> {
+    let mut n = DMatrix::<f64>::identity(3, 7);
+    n.view_mut((0, 3), (3, 3)).copy_from(&-skew(x));
+    n.view_mut((0, 6), (3, 1)).copy_from(x);
+    n
+}
+
+impl Whole {
     fn new(problem: &Problem, state: &State, lin: &Linearised) -> Self {
         let layout = &problem.layout;
         let mut slack_start = Vec::new();
@@ -34,13 +49,13 @@ impl Bordered {
         }
         let (marker_start, markers) = (n, &problem.plates[0].markers);
         n += 3 * markers.len();
-        let mut a = DMatrix::<f64>::zeros(n + 6, n + 6);
+        let mut a = DMatrix::<f64>::zeros(n, n);
         for (k, terms) in lin.terms.iter().enumerate() {
             // Jacobian of (pose, intrinsics) by all unknowns, then of each marker.
             let chain = &lin.chains[k];
             let camera = &layout.cameras[0];
             let e = MAX_PARAMETERS + MODES;
-            let mut j = DMatrix::<f64>::zeros(6 + e, n + 6);
+            let mut j = DMatrix::<f64>::zeros(6 + e, n);
             j.view_mut((0, 0), (6, layout.theta_len())).copy_from(&chain.d_theta);
             j.view_mut((0, slack_start[k]), chain.d_slack.shape()).copy_from(&chain.d_slack);
             (0..camera.len()).for_each(|c| j[(6 + c, camera.start + c)] = 1.0);
@@ -80,52 +95,78 @@ impl Bordered {
                 a[(c, c)] = 1.0;
             }
         }
+        let (mut normal, mut pull) = (DMatrix::<f64>::zeros(7, 7), DMatrix::<f64>::zeros(7, n));
         for (m, marker) in markers.iter().enumerate() {
             let information = marker.sigma_m.powi(-2);
             let at = marker_start + 3 * m;
-            let x = skew(&marker.position_m);
-            for d in 0..3 {
-                a[(at + d, at + d)] += information;
-                a[(at + d, n + d)] += information;
-                a[(n + d, at + d)] += information;
-                for r in 0..3 {
-                    a[(at + d, n + 3 + r)] -= information * x[(d, r)];
-                    a[(n + 3 + r, at + d)] -= information * x[(d, r)];
-                }
-            }
+            (0..3).for_each(|d| a[(at + d, at + d)] += information);
+            let constraint = motions(&marker.position_m).transpose() * information;
+            normal += &constraint * motions(&state.plates[0].position(m));
+            pull += &constraint * position(problem, state, marker_start, m, n);
         }
-        let scale: Vec<f64> =
-            (0..n + 6).map(|i| if a[(i, i)] > 0.0 { a[(i, i)].sqrt().recip() } else { 1e-6 }).collect();
-        let scaled = DMatrix::from_fn(n + 6, n + 6, |i, j| a[(i, j)] * scale[i] * scale[j]);
+        let off_frame = normal.lu().solve(&pull).unwrap();
+        let scale: Vec<f64> = (0..n).map(|i| a[(i, i)].sqrt().recip()).collect();
+        let scaled = DMatrix::from_fn(n, n, |i, j| a[(i, j)] * scale[i] * scale[j]);
         let inverse = scaled.lu().try_inverse().expect("regular");
-        let covariance = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
-        Self { covariance, slack_start, marker_start }
+        let mut covariance = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        for (c, _) in layout.columns.iter().enumerate().filter(|(_, c)| !c.free) {
+            covariance[(c, c)] = 0.0;
+        }
+        Self { covariance, slack_start, marker_start, off_frame }
     }
 
-    fn block(&self, start: usize) -> Matrix6<f64> {
-        self.covariance.fixed_view::<6, 6>(start, start).into_owned()
+    fn of(&self, functional: &DMatrix<f64>) -> DMatrix<f64> {
+        functional * &self.covariance * functional.transpose()
+    }
+
+    fn six(&self, start: usize) -> DMatrix<f64> {
+        let mut six = DMatrix::zeros(6, self.covariance.nrows());
+        six.view_mut((0, start), (6, 6)).copy_from(&Matrix6::<f64>::identity());
+        six
+    }
+
+    fn placement(&self, start: usize) -> Matrix6<f64> {
+        let c = self.of(&(self.six(start) + self.off_frame.rows(0, 6)));
+        Matrix6::from_column_slice(c.as_slice())
+    }
+
+    fn camera_pose(&self, k: usize, pose: &Pose) -> Matrix6<f64> {
+        let mut follows = self.six(self.slack_start[k]) + self.off_frame.rows(0, 6);
+        let mut translation = follows.rows_mut(0, 3);
+        translation -= (pose.rotation.transpose() * pose.translation) * self.off_frame.row(6);
+        Matrix6::from_column_slice(self.of(&follows).as_slice())
     }
 
     fn position_sigmas(&self, problem: &Problem, state: &State, marker: usize) -> [f64; 3] {
-        let shape = &state.plates[0];
-        let mut f = DMatrix::<f64>::zeros(3, self.covariance.nrows());
-        f.view_mut((0, problem.layout.shapes[0].start), (3, MODES))
-            .copy_from(&basis(&shape.nominal[marker], shape.half_diagonal_m));
-        (0..3).for_each(|d| f[(d, self.marker_start + 3 * marker + d)] = 1.0);
-        let c = &f * &self.covariance * f.transpose();
+        let place = position(problem, state, self.marker_start, marker, self.covariance.nrows());
+        let c = self.of(&(place - motions(&state.plates[0].position(marker)) * &self.off_frame));
         [0, 1, 2].map(|d| c[(d, d)].sqrt())
+    }
+
+    fn scale_sigma(&self) -> f64 {
+        self.of(&self.off_frame.rows(6, 1).into_owned())[(0, 0)].sqrt()
     }
 }
 
-/// Difference in units of the standard deviations of `whole`, the covariance from which the rigid part was subtracted.
-fn relative(a: &Matrix6<f64>, b: &Matrix6<f64>, whole: &Matrix6<f64>) -> f64 {
-    let scale = whole.diagonal().map(f64::sqrt);
+/// Position of a marker by all unknowns.
+fn position(problem: &Problem, state: &State, marker_start: usize, marker: usize, n: usize) -> DMatrix<f64> {
+    let shape = &state.plates[0];
+    let mut f = DMatrix::<f64>::zeros(3, n);
+    f.view_mut((0, problem.layout.shapes[0].start), (3, MODES))
+        .copy_from(&basis(&shape.nominal[marker], shape.half_diagonal_m));
+    (0..3).for_each(|d| f[(d, marker_start + 3 * marker + d)] = 1.0);
+    f
+}
+
+/// Largest difference in units of the standard deviations of `b`.
+fn relative(a: &Matrix6<f64>, b: &Matrix6<f64>) -> f64 {
+    let scale = b.diagonal().map(f64::sqrt);
     Matrix6::from_fn(|i, j| (a[(i, j)] - b[(i, j)]) / (scale[i] * scale[j])).amax()
 }
 
-/// Estimated markers lie up to 0.2 mm beside the nominal ones 130 mm from the centre, so that the rigid motion of the data and that
-/// of the nominal markers differ by this share.
-const TOLERANCE: f64 = 2e-4 / 0.13;
+/// Markers as estimated and as nominal differ by 0.2 mm on 130 mm: so far priors in the one and in the other frame differ, and by the
+/// square of it covariances.
+const TOLERANCE: f64 = 1e-4;
 
 fn table(files: &BTreeMap<String, Vec<u8>>, name: &str) -> Vec<BTreeMap<String, String>> {
     csv::Reader::from_reader(files[name].as_slice()).deserialize().map(|r| r.unwrap()).collect()
@@ -133,7 +174,7 @@ fn table(files: &BTreeMap<String, Vec<u8>>, name: &str) -> Vec<BTreeMap<String, 
 
 fn check(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
     let (problem, state) = (&solution.problem, &solution.state);
-    let joint = Bordered::new(problem, state, &solution.linearised);
+    let joint = Whole::new(problem, state, &solution.linearised);
     #[derive(serde::Deserialize)]
     struct PoseYaml {
         covariance: Vec<f64>,
@@ -142,26 +183,26 @@ fn check(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
         let yaml: PoseYaml = serde_saphyr::from_str(std::str::from_utf8(&files[name]).unwrap()).unwrap();
         Matrix6::from_row_slice(&yaml.covariance)
     };
-    let (plate_start, camera_start) = (problem.layout.placements[0].start, problem.layout.mountings[0].start);
-    let whole = solution.covariance.block(plate_start);
-    let plate = relative(&read("plate_pose.yaml"), &joint.block(plate_start), &whole);
-    let of_camera = solution.covariance.block(camera_start);
-    let camera = relative(&read("hand_camera.yaml"), &joint.block(camera_start), &of_camera);
-    println!("plate pose {plate:e}, hand-camera {camera:e}, tolerance {TOLERANCE:e}");
-    assert!(plate < TOLERANCE && camera < TOLERANCE);
-    // The rigid part is a visible one: without its subtraction the test fails.
-    let rigid = relative(&whole, &read("plate_pose.yaml"), &whole);
-    assert!(rigid > 2.0 * TOLERANCE, "the rigid part is {rigid:e} of the covariance only");
-    let raw = solution.covariance.positions(problem, state).swap_remove(0);
+    let camera_start = problem.layout.mountings[0].start;
+    let expected = joint.placement(problem.layout.placements[0].start);
+    let plate = relative(&read("plate_pose.yaml"), &expected);
+    let of_camera = Matrix6::from_column_slice(joint.of(&joint.six(camera_start)).as_slice());
+    let camera = relative(&read("hand_camera.yaml"), &of_camera);
+    println!("plate pose {plate:e}, hand-camera {camera:e}");
+    let mut worst: f64 = 0.0;
     for (m, row) in table(files, "plate.csv").iter().enumerate() {
         let expected = joint.position_sigmas(problem, state, m);
         for (d, column) in ["sigma_x_m", "sigma_y_m", "sigma_z_m"].iter().enumerate() {
             let sigma: f64 = row[*column].parse().unwrap();
-            // The share is one of what was subtracted, which is several times what remains.
-            let difference = (sigma.powi(2) - expected[d].powi(2)).abs() / raw[m].unwrap()[(d, d)];
-            assert!(difference < 2.0 * TOLERANCE, "marker {m} {column}: {sigma:e} {:e}", expected[d]);
+            worst = worst.max((sigma / expected[d] - 1.0).abs());
         }
     }
+    let record: serde_json::Value = serde_json::from_slice(&files["solution.json"]).unwrap();
+    let scale = record["plates"][0]["relative_scale"]["sigma"].as_f64().unwrap() / joint.scale_sigma() - 1.0;
+    println!("markers {worst:e}, scale {scale:e}");
+    let without_frame = relative(&solution.covariance.block(problem.layout.placements[0].start), &expected);
+    println!("without the frame {without_frame:e}");
+    assert!(plate < TOLERANCE && camera < TOLERANCE && worst < TOLERANCE && scale.abs() < TOLERANCE);
     check_poses(solution, files);
 }
 
@@ -172,33 +213,106 @@ fn check_poses(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
     problem.noise.pixel_factor = solution.free_poses.pixel_factor.clone();
     let state = &solution.free_poses.state;
     let lin = linearise_all(&problem, state).unwrap();
-    let free = Bordered::new(&problem, state, &lin);
+    let free = Whole::new(&problem, state, &lin);
     let rows = table(files, "poses.csv");
     assert_eq!(rows.len(), lin.images.len());
+    let positions: Vec<Vector3<f64>> = (0..48).map(|m| state.plates[0].position(m)).collect();
+    let frame = Alignment::of(&state.plates[0].nominal, &positions);
+    let mut worst: f64 = 0.0;
     for (k, row) in rows.iter().enumerate() {
-        let number = |name: &str| -> f64 { row[name].parse().unwrap() };
-        let pose = Pose::from_xyz_quaternion(["x_m", "y_m", "z_m"].map(number), ["qx", "qy", "qz", "qw"].map(number));
-        let (angle, distance) = pose.inverse().distance(&lin.chains[k].pose);
-        assert!(angle < 1e-12 && distance < 1e-12, "{}", row["image"]);
-        let written = Matrix6::from_fn(|i, j| number(&format!("c{}{}", i.min(j) + 1, i.max(j) + 1)));
+        let (pose, written) = pose_row(row);
+        let (angle, distance) = frame.camera(&lin.chains[k].pose.inverse()).distance(&pose);
+        assert!(angle < 1e-12 && distance < 1e-12, "{}: {angle:e} {distance:e}", row["image"]);
         // From the plate's side of the pose back to the camera's.
         let back = adjoint(&pose);
         let from_camera = back * written * back.transpose();
-        let whole = &solution.free_poses.poses[lin.images[k]].as_ref().unwrap().covariance;
-        let difference = relative(&from_camera, &free.block(free.slack_start[k]), whole);
-        let rigid = relative(whole, &from_camera, whole);
-        assert!(difference < 2.0 * TOLERANCE && rigid > 0.1, "{}: {difference:e} {rigid:e}", row["image"]);
-        assert!(from_camera.symmetric_eigenvalues().min() > 0.0);
+        worst = worst.max(relative(&from_camera, &free.camera_pose(k, &pose.inverse())));
+        assert!(least_eigenvalue(&written) > 0.0);
+    }
+    println!("poses {worst:e}");
+    assert!(worst < TOLERANCE);
+}
+
+#[test]
+fn covariances_are_those_in_the_frame_of_the_nominal_markers() {
+    let description = robot();
+    for mount in [CameraMount::Hand, CameraMount::Fixed] {
+        // Known: what the uncertainty of an estimated joint noise adds is no part of the formula.
+        let (model, joint_noise) = (RobotModel::Rigid, JointNoise::Known(2e-5));
+        let options = Options { model, joint_noise, ..Options::default() };
+        let chain = description.chain(None, None).unwrap();
+        let solution = identify(chain, &[series(mount, &description)], &options).unwrap();
+        check(&solution, &files(&solution, &context(&description)).unwrap());
+    }
+}
+
+/// Mean over worlds and the half-width of its 99 % interval, from the spread of the worlds.
+fn mean(all: &[Judged], of: impl Fn(&Judged) -> f64) -> (f64, f64) {
+    let n = all.len() as f64;
+    let mean = all.iter().map(&of).sum::<f64>() / n;
+    let spread = (all.iter().map(|j| (of(j) - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+    (mean, 2.576 * spread / n.sqrt())
+}
+
+/// The four judged means: poses and markers, shape and with scale.
+const COLUMNS: [fn(&Judged) -> f64; 4] =
+    [|j| j.poses_shape, |j| j.poses_with_scale, |j| j.markers_shape, |j| j.markers_with_scale];
+
+fn judged_worlds(pixel_sigma_px: f64, seeds: std::ops::RangeInclusive<u64>) -> Vec<Judged> {
+    let template = template();
+    let one = |seed| {
+        let world = world(pixel_sigma_px, seed);
+        judged(&world, &result(&template, &world))
+    };
+    seeds.into_par_iter().map(one).collect()
+}
+
+#[test]
+fn stated_uncertainties_of_poses_and_markers_are_true_at_a_thousandth_of_a_pixel() {
+    let all = judged_worlds(0.001, 1..=8);
+    println!("seeds 1..=8: {all:?}");
+    assert!(all.iter().all(|j| j.poses >= 24 && j.not_positive_definite == 0));
+    // Eight worlds of some 25 poses that share camera and markers: the mean is known to a tenth.
+    for of in [COLUMNS[0], COLUMNS[2]] {
+        let (mean, half_width) = mean(&all, of);
+        assert!((0.6..1.6).contains(&mean), "{mean} +- {half_width}");
     }
 }
 
 #[test]
-fn covariances_are_those_of_a_solve_with_inner_constraints() {
+fn poses_of_the_shipped_dataset_have_positive_definite_covariances() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let bytes = std::fs::read(root.join("reports/kr6_small/solution.json")).unwrap();
+    let measured = measured_series(&solution_json::read(&bytes).unwrap()).unwrap();
     let description = robot();
-    for mount in [CameraMount::Hand, CameraMount::Fixed] {
-        let solution = solved(mount, RobotModel::Rigid, &description);
-        let left_out = solution.problem.images.iter().flat_map(|i| &i.observations).filter(|o| o.rejected.is_some());
-        println!("{mount:?}: {} observations left out", left_out.count());
-        check(&solution, &files(&solution, &context(&description)).unwrap());
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let solution = identify(description.chain(None, None).unwrap(), &measured, &options).unwrap();
+    let files = files(&solution, &context(&description)).unwrap();
+    let rows = table(&files, "poses.csv");
+    let least = rows.iter().map(|row| least_eigenvalue(&pose_row(row).1)).fold(f64::INFINITY, f64::min);
+    println!("{} poses, least eigenvalue of a correlation {least:e}", rows.len());
+    assert!(rows.len() == 24 && least > 0.0);
+}
+
+/// Table of reports/plate-frame.md: `cargo test --release --test outputs_gauge -- --ignored --nocapture plate_frame`.
+#[test]
+#[ignore = "800 worlds, minutes"]
+fn study_of_the_plate_frame() {
+    let worlds: u64 = std::env::var("WORLDS").map_or(200, |w| w.parse().unwrap());
+    println!(
+        "| image noise, px | worlds | poses | not positive definite | poses, shape | poses, with scale | markers, shape | markers, with scale |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    let mut outside = Vec::new();
+    for noise in [0.001, 0.003, 0.01, 0.05] {
+        let all = judged_worlds(noise, 1..=worlds);
+        let cells = COLUMNS.map(|of| mean(&all, of));
+        let cell = |(m, half): (f64, f64)| format!("{m:.3} (+-{half:.3})");
+        let bad: usize = all.iter().map(|j| j.not_positive_definite).sum();
+        let poses: usize = all.iter().map(|j| j.poses).sum();
+        println!("| {noise} | {worlds} | {poses} | {bad} | {} |", cells.map(cell).join(" | "));
+        outside.extend(cells.into_iter().filter(|(m, half)| (m - 1.0).abs() > *half).map(|c| (noise, c)));
+        assert_eq!(bad, 0);
     }
+    println!("outside: {outside:?}");
 }

@@ -1,5 +1,8 @@
 //! A small simulated calibration, solved: what the tests of the outputs start from.
 
+#[allow(dead_code)]
+pub mod truth_frame;
+
 use std::path::Path;
 
 use nalgebra::{Vector2, Vector3, Vector6};

@@ -1,0 +1,209 @@
+//! Files of a result judged by a simulated truth: poses.csv and plate.csv as a reader of them would do it.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3, Vector6};
+use robotcal::geom::{Pose, project_to_so3};
+use robotcal::problem::{Measured, PlateShape, Slack, State};
+use robotcal::recipe::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify, measured};
+use robotcal::series::{Plate, PlateKind};
+use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
+use robotcal::solve::{covariance, linearise_all};
+
+use super::{context, robot};
+
+/// What was judged of one world; each mean is 1 where the stated uncertainty is true.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Judged {
+    pub poses: usize,
+    pub not_positive_definite: usize,
+    pub poses_shape: f64,
+    pub poses_with_scale: f64,
+    pub markers_shape: f64,
+    pub markers_with_scale: f64,
+}
+
+/// The similarity that takes nominal markers to others, by least squares: `x = size R n + t`.
+pub struct Alignment {
+    rotation: Matrix3<f64>,
+    translation: Vector3<f64>,
+    size: f64,
+}
+
+impl Alignment {
+    pub fn of(nominal: &[Vector3<f64>], others: &[Vector3<f64>]) -> Self {
+        let mean = |all: &[Vector3<f64>]| all.iter().sum::<Vector3<f64>>() / all.len() as f64;
+        let (n0, x0) = (mean(nominal), mean(others));
+        let pairs = || nominal.iter().zip(others).map(|(n, x)| (n - n0, x - x0));
+        let moment: Matrix3<f64> = pairs().map(|(n, x)| x * n.transpose()).sum();
+        let svd = moment.svd(true, true);
+        let (u, v_t) = (svd.u.unwrap(), svd.v_t.unwrap());
+        let proper = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v_t).determinant().signum()));
+        let rotation = project_to_so3(&(u * proper * v_t)).unwrap();
+        let along: f64 = pairs().map(|(n, x)| (rotation * n).dot(&x)).sum();
+        let size = along / pairs().map(|(n, _)| n.norm_squared()).sum::<f64>();
+        Self { rotation, translation: x0 - size * (rotation * n0), size }
+    }
+
+    /// A camera pose (`plate_from_camera`) in the frame of the nominal markers, at their size.
+    pub fn camera(&self, plate_from_camera: &Pose) -> Pose {
+        let turned = self.rotation.transpose() * plate_from_camera.rotation;
+        Pose::new(turned, self.undo(&plate_from_camera.translation) / self.size)
+    }
+
+    fn undo(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation.transpose() * (x - self.translation)
+    }
+}
+
+fn table(files: &BTreeMap<String, Vec<u8>>, name: &str) -> Vec<BTreeMap<String, String>> {
+    csv::Reader::from_reader(files[name].as_slice()).deserialize().map(|r| r.unwrap()).collect()
+}
+
+/// Pose and covariance of a row of poses.csv.
+pub fn pose_row(row: &BTreeMap<String, String>) -> (Pose, Matrix6<f64>) {
+    let number = |name: &str| -> f64 { row[name].parse().unwrap() };
+    let pose = Pose::from_xyz_quaternion(["x_m", "y_m", "z_m"].map(number), ["qx", "qy", "qz", "qw"].map(number));
+    (pose, Matrix6::from_fn(|i, j| number(&format!("c{}{}", i.min(j) + 1, i.max(j) + 1))))
+}
+
+/// Smallest eigenvalue with all variances brought to 1; below zero where a variance is.
+pub fn least_eigenvalue(covariance: &Matrix6<f64>) -> f64 {
+    let sigma = covariance.diagonal().map(f64::sqrt);
+    if sigma.iter().any(|s| !(*s > 0.0)) {
+        return -1.0;
+    }
+    Matrix6::from_fn(|i, j| covariance[(i, j)] / sigma[i] / sigma[j]).symmetric_eigenvalues().min()
+}
+
+/// `e' C^-1 e / 6` in units in which all variances are 1.
+fn normalised(error: &Vector6<f64>, covariance: &Matrix6<f64>) -> f64 {
+    let sigma = covariance.diagonal().map(f64::sqrt);
+    let scaled = Matrix6::from_fn(|i, j| covariance[(i, j)] / sigma[i] / sigma[j]);
+    let error = error.component_div(&sigma);
+    scaled.cholesky().map_or(f64::NAN, |c| error.dot(&c.solve(&error)) / 6.0)
+}
+
+/// A world of the plate tolerances of the estimator, 24 to 30 images.
+pub fn world(pixel_sigma_px: f64, seed: u64) -> SimulatedSeries {
+    let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 1e-4);
+    plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.01);
+    let wanted = WorldRequest {
+        images: 24 + (seed % 7) as usize,
+        pixel_sigma_px,
+        marker_sigma_m: 1e-4,
+        plate_modes: true,
+        held_out: 1,
+        seed,
+        ..WorldRequest::typical(robot().chain(None, None).unwrap(), plate)
+    };
+    series(&wanted).unwrap()
+}
+
+/// A solution of a world with the images that every world has, whose robot, report and so on the files of others have, too.
+pub fn template() -> Solution {
+    let chain = robot().chain(None, None).unwrap();
+    let options = Options { model: RobotModel::Rigid, joint_noise: JointNoise::Known(2e-5), ..Options::default() };
+    identify(chain.clone(), &[measured(&world(0.05, 0), &chain)], &options).unwrap()
+}
+
+/// All files of a world of which cameras, plate and free poses are adjusted, from nothing, and nothing else.
+pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, Vec<u8>> {
+    let mut problem = template.problem.clone();
+    let mut image = problem.images[0].clone();
+    problem.images.clear();
+    for seen in &world.observations {
+        image.name = seen.image.clone();
+        let measured = seen.observations.iter().map(|o| Measured {
+            marker: o.marker as usize,
+            edge: o.edge,
+            radius_m: world.plate.markers[o.marker as usize].outer_radius_m,
+            uv: o.uv.into(),
+            information: Matrix2::from_diagonal_element(1.0 / o.covariance.unwrap()[0]),
+            rejected: None,
+        });
+        image.observations = measured.collect();
+        problem.images.push(image.clone());
+    }
+    problem.noise.pixel_factor = vec![1.0];
+    let start = State {
+        slack: vec![Slack::Pose(Pose::identity()); problem.images.len()],
+        plates: vec![PlateShape::nominal(&world.plate)],
+        ..template.state.clone()
+    };
+    let (free_poses, _) = adjust_free_poses(&mut problem, start, &[None]).unwrap();
+    let theta = problem.layout.theta_len();
+    problem.layout.columns[..theta].iter_mut().for_each(|c| c.free = false);
+    let state = free_poses.state.clone();
+    let linearised = linearise_all(&problem, &state).unwrap();
+    let covariance = covariance(&problem, &state, &linearised).unwrap();
+    let solution = Solution { problem, state, linearised, covariance, free_poses, ..template.clone() };
+    let description = robot();
+    robotcal::output::files(&solution, &context(&description)).unwrap()
+}
+
+#[derive(serde::Deserialize)]
+struct Scale {
+    value: f64,
+    sigma: f64,
+}
+
+#[derive(serde::Deserialize)]
+struct Sigma {
+    sigma: f64,
+}
+
+#[derive(serde::Deserialize)]
+struct PlateOf {
+    relative_scale: Sigma,
+    relative_scale_of_poses: Scale,
+}
+
+#[derive(serde::Deserialize)]
+struct SolutionOf {
+    plates: Vec<PlateOf>,
+}
+
+pub fn judged(world: &SimulatedSeries, files: &BTreeMap<String, Vec<u8>>) -> Judged {
+    let positions = |plate: &Plate| plate.markers.iter().map(|m| m.position_m).collect::<Vec<_>>();
+    let (nominal, actual) = (positions(&world.plate), positions(&world.true_plate));
+    let truth = Alignment::of(&nominal, &actual);
+    let record: SolutionOf = serde_json::from_slice(&files["solution.json"]).unwrap();
+    let (scale, of_poses) = (&record.plates[0].relative_scale, &record.plates[0].relative_scale_of_poses);
+    let mut judged = Judged::default();
+    for row in table(files, "poses.csv") {
+        let (pose, covariance) = pose_row(&row);
+        let name = row["image"].rsplit('/').next().unwrap();
+        let stop = world.truth.stops.iter().find(|s| s.image == name).unwrap();
+        let actual = stop.camera_from_plate.pose().inverse();
+        let turned = truth.rotation.transpose() * actual.rotation;
+        let error = |size: f64| -> Vector6<f64> {
+            (Pose::new(turned, truth.undo(&actual.translation) * size).inverse() * pose).log()
+        };
+        let by_scale =
+            Vector6::from_row_slice(&[(pose.rotation.transpose() * pose.translation).as_slice(), &[0.0; 3]].concat())
+                * of_poses.sigma;
+        judged.poses += 1;
+        judged.not_positive_definite += usize::from(!(least_eigenvalue(&covariance) > 0.0));
+        judged.poses_shape += normalised(&error((1.0 + of_poses.value) / truth.size), &covariance);
+        judged.poses_with_scale += normalised(&error(1.0), &(covariance + by_scale * by_scale.transpose()));
+    }
+    judged.poses_shape /= judged.poses as f64;
+    judged.poses_with_scale /= judged.poses as f64;
+    let rows = table(files, "plate.csv");
+    let xyz = |row: &BTreeMap<String, String>, names: [&str; 3]| Vector3::from(names.map(|n| row[n].parse().unwrap()));
+    let found: Vec<Vector3<f64>> = rows.iter().map(|r| xyz(r, ["x_m", "y_m", "z_m"])).collect();
+    let sigmas: Vec<Vector3<f64>> = rows.iter().map(|r| xyz(r, ["sigma_x_m", "sigma_y_m", "sigma_z_m"])).collect();
+    let own = Alignment::of(&nominal, &found);
+    for (k, (x, sigma)) in found.iter().zip(&sigmas).enumerate() {
+        let (x, expected) = (own.undo(x), truth.undo(&actual[k]));
+        let shape = (x / own.size - expected / truth.size).component_div(sigma);
+        judged.markers_shape += shape.norm_squared() / 3.0;
+        let common = scale.sigma * nominal[k];
+        let sigma = sigma.zip_map(&common, f64::hypot);
+        judged.markers_with_scale += (x - expected).component_div(&sigma).norm_squared() / 3.0;
+    }
+    judged.markers_shape /= found.len() as f64;
+    judged.markers_with_scale /= found.len() as f64;
+    judged
+}
