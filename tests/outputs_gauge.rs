@@ -218,6 +218,8 @@ fn check_poses(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
     assert_eq!(rows.len(), lin.images.len());
     let positions: Vec<Vector3<f64>> = (0..48).map(|m| state.plates[0].position(m)).collect();
     let frame = Alignment::of(&state.plates[0].nominal, &positions);
+    // The axes of the frame are those of the plate as adjusted, turned.
+    let turned = adjoint(&frame.motion().inverse());
     let mut worst: f64 = 0.0;
     for (k, row) in rows.iter().enumerate() {
         let (pose, written) = pose_row(row);
@@ -226,7 +228,8 @@ fn check_poses(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
         // From the plate's side of the pose back to the camera's.
         let back = adjoint(&pose);
         let from_camera = back * written * back.transpose();
-        worst = worst.max(relative(&from_camera, &free.camera_pose(k, &pose.inverse())));
+        let expected = turned * free.camera_pose(k, &lin.chains[k].pose) * turned.transpose();
+        worst = worst.max(relative(&from_camera, &expected));
         assert!(least_eigenvalue(&written) > 0.0);
     }
     println!("poses {worst:e}");

@@ -156,6 +156,7 @@ pub fn series_in_postures(mount: CameraMount, description: &RobotDescription, st
     }
 }
 
+#[allow(dead_code)]
 pub fn solved(mount: CameraMount, model: RobotModel, description: &RobotDescription) -> Solution {
     let chain = description.chain(None, None).unwrap();
     identify(chain, &[series(mount, description)], &Options { model, ..Options::default() }).unwrap()

@@ -45,6 +45,11 @@ impl Alignment {
         Self { rotation, translation: x0 - size * (rotation * n0), size }
     }
 
+    /// Rotation and translation.
+    pub fn motion(&self) -> Pose {
+        Pose::new(self.rotation, self.translation)
+    }
+
     /// A camera pose (`plate_from_camera`) in the frame of the nominal markers, at their size.
     pub fn camera(&self, plate_from_camera: &Pose) -> Pose {
         let turned = self.rotation.transpose() * plate_from_camera.rotation;
