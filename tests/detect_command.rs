@@ -168,7 +168,9 @@ fn files_of_the_user_among_the_pictures_stay_and_stale_pictures_go() {
     let folder = tempfile::tempdir().unwrap();
     let (plate, image) = plate_and_image();
     let (first, second) = (folder.path().join("first.png"), folder.path().join("second.png"));
-    [&first, &second].into_iter().for_each(|to| drop(std::fs::copy(&image, to).unwrap()));
+    for copy in [&first, &second] {
+        std::fs::copy(&image, copy).unwrap();
+    }
     let out = folder.path().join("seen");
     let run = |image: &Path| {
         let output = robotcal(&["detect", "--plate", name(&plate), name(image), "--overlay", "--out", name(&out)]);
