@@ -154,7 +154,8 @@ fn a_result_without_robot_terms_plots_or_covariances_still_has_a_page() {
     record.robot.terms.clear();
     record.estimates.clear();
     record.covariance_lower.clear();
-    record.cameras.iter_mut().for_each(|c| c.joint_noise.iter_mut().for_each(|s| *s = 0.0));
+    let noises = record.series.iter_mut().filter_map(|s| s.noise.as_mut());
+    noises.for_each(|n| n.joint.iter_mut().for_each(|s| *s = 0.0));
     for image in &mut record.images {
         image.held_out_mm = None;
         image.observations = solution_json::ObservationColumns::default();

@@ -416,7 +416,7 @@ fn the_information_on_the_joint_noise_is_the_slope_of_the_redundancies() {
         let v = nalgebra::Vector6::from_fn(|r, _| {
             if readings.contains(&r) { sigma[r].powi(2) / readings.len() as f64 } else { 0.0 }
         });
-        let spread = told.mean_variance(0, &readings);
+        let spread = told.mean_variance(&[0], &readings);
         let ratio = spread.sigma / (expected * v).dot(&v).sqrt();
         // Central differences with h = 1e-4 of redundancies good to some 1e-9.
         assert!((ratio - 1.0).abs() < 1e-4, "{readings:?}: {ratio}");
@@ -435,7 +435,7 @@ fn what_the_uncertainty_of_the_joint_noise_adds_is_the_curvature_of_the_covarian
     let lin = outcome.linearised.as_ref().unwrap();
     let cov = covariance(&problem, &outcome.state, lin).unwrap();
     let told = noise_information(&problem, &outcome.state, lin, &cov).unwrap();
-    let variance = |readings: &[usize]| told.mean_variance(0, readings).sigma.powi(2);
+    let variance = |readings: &[usize]| told.mean_variance(&[0], readings).sigma.powi(2);
     let w = nalgebra::Matrix6::from_fn(|a, b| match a == b {
         true => variance(&[a]),
         false => 0.5 * (4.0 * variance(&[a, b]) - variance(&[a]) - variance(&[b])),
@@ -501,7 +501,7 @@ fn variance_components_recover_pixel_and_joint_noise() {
         let cov = covariance(&problem, &outcome.state, lin).unwrap();
         let sigma = &problem.noise.joint[0];
         let told = noise_information(&problem, &outcome.state, lin, &cov).unwrap();
-        let spread = told.mean_variance(0, &[0, 1, 2, 3, 4, 5]);
+        let spread = told.mean_variance(&[0], &[0, 1, 2, 3, 4, 5]);
         let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / 6.0).sqrt();
         assert!((spread.variance.sqrt() / mean - 1.0).abs() < 1e-12);
         let observations = 2.0 * lin.terms.iter().map(|t| t.residuals.len() as f64).sum::<f64>();

@@ -1,9 +1,13 @@
-//! Hold-out by image: a model fitted without an image predicts it from its joint readings alone.
+//! Hold-out by image and by region of the workspace: a model fitted without an image predicts it from its joint readings alone.
 
+use std::collections::BTreeSet;
+
+use nalgebra::{DMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::geom::Pose;
 use crate::init::resect;
+use crate::linalg::symmetric_eigen;
 use crate::problem::{Image, Problem, Slack, State, Weighting, posture_groups, predict};
 use crate::solve::{Settings, solve};
 
@@ -35,11 +39,20 @@ pub struct Accuracy {
 
 const FOLDS: usize = 6;
 
+/// Fewest postures that make up a region of the workspace, and fewest regions: one posture is what a fold leaves out.
+const FEWEST_POSTURES: usize = 2;
+const FEWEST_REGIONS: usize = 3;
+
 /// Joint error that a nominal robot is allowed per stop, rad or m, so that its geometric errors do not bend camera and plate.
 const NOMINAL_JOINT_ERROR: f64 = 3e-3;
 
-/// Predicts every image on the robot by models that have not seen it.
-pub fn hold_out(problem: &Problem, state: &State) -> Option<Accuracy> {
+/// Predicts every image on the robot by models that have not seen it: of what is calibrated by `fitted`, from the images that are left, which is
+/// [`refitted`] for the joint fit.
+pub fn hold_out(
+    problem: &Problem,
+    state: &State,
+    fitted: &dyn Fn(&Problem, &State) -> Option<State>,
+) -> Option<Accuracy> {
     let folds = folds(problem)?;
     let mut nominal_problem = problem.clone();
     let mut nominal_state = state.clone();
@@ -52,8 +65,8 @@ pub fn hold_out(problem: &Problem, state: &State) -> Option<Accuracy> {
     nominal_problem.layout.columns[robot].iter_mut().for_each(|c| c.free = false);
     nominal_problem.noise.local.fill(0.0);
     nominal_problem.noise.joint.iter_mut().flatten().for_each(|s| *s = s.max(NOMINAL_JOINT_ERROR));
-    let nominal = predictions(&nominal_problem, &nominal_state, &folds)?;
-    let calibrated = predictions(problem, state, &folds)?;
+    let nominal = predictions(&nominal_problem, &nominal_state, &folds, &joint)?;
+    let calibrated = predictions(problem, state, &folds, fitted)?;
     let mut per_image_mm = vec![None; problem.images.len()];
     for ((i, a), (_, b)) in nominal.iter().zip(&calibrated) {
         per_image_mm[*i] = Some([a.mm(), b.mm()]);
@@ -63,7 +76,11 @@ pub fn hold_out(problem: &Problem, state: &State) -> Option<Accuracy> {
 
 /// Error of every image on the robot, predicted by fits of the free columns to the images of the other folds; `None` for too few.
 pub fn hold_out_images(problem: &Problem, state: &State) -> Option<Vec<(usize, ImageError)>> {
-    predictions(problem, state, &folds(problem)?)
+    predictions(problem, state, &folds(problem)?, &joint)
+}
+
+fn joint(problem: &Problem, state: &State) -> Option<State> {
+    Some(refitted(problem, state))
 }
 
 /// Squared errors of one predicted image, summed over its markers.
@@ -122,10 +139,60 @@ pub fn folds(problem: &Problem) -> Option<Vec<Vec<usize>>> {
     Some(folds)
 }
 
-fn predictions(problem: &Problem, state: &State, folds: &[Vec<usize>]) -> Option<Vec<(usize, ImageError)>> {
+/// Regions of the workspace that are held out one after the other: postures (images that share joint readings) next to each other along the direction
+/// in which the tip moved most. `None` for too few postures, and where these would be the folds once more.
+pub fn regions(problem: &Problem, state: &State) -> Option<Vec<Vec<usize>>> {
+    let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
+    let postures = posture_groups(&problem.images, &on_robot);
+    let count = FOLDS.min(postures.len() / FEWEST_POSTURES);
+    if count < FEWEST_REGIONS {
+        return None;
+    }
+    let mut regions = vec![Vec::new(); count];
+    let mut before = 0;
+    for posture in along_the_workspace(problem, state, postures) {
+        // The middle of a posture decides, so that regions are alike in number of images.
+        let middle = 2 * before + posture.len();
+        before += posture.len();
+        regions[middle * count / (2 * on_robot.len())].extend(posture);
+    }
+    regions.retain(|r| !r.is_empty());
+    let sets = |folds: &[Vec<usize>]| -> BTreeSet<BTreeSet<usize>> {
+        folds.iter().map(|fold| fold.iter().copied().collect()).collect()
+    };
+    let repeated = folds(problem).is_some_and(|folds| sets(&folds) == sets(&regions));
+    (regions.len() >= FEWEST_REGIONS && !repeated).then_some(regions)
+}
+
+/// Postures in the order of their mean place along the direction in which the tip moved most.
+fn along_the_workspace(problem: &Problem, state: &State, postures: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
+    let place = |i: &usize| {
+        let readings = problem.images[*i].stop.as_ref().map(|s| s.readings.as_slice()).unwrap_or_default();
+        state.robot.base_from_tip(readings).translation
+    };
+    let mean_of = |images: &[usize]| images.iter().map(place).sum::<Vector3<f64>>() / images.len().max(1) as f64;
+    let all: Vec<usize> = postures.iter().flatten().copied().collect();
+    let mean = mean_of(&all);
+    let mut spread = DMatrix::<f64>::zeros(3, 3);
+    for d in all.iter().map(|i| place(i) - mean) {
+        spread += DMatrix::from_column_slice(3, 3, (d * d.transpose()).as_slice());
+    }
+    let main = symmetric_eigen(&spread).map_or(Vector3::x(), |(_, v)| Vector3::new(v[(0, 2)], v[(1, 2)], v[(2, 2)]));
+    let mut placed: Vec<(f64, Vec<usize>)> =
+        postures.into_iter().map(|posture| (main.dot(&(mean_of(&posture) - mean)), posture)).collect();
+    placed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    placed.into_iter().map(|(_, posture)| posture).collect()
+}
+
+fn predictions(
+    problem: &Problem,
+    state: &State,
+    folds: &[Vec<usize>],
+    fitted: &dyn Fn(&Problem, &State) -> Option<State>,
+) -> Option<Vec<(usize, ImageError)>> {
     let mut errors = Vec::new();
     for held in folds {
-        let fitted = refitted(&without_images(problem, held), state);
+        let fitted = fitted(&without_images(problem, held), state)?;
         for &i in held {
             errors.push((i, predict_image(problem, &fitted, i)?));
         }

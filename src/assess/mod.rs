@@ -18,7 +18,7 @@ pub use clustered::{Clustered, TellingImages, Told, clustered_covariance};
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
 pub use hold_out::{
     Accuracy, Errors, ImageError, cluster_of_images, folds, hold_out, hold_out_images, predict_image, refitted,
-    without_images,
+    regions, without_images,
 };
 pub use identifiability::{
     Cause, Correlation, Identifiability, Observability, UnknownDirection, frame_parameters, identifiability,

@@ -10,8 +10,8 @@ use crate::solve::Covariance;
 /// Which camera looks at which plate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct View {
-    /// Index of the camera (for its joint noise).
-    pub camera: usize,
+    /// Index of the series (for its joint noise).
+    pub series: usize,
     /// Index of the mounting.
     pub mounting: usize,
     /// Index of the placement.
@@ -42,8 +42,8 @@ impl View {
     /// The view of the first image on the robot; `None` where there is none.
     pub fn first(problem: &Problem) -> Option<Self> {
         let image = problem.images.iter().find(|i| i.stop.is_some())?;
-        let Image { camera, mounting, placement, mount, .. } = *image;
-        Some(Self { camera, mounting, placement, mount })
+        let Image { series, mounting, placement, mount, .. } = *image;
+        Some(Self { series, mounting, placement, mount })
     }
 }
 
@@ -59,8 +59,8 @@ pub fn predict_pose(
 ) -> Option<PredictedPose> {
     let image = Image {
         name: String::new(),
-        series: 0,
-        camera: view.camera,
+        series: view.series,
+        camera: 0,
         mounting: view.mounting,
         placement: view.placement,
         plate: 0,
@@ -74,7 +74,7 @@ pub fn predict_pose(
     let theta = problem.layout.theta_len();
     let of_theta = covariance.reduced.view((0, 0), (theta, theta));
     let model = &chain.d_theta * of_theta * chain.d_theta.transpose();
-    let noise = nalgebra::DVector::from_vec(problem.joint_sigma(view.camera)).map(|s| s * s);
+    let noise = nalgebra::DVector::from_vec(problem.joint_sigma(view.series)).map(|s| s * s);
     let noise = &chain.d_slack * DMatrix::from_diagonal(&noise) * chain.d_slack.transpose();
     // A body twist d of camera_from_plate is the body twist -Ad d of its inverse.
     let turned = |c: DMatrix<f64>| {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use crate::error::{Error, Result};
-use crate::recipe::{Config, JointNoise, MarkerTolerance, Options, Parameters, RobotModel, Selection};
+use crate::recipe::{Config, Estimator, JointNoise, MarkerTolerance, Options, Parameters, RobotModel, Selection};
 
 /// Flags that `identify` shares with whatever solves.
 #[derive(Debug, Args)]
@@ -100,6 +100,7 @@ impl ChoiceArgs {
                 prior: config.prior,
             },
             open_lenses: defaults.open_lenses,
+            estimator: defaults.estimator,
             payload: config.payload,
         })
     }
@@ -118,6 +119,9 @@ pub(super) fn in_words(options: &Options) -> Vec<(String, String)> {
     let mut words = vec![("joint noise".to_owned(), joint_noise), ("robot model".to_owned(), model)];
     if options.marker_tolerance == MarkerTolerance::Estimated {
         words.push(("marker tolerance".to_owned(), "estimated".to_owned()));
+    }
+    if options.estimator != Estimator::Joint {
+        words.push(("estimator".to_owned(), options.estimator.title().to_owned()));
     }
     words.extend(options.selection.in_words());
     words.extend(

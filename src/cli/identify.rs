@@ -13,8 +13,13 @@ use super::{Verdict, progress, summary};
 use crate::error::{Error, Notice, Result};
 use crate::model::camera::Lens;
 use crate::output::solution_json::{self, FILE_NAME};
+<<<<<<< HEAD
 use crate::output::{self, Context, Offsets, Place, Poses, folder_name, recover, restore};
 use crate::recipe::{self, MeasuredSeries, Options};
+=======
+use crate::output::{self, Context, Offsets, Poses, restore};
+use crate::recipe::{self, Estimator, MeasuredSeries, Options};
+>>>>>>> 98c9f18 (Joint noise and tilt per series; regions hold out whole postures; compare and identify ask one function; identify --two-stage (work in progress))
 use crate::series::{self, InputFile, Series};
 use crate::urdf::{self, Chain, RobotDescription};
 
@@ -48,6 +53,9 @@ pub(super) struct IdentifyArgs {
     /// Where joint offsets go
     #[arg(long, value_enum, default_value_t = OffsetsName::Folded)]
     offsets: OffsetsName,
+    /// Fit in two stages (camera poses first, the robot from the poses) instead of jointly; `compare` says what each would reach
+    #[arg(long, value_enum, value_name = "ESTIMATOR", ignore_case = true, conflicts_with = "dry_run")]
+    two_stage: Option<TwoStage>,
     /// Also write the stand-alone camera poses (poses.csv)
     #[arg(long)]
     poses: bool,
@@ -77,6 +85,30 @@ impl From<OffsetsName> for Offsets {
     }
 }
 
+/// Letters of the two-stage estimators, as in the tables of `compare`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum TwoStage {
+    /// One variance for the positions of the camera poses and one for their rotations, from the data
+    A,
+    /// The 6x6 covariance of every pose, with a common factor from the data
+    B,
+    /// The 6x6 covariance of every pose, and joint noise
+    C,
+    /// The covariance of all poses together, and joint noise
+    D,
+}
+
+impl From<TwoStage> for Estimator {
+    fn from(letter: TwoStage) -> Self {
+        match letter {
+            TwoStage::A => Self::Isotropic,
+            TwoStage::B => Self::Blocks,
+            TwoStage::C => Self::BlocksAndRepeatability,
+            TwoStage::D => Self::FullAndRepeatability,
+        }
+    }
+}
+
 /// What is solved.
 struct Task {
     description: RobotDescription,
@@ -84,6 +116,8 @@ struct Task {
     measured: Vec<MeasuredSeries>,
     notices: Vec<Notice>,
     inputs: Vec<InputFile>,
+    /// How an earlier solution was fitted.
+    estimator: Estimator,
 }
 
 pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
@@ -113,15 +147,24 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
             notices.extend(tip_notice(&description, &all, args.base.as_deref(), args.tip.as_deref())?);
             let inputs = inputs(urdf, &description, &all)?;
             let measured = measure_all(&all, &chain, &mut notices)?;
+<<<<<<< HEAD
             all.iter().try_for_each(|s| require_unchanged(&inputs, &s.image_hashes()?))?;
             Task { inputs, description, chain, measured, notices }
+=======
+            Task { inputs: inputs(urdf, &all)?, estimator: Estimator::Joint, description, chain, measured, notices }
+>>>>>>> 98c9f18 (Joint noise and tilt per series; regions hold out whole postures; compare and identify ask one function; identify --two-stage (work in progress))
         }
         (None, None) => {
             return Err(Error::input("identify", "no robot is given", "give --urdf and --series, or --from"));
         }
     };
+<<<<<<< HEAD
     let place = place.ok_or_else(|| Error::input("identify", "no folder for the results is given", "give --out"))?;
     solve(args, &options, task, place)
+=======
+    let estimator = args.two_stage.map_or(task.estimator, Into::into);
+    solve(args, &Options { estimator, ..options }, task)
+>>>>>>> 98c9f18 (Joint noise and tilt per series; regions hold out whole postures; compare and identify ask one function; identify --two-stage (work in progress))
 }
 
 /// The task of an earlier solution.
@@ -134,11 +177,17 @@ fn again(args: &IdentifyArgs, path: &Path) -> Result<Task> {
     let mut inputs = record.inputs.clone();
     inputs.push(InputFile::of_file(path)?);
     let notices = description.notices.clone();
-    Ok(Task { chain, measured: restore::measured_series(&record)?, notices, inputs, description })
+    let estimator = record.estimator;
+    Ok(Task { chain, estimator, measured: restore::measured_series(&record)?, notices, inputs, description })
 }
 
+<<<<<<< HEAD
 fn solve(args: &IdentifyArgs, options: &Options, task: Task, place: Place) -> Result<Verdict> {
     let Task { description, chain, mut measured, mut notices, inputs } = task;
+=======
+fn solve(args: &IdentifyArgs, options: &Options, task: Task) -> Result<Verdict> {
+    let Task { description, chain, mut measured, mut notices, inputs, .. } = task;
+>>>>>>> 98c9f18 (Joint noise and tilt per series; regions hold out whole postures; compare and identify ask one function; identify --two-stage (work in progress))
     let mut open_lenses = Vec::new();
     if let Some(name) = args.camera.as_deref() {
         let lens = if name == "auto" { Lens::Brown } else { super::simulate::lens(name)? };

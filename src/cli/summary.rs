@@ -6,7 +6,7 @@ use crate::assess::{Cause, Errors, Identifiability, UnknownDirection, median};
 use crate::error::Notice;
 use crate::output::solution_json::SolutionRecord;
 use crate::problem::{OriginPrior, short_name};
-use crate::recipe::{Comparison, LensEvidence};
+use crate::recipe::{Comparison, Estimator, LensEvidence};
 use crate::urdf::JointKind;
 
 /// Most lines of one kind before the rest is counted.
@@ -63,6 +63,9 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         robot.tip,
         robot.readings.len()
     )?;
+    if r.estimator != Estimator::Joint {
+        writeln!(out, "estimator {}; by default the fit is joint", r.estimator.title())?;
+    }
     for one in &r.series {
         let images = || r.images.iter().filter(|i| i.series == one.name);
         let used = || images().filter(|i| i.reason.is_none());
@@ -195,13 +198,14 @@ fn marker_tolerance(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 }
 
 fn joint_noise(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    for camera in &r.cameras {
-        let readings = r.robot.readings.iter().zip(&r.robot.reading_kinds).zip(&camera.joint_noise);
+    let all = r.stop_noise();
+    for (name, noise) in &all {
+        let readings = r.robot.readings.iter().zip(&r.robot.reading_kinds).zip(&noise.joint);
         let parts: Vec<String> = readings
             .enumerate()
             .map(|(k, ((name, kind), s))| {
                 let unit = if *kind == JointKind::Prismatic { " mm" } else { "" };
-                let told = match camera.joint_noise_interval.get(k) {
+                let told = match noise.joint_interval.get(k) {
                     Some([Some(low), Some(high)]) if *low == 0.0 => format!(" (below {:.3})", 1e3 * high),
                     Some([Some(low), Some(high)]) => format!(" ({:.3} to {:.3})", 1e3 * low, 1e3 * high),
                     _ => String::new(),
@@ -209,8 +213,8 @@ fn joint_noise(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
                 format!("{name} {:.3}{unit}{told}", 1e3 * s)
             })
             .collect();
-        let of = if r.cameras.len() > 1 { format!(" ({})", camera.name) } else { String::new() };
-        let tilt = Some(camera.apparent_tilt_rad).filter(|t| *t > 0.0);
+        let of = if all.len() > 1 { format!(" ({name})") } else { String::new() };
+        let tilt = Some(noise.apparent_tilt_rad).filter(|t| *t > 0.0);
         let tilt = tilt.map(|t| format!("; apparent tilt of the plate {:.3}", 1e3 * t));
         writeln!(out, "joints    noise in mrad (95 %){of}: {}{}", parts.join(", "), tilt.unwrap_or_default())?;
     }

@@ -43,4 +43,7 @@ pub mod decisions {
 
     #[doc = include_str!("decisions/0006_writing_results.md")]
     pub mod d0006_writing_results {}
+
+    #[doc = include_str!("decisions/0007_one_stage_or_two.md")]
+    pub mod d0007_one_stage_or_two {}
 }

@@ -14,7 +14,7 @@ use crate::geom::Pose;
 use crate::model::camera::Lens;
 use crate::model::joint_terms::Term;
 use crate::problem::short_name;
-use crate::recipe::{Comparison, Evidence, LensEvidence, StartVerdict};
+use crate::recipe::{Comparison, Estimator, Evidence, LensEvidence, StartVerdict};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
 use crate::solve::PlateScale;
 use crate::urdf::{JointKind, Payload};
@@ -164,12 +164,12 @@ pub struct CameraRecord {
     pub parameters: Vec<(String, f64)>,
     /// Estimated factor on the stated standard deviations of its observations.
     pub pixel_factor: f64,
-    /// Joint noise of each reading with this camera, rad or m.
+    /// Joint noise of each reading with this camera, root mean square over its series, rad or m.
     pub joint_noise: Vec<f64>,
     /// 95 % interval of each of them; empty where the data do not tell it. The upper end is absent where it is not told.
     #[serde(default)]
     pub joint_noise_interval: Vec<[Option<f64>; 2]>,
-    /// Apparent tilt of the plate in each image, rad; 0 where it is not part of the model.
+    /// Apparent tilt of the plate in each image, root mean square over the series, rad; 0 where it is not part of the model.
     #[serde(default)]
     pub apparent_tilt_rad: f64,
     /// How well it is known where in the image a direction shows.
@@ -381,6 +381,20 @@ pub struct SeriesRecord {
     pub plate: usize,
     /// True where the images stand in the order of visiting.
     pub order_known: bool,
+    /// What scatters from stop to stop in it; absent in files that know it per camera only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<StopNoise>,
+}
+
+/// What scatters from stop to stop in a series.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StopNoise {
+    /// Joint noise of each reading, rad or m.
+    pub joint: Vec<f64>,
+    /// 95 % interval of each of them; empty where the data do not tell it. The upper end is absent where it is not told.
+    pub joint_interval: Vec<[Option<f64>; 2]>,
+    /// Apparent tilt of the plate in each image, rad; 0 where it is not part of the model.
+    pub apparent_tilt_rad: f64,
 }
 
 /// Sigmas by the noise model against those by the scatter between images.
@@ -414,6 +428,9 @@ pub struct SolutionRecord {
     pub files: Vec<String>,
     /// What was read.
     pub inputs: Vec<InputFile>,
+    /// How the robot was fitted; files that do not say it are of joint fits.
+    #[serde(default)]
+    pub estimator: Estimator,
     /// How the last solve ended.
     pub status: String,
     /// Steps tried in all.
@@ -505,6 +522,18 @@ impl SolutionRecord {
             .filter(|e| e.share_of_data.is_some_and(|s| s < LEAST_SHARE))
             .filter(|e| !frames.contains(short_name(&e.name).as_str()))
             .collect()
+    }
+
+    /// What scatters from stop to stop, with the name of the series; that of the camera in files that know it per camera only.
+    pub fn stop_noise(&self) -> Vec<(&str, StopNoise)> {
+        let of_series = self.series.iter().filter_map(|s| Some((s.name.as_str(), s.noise.clone()?)));
+        let found: Vec<_> = of_series.collect();
+        let of_camera = |c: &CameraRecord| StopNoise {
+            joint: c.joint_noise.clone(),
+            joint_interval: c.joint_noise_interval.clone(),
+            apparent_tilt_rad: c.apparent_tilt_rad,
+        };
+        if found.is_empty() { self.cameras.iter().map(|c| (c.name.as_str(), of_camera(c))).collect() } else { found }
     }
 
     /// Observations in use of a camera: measured place (px) and stated covariance uu, uv, vv (px^2).

@@ -1,5 +1,7 @@
 //! From a solution to the record in solution.json.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Matrix6;
 
 use super::Context;
@@ -10,15 +12,15 @@ use super::pose_files::determined;
 use super::residuals::{poses, residuals};
 use super::solution_json::{
     AccuracyRecord, CameraRecord, FORMAT, FreePoseRecord, ImageRecord, JointRecord, ObservationColumns, PlacedRecord,
-    PlateRecord, ProgramRecord, RobotRecord, ScatterRecord, SeriesRecord, SolutionRecord, StatisticsRecord, TermRecord,
-    UrdfRecord,
+    PlateRecord, ProgramRecord, RobotRecord, ScatterRecord, SeriesRecord, SolutionRecord, StatisticsRecord, StopNoise,
+    TermRecord, UrdfRecord,
 };
 use crate::assess::{ProjectionMap, median};
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes;
-use crate::problem::{Image, Slack, State};
+use crate::problem::{Image, Problem, Slack, State};
 use crate::recipe::{Solution, depths_m};
 
 /// The record of a solution.
@@ -42,6 +44,7 @@ pub(super) fn record(
         },
         files,
         inputs: context.inputs.clone(),
+        estimator: solution.estimator,
         status: format!("{:?}", solution.status).to_lowercase(),
         iterations: solution.iterations,
         failed_gates: solution.failed_gates.clone(),
@@ -147,6 +150,7 @@ fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
         centroid: s.centroid,
         plate: plate(k),
         order_known: s.order_known,
+        noise: Some(stop_noise(solution, &[k])),
     };
     solution.series.iter().enumerate().map(record).collect()
 }
@@ -156,7 +160,7 @@ fn cameras(solution: &Solution) -> Vec<CameraRecord> {
     let depths = depths_m(solution);
     let camera = |(k, name): (usize, &String)| {
         let c = &solution.state.cameras[k];
-        let told = solution.worth.joint_noise.get(k);
+        let noise = stop_noise(solution, &series_with(problem, k));
         CameraRecord {
             name: name.clone(),
             lens: c.lens,
@@ -164,19 +168,41 @@ fn cameras(solution: &Solution) -> Vec<CameraRecord> {
             height_px: c.height_px,
             parameters: c.parameter_names().map(Into::into).zip(c.parameters.iter().copied()).collect(),
             pixel_factor: problem.noise.pixel_factor[k],
-            joint_noise: problem.joint_sigma(k),
-            joint_noise_interval: told
-                .into_iter()
-                .flatten()
-                .map(|i| i.map(|v| Some(v).filter(|v| v.is_finite())))
-                .collect(),
-            apparent_tilt_rad: problem.noise.tilt.get(k).copied().unwrap_or(0.0),
+            joint_noise: noise.joint,
+            joint_noise_interval: noise.joint_interval,
+            apparent_tilt_rad: noise.apparent_tilt_rad,
             ros_loss_px: c.in_ros(&depths[k]).map(|fit| [fit.rms_px, fit.worst_px]),
             projection: Some(projection(solution, k)),
             field_sigma_px: problem.layout.fields[k].clone().next().map(|c| problem.layout.columns[c].prior_sigma),
         }
     };
     problem.cameras.iter().enumerate().map(camera).collect()
+}
+
+/// Series that a camera took.
+fn series_with(problem: &Problem, camera: usize) -> Vec<usize> {
+    let taken: BTreeSet<usize> = problem.images.iter().filter(|i| i.camera == camera).map(|i| i.series).collect();
+    taken.into_iter().collect()
+}
+
+/// Root mean square over some series.
+fn stop_noise(solution: &Solution, series: &[usize]) -> StopNoise {
+    let problem = &solution.problem;
+    let rms = |of: &dyn Fn(usize) -> f64| match series {
+        [one] => of(*one),
+        _ => (series.iter().map(|s| of(*s).powi(2)).sum::<f64>() / series.len().max(1) as f64).sqrt(),
+    };
+    let readings = problem.noise.joint.first().map_or(0, Vec::len);
+    let sigmas: Vec<Vec<f64>> = (0..problem.noise.joint.len()).map(|s| problem.joint_sigma(s)).collect();
+    let interval = |r: usize| {
+        let ends = solution.worth.joint_noise_of(series, r)?;
+        Some(ends.map(|v| Some(v).filter(|v| v.is_finite())))
+    };
+    StopNoise {
+        joint: (0..readings).map(|r| rms(&|s| sigmas[s][r])).collect(),
+        joint_interval: (0..readings).filter_map(interval).collect(),
+        apparent_tilt_rad: rms(&|s| problem.noise.tilt.get(s).copied().unwrap_or(0.0)),
+    }
 }
 
 /// The map of a camera, for points as far away as the plates were.

@@ -35,7 +35,7 @@ fn condensed(
     let slack = setting.slack();
     let chain = chained(problem, state, image, &slack)?;
     let terms = linearise(image, state, &chain.pose, &Weighting::of(problem, image))?;
-    let slack: Vec<f64> = problem.noise.joint[image.camera].iter().map(|s| s.powi(-2)).collect();
+    let slack: Vec<f64> = problem.noise.joint[image.series].iter().map(|s| s.powi(-2)).collect();
     let h = problem::condensed(&terms, &chain.d_slack, &slack)?;
     let t = by_columns(&problem.layout, image, &chain);
     Some((h, t))

@@ -79,11 +79,11 @@ pub struct Image {
 pub struct Noise {
     /// Factor on the stated standard deviations of the observations, per camera.
     pub pixel_factor: Vec<f64>,
-    /// Joint noise of every stop by itself, rad or m: per camera, per reading.
+    /// Joint noise of every stop by itself, rad or m: per series, per reading.
     pub joint: Vec<Vec<f64>>,
     /// Local error of every reading, rad or m: common to stops at the same reading. Zero where no stops share readings.
     pub local: Vec<f64>,
-    /// Apparent tilt of the plate in every image, rad: per camera. Empty where it is not part of the slack.
+    /// Apparent tilt of the plate in every image, rad: per series. Empty where it is not part of the slack.
     pub tilt: Vec<f64>,
     /// Factor on the stated tolerances of the markers, per plate. Empty where they are taken as stated.
     pub marker: Vec<f64>,
@@ -141,8 +141,8 @@ impl Problem {
     /// Variances of the slack of one reading (behind the readings: of the tilt) at a stop, rad^2 or m^2: its own part, and the part of the local error that no
     /// column stands for.
     pub fn slack_variance(&self, image: &Image, reading: usize) -> [f64; 2] {
-        let Some(own) = self.noise.joint[image.camera].get(reading) else {
-            return [self.noise.tilt[image.camera].powi(2), 0.0];
+        let Some(own) = self.noise.joint[image.series].get(reading) else {
+            return [self.noise.tilt[image.series].powi(2), 0.0];
         };
         let covered = image.local_share.get(reading).map_or(0.0, |s| s.min(1.0));
         let local = self.noise.local.get(reading).map_or(0.0, |s| s * s);
@@ -209,10 +209,10 @@ impl Problem {
         }
     }
 
-    /// Standard deviation of the whole joint noise of a camera's stops, per reading, rad or m.
-    pub fn joint_sigma(&self, camera: usize) -> Vec<f64> {
+    /// Standard deviation of the whole joint noise of the stops of a series, per reading, rad or m.
+    pub fn joint_sigma(&self, series: usize) -> Vec<f64> {
         let local = self.noise.local.iter().chain(std::iter::repeat(&0.0));
-        self.noise.joint[camera].iter().zip(local).map(|(own, local)| own.hypot(*local)).collect()
+        self.noise.joint[series].iter().zip(local).map(|(own, local)| own.hypot(*local)).collect()
     }
 
     /// Information of the prior of a marker's correction, per coordinate, 1/m^2.

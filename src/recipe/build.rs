@@ -152,9 +152,9 @@ pub(super) fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool
     let layout = Layout::new(&state, &mountings, &placements, &cameras, &plate_names);
     let noise = Noise {
         pixel_factor: vec![1.0; cameras.len()],
-        joint: vec![vec![FIRST_JOINT_NOISE; readings]; cameras.len()],
+        joint: vec![vec![FIRST_JOINT_NOISE; readings]; series.len()],
         local: first_local(&state, &layout),
-        tilt: vec![FIRST_TILT; cameras.len()],
+        tilt: vec![FIRST_TILT; series.len()],
         marker: Vec::new(),
     };
     let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();

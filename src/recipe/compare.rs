@@ -1,18 +1,16 @@
 //! All estimators side by side: against truth where it is known, on held-out images where it is not.
 
-use nalgebra::{DMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::joint::JointNoise;
 use super::solution::Solution;
-use super::two_stage::{Estimator, PoseStage, estimate_all, fit_poses};
+use super::two_stage::{Estimator, PoseStage, fit_joint, fit_poses};
 use crate::assess::{
-    Ratio, bootstrap_ratio, by_cluster, camera_errors_m, cluster_of_images, flange_error_m, folds, predict_image,
-    refitted, root_mean_square, without_images,
+    ImageError, Ratio, bootstrap_ratio, by_cluster, camera_errors_m, cluster_of_images, flange_error_m, folds,
+    predict_image, refitted, regions, root_mean_square, without_images,
 };
 use crate::error::{Error, Result};
 use crate::geom::Pose;
-use crate::linalg::symmetric_eigen;
 use crate::problem::{Problem, State};
 use crate::series::CameraMount;
 use crate::simulate::truth::Truth;
@@ -46,7 +44,7 @@ pub struct ComparisonRow {
     pub estimator: Estimator,
     /// Held out fold by fold; images that share joint readings stay together.
     pub by_image: Option<HeldOut>,
-    /// Held out one region of the workspace after the other.
+    /// Held out one region of the workspace after the other; `None` for too few postures.
     pub by_region: Option<HeldOut>,
     /// Against truth.
     pub truth: Option<TruthError>,
@@ -59,7 +57,7 @@ pub struct Comparison {
     pub rows: Vec<ComparisonRow>,
     /// Images on the robot that took part.
     pub images: usize,
-    /// Number of folds by image, and of slabs of the workspace.
+    /// Number of folds by image, and of regions of the workspace; 0 where too few postures make none.
     pub folds: [usize; 2],
 }
 
@@ -76,110 +74,117 @@ impl Comparison {
     }
 }
 
-const FOLDS: usize = 6;
-
-/// Fewest images on the robot that leave enough for a fit when a region is held out.
+/// Fewest images on the robot that leave enough for a fit when some are held out.
 const FEWEST_IMAGES: usize = 12;
 
 /// Compares on the observations of a solution: its outliers and rejected images are left out for all estimators.
 ///
+/// The joint fit keeps the noise components of the solution, as in its accuracy; those of the others are from the images that are left.
+///
 /// # Errors
 /// Too few images on the robot.
 pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usize, usize)) -> Result<Comparison> {
-    let (problem, state) = (&solution.problem, &solution.state);
-    let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
-    if on_robot.len() < FEWEST_IMAGES {
+    let (problem, state) = solution.joint_fit();
+    let images = on_robot(problem);
+    let Some(by_image) = folds(problem).filter(|_| images >= FEWEST_IMAGES) else {
         return Err(Error::unsolved(
             "comparison",
-            format!("{} images of the robot are too few to hold regions out", on_robot.len()),
+            format!("{images} images of the robot are too few to hold some out"),
             format!("take at least {FEWEST_IMAGES}, better 30"),
         ));
-    }
-    let by_image = folds(problem).unwrap_or_default();
-    let total = by_image.len() + FOLDS + 1;
+    };
+    let by_region = regions(problem, state).unwrap_or_default();
+    let all = Estimator::ALL;
+    let total = by_image.len() + by_region.len() + 1;
     let mut done = 0;
     let mut tick = || {
         done += 1;
         progress(done, total);
     };
-    let clusters = cluster_of_images(problem);
-    let all =
-        |p: &Problem, s: &State| estimate_all(p, s).into_iter().map(|(e, found)| (e, found.map(|f| f.state))).collect();
-    let image_errors = held_out(problem, state, &by_image, all, &mut tick);
-    let region_errors = held_out(problem, state, &regions(problem, state, &on_robot), all, &mut tick);
     let against_truth = truth.map(|t| truth_errors(problem, state, t)).transpose()?;
     tick();
-    let rows = Estimator::ALL
-        .into_iter()
-        .enumerate()
-        .map(|(k, estimator)| ComparisonRow {
-            estimator,
-            by_image: summary(&image_errors, &clusters, k),
-            by_region: summary(&region_errors, &clusters, k),
-            truth: against_truth.as_ref().and_then(|t| t[k]),
-        })
-        .collect();
-    Ok(Comparison { rows, images: on_robot.len(), folds: [by_image.len(), FOLDS] })
+    let image_errors = held_out(problem, state, &by_image, &all, &mut tick);
+    let region_errors = held_out(problem, state, &by_region, &all, &mut tick);
+    let of_truth = |k: usize| against_truth.as_ref().and_then(|t| t[k]);
+    let held = [Some(&image_errors), Some(&region_errors).filter(|e| !e.is_empty())];
+    let rows = rows(problem, &all, held, of_truth);
+    Ok(Comparison { rows, images, folds: [by_image.len(), by_region.len()] })
 }
 
-/// The two-stage estimators beside the joint fit, held out by image: what the report of every solution says. `None` for too few images.
-///
-/// The joint fit keeps the noise components of the solution; those of the two-stage estimators are from the images that are left.
+/// The two-stage estimators beside the joint fit, held out by image: what the report of every solution says, and the same as [`compare`] says of them.
+/// `None` for too few images.
 pub fn beside_two_stages(solution: &Solution) -> Option<Comparison> {
-    let (problem, state) = (&solution.problem, &solution.state);
-    let images = problem.used().filter(|(_, i)| i.stop.is_some()).count();
+    let (problem, state) = solution.joint_fit();
+    let images = on_robot(problem);
     let folds = folds(problem).filter(|_| images >= FEWEST_IMAGES)?;
-    let errors = held_out(problem, state, &folds, two_stages_and_joint, &mut || ());
-    let clusters = cluster_of_images(problem);
-    let taking_part = Estimator::ALL.into_iter().enumerate().filter(|(_, e)| *e != Estimator::HardJoint);
-    let rows = taking_part
-        .map(|(k, estimator)| {
-            let by_image = summary(&errors, &clusters, k);
-            ComparisonRow { estimator, by_image, by_region: None, truth: None }
-        })
-        .collect();
+    let taking_part: Vec<Estimator> = Estimator::ALL.into_iter().filter(|e| *e != Estimator::HardJoint).collect();
+    let errors = held_out(problem, state, &folds, &taking_part, &mut || ());
+    let rows = rows(problem, &taking_part, [Some(&errors), None], |_| None);
     Some(Comparison { rows, images, folds: [folds.len(), 0] })
 }
 
-fn two_stages_and_joint(problem: &Problem, state: &State) -> Vec<(Estimator, Option<State>)> {
-    let stage = PoseStage::adjusted(problem, state);
-    let found = |estimator| match estimator {
-        Estimator::HardJoint => None,
-        Estimator::Joint => Some(refitted(problem, state)),
-        _ => Some(fit_poses(problem, stage.as_ref()?, state, estimator, JointNoise::Estimated)?.state),
+fn on_robot(problem: &Problem) -> usize {
+    problem.used().filter(|(_, i)| i.stop.is_some()).count()
+}
+
+fn rows(
+    problem: &Problem,
+    estimators: &[Estimator],
+    [by_image, by_region]: [Option<&Errors>; 2],
+    truth: impl Fn(usize) -> Option<TruthError>,
+) -> Vec<ComparisonRow> {
+    let clusters = cluster_of_images(problem);
+    let joint = estimators.iter().position(|e| *e == Estimator::Joint);
+    let of = |errors: Option<&Errors>, k: usize| summary(errors?, &clusters, k, joint);
+    let row = |(k, &estimator): (usize, &Estimator)| ComparisonRow {
+        estimator,
+        by_image: of(by_image, k),
+        by_region: of(by_region, k),
+        truth: truth(k),
     };
-    Estimator::ALL.map(|estimator| (estimator, found(estimator))).into()
+    estimators.iter().enumerate().map(row).collect()
+}
+
+/// What every estimator makes of the observations in use; `None` for one that has no solution.
+fn fitted(problem: &Problem, start: &State, estimators: &[Estimator]) -> Vec<Option<State>> {
+    let stage = PoseStage::adjusted(problem, start);
+    let noise = JointNoise::Estimated;
+    let found = |estimator: &Estimator| match estimator {
+        Estimator::Joint => Some(refitted(problem, start)),
+        Estimator::HardJoint => fit_joint(problem, start, *estimator, noise).map(|(_, found)| found.state),
+        _ => Some(fit_poses(problem, stage.as_ref()?, start, *estimator, noise)?.state),
+    };
+    estimators.iter().map(found).collect()
 }
 
 /// Error of every held-out image, with its index, by every estimator; `None` where an estimator has no solution for a fold.
-type Errors = Vec<(usize, [Option<crate::assess::ImageError>; 6])>;
+type Errors = Vec<(usize, Vec<Option<ImageError>>)>;
 
 fn held_out(
     problem: &Problem,
     state: &State,
     folds: &[Vec<usize>],
-    estimate: impl Fn(&Problem, &State) -> Vec<(Estimator, Option<State>)>,
+    estimators: &[Estimator],
     tick: &mut dyn FnMut(),
 ) -> Errors {
     let mut errors = Vec::new();
     for fold in folds {
-        let found = estimate(&without_images(problem, fold), state);
+        let found = fitted(&without_images(problem, fold), state, estimators);
         for &i in fold {
-            let of = |(_, state): &(Estimator, Option<State>)| predict_image(problem, state.as_ref()?, i);
-            errors.push((i, std::array::from_fn(|k| found.get(k).and_then(of))));
+            errors.push((i, found.iter().map(|state| predict_image(problem, state.as_ref()?, i)).collect()));
         }
         tick();
     }
     errors
 }
 
-fn summary(errors: &Errors, clusters: &[usize], k: usize) -> Option<HeldOut> {
-    let joint = Estimator::ALL.len() - 1;
+fn summary(errors: &Errors, clusters: &[usize], k: usize, joint: Option<usize>) -> Option<HeldOut> {
     let of_images: Vec<usize> = errors.iter().map(|(i, _)| clusters[*i]).collect();
     let own: Vec<_> = errors.iter().map(|(_, e)| e[k]).collect::<Option<_>>()?;
     let px: Vec<(f64, f64)> = own.iter().map(|e| (e.px2, e.count)).collect();
     let mm: Vec<(f64, f64)> = own.iter().map(|e| (e.mm2, e.count)).collect();
-    let reference: Option<Vec<(f64, f64)>> = errors.iter().map(|(_, e)| e[joint].map(|e| (e.mm2, e.count))).collect();
+    let reference: Option<Vec<(f64, f64)>> =
+        joint.and_then(|joint| errors.iter().map(|(_, e)| e[joint].map(|e| (e.mm2, e.count))).collect());
     Some(HeldOut {
         rms_px: root_mean_square(&px),
         rms_mm: root_mean_square(&mm),
@@ -188,32 +193,9 @@ fn summary(errors: &Errors, clusters: &[usize], k: usize) -> Option<HeldOut> {
     })
 }
 
-/// Slabs of the workspace, equal in number of images, along the direction in which the tip moved most.
-fn regions(problem: &Problem, state: &State, on_robot: &[usize]) -> Vec<Vec<usize>> {
-    let position = |i: &usize| {
-        let readings = problem.images[*i].stop.as_ref().map(|s| s.readings.as_slice()).unwrap_or_default();
-        (*i, state.robot.base_from_tip(readings).translation)
-    };
-    let places: Vec<(usize, Vector3<f64>)> = on_robot.iter().map(position).collect();
-    let mean = places.iter().map(|(_, p)| p).sum::<Vector3<f64>>() / places.len() as f64;
-    let mut spread = DMatrix::<f64>::zeros(3, 3);
-    for (_, p) in &places {
-        let d = p - mean;
-        spread += DMatrix::from_column_slice(3, 3, (d * d.transpose()).as_slice());
-    }
-    let main = symmetric_eigen(&spread).map_or(Vector3::x(), |(_, v)| Vector3::new(v[(0, 2)], v[(1, 2)], v[(2, 2)]));
-    let mut order: Vec<(usize, f64)> = places.iter().map(|(i, p)| (*i, main.dot(&(p - mean)))).collect();
-    order.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-    let n = order.len();
-    (0..FOLDS).map(|f| order[f * n / FOLDS..(f + 1) * n / FOLDS].iter().map(|(i, _)| *i).collect()).collect()
-}
-
 fn truth_errors(problem: &Problem, state: &State, truth: &Truth) -> Result<Vec<Option<TruthError>>> {
-    let found = estimate_all(problem, state);
-    found
-        .iter()
-        .map(|(_, e)| e.as_ref().map(|e| truth_error(&e.state, truth)).transpose().map(Option::flatten))
-        .collect()
+    let found = fitted(problem, state, &Estimator::ALL);
+    found.iter().map(|s| s.as_ref().map(|s| truth_error(s, truth)).transpose().map(Option::flatten)).collect()
 }
 
 /// Errors of a state over the held-out readings of the first placement.

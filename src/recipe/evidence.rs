@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::joint::{Options, RobotModel, identify_model};
 use super::lens_choice::{self, with_lenses};
+use super::two_stage::Estimator;
 use super::{MeasuredSeries, Solution};
 use crate::error::Result;
 use crate::linalg::SymmetricFactor;
@@ -43,10 +44,15 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
         RobotModel::Auto => RobotModel::Full,
         other => other,
     };
-    let (full, series) = with_lenses(&chain, series, &Options { model, ..options.clone() })?;
+    let by_joint_fit = Options { model, estimator: Estimator::Joint, ..options.clone() };
+    let (full, series) = with_lenses(&chain, series, &by_joint_fit)?;
     let mut solution = match options.model == RobotModel::Auto && !options.selection.names_terms() {
         true => best_model(chain, &series, options, full)?,
-        false => full,
+        false if options.estimator == Estimator::Joint => full,
+        false => {
+            let lenses = full.lenses;
+            Solution { lenses, ..identify_model(chain, &series, &Options { model, ..options.clone() })? }
+        }
     };
     solution.notices.extend(lens_choice::losses(&solution));
     Ok(solution)
@@ -59,7 +65,7 @@ fn best_model(chain: Chain, series: &[MeasuredSeries], options: &Options, full: 
     let largest = supported.max_by_key(|e| e.parameters).map_or(RobotModel::Full, |e| e.model);
     let lenses = full.lenses.clone();
     let chosen = match largest {
-        RobotModel::Full => full,
+        RobotModel::Full if options.estimator == Estimator::Joint => full,
         model => identify_model(chain, series, &Options { model, ..options.clone() })?,
     };
     Ok(Solution { evidences, lenses, ..chosen })

@@ -1,5 +1,6 @@
 //! Quality gates: what a result must fulfil to be trusted, and remarks that do not stop anyone.
 
+use super::build::MeasuredSeries;
 use super::free_poses::FreePoses;
 use super::joint::left_out;
 use super::loose::loose_mountings;
@@ -42,6 +43,7 @@ const BEYOND_TOLERANCE: f64 = 5.0;
 /// Gates that failed, in words with the first thing to look at.
 pub(super) fn gates(
     problem: &Problem,
+    series: &[MeasuredSeries],
     state: &State,
     free: &FreePoses,
     accuracy: &Accuracy,
@@ -55,12 +57,12 @@ pub(super) fn gates(
             free.rms_px
         ));
     }
-    for k in 0..problem.cameras.len() {
+    for (k, of) in series.iter().enumerate() {
         if let Some((joint, worst)) = noisiest_joint(problem, state, k).filter(|(_, s)| *s > WORST_JOINT_NOISE) {
             failed.push(format!(
-                "joint noise: {:.1} mrad ({joint} most) with camera {}; the readings do not explain the images: look for loose camera or plate, motion, wrong robot model{}",
+                "joint noise: {:.1} mrad ({joint} most) in series {}; the readings do not explain the images: look for loose camera or plate, motion, wrong robot model{}",
                 1e3 * worst,
-                problem.cameras[k],
+                of.name,
                 worst_predicted(problem, accuracy)
             ));
         }
@@ -93,9 +95,9 @@ pub(super) fn undetermined(worth: &Worth, accuracy: &Accuracy) -> Option<String>
     })
 }
 
-/// The reading with the largest joint noise with a camera, and its size, rad or m.
-fn noisiest_joint<'a>(problem: &Problem, state: &'a State, camera: usize) -> Option<(&'a str, f64)> {
-    let sigmas = problem.joint_sigma(camera).into_iter();
+/// The reading with the largest joint noise in a series, and its size, rad or m.
+fn noisiest_joint<'a>(problem: &Problem, state: &'a State, series: usize) -> Option<(&'a str, f64)> {
+    let sigmas = problem.joint_sigma(series).into_iter();
     let named = state.robot.chain.readings.iter().map(String::as_str).zip(sigmas);
     named.max_by(|a, b| a.1.total_cmp(&b.1))
 }
@@ -164,6 +166,7 @@ fn rejected_observations(problem: &Problem) -> Option<String> {
 /// What the user should know, though the result stands.
 pub(super) fn remarks(
     problem: &Problem,
+    series: &[MeasuredSeries],
     state: &State,
     accuracy: &Accuracy,
     on_robot: usize,
@@ -178,11 +181,11 @@ pub(super) fn remarks(
             "take 30 to 50 stops that move every joint through its range",
         ));
     }
-    for (k, camera) in problem.cameras.iter().enumerate() {
+    for (k, of) in series.iter().enumerate() {
         let noisiest = noisiest_joint(problem, state, k);
         if let Some((joint, sigma)) = noisiest.filter(|(_, s)| (UNUSUAL_JOINT_NOISE..=WORST_JOINT_NOISE).contains(s)) {
             notices.push(Notice::new(
-                format!("camera {camera}"),
+                format!("series {}", of.name),
                 format!(
                     "the joint noise is {:.2} mrad ({joint} most); robots repeat to some 0.1 mrad{}{}",
                     1e3 * sigma,

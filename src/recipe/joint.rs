@@ -8,9 +8,11 @@ use super::plate_size::doubted_sizes;
 use super::selection::Selection;
 use super::shift::find_shifts;
 use super::solution::Solution;
+use super::staged::{Fitted, refit, staged};
 use super::start::{misfit, start_robot, take_back};
+use super::two_stage::Estimator;
 use super::worth::judge;
-use crate::assess::hold_out;
+use crate::assess::{hold_out, refitted};
 use crate::error::{Error, Notice, Result};
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::robot::Robot;
@@ -71,6 +73,8 @@ pub struct Options {
     pub selection: Selection,
     /// Cameras whose lens is chosen by evidence; that of the others is as their series say.
     pub open_lenses: Vec<String>,
+    /// How the robot is fitted: jointly, or in two stages.
+    pub estimator: Estimator,
     /// What the tip carries; none where the chain says it or nobody does.
     pub payload: Option<Payload>,
 }
@@ -84,6 +88,7 @@ impl Default for Options {
             harmonics: HARMONICS,
             selection: Selection::default(),
             open_lenses: Vec::new(),
+            estimator: Estimator::default(),
             payload: None,
         }
     }
@@ -163,10 +168,15 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
         ));
     };
     let state = outcome.state;
-    let mut covariance = covariance(&problem, &state, &linearised).map_err(|_| {
+    let covariance = covariance(&problem, &state, &linearised).map_err(|_| {
         Error::unsolved("joint fit", "the normal equations are singular", "take stops that move every joint")
     })?;
-    let accuracy = hold_out(&problem, &state)
+    let (estimator, noise) = (options.estimator, options.joint_noise);
+    let fitted = |problem: &Problem, state: &State| match estimator.is_two_stage() {
+        true => refit(problem, state, estimator, noise),
+        false => Some(refitted(problem, state)),
+    };
+    let accuracy = hold_out(&problem, &state, &fitted)
         .ok_or_else(|| Error::unsolved("hold-out", "too few images to hold any out", "take more images"))?;
     let shifts = if free.focus_change.is_some() { Vec::new() } else { find_shifts(&problem, &state, &linearised) };
     let mut failed_gates = Vec::new();
@@ -178,14 +188,21 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
             notices.push(Notice::new("series", what, remedy));
         }
     }
-    failed_gates.extend(gates(&problem, &state, &free, &accuracy, &shifts, on_robot));
+    failed_gates.extend(gates(&problem, series, &state, &free, &accuracy, &shifts, on_robot));
     failed_gates.extend(doubted_sizes(&problem, &state, &covariance));
     failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
-    remarks(&problem, &state, &accuracy, on_robot, &mut notices);
-    let estimated = options.joint_noise == JointNoise::Estimated;
+    remarks(&problem, series, &state, &accuracy, on_robot, &mut notices);
+    let (fit, joint) = match estimator.is_two_stage() {
+        true => (staged((&problem, &state, &covariance), estimator, noise)?, Some(Box::new((problem, state)))),
+        false => (Fitted { problem, state, linearised, covariance }, None),
+    };
+    let Fitted { problem, state, linearised, mut covariance } = fit;
+    let estimated = noise == JointNoise::Estimated && joint.is_none();
     let worth = judge(&problem, &state, &linearised, &mut covariance, estimated, before, &mut notices);
     failed_gates.extend(undetermined(&worth, &accuracy));
     Ok(Solution {
+        estimator,
+        joint,
         series: series.to_vec(),
         worth,
         evidences: Vec::new(),

@@ -27,6 +27,7 @@ mod selection;
 mod shift;
 mod simulated;
 mod solution;
+mod staged;
 mod start;
 mod study;
 mod suspects;

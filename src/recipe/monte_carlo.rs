@@ -211,12 +211,12 @@ fn judged(s: &Solution, world: &SimulatedSeries, chain: &Chain) -> Result<Option
     }
     let sigmas = &world.truth.joint_noise_sigma;
     let holds = |readings: &[usize], sigma: f64| {
-        let [low, high] = told.mean_variance(0, readings).interval(NORMAL_95);
+        let [low, high] = told.mean_variance(&[0], readings).interval(NORMAL_95);
         (low..=high).contains(&sigma)
     };
     let n = sigmas.len() as f64;
     let all: Vec<usize> = (0..sigmas.len()).collect();
-    let together = told.mean_variance(0, &all);
+    let together = told.mean_variance(&[0], &all);
     Ok(Some(World {
         blocks: found,
         found: together.variance.sqrt(),
@@ -281,8 +281,8 @@ fn half_way_to_truth(s: &Solution, columns: &[(usize, f64)]) -> State {
 /// The problem with another joint noise, rad or m per reading.
 fn with_joint_noise(problem: &Problem, sigma: &[f64]) -> Problem {
     let mut problem = problem.clone();
-    for of_camera in &mut problem.noise.joint {
-        of_camera.iter_mut().zip(sigma).for_each(|(known, s)| *known = s.max(JOINT_NOISE_FLOOR));
+    for of_series in &mut problem.noise.joint {
+        of_series.iter_mut().zip(sigma).for_each(|(known, s)| *known = s.max(JOINT_NOISE_FLOOR));
     }
     problem
 }

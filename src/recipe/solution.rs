@@ -7,6 +7,7 @@ use super::compare::Comparison;
 use super::evidence::Evidence;
 use super::free_poses::FreePoses;
 use super::lens_choice::LensEvidence;
+use super::two_stage::Estimator;
 use super::worth::Worth;
 use crate::assess::Accuracy;
 use crate::error::Notice;
@@ -26,9 +27,13 @@ pub struct StartVerdict {
     pub won: bool,
 }
 
-/// The result of a joint fit.
+/// The result of a fit.
 #[derive(Debug, Clone)]
 pub struct Solution {
+    /// How it was fitted.
+    pub estimator: Estimator,
+    /// Data and estimates of the joint fit, where the result is that of two stages.
+    pub joint: Option<Box<(Problem, State)>>,
     /// Data, with the reasons of all rejections and the final variance components.
     pub problem: Problem,
     /// All estimates.
@@ -61,4 +66,11 @@ pub struct Solution {
     pub status: Status,
     /// Steps tried in all.
     pub iterations: usize,
+}
+
+impl Solution {
+    /// Data and estimates of the joint fit, be it the result or not.
+    pub fn joint_fit(&self) -> (&Problem, &State) {
+        self.joint.as_deref().map_or((&self.problem, &self.state), |(problem, state)| (problem, state))
+    }
 }

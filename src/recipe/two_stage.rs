@@ -21,7 +21,7 @@ use crate::solve::{
 use super::joint::JointNoise;
 
 /// The estimators that are compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Estimator {
     /// Two stages; one variance for positions and one for rotations, from the data.
@@ -35,6 +35,7 @@ pub enum Estimator {
     /// Joint fit; readings exact.
     HardJoint,
     /// Joint fit; joint noise from the data.
+    #[default]
     Joint,
 }
 
@@ -48,6 +49,16 @@ impl Estimator {
         Self::HardJoint,
         Self::Joint,
     ];
+
+    /// True where the camera poses are found first, and the robot from them.
+    pub fn is_two_stage(self) -> bool {
+        !matches!(self, Self::HardJoint | Self::Joint)
+    }
+
+    /// True where joint noise is part of the model.
+    pub fn has_joint_noise(self) -> bool {
+        matches!(self, Self::BlocksAndRepeatability | Self::FullAndRepeatability | Self::Joint)
+    }
 
     /// Letter in tables.
     pub fn letter(self) -> char {
@@ -84,7 +95,7 @@ pub struct Estimate {
     pub state: State,
     /// Covariance of the columns that act through the camera poses (robot, mountings, placements).
     pub covariance: DMatrix<f64>,
-    /// Its variance components: isotropic position (m) and rotation (rad), a factor, or joint noise per camera and reading.
+    /// Its variance components: isotropic position (m) and rotation (rad), a factor, or joint noise (behind it tilt) per series and reading.
     pub components: Vec<f64>,
 }
 
@@ -205,7 +216,7 @@ impl ErrorModel {
             }
             v
         };
-        let sizes = problem.cameras.len() * sizes_per_camera(problem);
+        let sizes = problem.noise.joint.len() * sizes_per_series(problem);
         let (first, estimated) = match noise {
             JointNoise::Estimated => (FIRST_JOINT_NOISE, true),
             JointNoise::Known(sigma) => (sigma, false),
@@ -235,8 +246,8 @@ impl ErrorModel {
             }
             _ => {
                 let image = &problem.images[image];
-                let per_camera = sizes_per_camera(problem);
-                let component = |k: usize| image.camera * per_camera + k.min(per_camera - 1);
+                let per_series = sizes_per_series(problem);
+                let component = |k: usize| image.series * per_series + k.min(per_series - 1);
                 Latent {
                     enters_by: d_slack.clone(),
                     component: (0..d_slack.ncols()).map(component).collect(),
@@ -291,21 +302,23 @@ impl ErrorModel {
             return change;
         }
         let mut change: f64 = 0.0;
-        let per_camera = sizes_per_camera(problem);
-        for camera in 0..problem.cameras.len() {
-            let mut groups = problem.noise.groups(kinds);
-            groups.extend((!problem.noise.tilt.is_empty()).then(|| vec![per_camera - 1]));
-            for group in groups {
-                let group: Vec<usize> = group.iter().map(|r| camera * per_camera + r).collect();
-                change = change.max(share_out(&group, &tally, tally.common(&group), &mut self.sizes));
+        let per_series = sizes_per_series(problem);
+        let mut groups = problem.noise.groups(kinds);
+        groups.extend((!problem.noise.tilt.is_empty()).then(|| vec![per_series - 1]));
+        for group in groups {
+            let of = |series: usize| group.iter().map(move |r| series * per_series + r);
+            let series = 0..problem.noise.joint.len();
+            let overall = Tally::usual(series.clone().map(|s| (&tally, of(s).collect())));
+            for own in series.map(|s| of(s).collect::<Vec<_>>()) {
+                change = change.max(share_out(&own, &tally, tally.drawn(&own, overall), &mut self.sizes));
             }
         }
         change
     }
 }
 
-/// Sizes of the joint-noise estimators per camera: one a reading, and the apparent tilt of the plate if there is one.
-fn sizes_per_camera(problem: &Problem) -> usize {
+/// Sizes of the joint-noise estimators per series: one a reading, and the apparent tilt of the plate if there is one.
+fn sizes_per_series(problem: &Problem) -> usize {
     problem.noise.joint.first().map_or(0, Vec::len) + usize::from(!problem.noise.tilt.is_empty())
 }
 
@@ -431,20 +444,29 @@ pub fn fit_poses(
 
 /// Cameras and plates at their optimum given robot, mountings and placements: what their covariance with the poses makes of them.
 fn with_cameras_for_the_robot(problem: &Problem, mut state: State, sizes: &[f64]) -> State {
-    let mut given = problem.clone();
+    let mut given = with_sizes(problem, Estimator::FullAndRepeatability, sizes);
     let theta = given.layout.theta_len();
     given.layout.columns[..theta].iter_mut().for_each(|c| c.free = false);
-    let per_camera = sizes_per_camera(problem);
-    for (camera, joint) in given.noise.joint.iter_mut().enumerate() {
-        let own = sizes[camera * per_camera..].iter().map(|s| s.max(f64::MIN_POSITIVE));
-        joint.iter_mut().zip(own).for_each(|(s, own)| *s = own);
-    }
-    for (camera, tilt) in given.noise.tilt.iter_mut().enumerate() {
-        *tilt = sizes[(camera + 1) * per_camera - 1].max(f64::MIN_POSITIVE);
-    }
     let hard = sizes.iter().all(|s| *s == 0.0);
     given.start_slack(&mut state, hard);
     refitted(&given, &state)
+}
+
+/// The problem with the joint noise and the tilt that an estimator found; as it is for one that has none.
+pub(super) fn with_sizes(problem: &Problem, estimator: Estimator, sizes: &[f64]) -> Problem {
+    let mut given = problem.clone();
+    if !estimator.has_joint_noise() {
+        return given;
+    }
+    let per_series = sizes_per_series(problem);
+    for (series, joint) in given.noise.joint.iter_mut().enumerate() {
+        let own = sizes[series * per_series..].iter().map(|s| s.max(f64::MIN_POSITIVE));
+        joint.iter_mut().zip(own).for_each(|(s, own)| *s = own);
+    }
+    for (series, tilt) in given.noise.tilt.iter_mut().enumerate() {
+        *tilt = sizes[(series + 1) * per_series - 1].max(f64::MIN_POSITIVE);
+    }
+    given
 }
 
 fn zero_fixed(problem: &Problem, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
@@ -515,7 +537,8 @@ pub fn fit_joint(
     let lin = outcome.linearised.filter(|_| outcome.status == Status::Converged)?;
     let theta = own.layout.theta_len();
     let covariance = covariance(&own, &outcome.state, &lin).ok()?.reduced.view((0, 0), (theta, theta)).into_owned();
-    let components = if hard { Vec::new() } else { (0..own.cameras.len()).flat_map(|c| own.joint_sigma(c)).collect() };
+    let components =
+        if hard { Vec::new() } else { (0..own.noise.joint.len()).flat_map(|s| own.joint_sigma(s)).collect() };
     Some((own, Estimate { estimator, state: outcome.state, covariance, components }))
 }
 

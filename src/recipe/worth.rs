@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use super::staged::images_know_the_robot;
 use crate::assess::{
     FlangeErrors, FlangeModel, Identifiability, WorkspacePoint, clustered_covariance, identifiability,
     usual_joint_sigma,
@@ -32,7 +33,7 @@ pub struct Worth {
     pub clustered_ratio: Option<f64>,
     /// True where the sigmas by clusters are the ones stated.
     pub larger_stated: bool,
-    /// 95 % interval of the joint noise of every camera and reading, rad or m; empty where it is not told.
+    /// 95 % interval of the joint noise of every series and reading, rad or m; empty where it is not told.
     pub joint_noise: Vec<Vec<[f64; 2]>>,
     /// What the data tell of the joint noise, also of that which counts as none; none where it was given.
     pub told: Option<NoiseInformation>,
@@ -85,7 +86,8 @@ pub(super) fn judge(
         worth.tell_joint_noise(problem, state, told.of_sizes());
     }
     worth.model_sigma = sigmas(&covariance.reduced);
-    if let Some(clustered) = clustered_covariance(problem, state, lin) {
+    let clustered = clustered_covariance(problem, state, lin).filter(|_| images_know_the_robot(problem, state));
+    if let Some(clustered) = clustered {
         let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &clustered.model, &stops));
         worth.clustered_ratio = model.map(|m| m.ratio_of(&clustered.sandwich));
         let by_clusters: Vec<f64> = worth.model_sigma.iter().zip(clustered.ratios()).map(|(s, r)| s * r).collect();
@@ -105,7 +107,7 @@ pub(super) fn judge(
     }
     let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops));
     let noise: Vec<Vec<f64>> =
-        problem.used().filter(|(_, i)| i.stop.is_some()).map(|(_, i)| problem.joint_sigma(i.camera)).collect();
+        problem.used().filter(|(_, i)| i.stop.is_some()).map(|(_, i)| problem.joint_sigma(i.series)).collect();
     let promise = |m: &FlangeModel| FlangeErrors::new(m, &state.robot, &usual_joint_sigma(&noise), &stops);
     worth.flange = model.as_ref().and_then(promise);
     worth.workspace = model.map(|m| m.workspace()).unwrap_or_default();
@@ -113,15 +115,23 @@ pub(super) fn judge(
 }
 
 impl Worth {
+    /// 95 % interval of the joint noise of a reading, root mean square over some series, rad or m; none where it is not told.
+    pub fn joint_noise_of(&self, series: &[usize], reading: usize) -> Option<[f64; 2]> {
+        match series {
+            [one] => self.joint_noise.get(*one)?.get(reading).copied(),
+            _ => Some(self.told.as_ref()?.mean_variance(series, &[reading]).interval(NORMAL_95)),
+        }
+    }
+
     /// Takes over what is known of the joint noise. The interval of what counts as none starts at none.
     fn tell_joint_noise(&mut self, problem: &Problem, state: &State, told: NoiseInformation) {
-        let interval = |camera: usize, reading: usize| {
-            let [low, high] = told.mean_variance(camera, &[reading]).interval(NORMAL_95);
-            [if problem.noise.joint[camera][reading] > JOINT_NOISE_FLOOR { low } else { 0.0 }, high]
+        let interval = |series: usize, reading: usize| {
+            let [low, high] = told.mean_variance(&[series], &[reading]).interval(NORMAL_95);
+            [if problem.noise.joint[series][reading] > JOINT_NOISE_FLOOR { low } else { 0.0 }, high]
         };
         let readings = state.robot.chain.readings.len();
         self.joint_noise =
-            (0..problem.cameras.len()).map(|c| (0..readings).map(|r| interval(c, r)).collect()).collect();
+            (0..problem.noise.joint.len()).map(|s| (0..readings).map(|r| interval(s, r)).collect()).collect();
         self.told = Some(told);
     }
 }

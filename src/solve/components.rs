@@ -32,7 +32,7 @@ impl Default for ComponentOptions {
 /// Smallest joint noise, rad or m: a tenth of what forty images of a good camera can tell from none.
 pub const JOINT_NOISE_FLOOR: f64 = 1e-7;
 
-/// Weight, in observations, with which the noise of a single joint is drawn to that of all joints together.
+/// Weight, in observations, with which the noise of a single joint is drawn to that of all joints of its series, and this to what is usual of all series.
 pub(super) const SHRINKAGE: f64 = 5.0;
 
 /// Relative change of every component below which the rounds end.
@@ -237,6 +237,30 @@ impl Tally {
         (free > 1e-9).then(|| (sum(&self.squares) / free).max(JOINT_NOISE_FLOOR * JOINT_NOISE_FLOOR))
     }
 
+    /// As [`Tally::common`], drawn to what is usual of all series.
+    pub fn drawn(&self, group: &[usize], overall: Option<f64>) -> Option<f64> {
+        let free = group.iter().map(|&r| self.redundancy[r]).sum::<f64>();
+        let squares = group.iter().map(|&r| self.squares[r]).sum::<f64>();
+        overall.map(|overall| (squares + SHRINKAGE * overall) / (free + SHRINKAGE))
+    }
+
+    /// Geometric mean over the series of the variance of the readings of a group, by what is told of each: a noisy series must not draw the others.
+    pub fn usual<'a>(all: impl Iterator<Item = (&'a Self, Vec<usize>)>) -> Option<f64> {
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for (tally, group) in all {
+            let Some(variance) = tally.common(&group) else { continue };
+            let told: f64 = group.iter().map(|&r| tally.redundancy[r]).sum();
+            sum += told * variance.ln();
+            weight += told;
+        }
+        (weight > 0.0).then(|| (sum / weight).exp())
+    }
+
+    /// All series together.
+    pub fn together(all: &[Self], readings: usize) -> Self {
+        all.iter().fold(Self::new(readings), |sum, tally| sum.with(tally, |_| true))
+    }
+
     fn with(mut self, other: &Self, which: impl Fn(usize) -> bool) -> Self {
         for r in (0..self.squares.len()).filter(|&r| which(r)) {
             self.squares[r] += other.squares[r];
@@ -256,10 +280,10 @@ impl Tally {
 
 /// What the latents of the slack tell of each size.
 struct Tallies {
-    /// Noise of the stops by themselves, per camera.
+    /// Noise of the stops by themselves, per series.
     own: Vec<Tally>,
     local: Tally,
-    /// Apparent tilt, indexed by camera.
+    /// Apparent tilt, indexed by series.
     tilt: Tally,
 }
 
@@ -274,12 +298,12 @@ fn tallies(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance)
         let (c, image) = (cov.slack(k, dq.len()), &problem.images[i]);
         for (r, value) in dq.iter().enumerate().skip(n) {
             let prior = problem.slack_variance(image, r)[0];
-            tilt.add(image.camera, *value, c[(r, r)], prior, prior);
+            tilt.add(image.series, *value, c[(r, r)], prior, prior);
         }
         for r in 0..n {
             let [own_part, local_part] = problem.slack_variance(image, r);
             let prior = own_part + local_part;
-            own[image.camera].add(r, dq[r], c[(r, r)], prior, own_part);
+            own[image.series].add(r, dq[r], c[(r, r)], prior, own_part);
             if local_part > 0.0 {
                 local.add(r, dq[r], c[(r, r)], prior, local_part);
             }
@@ -295,8 +319,9 @@ fn tallies(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance)
 }
 
 fn update_tilt(tilt: &Tally, noise: &mut Noise) -> f64 {
-    let of = |camera: usize| share_out(&[camera], tilt, tilt.common(&[camera]), &mut noise.tilt);
-    (0..tilt.squares.len()).map(of).fold(0.0, f64::max)
+    let all: Vec<usize> = (0..tilt.squares.len()).collect();
+    let usual = Tally::usual(all.iter().map(|&series| (tilt, vec![series])));
+    share_out(&all, tilt, usual, &mut noise.tilt)
 }
 
 /// Noise of the stops by themselves, and local errors where stops share readings.
@@ -304,17 +329,19 @@ fn update_joint(problem: &Problem, state: &State, found: &Tallies, noise: &mut N
     let kinds = &state.robot.chain.reading_kinds;
     let n = kinds.len();
     let Tallies { own, local, .. } = found;
+    let together = Tally::together(own, n);
     let mut change: f64 = 0.0;
     for group in problem.noise.groups(kinds) {
         if noise.local.get(group[0]).is_some_and(|s| *s > 0.0) {
             // A few postures tell little of their local errors: they are drawn to the noise of all joints of the kind.
             let alike: Vec<usize> = (0..n).filter(|&r| kinds[r] == kinds[group[0]]).collect();
-            let whole = own.iter().fold(local.clone(), |sum, tally| sum.with(tally, |r| noise.local[r] == 0.0));
+            let whole = local.clone().with(&together, |r| noise.local[r] == 0.0);
             let common = whole.common(&alike);
             change = change.max(share_out(&group, local, common, &mut noise.local));
         }
+        let overall = Tally::usual(own.iter().map(|tally| (tally, group.clone())));
         for (tally, sigma) in own.iter().zip(&mut noise.joint) {
-            change = change.max(share_out(&group, tally, tally.common(&group), sigma));
+            change = change.max(share_out(&group, tally, tally.drawn(&group, overall), sigma));
         }
     }
     change

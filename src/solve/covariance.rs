@@ -71,6 +71,15 @@ impl Covariance {
         self.enlarged.push((column, factor));
     }
 
+    /// Takes another covariance of the first columns, which go with no others then, and says of each whether anything touches it.
+    pub fn replace_first(&mut self, covariance: &DMatrix<f64>, touched: impl Fn(usize) -> bool) {
+        let n = covariance.nrows();
+        self.reduced.rows_mut(0, n).fill(0.0);
+        self.reduced.columns_mut(0, n).fill(0.0);
+        self.reduced.view_mut((0, 0), (n, n)).copy_from(covariance);
+        self.system.set_touched((0..n).map(touched));
+    }
+
     /// 6x6 block of six dense columns from `start`.
     pub fn block(&self, start: usize) -> Matrix6<f64> {
         self.reduced.fixed_view::<6, 6>(start, start).into_owned()

@@ -20,9 +20,9 @@ const MOST_COUPLED: usize = 1200;
 #[derive(Debug, Clone)]
 pub struct NoiseInformation {
     readings: usize,
-    cameras: usize,
+    series: usize,
     locals: usize,
-    /// Of the joint noise per camera and reading, of the local errors per reading, of the tilts per camera; rad^2 or m^2.
+    /// Of the joint noise per series and reading, of the local errors per reading, of the tilts per series; rad^2 or m^2.
     pub(super) variances: Vec<f64>,
     /// Covariance of the logarithms of those that the data touch, with their indices.
     covariance: DMatrix<f64>,
@@ -72,7 +72,7 @@ pub fn noise_information(
     lin: &Linearised,
     cov: &Covariance,
 ) -> Option<NoiseInformation> {
-    let (readings, cameras) = (state.robot.chain.readings.len(), problem.noise.joint.len());
+    let (readings, series) = (state.robot.chain.readings.len(), problem.noise.joint.len());
     let slack: usize = lin.images.iter().map(|&i| state.slack[i].len()).sum();
     let coupled = if cov.system.slack_start.is_empty() && slack <= MOST_COUPLED {
         Some(covariance_by(Elimination::Markers, problem, state, lin).ok()?)
@@ -89,7 +89,7 @@ pub fn noise_information(
             b.parts.iter().for_each(|(cb, pb)| information[(ca, *cb)] += 0.5 * pa * r * r * pb);
         }
     };
-    let first = cameras * readings;
+    let first = series * readings;
     let locals = local_latents(problem, state, cov, first);
     for a in &locals {
         locals.iter().for_each(|b| add(a, b, cov.reduced[(a.row, b.row)]));
@@ -125,7 +125,7 @@ pub fn noise_information(
     let covariance = factor.inverse();
     let scatter = &covariance * from_data * &covariance;
     let locals = problem.noise.local.len();
-    Some(NoiseInformation { readings, cameras, locals, variances, covariance, touched, scatter, together, coupled })
+    Some(NoiseInformation { readings, series, locals, variances, covariance, touched, scatter, together, coupled })
 }
 
 fn local_latents(problem: &Problem, state: &State, cov: &Covariance, first: usize) -> Vec<Latent> {
@@ -146,15 +146,16 @@ fn image_latents(problem: &Problem, state: &State, lin: &Linearised, k: usize) -
     let first = problem.noise.joint.len() * n;
     let latent = |row: usize| {
         let [own, local] = problem.slack_variance(image, row);
-        let a = if row < n { image.camera * n + row } else { first + problem.noise.local.len() + image.camera };
+        let a = if row < n { image.series * n + row } else { first + problem.noise.local.len() + image.series };
         let b = if local > 0.0 { first + row } else { a };
         Latent { row, sigma: (own + local).sqrt(), parts: [(a, own / (own + local)), (b, local / (own + local))] }
     };
     (0..dq.len()).map(latent).collect()
 }
 
-/// Every variance is drawn to a common one as by so many observations, as in the estimate: joint noise to that of the readings of its group, local errors to
-/// that of all readings of the kind, in which every variance counts with its size and its information.
+/// Every variance is drawn to a common one as by so many observations, as in the estimate: joint noise to that of the readings of its group in the
+/// series, this and the tilt to that of all series, local errors to that of all readings of the kind, in which every variance counts with its size and its
+/// information.
 fn draw_together(
     problem: &Problem,
     state: &State,
@@ -163,32 +164,42 @@ fn draw_together(
     information: &mut DMatrix<f64>,
 ) {
     let kinds = &state.robot.chain.reading_kinds;
-    let (n, cameras) = (kinds.len(), problem.noise.joint.len());
+    let (n, series) = (kinds.len(), problem.noise.joint.len());
     let is_local = |r: usize| problem.noise.local.get(r).is_some_and(|s| *s > 0.0);
     let weight: Vec<f64> = variances.iter().enumerate().map(|(c, v)| v * information[(c, c)]).collect();
-    let mut draw = |drawn: &[usize], common: &[(usize, f64)]| {
-        let common: Vec<_> = common.iter().filter(|(c, _)| touched.contains(c)).collect();
-        let whole: f64 = common.iter().map(|(_, w)| w).sum();
-        for &a in drawn.iter().filter(|a| whole > 0.0 && touched.contains(a)) {
-            let mut contrast = DVector::zeros(information.nrows());
-            contrast[a] = 1.0;
-            common.iter().for_each(|(c, w)| contrast[*c] -= w / whole);
-            information.ger(0.5 * SHRINKAGE, &contrast, &contrast, 1.0);
-        }
+    let mean = |of: &[(usize, f64)]| {
+        let of: Vec<_> = of.iter().filter(|(c, _)| touched.contains(c)).collect();
+        let whole: f64 = of.iter().map(|(_, w)| w).sum();
+        let mut mean = DVector::zeros(information.nrows());
+        of.iter().for_each(|(c, w)| mean[*c] += w / whole);
+        (whole > 0.0).then_some(mean)
     };
+    let mut drawn = Vec::new();
+    let mut draw = |from: &[(usize, f64)], to: &[(usize, f64)]| drawn.extend(mean(from).zip(mean(to)));
+    let alone = |c: &usize| [(*c, 1.0)];
     for group in problem.noise.groups(kinds) {
-        for camera in 0..cameras {
-            let own: Vec<usize> = group.iter().map(|r| camera * n + r).collect();
-            draw(&own, &own.iter().map(|&c| (c, 1.0)).collect::<Vec<_>>());
+        let own_of = |s: usize| group.iter().map(|r| s * n + r).collect::<Vec<_>>();
+        let level_of = |s: usize| own_of(s).into_iter().map(|c| (c, 1.0)).collect::<Vec<_>>();
+        let overall: Vec<_> = (0..series).flat_map(level_of).collect();
+        for s in 0..series {
+            own_of(s).iter().for_each(|c| draw(&alone(c), &level_of(s)));
+            draw(&level_of(s), &overall);
         }
         if is_local(group[0]) {
             let alike = (0..n).filter(|&r| kinds[r] == kinds[group[0]]);
             let (local, others): (Vec<usize>, Vec<usize>) = alike.partition(|&r| is_local(r));
-            let local: Vec<usize> = local.iter().map(|r| cameras * n + r).collect();
-            let own = (0..cameras).flat_map(|c| others.iter().map(move |r| c * n + r));
+            let local: Vec<usize> = local.iter().map(|r| series * n + r).collect();
+            let own = (0..series).flat_map(|s| others.iter().map(move |r| s * n + r));
             let common: Vec<_> = local.iter().copied().chain(own).map(|c| (c, weight[c])).collect();
-            draw(&local, &common);
+            local.iter().for_each(|c| draw(&alone(c), &common));
         }
+    }
+    let tilts: Vec<usize> = (series * n + problem.noise.local.len()..variances.len()).collect();
+    let all: Vec<_> = tilts.iter().flat_map(alone).collect();
+    tilts.iter().for_each(|c| draw(&alone(c), &all));
+    for (from, to) in drawn {
+        let contrast = from - to;
+        information.ger(0.5 * SHRINKAGE, &contrast, &contrast, 1.0);
     }
 }
 
@@ -198,18 +209,16 @@ impl NoiseInformation {
         Self { together: Vec::new(), coupled: None, ..self }
     }
 
-    /// Mean variance of some readings with a camera (the noise of the stops and local errors together).
-    pub fn mean_variance(&self, camera: usize, readings: &[usize]) -> Spread {
+    /// Mean variance of some readings in some series (the noise of the stops and local errors together).
+    pub fn mean_variance(&self, series: &[usize], readings: &[usize]) -> Spread {
         let mut gradient = DVector::zeros(self.touched.len());
         let (mut variance, mut told) = (0.0, true);
-        let first = self.cameras * self.readings;
+        let first = self.series * self.readings;
         for &r in readings {
-            let parts = [
-                Some(camera * self.readings + r),
-                Some(first + r).filter(|c| r < self.locals && self.variances[*c] > 0.0),
-            ];
-            for c in parts.into_iter().flatten() {
-                let part = self.variances[c] / readings.len() as f64;
+            let own = series.iter().map(|s| (s * self.readings + r, series.len() as f64));
+            let local = Some((first + r, 1.0)).filter(|(c, _)| r < self.locals && self.variances[*c] > 0.0);
+            for (c, of) in own.chain(local) {
+                let part = self.variances[c] / (of * readings.len() as f64);
                 variance += part;
                 match self.touched.iter().position(|t| *t == c) {
                     Some(at) => gradient[at] += part,

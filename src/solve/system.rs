@@ -200,6 +200,11 @@ impl System {
         self.touched[column]
     }
 
+    /// Says of the first columns whether anything touches them.
+    pub(super) fn set_touched(&mut self, touched: impl Iterator<Item = bool>) {
+        self.touched.iter_mut().zip(touched).for_each(|(slot, touched)| *slot = touched);
+    }
+
     /// The whole step from the solution `x` of the reduced system.
     pub fn step(&self, problem: &Problem, lin: &Linearised, x: &DVector<f64>) -> Step {
         match &self.eliminated {

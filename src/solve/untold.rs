@@ -16,8 +16,8 @@ const TOLD: f64 = 2.326;
 /// Sigmas by its own spread from which on an estimate is told without asking further.
 const PLAIN: f64 = 3.0;
 
-/// Readings of one kind with one camera.
-type Group = (usize, Vec<usize>);
+/// Readings of one kind, in all series: one of them alone may have too few stops to tell what all together do.
+type Group = Vec<usize>;
 
 /// The outcome with such noise at its floor, and what was known of all noise before, where that changed; the problem keeps it so.
 pub fn without_untold_noise(
@@ -26,19 +26,19 @@ pub fn without_untold_noise(
     settings: &Settings,
 ) -> (Outcome, Option<NoiseInformation>) {
     let Some(told) = information(problem, &outcome) else { return (outcome, None) };
+    let series: Vec<usize> = (0..problem.noise.joint.len()).collect();
+    let above_floor = |r: &usize| problem.noise.joint.iter().any(|own| own[*r] > JOINT_NOISE_FLOOR);
     let in_doubt: Vec<Group> = groups(problem, &outcome.state)
-        .filter(|(camera, group)| told.mean_variance(*camera, group).interval(PLAIN)[0] == 0.0)
-        .filter(|(camera, group)| group.iter().any(|&r| problem.noise.joint[*camera][r] > JOINT_NOISE_FLOOR))
+        .filter(|group| told.mean_variance(&series, group).interval(PLAIN)[0] == 0.0)
+        .filter(|group| group.iter().any(above_floor))
         .collect();
     if in_doubt.is_empty() {
         return (outcome, None);
     }
     let (without, at_none) = solved_without(problem, &outcome.state, &in_doubt, settings);
     let Some(spread) = information(&without, &at_none) else { return (outcome, None) };
-    let is_told = |(camera, group): &Group| {
-        let found = told.mean_variance(*camera, group).variance;
-        found > TOLD * spread.mean_variance(*camera, group).sigma
-    };
+    let is_told =
+        |group: &Group| told.mean_variance(&series, group).variance > TOLD * spread.mean_variance(&series, group).sigma;
     let (kept, untold): (Vec<Group>, Vec<Group>) = in_doubt.into_iter().partition(is_told);
     let (mended, outcome) = match (kept.is_empty(), untold.is_empty()) {
         (_, true) => return (outcome, None),
@@ -50,12 +50,9 @@ pub fn without_untold_noise(
 }
 
 /// Groups whose noise is that of single stops alone.
-fn groups(problem: &Problem, state: &State) -> impl Iterator<Item = Group> {
-    let local = problem.noise.local.clone();
+fn groups<'a>(problem: &'a Problem, state: &State) -> impl Iterator<Item = Group> + 'a {
     let of_stops = problem.noise.groups(&state.robot.chain.reading_kinds).into_iter();
-    let of_stops: Vec<Vec<usize>> =
-        of_stops.filter(|g| g.iter().all(|&r| local.get(r).is_none_or(|s| *s == 0.0))).collect();
-    (0..problem.noise.joint.len()).flat_map(move |c| of_stops.clone().into_iter().map(move |g| (c, g)))
+    of_stops.filter(|g| g.iter().all(|&r| problem.noise.local.get(r).is_none_or(|s| *s == 0.0)))
 }
 
 fn information(problem: &Problem, outcome: &Outcome) -> Option<NoiseInformation> {
@@ -65,8 +62,8 @@ fn information(problem: &Problem, outcome: &Outcome) -> Option<NoiseInformation>
 
 fn solved_without(problem: &Problem, state: &State, groups: &[Group], settings: &Settings) -> (Problem, Outcome) {
     let mut without = problem.clone();
-    for (camera, group) in groups {
-        group.iter().for_each(|&r| without.noise.joint[*camera][r] = JOINT_NOISE_FLOOR);
+    for own in &mut without.noise.joint {
+        groups.iter().flatten().for_each(|&r| own[r] = JOINT_NOISE_FLOOR);
     }
     let outcome = solve(&without, state.clone(), settings);
     (without, outcome)

@@ -74,7 +74,7 @@ impl Dense {
                     (column.prior_mean - values[c], column.prior_sigma)
                 }
                 Unknown::Slack(i, k) => match &state.slack[i] {
-                    Slack::Joints(dq) => (-dq[k], problem.noise.joint[problem.images[i].camera][k]),
+                    Slack::Joints(dq) => (-dq[k], problem.noise.joint[problem.images[i].series][k]),
                     _ => (0.0, f64::INFINITY),
                 },
                 Unknown::Marker(m, k) => (-state.plates[0].corrections[m][k], problem.plates[0].markers[m].sigma_m),

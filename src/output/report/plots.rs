@@ -97,9 +97,9 @@ pub(super) fn histogram(record: &SolutionRecord) -> Option<String> {
     Some(svg.finish())
 }
 
-/// Joint noise in thousandths of a degree (of a millimetre for a prismatic joint), a bar for each joint and camera.
+/// Joint noise in thousandths of a degree (of a millimetre for a prismatic joint), a bar for each joint and series.
 pub(super) fn joint_noise(record: &SolutionRecord) -> Option<String> {
-    let cameras = &record.cameras;
+    let all = record.stop_noise();
     let names = &record.robot.readings;
     let shown = |k: usize, sigma: f64| match record.robot.reading_kinds[k] {
         JointKind::Prismatic => (1e3 * sigma, format!("{} mm", plain_digits(1e3 * sigma))),
@@ -109,25 +109,25 @@ pub(super) fn joint_noise(record: &SolutionRecord) -> Option<String> {
         }
     };
     let largest =
-        cameras.iter().flat_map(|c| c.joint_noise.iter().enumerate().map(|(k, s)| shown(k, *s).0)).fold(0.0, f64::max);
+        all.iter().flat_map(|(_, n)| n.joint.iter().enumerate().map(|(k, s)| shown(k, *s).0)).fold(0.0, f64::max);
     if largest <= 0.0 || names.is_empty() {
         return None;
     }
     let (left, bar, gap) = (106.0, 16.0, 8.0);
-    let row = bar * cameras.len() as f64 + gap;
+    let row = bar * all.len() as f64 + gap;
     let height = row * names.len() as f64 + gap;
     let mut svg = Svg::new(WIDTH, height, "Joint noise of each joint");
     let reach = WIDTH - left - 175.0;
     for (k, name) in names.iter().enumerate() {
         let top = gap / 2.0 + row * k as f64;
         svg.text([left - 8.0, top + row / 2.0], Anchor::End, &shortened(name));
-        for (c, camera) in cameras.iter().enumerate() {
-            let (size, label) = shown(k, camera.joint_noise[k]);
+        for (c, (series, noise)) in all.iter().enumerate() {
+            let (size, label) = shown(k, noise.joint[k]);
             let y = top + bar * c as f64;
             let width = (reach * size / largest).max(1.0);
             svg.rect([left, y + 1.0], [width, bar - 2.0], "after");
-            let camera = if cameras.len() > 1 { format!(" ({})", camera.name) } else { String::new() };
-            svg.text([left + width + 6.0, y + bar - 4.0], Anchor::Start, &(label + &camera));
+            let of = if all.len() > 1 { format!(" ({series})") } else { String::new() };
+            svg.text([left + width + 6.0, y + bar - 4.0], Anchor::Start, &(label + &of));
         }
     }
     Some(svg.finish())
