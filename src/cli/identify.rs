@@ -13,13 +13,8 @@ use super::{Verdict, progress, summary};
 use crate::error::{Error, Notice, Result};
 use crate::model::camera::Lens;
 use crate::output::solution_json::{self, FILE_NAME};
-<<<<<<< HEAD
 use crate::output::{self, Context, Offsets, Place, Poses, folder_name, recover, restore};
-use crate::recipe::{self, MeasuredSeries, Options};
-=======
-use crate::output::{self, Context, Offsets, Poses, restore};
 use crate::recipe::{self, Estimator, MeasuredSeries, Options};
->>>>>>> 98c9f18 (Joint noise and tilt per series; regions hold out whole postures; compare and identify ask one function; identify --two-stage (work in progress))
 use crate::series::{self, InputFile, Series};
 use crate::urdf::{self, Chain, RobotDescription};
 
@@ -147,24 +142,16 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
             notices.extend(tip_notice(&description, &all, args.base.as_deref(), args.tip.as_deref())?);
             let inputs = inputs(urdf, &description, &all)?;
             let measured = measure_all(&all, &chain, &mut notices)?;
-<<<<<<< HEAD
             all.iter().try_for_each(|s| require_unchanged(&inputs, &s.image_hashes()?))?;
-            Task { inputs, description, chain, measured, notices }
-=======
-            Task { inputs: inputs(urdf, &all)?, estimator: Estimator::Joint, description, chain, measured, notices }
->>>>>>> 98c9f18 (Joint noise and tilt per series; regions hold out whole postures; compare and identify ask one function; identify --two-stage (work in progress))
+            Task { inputs, estimator: Estimator::Joint, description, chain, measured, notices }
         }
         (None, None) => {
             return Err(Error::input("identify", "no robot is given", "give --urdf and --series, or --from"));
         }
     };
-<<<<<<< HEAD
     let place = place.ok_or_else(|| Error::input("identify", "no folder for the results is given", "give --out"))?;
-    solve(args, &options, task, place)
-=======
     let estimator = args.two_stage.map_or(task.estimator, Into::into);
-    solve(args, &Options { estimator, ..options }, task)
->>>>>>> 98c9f18 (Joint noise and tilt per series; regions hold out whole postures; compare and identify ask one function; identify --two-stage (work in progress))
+    solve(args, &Options { estimator, ..options }, task, place)
 }
 
 /// The task of an earlier solution.
@@ -181,13 +168,8 @@ fn again(args: &IdentifyArgs, path: &Path) -> Result<Task> {
     Ok(Task { chain, estimator, measured: restore::measured_series(&record)?, notices, inputs, description })
 }
 
-<<<<<<< HEAD
 fn solve(args: &IdentifyArgs, options: &Options, task: Task, place: Place) -> Result<Verdict> {
-    let Task { description, chain, mut measured, mut notices, inputs } = task;
-=======
-fn solve(args: &IdentifyArgs, options: &Options, task: Task) -> Result<Verdict> {
     let Task { description, chain, mut measured, mut notices, inputs, .. } = task;
->>>>>>> 98c9f18 (Joint noise and tilt per series; regions hold out whole postures; compare and identify ask one function; identify --two-stage (work in progress))
     let mut open_lenses = Vec::new();
     if let Some(name) = args.camera.as_deref() {
         let lens = if name == "auto" { Lens::Brown } else { super::simulate::lens(name)? };
