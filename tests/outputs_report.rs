@@ -149,6 +149,20 @@ fn names_and_reasons_cannot_break_the_page() {
 }
 
 #[test]
+fn noise_is_per_series_and_per_camera_in_older_files() {
+    let mut record = record();
+    let own = record.series[0].noise.clone().unwrap();
+    assert_eq!(record.stop_noise(), [(record.series[0].name.as_str(), own.clone())]);
+    // One series: both are the same.
+    record.series[0].noise = None;
+    let bytes = solution_json::to_bytes(&record).unwrap();
+    assert!(!String::from_utf8_lossy(&bytes).contains("joint_interval"));
+    let older = solution_json::read(&bytes).unwrap();
+    assert_eq!(older.stop_noise(), [(older.cameras[0].name.as_str(), own)]);
+    assert_eq!(older.estimator, Estimator::Joint);
+}
+
+#[test]
 fn a_result_without_robot_terms_plots_or_covariances_still_has_a_page() {
     let mut record = record();
     record.robot.terms.clear();

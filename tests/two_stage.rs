@@ -4,13 +4,19 @@
 
 mod support;
 
+use std::collections::BTreeSet;
+
 use nalgebra::Vector3;
+use robotcal::assess::{folds, regions};
 use robotcal::model::joint_terms::{JointTerm, Term};
 use robotcal::problem::{Layout, Problem, Slack, State};
-use robotcal::recipe::{Estimator, JointNoise, PoseStage, estimate_all, fit_poses, linear_step};
+use robotcal::recipe::{
+    Estimator, JointNoise, Options, PoseStage, RobotModel, beside_two_stages, compare, estimate_all, fit_poses,
+    identify, linear_step,
+};
 use robotcal::series::CameraMount;
 use robotcal::solve::{Settings, Status, covariance, linearise_all, solve};
-use support::small::{Dice, Request, problem};
+use support::small::{Dice, Request, problem, series};
 
 fn hard(state: &State) -> State {
     State { slack: vec![Slack::None; state.slack.len()], ..state.clone() }
@@ -124,5 +130,79 @@ fn every_estimator_has_a_solution_where_joints_came_back_to_readings() {
     problem.noise.local = vec![1e-3, 0.0, 0.0, 0.0, 0.0, 0.0];
     for (estimator, found) in estimate_all(&problem, &state) {
         assert!(found.is_some(), "{}", estimator.title());
+    }
+}
+
+/// Images in postures of `of_posture` stops each, which share the readings of the first three joints.
+fn in_postures(images: usize, of_posture: usize) -> (Problem, State) {
+    let mut dice = Dice::new(77);
+    let (mut problem, state) = problem(&mut dice, &Request { images, ..Request::default() });
+    for (i, image) in problem.images.iter_mut().enumerate() {
+        let stop = image.stop.as_mut().unwrap();
+        let posture = (i / of_posture) as f64;
+        // Visited from side to side, so that neighbours in time are none in space.
+        let swing = 0.3 * posture * if i / of_posture % 2 == 0 { 1.0 } else { -1.0 };
+        stop.readings[..3].copy_from_slice(&[swing, 0.1 + 0.01 * posture, 0.4 + 0.01 * posture]);
+    }
+    (problem, state)
+}
+
+fn sets(folds: &[Vec<usize>]) -> BTreeSet<BTreeSet<usize>> {
+    folds.iter().map(|fold| fold.iter().copied().collect()).collect()
+}
+
+#[test]
+fn regions_hold_whole_postures_out_and_are_not_the_folds_by_image() {
+    let (problem, state) = in_postures(24, 4);
+    let (by_image, by_region) = (folds(&problem).unwrap(), regions(&problem, &state).unwrap());
+    assert_eq!((by_image.len(), by_region.len()), (6, 3));
+    assert_ne!(sets(&by_image), sets(&by_region));
+    let mut all: Vec<usize> = by_region.concat();
+    all.sort_unstable();
+    assert_eq!(all, (0..24).collect::<Vec<_>>());
+    for posture in 0..6 {
+        let first = 4 * posture;
+        let holding: Vec<_> = by_region.iter().filter(|r| (first..first + 4).any(|i| r.contains(&i))).collect();
+        assert_eq!(holding.len(), 1, "posture {posture} is split");
+    }
+    // Regions follow each other along the workspace: of the swings 0, -0.3, 0.6, -0.9, 1.2, -1.5 two neighbours each.
+    let postures: BTreeSet<BTreeSet<usize>> = by_region.iter().map(|r| r.iter().map(|i| i / 4).collect()).collect();
+    assert_eq!(postures, [[3, 5], [0, 1], [2, 4]].map(BTreeSet::from).into());
+    let (few, state) = in_postures(20, 4);
+    assert!(folds(&few).is_some() && regions(&few, &state).is_none());
+}
+
+#[test]
+fn identify_and_compare_answer_the_same_question_alike_and_a_two_stage_result_stands_by_itself() {
+    let mut dice = Dice::new(78);
+    let (problem, truth) =
+        problem(&mut dice, &Request { images: 18, lattice: (5, 4), joint_noise: 3e-4, ..Request::default() });
+    let (chain, measured) = (truth.robot.chain.clone(), [series(&problem)]);
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let joint = identify(chain.clone(), &measured, &options).unwrap();
+    let beside = beside_two_stages(&joint).unwrap();
+    let compared = compare(&joint, None, |_, _| ()).unwrap();
+    for row in &beside.rows {
+        let same = compared.rows.iter().find(|r| r.estimator == row.estimator).unwrap();
+        assert_eq!(row.by_image, same.by_image, "{}", row.estimator.title());
+    }
+    let joint_row = beside.rows.iter().find(|r| r.estimator == Estimator::Joint).unwrap();
+    assert!((joint_row.by_image.unwrap().rms_mm / joint.accuracy.calibrated.rms_mm - 1.0).abs() < 1e-9);
+    for estimator in Estimator::ALL.into_iter().filter(|e| e.is_two_stage()) {
+        let staged = identify(chain.clone(), &measured, &Options { estimator, ..options.clone() }).unwrap();
+        assert_eq!(staged.estimator, estimator);
+        // Its accuracy is the one that the joint fit's report states of it, and its robot that of the estimator.
+        let row = beside.rows.iter().find(|r| r.estimator == estimator).unwrap();
+        assert!((row.by_image.unwrap().rms_mm / staged.accuracy.calibrated.rms_mm - 1.0).abs() < 1e-9);
+        let stage = PoseStage::adjusted(&joint.problem, &joint.state).unwrap();
+        let found = fit_poses(&joint.problem, &stage, &joint.state, estimator, JointNoise::Estimated).unwrap();
+        assert_eq!(found.state.robot, staged.state.robot);
+        for c in staged.problem.layout.robot().filter(|&c| staged.problem.layout.columns[c].free) {
+            let (own, of_fit) = (staged.covariance.sigma(c), found.covariance[(c, c)].sqrt());
+            let same = if estimator == Estimator::FullAndRepeatability { 0.3 } else { 1e-9 };
+            assert!(own > 0.0 && (own / of_fit - 1.0).abs() < same || staged.worth.larger_stated, "{own} {of_fit}");
+        }
+        let again = beside_two_stages(&staged).unwrap();
+        assert_eq!(again.rows, beside.rows);
     }
 }

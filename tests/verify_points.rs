@@ -7,6 +7,71 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use robotcal::model::robot::Robot;
+use robotcal::recipe::Estimator;
+use robotcal::simulate::truth::Truth;
+
+#[test]
+fn a_two_stage_result_is_written_shown_judged_and_solved_again_like_a_joint_one() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let urdf = root.join("robots/ur10e/ur10e.urdf");
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let mut command = Command::cargo_bin("robotcal").unwrap();
+        command.current_dir(folder.path()).args(args).output().unwrap()
+    };
+    let series = root.join("datasets/ur10e_observations");
+    let (urdf, series) = (urdf.to_str().unwrap(), series.to_str().unwrap());
+    let estimator = |out: &str| {
+        let text = std::fs::read(folder.path().join(out).join("solution.json")).unwrap();
+        robotcal::output::solution_json::read(&text).unwrap().estimator
+    };
+    let of =
+        ["identify", "--urdf", urdf, "--series", series, "--robot-model", "rigid", "--two-stage", "b", "--out", "b"];
+    let found = run(&of);
+    assert!(found.status.success(), "{}", String::from_utf8_lossy(&found.stderr));
+    assert_eq!(estimator("b"), Estimator::Blocks);
+    assert!(run(&["show", "b/solution.json"]).status.success());
+    let truth = Truth::read(&root.join("datasets/ur10e_observations/truth.toml")).unwrap();
+    let mut table = format!("x_m,y_m,z_m,{}\n", truth.joints.join(","));
+    for held in &truth.held_out {
+        let cells: Vec<String> =
+            held.base_from_tip.pose().xyz().iter().chain(&held.readings).map(|v| format!("{v:.9}")).collect();
+        writeln!(table, "{}", cells.join(",")).unwrap();
+    }
+    std::fs::write(folder.path().join("points.csv"), table).unwrap();
+    let corrected = std::fs::read_dir(folder.path().join("b")).unwrap().map(|e| e.unwrap().path());
+    let corrected = corrected.filter(|p| p.extension().is_some_and(|e| e == "urdf")).next().unwrap();
+    let judged = run(&[
+        "verify",
+        "--urdf",
+        corrected.to_str().unwrap(),
+        "--compensation",
+        "b/compensation.toml",
+        "--nominal",
+        urdf,
+        "--base",
+        &truth.base,
+        "--tip",
+        &truth.tip,
+        "--points",
+        "points.csv",
+        "--joint-unit",
+        "rad",
+    ]);
+    assert!(
+        judged.status.success(),
+        "{}{}",
+        String::from_utf8_lossy(&judged.stdout),
+        String::from_utf8_lossy(&judged.stderr)
+    );
+    assert!(
+        run(&["identify", "--from", "b/solution.json", "--robot-model", "rigid", "--out", "again"]).status.success()
+    );
+    assert_eq!(estimator("again"), Estimator::Blocks);
+    // No joint noise can be stated for an estimator that has none.
+    let refused = run(&["identify", "--from", "b/solution.json", "--joint-noise", "0.0001", "--out", "no"]);
+    assert_eq!(refused.status.code(), Some(2));
+}
 
 #[test]
 fn readings_in_another_unit_are_no_good_verdict() {
