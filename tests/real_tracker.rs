@@ -218,7 +218,7 @@ fn held_out_mm(problem: &Problem, fit: impl Fn(&Problem) -> Option<State>) -> Op
 
 /// What of the noise model costs where two stages do better: every part switched off, in the joint fit and in the fits of poses.
 #[test]
-#[ignore = "minutes; its figures stand in the guide, decision 6"]
+#[ignore = "minutes; its figures stand in the guide, decision 7"]
 fn parts_of_the_noise_model_switched_off() {
     let Some(real) = real() else { return };
     for (name, tracker) in SERIES
