@@ -224,3 +224,138 @@ fn status_and_turn_choose_the_posture_and_follow_a_corrected_sign() {
     }
     assert!(turned > 3, "{turned}");
 }
+
+/// A world of frames: `X .., Y .., ..` of the flange in the base.
+fn coded(cell: &Cell, q: &[f64]) -> String {
+    let (s, t) = status_turn(q);
+    format!("{{{},S {s},T {t}}}", pose_text(&cell.nominal.base_from_tip(q)))
+}
+
+fn assert_pose_meets(cell: &Cell, old: &str, new: &str, key: &str, frames: (&Pose, &Pose), q: &[f64]) {
+    let (a, b) = (aggregate(old, key), aggregate(new, key));
+    let flange = |a: &BTreeMap<String, f64>| *frames.0 * pose(a) * frames.1.inverse();
+    let limits = inverse::reading_limits(&cell.nominal.chain);
+    let commanded = inverse::solve_from(&cell.nominal, &limits, &flange(&b), q).unwrap();
+    let change = commanded.iter().zip(q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(change < 0.15, "{key} left its posture: {change}");
+    assert_meets(&cell.real_at(&commanded, None), &flange(&a), key);
+    assert_ne!(a, b, "{key} is corrected");
+}
+
+#[test]
+fn frames_that_a_motion_states_for_itself_hold_for_it_alone() {
+    let mut cell = Cell::kuka(26);
+    let frame = |text: &str| pose(&aggregate(&format!("{{{text}}}"), ""));
+    let (tool, base) = (frame(TOOL), frame(BASE));
+    let q: Vec<Vec<f64>> = (0..4).map(|_| cell.readings()).collect();
+    let at = |q: &[f64], base: &Pose, tool: &Pose| {
+        let (s, t) = status_turn(q);
+        format!("{{{},S {s},T {t}}}", pose_text(&(base.inverse() * cell.nominal.base_from_tip(q) * *tool)))
+    };
+    let none = Pose::identity();
+    let src = format!(
+        "DEF a()\nSPTP XP1 WITH $VEL_AXIS[1] = SVEL_JOINT(10.0), $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO), $IPO_MODE = SIPO_MODE(FP1.IPO_FRAME), $LOAD = SLOAD(FP1.TOOL_NO), $APO = SAPO_PTP(PPDAT1)\n\
+SLIN XP2 WITH $TOOL=TOOL_DATA[1], $BASE={{{BASE}}} C_SPL\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP XP3\nSPLINE WITH $BASE = SBASE(FP1.BASE_NO), $TOOL = STOOL2(FP1)\nSPL XP4\nENDSPLINE\nEND\n"
+    );
+    let dat = format!(
+        "DEFDAT a\nDECL E6POS XP1={}\nDECL FDAT FP1={{TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE}}\nDECL E6POS XP2={}\nDECL E6POS XP3={}\nDECL E6POS XP4={}\nENDDAT\n",
+        at(&q[0], &base, &tool),
+        at(&q[1], &base, &tool),
+        at(&q[2], &none, &none),
+        at(&q[3], &base, &tool)
+    );
+    let config = format!("DEFDAT $CONFIG\nBASE_DATA[2]={{{BASE}}}\nTOOL_DATA[1]={{{TOOL}}}\nENDDAT\n");
+    let files = [("a.src", src), ("a.dat", dat.clone()), ("$config.dat", config)];
+    let paths: Vec<_> = files.iter().map(|(name, text)| cell.write(name, text.as_bytes())).collect();
+    let run = cell.compensate(&paths.iter().collect::<Vec<_>>(), &["--unordered"]).expect(0);
+    let new = run.text("a.dat");
+    assert_eq!(run.text("corrections.csv").lines().count(), 5, "corrected, and nothing is listed twice");
+    for (k, q) in q.iter().enumerate() {
+        let frames = if k == 2 { (&none, &none) } else { (&base, &tool) };
+        assert_pose_meets(&cell, &dat, &new, &format!("XP{}=", k + 1), frames, q);
+    }
+}
+
+#[test]
+fn an_element_that_is_chosen_while_the_program_runs_stands_for_all_that_are_declared() {
+    let mut cell = Cell::kuka(27);
+    let q: Vec<Vec<f64>> = (0..4).map(|_| cell.readings()).collect();
+    let src =
+        "DEF a()\nDECL INT I\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nFOR I=1 TO 3\nPTP P[I]\nENDFOR\nPTP Q[2,I]\nEND\n";
+    let dat = format!(
+        "DEFDAT a\nDECL E6POS P[3]\nP[1]={}\nP[2]={}\nP[3]={}\nDECL E6AXIS Q[2,2]\nQ[2,1]={{{}}}\nQ[1,1]={{A1 1.0,A2 -90.0,A3 90.0,A4 0.0,A5 10.0,A6 0.0}}\nENDDAT\n",
+        coded(&cell, &q[0]),
+        coded(&cell, &q[1]),
+        coded(&cell, &q[2]),
+        axes_text(&q[3])
+    );
+    let paths = [cell.write("a.src", src.as_bytes()), cell.write("a.dat", dat.as_bytes())];
+    let run = cell.compensate(&paths.iter().collect::<Vec<_>>(), &["--unordered"]).expect(0);
+    let new = run.text("a.dat");
+    let none = Pose::identity();
+    for (k, q) in q.iter().enumerate().take(3) {
+        assert_pose_meets(&cell, &dat, &new, &format!("P[{}]=", k + 1), (&none, &none), q);
+    }
+    let (old, new) = (aggregate(&dat, "Q[2,1]="), aggregate(&new, "Q[2,1]="));
+    assert_meets(&cell.real_at(&axes(&new), None), &cell.nominal.base_from_tip(&axes(&old)), "Q[2,1]");
+}
+
+#[test]
+fn a_declared_target_visited_again_gives_the_numbers_that_literals_give() {
+    let mut checked = 0;
+    for seed in 28..33 {
+        let mut cell = Cell::kuka(seed);
+        let (a, b) = (cell.readings(), cell.readings());
+        let c: Vec<f64> = a.iter().enumerate().map(|(i, v)| v + 0.05 * (i as f64 + 1.0).sin()).collect();
+        let last = format!("LIN {{{}}}", pose_text(&cell.nominal.base_from_tip(&c)));
+        let head = "DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n";
+        let (xa, xb) = (format!("{{{}}}", axes_text(&a)), format!("{{{}}}", axes_text(&b)));
+        let declared = cell.write("a.src", format!("{head}PTP XA\nPTP XB\nPTP XA\n{last}\nEND\n").as_bytes());
+        let data =
+            cell.write("a.dat", format!("DEFDAT a\nDECL E6AXIS XA={xa}\nDECL E6AXIS XB={xb}\nENDDAT\n").as_bytes());
+        let literal = cell.write("b.src", format!("{head}PTP {xa}\nPTP {xb}\nPTP {xa}\n{last}\nEND\n").as_bytes());
+        // In the order of the text: backlash counts, and depends on where the robot comes from.
+        let by_name = cell.compensate(&[&declared, &data], &[]).expect(0).text("a.src");
+        let by_number = cell.compensate(&[&literal], &[]).expect(0).text("b.src");
+        let of = |text: &str| aggregate(text.lines().find(|l| l.starts_with("LIN")).unwrap(), "LIN");
+        let (x, y) = (of(&by_name), of(&by_number));
+        for (name, value) in &x {
+            // XA has one correction by name and two by number: their backlash differs.
+            assert!((value - y[name]).abs() < 0.02, "seed {seed}, {name}: {value} {}", y[name]);
+        }
+        let none = Pose::identity();
+        let file = cell.write("a.src", format!("{head}PTP XA\nPTP XB\nPTP XA\n{last}\nEND\n").as_bytes());
+        let run = cell.compensate(&[&file, &data], &["--unordered"]).expect(0);
+        assert_pose_meets(&cell, &last, &run.text("a.src"), "LIN", (&none, &none), &c);
+        checked += 1;
+    }
+    assert_eq!(checked, 5);
+}
+
+#[test]
+fn poses_without_status_go_on_in_every_posture_of_the_arm() {
+    let mut cell = Cell::kuka(33);
+    let limits = inverse::reading_limits(&cell.nominal.chain);
+    let mut postures: Vec<Vec<f64>> = Vec::new();
+    let mut seen = std::collections::BTreeSet::new();
+    for _ in 0..4000 {
+        let q = cell.readings();
+        if q.iter().zip(&limits).all(|(v, (l, h))| *v > l + 0.3 && *v < h - 0.3) && seen.insert(status_turn(&q).0) {
+            postures.push(q);
+        }
+    }
+    assert!(postures.len() >= 6, "{seen:?}");
+    let none = Pose::identity();
+    for q in &postures {
+        let up: Vec<f64> = q.iter().enumerate().map(|(i, v)| v + 0.06 * (i as f64 + 0.5).cos()).collect();
+        let lin = format!("LIN {{{}}}", pose_text(&cell.nominal.base_from_tip(&up)));
+        let head = "DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n";
+        let file = cell.write("a.src", format!("{head}PTP {{{}}}\n{lin}\nEND\n", axes_text(q)).as_bytes());
+        let run = cell.compensate(&[&file], &["--unordered"]).expect(0);
+        assert_pose_meets(&cell, &lin, &run.text("a.src"), "LIN", (&none, &none), &up);
+        // Alone, nothing tells which of them it means.
+        let file = cell.write("b.src", format!("{head}{lin}\nEND\n").as_bytes());
+        let alone = cell.compensate(&[&file], &["--unordered"]).expect(1);
+        assert_eq!(alone.text("b.src").lines().nth(3), Some(lin.as_str()));
+    }
+}

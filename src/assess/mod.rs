@@ -5,6 +5,7 @@ mod clustered;
 mod flange;
 mod hold_out;
 mod identifiability;
+mod in_base;
 mod points;
 mod projection;
 mod promise;
@@ -24,6 +25,7 @@ pub use identifiability::{
     Cause, Correlation, Identifiability, Observability, UnknownDirection, frame_parameters, identifiability,
     identifiability_of_stops,
 };
+pub use in_base::sigma_in_base;
 pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
 pub use projection::ProjectionMap;
 pub use promise::{FlangeErrors, usual_joint_sigma};

@@ -1,23 +1,28 @@
 //! `robotcal compensate`: a program made for the nominal robot, corrected for the real one.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
 use super::Verdict;
-use super::robot::read_chain;
+use super::robot::noted_chain;
 use super::say::{say, say_line};
+use super::show::read_solution;
 use crate::error::{Error, Result};
 use crate::geom::{Pose, exp_so3};
 use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
-use crate::output::{Place, compensated};
+use crate::output::corrections::{self, TABLE, Weight};
+use crate::output::restore::found_model;
+use crate::output::{Place, compensated, solution_json};
+use crate::programs::compensate::Compensated;
 use crate::programs::program::Posture;
 use crate::programs::{
     self, Correction, Kind, Language, Left, Models, Outcome, Postures, Program, Setting, Target, TextFile,
 };
-use crate::urdf::{Chain, JointKind};
+use crate::urdf::{self, Chain, JointKind, RobotDescription};
 
 /// Flags of `compensate`.
 #[derive(Debug, Args)]
@@ -40,6 +45,9 @@ pub(super) struct CompensateArgs {
     /// compensation.toml of the robot on which the program was taught
     #[arg(long, value_name = "FILE", requires = "from")]
     from_compensation: Option<PathBuf>,
+    /// solution.json from which the description came: says how far the tool is expected from where the program meant it [default: the one beside it]
+    #[arg(long, value_name = "FILE")]
+    solution: Option<PathBuf>,
     /// Folder for the corrected files, which keep their names
     #[arg(long, value_name = "FOLDER", default_value = "compensated")]
     out: PathBuf,
@@ -61,7 +69,7 @@ pub(super) struct CompensateArgs {
     /// Joints that keep their programmed value, separated by commas
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     hold: Vec<String>,
-    /// Joint values near which the first pose is reached, in deg (mm) and in the order of the axes, separated by commas [default: middle of the ranges]
+    /// Joint values near which a pose is reached where the text does not tell from where the robot comes (the first pose), in deg (mm) and in the order of the axes, separated by commas
     #[arg(long, value_name = "VALUES", value_delimiter = ',', allow_hyphen_values = true)]
     start: Vec<f64>,
     /// Tool where the program sets none, in the notation of the language
@@ -111,7 +119,9 @@ impl From<LanguageName> for Language {
 pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     let place = Place::among(&args.out)?;
     let robot = |file: &Path, compensation: Option<&PathBuf>| -> Result<Robot> {
-        let chain = read_chain(file, args.base.as_deref(), args.tip.as_deref())?;
+        let description = urdf::read(file)?;
+        let base = stands_on(args, &description).map(|(link, _)| link).or(args.base.as_deref());
+        let chain = noted_chain(&description, base, args.tip.as_deref())?;
         let mut robot = compensated(chain, compensation.map(PathBuf::as_path))?;
         robot.terms.retain(|t| !args.unordered || t.term != Term::Backlash);
         Ok(robot)
@@ -131,6 +141,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
         chain: &controller.chain,
         axes: &axes,
         rad_per_unit: args.joint_unit.map(|u| if u == Unit::Deg { 1f64.to_radians() } else { 1.0 }),
+        base: stands_on(args, &urdf::read(nominal)?).map_or_else(Pose::identity, |(_, pose)| pose),
         tool: frame("--tool", &args.tool, language)?,
         work: frame("--work", &args.work, language)?,
     };
@@ -144,7 +155,9 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     }
     if args.nearest_posture {
         for target in &mut program.targets {
-            if let Kind::Pose(pose) = &mut target.kind {
+            if let Kind::Pose(pose) = &mut target.kind
+                && matches!(pose.posture, Posture::Coded(..) | Posture::Either(..))
+            {
                 pose.posture = Posture::Nearest;
             }
         }
@@ -152,21 +165,77 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     let models = Models { controller: &controller, from: from.as_ref().unwrap_or(&controller), to: &to };
     let done = programs::compensate(&program, models, &postures(args, &controller.chain, &axes)?);
     let left = done.left(&program);
-    let report = report_csv(&program, &done.outcomes, &controller.chain);
+    let expected = expected(args, &to, &program, &done)?;
+    let mut findings = corrections::nominal_findings(&program, &done);
+    findings.extend(corrections::displaced_finding(&program, &done));
+    let subject = args.urdf.display().to_string();
+    findings.push(corrections::expected_finding(expected.as_deref().map_err(|why| why.as_str()), &subject));
+    let report = corrections::table(&program, &done, expected.as_deref().ok(), &controller.chain);
+    let said = corrections::findings_json(&findings)?;
     let mut written: Vec<(String, &[u8])> = Vec::new();
     for (path, bytes) in args.programs.iter().zip(&done.files) {
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         written.push((name, bytes));
     }
-    written.push((REPORT.to_owned(), report.as_bytes()));
+    written.push((corrections::TABLE.to_owned(), report.as_bytes()));
+    written.push((corrections::FINDINGS.to_owned(), said.as_bytes()));
     place.write_beside(&written, &args.programs)?;
     say!("{}", text(&program, &done.outcomes, &left, &controller.chain));
+    for f in &findings {
+        say_line!("{}{}", if f.weight == Weight::Gate { "GATE      " } else { "note      " }, f.text);
+    }
     say_line!("results   {} ({} files)", args.out.display(), written.len());
-    Ok(if left.is_empty() { Verdict::Good } else { Verdict::GateFailed })
+    let good = left.is_empty() && findings.iter().all(|f| f.weight == Weight::Note);
+    Ok(if good { Verdict::Good } else { Verdict::GateFailed })
 }
 
-/// Name of the table of corrections.
-const REPORT: &str = "corrections.csv";
+/// The link of the chain on which `--base` is fixed, where it does not lie in the chain itself.
+fn stands_on<'d>(args: &CompensateArgs, description: &'d RobotDescription) -> Option<(&'d str, Pose)> {
+    description.fixed_base(args.base.as_deref()?, args.tip.as_deref()?)
+}
+
+/// Distance (m and rad) within which the origins of two descriptions are those of one robot.
+const SAME_ORIGIN: f64 = 1e-6;
+
+/// Expected error of every target by the solution from which the description came, m; else why it is not known.
+fn expected(
+    args: &CompensateArgs,
+    to: &Robot,
+    program: &Program,
+    done: &Compensated,
+) -> Result<std::result::Result<Vec<Option<f64>>, String>> {
+    if args.from.is_some() {
+        return Ok(Err("base and tool of both robots count".into()));
+    }
+    let beside = args.urdf.with_file_name(solution_json::FILE_NAME);
+    let path = args.solution.as_ref().unwrap_or(&beside);
+    if args.solution.is_none() && !path.is_file() {
+        return Ok(Err("no solution.json beside the description, and no --solution".into()));
+    }
+    let record = match read_solution(path) {
+        Ok(record) => record,
+        Err(error) if args.solution.is_some() => return Err(error),
+        Err(_) => return Ok(Err(format!("{} cannot be read", path.display()))),
+    };
+    let origin =
+        |name: &str| record.robot.joints.iter().find(|j| j.name == name).map(|j| Pose::from(&j.corrected_origin));
+    let same = to.chain.readings == record.robot.readings
+        && to.chain.tip == record.robot.tip
+        && to.chain.joints.iter().filter(|j| j.drive.is_some()).all(|j| {
+            origin(&j.name).is_some_and(|o| {
+                let (rad, m) = o.distance(&j.origin);
+                rad < SAME_ORIGIN && m < SAME_ORIGIN
+            })
+        });
+    if !same {
+        let what = format!("is not the solution from which {} came", args.urdf.display());
+        return match args.solution {
+            Some(_) => Err(Error::input(path.display(), what, "give the solution.json that was written beside it")),
+            None => Ok(Err(format!("{} {what}", path.display()))),
+        };
+    }
+    Ok(Ok(corrections::expected_errors(program, done, &found_model(&record)?)))
+}
 
 fn language(args: &CompensateArgs) -> Result<Language> {
     if let Some(name) = args.language {
@@ -240,21 +309,19 @@ fn postures(args: &CompensateArgs, chain: &Chain, axes: &[usize]) -> Result<Post
     for name in &args.hold {
         held[known("--hold", name, chain)?] = true;
     }
-    let limits = crate::plan::inverse::reading_limits(chain);
-    // A straight arm is singular: a little beside the middle of the ranges.
-    let mut start: Vec<f64> =
-        limits.iter().map(|(low, high)| 0.5 * (low + high) + 0.05 * (high - low).min(2.0)).collect();
-    if !args.start.is_empty() {
-        if args.start.len() != axes.len() {
-            let what = format!("{} values for {} joints", args.start.len(), axes.len());
-            return Err(Error::input("--start", what, "give one value for each joint, in deg (mm)"));
-        }
-        for (&reading, value) in axes.iter().zip(&args.start) {
-            let prismatic = chain.reading_kinds[reading] == JointKind::Prismatic;
-            start[reading] = if prismatic { 1e-3 * value } else { value.to_radians() };
-        }
+    if args.start.is_empty() {
+        return Ok(Postures { held, start: None });
     }
-    Ok(Postures { held, start })
+    if args.start.len() != axes.len() {
+        let what = format!("{} values for {} joints", args.start.len(), axes.len());
+        return Err(Error::input("--start", what, "give one value for each joint, in deg (mm)"));
+    }
+    let mut start = vec![0.0; axes.len()];
+    for (&reading, value) in axes.iter().zip(&args.start) {
+        let prismatic = chain.reading_kinds[reading] == JointKind::Prismatic;
+        start[reading] = if prismatic { 1e-3 * value } else { value.to_radians() };
+    }
+    Ok(Postures { held, start: Some(start) })
 }
 
 /// A frame on the command line, in the notation of the language.
@@ -280,31 +347,6 @@ fn frame(flag: &str, numbers: &[f64], language: Language) -> Result<Option<Pose>
         (Language::Csv, &[x, y, z, qx, qy, qz, qw]) => Ok(Some(Pose::from_xyz_quaternion([x, y, z], [qx, qy, qz, qw]))),
         (Language::Csv, _) => Err(bad("give x_m,y_m,z_m,qx,qy,qz,qw")),
     }
-}
-
-/// One row for every target: what the correction is, or why there is none.
-fn report_csv(program: &Program, outcomes: &[Outcome], chain: &Chain) -> String {
-    let mut out = String::from(
-        "file,line,target,correction_mm,correction_mrad,largest_joint_change,joint,residual_m,residual_rad,left_because\n",
-    );
-    let cell = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
-    for (t, outcome) in program.targets.iter().zip(outcomes) {
-        let head = format!("{},{},{}", cell(&program.files[t.file].name), t.line, cell(&t.name));
-        let _ = match outcome {
-            Outcome::Done(c) => {
-                let (joint, change) = c.largest_change();
-                let (mm, mrad) = (1e3 * c.shift_m, 1e3 * c.turn_rad);
-                let (name, rest_m, rest_rad) = (cell(&chain.readings[joint]), c.residual_m, c.residual_rad);
-                writeln!(out, "{head},{mm:.4},{mrad:.4},{change:.9},{name},{rest_m:.2e},{rest_rad:.2e},")
-            }
-            Outcome::Left(why) => writeln!(out, "{head},,,,,,,{}", cell(why)),
-        };
-    }
-    for l in &program.left {
-        let _ =
-            writeln!(out, "{},{},{},,,,,,,{}", cell(&program.files[l.file].name), l.line, cell(&l.name), cell(&l.why));
-    }
-    out
 }
 
 /// Targets listed one by one on the terminal; more only by their largest corrections.
@@ -338,7 +380,7 @@ fn text(program: &Program, outcomes: &[Outcome], left: &[Left], chain: &Chain) -
         );
     }
     if done.len() > SHOWN {
-        let _ = writeln!(out, "largest   {SHOWN} of {} (all in {REPORT}):", done.len());
+        let _ = writeln!(out, "largest   {SHOWN} of {} (all in {TABLE}):", done.len());
         done.sort_by(|a, b| b.1.shift_m.total_cmp(&a.1.shift_m));
         done.truncate(SHOWN);
     }
@@ -360,8 +402,16 @@ fn text(program: &Program, outcomes: &[Outcome], left: &[Left], chain: &Chain) -
     for notice in &program.notices {
         let _ = writeln!(out, "note      {notice}");
     }
+    let mut told: BTreeMap<&str, usize> = BTreeMap::new();
     for l in left {
-        let _ = writeln!(out, "left      {}:{} {}: {}", program.files[l.file].name, l.line, l.name, l.why);
+        let count = told.entry(&l.why).or_default();
+        *count += 1;
+        if *count <= SHOWN {
+            let _ = writeln!(out, "left      {}:{} {}: {}", program.files[l.file].name, l.line, l.name, l.why);
+        }
+    }
+    for (why, count) in told.iter().filter(|(_, count)| **count > SHOWN) {
+        let _ = writeln!(out, "left      {} more (all in {TABLE}): {why}", count - SHOWN);
     }
     out
 }

@@ -9,6 +9,7 @@ pub mod comparison;
 mod compensation;
 mod compensation_read;
 mod controller_files;
+pub mod corrections;
 pub mod detection_files;
 pub mod difference;
 mod dot_font;

@@ -7,12 +7,11 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Vector6;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
-use super::codes::{Branch, Codes};
+use super::codes::Branch;
 use super::field::{Edit, Place, splice};
-use super::program::{Kind, Left, PoseTarget, Posture, Program, Target, Understood, write_joints};
+use super::posture::{Before, Finder, Known};
+use super::program::{Approach, Displaced, Kind, Left, PoseTarget, Posture, Program, Target, Understood, write_joints};
 use crate::geom::Pose;
 use crate::model::robot::Robot;
 use crate::plan::inverse::{self, Reach, Stalled};
@@ -22,10 +21,8 @@ use crate::urdf::JointKind;
 pub const RESIDUAL: f64 = 1e-6;
 /// A joint that has to move further than this (rad or m) leaves the posture of the program: the target is next to a singularity.
 const MOST_JOINT_CHANGE: f64 = 0.3;
-/// Random starts for the joints of a pose that no earlier target is near to.
-const STARTS: usize = 200;
-/// Seed of these starts.
-const SEED: u64 = 5;
+/// Steps that place a displaced point exactly, though its orientation is that of another.
+const PLACING_STEPS: usize = 4;
 
 /// The three robots, with the same readings in the same order.
 #[derive(Debug, Clone, Copy)]
@@ -43,8 +40,8 @@ pub struct Models<'a> {
 pub struct Postures {
     /// True for readings that keep the value of the program.
     pub held: Vec<bool>,
-    /// Joint values near which the first pose is reached, rad or m.
-    pub start: Vec<f64>,
+    /// Joint values near which a pose is reached where the text does not tell from where the robot comes, rad or m.
+    pub start: Option<Vec<f64>>,
 }
 
 /// What became of one target.
@@ -63,11 +60,13 @@ pub struct Correction {
     pub programmed: Vec<f64>,
     /// Readings that bring the real robot there, as the new text gives them.
     pub corrected: Vec<f64>,
+    /// How the posture became known.
+    pub posture: Known,
     /// How far the real robot would have missed, m.
     pub shift_m: f64,
     /// The same, rad.
     pub turn_rad: f64,
-    /// What remains with the numbers as written, m.
+    /// What remains with the numbers as written, m (at the tool of a displaced point).
     pub residual_m: f64,
     /// The same, rad.
     pub residual_rad: f64,
@@ -92,12 +91,15 @@ pub struct Compensated {
     pub files: Vec<Vec<u8>>,
     /// One for each target of the program, in its order.
     pub outcomes: Vec<Outcome>,
+    /// Distance (rad, m) of each target with taught joints beside its pose from where the controller's model puts these joints.
+    pub taught: Vec<Option<(f64, f64)>>,
 }
 
 impl Compensated {
     /// All targets that stay as they are, those included that could not be read.
     pub fn left(&self, program: &Program) -> Vec<Left> {
-        let unreached = program.targets.iter().zip(&self.outcomes).filter_map(|(t, o)| match o {
+        let visited = program.targets.iter().zip(&self.outcomes).filter(|(t, _)| t.visited);
+        let unreached = visited.filter_map(|(t, o)| match o {
             Outcome::Done(_) => None,
             Outcome::Left(why) => Some(Left { file: t.file, line: t.line, name: t.name.clone(), why: why.clone() }),
         });
@@ -112,10 +114,12 @@ pub fn compensate(program: &Program, models: Models<'_>, postures: &Postures) ->
     let mut work = Work::new(models, postures);
     let mut edits = program.edits.clone();
     let mut outcomes = Vec::with_capacity(program.targets.len());
-    for target in &program.targets {
+    let mut displaced = Vec::new();
+    for (k, target) in program.targets.iter().enumerate() {
         match work.target(target, program) {
-            Ok((correction, own)) => {
+            Ok((correction, own, later)) => {
                 edits.extend(own);
+                displaced.extend(later.map(|l| (k, l)));
                 outcomes.push(Outcome::Done(correction));
             }
             Err(why) => {
@@ -124,8 +128,26 @@ pub fn compensate(program: &Program, models: Models<'_>, postures: &Postures) ->
             }
         }
     }
+    // Displaced points are written when the points that they start from are.
+    for (k, later) in displaced {
+        if let Outcome::Done(correction) = &mut outcomes[k] {
+            match work.displaced(&later, correction, program) {
+                Ok(own) => edits.extend(own),
+                Err(why) => outcomes[k] = Outcome::Left(why),
+            }
+        }
+    }
+    let taught = program.targets.iter().map(|t| taught(t, models.controller)).collect();
     let files = program.files.iter().enumerate().map(|(k, f)| splice(&f.bytes, k, &edits)).collect();
-    Compensated { files, outcomes }
+    Compensated { files, outcomes, taught }
+}
+
+/// Distance (rad, m) of the tool between a pose and the joints that were taught with it.
+fn taught(target: &Target, controller: &Robot) -> Option<(f64, f64)> {
+    let Kind::Pose(pose) = &target.kind else { return None };
+    let tool = &pose.flange_from_tool;
+    let by_joints = controller.base_from_tip(pose.taught.as_ref()?) * *tool;
+    Some(by_joints.distance(&(pose.base_from_flange() * *tool)))
 }
 
 /// Columns that a table gains stay empty in the rows that are left as they are.
@@ -138,88 +160,187 @@ fn empty_cells(target: &Target) -> Vec<Edit> {
     missing.collect()
 }
 
+/// A displaced target whose numbers are still to be written.
+struct Later {
+    pose: PoseTarget,
+    displaced: Displaced,
+    held: Vec<bool>,
+    /// Readings of the target before, as corrected.
+    previous: Option<Vec<f64>>,
+    wanted: Pose,
+}
+
+/// Joints of a target that was worked on.
+#[derive(Debug, Clone, Default)]
+struct Reached {
+    /// As programmed and as corrected.
+    readings: Option<(Vec<f64>, Vec<f64>)>,
+    /// Joints whose posture goes on from here, where those of the target itself are not known.
+    posture: Option<Vec<f64>>,
+}
+
 /// The way through a program.
 struct Work<'a> {
     models: Models<'a>,
     postures: &'a Postures,
     /// Limits of the robot that runs the program; joints without any have none.
     limits: Vec<(f64, f64)>,
-    /// Readings of the target before: as programmed, and as corrected.
-    before: Option<(Vec<f64>, Vec<f64>)>,
-    /// True after a target whose joints are not known.
-    lost: bool,
-    /// Joints of the last pose with each code.
-    by_code: BTreeMap<String, Vec<f64>>,
-    rng: ChaCha8Rng,
+    finder: Finder<'a>,
+    /// One for each target so far.
+    places: Vec<Reached>,
+    /// Corrected points that others may start from: file and first byte -> pose in the work object.
+    written: BTreeMap<(usize, usize), Pose>,
 }
+
+/// What became of a target: its correction, its edits, and what is written later.
+type Worked = (Correction, Vec<Edit>, Option<Later>);
 
 impl<'a> Work<'a> {
     fn new(models: Models<'a>, postures: &'a Postures) -> Self {
         let limits = inverse::stated_limits(&models.to.chain);
-        let limits = limits.into_iter().map(|l| l.unwrap_or((f64::NEG_INFINITY, f64::INFINITY))).collect();
-        Self {
-            models,
-            postures,
-            limits,
-            before: None,
-            lost: false,
-            by_code: BTreeMap::new(),
-            rng: ChaCha8Rng::seed_from_u64(SEED),
-        }
+        let limits: Vec<_> = limits.into_iter().map(|l| l.unwrap_or((f64::NEG_INFINITY, f64::INFINITY))).collect();
+        let finder = Finder::new(models.controller, &limits, postures.start.as_deref());
+        Self { models, postures, limits, finder, places: Vec::new(), written: BTreeMap::new() }
     }
 
-    fn target(&mut self, target: &Target, program: &Program) -> Understood<(Correction, Vec<Edit>)> {
-        let follows = target.follows && !std::mem::replace(&mut self.lost, true);
-        let kind = &self.completed(target, follows)?;
-        let (programmed, held) = match kind {
-            Kind::Joints(joints) => {
-                let absent = joints.fields.iter().map(Option::is_none);
-                (joints.readings.clone(), absent.zip(&self.postures.held).map(|(a, h)| a || *h).collect())
-            }
-            Kind::Pose(pose) => {
-                let fixed = pose.fixed.iter().map(Option::is_some);
-                let held: Vec<bool> = fixed.zip(&self.postures.held).map(|(a, h)| a || *h).collect();
-                (self.joints_of(pose, &held)?, held)
-            }
+    fn target(&mut self, target: &Target, program: &Program) -> Understood<Worked> {
+        let posture = target.approach.target().and_then(|k| self.places.get(k)).and_then(|p| p.posture.clone());
+        self.places.push(Reached { readings: None, posture });
+        self.worked(target, program)
+    }
+
+    fn worked(&mut self, target: &Target, program: &Program) -> Understood<Worked> {
+        let before = match target.approach {
+            Approach::From(k) => self.places.get(k).and_then(|p| p.readings.clone()),
+            _ => None,
         };
-        let before = if follows { self.before.take() } else { None };
         let (programmed_before, corrected_before) = before.unzip();
+        let kind = &self.completed(target, programmed_before.as_deref())?;
+        let (programmed, held, known) = self.meant(kind, programmed_before.is_some())?;
         let meant = reach(self.models.from, &self.limits, &held, programmed_before.as_deref()).stop(&programmed);
         let wanted = self.models.from.pose_at(&meant, &vec![0.0; programmed.len()]);
         let to = reach(self.models.to, &self.limits, &held, corrected_before.as_deref());
         let corrected = self.reached(&to, &wanted, &programmed);
         // The next target is approached from here also when this one stays as it is.
-        self.before = Some((programmed.clone(), corrected.clone().unwrap_or_else(|_| programmed.clone())));
-        self.lost = false;
+        let stands = corrected.clone().unwrap_or_else(|_| programmed.clone());
+        if let Some(place) = self.places.last_mut() {
+            *place = Reached { posture: Some(programmed.clone()), readings: Some((programmed.clone(), stands)) };
+        }
         let corrected = corrected?;
-        let (edits, read) = match kind {
-            Kind::Joints(joints) => joints.edits(&corrected, &program.files),
-            Kind::Pose(pose) if pose.joint_fields.iter().any(Option::is_some) => {
-                write_joints(&pose.joint_fields, &corrected, &program.files)
-            }
-            Kind::Pose(pose) => {
-                let (mut edits, base_from_flange) =
-                    pose.edits(&self.models.controller.base_from_tip(&corrected), &program.files);
-                edits.extend(self.code_edits(pose, &programmed, &corrected, program));
-                let controller = reach(self.models.controller, &self.limits, &held, None);
-                let read = controller.solve_from(&base_from_flange, &corrected);
-                (edits, read.map_err(|_| "the corrected pose is singular for the controller's model".to_owned())?)
-            }
-        };
         let pose_at = |q: &[f64]| self.models.to.pose_at(&to.stop(q), &vec![0.0; q.len()]);
         let (turn_rad, shift_m) = pose_at(&programmed).distance(&wanted);
+        let (edits, read, later) = match kind {
+            Kind::Joints(joints) => {
+                let (edits, read) = joints.edits(&corrected, &program.files);
+                (edits, read, None)
+            }
+            Kind::Pose(pose) if pose.joint_fields.iter().any(Option::is_some) => {
+                let (edits, read) = write_joints(&pose.joint_fields, &corrected, &program.files);
+                (edits, read, None)
+            }
+            Kind::Pose(pose) => match &pose.displaced {
+                None => {
+                    let (edits, read) = self.pose_edits(pose, &held, &programmed, &corrected, program)?;
+                    (edits, read, None)
+                }
+                Some(displaced) => {
+                    let (pose, displaced) = (PoseTarget::clone(pose), displaced.clone());
+                    let later =
+                        Later { pose, displaced, held: held.clone(), previous: corrected_before.clone(), wanted };
+                    (Vec::new(), corrected, Some(later))
+                }
+            },
+        };
         let (residual_rad, residual_m) = pose_at(&read).distance(&wanted);
-        if residual_m > RESIDUAL || residual_rad > RESIDUAL {
+        let beyond = residual_m > RESIDUAL || residual_rad > RESIDUAL;
+        if beyond {
             let rest = in_words(residual_m, residual_rad);
             return Err(format!("the decimals of the text leave {rest}"));
         }
-        let correction = Correction { programmed, corrected: read, shift_m, turn_rad, residual_m, residual_rad };
-        Ok((correction, edits))
+        if let Kind::Pose(pose) = kind
+            && later.is_none()
+        {
+            let place = (target.file, kind.first_byte());
+            let base_from_flange = self.models.controller.base_from_tip(&read);
+            let work_from_tool = pose.base_from_work.inverse() * base_from_flange * pose.flange_from_tool;
+            self.written.insert(place, work_from_tool);
+        }
+        let posture = known;
+        let correction =
+            Correction { programmed, corrected: read, posture, shift_m, turn_rad, residual_m, residual_rad };
+        Ok((correction, edits, later))
+    }
+
+    /// Joints that the program means, which of them stay, and how the posture is known.
+    fn meant(&mut self, kind: &Kind, straight: bool) -> Understood<(Vec<f64>, Vec<bool>, Known)> {
+        let held = |own: Vec<bool>| own.iter().zip(&self.postures.held).map(|(a, h)| *a || *h).collect::<Vec<bool>>();
+        match kind {
+            Kind::Joints(joints) => {
+                let held = held(joints.fields.iter().map(Option::is_none).collect());
+                Ok((joints.readings.clone(), held, Known::Joints))
+            }
+            Kind::Pose(pose) => {
+                let held = held(pose.fixed.iter().map(Option::is_some).collect());
+                let readings = self.places.last().and_then(|p| p.posture.clone());
+                let before = Before { readings: readings.as_deref(), straight };
+                let (q, known) = self.finder.joints(pose, &held, before)?;
+                Ok((q, held, known))
+            }
+        }
+    }
+
+    /// Edits that write the pose of the controller's model, and the joints that this model finds in it.
+    fn pose_edits(
+        &self,
+        pose: &PoseTarget,
+        held: &[bool],
+        programmed: &[f64],
+        corrected: &[f64],
+        program: &Program,
+    ) -> Understood<(Vec<Edit>, Vec<f64>)> {
+        let (mut edits, base_from_flange) =
+            pose.edits(&self.models.controller.base_from_tip(corrected), &program.files);
+        edits.extend(self.code_edits(pose, programmed, corrected, program));
+        Ok((edits, self.commanded(&base_from_flange, held, corrected)?))
+    }
+
+    fn commanded(&self, base_from_flange: &Pose, held: &[bool], near: &[f64]) -> Understood<Vec<f64>> {
+        let read = reach(self.models.controller, &self.limits, held, None).solve_from(base_from_flange, near);
+        read.map_err(|_| "the corrected pose is singular for the controller's model".to_owned())
+    }
+
+    /// Edits of a displaced target: its place is exact; so is its orientation where the displacement can turn, else it is that of the
+    /// point that it starts from.
+    fn displaced(&self, later: &Later, correction: &mut Correction, program: &Program) -> Understood<Vec<Edit>> {
+        let Later { pose, displaced, held, previous, wanted } = later;
+        let base = self.written.get(&displaced.base).copied().unwrap_or_else(|| pose.work_from_base());
+        let to = reach(self.models.to, &self.limits, held, previous.as_deref());
+        let (work, tool) = (&pose.base_from_work, &pose.flange_from_tool);
+        let wanted_tool = *wanted * *tool;
+        let mut aim = work.inverse() * self.models.controller.base_from_tip(&correction.corrected) * *tool;
+        let (mut edits, mut read) = (Vec::new(), Vec::new());
+        for _ in 0..PLACING_STEPS {
+            let (new, found) = displaced.edits(&base, &aim, &program.files);
+            read = self.commanded(&(*work * found * tool.inverse()), held, &correction.corrected)?;
+            edits = new;
+            let reached = self.models.to.pose_at(&to.stop(&read), &vec![0.0; read.len()]) * *tool;
+            (correction.residual_rad, correction.residual_m) = reached.distance(&wanted_tool);
+            if correction.residual_m < 0.1 * RESIDUAL || displaced.turned.is_some() {
+                break;
+            }
+            aim.translation += work.rotation.transpose() * (wanted_tool.translation - reached.translation);
+        }
+        correction.corrected = read;
+        let turns = displaced.turned.is_none() && correction.residual_rad <= correction.turn_rad + RESIDUAL;
+        if correction.residual_m > RESIDUAL || (correction.residual_rad > RESIDUAL && !turns) {
+            let rest = in_words(correction.residual_m, correction.residual_rad);
+            return Err(format!("the point that it starts from leaves {rest}"));
+        }
+        Ok(edits)
     }
 
     /// The target with what its text leaves out, which is what the target before it says.
-    fn completed(&self, target: &Target, follows: bool) -> Understood<Kind> {
-        let before = self.before.as_ref().filter(|_| follows).map(|(q, _)| q);
+    fn completed(&self, target: &Target, before: Option<&[f64]>) -> Understood<Kind> {
         let unknown = || "it leaves numbers out, and the target before it is not known".to_owned();
         let mut kind = target.kind.clone();
         match &mut kind {
@@ -228,7 +349,7 @@ impl<'a> Work<'a> {
                     // Axes that the target does not have keep their place, wherever that is.
                     let known = before.map(|b| b[i]);
                     *q = match joints.fields[i] {
-                        None => known.unwrap_or(self.postures.start[i]),
+                        None => known.unwrap_or_else(|| self.finder.anywhere(i)),
                         Some(_) => known.ok_or_else(unknown)?,
                     };
                 }
@@ -242,7 +363,7 @@ impl<'a> Work<'a> {
     }
 
     fn code_edits(&self, pose: &PoseTarget, programmed: &[f64], corrected: &[f64], program: &Program) -> Vec<Edit> {
-        let Posture::Coded(codes, axes) = &pose.posture else { return Vec::new() };
+        let (Posture::Coded(codes, axes) | Posture::Either(codes, axes)) = &pose.posture else { return Vec::new() };
         let six = |q: &[f64]| axes.map(|i| q[i]);
         let branch = |q: &[f64]| Branch::of(self.models.controller, axes, q);
         codes.edits((&six(programmed), branch(programmed)), (&six(corrected), branch(corrected)), &program.files)
@@ -294,109 +415,6 @@ impl<'a> Work<'a> {
             JointKind::Prismatic => format!("{:.3} mm", 1e3 * value),
             _ => format!("{:.4} deg", value.to_degrees()),
         }
-    }
-
-    /// Joints by which the controller reaches a pose.
-    fn joints_of(&mut self, pose: &PoseTarget, held: &[bool]) -> Understood<Vec<f64>> {
-        let wanted = pose.base_from_flange();
-        let fix = |q: &[f64]| q.iter().zip(&pose.fixed).map(|(q, f)| f.unwrap_or(*q)).collect::<Vec<f64>>();
-        let near = match (&pose.posture, &self.before) {
-            (Posture::Near(q), _) => fix(q),
-            (_, Some((q, _))) => fix(q),
-            (_, None) => fix(&self.postures.start),
-        };
-        let codes = match &pose.posture {
-            Posture::Coded(codes, axes) => Some((codes, axes)),
-            _ => None,
-        };
-        // Postures that a code had before are good starts for it.
-        let known = codes.and_then(|(c, _)| self.by_code.get(&c.shown()).map(|q| fix(q)));
-        for start in std::iter::once(&near).chain(&known) {
-            if let Some(q) = self.coded(&wanted, start, &near, held, codes)
-                && (codes.is_some() || largest_change(&near, &q).1.abs() < 1.0)
-            {
-                self.remember(codes, &q);
-                return Ok(q);
-            }
-        }
-        let found = self.nearest(&wanted, &near, held, codes).ok_or_else(|| {
-            let remedy = "look at the base and tip link, and at tool and work frame";
-            let posture = codes.map_or(String::new(), |(c, _)| format!(" in the posture {}", c.shown()));
-            format!("the controller's model does not reach this pose{posture} ({remedy})")
-        })?;
-        self.remember(codes, &found);
-        Ok(found)
-    }
-
-    fn remember(&mut self, codes: Option<(&Codes, &[usize; 6])>, q: &[f64]) {
-        if let Some((codes, _)) = codes {
-            self.by_code.insert(codes.shown(), q.to_vec());
-        }
-    }
-
-    /// Joints that reach a pose, found from `start`, if they are of the posture that is meant; whole turns as the codes say, else towards `near`.
-    fn coded(
-        &self,
-        wanted: &Pose,
-        start: &[f64],
-        near: &[f64],
-        held: &[bool],
-        codes: Option<(&Codes, &[usize; 6])>,
-    ) -> Option<Vec<f64>> {
-        let robot = self.models.controller;
-        let q = reach(robot, &self.limits, held, None).solve_from(wanted, start).ok()?;
-        let Some((codes, axes)) = codes else { return Some(self.turned_towards(&q, near, held)) };
-        let mut q = q;
-        for (axis, &i) in axes.iter().enumerate().filter(|(_, i)| !held[**i]) {
-            q[i] = codes.turned(axis, q[i], near[i], self.limits[i])?;
-        }
-        codes.mean(Branch::of(robot, axes, &q)).then_some(q)
-    }
-
-    /// Of the postures that random starts find the one nearest to `near`.
-    fn nearest(
-        &mut self,
-        wanted: &Pose,
-        near: &[f64],
-        held: &[bool],
-        codes: Option<(&Codes, &[usize; 6])>,
-    ) -> Option<Vec<f64>> {
-        let robot = self.models.controller;
-        let draw = inverse::reading_limits(&robot.chain);
-        let mut best: Option<(f64, Vec<f64>)> = None;
-        for k in 0..STARTS {
-            let mut start = match k {
-                0 => near.to_vec(),
-                _ => inverse::random_readings(&draw, &robot.chain.reading_kinds, &mut self.rng),
-            };
-            for (i, q) in start.iter_mut().enumerate().filter(|(i, _)| held[*i]) {
-                *q = near[i];
-            }
-            let Some(q) = self.coded(wanted, &start, near, held, codes) else { continue };
-            let distance = q.iter().zip(near).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            if best.as_ref().is_none_or(|(d, _)| distance < *d - 1e-9) {
-                best = Some((distance, q));
-            }
-            // Codes leave one posture; without them a six-axis arm has eight, found several times by then.
-            if best.is_some() && (codes.is_some() || k >= STARTS / 4) {
-                break;
-            }
-        }
-        best.map(|(_, q)| q)
-    }
-
-    /// Whole turns of revolute joints that bring `q` nearer to `near` within the limits.
-    fn turned_towards(&self, q: &[f64], near: &[f64], held: &[bool]) -> Vec<f64> {
-        let turn = std::f64::consts::TAU;
-        let one = |i: usize| {
-            if held[i] || self.models.controller.chain.reading_kinds[i] != JointKind::Revolute {
-                return q[i];
-            }
-            let wished = q[i] + turn * ((near[i] - q[i]) / turn).round();
-            let (low, high) = self.limits[i];
-            [wished, wished - turn, wished + turn].into_iter().find(|v| (low..=high).contains(v)).unwrap_or(q[i])
-        };
-        (0..q.len()).map(one).collect()
     }
 }
 

@@ -1,8 +1,8 @@
-//! The way through the targets of a program: in which order they are visited, and which one comes from the one before it.
+//! The way through the targets of a program: in which order they are visited, and from where the robot comes to each.
 
 use std::collections::BTreeMap;
 
-use super::program::{Kind, Left, Program, Target};
+use super::program::{Approach, Kind, Left, Program, Target};
 
 /// A program that is being read.
 pub(super) struct Itinerary {
@@ -10,25 +10,51 @@ pub(super) struct Itinerary {
     pub program: Program,
     /// File and first byte of a target -> its index in the program.
     visited: BTreeMap<(usize, usize), usize>,
-    /// True where it is not known from where the robot comes.
-    fresh: bool,
+    /// From where the robot comes to the next target.
+    from: Approach,
+    /// From where it came to the branches, loops and routines that are open.
+    open: Vec<Approach>,
 }
 
 impl Itinerary {
     /// Nothing visited yet.
     pub fn new() -> Self {
         let program = Program { files: vec![], targets: vec![], left: vec![], edits: vec![], notices: vec![] };
-        Self { program, visited: BTreeMap::new(), fresh: true }
+        Self { program, visited: BTreeMap::new(), from: Approach::Unknown, open: Vec::new() }
     }
 
     /// The next target comes from nowhere in particular.
     pub fn start_afresh(&mut self) {
-        self.fresh = true;
+        self.from = Approach::Unknown;
+        self.open.clear();
     }
 
-    /// True where the next target comes from the last one.
-    pub fn follows(&self) -> bool {
-        !self.fresh
+    /// A statement with branches, or a loop.
+    pub fn branches_begin(&mut self) {
+        self.open.push(self.from);
+    }
+
+    /// Another branch of the innermost statement: the robot comes to it from where it came to the first.
+    pub fn next_branch(&mut self) {
+        self.from = self.open.last().copied().unwrap_or(self.from);
+    }
+
+    /// Behind a statement with branches: which of them was taken is not known.
+    pub fn branches_end(&mut self) {
+        if self.open.pop().is_some_and(|before| before != self.from) {
+            self.from = self.from.beyond();
+        }
+    }
+
+    /// A routine inside another one: nobody knows from where it is called.
+    pub fn routine_begins(&mut self) {
+        self.open.push(self.from);
+        self.from = Approach::Unknown;
+    }
+
+    /// Behind such a routine.
+    pub fn routine_ends(&mut self) {
+        self.from = self.open.pop().unwrap_or(Approach::Unknown);
     }
 
     /// True for a target that was visited.
@@ -36,29 +62,42 @@ impl Itinerary {
         self.visited.contains_key(&(file, kind.first_byte()))
     }
 
-    /// A target that stays as it is.
-    pub fn leave(&mut self, left: Left) {
-        self.fresh = true;
+    /// A target that stays as it is; `same_posture` where the robot keeps its posture on the way there.
+    pub fn leave(&mut self, left: Left, same_posture: bool) {
+        self.from = if same_posture { self.from.beyond() } else { Approach::Unknown };
         self.program.left.push(left);
+    }
+
+    /// A target that no motion goes to.
+    pub fn declare(&mut self, target: Target) {
+        self.visited.insert((target.file, target.kind.first_byte()), self.program.targets.len());
+        self.program.targets.push(target);
     }
 
     /// Visits a target, perhaps again. False where it was visited before with another tool or work object.
     #[must_use]
-    pub fn visit(&mut self, target: Target) -> bool {
-        self.fresh = false;
+    pub fn visit(&mut self, mut target: Target) -> bool {
         let place = (target.file, target.kind.first_byte());
         let Some(&known) = self.visited.get(&place) else {
-            self.visited.insert(place, self.program.targets.len());
-            self.program.targets.push(target);
+            target.approach = self.from;
+            self.from = Approach::From(self.program.targets.len());
+            self.declare(target);
             return true;
         };
-        // Visited again: the target after it does not come from the one before it in the list.
-        self.fresh = true;
-        match (&self.program.targets[known].kind, &target.kind) {
+        let same = match (&self.program.targets[known].kind, &target.kind) {
             (Kind::Pose(a), Kind::Pose(b)) => {
                 (a.flange_from_tool, a.base_from_work) == (b.flange_from_tool, b.base_from_work)
             }
             _ => true,
+        };
+        if same {
+            self.from = Approach::From(known);
         }
+        same
+    }
+
+    /// The next target is approached from one of several: from none in particular.
+    pub fn lose(&mut self) {
+        self.from = Approach::Unknown;
     }
 }

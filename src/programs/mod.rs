@@ -5,6 +5,7 @@
 //! | [`field`] | one number in the text, and its replacement |
 //! | [`program`] | targets: joints or a pose, made of fields |
 //! | [`codes`] | status and turn, confdata: which posture a pose means |
+//! | [`posture`] | which joints a pose means |
 //! | [`mod@compensate`] | targets of one robot to targets of another |
 //! | `scan` | tokens that all languages share |
 //! | `table`, `krl`, `rapid`, `urscript` | text -> targets |
@@ -16,6 +17,7 @@ pub mod compensate;
 pub mod field;
 mod itinerary;
 mod krl;
+pub mod posture;
 pub mod program;
 mod rapid;
 mod scan;
@@ -25,6 +27,7 @@ mod urscript;
 use std::path::Path;
 
 pub use compensate::{Correction, Models, Outcome, Postures, compensate};
+pub use posture::Known;
 pub use program::{Kind, Left, Program, Target, TextFile};
 
 use crate::error::{Error, Result};
@@ -81,6 +84,8 @@ pub struct Setting<'a> {
     pub axes: &'a [usize],
     /// rad per unit of the joint columns of a CSV table.
     pub rad_per_unit: Option<f64>,
+    /// Frame in which the controller computes, in the base of the chain.
+    pub base: Pose,
     /// `flange_from_tool` where the text sets none.
     pub tool: Option<Pose>,
     /// `base_from_work` (work object, `$BASE`) where the text sets none.

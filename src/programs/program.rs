@@ -56,10 +56,41 @@ pub struct Target {
     pub line: usize,
     /// Name in the program, or the instruction.
     pub name: String,
-    /// True where the target before it in the list is the one that the robot comes from.
-    pub follows: bool,
+    /// From where the robot comes to it when it visits it first.
+    pub approach: Approach,
+    /// False for a point that no motion goes to, because only displacements start from it.
+    pub visited: bool,
     /// What it says.
     pub kind: Kind,
+}
+
+/// From where the robot comes to a target; targets by their index in the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Approach {
+    /// Straight from this target.
+    From(usize),
+    /// From this target by way of others that the text does not tell: the posture goes on, the direction is not known.
+    Beyond(usize),
+    /// The text does not tell.
+    Unknown,
+}
+
+impl Approach {
+    /// The same with something between that the text does not tell.
+    pub fn beyond(self) -> Self {
+        match self {
+            Self::From(k) | Self::Beyond(k) => Self::Beyond(k),
+            Self::Unknown => Self::Unknown,
+        }
+    }
+
+    /// The target whose posture goes on.
+    pub fn target(self) -> Option<usize> {
+        match self {
+            Self::From(k) | Self::Beyond(k) => Some(k),
+            Self::Unknown => None,
+        }
+    }
 }
 
 /// What a target says.
@@ -80,7 +111,10 @@ impl Kind {
         };
         let first = match self {
             Self::Joints(joints) => joints.fields.iter().flatten().map(start).min(),
-            Self::Pose(pose) => pose.position.iter().map(start).min(),
+            Self::Pose(pose) => match &pose.displaced {
+                Some(displaced) => displaced.by.iter().map(start).min(),
+                None => pose.position.iter().map(start).min(),
+            },
         };
         first.unwrap_or(0)
     }
@@ -110,6 +144,10 @@ pub struct PoseTarget {
     pub fixed: Vec<Option<f64>>,
     /// Which of the postures that reach the pose is meant.
     pub posture: Posture,
+    /// Joints that the text gives beside the pose, as taught; rad or m.
+    pub taught: Option<Vec<f64>>,
+    /// What lies between the point that the fields above say and the target.
+    pub displaced: Option<Displaced>,
     /// Where the joints of the corrected target go, beside the pose: numbers by reading.
     pub joint_fields: Vec<Option<Field>>,
 }
@@ -125,11 +163,64 @@ pub enum RotationFields {
     Quaternion([Field; 4]),
 }
 
+/// A target that is another point, displaced (`Offs`, `RelTool`).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Displaced {
+    /// File and first byte of the other point, as of [`Kind::first_byte`].
+    pub base: (usize, usize),
+    /// Displacement, m: along the axes of the tool with `turned`, else of the work object.
+    pub by: [Field; 3],
+    /// Rotations about x, then the new y, then the new z of the tool, rad.
+    pub turned: Option<[Field; 3]>,
+}
+
+impl Displaced {
+    /// The displaced pose of a pose in the work object.
+    pub fn applied(&self, work_from_base: &Pose) -> Pose {
+        let by: nalgebra::Vector3<f64> = self.by.each_ref().map(Field::value).into();
+        match &self.turned {
+            None => Pose::new(work_from_base.rotation, work_from_base.translation + by),
+            Some(turned) => {
+                let [x, y, z] = turned.each_ref().map(Field::value);
+                *work_from_base * Pose::new(matrix_from_rpy([-x, -y, -z]).transpose(), by)
+            }
+        }
+    }
+
+    /// Edits that make the displacement lead from one pose in the work object to another (to its place only, without `turned`), and
+    /// where a reader of the new text arrives.
+    pub fn edits(&self, work_from_base: &Pose, wanted: &Pose, files: &[TextFile]) -> (Vec<Edit>, Pose) {
+        let mut edits = Vec::new();
+        let mut write = |field: &Field, value: f64| {
+            let (edit, read) = field.edit(value, &files[field.file].bytes);
+            edits.extend(edit);
+            Field { written: read / field.si, ..field.clone() }
+        };
+        let between = work_from_base.inverse() * *wanted;
+        let by = match self.turned {
+            None => wanted.translation - work_from_base.translation,
+            Some(_) => between.translation,
+        };
+        let by = [0, 1, 2].map(|i| write(&self.by[i], by[i]));
+        let turned = self.turned.as_ref().map(|fields| {
+            let [x, y, z] = rpy_from_matrix(&between.rotation.transpose());
+            let turn = [-x, -y, -z];
+            [0, 1, 2].map(|i| write(&fields[i], turn[i]))
+        });
+        let read = Self { base: self.base, by, turned }.applied(work_from_base);
+        (edits, read)
+    }
+}
+
 /// Which of the postures that reach a pose is meant.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Posture {
     /// That next to the target before.
     Nearest,
+    /// That to which a straight line of the tool from the target before leads.
+    Along,
+    /// That of the codes where the controller heeds them, else that next to the target before: the text does not tell which.
+    Either(Codes, [usize; 6]),
     /// That next to these joint values, rad or m.
     Near(Vec<f64>),
     /// That of the codes in the text; the six readings are those of axes 1 to 6.
@@ -166,9 +257,15 @@ impl PoseTarget {
         self.position.iter().chain(rotation).any(|f| !f.written.is_finite())
     }
 
-    fn work_from_tool(&self) -> Pose {
+    /// The point that the fields say, in the work object.
+    pub(super) fn work_from_base(&self) -> Pose {
         let position = self.position.each_ref().map(Field::value);
         Pose::new(self.rotation.matrix(), position.into())
+    }
+
+    fn work_from_tool(&self) -> Pose {
+        let base = self.work_from_base();
+        self.displaced.as_ref().map_or(base, |displaced| displaced.applied(&base))
     }
 
     /// Edits that write another `base_from_flange`, and the pose that a reader of the new text finds.

@@ -8,7 +8,8 @@ use super::codes::{Code, Codes};
 use super::field::{Field, Place};
 use super::itinerary::Itinerary;
 use super::program::{
-    JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, TextFile, Understood,
+    Approach, Displaced, JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, TextFile,
+    Understood,
 };
 use super::scan::{Dialect, Reader, TokenKind};
 use crate::error::{Error, Result};
@@ -24,6 +25,8 @@ const TYPES: [&str; 4] = ["ROBTARGET", "JOINTTARGET", "TOOLDATA", "WOBJDATA"];
 const DECIMALS_MM: usize = 4;
 const DECIMALS_DEG: usize = 6;
 const DECIMALS_QUATERNION: usize = 9;
+/// Beginnings and ends of routines, and statements with branches.
+const ROUTINES: [&str; 3] = ["PROC", "FUNC", "TRAP"];
 /// An external axis that is not there.
 const NO_AXIS: f64 = 9e9;
 
@@ -33,7 +36,32 @@ enum Node {
     List(Vec<Node>),
     Number(f64, Range<usize>),
     Word(String),
+    /// `Offs(..)` or `RelTool(..)`: a name, and what is in the brackets.
+    Displaced(Box<Displacement>),
     Other,
+}
+
+/// `Offs(p, x, y, z)` or `RelTool(p, x, y, z \Rx:=.. \Ry:=.. \Rz:=..)`.
+#[derive(Debug, Clone)]
+struct Displacement {
+    of_tool: bool,
+    point: String,
+    /// `None` where they are not written in numbers.
+    by: Option<[(f64, Range<usize>); 3]>,
+    /// Rotations by their switches, deg; `None` for one that is not written in numbers.
+    turned: [Option<(f64, Range<usize>)>; 3],
+    /// Byte at which a missing rotation goes: switches stand in the order x, y, z.
+    missing_at: [usize; 3],
+    file: usize,
+}
+
+/// Whether confdata count for a kind of move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Watched {
+    On,
+    Off,
+    /// Other routines switch it.
+    Unknown,
 }
 
 /// Declared data.
@@ -48,9 +76,17 @@ struct Datum {
 
 /// Reads modules that belong together.
 pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
-    let mut task = Task { setting, data: BTreeMap::new(), way: Itinerary::new() };
+    let mut task = Task {
+        setting,
+        data: BTreeMap::new(),
+        bases: BTreeMap::new(),
+        switched_off: [false; 2],
+        watched: [Watched::On; 2],
+        way: Itinerary::new(),
+    };
     for (index, file) in files.iter().enumerate() {
         task.declarations(Reader::new(file, index, DIALECT)?)?;
+        task.switches(Reader::new(file, index, DIALECT)?);
     }
     for (index, file) in files.iter().enumerate() {
         task.way.start_afresh();
@@ -65,7 +101,80 @@ pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Progra
 struct Task<'a> {
     setting: &'a Setting<'a>,
     data: BTreeMap<String, Datum>,
+    /// Points from which displaced ones start: how they would be visited.
+    bases: BTreeMap<String, Target>,
+    /// True where a routine switches the check of configurations off: for moves of the joints, and on paths.
+    switched_off: [bool; 2],
+    /// State of these checks.
+    watched: [Watched; 2],
     way: Itinerary,
+}
+
+/// `ConfJ \Off`, `ConfL \On`: which check, and its state; the reader stands on the name.
+fn switch(reader: &Reader<'_>) -> Option<(usize, Watched)> {
+    let which = match reader.name()?.as_str() {
+        "CONFJ" => 0,
+        "CONFL" => 1,
+        _ => return None,
+    };
+    let state = reader.ahead(2).filter(|_| reader.ahead_is_mark(1, b'\\'))?;
+    match reader.text(state).to_ascii_uppercase().as_slice() {
+        b"ON" => Some((which, Watched::On)),
+        b"OFF" => Some((which, Watched::Off)),
+        _ => None,
+    }
+}
+
+/// `Offs(..)` or `RelTool(..)` of a name; `None` for anything else. The reader stands on the word and ends behind the bracket.
+fn displacement(reader: &mut Reader<'_>) -> Option<Displacement> {
+    let of_tool = match reader.name()?.as_str() {
+        "OFFS" => false,
+        "RELTOOL" => true,
+        _ => return None,
+    };
+    let close = reader.closing(reader.at + 1).filter(|_| reader.ahead_is_mark(1, b'('))?;
+    reader.at += 2;
+    reader.skip_line_ends();
+    let point = reader.name().filter(|_| reader.ahead_is_mark(1, b','));
+    reader.at += 1;
+    let mut by = Vec::new();
+    while reader.at < close && reader.take_mark(b',') {
+        reader.skip_line_ends();
+        let number = reader.take_number();
+        reader.skip_line_ends();
+        let ends = reader.at == close || reader.is_mark(b',') || reader.is_mark(b'\\');
+        by.extend(number.filter(|_| ends));
+    }
+    let mut turned = [None, None, None];
+    let mut stands = [None; 3];
+    let mut plain = true;
+    while reader.at < close {
+        reader.skip_line_ends();
+        let slash = reader.peek().map_or(0, |t| t.range.start);
+        if !reader.take_mark(b'\\') {
+            plain = false;
+            break;
+        }
+        let which = ["RX", "RY", "RZ"].iter().position(|n| reader.name().as_deref() == Some(n));
+        reader.at += 1;
+        let assigned = reader.take_mark(b':') && reader.take_mark(b'=');
+        let number = reader.take_number().filter(|_| assigned);
+        reader.skip_line_ends();
+        let ends = reader.at == close || reader.is_mark(b'\\');
+        match (which, number) {
+            (Some(k), Some(number)) if ends && of_tool => (turned[k], stands[k]) = (Some(number), Some(slash)),
+            _ => plain = false,
+        }
+        if !plain {
+            break;
+        }
+    }
+    reader.at = close;
+    let end = reader.ahead(-1).map_or(0, |t| t.range.end);
+    reader.at = close + 1;
+    let by = <[_; 3]>::try_from(by).ok().filter(|_| plain);
+    let missing_at = [0, 1, 2].map(|k: usize| stands[k..].iter().flatten().copied().next().unwrap_or(end));
+    Some(Displacement { of_tool, point: point?, by, turned, missing_at, file: reader.index })
 }
 
 /// A value in the text; the reader ends behind it.
@@ -77,8 +186,11 @@ fn node(reader: &mut Reader<'_>) -> Result<Node> {
         return Ok(Node::Number(value, range));
     }
     if !reader.is_mark(b'[') {
-        let name = reader.name();
-        reader.at += 1;
+        let (name, at) = (reader.name(), reader.at);
+        if let Some(displaced) = displacement(reader) {
+            return Ok(Node::Displaced(Box::new(displaced)));
+        }
+        reader.at = at + 1;
         return Ok(name.map_or(Node::Other, Node::Word));
     }
     let Some(close) = reader.closing(reader.at) else {
@@ -178,6 +290,40 @@ impl Task<'_> {
         Ok(())
     }
 
+    /// Which checks of configurations are switched off anywhere.
+    fn switches(&mut self, mut reader: Reader<'_>) {
+        while !reader.done() {
+            if let Some((which, Watched::Off)) = switch(&reader) {
+                self.switched_off[which] = true;
+            }
+            reader.at += 1;
+        }
+    }
+
+    /// Routines, branches and the check of configurations.
+    fn flow(&mut self, reader: &Reader<'_>, word: &str) {
+        let line_has = |wanted: &[u8]| {
+            let line = (1..).map_while(|k| reader.ahead(k).filter(|t| t.kind != TokenKind::LineEnd));
+            line.into_iter().any(|t| reader.text(t).eq_ignore_ascii_case(wanted))
+        };
+        if let Some((which, state)) = switch(reader) {
+            self.watched[which] = state;
+        }
+        match word {
+            w if ROUTINES.contains(&w) => {
+                self.way.start_afresh();
+                let state = |off: bool| if off { Watched::Unknown } else { Watched::On };
+                self.watched = self.switched_off.map(state);
+            }
+            // Without THEN it is a statement of one line.
+            "IF" if line_has(b"THEN") => self.way.branches_begin(),
+            "TEST" | "WHILE" | "FOR" => self.way.branches_begin(),
+            "ELSE" | "ELSEIF" | "CASE" | "DEFAULT" => self.way.next_branch(),
+            "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => self.way.branches_end(),
+            _ => {}
+        }
+    }
+
     fn moves(&mut self, mut reader: Reader<'_>) -> Result<()> {
         while !reader.done() {
             let Some(word) = reader.name() else {
@@ -193,6 +339,9 @@ impl Task<'_> {
                 self.instruction(&mut reader)?;
                 skip_statement(&mut reader);
             } else {
+                if begins || word == "PROC" || word == "FUNC" || word == "TRAP" {
+                    self.flow(&reader, &word);
+                }
                 reader.at += 1;
             }
         }
@@ -276,7 +425,11 @@ impl Task<'_> {
     }
 
     fn leave(&mut self, (file, line): (usize, usize), name: &str, why: String) {
-        self.way.leave(Left { file, line, name: name.to_owned(), why });
+        // Confdata may mean another posture, but on a path of the tool it goes on.
+        let upper = name.to_ascii_uppercase();
+        let same_posture =
+            !upper.starts_with("MOVEJ") && !upper.starts_with("MOVEABSJ") && !upper.starts_with("TRIGGJ");
+        self.way.leave(Left { file, line, name: name.to_owned(), why }, same_posture);
     }
 
     fn visit(
@@ -287,7 +440,10 @@ impl Task<'_> {
         tool: &Option<String>,
         work: Option<&Node>,
     ) -> Result<Understood<()>> {
-        let (value, place, name) = match value {
+        if let Node::Displaced(displaced) = value {
+            return Ok(self.displaced(displaced, name, from, tool.as_deref(), work));
+        }
+        let (value, place, named) = match value {
             Node::List(_) => {
                 let place = format!("{}:{}", "the instruction in line", from.1);
                 let kind = if name.to_ascii_uppercase().starts_with("MOVEABSJ") { "JOINTTARGET" } else { "ROBTARGET" };
@@ -301,14 +457,78 @@ impl Task<'_> {
             },
             _ => return Ok(Err("its target is computed, not written in numbers".into())),
         };
-        let follows = self.way.follows();
-        Ok(self.kind(&value, place.0, tool.as_deref(), work).and_then(|kind| self.add(name, place, kind, follows)))
+        let kind = self.kind(&value, place.0, tool.as_deref(), work);
+        Ok(kind.and_then(|kind| self.add(named, place, self.with_posture(kind, name))))
     }
 
-    fn add(&mut self, name: String, (file, line): (usize, usize), kind: Kind, follows: bool) -> Understood<()> {
+    /// The posture that a kind of move gives a target.
+    fn with_posture(&self, kind: Kind, name: &str) -> Kind {
+        let Kind::Pose(mut pose) = kind else { return kind };
+        let upper = name.to_ascii_uppercase();
+        let of_joints = upper.starts_with("MOVEJ") || upper.starts_with("TRIGGJ") || upper.ends_with('J');
+        let near = if upper.starts_with("MOVEL") { Posture::Along } else { Posture::Nearest };
+        pose.posture = match (self.watched[usize::from(!of_joints)], pose.posture) {
+            (Watched::Off, _) => near,
+            (Watched::Unknown, Posture::Coded(codes, axes)) => Posture::Either(codes, axes),
+            (_, posture) => posture,
+        };
+        Kind::Pose(pose)
+    }
+
+    /// A move to `Offs(p, ..)` or `RelTool(p, ..)`.
+    fn displaced(
+        &mut self,
+        displaced: &Displacement,
+        name: &str,
+        from: (usize, usize),
+        tool: Option<&str>,
+        work: Option<&Node>,
+    ) -> Understood<()> {
+        let point = &displaced.point;
+        let by = displaced.by.clone().ok_or("its displacement is computed, not written in numbers")?;
+        let (value, file, line) = match self.data.get(point) {
+            Some(Datum { value: Some(value), file, line, .. }) => (value.clone(), *file, *line),
+            Some(_) => return Err(format!("{point} is computed, not written in numbers")),
+            None => return Err(format!("{point} is in none of the files (give its module as well)")),
+        };
+        let base = self.kind(&value, file, tool, work)?;
+        let base = self.with_posture(base, name);
+        let place = (file, base.first_byte());
+        let Kind::Pose(mut pose) = base.clone() else { return Err(format!("{point} is no robtarget")) };
+        let field = |(written, range): (f64, Range<usize>), si: f64, decimals: usize| Field {
+            file: displaced.file,
+            place: Place::At(range),
+            written,
+            si,
+            decimals,
+        };
+        let turn = |k: usize| match displaced.turned[k].clone() {
+            Some(number) => field(number, 1f64.to_radians(), DECIMALS_DEG),
+            None => {
+                let words = format!("\\R{}:=", ["x", "y", "z"][k]);
+                let place = Place::Missing(displaced.missing_at[k], words);
+                Field { file: displaced.file, place, written: 0.0, si: 1f64.to_radians(), decimals: DECIMALS_DEG }
+            }
+        };
+        pose.displaced = Some(Displaced {
+            base: place,
+            by: by.map(|n| field(n, 1e-3, DECIMALS_MM)),
+            turned: displaced.of_tool.then(|| [0, 1, 2].map(turn)),
+        });
+        let index = self.way.program.targets.len();
+        let words = if displaced.of_tool { "RelTool" } else { "Offs" };
+        self.add(format!("{words}({point})"), from, Kind::Pose(pose))?;
+        // Its posture is that of the displaced point, where nothing else tells it.
+        let approach = Approach::Beyond(index);
+        let target = Target { file, line, name: point.clone(), approach, visited: false, kind: base };
+        self.bases.entry(point.clone()).or_insert(target);
+        Ok(())
+    }
+
+    fn add(&mut self, name: String, (file, line): (usize, usize), kind: Kind) -> Understood<()> {
         let clash = format!("{name} is used with different tools or work objects; give it a robtarget for each");
-        let visited = self.way.visit(Target { file, line, name, follows, kind });
-        if visited { Ok(()) } else { Err(clash) }
+        let target = Target { file, line, name, approach: Approach::Unknown, visited: true, kind };
+        if self.way.visit(target) { Ok(()) } else { Err(clash) }
     }
 
     fn kind(&self, value: &Node, file: usize, tool: Option<&str>, work: Option<&Node>) -> Understood<Kind> {
@@ -343,10 +563,12 @@ impl Task<'_> {
         Ok(Kind::Pose(Box::new(PoseTarget {
             position: trans.map(|t| field(t, 1e-3, DECIMALS_MM)),
             rotation: RotationFields::Quaternion([x, y, z, w].map(|q| field(q, 1.0, DECIMALS_QUATERNION))),
-            base_from_work: self.work(work)?,
+            base_from_work: self.setting.base * self.work(work)?,
             flange_from_tool: self.tool(tool)?,
             fixed,
             posture,
+            taught: None,
+            displaced: None,
             joint_fields: vec![None; axes.len()],
         })))
     }
@@ -423,9 +645,18 @@ impl Task<'_> {
             let seen =
                 self.way.program.targets.iter().any(|t| t.file == datum.file && t.line == datum.line && t.name == name);
             let known = self.way.program.left.iter().any(|l| l.why.contains(&name));
-            let Some(value) = datum.value.filter(|_| !seen && !known) else { continue };
+            let Some(value) = datum.value.filter(|_| !seen && (!known || self.bases.contains_key(&name))) else {
+                continue;
+            };
             let place = (datum.file, datum.line);
-            let done = self.kind(&value, datum.file, None, None).and_then(|k| self.add(name.clone(), place, k, false));
+            if let Some(base) = self.bases.remove(&name) {
+                self.way.declare(base);
+                continue;
+            }
+            let done = self.kind(&value, datum.file, None, None).map(|kind| {
+                let (file, line, approach) = (place.0, place.1, Approach::Unknown);
+                self.way.declare(Target { file, line, name: name.clone(), approach, visited: true, kind });
+            });
             if let Err(why) = done {
                 self.leave(place, &name, format!("no move of the files goes there, and {why}"));
             }

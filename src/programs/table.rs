@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::Setting;
 use super::field::{Edit, Field, Place};
-use super::program::{JointTarget, Kind, PoseTarget, Posture, Program, RotationFields, Target, TextFile};
+use super::program::{Approach, JointTarget, Kind, PoseTarget, Posture, Program, RotationFields, Target, TextFile};
 use crate::error::{Error, Result, closest_name};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
@@ -119,11 +119,16 @@ pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Progra
         let columns = columns(file, header, setting)?;
         let table = Table { file, index, columns, separator, setting };
         if table.columns.joints.is_empty() {
-            let names = setting.chain.readings.iter().map(|n| format!("{}{n}", char::from(separator)));
+            let quoted = |n: &String| match n.contains(['"', char::from(separator)]) {
+                true => format!("\"{}\"", n.replace('"', "\"\"")),
+                false => n.clone(),
+            };
+            let names = setting.chain.readings.iter().map(|n| format!("{}{}", char::from(separator), quoted(n)));
             program.edits.push(Edit { file: index, range: header.end..header.end, text: names.collect() });
         }
         for (k, row) in rows.iter().enumerate() {
-            targets.push(table.target(row, k > 0)?);
+            let approach = if k > 0 { Approach::From(targets.len() - 1) } else { Approach::Unknown };
+            targets.push(table.target(row, approach)?);
         }
     }
     program.targets = targets;
@@ -139,7 +144,7 @@ struct Table<'a> {
 }
 
 impl Table<'_> {
-    fn target(&self, row: &Row, follows: bool) -> Result<Target> {
+    fn target(&self, row: &Row, approach: Approach) -> Result<Target> {
         if row.cells.len() != self.columns.names.len() {
             let what = format!("{} cells under {} column names", row.cells.len(), self.columns.names.len());
             let place = format!("{}:{}", self.file.name, row.line);
@@ -149,7 +154,8 @@ impl Table<'_> {
             None => Kind::Joints(self.joints(row)?),
             Some(pose) => Kind::Pose(Box::new(self.pose(row, pose)?)),
         };
-        Ok(Target { file: self.index, line: row.line, name: format!("row {}", row.line), follows, kind })
+        let name = format!("row {}", row.line);
+        Ok(Target { file: self.index, line: row.line, name, approach, visited: true, kind })
     }
 
     fn joints(&self, row: &Row) -> Result<JointTarget> {
@@ -198,10 +204,12 @@ impl Table<'_> {
         Ok(PoseTarget {
             position: [field(0)?, field(1)?, field(2)?],
             rotation: RotationFields::Quaternion(q),
-            base_from_work: self.setting.work.unwrap_or_else(Pose::identity),
+            base_from_work: self.setting.base * self.setting.work.unwrap_or_else(Pose::identity),
             flange_from_tool: self.setting.tool.unwrap_or_else(Pose::identity),
             fixed: vec![None; self.setting.chain.readings.len()],
             posture,
+            taught: None,
+            displaced: None,
             joint_fields: joint_fields.into_iter().map(Some).collect(),
         })
     }

@@ -7,17 +7,39 @@ use super::Setting;
 use super::field::{Field, Place};
 use super::itinerary::Itinerary;
 use super::program::{
-    JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, TextFile, Understood,
+    Approach, JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, TextFile, Understood,
 };
 use super::scan::{Dialect, Reader, TokenKind};
 use crate::error::{Error, Result};
 use crate::geom::{Pose, exp_so3};
 
 const DIALECT: Dialect = Dialect { comment: b'#', quotes: b"\"'", header: None, based_numbers: false };
-/// Calls that move the robot to their first arguments, and how many of them are targets.
-const MOVES: [(&[u8], usize); 5] = [(b"movej", 1), (b"movel", 1), (b"movep", 1), (b"movec", 2), (b"servoj", 1)];
+/// Calls that move the robot to their first arguments, how many of them are targets, and how the tool gets there.
+const MOVES: [(&[u8], usize, Way); 5] = [
+    (b"movej", 1, Way::Joints),
+    (b"movel", 1, Way::Line),
+    (b"movep", 1, Way::Line),
+    (b"movec", 2, Way::Arc),
+    (b"servoj", 1, Way::Joints),
+];
+/// Statements that end with `end`.
+const BLOCKS: [&[u8]; 6] = [b"def", b"thread", b"if", b"while", b"switch", b"for"];
 /// Decimals in rad and m.
 const DECIMALS: usize = 8;
+
+/// How the tool gets to a target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    Joints,
+    Line,
+    Arc,
+}
+
+impl Way {
+    fn posture(self) -> Posture {
+        if self == Self::Line { Posture::Along } else { Posture::Nearest }
+    }
+}
 
 /// What stands where a target may stand.
 #[derive(Debug, Clone)]
@@ -26,8 +48,18 @@ enum Value {
     Joints(Vec<Field>, usize),
     /// `p[..]` with six numbers.
     Pose(Box<[Field; 6]>, usize),
-    /// Anything else.
+    /// Anything else; where it was computed by `get_inverse_kin`, the posture goes on.
     Expression,
+}
+
+/// A target in a call.
+struct Argument {
+    value: Value,
+    /// Joints beside the pose: `name_q` of `name_p`.
+    taught: Option<Vec<f64>>,
+    posture: Posture,
+    /// False where the move may change the posture to one that the text does not tell.
+    keeps: bool,
 }
 
 /// Reads scripts; each file is a program of its own.
@@ -39,6 +71,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Progra
             reader: Reader::new(file, index, DIALECT)?,
             setting,
             variables: BTreeMap::new(),
+            blocks: Vec::new(),
             tool: setting.tool.map(Tool::Known).unwrap_or(Tool::Unknown),
             way: &mut way,
         };
@@ -61,6 +94,8 @@ struct Script<'a> {
     setting: &'a Setting<'a>,
     /// Last value given to each variable.
     variables: BTreeMap<Vec<u8>, Value>,
+    /// Statements that wait for their `end`; true for routines.
+    blocks: Vec<bool>,
     tool: Tool,
     way: &'a mut Itinerary,
 }
@@ -74,10 +109,12 @@ impl Script<'_> {
                 continue;
             };
             let next = self.reader.ahead(1).map(|t| t.kind);
-            if let Some((_, count)) = MOVES.iter().find(|(name, _)| *name == word)
+            if let Some((_, count, way)) = MOVES.iter().find(|(name, ..)| *name == word)
                 && next == Some(TokenKind::Mark(b'('))
             {
-                self.moves(*count)?;
+                self.moves(*count, *way)?;
+            } else if self.block(word, next) {
+                self.reader.at = at + 1;
             } else if word == b"set_tcp" && next == Some(TokenKind::Mark(b'(')) {
                 self.reader.at += 2;
                 let value = self.argument()?;
@@ -99,8 +136,31 @@ impl Script<'_> {
         Ok(())
     }
 
+    /// Follows statements that end with `end`; false for any other word.
+    fn block(&mut self, word: &[u8], next: Option<TokenKind>) -> bool {
+        let assigned = next == Some(TokenKind::Mark(b'='));
+        let begins = BLOCKS.contains(&word);
+        let routine = matches!(word, b"def" | b"thread");
+        match word {
+            _ if assigned => return false,
+            _ if begins && routine => self.way.routine_begins(),
+            _ if begins => self.way.branches_begin(),
+            b"else" | b"elif" | b"case" => self.way.next_branch(),
+            b"end" => match self.blocks.pop() {
+                Some(true) => self.way.routine_ends(),
+                Some(false) => self.way.branches_end(),
+                None => {}
+            },
+            _ => return false,
+        }
+        if begins {
+            self.blocks.push(routine);
+        }
+        true
+    }
+
     /// A call that moves; the reader stands on its name.
-    fn moves(&mut self, count: usize) -> Result<()> {
+    fn moves(&mut self, count: usize, way: Way) -> Result<()> {
         let line = self.reader.line();
         let name = String::from_utf8_lossy(self.reader.word().unwrap_or_default()).into_owned();
         let open = self.reader.at + 1;
@@ -113,8 +173,8 @@ impl Script<'_> {
                 let what = format!("{name}(..) has {k} targets, not {count}");
                 return Err(Error::input(format!("{}:{line}", self.reader.file.name), what, "complete the call"));
             }
-            let (value, posture) = self.target_argument()?;
-            self.visit(&name, line, value, posture)?;
+            let argument = self.target_argument(way)?;
+            self.visit(&name, line, argument)?;
             // To the next argument.
             while self.reader.at < close && !self.reader.take_mark(b',') {
                 let bracket = matches!(self.reader.peek().map(|t| t.kind), Some(TokenKind::Mark(b'(' | b'[')));
@@ -127,28 +187,46 @@ impl Script<'_> {
     }
 
     /// An argument, `name=` before it left out, `get_inverse_kin` around it looked into.
-    fn target_argument(&mut self) -> Result<(Value, Posture)> {
+    fn target_argument(&mut self, way: Way) -> Result<Argument> {
         self.skip_argument_name();
         let inverse = self.reader.word() == Some(b"get_inverse_kin")
             && self.reader.ahead(1).is_some_and(|t| t.kind == TokenKind::Mark(b'('));
         if !inverse {
-            return Ok((self.argument()?, Posture::Nearest));
+            let taught = self.taught();
+            let value = self.argument()?;
+            let keeps = way != Way::Joints || matches!(value, Value::Pose(..));
+            return Ok(Argument { value, taught, posture: way.posture(), keeps });
         }
         let close = self.reader.closing(self.reader.at + 1);
         self.reader.at += 2;
         self.skip_argument_name();
-        let value = self.argument()?;
-        let mut posture = Posture::Nearest;
+        let taught = self.taught();
+        let mut found = Argument { value: self.argument()?, taught, posture: Posture::Nearest, keeps: true };
         if self.reader.take_mark(b',') {
             self.skip_argument_name();
-            if let Value::Joints(fields, _) = self.argument()? {
-                posture = Posture::Near(self.readings(&fields));
+            let own = self.reader.word() == Some(b"get_actual_joint_positions");
+            match self.argument()? {
+                Value::Joints(fields, _) if fields.len() == self.setting.axes.len() => {
+                    found.posture = Posture::Near(self.readings(&fields));
+                }
+                // The joints beside the pose are better than a `qnear` that the text does not tell.
+                _ if own || found.taught.is_some() => {}
+                _ => found = Argument { value: Value::Expression, keeps: false, ..found },
             }
         }
         if let Some(close) = close {
             self.reader.at = close + 1;
         }
-        Ok((value, posture))
+        Ok(found)
+    }
+
+    /// Joints of `name_q` where the reader stands on `name_p`.
+    fn taught(&self) -> Option<Vec<f64>> {
+        let stem = self.reader.word()?.strip_suffix(b"_p")?;
+        match self.variables.get(&[stem, b"_q"].concat())? {
+            Value::Joints(fields, _) if fields.len() == self.setting.axes.len() => Some(self.readings(fields)),
+            _ => None,
+        }
     }
 
     fn skip_argument_name(&mut self) {
@@ -236,8 +314,8 @@ impl Script<'_> {
         readings
     }
 
-    fn visit(&mut self, name: &str, line: usize, value: Value, posture: Posture) -> Result<()> {
-        if let Value::Joints(fields, line) = &value
+    fn visit(&mut self, name: &str, line: usize, argument: Argument) -> Result<()> {
+        if let Value::Joints(fields, line) = &argument.value
             && fields.len() != self.setting.axes.len()
         {
             let what = format!("{} joint values for the {} joints of the robot", fields.len(), self.setting.axes.len());
@@ -247,15 +325,15 @@ impl Script<'_> {
                 "give one value for each joint",
             ));
         }
-        if let Err(why) = self.take(name, value, posture) {
-            // Where this move ends is not known, so the next one has no known approach.
-            self.way.leave(Left { file: self.reader.index, line, name: name.to_owned(), why });
+        let keeps = argument.keeps;
+        if let Err(why) = self.take(name, argument) {
+            self.way.leave(Left { file: self.reader.index, line, name: name.to_owned(), why }, keeps);
         }
         Ok(())
     }
 
-    fn take(&mut self, name: &str, value: Value, posture: Posture) -> Understood<()> {
-        let (kind, line) = match value {
+    fn take(&mut self, name: &str, argument: Argument) -> Understood<()> {
+        let (kind, line) = match argument.value {
             Value::Joints(fields, line) => {
                 let mut by_reading = vec![None; self.setting.chain.readings.len()];
                 let readings = self.readings(&fields);
@@ -264,11 +342,14 @@ impl Script<'_> {
                 }
                 (Kind::Joints(JointTarget { readings, fields: by_reading }), line)
             }
-            Value::Pose(fields, line) => (Kind::Pose(Box::new(self.pose(*fields, posture)?)), line),
+            Value::Pose(fields, line) => {
+                let pose = self.pose(*fields, argument.posture)?;
+                (Kind::Pose(Box::new(PoseTarget { taught: argument.taught, ..pose })), line)
+            }
             Value::Expression => return Err("its target is computed, not written in numbers".into()),
         };
-        let follows = self.way.follows();
-        let target = Target { file: self.reader.index, line, name: name.to_owned(), follows, kind };
+        let file = self.reader.index;
+        let target = Target { file, line, name: name.to_owned(), approach: Approach::Unknown, visited: true, kind };
         if self.way.visit(target) {
             Ok(())
         } else {
@@ -285,10 +366,12 @@ impl Script<'_> {
         Ok(PoseTarget {
             position: [x, y, z],
             rotation: RotationFields::Vector([rx, ry, rz]),
-            base_from_work: self.setting.work.unwrap_or_else(Pose::identity),
+            base_from_work: self.setting.base * self.setting.work.unwrap_or_else(Pose::identity),
             flange_from_tool: tool,
             fixed: vec![None; readings],
             posture,
+            taught: None,
+            displaced: None,
             joint_fields: vec![None; readings],
         })
     }

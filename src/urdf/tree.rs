@@ -145,6 +145,21 @@ impl RobotDescription {
         Ok(())
     }
 
+    /// The link above `tip` on which `base` is fixed, and `link_from_base`: a frame like `base` of ur_description, beside the arm.
+    /// `None` where joints that move lie between, or the links are not there.
+    pub fn fixed_base(&self, base: &str, tip: &str) -> Option<(&str, Pose)> {
+        let tip = self.links().find(|l| *l == tip)?;
+        let above = self.ancestors(tip);
+        let mut current = self.links().find(|l| *l == base)?;
+        let mut pose = Pose::identity();
+        while !above.contains(&current) {
+            let joint = self.joint_to(current).filter(|j| j.joint_type == JointType::Fixed)?;
+            pose = joint.origin * pose;
+            current = &joint.parent;
+        }
+        Some((current, pose))
+    }
+
     fn known_link(&self, name: &str, role: &str) -> Result<&str> {
         self.links().find(|l| *l == name).ok_or_else(|| {
             let what = format!("has no link \"{name}\" (wanted as {role})");

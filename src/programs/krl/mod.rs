@@ -8,7 +8,7 @@ use aggregate::{Aggregate, index};
 
 use super::Setting;
 use super::itinerary::Itinerary;
-use super::program::{Kind, Left, PoseTarget, Program, Target, TextFile, Understood};
+use super::program::{Approach, Kind, Left, PoseTarget, Posture, Program, Target, TextFile, Understood};
 use super::scan::{Dialect, Reader, TokenKind};
 use crate::error::{Error, Result};
 use crate::geom::Pose;
@@ -41,6 +41,31 @@ enum FrameIs {
     Unknown(String),
 }
 
+/// Frames that a motion or a spline block states for itself (`WITH $TOOL=.., $BASE=..`).
+#[derive(Debug, Clone, Default)]
+struct Frames {
+    tool: Option<FrameIs>,
+    base: Option<FrameIs>,
+}
+
+impl Frames {
+    fn or(self, other: &Self) -> Self {
+        Self { tool: self.tool.or_else(|| other.tool.clone()), base: self.base.or_else(|| other.base.clone()) }
+    }
+}
+
+/// The numbers of an element of an array, where its name is that of the pattern with numbers in the place of words.
+fn matching(name: &str, pattern: &str) -> Option<Vec<i64>> {
+    let (array, indices) = name.strip_suffix(']')?.split_once('[')?;
+    let (wanted, pattern) = pattern.strip_suffix(']')?.split_once('[')?;
+    let numbers = indices.split(',').map(|n| n.parse().ok()).collect::<Option<Vec<i64>>>()?;
+    let patterns: Vec<&str> = pattern.split(',').collect();
+    let same = array == wanted
+        && patterns.len() == numbers.len()
+        && patterns.iter().zip(&numbers).all(|(p, n)| p.parse::<i64>().map_or(true, |p| p == *n));
+    same.then_some(numbers)
+}
+
 /// Reads a module of one or more files.
 pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
     let mut module = Module {
@@ -50,6 +75,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Progra
         declared: Vec::new(),
         tool: FrameIs::Unset,
         base: FrameIs::Unset,
+        spline: Frames::default(),
         way: Itinerary::new(),
     };
     // Data first: programs use them in whatever order the files are given.
@@ -73,12 +99,14 @@ struct Module<'a> {
     declared: Vec<(String, usize, usize)>,
     tool: FrameIs,
     base: FrameIs,
+    /// Frames of the spline block that is open.
+    spline: Frames,
     way: Itinerary,
 }
 
 impl Module<'_> {
     fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
-        (self.tool, self.base) = (FrameIs::Unset, FrameIs::Unset);
+        (self.tool, self.base, self.spline) = (FrameIs::Unset, FrameIs::Unset, Frames::default());
         self.way.start_afresh();
         let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {
@@ -89,7 +117,12 @@ impl Module<'_> {
             if moves && let Some((_, count)) = MOVES.iter().find(|(name, _)| *name == word) {
                 self.motion(&mut reader, &word, *count)?;
             } else if moves && RELATIVE.contains(&word.as_str()) {
-                self.leave(&reader, &word, "it is relative to the position before".into());
+                self.leave_at(reader.index, reader.line(), &word, "it is relative to the position before".into());
+            } else if moves && self.flow(&reader, &word) {
+                // Frames of a spline block hold for all of it.
+                if word == "SPLINE" {
+                    self.spline = self.with(&mut reader);
+                }
             } else if moves && word == "BAS" {
                 self.bas(&mut reader);
             } else {
@@ -223,6 +256,76 @@ impl Module<'_> {
         }
     }
 
+    /// `WITH .., $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO), ..` in the rest of a line.
+    fn with(&self, reader: &mut Reader<'_>) -> Frames {
+        let mut frames = Frames::default();
+        let mut within = false;
+        let mut fixed_tool = false;
+        while !reader.at_line_end() {
+            let word = reader.name();
+            within |= word.as_deref() == Some("WITH");
+            let assigned = within && reader.ahead_is_mark(1, b'=');
+            reader.at += 1;
+            match word.as_deref().filter(|_| assigned) {
+                Some("$TOOL") => {
+                    reader.at += 1;
+                    frames.tool = Some(self.stated_frame(reader, "TOOL_DATA", "TOOL_NO"));
+                }
+                Some("$BASE") => {
+                    reader.at += 1;
+                    frames.base = Some(self.stated_frame(reader, "BASE_DATA", "BASE_NO"));
+                }
+                Some("$IPO_MODE") => {
+                    reader.at += 1;
+                    fixed_tool = self.is_fixed_tool(reader);
+                }
+                _ => {}
+            }
+        }
+        if fixed_tool {
+            let why = || Some(FrameIs::Unknown("the tool is fixed in the room (IPO_FRAME #TCP)".to_owned()));
+            frames = Frames { tool: why(), base: why() };
+        }
+        frames
+    }
+
+    /// A frame as the inline forms state it: an aggregate, `TOOL_DATA[1]`, `STOOL2(FP1)`, `SBASE(FP1.BASE_NO)` or a number in brackets.
+    fn stated_frame(&self, reader: &mut Reader<'_>, table: &str, number: &str) -> FrameIs {
+        let called = reader.ahead_is_mark(1, b'(');
+        if !called {
+            let value = match reader.is_mark(b'{') {
+                true => Aggregate::read(reader).map(Value::Aggregate),
+                false => {
+                    let name = reader.name();
+                    reader.at += 1;
+                    Ok(name.map_or(Value::Expression, |n| Value::Name(n + &index(reader))))
+                }
+            };
+            return value.map_or_else(|e| FrameIs::Unknown(e.what), |v| self.frame(&v));
+        }
+        reader.at += 2;
+        if let Some((n, _)) = reader.take_number() {
+            return self.numbered(table, n as i64);
+        }
+        let data = reader.name().map(Value::Name).unwrap_or(Value::Expression);
+        let found = self.resolved(&data).ok().and_then(|(data, _)| data.whole(number));
+        match found {
+            Some(n) => self.numbered(table, n),
+            None => FrameIs::Unknown("its number is in none of the files (give the .dat as well)".into()),
+        }
+    }
+
+    /// `SIPO_MODE(FP1.IPO_FRAME)` and `#TCP`.
+    fn is_fixed_tool(&self, reader: &Reader<'_>) -> bool {
+        if reader.is_mark(b'#') {
+            return reader.ahead(1).is_some_and(|t| reader.text(t).eq_ignore_ascii_case(b"TCP"));
+        }
+        let name = reader.ahead(2).map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase());
+        let data = name
+            .and_then(|n| self.resolved(&Value::Name(n)).ok().map(|(data, _)| data.word("IPO_FRAME") == Some("TCP")));
+        data.unwrap_or(false)
+    }
+
     /// `BAS(#TOOL, n)` and `BAS(#BASE, n)`.
     fn bas(&mut self, reader: &mut Reader<'_>) {
         reader.at += 1;
@@ -248,6 +351,10 @@ impl Module<'_> {
     fn motion(&mut self, reader: &mut Reader<'_>, name: &str, count: usize) -> Result<()> {
         let line = reader.line();
         reader.at += 1;
+        let at = reader.at;
+        let own = self.with(reader);
+        reader.at = at;
+        let frames = own.or(&self.spline);
         for k in 0..count {
             if k > 0 && !reader.take_mark(b',') {
                 let what = format!("{name} has {k} targets, not {count}");
@@ -262,34 +369,85 @@ impl Module<'_> {
             if matches!(&value, Value::Name(n) if n.starts_with('$')) {
                 continue;
             }
-            if let Err(why) = self.visit(&value, name, (reader.index, line)) {
-                self.leave_at(reader.index, line, name, why);
+            let tool = frames.tool.clone().unwrap_or_else(|| self.tool.clone());
+            let base = frames.base.clone().unwrap_or_else(|| self.base.clone());
+            let elements = self.elements(value);
+            // Which element of several the robot goes to, the text does not tell.
+            let several = elements.len() > 1;
+            for value in elements {
+                if several {
+                    self.way.lose();
+                }
+                if let Err(why) = self.visit(&value, name, (reader.index, line), (&tool, &base)) {
+                    self.leave_at(reader.index, line, name, why);
+                }
+                if several {
+                    self.way.lose();
+                }
             }
         }
         Ok(())
     }
 
-    fn leave(&mut self, reader: &Reader<'_>, name: &str, why: String) {
-        self.leave_at(reader.index, reader.line(), name, why);
+    /// Statements that decide from where the robot comes; false for any other word.
+    fn flow(&mut self, reader: &Reader<'_>, word: &str) -> bool {
+        match word {
+            "DEF" | "DEFFCT" => self.way.start_afresh(),
+            "GLOBAL" if reader.ahead(1).is_some_and(|t| reader.text(t).to_ascii_uppercase().starts_with(b"DEF")) => {
+                self.way.start_afresh();
+            }
+            "IF" | "SWITCH" | "WHILE" | "LOOP" | "FOR" | "REPEAT" => self.way.branches_begin(),
+            "ELSE" | "CASE" | "DEFAULT" => self.way.next_branch(),
+            "ENDIF" | "ENDSWITCH" | "ENDWHILE" | "ENDLOOP" | "ENDFOR" | "UNTIL" => self.way.branches_end(),
+            "SPLINE" => {}
+            "ENDSPLINE" => self.spline = Frames::default(),
+            _ => return false,
+        }
+        true
     }
 
     fn leave_at(&mut self, file: usize, line: usize, name: &str, why: String) {
-        self.way.leave(Left { file, line, name: name.to_owned(), why });
+        // Status and turn may mean another posture, but on a path of the tool it goes on.
+        let same_posture = !name.starts_with("PTP") && !name.starts_with("SPTP");
+        self.way.leave(Left { file, line, name: name.to_owned(), why }, same_posture);
     }
 
-    fn visit(&mut self, value: &Value, motion: &str, from: (usize, usize)) -> Understood<()> {
+    /// `P[I]` stands for all elements of `P` that the text has, in the order of their numbers; anything else for itself.
+    fn elements(&mut self, value: Value) -> Vec<Value> {
+        let Value::Name(name) = &value else { return vec![value] };
+        if self.values.contains_key(name) || !name.ends_with(']') {
+            return vec![value];
+        }
+        let mut all: Vec<(Vec<i64>, Value)> =
+            self.values.keys().filter_map(|n| Some((matching(n, name)?, Value::Name(n.clone())))).collect();
+        if all.is_empty() {
+            return vec![value];
+        }
+        all.sort_by(|a, b| a.0.cmp(&b.0));
+        all.into_iter().map(|(_, v)| v).collect()
+    }
+
+    fn visit(
+        &mut self,
+        value: &Value,
+        motion: &str,
+        from: (usize, usize),
+        (tool, base): (&FrameIs, &FrameIs),
+    ) -> Understood<()> {
         let (aggregate, name) = self.resolved(value)?;
         let named = name.unwrap_or(motion).to_owned();
-        let kind = self.kind(aggregate, &self.tool, &self.base)?;
+        let mut kind = self.kind(aggregate, tool, base)?;
+        if let Kind::Pose(pose) = &mut kind
+            && pose.posture == Posture::Nearest
+            && ["LIN", "SLIN"].contains(&motion)
+        {
+            pose.posture = Posture::Along;
+        }
         let place = if name.is_some() { (aggregate.file, aggregate.line) } else { from };
-        self.add(named, place, kind, self.way.follows())?;
-        Ok(())
-    }
-
-    fn add(&mut self, name: String, (file, line): (usize, usize), kind: Kind, follows: bool) -> Understood<()> {
-        let clash = format!("{name} is used with different $TOOL or $BASE; give it a position for each");
-        let visited = self.way.visit(Target { file, line, name, follows, kind });
-        if visited { Ok(()) } else { Err(clash) }
+        let clash = format!("{named} is used with different $TOOL or $BASE; give it a position for each");
+        let (file, line) = place;
+        let target = Target { file, line, name: named, approach: Approach::Unknown, visited: true, kind };
+        if self.way.visit(target) { Ok(()) } else { Err(clash) }
     }
 
     fn kind(&self, a: &Aggregate, tool: &FrameIs, base: &FrameIs) -> Understood<Kind> {
@@ -309,10 +467,12 @@ impl Module<'_> {
         Ok(Kind::Pose(Box::new(PoseTarget {
             position: a.position(),
             rotation: a.rotation(),
-            base_from_work: frame("$BASE", base, self.setting.work, "--work")?,
+            base_from_work: self.setting.base * frame("$BASE", base, self.setting.work, "--work")?,
             flange_from_tool: frame("$TOOL", tool, self.setting.tool, "--tool")?,
             fixed: a.external(axes, &self.prismatic),
             posture: a.posture(axes),
+            taught: None,
+            displaced: None,
             joint_fields: vec![None; axes.len()],
         })))
     }
@@ -336,7 +496,10 @@ impl Module<'_> {
             if visited {
                 continue;
             }
-            let done = kind.and_then(|kind| self.add(name.clone(), (file, line), kind, false));
+            let done = kind.map(|kind| {
+                let approach = Approach::Unknown;
+                self.way.declare(Target { file, line, name: name.clone(), approach, visited: true, kind });
+            });
             if let Err(why) = done {
                 self.leave_at(file, line, &name, format!("no motion of the files goes there, and {why}"));
             }

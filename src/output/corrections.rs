@@ -1,0 +1,185 @@
+//! What a corrected program is worth, beside its text: corrections.csv and findings.json.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use super::restore::FoundModel;
+use crate::assess::sigma_in_base;
+use crate::error::Result;
+use crate::geom::Pose;
+use crate::programs::compensate::{Compensated, RESIDUAL};
+use crate::programs::{Kind, Outcome, Program};
+use crate::urdf::Chain;
+
+/// Name of the table of corrections.
+pub const TABLE: &str = "corrections.csv";
+/// Name of the file of findings.
+pub const FINDINGS: &str = "findings.json";
+/// Taught joints and poses of one program that lie further apart, RMS, are not of the nominal model, m.
+const SAME_MODEL: f64 = 5e-5;
+/// Joints and a pose further apart were taught with another tool or work frame, m.
+const SAME_FRAMES: f64 = 0.02;
+
+/// Whether a finding asks for something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Weight {
+    /// To know.
+    Note,
+    /// The result is not what was asked for: exit code 1.
+    Gate,
+}
+
+/// What was found about a program or the models it was corrected with.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// Code that stays the same in every version.
+    pub code: &'static str,
+    /// Its weight.
+    pub weight: Weight,
+    /// File that it is about.
+    pub subject: String,
+    /// Numbers by name, the unit at the end of the name.
+    pub quantities: BTreeMap<&'static str, f64>,
+    /// In words.
+    pub text: String,
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::max)
+}
+
+/// Whether the nominal model is the one in the controller: by joints and poses that were taught together.
+pub fn nominal_findings(program: &Program, done: &Compensated) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (k, file) in program.files.iter().enumerate() {
+        let of_file = program.targets.iter().zip(&done.taught).filter(|(t, _)| t.file == k);
+        let apart: Vec<f64> = of_file.filter_map(|(_, taught)| taught.map(|(_, m)| m)).collect();
+        let (same, other): (Vec<f64>, Vec<f64>) = apart.iter().partition(|m| **m < SAME_FRAMES);
+        let mut add = |code, weight, values: &[f64], words: &str| {
+            let (rms_mm, max_mm) = (1e3 * rms(values), 1e3 * largest(values));
+            let quantities = BTreeMap::from([("pairs", values.len() as f64), ("rms_mm", rms_mm), ("max_mm", max_mm)]);
+            let text = format!(
+                "{} taught poses lie {rms_mm:.3} mm RMS ({max_mm:.3} mm at most) from where the nominal model puts the joints beside them: {words}",
+                values.len()
+            );
+            findings.push(Finding { code, weight, subject: file.name.clone(), quantities, text });
+        };
+        if !same.is_empty() && rms(&same) <= SAME_MODEL {
+            add("nominal_is_controllers", Weight::Note, &same, "it is the model in the controller");
+        } else if !same.is_empty() {
+            let words = "it is not the model in the controller, and the corrected poses keep an error of that size; give the controller's own model with --nominal (Universal Robots: the one that ur_calibration reads from the robot)";
+            add("nominal_differs", Weight::Gate, &same, words);
+        }
+        if !same.is_empty() && !other.is_empty() {
+            let words = "taught with another tool or base; they tell the posture only";
+            add("taught_with_other_frames", Weight::Note, &other, words);
+        } else if !other.is_empty() {
+            let words = "the base frame or the tool is not that of the program: look at --base (the controllers of Universal Robots compute in `base`, half a turn about z from `base_link` of ur_description), --work and set_tcp";
+            add("frames_differ", Weight::Gate, &other, words);
+        }
+    }
+    findings
+}
+
+/// Displaced targets whose orientation is that of the point that they start from.
+pub fn displaced_finding(program: &Program, done: &Compensated) -> Option<Finding> {
+    let left = |o: &Outcome| match o {
+        Outcome::Done(c) if c.residual_rad > RESIDUAL => Some(1e3 * c.residual_rad),
+        _ => None,
+    };
+    let mrad: Vec<f64> = done.outcomes.iter().filter_map(left).collect();
+    let max_mrad = largest(&mrad);
+    (!mrad.is_empty()).then(|| Finding {
+        code: "displaced_orientation",
+        weight: Weight::Note,
+        subject: program.files.first().map_or_else(String::new, |f| f.name.clone()),
+        quantities: BTreeMap::from([("targets", mrad.len() as f64), ("max_mrad", max_mrad)]),
+        text: format!("{} displaced targets are exact in place and turned as the points that they start from: {max_mrad:.4} mrad at most are left (RelTool can turn, Offs cannot)", mrad.len()),
+    })
+}
+
+/// Expected error of every corrected target with base and tool unknown, m.
+pub fn expected_errors(program: &Program, done: &Compensated, model: &FoundModel) -> Vec<Option<f64>> {
+    let expected = |(target, outcome): (&crate::programs::Target, &Outcome)| {
+        let Outcome::Done(c) = outcome else { return None };
+        let tool = match &target.kind {
+            Kind::Pose(pose) => pose.flange_from_tool,
+            Kind::Joints(_) => Pose::identity(),
+        };
+        Some(sigma_in_base(&model.robot, &model.layout, &model.covariance, &c.corrected, &tool))
+    };
+    program.targets.iter().zip(&done.outcomes).map(expected).collect()
+}
+
+/// What the numbers promise, until base and tool frame are measured; `Err` says why it is not known.
+pub fn expected_finding(expected: std::result::Result<&[Option<f64>], &str>, subject: &str) -> Finding {
+    let remedy = "measure tool and base on the robot";
+    let finding =
+        |code, quantities, text| Finding { code, weight: Weight::Note, subject: subject.to_owned(), quantities, text };
+    match expected {
+        Ok(all) => {
+            let mm: Vec<f64> = all.iter().flatten().map(|m| 1e3 * m).collect();
+            let (rms_mm, max_mm) = (rms(&mm), largest(&mm));
+            let quantities = BTreeMap::from([("targets", mm.len() as f64), ("rms_mm", rms_mm), ("max_mm", max_mm)]);
+            let text = format!(
+                "in the base frame the tool is expected {rms_mm:.2} mm RMS ({max_mm:.2} mm at most) from where the program meant it: images do not tell where base and tool stand; {remedy}"
+            );
+            finding("expected_error", quantities, text)
+        }
+        Err(why) => {
+            let text = format!(
+                "how far in the base frame the tool will be from where the program meant it is not known ({why}); base and tool stand where the description says, usually wrong by millimetres; {remedy}"
+            );
+            finding("expected_error_unknown", BTreeMap::new(), text)
+        }
+    }
+}
+
+/// All findings as JSON, one a line.
+///
+/// # Errors
+/// None in practice: every field can be written as JSON.
+pub fn findings_json(findings: &[Finding]) -> Result<String> {
+    let line = |f: &Finding| serde_json::to_string(f).map_err(|e| crate::Error::unsolved(FINDINGS, e, "report this"));
+    let lines: Vec<String> = findings.iter().map(line).collect::<Result<_>>()?;
+    Ok(format!("[\n{}\n]\n", lines.join(",\n")))
+}
+
+/// One row for every target: what the correction is, or why there is none.
+pub fn table(program: &Program, done: &Compensated, expected: Option<&[Option<f64>]>, chain: &Chain) -> String {
+    let mut out = String::from(
+        "file,line,target,correction_mm,correction_mrad,largest_joint_change,joint,residual_m,residual_rad,left_because,posture,expected_mm,taught_mm\n",
+    );
+    let cell = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+    let millimetres = |m: Option<f64>| m.map_or_else(String::new, |m| format!("{:.4}", 1e3 * m));
+    for (k, (t, outcome)) in program.targets.iter().zip(&done.outcomes).enumerate() {
+        let head = format!("{},{},{}", cell(&program.files[t.file].name), t.line, cell(&t.name));
+        let expected = millimetres(expected.and_then(|e| e[k]));
+        let taught = millimetres(done.taught[k].map(|(_, m)| m));
+        let _ = match outcome {
+            Outcome::Done(c) => {
+                let (joint, change) = c.largest_change();
+                let (mm, mrad) = (1e3 * c.shift_m, 1e3 * c.turn_rad);
+                let (name, rest_m, rest_rad) = (cell(&chain.readings[joint]), c.residual_m, c.residual_rad);
+                let posture = c.posture.word();
+                writeln!(
+                    out,
+                    "{head},{mm:.4},{mrad:.4},{change:.9},{name},{rest_m:.2e},{rest_rad:.2e},,{posture},{expected},{taught}"
+                )
+            }
+            Outcome::Left(why) => writeln!(out, "{head},,,,,,,{},,,{taught}", cell(why)),
+        };
+    }
+    for l in &program.left {
+        let (file, name) = (cell(&program.files[l.file].name), cell(&l.name));
+        let _ = writeln!(out, "{file},{},{name},,,,,,,{},,,", l.line, cell(&l.why));
+    }
+    out
+}

@@ -1,0 +1,300 @@
+//! Which joints a pose means: by the joints beside it, by its codes, or by where the robot comes from.
+
+use std::collections::BTreeMap;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::codes::{Branch, Codes};
+use super::program::{PoseTarget, Posture, Understood};
+use crate::geom::Pose;
+use crate::model::robot::Robot;
+use crate::plan::inverse::{self, Reach};
+use crate::urdf::JointKind;
+
+/// Random starts for the joints of a pose that no earlier target is near to.
+const STARTS: usize = 200;
+/// Seed of these starts.
+const SEED: u64 = 5;
+/// A solution in which no joint is further (rad or m) from where the robot comes is of the same posture.
+const NEAR: f64 = 0.5;
+/// Nor is one in which a joint turns more between two places of a straight line.
+const LINE_TURN: f64 = 0.3;
+/// Distance of places on a straight line, m and rad.
+const LINE_STEP: f64 = 0.02;
+/// Most places on a line.
+const LINE_STEPS: f64 = 400.0;
+/// A second posture that is less than so many times as far as the nearest leaves open which is meant.
+const AMBIGUOUS: f64 = 1.25;
+/// Joints of two solutions that differ by less are the same, rad or m.
+const SAME: f64 = 1e-3;
+
+/// How the posture of a pose became known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Known {
+    /// The target has joints, no pose.
+    Joints,
+    /// Joints that the motion names (`qnear`) or the row of a table has.
+    Near,
+    /// Joints that were taught with the pose.
+    Taught,
+    /// Status and turn, or confdata.
+    Codes,
+    /// It goes on along a straight line from the target before.
+    Line,
+    /// It is the one next to that of the target before.
+    Before,
+    /// It is the one next to `--start`.
+    Start,
+    /// Any: the joints are written beside the pose.
+    Any,
+}
+
+impl Known {
+    /// Word for tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Joints => "joints",
+            Self::Near => "near",
+            Self::Taught => "taught",
+            Self::Codes => "codes",
+            Self::Line => "line",
+            Self::Before => "before",
+            Self::Start => "start",
+            Self::Any => "any",
+        }
+    }
+}
+
+/// Where the robot comes from.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Before<'a> {
+    /// Joints whose posture goes on, rad or m.
+    pub readings: Option<&'a [f64]>,
+    /// True where nothing lies between them and the target.
+    pub straight: bool,
+}
+
+/// Finds joints by the controller's model.
+pub(super) struct Finder<'a> {
+    robot: &'a Robot,
+    limits: Vec<(f64, f64)>,
+    start: Option<&'a [f64]>,
+    /// A little beside the middle of the ranges: a straight arm is singular.
+    middle: Vec<f64>,
+    /// Joints of the last pose with each code.
+    by_code: BTreeMap<String, Vec<f64>>,
+    rng: ChaCha8Rng,
+}
+
+type Six<'c> = Option<(&'c Codes, &'c [usize; 6])>;
+
+fn farthest(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+fn unreached(posture: &str) -> String {
+    let remedy = "look at the base and tip link, and at tool and work frame";
+    format!("the controller's model does not reach this pose{posture} ({remedy})")
+}
+
+impl<'a> Finder<'a> {
+    pub fn new(robot: &'a Robot, limits: &[(f64, f64)], start: Option<&'a [f64]>) -> Self {
+        let ranges = inverse::reading_limits(&robot.chain);
+        let middle = ranges.iter().map(|(low, high)| 0.5 * (low + high) + 0.05 * (high - low).min(2.0)).collect();
+        let rng = ChaCha8Rng::seed_from_u64(SEED);
+        Self { robot, limits: limits.to_vec(), start, middle, by_code: BTreeMap::new(), rng }
+    }
+
+    /// Joint values of axes that no target told so far.
+    pub fn anywhere(&self, reading: usize) -> f64 {
+        self.start.map_or(self.middle[reading], |s| s[reading])
+    }
+
+    /// Joints by which the controller reaches a pose.
+    pub fn joints(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>) -> Understood<(Vec<f64>, Known)> {
+        match (&pose.posture, &pose.taught) {
+            (Posture::Coded(codes, axes), _) => self.by_codes(pose, held, before, (codes, axes)),
+            (Posture::Either(codes, axes), _) => self.by_either(pose, held, before, (codes, axes)),
+            (Posture::Near(q), _) => Ok((self.near(pose, held, q, false)?, Known::Near)),
+            (Posture::Nearest | Posture::Along, Some(q)) => Ok((self.near(pose, held, q, false)?, Known::Taught)),
+            (Posture::Nearest | Posture::Along, None) => self.by_approach(pose, held, before),
+        }
+    }
+
+    /// The posture that goes on from the target before, or the one next to `--start`.
+    fn by_approach(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>) -> Understood<(Vec<f64>, Known)> {
+        let written = pose.joint_fields.iter().any(Option::is_some);
+        match (before.readings, self.start) {
+            (Some(q), _) => {
+                let along = before.straight && pose.posture == Posture::Along;
+                if let Some(found) = along.then(|| self.along(pose, held, q)).flatten() {
+                    return Ok((found, Known::Line));
+                }
+                Ok((self.near(pose, held, q, written)?, Known::Before))
+            }
+            (None, Some(start)) => Ok((self.near(pose, held, start, written)?, Known::Start)),
+            (None, None) if written => Ok((self.near(pose, held, &self.middle.clone(), true)?, Known::Any)),
+            (None, None) => {
+                Err("its posture is not known: nothing tells the joints from which the robot comes (give --start)"
+                    .into())
+            }
+        }
+    }
+
+    fn fixed(pose: &PoseTarget, q: &[f64]) -> Vec<f64> {
+        q.iter().zip(&pose.fixed).map(|(q, f)| f.unwrap_or(*q)).collect()
+    }
+
+    /// The solution next to `q`; where others are about as near it is refused, unless any will do.
+    fn near(&mut self, pose: &PoseTarget, held: &[bool], q: &[f64], any: bool) -> Understood<Vec<f64>> {
+        let (wanted, near) = (pose.base_from_flange(), Self::fixed(pose, q));
+        if let Some(found) = self.solved(&wanted, &near, &near, held, None)
+            && farthest(&near, &found) < NEAR
+        {
+            return Ok(found);
+        }
+        let all = self.postures(&wanted, &near, held);
+        let Some(best) = all.first() else { return Err(unreached("")) };
+        let redundant = held.iter().filter(|h| !**h).count() > 6;
+        let second = all.get(1).filter(|_| !any && !redundant);
+        match second.filter(|second| farthest(&near, second) < AMBIGUOUS * farthest(&near, best)) {
+            None => Ok(best.clone()),
+            Some(second) => Err(format!(
+                "its posture is not known: two lie about equally far from where the robot comes ({:.0} and {:.0} deg)",
+                farthest(&near, best).to_degrees(),
+                farthest(&near, second).to_degrees()
+            )),
+        }
+    }
+
+    /// The solution to which a straight line of the tool leads; `None` where a singular posture or a limit lies on it.
+    fn along(&self, pose: &PoseTarget, held: &[bool], q: &[f64]) -> Option<Vec<f64>> {
+        let tool = pose.flange_from_tool;
+        let (first, last) = (self.robot.base_from_tip(q) * tool, pose.base_from_flange() * tool);
+        let (turn, way) = first.distance(&last);
+        let steps = (turn.max(way) / LINE_STEP).ceil().clamp(1.0, LINE_STEPS);
+        let between = first.inverse() * last;
+        let turned = Pose::new(between.rotation, nalgebra::Vector3::zeros()).log();
+        let mut q = Self::fixed(pose, q);
+        for k in 1..=steps as usize {
+            let share = k as f64 / steps;
+            let mut place = first * Pose::exp(&(turned * share));
+            place.translation = first.translation * (1.0 - share) + last.translation * share;
+            let wanted = if k as f64 == steps { last } else { place };
+            let next = self.reach(held).solve_from(&(wanted * tool.inverse()), &q).ok()?;
+            if farthest(&q, &next) > LINE_TURN {
+                return None;
+            }
+            q = next;
+        }
+        Some(q)
+    }
+
+    fn by_codes(
+        &mut self,
+        pose: &PoseTarget,
+        held: &[bool],
+        before: Before<'_>,
+        codes: (&Codes, &[usize; 6]),
+    ) -> Understood<(Vec<f64>, Known)> {
+        let wanted = pose.base_from_flange();
+        let near = Self::fixed(pose, before.readings.or(self.start).unwrap_or(&self.middle));
+        // Postures that a code had before are good starts for it.
+        let known = self.by_code.get(&codes.0.shown()).map(|q| Self::fixed(pose, q));
+        let direct = std::iter::once(&near)
+            .chain(&known)
+            .find_map(|start| self.solved(&wanted, start, &near, held, Some(codes)));
+        let found = direct.or_else(|| self.searched(&wanted, &near, held, codes)).ok_or_else(|| {
+            let posture = format!(" in the posture {}", codes.0.shown());
+            unreached(&posture) + "; --nearest-posture heeds no codes"
+        })?;
+        self.by_code.insert(codes.0.shown(), found.clone());
+        Ok((found, Known::Codes))
+    }
+
+    /// The codes and the way there must mean the same, where it is not known which of them counts.
+    fn by_either(
+        &mut self,
+        pose: &PoseTarget,
+        held: &[bool],
+        before: Before<'_>,
+        codes: (&Codes, &[usize; 6]),
+    ) -> Understood<(Vec<f64>, Known)> {
+        let open = "its posture is not known: other routines switch the check of configurations off, and its confdata";
+        let remedy = "(--nearest-posture heeds no confdata)";
+        match (self.by_codes(pose, held, before, codes), self.by_approach(pose, held, before)) {
+            (Ok(coded), Ok((near, _))) if farthest(&coded.0, &near) < SAME => Ok(coded),
+            (Ok(_), Ok(_)) => Err(format!("{open} mean another one than the way there {remedy}")),
+            (Ok(_), Err(_)) => Err(format!("{open} may not count {remedy}")),
+            (Err(_), near) => near,
+        }
+    }
+
+    fn reach<'r>(&'r self, held: &'r [bool]) -> Reach<'r> {
+        Reach { robot: self.robot, limits: &self.limits, held, previous: None }
+    }
+
+    /// Joints found from `start`, if they are of the posture of the codes; whole turns as the codes say, else towards `near`.
+    fn solved(&self, wanted: &Pose, start: &[f64], near: &[f64], held: &[bool], codes: Six<'_>) -> Option<Vec<f64>> {
+        let mut q = self.reach(held).solve_from(wanted, start).ok()?;
+        let Some((codes, axes)) = codes else { return Some(self.turned_towards(&q, near, held)) };
+        for (axis, &i) in axes.iter().enumerate().filter(|(_, i)| !held[**i]) {
+            q[i] = codes.turned(axis, q[i], near[i], self.limits[i])?;
+        }
+        codes.mean(Branch::of(self.robot, axes, &q)).then_some(q)
+    }
+
+    fn random_start(&mut self, near: &[f64], held: &[bool]) -> Vec<f64> {
+        let draw = inverse::reading_limits(&self.robot.chain);
+        let mut start = inverse::random_readings(&draw, &self.robot.chain.reading_kinds, &mut self.rng);
+        start.iter_mut().enumerate().filter(|(i, _)| held[*i]).for_each(|(i, q)| *q = near[i]);
+        start
+    }
+
+    /// The posture of the codes, from random starts.
+    fn searched(
+        &mut self,
+        wanted: &Pose,
+        near: &[f64],
+        held: &[bool],
+        codes: (&Codes, &[usize; 6]),
+    ) -> Option<Vec<f64>> {
+        (0..STARTS).find_map(|_| {
+            let start = self.random_start(near, held);
+            self.solved(wanted, &start, near, held, Some(codes))
+        })
+    }
+
+    /// All postures that random starts find, the nearest to `near` first. A six-axis arm has eight, found several times by then.
+    fn postures(&mut self, wanted: &Pose, near: &[f64], held: &[bool]) -> Vec<Vec<f64>> {
+        let mut all: Vec<Vec<f64>> = Vec::new();
+        for k in 0..STARTS {
+            let start = if k == 0 { near.to_vec() } else { self.random_start(near, held) };
+            if let Some(q) = self.solved(wanted, &start, near, held, None)
+                && all.iter().all(|other| farthest(other, &q) > SAME)
+            {
+                all.push(q);
+            }
+            if k >= STARTS / 4 && !all.is_empty() {
+                break;
+            }
+        }
+        all.sort_by(|a, b| farthest(a, near).total_cmp(&farthest(b, near)));
+        all
+    }
+
+    /// Whole turns of revolute joints that bring `q` nearer to `near` within the limits.
+    fn turned_towards(&self, q: &[f64], near: &[f64], held: &[bool]) -> Vec<f64> {
+        let turn = std::f64::consts::TAU;
+        let one = |i: usize| {
+            if held[i] || self.robot.chain.reading_kinds[i] != JointKind::Revolute {
+                return q[i];
+            }
+            let wished = q[i] + turn * ((near[i] - q[i]) / turn).round();
+            let (low, high) = self.limits[i];
+            [wished, wished - turn, wished + turn].into_iter().find(|v| (low..=high).contains(v)).unwrap_or(q[i])
+        };
+        (0..q.len()).map(one).collect()
+    }
+}
