@@ -61,7 +61,7 @@ fn local_errors(r: &SolutionRecord) -> Markup {
         h3 { "Local errors of the joints" }
         p.note {
             "What a joint was off by, again and again, at readings that several stops have in common. It is noise of this series, as far as it repeats: "
-            "in none of the files, and no part of the uncertainty of the flange."
+            "in none of the files, and in no stated pose of the flange."
         }
         div.wide { table {
             thead { tr { th { "Joint" } th.n { "readings" } th.n { "RMS, mrad (mm)" } th.n { "largest, mrad (mm)" } } }
