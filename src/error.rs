@@ -179,7 +179,9 @@ pub fn closest_name<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -
     let reach = given.len().div_ceil(3).min(2);
     known
         .into_iter()
-        .map(|name| (edit_distance(&given, &plain(name)), name))
+        .map(|name| (plain(name), name))
+        .filter(|(name, _)| name.len().abs_diff(given.len()) <= reach)
+        .map(|(plain, name)| (edit_distance(&given, &plain), name))
         .filter(|(distance, _)| *distance <= reach)
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, name)| name)

@@ -5,6 +5,7 @@
 //! | room | from -> to |
 //! |---|---|
 //! | [`error`], [`geom`], [`linalg`] | rotations, rigid motions, factorisations |
+//! | [`files`] | a user's files -> bytes, text, pixels within limits |
 //! | [`series`], [`urdf`] | files -> readings, images, plate, kinematic chain |
 //! | [`detect`] | pixels -> identified observations with covariance |
 //! | [`model`] | parameters -> predictions and Jacobians |
@@ -20,6 +21,7 @@ pub mod assess;
 pub mod cli;
 pub mod detect;
 pub mod error;
+pub mod files;
 pub mod geom;
 pub mod guide;
 pub mod init;

@@ -8,7 +8,7 @@ use std::process::Command;
 /// Rooms from the bottom up; rooms on one level are peers and do not import each other, but for the pairs in `PEERS`.
 const LEVELS: [&[&str]; 13] = [
     &["error"],
-    &["geom", "linalg"],
+    &["files", "geom", "linalg"],
     &["series", "urdf"],
     &["detect"],
     &["model"],

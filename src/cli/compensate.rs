@@ -11,6 +11,7 @@ use super::robot::noted_chain;
 use super::say::{say, say_line};
 use super::show::read_solution;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::geom::{Pose, exp_so3};
 use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
@@ -256,7 +257,7 @@ fn language(args: &CompensateArgs) -> Result<Language> {
 }
 
 fn text_file(path: &Path) -> Result<TextFile> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+    let bytes = files::read(path, files::Kind::Program)?;
     if bytes.contains(&0) {
         let what = "is not a text of single bytes (it holds zero bytes, as UTF-16 does)";
         return Err(Error::input(path.display(), what, "save it as UTF-8 or as the controller writes it"));

@@ -10,6 +10,7 @@ use super::robot::read_chain;
 use super::say::{say, say_line};
 use super::show::read_solution;
 use crate::error::{Error, Result};
+use crate::files::picture_size;
 use crate::model::robot::Robot;
 use crate::output::NewFolder;
 use crate::output::recording::{MAGNIFIED, overlay};
@@ -95,7 +96,7 @@ type Given = (Option<CameraInfo>, Vec<FramePoses>, Vec<ImageMarks>);
 /// What is known without a solution: the stated focal length, the nominal tip, the observations where there are any.
 fn as_given(args: &ConvertArgs, series: &Series, chain: &Chain, readings: &[Option<Vec<f64>>]) -> Result<Given> {
     let stated = &series.manifest.camera;
-    let size = series.stops.stops.iter().find_map(|s| image::image_dimensions(s.path.as_ref()?).ok());
+    let size = series.stops.stops.iter().find_map(|s| picture_size(s.path.as_ref()?).ok());
     let camera = size.zip(stated.focal_px).map(|((width_px, height_px), focal)| CameraInfo {
         width_px,
         height_px,

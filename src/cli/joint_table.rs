@@ -5,6 +5,7 @@ use std::path::Path;
 use clap::ValueEnum;
 
 use crate::error::{Error, Result};
+use crate::files::{self, Kind};
 use crate::urdf::JointKind;
 
 /// Unit of revolute joints in a file.
@@ -26,10 +27,7 @@ pub(super) fn read(
     unit: Unit,
 ) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
     let bad = |line: u64, what: String, remedy: &str| Error::input(format!("{}:{line}", path.display()), what, remedy);
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(|e| Error::input(path.display(), e, "check the path"))?;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(files::open(path, Kind::Table)?.0);
     let header = reader.headers().map_err(|e| bad(1, e.to_string(), "the first line names the columns"))?.clone();
     let column = |name: &str| {
         header.iter().position(|h| h == name).ok_or_else(|| {

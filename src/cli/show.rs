@@ -8,6 +8,7 @@ use super::at::AtArgs;
 use super::say::{say, say_line};
 use super::{Verdict, summary};
 use crate::error::{Error, Result};
+use crate::files::{self, Kind};
 use crate::output::difference::{Difference, compare_solutions};
 use crate::output::recover;
 use crate::output::solution_json::{self, SolutionRecord};
@@ -32,7 +33,7 @@ pub(super) struct ShowArgs {
 /// Reads a solution.
 pub(super) fn read_solution(path: &Path) -> Result<SolutionRecord> {
     recover(path)?;
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+    let bytes = files::read(path, Kind::Solution)?;
     solution_json::read(&bytes).map_err(|e| Error { place: path.display().to_string(), ..e })
 }
 

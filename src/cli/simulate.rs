@@ -193,7 +193,7 @@ fn conditions(args: &SimulateArgs) -> Result<ImagingConditions> {
     let mut conditions = match &args.conditions {
         None => ImagingConditions::default(),
         Some(path) => {
-            let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+            let text = crate::files::read_text(path, crate::files::Kind::Settings)?;
             toml::from_str(&text).map_err(|e| {
                 Error::input(path.display(), e.message(), "see the fields of ImagingConditions in the manual")
             })?

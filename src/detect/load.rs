@@ -1,18 +1,13 @@
 //! Image files to [`Picture`]s in full depth.
 
-use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
 
-use image::{DynamicImage, ImageError, ImageReader, Limits};
+use image::{DynamicImage, ImageError};
 
 use super::Picture;
 use crate::error::{Error, Result};
-
-/// Longest side that is accepted, px; the largest industrial sensors have about 20 000.
-const MAX_SIDE: u32 = 32_768;
-/// Memory that decoding one image may take, bytes.
-const MAX_DECODED_BYTES: u64 = 1 << 30;
+use crate::files::{self, Kind, MOST_SIDE_PX, decode_picture};
 
 /// Weights of red, green and blue in the grey value (luma of ITU-R BT.709), applied to the stored counts.
 pub const LUMA_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
@@ -25,17 +20,23 @@ pub const LUMA_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
 /// # Errors
 /// A missing, unreadable, empty, truncated or oversized file; `bits` outside 1..=16 or counts beyond it.
 pub fn load(path: &Path, bits: Option<u32>) -> Result<Picture> {
-    let file = File::open(path).map_err(|e| Error::io(path, &e))?;
-    let metadata = file.metadata().map_err(|e| Error::io(path, &e))?;
-    if metadata.is_dir() {
-        return Err(Error::input(path.display(), "is a folder, not an image", "name the image file"));
-    }
-    if metadata.len() == 0 {
+    let (file, length) = files::open(path, Kind::Image)?;
+    if length == 0 {
         return Err(Error::input(path.display(), "the file is empty", "record or copy the image again"));
     }
-    let mut reader = ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(|e| Error::io(path, &e))?;
-    reader.limits(limits());
-    let decoded = reader.decode().map_err(|e| decode_error(path, &e))?;
+    load_from(path, BufReader::new(file), bits)
+}
+
+/// As [`load`] from the bytes of an image file; `path` is for messages only.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_bytes(path: &Path, bytes: &[u8], bits: Option<u32>) -> Result<Picture> {
+    load_from(path, Cursor::new(bytes), bits)
+}
+
+fn load_from(path: &Path, source: impl BufRead + Seek, bits: Option<u32>) -> Result<Picture> {
+    let decoded = decode_picture(source).map_err(|e| decode_error(path, &e))?;
     let picture = to_picture(&decoded);
     if picture.width < 2 || picture.height < 2 {
         return Err(Error::input(
@@ -50,14 +51,6 @@ pub fn load(path: &Path, bits: Option<u32>) -> Result<Picture> {
     }
 }
 
-fn limits() -> Limits {
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_SIDE);
-    limits.max_image_height = Some(MAX_SIDE);
-    limits.max_alloc = Some(MAX_DECODED_BYTES);
-    limits
-}
-
 fn decode_error(path: &Path, error: &ImageError) -> Error {
     let place = path.display();
     match error {
@@ -67,7 +60,7 @@ fn decode_error(path: &Path, error: &ImageError) -> Error {
         ImageError::Limits(e) => Error::input(
             place,
             format!("the image is too large: {e}"),
-            format!("check the file header; sides up to {MAX_SIDE} px are read"),
+            format!("check the file header; sides up to {MOST_SIDE_PX} px and some hundred megapixels are read"),
         ),
         ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
             Error::input(place, "the file is truncated", "copy or record the image again")
@@ -111,8 +104,9 @@ fn to_picture(decoded: &DynamicImage) -> Picture {
         DynamicImage::ImageRgba8(i) => {
             (i.pixels().map(|p| luma([p.0[0], p.0[1], p.0[2]].map(f32::from))).collect(), 255.0)
         }
-        DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) => {
-            (decoded.to_rgb16().pixels().map(|p| luma(p.0.map(f32::from))).collect(), 65535.0)
+        DynamicImage::ImageRgb16(i) => (i.pixels().map(|p| luma(p.0.map(f32::from))).collect(), 65535.0),
+        DynamicImage::ImageRgba16(i) => {
+            (i.pixels().map(|p| luma([p.0[0], p.0[1], p.0[2]].map(f32::from))).collect(), 65535.0)
         }
         // Floating-point TIFF: counts between 0 and 1 by convention of the decoder.
         _ => (decoded.to_rgb32f().pixels().map(|p| 65535.0 * luma(p.0)).collect(), 65535.0),

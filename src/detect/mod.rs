@@ -16,7 +16,7 @@ mod saddle;
 
 pub use detection::{Circles, Detection, Dropped};
 pub use flat_field::FlatField;
-pub use load::{LUMA_WEIGHTS, load};
+pub use load::{LUMA_WEIGHTS, load, load_bytes};
 pub use picture::Picture;
 pub use run::{SeriesImage, detect_series};
 

@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use super::compensation::largest_nm;
 use crate::error::{Error, Result};
+use crate::files::{self, Kind};
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::robot::Robot;
 use crate::urdf::{Chain, Payload};
@@ -48,8 +49,15 @@ pub fn compensated(chain: Chain, path: Option<&Path>) -> Result<Robot> {
 /// Names the file, and the line or joint: unreadable text, unknown keys, a joint that the chain does not have, wrong counts,
 /// a compliance where the URDF states no masses.
 pub fn read_compensation(path: &Path, chain: Chain) -> Result<Robot> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
-    let file: File = toml::from_str(&text)
+    parse_compensation(path, &files::read_text(path, Kind::Settings)?, chain)
+}
+
+/// As [`read_compensation`] from the text of the file; `path` is for messages only.
+///
+/// # Errors
+/// Those of [`read_compensation`].
+pub fn parse_compensation(path: &Path, text: &str, chain: Chain) -> Result<Robot> {
+    let file: File = toml::from_str(text)
         .map_err(|e| Error::input(path.display(), e, "use the compensation.toml that identify wrote"))?;
     let chain = chain.carrying(file.payload.as_ref()).map_err(|e| Error::input(path.display(), e.what, e.remedy))?;
     let mut terms = Vec::new();

@@ -41,7 +41,7 @@ mod solution_record;
 mod text;
 mod write;
 
-pub use compensation_read::{compensated, read_compensation};
+pub use compensation_read::{compensated, parse_compensation, read_compensation};
 pub use controller_files::kinematics_xacro;
 pub use kinematics_file::kinematics_yaml;
 pub use names::folder_name;

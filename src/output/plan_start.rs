@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use super::solution_json::{ImageRecord, ObservationColumns, SolutionRecord};
 use crate::error::{Error, Result};
+use crate::files::{self, Kind};
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
 use crate::model::joint_terms::JointTerm;
@@ -39,7 +40,7 @@ struct PoseFile {
 }
 
 fn text(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))
+    files::read_text(path, Kind::Settings)
 }
 
 /// The camera of a ROS camera_info file.

@@ -1,9 +1,11 @@
-//! Input files: read once, hashed for the record, with messages for the usual ways in which text files go wrong.
+//! Input files: read once, hashed for the record.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
+use crate::files::{self, Kind};
 use crate::{Error, Result};
 
 /// A file that went into the result.
@@ -21,33 +23,31 @@ impl InputFile {
         Self::of_digest(path, &Sha256::digest(bytes))
     }
 
-    /// A file whose SHA-256 is at hand.
-    pub(super) fn of_digest(path: &Path, digest: &[u8]) -> Self {
+    fn of_digest(path: &Path, digest: &[u8]) -> Self {
         Self { path: path.to_path_buf(), sha256: digest.iter().map(|b| format!("{b:02x}")).collect() }
     }
 
-    /// Reads and hashes a file.
+    /// Hashes a file of any length, as long as it was when it was opened.
     ///
     /// # Errors
     /// The file cannot be read.
     pub fn of_file(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
-        Ok(Self::of_bytes(path, &bytes))
+        let (file, length) = files::open(path, Kind::Recording)?;
+        let mut file = file.take(length);
+        let mut hasher = Sha256::new();
+        let mut buffer = vec![0; 1 << 20];
+        loop {
+            match file.read(&mut buffer).map_err(|e| Error::io(path, &e))? {
+                0 => return Ok(Self::of_digest(path, &hasher.finalize())),
+                read => hasher.update(&buffer[..read]),
+            }
+        }
     }
 }
 
 /// Reads a text file without its byte order mark and notes its hash.
-pub(super) fn read_text(path: &Path, inputs: &mut Vec<InputFile>) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+pub(super) fn read_text(path: &Path, kind: Kind, inputs: &mut Vec<InputFile>) -> Result<String> {
+    let bytes = files::read(path, kind)?;
     inputs.push(InputFile::of_bytes(path, &bytes));
-    let remedy = "save it as UTF-8 (in a spreadsheet: CSV UTF-8)";
-    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        return Err(Error::input(path.display(), "is UTF-16 text", remedy));
-    }
-    let text = String::from_utf8(bytes).map_err(|e| {
-        let valid = e.utf8_error().valid_up_to();
-        let line = 1 + e.as_bytes()[..valid].iter().filter(|b| **b == b'\n').count();
-        Error::input(format!("{}:{line}", path.display()), "is not UTF-8 text", remedy)
-    })?;
-    Ok(text.strip_prefix('\u{feff}').map(str::to_string).unwrap_or(text))
+    files::text(path, bytes)
 }

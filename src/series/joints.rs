@@ -48,16 +48,24 @@ impl Stops {
         Self::from_table(&Table::read(path, inputs)?)
     }
 
+    /// Reads the text of a joints.csv; `path` is for messages only.
+    ///
+    /// # Errors
+    /// As [`Stops::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        Self::from_table(&Table::parse(path, text)?)
+    }
+
     fn from_table(table: &Table) -> Result<Self> {
         let image = table.require("image")?;
         let (placement, time) = (table.column("placement"), table.column("time_s"));
         let columns: Vec<usize> =
             (0..table.headers.len()).filter(|&c| !RESERVED.contains(&table.headers[c].as_str())).collect();
         let joints: Vec<String> = columns.iter().map(|&c| table.headers[c].clone()).collect();
-        let placements_named = placement.is_some_and(|c| table.rows.iter().any(|r| !r.cell(c).is_empty()));
+        let placements_named = placement.is_some_and(|c| table.rows().any(|r| !r.cell(c).is_empty()));
         let mut seen: BTreeMap<String, u64> = BTreeMap::new();
         let mut stops = Vec::new();
-        for row in &table.rows {
+        for row in table.rows() {
             let name = image_name(table, row, image)?;
             if let Some(first) = seen.insert(name.clone(), row.line) {
                 let what = format!("is the image of line {first} already");
@@ -108,7 +116,7 @@ impl Stops {
     }
 }
 
-fn image_name(table: &Table, row: &Row, column: usize) -> Result<String> {
+fn image_name(table: &Table, row: Row<'_>, column: usize) -> Result<String> {
     let name = row.cell(column);
     if name.is_empty() {
         return Err(table.refuse(row, column, "names no image", "name the image of the stop"));
@@ -120,7 +128,7 @@ fn image_name(table: &Table, row: &Row, column: usize) -> Result<String> {
 }
 
 /// All cells or none.
-fn readings(table: &Table, row: &Row, columns: &[usize]) -> Result<Option<Vec<f64>>> {
+fn readings(table: &Table, row: Row<'_>, columns: &[usize]) -> Result<Option<Vec<f64>>> {
     if columns.iter().all(|&c| row.cell(c).is_empty()) {
         return Ok(None);
     }

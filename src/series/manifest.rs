@@ -6,6 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::inputs::{InputFile, read_text};
+use crate::files::Kind;
 use crate::{Error, Result, closest_name, plain_name};
 
 /// Unit of the revolute columns of joints.csv.
@@ -180,7 +181,15 @@ impl Manifest {
 
     /// Reads and checks `series.toml`.
     pub(super) fn read(path: &Path, inputs: &mut Vec<InputFile>) -> Result<Self> {
-        let manifest: Self = read_toml(path, inputs)?;
+        Self::parse(path, &read_text(path, Kind::Settings, inputs)?)
+    }
+
+    /// Checks the text of a `series.toml`; `path` is for messages only.
+    ///
+    /// # Errors
+    /// By line: unknown keys, wrong values, another version of the format.
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        let manifest: Self = parse_toml(path, text)?;
         check_format(path, manifest.format)?;
         let camera = &manifest.camera;
         let positive = [
@@ -239,15 +248,19 @@ pub(super) fn to_toml(file: &str, value: &impl Serialize) -> Result<String> {
 
 /// Reads a TOML file; unknown keys and wrong values are named with their line.
 pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path, inputs: &mut Vec<InputFile>) -> Result<T> {
-    let text = read_text(path, inputs)?;
-    let value = toml::from_str(&text).map_err(|error| {
+    parse_toml(path, &read_text(path, Kind::Settings, inputs)?)
+}
+
+/// A value from the text of a TOML file; `path` is for messages only.
+pub(super) fn parse_toml<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
+    let value = toml::from_str(text).map_err(|error| {
         let line = error.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count());
         let place = line.map_or_else(|| path.display().to_string(), |l| format!("{}:{l}", path.display()));
         let message = error.message().trim().replace('\n', "; ");
         let remedy = toml_remedy(&message);
         Error::input(place, message, remedy)
     })?;
-    plain_toml(path, &text)?;
+    plain_toml(path, text)?;
     Ok(value)
 }
 

@@ -26,8 +26,8 @@ pub use mcap::{
     Shown, StopReport, extract, write_recording,
 };
 pub use observation::{Edge, ImageObservations, Observation};
-pub use observation_file::observations_csv;
+pub use observation_file::{observations_csv, parse_observations};
 pub use plate::{Aruco, Marker, Plate, PlateKind, ScaleBar};
-pub use plate_file::{DEFAULT_TOLERANCE_M, plate_csv, plate_toml, read_plate};
+pub use plate_file::{DEFAULT_TOLERANCE_M, parse_plate, plate_csv, plate_toml, read_plate};
 pub use read::{Series, Source, read, read_images};
 pub use recorded::convert_recording;

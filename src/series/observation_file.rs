@@ -24,12 +24,32 @@ pub(super) fn read(
     size_px: Option<(u32, u32)>,
     inputs: &mut Vec<InputFile>,
 ) -> Result<BTreeMap<String, ImageObservations>> {
-    let table = Table::read(path, inputs)?;
+    from_table(&Table::read(path, inputs)?, plate, size_px)
+}
+
+/// Reads the text of an observations.csv; `path` is for messages only.
+///
+/// # Errors
+/// By line: unknown markers, an inner edge of a disc, numbers that are none, points outside the image, doubles.
+pub fn parse_observations(
+    path: &Path,
+    text: &str,
+    plate: &Plate,
+    size_px: Option<(u32, u32)>,
+) -> Result<BTreeMap<String, ImageObservations>> {
+    from_table(&Table::parse(path, text)?, plate, size_px)
+}
+
+fn from_table(
+    table: &Table,
+    plate: &Plate,
+    size_px: Option<(u32, u32)>,
+) -> Result<BTreeMap<String, ImageObservations>> {
     table.refuse_unknown(&KNOWN)?;
-    let reader = Reader::new(&table, plate, size_px)?;
+    let reader = Reader::new(table, plate, size_px)?;
     let mut seen: BTreeMap<(&str, u32, Edge), u64> = BTreeMap::new();
     let mut images: BTreeMap<String, ImageObservations> = BTreeMap::new();
-    for row in &table.rows {
+    for row in table.rows() {
         if reader.reason.is_some_and(|c| !row.cell(c).is_empty()) {
             continue;
         }
@@ -89,7 +109,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn observation(&self, row: &Row) -> Result<Observation> {
+    fn observation(&self, row: Row<'_>) -> Result<Observation> {
         let id = self.table.id(row, self.marker)?;
         let Some(index) = self.plate.index_of(id) else {
             let range = (self.plate.markers.first().map(|m| m.id), self.plate.markers.last().map(|m| m.id));
@@ -108,7 +128,7 @@ impl<'a> Reader<'a> {
         Ok(Observation { marker: id, edge, uv: self.point(row)?, covariance: self.covariance(row)? })
     }
 
-    fn edge(&self, row: &Row) -> Result<Edge> {
+    fn edge(&self, row: Row<'_>) -> Result<Edge> {
         let Some(column) = self.edge else { return Ok(Edge::Outer) };
         match row.cell(column) {
             "" | "outer" => Ok(Edge::Outer),
@@ -117,7 +137,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn point(&self, row: &Row) -> Result<[f64; 2]> {
+    fn point(&self, row: Row<'_>) -> Result<[f64; 2]> {
         let uv = [self.table.number(row, self.uv[0])?, self.table.number(row, self.uv[1])?];
         let Some((width, height)) = self.size_px else { return Ok(uv) };
         for (column, value, size) in [(self.uv[0], uv[0], width), (self.uv[1], uv[1], height)] {
@@ -130,7 +150,7 @@ impl<'a> Reader<'a> {
         Ok(uv)
     }
 
-    fn covariance(&self, row: &Row) -> Result<Option<[f64; 3]>> {
+    fn covariance(&self, row: Row<'_>) -> Result<Option<[f64; 3]>> {
         let Some(columns) = self.covariance else { return Ok(None) };
         if columns.iter().all(|&c| row.cell(c).is_empty()) {
             return Ok(None);

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::inputs::InputFile;
-use super::manifest::{check_format, read_toml, require_positive, to_toml};
+use super::inputs::{InputFile, read_text};
+use super::manifest::{check_format, parse_toml, read_toml, require_positive, to_toml};
 use super::plate::{Aruco, Marker, Plate, PlateKind, ScaleBar};
 use super::table::{Row, Table, to_csv};
+use crate::files::Kind;
 use crate::{Error, Result};
 
 /// Prior sigma of a printed marker where the plate states none, m.
@@ -47,7 +48,19 @@ struct PlateFile {
 /// By file and line: unknown keys or columns, missing sizes, doubles, circles that are none or overlap, markers that do
 /// not lie where their id says, an impossible scale bar.
 pub fn read_plate(path: &Path, inputs: &mut Vec<InputFile>) -> Result<Plate> {
-    let file: PlateFile = read_toml(path, inputs)?;
+    parse(path, &read_text(path, Kind::Settings, inputs)?, |csv| read_text(csv, Kind::Table, inputs))
+}
+
+/// Reads a plate from the text of its plate.toml and, where that names one, of its marker file; `path` is for messages only.
+///
+/// # Errors
+/// As [`read_plate`].
+pub fn parse_plate(path: &Path, toml: &str, markers: &str) -> Result<Plate> {
+    parse(path, toml, |_| Ok(markers.to_string()))
+}
+
+fn parse(path: &Path, toml: &str, marker_text: impl FnOnce(&Path) -> Result<String>) -> Result<Plate> {
+    let file: PlateFile = parse_toml(path, toml)?;
     check_format(path, file.format)?;
     for (key, value) in [("pitch_m", file.pitch_m), ("tolerance_m", file.tolerance_m), ("radius_m", file.radius_m)] {
         require_positive(path, key, value)?;
@@ -55,7 +68,7 @@ pub fn read_plate(path: &Path, inputs: &mut Vec<InputFile>) -> Result<Plate> {
     let mut plate = nominal(path, &file)?;
     if let Some(markers) = &file.markers {
         let csv = path.with_file_name(markers);
-        plate.markers = read_markers(&Table::read(&csv, inputs)?, &plate)?;
+        plate.markers = read_markers(&Table::parse(&csv, &marker_text(&csv)?)?, &plate)?;
         check_ids(&csv, &plate)?;
     }
     check_overlap(path, &plate)?;
@@ -142,7 +155,7 @@ fn read_markers(table: &Table, plate: &Plate) -> Result<Vec<Marker>> {
     let radii = [radius("outer_radius_m")?, radius("inner_radius_m")?];
     let sigmas = ["sigma_m", "sigma_x_m", "sigma_y_m", "sigma_z_m"].map(|name| table.column(name));
     let mut markers: Vec<(u64, Marker)> = Vec::new();
-    for row in &table.rows {
+    for row in table.rows() {
         let [x, y, z] = xyz.map(|c| table.number(row, c));
         let [outer_radius_m, inner_radius_m] = marker_radii(table, row, radii, circles)?;
         let id = table.id(row, id)?;
@@ -163,7 +176,7 @@ fn read_markers(table: &Table, plate: &Plate) -> Result<Vec<Marker>> {
 }
 
 /// Outer and inner radius, m; zero where a plate of points has no such column.
-fn marker_radii(table: &Table, row: &Row, columns: [Option<usize>; 2], circles: bool) -> Result<[f64; 2]> {
+fn marker_radii(table: &Table, row: Row<'_>, columns: [Option<usize>; 2], circles: bool) -> Result<[f64; 2]> {
     let read = |c: Option<usize>| c.map_or(Ok(0.0), |c| table.number(row, c));
     let [outer, inner] = columns.map(read);
     let (outer, inner) = (outer?, inner?);
@@ -179,7 +192,7 @@ fn marker_radii(table: &Table, row: &Row, columns: [Option<usize>; 2], circles: 
 }
 
 /// `sigma_m`, or the largest of the three sigmas of a corrected plate.
-fn marker_sigma(table: &Table, row: &Row, columns: [Option<usize>; 4]) -> Result<Option<f64>> {
+fn marker_sigma(table: &Table, row: Row<'_>, columns: [Option<usize>; 4]) -> Result<Option<f64>> {
     let mut sigma = None;
     for column in columns.into_iter().flatten() {
         let value = table.optional_number(row, Some(column))?;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::inputs::InputFile;
 use super::joints::Stops;
 use super::manifest::{AngleUnit, Manifest};
-use super::mcap::require_mcap;
+use super::mcap::require_recording;
 use super::observation::ImageObservations;
 use super::observation_file;
 use super::plate::Plate;
@@ -85,7 +85,7 @@ pub fn read_images(path: &Path) -> Result<Series> {
 
 fn read_recording(path: &Path) -> Result<Series> {
     // A bag of another kind is named as such before its manifest is missed.
-    require_mcap(path)?;
+    require_recording(path)?;
     let manifest_path = manifest_beside(path)?;
     let folder = manifest_path.parent().unwrap_or(path).to_path_buf();
     let mut inputs = Vec::new();

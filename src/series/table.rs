@@ -1,21 +1,43 @@
 //! CSV tables with a header, whose every complaint names file, line and column.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::inputs::{InputFile, read_text};
+use crate::files::Kind;
 use crate::{Error, Result, closest_name, plain_name};
 
 /// One data row.
-#[derive(Debug)]
-pub(super) struct Row {
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row<'a> {
     pub line: u64,
-    cells: Vec<String>,
+    first: usize,
+    cells: &'a Cells,
 }
 
-impl Row {
+impl<'a> Row<'a> {
     /// Cell of a column, without blanks around it.
-    pub fn cell(&self, column: usize) -> &str {
-        &self.cells[column]
+    pub fn cell(&self, column: usize) -> &'a str {
+        self.cells.cell(self.first + column)
+    }
+}
+
+/// All cells of a table, one after the other in one text: a table of many small cells stays small.
+#[derive(Debug, Default)]
+struct Cells {
+    text: String,
+    ends: Vec<u32>,
+}
+
+impl Cells {
+    fn push(&mut self, cell: &str) {
+        self.text.push_str(cell);
+        self.ends.push(self.text.len() as u32);
+    }
+
+    fn cell(&self, index: usize) -> &str {
+        let start = index.checked_sub(1).map_or(0, |before| self.ends[before] as usize);
+        &self.text[start..self.ends[index] as usize]
     }
 }
 
@@ -24,61 +46,85 @@ impl Row {
 pub(super) struct Table {
     file: String,
     pub headers: Vec<String>,
-    pub rows: Vec<Row>,
+    lines: Vec<u64>,
+    cells: Cells,
 }
 
 impl Table {
     pub fn read(path: &Path, inputs: &mut Vec<InputFile>) -> Result<Self> {
-        Self::parse(&path.display().to_string(), &read_text(path, inputs)?)
+        Self::parse(path, &read_text(path, Kind::Table, inputs)?)
     }
 
-    pub fn parse(file: &str, text: &str) -> Result<Self> {
-        refuse_other_separators(file, text)?;
+    /// Rows under the header.
+    pub fn rows(&self) -> impl Iterator<Item = Row<'_>> + Clone {
+        let width = self.headers.len();
+        self.lines.iter().enumerate().map(move |(k, &line)| Row { line, first: k * width, cells: &self.cells })
+    }
+
+    /// Reads the text of a table; `path` is for messages only.
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        let file = path.display().to_string();
+        if text.len() as u64 > Kind::Table.most_bytes() {
+            return Err(Error::input(file, "is too long for a table", "check that it is the right file"));
+        }
+        refuse_other_separators(&file, text)?;
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
-        let mut rows = Vec::new();
+        let mut table = Self { file, headers: Vec::new(), lines: Vec::new(), cells: Cells::default() };
         let (mut at, mut line) = (0, 1);
-        for record in reader.records() {
-            let record = record.map_err(|e| Error::input(file, e, "correct the line (quotes must be closed)"))?;
+        let mut record = csv::StringRecord::new();
+        loop {
+            let more = reader.read_record(&mut record);
+            let remedy = "correct the line (quotes must be closed)";
+            if !more.map_err(|e| Error::input(&table.file, e, remedy))? {
+                break;
+            }
             // The position of the csv reader may stand before line ends that it has yet to skip.
             let start = record.position().map_or(at, |p| p.byte() as usize);
             let start = start + text.as_bytes()[start..].iter().take_while(|b| matches!(b, b'\r' | b'\n')).count();
             line += text.as_bytes()[at..start].iter().filter(|b| **b == b'\n').count() as u64;
             at = start;
-            rows.push(Row { line, cells: record.iter().map(str::to_string).collect() });
+            table.push(line, &record)?;
         }
-        let mut rows = rows.into_iter();
-        let Some(header) = rows.next() else {
-            return Err(Error::input(file, "is empty", "its first line names the columns"));
-        };
-        let table = Self { file: file.to_string(), headers: header.cells, rows: rows.collect() };
-        table.check()?;
-        Ok(table)
+        match table.headers.is_empty() {
+            true => Err(Error::input(table.file, "is empty", "its first line names the columns")),
+            false => Ok(table),
+        }
     }
 
-    fn check(&self) -> Result<()> {
+    /// The next row; the first is the header.
+    fn push(&mut self, line: u64, record: &csv::StringRecord) -> Result<()> {
+        if self.headers.is_empty() {
+            self.headers = record.iter().map(str::to_string).collect();
+            return self.check_headers();
+        }
+        if record.len() != self.headers.len() {
+            let what = format!("{} cells under {} column names", record.len(), self.headers.len());
+            let remedy = "give every row all cells; numbers need a decimal point, not a comma";
+            return Err(Error::input(self.place_of_line(line), what, remedy));
+        }
+        self.lines.push(line);
+        for (cell, column) in record.iter().zip(&self.headers) {
+            plain_name(column, cell, format_args!("{}:{line}", self.file))?;
+            self.cells.push(cell);
+        }
+        Ok(())
+    }
+
+    fn check_headers(&self) -> Result<()> {
+        let mut seen = BTreeSet::new();
         for (i, name) in self.headers.iter().enumerate() {
             plain_name("column", name, self.place_of_header())?;
             if name.is_empty() {
                 let what = format!("column {} has no name", i + 1);
                 return Err(Error::input(self.place_of_header(), what, "name it or remove the extra comma"));
             }
-            if self.headers[..i].contains(name) {
+            if !seen.insert(name) {
                 let what = format!("two columns are named \"{name}\"");
                 return Err(Error::input(self.place_of_header(), what, "remove or rename one"));
-            }
-        }
-        for row in &self.rows {
-            if row.cells.len() != self.headers.len() {
-                let what = format!("{} cells under {} column names", row.cells.len(), self.headers.len());
-                let remedy = "give every row all cells; numbers need a decimal point, not a comma";
-                return Err(Error::input(self.place(row), what, remedy));
-            }
-            for (cell, column) in row.cells.iter().zip(&self.headers) {
-                plain_name(column, cell, self.place(row))?;
             }
         }
         Ok(())
@@ -89,7 +135,7 @@ impl Table {
         format!("{}:{line}", self.file)
     }
 
-    pub fn place(&self, row: &Row) -> String {
+    pub fn place(&self, row: Row<'_>) -> String {
         self.place_of_line(row.line)
     }
 
@@ -128,7 +174,7 @@ impl Table {
     }
 
     /// A finite number.
-    pub fn number(&self, row: &Row, column: usize) -> Result<f64> {
+    pub fn number(&self, row: Row<'_>, column: usize) -> Result<f64> {
         let cell = row.cell(column);
         match cell.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
@@ -143,7 +189,7 @@ impl Table {
     }
 
     /// A number, or nothing where the cell is empty or the column does not exist.
-    pub fn optional_number(&self, row: &Row, column: Option<usize>) -> Result<Option<f64>> {
+    pub fn optional_number(&self, row: Row<'_>, column: Option<usize>) -> Result<Option<f64>> {
         match column {
             Some(column) if !row.cell(column).is_empty() => self.number(row, column).map(Some),
             _ => Ok(None),
@@ -151,13 +197,13 @@ impl Table {
     }
 
     /// A marker id.
-    pub fn id(&self, row: &Row, column: usize) -> Result<u32> {
+    pub fn id(&self, row: Row<'_>, column: usize) -> Result<u32> {
         let bad = || self.refuse(row, column, "is not a marker id", "ids are whole numbers from 0 on");
         row.cell(column).parse().map_err(|_| bad())
     }
 
     /// Complaint about one cell.
-    pub fn refuse(&self, row: &Row, column: usize, what: &str, remedy: &str) -> Error {
+    pub fn refuse(&self, row: Row<'_>, column: usize, what: &str, remedy: &str) -> Error {
         let cell = row.cell(column);
         let what = match cell.is_empty() {
             true => format!("column {}: an empty cell {what}", self.headers[column]),

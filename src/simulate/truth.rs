@@ -123,7 +123,7 @@ impl Truth {
     /// # Errors
     /// A missing file, unknown keys, wrong values, another version of the format.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        let text = crate::files::read_text(path, crate::files::Kind::Settings)?;
         let truth: Self = toml::from_str(&text).map_err(|e| {
             Error::input(path.display(), e.message(), "write it with robotcal simulate of this version")
         })?;

@@ -44,6 +44,8 @@ pub(super) struct MimicElement {
 pub(super) struct Source<'a> {
     pub file: String,
     pub document: &'a roxmltree::Document<'a>,
+    /// Bytes at which lines end.
+    pub line_ends: Vec<usize>,
     /// `quat_xyzw` counts from URDF 1.1 on.
     pub has_quaternions: bool,
 }
@@ -51,7 +53,12 @@ pub(super) struct Source<'a> {
 impl Source<'_> {
     /// `file:line` of a node.
     pub fn place(&self, node: Node<'_, '_>) -> String {
-        format!("{}:{}", self.file, self.document.text_pos_at(node.range().start).row)
+        format!("{}:{}", self.file, self.line(node))
+    }
+
+    /// Line of a node, from 1.
+    pub fn line(&self, node: Node<'_, '_>) -> u32 {
+        1 + self.line_ends.partition_point(|end| *end < node.range().start) as u32
     }
 
     fn refuse(&self, node: Node<'_, '_>, joint: &str, what: String, remedy: &str) -> Error {

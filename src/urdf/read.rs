@@ -7,6 +7,7 @@ use roxmltree::{Document, Node};
 
 use super::elements::{JointElement, Source};
 use super::masses::{Inertial, inertial};
+use crate::files::{self, Kind};
 use crate::{Error, Notice, Result, closest_name, plain_name};
 
 /// A robot as its URDF describes it, with the text it came from.
@@ -25,6 +26,8 @@ pub struct RobotDescription {
     /// Joints in the order of the file.
     pub(super) joints: Vec<JointElement>,
     pub(super) inertials: BTreeMap<String, Inertial>,
+    /// Index in `joints` of the joint above a link.
+    pub(super) joint_above: BTreeMap<String, usize>,
 }
 
 /// Reads a URDF file.
@@ -33,7 +36,7 @@ pub struct RobotDescription {
 /// Names file, line and joint: unreadable file or XML, unexpanded xacro, an unknown joint type, numbers that are none,
 /// a zero axis, links or joints of the same name, unknown links, a link with two parents, loops.
 pub fn read(path: &Path) -> Result<RobotDescription> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+    let bytes = files::read(path, Kind::Robot)?;
     let text = String::from_utf8(bytes).map_err(|e| {
         let what = format!("is not UTF-8 text (byte {})", e.utf8_error().valid_up_to());
         Error::input(path.display(), what, "convert it: iconv -t UTF-8 in.urdf > out.urdf")
@@ -49,8 +52,12 @@ impl RobotDescription {
     pub fn from_text(path: &Path, text: String) -> Result<Self> {
         let document = parse(path, &text)?;
         let robot = document.root_element();
-        let source =
-            Source { file: path.display().to_string(), document: &document, has_quaternions: version(robot) >= (1, 1) };
+        let source = Source {
+            file: path.display().to_string(),
+            document: &document,
+            line_ends: text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(at, _)| at).collect(),
+            has_quaternions: version(robot) >= (1, 1),
+        };
         refuse_xacro(&source)?;
         if robot.tag_name().name() != "robot" {
             let what = format!("the root element is <{}>, not <robot>", robot.tag_name().name());
@@ -82,8 +89,16 @@ impl RobotDescription {
                 inertials.insert(link.name.clone(), found);
             }
         }
-        let mut description =
-            Self { path: path.to_path_buf(), name: read.name, notices, links, joints, inertials, text: String::new() };
+        let mut description = Self {
+            path: path.to_path_buf(),
+            name: read.name,
+            notices,
+            links,
+            joint_above: joints.iter().enumerate().map(|(k, j)| (j.child.clone(), k)).collect(),
+            joints,
+            inertials,
+            text: String::new(),
+        };
         description.check_tree()?;
         if let Some(mass) = description.placeholder_mass() {
             let what =
@@ -99,8 +114,50 @@ impl RobotDescription {
     }
 }
 
+/// Elements within elements: a robot description has some ten.
+const DEEPEST: usize = 64;
+
+/// Refuses elements that are nested deeper than any robot's: the parsers follow them by recursion.
+fn refuse_depth(path: &Path, text: &str) -> Result<()> {
+    let (mut depth, mut rest) = (0_usize, text);
+    while let Some(at) = rest.find('<') {
+        rest = &rest[at..];
+        let special = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")];
+        if let Some((start, end)) = special.into_iter().find(|(start, _)| rest.starts_with(start)) {
+            // Without its end the parser stops there as well.
+            let Some(length) = rest[start.len()..].find(end) else { return Ok(()) };
+            rest = &rest[start.len() + length + end.len()..];
+            continue;
+        }
+        if rest.starts_with("</") {
+            depth = depth.saturating_sub(1);
+        } else if !rest.starts_with("<!") {
+            depth += 1;
+        }
+        if depth > DEEPEST {
+            let line = 1 + text[..text.len() - rest.len()].matches('\n').count();
+            let what = format!("elements are nested more than {DEEPEST} deep");
+            return Err(Error::input(format!("{}:{line}", path.display()), what, "give a URDF that describes a robot"));
+        }
+        let mut quote = None;
+        let end = rest.bytes().position(|byte| {
+            match quote {
+                Some(open) if byte == open => quote = None,
+                None if matches!(byte, b'"' | b'\'') => quote = Some(byte),
+                _ => {}
+            }
+            byte == b'>' && quote.is_none()
+        });
+        let Some(end) = end else { return Ok(()) };
+        depth -= usize::from(rest[..end].ends_with('/') && !rest.starts_with("</") && depth > 0);
+        rest = &rest[end + 1..];
+    }
+    Ok(())
+}
+
 /// Parses XML, with an error that knows the line.
 pub(super) fn parse<'a>(path: &Path, text: &'a str) -> Result<Document<'a>> {
+    refuse_depth(path, text)?;
     Document::parse(text).map_err(|error| match &error {
         roxmltree::Error::UnknownNamespace(prefix, at) if prefix == "xacro" => xacro(path, at.row),
         _ => {
@@ -128,8 +185,7 @@ fn refuse_xacro(source: &Source<'_>) -> Result<()> {
             || node.attributes().any(|a| is_xacro(a.namespace()))
             || (node.attributes().any(|a| substituted(a.value())) && kinematic())
     });
-    found
-        .map_or(Ok(()), |node| Err(xacro(Path::new(&source.file), source.document.text_pos_at(node.range().start).row)))
+    found.map_or(Ok(()), |node| Err(xacro(Path::new(&source.file), source.line(node))))
 }
 
 /// `version` of `<robot>` as (major, minor); 1.0 where it is missing or malformed, as urdfdom reads it.
@@ -162,10 +218,16 @@ fn named(source: &Source<'_>, robot: Node<'_, '_>, tag: &'static str) -> Result<
     Ok(names)
 }
 
+/// Names that a message lists.
+const MOST_NAMED: usize = 100;
+
 /// A remedy that names what was probably meant, else everything there is.
 pub(super) fn suggest<'a>(given: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
     match closest_name(given, known.clone()) {
         Some(meant) => format!("\"{meant}\" is there"),
-        None => format!("there are: {}", known.collect::<Vec<_>>().join(", ")),
+        None => {
+            let (first, more) = (known.clone().take(MOST_NAMED), known.count() > MOST_NAMED);
+            format!("there are: {}{}", first.collect::<Vec<_>>().join(", "), if more { ", ..." } else { "" })
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! The tip of a chain where none is named.
 
+use std::collections::BTreeSet;
+
 use urdf_rs::JointType;
 
 use super::elements::JointElement;
@@ -39,12 +41,16 @@ impl RobotDescription {
 
     fn choose_tip<'a>(&'a self, base: &'a str) -> Result<Choice<'a>> {
         let moving = |joint: &&JointElement| joint.joint_type != JointType::Fixed;
-        let is_below = |link: &str, top: &str| link == top || self.ancestors(link).contains(&top);
-        let moves_below = |top: &&str| self.joints.iter().filter(moving).any(|j| is_below(&j.parent, top));
+        let moves_below = |top: &&str| {
+            let below = self.below(top);
+            self.joints.iter().filter(moving).any(|j| below.contains(j.parent.as_str()))
+        };
         let above = self.fixed_ancestors(base).map(|j| j.parent.as_str());
         let top = std::iter::once(base).chain(above).find(moves_below).unwrap_or(base);
-        let below = |link: &str| is_below(link, top);
-        let is_leaf = |link: &str| self.joints.iter().all(|j| j.parent != link);
+        let within = self.below(top);
+        let below = |link: &str| within.contains(link);
+        let parents: BTreeSet<&str> = self.joints.iter().map(|j| j.parent.as_str()).collect();
+        let is_leaf = |link: &str| !parents.contains(link);
         let leaves: Vec<&str> = self.links().filter(|l| *l != base && *l != top && is_leaf(l) && below(l)).collect();
         let all = self.joints.iter().filter(moving).filter(|j| below(&j.parent)).count();
         let before = |leaf: &str| self.joints_above(leaf).take_while(|j| below(&j.parent)).filter(moving).count();

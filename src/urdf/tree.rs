@@ -15,6 +15,9 @@ use crate::{Error, Result};
 /// Links of an arm together are shorter, m; the smallest arms in millimetres are longer.
 const LONGEST_ARM_M: f64 = 50.0;
 
+/// Joints of a chain, fixed ones included; no arm has as many.
+const MOST_JOINTS: usize = 256;
+
 impl RobotDescription {
     /// Names of all links, in the order of the file.
     pub fn links(&self) -> impl Iterator<Item = &str> + Clone {
@@ -52,6 +55,10 @@ impl RobotDescription {
             masses: Vec::new(),
         };
         let (up, down) = self.path(base, tip)?;
+        if up.len() + down.len() > MOST_JOINTS {
+            let what = format!("has {} joints between \"{base}\" and \"{tip}\"", up.len() + down.len());
+            return Err(Error::input(self.path.display(), what, "choose a base and a tip of the arm alone"));
+        }
         chain.joints.extend(up.into_iter().map(upwards));
         for element in down {
             let joint = self.chain_joint(element, &mut chain)?;
@@ -82,7 +89,7 @@ impl RobotDescription {
 
     /// The joint above a link.
     pub(super) fn joint_to(&self, link: &str) -> Option<&JointElement> {
-        self.joints.iter().find(|j| j.child == link)
+        self.joint_above.get(link).map(|k| &self.joints[*k])
     }
 
     /// Parent and child link of a joint.
@@ -128,19 +135,19 @@ impl RobotDescription {
                 return Err(Error::input(place(), what, "a URDF is a tree: remove one of the joints"));
             }
         }
+        // Links that a root is known to be above.
+        let mut rooted: BTreeSet<&str> = BTreeSet::new();
         for link in &links {
-            let mut current = *link;
-            for _ in 0..=links.len() {
-                match parents.get(current) {
-                    Some(joint) => current = &joint.parent,
-                    None => break,
+            let (mut current, mut way) = (*link, BTreeSet::new());
+            while let Some(joint) = parents.get(current).filter(|_| !rooted.contains(current)) {
+                if !way.insert(current) {
+                    let what = format!("links form a loop through \"{current}\"");
+                    let place = format!("{}, joint \"{}\"", joint.place, joint.name);
+                    return Err(Error::input(place, what, "a URDF is a tree: remove the joint that closes the loop"));
                 }
+                current = &joint.parent;
             }
-            if let Some(joint) = parents.get(current) {
-                let what = format!("links form a loop through \"{current}\"");
-                let place = format!("{}, joint \"{}\"", joint.place, joint.name);
-                return Err(Error::input(place, what, "a URDF is a tree: remove the joint that closes the loop"));
-            }
+            rooted.append(&mut way);
         }
         Ok(())
     }
@@ -158,6 +165,23 @@ impl RobotDescription {
             current = &joint.parent;
         }
         Some((current, pose))
+    }
+
+    /// A link and all links below it.
+    pub(super) fn below<'a>(&'a self, top: &'a str) -> BTreeSet<&'a str> {
+        let mut children: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        for joint in &self.joints {
+            children.entry(&joint.parent).or_default().push(&joint.child);
+        }
+        let mut found = BTreeSet::from([top]);
+        let mut waiting = vec![top];
+        while let Some(link) = waiting.pop() {
+            for child in children.get(link).into_iter().flatten() {
+                found.insert(*child);
+                waiting.push(*child);
+            }
+        }
+        found
     }
 
     fn known_link(&self, name: &str, role: &str) -> Result<&str> {

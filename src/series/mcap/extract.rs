@@ -1,19 +1,14 @@
-//! Second pass: the pictures of the standstills, and the joints at their stamps.
+//! Which pictures of a recording are taken: those of the standstills.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use image::{DynamicImage, ImageFormat};
-use rayon::prelude::*;
-
-use super::cdr::Decoded;
-use super::file::{Message, for_each};
-use super::messages::{self, CameraInfo, RawImage};
-use super::motion::{Interpolated, Posture, Standstill, interpolate, postures, standstills};
-use super::options::{Motion, Picking, RecordingOptions};
-use super::pixels;
-use super::scan::{Scan, scan, time_ns};
-use crate::series::{DEFAULT_PLACEMENT, InputFile, Stop, Stops};
+use super::collect::Collector;
+use super::file::for_each;
+use super::messages::CameraInfo;
+use super::motion::{Posture, Standstill, interpolate, postures, standstills};
+use super::options::{Motion, RecordingOptions};
+use super::scan::{Scan, scan};
+use crate::series::{InputFile, Stops};
 use crate::{Error, Notice, Result};
 
 /// Of a long standstill so many pictures are looked at.
@@ -135,7 +130,7 @@ fn require_overlap(scan: &Scan, postures: &[Posture], times: &[i64]) -> Result<(
 }
 
 /// Image times that belong to one stop.
-type Group = Vec<i64>;
+pub(super) type Group = Vec<i64>;
 
 fn groups(scan: &mut Scan, postures: &[Posture], times: &[i64], options: &RecordingOptions) -> Result<Vec<Group>> {
     let still = standstills(postures, options.still_speed, (options.least_still_s * 1e9) as i64);
@@ -210,182 +205,4 @@ fn shrunk(standstill: Standstill) -> Standstill {
 fn spread(times: &[i64]) -> Group {
     let count = times.len().min(MOST_PICTURES);
     (0..count).map(|k| times[k * times.len() / count + times.len() / count / 2]).collect()
-}
-
-/// A picture as the recording has it.
-enum Frame {
-    Raw(RawImage),
-    Compressed(Vec<u8>),
-}
-
-impl Frame {
-    fn read(message: &Message<'_>) -> Decoded<Self> {
-        match message.schema {
-            messages::COMPRESSED_IMAGE => messages::compressed_image(message.data).map(Self::Compressed),
-            _ => RawImage::read(message.data).map(Self::Raw),
-        }
-    }
-
-    fn decode(&self) -> Decoded<DynamicImage> {
-        match self {
-            Self::Raw(raw) => pixels::to_image(raw),
-            Self::Compressed(bytes) => {
-                image::load_from_memory(bytes).map_err(|e| format!("is no picture that can be read ({e})"))
-            }
-        }
-    }
-
-    /// Bytes that can be written as they are, with the extension of their format.
-    fn file(&self) -> Option<(&[u8], &'static str)> {
-        let Self::Compressed(bytes) = self else { return None };
-        match image::guess_format(bytes) {
-            Ok(ImageFormat::Jpeg) => Some((bytes, "jpg")),
-            Ok(ImageFormat::Png) => Some((bytes, "png")),
-            _ => None,
-        }
-    }
-}
-
-/// Pictures of one stop that have come so far.
-struct Open {
-    waiting: usize,
-    frames: Vec<(i64, Frame)>,
-}
-
-/// Gathers the wanted pictures as they pass by, and finishes a stop when its last one has come.
-struct Collector<'a> {
-    stop_of: BTreeMap<i64, usize>,
-    open: Vec<Open>,
-    images: &'a Path,
-    options: &'a RecordingOptions,
-    postures: &'a [Posture],
-    taken: Taken,
-}
-
-/// Finished stops by the time of their picture.
-#[derive(Default)]
-struct Taken {
-    rows: BTreeMap<i64, (Stop, StopReport)>,
-    /// How many pictures could not be read, and why the first could not.
-    malformed: Option<(usize, String)>,
-}
-
-impl Taken {
-    fn reject(&mut self, reason: String) {
-        self.malformed.get_or_insert((0, reason)).0 += 1;
-    }
-}
-
-impl<'a> Collector<'a> {
-    fn new(groups: Vec<Group>, images: &'a Path, options: &'a RecordingOptions, postures: &'a [Posture]) -> Self {
-        let stop_of = groups.iter().enumerate().flat_map(|(i, g)| g.iter().map(move |t| (*t, i))).collect();
-        let open = groups.iter().map(|g| Open { waiting: g.len(), frames: Vec::new() }).collect();
-        Self { stop_of, open, images, options, postures, taken: Taken::default() }
-    }
-
-    fn take(&mut self, message: &Message<'_>) -> Result<()> {
-        let Ok(stamp_ns) = messages::stamp_of(message.data) else { return Ok(()) };
-        let time = time_ns(stamp_ns, message, self.options.clock);
-        let Some(stop) = self.stop_of.remove(&time) else { return Ok(()) };
-        match Frame::read(message) {
-            Ok(frame) => self.open[stop].frames.push((time, frame)),
-            Err(reason) => self.taken.reject(reason),
-        }
-        self.open[stop].waiting -= 1;
-        if self.open[stop].waiting == 0 {
-            self.close(stop)?;
-        }
-        Ok(())
-    }
-
-    fn finish(mut self) -> Result<Taken> {
-        for stop in 0..self.open.len() {
-            self.close(stop)?;
-        }
-        Ok(self.taken)
-    }
-
-    /// Chooses or averages the pictures of a stop and writes the result.
-    fn close(&mut self, stop: usize) -> Result<()> {
-        let frames = std::mem::take(&mut self.open[stop].frames);
-        let decoded: Vec<Decoded<DynamicImage>> = frames.par_iter().map(|(_, frame)| frame.decode()).collect();
-        let mut pictures = Vec::new();
-        for ((time, frame), picture) in frames.into_iter().zip(decoded) {
-            match picture {
-                Ok(picture) => pictures.push((time, frame, picture)),
-                Err(reason) => self.taken.reject(reason),
-            }
-        }
-        let sharpness: Vec<f64> = pictures.par_iter().map(|(_, _, picture)| pixels::sharpness(picture)).collect();
-        // The first of equally sharp ones, so that the choice does not depend on anything else.
-        let Some(best) = (0..pictures.len()).reduce(|a, b| if sharpness[b] > sharpness[a] { b } else { a }) else {
-            return Ok(());
-        };
-        let (times, pixels_only): (Vec<i64>, Vec<DynamicImage>) = match self.options.picking {
-            Picking::Average => pictures.iter().map(|(t, _, p)| (*t, p.clone())).unzip(),
-            Picking::Sharpest => (vec![pictures[best].0], Vec::new()),
-        };
-        let averaged = pixels::average(&pixels_only);
-        let noise_counts = averaged.as_ref().map(|(_, noise)| *noise);
-        let times = if averaged.is_some() { times } else { vec![pictures[best].0] };
-        let Some(joints) = mean_joints(self.postures, &times) else { return Ok(()) };
-        let time = times[times.len() / 2];
-        let image = match averaged {
-            Some((mean, _)) => self.write_png(time, &mean)?,
-            None => match pictures[best].1.file() {
-                Some((bytes, extension)) => self.write(time, extension, bytes)?,
-                None => self.write_png(time, &pictures[best].2)?,
-            },
-        };
-        let stop = Stop {
-            path: Some(self.images.join(&image)),
-            image: image.clone(),
-            raw_readings: Some(joints.positions),
-            placement: DEFAULT_PLACEMENT.to_string(),
-            time_s: Some(time as f64 * 1e-9),
-            line: 0,
-        };
-        let report = StopReport {
-            image,
-            speed: joints.speed,
-            nearest_sample_s: joints.nearest_ns as f64 * 1e-9,
-            pictures: pictures.len(),
-            sharpness: sharpness[best],
-            noise_counts,
-        };
-        self.taken.rows.insert(time, (stop, report));
-        Ok(())
-    }
-
-    fn write_png(&self, time: i64, picture: &DynamicImage) -> Result<String> {
-        let mut bytes = std::io::Cursor::new(Vec::new());
-        picture.write_to(&mut bytes, ImageFormat::Png).map_err(|e| {
-            Error::input(self.images.display(), format!("a picture cannot be written: {e}"), "report this")
-        })?;
-        self.write(time, "png", bytes.get_ref())
-    }
-
-    /// Writes a picture named by its stamp.
-    fn write(&self, time: i64, extension: &str, bytes: &[u8]) -> Result<String> {
-        const SECOND: i64 = 1_000_000_000;
-        let name = format!("{}.{:09}.{extension}", time.div_euclid(SECOND), time.rem_euclid(SECOND));
-        let path = self.images.join(&name);
-        std::fs::write(&path, bytes).map_err(|e| Error::io(&path, &e))?;
-        Ok(name)
-    }
-}
-
-/// Joints at the mean of some times; the largest speed and distance among them.
-fn mean_joints(postures: &[Posture], times: &[i64]) -> Option<Interpolated> {
-    let all = times.iter().map(|t| interpolate(postures, *t)).collect::<Option<Vec<_>>>()?;
-    let mut mean = all.first()?.clone();
-    for other in &all[1..] {
-        for (sum, q) in mean.positions.iter_mut().zip(&other.positions) {
-            *sum += q;
-        }
-        mean.speed = mean.speed.max(other.speed);
-        mean.nearest_ns = mean.nearest_ns.max(other.nearest_ns);
-    }
-    mean.positions.iter_mut().for_each(|q| *q /= all.len() as f64);
-    Some(mean)
 }

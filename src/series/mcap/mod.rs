@@ -1,10 +1,11 @@
-//! Recordings in MCAP (rosbag2): joint states and images become stops of a series.
+//! Recordings of rosbag2, in MCAP or sqlite: joint states and images become stops of a series.
 //!
 //! The robot moves, stands, moves: standstills are found from the joints, and one picture is taken of each. Two passes
 //! over the file, in constant memory: the first reads joints and stamps, the second the pictures that were chosen.
 //! Nothing of ROS is needed.
 
 mod cdr;
+mod collect;
 mod extract;
 mod file;
 mod interfaces;
@@ -12,11 +13,13 @@ mod messages;
 mod motion;
 mod options;
 mod pixels;
+mod records;
 mod scan;
+mod sqlite;
 mod write;
 
 pub use extract::{Extracted, StopReport, extract};
-pub(super) use file::require_mcap;
+pub(super) use file::require_recording;
 pub use messages::CameraInfo;
 pub use options::{Clock, Motion, Picking, RecordingOptions};
 pub use write::{FramePoses, ImageMarks, MarkKind, MarkLayer, Shown, write_recording};

@@ -1,6 +1,6 @@
 //! Pixels of ROS image messages in full depth, and which of several pictures is best.
 
-use image::{DynamicImage, ImageBuffer, Luma, Rgb};
+use image::{ColorType, DynamicImage, ImageBuffer, Luma, Rgb};
 
 use super::cdr::Decoded;
 use super::messages::RawImage;
@@ -146,37 +146,57 @@ pub(super) fn sharpness(picture: &DynamicImage) -> f64 {
     sum / (width * height).max(1) as f64
 }
 
-/// The mean picture in 16 bits (8-bit counts times 257), and the noise of one picture in counts of its own depth: rms
-/// over the pixels of the standard deviation over the pictures. `None` for fewer than two, or of different sizes.
-pub(super) fn average(pictures: &[DynamicImage]) -> Option<(DynamicImage, f64)> {
-    let [first, rest @ ..] = pictures else { return None };
-    let same =
-        |p: &DynamicImage| p.color() == first.color() && (p.width(), p.height()) == (first.width(), first.height());
-    if rest.is_empty() || !rest.iter().all(same) {
-        return None;
-    }
-    let colour = first.color().has_color();
-    let words = |p: &DynamicImage| if colour { p.to_rgb16().into_raw() } else { p.to_luma16().into_raw() };
-    let mut sums: Vec<(f64, f64)> = vec![(0.0, 0.0); words(first).len()];
-    for picture in pictures {
-        for ((sum, squares), value) in sums.iter_mut().zip(words(picture)) {
-            let value = f64::from(value);
-            *sum += value;
-            *squares += value * value;
+/// Samples of a picture that are averaged at most; a larger one is taken by itself.
+const MOST_SAMPLES: usize = 64 << 20;
+
+/// The mean of pictures that come one by one.
+#[derive(Default)]
+pub(super) struct Mean {
+    /// Sums over the pictures, 16-bit counts.
+    sums: Vec<u32>,
+    /// Sum over pictures and pixels of the squared counts.
+    squares: u128,
+    pictures: u32,
+    like: Option<(ColorType, u32, u32)>,
+    /// A picture did not fit to the others.
+    broken: bool,
+}
+
+impl Mean {
+    pub fn add(&mut self, picture: &DynamicImage) {
+        let like = (picture.color(), picture.width(), picture.height());
+        let samples = like.1 as usize * like.2 as usize * if like.0.has_color() { 3 } else { 1 };
+        self.broken |= *self.like.get_or_insert(like) != like || samples > MOST_SAMPLES;
+        if self.broken {
+            self.sums = Vec::new();
+            return;
         }
+        self.sums.resize(samples, 0);
+        let words = if like.0.has_color() { picture.to_rgb16().into_raw() } else { picture.to_luma16().into_raw() };
+        for (sum, value) in self.sums.iter_mut().zip(words) {
+            *sum += u32::from(value);
+            self.squares += u128::from(value) * u128::from(value);
+        }
+        self.pictures += 1;
     }
-    let n = pictures.len() as f64;
-    let variance = sums.iter().map(|(s, q)| (q - s * s / n).max(0.0) / (n - 1.0)).sum::<f64>() / sums.len() as f64;
-    let bytes = first.color().bytes_per_pixel() / first.color().channel_count();
-    let count = if bytes == 1 { 257.0 } else { 1.0 };
-    let means: Vec<u16> = sums.iter().map(|(sum, _)| (sum / n).round() as u16).collect();
-    let (width, height) = (first.width(), first.height());
-    let mean = if colour {
-        DynamicImage::ImageRgb16(ImageBuffer::from_raw(width, height, means)?)
-    } else {
-        DynamicImage::ImageLuma16(ImageBuffer::from_raw(width, height, means)?)
-    };
-    Some((mean, variance.sqrt() / count))
+
+    /// The mean picture in 16 bits (8-bit counts times 257), and the noise of one picture in counts of its own depth: rms
+    /// over the pixels of the standard deviation over the pictures. `None` for fewer than two, or of different sizes.
+    pub fn finish(self) -> Option<(DynamicImage, f64)> {
+        let (color, width, height) = self.like.filter(|_| !self.broken && self.pictures > 1)?;
+        let n = f64::from(self.pictures);
+        let of_sums: u128 = self.sums.iter().map(|s| u128::from(*s) * u128::from(*s)).sum();
+        // Exact in whole numbers: n times the sum of the squared deviations.
+        let scatter = (u128::from(self.pictures) * self.squares).saturating_sub(of_sums) as f64;
+        let variance = scatter / (n * (n - 1.0) * self.sums.len() as f64);
+        let count = if color.bytes_per_pixel() == color.channel_count() { 257.0 } else { 1.0 };
+        let means: Vec<u16> = self.sums.iter().map(|sum| (f64::from(*sum) / n).round() as u16).collect();
+        let mean = match color.has_color() {
+            true => DynamicImage::ImageRgb16(ImageBuffer::from_raw(width, height, means)?),
+            false => DynamicImage::ImageLuma16(ImageBuffer::from_raw(width, height, means)?),
+        };
+        Some((mean, variance.sqrt() / count))
+    }
 }
 
 #[cfg(test)]
@@ -236,6 +256,11 @@ mod tests {
             DynamicImage::ImageLuma8(ImageBuffer::from_fn(32, 16, pixel))
         };
         assert!(sharpness(&stripes(0, 200)) > sharpness(&stripes(40, 160)));
+        let average = |pictures: &[DynamicImage]| {
+            let mut mean = Mean::default();
+            pictures.iter().for_each(|p| mean.add(p));
+            mean.finish()
+        };
         let (mean, noise) = average(&[stripes(10, 100), stripes(12, 102), stripes(14, 104)]).unwrap();
         assert_eq!(mean.as_luma16().unwrap().get_pixel(0, 0).0[0], 12 * 257);
         assert!((noise - 2.0).abs() < 1e-12, "{noise}");

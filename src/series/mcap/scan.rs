@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use super::cdr::Decoded;
-use super::file::{Message, files_of, for_each, hash};
+use super::file::{Message, files_of, for_each};
 use super::messages::{self, CameraInfo, JointState};
 use super::options::{Clock, RecordingOptions};
 use crate::series::InputFile;
@@ -43,6 +43,8 @@ pub(super) struct Scan {
     joints: BTreeMap<String, Vec<JointSample>>,
     images: BTreeMap<String, Vec<i64>>,
     infos: BTreeMap<String, CameraInfo>,
+    /// Memory of the joint samples, bytes.
+    held: usize,
     pub notices: Vec<Notice>,
     pub inputs: Vec<InputFile>,
 }
@@ -57,17 +59,27 @@ pub(super) fn scan(recording: &Path, clock: Clock) -> Result<Scan> {
             Ok(())
         })?;
         scan.notices.extend(damage);
-        scan.inputs.push(hash(&path)?);
+        scan.inputs.push(InputFile::of_file(&path)?);
     }
     scan.judge()?;
     Ok(scan)
+}
+
+/// Memory of all joint samples of a recording, bytes: some hours at 500 Hz.
+const MOST_HELD: usize = 512 << 20;
+
+/// Latest time of recording, ns (in the year 2096): later ones are damaged, and differences of times stay numbers.
+const LATEST_NS: u64 = 4_000_000_000_000_000_000;
+
+fn log_time_ns(message: &Message<'_>) -> i64 {
+    message.log_time_ns.min(LATEST_NS) as i64
 }
 
 /// Time of a message by the chosen clock, ns; a stamp of zero means that none was set.
 pub(super) fn time_ns(stamp_ns: i64, message: &Message<'_>, clock: Clock) -> i64 {
     match clock {
         Clock::Stamp if stamp_ns != 0 => stamp_ns,
-        _ => message.log_time_ns as i64,
+        _ => log_time_ns(message),
     }
 }
 
@@ -104,8 +116,15 @@ impl Scan {
                 let samples = self.joints.entry(message.topic.to_string()).or_default();
                 let names = match samples.last() {
                     Some(last) if *last.names == state.names => Rc::clone(&last.names),
-                    _ => Rc::new(state.names),
+                    _ => {
+                        self.held += state.names.iter().map(|n| n.len() + size_of::<String>()).sum::<usize>();
+                        Rc::new(state.names)
+                    }
                 };
+                self.held += size_of::<JointSample>() + size_of_val(&state.positions[..]);
+                if self.held > MOST_HELD {
+                    return Ok(());
+                }
                 samples.push(JointSample { time_ns, names, positions: state.positions });
             }
             messages::IMAGE | messages::COMPRESSED_IMAGE => {
@@ -123,7 +142,7 @@ impl Scan {
     fn stamped(&mut self, message: &Message<'_>, stamp_ns: i64, clock: Clock) -> i64 {
         if let Some(topic) = self.topics.get_mut(message.topic) {
             topic.unstamped |= stamp_ns == 0;
-            topic.delays_ns.push(message.log_time_ns as i64 - stamp_ns);
+            topic.delays_ns.push(log_time_ns(message) - stamp_ns);
         }
         time_ns(stamp_ns, message, clock)
     }
@@ -136,6 +155,10 @@ impl Scan {
             let remedy =
                 format!("convert it: pip install rosbags; rosbags-convert --src {shown} --dst run1 --dst-storage mcap");
             return Err(Error::input(shown, what, remedy));
+        }
+        if self.held > MOST_HELD {
+            let what = format!("holds more joint states than {} MiB of memory", MOST_HELD >> 20);
+            return Err(Error::input(shown, what, "cut it into parts: ros2 bag convert with max_bagfile_size"));
         }
         for (name, topic) in &self.topics {
             let place = format!("{shown}, topic {name}");

@@ -11,6 +11,7 @@ use mcap::{Compression, WriteOptions, Writer};
 
 use super::interfaces::{ANNOTATIONS, ANNOTATIONS_SCHEMA, TRANSFORMS, definition};
 use super::messages::{CAMERA_INFO, COMPRESSED_IMAGE, CameraInfo, JOINT_STATE};
+use crate::files::{self, Kind, decode_picture};
 use crate::geom::Pose;
 use crate::series::{ImageObservations, Series, Stop};
 use crate::{Error, Notice, Result};
@@ -215,13 +216,13 @@ impl Recording {
     }
 
     fn image(&mut self, time_ns: i64, path: &Path) -> Result<()> {
-        let mut bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+        let mut bytes = files::read(path, Kind::Image)?;
         let unreadable = |e: image::ImageError| Error::input(path.display(), e, "remove the image or its row");
         let format = match image::guess_format(&bytes) {
             Ok(ImageFormat::Jpeg) => "jpeg",
             Ok(ImageFormat::Png) => "png",
             _ => {
-                let picture = image::load_from_memory(&bytes).map_err(unreadable)?;
+                let picture = decode_picture(std::io::Cursor::new(&bytes)).map_err(unreadable)?;
                 let mut png = std::io::Cursor::new(Vec::new());
                 picture.write_to(&mut png, ImageFormat::Png).map_err(unreadable)?;
                 bytes = png.into_inner();

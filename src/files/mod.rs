@@ -1,0 +1,121 @@
+//! A user's files: regular files alone, none longer than its kind can be, pictures in bounded memory.
+
+mod picture;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+pub use picture::{MOST_SIDE_PX, decode_picture, decoded_bytes, picture_size};
+
+use crate::{Error, Result};
+
+/// What a file is; says how long it may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// TOML or YAML.
+    Settings,
+    /// CSV: some million cells.
+    Table,
+    /// URDF.
+    Robot,
+    /// A program of a robot.
+    Program,
+    /// solution.json, whose covariance grows with the square of the parameters.
+    Solution,
+    /// One image, compressed or not.
+    Image,
+    /// A recording: read piece by piece, of any length.
+    Recording,
+}
+
+impl Kind {
+    /// Bytes that a file of this kind has at most.
+    pub fn most_bytes(self) -> u64 {
+        const MIB: u64 = 1 << 20;
+        match self {
+            Self::Settings => 4 * MIB,
+            Self::Robot => 16 * MIB,
+            Self::Program => 64 * MIB,
+            Self::Table => 128 * MIB,
+            Self::Solution => 256 * MIB,
+            Self::Image => 1024 * MIB,
+            Self::Recording => u64::MAX,
+        }
+    }
+}
+
+/// Opens a regular file and tells its length.
+///
+/// # Errors
+/// A file that is not there, empty names, folders, pipes, sockets and devices; files too long for their kind.
+pub fn open(path: &Path, kind: Kind) -> Result<(File, u64)> {
+    let io = |e: std::io::Error| Error::io(path, &e);
+    // Looked at before it is opened: a pipe without a writer would be waited for without end.
+    refuse_special(path, &std::fs::metadata(path).map_err(io)?)?;
+    let file = File::open(path).map_err(io)?;
+    let metadata = file.metadata().map_err(io)?;
+    refuse_special(path, &metadata)?;
+    refuse_long(path, metadata.len(), kind)?;
+    Ok((file, metadata.len()))
+}
+
+fn refuse_special(path: &Path, metadata: &std::fs::Metadata) -> Result<()> {
+    if metadata.is_dir() {
+        return Err(Error::input(path.display(), "is a folder, not a file", "name the file itself"));
+    }
+    if !metadata.is_file() {
+        let what = "is a pipe, a socket or a device, not a file";
+        return Err(Error::input(path.display(), what, "write its content to a file first"));
+    }
+    Ok(())
+}
+
+fn refuse_long(path: &Path, bytes: u64, kind: Kind) -> Result<()> {
+    let most = kind.most_bytes();
+    if bytes <= most {
+        return Ok(());
+    }
+    let what = format!("has {bytes} bytes; a file of this kind ({kind:?}) has at most {most}").to_lowercase();
+    Err(Error::input(path.display(), what, "check that it is the right file"))
+}
+
+/// The bytes of a regular file.
+///
+/// # Errors
+/// Those of [`open`]; a file that grows beyond its kind while it is read.
+pub fn read(path: &Path, kind: Kind) -> Result<Vec<u8>> {
+    let (file, length) = open(path, kind)?;
+    let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0));
+    file.take(kind.most_bytes().saturating_add(1)).read_to_end(&mut bytes).map_err(|e| Error::io(path, &e))?;
+    refuse_long(path, bytes.len() as u64, kind)?;
+    Ok(bytes)
+}
+
+/// The text of a regular file without its byte order mark.
+///
+/// # Errors
+/// Those of [`read`] and [`text`].
+pub fn read_text(path: &Path, kind: Kind) -> Result<String> {
+    text(path, read(path, kind)?)
+}
+
+/// Bytes as text without its byte order mark; `origin` is for messages only.
+///
+/// # Errors
+/// UTF-16, and bytes that are not UTF-8 by their line.
+pub fn text(origin: &Path, bytes: Vec<u8>) -> Result<String> {
+    let remedy = "save it as UTF-8 (in a spreadsheet: CSV UTF-8)";
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err(Error::input(origin.display(), "is UTF-16 text", remedy));
+    }
+    let mut text = String::from_utf8(bytes).map_err(|e| {
+        let valid = e.utf8_error().valid_up_to();
+        let line = 1 + e.as_bytes()[..valid].iter().filter(|b| **b == b'\n').count();
+        Error::input(format!("{}:{line}", origin.display()), "is not UTF-8 text", remedy)
+    })?;
+    if text.starts_with('\u{feff}') {
+        text.drain(..'\u{feff}'.len_utf8());
+    }
+    Ok(text)
+}

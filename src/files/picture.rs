@@ -1,0 +1,78 @@
+//! Pictures of the formats that are read, in bounded memory.
+
+use std::io::{BufRead, BufReader, Seek};
+use std::path::Path;
+
+use image::error::{ImageFormatHint, LimitError, LimitErrorKind, UnsupportedError, UnsupportedErrorKind};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Limits};
+
+use super::{Kind, open};
+use crate::Result;
+
+/// Longest side that is accepted, px; the largest industrial sensors have about 20 000.
+pub const MOST_SIDE_PX: u32 = 32_768;
+
+/// Memory of one decoded picture together with its grey values of four bytes each.
+const MOST_BYTES: u64 = 950_000_000;
+
+const GREY_BYTES: u64 = 4;
+
+/// Formats that are read, whatever the name of the file says.
+const FORMATS: [ImageFormat; 5] =
+    [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Tiff, ImageFormat::Pnm, ImageFormat::Bmp];
+
+/// Decodes a picture; its format is told by its content, its size is judged before memory is taken.
+///
+/// # Errors
+/// Other formats, damaged pictures, pictures whose header promises more than the program holds.
+pub fn decode_picture(source: impl BufRead + Seek) -> ImageResult<DynamicImage> {
+    let mut decoder = decoder(source)?;
+    let (width, height) = decoder.dimensions();
+    let grey = GREY_BYTES * u64::from(width) * u64::from(height);
+    if decoder.total_bytes().saturating_add(grey) > MOST_BYTES {
+        return Err(ImageError::Limits(LimitError::from_kind(LimitErrorKind::InsufficientMemory)));
+    }
+    let mut left = limits();
+    left.reserve(decoder.total_bytes())?;
+    decoder.set_limits(left)?;
+    DynamicImage::from_decoder(decoder)
+}
+
+/// Memory that a picture takes once it is decoded, bytes, from its header alone.
+///
+/// # Errors
+/// Other formats, a header that cannot be read.
+pub fn decoded_bytes(source: impl BufRead + Seek) -> ImageResult<u64> {
+    decoder(source).map(|d| d.total_bytes())
+}
+
+/// Width and height of an image file, px, from its header alone.
+///
+/// # Errors
+/// A file that is none; a header that cannot be read.
+pub fn picture_size(path: &Path) -> Result<(u32, u32)> {
+    let (file, _) = open(path, Kind::Image)?;
+    let size = decoder(BufReader::new(file)).map(|d| d.dimensions());
+    size.map_err(|e| {
+        crate::Error::input(path.display(), e, "open it in an image viewer; record it again if it is damaged")
+    })
+}
+
+fn decoder<'a>(source: impl BufRead + Seek + 'a) -> ImageResult<impl ImageDecoder + 'a> {
+    let mut reader = ImageReader::new(source).with_guessed_format()?;
+    if !reader.format().is_some_and(|f| FORMATS.contains(&f)) {
+        let hint = reader.format().map_or(ImageFormatHint::Unknown, ImageFormatHint::Exact);
+        let kind = UnsupportedErrorKind::Format(hint.clone());
+        return Err(ImageError::Unsupported(UnsupportedError::from_format_and_kind(hint, kind)));
+    }
+    reader.limits(limits());
+    reader.into_decoder()
+}
+
+fn limits() -> Limits {
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(MOST_SIDE_PX);
+    limits.max_image_height = Some(MOST_SIDE_PX);
+    limits.max_alloc = Some(MOST_BYTES);
+    limits
+}

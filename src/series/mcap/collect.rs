@@ -1,0 +1,273 @@
+//! Second pass: the pictures of the stops as they pass by, in bounded memory, and the joints at their stamps.
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::ops::Range;
+use std::path::Path;
+
+use image::{DynamicImage, ImageFormat};
+use rayon::prelude::*;
+
+use super::cdr::Decoded;
+use super::extract::{Group, StopReport};
+use super::file::Message;
+use super::messages::{self, RawImage};
+use super::motion::{Interpolated, Posture, interpolate};
+use super::options::{Picking, RecordingOptions};
+use super::pixels::{self, Mean};
+use super::scan::time_ns;
+use crate::files::{decode_picture, decoded_bytes};
+use crate::series::{DEFAULT_PLACEMENT, Stop};
+use crate::{Error, Result};
+
+/// Memory of messages that wait for others of their stop, bytes.
+const MOST_HELD: usize = 256 << 20;
+/// Memory of pictures that are decoded at one time, bytes.
+const MOST_IN_FLIGHT: u64 = 256 << 20;
+
+/// A picture as the recording has it.
+enum Frame {
+    Raw(RawImage),
+    Compressed(Vec<u8>),
+}
+
+impl Frame {
+    fn read(message: &Message<'_>) -> Decoded<Self> {
+        match message.schema {
+            messages::COMPRESSED_IMAGE => messages::compressed_image(message.data).map(Self::Compressed),
+            _ => RawImage::read(message.data).map(Self::Raw),
+        }
+    }
+
+    fn decode(&self) -> Decoded<DynamicImage> {
+        match self {
+            Self::Raw(raw) => pixels::to_image(raw),
+            Self::Compressed(bytes) => {
+                decode_picture(Cursor::new(bytes)).map_err(|e| format!("is no picture that can be read ({e})"))
+            }
+        }
+    }
+
+    /// Memory of the message, bytes.
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Raw(raw) => raw.data.len(),
+            Self::Compressed(bytes) => bytes.len(),
+        }
+    }
+
+    /// Memory that decoding takes, bytes, as its header says.
+    fn decoded_bytes(&self) -> u64 {
+        match self {
+            // A mosaic becomes three colours.
+            Self::Raw(raw) => 3 * raw.data.len() as u64,
+            Self::Compressed(bytes) => decoded_bytes(Cursor::new(bytes)).unwrap_or(0),
+        }
+    }
+
+    /// Bytes that can be written as they are, with the extension of their format.
+    fn file(&self) -> Option<(&[u8], &'static str)> {
+        let Self::Compressed(bytes) = self else { return None };
+        match image::guess_format(bytes) {
+            Ok(ImageFormat::Jpeg) => Some((bytes, "jpg")),
+            Ok(ImageFormat::Png) => Some((bytes, "png")),
+            _ => None,
+        }
+    }
+}
+
+/// Pictures of one stop that have come so far.
+#[derive(Default)]
+struct Open {
+    waiting: usize,
+    done: bool,
+    frames: Vec<(i64, Frame)>,
+}
+
+/// Gathers the wanted pictures as they pass by, and finishes a stop when its last one has come.
+pub(super) struct Collector<'a> {
+    stop_of: BTreeMap<i64, usize>,
+    open: Vec<Open>,
+    images: &'a Path,
+    options: &'a RecordingOptions,
+    postures: &'a [Posture],
+    /// Memory of the pictures that wait, bytes.
+    held: usize,
+    taken: Taken,
+}
+
+/// Finished stops by the time of their picture.
+#[derive(Default)]
+pub(super) struct Taken {
+    pub rows: BTreeMap<i64, (Stop, StopReport)>,
+    /// How many pictures could not be read, and why the first could not.
+    pub malformed: Option<(usize, String)>,
+}
+
+impl Taken {
+    fn reject(&mut self, reason: String) {
+        self.malformed.get_or_insert((0, reason)).0 += 1;
+    }
+}
+
+impl<'a> Collector<'a> {
+    pub fn new(groups: Vec<Group>, images: &'a Path, options: &'a RecordingOptions, postures: &'a [Posture]) -> Self {
+        let stop_of = groups.iter().enumerate().flat_map(|(i, g)| g.iter().map(move |t| (*t, i))).collect();
+        let open = groups.iter().map(|g| Open { waiting: g.len(), ..Open::default() }).collect();
+        Self { stop_of, open, images, options, postures, held: 0, taken: Taken::default() }
+    }
+
+    pub fn take(&mut self, message: &Message<'_>) -> Result<()> {
+        let Ok(stamp_ns) = messages::stamp_of(message.data) else { return Ok(()) };
+        let time = time_ns(stamp_ns, message, self.options.clock);
+        let Some(stop) = self.stop_of.remove(&time) else { return Ok(()) };
+        if self.open[stop].done {
+            return Ok(());
+        }
+        match Frame::read(message) {
+            Ok(frame) => {
+                self.held += frame.bytes();
+                self.open[stop].frames.push((time, frame));
+            }
+            Err(reason) => self.taken.reject(reason),
+        }
+        self.open[stop].waiting -= 1;
+        if self.open[stop].waiting == 0 {
+            self.close(stop)?;
+        }
+        if self.held > MOST_HELD {
+            // Pictures come in the order of time, but for a few: the stops that wait have what they need.
+            self.close_all()?;
+        }
+        Ok(())
+    }
+
+    pub fn finish(mut self) -> Result<Taken> {
+        self.close_all()?;
+        Ok(self.taken)
+    }
+
+    fn close_all(&mut self) -> Result<()> {
+        for stop in 0..self.open.len() {
+            if !self.open[stop].frames.is_empty() {
+                self.close(stop)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Chooses or averages the pictures of a stop and writes the result.
+    fn close(&mut self, stop: usize) -> Result<()> {
+        self.open[stop].done = true;
+        let frames = std::mem::take(&mut self.open[stop].frames);
+        self.held -= frames.iter().map(|(_, frame)| frame.bytes()).sum::<usize>();
+        let mut mean = Mean::default();
+        let mut seen: Vec<(usize, f64)> = Vec::new();
+        for batch in batches(&frames) {
+            let decoded: Vec<Decoded<(DynamicImage, f64)>> = (frames[batch.clone()].par_iter())
+                .map(|(_, frame)| frame.decode().map(|p| (pixels::sharpness(&p), p)).map(|(s, p)| (p, s)))
+                .collect();
+            for (k, picture) in batch.zip(decoded) {
+                match picture {
+                    Ok((picture, sharpness)) => {
+                        seen.push((k, sharpness));
+                        if self.options.picking == Picking::Average {
+                            mean.add(&picture);
+                        }
+                    }
+                    Err(reason) => self.taken.reject(reason),
+                }
+            }
+        }
+        // The first of equally sharp ones, so that the choice does not depend on anything else.
+        let Some((best, sharpness)) = seen.iter().copied().reduce(|a, b| if b.1 > a.1 { b } else { a }) else {
+            return Ok(());
+        };
+        let averaged = mean.finish();
+        let noise_counts = averaged.as_ref().map(|(_, noise)| *noise);
+        let times = match averaged {
+            Some(_) => seen.iter().map(|(k, _)| frames[*k].0).collect(),
+            None => vec![frames[best].0],
+        };
+        let Some(joints) = mean_joints(self.postures, &times) else { return Ok(()) };
+        let time = times[times.len() / 2];
+        let image = match (averaged, frames[best].1.file()) {
+            (Some((mean, _)), _) => self.write_png(time, &mean)?,
+            (None, Some((bytes, extension))) => self.write(time, extension, bytes)?,
+            (None, None) => match frames[best].1.decode() {
+                Ok(picture) => self.write_png(time, &picture)?,
+                Err(reason) => return Ok(self.taken.reject(reason)),
+            },
+        };
+        let stop = Stop {
+            path: Some(self.images.join(&image)),
+            image: image.clone(),
+            raw_readings: Some(joints.positions),
+            placement: DEFAULT_PLACEMENT.to_string(),
+            time_s: Some(time as f64 * 1e-9),
+            line: 0,
+        };
+        let report = StopReport {
+            image,
+            speed: joints.speed,
+            nearest_sample_s: joints.nearest_ns as f64 * 1e-9,
+            pictures: seen.len(),
+            sharpness,
+            noise_counts,
+        };
+        self.taken.rows.insert(time, (stop, report));
+        Ok(())
+    }
+
+    fn write_png(&self, time: i64, picture: &DynamicImage) -> Result<String> {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut bytes, ImageFormat::Png).map_err(|e| {
+            Error::input(self.images.display(), format!("a picture cannot be written: {e}"), "report this")
+        })?;
+        self.write(time, "png", bytes.get_ref())
+    }
+
+    /// Writes a picture named by its stamp.
+    fn write(&self, time: i64, extension: &str, bytes: &[u8]) -> Result<String> {
+        const SECOND: i64 = 1_000_000_000;
+        let name = format!("{}.{:09}.{extension}", time.div_euclid(SECOND), time.rem_euclid(SECOND));
+        let path = self.images.join(&name);
+        std::fs::write(&path, bytes).map_err(|e| Error::io(&path, &e))?;
+        Ok(name)
+    }
+}
+
+/// Frames that are decoded at a time: as many as the memory in flight allows, at least one.
+fn batches(frames: &[(i64, Frame)]) -> Vec<Range<usize>> {
+    let mut batches: Vec<Range<usize>> = Vec::new();
+    let mut in_flight = 0;
+    for (k, (_, frame)) in frames.iter().enumerate() {
+        let bytes = frame.decoded_bytes();
+        match batches.last_mut() {
+            Some(batch) if in_flight + bytes <= MOST_IN_FLIGHT => {
+                batch.end = k + 1;
+                in_flight += bytes;
+            }
+            _ => {
+                batches.push(k..k + 1);
+                in_flight = bytes;
+            }
+        }
+    }
+    batches
+}
+
+/// Joints at the mean of some times; the largest speed and distance among them.
+fn mean_joints(postures: &[Posture], times: &[i64]) -> Option<Interpolated> {
+    let all = times.iter().map(|t| interpolate(postures, *t)).collect::<Option<Vec<_>>>()?;
+    let mut mean = all.first()?.clone();
+    for other in &all[1..] {
+        for (sum, q) in mean.positions.iter_mut().zip(&other.positions) {
+            *sum += q;
+        }
+        mean.speed = mean.speed.max(other.speed);
+        mean.nearest_ns = mean.nearest_ns.max(other.nearest_ns);
+    }
+    mean.positions.iter_mut().for_each(|q| *q /= all.len() as f64);
+    Some(mean)
+}
