@@ -88,9 +88,9 @@ def events():
     return sorted(rows)
 
 
-def rosbag2(path, encode, little_endian=True, compression=None):
+def rosbag2(path, encode, little_endian=True, compression=None, storage=StoragePlugin.MCAP):
     shutil.rmtree(path, ignore_errors=True)
-    writer = Bag2Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
+    writer = Bag2Writer(path, version=9, storage_plugin=storage)
     if compression:
         writer.set_compression(compression, CompressionFormat.ZSTD)
     with writer:
@@ -153,23 +153,20 @@ def definition(name):
 
 
 def others(folder):
-    """A ROS 1 bag and a sqlite bag, which are to be refused with advice."""
+    """A ROS 1 bag, which is to be refused with advice."""
     (folder / "old.bag").unlink(missing_ok=True)
     store1 = get_typestore(Stores.ROS1_NOETIC)
     with Bag1Writer(folder / "old.bag") as writer:
         connection = writer.add_connection("/note", "std_msgs/msg/String", typestore=store1)
         note = store1.types["std_msgs/msg/String"]("old")
         writer.write(connection, START, store1.serialize_ros1(note, "std_msgs/msg/String"))
-    shutil.rmtree(folder / "sqlite", ignore_errors=True)
-    with Bag2Writer(folder / "sqlite", version=9) as writer:
-        connection = writer.add_connection("/note", "std_msgs/msg/String", typestore=store)
-        writer.write(connection, START, store.serialize_cdr(Msg["std_msgs/msg/String"]("x"), "std_msgs/msg/String"))
 
 
 if __name__ == "__main__":
     target = pathlib.Path(sys.argv[1])
     target.mkdir(parents=True, exist_ok=True)
     rosbag2(target / "mono8", mono8)
+    rosbag2(target / "sqlite", mono8, storage=StoragePlugin.SQLITE3)
     rosbag2(target / "bayer16_big_endian", bayer16, little_endian=False)
     rosbag2(target / "zipped_messages", mono8, compression=CompressionMode.MESSAGE)
     ros2_support(target / "lz4.mcap", CompressionType.LZ4)

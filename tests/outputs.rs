@@ -10,11 +10,12 @@ use outputs_support::{context, robot, solved};
 use robotcal::geom::Pose;
 use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::Robot;
-use robotcal::output::{files, solution_json};
+use robotcal::output::{files, plan_start, restore, solution_json};
 use robotcal::problem::Slack;
 use robotcal::recipe::RobotModel;
 use robotcal::series::{CameraMount, read_plate};
 use serde::Deserialize;
+use serde_json::Value;
 
 type Files = BTreeMap<String, Vec<u8>>;
 
@@ -315,6 +316,73 @@ fn solution_json_reads_back_with_everything_in_it() {
     assert_eq!(files, second);
     let newer = String::from_utf8(files["solution.json"].clone()).unwrap().replacen("\"format\":2", "\"format\":3", 1);
     assert!(solution_json::read(newer.as_bytes()).unwrap_err().what.contains("format = 3"));
+}
+
+/// Every place of a JSON value, as a path of keys and indices; of long arrays the first, second and last entries.
+fn places(value: &Value, path: &str, out: &mut Vec<String>) {
+    out.push(path.to_string());
+    match value {
+        Value::Array(all) => {
+            for k in (0..all.len()).filter(|k| *k < 2 || k + 1 == all.len()) {
+                places(&all[k], &format!("{path}/{k}"), out);
+            }
+        }
+        Value::Object(all) => {
+            all.iter().for_each(|(key, v)| places(v, &format!("{path}/{}", key.replace('/', "~1")), out));
+        }
+        _ => {}
+    }
+}
+
+/// Wrong in every way that JSON allows: an array shorter or longer by one, an index beyond its end, nothing for a number.
+fn wrong_ones(value: &Value) -> Vec<Value> {
+    match value {
+        Value::Array(all) if !all.is_empty() => {
+            vec![all[1..].into(), all.iter().chain(all.last()).cloned().collect()]
+        }
+        Value::Number(n) if n.is_u64() => vec![Value::Null, 1_000_000_000_u64.into(), 0.into()],
+        Value::Number(_) => vec![Value::Null, 0.0.into(), (-1e300).into()],
+        Value::String(_) => vec!["nobody".into()],
+        Value::Object(_) => vec![Value::Null],
+        _ => Vec::new(),
+    }
+}
+
+/// A damaged solution is refused by the field that is wrong, or it is whole enough for all that reads it; nothing panics.
+#[test]
+fn a_solution_that_contradicts_itself_is_refused_when_it_is_read() {
+    let description = robot();
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let files = files(&solution, &context(&description)).unwrap();
+    let mut whole: Value = serde_json::from_slice(&files["solution.json"]).unwrap();
+    // Two images tell as much as all, and are read sooner.
+    whole["images"].as_array_mut().unwrap().truncate(2);
+    let chain = description.chain(None, None).unwrap();
+    let mut all = Vec::new();
+    places(&whole, "", &mut all);
+    let (mut refused, mut named, mut read) = (0, 0, 0);
+    for path in &all {
+        for wrong in wrong_ones(whole.pointer(path).unwrap()) {
+            let mut damaged = whole.clone();
+            *damaged.pointer_mut(path).unwrap() = wrong;
+            match solution_json::read(&serde_json::to_vec(&damaged).unwrap()) {
+                Err(error) => {
+                    assert_eq!(error.exit_code(), 2);
+                    refused += 1;
+                    named += usize::from(error.place.contains(": "));
+                }
+                Ok(record) => {
+                    read += 1;
+                    let _ = restore::measured_series(&record);
+                    let _ = restore::found_model(&record).map(|m| m.flange().is_some());
+                    let _ = plan_start::from_solution(&record, chain.clone(), RobotModel::Rigid);
+                    let _ = robotcal::cli::summary_of(&record);
+                }
+            }
+        }
+    }
+    println!("{refused} refused, {named} of them by field, {read} read");
+    assert!(refused > 500 && named > 50 && read > 100);
 }
 
 #[test]

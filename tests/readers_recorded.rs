@@ -111,11 +111,42 @@ fn a_recording_without_a_manifest_says_what_to_write() {
     let converted = folder.path().join("converted");
     let extracted = convert_recording(&path, &converted, &RecordingOptions::default()).unwrap();
     assert!(extracted.notices.iter().any(|n| n.remedy.contains("plate.toml")), "{:?}", extracted.notices);
-    assert!(fs::read_to_string(converted.join("series.toml")).unwrap().contains("joint_unit = \"rad\""));
+    let manifest = fs::read_to_string(converted.join("series.toml")).unwrap();
+    assert!(manifest.contains("joint_unit = \"rad\""));
+    // Nobody said where the camera is: it must be asked for, not invented.
+    assert!(!manifest.contains("camera_mount"), "{manifest}");
+    fs::write(converted.join("plate.toml"), BOARD).unwrap();
+    let error = read(&converted).unwrap_err();
+    assert!(error.what.contains("camera_mount") && error.remedy.contains("camera_mount"), "{error}");
     let error = read(&recording("old.bag")).unwrap_err().to_string();
     assert!(error.contains("ROS 1") && error.contains("rosbags-convert"), "{error}");
-    let error = read(&recording("sqlite")).unwrap_err().to_string();
-    assert!(error.contains("sqlite") && error.contains("rosbags-convert"), "{error}");
+}
+
+/// Kind and points of the layers of a `foxglove_msgs/msg/ImageAnnotations` in little-endian CDR.
+fn annotations(message: &[u8]) -> Vec<(u8, Vec<[f64; 2]>)> {
+    let body = &message[4..];
+    let mut at = 0;
+    let mut take = |size: usize| {
+        at = usize::next_multiple_of(at, size);
+        at += size;
+        let mut bytes = [0; 8];
+        bytes[..size].copy_from_slice(&body[at - size..at]);
+        u64::from_le_bytes(bytes)
+    };
+    assert_eq!(take(4), 0, "no circles");
+    let layers = (0..take(4))
+        .map(|_| {
+            let (_time, kind) = ([take(4), take(4)], take(1) as u8);
+            let points = (0..take(4)).map(|_| [take(8), take(8)].map(f64::from_bits)).collect();
+            let _colour = [take(8), take(8), take(8), take(8)];
+            assert_eq!(take(4), 0, "no colours of single points");
+            let _fill_and_thickness = [take(8), take(8), take(8), take(8), take(8)];
+            (kind, points)
+        })
+        .collect();
+    assert_eq!(take(4), 0, "no texts");
+    assert_eq!(at, body.len());
+    layers
 }
 
 #[test]
@@ -192,11 +223,14 @@ fn a_folder_written_as_a_recording_reads_back_the_same() {
     for message in mcap::MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
         *counts.entry(message.channel.topic.clone()).or_insert(0) += 1;
+        // One channel of another kind, and readers of ROS refuse the whole recording.
+        assert_eq!(message.channel.message_encoding, "cdr");
+        assert_eq!(message.channel.schema.as_ref().map(|s| s.encoding.as_str()), Some("ros2msg"));
         if message.channel.topic == "/camera/annotations" {
-            let text: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
-            assert_eq!(text["points"][0]["points"][0], serde_json::json!({"x": 3.5, "y": 4.75}));
-            assert_eq!(text["points"][1]["type"], 4, "a list of lines");
-            assert_eq!(text["points"][1]["points"][1], serde_json::json!({"x": 5.5, "y": 6.5}));
+            let layers = annotations(&message.data);
+            assert_eq!(layers[0].1[0], [3.5, 4.75]);
+            assert_eq!(layers[1].0, 4, "a list of lines");
+            assert_eq!(layers[1].1[1], [5.5, 6.5]);
         }
     }
     let expected = [

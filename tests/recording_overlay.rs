@@ -59,11 +59,36 @@ fn camera_frames_and_residuals_of_the_solution_are_in_the_recording() {
     let camera: Vec<f64> = camera.iter().map(|v| v.as_f64().unwrap()).collect();
     assert!(topics["/tf"].iter().all(|m| holds(m, &camera)), "{camera:?}");
     for (image, marks) in images.iter().zip(&topics["/camera/annotations"]) {
-        let marks: Value = serde_json::from_slice(marks).unwrap();
-        let drawn: usize =
-            marks["points"].as_array().unwrap().iter().map(|p| p["points"].as_array().unwrap().len()).sum();
+        let drawn: usize = annotations(marks).iter().map(|(_, points)| points.len()).sum();
         // a residual is a line of two points, a measured place is one
         let used = image["observations"]["reason"].as_array().unwrap().iter().filter(|r| r.is_null()).count();
         assert!(drawn >= 2 * used && used > 30, "{drawn} points for {used} observations");
     }
+}
+
+/// Kind and points of the layers of a `foxglove_msgs/msg/ImageAnnotations` in little-endian CDR.
+fn annotations(message: &[u8]) -> Vec<(u8, Vec<[f64; 2]>)> {
+    let body = &message[4..];
+    let mut at = 0;
+    let mut take = |size: usize| {
+        at = usize::next_multiple_of(at, size);
+        at += size;
+        let mut bytes = [0; 8];
+        bytes[..size].copy_from_slice(&body[at - size..at]);
+        u64::from_le_bytes(bytes)
+    };
+    assert_eq!(take(4), 0, "no circles");
+    let layers = (0..take(4))
+        .map(|_| {
+            let (_time, kind) = ([take(4), take(4)], take(1) as u8);
+            let points = (0..take(4)).map(|_| [take(8), take(8)].map(f64::from_bits)).collect();
+            let _colour = [take(8), take(8), take(8), take(8)];
+            assert_eq!(take(4), 0, "no colours of single points");
+            let _fill_and_thickness = [take(8), take(8), take(8), take(8), take(8)];
+            (kind, points)
+        })
+        .collect();
+    assert_eq!(take(4), 0, "no texts");
+    assert_eq!(at, body.len());
+    layers
 }

@@ -121,13 +121,14 @@ fn text(extracted: &Extracted) -> String {
     let pictures: usize = reports.iter().map(|r| r.pictures).sum();
     let mut text = format!(
         "stops     {} from {pictures} images of {} and the joints {} of {}\n\
-         time      images recorded {:+.1} ms later than joint states, counted from their stamps\n\
+         time      images recorded {:.1} ms {} than joint states, counted from their stamps\n\
          joints    nearest sample within {:.1} ms, fastest {:.2e} rad/s (m/s) at an exposure\n",
         reports.len(),
         extracted.image_topic,
         extracted.stops.joints.join(", "),
         extracted.joint_topic,
-        1e3 * extracted.image_delay_s,
+        1e3 * extracted.image_delay_s.abs(),
+        if extracted.image_delay_s < 0.0 { "earlier" } else { "later" },
         1e3 * worst(|r| r.nearest_sample_s),
         worst(|r| r.speed),
     );

@@ -128,7 +128,7 @@ fn write(args: &DetectArgs, looked: &Looked, place: Place) -> Result<usize> {
         plate: &looked.plate,
         series: looked.series.as_ref(),
         inputs: looked.inputs.clone(),
-        command: std::env::args().collect::<Vec<_>>().join(" "),
+        command: super::command_line().join(" "),
         pictures: drawable.iter().map(|(_, _, name)| (*name).clone()).collect(),
     };
     let files = detection_files(&looked.images, &context)?;

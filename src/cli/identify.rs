@@ -161,6 +161,10 @@ fn again(args: &IdentifyArgs, path: &Path) -> Result<Task> {
     let base = args.base.as_deref().unwrap_or(&record.robot.base);
     let tip = args.tip.as_deref().unwrap_or(&record.robot.tip);
     let chain = restore::chain(&record, &description, base, tip)?;
+    if chain.readings != record.robot.readings {
+        let what = format!("is of the joints {}", record.robot.readings.join(", "));
+        return Err(Error::input(path.display(), what, "choose --base and --tip with the same joints between them"));
+    }
     let mut inputs = record.inputs.clone();
     inputs.push(InputFile::of_file(path)?);
     let notices = description.notices.clone();
@@ -192,7 +196,7 @@ fn solve(args: &IdentifyArgs, options: &Options, task: Task, place: Place) -> Re
         series: names,
         inputs,
         options: in_words(options),
-        command: std::env::args().collect::<Vec<_>>().join(" "),
+        command: super::command_line().join(" "),
         offsets: args.offsets.into(),
         poses: if args.poses { Poses::Written } else { Poses::LeftOut },
     };

@@ -104,6 +104,16 @@ impl Command {
     }
 }
 
+/// What `show --parameters` prints of a solution.
+pub fn summary_of(record: &crate::output::solution_json::SolutionRecord) -> String {
+    summary::text(record) + &summary::parameters(record)
+}
+
+/// Words of the command line as they can be shown: a path may hold bytes that are no text.
+fn command_line() -> Vec<String> {
+    std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect()
+}
+
 /// Runs the program with the arguments of the process.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();

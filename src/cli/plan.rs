@@ -190,7 +190,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     }
     forecast.words.extend(words);
     check_wish(&request, &forecast)?;
-    let command: Vec<String> = std::env::args().skip(1).collect();
+    let command: Vec<String> = super::command_line().into_iter().skip(1).collect();
     let command = format!("robotcal {}", command.join(" "));
     let mut more = plan_programs::programs(&request, &plan);
     more.insert("plan.html".into(), plan_html(&request, &plan, &forecast, &command).into_bytes());

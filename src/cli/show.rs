@@ -34,7 +34,8 @@ pub(super) struct ShowArgs {
 pub(super) fn read_solution(path: &Path) -> Result<SolutionRecord> {
     recover(path)?;
     let bytes = files::read(path, Kind::Solution)?;
-    solution_json::read(&bytes).map_err(|e| Error { place: path.display().to_string(), ..e })
+    solution_json::read(&bytes)
+        .map_err(|e| Error { place: e.place.replacen(solution_json::FILE_NAME, &path.display().to_string(), 1), ..e })
 }
 
 pub(super) fn run(args: &ShowArgs) -> Result<Verdict> {

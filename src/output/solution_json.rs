@@ -618,7 +618,7 @@ impl serde_json::ser::Formatter for FieldPerLine {
 /// Reads solution.json back.
 ///
 /// # Errors
-/// Text that is no such file, and other versions of the format.
+/// Text that is no such file, other versions of the format, parts that do not fit together (by field).
 pub fn read(bytes: &[u8]) -> Result<SolutionRecord> {
     #[derive(Deserialize)]
     struct Version {
@@ -640,6 +640,7 @@ pub fn read(bytes: &[u8]) -> Result<SolutionRecord> {
     let of_older = |t: &mut TermRecord| matches!(Term::from_name(&t.term), Some(Term::Local(_)));
     let older: Vec<TermRecord> = record.robot.terms.extract_if(.., of_older).collect();
     record.robot.local_errors.extend(older);
+    super::solution_check::check(&record)?;
     Ok(record)
 }
 

@@ -92,7 +92,7 @@ pub fn convert_recording(recording: &Path, folder: &Path, options: &RecordingOpt
 fn write_folder(recording: &Path, unfinished: &Path, folder: &Path, options: &RecordingOptions) -> Result<Extracted> {
     let mut extracted = extract(recording, &unfinished.join("images"), options)?;
     let manifest = carried_manifest(recording, unfinished, &mut extracted)?;
-    write(&unfinished.join("series.toml"), manifest.to_toml()?.as_bytes())?;
+    write(&unfinished.join("series.toml"), manifest.as_bytes())?;
     write(&unfinished.join("joints.csv"), extracted.stops.to_csv().as_bytes())?;
     if unfinished != folder {
         std::fs::rename(unfinished, folder).map_err(|e| Error::io(folder, &e))?;
@@ -103,8 +103,10 @@ fn write_folder(recording: &Path, unfinished: &Path, folder: &Path, options: &Re
     Ok(extracted)
 }
 
-/// The manifest for the folder, with its plate copied; a plain one where there is none beside the recording.
-fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extracted) -> Result<Manifest> {
+/// Text of the manifest for the folder, with its plate copied. Where there is none beside the recording, it does not say where
+/// the camera is: nobody knows, and a guess would look like knowledge.
+fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extracted) -> Result<String> {
+    let mut known = true;
     let mut manifest = match manifest_beside(recording) {
         Ok(path) => {
             let mut manifest = Manifest::read(&path, &mut extracted.inputs)?;
@@ -112,8 +114,9 @@ fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extract
             manifest
         }
         Err(_) => {
+            known = false;
             let what = "nothing beside it says where the camera is and which plate was seen";
-            let remedy = "check camera_mount in series.toml and put plate.toml into the folder";
+            let remedy = "add camera_mount = \"hand\" or \"fixed\" to series.toml and put plate.toml into the folder";
             extracted.notices.push(Notice::new(recording.display(), what, remedy));
             Manifest::plain(CameraMount::Hand, "plate.toml")
         }
@@ -121,7 +124,9 @@ fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extract
     manifest.mcap = None;
     manifest.joint_unit.get_or_insert(AngleUnit::Rad);
     fill_camera(&mut manifest, extracted.camera_info.as_ref());
-    Ok(manifest)
+    let text = manifest.to_toml()?;
+    let stays = |line: &&str| known || !line.starts_with("camera_mount");
+    Ok(text.lines().filter(stays).map(|line| format!("{line}\n")).collect())
 }
 
 /// Copies the plate file and the marker file that it names; returns the name of the plate file.

@@ -22,6 +22,8 @@ use crate::{Error, Result};
 
 /// Memory of messages that wait for others of their stop, bytes.
 const MOST_HELD: usize = 256 << 20;
+/// A picture with its grey values of 16 bits takes up to three times its own memory.
+const GREY_WORDS: u64 = 3;
 /// Memory of pictures that are decoded at one time, bytes.
 const MOST_IN_FLIGHT: u64 = 256 << 20;
 
@@ -60,8 +62,8 @@ impl Frame {
     fn decoded_bytes(&self) -> u64 {
         match self {
             // A mosaic becomes three colours.
-            Self::Raw(raw) => 3 * raw.data.len() as u64,
-            Self::Compressed(bytes) => decoded_bytes(Cursor::new(bytes)).unwrap_or(0),
+            Self::Raw(raw) => GREY_WORDS * 3 * raw.data.len() as u64,
+            Self::Compressed(bytes) => GREY_WORDS * decoded_bytes(Cursor::new(bytes)).unwrap_or(0),
         }
     }
 

@@ -91,7 +91,8 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     }
     let image_delay_s = scan.delay_s(&image_topic) - scan.delay_s(&joint_topic);
     if image_delay_s.abs() > NOTABLE_DELAY_S {
-        let what = format!("images arrive {image_delay_s:.3} s later after their stamp than joint states");
+        let sign = if image_delay_s < 0.0 { "earlier" } else { "later" };
+        let what = format!("images arrive {:.3} s {sign} after their stamp than joint states", image_delay_s.abs());
         let remedy = "check that camera and robot stamp by the same clock; a robot that stands is not affected";
         notices.push(Notice::new(recording.display(), what, remedy));
     }

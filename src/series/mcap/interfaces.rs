@@ -25,6 +25,11 @@ pub(super) fn definition(schema: &str) -> String {
                 "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify",
             )],
         ),
+        ANNOTATIONS => (
+            "foxglove_msgs/CircleAnnotation[] circles\nfoxglove_msgs/PointsAnnotation[] points\n\
+             foxglove_msgs/TextAnnotation[] texts",
+            ANNOTATION_PARTS,
+        ),
         _ => (
             "geometry_msgs/TransformStamped[] transforms",
             &[
@@ -42,14 +47,26 @@ pub(super) fn definition(schema: &str) -> String {
     own.to_string() + &parts.collect::<String>() + "\n"
 }
 
-/// JSON schema of the marks on images, by the name that viewers know.
-pub(super) const ANNOTATIONS: &str = "foxglove.ImageAnnotations";
+/// Name of the type of marks on images, which viewers know.
+pub(super) const ANNOTATIONS: &str = "foxglove_msgs/msg/ImageAnnotations";
 
-/// The schema text of [`ANNOTATIONS`], as far as it is used.
-pub(super) const ANNOTATIONS_SCHEMA: &str = r#"{"title":"foxglove.ImageAnnotations","type":"object","properties":{
-"circles":{"type":"array","items":{"type":"object"}},"texts":{"type":"array","items":{"type":"object"}},
-"points":{"type":"array","items":{"type":"object","properties":{
-"timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
-"type":{"type":"integer"},"points":{"type":"array","items":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"}}}},
-"outline_color":{"type":"object"},"outline_colors":{"type":"array","items":{"type":"object"}},"fill_color":{"type":"object"},
-"thickness":{"type":"number"}}}}}}"#;
+/// The parts of [`ANNOTATIONS`].
+const ANNOTATION_PARTS: &[(&str, &str)] = &[
+    (
+        "foxglove_msgs/CircleAnnotation",
+        "builtin_interfaces/Time timestamp\nfoxglove_msgs/Point2 position\nfloat64 diameter\nfloat64 thickness\n\
+         foxglove_msgs/Color fill_color\nfoxglove_msgs/Color outline_color",
+    ),
+    (
+        "foxglove_msgs/PointsAnnotation",
+        "builtin_interfaces/Time timestamp\nuint8 type\nfoxglove_msgs/Point2[] points\nfoxglove_msgs/Color outline_color\n\
+         foxglove_msgs/Color[] outline_colors\nfoxglove_msgs/Color fill_color\nfloat64 thickness",
+    ),
+    (
+        "foxglove_msgs/TextAnnotation",
+        "builtin_interfaces/Time timestamp\nfoxglove_msgs/Point2 position\nstring text\nfloat64 font_size\n\
+         foxglove_msgs/Color text_color\nfoxglove_msgs/Color background_color",
+    ),
+    ("foxglove_msgs/Point2", "float64 x\nfloat64 y"),
+    ("foxglove_msgs/Color", "float64 r\nfloat64 g\nfloat64 b\nfloat64 a"),
+];

@@ -9,7 +9,7 @@ use image::ImageFormat;
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions, Writer};
 
-use super::interfaces::{ANNOTATIONS, ANNOTATIONS_SCHEMA, TRANSFORMS, definition};
+use super::interfaces::{ANNOTATIONS, TRANSFORMS, definition};
 use super::messages::{CAMERA_INFO, COMPRESSED_IMAGE, CameraInfo, JOINT_STATE};
 use crate::files::{self, Kind, decode_picture};
 use crate::geom::Pose;
@@ -24,8 +24,10 @@ const STANDING_NS: i64 = 500_000_000;
 const STEP_NS: i64 = 2_000_000_000;
 
 /// Types of annotations of points, as Foxglove numbers them.
-const POINTS: u32 = 1;
-const LINE_LIST: u32 = 4;
+const POINTS: u8 = 1;
+const LINE_LIST: u8 = 4;
+/// Of points and lines, px.
+const THICKNESS_PX: f64 = 2.0;
 
 /// What a recording shows beside the images.
 #[derive(Debug, Clone, Copy)]
@@ -94,7 +96,7 @@ impl From<&ImageObservations> for ImageMarks {
 /// Writes the stops of a series as an MCAP recording that [`super::extract`] reads back as the same series.
 ///
 /// Topics: `/joint_states`, `/camera/image/compressed` (png and jpg as they are, other formats as png), `/camera/camera_info`,
-/// `/tf`, `/camera/annotations`. Stamps are the times of the stops; where they are missing, not in order or too dense for
+/// `/tf`, `/camera/annotations`, all of them ROS messages. Stamps are the times of the stops; where they are missing, not in order or too dense for
 /// standstills, two seconds apart.
 ///
 /// # Errors
@@ -196,13 +198,8 @@ impl Recording {
 
     /// Schema and channel are written once: the writer knows what it has.
     fn channel(&mut self, topic: &str, schema: &str) -> mcap::McapResult<u16> {
-        let json = schema == ANNOTATIONS;
-        let (kind, text) = match json {
-            true => ("jsonschema", ANNOTATIONS_SCHEMA.to_string()),
-            false => ("ros2msg", definition(schema)),
-        };
-        let id = self.writer.add_schema(schema, kind, text.as_bytes())?;
-        self.writer.add_channel(id, topic, if json { "json" } else { "cdr" }, &BTreeMap::new())
+        let id = self.writer.add_schema(schema, "ros2msg", definition(schema).as_bytes())?;
+        self.writer.add_channel(id, topic, "cdr", &BTreeMap::new())
     }
 
     fn joint_state(&mut self, time_ns: i64, names: &[String], positions: &[f64]) -> Result<()> {
@@ -273,22 +270,25 @@ impl Recording {
     }
 
     fn marks(&mut self, time_ns: i64, marks: &ImageMarks) -> Result<()> {
-        let (seconds, nanoseconds) = split(time_ns);
-        let layer = |layer: &MarkLayer| {
+        let mut cdr = CdrWriter::new();
+        // No circles.
+        cdr.u32(0);
+        cdr.u32(marks.layers.len() as u32);
+        for layer in &marks.layers {
+            cdr.time(time_ns);
+            cdr.0.push(if layer.kind == MarkKind::Points { POINTS } else { LINE_LIST });
+            cdr.u32(layer.points.len() as u32);
             // Viewers count from the corner of the top-left pixel, not from its centre.
-            let points: Vec<_> =
-                layer.points.iter().map(|p| serde_json::json!({"x": p[0] + 0.5, "y": p[1] + 0.5})).collect();
-            let [r, g, b] = layer.colour;
-            let colour = serde_json::json!({"r": r, "g": g, "b": b, "a": 1.0});
-            let kind = if layer.kind == MarkKind::Points { POINTS } else { LINE_LIST };
-            serde_json::json!({
-                "timestamp": {"sec": seconds, "nsec": nanoseconds}, "type": kind, "points": points, "thickness": 2.0,
-                "outline_color": colour, "outline_colors": [], "fill_color": colour,
-            })
-        };
-        let layers: Vec<_> = marks.layers.iter().map(layer).collect();
-        let text = serde_json::json!({"circles": [], "texts": [], "points": layers});
-        self.message(time_ns, "/camera/annotations", ANNOTATIONS, text.to_string().as_bytes())
+            layer.points.iter().flatten().for_each(|v| cdr.f64(v + 0.5));
+            cdr.colour(layer.colour);
+            // No colours of single points.
+            cdr.u32(0);
+            cdr.colour(layer.colour);
+            cdr.f64(THICKNESS_PX);
+        }
+        // No texts.
+        cdr.u32(0);
+        self.message(time_ns, "/camera/annotations", ANNOTATIONS, &cdr.0)
     }
 
     fn finish(mut self) -> Result<()> {
@@ -322,10 +322,19 @@ impl CdrWriter {
     }
 
     fn header(&mut self, time_ns: i64, frame: &str) {
+        self.time(time_ns);
+        self.string(frame);
+    }
+
+    fn time(&mut self, time_ns: i64) {
         let (seconds, nanoseconds) = split(time_ns);
         self.u32(seconds as u32);
         self.u32(nanoseconds);
-        self.string(frame);
+    }
+
+    /// Red, green and blue, opaque.
+    fn colour(&mut self, [r, g, b]: [f64; 3]) {
+        [r, g, b, 1.0].into_iter().for_each(|v| self.f64(v));
     }
 
     /// Alignment counts from the end of the encapsulation header.
