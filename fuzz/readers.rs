@@ -103,7 +103,14 @@ fn recording(bytes: &[u8]) {
 fn program(language: Language, bytes: &[u8]) {
     let chain = chain();
     let axes: Vec<usize> = (0..chain.readings.len()).collect();
-    let setting = programs::Setting { chain: &chain, axes: &axes, rad_per_unit: Some(1.0), tool: None, work: None };
+    let setting = programs::Setting {
+        chain: &chain,
+        axes: &axes,
+        rad_per_unit: Some(1.0),
+        base: Pose::identity(),
+        tool: None,
+        work: None,
+    };
     let file = TextFile { name: "program".into(), bytes: bytes.to_vec() };
     drop(programs::read(language, vec![file], &setting));
 }
