@@ -36,6 +36,7 @@ mod report;
 mod residuals;
 pub mod restore;
 mod robot_files;
+mod solution_bytes;
 mod solution_check;
 pub mod solution_json;
 mod solution_record;

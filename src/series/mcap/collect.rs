@@ -198,7 +198,10 @@ impl<'a> Collector<'a> {
             (None, Some((bytes, extension))) => self.write(time, extension, bytes)?,
             (None, None) => match frames[best].1.decode() {
                 Ok(picture) => self.write_png(time, &picture)?,
-                Err(reason) => return Ok(self.taken.reject(reason)),
+                Err(reason) => {
+                    self.taken.reject(reason);
+                    return Ok(());
+                }
             },
         };
         let stop = Stop {

@@ -1,0 +1,138 @@
+//! Values in RAPID: aggregates, numbers, names, displaced points.
+
+use std::ops::Range;
+
+use crate::error::{Error, Result};
+use crate::geom::Pose;
+use crate::programs::scan::Reader;
+
+/// `[..]` with what is in it.
+#[derive(Debug, Clone)]
+pub(super) enum Node {
+    List(Vec<Node>),
+    Number(f64, Range<usize>),
+    Word(String),
+    /// `Offs(..)` or `RelTool(..)`: a name, and what is in the brackets.
+    Displaced(Box<Displacement>),
+    Other,
+}
+
+/// `Offs(p, x, y, z)` or `RelTool(p, x, y, z \Rx:=.. \Ry:=.. \Rz:=..)`.
+#[derive(Debug, Clone)]
+pub(super) struct Displacement {
+    pub of_tool: bool,
+    pub point: String,
+    /// `None` where they are not written in numbers.
+    pub by: Option<[(f64, Range<usize>); 3]>,
+    /// Rotations by their switches, deg; `None` for one that is not written in numbers.
+    pub turned: [Option<(f64, Range<usize>)>; 3],
+    /// Byte at which a missing rotation goes: switches stand in the order x, y, z.
+    pub missing_at: [usize; 3],
+    pub file: usize,
+}
+
+/// `Offs(..)` or `RelTool(..)` of a name; `None` for anything else. The reader stands on the word and ends behind the bracket.
+pub(super) fn displacement(reader: &mut Reader<'_>) -> Option<Displacement> {
+    let of_tool = match reader.name()?.as_str() {
+        "OFFS" => false,
+        "RELTOOL" => true,
+        _ => return None,
+    };
+    let close = reader.closing(reader.at + 1).filter(|_| reader.ahead_is_mark(1, b'('))?;
+    reader.at += 2;
+    reader.skip_line_ends();
+    let point = reader.name().filter(|_| reader.ahead_is_mark(1, b','));
+    reader.at += 1;
+    let mut by = Vec::new();
+    while reader.at < close && reader.take_mark(b',') {
+        reader.skip_line_ends();
+        let number = reader.take_number();
+        reader.skip_line_ends();
+        let ends = reader.at == close || reader.is_mark(b',') || reader.is_mark(b'\\');
+        by.extend(number.filter(|_| ends));
+    }
+    let mut turned = [None, None, None];
+    let mut stands = [None; 3];
+    let mut plain = true;
+    while reader.at < close {
+        reader.skip_line_ends();
+        let slash = reader.peek().map_or(0, |t| t.range.start);
+        if !reader.take_mark(b'\\') {
+            plain = false;
+            break;
+        }
+        let which = ["RX", "RY", "RZ"].iter().position(|n| reader.name().as_deref() == Some(n));
+        reader.at += 1;
+        let assigned = reader.take_mark(b':') && reader.take_mark(b'=');
+        let number = reader.take_number().filter(|_| assigned);
+        reader.skip_line_ends();
+        let ends = reader.at == close || reader.is_mark(b'\\');
+        match (which, number) {
+            (Some(k), Some(number)) if ends && of_tool => (turned[k], stands[k]) = (Some(number), Some(slash)),
+            _ => plain = false,
+        }
+        if !plain {
+            break;
+        }
+    }
+    reader.at = close;
+    let end = reader.ahead(-1).map_or(0, |t| t.range.end);
+    reader.at = close + 1;
+    let by = <[_; 3]>::try_from(by).ok().filter(|_| plain);
+    let missing_at = [0, 1, 2].map(|k: usize| stands[k..].iter().flatten().copied().next().unwrap_or(end));
+    Some(Displacement { of_tool, point: point?, by, turned, missing_at, file: reader.index })
+}
+
+/// A value in the text; the reader ends behind it.
+///
+/// # Errors
+/// A bracket that is not closed.
+pub(super) fn node(reader: &mut Reader<'_>) -> Result<Node> {
+    if let Some((value, range)) = reader.take_number() {
+        return Ok(Node::Number(value, range));
+    }
+    if !reader.is_mark(b'[') {
+        let (name, at) = (reader.name(), reader.at);
+        if let Some(displaced) = displacement(reader) {
+            return Ok(Node::Displaced(Box::new(displaced)));
+        }
+        reader.at = at + 1;
+        return Ok(name.map_or(Node::Other, Node::Word));
+    }
+    let Some(close) = reader.closing(reader.at) else {
+        return Err(Error::input(reader.place(), "a list [ is not closed", "close it with ]"));
+    };
+    reader.at += 1;
+    let mut list = Vec::new();
+    while reader.at < close {
+        reader.skip_line_ends();
+        let mut item = node(reader)?;
+        reader.skip_line_ends();
+        while reader.at < close && !reader.is_mark(b',') {
+            item = Node::Other;
+            reader.at += 1;
+        }
+        reader.take_mark(b',');
+        list.push(item);
+    }
+    reader.at = close + 1;
+    Ok(Node::List(list))
+}
+
+pub(super) fn numbers<const N: usize>(node: &Node) -> Option<[(f64, Range<usize>); N]> {
+    let Node::List(list) = node else { return None };
+    let number = |n: &Node| match n {
+        Node::Number(value, range) => Some((*value, range.clone())),
+        _ => None,
+    };
+    list.iter().map(number).collect::<Option<Vec<_>>>()?.try_into().ok()
+}
+
+/// `[[x, y, z], [q1, q2, q3, q4]]`, q1 the scalar part.
+pub(super) fn frame(node: &Node) -> Option<Pose> {
+    let Node::List(list) = node else { return None };
+    let (trans, rot) = (list.first()?, list.get(1)?);
+    let trans = numbers::<3>(trans)?.map(|(v, _)| 1e-3 * v);
+    let [w, x, y, z] = numbers::<4>(rot)?.map(|(v, _)| v);
+    Some(Pose::from_xyz_quaternion(trans, [x, y, z, w]))
+}
