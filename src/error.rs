@@ -69,6 +69,9 @@ impl fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
+/// Places that a notice names when it says the same of several.
+const MOST_PLACES: usize = 4;
+
 /// Something seen on the way that the user should know of, though the work went on.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Notice {
@@ -118,8 +121,11 @@ impl Notice {
             return first.clone();
         }
         let differ = if group.iter().any(|n| n.what != first.what) { " (numbers of the first)" } else { "" };
+        let named = places[..places.len().min(MOST_PLACES)].join(", ");
+        let more = places.len().saturating_sub(MOST_PLACES);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         Self {
-            place: format!("{} and {} more", first.place, places.len() - 1),
+            place: format!("{} places ({named}{more})", places.len()),
             what: format!("{}{differ}", first.what),
             ..first.clone()
         }
@@ -228,7 +234,7 @@ mod tests {
         let all = [of("a.png", 0.1), joint("joint_1"), of("b.png", 0.2), of("c.png", -0.1), joint("joint_2")];
         let said = Notice::said_once(&all);
         assert_eq!(said.len(), 3, "{said:?}");
-        assert_eq!(said[0].place, "a.png and 2 more");
+        assert_eq!(said[0].place, "3 places (a.png, b.png, c.png)");
         assert_eq!(said[1..], [joint("joint_1"), joint("joint_2")]);
     }
 

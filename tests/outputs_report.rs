@@ -185,6 +185,8 @@ fn local_errors_are_summed_up_and_make_no_columns() {
     let heads = |page: &str| page.matches("<th class=\"n\">").count();
     let before = heads(&report_html(&record));
     let joint = record.robot.readings[0].clone();
+    let known = record.estimates.len();
+    record.covariance_lower.resize((known + 3) * (known + 4) / 2, 0.0);
     for (at, value) in [("0.3298", 3e-4), ("-0.2237", -4e-4), ("1.5000", 0.0)] {
         let like = record.estimates.iter().find(|e| e.name.ends_with(".offset")).unwrap().clone();
         let name = format!("robot/{joint}.local_{at}");

@@ -63,7 +63,7 @@ pub(super) fn gates(
                 "joint noise: {:.1} mrad ({joint} most) in series {}; the readings do not explain the images: look for loose camera or plate, motion, wrong robot model{}",
                 1e3 * worst,
                 of.name,
-                worst_predicted(problem, accuracy)
+                worst_predicted(problem, k, accuracy)
             ));
         }
     }
@@ -103,9 +103,9 @@ fn noisiest_joint<'a>(problem: &Problem, state: &'a State, series: usize) -> Opt
 }
 
 /// Images that the others predict far worse than usual, in words; empty where none stands out.
-fn worst_predicted(problem: &Problem, accuracy: &Accuracy) -> String {
+fn worst_predicted(problem: &Problem, series: usize, accuracy: &Accuracy) -> String {
     let errors = |i: usize| accuracy.per_image_mm[i].map(|[_, calibrated]| calibrated);
-    let standing_out: Vec<String> = standing_out(problem, errors, STANDS_OUT)
+    let standing_out: Vec<String> = standing_out(problem, series, errors, STANDS_OUT)
         .into_iter()
         .map(|(mm, name)| format!("{name} ({mm:.1} mm)"))
         .collect();
@@ -113,12 +113,12 @@ fn worst_predicted(problem: &Problem, accuracy: &Accuracy) -> String {
 }
 
 /// Images whose markers are known far less well than usual: blurred, badly lit, far away.
-fn worst_seen(problem: &Problem) -> String {
+fn worst_seen(problem: &Problem, series: usize) -> String {
     let sigma = |i: usize| {
         let sigmas: Vec<f64> = problem.images[i].used().map(|o| o.information.determinant().powf(-0.25)).collect();
         median(&sigmas)
     };
-    let standing_out: Vec<String> = standing_out(problem, sigma, BLURRED)
+    let standing_out: Vec<String> = standing_out(problem, series, sigma, BLURRED)
         .into_iter()
         .map(|(px, name)| format!("{name} (sigma {px:.3} px)"))
         .collect();
@@ -132,10 +132,11 @@ fn in_words(what: &str, images: &[String]) -> String {
     if named.is_empty() { String::new() } else { format!("{what} {}{rest}", named.join(", ")) }
 }
 
-/// Images of which something is more than so many times its median, the largest first.
-fn standing_out(problem: &Problem, of: impl Fn(usize) -> Option<f64>, times: f64) -> Vec<(f64, &str)> {
+/// Images of a series of which something is more than so many times its median, the largest first.
+fn standing_out(problem: &Problem, series: usize, of: impl Fn(usize) -> Option<f64>, times: f64) -> Vec<(f64, &str)> {
+    let own = problem.used().filter(|(_, image)| image.series == series);
     let mut all: Vec<(f64, &str)> =
-        problem.used().filter_map(|(i, image)| of(i).map(|value| (value, image.name.as_str()))).collect();
+        own.filter_map(|(i, image)| of(i).map(|value| (value, image.name.as_str()))).collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     let usual = all.get(all.len() / 2).map_or(0.0, |e| e.0);
     all.retain(|e| e.0 > times * usual);
@@ -189,8 +190,8 @@ pub(super) fn remarks(
                 format!(
                     "the joint noise is {:.2} mrad ({joint} most); robots repeat to some 0.1 mrad{}{}",
                     1e3 * sigma,
-                    worst_predicted(problem, accuracy),
-                    worst_seen(problem)
+                    worst_predicted(problem, k, accuracy),
+                    worst_seen(problem, k)
                 ),
                 "did plate or camera move, were images taken before the arm stood still, are readings rounded? the stated sigmas contain it",
             ));

@@ -95,18 +95,21 @@ pub(super) fn sweep(stray: &Path, target: &Path, own: &BTreeSet<String>) -> io::
     let is_record = |p: &PathBuf| RECORDS.iter().any(|r| p == Path::new(r));
     let (records, others): (Vec<PathBuf>, Vec<PathBuf>) =
         tree::entries(stray, &folders)?.into_iter().partition(is_record);
-    for entry in others.into_iter().chain(records) {
-        let (from, to) = (stray.join(&entry), target.join(&entry));
+    let clear = |entry: &PathBuf| {
+        let (from, to) = (stray.join(entry), target.join(entry));
         let is_own = entry.to_str().is_some_and(|e| own.contains(e));
         if is_own || is_same_file(&from, &to) {
-            fs::remove_file(&from)?;
+            fs::remove_file(&from)
         } else {
             to.parent().map_or(Ok(()), fs::create_dir_all)?;
-            fs::rename(&from, free_name(to))?;
+            fs::rename(&from, free_name(to))
         }
-    }
+    };
+    others.iter().try_for_each(clear)?;
     let below = folders.iter().rev().filter(|f| f.file_name().is_some());
     below.map(|f| fs::remove_dir(stray.join(f))).try_for_each(journal::gone)?;
+    // The record goes last: without it the next run would take what is left, folders too, for the user's.
+    records.iter().try_for_each(clear)?;
     fs::remove_dir(stray)
 }
 
