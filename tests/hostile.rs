@@ -203,7 +203,7 @@ fn ten_thousand_links_are_read_in_linear_time() {
     for comb in [false, true] {
         let links: String = (0..n).map(|k| format!("<link name='l{k}'/>\n")).collect();
         let joint = |k: usize| {
-            let parent = if comb && k % 2 == 0 { k.saturating_sub(2) } else { k - 1 };
+            let parent = if comb && k.is_multiple_of(2) { k.saturating_sub(2) } else { k - 1 };
             format!(
                 "<joint name='j{k}' type='continuous'><parent link='l{parent}'/><child link='l{k}'/><axis xyz='0 0 1'/></joint>\n"
             )

@@ -374,11 +374,11 @@ fn a_camera_that_looked_straight_ahead_only_is_named() {
             [rng.random_range(-0.03..0.03), rng.random_range(-0.03..0.03), rng.random_range(0.3..0.6)],
             [std::f64::consts::PI, 0.0, rng.random_range(-3.0..3.0)],
         );
-        let seen = stop.observations[0].clone();
+        let seen = stop.observations[0];
         let observation = |m: &Marker| {
             let x = camera_from_plate.transform(&m.position_m);
             let uv = [640.0 + 1000.0 * x.x / x.z, 512.0 + 1000.0 * x.y / x.z];
-            Observation { marker: m.id, uv: uv.map(|v| v + rng.random_range(-0.05..0.05)), ..seen.clone() }
+            Observation { marker: m.id, uv: uv.map(|v| v + rng.random_range(-0.05..0.05)), ..seen }
         };
         stop.observations = markers.iter().map(observation).collect();
     }

@@ -316,4 +316,5 @@ fn displaced_points_are_exact_and_the_points_they_start_from_are_corrected() {
             "{turned}"
         );
     }
+    assert!(complete >= 2, "{complete}");
 }

@@ -141,7 +141,7 @@ fn in_postures(images: usize, of_posture: usize) -> (Problem, State) {
         let stop = image.stop.as_mut().unwrap();
         let posture = (i / of_posture) as f64;
         // Visited from side to side, so that neighbours in time are none in space.
-        let swing = 0.3 * posture * if i / of_posture % 2 == 0 { 1.0 } else { -1.0 };
+        let swing = 0.3 * posture * if (i / of_posture).is_multiple_of(2) { 1.0 } else { -1.0 };
         stop.readings[..3].copy_from_slice(&[swing, 0.1 + 0.01 * posture, 0.4 + 0.01 * posture]);
     }
     (problem, state)

@@ -58,8 +58,8 @@ fn a_two_stage_result_is_written_shown_judged_and_solved_again_like_a_joint_one(
         writeln!(table, "{}", cells.join(",")).unwrap();
     }
     std::fs::write(folder.path().join("points.csv"), table).unwrap();
-    let corrected = std::fs::read_dir(folder.path().join("b")).unwrap().map(|e| e.unwrap().path());
-    let corrected = corrected.filter(|p| p.extension().is_some_and(|e| e == "urdf")).next().unwrap();
+    let mut corrected = std::fs::read_dir(folder.path().join("b")).unwrap().map(|e| e.unwrap().path());
+    let corrected = corrected.find(|p| p.extension().is_some_and(|e| e == "urdf")).unwrap();
     let judged = run(&[
         "verify",
         "--urdf",

@@ -105,7 +105,7 @@ pub fn series_in_postures(mount: CameraMount, description: &RobotDescription, st
         let reach = [0.5, 0.5, 0.5, 1.2, 0.8, 2.5];
         let mut q: Vec<f64> = (0..6).map(|i| scene.middle[i] + reach[i] * range.sample(&mut rng)).collect();
         let before = stops.last().and_then(|s: &MeasuredStop| s.readings.as_ref());
-        if let Some(before) = before.filter(|_| stops.len() % stops_each > 0) {
+        if let Some(before) = before.filter(|_| !stops.len().is_multiple_of(stops_each)) {
             q[..3].copy_from_slice(&before[..3]);
         }
         let posture = (stops.len() / stops_each) as f64;

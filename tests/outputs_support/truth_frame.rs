@@ -75,7 +75,7 @@ pub fn pose_row(row: &BTreeMap<String, String>) -> (Pose, Matrix6<f64>) {
 /// Smallest eigenvalue with all variances brought to 1; below zero where a variance is.
 pub fn least_eigenvalue(covariance: &Matrix6<f64>) -> f64 {
     let sigma = covariance.diagonal().map(f64::sqrt);
-    if sigma.iter().any(|s| !(*s > 0.0)) {
+    if !sigma.iter().all(|s| *s > 0.0) {
         return -1.0;
     }
     Matrix6::from_fn(|i, j| covariance[(i, j)] / sigma[i] / sigma[j]).symmetric_eigenvalues().min()
@@ -189,7 +189,8 @@ pub fn judged(world: &SimulatedSeries, files: &BTreeMap<String, Vec<u8>>) -> Jud
             Vector6::from_row_slice(&[(pose.rotation.transpose() * pose.translation).as_slice(), &[0.0; 3]].concat())
                 * of_poses.sigma;
         judged.poses += 1;
-        judged.not_positive_definite += usize::from(!(least_eigenvalue(&covariance) > 0.0));
+        judged.not_positive_definite +=
+            usize::from(least_eigenvalue(&covariance).partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater));
         judged.poses_shape += normalised(&error((1.0 + of_poses.value) / truth.size), &covariance);
         judged.poses_with_scale += normalised(&error(1.0), &(covariance + by_scale * by_scale.transpose()));
     }
