@@ -168,7 +168,7 @@ fn a_noisy_series_does_not_spoil_the_others() {
 }
 
 #[test]
-#[ignore = "ten minutes of one core; its figures stand in the guide, decision 7"]
+#[ignore = "some minutes; its figures stand in the guide, decision 7"]
 fn six_series_one_of_them_noisy_are_no_worse_than_the_five_others() {
     let [five, six] = without_and_with(1..=10, 6, 24);
     println!("six over five, ten worlds: {:.3}", six / five);
