@@ -1,8 +1,11 @@
 //! Series whose stops come from a recording, and recordings turned into series folders.
 
+mod recording_support;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use recording_support::annotations;
 use robotcal::geom::Pose;
 use robotcal::series::{
     CameraInfo, Edge, FramePoses, ImageMarks, ImageObservations, MarkKind, MarkLayer, Observation, RecordingOptions,
@@ -120,33 +123,6 @@ fn a_recording_without_a_manifest_says_what_to_write() {
     assert!(error.what.contains("camera_mount") && error.remedy.contains("camera_mount"), "{error}");
     let error = read(&recording("old.bag")).unwrap_err().to_string();
     assert!(error.contains("ROS 1") && error.contains("rosbags-convert"), "{error}");
-}
-
-/// Kind and points of the layers of a `foxglove_msgs/msg/ImageAnnotations` in little-endian CDR.
-fn annotations(message: &[u8]) -> Vec<(u8, Vec<[f64; 2]>)> {
-    let body = &message[4..];
-    let mut at = 0;
-    let mut take = |size: usize| {
-        at = usize::next_multiple_of(at, size);
-        at += size;
-        let mut bytes = [0; 8];
-        bytes[..size].copy_from_slice(&body[at - size..at]);
-        u64::from_le_bytes(bytes)
-    };
-    assert_eq!(take(4), 0, "no circles");
-    let layers = (0..take(4))
-        .map(|_| {
-            let (_time, kind) = ([take(4), take(4)], take(1) as u8);
-            let points = (0..take(4)).map(|_| [take(8), take(8)].map(f64::from_bits)).collect();
-            let _colour = [take(8), take(8), take(8), take(8)];
-            assert_eq!(take(4), 0, "no colours of single points");
-            let _fill_and_thickness = [take(8), take(8), take(8), take(8), take(8)];
-            (kind, points)
-        })
-        .collect();
-    assert_eq!(take(4), 0, "no texts");
-    assert_eq!(at, body.len());
-    layers
 }
 
 #[test]

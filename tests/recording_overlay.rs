@@ -2,10 +2,13 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod recording_support;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use recording_support::annotations;
 use serde_json::Value;
 
 fn shipped(path: &str) -> PathBuf {
@@ -64,31 +67,4 @@ fn camera_frames_and_residuals_of_the_solution_are_in_the_recording() {
         let used = image["observations"]["reason"].as_array().unwrap().iter().filter(|r| r.is_null()).count();
         assert!(drawn >= 2 * used && used > 30, "{drawn} points for {used} observations");
     }
-}
-
-/// Kind and points of the layers of a `foxglove_msgs/msg/ImageAnnotations` in little-endian CDR.
-fn annotations(message: &[u8]) -> Vec<(u8, Vec<[f64; 2]>)> {
-    let body = &message[4..];
-    let mut at = 0;
-    let mut take = |size: usize| {
-        at = usize::next_multiple_of(at, size);
-        at += size;
-        let mut bytes = [0; 8];
-        bytes[..size].copy_from_slice(&body[at - size..at]);
-        u64::from_le_bytes(bytes)
-    };
-    assert_eq!(take(4), 0, "no circles");
-    let layers = (0..take(4))
-        .map(|_| {
-            let (_time, kind) = ([take(4), take(4)], take(1) as u8);
-            let points = (0..take(4)).map(|_| [take(8), take(8)].map(f64::from_bits)).collect();
-            let _colour = [take(8), take(8), take(8), take(8)];
-            assert_eq!(take(4), 0, "no colours of single points");
-            let _fill_and_thickness = [take(8), take(8), take(8), take(8), take(8)];
-            (kind, points)
-        })
-        .collect();
-    assert_eq!(take(4), 0, "no texts");
-    assert_eq!(at, body.len());
-    layers
 }
