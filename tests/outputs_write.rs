@@ -264,6 +264,24 @@ fn an_earlier_result_that_a_killed_run_moved_away_comes_back() {
     assert_eq!(names(root.path()), ["out"]);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_folder_is_free_at_once_though_programs_are_being_started() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    let done = std::sync::atomic::AtomicBool::new(false);
+    std::thread::scope(|threads| {
+        threads.spawn(|| {
+            while !done.load(std::sync::atomic::Ordering::Relaxed) {
+                std::process::Command::new("true").status().unwrap();
+            }
+        });
+        let all_written = (0..400).all(|k| write_all(&out, &two_results()[k % 2]).is_ok());
+        done.store(true, std::sync::atomic::Ordering::Relaxed);
+        assert!(all_written);
+    });
+}
+
 #[test]
 fn what_the_user_puts_there_meanwhile_stays() {
     let root = tempfile::tempdir().unwrap();

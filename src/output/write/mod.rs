@@ -4,6 +4,7 @@
 //! system; where that cannot be (a mount point, the current folder, a file system without that step), file by file after a
 //! list of what is to be done, by which a run that was cut short is completed ([`recover`]). See *Decisions*, 6.
 
+mod held;
 mod journal;
 mod place;
 mod strays;

@@ -6,6 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+use super::held::{Held, Taken};
 use super::strays::{bring_back, part_name, sweep_beside};
 use super::{NewResult, Staging, journal, tree, write_synced};
 use crate::error::{Error, Result};
@@ -17,7 +18,7 @@ pub struct Place {
     pub(super) target: PathBuf,
     made: Vec<PathBuf>,
     /// Held against other runs.
-    lock: Option<fs::File>,
+    held: Option<Held>,
 }
 
 impl Place {
@@ -65,7 +66,7 @@ impl Place {
 
     fn made(dir: &Path) -> Result<Self> {
         let missing = missing(dir)?;
-        let mut place = Self { given: dir.to_path_buf(), target: PathBuf::new(), made: Vec::new(), lock: None };
+        let mut place = Self { given: dir.to_path_buf(), target: PathBuf::new(), made: Vec::new(), held: None };
         for folder in missing {
             fs::create_dir(&folder).map_err(|e| Error::io(&folder, &e))?;
             place.made.push(folder);
@@ -77,8 +78,11 @@ impl Place {
     fn locked(dir: &Path) -> Result<Self> {
         bring_back(dir);
         let mut place = Self::made(dir)?;
-        place.lock = lock(&place.target)?;
-        if place.lock.is_some() {
+        place.held = Held::at_once(&place.target).map_err(|Taken| {
+            let remedy = "wait until it is done, or choose another folder";
+            Error::input(place.target.display(), "another run is writing its results here", remedy)
+        })?;
+        if place.held.is_some() {
             journal::complete(&place.target)?;
             journal::sweep(&place.target);
             sweep_beside(&place.target);
@@ -150,7 +154,7 @@ impl Place {
             }
         }
         // Other runs may put other files here.
-        let lock = fs::File::open(target).inspect(|f| drop(f.lock()));
+        let held = Held::when_free(target);
         journal::complete(target)?;
         journal::sweep(target);
         let staging = Staging::Inside(journal::stage(target).map_err(|e| Error::io(target, &e))?);
@@ -158,7 +162,7 @@ impl Place {
             write_synced(&staging.path().join(name), bytes).map_err(|e| Error::io(&target.join(name), &e))?;
         }
         journal::commit(target, &files.iter().map(|(name, _)| name.clone()).collect(), &[])?;
-        drop(lock);
+        drop(held);
         Ok(())
     }
 
@@ -204,17 +208,4 @@ fn missing(dir: &Path) -> Result<Vec<PathBuf>> {
     let mut missing: Vec<PathBuf> = dir.ancestors().take_while(is_missing).map(Path::to_path_buf).collect();
     missing.reverse();
     Ok(missing)
-}
-
-/// Holds a folder against other runs; `None` where the file system knows no such thing.
-fn lock(folder: &Path) -> Result<Option<fs::File>> {
-    let Ok(file) = fs::File::open(folder) else { return Ok(None) };
-    match file.try_lock() {
-        Ok(()) => Ok(Some(file)),
-        Err(fs::TryLockError::Error(_)) => Ok(None),
-        Err(fs::TryLockError::WouldBlock) => {
-            let remedy = "wait until it is done, or choose another folder";
-            Err(Error::input(folder.display(), "another run is writing its results here", remedy))
-        }
-    }
 }

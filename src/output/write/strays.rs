@@ -5,6 +5,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::held::{Held, Taken};
 use super::journal;
 use super::tree::{self, RECORDS};
 use crate::error::Result;
@@ -18,9 +19,10 @@ pub fn recover(file: &Path) -> Result<()> {
     let Some(folder) = file.parent() else { return Ok(()) };
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     bring_back(folder);
-    // Whoever holds the folder is at work in it.
-    let free = fs::File::open(folder).is_ok_and(|f| !matches!(f.try_lock(), Err(fs::TryLockError::WouldBlock)));
-    if free { journal::complete(folder) } else { Ok(()) }
+    match Held::at_once(folder) {
+        Ok(_held) => journal::complete(folder),
+        Err(Taken) => Ok(()),
+    }
 }
 
 /// Kinds of folders beside a target: not finished yet, and finished.

@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::held::Held;
 use super::strays::{self, sweep};
 use super::tree;
 
@@ -18,7 +19,7 @@ pub(super) fn swap(target: &Path, part: &Path, foreign: &[PathBuf]) -> io::Resul
     }
     // The folder that is the target in a moment, and its earlier files as long as they are here.
     let own = tree::earlier_files(target).unwrap_or_default();
-    let lock = fs::File::open(part).inspect(|f| drop(f.try_lock()));
+    let held = Held::at_once(part);
     fs::rename(part, &new)?;
     if let Err(error) = exchange(&new, target) {
         let _ = fs::rename(&new, part);
@@ -30,7 +31,7 @@ pub(super) fn swap(target: &Path, part: &Path, foreign: &[PathBuf]) -> io::Resul
     if let Err(error) = sweep(&new, target, &own) {
         tracing::debug!("{}: {error}; left for the next run", new.display());
     }
-    drop(lock);
+    drop(held);
     Ok(())
 }
 
