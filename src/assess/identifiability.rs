@@ -22,6 +22,9 @@ const MOST_PAIRS: usize = 60;
 /// Part of a direction, beside its largest, below which a parameter is not named.
 const LEAST_PART: f64 = 0.1;
 
+/// Relative difference of two lengths that rounding may make.
+const AS_LONG: f64 = 1e-6;
+
 /// Part of a direction outside the structural ones from which it counts as one of its own.
 const OUTSIDE: f64 = 0.5;
 
@@ -213,41 +216,30 @@ fn beyond(never: &Structural, silent: &DMatrix<f64>) -> DMatrix<f64> {
     vectors.select_columns(&kept)
 }
 
-/// The same span with few parameters in every direction: each has a pivot that the others do not have.
+/// The same span with few parameters in every direction: each has a pivot that the others do not have. Pivots are those of Cholesky's
+/// factorisation of the projector onto the span, in the order of the parameters: they do not hang on the basis that is given.
 fn sparse(basis: &DMatrix<f64>) -> Vec<DVector<f64>> {
-    let mut b = basis.clone();
-    let mut taken: Vec<usize> = Vec::new();
-    for done in 0..b.ncols() {
-        let mut best = (0, done, 0.0);
-        for c in done..b.ncols() {
-            for r in (0..b.nrows()).filter(|r| !taken.contains(r)) {
-                if b[(r, c)].abs() > f64::abs(best.2) {
-                    best = (r, c, b[(r, c)]);
-                }
-            }
-        }
-        let (row, column, value) = best;
-        if value == 0.0 {
-            break;
-        }
-        b.swap_columns(done, column);
-        let pivot = b.column(done) / value;
-        b.set_column(done, &pivot);
-        for c in (0..b.ncols()).filter(|c| *c != done) {
-            let factor = b[(row, c)];
-            let cleared = b.column(c) - &pivot * factor;
-            b.set_column(c, &cleared);
-        }
-        taken.push(row);
+    let mut pivots = Vec::new();
+    let mut left = basis.clone();
+    for _ in 0..basis.ncols() {
+        let lengths: Vec<f64> = left.row_iter().map(|r| r.norm_squared()).collect();
+        let largest = lengths.iter().fold(0.0, |m: f64, &l| m.max(l));
+        let Some(row) = lengths.iter().position(|&l| l > (1.0 - AS_LONG) * largest) else { break };
+        let along = left.row(row).transpose() / lengths[row].sqrt();
+        left -= &left * &along * along.transpose();
+        pivots.push(row);
     }
-    b.column_iter().map(|c| c.into_owned()).collect()
+    pivots.sort_unstable();
+    let Some(inverse) = basis.select_rows(&pivots).try_inverse() else { return Vec::new() };
+    (basis * inverse).column_iter().map(|c| c.into_owned()).collect()
 }
 
 fn named(v: &DVector<f64>, names: &[String]) -> Vec<(String, f64)> {
     let largest = v.amax();
     let mut parts: Vec<(usize, f64)> =
         v.iter().copied().enumerate().filter(|(_, x)| x.abs() >= LEAST_PART * largest).collect();
-    parts.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()).then(a.0.cmp(&b.0)));
+    let size = |x: f64| (x.abs() / (AS_LONG * largest)).round();
+    parts.sort_by(|a, b| size(b.1).total_cmp(&size(a.1)).then(a.0.cmp(&b.0)));
     parts.into_iter().map(|(k, x)| (names[k].clone(), x)).collect()
 }
 
