@@ -5,7 +5,7 @@ mod recording_support;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use recording_support::annotations;
+use recording_support::{annotations, undefined};
 use robotcal::geom::Pose;
 use robotcal::series::{
     CameraInfo, Edge, FramePoses, ImageMarks, ImageObservations, MarkKind, MarkLayer, Observation, RecordingOptions,
@@ -201,7 +201,11 @@ fn a_folder_written_as_a_recording_reads_back_the_same() {
         *counts.entry(message.channel.topic.clone()).or_insert(0) += 1;
         // One channel of another kind, and readers of ROS refuse the whole recording.
         assert_eq!(message.channel.message_encoding, "cdr");
-        assert_eq!(message.channel.schema.as_ref().map(|s| s.encoding.as_str()), Some("ros2msg"));
+        let schema = message.channel.schema.as_ref().unwrap();
+        assert_eq!(schema.encoding, "ros2msg");
+        let definition = std::str::from_utf8(&schema.data).unwrap();
+        assert!(definition.lines().count() > 5, "{}", schema.name);
+        assert_eq!(undefined(definition), [""; 0], "{}", schema.name);
         if message.channel.topic == "/camera/annotations" {
             let layers = annotations(&message.data);
             assert_eq!(layers[0].1[0], [3.5, 4.75]);

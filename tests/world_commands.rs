@@ -208,3 +208,43 @@ fn a_board_that_is_not_there_takes_two_lines() {
     assert_eq!(output.status.code(), Some(2), "{}", text(&output));
     assert_eq!(String::from_utf8_lossy(&output.stderr).lines().count(), 2, "{}", text(&output));
 }
+
+/// A path may hold bytes that are no text; a name may not, and is refused before anything is read or made.
+#[cfg(unix)]
+#[test]
+fn bytes_that_are_no_text_are_taken_in_paths_and_refused_in_names_at_once() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let [made, none] = [&b"plate\xff"[..], b"none"].map(|name| folder.path().join(OsStr::from_bytes(name)));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_robotcal"));
+    assert_eq!(command.arg("plate").arg("--out").arg(&made).output().unwrap().status.code(), Some(0));
+    assert!(made.join("plate.toml").is_file());
+
+    let shipped = |path: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    let start = std::time::Instant::now();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_robotcal"));
+    command.arg("identify").arg("--urdf").arg(shipped("robots/kuka_kr6_r900/kuka_kr6_r900.urdf"));
+    command.arg("--series").arg(shipped("datasets/kr6_small")).arg("--out").arg(&none);
+    command.arg("--fix").arg(OsStr::from_bytes(b"joint_1\xff.offset"));
+    assert_eq!(command.output().unwrap().status.code(), Some(2));
+    // Reading the 24 images takes longer, and a solve much longer.
+    assert!(start.elapsed().as_secs_f64() < 1.0 && !none.exists(), "{:?}", start.elapsed());
+}
+
+/// The place of a recording is tried before the series is read: a series that does not exist is not even missed.
+#[test]
+fn a_recording_that_cannot_be_written_is_refused_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    std::fs::write(at("file"), "mine").unwrap();
+    std::fs::write(at("old.mcap"), "mine").unwrap();
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    for (to, named) in [("file/run.mcap", "file"), ("old.mcap", "old.mcap")] {
+        let output = robotcal(&["convert", &at("missing_series"), &at(to), "--urdf", urdf.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(text(&output).contains(&at(named)) && !text(&output).contains("missing_series"), "{}", text(&output));
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+    assert_eq!(std::fs::read(at("old.mcap")).unwrap(), b"mine");
+}

@@ -1,6 +1,6 @@
 //! `robotcal convert`: a recording becomes a series folder, a series folder becomes a recording.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -12,8 +12,8 @@ use super::show::read_solution;
 use crate::error::{Error, Result};
 use crate::files::picture_size;
 use crate::model::robot::Robot;
-use crate::output::NewFolder;
 use crate::output::recording::{MAGNIFIED, overlay};
+use crate::output::{NewFolder, Place};
 use crate::series::{self, CameraInfo, Extracted, FramePoses, ImageMarks, Series, Shown, Source, convert_recording};
 use crate::urdf::Chain;
 
@@ -64,6 +64,9 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Verdict> {
 
 /// A series folder as a recording, with the nominal tip and the observations where there are any.
 fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<()> {
+    series::require_new(&args.to)?;
+    let folder = args.to.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let _tried = Place::among(folder)?;
     let Some(chain) = chain else {
         let what = "the joints of a series mean nothing without their robot";
         return Err(Error::input(args.from.display(), what, "add --urdf robot.urdf (and --base, --tip if needed)"));

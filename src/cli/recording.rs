@@ -20,6 +20,9 @@ pub(super) struct RecordingArgs {
     /// Recordings: whose time counts, that of the message's stamp or that of its recording
     #[arg(long, value_enum, default_value_t = ClockName::Stamp)]
     clock: ClockName,
+    /// Recordings: how long before its time an image was taken [default: as motion in the images tells, where it does]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    image_delay: Option<f64>,
     /// Recordings: what stands for a standstill, its sharpest image or the average of its images
     #[arg(long, value_enum, default_value_t = PickingName::Sharpest)]
     picture: PickingName,
@@ -27,6 +30,9 @@ pub(super) struct RecordingArgs {
     #[arg(long, value_name = "SECONDS")]
     in_motion: Option<f64>,
 }
+
+/// Longest delay that is accepted, s.
+const LONGEST_DELAY_S: f64 = 60.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ClockName {
@@ -50,11 +56,16 @@ impl RecordingArgs {
                 return Err(Error::input("--in-motion", format!("{s} is no time"), "give seconds, for example 0.5"));
             }
         };
+        if let Some(delay_s) = self.image_delay.filter(|s| s.abs() > LONGEST_DELAY_S || s.is_nan()) {
+            let what = format!("{delay_s} is no delay of images");
+            return Err(Error::input("--image-delay", what, "give seconds, for example 0.25"));
+        }
         Ok(RecordingOptions {
             joints: joints.to_vec(),
             joint_topic: self.joint_topic.clone(),
             image_topic: self.image_topic.clone(),
             clock: if self.clock == ClockName::Log { Clock::Log } else { Clock::Stamp },
+            image_delay_s: self.image_delay,
             motion,
             picking: if self.picture == PickingName::Average { Picking::Average } else { Picking::Sharpest },
             ..RecordingOptions::default()

@@ -22,8 +22,8 @@ pub use manifest::{
     AngleUnit, CameraMount, CameraSection, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder,
 };
 pub use mcap::{
-    CameraInfo, Clock, Extracted, FramePoses, ImageMarks, MarkKind, MarkLayer, Motion, Picking, RecordingOptions,
-    Shown, StopReport, extract, write_recording,
+    CameraInfo, Clock, Delay, Extracted, FramePoses, ImageMarks, MarkKind, MarkLayer, Motion, Picking,
+    RecordingOptions, Shown, StopReport, extract, require_new, write_recording,
 };
 pub use observation::{Edge, ImageObservations, Observation};
 pub use observation_file::{observations_csv, parse_observations};

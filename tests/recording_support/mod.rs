@@ -26,3 +26,13 @@ pub fn annotations(message: &[u8]) -> Vec<(u8, Vec<[f64; 2]>)> {
     assert_eq!(at, body.len());
     layers
 }
+
+/// Types of the fields of a message definition, with its parts, that are neither basic nor defined in it.
+#[allow(dead_code)]
+pub fn undefined(definition: &str) -> Vec<String> {
+    const BASIC: [&str; 8] = ["bool", "uint8", "int32", "uint32", "uint64", "float32", "float64", "string"];
+    let defined: Vec<&str> = definition.lines().filter_map(|l| l.strip_prefix("MSG: ")).collect();
+    let fields = definition.lines().filter(|l| !l.is_empty() && !l.starts_with("MSG: ") && !l.starts_with('='));
+    let types = fields.map(|l| l.split([' ', '[']).next().unwrap());
+    types.filter(|t| !BASIC.contains(t) && !defined.contains(t)).map(String::from).collect()
+}

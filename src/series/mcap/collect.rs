@@ -1,7 +1,6 @@
 //! Second pass: the pictures of the stops as they pass by, in bounded memory, and the joints at their stamps.
 
 use std::collections::BTreeMap;
-use std::io::Cursor;
 use std::ops::Range;
 use std::path::Path;
 
@@ -11,72 +10,19 @@ use rayon::prelude::*;
 use super::cdr::Decoded;
 use super::extract::{Group, StopReport};
 use super::file::Message;
-use super::messages::{self, RawImage};
+use super::frame::Frame;
+use super::messages;
 use super::motion::{Interpolated, Posture, interpolate};
 use super::options::{Picking, RecordingOptions};
 use super::pixels::{self, Mean};
 use super::scan::time_ns;
-use crate::files::{decode_picture, decoded_bytes};
 use crate::series::{DEFAULT_PLACEMENT, Stop};
 use crate::{Error, Result};
 
 /// Memory of messages that wait for others of their stop, bytes.
 const MOST_HELD: usize = 256 << 20;
-/// A picture with its grey values of 16 bits takes up to three times its own memory.
-const GREY_WORDS: u64 = 3;
 /// Memory of pictures that are decoded at one time, bytes.
 const MOST_IN_FLIGHT: u64 = 256 << 20;
-
-/// A picture as the recording has it.
-enum Frame {
-    Raw(RawImage),
-    Compressed(Vec<u8>),
-}
-
-impl Frame {
-    fn read(message: &Message<'_>) -> Decoded<Self> {
-        match message.schema {
-            messages::COMPRESSED_IMAGE => messages::compressed_image(message.data).map(Self::Compressed),
-            _ => RawImage::read(message.data).map(Self::Raw),
-        }
-    }
-
-    fn decode(&self) -> Decoded<DynamicImage> {
-        match self {
-            Self::Raw(raw) => pixels::to_image(raw),
-            Self::Compressed(bytes) => {
-                decode_picture(Cursor::new(bytes)).map_err(|e| format!("is no picture that can be read ({e})"))
-            }
-        }
-    }
-
-    /// Memory of the message, bytes.
-    fn bytes(&self) -> usize {
-        match self {
-            Self::Raw(raw) => raw.data.len(),
-            Self::Compressed(bytes) => bytes.len(),
-        }
-    }
-
-    /// Memory that decoding takes, bytes, as its header says.
-    fn decoded_bytes(&self) -> u64 {
-        match self {
-            // A mosaic becomes three colours.
-            Self::Raw(raw) => GREY_WORDS * 3 * raw.data.len() as u64,
-            Self::Compressed(bytes) => GREY_WORDS * decoded_bytes(Cursor::new(bytes)).unwrap_or(0),
-        }
-    }
-
-    /// Bytes that can be written as they are, with the extension of their format.
-    fn file(&self) -> Option<(&[u8], &'static str)> {
-        let Self::Compressed(bytes) = self else { return None };
-        match image::guess_format(bytes) {
-            Ok(ImageFormat::Jpeg) => Some((bytes, "jpg")),
-            Ok(ImageFormat::Png) => Some((bytes, "png")),
-            _ => None,
-        }
-    }
-}
 
 /// Pictures of one stop that have come so far.
 #[derive(Default)]

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::collect::Collector;
+use super::delay::{self, Delay, Frames};
 use super::file::for_each;
 use super::messages::CameraInfo;
 use super::motion::{Posture, Standstill, interpolate, postures, standstills};
@@ -48,6 +49,8 @@ pub struct Extracted {
     pub image_topic: String,
     /// How much longer images take from stamp to recording than joint states (median), s.
     pub image_delay_s: f64,
+    /// How late the images are by what they show, where this is notable; it was taken off.
+    pub late: Option<Delay>,
     /// The camera as the recording describes it.
     pub camera_info: Option<CameraInfo>,
     /// What was seen while reading that the user should know.
@@ -67,8 +70,14 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     let (image_topic, mut times) = scan.image_topic(options)?;
     times.sort_unstable();
     times.dedup();
-    let postures = postures(&samples, &joints);
+    let mut postures = postures(&samples, &joints);
     require_overlap(&scan, &postures, &times)?;
+    let late = late(&scan, &image_topic, &postures, &times, options)?;
+    if let Some(delay_s) = options.image_delay_s.or(late.map(|d| d.delay_s)) {
+        // In the time of the images, the joints were there so much later.
+        postures.iter_mut().for_each(|p| p.time_ns += (delay_s * 1e9).round() as i64);
+    }
+    scan.notices.extend(late.map(|d| d.notice(recording)));
     let groups = groups(&mut scan, &postures, &times, options)?;
     std::fs::create_dir_all(images).map_err(|e| Error::io(images, &e))?;
     let mut collector = Collector::new(groups, images, options, &postures);
@@ -101,12 +110,37 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         stops: Stops { joints, stops },
         reports,
         image_delay_s,
+        late,
         camera_info: scan.camera_info(&image_topic).cloned(),
         joint_topic,
         image_topic,
         notices,
         inputs: scan.inputs,
     })
+}
+
+/// The delay of the images by what they show, unless it is given.
+fn late(
+    scan: &Scan,
+    topic: &str,
+    postures: &[Posture],
+    times: &[i64],
+    options: &RecordingOptions,
+) -> Result<Option<Delay>> {
+    if options.image_delay_s.is_some() {
+        return Ok(None);
+    }
+    let still = standstills(postures, options.still_speed, (options.least_still_s * 1e9) as i64);
+    let Some(mut frames) = Frames::about_motions(times, &still) else { return Ok(None) };
+    for file in &scan.files {
+        for_each(file, |message| {
+            if message.topic == topic {
+                frames.take(&message, options.clock);
+            }
+            Ok(())
+        })?;
+    }
+    Ok(delay::measured(&frames.pairs(), postures))
 }
 
 fn require_overlap(scan: &Scan, postures: &[Posture], times: &[i64]) -> Result<()> {

@@ -1,13 +1,16 @@
 //! Recordings of rosbag2, in MCAP or sqlite: joint states and images become stops of a series.
 //!
 //! The robot moves, stands, moves: standstills are found from the joints, and one picture is taken of each. Two passes
-//! over the file, in constant memory: the first reads joints and stamps, the second the pictures that were chosen.
+//! over the file, in constant memory: the first reads joints and stamps, the second the pictures that were chosen. Between them,
+//! pictures about motions tell how late they are.
 //! Nothing of ROS is needed.
 
 mod cdr;
 mod collect;
+mod delay;
 mod extract;
 mod file;
+mod frame;
 mod interfaces;
 mod messages;
 mod motion;
@@ -18,8 +21,9 @@ mod scan;
 mod sqlite;
 mod write;
 
+pub use delay::Delay;
 pub use extract::{Extracted, StopReport, extract};
 pub(super) use file::require_recording;
 pub use messages::CameraInfo;
 pub use options::{Clock, Motion, Picking, RecordingOptions};
-pub use write::{FramePoses, ImageMarks, MarkKind, MarkLayer, Shown, write_recording};
+pub use write::{FramePoses, ImageMarks, MarkKind, MarkLayer, Shown, require_new, write_recording};

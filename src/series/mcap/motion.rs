@@ -105,8 +105,32 @@ pub(super) struct Interpolated {
     pub nearest_ns: i64,
 }
 
+/// How far the joint that moved most moved between two times, rad or m; `None` where a time has no posture.
+pub(super) fn moved(postures: &[Posture], from_ns: i64, to_ns: i64) -> Option<f64> {
+    let (from, to) = (between(postures, from_ns)?, between(postures, to_ns)?);
+    let at = |(before, after, share): (usize, usize, f64), joint: usize| {
+        let (a, b) = (postures[before].positions[joint], postures[after].positions[joint]);
+        a + share * (b - a)
+    };
+    let joints = 0..postures[from.0].positions.len();
+    Some(joints.map(|joint| (at(to, joint) - at(from, joint)).abs()).fold(0.0, f64::max))
+}
+
 /// Linear interpolation between the samples around a time; `None` before the first, after the last, or in a gap.
 pub(super) fn interpolate(postures: &[Posture], time_ns: i64) -> Option<Interpolated> {
+    let (previous, next, share) = between(postures, time_ns)?;
+    let (before, after) = (&postures[previous], &postures[next]);
+    let positions = before.positions.iter().zip(&after.positions).map(|(a, b)| a + share * (b - a)).collect();
+    let nearest = if share > 0.5 { next } else { previous };
+    Some(Interpolated {
+        positions,
+        speed: speed(postures, nearest),
+        nearest_ns: (time_ns - postures[nearest].time_ns).abs(),
+    })
+}
+
+/// The samples before and after a time, and where it stands between them, 0 to 1.
+fn between(postures: &[Posture], time_ns: i64) -> Option<(usize, usize, f64)> {
     let next = postures.partition_point(|p| p.time_ns < time_ns);
     let after = postures.get(next)?;
     let previous = if after.time_ns == time_ns { next } else { next.checked_sub(1)? };
@@ -115,14 +139,7 @@ pub(super) fn interpolate(postures: &[Posture], time_ns: i64) -> Option<Interpol
     if span > LONGEST_GAP_NS {
         return None;
     }
-    let share = if span == 0 { 0.0 } else { (time_ns - before.time_ns) as f64 / span as f64 };
-    let positions = before.positions.iter().zip(&after.positions).map(|(a, b)| a + share * (b - a)).collect();
-    let nearest = if share > 0.5 { next } else { previous };
-    Some(Interpolated {
-        positions,
-        speed: speed(postures, nearest),
-        nearest_ns: (time_ns - postures[nearest].time_ns).abs(),
-    })
+    Some((previous, next, if span == 0 { 0.0 } else { (time_ns - before.time_ns) as f64 / span as f64 }))
 }
 
 #[cfg(test)]

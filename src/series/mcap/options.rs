@@ -47,6 +47,8 @@ pub struct RecordingOptions {
     pub image_topic: Option<String>,
     /// Which time counts.
     pub clock: Clock,
+    /// How long before its time an image was taken, s; measured from the motion in the images where it is not given.
+    pub image_delay_s: Option<f64>,
     /// Whether images in motion are taken.
     pub motion: Motion,
     /// Sharpest image or average.
@@ -64,6 +66,7 @@ impl Default for RecordingOptions {
             joint_topic: None,
             image_topic: None,
             clock: Clock::Stamp,
+            image_delay_s: None,
             motion: Motion::Refuse,
             picking: Picking::Sharpest,
             // Encoder noise of 0.1 mrad over the window of 0.1 s is 1 mrad/s; slow moves are above 10 mrad/s.

@@ -102,9 +102,7 @@ impl From<&ImageObservations> for ImageMarks {
 /// # Errors
 /// A file that exists already or cannot be written, an image that cannot be read.
 pub fn write_recording(path: &Path, series: &Series, shown: Shown<'_>) -> Result<Vec<Notice>> {
-    if path.exists() {
-        return Err(Error::input(path.display(), "exists already", "name a new file, or remove this one"));
-    }
+    require_new(path)?;
     let unfinished = unfinished(path);
     let done = write_stops(&unfinished, series, shown);
     match &done {
@@ -113,6 +111,17 @@ pub fn write_recording(path: &Path, series: &Series, shown: Shown<'_>) -> Result
         Err(_) => drop(std::fs::remove_file(&unfinished)),
     }
     done
+}
+
+/// Refuses a recording that would replace something.
+///
+/// # Errors
+/// As the name says.
+pub fn require_new(path: &Path) -> Result<()> {
+    match path.symlink_metadata() {
+        Ok(_) => Err(Error::input(path.display(), "exists already", "name a new file, or remove this one")),
+        Err(_) => Ok(()),
+    }
 }
 
 fn unfinished(path: &Path) -> PathBuf {
