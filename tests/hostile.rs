@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use image::{DynamicImage, GrayImage};
 use rand::{RngExt, SeedableRng};
-use robotcal::series::{RecordingOptions, extract, read, read_plate};
+use robotcal::series::{Plate, PlateKind, RecordingOptions, extract, read, read_plate};
 use robotcal::{detect, urdf};
 use tempfile::TempDir;
 
@@ -275,4 +275,25 @@ fn mutate(rounds: usize) {
         }
         println!("{name}: {runs} runs in {:.1} s", start.elapsed().as_secs_f64());
     }
+}
+
+/// Pictures that together would not fit into a gigabyte take turns, whatever the number of threads; their headers tell.
+#[test]
+fn large_pictures_of_a_folder_are_looked_at_one_by_one() {
+    use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
+    let folder = tempfile::tempdir().unwrap();
+    let images: Vec<PathBuf> = (0..6).map(|k| folder.path().join(format!("{k}.pgm"))).collect();
+    images.iter().for_each(|path| fs::write(path, "P5 13700 13700 255\n").unwrap());
+    let plate = Plate::lattice(PlateKind::CodedCircles, 5, 4, 0.01, 1e-4);
+    let (now, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let picture = |path: &Path| {
+        most.fetch_max(now.fetch_add(1, SeqCst) + 1, SeqCst);
+        std::thread::sleep(Duration::from_millis(30));
+        now.fetch_sub(1, SeqCst);
+        Err(robotcal::Error::input(path.display(), "is not there", "nothing"))
+    };
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(4).build().unwrap();
+    let found = threads.install(|| detect::detect_series(&images, &plate, picture, |_| ()));
+    assert_eq!((found.len(), most.into_inner()), (6, 1));
+    assert!(found.iter().all(|image| image.detection.failure.is_some()));
 }

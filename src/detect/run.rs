@@ -7,7 +7,13 @@ use rayon::prelude::*;
 
 use super::{Detection, Picture, examine};
 use crate::error::{Error, Result};
+use crate::files::{batches, picture_size};
 use crate::series::Plate;
+
+/// Of a picture of three colours and its grey values.
+const BYTES_PER_PX: u64 = 7;
+/// Memory of pictures that are looked at together, bytes.
+const MOST_IN_FLIGHT: u64 = 1 << 30;
 
 /// One image of a series with what was found in it.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -29,27 +35,30 @@ impl SeriesImage {
 ///
 /// Results stand in the order of `images`, whatever the number of threads; an image that cannot be read or shows no
 /// plate is a failure in its own place only, and so is one whose size differs from that of most. Each thread holds one image at a
-/// time, which `picture` reads; `progress` is called after every image, from any thread.
+/// time, which `picture` reads, and all of them together a gigabyte or one image; `progress` is called after every image, from any thread.
 pub fn detect_series(
     images: &[PathBuf],
     plate: &Plate,
     picture: impl Fn(&Path) -> Result<Picture> + Sync,
     progress: impl Fn(&Path) + Sync,
 ) -> Vec<SeriesImage> {
-    let mut found: Vec<SeriesImage> = images
-        .par_iter()
-        .map(|path| {
-            let mut image = match picture(path) {
-                Err(error) => SeriesImage::failed(error),
-                Ok(picture) => {
-                    SeriesImage { size: Some((picture.width, picture.height)), detection: examine(&picture, plate) }
-                }
-            };
-            progress(path);
-            name_image(&mut image.detection, path);
-            image
-        })
-        .collect();
+    let one = |path: &PathBuf| {
+        let mut image = match picture(path) {
+            Err(error) => SeriesImage::failed(error),
+            Ok(picture) => {
+                SeriesImage { size: Some((picture.width, picture.height)), detection: examine(&picture, plate) }
+            }
+        };
+        progress(path);
+        name_image(&mut image.detection, path);
+        image
+    };
+    let bytes = |path: &PathBuf| picture_size(path).map_or(0, |(w, h)| BYTES_PER_PX * u64::from(w) * u64::from(h));
+    let sizes: Vec<u64> = images.iter().map(bytes).collect();
+    let mut found: Vec<SeriesImage> = Vec::with_capacity(images.len());
+    for batch in batches(&sizes, MOST_IN_FLIGHT) {
+        found.par_extend(images[batch].par_iter().map(one));
+    }
     refuse_odd_sizes(images, &mut found);
     found
 }

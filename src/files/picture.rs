@@ -1,6 +1,7 @@
 //! Pictures of the formats that are read, in bounded memory.
 
 use std::io::{BufRead, BufReader, Seek};
+use std::ops::Range;
 use std::path::Path;
 
 use image::error::{ImageFormatHint, LimitError, LimitErrorKind, UnsupportedError, UnsupportedErrorKind};
@@ -44,6 +45,25 @@ pub fn decode_picture(source: impl BufRead + Seek) -> ImageResult<DynamicImage> 
 /// Other formats, a header that cannot be read.
 pub fn decoded_bytes(source: impl BufRead + Seek) -> ImageResult<u64> {
     decoder(source).map(|d| d.total_bytes())
+}
+
+/// Pictures that are decoded at a time: as many as `most` bytes allow, in their order, at least one.
+pub fn batches(sizes: &[u64], most: u64) -> Vec<Range<usize>> {
+    let mut batches: Vec<Range<usize>> = Vec::new();
+    let mut in_flight = 0_u64;
+    for (k, bytes) in sizes.iter().enumerate() {
+        match batches.last_mut() {
+            Some(batch) if in_flight.saturating_add(*bytes) <= most => {
+                batch.end = k + 1;
+                in_flight += bytes;
+            }
+            _ => {
+                batches.push(k..k + 1);
+                in_flight = *bytes;
+            }
+        }
+    }
+    batches
 }
 
 /// Width and height of an image file, px, from its header alone.

@@ -1,7 +1,6 @@
 //! Second pass: the pictures of the stops as they pass by, in bounded memory, and the joints at their stamps.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::path::Path;
 
 use image::{DynamicImage, ImageFormat};
@@ -16,6 +15,7 @@ use super::motion::{Interpolated, Posture, interpolate};
 use super::options::{Picking, RecordingOptions};
 use super::pixels::{self, Mean};
 use super::scan::time_ns;
+use crate::files::batches;
 use crate::series::{DEFAULT_PLACEMENT, Stop};
 use crate::{Error, Result};
 
@@ -111,7 +111,8 @@ impl<'a> Collector<'a> {
         self.held -= frames.iter().map(|(_, frame)| frame.bytes()).sum::<usize>();
         let mut mean = Mean::default();
         let mut seen: Vec<(usize, f64)> = Vec::new();
-        for batch in batches(&frames) {
+        let sizes: Vec<u64> = frames.iter().map(|(_, frame)| frame.decoded_bytes()).collect();
+        for batch in batches(&sizes, MOST_IN_FLIGHT) {
             let decoded: Vec<Decoded<(DynamicImage, f64)>> = (frames[batch.clone()].par_iter())
                 .map(|(_, frame)| frame.decode().map(|p| (pixels::sharpness(&p), p)).map(|(s, p)| (p, s)))
                 .collect();
@@ -186,26 +187,6 @@ impl<'a> Collector<'a> {
         std::fs::write(&path, bytes).map_err(|e| Error::io(&path, &e))?;
         Ok(name)
     }
-}
-
-/// Frames that are decoded at a time: as many as the memory in flight allows, at least one.
-fn batches(frames: &[(i64, Frame)]) -> Vec<Range<usize>> {
-    let mut batches: Vec<Range<usize>> = Vec::new();
-    let mut in_flight = 0;
-    for (k, (_, frame)) in frames.iter().enumerate() {
-        let bytes = frame.decoded_bytes();
-        match batches.last_mut() {
-            Some(batch) if in_flight + bytes <= MOST_IN_FLIGHT => {
-                batch.end = k + 1;
-                in_flight += bytes;
-            }
-            _ => {
-                batches.push(k..k + 1);
-                in_flight = bytes;
-            }
-        }
-    }
-    batches
 }
 
 /// Joints at the mean of some times; the largest speed and distance among them.
