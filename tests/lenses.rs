@@ -1,4 +1,4 @@
-//! Lenses: simulated ones are recovered, `--camera auto` tells them apart, and what ROS cannot say is said with its loss.
+//! Lenses: simulated ones are recovered, the evidence tells them apart, and what ROS cannot say is said with its loss.
 
 #![allow(clippy::unwrap_used)]
 
@@ -89,9 +89,8 @@ fn rays_and_projections_undo_each_other_through_every_lens() {
 /// The camera of a world as the joint fit finds it.
 fn found(made: &SimulatedSeries, lens: Lens, open: bool) -> Solution {
     let mut seen = vec![measured(made, &chain())];
-    seen[0].lens = lens;
-    let open_lenses = if open { vec![seen[0].camera.clone()] } else { Vec::new() };
-    let options = Options { model: RobotModel::Rigid, open_lenses, ..Options::default() };
+    (seen[0].lens, seen[0].lens_is_open) = (lens, open);
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
     identify(chain(), &seen, &options).unwrap()
 }
 

@@ -99,7 +99,6 @@ impl ChoiceArgs {
                 fix: joined(&config.fix, &self.fix),
                 prior: config.prior,
             },
-            open_lenses: defaults.open_lenses,
             estimator: defaults.estimator,
             payload: config.payload,
         })

@@ -11,7 +11,6 @@ use super::say::{say, say_line};
 use super::show::read_solution;
 use super::{Verdict, progress, summary};
 use crate::error::{Error, Notice, Result};
-use crate::model::camera::Lens;
 use crate::output::solution_json::{self, FILE_NAME};
 use crate::output::{self, Context, Offsets, Place, Poses, folder_name, recover, restore};
 use crate::recipe::{self, Estimator, MeasuredSeries, Options};
@@ -42,7 +41,7 @@ pub(super) struct IdentifyArgs {
     /// Tip link that carries camera or plate (overrides series.toml)
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
-    /// Lens: auto (the simplest that none beats decisively by the evidence of the joint fit), brown, fisheye, parallax, rational, thin_prism, brown+field or fisheye+field [default: as in series.toml, else brown]
+    /// Lens: auto (the simplest that none beats decisively by the evidence of the joint fit), brown, fisheye, parallax, rational, thin_prism, brown+field or fisheye+field [default: as in series.toml, else auto]
     #[arg(long, value_name = "LENS")]
     camera: Option<String>,
     /// Where joint offsets go
@@ -174,17 +173,14 @@ fn again(args: &IdentifyArgs, path: &Path) -> Result<Task> {
 
 fn solve(args: &IdentifyArgs, options: &Options, task: Task, place: Place) -> Result<Verdict> {
     let Task { description, chain, mut measured, mut notices, inputs, .. } = task;
-    let mut open_lenses = Vec::new();
-    if let Some(name) = args.camera.as_deref() {
-        let lens = if name == "auto" { Lens::Brown } else { super::simulate::lens(name)? };
-        measured.iter_mut().for_each(|s| s.lens = lens);
-        if name == "auto" {
-            open_lenses.extend(measured.iter().map(|s| s.camera.clone()));
-            open_lenses.sort();
-            open_lenses.dedup();
+    match args.camera.as_deref() {
+        Some("auto") => measured.iter_mut().for_each(|s| s.lens_is_open = true),
+        Some(name) => {
+            let lens = super::simulate::lens(name)?;
+            measured.iter_mut().for_each(|s| (s.lens, s.lens_is_open) = (lens, false));
         }
+        None => {}
     }
-    let options = &Options { open_lenses, ..options.clone() };
     let mut solution = recipe::identify(chain, &measured, options)?;
     solution.two_stage = recipe::beside_two_stages(&solution);
     notices.append(&mut solution.notices);

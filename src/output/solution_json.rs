@@ -375,6 +375,9 @@ pub struct SeriesRecord {
     pub focal_px: Option<f64>,
     /// Lens model.
     pub lens: Lens,
+    /// True where the evidence decided on it.
+    #[serde(default)]
+    pub lens_is_open: bool,
     /// True where an observation of a circle is the centroid of its image, false for its imaged centre.
     pub centroid: bool,
     /// Index of its plate.

@@ -31,6 +31,8 @@ pub struct MeasuredSeries {
     pub focal_px: Option<f64>,
     /// Lens model.
     pub lens: Lens,
+    /// True where the evidence decides on the lens, see the formulation; the fit then begins with the simplest.
+    pub lens_is_open: bool,
     /// What an observation of a circle means: true for the centroid of its image, false for its imaged centre.
     pub centroid: bool,
     /// The plate.

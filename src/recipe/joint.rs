@@ -71,8 +71,6 @@ pub struct Options {
     pub harmonics: u8,
     /// Which parameters are estimated, and their priors.
     pub selection: Selection,
-    /// Cameras whose lens is chosen by evidence; that of the others is as their series say.
-    pub open_lenses: Vec<String>,
     /// How the robot is fitted: jointly, or in two stages.
     pub estimator: Estimator,
     /// What the tip carries; none where the chain says it or nobody does.
@@ -87,7 +85,6 @@ impl Default for Options {
             model: RobotModel::Auto,
             harmonics: HARMONICS,
             selection: Selection::default(),
-            open_lenses: Vec::new(),
             estimator: Estimator::default(),
             payload: None,
         }

@@ -1,5 +1,7 @@
 //! Which lens: that which the joint fit supports by evidence, as the robot model is; see the formulation.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 
 use super::build::{MeasuredSeries, build};
@@ -52,14 +54,11 @@ pub(super) fn with_lenses(
     options: &Options,
 ) -> Result<(Solution, Vec<MeasuredSeries>)> {
     let mut series = series.to_vec();
-    let open: &[String] = if options.selection.names_cameras() { &[] } else { &options.open_lenses };
-    let mut notices = Vec::new();
-    let mut solution = match identify_model(chain.clone(), &series, options) {
-        Err(error) if !open.is_empty() => {
-            notices = choose_lens(chain, &mut series, open).map_err(|_| error)?;
-            identify_model(chain.clone(), &series, options)?
-        }
-        other => other?,
+    let open = if options.selection.names_cameras() { Vec::new() } else { open_cameras(&series) };
+    series.iter_mut().filter(|s| open.contains(&s.camera)).for_each(|s| s.lens = Lens::ALL[0]);
+    let (mut solution, notices) = match identify_model(chain.clone(), &series, options) {
+        Ok(solution) => (solution, Vec::new()),
+        Err(error) => by_hold_out(chain, &mut series, &open, options).ok_or(error)?,
     };
     let lenses: Vec<LensEvidence> = open.iter().flat_map(|camera| compare_lenses(&solution, camera)).collect();
     let mut better = series.clone();
@@ -72,6 +71,27 @@ pub(super) fn with_lenses(
     }
     solution.notices.extend(notices);
     Ok((Solution { lenses, ..solution }, series))
+}
+
+/// Cameras none of whose series states a lens.
+fn open_cameras(series: &[MeasuredSeries]) -> Vec<String> {
+    let settled = |name: &String| series.iter().any(|s| s.camera == *name && !s.lens_is_open);
+    let names: BTreeSet<String> = series.iter().map(|s| s.camera.clone()).collect();
+    names.into_iter().filter(|name| !settled(name)).collect()
+}
+
+/// The solution with other lenses for the open cameras, where free poses speak for others.
+fn by_hold_out(
+    chain: &Chain,
+    series: &mut [MeasuredSeries],
+    open: &[String],
+    options: &Options,
+) -> Option<(Solution, Vec<Notice>)> {
+    let first: Vec<Lens> = series.iter().map(|s| s.lens).collect();
+    let notices = if open.is_empty() { return None } else { choose_lens(chain, series, open).ok()? };
+    let is_another = series.iter().zip(first).any(|(s, first)| s.lens != first);
+    let solution = if is_another { identify_model(chain.clone(), series, options).ok()? } else { return None };
+    Some((solution, notices))
 }
 
 /// Evidence of every lens formula for a camera, from the fit with its present one.

@@ -96,6 +96,7 @@ pub(super) fn measured_series(
         height_px,
         focal_px: series.manifest.camera.focal_px,
         lens,
+        lens_is_open: series.manifest.camera.model.is_none(),
         centroid,
         plate: series.plate.clone(),
         plate_name: plate_file.canonicalize().unwrap_or(plate_file).display().to_string(),
@@ -104,7 +105,7 @@ pub(super) fn measured_series(
     }
 }
 
-/// The lens model that a series states.
+/// The lens model that a series states, or with which the choice begins.
 pub(super) fn lens_of(series: &Series) -> Result<Lens> {
     let Some(name) = series.manifest.camera.model.as_deref() else { return Ok(Lens::Brown) };
     Lens::from_name(name).ok_or_else(|| {

@@ -48,7 +48,9 @@ pub use joint::{JointNoise, MarkerTolerance, Options, RobotModel};
 pub use lens_choice::{LensEvidence, choose_lens, depths_m};
 pub use look::{SeenImage, look, look_at, pictures, require_some};
 pub use measure::{Measured, measure};
-pub use monte_carlo::{BLOCKS, BlockResult, MonteCarloCell, MonteCarloRequest, monte_carlo};
+pub use monte_carlo::{
+    BLOCKS, BlockResult, ErrorWithCovariance, MonteCarloCell, MonteCarloRequest, flange_error, monte_carlo,
+};
 pub use places::{PlaceForecast, compare_places, place_words};
 pub use plan::{Budget, Choice, Plan, PlanRequest, Wish, choose, plan};
 pub use plan_study::{PlanStudy, PlanStudyRequest, PlanStudyRow, plan_study};

@@ -226,7 +226,8 @@ fn judged(s: &Solution, world: &SimulatedSeries, chain: &Chain) -> Result<Option
     }))
 }
 
-type ErrorWithCovariance = (DVector<f64>, DMatrix<f64>);
+/// An error and the covariance that is stated of it.
+pub type ErrorWithCovariance = (DVector<f64>, DMatrix<f64>);
 
 fn normalised((error, covariance): &ErrorWithCovariance) -> Option<Normalised> {
     let n = error.len() as f64;
@@ -316,9 +317,9 @@ fn free_pose_error(s: &Solution, world: &SimulatedSeries) -> Option<ErrorWithCov
     Some(pose_error(&free.camera_from_plate, &world.truth.stops[k].camera_from_plate.pose(), &free.covariance))
 }
 
-/// The flange in the plate frame at a joint vector that was not measured: the camera of the solution, as if it were exact, on
-/// the robot and plate of the solution against the same camera on the true ones.
-fn flange_error(s: &Solution, world: &SimulatedSeries, truth: &Robot) -> Option<ErrorWithCovariance> {
+/// The flange in the plate frame at the first joint vector that was kept aside: the camera of the solution, as if it were exact, on
+/// the robot and plate of the solution against the same camera on the true ones. Its error (m, rad) and the stated covariance.
+pub fn flange_error(s: &Solution, world: &SimulatedSeries, truth: &Robot) -> Option<ErrorWithCovariance> {
     let mut image = s.problem.images.iter().find(|i| i.stop.is_some())?.clone();
     let readings = &world.truth.held_out.first()?.readings;
     image.stop = Some(Stop::at(readings));

@@ -31,6 +31,7 @@ pub fn measured(series: &SimulatedSeries, chain: &Chain) -> MeasuredSeries {
         height_px: camera.height_px,
         focal_px: None,
         lens: camera.lens,
+        lens_is_open: false,
         centroid: true,
         plate: series.plate.clone(),
         plate_name: "plate".into(),
