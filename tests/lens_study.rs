@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use robotcal::linalg::SymmetricFactor;
 use robotcal::model::camera::Lens;
 use robotcal::plan::plate_design::{PlateRequest, design};
-use robotcal::recipe::{MeasuredSeries, Options, RobotModel, Solution, flange_error, identify, measured};
+use robotcal::recipe::{LensChoice, MeasuredSeries, Options, RobotModel, Solution, flange_error, identify, measured};
 use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::urdf::{Chain, read};
 
@@ -49,17 +49,18 @@ fn world(lens: Lens, images: usize, joint_noise_rad: f64, seed: u64) -> Simulate
 fn taken(made: &SimulatedSeries) -> Option<(Lens, f64, f64)> {
     let seen = measured(made, &chain());
     let options = Options { model: RobotModel::Full, ..Options::default() };
-    let by = |lens_is_open: bool| {
-        identify(chain(), &[MeasuredSeries { lens: Lens::Brown, lens_is_open, ..seen.clone() }], &options).ok()
+    let by = |lens_choice: LensChoice| {
+        identify(chain(), &[MeasuredSeries { lens: Lens::Brown, lens_choice, ..seen.clone() }], &options).ok()
     };
     let normalised = |s: &Solution| {
         let (error, covariance) = flange_error(s, made, &made.truth.robot(&chain()).unwrap())?;
         let factor = SymmetricFactor::new(&covariance).ok()?;
         Some(error.dot(&factor.solve(&error)) / 6.0)
     };
-    let open = by(true)?;
+    let open = by(LensChoice::All)?;
     let lens = open.state.cameras[0].lens;
-    let with_brown = if lens == Lens::Brown { normalised(&open)? } else { by(false).as_ref().and_then(normalised)? };
+    let with_brown =
+        if lens == Lens::Brown { normalised(&open)? } else { by(LensChoice::Settled).as_ref().and_then(normalised)? };
     Some((lens, normalised(&open)?, with_brown))
 }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use robotcal::model::camera::{Camera, Lens, fit_lens};
 use robotcal::plan::plate_design::{PlateRequest, design};
-use robotcal::recipe::{Options, RobotModel, Solution, choose_lens, depths_m, identify, measured};
+use robotcal::recipe::{LensChoice, Options, RobotModel, Solution, choose_lens, depths_m, identify, measured};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::urdf::{Chain, read};
 
@@ -87,9 +87,10 @@ fn rays_and_projections_undo_each_other_through_every_lens() {
 }
 
 /// The camera of a world as the joint fit finds it.
-fn found(made: &SimulatedSeries, lens: Lens, open: bool) -> Solution {
+fn found(made: &SimulatedSeries, lens: Lens, choice: LensChoice) -> Solution {
     let mut seen = vec![measured(made, &chain())];
-    (seen[0].lens, seen[0].lens_is_open) = (lens, open);
+    seen[0].lens = lens;
+    seen[0].lens_choice = choice;
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
     identify(chain(), &seen, &options).unwrap()
 }
@@ -97,7 +98,7 @@ fn found(made: &SimulatedSeries, lens: Lens, open: bool) -> Solution {
 #[test]
 fn the_joint_fit_tells_lenses_apart_and_states_what_ros_cannot_express() {
     for (lens, field_deg) in [(Lens::Brown, 60.0), (Lens::Fisheye, 100.0), (Lens::Parallax, 60.0)] {
-        let s = found(&world(lens, field_deg), Lens::Brown, true);
+        let s = found(&world(lens, field_deg), Lens::Brown, LensChoice::All);
         let taken: Vec<Lens> = s.lenses.iter().filter(|l| l.taken).map(|l| l.lens).collect();
         println!("{lens:?}: {:?}", s.lenses);
         assert_eq!((taken, s.state.cameras[0].lens), (vec![lens], lens));
@@ -108,12 +109,24 @@ fn the_joint_fit_tells_lenses_apart_and_states_what_ros_cannot_express() {
     }
 }
 
+/// Without a word of the user the evidence chooses among the lenses that camera.yaml can express.
+#[test]
+fn the_default_takes_a_lens_that_ros_can_express() {
+    for (lens, field_deg) in [(Lens::Brown, 60.0), (Lens::Fisheye, 100.0), (Lens::Parallax, 60.0)] {
+        let s = found(&world(lens, field_deg), Lens::Brown, LensChoice::Exported);
+        println!("{lens:?}: {:?}", s.lenses);
+        let taken = s.state.cameras[0].lens;
+        assert!(s.lenses.iter().all(|l| l.lens.is_in_ros()) && taken.is_in_ros(), "{taken:?}");
+        assert!(taken == lens || lens == Lens::Parallax, "{lens:?} taken for {taken:?}");
+    }
+}
+
 /// A prism says nearly what a shift of the principal point with a turn does; it must not take the principal point along.
 #[test]
 fn prism_and_principal_point_are_kept_apart() {
     let made = world(Lens::Brown, 60.0);
     let sigma = |lens: Lens| {
-        let s = found(&made, lens, false);
+        let s = found(&made, lens, LensChoice::Settled);
         let first = s.problem.layout.cameras[0].start;
         [2, 3].map(|k| s.covariance.sigma(first + k))
     };

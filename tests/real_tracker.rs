@@ -11,7 +11,7 @@ use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::Robot;
 use robotcal::problem::{Problem, State};
 use robotcal::recipe::{
-    Estimator, JointNoise, MeasuredSeries, Options, PoseStage, Solution, fit_poses, identify, measure,
+    Estimator, JointNoise, LensChoice, MeasuredSeries, Options, PoseStage, Solution, fit_poses, identify, measure,
 };
 use robotcal::solve::{ComponentOptions, estimate_components};
 
@@ -92,9 +92,9 @@ fn study_of_series_on_the_tracker() {
         };
         let all = measured(&if choices.len() > 1 { SERIES.to_vec() } else { choices[0].clone() });
         for chosen in choices {
-            for lens_is_open in [false, true] {
+            for lens_choice in [LensChoice::Settled, LensChoice::Exported, LensChoice::All] {
                 let taken: Vec<MeasuredSeries> = (all.iter().filter(|m| chosen.contains(&m.name.as_str())))
-                    .map(|m| MeasuredSeries { lens_is_open, ..m.clone() })
+                    .map(|m| MeasuredSeries { lens_choice, ..m.clone() })
                     .collect();
                 let start = std::time::Instant::now();
                 let s = identify(chain.clone(), &taken, &Options::default()).unwrap();
@@ -236,7 +236,7 @@ fn parts_of_the_noise_model_switched_off() {
         let points = tracker_points(&real.join(tracker));
         let measured = measure(&series, &chain, false, |_| {}).unwrap().series;
         for lens in [Lens::Brown, Lens::ThinPrism] {
-            let measured = [MeasuredSeries { lens, lens_is_open: false, ..measured.clone() }];
+            let measured = [MeasuredSeries { lens, lens_choice: LensChoice::Settled, ..measured.clone() }];
             let solution = match identify(chain.clone(), &measured, &Options::default()) {
                 Ok(solution) => solution,
                 Err(error) => {

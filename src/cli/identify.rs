@@ -13,7 +13,7 @@ use super::{Verdict, progress, summary};
 use crate::error::{Error, Notice, Result};
 use crate::output::solution_json::{self, FILE_NAME};
 use crate::output::{self, Context, Offsets, Place, Poses, folder_name, recover, restore};
-use crate::recipe::{self, Estimator, MeasuredSeries, Options};
+use crate::recipe::{self, Estimator, LensChoice, MeasuredSeries, Options};
 use crate::series::{self, InputFile, Series};
 use crate::urdf::{self, Chain, RobotDescription};
 
@@ -41,7 +41,7 @@ pub(super) struct IdentifyArgs {
     /// Tip link that carries camera or plate (overrides series.toml)
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
-    /// Lens: auto (the simplest that none beats decisively by the evidence of the joint fit), brown, fisheye, parallax, rational, thin_prism, brown+field or fisheye+field [default: as in series.toml, else auto]
+    /// Lens: auto (the simplest of all that none beats decisively by the evidence of the joint fit), brown, fisheye, parallax, rational, thin_prism, brown+field or fisheye+field [default: as in series.toml, else by evidence among those that camera.yaml can express]
     #[arg(long, value_name = "LENS")]
     camera: Option<String>,
     /// Where joint offsets go
@@ -174,10 +174,10 @@ fn again(args: &IdentifyArgs, path: &Path) -> Result<Task> {
 fn solve(args: &IdentifyArgs, options: &Options, task: Task, place: Place) -> Result<Verdict> {
     let Task { description, chain, mut measured, mut notices, inputs, .. } = task;
     match args.camera.as_deref() {
-        Some("auto") => measured.iter_mut().for_each(|s| s.lens_is_open = true),
+        Some("auto") => measured.iter_mut().for_each(|s| s.lens_choice = LensChoice::All),
         Some(name) => {
             let lens = super::simulate::lens(name)?;
-            measured.iter_mut().for_each(|s| (s.lens, s.lens_is_open) = (lens, false));
+            measured.iter_mut().for_each(|s| (s.lens, s.lens_choice) = (lens, LensChoice::Settled));
         }
         None => {}
     }

@@ -58,7 +58,7 @@ pub(super) fn camera_yaml(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> R
 
 /// The camera as ROS can say it, and what that loses, in words.
 fn in_ros(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<(Camera, String)> {
-    if matches!(camera.lens, Lens::Brown | Lens::Rational | Lens::Fisheye) {
+    if camera.lens.is_in_ros() {
         return Ok((camera.clone(), String::new()));
     }
     let lens = camera.lens.name();

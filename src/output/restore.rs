@@ -99,7 +99,7 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
             height_px: s.height_px,
             focal_px: s.focal_px,
             lens: s.lens,
-            lens_is_open: s.lens_is_open,
+            lens_choice: s.lens_choice,
             centroid: s.centroid,
             plate: plates.get(s.plate).ok_or_else(of_plate)?.clone(),
             plate_name: format!("{} {}", record.plates[s.plate].name, s.plate),

@@ -12,7 +12,7 @@ use crate::error::{Notice, Result, plain_name};
 use crate::geom::Pose;
 use crate::model::camera::Lens;
 use crate::problem::short_name;
-use crate::recipe::{Comparison, Estimator, Evidence, LensEvidence, StartVerdict};
+use crate::recipe::{Comparison, Estimator, Evidence, LensChoice, LensEvidence, StartVerdict};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
 use crate::solve::PlateScale;
 use crate::urdf::{JointKind, Payload};
@@ -375,9 +375,9 @@ pub struct SeriesRecord {
     pub focal_px: Option<f64>,
     /// Lens model.
     pub lens: Lens,
-    /// True where the evidence decided on it.
+    /// Whether the evidence decided on it.
     #[serde(default)]
-    pub lens_is_open: bool,
+    pub lens_choice: LensChoice,
     /// True where an observation of a circle is the centroid of its image, false for its imaged centre.
     pub centroid: bool,
     /// Index of its plate.

@@ -147,7 +147,7 @@ fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
         height_px: s.height_px,
         focal_px: s.focal_px,
         lens: s.lens,
-        lens_is_open: s.lens_is_open,
+        lens_choice: s.lens_choice,
         centroid: s.centroid,
         plate: plate(k),
         order_known: s.order_known,

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use super::lens_choice::LensChoice;
 use super::local_errors::{local_share, local_terms};
 use super::plate_size::hold_scale_bars;
 use crate::error::{Error, Result};
@@ -31,8 +32,8 @@ pub struct MeasuredSeries {
     pub focal_px: Option<f64>,
     /// Lens model.
     pub lens: Lens,
-    /// True where the evidence decides on the lens, see the formulation; the fit then begins with the simplest.
-    pub lens_is_open: bool,
+    /// Whether the evidence decides on the lens; the fit then begins with the simplest.
+    pub lens_choice: LensChoice,
     /// What an observation of a circle means: true for the centroid of its image, false for its imaged centre.
     pub centroid: bool,
     /// The plate.

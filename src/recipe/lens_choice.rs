@@ -1,6 +1,6 @@
 //! Which lens: that which the joint fit supports by evidence, as the robot model is; see the formulation.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +28,29 @@ const FISHEYE_FROM: f64 = 1.0;
 /// Rounds in which image noise and fit follow the lens.
 const ROUNDS: usize = 3;
 
+/// Which lenses the evidence chooses among.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LensChoice {
+    /// None: the lens is as stated.
+    #[default]
+    Settled,
+    /// Those that camera.yaml can express.
+    Exported,
+    /// All formulas.
+    All,
+}
+
+impl LensChoice {
+    fn has(self, lens: Lens) -> bool {
+        match self {
+            Self::Settled => false,
+            Self::Exported => lens.is_in_ros(),
+            Self::All => !lens.has_field(),
+        }
+    }
+}
+
 /// Evidence of a lens for one camera.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LensEvidence {
@@ -54,13 +77,14 @@ pub(super) fn with_lenses(
     options: &Options,
 ) -> Result<(Solution, Vec<MeasuredSeries>)> {
     let mut series = series.to_vec();
-    let open = if options.selection.names_cameras() { Vec::new() } else { open_cameras(&series) };
-    series.iter_mut().filter(|s| open.contains(&s.camera)).for_each(|s| s.lens = Lens::ALL[0]);
+    let open = if options.selection.names_cameras() { BTreeMap::new() } else { open_cameras(&series) };
+    series.iter_mut().filter(|s| open.contains_key(&s.camera)).for_each(|s| s.lens = Lens::ALL[0]);
     let (mut solution, notices) = match identify_model(chain.clone(), &series, options) {
         Ok(solution) => (solution, Vec::new()),
         Err(error) => by_hold_out(chain, &mut series, &open, options).ok_or(error)?,
     };
-    let lenses: Vec<LensEvidence> = open.iter().flat_map(|camera| compare_lenses(&solution, camera)).collect();
+    let lenses: Vec<LensEvidence> =
+        open.iter().flat_map(|(camera, choice)| compare_lenses(&solution, camera, *choice)).collect();
     let mut better = series.clone();
     for chosen in lenses.iter().filter(|l| l.taken) {
         better.iter_mut().filter(|s| s.camera == chosen.camera).for_each(|s| s.lens = chosen.lens);
@@ -73,32 +97,37 @@ pub(super) fn with_lenses(
     Ok((Solution { lenses, ..solution }, series))
 }
 
-/// Cameras none of whose series states a lens.
-fn open_cameras(series: &[MeasuredSeries]) -> Vec<String> {
-    let settled = |name: &String| series.iter().any(|s| s.camera == *name && !s.lens_is_open);
-    let names: BTreeSet<String> = series.iter().map(|s| s.camera.clone()).collect();
-    names.into_iter().filter(|name| !settled(name)).collect()
+/// Cameras none of whose series settles the lens.
+fn open_cameras(series: &[MeasuredSeries]) -> BTreeMap<String, LensChoice> {
+    let mut open = BTreeMap::new();
+    for s in series {
+        let choice = open.entry(s.camera.clone()).or_insert(s.lens_choice);
+        *choice = (*choice).min(s.lens_choice);
+    }
+    open.retain(|_, choice| *choice != LensChoice::Settled);
+    open
 }
 
 /// The solution with other lenses for the open cameras, where free poses speak for others.
 fn by_hold_out(
     chain: &Chain,
     series: &mut [MeasuredSeries],
-    open: &[String],
+    open: &BTreeMap<String, LensChoice>,
     options: &Options,
 ) -> Option<(Solution, Vec<Notice>)> {
     let first: Vec<Lens> = series.iter().map(|s| s.lens).collect();
-    let notices = if open.is_empty() { return None } else { choose_lens(chain, series, open).ok()? };
+    let names: Vec<String> = open.keys().cloned().collect();
+    let notices = if open.is_empty() { return None } else { choose_lens(chain, series, &names).ok()? };
     let is_another = series.iter().zip(first).any(|(s, first)| s.lens != first);
     let solution = if is_another { identify_model(chain.clone(), series, options).ok()? } else { return None };
     Some((solution, notices))
 }
 
 /// Evidence of every lens formula for a camera, from the fit with its present one.
-fn compare_lenses(solution: &Solution, camera: &str) -> Vec<LensEvidence> {
+fn compare_lenses(solution: &Solution, camera: &str, choice: LensChoice) -> Vec<LensEvidence> {
     let Some(k) = solution.problem.cameras.iter().position(|c| c == camera) else { return Vec::new() };
     let is_wide = solution.state.cameras[k].corner() > FISHEYE_FROM;
-    let formulas = Lens::ALL.into_iter().filter(|l| !l.has_field() && (*l != Lens::Fisheye || is_wide));
+    let formulas = Lens::ALL.into_iter().filter(|l| choice.has(*l) && (*l != Lens::Fisheye || is_wide));
     let mut all: Vec<LensEvidence> = formulas.filter_map(|lens| evidence(solution, k, lens)).collect();
     let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     all.iter_mut().for_each(|e| e.log_evidence -= best);

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::build::{MeasuredSeries, MeasuredStop};
+use super::lens_choice::LensChoice;
 use super::look::{SeenImage, look, recording, require_some};
 use crate::detect::Detection;
 use crate::error::{Error, Notice, Result};
@@ -96,7 +97,10 @@ pub(super) fn measured_series(
         height_px,
         focal_px: series.manifest.camera.focal_px,
         lens,
-        lens_is_open: series.manifest.camera.model.is_none(),
+        lens_choice: match series.manifest.camera.model {
+            Some(_) => LensChoice::Settled,
+            None => LensChoice::Exported,
+        },
         centroid,
         plate: series.plate.clone(),
         plate_name: plate_file.canonicalize().unwrap_or(plate_file).display().to_string(),

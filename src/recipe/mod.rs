@@ -45,7 +45,7 @@ pub use forecast::{
 };
 pub use free_poses::{FreePose, FreePoses, PlacedCamera, adjust_free_poses};
 pub use joint::{JointNoise, MarkerTolerance, Options, RobotModel};
-pub use lens_choice::{LensEvidence, choose_lens, depths_m};
+pub use lens_choice::{LensChoice, LensEvidence, choose_lens, depths_m};
 pub use look::{SeenImage, look, look_at, pictures, require_some};
 pub use measure::{Measured, measure};
 pub use monte_carlo::{

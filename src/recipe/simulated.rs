@@ -1,6 +1,7 @@
 //! A simulated series as if it had been measured.
 
 use super::build::{MeasuredSeries, MeasuredStop};
+use super::lens_choice::LensChoice;
 use crate::series::{AngleUnit, StopOrder};
 use crate::simulate::SimulatedSeries;
 use crate::urdf::{Chain, JointKind};
@@ -31,7 +32,7 @@ pub fn measured(series: &SimulatedSeries, chain: &Chain) -> MeasuredSeries {
         height_px: camera.height_px,
         focal_px: None,
         lens: camera.lens,
-        lens_is_open: false,
+        lens_choice: LensChoice::Settled,
         centroid: true,
         plate: series.plate.clone(),
         plate_name: "plate".into(),

@@ -148,7 +148,7 @@ pub fn series_in_postures(mount: CameraMount, description: &RobotDescription, st
         height_px: 1024,
         focal_px: None,
         lens: Lens::Brown,
-        lens_is_open: false,
+        lens_choice: robotcal::recipe::LensChoice::Settled,
         centroid: true,
         plate,
         plate_name: "/somewhere/run1/plate.toml".into(),

@@ -307,7 +307,7 @@ pub fn series(problem: &Problem) -> MeasuredSeries {
         height_px: 1024,
         focal_px: None,
         lens: Lens::Brown,
-        lens_is_open: false,
+        lens_choice: robotcal::recipe::LensChoice::Settled,
         centroid: true,
         plate_name: "plate".into(),
         order_known: false,

@@ -113,6 +113,11 @@ impl Lens {
         }
     }
 
+    /// True where camera.yaml, with the models of ROS, says all of this lens.
+    pub fn is_in_ros(self) -> bool {
+        matches!(self, Self::Brown | Self::Fisheye | Self::Rational)
+    }
+
     /// True with a displacement field on top of the formula.
     pub fn has_field(self) -> bool {
         self != self.formula()
