@@ -8,12 +8,13 @@ use std::error::Error;
 use std::path::Path;
 
 use nalgebra::{DMatrix, Matrix2, Matrix3, Vector2, Vector3};
+use robotcal::fit::FreePose;
 use robotcal::geom::{Pose, exp_so3};
+use robotcal::identify::adjust_free_poses;
 use robotcal::init::{PosePair, solve_hand_eye};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::{Robot, Stop};
 use robotcal::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State};
-use robotcal::recipe::{FreePose, adjust_free_poses};
 use robotcal::series::{CameraMount, Edge, Marker, Plate, PlateKind};
 use robotcal::solve::{Outcome, Settings, solve};
 

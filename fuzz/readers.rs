@@ -4,9 +4,9 @@ use std::path::Path;
 
 use robotcal::detect::load_bytes;
 use robotcal::geom::Pose;
+use robotcal::identify::RobotModel;
 use robotcal::output::{parse_compensation, plan_start, restore, solution_json};
 use robotcal::programs::{self, Language, TextFile};
-use robotcal::recipe::RobotModel;
 use robotcal::series::{Manifest, Plate, PlateKind, RecordingOptions, Stops, extract, parse_observations, parse_plate};
 use robotcal::urdf::{Chain, RobotDescription, patch_origins};
 

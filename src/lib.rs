@@ -10,20 +10,25 @@
 //! | [`detect`] | pixels -> identified observations with covariance |
 //! | [`model`] | parameters -> predictions and Jacobians |
 //! | [`problem`] | parameter blocks, priors, columns, residuals |
-//! | [`plan`] | plate design, pose planning |
-//! | [`programs`] | program text -> targets -> program text for the real robot |
-//! | [`init`], [`solve`], [`assess`] | starting values, the solver, what the result is worth |
-//! | [`simulate`], [`recipe`] | a world with known truth; the modes of the program |
+//! | [`init`], [`solve`] | starting values; the solver |
+//! | [`fit`], [`assess`] | an adjustment at its optimum; what it is worth |
+//! | [`plan`], [`programs`] | plate design, pose planning; program text -> targets -> program text for the real robot |
+//! | [`simulate`], [`diagnose`] | a world with known truth; what the data contradict |
+//! | [`identify`] | series -> solution |
 //! | [`output`] | solution -> bytes |
+//! | [`study`] | what the program reaches where the truth is known |
 //! | [`cli`] | the only room that prints |
 
 pub mod assess;
 pub mod cli;
 pub mod detect;
+pub mod diagnose;
 pub mod error;
 pub mod files;
+pub mod fit;
 pub mod geom;
 pub mod guide;
+pub mod identify;
 pub mod init;
 pub mod linalg;
 pub mod model;
@@ -31,10 +36,10 @@ pub mod output;
 pub mod plan;
 pub mod problem;
 pub mod programs;
-pub mod recipe;
 pub mod series;
 pub mod simulate;
 pub mod solve;
+pub mod study;
 pub mod urdf;
 
 pub use error::{Error, ErrorKind, Notice, Result, closest_name, plain_name};

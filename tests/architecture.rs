@@ -6,24 +6,26 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Rooms from the bottom up; rooms on one level are peers and do not import each other, but for the pairs in `PEERS`.
-const LEVELS: [&[&str]; 13] = [
+const LEVELS: [&[&str]; 15] = [
     &["error"],
     &["files", "geom", "linalg"],
     &["series", "urdf"],
     &["detect"],
     &["model"],
     &["problem"],
-    &["plan"],
-    &["programs"],
     &["init", "solve"],
+    &["fit"],
     &["assess"],
-    &["recipe", "simulate"],
+    &["plan", "programs"],
+    &["simulate", "diagnose"],
+    &["identify"],
     &["output"],
+    &["study"],
     &["cli"],
 ];
 
-/// Peers where the first may import the second: readings are matched to chains, and a recipe may be tried on a simulated world.
-const PEERS: [(&str, &str); 2] = [("series", "urdf"), ("recipe", "simulate")];
+/// Peers where the first may import the second: readings are matched to chains.
+const PEERS: [(&str, &str); 1] = [("series", "urdf")];
 
 const MOST_LINES: usize = 600;
 

@@ -4,7 +4,7 @@ mod circles_support;
 
 use circles_support::{View, errors, report, scene};
 use robotcal::detect::circles::{Options, Outcome, detect};
-use robotcal::simulate::image_study::{MirrorAnswer, Plates, identity_view};
+use robotcal::study::image_stage::{MirrorAnswer, Plates, identity_view};
 
 #[test]
 fn a_whole_plate_is_found_and_measured() {

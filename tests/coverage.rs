@@ -5,10 +5,12 @@
 use nalgebra::Vector6;
 use robotcal::assess::{MeasuredPoint, View, fit_points, predict_pose};
 use robotcal::geom::Pose;
+use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::model::robot::Robot;
-use robotcal::recipe::{MeasuredSeries, Options, RobotModel, Solution, identify, measured};
+use robotcal::problem::MeasuredSeries;
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
+use robotcal::study::measured;
 use robotcal::urdf::Chain;
 use std::path::Path;
 

@@ -3,9 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use robotcal::assess::WorkspacePoint;
-use robotcal::recipe::{JointNoise, MeasuredSeries, Options, identify, measured};
+use robotcal::identify::{JointNoise, Options, identify};
+use robotcal::problem::MeasuredSeries;
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{WorldRequest, series};
+use robotcal::study::measured;
 use robotcal::urdf::Chain;
 use std::path::Path;
 

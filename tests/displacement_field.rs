@@ -7,10 +7,12 @@ use std::path::Path;
 use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 use robotcal::assess::ProjectionMap;
 use robotcal::geom::skew;
+use robotcal::identify::{Options, Solution, identify};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::plan::plate_design::{PlateRequest, design};
-use robotcal::recipe::{MeasuredSeries, Options, Solution, identify, measured};
+use robotcal::problem::MeasuredSeries;
 use robotcal::simulate::{WorldRequest, series};
+use robotcal::study::measured;
 use robotcal::urdf::{Chain, read};
 
 /// Noise of an observation, px per axis.

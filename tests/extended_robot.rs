@@ -6,10 +6,12 @@ use std::path::Path;
 
 use robotcal::assess::{flange_error_m, median};
 use robotcal::geom::Pose;
+use robotcal::identify::{Options, RobotModel, Selection, StatedPrior, identify};
+use robotcal::problem::MeasuredSeries;
 use robotcal::problem::OriginPrior;
-use robotcal::recipe::{MeasuredSeries, Options, RobotModel, Selection, StatedPrior, identify, measured};
 use robotcal::series::{Plate, PlateKind};
 use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
+use robotcal::study::measured;
 use robotcal::urdf::{Chain, read};
 
 fn chain() -> Chain {

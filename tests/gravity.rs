@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 
 use robotcal::assess::flange_error_m;
 use robotcal::geom::Pose;
+use robotcal::identify::{Options, RobotModel, identify};
 use robotcal::model::joint_terms::{JointTerm, Term};
 use robotcal::model::robot::Robot;
 use robotcal::output::read_compensation;
-use robotcal::recipe::{Options, RobotModel, identify, measured};
 use robotcal::series::{Plate, PlateKind};
 use robotcal::simulate::{RobotErrors, WorldRequest, series};
+use robotcal::study::measured;
 use robotcal::urdf::{Chain, Payload, RobotDescription, read};
 
 fn chain(name: &str) -> Chain {

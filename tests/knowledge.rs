@@ -14,19 +14,19 @@ use robotcal::assess::{
     Cause, Identifiability, MeasuredPoint, fit_points, ideal_stops, identifiability_of_stops, minimal_set, structural,
 };
 use robotcal::geom::Pose;
+use robotcal::identify::{
+    Config, JointNoise, Options, Parameters, RobotModel, Selection, Solution, StatedPrior, identify, verify_series,
+};
 use robotcal::model::joint_terms::{JointTerm, Term};
 use robotcal::model::robot::{Robot, Stop};
 use robotcal::output::difference::compare_solutions;
 use robotcal::output::restore::{found_model, measured_series, robot_description};
 use robotcal::output::{files, solution_json};
 use robotcal::problem::{Layout, State, short_name};
-use robotcal::recipe::{
-    Config, JointNoise, Options, Parameters, RobotModel, Selection, Solution, StatedPrior, identify, measured,
-    verify_series,
-};
 use robotcal::series::{CameraMount, Marker, Observation, Plate, PlateKind};
 use robotcal::simulate::truth::{TermRecord, Truth};
 use robotcal::simulate::{RobotErrors, WorldRequest, series};
+use robotcal::study::measured;
 use robotcal::urdf::Chain;
 
 fn chain() -> Chain {
@@ -245,7 +245,7 @@ fn request(seed: u64, joint_noise_rad: f64) -> WorldRequest {
     }
 }
 
-fn world(seed: u64, joint_noise_rad: f64) -> robotcal::recipe::MeasuredSeries {
+fn world(seed: u64, joint_noise_rad: f64) -> robotcal::problem::MeasuredSeries {
     measured(&series(&request(seed, joint_noise_rad)).unwrap(), &chain())
 }
 

@@ -6,11 +6,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use rayon::prelude::*;
+use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::linalg::SymmetricFactor;
 use robotcal::model::camera::Lens;
 use robotcal::plan::plate_design::{PlateRequest, design};
-use robotcal::recipe::{LensChoice, MeasuredSeries, Options, RobotModel, Solution, flange_error, identify, measured};
+use robotcal::problem::{LensChoice, MeasuredSeries};
 use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series};
+use robotcal::study::{flange_error, measured};
 use robotcal::urdf::{Chain, read};
 
 /// Errors of the size of the priors of the fit, beyond rigid geometry, too.

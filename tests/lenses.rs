@@ -4,10 +4,12 @@
 
 use std::path::Path;
 
+use robotcal::identify::{Options, RobotModel, Solution, choose_lens, depths_m, identify};
 use robotcal::model::camera::{Camera, Lens, fit_lens};
 use robotcal::plan::plate_design::{PlateRequest, design};
-use robotcal::recipe::{LensChoice, Options, RobotModel, Solution, choose_lens, depths_m, identify, measured};
+use robotcal::problem::LensChoice;
 use robotcal::simulate::{SimulatedSeries, WorldRequest, lens_camera, series};
+use robotcal::study::measured;
 use robotcal::urdf::{Chain, read};
 
 fn chain() -> Chain {

@@ -4,9 +4,10 @@
 
 use std::path::Path;
 
-use robotcal::recipe::{MarkerTolerance, Options, RobotModel, Solution, identify, measured};
+use robotcal::identify::{MarkerTolerance, Options, RobotModel, Solution, identify};
 use robotcal::series::{Plate, PlateKind};
 use robotcal::simulate::{WorldRequest, series};
+use robotcal::study::measured;
 
 const STATED_M: f64 = 0.1e-3;
 const JOINT_NOISE_RAD: f64 = 0.05e-3;

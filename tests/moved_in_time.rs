@@ -5,10 +5,11 @@
 
 use nalgebra::Vector6;
 use robotcal::geom::Pose;
+use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::model::circle::centroid_uv;
-use robotcal::recipe::{Options, RobotModel, Solution, identify, measured};
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
+use robotcal::study::measured;
 use robotcal::urdf::Chain;
 use std::ops::Range;
 use std::path::Path;

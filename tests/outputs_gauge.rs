@@ -10,13 +10,13 @@ use outputs_support::truth_frame::{Alignment, Judged, judged, least_eigenvalue, 
 use outputs_support::{context, robot, series};
 use rayon::prelude::*;
 use robotcal::geom::{Pose, adjoint, skew};
+use robotcal::identify::{JointNoise, Options, RobotModel, Solution, identify};
 use robotcal::model::camera::MAX_PARAMETERS;
 use robotcal::model::plate_modes::{MODES, basis};
 use robotcal::output::files;
 use robotcal::output::restore::measured_series;
 use robotcal::output::solution_json;
 use robotcal::problem::{Problem, Slack, State};
-use robotcal::recipe::{JointNoise, Options, RobotModel, Solution, identify};
 use robotcal::series::CameraMount;
 use robotcal::solve::{Linearised, linearise_all};
 

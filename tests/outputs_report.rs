@@ -3,8 +3,8 @@
 mod outputs_support;
 
 use outputs_support::{context, robot, solved};
+use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
 use robotcal::output::{files, report_html, solution_json};
-use robotcal::recipe::{Estimator, RobotModel, beside_two_stages};
 use robotcal::series::CameraMount;
 
 fn record() -> solution_json::SolutionRecord {

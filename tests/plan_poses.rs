@@ -5,12 +5,13 @@ use std::process::Command;
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use robotcal::geom::Pose;
+use robotcal::identify::RobotModel;
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::plan::candidates::CandidateOptions;
 use robotcal::plan::criterion::Criterion;
 use robotcal::plan::scene::{Capsule, Scene, SceneOptions, arm_length_m};
 use robotcal::plan::setting::Setting;
-use robotcal::recipe::{Budget, Choice, Plan, PlanRequest, RobotModel, Wish, choose, forecast, plan};
+use robotcal::plan::{Budget, Choice, Plan, PlanRequest, Wish, choose, forecast, plan};
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::urdf::{Chain, JointKind};
 

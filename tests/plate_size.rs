@@ -5,9 +5,11 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
-use robotcal::recipe::{MeasuredSeries, Options, Solution, identify, measured};
+use robotcal::identify::{Options, Solution, identify};
+use robotcal::problem::MeasuredSeries;
 use robotcal::series::{Plate, PlateKind, ScaleBar};
 use robotcal::simulate::{WorldRequest, series};
+use robotcal::study::measured;
 use robotcal::urdf::Chain;
 
 fn chain() -> Chain {

@@ -11,8 +11,8 @@ use std::time::Instant;
 
 use programs_support::{Cell, assert_meets, numbers, shape};
 use robotcal::geom::{Pose, exp_so3};
+use robotcal::model::inverse;
 use robotcal::model::robot::Robot;
-use robotcal::plan::inverse;
 use robotcal::programs::{self, Language, Models, Outcome, Postures, Setting, TextFile};
 
 fn csv(header: &str, rows: &[Vec<f64>]) -> String {

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use programs_support::{Cell, assert_meets, shape, status_turn};
 use robotcal::geom::{Pose, matrix_from_rpy};
-use robotcal::plan::inverse;
+use robotcal::model::inverse;
 
 /// `name -> value` of an aggregate, by a reader of its own.
 fn aggregate(text: &str, before: &str) -> BTreeMap<String, f64> {

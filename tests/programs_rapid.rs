@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
 use programs_support::{Cell, assert_meets, numbers, shape, status_turn};
 use robotcal::geom::Pose;
-use robotcal::plan::inverse;
+use robotcal::model::inverse;
 
 const MODULE: &str = "%%%\r\n  VERSION:1\r\n  LANGUAGE:ENGLISH\r\n%%%\r\n\r\nMODULE MainModule\r\n\
   ! [[1.0,2.0,3.0],[1,0,0,0]] is no target\r\n\

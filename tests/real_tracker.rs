@@ -6,13 +6,11 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use robotcal::assess::{MeasuredPoint, fit_points, folds, predict_image, refitted, without_images};
+use robotcal::identify::{Estimator, JointNoise, Options, PoseStage, Solution, fit_poses, identify, measure};
 use robotcal::model::camera::Lens;
 use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::Robot;
-use robotcal::problem::{Problem, State};
-use robotcal::recipe::{
-    Estimator, JointNoise, LensChoice, MeasuredSeries, Options, PoseStage, Solution, fit_poses, identify, measure,
-};
+use robotcal::problem::{LensChoice, MeasuredSeries, Problem, State};
 use robotcal::solve::{ComponentOptions, estimate_components};
 
 const SERIES: [&str; 3] = ["nachi-2025-01-17", "nachi-2025-02-04", "nachi-2025-02-19"];

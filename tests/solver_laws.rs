@@ -6,10 +6,10 @@ mod support;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use robotcal::geom::{Pose, exp_so3};
+use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::linalg::SymmetricFactor;
 use robotcal::model::joint_terms::Term;
 use robotcal::problem::{Image, Problem, Slack, State, Step};
-use robotcal::recipe::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::series::CameraMount;
 use robotcal::solve::{
     ComponentOptions, Elimination, JOINT_NOISE_FLOOR, NoiseUncertainty, Outcome, Settings, Status, System, covariance,
@@ -352,7 +352,7 @@ fn poses_mode_is_the_free_pose_adjustment() {
     // ... and with the same weights from the truth, robot present but tied to nothing.
     let mode = converged(&problem, free_poses(&problem, &state), &TIGHT);
     let cov = covariance(&problem, &mode.state, mode.linearised.as_ref().unwrap()).unwrap();
-    // The recipe stops when no unknown moves by more than 1e-3 of its sigma.
+    // The fit stops when no unknown moves by more than 1e-3 of its sigma.
     assert_same_solution(
         (&problem, &mode),
         &Outcome { state: found.state.clone(), ..mode.clone() },
@@ -491,7 +491,7 @@ fn variance_components_recover_pixel_and_joint_noise() {
             ..Request::default()
         };
         let (mut problem, state) = problem(&mut dice, &request);
-        // From above, as the recipes do.
+        // From above, as `identify` does.
         problem.noise.pixel_factor = vec![3.0];
         problem.noise.joint = vec![vec![3e-3; 6]];
         let options = ComponentOptions { rounds: 100, ..ComponentOptions::default() };

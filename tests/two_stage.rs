@@ -8,12 +8,12 @@ use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 use robotcal::assess::{folds, regions};
-use robotcal::model::joint_terms::{JointTerm, Term};
-use robotcal::problem::{Layout, Problem, Slack, State};
-use robotcal::recipe::{
+use robotcal::identify::{
     Estimator, JointNoise, Options, PoseStage, RobotModel, beside_two_stages, compare, estimate_all, fit_poses,
     identify, linear_step,
 };
+use robotcal::model::joint_terms::{JointTerm, Term};
+use robotcal::problem::{Layout, Problem, Slack, State};
 use robotcal::series::CameraMount;
 use robotcal::solve::{Settings, Status, covariance, linearise_all, solve};
 use support::small::{Dice, Request, problem, series};

@@ -6,8 +6,8 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
+use robotcal::identify::Estimator;
 use robotcal::model::robot::Robot;
-use robotcal::recipe::Estimator;
 use robotcal::simulate::truth::Truth;
 
 /// A copy of a series with its first 24 stops.

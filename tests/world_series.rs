@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use robotcal::model::circle;
+use robotcal::model::inverse;
 use robotcal::model::robot::{Robot, Stop};
-use robotcal::plan::inverse;
 use robotcal::plan::plate_design::{PlateRequest, design};
 use robotcal::series::{AngleUnit, CameraMount, Edge, Plate, Source};
 use robotcal::simulate::conditions::ImagingConditions;

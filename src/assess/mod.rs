@@ -13,6 +13,7 @@ mod propagate;
 mod statistics;
 mod stops;
 mod truth;
+mod worth;
 
 pub use advice::Advice;
 pub use clustered::{Clustered, TellingImages, Told, clustered_covariance};
@@ -33,3 +34,4 @@ pub use propagate::{PredictedPose, View, predict_pose};
 pub use statistics::{Ratio, bootstrap_ratio, by_cluster, median, root_mean_square};
 pub use stops::{Structural, ideal_stops, minimal_set, structural};
 pub use truth::{camera_errors_m, flange_error_m};
+pub use worth::{NORMAL_95, Worth, judge, still, stops};

@@ -2,7 +2,6 @@
 
 use nalgebra::DMatrix;
 
-use super::staged::images_know_the_robot;
 use crate::assess::{
     FlangeErrors, FlangeModel, Identifiability, WorkspacePoint, clustered_covariance, identifiability,
     usual_joint_sigma,
@@ -10,7 +9,7 @@ use crate::assess::{
 use crate::error::Notice;
 use crate::geom::Pose;
 use crate::model::robot::Stop;
-use crate::problem::{Layout, Problem, State};
+use crate::problem::{Layout, Problem, Slack, State};
 use crate::series::CameraMount;
 use crate::solve::{Covariance, JOINT_NOISE_FLOOR, Linearised, NoiseInformation, NoiseUncertainty, noise_information};
 
@@ -18,7 +17,7 @@ use crate::solve::{Covariance, JOINT_NOISE_FLOOR, Linearised, NoiseInformation, 
 const REPORT_LARGER: f64 = 1.5;
 
 /// Sigmas of a 95 % interval.
-pub(super) const NORMAL_95: f64 = 1.96;
+pub const NORMAL_95: f64 = 1.96;
 
 /// What a solution is worth.
 #[derive(Debug, Clone, Default)]
@@ -59,7 +58,7 @@ pub fn still(problem: &Problem, layout: &Layout, state: &State) -> Option<(Pose,
 
 /// Judges a solution. `covariance` is made larger by what the uncertainty of an estimated joint noise adds, and where the scatter
 /// between images says clearly more than the noise model. What was `told_before` some joint noise was set to none is what is stated.
-pub(super) fn judge(
+pub fn judge(
     problem: &Problem,
     state: &State,
     lin: &Linearised,
@@ -143,4 +142,9 @@ fn enlarge(covariance: &mut Covariance, model: &[f64], clusters: &[f64], theta: 
             covariance.enlarge(k, clusters[k] / model[k]);
         }
     }
+}
+
+/// False where every image has a pose of its own that does not know of the robot.
+fn images_know_the_robot(problem: &Problem, state: &State) -> bool {
+    problem.used().any(|(i, image)| image.stop.is_some() && !matches!(state.slack[i], Slack::Pose(_)))
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use crate::error::{Error, Result};
-use crate::recipe::{Config, Estimator, JointNoise, MarkerTolerance, Options, Parameters, RobotModel, Selection};
+use crate::identify::{Config, Estimator, JointNoise, MarkerTolerance, Options, Parameters, RobotModel, Selection};
 
 /// Flags that `identify` shares with whatever solves.
 #[derive(Debug, Args)]

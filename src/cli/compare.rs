@@ -10,12 +10,14 @@ use super::robot::read_chain;
 use super::say::{say, say_line};
 use super::{Verdict, identify, progress};
 use crate::error::{Error, Result};
+use crate::identify::Options;
 use crate::output::Place;
-use crate::output::comparison::{comparison_markdown, study_html, study_markdown, study_verdict};
-use crate::output::monte_carlo::monte_carlo_markdown;
-use crate::recipe::{self, MonteCarloRequest, Options, StudyRequest};
+use crate::output::comparison::comparison_markdown;
 use crate::series::Series;
 use crate::simulate::truth::Truth;
+use crate::study::monte_carlo_markdown;
+use crate::study::{MonteCarloRequest, StudyRequest};
+use crate::study::{study_html, study_markdown, study_verdict};
 use crate::urdf;
 
 /// Flags of `compare`.
@@ -77,9 +79,9 @@ fn series(args: &CompareArgs) -> Result<Verdict> {
     let mut notices = Vec::new();
     let measured = identify::measure_all(&all, &chain, &mut notices)?;
     let options = Options { model: args.robot_model.into(), ..Options::default() };
-    let solution = recipe::identify(chain, &measured, &options)?;
+    let solution = crate::identify::identify(chain, &measured, &options)?;
     let bar = progress::bar(1, "folds");
-    let comparison = recipe::compare(&solution, truth.as_ref(), |done, total| {
+    let comparison = crate::identify::compare(&solution, truth.as_ref(), |done, total| {
         bar.set_length(total as u64);
         bar.set_position(done as u64);
     })?;
@@ -110,7 +112,7 @@ fn study(args: &CompareArgs) -> Result<Verdict> {
     }
     let request = StudyRequest { seeds: args.seeds, ..StudyRequest::full(chain) };
     let bar = progress::bar(1, "cells");
-    let study = recipe::study(&request, |done, total| {
+    let study = crate::study::study(&request, |done, total| {
         bar.set_length(total as u64);
         bar.set_position(done as u64);
     })?;
@@ -139,7 +141,7 @@ fn monte_carlo(args: &CompareArgs) -> Result<Verdict> {
         joint_noise_rad: MONTE_CARLO_NOISE.to_vec(),
     };
     let bar = progress::bar(1, "noise levels");
-    let cells = recipe::monte_carlo(&request, |done, total| {
+    let cells = crate::study::monte_carlo(&request, |done, total| {
         bar.set_length(total as u64);
         bar.set_position(done as u64);
     })?;

@@ -12,10 +12,10 @@ use super::say::{say, say_line};
 use super::{Verdict, progress};
 use crate::detect::load;
 use crate::error::{Error, Notice, Result};
+use crate::identify::SeenImage;
 use crate::output::detection_files::{DetectionContext, detection_files, dropped_counts, marker_counts, picture_names};
 use crate::output::overlay::{Palette, overlay_png};
 use crate::output::{NewResult, Place, folder_name};
-use crate::recipe::{self, SeenImage};
 use crate::series::{self, InputFile, Plate, Series, read_plate};
 
 /// Flags of `detect`.
@@ -79,7 +79,7 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
     let failures: Vec<&Error> = looked.images.iter().filter_map(|i| i.detection.failure.as_ref()).collect();
     let seen = |i: &SeenImage| (i.detection.observations.len(), i.detection.failure.as_ref().map(|f| f.what.clone()));
     let states: Vec<_> = looked.images.iter().map(|i| (i.name.as_str(), seen(i))).collect();
-    recipe::require_some(&name, states.iter().map(|(n, (count, failure))| (*n, *count, failure.as_deref())))?;
+    crate::identify::require_some(&name, states.iter().map(|(n, (count, failure))| (*n, *count, failure.as_deref())))?;
     Ok(if failures.is_empty() { Verdict::Good } else { Verdict::GateFailed })
 }
 
@@ -91,7 +91,7 @@ fn of_series(args: &DetectArgs, series: Series, pictures: &Pictures) -> Result<L
     let mut inputs = series.inputs.clone();
     inputs.extend(series.image_hashes()?);
     let bar = progress::bar(series.stops.stops.len(), &series.name);
-    let images = recipe::look(&series, |_| bar.inc(1))?;
+    let images = crate::identify::look(&series, |_| bar.inc(1))?;
     bar.finish_and_clear();
     require_unchanged(&inputs, &series.image_hashes()?)?;
     Ok(Looked { plate: series.plate.clone(), images, notices: series.notices.clone(), inputs, series: Some(series) })
@@ -108,7 +108,7 @@ fn of_images(images: &[PathBuf], plate: &Path) -> Result<Looked> {
     let hashes = || images.iter().filter(|i| i.is_file()).map(|i| InputFile::of_file(i)).collect::<Result<Vec<_>>>();
     inputs.extend(hashes()?);
     let bar = progress::bar(images.len(), "images");
-    let seen = recipe::look_at(images, &plate, |_| bar.inc(1));
+    let seen = crate::identify::look_at(images, &plate, |_| bar.inc(1));
     bar.finish_and_clear();
     require_unchanged(&inputs, &hashes()?)?;
     Ok(Looked { series: None, plate, images: seen, notices: Vec::new(), inputs })
@@ -141,7 +141,7 @@ fn write(args: &DetectArgs, looked: &Looked, place: Place) -> Result<usize> {
 
 fn draw(looked: &Looked, drawable: &[(&SeenImage, &PathBuf, &String)], result: &NewResult) -> Result<()> {
     let palette = Palette::of(&looked.images);
-    let corrected = looked.series.as_ref().map(recipe::pictures).transpose()?;
+    let corrected = looked.series.as_ref().map(crate::identify::pictures).transpose()?;
     let picture = |path: &Path| corrected.as_ref().map_or_else(|| load(path, None), |read| read(path));
     let bar = progress::bar(drawable.len(), "drawing");
     drawable.par_iter().try_for_each(|(image, path, name)| {

@@ -11,9 +11,10 @@ use super::say::{say, say_line};
 use super::show::read_solution;
 use super::{Verdict, progress, summary};
 use crate::error::{Error, Notice, Result};
+use crate::identify::{Estimator, Options};
 use crate::output::solution_json::{self, FILE_NAME};
 use crate::output::{self, Context, Offsets, Place, Poses, folder_name, recover, restore};
-use crate::recipe::{self, Estimator, LensChoice, MeasuredSeries, Options};
+use crate::problem::{LensChoice, MeasuredSeries};
 use crate::series::{self, InputFile, Series};
 use crate::urdf::{self, Chain, RobotDescription};
 
@@ -134,7 +135,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
                 if let Some(notice) = tip_notice(&description, &all, args.base.as_deref(), args.tip.as_deref())? {
                     say_line!("note      {notice}");
                 }
-                say!("{}", summary::of_stops(&recipe::dry_run(chain, &all, &options)?));
+                say!("{}", summary::of_stops(&crate::identify::dry_run(chain, &all, &options)?));
                 return Ok(Verdict::Good);
             }
             let mut notices = description.notices.clone();
@@ -181,8 +182,8 @@ fn solve(args: &IdentifyArgs, options: &Options, task: Task, place: Place) -> Re
         }
         None => {}
     }
-    let mut solution = recipe::identify(chain, &measured, options)?;
-    solution.two_stage = recipe::beside_two_stages(&solution);
+    let mut solution = crate::identify::identify(chain, &measured, options)?;
+    solution.two_stage = crate::identify::beside_two_stages(&solution);
     notices.append(&mut solution.notices);
     solution.notices = notices;
     let names: Vec<String> = measured.iter().map(|s| s.name.clone()).collect();
@@ -293,7 +294,7 @@ pub(super) fn measure_all(all: &[Series], chain: &Chain, notices: &mut Vec<Notic
     let mut measured = Vec::new();
     for s in all {
         let bar = progress::bar(s.stops.stops.len(), &s.name);
-        let m = recipe::measure(s, chain, all.len() > 1, |_| bar.inc(1))?;
+        let m = crate::identify::measure(s, chain, all.len() > 1, |_| bar.inc(1))?;
         bar.finish_and_clear();
         notices.extend(m.notices);
         measured.push(m.series);

@@ -7,14 +7,14 @@ use clap::{Args, ValueEnum};
 use super::say::say_line;
 use super::{Verdict, progress};
 use crate::error::{Error, Result};
+use crate::identify::SeenImage;
 use crate::output::Place;
-use crate::output::image_study::{
-    REPORT, Section, bias_section, identity_section, image_study_files, precision_section,
-};
 use crate::output::overlay::{Palette, overlay_png};
 use crate::plan::plate_design::{PlateRequest, design};
-use crate::recipe::SeenImage;
-use crate::simulate::image_study::{
+use crate::study::image_stage::tables::{
+    REPORT, Section, bias_section, identity_section, image_study_files, precision_section,
+};
+use crate::study::image_stage::{
     Bias, Identity, IdentityRequest, Plates, Precision, bias, bias_cases, identity, identity_view, precision,
     precision_cells,
 };
@@ -139,7 +139,7 @@ fn run_identity(args: &StudyArgs) -> Result<Identity> {
 fn failed_views(study: &Identity) -> Result<Vec<(String, Vec<u8>)>> {
     let only = study.views.len() == 1;
     let plates = Plates::standard()?;
-    let missed = |v: &&crate::simulate::image_study::IdentityView| only || v.failed() || v.found < v.visible;
+    let missed = |v: &&crate::study::image_stage::IdentityView| only || v.failed() || v.found < v.visible;
     let drawn = study.views.iter().filter(missed).take(DRAWN).map(|view| {
         let (_, picture, detection) = identity_view(&plates, view.seed);
         let name = format!("view-{}.png", view.seed);

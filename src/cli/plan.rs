@@ -15,6 +15,7 @@ use super::show::read_solution;
 use super::simulate::Mount;
 use crate::error::{Error, Result};
 use crate::geom::{OrientedBox, Pose};
+use crate::identify::RobotModel;
 use crate::model::camera::Camera;
 use crate::output::{Place, plan_files, plan_html, plan_programs, plan_start, sigma_text};
 use crate::plan::candidates::CandidateOptions;
@@ -23,13 +24,14 @@ use crate::plan::scene::{self, SceneOptions, arm_length_m};
 use crate::plan::setting::Setting;
 use crate::plan::viewpoint::ViewRange;
 use crate::plan::visibility::SightLimits;
-use crate::problem::Image;
-use crate::recipe::{
-    Budget, Forecast, PlaceForecast, Plan, PlanRequest, PlanStudyRequest, RobotModel, Wish, check_wish, choose,
-    compare_places, forecast, image_name, place_words, plan, plan_study,
+use crate::plan::{
+    Budget, Forecast, PlaceForecast, Plan, PlanRequest, Wish, check_wish, choose, compare_places, forecast, image_name,
+    place_words, plan,
 };
+use crate::problem::Image;
 use crate::series::{CameraMount, Stops, read_plate};
 use crate::simulate::typical_camera;
+use crate::study::{PlanStudyRequest, plan_study};
 use crate::urdf::{self, Chain, JointKind};
 
 /// Flags of `plan`.
@@ -267,7 +269,7 @@ fn study(args: &PlanArgs, seeds: u64) -> Result<Verdict> {
         rounds: args.rounds,
     };
     let study = plan_study(&request, |seed| tracing::info!("world {seed} done"))?;
-    let text = plan_files::study_table(&robot, &request, &study);
+    let text = crate::study::study_table(&robot, &request, &study);
     place.write_beside(&[("study.md".to_owned(), text.as_bytes())], std::slice::from_ref(&args.urdf))?;
     say!("{text}");
     Ok(Verdict::Good)

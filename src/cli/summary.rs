@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use crate::assess::{Cause, Errors, Identifiability, UnknownDirection, median};
 use crate::error::Notice;
+use crate::identify::{Comparison, Estimator, LensEvidence};
 use crate::output::solution_json::SolutionRecord;
 use crate::problem::{OriginPrior, short_name};
-use crate::recipe::{Comparison, Estimator, LensEvidence};
 use crate::urdf::JointKind;
 
 /// Most lines of one kind before the rest is counted.

@@ -9,8 +9,8 @@ use super::verify::VerifyArgs;
 use super::{Verdict, progress};
 use crate::assess::{Ratio, bootstrap_ratio, by_cluster, root_mean_square};
 use crate::error::{Error, Result};
+use crate::identify::{JudgedImage, verify_series};
 use crate::output::compensated;
-use crate::recipe::{JudgedImage, verify_series};
 use crate::urdf;
 
 /// Judges the model, and the nominal one where it is given, by the images that both predict.

@@ -28,7 +28,7 @@ fn vote(terms: &ImageTerms, fx: f64, fy: f64) -> Option<f64> {
 }
 
 /// The most significant change along the order of the images of a camera, in words that name the first image after it.
-pub(super) fn find_focus_change(problem: &Problem, state: &State, lin: &Linearised) -> Option<String> {
+pub fn find_focus_change(problem: &Problem, state: &State, lin: &Linearised) -> Option<String> {
     for (camera, name) in problem.cameras.iter().enumerate() {
         let p = &state.cameras[camera].parameters;
         let votes: Vec<(usize, f64)> = (lin.images.iter().zip(&lin.terms))

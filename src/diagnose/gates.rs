@@ -1,13 +1,12 @@
 //! Quality gates: what a result must fulfil to be trusted, and remarks that do not stop anyone.
 
-use super::build::MeasuredSeries;
-use super::free_poses::FreePoses;
-use super::joint::left_out;
 use super::loose::loose_mountings;
 use super::shift::Shift;
-use super::worth::Worth;
+use crate::assess::Worth;
 use crate::assess::{Accuracy, median};
 use crate::error::Notice;
+use crate::fit::FreePoses;
+use crate::problem::MeasuredSeries;
 use crate::problem::{Problem, State};
 
 /// Free-pose RMS beyond which the camera model does not explain the images, px per point.
@@ -41,7 +40,7 @@ const MOST_IMAGES: usize = 4;
 const BEYOND_TOLERANCE: f64 = 5.0;
 
 /// Gates that failed, in words with the first thing to look at.
-pub(super) fn gates(
+pub fn gates(
     problem: &Problem,
     series: &[MeasuredSeries],
     state: &State,
@@ -83,7 +82,7 @@ pub(super) fn gates(
 }
 
 /// Where the corrected robot is known less well than the nominal one misses, in words; up to [`NO_MISS_MM`] it may be.
-pub(super) fn undetermined(worth: &Worth, accuracy: &Accuracy) -> Option<String> {
+pub fn undetermined(worth: &Worth, accuracy: &Accuracy) -> Option<String> {
     let covered = worth.workspace.iter().filter(|w| w.covered);
     let usual = 1e3 * median(&covered.map(|w| w.sigma_m).collect::<Vec<f64>>())?;
     (usual > accuracy.nominal.rms_mm.max(NO_MISS_MM)).then(|| {
@@ -165,7 +164,7 @@ fn rejected_observations(problem: &Problem) -> Option<String> {
 }
 
 /// What the user should know, though the result stands.
-pub(super) fn remarks(
+pub fn remarks(
     problem: &Problem,
     series: &[MeasuredSeries],
     state: &State,
@@ -223,4 +222,9 @@ pub(super) fn remarks(
             ));
         }
     }
+}
+
+/// Images of the robot that were left out, of `on_robot` at the start.
+pub fn left_out(problem: &Problem, on_robot: usize) -> usize {
+    on_robot - problem.used().filter(|(_, i)| i.stop.is_some()).count()
 }

@@ -54,7 +54,7 @@ fn split(values: &[f64]) -> Option<Split> {
 /// Names every mounting whose camera turned between two positions; with what to do.
 ///
 /// Mountings whose images a displacement explains already are left out.
-pub(super) fn loose_mountings(problem: &Problem, state: &State, shifts: &[Shift]) -> Vec<String> {
+pub fn loose_mountings(problem: &Problem, state: &State, shifts: &[Shift]) -> Vec<String> {
     let open = |m: &usize| !shifts.iter().any(|s| s.explains(problem, *m));
     (0..problem.mountings.len()).filter(open).filter_map(|m| loose(problem, state, m)).collect()
 }

@@ -1,7 +1,6 @@
 //! Images that disagree with their readings but agree with each other: the plate or the camera was moved.
 
-use super::free_poses::FreePoses;
-use super::start::pose_pair;
+use crate::fit::FreePoses;
 use crate::geom::Pose;
 use crate::init::PosePair;
 use crate::problem::{Problem, State};
@@ -14,7 +13,7 @@ const AGREEMENT: f64 = 0.2;
 
 /// What moved, and when.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Move {
+pub struct Move {
     /// Images that saw the new place.
     pub images: Vec<usize>,
     /// In words.
@@ -24,12 +23,12 @@ pub(super) struct Move {
 }
 
 /// Looks for one common new place among the wrongly paired images of a series.
-pub(super) fn find_move(problem: &Problem, state: &State, free: &FreePoses, series: usize) -> Option<Move> {
+pub fn find_move(problem: &Problem, state: &State, free: &FreePoses, series: usize) -> Option<Move> {
     let mut wrong: Vec<(usize, PosePair)> = Vec::new();
     for (i, image) in problem.images.iter().enumerate().filter(|(_, image)| image.series == series) {
         let suspect = image.rejected.as_ref().is_some_and(|r| r.starts_with("wrongly paired"));
         if let (true, Some(stop), Some(pose)) = (suspect, &image.stop, &free.poses[i]) {
-            wrong.push((i, pose_pair(&state.robot, image.mount, &stop.readings, pose.camera_from_plate)));
+            wrong.push((i, PosePair::of_stop(&state.robot, image.mount, &stop.readings, pose.camera_from_plate)));
         }
     }
     let first = &problem.images[wrong.first()?.0];

@@ -52,7 +52,7 @@ enum Order {
 
 /// A step of one body between two parts of a series.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Shift {
+pub struct Shift {
     /// Index of the series.
     pub series: usize,
     body: Body,
@@ -96,7 +96,7 @@ impl Row {
 }
 
 /// Steps that explain most of the joint noise, in the order of the images.
-pub(super) fn find_shifts(problem: &Problem, state: &State, lin: &Linearised) -> Vec<Shift> {
+pub fn find_shifts(problem: &Problem, state: &State, lin: &Linearised) -> Vec<Shift> {
     let mut linear = Linear::of(problem, state, lin);
     let columns = linear.information.ncols();
     let squares = |row: &Row| problem.slack_squares(&problem.images[row.image], &state.slack[row.image]);
@@ -317,17 +317,17 @@ impl Shift {
     }
 
     /// True where it is beyond what a good robot repeats to.
-    pub(super) fn matters(&self) -> bool {
+    pub fn matters(&self) -> bool {
         self.distance_m() > MATTERS.0 || self.angle_rad() > MATTERS.1
     }
 
     /// True where it happened once, in images of this mounting.
-    pub(super) fn explains(&self, problem: &Problem, mounting: usize) -> bool {
+    pub fn explains(&self, problem: &Problem, mounting: usize) -> bool {
         self.order == Order::Time && problem.images[self.behind[0]].mounting == mounting
     }
 
     /// What stands where, and what to do, in words.
-    pub(super) fn in_words(&self, problem: &Problem, series: &str) -> (String, String) {
+    pub fn in_words(&self, problem: &Problem, series: &str) -> (String, String) {
         let image = &problem.images[self.behind[0]];
         let camera = matches!(self.body, Body::Mounting(_));
         let in_hand = image.mount == CameraMount::Hand;

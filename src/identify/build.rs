@@ -2,64 +2,16 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::lens_choice::LensChoice;
 use super::local_errors::{local_share, local_terms};
-use super::plate_size::hold_scale_bars;
 use crate::error::{Error, Result};
 use crate::geom::Pose;
-use crate::model::camera::{Camera, Lens};
+use crate::model::camera::Camera;
 use crate::model::robot::{Robot, Stop};
-use crate::problem::{Family, Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State};
-use crate::series::CameraMount;
-use crate::series::{Edge, Observation, Plate};
-
-/// One series after detection, joint readings in SI and in the order of the chain.
-#[derive(Debug, Clone)]
-pub struct MeasuredSeries {
-    /// Name of the series, for messages.
-    pub name: String,
-    /// Series with the same camera share intrinsics.
-    pub camera: String,
-    /// Series with the same mounting share the hand-camera offset.
-    pub mounting: String,
-    /// Where the camera is.
-    pub mount: CameraMount,
-    /// Columns of the images.
-    pub width_px: u32,
-    /// Rows of the images.
-    pub height_px: u32,
-    /// Focal length as stated, px.
-    pub focal_px: Option<f64>,
-    /// Lens model.
-    pub lens: Lens,
-    /// Whether the evidence decides on the lens; the fit then begins with the simplest.
-    pub lens_choice: LensChoice,
-    /// What an observation of a circle means: true for the centroid of its image, false for its imaged centre.
-    pub centroid: bool,
-    /// The plate.
-    pub plate: Plate,
-    /// Series with the same plate name share its shape.
-    pub plate_name: String,
-    /// True where the rows stand in the order of visiting.
-    pub order_known: bool,
-    /// Stops in the order of the rows.
-    pub stops: Vec<MeasuredStop>,
-}
-
-/// One stop with what its image shows.
-#[derive(Debug, Clone)]
-pub struct MeasuredStop {
-    /// File name of the image.
-    pub image: String,
-    /// Readings, rad or m; `None` off the robot.
-    pub readings: Option<Vec<f64>>,
-    /// Where the plate stood.
-    pub placement: String,
-    /// What was seen.
-    pub observations: Vec<Observation>,
-    /// Why the image is left out already (unreadable, nothing found).
-    pub left_out: Option<String>,
-}
+use crate::problem::{
+    Family, Image, Layout, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape, Problem, Slack, State,
+    hold_scale_bars,
+};
+use crate::series::{Edge, Plate};
 
 /// Standard deviation of an observation whose source states none, px per axis.
 const DEFAULT_SIGMA_PX: f64 = 0.1;
@@ -86,7 +38,7 @@ fn intern(names: &mut Vec<String>, name: &str) -> usize {
 /// The problem and a state whose poses and focal lengths are still unknown (identities; pinhole of one image width).
 ///
 /// With `local_errors` the errors of readings that stops have in common become columns.
-pub(super) fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool) -> Result<(Problem, State)> {
+pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool) -> Result<(Problem, State)> {
     let (mut cameras, mut mountings, mut placements, mut plate_names) = (vec![], vec![], vec![], vec![]);
     let (mut lenses, mut plates, mut images): (Vec<Camera>, Vec<Plate>, Vec<Image>) = (vec![], vec![], vec![]);
     for (index, s) in series.iter().enumerate() {

@@ -199,7 +199,7 @@ fn truth_errors(problem: &Problem, state: &State, truth: &Truth) -> Result<Vec<O
 }
 
 /// Errors of a state over the held-out readings of the first placement.
-pub(super) fn truth_error(state: &State, truth: &Truth) -> Result<Option<TruthError>> {
+pub fn truth_error(state: &State, truth: &Truth) -> Result<Option<TruthError>> {
     let Some((_, plate)) = truth.plate_poses.iter().next() else { return Ok(None) };
     let plate = plate.pose();
     let held: Vec<(Vec<f64>, Pose)> =

@@ -5,14 +5,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Solution;
 use super::joint::{Options, RobotModel, identify_model};
 use super::lens_choice::{self, with_lenses};
 use super::two_stage::Estimator;
-use super::{MeasuredSeries, Solution};
 use crate::error::Result;
-use crate::linalg::SymmetricFactor;
-use crate::problem::{Problem, State};
-use crate::solve::{Elimination, Linearised, SeenMarkers, Settings, System, solve};
+use crate::fit::log_evidence;
+use crate::problem::MeasuredSeries;
+use crate::solve::{Settings, solve};
 use crate::urdf::Chain;
 
 /// Logarithm of the odds at which a smaller model takes the place of a larger one: "decisive" (H. Jeffreys, *Theory of
@@ -95,16 +95,4 @@ fn evidence(full: &Solution, model: RobotModel) -> Option<Evidence> {
     let parameters = problem.layout.columns[robot].iter().filter(|c| c.free).count();
     let log_evidence = log_evidence(&problem, &outcome.state, &lin)?;
     Some(Evidence { model, log_evidence, cost: lin.cost, parameters })
-}
-
-pub(super) fn log_evidence(problem: &Problem, state: &State, lin: &Linearised) -> Option<f64> {
-    let system = System::with(Elimination::Markers, problem, state, lin, 0.0);
-    let reduced = SymmetricFactor::new(&system.information).ok()?.log_determinant();
-    let markers = SeenMarkers::of(problem, lin).information(problem, lin);
-    let eliminated: f64 = markers.iter().map(|block| block.determinant().ln()).sum();
-    let priors: f64 = (problem.layout.columns.iter())
-        .filter(|c| c.free && c.prior_sigma.is_finite())
-        .map(|c| c.prior_sigma.ln())
-        .sum();
-    Some(-lin.cost - 0.5 * (reduced + eliminated) - priors).filter(|e| e.is_finite())
 }

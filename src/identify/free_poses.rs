@@ -2,61 +2,19 @@
 
 use nalgebra::{Matrix6, Vector2};
 
-use super::focus::find_focus_change;
-use super::plate_size::{hold_scale_bars, size_by_bar};
 use super::solution::StartVerdict;
+use crate::diagnose::find_focus_change;
 use crate::error::{Error, Result};
+use crate::fit::{FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
 use crate::problem::{Problem, Slack, State, Weighting};
+use crate::problem::{hold_scale_bars, size_by_bar};
 use crate::solve::{
     ComponentOptions, Covariance, Linearised, PlateScale, Settings, Similarity, Status, covariance,
     estimate_components, frames, in_frame, linearise_all, reject_observations, solve,
 };
-
-/// Stand-alone pose of one image.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FreePose {
-    /// `camera_from_plate`.
-    pub camera_from_plate: Pose,
-    /// Covariance of its body twist [rho, phi], m and rad, with the tolerances of the markers.
-    pub covariance: Matrix6<f64>,
-    /// The pose in the plate frame that the nominal markers define, with the scale of [`FreePoses::scales`]; the sigma of the scale is not
-    /// in its covariance.
-    pub in_frame: PlacedCamera,
-    /// RMS of the lengths of its residuals, px.
-    pub rms_px: f64,
-}
-
-/// A camera in the frame of a plate.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PlacedCamera {
-    /// The pose.
-    pub plate_from_camera: Pose,
-    /// Covariance of its body twist [rho, phi], m and rad.
-    pub covariance: Matrix6<f64>,
-}
-
-/// The adjusted free poses.
-#[derive(Debug, Clone)]
-pub struct FreePoses {
-    /// One for each image of the problem; `None` for an image that is left out.
-    pub poses: Vec<Option<FreePose>>,
-    /// RMS of the lengths of all residuals, px per point.
-    pub rms_px: f64,
-    /// Number of observations in use.
-    pub observations: usize,
-    /// Cameras and plates of this adjustment.
-    pub state: State,
-    /// Scale of every plate, in which the poses in its frame are given: as it was made, or as it was measured (`[scale]`). None for a
-    /// plate that no image shows.
-    pub scales: Vec<Option<PlateScale>>,
-    /// Pixel factors found.
-    pub pixel_factor: Vec<f64>,
-    /// A change of focus or zoom within the images of a camera, in words.
-    pub focus_change: Option<String>,
-}
 
 /// RMS of a start, px per point, from which no further focal length is tried.
 const GOOD_START_PX: f64 = 2.0;

@@ -1,21 +1,20 @@
 //! The joint fit: robot, cameras, hand-camera offsets and plates directly against the pixels, with joint noise.
 
-use super::build::{MeasuredSeries, build};
-use super::free_poses::{FreePoses, adjust_free_poses};
-use super::gates::{gates, remarks, undetermined};
-use super::moved::{Move, find_move};
-use super::plate_size::doubted_sizes;
+use super::build::build;
+use super::free_poses::adjust_free_poses;
 use super::selection::Selection;
-use super::shift::find_shifts;
 use super::solution::Solution;
-use super::staged::{Fitted, refit, staged};
-use super::start::{misfit, start_robot, take_back};
+use super::staged::{refit, staged};
+use super::start::{start_robot, take_back};
 use super::two_stage::Estimator;
-use super::worth::judge;
+use crate::assess::judge;
 use crate::assess::{hold_out, refitted};
+use crate::diagnose::{Move, doubted_sizes, find_move, find_shifts, gates, left_out, remarks, undetermined};
 use crate::error::{Error, Notice, Result};
+use crate::fit::{Fit, FreePoses, misfit};
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::robot::Robot;
+use crate::problem::MeasuredSeries;
 use crate::problem::{Family, Problem, Slack, State};
 use crate::solve::{
     ComponentOptions, NoiseInformation, Outcome, Status, covariance, estimate_components, reject_images,
@@ -191,9 +190,9 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     remarks(&problem, series, &state, &accuracy, on_robot, &mut notices);
     let (fit, joint) = match estimator.is_two_stage() {
         true => (staged((&problem, &state, &covariance), estimator, noise)?, Some(Box::new((problem, state)))),
-        false => (Fitted { problem, state, linearised, covariance }, None),
+        false => (Fit { problem, state, linearised, covariance }, None),
     };
-    let Fitted { problem, state, linearised, mut covariance } = fit;
+    let Fit { problem, state, linearised, mut covariance } = fit;
     let estimated = noise == JointNoise::Estimated && joint.is_none();
     let worth = judge(&problem, &state, &linearised, &mut covariance, estimated, before, &mut notices);
     failed_gates.extend(undetermined(&worth, &accuracy));
@@ -304,10 +303,6 @@ fn check_on_robot(problem: &Problem, on_robot: usize) -> Result<()> {
             "look at them with `robotcal detect`: is the plate in view, sharp, and the one of plate.toml?",
         )),
     }
-}
-
-pub(super) fn left_out(problem: &Problem, on_robot: usize) -> usize {
-    on_robot - problem.used().filter(|(_, i)| i.stop.is_some()).count()
 }
 
 fn check_left_out(problem: &Problem, on_robot: usize, moves: &[Move]) -> Result<()> {

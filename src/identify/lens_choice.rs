@@ -4,14 +4,16 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::build::{MeasuredSeries, build};
-use super::evidence::{DECISIVE, log_evidence};
+use super::build::build;
+use super::evidence::DECISIVE;
 use super::free_poses::adjust_free_poses;
 use super::joint::{Options, identify_model};
 use super::solution::Solution;
 use crate::error::{Error, Notice, Result};
+use crate::fit::log_evidence;
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
+use crate::problem::{LensChoice, MeasuredSeries};
 use crate::problem::{Problem, State, predict};
 use crate::solve::{ComponentOptions, Linearised, Status, estimate_components};
 use crate::urdf::Chain;
@@ -27,29 +29,6 @@ const OUTLIERS: f64 = 0.02;
 const FISHEYE_FROM: f64 = 1.0;
 /// Rounds in which image noise and fit follow the lens.
 const ROUNDS: usize = 3;
-
-/// Which lenses the evidence chooses among.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LensChoice {
-    /// None: the lens is as stated.
-    #[default]
-    Settled,
-    /// Those that camera.yaml can express.
-    Exported,
-    /// All formulas.
-    All,
-}
-
-impl LensChoice {
-    fn has(self, lens: Lens) -> bool {
-        match self {
-            Self::Settled => false,
-            Self::Exported => lens.is_in_ros(),
-            Self::All => !lens.has_field(),
-        }
-    }
-}
 
 /// Evidence of a lens for one camera.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

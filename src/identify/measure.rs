@@ -3,12 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::build::{MeasuredSeries, MeasuredStop};
-use super::lens_choice::LensChoice;
 use super::look::{SeenImage, look, recording, require_some};
 use crate::detect::Detection;
 use crate::error::{Error, Notice, Result};
 use crate::model::camera::Lens;
+use crate::problem::{LensChoice, MeasuredSeries, MeasuredStop};
 use crate::series::{CirclePoint, Observation, Series, Source, StopOrder};
 use crate::urdf::Chain;
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::build::{MeasuredStop, build};
+use super::build::build;
 use super::free_poses::adjust_free_poses;
 use super::look::SeenImage;
 use super::measure::{lens_of, measured_series};
@@ -15,6 +15,7 @@ use crate::detect::circles::{Predicted, look_where_predicted};
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::model::robot::Robot;
+use crate::problem::MeasuredStop;
 use crate::problem::State;
 use crate::series::{DEFAULT_PLACEMENT, Marker, Plate, PlateKind, Series};
 use crate::urdf::Chain;

@@ -2,15 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::build::MeasuredSeries;
 use super::compare::Comparison;
 use super::evidence::Evidence;
-use super::free_poses::FreePoses;
 use super::lens_choice::LensEvidence;
 use super::two_stage::Estimator;
-use super::worth::Worth;
 use crate::assess::Accuracy;
+use crate::assess::Worth;
 use crate::error::Notice;
+use crate::fit::FreePoses;
+use crate::problem::MeasuredSeries;
 use crate::problem::{Problem, State};
 use crate::solve::{Covariance, Linearised, Status};
 

@@ -3,16 +3,9 @@
 use super::joint::JointNoise;
 use super::two_stage::{Estimate, Estimator, PoseStage, fit_poses, with_sizes};
 use crate::error::{Error, Result};
-use crate::problem::{Problem, Slack, State};
-use crate::solve::{Covariance, Linearised, covariance, linearise_all};
-
-/// What was fitted.
-pub(super) struct Fitted {
-    pub problem: Problem,
-    pub state: State,
-    pub linearised: Linearised,
-    pub covariance: Covariance,
-}
+use crate::fit::Fit;
+use crate::problem::{Problem, State};
+use crate::solve::{Covariance, covariance, linearise_all};
 
 fn unsolved(estimator: Estimator) -> Error {
     let remedy = "take more stops, or leave --two-stage away: the joint fit has a solution";
@@ -27,11 +20,7 @@ fn unsolved(estimator: Estimator) -> Error {
 ///
 /// # Errors
 /// An estimator that has no solution here, or that has no joint noise where one is given.
-pub(super) fn staged(
-    joint: (&Problem, &State, &Covariance),
-    estimator: Estimator,
-    noise: JointNoise,
-) -> Result<Fitted> {
+pub(super) fn staged(joint: (&Problem, &State, &Covariance), estimator: Estimator, noise: JointNoise) -> Result<Fit> {
     let (problem, start, of_joint) = joint;
     if noise != JointNoise::Estimated && !estimator.has_joint_noise() {
         let what = format!("--joint-noise is given, but \"{}\" has no joint noise", estimator.title());
@@ -55,16 +44,11 @@ pub(super) fn staged(
     if estimator != Estimator::FullAndRepeatability {
         covariance.replace_first(&of_theta, |c| of_joint.system.touched(c) && own.layout.columns[c].free);
     }
-    Ok(Fitted { problem: own, state, linearised, covariance })
+    Ok(Fit { problem: own, state, linearised, covariance })
 }
 
 /// As the hold-out needs it: from the images that are left.
 pub(super) fn refit(problem: &Problem, start: &State, estimator: Estimator, noise: JointNoise) -> Option<State> {
     let stage = PoseStage::adjusted(problem, start)?;
     Some(fit_poses(problem, &stage, start, estimator, noise)?.state)
-}
-
-/// False where every image has a pose of its own that does not know of the robot.
-pub(super) fn images_know_the_robot(problem: &Problem, state: &State) -> bool {
-    problem.used().any(|(i, image)| image.stop.is_some() && !matches!(state.slack[i], Slack::Pose(_)))
 }

@@ -2,17 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use super::free_poses::FreePoses;
 use super::solution::StartVerdict;
 use super::suspects::Suspects;
 use crate::assess::median;
 use crate::error::{Error, Result};
-use crate::geom::{Pose, log_so3};
+use crate::fit::{FreePoses, misfit};
+use crate::geom::log_so3;
 use crate::init::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
 use crate::linalg::symmetric_eigen;
-use crate::model::robot::Robot;
 use crate::problem::{Problem, Slack, State, predict};
-use crate::series::CameraMount;
 
 /// Robust spread (rad + m) of the best closed form beyond which readings and images do not belong together.
 const WORST_SPREAD: f64 = 0.08;
@@ -43,7 +41,7 @@ pub(super) fn start_robot(
     let mut groups: BTreeMap<(usize, usize), Vec<(usize, PosePair)>> = BTreeMap::new();
     for (i, image) in problem.used() {
         let (Some(stop), Some(pose)) = (&image.stop, &free.poses[i]) else { continue };
-        let pair = pose_pair(&state.robot, image.mount, &stop.readings, pose.camera_from_plate);
+        let pair = PosePair::of_stop(&state.robot, image.mount, &stop.readings, pose.camera_from_plate);
         groups.entry((image.mounting, image.placement)).or_default().push((i, pair));
     }
     let mut order: Vec<_> = groups.into_iter().collect();
@@ -74,12 +72,6 @@ pub(super) fn start_robot(
         *pose = plates.get(&k).copied().unwrap_or(*pose);
     }
     Ok(aside)
-}
-
-/// What one image says, for the closed forms.
-pub(super) fn pose_pair(robot: &Robot, mount: CameraMount, readings: &[f64], camera_from_plate: Pose) -> PosePair {
-    let tip = robot.base_from_tip(readings);
-    PosePair { camera_from_plate, chain: if mount == CameraMount::Hand { tip.inverse() } else { tip } }
 }
 
 /// Of the solutions that single images give, the one that all images like best.
@@ -237,10 +229,4 @@ pub(super) fn take_back(problem: &mut Problem, state: &State, free: &FreePoses, 
     let back: Vec<usize> = aside.iter().copied().filter(fits).collect();
     back.iter().for_each(|&i| problem.images[i].rejected = None);
     !back.is_empty()
-}
-
-/// Pose error of the readings of an image against its free pose, for messages.
-pub(super) fn misfit(state: &State, problem: &Problem, free: &Pose, image: usize) -> Option<(f64, f64)> {
-    let predicted = state.camera_from_plate(&problem.images[image], &Slack::None)?;
-    Some(predicted.distance(free))
 }

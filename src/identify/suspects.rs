@@ -1,6 +1,5 @@
 //! When readings and images do not fit: the usual mistakes, tried one by one, named where one of them explains it.
 
-use super::start::pose_pair;
 use crate::init::{PosePair, plate_scale, solve_hand_eye};
 use crate::model::robot::Robot;
 use crate::problem::Problem;
@@ -73,7 +72,7 @@ impl Suspects<'_> {
     fn misfit_mounted(&self, readings: &[Vec<f64>], changed: impl Fn(CameraMount) -> CameraMount) -> f64 {
         let pairs: Vec<PosePair> = (self.pairs.iter().zip(readings))
             .map(|((i, pair), q)| {
-                pose_pair(self.robot, changed(self.problem.images[*i].mount), q, pair.camera_from_plate)
+                PosePair::of_stop(self.robot, changed(self.problem.images[*i].mount), q, pair.camera_from_plate)
             })
             .collect();
         solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error)

@@ -1,11 +1,12 @@
 //! A robot model judged by a series that it was not fitted to: camera, hand-camera offset and plate are fitted, the robot is not.
 
-use super::build::{MeasuredSeries, build};
+use super::build::build;
 use super::free_poses::adjust_free_poses;
 use super::start::start_robot;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
 use crate::error::{Error, Result};
 use crate::model::robot::Robot;
+use crate::problem::MeasuredSeries;
 use crate::solve::{ComponentOptions, Status, estimate_components};
 
 /// Error of one image, predicted from its joint readings by a fit of camera and plate to the other images.

@@ -12,6 +12,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::geom::{Pose, log_so3, project_to_so3};
 use crate::linalg::{SymmetricFactor, symmetric_eigen};
+use crate::model::robot::Robot;
+use crate::series::CameraMount;
 
 /// What one image says: `X * camera_from_plate = chain * Z`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +22,14 @@ pub struct PosePair {
     pub camera_from_plate: Pose,
     /// `flange_from_base` (camera in the hand) or `base_from_flange` (fixed camera) from the readings.
     pub chain: Pose,
+}
+
+impl PosePair {
+    /// That of a stop with these readings, in which the camera saw the plate.
+    pub fn of_stop(robot: &Robot, mount: CameraMount, readings: &[f64], camera_from_plate: Pose) -> Self {
+        let tip = robot.base_from_tip(readings);
+        Self { camera_from_plate, chain: if mount == CameraMount::Hand { tip.inverse() } else { tip } }
+    }
 }
 
 /// X and Z.

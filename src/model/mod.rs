@@ -2,6 +2,7 @@
 
 pub mod camera;
 pub mod circle;
+pub mod inverse;
 pub mod joint_terms;
 pub mod mdh;
 pub mod mount;

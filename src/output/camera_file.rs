@@ -3,8 +3,8 @@
 use super::names::file_names;
 use super::text::{list, quoted};
 use crate::error::{Error, Result};
+use crate::identify::{Solution, depths_m};
 use crate::model::camera::{Camera, Lens};
-use crate::recipe::{Solution, depths_m};
 use crate::series::CameraInfo;
 
 /// One file for each camera, as (file name, text).

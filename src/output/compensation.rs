@@ -4,8 +4,8 @@ use super::Context;
 use super::controller_files::{exported, offsets_in_words};
 use super::text::{key, list, number};
 use crate::error::{Error, Result};
+use crate::identify::Solution;
 use crate::model::joint_terms::Term;
-use crate::recipe::Solution;
 use crate::urdf::Chain;
 
 /// Acceleration of gravity, m/s^2 (standard).

@@ -6,10 +6,10 @@ use rand_chacha::ChaCha8Rng;
 use super::text::{csv, number};
 use super::{Context, Offsets};
 use crate::geom::Pose;
+use crate::identify::Solution;
+use crate::model::inverse;
 use crate::model::mdh::{Mdh, Unfit};
 use crate::model::robot::Robot;
-use crate::plan::inverse;
-use crate::recipe::Solution;
 use crate::urdf::{Chain, JointKind};
 
 /// The robot as the files of this result describe it: offsets folded into origins, or left to the controller.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::names::file_parts;
 use super::text::csv;
 use crate::error::{Error, Result};
-use crate::recipe::SeenImage;
+use crate::identify::SeenImage;
 use crate::series::{
     CirclePoint, Edge, ImageObservations, InputFile, Plate, Series, observations_csv, plate_csv, plate_toml,
 };

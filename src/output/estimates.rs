@@ -4,7 +4,7 @@ use super::Context;
 use super::names::column_names;
 use super::solution_json::EstimateRecord;
 use crate::error::{Error, Result};
-use crate::recipe::Solution;
+use crate::identify::Solution;
 
 /// Posterior sigma of a column in its unit; `None` where it was held fixed or nothing touches it.
 pub(super) fn sigma(solution: &Solution, column: usize) -> Option<f64> {

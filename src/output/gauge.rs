@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix6};
 
 use crate::error::Result;
-use crate::recipe::Solution;
+use crate::identify::Solution;
 use crate::solve::{InFrame, PlateScale, Similarity, in_frame};
 
 /// Covariances of placements and markers in the frames of the plates.

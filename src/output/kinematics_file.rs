@@ -8,8 +8,8 @@ use super::Context;
 use super::controller_files::{exported, offsets_in_words, postures};
 use super::text::{key, number};
 use crate::geom::Pose;
+use crate::identify::Solution;
 use crate::model::robot::Robot;
-use crate::recipe::Solution;
 use crate::urdf::{Chain, JointKind, RobotDescription};
 
 /// Joints of ur_description without prefix, and what its kinematics file calls them.

@@ -16,9 +16,7 @@ mod dot_font;
 mod estimates;
 pub mod flange_table;
 mod gauge;
-pub mod image_study;
 mod kinematics_file;
-pub mod monte_carlo;
 mod names;
 mod observation_table;
 pub mod overlay;
@@ -32,7 +30,7 @@ mod plate_png;
 mod plate_svg;
 mod pose_files;
 pub mod recording;
-mod report;
+pub(crate) mod report;
 mod residuals;
 pub mod restore;
 mod robot_files;
@@ -53,7 +51,7 @@ pub use write::{NewFolder, NewResult, Place, recover, write_all, write_beside};
 use std::collections::BTreeMap;
 
 use crate::error::Result;
-use crate::recipe::Solution;
+use crate::identify::Solution;
 use crate::series::InputFile;
 use crate::urdf::RobotDescription;
 

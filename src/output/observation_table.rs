@@ -4,7 +4,7 @@ use super::Context;
 use super::names::ImageNames;
 use super::residuals::{poses, residuals};
 use super::text::csv;
-use crate::recipe::Solution;
+use crate::identify::Solution;
 use crate::series::Edge;
 
 const HEADER: [&str; 11] = ["image", "marker", "u", "v", "edge", "cov_uu", "cov_uv", "cov_vv", "du", "dv", "reason"];

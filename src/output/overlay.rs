@@ -12,7 +12,7 @@ use crate::detect::Picture;
 use crate::detect::circles::{Ellipse, Found, Outcome};
 use crate::error::{Error, Result};
 use crate::geom::PlaneMap;
-use crate::recipe::SeenImage;
+use crate::identify::SeenImage;
 use crate::series::{Edge, Plate};
 
 const OUTER: Colour = Colour(0, 214, 90);

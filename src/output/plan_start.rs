@@ -9,12 +9,12 @@ use super::solution_json::{ImageRecord, ObservationColumns, SolutionRecord};
 use crate::error::{Error, Result};
 use crate::files::{self, Kind};
 use crate::geom::Pose;
+use crate::identify::RobotModel;
 use crate::model::camera::{Camera, Lens};
 use crate::model::joint_terms::JointTerm;
 use crate::model::robot::{Robot, Stop};
 use crate::plan::setting::Setting;
 use crate::problem::{Image, Measured};
-use crate::recipe::RobotModel;
 use crate::series::{Marker, Plate};
 use crate::urdf::Chain;
 

@@ -5,7 +5,7 @@ use super::gauge::Gauge;
 use super::names::{file_names, plate_name};
 use super::text::csv;
 use crate::error::Result;
-use crate::recipe::Solution;
+use crate::identify::Solution;
 use crate::series::plate_toml;
 
 const HEADER: [&str; 9] =

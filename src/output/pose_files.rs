@@ -6,9 +6,10 @@ use super::Context;
 use super::gauge::Gauge;
 use super::names::{ImageNames, file_names};
 use super::text::{csv, list, quoted};
+use crate::fit::PlacedCamera;
 use crate::geom::Pose;
+use crate::identify::Solution;
 use crate::problem::Image;
-use crate::recipe::{PlacedCamera, Solution};
 use crate::series::CameraMount;
 
 const PERTURBATION: &str = "\

@@ -3,8 +3,8 @@
 use nalgebra::Vector2;
 
 use crate::geom::Pose;
+use crate::identify::Solution;
 use crate::problem::{Slack, predict};
-use crate::recipe::Solution;
 
 /// Where each image was taken from, as the estimates say: with its joint noise for images in use, from the readings alone
 /// for those left out, `None` where there is neither.

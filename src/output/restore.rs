@@ -13,7 +13,7 @@ use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes::MODES;
 use crate::model::robot::{Robot, Stop};
 use crate::problem::{Layout, PlateShape, Slack, State};
-use crate::recipe::{MeasuredSeries, MeasuredStop};
+use crate::problem::{MeasuredSeries, MeasuredStop};
 use crate::series::{CameraMount, Marker, Observation, Plate};
 use crate::urdf::{Chain, RobotDescription};
 

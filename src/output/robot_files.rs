@@ -7,7 +7,7 @@ use super::controller_files::exported;
 use super::names::file_part;
 use crate::error::Result;
 use crate::geom::Pose;
-use crate::recipe::Solution;
+use crate::identify::Solution;
 use crate::urdf::patch_origins;
 
 /// File name of the corrected URDF.

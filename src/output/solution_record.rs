@@ -18,10 +18,10 @@ use super::solution_json::{
 use crate::assess::{ProjectionMap, median};
 use crate::error::Result;
 use crate::geom::Pose;
+use crate::identify::{Solution, depths_m};
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes;
 use crate::problem::{Image, Problem, Slack, State};
-use crate::recipe::{Solution, depths_m};
 
 /// The record of a solution.
 ///
@@ -138,7 +138,7 @@ fn robot(state: &State, twist_factor: f64) -> RobotRecord {
 
 fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
     let plate = |k: usize| solution.problem.images.iter().find(|i| i.series == k).map_or(0, |i| i.plate);
-    let record = |(k, s): (usize, &crate::recipe::MeasuredSeries)| SeriesRecord {
+    let record = |(k, s): (usize, &crate::problem::MeasuredSeries)| SeriesRecord {
         name: series_name(context, k),
         camera: s.camera.clone(),
         mounting: s.mounting.clone(),

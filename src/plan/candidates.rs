@@ -7,13 +7,13 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
-use super::inverse::{random_readings, reading_limits, solve_from};
 use super::scene::{Scene, arm_length_m};
 use super::setting::Setting;
 use super::viewpoint::{View, ViewRange};
 use super::visibility::{SightLimits, seen_markers};
 use crate::error::{Error, Result};
 use crate::geom::Pose;
+use crate::model::inverse::{random_readings, reading_limits, solve_from};
 use crate::series::CameraMount;
 
 /// A pose that could be planned.

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::plan::{Plan, PlanRequest, Wish};
+use super::choose::{Plan, PlanRequest, Wish};
 use crate::assess::root_mean_square;
 use crate::error::{Error, Result};
 use crate::linalg::SymmetricFactor;
@@ -356,7 +356,7 @@ impl ParameterForecast {
 
 fn ranges(request: &PlanRequest, plan: &Plan) -> Vec<JointRange> {
     let chain = &request.setting.robot.chain;
-    let limits = crate::plan::inverse::reading_limits(chain);
+    let limits = crate::model::inverse::reading_limits(chain);
     let one = |k: usize| JointRange {
         name: chain.readings[k].clone(),
         kind: chain.reading_kinds[k],

@@ -4,10 +4,12 @@
 //! [`information`] -> [`relax`] (optimal weights with certificate), [`refine`] (further poses where they pay) -> [`rounding`] -> [`order`].
 
 pub mod candidates;
+mod choose;
 pub mod criterion;
+mod forecast;
 pub mod information;
-pub mod inverse;
 pub mod order;
+mod places;
 pub mod plate_code;
 pub mod plate_design;
 pub mod refine;
@@ -17,3 +19,10 @@ pub mod scene;
 pub mod setting;
 pub mod viewpoint;
 pub mod visibility;
+
+pub use choose::{Budget, Choice, Plan, PlanRequest, Wish, choose, plan};
+pub use forecast::{
+    CurvePoint, Forecast, Gain, JointRange, ParameterForecast, check_wish, exact_covariance, flange_m, forecast,
+    image_name,
+};
+pub use places::{PlaceForecast, compare_places, place_words};

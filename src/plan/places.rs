@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
+use super::choose::{Choice, PlanRequest, criterion};
 use super::forecast::{KNOWN_SHARE, flange_m};
-use super::plan::{Choice, PlanRequest, criterion};
 use crate::error::Result;
 use crate::linalg::SymmetricFactor;
 use crate::plan::relax::Design;

@@ -8,7 +8,9 @@ mod equations;
 mod family;
 mod layout;
 mod linearise;
+mod measured_series;
 mod postures;
+mod scale_bar;
 mod select;
 mod state;
 
@@ -19,7 +21,9 @@ pub use layout::{Column, Layout, OriginPrior};
 pub use linearise::{
     Chained, E, ImageTerms, Residual, Weighting, chained, chained_from, equations, linearise, predict,
 };
+pub use measured_series::{LensChoice, MeasuredSeries, MeasuredStop};
 pub use postures::{common_readings, joined, posture_groups};
+pub use scale_bar::{SCALE, hold_scale_bars, seen_markers, size_by_bar};
 pub use select::short_name;
 pub use state::{PlateShape, Slack, State, Step};
 

@@ -13,8 +13,8 @@ use super::field::{Edit, Place, splice};
 use super::posture::{Before, Finder, Known};
 use super::program::{Approach, Displaced, Kind, Left, PoseTarget, Posture, Program, Target, Understood, write_joints};
 use crate::geom::Pose;
+use crate::model::inverse::{self, Reach, Stalled};
 use crate::model::robot::Robot;
-use crate::plan::inverse::{self, Reach, Stalled};
 use crate::urdf::JointKind;
 
 /// What may remain at a target, m and rad.

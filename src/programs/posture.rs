@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use super::codes::{Branch, Codes};
 use super::program::{PoseTarget, Posture, Understood};
 use crate::geom::Pose;
+use crate::model::inverse::{self, Reach};
 use crate::model::robot::Robot;
-use crate::plan::inverse::{self, Reach};
 use crate::urdf::JointKind;
 
 /// Random starts for the joints of a pose that no earlier target is near to.

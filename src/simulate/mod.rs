@@ -3,7 +3,6 @@
 pub mod conditions;
 pub mod faults;
 pub mod folder;
-pub mod image_study;
 mod observe;
 mod placement;
 pub mod psf;

@@ -3,14 +3,11 @@
 
 use rayon::prelude::*;
 
-use super::build::build;
-use super::compare::{TruthError, truth_error};
-use super::joint::RobotModel;
 use super::simulated::measured;
-use super::two_stage::{Estimator, PoseStage, estimate_all};
 use crate::assess::{Ratio, bootstrap_ratio, median, root_mean_square};
 use crate::error::{Error, Result};
 use crate::geom::{Pose, adjoint};
+use crate::identify::{Estimator, PoseStage, RobotModel, TruthError, build, estimate_all, truth_error};
 use crate::problem::{Problem, Slack, State, chained};
 use crate::series::{Plate, PlateKind};
 use crate::simulate::{SimulatedSeries, WorldRequest, series};

@@ -17,13 +17,11 @@
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use rayon::prelude::*;
 
-use super::evidence::identify;
-use super::joint::{Options, RobotModel};
 use super::simulated::measured;
-use super::solution::Solution;
-use super::worth::NORMAL_95;
+use crate::assess::NORMAL_95;
 use crate::error::Result;
 use crate::geom::Pose;
+use crate::identify::{Options, RobotModel, Solution, identify};
 use crate::linalg::SymmetricFactor;
 use crate::model::robot::{Robot, Stop};
 use crate::problem::{Problem, Slack, State, chained};

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::recipe::{BLOCKS, MonteCarloCell};
+use crate::study::{BLOCKS, MonteCarloCell};
 
 /// Markdown with one table of normalised errors and one of the joint noise; `command` makes it.
 pub fn monte_carlo_markdown(cells: &[MonteCarloCell], command: &str) -> String {
@@ -26,7 +26,7 @@ pub fn monte_carlo_markdown(cells: &[MonteCarloCell], command: &str) -> String {
     let _ = writeln!(out, "| joint noise, mrad | worlds | {} |", BLOCKS.join(" | "));
     let _ = writeln!(out, "|---|---|{}", "---|".repeat(BLOCKS.len()));
     for c in cells {
-        let block = |b: &crate::recipe::BlockResult| {
+        let block = |b: &crate::study::BlockResult| {
             let mean = if b.holds() { format!("{:.3}", b.mean) } else { format!("**{:.3}**", b.mean) };
             format!("{mean} (+-{:.3})", b.half_width)
         };

@@ -1,7 +1,6 @@
 //! A simulated series as if it had been measured.
 
-use super::build::{MeasuredSeries, MeasuredStop};
-use super::lens_choice::LensChoice;
+use crate::problem::{LensChoice, MeasuredSeries, MeasuredStop};
 use crate::series::{AngleUnit, StopOrder};
 use crate::simulate::SimulatedSeries;
 use crate::urdf::{Chain, JointKind};

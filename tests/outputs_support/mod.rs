@@ -10,10 +10,11 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
 use robotcal::geom::{Pose, exp_so3};
+use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::Robot;
 use robotcal::output::{Context, Offsets, Poses};
-use robotcal::recipe::{MeasuredSeries, MeasuredStop, Options, RobotModel, Solution, identify};
+use robotcal::problem::{MeasuredSeries, MeasuredStop};
 use robotcal::series::{CameraMount, Edge, InputFile, Observation, Plate, PlateKind};
 use robotcal::urdf::RobotDescription;
 
@@ -148,7 +149,7 @@ pub fn series_in_postures(mount: CameraMount, description: &RobotDescription, st
         height_px: 1024,
         focal_px: None,
         lens: Lens::Brown,
-        lens_choice: robotcal::recipe::LensChoice::Settled,
+        lens_choice: robotcal::problem::LensChoice::Settled,
         centroid: true,
         plate,
         plate_name: "/somewhere/run1/plate.toml".into(),

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3, Vector6};
 use robotcal::geom::{Pose, project_to_so3};
+use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::problem::{Measured, PlateShape, Slack, State};
-use robotcal::recipe::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify, measured};
 use robotcal::series::{Plate, PlateKind};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
 use robotcal::solve::{covariance, linearise_all};
+use robotcal::study::measured;
 
 use super::{context, robot};
 

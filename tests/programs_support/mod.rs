@@ -96,7 +96,7 @@ impl Cell {
 
     /// The same, for a robot whose joint `held` does not move.
     pub fn readings_holding(&mut self, held: Option<usize>) -> Vec<f64> {
-        let limits = robotcal::plan::inverse::reading_limits(&self.nominal.chain);
+        let limits = robotcal::model::inverse::reading_limits(&self.nominal.chain);
         loop {
             let q: Vec<f64> = limits
                 .iter()

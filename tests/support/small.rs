@@ -9,7 +9,7 @@ use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use robotcal::model::robot::{Robot, Stop};
 use robotcal::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State, predict};
-use robotcal::recipe::{MeasuredSeries, MeasuredStop};
+use robotcal::problem::{MeasuredSeries, MeasuredStop};
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 use robotcal::urdf::{CarriedMass, Chain, Drive, Joint, JointKind};
 
@@ -282,7 +282,7 @@ fn observed(dice: &mut Dice, request: &Request, plate: &Plate, state: &State, mu
     image
 }
 
-/// The same data as a series for the recipes.
+/// The same data as a series for `identify`.
 pub fn series(problem: &Problem) -> MeasuredSeries {
     let plate = problem.plates[0].clone();
     let stop = |image: &Image| MeasuredStop {
@@ -307,7 +307,7 @@ pub fn series(problem: &Problem) -> MeasuredSeries {
         height_px: 1024,
         focal_px: None,
         lens: Lens::Brown,
-        lens_choice: robotcal::recipe::LensChoice::Settled,
+        lens_choice: robotcal::problem::LensChoice::Settled,
         centroid: true,
         plate_name: "plate".into(),
         order_known: false,

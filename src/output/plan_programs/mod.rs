@@ -10,7 +10,7 @@ mod urscript;
 use std::collections::BTreeMap;
 
 use crate::plan::order::motion;
-use crate::recipe::{Plan, PlanRequest, image_name};
+use crate::plan::{Plan, PlanRequest, image_name};
 use crate::urdf::JointKind;
 
 /// Name of the programs.

@@ -5,13 +5,13 @@
 mod images;
 mod knowledge;
 mod maps;
-pub(super) mod page;
+pub(crate) mod page;
 mod parameters;
 mod plan_page;
 mod plan_pictures;
 mod plots;
 mod sections;
-pub(super) mod svg;
+pub(crate) mod svg;
 mod two_stage;
 mod verdict;
 mod words;

@@ -3,7 +3,7 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// A page with its style; `body` is what stands in it.
-pub(in crate::output) fn page(title: &str, style: &str, body: &Markup) -> String {
+pub fn page(title: &str, style: &str, body: &Markup) -> String {
     let page: Markup = html! {
         (DOCTYPE)
         html lang="en" {

@@ -6,7 +6,7 @@ use super::page::page;
 use super::plan_pictures::{View, coverage, curve, joint_ranges, scene};
 use super::{STYLE, figure};
 use crate::output::plan_files::written;
-use crate::recipe::{Forecast, Plan, PlanRequest, image_name};
+use crate::plan::{Forecast, Plan, PlanRequest, image_name};
 
 /// Rows of the table of parameters.
 const PARAMETERS: usize = 15;

@@ -6,7 +6,7 @@ use super::svg::{Anchor, Svg};
 use super::words::plain;
 use crate::geom::Pose;
 use crate::plan::visibility::seen_markers;
-use crate::recipe::{Forecast, JointRange, Plan, PlanRequest};
+use crate::plan::{Forecast, JointRange, Plan, PlanRequest};
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
 

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 /// A drawing in user units; x to the right, y down.
-pub(in crate::output) struct Svg {
+pub struct Svg {
     width: f64,
     height: f64,
     label: String,
@@ -12,7 +12,7 @@ pub(in crate::output) struct Svg {
 
 /// Where a text hangs on its point.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::output) enum Anchor {
+pub enum Anchor {
     Start,
     Middle,
     End,
@@ -28,7 +28,7 @@ impl Anchor {
     }
 }
 
-pub(in crate::output) fn escaped(text: &str) -> String {
+pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
@@ -118,7 +118,7 @@ impl Svg {
 }
 
 /// A round number (1, 2 or 5 times a power of ten) at most `value`.
-pub(in crate::output) fn round_below(value: f64) -> f64 {
+pub fn round_below(value: f64) -> f64 {
     if !(value > 0.0 && value.is_finite()) {
         return 1.0;
     }
@@ -127,7 +127,7 @@ pub(in crate::output) fn round_below(value: f64) -> f64 {
 }
 
 /// Round ticks from zero to at most `largest`, about five.
-pub(in crate::output) fn ticks(largest: f64) -> Vec<f64> {
+pub fn ticks(largest: f64) -> Vec<f64> {
     let step = round_below(largest / 4.0);
     (0..=20).map(|k| step * f64::from(k)).take_while(|t| *t <= largest * (1.0 + 1e-9)).collect()
 }

@@ -5,8 +5,8 @@ use maud::{Markup, html};
 use super::figure;
 use super::svg::{Anchor, Svg, round_below};
 use super::words::{count, fixed, significant};
+use crate::identify::{Comparison, Estimator};
 use crate::output::solution_json::SolutionRecord;
-use crate::recipe::{Comparison, Estimator};
 
 /// What a fit of the robot to stand-alone camera poses would have reached.
 pub(super) fn section(r: &SolutionRecord) -> Markup {

@@ -4,6 +4,7 @@ mod bias;
 mod identity;
 mod identity_view;
 mod precision;
+pub mod tables;
 mod view;
 
 pub use bias::{Bias, BiasCase, COMA_CONTRAST_TO_NOISE, Cause, bias, bias_cases};

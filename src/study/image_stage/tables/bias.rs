@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::{Claim, Section};
 use crate::detect::circles::LOPSIDED_PX;
-use crate::simulate::image_study::{Bias, COMA_CONTRAST_TO_NOISE, Cause};
+use crate::study::image_stage::{Bias, COMA_CONTRAST_TO_NOISE, Cause};
 
 /// Largest distance to the true centroid that is allowed, px.
 const LARGEST_BIAS_PX: f64 = 0.003;

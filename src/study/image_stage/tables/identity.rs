@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::{Claim, Section};
 use crate::output::report::svg::{Anchor, Svg};
 use crate::plan::plate_design::LEAST_MINOR_AXIS_PX;
-use crate::simulate::image_study::{DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityView, MirrorAnswer, Sight};
+use crate::study::image_stage::{DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityView, MirrorAnswer, Sight};
 
 /// Share of the wholly visible markers that must be found.
 const LEAST_RECALL: f64 = 0.99;

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::{Claim, Section, precision_plot};
 use crate::plan::plate_design::LEAST_MINOR_AXIS_PX;
-use crate::simulate::image_study::{MAP_OFF_PX, Precision};
+use crate::study::image_stage::{MAP_OFF_PX, Precision};
 
 /// Largest rms in units of the bound.
 const LARGEST_RATIO: f64 = 1.3;

@@ -1,7 +1,7 @@
 //! Plot of the study of precision: what was reached over the exact bound.
 
 use crate::output::report::svg::{Anchor, Svg};
-use crate::simulate::image_study::Precision;
+use crate::study::image_stage::Precision;
 
 const STYLE: &str = "text{font:11px sans-serif;fill:#222}.axis{stroke:#444}.grid{stroke:#ddd}.bound{stroke:#444}\
                      .limit{stroke:#c0392b;stroke-dasharray:4 3}.r0{fill:#1b9e77}.r1{fill:#d95f02}.r2{fill:#7570b3}.r3{fill:#e7298a}.r4{fill:#66a61e}";

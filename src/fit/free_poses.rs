@@ -1,0 +1,56 @@
+//! Stand-alone camera poses: what the free-pose adjustment found.
+
+use nalgebra::Matrix6;
+
+use crate::geom::Pose;
+use crate::problem::{Problem, Slack, State};
+use crate::solve::PlateScale;
+
+/// Stand-alone pose of one image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreePose {
+    /// `camera_from_plate`.
+    pub camera_from_plate: Pose,
+    /// Covariance of its body twist [rho, phi], m and rad, with the tolerances of the markers.
+    pub covariance: Matrix6<f64>,
+    /// The pose in the plate frame that the nominal markers define, with the scale of [`FreePoses::scales`]; the sigma of the scale is not
+    /// in its covariance.
+    pub in_frame: PlacedCamera,
+    /// RMS of the lengths of its residuals, px.
+    pub rms_px: f64,
+}
+
+/// A camera in the frame of a plate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlacedCamera {
+    /// The pose.
+    pub plate_from_camera: Pose,
+    /// Covariance of its body twist [rho, phi], m and rad.
+    pub covariance: Matrix6<f64>,
+}
+
+/// The adjusted free poses.
+#[derive(Debug, Clone)]
+pub struct FreePoses {
+    /// One for each image of the problem; `None` for an image that is left out.
+    pub poses: Vec<Option<FreePose>>,
+    /// RMS of the lengths of all residuals, px per point.
+    pub rms_px: f64,
+    /// Number of observations in use.
+    pub observations: usize,
+    /// Cameras and plates of this adjustment.
+    pub state: State,
+    /// Scale of every plate, in which the poses in its frame are given: as it was made, or as it was measured (`[scale]`). None for a
+    /// plate that no image shows.
+    pub scales: Vec<Option<PlateScale>>,
+    /// Pixel factors found.
+    pub pixel_factor: Vec<f64>,
+    /// A change of focus or zoom within the images of a camera, in words.
+    pub focus_change: Option<String>,
+}
+
+/// Error of rotation (rad) and of position (m) of the pose that the readings of an image say, against its free pose.
+pub fn misfit(state: &State, problem: &Problem, free: &Pose, image: usize) -> Option<(f64, f64)> {
+    let predicted = state.camera_from_plate(&problem.images[image], &Slack::None)?;
+    Some(predicted.distance(free))
+}

@@ -1,0 +1,78 @@
+//! A series as the adjustment takes it: everything that was measured, with identified markers.
+
+use serde::{Deserialize, Serialize};
+
+use crate::model::camera::Lens;
+use crate::series::{CameraMount, Observation, Plate};
+
+/// Which lenses the evidence chooses among.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LensChoice {
+    /// None: the lens is as stated.
+    #[default]
+    Settled,
+    /// Those that camera.yaml can express.
+    Exported,
+    /// All formulas.
+    All,
+}
+
+impl LensChoice {
+    /// True where a lens is among them.
+    pub fn has(self, lens: Lens) -> bool {
+        match self {
+            Self::Settled => false,
+            Self::Exported => lens.is_in_ros(),
+            Self::All => !lens.has_field(),
+        }
+    }
+}
+
+/// One series after detection, joint readings in SI and in the order of the chain.
+#[derive(Debug, Clone)]
+pub struct MeasuredSeries {
+    /// Name of the series, for messages.
+    pub name: String,
+    /// Series with the same camera share intrinsics.
+    pub camera: String,
+    /// Series with the same mounting share the hand-camera offset.
+    pub mounting: String,
+    /// Where the camera is.
+    pub mount: CameraMount,
+    /// Columns of the images.
+    pub width_px: u32,
+    /// Rows of the images.
+    pub height_px: u32,
+    /// Focal length as stated, px.
+    pub focal_px: Option<f64>,
+    /// Lens model.
+    pub lens: Lens,
+    /// Whether the evidence decides on the lens; the fit then begins with the simplest.
+    pub lens_choice: LensChoice,
+    /// What an observation of a circle means: true for the centroid of its image, false for its imaged centre.
+    pub centroid: bool,
+    /// The plate.
+    pub plate: Plate,
+    /// Series with the same plate name share its shape.
+    pub plate_name: String,
+    /// True where the rows stand in the order of visiting.
+    pub order_known: bool,
+    /// Stops in the order of the rows.
+    pub stops: Vec<MeasuredStop>,
+}
+
+/// One stop with what its image shows.
+#[derive(Debug, Clone)]
+pub struct MeasuredStop {
+    /// File name of the image.
+    pub image: String,
+    /// Readings, rad or m; `None` off the robot.
+    pub readings: Option<Vec<f64>>,
+    /// Where the plate stood.
+    pub placement: String,
+    /// What was seen.
+    pub observations: Vec<Observation>,
+    /// Why the image is left out already (unreadable, nothing found).
+    pub left_out: Option<String>,
+}
