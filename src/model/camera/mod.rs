@@ -1,7 +1,7 @@
 //! Cameras: one table of lenses, one file per lens.
 //!
 //! To add a lens: write `src/model/camera/<lens>.rs` with its names and `distort` (value and derivatives), add a variant to
-//! [`Lens`] and a row to each `match` in this file (the compiler lists them), and a row to `tests/jacobians.rs`.
+//! [`Lens`] and a row to each `match` in this file (the compiler lists them), and a row to `tests/model/jacobians.rs`.
 
 mod brown;
 mod field;

@@ -1,11 +1,9 @@
 //! Series whose stops come from a recording, and recordings turned into series folders.
 
-mod recording_support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use recording_support::{annotations, undefined};
+use crate::recording_support::{annotations, undefined};
 use robotcal::geom::Pose;
 use robotcal::series::{
     CameraInfo, Edge, FramePoses, ImageMarks, ImageObservations, MarkKind, MarkLayer, Observation, RecordingOptions,

@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod programs_support;
-
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
-use programs_support::{Cell, assert_meets, numbers, shape, status_turn};
+use crate::programs_support::{Cell, assert_meets, numbers, shape, status_turn};
 use robotcal::geom::Pose;
 use robotcal::model::inverse;
 

@@ -1,6 +1,6 @@
 //! What the program says of the series that come with it: terminal, exit code, findings and numbers, frozen in tests/golden.
 //!
-//! `GOLDEN=write cargo test --release --test golden` writes them anew; a commit of its own says why. Numbers are compared within
+//! `GOLDEN=write cargo test --release --test world golden` writes them anew; a commit of its own says why. Numbers are compared within
 //! [`SAME`] of their size; on the machine that wrote them, `GOLDEN=exact` asks for [`EXACT`].
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

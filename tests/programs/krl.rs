@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod programs_support;
-
 use std::collections::BTreeMap;
 
-use programs_support::{Cell, assert_meets, shape, status_turn};
+use crate::programs_support::{Cell, assert_meets, shape, status_turn};
 use robotcal::geom::{Pose, matrix_from_rpy};
 use robotcal::model::inverse;
 

@@ -10,8 +10,7 @@ use robotcal::Error;
 use robotcal::detect::{FlatField, Picture, detect_series, load};
 use robotcal::series::{Plate, PlateKind};
 
-mod boards_scene;
-use boards_scene::{Scene, View};
+use crate::boards_scene::{Scene, View};
 
 fn ramp(x: u32, y: u32) -> u16 {
     (x * 700 + y * 90) as u16

@@ -2,9 +2,7 @@
 
 #![allow(missing_docs, clippy::expect_used, clippy::panic)]
 
-mod boards_scene;
-
-use boards_scene::{Scene, View};
+use crate::boards_scene::{Scene, View};
 use robotcal::detect::{Detection, Picture, detect};
 use robotcal::series::{Plate, PlateKind};
 

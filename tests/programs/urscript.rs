@@ -5,11 +5,9 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod programs_support;
-
 use std::time::Instant;
 
-use programs_support::{Cell, assert_meets, numbers, shape};
+use crate::programs_support::{Cell, assert_meets, numbers, shape};
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::model::inverse;
 use robotcal::model::robot::Robot;
@@ -230,7 +228,7 @@ fn a_program_moves_from_one_calibrated_robot_to_another() {
 
 #[test]
 fn redundant_axes_stay_close_and_held_ones_stay() {
-    let urdf = programs_support::repo("robots/lbr_iiwa_14/lbr_iiwa_14.urdf");
+    let urdf = crate::programs_support::repo("robots/lbr_iiwa_14/lbr_iiwa_14.urdf");
     let mut cell = Cell::new(&urdf, ("base_link", "flange"), 9);
     let table: Vec<Vec<f64>> = (0..50).map(|_| cell.readings_holding(Some(2))).collect();
     let text = csv(&cell.nominal.chain.readings.join(","), &table);
@@ -333,7 +331,7 @@ fn left_over(cell: &Cell, tool: &Pose, old: &[f64], new: &[f64], q: &[f64]) -> f
 }
 
 /// The findings of a call: code -> (weight, quantities).
-fn findings(run: &programs_support::Run) -> std::collections::BTreeMap<String, (String, serde_json::Value)> {
+fn findings(run: &crate::programs_support::Run) -> std::collections::BTreeMap<String, (String, serde_json::Value)> {
     let all: Vec<serde_json::Value> = serde_json::from_str(&run.text("findings.json")).unwrap();
     let one = |f: serde_json::Value| {
         (f["code"].as_str().unwrap().into(), (f["weight"].as_str().unwrap().into(), f["quantities"].clone()))
@@ -341,7 +339,7 @@ fn findings(run: &programs_support::Run) -> std::collections::BTreeMap<String, (
     all.into_iter().map(one).collect()
 }
 
-fn column(run: &programs_support::Run, name: &str) -> Vec<String> {
+fn column(run: &crate::programs_support::Run, name: &str) -> Vec<String> {
     let text = run.text("corrections.csv");
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let at = reader.headers().unwrap().iter().position(|h| h == name).unwrap();
@@ -557,7 +555,7 @@ fn the_controller_may_compute_in_a_frame_that_is_fixed_beside_the_arm() {
             .arg("--urdf")
             .arg(&real);
         command.arg("--compensation").arg(&cell.compensation).args(["--unordered", "--base", base, "--tip", "tool0"]);
-        programs_support::Run { output: command.output().unwrap(), out }
+        crate::programs_support::Run { output: command.output().unwrap(), out }
     };
     let run = call("base").expect(0);
     assert!(findings(&run).contains_key("nominal_is_controllers"));
@@ -574,8 +572,8 @@ fn the_controller_may_compute_in_a_frame_that_is_fixed_beside_the_arm() {
 /// The world behind reports/kr6_small is known: what is left in its base frame against what is promised.
 #[test]
 fn what_base_and_tool_leave_is_stated_by_the_covariance_of_the_solution() {
-    let report = programs_support::repo("reports/kr6_small");
-    let truth = std::fs::read_to_string(programs_support::repo("datasets/kr6_small/truth.toml")).unwrap();
+    let report = crate::programs_support::repo("reports/kr6_small");
+    let truth = std::fs::read_to_string(crate::programs_support::repo("datasets/kr6_small/truth.toml")).unwrap();
     let truth: toml::Value = toml::from_str(&truth).unwrap();
     let list = |v: &toml::Value| -> Vec<f64> { v.as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect() };
     let known: Vec<(Vec<f64>, Pose)> = truth["held_out"]
@@ -598,7 +596,7 @@ fn what_base_and_tool_leave_is_stated_by_the_covariance_of_the_solution() {
         command.arg("compensate").arg(&file).arg("--out").arg(&out).arg("--nominal").arg(&cell.nominal_urdf);
         command.arg("--urdf").arg(urdf).arg("--compensation").arg(report.join("compensation.toml"));
         command.args(["--joint-unit", "rad", "--unordered", "--base", "base_link", "--tip", "tool0"]).args(more);
-        programs_support::Run { output: command.output().unwrap(), out }
+        crate::programs_support::Run { output: command.output().unwrap(), out }
     };
     let run = call(&report.join("kuka_kr6_r900.calibrated.urdf"), &[]);
     let (_, told) = &findings(&run)["expected_error"];

@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod outputs_support;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use crate::outputs_support::{context, robot, series_in_postures, solved};
 use nalgebra::{Matrix4, Vector3, Vector6};
-use outputs_support::{context, robot, series_in_postures, solved};
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::{Options, RobotModel, identify};
 use robotcal::model::robot::Robot;

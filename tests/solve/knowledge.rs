@@ -2,10 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-mod outputs_support;
-
+use crate::outputs_support::{context, robot, solved};
 use nalgebra::{DMatrix, DVector, Vector6};
-use outputs_support::{context, robot, solved};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

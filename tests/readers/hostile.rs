@@ -1,8 +1,5 @@
 //! Files that were made to exhaust memory, time or the stack, and the corpus of every reader (fuzz/readers.rs).
 
-#[path = "../fuzz/readers.rs"]
-mod readers;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -236,7 +233,7 @@ fn no_input_of_the_corpus_makes_a_reader_panic() {
     mutate(40);
 }
 
-/// The same at length: `cargo test --release --test hostile -- --ignored --nocapture`, with `ROUNDS` for each input.
+/// The same at length: `cargo test --release --test readers -- --ignored --nocapture`, with `ROUNDS` for each input.
 #[test]
 #[ignore = "minutes to hours"]
 fn no_mutation_of_the_corpus_makes_a_reader_panic() {
@@ -247,14 +244,14 @@ fn mutate(rounds: usize) {
     let seed = 20_261_122;
     println!("seed {seed}");
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    for name in readers::NAMES {
+    for name in crate::readers::NAMES {
         let files = corpus(name);
         assert!(!files.is_empty(), "no input for {name}");
         let (start, mut runs) = (Instant::now(), 0);
         let words: Vec<&[u8]> = files.iter().flat_map(|(_, b)| b.split(|c| !c.is_ascii_alphanumeric())).collect();
         for (path, whole) in &files {
             println!("{}", path.display());
-            readers::read(name, whole);
+            crate::readers::read(name, whole);
             for _ in 0..rounds {
                 let mut wrong = whole.clone();
                 for _ in 0..random.random_range(1..4) {
@@ -269,7 +266,7 @@ fn mutate(rounds: usize) {
                         _ => wrong[at..to].iter_mut().take(1).for_each(|b| *b ^= 1 << random.random_range(0..8)),
                     }
                 }
-                readers::read(name, &wrong);
+                crate::readers::read(name, &wrong);
                 runs += 1;
             }
         }

@@ -2,10 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-mod support;
-
 use std::collections::BTreeSet;
 
+use crate::support::small::{Dice, Request, problem, series};
 use nalgebra::Vector3;
 use robotcal::assess::{folds, regions};
 use robotcal::identify::{
@@ -16,7 +15,6 @@ use robotcal::model::joint_terms::{JointTerm, Term};
 use robotcal::problem::{Layout, Problem, Slack, State};
 use robotcal::series::CameraMount;
 use robotcal::solve::{Settings, Status, covariance, linearise_all, solve};
-use support::small::{Dice, Request, problem, series};
 
 fn hard(state: &State) -> State {
     State { slack: vec![Slack::None; state.slack.len()], ..state.clone() }

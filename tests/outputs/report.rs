@@ -1,8 +1,6 @@
 //! The report: complete, self-contained, and safe against whatever stands in names.
 
-mod outputs_support;
-
-use outputs_support::{context, robot, solved};
+use crate::outputs_support::{context, robot, solved};
 use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
 use robotcal::output::{files, report_html, solution_json};
 use robotcal::series::CameraMount;

@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-mod support;
-
+use crate::support::dense::{Dense, Unknown};
+use crate::support::small::{Dice, Part, Request, problem, series};
 use nalgebra::{DMatrix, DVector, Vector3};
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
@@ -15,8 +15,6 @@ use robotcal::solve::{
     ComponentOptions, Elimination, JOINT_NOISE_FLOOR, NoiseUncertainty, Outcome, Settings, Status, System, covariance,
     covariance_by, estimate_components, linearise_all, noise_information, solve,
 };
-use support::dense::{Dense, Unknown};
-use support::small::{Dice, Part, Request, problem, series};
 
 /// Iterates to where rounding ends it.
 const TIGHT: Settings = Settings { iterations: 200, decrement: 1e-9 };

@@ -1,13 +1,13 @@
 //! Covariances of plate, placement and stand-alone poses in the frame of the nominal markers: against the whole covariance brought there by the
 //! formula, and against the truth of simulated worlds.
 
-mod outputs_support;
-
 use std::collections::BTreeMap;
 
+use crate::outputs_support::truth_frame::{
+    Alignment, Judged, judged, least_eigenvalue, pose_row, result, template, world,
+};
+use crate::outputs_support::{context, robot, series};
 use nalgebra::{DMatrix, Matrix6, Vector3};
-use outputs_support::truth_frame::{Alignment, Judged, judged, least_eigenvalue, pose_row, result, template, world};
-use outputs_support::{context, robot, series};
 use rayon::prelude::*;
 use robotcal::geom::{Pose, adjoint, skew};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, identify};
@@ -297,7 +297,7 @@ fn poses_of_the_shipped_dataset_have_positive_definite_covariances() {
     assert!(rows.len() == 24 && least > 0.0);
 }
 
-/// Table of reports/plate-frame.md: `cargo test --release --test outputs_gauge -- --ignored --nocapture plate_frame`.
+/// Table of reports/plate-frame.md: `cargo test --release --test outputs -- --ignored --nocapture plate_frame`.
 #[test]
 #[ignore = "800 worlds, minutes"]
 fn study_of_the_plate_frame() {

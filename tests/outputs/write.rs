@@ -177,7 +177,7 @@ fn child() {
 
 fn child_command(out: &Path) -> Command {
     let mut command = Command::new(std::env::current_exe().unwrap());
-    command.args(["--ignored", "--exact", "child", "--nocapture", "--test-threads=1"]).env("RESULTS_GO_TO", out);
+    command.args(["--ignored", "--exact", "write::child", "--nocapture", "--test-threads=1"]).env("RESULTS_GO_TO", out);
     command
 }
 

@@ -1,12 +1,10 @@
 //! Every file of a result, read back by another reader than the writer.
 
-mod outputs_support;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::outputs_support::{context, robot, solved};
 use nalgebra::Matrix6;
-use outputs_support::{context, robot, solved};
 use robotcal::geom::Pose;
 use robotcal::identify::RobotModel;
 use robotcal::model::joint_terms::Term;

@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod recording_support;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use recording_support::annotations;
+use crate::recording_support::annotations;
 use serde_json::Value;
 
 fn shipped(path: &str) -> PathBuf {

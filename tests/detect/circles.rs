@@ -1,8 +1,6 @@
 //! The circle detector on rendered pictures with known truth.
 
-mod circles_support;
-
-use circles_support::{View, errors, report, scene};
+use crate::circles_support::{View, errors, report, scene};
 use robotcal::detect::circles::{Options, Outcome, detect};
 use robotcal::study::image_stage::{MirrorAnswer, Plates, identity_view};
 

@@ -5,8 +5,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-mod support;
-
+use crate::support::small::{Dice, Part, Request, all_terms, problem};
+use crate::support::witness::{self, D, Seed, body_twist, constant, variable};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 use robotcal::geom::{Pose, exp_so3, log_so3, right_jacobian_se3, right_jacobian_so3};
 use robotcal::model::camera::{Camera, Lens};
@@ -16,8 +16,6 @@ use robotcal::problem::{E, Image, Problem, Slack, State, Weighting, chained, equ
 use robotcal::series::CameraMount;
 use robotcal::urdf::JointKind;
 use std::f64::consts::PI;
-use support::small::{Dice, Part, Request, all_terms, problem};
-use support::witness::{self, D, Seed, body_twist, constant, variable};
 
 /// Rounding of a robot chain, relative to the largest entry.
 const CHAIN: f64 = 1e-12;

@@ -1,0 +1,13 @@
+//! Tests of detect; one binary, a file a subject.
+
+#[path = "../boards_scene/mod.rs"]
+mod boards_scene;
+#[path = "../circles_support/mod.rs"]
+mod circles_support;
+
+mod boards_charuco;
+mod boards_chessboard;
+mod boards_files;
+mod boards_real;
+mod circles;
+mod command;

@@ -1,0 +1,11 @@
+//! Tests of model; one binary, a file a subject.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod displacement_field;
+mod extended_robot;
+mod gravity;
+mod independent;
+mod jacobians;
+mod lenses;

@@ -1,0 +1,11 @@
+//! Tests of outputs; one binary, a file a subject.
+
+#[path = "../outputs_support/mod.rs"]
+mod outputs_support;
+
+mod controller;
+mod gauge;
+mod report;
+mod verify_points;
+mod whole;
+mod write;

@@ -1,0 +1,10 @@
+//! Tests of programs; one binary, a file a subject.
+
+#[path = "../programs_support/mod.rs"]
+mod programs_support;
+
+mod krl;
+mod plan_choice;
+mod plan_poses;
+mod rapid;
+mod urscript;

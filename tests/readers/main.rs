@@ -1,0 +1,17 @@
+//! Tests of readers; one binary, a file a subject.
+
+#[path = "../../fuzz/readers.rs"]
+mod readers;
+#[path = "../recording_support/mod.rs"]
+mod recording_support;
+
+mod hostile;
+mod mcap;
+mod plate;
+mod real;
+mod recorded;
+mod recording_overlay;
+mod series;
+mod simulated;
+mod urdf;
+mod urdf_patch;

@@ -1,0 +1,17 @@
+//! Tests of solve; one binary, a file a subject.
+
+#[path = "../outputs_support/mod.rs"]
+mod outputs_support;
+#[path = "../support/mod.rs"]
+mod support;
+
+mod coverage;
+mod diagnosis;
+mod knowledge;
+mod marker_tolerance;
+mod moved_in_time;
+mod plate_size;
+mod real_tracker;
+mod second_pass;
+mod solver_laws;
+mod two_stage;

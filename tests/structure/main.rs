@@ -1,0 +1,3 @@
+//! Tests of structure; one binary, a file a subject.
+
+mod architecture;
