@@ -8,6 +8,7 @@ mod support;
 mod coverage;
 mod diagnosis;
 mod knowledge;
+mod lens_study;
 mod marker_tolerance;
 mod moved_in_time;
 mod plate_size;
