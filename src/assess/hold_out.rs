@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::geom::Pose;
 use crate::init::resect;
 use crate::linalg::symmetric_eigen;
-use crate::problem::{Image, Problem, Slack, State, Weighting, posture_groups, predict};
+use crate::problem::{Image, ImageRejection, Problem, Slack, State, Weighting, posture_groups, predict};
 use crate::solve::{Settings, solve};
 
 /// Errors of predicted images.
@@ -204,7 +204,7 @@ fn predictions(
 /// The problem with some of its images held out.
 pub fn without_images(problem: &Problem, held: &[usize]) -> Problem {
     let mut rest = problem.clone();
-    held.iter().for_each(|&i| rest.images[i].rejected = Some("held out".into()));
+    held.iter().for_each(|&i| rest.images[i].rejected = Some(ImageRejection::Excluded));
     rest
 }
 

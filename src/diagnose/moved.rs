@@ -3,7 +3,7 @@
 use crate::fit::FreePoses;
 use crate::geom::Pose;
 use crate::init::PosePair;
-use crate::problem::{Problem, State};
+use crate::problem::{ImageRejection, Problem, State};
 
 /// Fewest wrongly paired images that make a new place of plate or camera credible.
 const FEWEST: usize = 3;
@@ -26,7 +26,7 @@ pub struct Move {
 pub fn find_move(problem: &Problem, state: &State, free: &FreePoses, series: usize) -> Option<Move> {
     let mut wrong: Vec<(usize, PosePair)> = Vec::new();
     for (i, image) in problem.images.iter().enumerate().filter(|(_, image)| image.series == series) {
-        let suspect = image.rejected.as_ref().is_some_and(|r| r.starts_with("wrongly paired"));
+        let suspect = image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair);
         if let (true, Some(stop), Some(pose)) = (suspect, &image.stop, &free.poses[i]) {
             wrong.push((i, PosePair::of_stop(&state.robot, image.mount, &stop.readings, pose.camera_from_plate)));
         }

@@ -8,8 +8,8 @@ use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Robot, Stop};
 use crate::problem::{
-    Family, Image, Layout, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape, Problem, Slack, State,
-    hold_scale_bars,
+    Family, Image, ImageRejection, Layout, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape, Problem, Slack,
+    State, hold_scale_bars,
 };
 use crate::series::{Edge, Plate};
 
@@ -69,10 +69,11 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool) -> Re
             let observations = measured(stop, s)?;
             let twin =
                 s.stops[..row].iter().find(|t| !t.observations.is_empty() && t.observations == stop.observations);
-            let duplicate = twin.map(|t| format!("duplicate: it shows exactly what {} shows", t.image));
+            let duplicate = twin.map(|t| ImageRejection::Duplicate { of: t.image.clone() });
             let rejected = stop.left_out.clone().or(duplicate).or_else(|| {
-                (observations.len() < FEWEST_OBSERVATIONS)
-                    .then(|| format!("only {} markers found, {FEWEST_OBSERVATIONS} are needed", observations.len()))
+                let found = observations.len();
+                (found < FEWEST_OBSERVATIONS)
+                    .then_some(ImageRejection::TooFewMarkers { found, needed: FEWEST_OBSERVATIONS })
             });
             images.push(Image {
                 name: stop.image.clone(),

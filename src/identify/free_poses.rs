@@ -9,7 +9,7 @@ use crate::fit::{FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
-use crate::problem::{Problem, Slack, State, Weighting};
+use crate::problem::{ImageRejection, Problem, Slack, State, Weighting};
 use crate::problem::{hold_scale_bars, size_by_bar};
 use crate::solve::{
     ComponentOptions, Covariance, Linearised, PlateScale, Settings, Similarity, Status, covariance,
@@ -59,13 +59,13 @@ fn fit_homographies(problem: &mut Problem, state: &State) -> Result<Vec<Option<H
         let pixels: Vec<Vector2<f64>> = image.used().map(|o| o.uv).collect();
         let homography = if image.rejected.is_none() { Homography::fit(&plane, &pixels) } else { None };
         if image.rejected.is_none() && homography.is_none() {
-            image.rejected = Some("its markers lie on a line".into());
+            image.rejected = Some(ImageRejection::Collinear);
         }
         all.push(homography);
     }
     if problem.used().count() == 0 {
         let reasons: Vec<String> = (problem.images.iter().take(3))
-            .map(|i| format!("{}: {}", i.name, i.rejected.as_deref().unwrap_or("")))
+            .map(|i| format!("{}: {}", i.name, i.rejected.as_ref().map(ToString::to_string).unwrap_or_default()))
             .collect();
         return Err(Error::input(
             "images",
@@ -107,7 +107,7 @@ fn quick_problem(problem: &Problem, camera: usize) -> Problem {
     let mut quick = problem.clone();
     for image in &mut quick.images {
         if image.camera != camera && image.rejected.is_none() {
-            image.rejected = Some("another camera".into());
+            image.rejected = Some(ImageRejection::Excluded);
         }
         image.observations.iter_mut().for_each(|o| o.radius_m = 0.0);
     }

@@ -15,7 +15,7 @@ use crate::fit::{Fit, FreePoses, misfit};
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::robot::Robot;
 use crate::problem::MeasuredSeries;
-use crate::problem::{Family, Problem, Slack, State};
+use crate::problem::{Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem, Slack, State};
 use crate::solve::{
     ComponentOptions, NoiseInformation, Outcome, Status, covariance, estimate_components, reject_images,
     reject_observations, without_untold_noise,
@@ -256,15 +256,10 @@ fn fit(
 fn name_wrong_pairs(problem: &mut Problem, state: &State, free: &FreePoses) {
     let mut remarks = Vec::new();
     for (i, image) in problem.images.iter().enumerate() {
-        let wrong = image.rejected.as_ref().is_some_and(|r| r.starts_with("wrongly paired"));
+        let wrong = image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair);
         let (true, Some(pose)) = (wrong, &free.poses[i]) else { continue };
         let pose = &pose.camera_from_plate;
-        let Some((angle, distance)) = misfit(state, problem, pose, i) else { continue };
-        let mut text = format!(
-            "wrongly paired or taken in motion: {:.1} mm and {:.1} mrad from where its joint readings put it",
-            1e3 * distance,
-            1e3 * angle
-        );
+        let Some((angle_rad, distance_m)) = misfit(state, problem, pose, i) else { continue };
         let better = (0..problem.images.len())
             .filter(|&k| k != i && problem.images[k].series == image.series)
             .filter_map(|k| {
@@ -275,13 +270,12 @@ fn name_wrong_pairs(problem: &mut Problem, state: &State, free: &FreePoses) {
                 Some((a + d, k))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((size, k)) = better.filter(|(size, _)| *size < 0.1 * (angle + distance)) {
-            text += &format!("; it fits the readings of {} to {:.1} (mm + mrad)", problem.images[k].name, 1e3 * size);
-        }
-        remarks.push((i, text));
+        let better = better.filter(|(size, _)| *size < 0.1 * (angle_rad + distance_m));
+        let fits = better.map(|(misfit, k)| FitsReadings { of: problem.images[k].name.clone(), misfit });
+        remarks.push((i, Mismatch::Fit { misfit: Misfit { distance_m, angle_rad }, fits }));
     }
-    for (i, text) in remarks {
-        problem.images[i].rejected = Some(text);
+    for (i, mismatch) in remarks {
+        problem.images[i].rejected = Some(ImageRejection::WronglyPaired(mismatch));
     }
 }
 
@@ -314,7 +308,7 @@ fn check_left_out(problem: &Problem, on_robot: usize, moves: &[Move]) -> Result<
         return Err(Error::unsolved("joint readings", &m.what, &m.remedy));
     }
     let named: Vec<&str> = (problem.images.iter())
-        .filter(|i| i.rejected.as_ref().is_some_and(|r| r.starts_with("wrongly paired")))
+        .filter(|i| i.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair))
         .map(|i| i.name.as_str())
         .take(5)
         .collect();

@@ -7,7 +7,7 @@ use super::look::{SeenImage, look, recording, require_some};
 use crate::detect::Detection;
 use crate::error::{Error, Notice, Result};
 use crate::model::camera::Lens;
-use crate::problem::{LensChoice, MeasuredSeries, MeasuredStop};
+use crate::problem::{ImageRejection, LensChoice, MeasuredSeries, MeasuredStop};
 use crate::series::{CirclePoint, Observation, Series, Source, StopOrder};
 use crate::urdf::Chain;
 
@@ -22,7 +22,7 @@ pub struct Measured {
 
 struct Seen {
     observations: Vec<Observation>,
-    left_out: Option<String>,
+    left_out: Option<ImageRejection>,
 }
 
 /// Reads joint values in the order of the chain and finds the plate in every image. `several` series qualify the names
@@ -44,16 +44,17 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
                 all.iter().map(|i| (i.image.as_str(), &i.observations)).collect();
             let given = |image: &str| match by_name.get(image) {
                 Some(o) => Seen { observations: (*o).clone(), left_out: None },
-                None => Seen { observations: vec![], left_out: Some("no observations are given".into()) },
+                None => Seen { observations: vec![], left_out: Some(ImageRejection::NoObservations) },
             };
             (series.stops.stops.iter().map(|s| given(&s.image)).collect(), None)
         }
         Source::Recording(path) => return Err(recording(path)),
     };
-    let stops = series.stops.stops.iter().zip(&seen);
+    let failures: Vec<Option<String>> = seen.iter().map(|s| s.left_out.as_ref().map(ToString::to_string)).collect();
+    let stops = series.stops.stops.iter().zip(&seen).zip(&failures);
     require_some(
         &format!("series {}", series.name),
-        stops.map(|(stop, s)| (stop.image.as_str(), s.observations.len(), s.left_out.as_deref())),
+        stops.map(|((stop, s), failure)| (stop.image.as_str(), s.observations.len(), failure.as_deref())),
     )?;
     let stated = camera.width_px.zip(camera.height_px);
     let (width_px, height_px) = found_size.or(stated).ok_or_else(|| {
@@ -141,7 +142,7 @@ fn look_through(series: &Series, progress: impl Fn(&Path) + Sync, notices: &mut 
     let size = usable.filter_map(|i| i.size).next().map(|(w, h)| (w as u32, h as u32));
     let seen = |image: SeenImage| {
         let Detection { observations, failure, .. } = image.detection;
-        Seen { observations, left_out: failure.map(|error| error.what) }
+        Seen { observations, left_out: failure.map(|error| ImageRejection::Unusable { what: error.what }) }
     };
     Ok((images.into_iter().map(seen).collect(), size))
 }

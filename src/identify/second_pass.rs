@@ -15,8 +15,7 @@ use crate::detect::circles::{Predicted, look_where_predicted};
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::model::robot::Robot;
-use crate::problem::MeasuredStop;
-use crate::problem::State;
+use crate::problem::{ImageRejection, MeasuredStop, State};
 use crate::series::{DEFAULT_PLACEMENT, Marker, Plate, PlateKind, Series};
 use crate::urdf::Chain;
 
@@ -55,7 +54,7 @@ fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Opti
         readings: None,
         placement: DEFAULT_PLACEMENT.to_owned(),
         observations: image.detection.observations.clone(),
-        left_out: image.detection.failure.as_ref().map(|e| e.what.clone()),
+        left_out: image.detection.failure.as_ref().map(|e| ImageRejection::Unusable { what: e.what.clone() }),
     };
     let stops = images.iter().map(stop).collect();
     let measured = measured_series(series, lens_of(series).ok()?, (width as u32, height as u32), true, stops);

@@ -10,7 +10,7 @@ use crate::fit::{FreePoses, misfit};
 use crate::geom::log_so3;
 use crate::init::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
 use crate::linalg::symmetric_eigen;
-use crate::problem::{Problem, Slack, State, predict};
+use crate::problem::{ImageRejection, Misfit, Mismatch, Problem, Slack, State, predict};
 
 /// Robust spread (rad + m) of the best closed form beyond which readings and images do not belong together.
 const WORST_SPREAD: f64 = 0.08;
@@ -204,13 +204,10 @@ fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &Hand
     sizes.sort_by(f64::total_cmp);
     let bound = (SET_ASIDE_FACTOR * sizes[sizes.len() / 2]).max(SET_ASIDE_FLOOR);
     for (i, pair) in pairs {
-        let (angle, distance) = solution.error(pair);
-        if angle + distance > bound {
-            problem.images[*i].rejected = Some(format!(
-                "wrongly paired or taken in motion: its camera pose is {:.1} mm and {:.1} mrad from where its joint readings put it",
-                1e3 * distance,
-                1e3 * angle
-            ));
+        let (angle_rad, distance_m) = solution.error(pair);
+        if angle_rad + distance_m > bound {
+            problem.images[*i].rejected =
+                Some(ImageRejection::WronglyPaired(Mismatch::HandEye(Misfit { distance_m, angle_rad })));
             aside.push(*i);
         }
     }

@@ -30,10 +30,10 @@ pub(super) fn observations_csv(solution: &Solution, context: &Context) -> String
             row.extend([(0, 0), (0, 1), (1, 1)].map(|at| format!("{:?}", covariance[at])));
             row.extend([0, 1].map(|at| residual.map_or_else(String::new, |r| format!("{:.6}", r[at]))));
             row.push(
-                image
-                    .rejected
-                    .as_ref()
-                    .map_or_else(|| o.rejected.unwrap_or_default().to_owned(), |reason| format!("image: {reason}")),
+                image.rejected.as_ref().map_or_else(
+                    || o.rejected.map_or("", |r| r.code()).to_owned(),
+                    |reason| format!("image: {reason}"),
+                ),
             );
             rows.push(row);
         }

@@ -75,7 +75,7 @@ fn stop(image: &ImageRecord, series: &str, placements: &[String]) -> Result<Meas
         image: image.name.strip_prefix(&prefix).unwrap_or(&image.name).to_owned(),
         readings: image.readings.clone(),
         placement: placement.ok_or_else(|| damaged(format!("image {} has no placement", image.name)))?.clone(),
-        left_out: image.reason.clone().filter(|_| observations.is_empty()),
+        left_out: image.rejection().filter(|_| observations.is_empty()),
         observations,
     })
 }

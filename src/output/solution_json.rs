@@ -12,7 +12,7 @@ use crate::error::{Notice, Result, plain_name};
 use crate::geom::Pose;
 use crate::identify::{Comparison, Estimator, Evidence, LensEvidence, StartVerdict};
 use crate::model::camera::Lens;
-use crate::problem::{LensChoice, short_name};
+use crate::problem::{ImageRejection, LensChoice, ObservationRejection, short_name};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
 use crate::solve::PlateScale;
 use crate::urdf::{JointKind, Payload};
@@ -282,7 +282,7 @@ pub struct ObservationColumns {
     /// Measured minus predicted, px.
     pub duv: Vec<Option<[f64; 2]>>,
     /// Why it is left out.
-    pub reason: Vec<Option<String>>,
+    pub reason: Vec<Option<ObservationRejection>>,
 }
 
 /// One image.
@@ -316,8 +316,11 @@ pub struct ImageRecord {
     pub rms_px: Option<f64>,
     /// Held-out error with nominal and calibrated robot, mm.
     pub held_out_mm: Option<[f64; 2]>,
-    /// Why the image is left out.
+    /// Why the image is left out, in words.
     pub reason: Option<String>,
+    /// The same with its code and sizes; absent in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rejection: Option<ImageRejection>,
     /// Observations.
     pub observations: ObservationColumns,
 }
@@ -551,6 +554,14 @@ impl SolutionRecord {
                 .zip(used)
                 .filter_map(|(seen, used)| used.then_some(seen))
         })
+    }
+}
+
+impl ImageRecord {
+    /// Why the image is left out; of files that have it in words alone, these.
+    pub fn rejection(&self) -> Option<ImageRejection> {
+        let in_words = || self.reason.clone().map(|what| ImageRejection::Unusable { what });
+        self.rejection.clone().or_else(in_words)
     }
 }
 

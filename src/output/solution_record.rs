@@ -298,7 +298,8 @@ fn images(solution: &Solution, context: &Context) -> Vec<ImageRecord> {
             }),
             rms_px: rms_px(solution, k),
             held_out_mm: solution.accuracy.per_image_mm.get(k).copied().flatten(),
-            reason: i.rejected.clone(),
+            reason: i.rejected.as_ref().map(ToString::to_string),
+            rejection: i.rejected.clone(),
             observations,
         }
     };
@@ -325,7 +326,7 @@ fn observations(solution: &Solution, image: usize, pose: Option<&Pose>) -> Obser
         columns.uv.push(o.uv.into());
         columns.covariance.push([c[(0, 0)], c[(0, 1)], c[(1, 1)]]);
         columns.duv.push(residual.map(Into::into));
-        columns.reason.push(o.rejected.map(String::from));
+        columns.reason.push(o.rejected);
     }
     columns
 }

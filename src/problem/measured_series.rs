@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::rejection::ImageRejection;
 use crate::model::camera::Lens;
 use crate::series::{CameraMount, Observation, Plate};
 
@@ -74,5 +75,5 @@ pub struct MeasuredStop {
     /// What was seen.
     pub observations: Vec<Observation>,
     /// Why the image is left out already (unreadable, nothing found).
-    pub left_out: Option<String>,
+    pub left_out: Option<ImageRejection>,
 }

@@ -10,6 +10,7 @@ mod layout;
 mod linearise;
 mod measured_series;
 mod postures;
+mod rejection;
 mod scale_bar;
 mod select;
 mod state;
@@ -23,6 +24,7 @@ pub use linearise::{
 };
 pub use measured_series::{LensChoice, MeasuredSeries, MeasuredStop};
 pub use postures::{common_readings, joined, posture_groups};
+pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};
 pub use scale_bar::{SCALE, hold_scale_bars, seen_markers, size_by_bar};
 pub use select::short_name;
 pub use state::{PlateShape, Slack, State, Step};
@@ -48,7 +50,7 @@ pub struct Measured {
     /// Inverse of the covariance that the detector states, px^-2.
     pub information: Matrix2<f64>,
     /// Why it is left out; `None` while it is used.
-    pub rejected: Option<&'static str>,
+    pub rejected: Option<ObservationRejection>,
 }
 
 /// One image with what belongs to it.
@@ -75,7 +77,7 @@ pub struct Image {
     /// Share of the local variance of each reading that the local errors of this stop cover; empty where there are none.
     pub local_share: Vec<f64>,
     /// Why the image is left out; `None` while it is used.
-    pub rejected: Option<String>,
+    pub rejected: Option<ImageRejection>,
 }
 
 /// Standard deviations that the data themselves decide (variance components).

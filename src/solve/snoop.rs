@@ -1,7 +1,9 @@
 //! Rejection with reasons: single observations by their residual, whole images by the joint error that they would need.
 
 use super::levenberg::Outcome;
-use crate::problem::{Problem, Slack, State, Weighting, chained, predict};
+use crate::problem::{
+    ImageRejection, Mismatch, ObservationRejection, Problem, Slack, State, Weighting, chained, predict,
+};
 
 /// Normalised residual length beyond which an observation is left out (a clean one is so with probability 4e-5).
 const OBSERVATION_BOUND: f64 = 4.5;
@@ -15,9 +17,6 @@ const IMAGE_BOUND: f64 = 8.0;
 /// Smallest robust sigma of a joint that is believed in this test, rad or m.
 const IMAGE_SIGMA_FLOOR: f64 = 1e-4;
 
-/// Reason given to an observation that disagrees with all others.
-pub const OUTLIER: &str = "residual";
-
 /// Re-judges every observation at the outcome; returns how many verdicts changed.
 pub fn reject_observations(problem: &mut Problem, outcome: &Outcome) -> usize {
     let state = &outcome.state;
@@ -26,7 +25,7 @@ pub fn reject_observations(problem: &mut Problem, outcome: &Outcome) -> usize {
         let Some(chain) = chained(problem, state, image, &state.slack[i]) else { continue };
         let w = Weighting::of(problem, image);
         for (k, o) in image.observations.iter().enumerate() {
-            if o.rejected.is_some_and(|r| r != OUTLIER) {
+            if o.rejected.is_some_and(|r| r != ObservationRejection::Residual) {
                 continue;
             }
             let Some(p) = predict(image, state, &chain.pose, o) else { continue };
@@ -39,7 +38,7 @@ pub fn reject_observations(problem: &mut Problem, outcome: &Outcome) -> usize {
         }
     }
     for &(i, k, out) in &verdicts {
-        problem.images[i].observations[k].rejected = out.then_some(OUTLIER);
+        problem.images[i].observations[k].rejected = out.then_some(ObservationRejection::Residual);
     }
     verdicts.len()
 }
@@ -75,11 +74,10 @@ pub fn reject_images(problem: &mut Problem, outcome: &Outcome) -> Option<usize> 
     let (joint, error) =
         dq.iter().enumerate().max_by(|a, b| (a.1 / sigma[a.0]).abs().total_cmp(&(b.1 / sigma[b.0]).abs()))?;
     let reading = &outcome.state.robot.chain.readings[joint];
-    problem.images[*worst].rejected = Some(format!(
-        "wrongly paired or taken in motion: its joint readings would have to be wrong by {:.1} of the usual noise ({} alone by {:.2} mrad)",
-        score(dq),
-        reading,
-        error.abs() * 1e3
-    ));
+    problem.images[*worst].rejected = Some(ImageRejection::WronglyPaired(Mismatch::JointError {
+        usual_errors: score(dq),
+        joint: reading.clone(),
+        error: *error,
+    }));
     Some(*worst)
 }

@@ -10,7 +10,7 @@ use robotcal::identify::RobotModel;
 use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::Robot;
 use robotcal::output::{files, plan_start, restore, solution_json};
-use robotcal::problem::Slack;
+use robotcal::problem::{ImageRejection, ObservationRejection, Slack};
 use robotcal::series::{CameraMount, read_plate};
 use serde::Deserialize;
 use serde_json::Value;
@@ -246,8 +246,8 @@ fn compensation_has_every_term_but_the_offset() {
 fn observations_csv_has_all_observations_with_reasons_and_is_a_series_input() {
     let description = robot();
     let mut solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
-    solution.problem.images[3].rejected = Some("wrongly paired, \"really\"".into());
-    solution.problem.images[5].observations[2].rejected = Some("residual");
+    solution.problem.images[3].rejected = Some(ImageRejection::Duplicate { of: "an image, \"really\"".into() });
+    solution.problem.images[5].observations[2].rejected = Some(ObservationRejection::Residual);
     let files = files(&solution, &context(&description)).unwrap();
     let table = rows(&files, "observations.csv");
     let all: usize = solution.problem.images.iter().map(|i| i.observations.len()).sum();

@@ -9,7 +9,7 @@ use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::linalg::SymmetricFactor;
 use robotcal::model::joint_terms::Term;
-use robotcal::problem::{Image, Problem, Slack, State, Step};
+use robotcal::problem::{Image, ImageRejection, ObservationRejection, Problem, Slack, State, Step};
 use robotcal::series::CameraMount;
 use robotcal::solve::{
     ComponentOptions, Elimination, JOINT_NOISE_FLOOR, NoiseUncertainty, Outcome, Settings, Status, System, covariance,
@@ -36,12 +36,12 @@ fn awkward(mount: CameraMount) -> (Problem, State) {
     state.slack[4] = Slack::None;
     state.slack[5] = Slack::Pose(state.camera_from_plate(&problem.images[5], &state.slack[5]).unwrap());
     problem.images[5].stop = None;
-    problem.images[6].rejected = Some("test".into());
+    problem.images[6].rejected = Some(ImageRejection::Excluded);
     for image in &mut problem.images {
-        image.observations[UNSEEN].rejected = Some("test");
+        image.observations[UNSEEN].rejected = Some(ObservationRejection::Excluded);
     }
     problem.images[1].observations[2].uv.x += 3.0;
-    problem.images[2].observations[3].rejected = Some("test");
+    problem.images[2].observations[3].rejected = Some(ObservationRejection::Excluded);
     problem.plates[0].markers[4].sigma_m = 3e-5;
     problem.layout.set_free(false, |name| name.ends_with("joint_2/origin.rx") || name == "camera/front/lens.k3");
     (problem, state)
