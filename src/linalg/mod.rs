@@ -1,6 +1,7 @@
 //! Dense factorisations and quadratic programmes; the only room that imports `faer` and `clarabel`.
 //!
-//! Everything runs on one thread: parallelism lies outside, over images.
+//! Everything runs on one thread: parallelism lies outside, over images. Every call of `faer` says so itself; its setting for
+//! the whole process belongs to the caller and is neither read nor changed.
 
 mod quadratic;
 mod wide;
@@ -10,16 +11,20 @@ pub use wide::wide;
 
 use std::ops::Range;
 
+use faer::diag::Diag;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::{factor, solve};
+use faer::linalg::evd;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::linalg::solvers::{Llt, Solve};
-use faer::{Accum, MatMut, MatRef, Par, Side};
+use faer::{Accum, Conj, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 
 /// Cholesky factor of a symmetric positive definite matrix, with the diagonal scaled to one first.
 pub struct SymmetricFactor {
     scale: DVector<f64>,
-    factor: Llt<f64>,
+    /// In the lower triangle; what lies above is not read.
+    factor: DMatrix<f64>,
 }
 
 /// The matrix is not positive definite, or not finite.
@@ -30,27 +35,34 @@ fn view(m: &DMatrix<f64>) -> MatRef<'_, f64> {
     MatRef::from_column_major_slice(m.as_slice(), m.nrows(), m.ncols())
 }
 
-fn sequential() {
-    faer::set_global_parallelism(Par::Seq);
+fn view_mut(m: &mut DMatrix<f64>) -> MatMut<'_, f64> {
+    let (rows, columns) = m.shape();
+    MatMut::from_column_major_slice_mut(m.as_mut_slice(), rows, columns)
 }
 
 impl SymmetricFactor {
     /// Factorises `m` (its lower triangle is read).
     pub fn new(m: &DMatrix<f64>) -> Result<Self, NotPositiveDefinite> {
-        sequential();
         let diagonal_is_positive = m.diagonal().iter().all(|d| *d > 0.0 && d.is_finite());
         if !diagonal_is_positive || m.nrows() != m.ncols() {
             return Err(NotPositiveDefinite);
         }
         let scale = m.diagonal().map(|d| 1.0 / d.sqrt());
-        let scaled = DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * scale[i] * scale[j]);
+        let mut scaled = DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * scale[i] * scale[j]);
         if !scaled.iter().all(|x| x.is_finite()) {
             return Err(NotPositiveDefinite);
         }
-        match Llt::new(view(&scaled), Side::Lower) {
-            Ok(factor) => Ok(Self { scale, factor }),
-            Err(_) => Err(NotPositiveDefinite),
-        }
+        let needed = factor::cholesky_in_place_scratch::<f64>(m.nrows(), Par::Seq, Default::default());
+        let (mut memory, options) = (MemBuffer::new(needed), Default::default());
+        factor::cholesky_in_place(
+            view_mut(&mut scaled),
+            Default::default(),
+            Par::Seq,
+            MemStack::new(&mut memory),
+            options,
+        )
+        .map_err(|_| NotPositiveDefinite)?;
+        Ok(Self { scale, factor: scaled })
     }
 
     /// Solves `m x = b`.
@@ -61,8 +73,10 @@ impl SymmetricFactor {
 
     /// Solves `m x = b` for every column of `b`.
     pub fn solve_many(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
-        let scaled = DMatrix::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * self.scale[i]);
-        let x = self.factor.solve(view(&scaled));
+        let mut x = DMatrix::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * self.scale[i]);
+        let mut memory = MemBuffer::new(solve::solve_in_place_scratch::<f64>(b.nrows(), b.ncols(), Par::Seq));
+        let stack = MemStack::new(&mut memory);
+        solve::solve_in_place_with_conj(view(&self.factor), Conj::No, view_mut(&mut x), Par::Seq, stack);
         DMatrix::from_fn(b.nrows(), b.ncols(), |i, j| x[(i, j)] * self.scale[i])
     }
 
@@ -75,7 +89,7 @@ impl SymmetricFactor {
 
     /// Natural logarithm of the determinant.
     pub fn log_determinant(&self) -> f64 {
-        let l = self.factor.L();
+        let l = &self.factor;
         let factor: f64 = (0..self.scale.len()).map(|i| 2.0 * l[(i, i)].ln()).sum();
         factor - 2.0 * self.scale.iter().map(|s| s.ln()).sum::<f64>()
     }
@@ -102,8 +116,7 @@ pub fn product_with_rows(a: &DMatrix<f64>, b: &DMatrix<f64>, rows: Range<usize>)
 
 fn multiply(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
     let mut c = DMatrix::zeros(a.nrows(), b.ncols());
-    let into = MatMut::from_column_major_slice_mut(c.as_mut_slice(), a.nrows(), b.ncols());
-    matmul(into, Accum::Replace, a, b, 1.0, Par::Seq);
+    matmul(view_mut(&mut c), Accum::Replace, a, b, 1.0, Par::Seq);
     c
 }
 
@@ -114,10 +127,8 @@ pub fn gram(y: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// `a -= y y'` in the upper triangle of `a`; what lies below the diagonal is left as it is.
 pub fn subtract_gram(a: &mut DMatrix<f64>, y: &DMatrix<f64>) {
-    let n = a.nrows();
     let (upper, full) = (BlockStructure::TriangularUpper, BlockStructure::Rectangular);
-    let into = MatMut::from_column_major_slice_mut(a.as_mut_slice(), n, n);
-    triangular::matmul(into, upper, Accum::Add, view(y), full, view(y).transpose(), full, -1.0, Par::Seq);
+    triangular::matmul(view_mut(a), upper, Accum::Add, view(y), full, view(y).transpose(), full, -1.0, Par::Seq);
 }
 
 /// Copies the upper triangle to the lower one.
@@ -131,15 +142,17 @@ pub fn mirror_upper(a: &mut DMatrix<f64>) {
 
 /// Eigenvalues (ascending) and eigenvectors (columns) of a symmetric matrix; `None` when it has no finite ones.
 pub fn symmetric_eigen(m: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
-    sequential();
     if !m.iter().all(|x| x.is_finite()) {
         return None;
     }
     let n = m.nrows();
-    let eigen = view(m).self_adjoint_eigen(Side::Lower).ok()?;
-    let values = DVector::from_fn(n, |i, _| eigen.S()[i]);
-    let vectors = DMatrix::from_fn(n, n, |i, j| eigen.U()[(i, j)]);
-    Some((values, vectors))
+    let wanted = evd::ComputeEigenvectors::Yes;
+    let needed = evd::self_adjoint_evd_scratch::<f64>(n, wanted, Par::Seq, Default::default());
+    let (mut values, mut vectors) = (Diag::zeros(n), DMatrix::zeros(n, n));
+    let (mut memory, into) = (MemBuffer::new(needed), Some(view_mut(&mut vectors)));
+    let stack = MemStack::new(&mut memory);
+    evd::self_adjoint_evd(view(m), values.as_mut(), into, Par::Seq, stack, Default::default()).ok()?;
+    Some((DVector::from_fn(n, |i, _| values[i]), vectors))
 }
 
 #[cfg(test)]
@@ -171,6 +184,14 @@ mod tests {
         assert!(SymmetricFactor::new(&DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0])).is_err());
         assert!(SymmetricFactor::new(&DMatrix::from_row_slice(2, 2, &[1.0, f64::NAN, f64::NAN, 1.0])).is_err());
         assert!(SymmetricFactor::new(&DMatrix::zeros(2, 2)).is_err());
+    }
+
+    #[test]
+    fn the_parallelism_of_the_caller_is_left_as_it_was() {
+        faer::set_global_parallelism(Par::rayon(3));
+        SymmetricFactor::new(&matrix()).unwrap().inverse();
+        symmetric_eigen(&matrix()).unwrap();
+        assert_eq!(faer::get_global_parallelism(), Par::rayon(3));
     }
 
     #[test]
