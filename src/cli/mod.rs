@@ -2,6 +2,7 @@
 //!
 //! To add a subcommand: a file with its `Args` and `run`, a variant of `Command` and a row in `Command::run`.
 
+mod arguments;
 mod at;
 mod choices;
 mod compare;
@@ -21,7 +22,9 @@ mod say;
 mod show;
 mod simulate;
 mod summary;
+mod verdict;
 mod verify;
+mod verify_args;
 mod verify_series;
 
 use std::io::Write;
@@ -32,6 +35,8 @@ use tracing_subscriber::filter::filter_fn;
 use tracing_subscriber::prelude::*;
 
 use crate::error::{Error, Result};
+use arguments::command_line;
+use verdict::Verdict;
 
 /// Calibrates a robot, its camera and a plate of markers in one problem, directly from images.
 #[derive(Parser)]
@@ -75,16 +80,7 @@ enum Command {
     /// Make a series of a robot with known errors, with images or observations
     Simulate(Box<simulate::SimulateArgs>),
     /// Judge a corrected model by points that another device measured
-    Verify(verify::VerifyArgs),
-}
-
-/// What a subcommand that ran to its end says of its result.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Verdict {
-    /// Exit code 0.
-    Good,
-    /// Solved, but a named quality gate failed: exit code 1.
-    GateFailed,
+    Verify(verify_args::VerifyArgs),
 }
 
 impl Command {
@@ -107,11 +103,6 @@ impl Command {
 /// What `show --parameters` prints of a solution.
 pub fn summary_of(record: &crate::output::solution_json::SolutionRecord) -> String {
     summary::text(record) + &summary::parameters(record)
-}
-
-/// Words of the command line as they can be shown: a path may hold bytes that are no text.
-fn command_line() -> Vec<String> {
-    std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect()
 }
 
 /// Runs the program with the arguments of the process.

@@ -2,49 +2,17 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
 use nalgebra::Vector3;
 
 use super::joint_table::{self, Unit};
-use super::recording::RecordingArgs;
 use super::robot::read_chain;
 use super::say::say_line;
+use super::verify_args::VerifyArgs;
 use super::{Verdict, verify_series};
 use crate::assess::{MeasuredPoint, fit_points};
 use crate::error::{Error, Result};
 use crate::output::compensated;
 use crate::urdf::Chain;
-
-/// Flags of `verify`.
-#[derive(Debug, Args)]
-pub(super) struct VerifyArgs {
-    /// Robot description to judge (a corrected URDF)
-    #[arg(long, value_name = "FILE")]
-    pub(super) urdf: PathBuf,
-    /// Its compensation.toml: gear scale, harmonics, gravity and backlash, which a URDF cannot hold
-    #[arg(long, value_name = "FILE")]
-    pub(super) compensation: Option<PathBuf>,
-    /// Nominal robot description to compare with
-    #[arg(long, value_name = "FILE")]
-    pub(super) nominal: Option<PathBuf>,
-    /// Points of one reflector on the tip: x_m, y_m, z_m and one column per joint
-    #[arg(long, value_name = "FILE", required_unless_present = "series", requires = "joint_unit")]
-    points: Option<PathBuf>,
-    /// Unit of the revolute joints in that file
-    #[arg(long, value_enum)]
-    joint_unit: Option<Unit>,
-    /// Another series of the robot, in mm and px; several are judged together
-    #[arg(long, value_name = "FOLDER", conflicts_with = "points")]
-    pub(super) series: Vec<PathBuf>,
-    /// Base link
-    #[arg(long, value_name = "LINK")]
-    pub(super) base: Option<String>,
-    /// Tip link
-    #[arg(long, value_name = "LINK")]
-    pub(super) tip: Option<String>,
-    #[command(flatten)]
-    recording: RecordingArgs,
-}
 
 pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
     match (&args.points, args.joint_unit) {

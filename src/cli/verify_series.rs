@@ -5,7 +5,7 @@ use std::path::Path;
 use super::identify::{chain, measure_all, read_all};
 use super::recording::{Pictures, RecordingArgs};
 use super::say::say_line;
-use super::verify::VerifyArgs;
+use super::verify_args::VerifyArgs;
 use super::{Verdict, progress};
 use crate::assess::{Ratio, bootstrap_ratio, by_cluster, root_mean_square};
 use crate::error::{Error, Result};

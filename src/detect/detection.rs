@@ -1,6 +1,6 @@
 //! What a detector hands back for one image.
 
-use super::circles::{Ellipse, Found, Outcome};
+use super::circles::{self, Drift, Ellipse, Found, InnerOuter, LOPSIDED_PX, Outcome};
 use crate::error::{Error, Notice};
 use crate::series::Observation;
 
@@ -50,4 +50,40 @@ impl Dropped {
     pub fn point(uv: [f64; 2], reason: &'static str) -> Self {
         Self { uv, reason, ellipse: None, marker: None }
     }
+}
+
+/// What the detector of circles found, with a notice when the point spread is asymmetric.
+impl From<circles::Detection> for Detection {
+    fn from(found: circles::Detection) -> Self {
+        let rings = found.inner_outer.filter(InnerOuter::asymmetric).map(|io| io.notice());
+        let edges = found.lopsided.filter(|l| l.exceeds(LOPSIDED_PX)).map(lopsided_notice);
+        let notices = rings.into_iter().chain(edges).collect();
+        let failure = found.outcome.failure();
+        let failure =
+            failure.map(|(what, remedy)| Error::input("image", format!("{what}{}", found.dropped_summary()), remedy));
+        let dropped =
+            |d: &circles::Dropped| Dropped { uv: d.uv, reason: d.reason.name(), ellipse: d.ellipse, marker: d.marker };
+        Self {
+            observations: found.observations,
+            dropped: found.dropped.iter().map(dropped).collect(),
+            circles: Some(Circles {
+                found: found.found,
+                outcome: found.outcome,
+                blur_px: found.blur_px,
+                noise: found.noise,
+            }),
+            notices,
+            failure,
+        }
+    }
+}
+
+fn lopsided_notice(drift: Drift) -> Notice {
+    let [u, v] = drift.mean_px;
+    let what = format!(
+        "the edges are blurred more to one side, which displaces centres by ({u:.4}, {v:.4}) px everywhere and by {:.4} px \
+         along the radius in the corner",
+        drift.corner_px
+    );
+    Notice::new("image", what, "look for coma (stop the lens down) or motion during the exposure")
 }

@@ -43,7 +43,7 @@ pub fn examine(picture: &Picture, plate: &Plate) -> Detection {
 fn by_kind(picture: &Picture, plate: &Plate) -> Result<Detection> {
     match plate.kind {
         PlateKind::Chessboard => chessboard::detect(picture, plate),
-        PlateKind::CodedCircles => Ok(circles::detect(picture, plate, &circles::Options::default())?.into_common()),
+        PlateKind::CodedCircles => circles::detect(picture, plate, &circles::Options::default()).map(Detection::from),
         PlateKind::CircleGrid => circles::detect_grid(picture, plate, &circles::Options::default()),
         PlateKind::Charuco => charuco::detect(picture, plate),
         PlateKind::Points => Err(Error::input(

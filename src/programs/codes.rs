@@ -9,7 +9,7 @@ use std::ops::Range;
 use nalgebra::{Vector3, Vector6};
 
 use super::field::Edit;
-use super::program::TextFile;
+use super::text_file::TextFile;
 use crate::geom::{adjoint, exp_so3};
 use crate::model::robot::{Robot, Stop};
 

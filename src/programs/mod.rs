@@ -21,18 +21,20 @@ pub mod posture;
 pub mod program;
 mod rapid;
 mod scan;
+mod setting;
 mod table;
+mod text_file;
 mod urscript;
 
 use std::path::Path;
 
 pub use compensate::{Correction, Models, Outcome, Postures, compensate};
 pub use posture::Known;
-pub use program::{Kind, Left, Program, Target, TextFile};
+pub use program::{Kind, Left, Program, Target};
+pub use setting::Setting;
+pub use text_file::TextFile;
 
 use crate::error::{Error, Result};
-use crate::geom::Pose;
-use crate::urdf::Chain;
 
 /// Languages of programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,23 +75,6 @@ impl Language {
             Error::input(path.display(), what, format!("rename it (known are {}) or give --language", known.join(", ")))
         })
     }
-}
-
-/// What the text alone does not say.
-#[derive(Debug, Clone)]
-pub struct Setting<'a> {
-    /// Chain of the controller's model, for names, kinds and the order of the joints.
-    pub chain: &'a Chain,
-    /// Reading of every axis of the program's language, in its order (A1.. or the list of a joint target, then external axes).
-    pub axes: &'a [usize],
-    /// rad per unit of the joint columns of a CSV table.
-    pub rad_per_unit: Option<f64>,
-    /// Frame in which the controller computes, in the base of the chain.
-    pub base: Pose,
-    /// `flange_from_tool` where the text sets none.
-    pub tool: Option<Pose>,
-    /// `base_from_work` (work object, `$BASE`) where the text sets none.
-    pub work: Option<Pose>,
 }
 
 /// Finds the targets of a program of one or more files (a module and its data).

@@ -4,17 +4,9 @@ use std::f64::consts::PI;
 
 use super::codes::Codes;
 use super::field::{Edit, Field, Place};
+use super::text_file::TextFile;
 use crate::error::Notice;
 use crate::geom::{Pose, exp_so3, log_so3, matrix_from_rpy, rpy_from_matrix};
-
-/// One file of a program.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TextFile {
-    /// Name for messages.
-    pub name: String,
-    /// Its bytes, in whatever encoding its comments are.
-    pub bytes: Vec<u8>,
-}
 
 /// A program with what was found in it.
 #[derive(Debug, Clone)]

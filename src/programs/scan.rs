@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::program::TextFile;
+use super::text_file::TextFile;
 use crate::error::{Error, Result};
 
 /// One token.

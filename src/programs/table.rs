@@ -7,7 +7,8 @@ use std::ops::Range;
 
 use super::Setting;
 use super::field::{Edit, Field, Place};
-use super::program::{Approach, JointTarget, Kind, PoseTarget, Posture, Program, RotationFields, Target, TextFile};
+use super::program::{Approach, JointTarget, Kind, PoseTarget, Posture, Program, RotationFields, Target};
+use super::text_file::TextFile;
 use crate::error::{Error, Result, closest_name};
 use crate::geom::Pose;
 use crate::urdf::JointKind;

@@ -7,9 +7,10 @@ use super::Setting;
 use super::field::{Field, Place};
 use super::itinerary::Itinerary;
 use super::program::{
-    Approach, JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, TextFile, Understood,
+    Approach, JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, Understood,
 };
 use super::scan::{Dialect, Reader, TokenKind};
+use super::text_file::TextFile;
 use crate::error::{Error, Result};
 use crate::geom::{Pose, exp_so3};
 

@@ -13,7 +13,6 @@ use super::observation::ImageObservations;
 use super::observation_file;
 use super::plate::Plate;
 use super::plate_file::read_plate;
-use super::recorded::{is_recording, manifest_beside};
 use super::units;
 use crate::urdf::Chain;
 use crate::{Error, Notice, Result, plain_name};
@@ -309,4 +308,28 @@ impl Series {
         }
         files.into_par_iter().map(InputFile::of_file).collect()
     }
+}
+
+/// Whether a path is a recording: an `.mcap` file, another bag that will be refused with advice, or a rosbag2 folder.
+fn is_recording(path: &Path) -> bool {
+    if path.is_dir() {
+        return !path.join("series.toml").exists() && path.join("metadata.yaml").exists();
+    }
+    path.extension().is_some_and(|e| ["mcap", "bag", "db3", "zstd"].iter().any(|known| e == *known))
+}
+
+/// The manifest of a recording that is given by itself: `<its name>.toml` or `series.toml` beside it.
+pub(super) fn manifest_beside(recording: &Path) -> Result<PathBuf> {
+    let candidates = [recording.with_extension("toml"), recording.with_file_name("series.toml")];
+    let found = candidates.iter().find(|p| p.is_file()).cloned();
+    found.ok_or_else(|| {
+        let what = format!(
+            "nothing beside it says which plate was seen: neither {} nor {} exists",
+            candidates[0].display(),
+            candidates[1].display()
+        );
+        let remedy =
+            "write one: format = 1, camera_mount = \"hand\", plate = \"plate.toml\", and base and tip if needed";
+        Error::input(recording.display(), what, remedy)
+    })
 }

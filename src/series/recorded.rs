@@ -1,35 +1,11 @@
 //! Series whose images and readings come from a recording, and recordings turned into series folders.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::manifest::{AngleUnit, CameraMount, Manifest};
 use super::mcap::{CameraInfo, Extracted, RecordingOptions, extract};
-use super::read::{Series, Source, file_name, optional_images};
+use super::read::{Series, Source, file_name, manifest_beside, optional_images};
 use crate::{Error, Notice, Result};
-
-/// Whether a path is a recording: an `.mcap` file, another bag that will be refused with advice, or a rosbag2 folder.
-pub(super) fn is_recording(path: &Path) -> bool {
-    if path.is_dir() {
-        return !path.join("series.toml").exists() && path.join("metadata.yaml").exists();
-    }
-    path.extension().is_some_and(|e| ["mcap", "bag", "db3", "zstd"].iter().any(|known| e == *known))
-}
-
-/// The manifest of a recording that is given by itself: `<its name>.toml` or `series.toml` beside it.
-pub(super) fn manifest_beside(recording: &Path) -> Result<PathBuf> {
-    let candidates = [recording.with_extension("toml"), recording.with_file_name("series.toml")];
-    let found = candidates.iter().find(|p| p.is_file()).cloned();
-    found.ok_or_else(|| {
-        let what = format!(
-            "nothing beside it says which plate was seen: neither {} nor {} exists",
-            candidates[0].display(),
-            candidates[1].display()
-        );
-        let remedy =
-            "write one: format = 1, camera_mount = \"hand\", plate = \"plate.toml\", and base and tip if needed";
-        Error::input(recording.display(), what, remedy)
-    })
-}
 
 impl Series {
     /// The same series with the stops of its recording: pictures are written to `images`. A series that has no recording

@@ -8,6 +8,7 @@ mod placement;
 pub mod psf;
 pub mod raster;
 pub mod render;
+mod request;
 pub mod scenery;
 pub mod sensor;
 pub mod truth;
@@ -15,4 +16,5 @@ pub mod world;
 
 pub use crate::plan::visibility::is_seen;
 pub use observe::observe;
-pub use world::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series, typical_camera};
+pub use request::{RobotErrors, WorldRequest, lens_camera, typical_camera};
+pub use world::{SimulatedSeries, series};

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, RngExt};
 
-use super::world::WorldRequest;
+use super::request::WorldRequest;
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::inverse;

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector2;
 
-use super::raster::OVERSAMPLING;
+/// Cells per pixel and axis.
+pub const OVERSAMPLING: usize = 4;
 
 /// Share of the light in the tail of a comatic point-spread function.
 const COMA_SHARE: f64 = 0.3;

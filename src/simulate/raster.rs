@@ -6,10 +6,7 @@
 
 use nalgebra::Vector2;
 
-use super::psf::Psf;
-
-/// Cells per pixel and axis.
-pub const OVERSAMPLING: usize = 4;
+use super::psf::{OVERSAMPLING, Psf};
 
 /// A rectangle of pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

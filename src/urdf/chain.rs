@@ -2,7 +2,6 @@
 
 use nalgebra::Vector3;
 
-use super::masses::CarriedMass;
 use crate::geom::Pose;
 
 /// How a joint moves.
@@ -47,6 +46,19 @@ pub struct Joint {
     pub drive: Option<Drive>,
     /// True where the chain passes it from child to parent: a fixed joint between the base and the first link above the tip.
     pub upwards: bool,
+}
+
+/// A mass that a joint of the chain carries rigidly with its child link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CarriedMass {
+    /// Link whose mass it is.
+    pub link: String,
+    /// Index in [`Chain::joints`] of the last joint before it; all joints up to there bear it.
+    pub joint: usize,
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Centre of mass in the child frame of that joint, m; joints beside the chain stand at zero.
+    pub centre_m: Vector3<f64>,
 }
 
 /// All joints from `base` to `tip`, in order.

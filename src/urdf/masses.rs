@@ -1,36 +1,12 @@
 //! Masses of the links, for gravity terms.
 
 use nalgebra::Vector3;
-use roxmltree::Node;
 use serde::{Deserialize, Serialize};
 
-use super::chain::{Chain, JointKind};
-use super::elements::{Source, child, numbers};
+use super::chain::{CarriedMass, Chain, JointKind};
 use super::read::RobotDescription;
 use crate::geom::Pose;
 use crate::{Error, Result};
-
-/// Mass of a link.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Inertial {
-    /// Mass, kg.
-    pub mass_kg: f64,
-    /// Centre of mass in the link frame, m.
-    pub centre_m: Vector3<f64>,
-}
-
-/// A mass that a joint of the chain carries rigidly with its child link.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CarriedMass {
-    /// Link whose mass it is.
-    pub link: String,
-    /// Index in [`Chain::joints`] of the last joint before it; all joints up to there bear it.
-    pub joint: usize,
-    /// Mass, kg.
-    pub mass_kg: f64,
-    /// Centre of mass in the child frame of that joint, m; joints beside the chain stand at zero.
-    pub centre_m: Vector3<f64>,
-}
 
 /// What the tip carries beside the links of the URDF: tool, camera, workpiece.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -146,21 +122,4 @@ impl RobotDescription {
         }
         carried
     }
-}
-
-/// The `<inertial>` of a link; `None` where there is none (`urdf-rs` would say zero).
-pub(super) fn inertial(source: &Source<'_>, node: Node<'_, '_>, link: &urdf_rs::Link) -> Result<Option<Inertial>> {
-    let Some(element) = child(node, "inertial") else { return Ok(None) };
-    let place = || format!("{}, link \"{}\"", source.place(element), link.name);
-    if let Some(xyz) = child(element, "origin").and_then(|o| o.attribute("xyz"))
-        && numbers(xyz, 3).is_none()
-    {
-        let what = format!("centre of mass \"{xyz}\" is not 3 finite numbers");
-        return Err(Error::input(place(), what, "correct the numbers (point as decimal mark)"));
-    }
-    let mass_kg = link.inertial.mass.value;
-    if !(mass_kg >= 0.0 && mass_kg.is_finite()) {
-        return Err(Error::input(place(), format!("mass {mass_kg} kg"), "a mass is zero or positive"));
-    }
-    Ok(Some(Inertial { mass_kg, centre_m: link.inertial.origin.xyz.0.into() }))
 }

@@ -3,14 +3,16 @@
 mod chain;
 mod collisions;
 mod elements;
+mod inertial;
 mod masses;
 mod patch;
 mod read;
 mod tips;
 mod tree;
 
-pub use chain::{Chain, Drive, Joint, JointKind};
+pub use chain::{CarriedMass, Chain, Drive, Joint, JointKind};
 pub use collisions::CarriedCapsule;
-pub use masses::{CarriedMass, Inertial, Payload};
+pub use inertial::Inertial;
+pub use masses::Payload;
 pub use patch::patch_origins;
 pub use read::{RobotDescription, read};

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use roxmltree::{Document, Node};
 
 use super::elements::{JointElement, Source};
-use super::masses::{Inertial, inertial};
+use super::inertial::{Inertial, inertial};
 use crate::files::{self, Kind};
 use crate::{Error, Notice, Result, closest_name, plain_name};
 

@@ -22,14 +22,11 @@
 use super::edge_state::{ANNULUS, CENTRE, INNER, LN_BLUR, LN_RATIO, SHAPE, State, THIRD, WHITE};
 use super::exact_edge::{Contour, MOMENTS, Nodes};
 use super::flat_zone::Flat;
-use super::gauss::normal_tail;
+use super::gauss::{LANES, normal_tail};
 use crate::linalg::wide;
 
 /// Distance from an edge, in units of the blur, beyond which a pixel sees nothing of its shape.
 const FAR: f32 = 4.2;
-
-/// Lanes of the vectorised loops; the number of pixels is padded to a multiple.
-pub(super) const LANES: usize = 8;
 
 /// Pixels of a band, relative to the anchor, and the work arrays of the model.
 #[derive(Debug, Default)]

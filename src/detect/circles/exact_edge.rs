@@ -12,8 +12,7 @@
 //! The closed form of [`super::edge_model`] is cheaper and as good where the radius of curvature is large against the
 //! blur; elsewhere the difference between the two is taken from here and held while the fit converges.
 
-use super::edge_model::LANES;
-use super::gauss::exp_negative;
+use super::gauss::{LANES, exp_negative};
 use crate::linalg::wide;
 
 /// Longest step along the contour in units of the blur.

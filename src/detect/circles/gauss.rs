@@ -1,5 +1,8 @@
 //! The standard normal distribution in single precision, without branches, for vectorised loops.
 
+/// Lanes of the vectorised loops; the number of pixels is padded to a multiple.
+pub(super) const LANES: usize = 8;
+
 /// Upper tail and density of the standard normal distribution, without branches.
 ///
 /// Tail: M. Abramowitz and I. Stegun, Handbook of Mathematical Functions, 26.2.17 (error below 7.5e-8).

@@ -43,7 +43,7 @@ pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Resul
         symmetric = turned;
         Ok((board, outcome))
     })?;
-    let mut detection = found.into_common();
+    let mut detection = Detection::from(found);
     if symmetric {
         detection.notices.push(symmetric_notice());
     }

@@ -17,7 +17,7 @@ use super::second_look::{Figure, Place, second_look};
 use super::types::{Detection, Dropped, Found, InnerOuter, Options, Outcome, Reason};
 use super::vet::{Board, Placed, around, continuation, neighbourhood, vet};
 use crate::detect::Picture;
-use crate::series::{Edge, Observation, Plate};
+use crate::series::Plate;
 use crate::{Error, Result};
 
 /// Smallest lattice that is worth a try; below it chance cannot be excluded.
@@ -372,7 +372,7 @@ impl Work<'_> {
             })
             .collect();
         found.sort_by_key(|f| f.marker);
-        let observations = found.iter().flat_map(observations_of).collect();
+        let observations = found.iter().flat_map(Found::observations).collect();
         let blur_px = median(found.iter().map(|f| f.measured.blur_px).collect());
         let noise = harvest.camera.noise.map(f64::sqrt);
         let skew = |e: &Entry| {
@@ -383,16 +383,4 @@ impl Work<'_> {
         let lopsided = Drift::fit(harvest.entries.iter().map(skew), size);
         Detection { observations, found, dropped, outcome, blur_px, noise, inner_outer: harvest.inner_outer, lopsided }
     }
-}
-
-/// The observations of a measured marker: outer, then inner.
-pub(super) fn observations_of(found: &Found) -> Vec<Observation> {
-    let one = |imaged: &super::types::Imaged| Observation {
-        marker: found.marker,
-        edge: imaged.edge,
-        uv: imaged.ellipse.centre,
-        covariance: Some(imaged.covariance),
-    };
-    let inner = found.measured.inner.as_ref().filter(|i| i.edge == Edge::Inner);
-    std::iter::once(&found.measured.outer).chain(inner).map(one).collect()
 }

@@ -4,14 +4,12 @@ use super::agreement::centroid;
 use super::candidate::Profile;
 use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
-use super::measure::{Camera, INK_SLOPE, Target};
-use super::pipeline::observations_of;
+use super::measure::{Camera, Target};
 use super::refine::{Fit, Start, refine};
 use super::second_look::{is_thin, tie_sigma};
 use super::tails::Tail;
-use super::together::{measure_alone, measure_beside};
 use super::types::{Found, Imaged, Measured, Reason};
-use crate::detect::{Circles, Detection, Picture};
+use crate::detect::Picture;
 use crate::series::{Edge, Marker};
 
 /// A marker whose image is predicted.
@@ -193,7 +191,7 @@ impl Predicted {
     }
 
     /// What is kept of a fit: enough of the marker was seen, and its edges are where they are predicted.
-    fn accepted(&self, mut fit: Fit) -> Option<Found> {
+    pub(super) fn accepted(&self, mut fit: Fit) -> Option<Found> {
         self.allow_for_rest(&mut fit.measured);
         let sound = fit.measured.visible >= ENOUGH && self.edges_agree(&fit);
         sound.then_some(Found { marker: self.marker, measured: fit.measured, rescued: true })
@@ -222,36 +220,4 @@ fn third_harmonic(ellipse: &Ellipse, ring: &[[f64; 2]]) -> ([f64; 2], f64) {
     let third = [2.0 * mean(&|(h, cos, _)| h * cos), 2.0 * mean(&|(h, _, sin)| h * sin)];
     let rest = mean(&|(h, cos, sin)| (h - third[0] * cos - third[1] * sin).powi(2)).sqrt();
     (third, rest)
-}
-
-/// The second pass: looks for the markers that are predicted and were not found. What is found is added to the detection.
-///
-/// Markers across the border of the picture are measured from the part that is in it; those with neighbours within the reach
-/// of the blur together with them.
-pub fn look_where_predicted(picture: &Picture, detection: &mut Detection, predicted: &[Predicted]) {
-    let Detection { observations, dropped, circles: Some(Circles { found, blur_px, noise, .. }), .. } = detection
-    else {
-        return;
-    };
-    let camera = Camera { blur_px: *blur_px, noise: noise.map(|n| n * n), ink_slope: INK_SLOPE };
-    let is_known = |p: &&Predicted| found.iter().any(|f| f.marker == p.marker);
-    let missing: Vec<Predicted> = predicted.iter().filter(|p| !is_known(p)).copied().collect();
-    let known: Vec<Measured> = found.iter().map(|f| f.measured).collect();
-    let fits = measure_beside(picture, camera, &known, &missing);
-    for (p, fit) in missing.iter().zip(fits) {
-        let Some(new) = fit.and_then(|f| p.accepted(f)) else { continue };
-        dropped.retain(|d| !p.lies_at(d.uv));
-        observations.extend(observations_of(&new));
-        found.push(new);
-    }
-    found.sort_by_key(|f| f.marker);
-    observations.sort_by_key(|o| (o.marker, o.edge));
-}
-
-/// Measures markers in a picture of which nothing is known but where they are; blur and noise are learned from them.
-///
-/// For pictures in which no marker can be identified because all are too small against the blur: precision does not need
-/// what identity needs. The contours must be predicted to about a quarter of a radius, the shape to 1 %.
-pub fn measure_predicted(picture: &Picture, predicted: &[Predicted]) -> Vec<Found> {
-    predicted.iter().zip(measure_alone(picture, predicted)).filter_map(|(p, fit)| p.accepted(fit?)).collect()
 }

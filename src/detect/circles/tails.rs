@@ -4,9 +4,10 @@
 //! contrast at two sigma, which is some 0.03 px. Once the neighbours are measured, what they take from a pixel is known
 //! and given back; pixels that they cover by more than [`MOST`] are left out.
 
-use super::edge_model::{LANES, Pixels};
+use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
 use super::exact_edge::Contour;
+use super::gauss::LANES;
 use super::types::Measured;
 
 /// Largest coverage by neighbours of a pixel that is still used: one sigma of the blur from their edge. Beyond it their

@@ -5,9 +5,8 @@ use std::fmt;
 
 use super::asymmetry::Drift;
 use super::ellipse::Ellipse;
-use crate::detect::Circles;
+use crate::Notice;
 use crate::series::{Edge, Observation};
-use crate::{Error, Notice};
 
 /// What the detector looks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -190,7 +189,7 @@ pub enum Outcome {
 
 impl Outcome {
     /// What went wrong and what to try; `None` where markers were identified.
-    fn failure(self) -> Option<(&'static str, &'static str)> {
+    pub(in crate::detect) fn failure(self) -> Option<(&'static str, &'static str)> {
         match self {
             Self::Identified { .. } => None,
             Self::NoCandidates => Some(("nothing looks like a marker", "check focus, exposure and view")),
@@ -203,6 +202,20 @@ impl Outcome {
                 "switch off the mirroring in the camera driver, or look at the plate without a mirror",
             )),
         }
+    }
+}
+
+impl Found {
+    /// The observations of the marker: outer, then inner.
+    pub(super) fn observations(&self) -> Vec<Observation> {
+        let one = |imaged: &Imaged| Observation {
+            marker: self.marker,
+            edge: imaged.edge,
+            uv: imaged.ellipse.centre,
+            covariance: Some(imaged.covariance),
+        };
+        let inner = self.measured.inner.as_ref().filter(|i| i.edge == Edge::Inner);
+        std::iter::once(&self.measured.outer).chain(inner).map(one).collect()
     }
 }
 
@@ -238,35 +251,8 @@ impl Detection {
         counts
     }
 
-    /// The form that all detectors share, with a notice when the point spread is asymmetric.
-    pub fn into_common(self) -> crate::detect::Detection {
-        let rings = self.inner_outer.filter(InnerOuter::asymmetric).map(|io| io.notice());
-        let edges = self.lopsided.filter(|l| l.exceeds(LOPSIDED_PX)).map(lopsided_notice);
-        let notices = rings.into_iter().chain(edges).collect();
-        let failure = self.outcome.failure();
-        let failure =
-            failure.map(|(what, remedy)| Error::input("image", format!("{what}{}", self.dropped_summary()), remedy));
-        let dropped = |d: &Dropped| crate::detect::Dropped {
-            uv: d.uv,
-            reason: d.reason.name(),
-            ellipse: d.ellipse,
-            marker: d.marker,
-        };
-        crate::detect::Detection {
-            observations: self.observations,
-            dropped: self.dropped.iter().map(dropped).collect(),
-            circles: Some(Circles {
-                found: self.found,
-                outcome: self.outcome,
-                blur_px: self.blur_px,
-                noise: self.noise,
-            }),
-            notices,
-            failure,
-        }
-    }
-
-    fn dropped_summary(&self) -> String {
+    /// The reasons of the dropped candidates in words, in brackets; nothing where there are none.
+    pub(in crate::detect) fn dropped_summary(&self) -> String {
         let counts = self.dropped_counts();
         if counts.is_empty() {
             return String::new();
@@ -295,7 +281,7 @@ impl InnerOuter {
         self.drift.mean_exceeds(0.005_f64.max(0.05 * self.explained_px))
     }
 
-    fn notice(&self) -> Notice {
+    pub(in crate::detect) fn notice(&self) -> Notice {
         let [u, v] = self.drift.mean_px;
         let what = format!(
             "inner and outer circles are off by ({u:.4}, {v:.4}) px on the mean of {} annuli: the blur is asymmetric",
@@ -308,13 +294,3 @@ impl InnerOuter {
 /// Displacement by lopsided edges from which on it is told, px. The edges tell some 40 % of what coma displaces the worst
 /// marker by, so that this stands for 0.003 px.
 pub const LOPSIDED_PX: f64 = 0.0012;
-
-fn lopsided_notice(drift: Drift) -> Notice {
-    let [u, v] = drift.mean_px;
-    let what = format!(
-        "the edges are blurred more to one side, which displaces centres by ({u:.4}, {v:.4}) px everywhere and by {:.4} px \
-         along the radius in the corner",
-        drift.corner_px
-    );
-    Notice::new("image", what, "look for coma (stop the lens down) or motion during the exposure")
-}

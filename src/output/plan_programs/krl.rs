@@ -1,6 +1,6 @@
 //! KUKA KRL: a .src with the motions and a .dat with the axis positions.
 
-use super::{EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S, harmless};
+use super::route::{EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S, harmless};
 
 /// Axes that KRL names A1.. and E1..
 const AXES: usize = 6;

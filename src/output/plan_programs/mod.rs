@@ -5,106 +5,17 @@
 mod krl;
 mod rapid;
 mod ros;
+mod route;
 mod urscript;
 
 use std::collections::BTreeMap;
 
-use crate::plan::order::motion;
-use crate::plan::{Plan, PlanRequest, image_name};
-use crate::urdf::JointKind;
-
-/// Name of the programs.
-const NAME: &str = "robotcal_plan";
-/// Time for the arm to come to rest before the trigger, s.
-const SETTLE_S: f64 = 1.0;
-/// Time after the trigger, s.
-const EXPOSE_S: f64 = 0.5;
-/// Length of the trigger pulse, s.
-const PULSE_S: f64 = 0.2;
-/// Greatest joint speed, rad/s (or m/s).
-const SPEED: f64 = 0.5;
-/// Letters of a name in a text in quotes; RAPID allows 80 in all.
-const LONGEST_NAME: usize = 40;
-/// Shortest time of a motion, s.
-const LEAST_TIME_S: f64 = 1.0;
-
-/// What happens at the end of a motion.
-#[derive(Debug, Clone, PartialEq)]
-enum Purpose {
-    /// Nothing: a posture on the way.
-    Pass,
-    /// An image is taken.
-    Image(String),
-    /// The operator moves the plate to this place before the motion, then an image is taken.
-    MovePlate(String, String),
-}
-
-/// One motion of the program.
-#[derive(Debug, Clone, PartialEq)]
-struct Visit {
-    /// Readings, rad or m.
-    readings: Vec<f64>,
-    /// What for.
-    purpose: Purpose,
-    /// Time of the motion, s.
-    time_s: f64,
-}
-
-/// What every writer needs.
-struct Route<'a> {
-    joints: &'a [String],
-    kinds: &'a [JointKind],
-    visits: Vec<Visit>,
-}
-
-fn route<'a>(request: &'a PlanRequest, plan: &Plan) -> Route<'a> {
-    let chain = &request.setting.robot.chain;
-    let mut visits: Vec<Visit> = Vec::new();
-    let mut placement = None;
-    for (k, leg) in plan.legs.iter().enumerate() {
-        let stop = &plan.pool[leg.stop];
-        let image = image_name(k);
-        let moved = placement.is_some_and(|p| p != stop.placement);
-        placement = Some(stop.placement);
-        let purpose = match moved {
-            true => Purpose::MovePlate(request.setting.placements[stop.placement].0.clone(), image),
-            false => Purpose::Image(image),
-        };
-        let ways = leg.via.iter().map(|q| (q.clone(), Purpose::Pass));
-        for (readings, purpose) in ways.chain([(stop.readings.clone(), purpose)]) {
-            let length = visits.last().map_or(0.0, |v| motion(&v.readings, &readings));
-            visits.push(Visit { readings, purpose, time_s: (length / SPEED).max(LEAST_TIME_S) });
-        }
-    }
-    Route { joints: &chain.readings, kinds: &chain.reading_kinds, visits }
-}
-
-impl Route<'_> {
-    /// Names of the joints for a comment.
-    fn joint_list(&self) -> String {
-        self.joints.iter().map(|j| harmless(j)).collect::<Vec<_>>().join(", ")
-    }
-
-    /// Readings as teach pendants show them: degrees, or mm.
-    fn shown(&self, readings: &[f64]) -> Vec<f64> {
-        let one = |(q, kind): (&f64, &JointKind)| match kind {
-            JointKind::Prismatic => 1e3 * q,
-            _ => q.to_degrees(),
-        };
-        readings.iter().zip(self.kinds).map(one).collect()
-    }
-}
-
-/// A name inside a comment or a text in quotes of any controller: printable ASCII, without quotes, escapes and marks that begin or
-/// end a comment; short, since controllers limit the length of texts.
-fn harmless(name: &str) -> String {
-    let safe = |c: char| if (c.is_ascii_graphic() && !"\"'\\;!#&%{}".contains(c)) || c == ' ' { c } else { '_' };
-    name.chars().take(LONGEST_NAME).map(safe).collect()
-}
+use crate::plan::{Plan, PlanRequest};
+use route::{NAME, Route};
 
 /// Programs in all languages that can express the plan: file name -> bytes.
 pub fn programs(request: &PlanRequest, plan: &Plan) -> BTreeMap<String, Vec<u8>> {
-    let route = route(request, plan);
+    let route = Route::of(request, plan);
     let mut files = BTreeMap::new();
     let mut add = |name: &str, text: Option<String>| {
         if let Some(text) = text {

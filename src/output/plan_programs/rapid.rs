@@ -1,6 +1,6 @@
 //! ABB RAPID: one module with joint targets.
 
-use super::{EXPOSE_S, PULSE_S, Purpose, Route, SETTLE_S, harmless};
+use super::route::{EXPOSE_S, PULSE_S, Purpose, Route, SETTLE_S, harmless};
 
 /// Axes of the arm in a joint target.
 const AXES: usize = 6;

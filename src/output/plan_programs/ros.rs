@@ -1,6 +1,6 @@
 //! ROS: a `trajectory_msgs/JointTrajectory` as YAML, with the times of the triggers beside it.
 
-use super::{EXPOSE_S, Purpose, Route, SETTLE_S};
+use super::route::{EXPOSE_S, Purpose, Route, SETTLE_S};
 use crate::output::text::{list, quoted};
 
 /// Seconds and nanoseconds of a time.

@@ -1,6 +1,6 @@
 //! Universal Robots URScript.
 
-use super::{EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S, SPEED, harmless};
+use super::route::{EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S, SPEED, harmless};
 use crate::urdf::JointKind;
 
 /// Joints of every arm of this maker.

@@ -2,9 +2,10 @@
 
 use maud::{Markup, html};
 
+use super::figure::figure;
+use super::maps;
 use super::svg::{Anchor, Svg};
 use super::words::{count, significant};
-use super::{figure, maps};
 use crate::assess::{Cause, UnknownDirection};
 use crate::output::solution_json::SolutionRecord;
 

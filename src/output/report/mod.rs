@@ -2,6 +2,7 @@
 //!
 //! A new section is one function in `sections`, `parameters` or `images` and one row in [`report_html`].
 
+mod figure;
 mod images;
 mod knowledge;
 mod maps;
@@ -18,7 +19,7 @@ mod words;
 
 pub use plan_page::{plan_html, sigma_text};
 
-use maud::{Markup, PreEscaped, html};
+use maud::html;
 
 use crate::output::solution_json::SolutionRecord;
 
@@ -45,9 +46,4 @@ pub fn report_html(record: &SolutionRecord) -> String {
         (sections::record(record))
     };
     page::page(&format!("Calibration of {}", record.robot.name), STYLE, &body)
-}
-
-/// A figure with its caption.
-fn figure(svg: &str, caption: &str) -> Markup {
-    html! { figure { (PreEscaped(svg)) figcaption { (caption) } } }
 }

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 
+use super::figure::figure;
+use super::maps;
 use super::words::{fixed, grouped, is_local, parameter, plus_minus, short, significant, split, unit};
-use super::{figure, maps};
 use crate::geom::Pose;
 use crate::output::solution_json::{EstimateRecord, LEAST_SHARE, PlacedRecord, SolutionRecord};
 use crate::series::CameraMount;

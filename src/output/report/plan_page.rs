@@ -2,9 +2,10 @@
 
 use maud::{Markup, html};
 
+use super::STYLE;
+use super::figure::figure;
 use super::page::page;
 use super::plan_pictures::{View, coverage, curve, joint_ranges, scene};
-use super::{STYLE, figure};
 use crate::output::plan_files::written;
 use crate::plan::{Forecast, Plan, PlanRequest, image_name};
 

@@ -2,7 +2,7 @@
 
 use maud::{Markup, PreEscaped, html};
 
-use super::figure;
+use super::figure::figure;
 use super::verdict::verdict;
 use super::words::{count, fixed, plus_minus, significant, unit};
 use super::{maps, plots};

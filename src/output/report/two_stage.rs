@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::figure;
+use super::figure::figure;
 use super::svg::{Anchor, Svg, round_below};
 use super::words::{count, fixed, significant};
 use crate::identify::{Comparison, Estimator};

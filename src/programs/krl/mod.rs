@@ -8,8 +8,9 @@ use aggregate::{Aggregate, index};
 
 use super::Setting;
 use super::itinerary::Itinerary;
-use super::program::{Approach, Kind, Left, PoseTarget, Posture, Program, Target, TextFile, Understood};
+use super::program::{Approach, Kind, Left, PoseTarget, Posture, Program, Target, Understood};
 use super::scan::{Dialect, Reader, TokenKind};
+use super::text_file::TextFile;
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;

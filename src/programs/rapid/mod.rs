@@ -10,10 +10,10 @@ use super::codes::{Code, Codes};
 use super::field::{Field, Place};
 use super::itinerary::Itinerary;
 use super::program::{
-    Approach, Displaced, JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, TextFile,
-    Understood,
+    Approach, Displaced, JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, Understood,
 };
 use super::scan::{Dialect, Reader, TokenKind};
+use super::text_file::TextFile;
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;

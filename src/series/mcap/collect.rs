@@ -7,9 +7,8 @@ use image::{DynamicImage, ImageFormat};
 use rayon::prelude::*;
 
 use super::cdr::Decoded;
-use super::extract::{Group, StopReport};
-use super::file::Message;
 use super::frame::Frame;
+use super::message::Message;
 use super::messages;
 use super::motion::{Interpolated, Posture, interpolate};
 use super::options::{Picking, RecordingOptions};
@@ -23,6 +22,26 @@ use crate::{Error, Result};
 const MOST_HELD: usize = 256 << 20;
 /// Memory of pictures that are decoded at one time, bytes.
 const MOST_IN_FLIGHT: u64 = 256 << 20;
+
+/// How one stop was taken from a recording.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct StopReport {
+    /// Name of its picture.
+    pub image: String,
+    /// Largest joint speed at its stamp, rad/s or m/s.
+    pub speed: f64,
+    /// From its stamp to the nearest joint sample, s.
+    pub nearest_sample_s: f64,
+    /// Pictures that were looked at.
+    pub pictures: usize,
+    /// Mean squared gradient of the best picture, 16-bit counts.
+    pub sharpness: f64,
+    /// Noise of one picture, counts; known where pictures were averaged.
+    pub noise_counts: Option<f64>,
+}
+
+/// Image times that belong to one stop.
+pub(super) type Group = Vec<i64>;
 
 /// Pictures of one stop that have come so far.
 #[derive(Default)]

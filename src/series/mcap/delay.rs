@@ -8,8 +8,8 @@ use std::path::Path;
 
 use image::DynamicImage;
 
-use super::file::Message;
 use super::frame::Frame;
+use super::message::Message;
 use super::messages;
 use super::motion::{Posture, Standstill, moved};
 use super::options::Clock;

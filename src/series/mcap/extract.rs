@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::collect::Collector;
+use super::collect::{Collector, Group, StopReport};
 use super::delay::{self, Delay, Frames};
 use super::file::for_each;
 use super::messages::CameraInfo;
@@ -18,23 +18,6 @@ const MOST_PICTURES: usize = 9;
 const MARGIN_NS: i64 = 50_000_000;
 /// Delays of images and joints that differ by more deserve a look, s.
 const NOTABLE_DELAY_S: f64 = 0.05;
-
-/// How one stop was taken from a recording.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct StopReport {
-    /// Name of its picture.
-    pub image: String,
-    /// Largest joint speed at its stamp, rad/s or m/s.
-    pub speed: f64,
-    /// From its stamp to the nearest joint sample, s.
-    pub nearest_sample_s: f64,
-    /// Pictures that were looked at.
-    pub pictures: usize,
-    /// Mean squared gradient of the best picture, 16-bit counts.
-    pub sharpness: f64,
-    /// Noise of one picture, counts; known where pictures were averaged.
-    pub noise_counts: Option<f64>,
-}
 
 /// The stops of a recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -163,9 +146,6 @@ fn require_overlap(scan: &Scan, postures: &[Posture], times: &[i64]) -> Result<(
     );
     Err(Error::input(place, what, "synchronise the clocks, or use the times of recording (--clock log)"))
 }
-
-/// Image times that belong to one stop.
-pub(super) type Group = Vec<i64>;
 
 fn groups(scan: &mut Scan, postures: &[Posture], times: &[i64], options: &RecordingOptions) -> Result<Vec<Group>> {
     let still = standstills(postures, options.still_speed, (options.least_still_s * 1e9) as i64);

@@ -3,20 +3,10 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::message::Message;
 use super::{records, sqlite};
 use crate::files::{self, Kind};
 use crate::{Error, Notice, Result, plain_name};
-
-/// One message of a recording.
-pub(super) struct Message<'a> {
-    pub topic: &'a str,
-    /// Name of the type.
-    pub schema: &'a str,
-    /// `cdr` for ROS 2.
-    pub encoding: &'a str,
-    pub log_time_ns: u64,
-    pub data: &'a [u8],
-}
 
 /// The files of a recording, in the order in which they were written: one file, or a rosbag2 folder.
 ///

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use image::{DynamicImage, ImageFormat};
 
 use super::cdr::Decoded;
-use super::file::Message;
+use super::message::Message;
 use super::messages::{self, RawImage};
 use super::pixels;
 use crate::files::{decode_picture, decoded_bytes};

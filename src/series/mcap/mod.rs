@@ -12,6 +12,7 @@ mod extract;
 mod file;
 mod frame;
 mod interfaces;
+mod message;
 mod messages;
 mod motion;
 mod options;
@@ -21,8 +22,9 @@ mod scan;
 mod sqlite;
 mod write;
 
+pub use collect::StopReport;
 pub use delay::Delay;
-pub use extract::{Extracted, StopReport, extract};
+pub use extract::{Extracted, extract};
 pub(super) use file::require_recording;
 pub use messages::CameraInfo;
 pub use options::{Clock, Motion, Picking, RecordingOptions};

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use super::cdr::Decoded;
-use super::file::{Message, files_of, for_each};
+use super::file::{files_of, for_each};
+use super::message::Message;
 use super::messages::{self, CameraInfo, JointState};
 use super::options::{Clock, RecordingOptions};
 use crate::series::InputFile;

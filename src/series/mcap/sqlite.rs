@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-use super::file::Message;
+use super::message::Message;
 use crate::files::{self, Kind};
 use crate::{Error, Notice, Result};
 

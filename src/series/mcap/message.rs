@@ -1,0 +1,12 @@
+//! A message of a recording, whatever holds it.
+
+/// One message of a recording.
+pub(super) struct Message<'a> {
+    pub topic: &'a str,
+    /// Name of the type.
+    pub schema: &'a str,
+    /// `cdr` for ROS 2.
+    pub encoding: &'a str,
+    pub log_time_ns: u64,
+    pub data: &'a [u8],
+}
