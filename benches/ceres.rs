@@ -14,7 +14,7 @@ use robotcal::identify::adjust_free_poses;
 use robotcal::init::{PosePair, solve_hand_eye};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::{Robot, Stop};
-use robotcal::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State};
+use robotcal::problem::{Adjustment, Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State};
 use robotcal::series::{CameraMount, Edge, Marker, Plate, PlateKind};
 use robotcal::solve::{Outcome, Settings, solve};
 
@@ -46,7 +46,7 @@ fn pose(rows: &serde_json::Value) -> Fallible<Pose> {
 
 /// Both sides' model: eight camera parameters, four parameters a joint axis, one free rigid motion, marker corrections with a
 /// prior, and no prior else.
-fn read(folder: &Path, mode: Mode) -> Fallible<(Problem, State)> {
+fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
     let guess: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(folder.join("guess.json"))?)?;
     let number = |key: &str| guess[key].as_f64().ok_or(format!("guess.json has no number '{key}'"));
     let size: Vec<u32> = serde_json::from_value(guess["image_size"].clone())?;
@@ -132,20 +132,22 @@ fn read(folder: &Path, mode: Mode) -> Fallible<(Problem, State)> {
         families: Vec::new(),
         huber: f64::INFINITY,
     };
-    Ok((problem, state))
+    Ok(Adjustment { problem, state })
 }
 
 /// Starting values from the images alone: free camera poses, then hand-camera and plate pose in closed form.
-fn start_from_images(problem: &Problem, guess: State) -> Fallible<State> {
-    let focal_px = guess.cameras[0].parameters[0];
-    let (free, _) = adjust_free_poses(&mut problem.clone(), guess.clone(), &[Some(focal_px)])?;
+fn start_from_images(mut guess: Adjustment) -> Fallible<Adjustment> {
+    let focal_px = guess.state.cameras[0].parameters[0];
+    let (_, free, _) = adjust_free_poses(guess.clone(), &[Some(focal_px)])?;
     let pair = |(image, free): (&Image, &Option<FreePose>)| {
-        let chain = guess.robot.base_from_tip(&image.stop.as_ref()?.readings).inverse();
+        let chain = guess.state.robot.base_from_tip(&image.stop.as_ref()?.readings).inverse();
         Some(PosePair { camera_from_plate: free.as_ref()?.camera_from_plate, chain })
     };
-    let pairs: Vec<PosePair> = problem.images.iter().zip(&free.poses).filter_map(pair).collect();
+    let pairs: Vec<PosePair> = guess.problem.images.iter().zip(&free.poses).filter_map(pair).collect();
     let best = solve_hand_eye(&pairs).first().ok_or("no closed form has a solution")?.solution;
-    Ok(State { mountings: vec![best.camera], placements: vec![best.plate], cameras: free.state.cameras, ..guess })
+    (guess.state.mountings, guess.state.placements) = (vec![best.camera], vec![best.plate]);
+    guess.state.cameras = free.state.cameras;
+    Ok(guess)
 }
 
 /// Time that the processor spent on this thread, s: fair on a machine that others use, too.
@@ -190,13 +192,13 @@ fn main() -> Fallible<()> {
         other => return Err(format!("no mode '{other}': poses, exact or joint").into()),
     };
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global()?;
-    let (problem, guess) = read(Path::new(folder), mode)?;
+    let guess = read(Path::new(folder), mode)?;
     let begin = processor_seconds()?;
     let start = match rest.first().map(String::as_str) {
         None | Some("guess") => guess,
-        Some("images") => start_from_images(&problem, guess)?,
+        Some("images") => start_from_images(guess)?,
         Some(other) => return Err(format!("no start '{other}': guess or images").into()),
     };
-    let outcome = solve(&problem, start, &Settings::default());
+    let outcome = solve(start, &Settings::default());
     report(name, &outcome, processor_seconds()? - begin)
 }

@@ -13,8 +13,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
-use crate::problem::{E, Problem, Slack, State, by_columns, condensed};
-use crate::solve::Linearised;
+use crate::problem::{E, Layout, by_columns, condensed};
+use crate::solve::{LinearImage, LinearProblem};
 
 /// Largest part of the scatter of one image that counts as taken: beyond it the image alone decides what it is compared with.
 const MOST_TAKEN: f64 = 0.8;
@@ -40,12 +40,12 @@ impl Clustered {
 }
 
 /// Both covariances; `None` for too few images.
-pub fn clustered_covariance(problem: &Problem, state: &State, lin: &Linearised) -> Option<Clustered> {
-    if lin.images.len() < FEWEST_IMAGES {
+pub fn clustered_covariance(linear: LinearProblem) -> Option<Clustered> {
+    if linear.images().len() < FEWEST_IMAGES {
         return None;
     }
-    let n = problem.layout.len();
-    let TellingImages { images, free, prior, information } = TellingImages::of(problem, state, lin);
+    let n = linear.adjustment.problem.layout.len();
+    let TellingImages { images, free, prior, information } = TellingImages::of(linear);
     let model = SymmetricFactor::new(&information).ok()?.inverse();
     let by_prior = &model * DMatrix::from_diagonal(&prior);
     let mut sandwich = product(&by_prior, &by_prior.transpose());
@@ -79,13 +79,14 @@ pub struct TellingImages {
 
 impl TellingImages {
     /// At a linearised fit.
-    pub fn of(problem: &Problem, state: &State, lin: &Linearised) -> Self {
-        let columns = &problem.layout.columns;
+    pub fn of(linear: LinearProblem) -> Self {
+        let layout = &linear.adjustment.problem.layout;
+        let columns = &layout.columns;
         let free: Vec<usize> = (0..columns.len()).filter(|&c| columns[c].free).collect();
         let prior = DVector::from_iterator(free.len(), free.iter().map(|&c| columns[c].prior_sigma.recip()));
         let mut information = DMatrix::from_diagonal(&prior.component_mul(&prior));
-        let told = |k| Told::of(problem, state, lin, k, &free);
-        let images: Vec<Told> = (0..lin.images.len()).filter_map(told).collect();
+        let told = |(k, image)| Told::of(k, image, layout, &free);
+        let images: Vec<Told> = linear.images().enumerate().filter_map(told).collect();
         for d in images.iter().map(|told| &told.by_free) {
             information += product(&d.transpose(), d);
         }
@@ -108,17 +109,11 @@ pub struct Told {
 
 impl Told {
     /// Of the k-th image in use.
-    fn of(problem: &Problem, state: &State, lin: &Linearised, k: usize, free: &[usize]) -> Option<Self> {
-        let (terms, chain, i) = (&lin.terms[k], &lin.chains[k], lin.images[k]);
-        let image = &problem.images[i];
-        let known = |r: usize| match &state.slack[i] {
-            Slack::Joints(_) => problem.slack_information(image, r),
-            _ => 0.0,
-        };
-        let slack: Vec<f64> = (0..state.slack[i].len()).map(known).collect();
-        let (root, inverse) = roots(&condensed(terms, &chain.d_slack, &slack)?)?;
+    fn of(k: usize, own: LinearImage, layout: &Layout, free: &[usize]) -> Option<Self> {
+        let LinearImage { image, terms, chain, .. } = own;
+        let (root, inverse) = roots(&condensed(terms, &chain.d_slack, &own.prior_of_slack())?)?;
         let score = DVector::from_iterator(6 + E, terms.bp.iter().chain(terms.be.iter().take(E)).copied());
-        let by_root = product(&root.transpose(), &by_columns(&problem.layout, image, chain));
+        let by_root = product(&root.transpose(), &by_columns(layout, image, chain));
         let by_free = by_root.select_columns(free);
         Some(Self { place: k, score: inverse * score, by_root, by_free })
     }

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 use crate::geom::Pose;
 use crate::init::resect;
 use crate::linalg::symmetric_eigen;
-use crate::problem::{Image, ImageRejection, Problem, Slack, State, Weighting, posture_groups, predict};
+use crate::model::robot::Robot;
+use crate::problem::{Adjustment, Image, Problem, Slack, State, Weighting, posture_groups, predict};
 use crate::solve::{Settings, solve};
 
 /// Errors of predicted images.
@@ -37,6 +38,9 @@ pub struct Accuracy {
     pub folds: usize,
 }
 
+/// A fit of the images that are left, from where the adjustment stands.
+pub type Refit<'a> = dyn Fn(Adjustment) -> Option<State> + 'a;
+
 const FOLDS: usize = 6;
 
 /// Fewest postures that make up a region of the workspace, and fewest regions: one posture is what a fold leaves out.
@@ -48,39 +52,37 @@ const NOMINAL_JOINT_ERROR: f64 = 3e-3;
 
 /// Predicts every image on the robot by models that have not seen it: of what is calibrated by `fitted`, from the images that are left, which is
 /// [`refitted`] for the joint fit.
-pub fn hold_out(
-    problem: &Problem,
-    state: &State,
-    fitted: &dyn Fn(&Problem, &State) -> Option<State>,
-) -> Option<Accuracy> {
-    let folds = folds(problem)?;
-    let mut nominal_problem = problem.clone();
-    let mut nominal_state = state.clone();
-    nominal_state.robot = crate::model::robot::Robot {
-        terms: state.robot.terms.clone(),
-        ..crate::model::robot::Robot::nominal(state.robot.chain.clone())
-    };
-    nominal_state.robot.terms.iter_mut().for_each(|t| t.value = 0.0);
-    let robot = problem.layout.twists.start..problem.layout.terms.end;
-    nominal_problem.layout.columns[robot].iter_mut().for_each(|c| c.free = false);
-    nominal_problem.noise.local.fill(0.0);
-    nominal_problem.noise.joint.iter_mut().flatten().for_each(|s| *s = s.max(NOMINAL_JOINT_ERROR));
-    let nominal = predictions(&nominal_problem, &nominal_state, &folds, &joint)?;
-    let calibrated = predictions(problem, state, &folds, fitted)?;
-    let mut per_image_mm = vec![None; problem.images.len()];
+pub fn hold_out(fit: &Adjustment, fitted: &Refit) -> Option<Accuracy> {
+    let folds = folds(&fit.problem)?;
+    let nominal = predictions(&nominal(fit), &folds, &joint)?;
+    let calibrated = predictions(fit, &folds, fitted)?;
+    let mut per_image_mm = vec![None; fit.problem.images.len()];
     for ((i, a), (_, b)) in nominal.iter().zip(&calibrated) {
         per_image_mm[*i] = Some([a.mm(), b.mm()]);
     }
     Some(Accuracy { nominal: summary(&nominal), calibrated: summary(&calibrated), per_image_mm, folds: folds.len() })
 }
 
-/// Error of every image on the robot, predicted by fits of the free columns to the images of the other folds; `None` for too few.
-pub fn hold_out_images(problem: &Problem, state: &State) -> Option<Vec<(usize, ImageError)>> {
-    predictions(problem, state, &folds(problem)?, &joint)
+/// With the nominal robot, which stays as it is.
+fn nominal(fit: &Adjustment) -> Adjustment {
+    let mut nominal = fit.clone();
+    let Adjustment { problem, state } = &mut nominal;
+    state.robot = Robot { terms: fit.state.robot.terms.clone(), ..Robot::nominal(fit.state.robot.chain.clone()) };
+    state.robot.terms.iter_mut().for_each(|t| t.value = 0.0);
+    let robot = problem.layout.twists.start..problem.layout.terms.end;
+    problem.layout.columns[robot].iter_mut().for_each(|c| c.free = false);
+    problem.noise.local.fill(0.0);
+    problem.noise.joint.iter_mut().flatten().for_each(|s| *s = s.max(NOMINAL_JOINT_ERROR));
+    nominal
 }
 
-fn joint(problem: &Problem, state: &State) -> Option<State> {
-    Some(refitted(problem, state))
+/// Error of every image on the robot, predicted by fits of the free columns to the images of the other folds; `None` for too few.
+pub fn hold_out_images(fit: &Adjustment) -> Option<Vec<(usize, ImageError)>> {
+    predictions(fit, &folds(&fit.problem)?, &joint)
+}
+
+fn joint(adjustment: Adjustment) -> Option<State> {
+    Some(refitted(adjustment))
 }
 
 /// Squared errors of one predicted image, summed over its markers.
@@ -141,7 +143,8 @@ pub fn folds(problem: &Problem) -> Option<Vec<Vec<usize>>> {
 
 /// Regions of the workspace that are held out one after the other: postures (images that share joint readings) next to each other along the direction
 /// in which the tip moved most. `None` for too few postures, and where these would be the folds once more.
-pub fn regions(problem: &Problem, state: &State) -> Option<Vec<Vec<usize>>> {
+pub fn regions(fit: &Adjustment) -> Option<Vec<Vec<usize>>> {
+    let problem = &fit.problem;
     let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
     let postures = posture_groups(&problem.images, &on_robot);
     let count = FOLDS.min(postures.len() / FEWEST_POSTURES);
@@ -150,7 +153,7 @@ pub fn regions(problem: &Problem, state: &State) -> Option<Vec<Vec<usize>>> {
     }
     let mut regions = vec![Vec::new(); count];
     let mut before = 0;
-    for posture in along_the_workspace(problem, state, postures) {
+    for posture in along_the_workspace(fit, postures) {
         // The middle of a posture decides, so that regions are alike in number of images.
         let middle = 2 * before + posture.len();
         before += posture.len();
@@ -165,7 +168,7 @@ pub fn regions(problem: &Problem, state: &State) -> Option<Vec<Vec<usize>>> {
 }
 
 /// Postures in the order of their mean place along the direction in which the tip moved most.
-fn along_the_workspace(problem: &Problem, state: &State, postures: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
+fn along_the_workspace(Adjustment { problem, state }: &Adjustment, postures: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
     let place = |i: &usize| {
         let readings = problem.images[*i].stop.as_ref().map(|s| s.readings.as_slice()).unwrap_or_default();
         state.robot.base_from_tip(readings).translation
@@ -184,33 +187,21 @@ fn along_the_workspace(problem: &Problem, state: &State, postures: Vec<Vec<usize
     placed.into_iter().map(|(_, posture)| posture).collect()
 }
 
-fn predictions(
-    problem: &Problem,
-    state: &State,
-    folds: &[Vec<usize>],
-    fitted: &dyn Fn(&Problem, &State) -> Option<State>,
-) -> Option<Vec<(usize, ImageError)>> {
+fn predictions(fit: &Adjustment, folds: &[Vec<usize>], fitted: &Refit) -> Option<Vec<(usize, ImageError)>> {
     let mut errors = Vec::new();
     for held in folds {
-        let fitted = fitted(&without_images(problem, held), state)?;
+        let fitted = fitted(fit.without_images(held))?;
         for &i in held {
-            errors.push((i, predict_image(problem, &fitted, i)?));
+            errors.push((i, predict_image(&fit.problem, &fitted, i)?));
         }
     }
     errors.sort_by_key(|(i, _)| *i);
     Some(errors)
 }
 
-/// The problem with some of its images held out.
-pub fn without_images(problem: &Problem, held: &[usize]) -> Problem {
-    let mut rest = problem.clone();
-    held.iter().for_each(|&i| rest.images[i].rejected = Some(ImageRejection::Excluded));
-    rest
-}
-
-/// The free columns fitted to the images in use, from `state`, at the noise of the problem.
-pub fn refitted(problem: &Problem, state: &State) -> State {
-    solve(problem, state.clone(), &Settings { iterations: 30, decrement: 1e-2 }).state
+/// The free columns fitted to the images in use, from where the adjustment stands, at its noise.
+pub fn refitted(adjustment: Adjustment) -> State {
+    solve(adjustment, &Settings { iterations: 30, decrement: 1e-2 }).adjustment.state
 }
 
 /// Error of an image that `state` was not fitted to, predicted from its joint readings alone; `None` off the robot, or where

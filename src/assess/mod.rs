@@ -19,8 +19,8 @@ pub use advice::Advice;
 pub use clustered::{Clustered, TellingImages, Told, clustered_covariance};
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
 pub use hold_out::{
-    Accuracy, Errors, ImageError, cluster_of_images, folds, hold_out, hold_out_images, predict_image, refitted,
-    regions, without_images,
+    Accuracy, Errors, ImageError, Refit, cluster_of_images, folds, hold_out, hold_out_images, predict_image, refitted,
+    regions,
 };
 pub use identifiability::{
     Cause, Correlation, Identifiability, Observability, UnknownDirection, frame_parameters, identifiability,

@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, Matrix6};
 
 use crate::geom::{Pose, adjoint};
 use crate::model::robot::Stop;
-use crate::problem::{Image, Problem, Slack, State, chained};
-use crate::solve::Covariance;
+use crate::problem::{Image, Problem, Slack};
+use crate::solve::Fit;
 
 /// Which camera looks at which plate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,13 +50,8 @@ impl View {
 /// Pose and covariance at `readings` (rad or m, in the order of the chain), approach unknown.
 ///
 /// First-order propagation of the joint covariance of robot, mounting and placement: `G cov G'`, turned into the plate frame.
-pub fn predict_pose(
-    problem: &Problem,
-    state: &State,
-    covariance: &Covariance,
-    view: View,
-    readings: &[f64],
-) -> Option<PredictedPose> {
+pub fn predict_pose(fit: &Fit, view: View, readings: &[f64]) -> Option<PredictedPose> {
+    let layout = &fit.problem.layout;
     let image = Image {
         name: String::new(),
         series: view.series,
@@ -70,11 +65,11 @@ pub fn predict_pose(
         local_share: Vec::new(),
         rejected: None,
     };
-    let chain = chained(problem, state, &image, &Slack::Joints(vec![0.0; readings.len()]))?;
-    let theta = problem.layout.theta_len();
-    let of_theta = covariance.reduced.view((0, 0), (theta, theta));
+    let chain = fit.state.chained(layout, &image, &Slack::Joints(vec![0.0; readings.len()]))?;
+    let theta = layout.theta_len();
+    let of_theta = fit.covariance.reduced.view((0, 0), (theta, theta));
     let model = &chain.d_theta * of_theta * chain.d_theta.transpose();
-    let noise = nalgebra::DVector::from_vec(problem.joint_sigma(view.series)).map(|s| s * s);
+    let noise = nalgebra::DVector::from_vec(fit.problem.joint_sigma(view.series)).map(|s| s * s);
     let noise = &chain.d_slack * DMatrix::from_diagonal(&noise) * chain.d_slack.transpose();
     // A body twist d of camera_from_plate is the body twist -Ad d of its inverse.
     let turned = |c: DMatrix<f64>| {

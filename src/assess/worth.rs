@@ -9,9 +9,9 @@ use crate::assess::{
 use crate::error::Notice;
 use crate::geom::Pose;
 use crate::model::robot::Stop;
-use crate::problem::{Layout, Problem, Slack, State};
+use crate::problem::{Adjustment, Noise, Problem, Slack};
 use crate::series::CameraMount;
-use crate::solve::{Covariance, JOINT_NOISE_FLOOR, Linearised, NoiseInformation, NoiseUncertainty, noise_information};
+use crate::solve::{Covariance, Fit, JOINT_NOISE_FLOOR, NoiseInformation, NoiseUncertainty, noise_information};
 
 /// Ratio of the sigma of the flange by clusters to that by the model from which the larger one is reported.
 const REPORT_LARGER: f64 = 1.5;
@@ -48,7 +48,8 @@ pub fn stops(problem: &Problem) -> Vec<Stop> {
 }
 
 /// What stands still in the base frame for the first image on the robot, with its first column: the plate, or a fixed camera.
-pub fn still(problem: &Problem, layout: &Layout, state: &State) -> Option<(Pose, usize)> {
+pub fn still(Adjustment { problem, state }: &Adjustment) -> Option<(Pose, usize)> {
+    let layout = &problem.layout;
     let (_, image) = problem.used().find(|(_, i)| i.stop.is_some())?;
     Some(match image.mount {
         CameraMount::Hand => (state.placements[image.placement], layout.placements[image.placement].start),
@@ -56,36 +57,32 @@ pub fn still(problem: &Problem, layout: &Layout, state: &State) -> Option<(Pose,
     })
 }
 
-/// Judges a solution. `covariance` is made larger by what the uncertainty of an estimated joint noise adds, and where the scatter
+/// Judges a fit. Its covariance is made larger by what the uncertainty of an estimated joint noise adds, and where the scatter
 /// between images says clearly more than the noise model. What was `told_before` some joint noise was set to none is what is stated.
 pub fn judge(
-    problem: &Problem,
-    state: &State,
-    lin: &Linearised,
-    covariance: &mut Covariance,
+    fit: &mut Fit,
     joint_noise_is_estimated: bool,
     told_before: Option<NoiseInformation>,
     notices: &mut Vec<Notice>,
 ) -> Worth {
+    let told = if joint_noise_is_estimated { noise_information(fit) } else { None };
+    let uncertainty = told.as_ref().and_then(|told| NoiseUncertainty::of(told, fit));
+    let clustered = clustered_covariance(fit.linear()).filter(|_| images_know_the_robot(fit));
+    let still = still(fit);
+    let Fit { adjustment: Adjustment { problem, state }, covariance, .. } = fit;
     let layout = &problem.layout;
     let n = layout.len();
     let stops = stops(problem);
     let sigmas = |c: &DMatrix<f64>| (0..n).map(|k| c[(k, k)].max(0.0).sqrt()).collect::<Vec<f64>>();
-    let still = still(problem, layout, state);
     let mut worth = Worth {
         identifiability: identifiability(&state.robot, layout, &stops, &covariance.reduced),
         ..Worth::default()
     };
-    let told = if joint_noise_is_estimated { noise_information(problem, state, lin, covariance) } else { None };
-    if let Some(told) = &told {
-        let uncertainty = NoiseUncertainty::of(told, problem, covariance);
-        uncertainty.iter().for_each(|u| covariance.add(&u.added()));
-    }
+    uncertainty.iter().for_each(|u| covariance.add(&u.added()));
     if let Some(told) = told_before.or(told) {
-        worth.tell_joint_noise(problem, state, told.of_sizes());
+        worth.tell_joint_noise(&problem.noise, told.of_sizes());
     }
     worth.model_sigma = sigmas(&covariance.reduced);
-    let clustered = clustered_covariance(problem, state, lin).filter(|_| images_know_the_robot(problem, state));
     if let Some(clustered) = clustered {
         let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &clustered.model, &stops));
         worth.clustered_ratio = model.map(|m| m.ratio_of(&clustered.sandwich));
@@ -123,14 +120,13 @@ impl Worth {
     }
 
     /// Takes over what is known of the joint noise. The interval of what counts as none starts at none.
-    fn tell_joint_noise(&mut self, problem: &Problem, state: &State, told: NoiseInformation) {
+    fn tell_joint_noise(&mut self, noise: &Noise, told: NoiseInformation) {
         let interval = |series: usize, reading: usize| {
             let [low, high] = told.mean_variance(&[series], &[reading]).interval(NORMAL_95);
-            [if problem.noise.joint[series][reading] > JOINT_NOISE_FLOOR { low } else { 0.0 }, high]
+            [if noise.joint[series][reading] > JOINT_NOISE_FLOOR { low } else { 0.0 }, high]
         };
-        let readings = state.robot.chain.readings.len();
-        self.joint_noise =
-            (0..problem.noise.joint.len()).map(|s| (0..readings).map(|r| interval(s, r)).collect()).collect();
+        let of_series = |(s, own): (usize, &Vec<f64>)| (0..own.len()).map(|r| interval(s, r)).collect();
+        self.joint_noise = noise.joint.iter().enumerate().map(of_series).collect();
         self.told = Some(told);
     }
 }
@@ -145,6 +141,6 @@ fn enlarge(covariance: &mut Covariance, model: &[f64], clusters: &[f64], theta: 
 }
 
 /// False where every image has a pose of its own that does not know of the robot.
-fn images_know_the_robot(problem: &Problem, state: &State) -> bool {
-    problem.used().any(|(i, image)| image.stop.is_some() && !matches!(state.slack[i], Slack::Pose(_)))
+fn images_know_the_robot(fit: &Adjustment) -> bool {
+    fit.used().any(|(_, image, slack)| image.stop.is_some() && !matches!(slack, Slack::Pose(_)))
 }

@@ -2,8 +2,8 @@
 
 use nalgebra::SVector;
 
-use crate::problem::{E, ImageTerms, Problem, State};
-use crate::solve::Linearised;
+use crate::fit::Fit;
+use crate::problem::{Adjustment, E, ImageTerms};
 
 /// Fewest images on either side of a change.
 const FEWEST: usize = 3;
@@ -28,7 +28,8 @@ fn vote(terms: &ImageTerms, fx: f64, fy: f64) -> Option<f64> {
 }
 
 /// The most significant change along the order of the images of a camera, in words that name the first image after it.
-pub fn find_focus_change(problem: &Problem, state: &State, lin: &Linearised) -> Option<String> {
+pub fn find_focus_change(fit: &Fit) -> Option<String> {
+    let Fit { adjustment: Adjustment { problem, state }, linearised: lin, .. } = fit;
     for (camera, name) in problem.cameras.iter().enumerate() {
         let p = &state.cameras[camera].parameters;
         let votes: Vec<(usize, f64)> = (lin.images.iter().zip(&lin.terms))

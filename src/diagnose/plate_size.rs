@@ -1,7 +1,8 @@
 //! Whether a plate has the size that its file states. The lengths of the robot's links are the only others there are.
 
 use crate::assess::refitted;
-use crate::problem::{Problem, SCALE, State, seen_markers};
+use crate::fit::Fit;
+use crate::problem::{Adjustment, Problem, SCALE, State, seen_markers};
 use crate::solve::Covariance;
 
 /// Standard deviations from which on plate and links contradict each other.
@@ -16,13 +17,13 @@ const NOT_TO_SIZE: f64 = 5.0;
 const ASPECT: usize = 1;
 
 /// Reasons not to believe the size of a plate, in words with what to do.
-pub fn doubted_sizes(problem: &Problem, state: &State, covariance: &Covariance) -> Vec<String> {
+pub fn doubted_sizes(fit: &Fit) -> Vec<String> {
+    let Fit { adjustment: Adjustment { problem, state }, covariance, .. } = fit;
     let mut doubts = Vec::new();
     for (k, (columns, shape)) in problem.layout.shapes.iter().zip(&state.plates).enumerate() {
         let plate = &problem.plates[k];
         let of = |mode: usize| &problem.layout.columns[columns.start + mode];
-        let free_scale =
-            || with_free_scale(problem, state, columns.start).plates[k].modes[SCALE] - of(SCALE).prior_mean;
+        let free_scale = || with_free_scale(fit, columns.start).plates[k].modes[SCALE] - of(SCALE).prior_mean;
         let contradicted = contradicted(problem, columns.start, shape.modes[SCALE], covariance);
         let far =
             contradicted.map(|sigma| (free_scale(), sigma)).filter(|(off, sigma)| off.abs() > CONTRADICTION * sigma);
@@ -84,8 +85,8 @@ fn x_y_scale(problem: &Problem, state: &State, plate: usize) -> Option<(f64, f64
 }
 
 /// The fit with a scale that nothing but images and links tells: where it is far off, the linear answer need not hold.
-fn with_free_scale(problem: &Problem, state: &State, column: usize) -> State {
-    let mut loose = problem.clone();
-    loose.layout.columns[column].prior_sigma = UNKNOWN_SCALE;
-    refitted(&loose, state)
+fn with_free_scale(fit: &Adjustment, column: usize) -> State {
+    let mut loose = fit.clone();
+    loose.problem.layout.columns[column].prior_sigma = UNKNOWN_SCALE;
+    refitted(loose)
 }

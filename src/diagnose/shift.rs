@@ -15,9 +15,9 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use crate::assess::TellingImages;
 use crate::linalg::{SymmetricFactor, product};
-use crate::problem::{Problem, Slack, State};
+use crate::problem::{Adjustment, Problem, Slack};
 use crate::series::CameraMount;
-use crate::solve::Linearised;
+use crate::solve::LinearProblem;
 
 /// Fewest images on either side of a step.
 const FEWEST: usize = 3;
@@ -96,8 +96,9 @@ impl Row {
 }
 
 /// Steps that explain most of the joint noise, in the order of the images.
-pub fn find_shifts(problem: &Problem, state: &State, lin: &Linearised) -> Vec<Shift> {
-    let mut linear = Linear::of(problem, state, lin);
+pub fn find_shifts(fit: LinearProblem) -> Vec<Shift> {
+    let Adjustment { problem, state } = fit.adjustment;
+    let mut linear = Linear::of(fit);
     let columns = linear.information.ncols();
     let squares = |row: &Row| problem.slack_squares(&problem.images[row.image], &state.slack[row.image]);
     let all: f64 = linear.images.iter().map(squares).sum();
@@ -189,9 +190,10 @@ fn candidates(problem: &Problem, linear: &Linear) -> Vec<Candidate> {
 }
 
 impl Linear {
-    fn of(problem: &Problem, state: &State, lin: &Linearised) -> Self {
-        let layout = &problem.layout;
-        let TellingImages { images: all, information, .. } = TellingImages::of(problem, state, lin);
+    fn of(linear: LinearProblem) -> Self {
+        let Adjustment { problem, state } = linear.adjustment;
+        let (layout, lin) = (&problem.layout, linear.lin);
+        let TellingImages { images: all, information, .. } = TellingImages::of(linear);
         let mut images = Vec::new();
         for told in all {
             let i = lin.images[told.place];

@@ -3,7 +3,7 @@
 use nalgebra::Matrix6;
 
 use crate::geom::Pose;
-use crate::problem::{Problem, Slack, State};
+use crate::problem::State;
 use crate::solve::PlateScale;
 
 /// Stand-alone pose of one image.
@@ -47,10 +47,4 @@ pub struct FreePoses {
     pub pixel_factor: Vec<f64>,
     /// A change of focus or zoom within the images of a camera, in words.
     pub focus_change: Option<String>,
-}
-
-/// Error of rotation (rad) and of position (m) of the pose that the readings of an image say, against its free pose.
-pub fn misfit(state: &State, problem: &Problem, free: &Pose, image: usize) -> Option<(f64, f64)> {
-    let predicted = state.camera_from_plate(&problem.images[image], &Slack::None)?;
-    Some(predicted.distance(free))
 }

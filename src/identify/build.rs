@@ -8,8 +8,8 @@ use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Robot, Stop};
 use crate::problem::{
-    Family, Image, ImageRejection, Layout, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape, Problem, Slack,
-    State, hold_scale_bars,
+    Adjustment, Family, Image, ImageRejection, Layout, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape,
+    Problem, Slack, State, hold_scale_bars,
 };
 use crate::series::{Edge, Plate};
 
@@ -35,10 +35,10 @@ fn intern(names: &mut Vec<String>, name: &str) -> usize {
     })
 }
 
-/// The problem and a state whose poses and focal lengths are still unknown (identities; pinhole of one image width).
+/// The problem at a state whose poses and focal lengths are still unknown (identities; pinhole of one image width).
 ///
 /// With `local_errors` the errors of readings that stops have in common become columns.
-pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool) -> Result<(Problem, State)> {
+pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool) -> Result<Adjustment> {
     let (mut cameras, mut mountings, mut placements, mut plate_names) = (vec![], vec![], vec![], vec![]);
     let (mut lenses, mut plates, mut images): (Vec<Camera>, Vec<Plate>, Vec<Image>) = (vec![], vec![], vec![]);
     for (index, s) in series.iter().enumerate() {
@@ -114,9 +114,10 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool) -> Re
         marker: Vec::new(),
     };
     let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
-    let mut problem = Problem { layout, plates, placements, mountings, cameras, images, noise, families, huber: HUBER };
-    hold_scale_bars(&mut problem, &state);
-    Ok((problem, state))
+    let problem = Problem { layout, plates, placements, mountings, cameras, images, noise, families, huber: HUBER };
+    let mut adjustment = Adjustment { problem, state };
+    hold_scale_bars(&mut adjustment);
+    Ok(adjustment)
 }
 
 /// First guess of the local error of every reading that has columns for it; 0 for the others.

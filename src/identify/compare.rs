@@ -7,11 +7,11 @@ use super::solution::Solution;
 use super::two_stage::{Estimator, PoseStage, fit_joint, fit_poses};
 use crate::assess::{
     ImageError, Ratio, bootstrap_ratio, by_cluster, camera_errors_m, cluster_of_images, flange_error_m, folds,
-    predict_image, refitted, regions, root_mean_square, without_images,
+    predict_image, refitted, regions, root_mean_square,
 };
 use crate::error::{Error, Result};
 use crate::geom::Pose;
-use crate::problem::{Problem, State};
+use crate::problem::{Adjustment, Problem, State};
 use crate::series::CameraMount;
 use crate::simulate::truth::Truth;
 
@@ -84,7 +84,8 @@ const FEWEST_IMAGES: usize = 12;
 /// # Errors
 /// Too few images on the robot.
 pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usize, usize)) -> Result<Comparison> {
-    let (problem, state) = solution.joint_fit();
+    let joint = solution.joint_fit();
+    let problem = &joint.problem;
     let images = on_robot(problem);
     let Some(by_image) = folds(problem).filter(|_| images >= FEWEST_IMAGES) else {
         return Err(Error::unsolved(
@@ -93,7 +94,7 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
             format!("take at least {FEWEST_IMAGES}, better 30"),
         ));
     };
-    let by_region = regions(problem, state).unwrap_or_default();
+    let by_region = regions(joint).unwrap_or_default();
     let all = Estimator::ALL;
     let total = by_image.len() + by_region.len() + 1;
     let mut done = 0;
@@ -101,10 +102,10 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
         done += 1;
         progress(done, total);
     };
-    let against_truth = truth.map(|t| truth_errors(problem, state, t)).transpose()?;
+    let against_truth = truth.map(|t| truth_errors(joint, t)).transpose()?;
     tick();
-    let image_errors = held_out(problem, state, &by_image, &all, &mut tick);
-    let region_errors = held_out(problem, state, &by_region, &all, &mut tick);
+    let image_errors = held_out(joint, &by_image, &all, &mut tick);
+    let region_errors = held_out(joint, &by_region, &all, &mut tick);
     let of_truth = |k: usize| against_truth.as_ref().and_then(|t| t[k]);
     let held = [Some(&image_errors), Some(&region_errors).filter(|e| !e.is_empty())];
     let rows = rows(problem, &all, held, of_truth);
@@ -114,11 +115,12 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
 /// The two-stage estimators beside the joint fit, held out by image: what the report of every solution says, and the same as [`compare`] says of them.
 /// `None` for too few images.
 pub fn beside_two_stages(solution: &Solution) -> Option<Comparison> {
-    let (problem, state) = solution.joint_fit();
+    let joint = solution.joint_fit();
+    let problem = &joint.problem;
     let images = on_robot(problem);
     let folds = folds(problem).filter(|_| images >= FEWEST_IMAGES)?;
     let taking_part: Vec<Estimator> = Estimator::ALL.into_iter().filter(|e| *e != Estimator::HardJoint).collect();
-    let errors = held_out(problem, state, &folds, &taking_part, &mut || ());
+    let errors = held_out(joint, &folds, &taking_part, &mut || ());
     let rows = rows(problem, &taking_part, [Some(&errors), None], |_| None);
     Some(Comparison { rows, images, folds: [folds.len(), 0] })
 }
@@ -146,13 +148,13 @@ fn rows(
 }
 
 /// What every estimator makes of the observations in use; `None` for one that has no solution.
-fn fitted(problem: &Problem, start: &State, estimators: &[Estimator]) -> Vec<Option<State>> {
-    let stage = PoseStage::adjusted(problem, start);
+fn fitted(start: &Adjustment, estimators: &[Estimator]) -> Vec<Option<State>> {
+    let stage = PoseStage::adjusted(start);
     let noise = JointNoise::Estimated;
     let found = |estimator: &Estimator| match estimator {
-        Estimator::Joint => Some(refitted(problem, start)),
-        Estimator::HardJoint => fit_joint(problem, start, *estimator, noise).map(|(_, found)| found.state),
-        _ => Some(fit_poses(problem, stage.as_ref()?, start, *estimator, noise)?.state),
+        Estimator::Joint => Some(refitted(start.clone())),
+        Estimator::HardJoint => fit_joint(start, *estimator, noise).map(|(_, found)| found.state),
+        _ => Some(fit_poses(start, stage.as_ref()?, *estimator, noise)?.state),
     };
     estimators.iter().map(found).collect()
 }
@@ -160,18 +162,12 @@ fn fitted(problem: &Problem, start: &State, estimators: &[Estimator]) -> Vec<Opt
 /// Error of every held-out image, with its index, by every estimator; `None` where an estimator has no solution for a fold.
 type Errors = Vec<(usize, Vec<Option<ImageError>>)>;
 
-fn held_out(
-    problem: &Problem,
-    state: &State,
-    folds: &[Vec<usize>],
-    estimators: &[Estimator],
-    tick: &mut dyn FnMut(),
-) -> Errors {
+fn held_out(joint: &Adjustment, folds: &[Vec<usize>], estimators: &[Estimator], tick: &mut dyn FnMut()) -> Errors {
     let mut errors = Vec::new();
     for fold in folds {
-        let found = fitted(&without_images(problem, fold), state, estimators);
+        let found = fitted(&joint.without_images(fold), estimators);
         for &i in fold {
-            errors.push((i, found.iter().map(|state| predict_image(problem, state.as_ref()?, i)).collect()));
+            errors.push((i, found.iter().map(|state| predict_image(&joint.problem, state.as_ref()?, i)).collect()));
         }
         tick();
     }
@@ -193,8 +189,8 @@ fn summary(errors: &Errors, clusters: &[usize], k: usize, joint: Option<usize>) 
     })
 }
 
-fn truth_errors(problem: &Problem, state: &State, truth: &Truth) -> Result<Vec<Option<TruthError>>> {
-    let found = fitted(problem, state, &Estimator::ALL);
+fn truth_errors(joint: &Adjustment, truth: &Truth) -> Result<Vec<Option<TruthError>>> {
+    let found = fitted(joint, &Estimator::ALL);
     found.iter().map(|s| s.as_ref().map(|s| truth_error(s, truth)).transpose().map(Option::flatten)).collect()
 }
 

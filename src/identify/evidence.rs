@@ -11,7 +11,7 @@ use super::lens_choice::{self, with_lenses};
 use super::two_stage::Estimator;
 use crate::error::Result;
 use crate::fit::log_evidence;
-use crate::problem::MeasuredSeries;
+use crate::problem::{Adjustment, MeasuredSeries};
 use crate::solve::{Settings, solve};
 use crate::urdf::Chain;
 
@@ -81,7 +81,8 @@ fn compare_models(full: &Solution) -> Vec<Evidence> {
 }
 
 fn evidence(full: &Solution, model: RobotModel) -> Option<Evidence> {
-    let (mut problem, mut state) = (full.problem.clone(), full.state.clone());
+    let mut smaller = full.fit.adjustment.clone();
+    let Adjustment { problem, state } = &mut smaller;
     let first = problem.layout.terms.start;
     for (k, t) in state.robot.terms.iter_mut().enumerate().filter(|(_, t)| !model.has(t.term)) {
         let column = &mut problem.layout.columns[first + k];
@@ -89,10 +90,10 @@ fn evidence(full: &Solution, model: RobotModel) -> Option<Evidence> {
         t.value = column.prior_mean;
         column.free = false;
     }
-    let outcome = solve(&problem, state, &Settings::default());
-    let lin = outcome.linearised?;
-    let robot = problem.layout.robot();
-    let parameters = problem.layout.columns[robot].iter().filter(|c| c.free).count();
-    let log_evidence = log_evidence(&problem, &outcome.state, &lin)?;
-    Some(Evidence { model, log_evidence, cost: lin.cost, parameters })
+    let outcome = solve(smaller, &Settings::default());
+    let linear = outcome.linear()?;
+    let layout = &outcome.adjustment.problem.layout;
+    let parameters = layout.columns[layout.robot()].iter().filter(|c| c.free).count();
+    let log_evidence = log_evidence(linear)?;
+    Some(Evidence { model, log_evidence, cost: linear.lin.cost, parameters })
 }

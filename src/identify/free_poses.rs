@@ -9,11 +9,10 @@ use crate::fit::{FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
-use crate::problem::{ImageRejection, Problem, Slack, State, Weighting};
-use crate::problem::{hold_scale_bars, size_by_bar};
+use crate::problem::{Adjustment, ImageRejection, Problem, Slack, State, Weighting, hold_scale_bars, size_by_bar};
 use crate::solve::{
-    ComponentOptions, Covariance, Linearised, PlateScale, Settings, Similarity, Status, covariance,
-    estimate_components, frames, in_frame, linearise_all, reject_observations, solve,
+    ComponentOptions, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status, estimate_components,
+    frames, in_frame, reject_observations, solve,
 };
 
 /// RMS of a start, px per point, from which no further focal length is tried.
@@ -25,34 +24,30 @@ const WORST_FOCAL_SIGMA: f64 = 0.02;
 /// Most rounds of rejection.
 const ROUNDS: usize = 6;
 
-/// Adjusts from nothing. On return the problem holds rejections and pixel factors, and `state` the cameras, plates and poses.
+/// Adjusts from nothing. The adjustment that is left holds rejections and pixel factors, cameras, plates and poses.
 ///
 /// # Errors
 /// When no image shows enough markers, when the plate is mirrored, when no start converges or the focal length is not determined.
 pub fn adjust_free_poses(
-    problem: &mut Problem,
-    state: State,
+    mut adjustment: Adjustment,
     stated_focal_px: &[Option<f64>],
-) -> Result<(FreePoses, Vec<StartVerdict>)> {
-    let theta = problem.layout.theta_len();
-    let free_before: Vec<bool> = problem.layout.columns.iter().map(|c| c.free).collect();
-    problem.layout.columns[..theta].iter_mut().for_each(|c| c.free = false);
-    let homographies = fit_homographies(problem, &state)?;
+) -> Result<(Adjustment, FreePoses, Vec<StartVerdict>)> {
+    let free_before: Vec<bool> = adjustment.problem.layout.columns.iter().map(|c| c.free).collect();
+    adjustment.hold_poses();
+    let homographies = fit_homographies(&mut adjustment)?;
     let mut verdicts = Vec::new();
-    let mut start = state;
     for (camera, stated) in stated_focal_px.iter().enumerate() {
-        start = start_camera(problem, start, camera, &homographies, *stated, &mut verdicts)?;
+        adjustment.state = start_camera(&adjustment, camera, &homographies, *stated, &mut verdicts)?;
     }
-    let result = finish(problem, start);
-    for (column, free) in problem.layout.columns.iter_mut().zip(free_before) {
+    let (mut adjustment, free) = finish(adjustment)?;
+    for (column, free) in adjustment.problem.layout.columns.iter_mut().zip(free_before) {
         column.free = free;
     }
-    let free = result?;
-    hold_scale_bars(problem, &free.state);
-    Ok((free, verdicts))
+    hold_scale_bars(&mut adjustment);
+    Ok((adjustment, free, verdicts))
 }
 
-fn fit_homographies(problem: &mut Problem, state: &State) -> Result<Vec<Option<Homography>>> {
+fn fit_homographies(Adjustment { problem, state }: &mut Adjustment) -> Result<Vec<Option<Homography>>> {
     let mut all = Vec::with_capacity(problem.images.len());
     for image in &mut problem.images {
         let plane: Vec<Vector2<f64>> = image.used().map(|o| state.plates[image.plate].nominal[o.marker].xy()).collect();
@@ -76,14 +71,13 @@ fn fit_homographies(problem: &mut Problem, state: &State) -> Result<Vec<Option<H
     Ok(all)
 }
 
-/// Poses of all images of a camera from homographies, refined, for one focal length; also counts views from behind.
+/// Starts the poses of all images of a camera from homographies, refined, for one focal length; counts views from behind and those that fail.
 fn start_poses(
-    problem: &Problem,
-    state: &State,
+    Adjustment { problem, state }: &mut Adjustment,
     camera: usize,
     homographies: &[Option<Homography>],
-) -> (State, usize, usize) {
-    let mut next = state.clone();
+) -> [usize; 2] {
+    let mut slack = state.slack.clone();
     let (mut behind, mut failed) = (0, 0);
     let lens = &state.cameras[camera];
     let centre = Vector2::new(lens.parameters[2], lens.parameters[3]);
@@ -97,9 +91,10 @@ fn start_poses(
         let weighting = Weighting::of(problem, image);
         let tries = [planar, planar.flipped()].map(|p| resect(image, state, &p.camera_from_plate, &weighting));
         let best = tries.into_iter().flatten().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-        next.slack[i] = Slack::Pose(best.map_or(planar.camera_from_plate, |(pose, _)| pose));
+        slack[i] = Slack::Pose(best.map_or(planar.camera_from_plate, |(pose, _)| pose));
     }
-    (next, behind, failed)
+    state.slack = slack;
+    [behind, failed]
 }
 
 /// Points instead of circles, one camera, markers as printed: a quick problem that tells good starts from bad ones.
@@ -119,14 +114,15 @@ fn quick_problem(problem: &Problem, camera: usize) -> Problem {
     quick
 }
 
+/// The best start of a camera.
 fn start_camera(
-    problem: &Problem,
-    state: State,
+    adjustment: &Adjustment,
     camera: usize,
     homographies: &[Option<Homography>],
     stated: Option<f64>,
     verdicts: &mut Vec<StartVerdict>,
 ) -> Result<State> {
+    let Adjustment { problem, state } = adjustment;
     let name = &problem.cameras[camera];
     let own: Vec<Homography> =
         problem.used().filter(|(_, i)| i.camera == camera).filter_map(|(i, _)| homographies[i]).collect();
@@ -146,7 +142,7 @@ fn start_camera(
             verdicts.push(StartVerdict { of, origin, verdict: "not needed".into(), won: false });
             continue;
         }
-        let (rms, candidate, behind) = try_focal(problem, &state, camera, homographies, focal_px);
+        let (rms, candidate, behind) = try_focal(adjustment, camera, homographies, focal_px);
         verdicts.push(StartVerdict { of, origin, verdict: format!("reached {rms:.3} px per point"), won: false });
         if best.as_ref().is_none_or(|b| rms < b.0) {
             verdicts.iter_mut().filter(|v| v.of.ends_with(&format!("camera {name}"))).for_each(|v| v.won = false);
@@ -171,38 +167,37 @@ fn start_camera(
     }
 }
 
+/// RMS that a focal length reaches, px, with the state and the number of views from behind.
 fn try_focal(
-    problem: &Problem,
-    state: &State,
+    Adjustment { problem, state }: &Adjustment,
     camera: usize,
     homographies: &[Option<Homography>],
     focal_px: f64,
 ) -> (f64, State, usize) {
-    let mut quick = quick_problem(problem, camera);
-    let mut trial = state.clone();
+    let mut quick = Adjustment { problem: quick_problem(problem, camera), state: state.clone() };
     let lens = &state.cameras[camera];
-    trial.cameras[camera] = Camera::pinhole(lens.lens, lens.width_px, lens.height_px, focal_px);
-    let (mut trial, behind, failed) = start_poses(&quick, &trial, camera, homographies);
+    quick.state.cameras[camera] = Camera::pinhole(lens.lens, lens.width_px, lens.height_px, focal_px);
+    let [behind, failed] = start_poses(&mut quick, camera, homographies);
     if failed > 0 {
-        return (f64::INFINITY, trial, behind);
+        return (f64::INFINITY, quick.state, behind);
     }
     // Focal lengths and the first radial coefficient first, then all.
-    let columns = quick.layout.cameras[camera].clone();
+    let columns = problem.layout.cameras[camera].clone();
     let early = [0, 1, 4];
     for stage in 0..2 {
         for (k, c) in columns.clone().enumerate() {
             let wanted = early.contains(&k) || (stage == 1 && k < lens.parametric());
-            quick.layout.columns[c].free = problem.layout.columns[c].free && wanted;
+            quick.problem.layout.columns[c].free = problem.layout.columns[c].free && wanted;
         }
         let settings = Settings { iterations: 40, decrement: 0.1 };
-        let outcome = solve(&quick, trial, &settings);
-        trial = outcome.state;
-        let Some(lin) = outcome.linearised else { return (f64::INFINITY, trial, behind) };
+        let outcome = solve(quick, &settings);
+        quick = outcome.adjustment;
+        let Some(lin) = outcome.linearised else { break };
         if stage == 1 {
-            return (rms_px(&lin), trial, behind);
+            return (rms_px(&lin), quick.state, behind);
         }
     }
-    (f64::INFINITY, trial, behind)
+    (f64::INFINITY, quick.state, behind)
 }
 
 fn rms_px(lin: &Linearised) -> f64 {
@@ -216,11 +211,9 @@ fn rms_px(lin: &Linearised) -> f64 {
 const LEAST_TURN: f64 = 0.09;
 
 /// A camera is determined by views from different directions only.
-fn check_views(problem: &Problem, state: &State) -> Result<()> {
-    for (camera, name) in problem.cameras.iter().enumerate() {
-        let views: Vec<&Pose> = (problem.used().filter(|(_, i)| i.camera == camera))
-            .filter_map(|(i, _)| if let Slack::Pose(pose) = &state.slack[i] { Some(pose) } else { None })
-            .collect();
+fn check_views(adjustment: &Adjustment) -> Result<()> {
+    for (camera, name) in adjustment.problem.cameras.iter().enumerate() {
+        let views: Vec<&Pose> = views(adjustment, camera).collect();
         let Some(first) = views.first() else { continue };
         let turn = views.iter().map(|v| first.distance(v).0).fold(0.0, f64::max);
         if turn < LEAST_TURN {
@@ -233,16 +226,21 @@ fn check_views(problem: &Problem, state: &State) -> Result<()> {
     Ok(())
 }
 
+/// The free poses of a camera.
+fn views(adjustment: &Adjustment, camera: usize) -> impl Iterator<Item = &Pose> {
+    let own = adjustment.used().filter(move |(_, image, _)| image.camera == camera);
+    own.filter_map(|(_, _, slack)| if let Slack::Pose(pose) = slack { Some(pose) } else { None })
+}
+
 /// Largest tilt of the plate against the image below which all images of a camera face it, rad.
 const LEAST_TILT: f64 = 0.14;
 
 /// Names a camera that looked at the plate from straight ahead only, whatever its distance and roll: a longer focal length and a
 /// greater distance show the same.
-fn facing(problem: &Problem, state: &State) -> Option<Error> {
+fn facing(adjustment: &Adjustment) -> Option<Error> {
     let tilt = |pose: &Pose| pose.rotation[(2, 2)].abs().min(1.0).acos();
-    problem.cameras.iter().enumerate().find_map(|(camera, name)| {
-        let own = problem.images.iter().zip(&state.slack).filter(|(i, _)| i.camera == camera && i.rejected.is_none());
-        let tilts: Vec<f64> = own.filter_map(|(_, s)| if let Slack::Pose(pose) = s { Some(tilt(pose)) } else { None }).collect();
+    adjustment.problem.cameras.iter().enumerate().find_map(|(camera, name)| {
+        let tilts: Vec<f64> = views(adjustment, camera).map(tilt).collect();
         let largest = tilts.iter().copied().reduce(f64::max)?;
         (largest < LEAST_TILT).then(|| {
             undetermined(&format!(
@@ -255,29 +253,29 @@ fn facing(problem: &Problem, state: &State) -> Option<Error> {
     })
 }
 
-fn finish(problem: &mut Problem, start: State) -> Result<FreePoses> {
-    check_views(problem, &start)?;
+fn finish(start: Adjustment) -> Result<(Adjustment, FreePoses)> {
+    check_views(&start)?;
     let options = ComponentOptions { joint: false, rounds: 20, ..ComponentOptions::default() };
-    let mut outcome = estimate_components(problem, start, &options);
+    let mut outcome = estimate_components(start, &options);
     for _ in 0..ROUNDS {
-        if reject_observations(problem, &outcome) == 0 {
+        if reject_observations(&mut outcome.adjustment) == 0 {
             break;
         }
-        outcome = estimate_components(problem, outcome.state, &options);
+        outcome = estimate_components(outcome.adjustment, &options);
     }
-    let (Status::Converged, Some(lin)) = (outcome.status, &outcome.linearised) else {
-        return Err(facing(problem, &outcome.state).unwrap_or_else(|| {
+    if outcome.status != Status::Converged {
+        return Err(facing(&outcome.adjustment).unwrap_or_else(|| {
             Error::unsolved(
                 "free camera poses",
                 format!("the adjustment ended without converging ({:?})", outcome.status),
                 "look at the images for a wrong plate, motion blur or changed focus",
             )
         }));
-    };
-    let cov =
-        covariance(problem, &outcome.state, lin).map_err(|_| undetermined("the normal equations are singular"))?;
-    check_focal(problem, &outcome.state, &cov)?;
-    collect(problem, &outcome.state, lin, &cov)
+    }
+    let fit = outcome.fit().map_err(|_| undetermined("the normal equations are singular"))?;
+    check_focal(&fit)?;
+    let free = collect(&fit)?;
+    Ok((fit.adjustment, free))
 }
 
 fn undetermined(what: &str) -> Error {
@@ -288,31 +286,33 @@ fn undetermined(what: &str) -> Error {
     )
 }
 
-fn check_focal(problem: &Problem, state: &State, cov: &Covariance) -> Result<()> {
+fn check_focal(fit: &Fit) -> Result<()> {
+    let (Adjustment { problem, state }, cov) = (&fit.adjustment, &fit.covariance);
     for (k, range) in problem.layout.cameras.iter().enumerate() {
         for (c, axis) in [(range.start, "fx"), (range.start + 1, "fy")] {
             let focal = state.cameras[k].parameters[c - range.start];
             let relative = cov.sigma(c) / focal.abs();
             if problem.layout.columns[c].free && (relative.is_nan() || relative > WORST_FOCAL_SIGMA || focal <= 0.0) {
                 let what = format!("{axis} of {} is known to {:.1} % only", problem.cameras[k], 100.0 * relative);
-                return Err(facing(problem, state).unwrap_or_else(|| undetermined(&what)));
+                return Err(facing(fit).unwrap_or_else(|| undetermined(&what)));
             }
         }
     }
     Ok(())
 }
 
-fn collect(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance) -> Result<FreePoses> {
-    let (placed, scales) = placed_cameras(problem, state, cov)?;
+fn collect(fit: &Fit) -> Result<FreePoses> {
+    let Fit { adjustment: Adjustment { problem, state }, linearised: lin, covariance } = fit;
+    let (placed, scales) = placed_cameras(fit)?;
     let mut poses = vec![None; problem.images.len()];
-    for ((k, &i), in_frame) in lin.images.iter().enumerate().zip(placed) {
-        let squares: f64 = lin.terms[k].residuals.iter().map(|r| r.duv.norm_squared()).sum();
-        let c = cov.slack(k, 6);
-        poses[i] = Some(FreePose {
-            camera_from_plate: lin.chains[k].pose,
+    for ((k, LinearImage { index, terms, chain, .. }), in_frame) in fit.linear().images().enumerate().zip(placed) {
+        let squares: f64 = terms.residuals.iter().map(|r| r.duv.norm_squared()).sum();
+        let c = covariance.slack(k, 6);
+        poses[index] = Some(FreePose {
+            camera_from_plate: chain.pose,
             covariance: Matrix6::from_column_slice(c.as_slice()),
             in_frame,
-            rms_px: (squares / lin.terms[k].residuals.len().max(1) as f64).sqrt(),
+            rms_px: (squares / terms.residuals.len().max(1) as f64).sqrt(),
         });
     }
     Ok(FreePoses {
@@ -322,19 +322,16 @@ fn collect(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance)
         state: state.clone(),
         scales,
         pixel_factor: problem.noise.pixel_factor.clone(),
-        focus_change: find_focus_change(problem, state, lin),
+        focus_change: find_focus_change(fit),
     })
 }
 
 /// The cameras of the images in use in the frames of their plates, and the scales of the plates.
-fn placed_cameras(
-    problem: &Problem,
-    state: &State,
-    cov: &Covariance,
-) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale>>)> {
+fn placed_cameras(fit: &Fit) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale>>)> {
+    let Adjustment { problem, state } = &fit.adjustment;
     let mut moved = state.clone();
     let mut scales = vec![None; problem.plates.len()];
-    for frame in frames(problem, state)? {
+    for frame in frames(fit)? {
         for &plate in &frame.plates {
             let similarity = Similarity::of(problem, &frame.seen, plate, &state.plates[plate])?;
             let as_made = similarity.shape(&state.plates[plate], 1.0);
@@ -349,8 +346,9 @@ fn placed_cameras(
             scales[plate] = Some(PlateScale { relative: size - 1.0, sigma });
         }
     }
-    let lin = linearise_all(problem, &moved).ok_or_else(|| undetermined("a marker lies behind its camera"))?;
-    let covariance = in_frame(problem, &moved, &lin, cov)?;
+    let moved = Adjustment { problem: problem.clone(), state: moved };
+    let lin = moved.linearise().ok_or_else(|| undetermined("a marker lies behind its camera"))?;
+    let covariance = in_frame(moved.linear(&lin), &fit.covariance)?;
     let placed = lin.chains.iter().enumerate().map(|(k, c)| PlacedCamera::of(&c.pose, &covariance.pose(k)));
     Ok((placed.collect(), scales))
 }

@@ -11,14 +11,14 @@ use crate::assess::judge;
 use crate::assess::{hold_out, refitted};
 use crate::diagnose::{Move, doubted_sizes, find_move, find_shifts, gates, left_out, remarks, undetermined};
 use crate::error::{Error, Notice, Result};
-use crate::fit::{Fit, FreePoses, misfit};
+use crate::fit::FreePoses;
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::robot::Robot;
 use crate::problem::MeasuredSeries;
-use crate::problem::{Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem, Slack, State};
+use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem, Slack};
 use crate::solve::{
-    ComponentOptions, NoiseInformation, Outcome, Status, covariance, estimate_components, reject_images,
-    reject_observations, without_untold_noise,
+    ComponentOptions, NoiseInformation, Outcome, Status, estimate_components, reject_images, reject_observations,
+    without_untold_noise,
 };
 use crate::urdf::{Chain, Payload};
 
@@ -136,8 +136,9 @@ const ROUNDS: usize = 12;
 /// As [`super::identify`] with one robot model.
 pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
     let robot = options.model.robot_with(chain, options.harmonics);
-    let (mut problem, mut state) = build(&robot, series, options.joint_noise == JointNoise::Estimated)?;
-    options.selection.apply(&mut problem.layout, &mut state)?;
+    let mut start = build(&robot, series, options.joint_noise == JointNoise::Estimated)?;
+    let Adjustment { problem, state } = &mut start;
+    options.selection.apply(&mut problem.layout, state)?;
     let stated = options.selection.with_priors(&problem.layout)?;
     problem.families.extend(Family::of_twists(&problem.layout, |c| stated.contains(&c)));
     if options.marker_tolerance == MarkerTolerance::Estimated {
@@ -146,55 +147,55 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let stated: Vec<Option<f64>> = (problem.cameras.iter())
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();
-    let (free, mut starts) = adjust_free_poses(&mut problem, state, &stated)?;
-    let mut state = free.state.clone();
-    let on_robot = problem.used().filter(|(_, i)| i.stop.is_some()).count();
-    check_on_robot(&problem, on_robot)?;
-    let aside = start_robot(&mut problem, &mut state, &free, &mut starts)?;
-    let (outcome, before) = fit(&mut problem, state, &free, &aside, options);
+    let (mut start, free, mut starts) = adjust_free_poses(start, &stated)?;
+    let on_robot = start.problem.used().filter(|(_, i)| i.stop.is_some()).count();
+    check_on_robot(&start.problem, on_robot)?;
+    let aside = start_robot(&mut start, &free, &mut starts)?;
+    let (mut outcome, before) = fit(start, &free, &aside, options);
+    let (status, iterations) = (outcome.status, outcome.iterations);
     let mut notices = Vec::new();
-    name_wrong_pairs(&mut problem, &outcome.state, &free);
-    let moves: Vec<Move> = (0..series.len()).filter_map(|k| find_move(&problem, &outcome.state, &free, k)).collect();
-    check_left_out(&problem, on_robot, &moves)?;
-    let (Status::Converged, Some(linearised)) = (outcome.status, outcome.linearised) else {
+    name_wrong_pairs(&mut outcome.adjustment, &free);
+    let Adjustment { problem, state } = &outcome.adjustment;
+    let moves: Vec<Move> = (0..series.len()).filter_map(|k| find_move(problem, state, &free, k)).collect();
+    check_left_out(problem, on_robot, &moves)?;
+    if status != Status::Converged {
         return Err(Error::unsolved(
             "joint fit",
-            format!("ended without converging ({:?})", outcome.status),
+            format!("ended without converging ({status:?})"),
             "look at the per-image table for images that do not belong, and at the starting values",
         ));
-    };
-    let state = outcome.state;
-    let covariance = covariance(&problem, &state, &linearised).map_err(|_| {
+    }
+    let fit = outcome.fit().map_err(|_| {
         Error::unsolved("joint fit", "the normal equations are singular", "take stops that move every joint")
     })?;
     let (estimator, noise) = (options.estimator, options.joint_noise);
-    let fitted = |problem: &Problem, state: &State| match estimator.is_two_stage() {
-        true => refit(problem, state, estimator, noise),
-        false => Some(refitted(problem, state)),
+    let fitted = |left: Adjustment| match estimator.is_two_stage() {
+        true => refit(&left, estimator, noise),
+        false => Some(refitted(left)),
     };
-    let accuracy = hold_out(&problem, &state, &fitted)
+    let accuracy = hold_out(&fit, &fitted)
         .ok_or_else(|| Error::unsolved("hold-out", "too few images to hold any out", "take more images"))?;
-    let shifts = if free.focus_change.is_some() { Vec::new() } else { find_shifts(&problem, &state, &linearised) };
+    let shifts = if free.focus_change.is_some() { Vec::new() } else { find_shifts(fit.linear()) };
+    let Adjustment { problem, state } = &fit.adjustment;
     let mut failed_gates = Vec::new();
     for shift in &shifts {
-        let (what, remedy) = shift.in_words(&problem, &series[shift.series].name);
+        let (what, remedy) = shift.in_words(problem, &series[shift.series].name);
         if shift.matters() {
             failed_gates.push(format!("{what}; {remedy}"));
         } else {
             notices.push(Notice::new("series", what, remedy));
         }
     }
-    failed_gates.extend(gates(&problem, series, &state, &free, &accuracy, &shifts, on_robot));
-    failed_gates.extend(doubted_sizes(&problem, &state, &covariance));
+    failed_gates.extend(gates(problem, series, state, &free, &accuracy, &shifts, on_robot));
+    failed_gates.extend(doubted_sizes(&fit));
     failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
-    remarks(&problem, series, &state, &accuracy, on_robot, &mut notices);
-    let (fit, joint) = match estimator.is_two_stage() {
-        true => (staged((&problem, &state, &covariance), estimator, noise)?, Some(Box::new((problem, state)))),
-        false => (Fit { problem, state, linearised, covariance }, None),
+    remarks(problem, series, state, &accuracy, on_robot, &mut notices);
+    let (mut fit, joint) = match estimator.is_two_stage() {
+        true => (staged(&fit, estimator, noise)?, Some(Box::new(fit.adjustment))),
+        false => (fit, None),
     };
-    let Fit { problem, state, linearised, mut covariance } = fit;
     let estimated = noise == JointNoise::Estimated && joint.is_none();
-    let worth = judge(&problem, &state, &linearised, &mut covariance, estimated, before, &mut notices);
+    let worth = judge(&mut fit, estimated, before, &mut notices);
     failed_gates.extend(undetermined(&worth, &accuracy));
     Ok(Solution {
         estimator,
@@ -203,18 +204,15 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
         worth,
         evidences: Vec::new(),
         lenses: Vec::new(),
-        problem,
-        state,
-        linearised,
-        covariance,
+        fit,
         free_poses: free,
         two_stage: None,
         accuracy,
         starts,
         notices,
         failed_gates,
-        status: outcome.status,
-        iterations: outcome.iterations,
+        status,
+        iterations,
     })
 }
 
@@ -222,44 +220,44 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
 ///
 /// Images that were set `aside` before take part where the fit says that they belong.
 fn fit(
-    problem: &mut Problem,
-    mut state: State,
+    mut start: Adjustment,
     free: &FreePoses,
     aside: &[usize],
     options: &Options,
 ) -> (Outcome, Option<NoiseInformation>) {
     let exact = options.joint_noise == JointNoise::Known(0.0);
     if exact {
-        problem.noise.tilt.clear();
+        start.problem.noise.tilt.clear();
     }
-    problem.start_slack(&mut state, exact);
+    start.start_slack(exact);
     if let JointNoise::Known(sigma) = options.joint_noise {
-        problem.noise.joint.iter_mut().flatten().for_each(|s| *s = sigma.max(f64::MIN_POSITIVE));
+        start.problem.noise.joint.iter_mut().flatten().for_each(|s| *s = sigma.max(f64::MIN_POSITIVE));
     }
     let components =
         ComponentOptions { joint: options.joint_noise == JointNoise::Estimated, ..ComponentOptions::default() };
-    let mut outcome = estimate_components(problem, state, &components);
-    if take_back(problem, &outcome.state, free, aside) {
-        outcome = estimate_components(problem, outcome.state, &components);
+    let mut outcome = estimate_components(start, &components);
+    if take_back(&mut outcome.adjustment, free, aside) {
+        outcome = estimate_components(outcome.adjustment, &components);
     }
     for _ in 0..ROUNDS {
-        let images = reject_images(problem, &outcome);
-        if images.is_none() && reject_observations(problem, &outcome) == 0 {
+        let images = reject_images(&mut outcome.adjustment);
+        if images.is_none() && reject_observations(&mut outcome.adjustment) == 0 {
             break;
         }
-        outcome = estimate_components(problem, outcome.state, &components);
+        outcome = estimate_components(outcome.adjustment, &components);
     }
-    if components.joint { without_untold_noise(problem, outcome, &components.settings) } else { (outcome, None) }
+    if components.joint { without_untold_noise(outcome, &components.settings) } else { (outcome, None) }
 }
 
 /// Adds to every wrongly paired image by how much its readings miss, and whose readings would fit it.
-fn name_wrong_pairs(problem: &mut Problem, state: &State, free: &FreePoses) {
+fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses) {
+    let Adjustment { problem, state } = &*adjustment;
     let mut remarks = Vec::new();
     for (i, image) in problem.images.iter().enumerate() {
         let wrong = image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair);
         let (true, Some(pose)) = (wrong, &free.poses[i]) else { continue };
         let pose = &pose.camera_from_plate;
-        let Some((angle_rad, distance_m)) = misfit(state, problem, pose, i) else { continue };
+        let Some((angle_rad, distance_m)) = adjustment.misfit(pose, i) else { continue };
         let better = (0..problem.images.len())
             .filter(|&k| k != i && problem.images[k].series == image.series)
             .filter_map(|k| {
@@ -275,7 +273,7 @@ fn name_wrong_pairs(problem: &mut Problem, state: &State, free: &FreePoses) {
         remarks.push((i, Mismatch::Fit { misfit: Misfit { distance_m, angle_rad }, fits }));
     }
     for (i, mismatch) in remarks {
-        problem.images[i].rejected = Some(ImageRejection::WronglyPaired(mismatch));
+        adjustment.problem.images[i].rejected = Some(ImageRejection::WronglyPaired(mismatch));
     }
 }
 

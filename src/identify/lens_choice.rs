@@ -13,9 +13,8 @@ use crate::error::{Error, Notice, Result};
 use crate::fit::log_evidence;
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
-use crate::problem::{LensChoice, MeasuredSeries};
-use crate::problem::{Problem, State, predict};
-use crate::solve::{ComponentOptions, Linearised, Status, estimate_components};
+use crate::problem::{Adjustment, LensChoice, MeasuredSeries, predict};
+use crate::solve::{ComponentOptions, LinearProblem, Status, estimate_components};
 use crate::urdf::Chain;
 
 /// One observation of so many is kept aside, in every image and of every marker in other images.
@@ -104,8 +103,8 @@ fn by_hold_out(
 
 /// Evidence of every lens formula for a camera, from the fit with its present one.
 fn compare_lenses(solution: &Solution, camera: &str, choice: LensChoice) -> Vec<LensEvidence> {
-    let Some(k) = solution.problem.cameras.iter().position(|c| c == camera) else { return Vec::new() };
-    let is_wide = solution.state.cameras[k].corner() > FISHEYE_FROM;
+    let Some(k) = solution.fit.problem.cameras.iter().position(|c| c == camera) else { return Vec::new() };
+    let is_wide = solution.fit.state.cameras[k].corner() > FISHEYE_FROM;
     let formulas = Lens::ALL.into_iter().filter(|l| choice.has(*l) && (*l != Lens::Fisheye || is_wide));
     let mut all: Vec<LensEvidence> = formulas.filter_map(|lens| evidence(solution, k, lens)).collect();
     let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
@@ -117,21 +116,23 @@ fn compare_lenses(solution: &Solution, camera: &str, choice: LensChoice) -> Vec<
 }
 
 fn evidence(solution: &Solution, camera: usize, lens: Lens) -> Option<LensEvidence> {
-    let (mut problem, state) = with_lens(solution, camera, lens)?;
+    let mut other = with_lens(solution, camera, lens)?;
     // Image noise follows the lens; joint noise, tilt and the sizes of families stay.
-    problem.families.retain(|f| f.held.ncols() > 0);
+    other.problem.families.retain(|f| f.held.ncols() > 0);
     let options = ComponentOptions { joint: false, tilt: false, rounds: ROUNDS, ..ComponentOptions::default() };
-    let outcome = estimate_components(&mut problem, state, &options);
-    let lin = outcome.linearised.filter(|_| outcome.status == Status::Converged)?;
-    let found = &outcome.state.cameras[camera];
-    let log_evidence = log_evidence(&problem, &outcome.state, &lin)? + of_noise(&problem, &lin) + of_formula(found);
+    let outcome = estimate_components(other, &options);
+    let linear = outcome.linear().filter(|_| outcome.status == Status::Converged)?;
+    let Adjustment { problem, state } = &outcome.adjustment;
+    let found = &state.cameras[camera];
+    let log_evidence = log_evidence(linear)? + of_noise(linear) + of_formula(found);
     let centre_px = [found.parameters[2], found.parameters[3]];
     Some(LensEvidence { camera: problem.cameras[camera].clone(), lens, log_evidence, centre_px, taken: false })
 }
 
-/// The problem with another lens for one camera, which images as the present one does.
-fn with_lens(solution: &Solution, camera: usize, lens: Lens) -> Option<(Problem, State)> {
-    let (mut problem, mut state) = (solution.problem.clone(), solution.state.clone());
+/// The adjustment with another lens for one camera, which images as the present one does.
+fn with_lens(solution: &Solution, camera: usize, lens: Lens) -> Option<Adjustment> {
+    let mut other = solution.fit.adjustment.clone();
+    let Adjustment { problem, state } = &mut other;
     let present = &state.cameras[camera];
     let next = match present.extended(lens) {
         Some(extended) => extended,
@@ -142,15 +143,13 @@ fn with_lens(solution: &Solution, camera: usize, lens: Lens) -> Option<(Problem,
     let columns = problem.families.iter_mut().flat_map(|f| &mut f.columns);
     columns.filter(|c| **c >= from).for_each(|c| *c = c.saturating_add_signed(moved));
     state.cameras[camera] = next;
-    Some((problem, state))
+    Some(other)
 }
 
 /// What the size of the image noise adds to the logarithm of the density of the observations.
-fn of_noise(problem: &Problem, lin: &Linearised) -> f64 {
-    let images = lin.images.iter().zip(&lin.terms);
-    -images
-        .map(|(&i, t)| 2.0 * t.residuals.len() as f64 * problem.noise.pixel_factor[problem.images[i].camera].ln())
-        .sum::<f64>()
+fn of_noise(linear: LinearProblem) -> f64 {
+    let factors = &linear.adjustment.problem.noise.pixel_factor;
+    -linear.images().map(|i| 2.0 * i.terms.residuals.len() as f64 * factors[i.image.camera].ln()).sum::<f64>()
 }
 
 /// Logarithm of the density of coefficients that the fit has no prior for: evidences of formulas need one.
@@ -166,8 +165,8 @@ fn of_formula(camera: &Camera) -> f64 {
 
 /// Nearest and farthest plate centre that each camera saw, m.
 pub fn depths_m(solution: &Solution) -> Vec<[f64; 2]> {
-    let mut all = vec![[f64::INFINITY, 0.0f64]; solution.problem.cameras.len()];
-    for (i, image) in solution.problem.used() {
+    let mut all = vec![[f64::INFINITY, 0.0f64]; solution.fit.problem.cameras.len()];
+    for (i, image) in solution.fit.problem.used() {
         let Some(pose) = &solution.free_poses.poses[i] else { continue };
         let z = pose.camera_from_plate.translation.z;
         let range = &mut all[image.camera];
@@ -178,7 +177,7 @@ pub fn depths_m(solution: &Solution) -> Vec<[f64; 2]> {
 
 /// What the cameras of ROS cannot say of the lenses that were identified.
 pub(super) fn losses(solution: &Solution) -> Vec<Notice> {
-    let named = solution.problem.cameras.iter().zip(&solution.state.cameras).zip(depths_m(solution));
+    let named = solution.fit.problem.cameras.iter().zip(&solution.fit.state.cameras).zip(depths_m(solution));
     let notice = |((name, camera), depths): ((&String, &Camera), [f64; 2])| {
         let fit = camera.in_ros(&depths)?;
         let what = format!(
@@ -241,17 +240,17 @@ fn held_out_errors(chain: &Chain, series: &[MeasuredSeries], lens: Lens) -> Resu
     let robot = Robot::nominal(chain.clone());
     let mut all = series.to_vec();
     all.iter_mut().for_each(|s| s.lens = lens);
-    let (full, _) = build(&robot, &all, false)?;
+    let full = build(&robot, &all, false)?.problem;
     let aside = |image: usize, marker: usize| (marker + 7 * image).is_multiple_of(KEPT_ASIDE);
-    let (mut problem, state) = build(&robot, &all, false)?;
-    for (i, image) in problem.images.iter_mut().enumerate() {
+    let mut thinned = build(&robot, &all, false)?;
+    for (i, image) in thinned.problem.images.iter_mut().enumerate() {
         image.observations.retain(|o| !aside(i, o.marker));
     }
-    let stated: Vec<Option<f64>> = (problem.cameras.iter())
+    let stated: Vec<Option<f64>> = (full.cameras.iter())
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();
-    let (free, _) = adjust_free_poses(&mut problem, state, &stated)?;
-    let mut squares: Vec<Vec<f64>> = vec![Vec::new(); problem.cameras.len()];
+    let (_, free, _) = adjust_free_poses(thinned, &stated)?;
+    let mut squares: Vec<Vec<f64>> = vec![Vec::new(); full.cameras.len()];
     for (i, image) in full.images.iter().enumerate() {
         let Some(pose) = &free.poses[i] else { continue };
         for o in image.observations.iter().filter(|o| aside(i, o.marker)) {
@@ -259,7 +258,7 @@ fn held_out_errors(chain: &Chain, series: &[MeasuredSeries], lens: Lens) -> Resu
             squares[image.camera].extend(predicted.map(|p| (p.uv - o.uv).norm_squared()));
         }
     }
-    Ok(problem.cameras.iter().cloned().zip(squares.into_iter().map(trimmed_rms)).collect())
+    Ok(full.cameras.iter().cloned().zip(squares.into_iter().map(trimmed_rms)).collect())
 }
 
 fn trimmed_rms(mut squares: Vec<f64>) -> f64 {

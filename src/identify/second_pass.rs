@@ -59,8 +59,8 @@ fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Opti
     let stops = images.iter().map(stop).collect();
     let measured = measured_series(series, lens_of(series).ok()?, (width as u32, height as u32), true, stops);
     let nobody = Robot::nominal(Chain::empty());
-    let (mut problem, state) = build(&nobody, &[measured], false).ok()?;
-    let (free, _) = adjust_free_poses(&mut problem, state, &[series.manifest.camera.focal_px]).ok()?;
+    let nothing = build(&nobody, &[measured], false).ok()?;
+    let (_, free, _) = adjust_free_poses(nothing, &[series.manifest.camera.focal_px]).ok()?;
     let pose = |k: usize| free.poses[k].as_ref().map(|p| p.camera_from_plate);
     // The adjustment takes one of two images that show the same; they stay the same when both have its pose.
     let original =

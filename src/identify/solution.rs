@@ -9,10 +9,10 @@ use super::two_stage::Estimator;
 use crate::assess::Accuracy;
 use crate::assess::Worth;
 use crate::error::Notice;
-use crate::fit::FreePoses;
+use crate::fit::{Fit, FreePoses};
+use crate::problem::Adjustment;
 use crate::problem::MeasuredSeries;
-use crate::problem::{Problem, State};
-use crate::solve::{Covariance, Linearised, Status};
+use crate::solve::Status;
 
 /// How one starting value fared.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,15 +33,9 @@ pub struct Solution {
     /// How it was fitted.
     pub estimator: Estimator,
     /// Data and estimates of the joint fit, where the result is that of two stages.
-    pub joint: Option<Box<(Problem, State)>>,
-    /// Data, with the reasons of all rejections and the final variance components.
-    pub problem: Problem,
-    /// All estimates.
-    pub state: State,
-    /// Linearisation at the estimates: residuals and weights of the images in use.
-    pub linearised: Linearised,
-    /// Covariance of the estimates.
-    pub covariance: Covariance,
+    pub joint: Option<Box<Adjustment>>,
+    /// The fit.
+    pub fit: Fit,
     /// The stand-alone camera poses.
     pub free_poses: FreePoses,
     /// What the solve went from.
@@ -70,7 +64,7 @@ pub struct Solution {
 
 impl Solution {
     /// Data and estimates of the joint fit, be it the result or not.
-    pub fn joint_fit(&self) -> (&Problem, &State) {
-        self.joint.as_deref().map_or((&self.problem, &self.state), |(problem, state)| (problem, state))
+    pub fn joint_fit(&self) -> &Adjustment {
+        self.joint.as_deref().unwrap_or(&self.fit)
     }
 }

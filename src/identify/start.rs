@@ -6,11 +6,11 @@ use super::solution::StartVerdict;
 use super::suspects::Suspects;
 use crate::assess::median;
 use crate::error::{Error, Result};
-use crate::fit::{FreePoses, misfit};
+use crate::fit::FreePoses;
 use crate::geom::log_so3;
 use crate::init::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
 use crate::linalg::symmetric_eigen;
-use crate::problem::{ImageRejection, Misfit, Mismatch, Problem, Slack, State, predict};
+use crate::problem::{Adjustment, Image, ImageRejection, Misfit, Mismatch, Problem, Slack, State, predict};
 
 /// Robust spread (rad + m) of the best closed form beyond which readings and images do not belong together.
 const WORST_SPREAD: f64 = 0.08;
@@ -30,18 +30,17 @@ const FEWEST_IMAGES: usize = 5;
 /// Closed forms whose pixel cost is compared.
 const COMPARED: usize = 4;
 
-/// Fills in mountings and placements of `state`; sets images aside that do not fit their readings, and returns which.
+/// Fills in mountings and placements; sets images aside that do not fit their readings, and returns which.
 pub(super) fn start_robot(
-    problem: &mut Problem,
-    state: &mut State,
+    adjustment: &mut Adjustment,
     free: &FreePoses,
     verdicts: &mut Vec<StartVerdict>,
 ) -> Result<Vec<usize>> {
     let mut aside = Vec::new();
     let mut groups: BTreeMap<(usize, usize), Vec<(usize, PosePair)>> = BTreeMap::new();
-    for (i, image) in problem.used() {
+    for (i, image, _) in adjustment.used() {
         let (Some(stop), Some(pose)) = (&image.stop, &free.poses[i]) else { continue };
-        let pair = PosePair::of_stop(&state.robot, image.mount, &stop.readings, pose.camera_from_plate);
+        let pair = PosePair::of_stop(&adjustment.state.robot, image.mount, &stop.readings, pose.camera_from_plate);
         groups.entry((image.mounting, image.placement)).or_default().push((i, pair));
     }
     let mut order: Vec<_> = groups.into_iter().collect();
@@ -49,6 +48,7 @@ pub(super) fn start_robot(
     let (mut cameras, mut plates) = (BTreeMap::new(), BTreeMap::new());
     for ((mounting, placement), pairs) in &order {
         let poses: Vec<PosePair> = pairs.iter().map(|(_, p)| *p).collect();
+        let problem = &adjustment.problem;
         let of = format!("hand-camera {} and plate {}", problem.mountings[*mounting], problem.placements[*placement]);
         let known = (cameras.get(mounting).copied(), plates.get(placement).copied());
         let solution = match known {
@@ -59,16 +59,16 @@ pub(super) fn start_robot(
             (None, Some(plate)) => {
                 closest(&poses, |p| HandEye { camera: (p.chain * plate) * p.camera_from_plate.inverse(), plate })
             }
-            (None, None) => closed_form(problem, state, pairs, &poses, (*mounting, *placement), &of, verdicts)?,
+            (None, None) => closed_form(adjustment, pairs, &poses, (*mounting, *placement), &of, verdicts)?,
         };
         cameras.insert(*mounting, solution.camera);
         plates.insert(*placement, solution.plate);
-        aside.extend(set_aside(problem, pairs, &solution));
+        aside.extend(set_aside(&mut adjustment.problem, pairs, &solution));
     }
-    for (k, pose) in state.mountings.iter_mut().enumerate() {
+    for (k, pose) in adjustment.state.mountings.iter_mut().enumerate() {
         *pose = cameras.get(&k).copied().unwrap_or(*pose);
     }
-    for (k, pose) in state.placements.iter_mut().enumerate() {
+    for (k, pose) in adjustment.state.placements.iter_mut().enumerate() {
         *pose = plates.get(&k).copied().unwrap_or(*pose);
     }
     Ok(aside)
@@ -89,8 +89,7 @@ fn closest(poses: &[PosePair], solution: impl Fn(&PosePair) -> HandEye) -> HandE
 }
 
 fn closed_form(
-    problem: &Problem,
-    state: &State,
+    Adjustment { problem, state }: &Adjustment,
     pairs: &[(usize, PosePair)],
     poses: &[PosePair],
     (mounting, placement): (usize, usize),
@@ -113,7 +112,8 @@ fn closed_form(
         let mut trial = state.clone();
         trial.mountings[mounting] = s.solution.camera;
         trial.placements[placement] = s.solution.plate;
-        median_pixels(problem, &trial, pairs)
+        let errors = pairs.iter().map(|(i, _)| pixels(&problem.images[*i], &trial).unwrap_or(f64::INFINITY));
+        upper_median(errors.collect())
     };
     let mut ranked: Vec<(f64, &HandEyeStart)> = starts.iter().take(COMPARED).map(|s| (cost(s), s)).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -152,24 +152,20 @@ fn no_fit(of: &str, what: &str) -> Error {
     )
 }
 
-/// Median over the images of the RMS pixel error of the poses that the readings predict.
-fn median_pixels(problem: &Problem, state: &State, pairs: &[(usize, PosePair)]) -> f64 {
-    let mut errors: Vec<f64> = pairs
-        .iter()
-        .map(|(i, _)| {
-            let image = &problem.images[*i];
-            let Some(pose) = state.camera_from_plate(image, &Slack::None) else { return f64::INFINITY };
-            let (mut sum, mut count) = (0.0, 0.0);
-            for o in image.used() {
-                let Some(p) = predict(image, state, &pose, o) else { return f64::INFINITY };
-                sum += (o.uv - p.uv).norm_squared();
-                count += 1.0;
-            }
-            (sum / f64::max(count, 1.0)).sqrt()
-        })
-        .collect();
-    errors.sort_by(f64::total_cmp);
-    errors[errors.len() / 2]
+/// RMS pixel error of an image at the pose that its readings predict; `None` where a marker lies behind the camera.
+fn pixels(image: &Image, state: &State) -> Option<f64> {
+    let pose = state.camera_from_plate(image, &Slack::None)?;
+    let (mut sum, mut count) = (0.0, 0.0);
+    for o in image.used() {
+        sum += (o.uv - predict(image, state, &pose, o)?.uv).norm_squared();
+        count += 1.0;
+    }
+    Some((sum / f64::max(count, 1.0)).sqrt())
+}
+
+fn upper_median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
 }
 
 /// Hand-camera and plate pose need rotations about at least two axes.
@@ -200,9 +196,8 @@ fn check_rotations(of: &str, poses: &[PosePair]) -> Result<()> {
 
 fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &HandEye) -> Vec<usize> {
     let mut aside = Vec::new();
-    let mut sizes: Vec<f64> = pairs.iter().map(|(_, p)| solution.error(p)).map(|(a, d)| a + d).collect();
-    sizes.sort_by(f64::total_cmp);
-    let bound = (SET_ASIDE_FACTOR * sizes[sizes.len() / 2]).max(SET_ASIDE_FLOOR);
+    let sizes: Vec<f64> = pairs.iter().map(|(_, p)| solution.error(p)).map(|(a, d)| a + d).collect();
+    let bound = (SET_ASIDE_FACTOR * upper_median(sizes)).max(SET_ASIDE_FLOOR);
     for (i, pair) in pairs {
         let (angle_rad, distance_m) = solution.error(pair);
         if angle_rad + distance_m > bound {
@@ -215,15 +210,15 @@ fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &Hand
 }
 
 /// Takes images back that were set `aside` with the nominal robot, and fit the robot that was found as the others do. True where there are some.
-pub(super) fn take_back(problem: &mut Problem, state: &State, free: &FreePoses, aside: &[usize]) -> bool {
+pub(super) fn take_back(adjustment: &mut Adjustment, free: &FreePoses, aside: &[usize]) -> bool {
     let size = |i: usize| {
-        let (angle, distance) = misfit(state, problem, &free.poses[i].as_ref()?.camera_from_plate, i)?;
+        let (angle, distance) = adjustment.misfit(&free.poses[i].as_ref()?.camera_from_plate, i)?;
         Some(angle + distance)
     };
-    let on_robot = problem.used().filter(|(_, image)| image.stop.is_some());
+    let on_robot = adjustment.problem.used().filter(|(_, image)| image.stop.is_some());
     let Some(usual) = median(&on_robot.filter_map(|(i, _)| size(i)).collect::<Vec<f64>>()) else { return false };
     let fits = |i: &usize| size(*i).is_some_and(|s| s < SET_ASIDE_FACTOR * usual);
     let back: Vec<usize> = aside.iter().copied().filter(fits).collect();
-    back.iter().for_each(|&i| problem.images[i].rejected = None);
+    back.iter().for_each(|&i| adjustment.problem.images[i].rejected = None);
     !back.is_empty()
 }

@@ -10,13 +10,11 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::assess::refitted;
+use crate::fit::Fit;
 use crate::geom::{Pose, right_jacobian_se3};
 use crate::linalg::{SymmetricFactor, product};
-use crate::problem::{Chained, Problem, Slack, State, Step, chained};
-use crate::solve::{
-    ComponentOptions, Elimination, Settings, Status, System, Tally, covariance, estimate_components, linearise_all,
-    share_out,
-};
+use crate::problem::{Adjustment, Chained, Problem, Slack, State, Step};
+use crate::solve::{ComponentOptions, Elimination, Settings, Status, System, Tally, estimate_components, share_out};
 
 use super::joint::JointNoise;
 
@@ -118,26 +116,24 @@ pub struct PoseStage {
 
 impl PoseStage {
     /// The free-pose adjustment of the observations in use, from the poses that `start` predicts.
-    pub fn adjusted(problem: &Problem, start: &State) -> Option<Self> {
-        let mut free = without_robot(problem);
+    pub fn adjusted(start: &Adjustment) -> Option<Self> {
         let options = ComponentOptions { joint: false, ..ComponentOptions::default() };
-        let outcome = estimate_components(&mut free, with_free_poses(problem, start)?, &options);
+        let outcome = estimate_components(with_free_poses(start)?, &options);
         if outcome.status != Status::Converged {
             return None;
         }
-        Self::linearised(&free, &outcome.state)
+        Self::linearised(&outcome.adjustment)
     }
 
-    /// The adjustment linearised at the poses, cameras and plates of `state`: one step from there, not iterated.
-    pub fn linearised(problem: &Problem, state: &State) -> Option<Self> {
-        let free = without_robot(problem);
-        let at = with_free_poses(problem, state)?;
-        let lin = linearise_all(&free, &at)?;
-        let system = System::with(Elimination::Markers, &free, &at, &lin, 0.0);
+    /// The adjustment linearised at its poses, cameras and plates: one step from there, not iterated.
+    pub fn linearised(at: &Adjustment) -> Option<Self> {
+        let free = with_free_poses(at)?;
+        let lin = free.linearise()?;
+        let system = System::with(Elimination::Markers, free.linear(&lin), 0.0);
         let factor = SymmetricFactor::new(&system.information).ok()?;
         let (x, all) = (factor.solve(&system.rhs), factor.inverse());
         let on_robot: Vec<usize> =
-            (0..lin.images.len()).filter(|&k| problem.images[lin.images[k]].stop.is_some()).collect();
+            (0..lin.images.len()).filter(|&k| free.problem.images[lin.images[k]].stop.is_some()).collect();
         let rows: Vec<usize> = on_robot
             .iter()
             .flat_map(|&k| (0..6).map(move |c| (k, c)))
@@ -148,8 +144,8 @@ impl PoseStage {
             references: on_robot.iter().map(|&k| lin.chains[k].pose).collect(),
             offset: DVector::from_iterator(rows.len(), rows.iter().map(|&r| x[r])),
             covariance: DMatrix::from_fn(rows.len(), rows.len(), |i, j| all[(rows[i], rows[j])]),
-            state: at,
-            pixel_factor: free.noise.pixel_factor,
+            state: free.state,
+            pixel_factor: free.problem.noise.pixel_factor,
         })
     }
 
@@ -158,19 +154,14 @@ impl PoseStage {
     }
 }
 
-fn without_robot(problem: &Problem) -> Problem {
-    let mut free = problem.clone();
-    let theta = free.layout.theta_len();
-    free.layout.columns[..theta].iter_mut().for_each(|c| c.free = false);
-    free
-}
-
-fn with_free_poses(problem: &Problem, state: &State) -> Option<State> {
-    let mut next = state.clone();
-    for (i, image) in problem.used() {
-        next.slack[i] = Slack::Pose(state.camera_from_plate(image, &state.slack[i])?);
+/// Every image in use with a free pose, and nothing of the robot.
+fn with_free_poses(start: &Adjustment) -> Option<Adjustment> {
+    let mut free = start.clone();
+    free.hold_poses();
+    for (i, image, slack) in start.used() {
+        free.state.slack[i] = Slack::Pose(start.state.camera_from_plate(image, slack)?);
     }
-    Some(next)
+    Some(free)
 }
 
 /// Latent noise of one pose: `L` (6 x n) and the component that each of its columns belongs to.
@@ -257,6 +248,12 @@ impl ErrorModel {
         })
     }
 
+    /// Those of all poses.
+    fn latents(&self, problem: &Problem, stage: &PoseStage, p: &Predicted) -> Option<Vec<Latent>> {
+        let poses = stage.images.iter().zip(&p.d_slack).enumerate();
+        poses.map(|(k, (&i, l))| self.latent(problem, i, k, l)).collect()
+    }
+
     /// `V`.
     fn covariance(&self, latents: &[Latent]) -> DMatrix<f64> {
         let mut v = self.known.clone();
@@ -332,14 +329,14 @@ struct Predicted {
     d_slack: Vec<DMatrix<f64>>,
 }
 
-fn predict(problem: &Problem, stage: &PoseStage, state: &State) -> Option<Predicted> {
+fn predict(Adjustment { problem, state }: &Adjustment, stage: &PoseStage) -> Option<Predicted> {
     let theta = problem.layout.theta_len();
     let n = stage.offset.len();
     let mut p = Predicted { residual: stage.offset.clone(), jacobian: DMatrix::zeros(n, theta), d_slack: Vec::new() };
     for (k, &i) in stage.images.iter().enumerate() {
         let image = &problem.images[i];
         let exact = problem.exact_slack(image);
-        let Chained { pose, d_theta, d_slack } = chained(problem, state, image, &exact)?;
+        let Chained { pose, d_theta, d_slack } = state.chained(&problem.layout, image, &exact)?;
         let x: Vector6<f64> = (stage.references[k].inverse() * pose).log();
         let chart = right_jacobian_se3(&x).try_inverse()?;
         let chart = DMatrix::from_column_slice(6, 6, chart.as_slice());
@@ -363,7 +360,7 @@ struct Normal {
     weighted_jacobian: DMatrix<f64>,
 }
 
-fn normal(problem: &Problem, state: &State, p: &Predicted, weight: &DMatrix<f64>) -> Normal {
+fn normal(Adjustment { problem, state }: &Adjustment, p: &Predicted, weight: &DMatrix<f64>) -> Normal {
     let weighted_jacobian = product(weight, &p.jacobian);
     let mut information = product(&p.jacobian.transpose(), &weighted_jacobian);
     let mut rhs = weighted_jacobian.transpose() * &p.residual;
@@ -381,7 +378,8 @@ fn normal(problem: &Problem, state: &State, p: &Predicted, weight: &DMatrix<f64>
     Normal { information, rhs, weighted_jacobian }
 }
 
-fn moved(problem: &Problem, state: &State, step: &DVector<f64>) -> State {
+/// The state after a step of the columns that act through the poses.
+fn moved(Adjustment { problem, state }: &Adjustment, step: &DVector<f64>) -> State {
     let mut dense = DVector::zeros(problem.layout.len());
     dense.rows_mut(0, step.len()).copy_from(step);
     let step = Step {
@@ -396,46 +394,35 @@ fn moved(problem: &Problem, state: &State, step: &DVector<f64>) -> State {
 ///
 /// `start` gives robot, mountings and placements to start from; priors are those of the problem. `noise` is of the joint noise
 /// of the estimators that have one.
-pub fn fit_poses(
-    problem: &Problem,
-    stage: &PoseStage,
-    start: &State,
-    estimator: Estimator,
-    noise: JointNoise,
-) -> Option<Estimate> {
-    let mut state = State {
-        cameras: stage.state.cameras.clone(),
-        plates: stage.state.plates.clone(),
-        slack: stage.state.slack.clone(),
-        ..start.clone()
-    };
-    let mut problem = problem.clone();
+pub fn fit_poses(start: &Adjustment, stage: &PoseStage, estimator: Estimator, noise: JointNoise) -> Option<Estimate> {
+    let mut at = start.clone();
+    at.state.cameras.clone_from(&stage.state.cameras);
+    at.state.plates.clone_from(&stage.state.plates);
+    at.state.slack.clone_from(&stage.state.slack);
     if matches!(estimator, Estimator::Isotropic | Estimator::Blocks) || noise != JointNoise::Estimated {
-        problem.without_local_errors(&mut state);
+        at.without_local_errors();
     }
-    let problem = &problem;
-    let mut model = ErrorModel::new(problem, stage, estimator, noise)?;
-    let kinds = state.robot.chain.reading_kinds.clone();
+    let mut model = ErrorModel::new(&at.problem, stage, estimator, noise)?;
+    let kinds = at.state.robot.chain.reading_kinds.clone();
     let mut standing = !model.estimated;
     for round in 1.. {
-        let p = predict(problem, stage, &state)?;
-        let latents: Vec<Latent> = (stage.images.iter().zip(&p.d_slack).enumerate())
-            .map(|(k, (&i, l))| model.latent(problem, i, k, l))
-            .collect::<Option<_>>()?;
+        let p = predict(&at, stage)?;
+        let latents = model.latents(&at.problem, stage, &p)?;
         let weight = SymmetricFactor::new(&model.covariance(&latents)).ok()?.inverse();
-        state = gauss_newton(problem, stage, state, &weight)?;
-        let p = predict(problem, stage, &state)?;
-        let normal = normal(problem, &state, &p, &weight);
+        gauss_newton(&mut at, stage, &weight)?;
+        let p = predict(&at, stage)?;
+        let normal = normal(&at, &p, &weight);
         let covariance = SymmetricFactor::new(&normal.information).ok()?.inverse();
         if standing {
-            let covariance = zero_fixed(problem, covariance);
-            if estimator == Estimator::FullAndRepeatability {
-                state = with_cameras_for_the_robot(problem, state, &model.sizes);
-            }
+            let covariance = zero_fixed(&at.problem, covariance);
+            let state = match estimator {
+                Estimator::FullAndRepeatability => with_cameras_for_the_robot(at, &model.sizes),
+                _ => at.state,
+            };
             return Some(Estimate { estimator, state, covariance, components: model.sizes });
         }
         let taken = product(&product(&normal.weighted_jacobian, &covariance), &normal.weighted_jacobian.transpose());
-        let change = model.update(problem, &kinds, &latents, &(&weight * &p.residual), &(&weight - taken));
+        let change = model.update(&at.problem, &kinds, &latents, &(&weight * &p.residual), &(&weight - taken));
         // Sizes that go to nothing never stand, but matter no more.
         standing = change < STANDING || round >= ROUNDS;
     }
@@ -443,13 +430,12 @@ pub fn fit_poses(
 }
 
 /// Cameras and plates at their optimum given robot, mountings and placements: what their covariance with the poses makes of them.
-fn with_cameras_for_the_robot(problem: &Problem, mut state: State, sizes: &[f64]) -> State {
-    let mut given = with_sizes(problem, Estimator::FullAndRepeatability, sizes);
-    let theta = given.layout.theta_len();
-    given.layout.columns[..theta].iter_mut().for_each(|c| c.free = false);
-    let hard = sizes.iter().all(|s| *s == 0.0);
-    given.start_slack(&mut state, hard);
-    refitted(&given, &state)
+fn with_cameras_for_the_robot(at: Adjustment, sizes: &[f64]) -> State {
+    let problem = with_sizes(&at.problem, Estimator::FullAndRepeatability, sizes);
+    let mut given = Adjustment { problem, state: at.state };
+    given.hold_poses();
+    given.start_slack(sizes.iter().all(|s| *s == 0.0));
+    refitted(given)
 }
 
 /// The problem with the joint noise and the tilt that an estimator found; as it is for one that has none.
@@ -476,56 +462,45 @@ fn zero_fixed(problem: &Problem, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
     covariance
 }
 
-fn gauss_newton(problem: &Problem, stage: &PoseStage, mut state: State, weight: &DMatrix<f64>) -> Option<State> {
+/// Solves at given weights; `None` where the normal equations are singular.
+fn gauss_newton(at: &mut Adjustment, stage: &PoseStage, weight: &DMatrix<f64>) -> Option<()> {
     for _ in 0..STEPS {
-        let p = predict(problem, stage, &state)?;
-        let n = normal(problem, &state, &p, weight);
+        let p = predict(at, stage)?;
+        let n = normal(at, &p, weight);
         let step = SymmetricFactor::new(&n.information).ok()?.solve(&n.rhs);
-        state = moved(problem, &state, &step);
+        at.state = moved(at, &step);
         if step.dot(&n.rhs).max(0.0).sqrt() < DECREMENT {
             break;
         }
     }
-    Some(state)
+    Some(())
 }
 
 /// One linear step of the second stage at `start`, the components given: zero where `start` solves it already.
 ///
 /// Returns the step of the columns that act through the poses, and their covariance.
-pub fn linear_step(
-    problem: &Problem,
-    stage: &PoseStage,
-    start: &State,
-    sigma: f64,
-) -> Option<(DVector<f64>, DMatrix<f64>)> {
+pub fn linear_step(start: &Adjustment, stage: &PoseStage, sigma: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let problem = &start.problem;
     let model = ErrorModel::new(problem, stage, Estimator::FullAndRepeatability, JointNoise::Known(sigma))?;
-    let p = predict(problem, stage, start)?;
-    let latents: Vec<Latent> = (stage.images.iter().zip(&p.d_slack).enumerate())
-        .map(|(k, (&i, l))| model.latent(problem, i, k, l))
-        .collect::<Option<_>>()?;
+    let p = predict(start, stage)?;
+    let latents = model.latents(problem, stage, &p)?;
     let weight = SymmetricFactor::new(&model.covariance(&latents)).ok()?.inverse();
-    let n = normal(problem, start, &p, &weight);
+    let n = normal(start, &p, &weight);
     let factor = SymmetricFactor::new(&n.information).ok()?;
     Some((factor.solve(&n.rhs), zero_fixed(problem, factor.inverse())))
 }
 
 /// One of the joint estimators on the observations in use, from `start`.
-pub fn fit_joint(
-    problem: &Problem,
-    start: &State,
-    estimator: Estimator,
-    noise: JointNoise,
-) -> Option<(Problem, Estimate)> {
-    let mut own = problem.clone();
-    let mut state = start.clone();
+pub fn fit_joint(start: &Adjustment, estimator: Estimator, noise: JointNoise) -> Option<(Problem, Estimate)> {
+    let mut own = start.clone();
     let hard = estimator == Estimator::HardJoint || noise == JointNoise::Known(0.0);
-    own.start_slack(&mut state, hard);
+    own.start_slack(hard);
     let first = if let JointNoise::Known(sigma) = noise { sigma } else { FIRST_JOINT_NOISE };
-    own.noise.start_at(first.max(f64::MIN_POSITIVE));
+    own.problem.noise.start_at(first.max(f64::MIN_POSITIVE));
     if hard || noise != JointNoise::Estimated {
-        own.without_local_errors(&mut state);
+        own.without_local_errors();
     } else {
-        own.hold_component_priors(&state.robot);
+        own.hold_component_priors();
     }
     let options = ComponentOptions {
         joint: !hard && noise == JointNoise::Estimated,
@@ -533,26 +508,29 @@ pub fn fit_joint(
         settings: Settings { decrement: 1e-4, ..Settings::default() },
         ..ComponentOptions::default()
     };
-    let outcome = estimate_components(&mut own, state, &options);
-    let lin = outcome.linearised.filter(|_| outcome.status == Status::Converged)?;
-    let theta = own.layout.theta_len();
-    let covariance = covariance(&own, &outcome.state, &lin).ok()?.reduced.view((0, 0), (theta, theta)).into_owned();
-    let components =
-        if hard { Vec::new() } else { (0..own.noise.joint.len()).flat_map(|s| own.joint_sigma(s)).collect() };
-    Some((own, Estimate { estimator, state: outcome.state, covariance, components }))
+    let outcome = estimate_components(own, &options);
+    if outcome.status != Status::Converged {
+        return None;
+    }
+    let Fit { adjustment: Adjustment { problem, state }, covariance, .. } = outcome.fit().ok()?;
+    let theta = problem.layout.theta_len();
+    let covariance = covariance.reduced.view((0, 0), (theta, theta)).into_owned();
+    let sigmas = || (0..problem.noise.joint.len()).flat_map(|s| problem.joint_sigma(s)).collect();
+    let components = if hard { Vec::new() } else { sigmas() };
+    Some((problem, Estimate { estimator, state, covariance, components }))
 }
 
 /// All estimators on the same observations, outliers, priors and gauge; `None` for one that has no solution.
-pub fn estimate_all(problem: &Problem, start: &State) -> Vec<(Estimator, Option<Estimate>)> {
-    let stage = PoseStage::adjusted(problem, start);
+pub fn estimate_all(start: &Adjustment) -> Vec<(Estimator, Option<Estimate>)> {
+    let stage = PoseStage::adjusted(start);
     Estimator::ALL
         .into_iter()
         .map(|estimator| {
             let found = match estimator {
                 Estimator::HardJoint | Estimator::Joint => {
-                    fit_joint(problem, start, estimator, JointNoise::Estimated).map(|(_, e)| e)
+                    fit_joint(start, estimator, JointNoise::Estimated).map(|(_, e)| e)
                 }
-                _ => stage.as_ref().and_then(|s| fit_poses(problem, s, start, estimator, JointNoise::Estimated)),
+                _ => stage.as_ref().and_then(|s| fit_poses(start, s, estimator, JointNoise::Estimated)),
             };
             (estimator, found)
         })

@@ -29,17 +29,17 @@ pub struct JudgedImage {
 /// # Errors
 /// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset.
 pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<JudgedImage>> {
-    let (mut problem, state) = build(robot, series, false)?;
-    let columns = problem.layout.robot();
-    problem.layout.columns[columns].iter_mut().for_each(|c| c.free = false);
-    let stated: Vec<Option<f64>> = (problem.cameras.iter())
+    let mut adjustment = build(robot, series, false)?;
+    let layout = &mut adjustment.problem.layout;
+    let columns = layout.robot();
+    layout.columns[columns].iter_mut().for_each(|c| c.free = false);
+    let stated: Vec<Option<f64>> = (adjustment.problem.cameras.iter())
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();
-    let (free, mut starts) = adjust_free_poses(&mut problem, state, &stated)?;
-    let mut state = free.state.clone();
-    start_robot(&mut problem, &mut state, &free, &mut starts)?;
-    problem.start_slack(&mut state, false);
-    let outcome = estimate_components(&mut problem, state, &ComponentOptions::default());
+    let (mut adjustment, free, mut starts) = adjust_free_poses(adjustment, &stated)?;
+    start_robot(&mut adjustment, &free, &mut starts)?;
+    adjustment.start_slack(false);
+    let outcome = estimate_components(adjustment, &ComponentOptions::default());
     if outcome.status != Status::Converged {
         return Err(Error::unsolved(
             "verification",
@@ -47,10 +47,11 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
             "check that URDF, base, tip and series belong together",
         ));
     }
-    let errors = hold_out_images(&problem, &outcome.state).ok_or_else(|| {
+    let errors = hold_out_images(&outcome.adjustment).ok_or_else(|| {
         Error::unsolved("verification", "too few images to hold any out", "take at least 12 images of the robot")
     })?;
-    let postures = cluster_of_images(&problem);
+    let problem = &outcome.adjustment.problem;
+    let postures = cluster_of_images(problem);
     let judged = |(i, error): (usize, ImageError)| JudgedImage {
         series: problem.images[i].series,
         name: problem.images[i].name.clone(),

@@ -12,9 +12,9 @@ use crate::series::CameraInfo;
 /// # Errors
 /// A lens that camera_info cannot express.
 pub(super) fn cameras(solution: &Solution) -> Result<Vec<(String, String)>> {
-    let names = &solution.problem.cameras;
+    let names = &solution.fit.problem.cameras;
     let depths = depths_m(solution);
-    let cameras = names.iter().zip(&solution.state.cameras).zip(&depths);
+    let cameras = names.iter().zip(&solution.fit.state.cameras).zip(&depths);
     let texts = cameras.map(|((name, camera), depths)| camera_yaml(name, camera, depths));
     file_names("camera", "yaml", names).into_iter().zip(texts).map(|(file, text)| Ok((file, text?))).collect()
 }

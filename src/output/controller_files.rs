@@ -15,8 +15,8 @@ use crate::urdf::{Chain, JointKind};
 /// The robot as the files of this result describe it: offsets folded into origins, or left to the controller.
 pub(super) fn exported(solution: &Solution, context: &Context) -> Robot {
     match context.offsets {
-        Offsets::Folded => solution.state.robot.clone(),
-        Offsets::Mastering => solution.state.robot.mastered().0,
+        Offsets::Folded => solution.fit.state.robot.clone(),
+        Offsets::Mastering => solution.fit.state.robot.mastered().0,
     }
 }
 
@@ -91,15 +91,15 @@ fn is_determined(offset: f64, sigma: f64, prior: f64, prismatic: bool) -> bool {
 
 /// Joint offsets for the controller: one row for every joint.
 pub(super) fn mastering_csv(solution: &Solution, context: &Context) -> String {
-    let robot = &solution.state.robot;
+    let robot = &solution.fit.state.robot;
     let offsets = robot.mastered().1;
     let mut rows = vec![["joint", "offset", "sigma", "unit", "determined", "in_urdf"].map(String::from).to_vec()];
     for (reading, name) in robot.chain.readings.iter().enumerate() {
         let prismatic = robot.chain.reading_kinds[reading] == JointKind::Prismatic;
         let (unit, factor) = if prismatic { ("mm", 1e3) } else { ("deg", 1f64.to_degrees()) };
-        let column = solution.problem.layout.find(&format!("robot/{name}.offset"));
-        let sigma = column.map_or(f64::NAN, |c| solution.covariance.reduced[(c, c)].max(0.0).sqrt());
-        let prior = column.map_or(f64::NAN, |c| solution.problem.layout.columns[c].prior_sigma);
+        let column = solution.fit.problem.layout.find(&format!("robot/{name}.offset"));
+        let sigma = column.map_or(f64::NAN, |c| solution.fit.covariance.reduced[(c, c)].max(0.0).sqrt());
+        let prior = column.map_or(f64::NAN, |c| solution.fit.problem.layout.columns[c].prior_sigma);
         let determined = if is_determined(offsets[reading], sigma, prior, prismatic) { "yes" } else { "no" };
         let folded = if context.offsets == Offsets::Folded { "yes" } else { "no" };
         let numbers = [offsets[reading], sigma].map(|v| format!("{:.6}", v * factor + 0.0));

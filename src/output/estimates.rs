@@ -8,13 +8,13 @@ use crate::identify::Solution;
 
 /// Posterior sigma of a column in its unit; `None` where it was held fixed or nothing touches it.
 pub(super) fn sigma(solution: &Solution, column: usize) -> Option<f64> {
-    let known = solution.problem.layout.columns[column].free && solution.covariance.system.touched(column);
-    known.then(|| solution.covariance.sigma(column))
+    let known = solution.fit.problem.layout.columns[column].free && solution.fit.covariance.system.touched(column);
+    known.then(|| solution.fit.covariance.sigma(column))
 }
 
 /// `1 - sigma^2 / prior^2` of a column with a prior.
 pub(super) fn share_of_data(solution: &Solution, column: usize) -> Option<f64> {
-    let prior = solution.problem.layout.columns[column].prior_sigma;
+    let prior = solution.fit.problem.layout.columns[column].prior_sigma;
     let sigma = sigma(solution, column).filter(|_| prior.is_finite())?;
     Some((1.0 - (sigma / prior).powi(2)).max(0.0))
 }
@@ -24,10 +24,10 @@ pub(super) fn share_of_data(solution: &Solution, column: usize) -> Option<f64> {
 /// # Errors
 /// A value or sigma that is not finite.
 pub(super) fn estimates(solution: &Solution, context: &Context) -> Result<Vec<EstimateRecord>> {
-    let layout = &solution.problem.layout;
-    let values = solution.state.values(layout);
+    let layout = &solution.fit.problem.layout;
+    let values = solution.fit.state.values(layout);
     let poses = || layout.mountings.iter().chain(&layout.placements);
-    let names = column_names(&solution.problem, context);
+    let names = column_names(&solution.fit.problem, context);
     let mut all = Vec::with_capacity(layout.len());
     for (k, (column, name)) in layout.columns.iter().zip(names).enumerate() {
         let sigma = sigma(solution, k);
@@ -54,8 +54,8 @@ pub(super) fn estimates(solution: &Solution, context: &Context) -> Result<Vec<Es
 
 /// Lower triangle of the covariance of the dense part, row by row; zero where a column was held fixed or is not touched.
 pub(super) fn lower_triangle(solution: &Solution) -> Vec<f64> {
-    let known: Vec<bool> = (0..solution.problem.layout.len()).map(|k| sigma(solution, k).is_some()).collect();
-    let c = &solution.covariance.reduced;
+    let known: Vec<bool> = (0..solution.fit.problem.layout.len()).map(|k| sigma(solution, k).is_some()).collect();
+    let c = &solution.fit.covariance.reduced;
     let entry = |i: usize, j: usize| if known[i] && known[j] { c[(i, j)] } else { 0.0 };
     (0..known.len()).flat_map(|i| (0..=i).map(move |j| (i, j))).map(|(i, j)| entry(i, j)).collect()
 }

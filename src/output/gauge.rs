@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Matrix6};
 
 use crate::error::Result;
 use crate::identify::Solution;
+use crate::problem::Adjustment;
 use crate::solve::{InFrame, PlateScale, Similarity, in_frame};
 
 /// Covariances of placements and markers in the frames of the plates.
@@ -21,8 +22,9 @@ impl Gauge {
     /// # Errors
     /// Markers that lie on a line.
     pub fn of(solution: &Solution) -> Result<Self> {
-        let (problem, state) = (&solution.problem, &solution.state);
-        let in_frame = in_frame(problem, state, &solution.linearised, &solution.covariance)?;
+        let fit = &solution.fit;
+        let Adjustment { problem, state } = &fit.adjustment;
+        let in_frame = in_frame(fit.linear(), &fit.covariance)?;
         let scale = |plate: usize| -> Result<Option<PlateScale>> {
             let Some((frame, sigma)) = in_frame.frame(plate).zip(in_frame.scale_sigma(problem, plate)) else {
                 return Ok(None);
@@ -31,11 +33,11 @@ impl Gauge {
             Ok(Some(PlateScale { relative: similarity.size - 1.0, sigma }))
         };
         let scales = (0..problem.plates.len()).map(scale).collect::<Result<_>>()?;
-        Ok(Self { positions: in_frame.positions(problem, state), scales, in_frame })
+        Ok(Self { positions: in_frame.positions(fit), scales, in_frame })
     }
 
     /// Covariance of the pose of a plate.
     pub fn placement(&self, solution: &Solution, placement: usize) -> Matrix6<f64> {
-        self.in_frame.placement(solution.problem.layout.placements[placement].start)
+        self.in_frame.placement(solution.fit.problem.layout.placements[placement].start)
     }
 }

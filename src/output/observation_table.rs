@@ -12,11 +12,11 @@ const HEADER: [&str; 11] = ["image", "marker", "u", "v", "edge", "cov_uu", "cov_
 /// Text of observations.csv; covariances as the detector states them, du and dv measured minus predicted (px). For an image
 /// that is left out the prediction is that of its joint readings.
 pub(super) fn observations_csv(solution: &Solution, context: &Context) -> String {
-    let names = ImageNames::new(&solution.problem, context);
+    let names = ImageNames::new(&solution.fit.problem, context);
     let poses = poses(solution);
     let mut rows = vec![HEADER.map(String::from).to_vec()];
-    for (k, image) in solution.problem.images.iter().enumerate() {
-        let markers = &solution.problem.plates[image.plate].markers;
+    for (k, image) in solution.fit.problem.images.iter().enumerate() {
+        let markers = &solution.fit.problem.plates[image.plate].markers;
         let residuals = residuals(solution, k, poses[k].as_ref());
         for (o, residual) in image.observations.iter().zip(residuals) {
             let covariance = o.information.try_inverse().unwrap_or_default();

@@ -16,7 +16,7 @@ const HEADER: [&str; 9] =
 /// # Errors
 /// A plate that cannot be written.
 pub(super) fn plates(solution: &Solution, context: &Context, gauge: &Gauge) -> Result<Vec<(String, String)>> {
-    let problem = &solution.problem;
+    let problem = &solution.fit.problem;
     let names: Vec<String> = (0..problem.plates.len()).map(|p| plate_name(problem, context, p)).collect();
     let (tomls, tables) = (file_names("plate", "toml", &names), file_names("plate", "csv", &names));
     let mut out = Vec::new();
@@ -28,10 +28,10 @@ pub(super) fn plates(solution: &Solution, context: &Context, gauge: &Gauge) -> R
 }
 
 fn plate_csv(solution: &Solution, plate: usize, gauge: &Gauge) -> String {
-    let shape = &solution.state.plates[plate];
+    let shape = &solution.fit.state.plates[plate];
     let covariances = &gauge.positions[plate];
     let mut rows = vec![HEADER.map(String::from).to_vec()];
-    for (k, m) in solution.problem.plates[plate].markers.iter().enumerate() {
+    for (k, m) in solution.fit.problem.plates[plate].markers.iter().enumerate() {
         let x = shape.position(k);
         let sigma = covariances[k].diagonal().map(|v| v.max(0.0).sqrt());
         let numbers = [x.x, x.y, x.z, m.outer_radius_m, m.inner_radius_m, sigma.x, sigma.y, sigma.z];

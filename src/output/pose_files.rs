@@ -52,17 +52,17 @@ impl PoseFile<'_> {
 
 /// True where an image in use ties the six columns of a pose to the data.
 pub(super) fn determined(solution: &Solution, start: usize) -> bool {
-    (start..start + 6).all(|c| solution.covariance.system.touched(c))
+    (start..start + 6).all(|c| solution.fit.covariance.system.touched(c))
 }
 
 fn first_on_robot(solution: &Solution, which: impl Fn(&Image) -> bool) -> Option<&Image> {
-    solution.problem.used().map(|(_, i)| i).find(|i| i.stop.is_some() && which(i))
+    solution.fit.problem.used().map(|(_, i)| i).find(|i| i.stop.is_some() && which(i))
 }
 
 /// `flange_from_camera` (or `base_from_camera`) of every mounting that the robot's images determine.
 pub(super) fn mountings(solution: &Solution) -> Vec<(String, String)> {
-    let problem = &solution.problem;
-    let chain = &solution.state.robot.chain;
+    let problem = &solution.fit.problem;
+    let chain = &solution.fit.state.robot.chain;
     let mut out = Vec::new();
     for (k, file) in file_names("hand_camera", "yaml", &problem.mountings).into_iter().enumerate() {
         let start = problem.layout.mountings[k].start;
@@ -76,8 +76,8 @@ pub(super) fn mountings(solution: &Solution) -> Vec<(String, String)> {
         let text = PoseFile {
             parent,
             child: &problem.cameras[image.camera],
-            pose: &solution.state.mountings[k],
-            covariance: solution.covariance.block(start),
+            pose: &solution.fit.state.mountings[k],
+            covariance: solution.fit.covariance.block(start),
             remark: OPTICAL,
         };
         out.push((file, text.text()));
@@ -87,8 +87,8 @@ pub(super) fn mountings(solution: &Solution) -> Vec<(String, String)> {
 
 /// `base_from_plate` (or `flange_from_plate`) of every placement that the robot's images determine.
 pub(super) fn placements(solution: &Solution, gauge: &Gauge) -> Vec<(String, String)> {
-    let problem = &solution.problem;
-    let chain = &solution.state.robot.chain;
+    let problem = &solution.fit.problem;
+    let chain = &solution.fit.state.robot.chain;
     let mut out = Vec::new();
     for (k, file) in file_names("plate_pose", "yaml", &problem.placements).into_iter().enumerate() {
         let start = problem.layout.placements[k].start;
@@ -102,7 +102,7 @@ pub(super) fn placements(solution: &Solution, gauge: &Gauge) -> Vec<(String, Str
         let text = PoseFile {
             parent,
             child: if problem.placements.len() == 1 { "plate" } else { &problem.placements[k] },
-            pose: &solution.state.placements[k],
+            pose: &solution.fit.state.placements[k],
             covariance: gauge.placement(solution, k),
             remark: INNER,
         };
@@ -113,7 +113,7 @@ pub(super) fn placements(solution: &Solution, gauge: &Gauge) -> Vec<(String, Str
 
 /// Text of poses.csv.
 pub(super) fn poses_csv(solution: &Solution, context: &Context) -> String {
-    let names = ImageNames::new(&solution.problem, context);
+    let names = ImageNames::new(&solution.fit.problem, context);
     let upper = || (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
     let mut header: Vec<String> = ["image", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"].map(String::from).to_vec();
     header.extend(upper().map(|(i, j)| format!("c{}{}", i + 1, j + 1)));

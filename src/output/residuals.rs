@@ -9,11 +9,11 @@ use crate::problem::{Slack, predict};
 /// Where each image was taken from, as the estimates say: with its joint noise for images in use, from the readings alone
 /// for those left out, `None` where there is neither.
 pub(super) fn poses(solution: &Solution) -> Vec<Option<Pose>> {
-    let (problem, state) = (&solution.problem, &solution.state);
+    let (problem, state) = (&solution.fit.problem, &solution.fit.state);
     let mut poses: Vec<Option<Pose>> = (problem.images.iter())
         .map(|i| i.stop.as_ref().and_then(|_| state.camera_from_plate(i, &Slack::None)))
         .collect();
-    for (&i, chain) in solution.linearised.images.iter().zip(&solution.linearised.chains) {
+    for (&i, chain) in solution.fit.linearised.images.iter().zip(&solution.fit.linearised.chains) {
         poses[i] = Some(chain.pose);
     }
     poses
@@ -21,7 +21,7 @@ pub(super) fn poses(solution: &Solution) -> Vec<Option<Pose>> {
 
 /// Measured minus predicted, px, of every observation of an image; `None` where nothing can be predicted.
 pub(super) fn residuals(solution: &Solution, image: usize, pose: Option<&Pose>) -> Vec<Option<Vector2<f64>>> {
-    let i = &solution.problem.images[image];
-    let residual = |o| predict(i, &solution.state, pose?, o).map(|p| o.uv - p.uv);
+    let i = &solution.fit.problem.images[image];
+    let residual = |o| predict(i, &solution.fit.state, pose?, o).map(|p| o.uv - p.uv);
     i.observations.iter().map(residual).collect()
 }

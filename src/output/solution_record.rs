@@ -52,7 +52,7 @@ pub(super) fn record(
         statistics: statistics(solution),
         notices: solution.notices.clone(),
         starts: solution.starts.clone(),
-        robot: robot(&solution.state, solution.problem.twist_factor()),
+        robot: robot(&solution.fit.state, solution.fit.problem.twist_factor()),
         cameras: cameras(solution),
         mountings: mountings(solution),
         placements: placements(solution, gauge),
@@ -80,8 +80,8 @@ pub(super) fn record(
 
 /// Residuals in numbers.
 pub(super) fn statistics(solution: &Solution) -> StatisticsRecord {
-    let problem = &solution.problem;
-    let all = || solution.linearised.terms.iter().flat_map(|t| &t.residuals);
+    let problem = &solution.fit.problem;
+    let all = || solution.fit.linearised.terms.iter().flat_map(|t| &t.residuals);
     let used = all().count();
     let squares: f64 = all().map(|r| r.duv.norm_squared()).sum();
     let given: usize = problem.used().map(|(_, i)| i.observations.len()).sum();
@@ -94,7 +94,7 @@ pub(super) fn statistics(solution: &Solution) -> StatisticsRecord {
         free_pose_rms_px: solution.free_poses.rms_px,
         free_pose_observations: solution.free_poses.observations,
         largest_normalised: all().map(|r| r.normalised).fold(0.0, f64::max),
-        cost: solution.linearised.cost,
+        cost: solution.fit.linearised.cost,
         huber: problem.huber,
     }
 }
@@ -137,7 +137,7 @@ fn robot(state: &State, twist_factor: f64) -> RobotRecord {
 }
 
 fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
-    let plate = |k: usize| solution.problem.images.iter().find(|i| i.series == k).map_or(0, |i| i.plate);
+    let plate = |k: usize| solution.fit.problem.images.iter().find(|i| i.series == k).map_or(0, |i| i.plate);
     let record = |(k, s): (usize, &crate::problem::MeasuredSeries)| SeriesRecord {
         name: series_name(context, k),
         camera: s.camera.clone(),
@@ -157,10 +157,10 @@ fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
 }
 
 fn cameras(solution: &Solution) -> Vec<CameraRecord> {
-    let problem = &solution.problem;
+    let problem = &solution.fit.problem;
     let depths = depths_m(solution);
     let camera = |(k, name): (usize, &String)| {
-        let c = &solution.state.cameras[k];
+        let c = &solution.fit.state.cameras[k];
         let noise = stop_noise(solution, &series_with(problem, k));
         CameraRecord {
             name: name.clone(),
@@ -188,7 +188,7 @@ fn series_with(problem: &Problem, camera: usize) -> Vec<usize> {
 
 /// Root mean square over some series.
 fn stop_noise(solution: &Solution, series: &[usize]) -> StopNoise {
-    let problem = &solution.problem;
+    let problem = &solution.fit.problem;
     let rms = |of: &dyn Fn(usize) -> f64| match series {
         [one] => of(*one),
         _ => (series.iter().map(|s| of(*s).powi(2)).sum::<f64>() / series.len().max(1) as f64).sqrt(),
@@ -208,12 +208,12 @@ fn stop_noise(solution: &Solution, series: &[usize]) -> StopNoise {
 
 /// The map of a camera, for points as far away as the plates were.
 fn projection(solution: &Solution, camera: usize) -> ProjectionMap {
-    let depths: Vec<f64> = (solution.problem.used().filter(|(_, i)| i.camera == camera))
+    let depths: Vec<f64> = (solution.fit.problem.used().filter(|(_, i)| i.camera == camera))
         .filter_map(|(i, _)| solution.free_poses.poses[i].as_ref().map(|p| p.camera_from_plate.translation.z))
         .collect();
-    let range = solution.problem.layout.cameras[camera].clone();
-    let covariance = solution.covariance.reduced.view((range.start, range.start), (range.len(), range.len()));
-    ProjectionMap::new(&solution.state.cameras[camera], &covariance.into_owned(), median(&depths).unwrap_or(1.0))
+    let range = solution.fit.problem.layout.cameras[camera].clone();
+    let covariance = solution.fit.covariance.reduced.view((range.start, range.start), (range.len(), range.len()));
+    ProjectionMap::new(&solution.fit.state.cameras[camera], &covariance.into_owned(), median(&depths).unwrap_or(1.0))
 }
 
 fn flat(c: &Matrix6<f64>) -> Vec<f64> {
@@ -221,29 +221,29 @@ fn flat(c: &Matrix6<f64>) -> Vec<f64> {
 }
 
 fn mountings(solution: &Solution) -> Vec<PlacedRecord> {
-    let problem = &solution.problem;
+    let problem = &solution.fit.problem;
     let placed = |(k, name): (usize, &String)| {
         let start = problem.layout.mountings[k].start;
-        let covariance = determined(solution, start).then(|| flat(&solution.covariance.block(start)));
-        PlacedRecord { name: name.clone(), pose: (&solution.state.mountings[k]).into(), covariance }
+        let covariance = determined(solution, start).then(|| flat(&solution.fit.covariance.block(start)));
+        PlacedRecord { name: name.clone(), pose: (&solution.fit.state.mountings[k]).into(), covariance }
     };
     problem.mountings.iter().enumerate().map(placed).collect()
 }
 
 fn placements(solution: &Solution, gauge: &Gauge) -> Vec<PlacedRecord> {
-    let problem = &solution.problem;
+    let problem = &solution.fit.problem;
     let placed = |(k, name): (usize, &String)| {
         let determined = determined(solution, problem.layout.placements[k].start);
         let covariance = determined.then(|| flat(&gauge.placement(solution, k)));
-        PlacedRecord { name: name.clone(), pose: (&solution.state.placements[k]).into(), covariance }
+        PlacedRecord { name: name.clone(), pose: (&solution.fit.state.placements[k]).into(), covariance }
     };
     problem.placements.iter().enumerate().map(placed).collect()
 }
 
 fn plates(solution: &Solution, context: &Context, gauge: &Gauge) -> Vec<PlateRecord> {
-    let problem = &solution.problem;
+    let problem = &solution.fit.problem;
     let plate = |(k, p): (usize, &crate::series::Plate)| {
-        let shape = &solution.state.plates[k];
+        let shape = &solution.fit.state.plates[k];
         let sigmas = &gauge.positions[k];
         PlateRecord {
             name: plate_name(problem, context, k),
@@ -270,12 +270,12 @@ fn plates(solution: &Solution, context: &Context, gauge: &Gauge) -> Vec<PlateRec
 }
 
 fn images(solution: &Solution, context: &Context) -> Vec<ImageRecord> {
-    let problem = &solution.problem;
+    let problem = &solution.fit.problem;
     let names = ImageNames::new(problem, context);
     let poses = poses(solution);
     let image = |(k, i): (usize, &Image)| {
-        let joint_noise = match (&solution.state.slack[k], &i.rejected, &i.stop) {
-            (Slack::Joints(dq), None, Some(_)) => Some(dq[..solution.state.robot.chain.readings.len()].to_vec()),
+        let joint_noise = match (&solution.fit.state.slack[k], &i.rejected, &i.stop) {
+            (Slack::Joints(dq), None, Some(_)) => Some(dq[..solution.fit.state.robot.chain.readings.len()].to_vec()),
             _ => None,
         };
         let observations = observations(solution, k, poses[k].as_ref());
@@ -308,15 +308,15 @@ fn images(solution: &Solution, context: &Context) -> Vec<ImageRecord> {
 
 /// RMS of the lengths of the residuals of an image in use, px.
 pub(super) fn rms_px(solution: &Solution, image: usize) -> Option<f64> {
-    let at = solution.linearised.images.iter().position(|&i| i == image)?;
-    let residuals = &solution.linearised.terms[at].residuals;
+    let at = solution.fit.linearised.images.iter().position(|&i| i == image)?;
+    let residuals = &solution.fit.linearised.terms[at].residuals;
     let squares: f64 = residuals.iter().map(|r| r.duv.norm_squared()).sum();
     Some((squares / residuals.len().max(1) as f64).sqrt())
 }
 
 fn observations(solution: &Solution, image: usize, pose: Option<&Pose>) -> ObservationColumns {
-    let i = &solution.problem.images[image];
-    let markers = &solution.problem.plates[i.plate].markers;
+    let i = &solution.fit.problem.images[image];
+    let markers = &solution.fit.problem.plates[i.plate].markers;
     let mut columns = ObservationColumns::default();
     for (o, residual) in i.observations.iter().zip(residuals(solution, image, pose)) {
         let c = o.information.try_inverse().unwrap_or_default();

@@ -16,7 +16,7 @@ use crate::plan::relax::{Design, NoDesign};
 use crate::plan::rounding::round;
 use crate::plan::scene::{Scene, SceneOptions};
 use crate::plan::setting::{Setting, rough_knowledge};
-use crate::problem::{Image, Layout, Problem, State};
+use crate::problem::{Adjustment, Image, Layout};
 
 /// What the user wants to know.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,10 +114,8 @@ pub struct Choice {
     pub known: DMatrix<f64>,
     /// What images tell.
     pub told: Told,
-    /// The problem without images.
-    pub problem: Problem,
-    /// The state about which it is linearised.
-    pub state: State,
+    /// The problem without images, at the state about which it is linearised.
+    pub adjustment: Adjustment,
 }
 
 /// Does something and logs how long it took.
@@ -136,11 +134,12 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
     let setting = &request.setting;
     let scene = Scene::new(setting, &request.scene);
     let (pool, tally) = timed("candidates", || candidates(setting, &scene, &request.candidates))?;
-    let (problem, state) = setting.problem();
-    let mut known = rough_knowledge(&problem, &setting.camera);
+    let adjustment = setting.adjustment();
+    let problem = &adjustment.problem;
+    let mut known = rough_knowledge(problem, &setting.camera);
     let prior: Vec<f64> = known.diagonal().iter().map(|m| 1.0 / m).collect();
     for image in &request.taken {
-        if let Some(m) = image_information(&problem, setting, &state, image) {
+        if let Some(m) = image_information(&adjustment, setting, image) {
             known += m;
         }
     }
@@ -150,12 +149,12 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
         _ => workspace(setting, &scene, TARGETS, margin, request.candidates.seed),
     };
     let targets = if targets.is_empty() { pool.iter().map(|c| c.readings.clone()).collect() } else { targets };
-    let weight = flange_weight(&problem, &setting.robot, &targets);
+    let weight = flange_weight(problem, &setting.robot, &targets);
     let criterion = criterion(&request.wish, &problem.layout, &weight)?;
     let (drawn, count) = (pool.len(), request.count);
     let (told, known, information) = timed("information", || {
         let whole: Vec<DMatrix<f64>> =
-            pool.par_iter().map(|c| candidate_information(&problem, setting, &state, c)).collect();
+            pool.par_iter().map(|c| candidate_information(&adjustment, setting, c)).collect();
         let told = told(&criterion, &prior, &known, &whole);
         let information: Vec<DMatrix<f64>> = whole.par_iter().map(|m| told.information(m)).collect();
         let known = told.known(&known);
@@ -164,7 +163,7 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
     let criterion = told.criterion(&criterion);
     let refinement = Refinement {
         search: &Search::new(setting, &scene, &request.candidates),
-        inform: &|candidate| told.of_candidate(&problem, setting, &state, candidate),
+        inform: &|candidate| told.of_candidate(&adjustment, setting, candidate),
         rows: &|pool| rows(&request.budget, pool, drawn, setting.placements.len()),
         known: &known,
         criterion: &criterion,
@@ -190,8 +189,7 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
         efficiency: [relaxed.efficiency, rounded.efficiency],
         targets,
         weight,
-        problem,
-        state,
+        adjustment,
         pool,
         information,
         known,

@@ -9,9 +9,8 @@ use crate::error::{Error, Result};
 use crate::linalg::SymmetricFactor;
 use crate::plan::criterion::Criterion;
 use crate::plan::setting::Setting;
-use crate::problem::{Image, Problem, State};
+use crate::problem::{Adjustment, Image};
 use crate::series::CameraMount;
-use crate::solve::{covariance, linearise_all};
 use crate::urdf::JointKind;
 
 /// Predicted sigma of one parameter.
@@ -105,23 +104,17 @@ const WORTH_NAMING: f64 = 0.25;
 ///
 /// # Errors
 /// Where the images do not determine camera, plate or hand-camera offset.
-pub fn exact_covariance(
-    problem: &Problem,
-    state: &State,
-    setting: &Setting,
-    images: Vec<Image>,
-) -> Result<DMatrix<f64>> {
-    let mut problem = problem.clone();
-    let mut state = state.clone();
-    state.slack = vec![setting.slack(); images.len()];
-    let n = problem.layout.len();
-    problem.images = images;
+pub fn exact_covariance(planned: &Adjustment, setting: &Setting, images: Vec<Image>) -> Result<DMatrix<f64>> {
+    let mut planned = planned.clone();
+    planned.state.slack = vec![setting.slack(); images.len()];
+    let (n, count) = (planned.problem.layout.len(), images.len());
+    planned.problem.images = images;
     let singular = || {
-        let what = format!("{} images do not determine camera, plate and hand-camera offset", problem.images.len());
+        let what = format!("{count} images do not determine camera, plate and hand-camera offset");
         Error::unsolved("plan: forecast", what, "plan more images, or views that differ more in tilt and distance")
     };
-    let lin = linearise_all(&problem, &state).ok_or_else(singular)?;
-    let all = covariance(&problem, &state, &lin).map_err(|_| singular())?;
+    let lin = planned.linearise().ok_or_else(singular)?;
+    let all = planned.linear(&lin).covariance().map_err(|_| singular())?;
     Ok(all.reduced.view((0, 0), (n, n)).into_owned())
 }
 
@@ -135,7 +128,7 @@ impl Plan {
     fn images(&self, setting: &Setting, legs: impl Iterator<Item = usize>) -> Vec<Image> {
         let image = |k: usize| {
             let c = &self.pool[self.legs[k].stop];
-            setting.image(&self.state, &image_name(k), &c.readings, c.placement)
+            setting.image(&self.adjustment.state, &image_name(k), &c.readings, c.placement)
         };
         legs.filter_map(image).collect()
     }
@@ -157,7 +150,7 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
     let exact = |legs: &[usize]| {
         let mut images = request.taken.clone();
         images.extend(plan.images(setting, legs.iter().copied()));
-        exact_covariance(&plan.problem, &plan.state, setting, images)
+        exact_covariance(&plan.adjustment, setting, images)
     };
     let whole = exact(&(0..n).collect::<Vec<_>>())?;
     let random = |count: usize| -> Option<f64> {
@@ -167,9 +160,9 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
             images.extend((0..count).filter_map(|k| {
                 let shift = draw as f64 / RANDOM_DRAWS as f64;
                 let c = &plan.pool[((k as f64 + shift) * step) as usize];
-                setting.image(&plan.state, "", &c.readings, c.placement)
+                setting.image(&plan.adjustment.state, "", &c.readings, c.placement)
             }));
-            let covariance = exact_covariance(&plan.problem, &plan.state, setting, images).ok()?;
+            let covariance = exact_covariance(&plan.adjustment, setting, images).ok()?;
             Some((flange_m(&plan.weight, &covariance).powi(2), 1.0))
         };
         let squares: Vec<(f64, f64)> = (0..RANDOM_DRAWS).into_par_iter().filter_map(one).collect();
@@ -247,7 +240,7 @@ fn among_others(plan: &Plan, leg: usize) -> Option<[DMatrix<f64>; 2]> {
 
 /// Gains of all stops, the greatest first; `covariances` are those without an image and with it.
 fn gains(plan: &Plan, covariances: impl Fn(usize) -> Option<[DMatrix<f64>; 2]> + Sync) -> Vec<Gain> {
-    let layout = &plan.problem.layout;
+    let layout = &plan.adjustment.problem.layout;
     let sigma = |c: &DMatrix<f64>, k: usize| c[(k, k)].max(0.0).sqrt();
     let one = |leg: usize| {
         let [before, after] = covariances(leg)?;
@@ -268,10 +261,10 @@ fn gains(plan: &Plan, covariances: impl Fn(usize) -> Option<[DMatrix<f64>; 2]> +
 
 /// Says so where the scale of the plate is most of the error: it is the only length, and no pose makes it better known.
 fn scale_word(plan: &Plan, covariance: &DMatrix<f64>, flange: f64) -> Option<String> {
-    let scale = plan.problem.layout.shapes.first()?.start;
+    let scale = plan.adjustment.problem.layout.shapes.first()?.start;
     let column = covariance.column(scale);
     let part = (column.dot(&(&plan.weight * column)) / covariance[(scale, scale)]).max(0.0).sqrt();
-    let measured = plan.problem.plates.first().is_some_and(|p| p.scale.is_some());
+    let measured = plan.adjustment.problem.plates.first().is_some_and(|p| p.scale.is_some());
     let remedy = match measured {
         true => "measure the distance in [scale] of plate.toml more exactly, or that of markers farther apart",
         false => "measure the distance of two far markers and put it into [scale] of plate.toml",
@@ -320,7 +313,7 @@ pub fn check_wish(request: &PlanRequest, forecast: &Forecast) -> Result<()> {
 }
 
 fn parameters(plan: &Plan, covariance: &DMatrix<f64>) -> Vec<ParameterForecast> {
-    let layout = &plan.problem.layout;
+    let layout = &plan.adjustment.problem.layout;
     let one = |k: usize| {
         let c = &layout.columns[k];
         let sigma = covariance[(k, k)].max(0.0).sqrt();
@@ -382,7 +375,7 @@ fn words(
     mount: CameraMount,
 ) -> Vec<String> {
     let mut words = Vec::new();
-    let terms = &parameters[plan.problem.layout.terms.clone()];
+    let terms = &parameters[plan.adjustment.problem.layout.terms.clone()];
     for range in ranges {
         let own = terms.iter().filter(|p| p.name.starts_with(&format!("{}.", range.name)));
         let unknown: Vec<&ParameterForecast> = own.filter(|p| !p.is_known()).collect();

@@ -8,14 +8,14 @@ use super::setting::Setting;
 use crate::geom::skew;
 use crate::linalg::{product, symmetric_eigen};
 use crate::model::robot::{Robot, Stop};
-use crate::problem::{self, Image, Problem, State, Weighting, by_columns, chained, linearise};
+use crate::problem::{self, Adjustment, Image, Problem, Weighting, by_columns, linearise};
 
 /// Information of an image about all columns; `None` where it shows nothing.
 ///
 /// Joint noise is eliminated (Schur complement); the corrections of single markers and the displacement field of a lens are taken as
 /// known.
-pub fn image_information(problem: &Problem, setting: &Setting, state: &State, image: &Image) -> Option<DMatrix<f64>> {
-    let (h, t) = condensed(problem, setting, state, image)?;
+pub fn image_information(planned: &Adjustment, setting: &Setting, image: &Image) -> Option<DMatrix<f64>> {
+    let (h, t) = condensed(planned, setting, image)?;
     Some(carried(&h, &t))
 }
 
@@ -27,13 +27,12 @@ fn carried(h: &DMatrix<f64>, t: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// Information `H` of an image about its camera pose and intrinsics, and their derivatives `T` by all columns.
 fn condensed(
-    problem: &Problem,
+    Adjustment { problem, state }: &Adjustment,
     setting: &Setting,
-    state: &State,
     image: &Image,
 ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let slack = setting.slack();
-    let chain = chained(problem, state, image, &slack)?;
+    let chain = state.chained(&problem.layout, image, &slack)?;
     let terms = linearise(image, state, &chain.pose, &Weighting::of(problem, image))?;
     let slack: Vec<f64> = problem.noise.joint[image.series].iter().map(|s| s.powi(-2)).collect();
     let h = problem::condensed(&terms, &chain.d_slack, &slack)?;
@@ -42,13 +41,12 @@ fn condensed(
 }
 
 fn condensed_candidate(
-    problem: &Problem,
+    planned: &Adjustment,
     setting: &Setting,
-    state: &State,
     candidate: &Candidate,
 ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-    let image = setting.image(state, "", &candidate.readings, candidate.placement)?;
-    condensed(problem, setting, state, &image)
+    let image = setting.image(&planned.state, "", &candidate.readings, candidate.placement)?;
+    condensed(planned, setting, &image)
 }
 
 /// Directions in the space of the columns about which images tell something, and those about which none does.
@@ -115,14 +113,8 @@ impl Told {
     }
 
     /// Information of a candidate; zero where its image would show nothing.
-    pub fn of_candidate(
-        &self,
-        problem: &Problem,
-        setting: &Setting,
-        state: &State,
-        candidate: &Candidate,
-    ) -> DMatrix<f64> {
-        condensed_candidate(problem, setting, state, candidate).map_or_else(
+    pub fn of_candidate(&self, planned: &Adjustment, setting: &Setting, candidate: &Candidate) -> DMatrix<f64> {
+        condensed_candidate(planned, setting, candidate).map_or_else(
             || DMatrix::zeros(self.rows(), self.rows()),
             |(h, t)| self.with_last(&carried(&h, &product(&t, &self.told)), 0.0),
         )
@@ -148,15 +140,9 @@ impl Told {
 }
 
 /// Information of a candidate; zero where its image would show nothing.
-pub fn candidate_information(
-    problem: &Problem,
-    setting: &Setting,
-    state: &State,
-    candidate: &Candidate,
-) -> DMatrix<f64> {
-    let n = problem.layout.len();
-    condensed_candidate(problem, setting, state, candidate)
-        .map_or_else(|| DMatrix::zeros(n, n), |(h, t)| carried(&h, &t))
+pub fn candidate_information(planned: &Adjustment, setting: &Setting, candidate: &Candidate) -> DMatrix<f64> {
+    let n = planned.problem.layout.len();
+    condensed_candidate(planned, setting, candidate).map_or_else(|| DMatrix::zeros(n, n), |(h, t)| carried(&h, &t))
 }
 
 /// `W = (P D)' (P D) / K`: the mean squared error of the flange's position over the targets is `tr(W cov)`, m^2.

@@ -30,7 +30,8 @@ pub struct PlaceForecast {
 /// # Errors
 /// Where a parameter asked for is unknown.
 pub fn compare_places(request: &PlanRequest, choice: &Choice) -> Result<Vec<PlaceForecast>> {
-    let criterion = choice.told.criterion(&criterion(&request.wish, &choice.problem.layout, &choice.weight)?);
+    let criterion =
+        choice.told.criterion(&criterion(&request.wish, &choice.adjustment.problem.layout, &choice.weight)?);
     let one = |(placement, (name, _)): (usize, &(String, crate::geom::Pose))| {
         let drawn = choice.pool.iter().zip(&choice.information).take(choice.drawn);
         let here = drawn.filter(|(c, _)| c.placement == placement);
@@ -59,7 +60,7 @@ pub fn compare_places(request: &PlanRequest, choice: &Choice) -> Result<Vec<Plac
 }
 
 fn known(choice: &Choice, covariance: &DMatrix<f64>) -> Vec<String> {
-    let layout = &choice.problem.layout;
+    let layout = &choice.adjustment.problem.layout;
     let is_known = |k: &usize| 1.0 - covariance[(*k, *k)] / layout.columns[*k].prior_sigma.powi(2) > KNOWN_SHARE;
     let name = |k: usize| layout.columns[k].name.trim_start_matches("robot/").to_owned();
     (0..layout.terms.end).filter(is_known).map(name).collect()

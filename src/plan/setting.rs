@@ -6,7 +6,7 @@ use super::visibility::seen_markers;
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Robot, Stop};
-use crate::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State, predict};
+use crate::problem::{Adjustment, Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State, predict};
 use crate::series::{CameraMount, Edge, Plate};
 
 /// Huber bound of planned images; predictions have no residuals, so that it never acts.
@@ -37,8 +37,8 @@ pub struct Setting {
 pub const LEAST_JOINT_SIGMA: f64 = 1e-6;
 
 impl Setting {
-    /// A problem with the columns of this setting and no image, and the state about which it is linearised.
-    pub fn problem(&self) -> (Problem, State) {
+    /// A problem with the columns of this setting and no image, at the state about which it is linearised.
+    pub fn adjustment(&self) -> Adjustment {
         let names: Vec<String> = self.placements.iter().map(|p| p.0.clone()).collect();
         let one = |name: &str| vec![name.to_owned()];
         let state = State {
@@ -65,7 +65,7 @@ impl Setting {
             families: Vec::new(),
             huber: HUBER,
         };
-        (problem, state)
+        Adjustment { problem, state }
     }
 
     /// `camera_from_plate` at joint readings.

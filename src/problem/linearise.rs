@@ -2,12 +2,12 @@
 //!
 //! Pixels know the robot only through the six degrees of freedom of the camera pose. So the pixels are condensed to blocks of
 //! pose (p, 6), intrinsics (e, camera parameters then plate modes) and markers (m, 3 each); the robot enters afterwards by
-//! `dp = G dtheta + L dslack` ([`chained`]).
+//! `dp = G dtheta + L dslack` ([`State::chained`]).
 
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, Matrix6x2, Matrix6xX, Vector2, Vector3, Vector6};
 
 use super::equations::{Collector, Equations, MarkerTerms};
-use super::{Image, Measured, Problem, Slack, State};
+use super::{Image, Layout, Measured, Problem, Slack, State};
 use crate::geom::{Pose, adjoint, right_jacobian_se3};
 use crate::linalg::wide;
 use crate::model::camera::MAX_PARAMETERS;
@@ -226,55 +226,58 @@ pub(super) fn tilt_axes(centre: &Vector3<f64>) -> Matrix6x2<f64> {
     axes
 }
 
-/// Pose of an image and its derivatives as body twists; `None` for an image off the robot that has no free pose.
-pub fn chained(problem: &Problem, state: &State, image: &Image, slack: &Slack) -> Option<Chained> {
-    chained_from(&state.robot.moved_origins(), problem, state, image, slack)
-}
+impl State {
+    /// Pose of an image and its derivatives as body twists; `None` for an image off the robot that has no free pose.
+    pub fn chained(&self, layout: &Layout, image: &Image, slack: &Slack) -> Option<Chained> {
+        self.chained_from(&self.robot.moved_origins(), layout, image, slack)
+    }
 
-/// As [`chained`], where the origins of the robot are at hand.
-pub fn chained_from(
-    origins: &MovedOrigins,
-    problem: &Problem,
-    state: &State,
-    image: &Image,
-    slack: &Slack,
-) -> Option<Chained> {
-    let theta = problem.layout.theta_len();
-    if let Slack::Pose(pose) = slack {
-        return Some(Chained { pose: *pose, d_theta: DMatrix::zeros(6, theta), d_slack: DMatrix::identity(6, 6) });
+    /// As [`State::chained`], where the origins of the robot are at hand.
+    pub fn chained_from(
+        &self,
+        origins: &MovedOrigins,
+        layout: &Layout,
+        image: &Image,
+        slack: &Slack,
+    ) -> Option<Chained> {
+        let theta = layout.theta_len();
+        if let Slack::Pose(pose) = slack {
+            return Some(Chained { pose: *pose, d_theta: DMatrix::zeros(6, theta), d_slack: DMatrix::identity(6, 6) });
+        }
+        let stop = image.stop.as_ref()?;
+        let zero = vec![0.0; stop.readings.len()];
+        let noise = if let Slack::Joints(dq) = slack { dq } else { &zero };
+        let kinematics = self.robot.kinematics_from(origins, stop, noise);
+        let mounted = image.mount.linearised(
+            &self.mountings[image.mounting],
+            &kinematics.base_from_tip,
+            &self.placements[image.placement],
+        );
+        let mut g = DMatrix::zeros(6, theta);
+        for (k, d) in kinematics.d_twists.iter().enumerate() {
+            g.fixed_view_mut::<6, 6>(0, layout.twists.start + 6 * k).copy_from(&(mounted.d_robot * d));
+        }
+        for (k, d) in kinematics.d_terms.iter().enumerate() {
+            g.fixed_view_mut::<6, 1>(0, layout.terms.start + k).copy_from(&(mounted.d_robot * d));
+        }
+        g.fixed_view_mut::<6, 6>(0, layout.mountings[image.mounting].start).copy_from(&mounted.d_camera);
+        g.fixed_view_mut::<6, 6>(0, layout.placements[image.placement].start).copy_from(&Matrix6::identity());
+        let mut l = DMatrix::zeros(6, slack.len());
+        for (k, d) in kinematics.d_readings.iter().enumerate().take(slack.len()) {
+            l.fixed_view_mut::<6, 1>(0, k).copy_from(&(mounted.d_robot * d));
+        }
+        let pose = mounted.camera_from_plate;
+        let Some([x, y]) = slack.tilt(stop.readings.len()) else {
+            return Some(Chained { pose, d_theta: g, d_slack: l });
+        };
+        let axes = tilt_axes(&seen_centre(image, self));
+        let tilt = axes * Vector2::new(x, y);
+        let turned = Pose::exp(&tilt);
+        // What moves the pose before the tilt moves it after the tilt as seen from the tilted plate.
+        let carry = adjoint(&turned.inverse());
+        let carry = DMatrix::from_column_slice(6, 6, carry.as_slice());
+        let mut l = &carry * l;
+        l.view_mut((0, stop.readings.len()), (6, 2)).copy_from(&(right_jacobian_se3(&tilt) * axes));
+        Some(Chained { pose: pose * turned, d_theta: carry * g, d_slack: l })
     }
-    let stop = image.stop.as_ref()?;
-    let zero = vec![0.0; stop.readings.len()];
-    let noise = if let Slack::Joints(dq) = slack { dq } else { &zero };
-    let kinematics = state.robot.kinematics_from(origins, stop, noise);
-    let mounted = image.mount.linearised(
-        &state.mountings[image.mounting],
-        &kinematics.base_from_tip,
-        &state.placements[image.placement],
-    );
-    let layout = &problem.layout;
-    let mut g = DMatrix::zeros(6, theta);
-    for (k, d) in kinematics.d_twists.iter().enumerate() {
-        g.fixed_view_mut::<6, 6>(0, layout.twists.start + 6 * k).copy_from(&(mounted.d_robot * d));
-    }
-    for (k, d) in kinematics.d_terms.iter().enumerate() {
-        g.fixed_view_mut::<6, 1>(0, layout.terms.start + k).copy_from(&(mounted.d_robot * d));
-    }
-    g.fixed_view_mut::<6, 6>(0, layout.mountings[image.mounting].start).copy_from(&mounted.d_camera);
-    g.fixed_view_mut::<6, 6>(0, layout.placements[image.placement].start).copy_from(&Matrix6::identity());
-    let mut l = DMatrix::zeros(6, slack.len());
-    for (k, d) in kinematics.d_readings.iter().enumerate().take(slack.len()) {
-        l.fixed_view_mut::<6, 1>(0, k).copy_from(&(mounted.d_robot * d));
-    }
-    let pose = mounted.camera_from_plate;
-    let Some([x, y]) = slack.tilt(stop.readings.len()) else { return Some(Chained { pose, d_theta: g, d_slack: l }) };
-    let axes = tilt_axes(&seen_centre(image, state));
-    let tilt = axes * Vector2::new(x, y);
-    let turned = Pose::exp(&tilt);
-    // What moves the pose before the tilt moves it after the tilt as seen from the tilted plate.
-    let carry = adjoint(&turned.inverse());
-    let carry = DMatrix::from_column_slice(6, 6, carry.as_slice());
-    let mut l = &carry * l;
-    l.view_mut((0, stop.readings.len()), (6, 2)).copy_from(&(right_jacobian_se3(&tilt) * axes));
-    Some(Chained { pose: pose * turned, d_theta: carry * g, d_slack: l })
 }

@@ -1,8 +1,9 @@
 //! The least-squares problem: what is unknown, what was measured, what is known beforehand.
 //!
-//! [`Problem`] holds the data and never changes during a solve; [`State`] holds every unknown; [`Layout`] is the one place
+//! [`Problem`] holds the data and never changes during a solve; [`State`] holds every unknown; [`Adjustment`] is both; [`Layout`] is the one place
 //! that turns a name into a column. The unit of residual evaluation is one image ([`linearise`]).
 
+mod adjustment;
 mod condensed;
 mod equations;
 mod family;
@@ -15,13 +16,12 @@ mod scale_bar;
 mod select;
 mod state;
 
+pub use adjustment::Adjustment;
 pub use condensed::{by_columns, condensed};
 pub use equations::{Equations, MarkerCoupling, MarkerTerms, Sight};
 pub use family::Family;
 pub use layout::{Column, Layout, OriginPrior};
-pub use linearise::{
-    Chained, E, ImageTerms, Residual, Weighting, chained, chained_from, equations, linearise, predict,
-};
+pub use linearise::{Chained, E, ImageTerms, Residual, Weighting, equations, linearise, predict};
 pub use measured_series::{LensChoice, MeasuredSeries, MeasuredStop};
 pub use postures::{common_readings, joined, posture_groups};
 pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};
@@ -31,7 +31,7 @@ pub use state::{PlateShape, Slack, State, Step};
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::Stop;
 use crate::series::CameraMount;
 use crate::series::{Edge, Plate};
 use crate::urdf::JointKind;
@@ -169,28 +169,6 @@ impl Problem {
         }
     }
 
-    /// Leaves the local errors out: their columns stay at zero.
-    pub fn without_local_errors(&mut self, state: &mut State) {
-        let first = self.layout.terms.start;
-        for c in self.layout.locals.clone() {
-            self.layout.columns[c].free = false;
-            state.robot.terms[c - first].value = 0.0;
-        }
-        self.noise.local.fill(0.0);
-    }
-
-    /// The priors of local errors and of families follow their components; local errors that are left out keep theirs.
-    pub fn hold_component_priors(&mut self, robot: &Robot) {
-        self.families.iter().for_each(|f| f.hold(&mut self.layout));
-        let first = self.layout.terms.start;
-        for c in self.layout.locals.clone() {
-            let column = &mut self.layout.columns[c];
-            if column.free {
-                column.prior_sigma = self.noise.local[robot.terms[c - first].reading];
-            }
-        }
-    }
-
     /// Slack of a stop whose readings are right: joint noise, and tilt where it has a size.
     pub fn exact_slack(&self, image: &Image) -> Slack {
         let readings = image.stop.as_ref().map_or(0, |s| s.readings.len());
@@ -206,13 +184,6 @@ impl Problem {
     pub fn stated_sigma(&self, column: usize) -> f64 {
         let of = |f: &Family| f.columns.iter().position(|c| *c == column).map(|k| f.base[k]);
         self.families.iter().find_map(of).unwrap_or(self.layout.columns[column].prior_sigma)
-    }
-
-    /// Starts all stops of the robot at right readings: [`Problem::exact_slack`], or none at all for readings that count as exact.
-    pub fn start_slack(&self, state: &mut State, readings_are_exact: bool) {
-        for (slack, image) in state.slack.iter_mut().zip(&self.images).filter(|(_, i)| i.stop.is_some()) {
-            *slack = if readings_are_exact { Slack::None } else { self.exact_slack(image) };
-        }
     }
 
     /// Standard deviation of the whole joint noise of the stops of a series, per reading, rad or m.

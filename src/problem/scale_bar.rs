@@ -2,14 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use super::{PlateShape, Problem, State};
+use super::{Adjustment, PlateShape, Problem};
 use crate::series::Plate;
 
 /// Index of the scale among the modes of a plate.
 pub const SCALE: usize = 0;
 
-/// Gives the scale of every plate with a measured distance the prior that the distance makes, on a plate of the shape in `state`.
-pub fn hold_scale_bars(problem: &mut Problem, state: &State) {
+/// Gives the scale of every plate with a measured distance the prior that the distance makes, on a plate of its present shape.
+pub fn hold_scale_bars(Adjustment { problem, state }: &mut Adjustment) {
     for (k, (columns, shape)) in problem.layout.shapes.clone().iter().zip(&state.plates).enumerate() {
         if let Some((mean, sigma)) = bar_scale(&problem.plates[k], shape, &seen_markers(problem, k)) {
             let column = &mut problem.layout.columns[columns.start + SCALE];

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 
-use super::system::Linearised;
+use super::linear::{LinearImage, LinearProblem};
 use crate::linalg::product;
-use crate::problem::{E, Equations, Problem, Slack, State};
+use crate::problem::{Adjustment, E, Equations, Problem};
 
 /// Markers that images in use show.
 #[derive(Debug, Clone)]
@@ -22,10 +22,10 @@ impl SeenMarkers {
     }
 
     /// Numbered by plate and index.
-    pub fn of(problem: &Problem, lin: &Linearised) -> Self {
-        let mut seen = Self::none(problem);
-        for (terms, &i) in lin.terms.iter().zip(&lin.images) {
-            let number = &mut seen.number[problem.images[i].plate];
+    pub fn of(linear: LinearProblem) -> Self {
+        let mut seen = Self::none(&linear.adjustment.problem);
+        for LinearImage { image, terms, .. } in linear.images() {
+            let number = &mut seen.number[image.plate];
             terms.markers.iter().for_each(|m| number[m.marker] = Some(0));
         }
         for (p, plate) in seen.number.iter_mut().enumerate() {
@@ -38,11 +38,13 @@ impl SeenMarkers {
     }
 
     /// Information of each, prior included.
-    pub fn information(&self, problem: &Problem, lin: &Linearised) -> Vec<Matrix3<f64>> {
-        let prior = |&(p, m): &(usize, usize)| Matrix3::from_diagonal_element(problem.marker_information(p, m));
+    pub fn information(&self, linear: LinearProblem) -> Vec<Matrix3<f64>> {
+        let prior = |&(p, m): &(usize, usize)| {
+            Matrix3::from_diagonal_element(linear.adjustment.problem.marker_information(p, m))
+        };
         let mut information: Vec<Matrix3<f64>> = self.order.iter().map(prior).collect();
-        for (terms, &i) in lin.terms.iter().zip(&lin.images) {
-            let number = &self.number[problem.images[i].plate];
+        for LinearImage { image, terms, .. } in linear.images() {
+            let number = &self.number[image.plate];
             for own in &terms.markers {
                 number[own.marker].iter().for_each(|&at| information[at] += own.mm);
             }
@@ -51,14 +53,15 @@ impl SeenMarkers {
     }
 
     /// Right-hand side of each, prior included.
-    pub fn gradient(&self, problem: &Problem, state: &State, lin: &Linearised) -> DVector<f64> {
+    pub fn gradient(&self, linear: LinearProblem) -> DVector<f64> {
+        let Adjustment { problem, state } = linear.adjustment;
         let mut gradient = DVector::zeros(3 * self.order.len());
         for (at, &(p, m)) in self.order.iter().enumerate() {
             let pull = state.plates[p].corrections[m] * -problem.marker_information(p, m);
             gradient.fixed_rows_mut::<3>(3 * at).copy_from(&pull);
         }
-        for (terms, &i) in lin.terms.iter().zip(&lin.images) {
-            let number = &self.number[problem.images[i].plate];
+        for LinearImage { image, terms, .. } in linear.images() {
+            let number = &self.number[image.plate];
             for own in &terms.markers {
                 if let Some(at) = number[own.marker] {
                     let mut sum = gradient.fixed_rows_mut::<3>(3 * at);
@@ -90,11 +93,11 @@ impl DenseCoupling {
         Self { free, theta, values }
     }
 
-    /// Adds the k-th image in use.
-    pub fn add(&mut self, problem: &Problem, lin: &Linearised, k: usize, seen: &SeenMarkers, equations: &Equations) {
-        let (image, theta) = (&problem.images[lin.images[k]], self.theta);
-        let by_theta = equations.through_pose(&lin.chains[k].d_theta.select_columns(&self.free[..theta]).transpose());
-        let intrinsics = problem.layout.intrinsics(image).into_iter();
+    /// Adds an image with its intrinsic columns.
+    pub fn add(&mut self, own: LinearImage, intrinsics: Vec<Option<usize>>, seen: &SeenMarkers, equations: &Equations) {
+        let (image, theta) = (own.image, self.theta);
+        let by_theta = equations.through_pose(&own.chain.d_theta.select_columns(&self.free[..theta]).transpose());
+        let intrinsics = intrinsics.into_iter();
         let intrinsics: Vec<_> = intrinsics.map(|c| c.and_then(|c| self.free.binary_search(&c).ok())).collect();
         let runs = runs((0..E).filter_map(|e| Some((equations.intrinsic_row(e)?, intrinsics[e]?))));
         for (o, (&marker, sight)) in equations.markers.iter().zip(equations.sights()).enumerate() {
@@ -171,9 +174,8 @@ fn add_combination(into: &mut [f64], [a, b]: [&[f64]; 2], [s, t]: [f64; 2]) {
     }
 }
 
-/// Markers of the k-th image in use, each once, and their coupling with its slack: slack x 3 markers.
-pub(super) fn slack_with_markers(lin: &Linearised, k: usize, equations: &Equations) -> (Vec<usize>, DMatrix<f64>) {
-    let l = &lin.chains[k].d_slack;
+/// Markers of an image, each once, and their coupling with its slack through `l`: slack x 3 markers.
+pub(super) fn slack_with_markers(l: &DMatrix<f64>, equations: &Equations) -> (Vec<usize>, DMatrix<f64>) {
     let by_slack = equations.through_pose(&l.transpose());
     let mut markers = equations.markers.clone();
     markers.dedup();
@@ -190,40 +192,6 @@ pub(super) fn slack_with_markers(lin: &Linearised, k: usize, equations: &Equatio
     (markers, coupling)
 }
 
-/// Information of the slack of the k-th image in use, prior included.
-pub(super) fn slack_information(problem: &Problem, state: &State, lin: &Linearised, k: usize) -> DMatrix<f64> {
-    let (l, i) = (&lin.chains[k].d_slack, lin.images[k]);
-    let mut information = l.tr_mul(&(lin.terms[k].pp * l));
-    if let Slack::Joints(dq) = &state.slack[i] {
-        (0..dq.len()).for_each(|s| information[(s, s)] += problem.slack_information(&problem.images[i], s));
-    }
-    information
-}
-
-/// Right-hand side of the slack of the k-th image in use, prior included.
-pub(super) fn slack_gradient(problem: &Problem, state: &State, lin: &Linearised, k: usize) -> DVector<f64> {
-    let i = lin.images[k];
-    let mut gradient = lin.chains[k].d_slack.tr_mul(&lin.terms[k].bp);
-    if let Slack::Joints(dq) = &state.slack[i] {
-        for (s, q) in dq.iter().enumerate() {
-            gradient[s] -= q * problem.slack_information(&problem.images[i], s);
-        }
-    }
-    gradient
-}
-
-/// Right-hand side of the dense columns, without their priors.
-pub(super) fn dense_gradient(problem: &Problem, lin: &Linearised) -> DVector<f64> {
-    let mut gradient = DVector::zeros(problem.layout.len());
-    for (k, (terms, chain)) in lin.terms.iter().zip(&lin.chains).enumerate() {
-        gradient.rows_mut(0, problem.layout.theta_len()).gemv_tr(1.0, &chain.d_theta, &terms.bp, 1.0);
-        for (e, c) in problem.layout.intrinsics(&problem.images[lin.images[k]]).iter().enumerate() {
-            c.iter().for_each(|&c| gradient[c] += terms.be[e]);
-        }
-    }
-    gradient
-}
-
 /// The pixel equations of all images in the space of their camera poses, six rows an image.
 pub(super) struct PoseRows {
     /// `G`, 6J x theta.
@@ -233,14 +201,15 @@ pub(super) struct PoseRows {
 }
 
 impl PoseRows {
-    pub fn new(problem: &Problem, lin: &Linearised) -> Self {
-        let (theta, dense) = (problem.layout.theta_len(), problem.layout.len());
-        let rows = 6 * lin.images.len();
+    pub fn new(linear: LinearProblem) -> Self {
+        let layout = &linear.adjustment.problem.layout;
+        let (theta, dense) = (layout.theta_len(), layout.len());
+        let rows = 6 * linear.images().len();
         let (mut chain, mut coupling) = (DMatrix::zeros(rows, theta), DMatrix::zeros(rows, dense));
-        for (k, (terms, own)) in lin.terms.iter().zip(&lin.chains).enumerate() {
+        for (k, LinearImage { image, terms, chain: own, .. }) in linear.images().enumerate() {
             chain.rows_mut(6 * k, 6).copy_from(&own.d_theta);
             coupling.view_mut((6 * k, 0), (6, theta)).copy_from(&(terms.pp * &own.d_theta));
-            for (e, c) in problem.layout.intrinsics(&problem.images[lin.images[k]]).iter().enumerate() {
+            for (e, c) in layout.intrinsics(image).iter().enumerate() {
                 if let Some(c) = *c {
                     coupling.fixed_view_mut::<6, 1>(6 * k, c).copy_from(&terms.pe.column(e));
                 }
@@ -250,23 +219,17 @@ impl PoseRows {
     }
 
     /// Adds the information of the dense columns: upper triangle.
-    pub fn add_to(&self, problem: &Problem, lin: &Linearised, a: &mut DMatrix<f64>) {
-        let (theta, dense) = (problem.layout.theta_len(), problem.layout.len());
+    pub fn add_to(&self, linear: LinearProblem, a: &mut DMatrix<f64>) {
+        let layout = &linear.adjustment.problem.layout;
+        let (theta, dense) = (layout.theta_len(), layout.len());
         let mut upper = a.view_mut((0, 0), (theta, dense));
         upper += product(&self.chain.transpose(), &self.coupling);
-        for (terms, &i) in lin.terms.iter().zip(&lin.images) {
-            let columns = problem.layout.intrinsics(&problem.images[i]);
+        for LinearImage { image, terms, .. } in linear.images() {
+            let columns = layout.intrinsics(image);
             let used = || columns.iter().enumerate().filter_map(|(e, c)| c.map(|c| (e, c)));
             for (e, c) in used() {
                 used().filter(|(_, d)| *d <= c).for_each(|(f, d)| a[(d, c)] += terms.ee[(f, e)]);
             }
         }
     }
-}
-
-/// Dense columns that the k-th image in use depends on and that are free.
-pub(super) fn free_columns(problem: &Problem, lin: &Linearised, k: usize) -> Vec<usize> {
-    let intrinsics = problem.layout.intrinsics(&problem.images[lin.images[k]]);
-    let all = (0..problem.layout.theta_len()).chain(intrinsics.into_iter().flatten());
-    all.filter(|&c| problem.layout.columns[c].free).collect()
 }

@@ -5,14 +5,12 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::blocks::{
-    DenseCoupling, PoseRows, SeenMarkers, dense_gradient, slack_gradient, slack_information, slack_with_markers,
-    times_right,
-};
-use super::system::{Carried, Linearised};
+use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, slack_with_markers, times_right};
+use super::linear::LinearProblem;
+use super::system::Carried;
 use crate::linalg::{mirror_upper, orthonormal, product, subtract_gram};
 use crate::model::plate_modes::MODES;
-use crate::problem::{Problem, State, Step};
+use crate::problem::Step;
 
 /// Every marker that was seen, with its elimination.
 #[derive(Debug, Clone)]
@@ -32,30 +30,31 @@ pub(super) struct MarkersEliminated {
 
 impl MarkersEliminated {
     /// Information with the priors of slack and markers, without those of the dense columns.
-    pub fn build(problem: &Problem, state: &State, lin: &Linearised, lambda: f64) -> (DMatrix<f64>, Self) {
-        let mut n = problem.layout.len();
-        let slack_start: Vec<usize> = (lin.chains.iter())
-            .map(|c| {
-                n += c.d_slack.ncols();
-                n - c.d_slack.ncols()
+    pub fn build(linear: LinearProblem, lambda: f64) -> (DMatrix<f64>, Self) {
+        let mut n = linear.adjustment.problem.layout.len();
+        let slack_start: Vec<usize> = (linear.images())
+            .map(|image| {
+                let own = image.chain.d_slack.ncols();
+                n += own;
+                n - own
             })
             .collect();
         let mut a = DMatrix::zeros(n, n);
-        let poses = PoseRows::new(problem, lin);
-        poses.add_to(problem, lin, &mut a);
-        for (k, &start) in slack_start.iter().enumerate() {
-            let l = &lin.chains[k].d_slack;
+        let poses = PoseRows::new(linear);
+        poses.add_to(linear, &mut a);
+        for (k, (image, &start)) in linear.images().zip(&slack_start).enumerate() {
+            let l = &image.chain.d_slack;
             let with_dense = poses.coupling.rows(6 * k, 6).tr_mul(l);
             a.view_mut((0, start), with_dense.shape()).copy_from(&with_dense);
-            a.view_mut((start, start), (l.ncols(), l.ncols())).copy_from(&slack_information(problem, state, lin, k));
+            a.view_mut((start, start), (l.ncols(), l.ncols())).copy_from(&image.slack_information());
         }
-        let seen = SeenMarkers::of(problem, lin);
+        let seen = SeenMarkers::of(linear);
         let damped = |mut v: Matrix3<f64>| {
             (0..3).for_each(|d| v[(d, d)] *= 1.0 + lambda);
             v.cholesky().and_then(|c| c.l().try_inverse()).unwrap_or_else(Matrix3::zeros)
         };
-        let inverse_factors: Vec<Matrix3<f64>> = seen.information(problem, lin).into_iter().map(damped).collect();
-        let y = whitened_coupling(problem, state, lin, &seen, &inverse_factors, (n, &slack_start));
+        let inverse_factors: Vec<Matrix3<f64>> = seen.information(linear).into_iter().map(damped).collect();
+        let y = whitened_coupling(linear, &seen, &inverse_factors, (n, &slack_start));
         subtract_gram(&mut a, &y);
         mirror_upper(&mut a);
         let rhs = DVector::zeros(3 * seen.order.len());
@@ -85,13 +84,13 @@ impl MarkersEliminated {
     }
 
     /// Takes over the right-hand side of the markers at a linearisation; returns the reduced one, without the priors of the dense columns.
-    pub fn reduce_gradient(&mut self, problem: &Problem, state: &State, lin: &Linearised) -> DVector<f64> {
-        let mut reduced = dense_gradient(problem, lin).resize_vertically(self.y.nrows(), 0.0);
-        for (k, &start) in self.slack_start.iter().enumerate() {
-            let own = slack_gradient(problem, state, lin, k);
+    pub fn reduce_gradient(&mut self, linear: LinearProblem) -> DVector<f64> {
+        let mut reduced = linear.dense_gradient().resize_vertically(self.y.nrows(), 0.0);
+        for (image, &start) in linear.images().zip(&self.slack_start) {
+            let own = image.slack_gradient();
             reduced.rows_mut(start, own.len()).copy_from(&own);
         }
-        self.rhs = self.seen.gradient(problem, state, lin);
+        self.rhs = self.seen.gradient(linear);
         for (at, inverse) in self.inverse_factors.iter().enumerate() {
             let own = inverse * self.rhs.fixed_rows::<3>(3 * at);
             self.rhs.fixed_rows_mut::<3>(3 * at).copy_from(&own);
@@ -106,17 +105,17 @@ impl MarkersEliminated {
     }
 
     /// The whole step from the solution `x` of the reduced system.
-    pub fn step(&self, problem: &Problem, lin: &Linearised, x: &DVector<f64>) -> Step {
-        let mut slack = vec![Vec::new(); problem.images.len()];
-        for (k, &image) in lin.images.iter().enumerate() {
-            slack[image] = x.rows(self.slack_start[k], lin.chains[k].d_slack.ncols()).as_slice().to_vec();
+    pub fn step(&self, linear: LinearProblem, x: &DVector<f64>) -> Step {
+        let mut slack = vec![Vec::new(); linear.adjustment.problem.images.len()];
+        for (image, &start) in linear.images().zip(&self.slack_start) {
+            slack[image.index] = x.rows(start, image.chain.d_slack.ncols()).as_slice().to_vec();
         }
         let mut own = self.rhs.clone();
         own.gemv_tr(-1.0, &self.y, x, 1.0);
         let of = |at: usize| self.inverse_factors[at].transpose() * own.fixed_rows::<3>(3 * at);
         let step = |at: &Option<usize>| at.map_or(Vector3::zeros(), of);
         let markers = self.seen.number.iter().map(|plate| plate.iter().map(step).collect()).collect();
-        Step { dense: x.rows(0, problem.layout.len()).into_owned(), slack, markers }
+        Step { dense: x.rows(0, linear.adjustment.problem.layout.len()).into_owned(), slack, markers }
     }
 
     /// Covariance of every marker that was seen: `V^-1 + D cov(x) D'` with `D = V^-1 B'`, less what moves the marker with `x`
@@ -149,20 +148,18 @@ impl MarkersEliminated {
 
 /// `Y`, unknowns that stay x 3 markers.
 fn whitened_coupling(
-    problem: &Problem,
-    state: &State,
-    lin: &Linearised,
+    linear: LinearProblem,
     seen: &SeenMarkers,
     inverse_factors: &[Matrix3<f64>],
     (n, slack_start): (usize, &[usize]),
 ) -> DMatrix<f64> {
     let mut y = DMatrix::zeros(n, 3 * seen.order.len());
-    let mut dense = DenseCoupling::new(problem, seen);
-    for (k, &start) in slack_start.iter().enumerate() {
-        let Some(equations) = lin.equations(problem, state, k) else { continue };
-        dense.add(problem, lin, k, seen, &equations);
-        let number = &seen.number[problem.images[lin.images[k]].plate];
-        let (markers, mut coupling) = slack_with_markers(lin, k, &equations);
+    let mut dense = DenseCoupling::new(&linear.adjustment.problem, seen);
+    for (own, &start) in linear.images().zip(slack_start) {
+        let Some(equations) = own.equations() else { continue };
+        dense.add(own, linear.adjustment.problem.layout.intrinsics(own.image), seen, &equations);
+        let number = &seen.number[own.image.plate];
+        let (markers, mut coupling) = slack_with_markers(&own.chain.d_slack, &equations);
         for (m, &marker) in markers.iter().enumerate() {
             let Some(at) = number[marker] else { continue };
             times_right(&mut coupling, 3 * m, &inverse_factors[at].transpose());

@@ -3,16 +3,14 @@
 //! With the information `H = F F'` of the slack of an image (pixels through `L`, and the prior) and its coupling `B` with what stays,
 //! `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
+use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, SMatrix, Vector3};
 
-use super::blocks::{
-    DenseCoupling, PoseRows, SeenMarkers, dense_gradient, free_columns, slack_gradient, slack_information,
-    slack_with_markers,
-};
-use super::system::{Carried, Linearised};
+use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, slack_with_markers};
+use super::linear::{LinearImage, LinearProblem};
+use super::system::Carried;
 use crate::linalg::{gram, mirror_upper, orthonormal, product, subtract_gram};
 use crate::model::plate_modes::MODES;
-use crate::problem::{Equations, Problem, State, Step};
+use crate::problem::{Equations, Step};
 
 /// What moves a marker with the modes of a plate.
 type Modes = SMatrix<f64, 3, MODES>;
@@ -45,27 +43,23 @@ pub(super) struct SlackEliminated {
 impl SlackEliminated {
     /// Information with the priors of slack and markers, without those of the dense columns; markers that are not among those `seen` stay
     /// where they are.
-    pub fn build(
-        problem: &Problem,
-        state: &State,
-        lin: &Linearised,
-        lambda: f64,
-        seen: SeenMarkers,
-    ) -> (DMatrix<f64>, Self) {
-        let dense = problem.layout.len();
+    pub fn build(linear: LinearProblem, lambda: f64, seen: SeenMarkers) -> (DMatrix<f64>, Self) {
+        let layout = &linear.adjustment.problem.layout;
+        let dense = layout.len();
         let n = dense + 3 * seen.order.len();
         let mut a = DMatrix::zeros(n, n);
-        let poses = PoseRows::new(problem, lin);
-        poses.add_to(problem, lin, &mut a);
-        for (at, information) in seen.information(problem, lin).iter().enumerate() {
+        let poses = PoseRows::new(linear);
+        poses.add_to(linear, &mut a);
+        for (at, information) in seen.information(linear).iter().enumerate() {
             a.fixed_view_mut::<3, 3>(dense + 3 * at, dense + 3 * at).copy_from(information);
         }
-        let mut coupling = DenseCoupling::new(problem, &seen);
-        let mut blocks = Vec::with_capacity(lin.images.len());
-        for k in 0..lin.images.len() {
-            let equations = if seen.order.is_empty() { None } else { lin.equations(problem, state, k) };
-            equations.iter().for_each(|e| coupling.add(problem, lin, k, &seen, e));
-            blocks.push(Block::new(problem, state, lin, k, lambda, (&poses, &seen, equations.as_ref())));
+        let mut coupling = DenseCoupling::new(&linear.adjustment.problem, &seen);
+        let mut blocks = Vec::with_capacity(linear.images().len());
+        for (k, image) in linear.images().enumerate() {
+            let equations = if seen.order.is_empty() { None } else { image.equations() };
+            equations.iter().for_each(|e| coupling.add(image, layout.intrinsics(image.image), &seen, e));
+            let of_pose = poses.coupling.rows(6 * k, 6);
+            blocks.push(Block::new(image, of_pose, lambda, (dense, &seen, equations.as_ref())));
         }
         coupling.copy_to(&mut a, dense);
         for part in blocks.chunks(IMAGES_A_PRODUCT) {
@@ -82,12 +76,12 @@ impl SlackEliminated {
     }
 
     /// Takes over the right-hand sides of the slack at a linearisation; returns the reduced one, without the priors of the dense columns.
-    pub fn reduce_gradient(&mut self, problem: &Problem, state: &State, lin: &Linearised) -> DVector<f64> {
-        let dense = problem.layout.len();
-        let mut reduced = dense_gradient(problem, lin).resize_vertically(dense + 3 * self.seen.order.len(), 0.0);
-        reduced.rows_range_mut(dense..).copy_from(&self.seen.gradient(problem, state, lin));
-        for (k, block) in self.blocks.iter_mut().enumerate() {
-            block.rhs = &block.inverse_factor * slack_gradient(problem, state, lin, k);
+    pub fn reduce_gradient(&mut self, linear: LinearProblem) -> DVector<f64> {
+        let dense = self.dense;
+        let mut reduced = linear.dense_gradient().resize_vertically(dense + 3 * self.seen.order.len(), 0.0);
+        reduced.rows_range_mut(dense..).copy_from(&self.seen.gradient(linear));
+        for (block, image) in self.blocks.iter_mut().zip(linear.images()) {
+            block.rhs = &block.inverse_factor * image.slack_gradient();
             let taken = &block.y * &block.rhs;
             block.rows.iter().zip(taken.iter()).for_each(|(&row, value)| reduced[row] -= value);
         }
@@ -131,9 +125,9 @@ impl SlackEliminated {
     }
 
     /// The whole step from the solution `x` of the reduced system.
-    pub fn step(&self, problem: &Problem, lin: &Linearised, x: &DVector<f64>) -> Step {
-        let mut slack = vec![Vec::new(); problem.images.len()];
-        for (block, &image) in self.blocks.iter().zip(&lin.images) {
+    pub fn step(&self, linear: LinearProblem, x: &DVector<f64>) -> Step {
+        let mut slack = vec![Vec::new(); linear.adjustment.problem.images.len()];
+        for (block, &image) in self.blocks.iter().zip(&linear.lin.images) {
             let own = DVector::from_iterator(block.rows.len(), block.rows.iter().map(|&c| x[c]));
             let dl = block.inverse_factor.tr_mul(&(&block.rhs - block.y.tr_mul(&own)));
             slack[image] = dl.as_slice().to_vec();
@@ -177,28 +171,27 @@ impl SlackEliminated {
 }
 
 impl Block {
+    /// Of an image with the coupling of its pose with the `dense` columns, and of the markers that were seen where they stay.
     fn new(
-        problem: &Problem,
-        state: &State,
-        lin: &Linearised,
-        k: usize,
+        own: LinearImage,
+        of_pose: DMatrixView<f64>,
         lambda: f64,
-        (poses, seen, equations): (&PoseRows, &SeenMarkers, Option<&Equations>),
+        (dense, seen, equations): (usize, &SeenMarkers, Option<&Equations>),
     ) -> Self {
-        let l = &lin.chains[k].d_slack;
-        let mut h = slack_information(problem, state, lin, k);
+        let l = &own.chain.d_slack;
+        let mut h = own.slack_information();
         (0..h.nrows()).for_each(|s| h[(s, s)] *= 1.0 + lambda);
         let factor = h.cholesky().and_then(|c| c.l().try_inverse());
         let inverse_factor = factor.unwrap_or_else(|| DMatrix::zeros(l.ncols(), l.ncols()));
         // Columns that stay at their value take no part, nor in the back-substitution.
-        let mut rows = free_columns(problem, lin, k);
-        let columns = rows.iter().map(|&c| l.tr_mul(&poses.coupling.fixed_view::<6, 1>(6 * k, c)));
+        let mut rows = own.free_columns();
+        let columns = rows.iter().map(|&c| l.tr_mul(&of_pose.fixed_view::<6, 1>(0, c)));
         let mut coupling = DMatrix::from_iterator(l.ncols(), rows.len(), columns.flat_map(|c| c.as_slice().to_vec()));
         if let Some(equations) = equations {
-            let number = &seen.number[problem.images[lin.images[k]].plate];
-            let (markers, with_markers) = slack_with_markers(lin, k, equations);
+            let number = &seen.number[own.image.plate];
+            let (markers, with_markers) = slack_with_markers(l, equations);
             let first = rows.len();
-            let starts = markers.iter().filter_map(|&m| number[m].map(|at| problem.layout.len() + 3 * at));
+            let starts = markers.iter().filter_map(|&m| number[m].map(|at| dense + 3 * at));
             rows.extend(starts.flat_map(|start| start..start + 3));
             coupling = coupling.resize_horizontally(rows.len(), 0.0);
             coupling.columns_range_mut(first..).copy_from(&with_markers);

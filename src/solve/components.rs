@@ -5,10 +5,11 @@
 
 use nalgebra::Matrix3;
 
-use super::covariance::{Covariance, covariance};
+use super::fit::Fit;
 use super::levenberg::{Outcome, Settings, Status, solve};
-use super::system::Linearised;
-use crate::problem::{Noise, Problem, Slack, State};
+use super::linear::LinearImage;
+use crate::problem::{Adjustment, Noise, Slack};
+use crate::urdf::JointKind;
 
 /// What is estimated and how long.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,27 +51,30 @@ const FEWEST_MARKER_COORDINATES: f64 = 50.0;
 /// Newton decrement between rounds: the components need no better.
 const ROUGH_DECREMENT: f64 = 0.05;
 
-/// Alternates solving and re-estimating until the components stand. The problem keeps the final components.
-pub fn estimate_components(problem: &mut Problem, start: State, options: &ComponentOptions) -> Outcome {
+/// Alternates solving and re-estimating until the components stand. The adjustment keeps the final components.
+pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Outcome {
     let rough = Settings { decrement: ROUGH_DECREMENT.max(options.settings.decrement), ..options.settings };
-    let mut outcome = solve(problem, start, &rough);
+    let mut outcome = solve(start, &rough);
     let mut iterations = outcome.iterations;
     for round in 0..options.rounds {
-        let Some(lin) = &outcome.linearised else { break };
-        let Ok(cov) = covariance(problem, &outcome.state, lin) else {
-            outcome.status = Status::Stalled;
-            break;
+        let mut fit = match outcome.fit() {
+            Ok(fit) => fit,
+            Err(unsolved) => {
+                outcome = *unsolved;
+                break;
+            }
         };
-        let change = update(problem, &outcome.state, lin, &cov, options);
-        tracing::debug!(round, change, pixel = ?problem.noise.pixel_factor, joint = ?problem.noise.joint, "variance components");
-        outcome = solve(problem, outcome.state, &rough);
+        let change = fit.update_components(options);
+        let noise = &fit.problem.noise;
+        tracing::debug!(round, change, pixel = ?noise.pixel_factor, joint = ?noise.joint, "variance components");
+        outcome = solve(fit.adjustment, &rough);
         iterations += outcome.iterations;
         if change < CONVERGED || outcome.status == Status::BadStart {
             break;
         }
     }
     if outcome.status == Status::Converged {
-        outcome = solve(problem, outcome.state, &options.settings);
+        outcome = solve(outcome.adjustment, &options.settings);
         iterations += outcome.iterations;
         // The rough solve converged to 0.05 sigma; polishing lowered the cost further, if slowly.
         if outcome.status == Status::OutOfIterations {
@@ -80,65 +84,136 @@ pub fn estimate_components(problem: &mut Problem, start: State, options: &Compon
     Outcome { iterations, ..outcome }
 }
 
-/// One round; returns the largest relative change.
-fn update(problem: &mut Problem, state: &State, lin: &Linearised, cov: &Covariance, options: &ComponentOptions) -> f64 {
-    let mut noise = problem.noise.clone();
-    let markers = marker_tallies(problem, state, cov);
-    let taken = effective_parameters(problem, state, lin, cov, markers.iter().map(|[_, told]| told).sum());
-    let mut change = update_markers(&markers, &mut noise);
-    let counts = lin.terms.iter().map(|t| 2.0 * t.residuals.len() as f64);
-    let total: f64 = counts.clone().sum();
-    for (camera, factor) in noise.pixel_factor.iter_mut().enumerate() {
-        let of_camera = lin.images.iter().zip(&lin.terms).filter(|(i, _)| problem.images[**i].camera == camera);
-        let (mut squares, mut count) = (0.0, 0.0);
-        for (_, terms) in of_camera {
-            squares += terms.residuals.iter().map(|r| r.weight * r.normalised * r.normalised).sum::<f64>();
-            count += 2.0 * terms.residuals.len() as f64;
+impl Fit {
+    /// One round; returns the largest relative change.
+    fn update_components(&mut self, options: &ComponentOptions) -> f64 {
+        let problem = &self.problem;
+        let mut noise = problem.noise.clone();
+        let markers = self.marker_tallies();
+        let taken = self.effective_parameters(markers.iter().map(|[_, told]| told).sum());
+        let mut change = update_markers(&markers, &mut noise);
+        let counts = self.linearised.terms.iter().map(|t| 2.0 * t.residuals.len() as f64);
+        let total: f64 = counts.clone().sum();
+        for (camera, factor) in noise.pixel_factor.iter_mut().enumerate() {
+            let of_camera = self.linear().images().filter(|i| i.image.camera == camera);
+            let (mut squares, mut count) = (0.0, 0.0);
+            for LinearImage { terms, .. } in of_camera {
+                squares += terms.residuals.iter().map(|r| r.weight * r.normalised * r.normalised).sum::<f64>();
+                count += 2.0 * terms.residuals.len() as f64;
+            }
+            let redundancy = count * (1.0 - taken / total);
+            if redundancy < 1.0 || squares <= 0.0 {
+                continue;
+            }
+            let ratio = (squares * huber_consistency(problem.huber) / redundancy).sqrt();
+            *factor *= ratio;
+            change = change.max((ratio - 1.0).abs());
         }
-        let redundancy = count * (1.0 - taken / total);
-        if redundancy < 1.0 || squares <= 0.0 {
-            continue;
+        if options.joint || options.tilt {
+            let found = self.tallies();
+            if options.tilt {
+                change = change.max(update_tilt(&found.tilt, &mut noise));
+            }
+            if options.joint {
+                change = change.max(found.update_joint(self.state.robot.chain.reading_kinds.as_slice(), &mut noise));
+            }
         }
-        let ratio = (squares * huber_consistency(problem.huber) / redundancy).sqrt();
-        *factor *= ratio;
-        change = change.max((ratio - 1.0).abs());
+        self.problem.noise = noise;
+        change = change.max(self.update_families());
+        self.hold_component_priors();
+        change
     }
-    if options.joint || options.tilt {
-        let found = tallies(problem, state, lin, cov);
-        if options.tilt {
-            change = change.max(update_tilt(&found.tilt, &mut noise));
-        }
-        if options.joint {
-            change = change.max(update_joint(problem, state, &found, &mut noise));
-        }
-    }
-    problem.noise = noise;
-    change = change.max(update_families(problem, state, cov));
-    problem.hold_component_priors(&state.robot);
-    change
-}
 
-/// New factors of the families, from the sums of squares of their parameters and how many of them the data determine.
-fn update_families(problem: &mut Problem, state: &State, cov: &Covariance) -> f64 {
-    let values = state.values(&problem.layout);
-    let (layout, mut change) = (&problem.layout, 0.0f64);
-    for family in &mut problem.families {
-        let (mut squares, mut determined) = (0.0, -(family.held.ncols() as f64));
-        for (&c, base) in family.columns.iter().zip(&family.base).filter(|(c, _)| layout.columns[**c].free) {
-            let prior = family.factor * base;
-            squares += ((values[c] - layout.columns[c].prior_mean) / base).powi(2);
-            determined += 1.0 - cov.reduced[(c, c)] / (prior * prior);
+    /// New factors of the families, from the sums of squares of their parameters and how many of them the data determine.
+    fn update_families(&mut self) -> f64 {
+        let Self { adjustment: Adjustment { problem, state }, covariance: cov, .. } = self;
+        let values = state.values(&problem.layout);
+        let (layout, mut change) = (&problem.layout, 0.0f64);
+        for family in &mut problem.families {
+            let (mut squares, mut determined) = (0.0, -(family.held.ncols() as f64));
+            for (&c, base) in family.columns.iter().zip(&family.base).filter(|(c, _)| layout.columns[**c].free) {
+                let prior = family.factor * base;
+                squares += ((values[c] - layout.columns[c].prior_mean) / base).powi(2);
+                determined += 1.0 - cov.reduced[(c, c)] / (prior * prior);
+            }
+            if determined < FEWEST_DETERMINED {
+                continue;
+            }
+            let next = family.asked(squares, determined).clamp(SMALLEST_FACTOR, 2.0 * family.factor);
+            if next > SMALLEST_FACTOR {
+                change = change.max((next / family.factor - 1.0).abs());
+            }
+            family.factor = next;
         }
-        if determined < FEWEST_DETERMINED {
-            continue;
-        }
-        let next = family.asked(squares, determined).clamp(SMALLEST_FACTOR, 2.0 * family.factor);
-        if next > SMALLEST_FACTOR {
-            change = change.max((next / family.factor - 1.0).abs());
-        }
-        family.factor = next;
+        change
     }
-    change
+
+    /// Of every plate: sum of squares of the corrections of its markers in units of their prior, and how many coordinates the data tell.
+    pub(super) fn marker_tallies(&self) -> Vec<[f64; 2]> {
+        let Adjustment { problem, state } = &self.adjustment;
+        let of_plate = |(p, covariances): (usize, &Vec<Option<Matrix3<f64>>>)| {
+            let seen = covariances.iter().enumerate().filter_map(|(m, c)| c.map(|c| (m, c)));
+            seen.fold([0.0; 2], |[squares, told], (m, c)| {
+                let information = problem.marker_information(p, m);
+                let square = state.plates[p].corrections[m].norm_squared() * information;
+                [squares + square, told + 3.0 - c.trace() * information]
+            })
+        };
+        self.covariance.markers().iter().enumerate().map(of_plate).collect()
+    }
+
+    /// Number of parameters that the pixels (and not the priors) determine, with so many `markers` coordinates among them.
+    pub(super) fn effective_parameters(&self, markers: f64) -> f64 {
+        let (problem, cov) = (&self.problem, &self.covariance);
+        let columns = &problem.layout.columns;
+        let dense: f64 = (columns.iter().enumerate())
+            .filter(|(i, c)| c.free && cov.system.touched(*i))
+            .map(|(i, c)| 1.0 - cov.reduced[(i, i)] / (c.prior_sigma * c.prior_sigma))
+            .sum();
+        let mut slack = 0.0;
+        for (k, LinearImage { image, slack: own, .. }) in self.linear().images().enumerate() {
+            let length = own.len();
+            let c = cov.slack(k, length);
+            slack += match own {
+                Slack::Joints(_) => (0..length).map(|r| 1.0 - c[(r, r)] * problem.slack_information(image, r)).sum(),
+                _ => length as f64,
+            };
+        }
+        dense + slack + markers
+    }
+
+    /// What the latents of the slack tell of their sizes.
+    fn tallies(&self) -> Tallies {
+        let (Adjustment { problem, state }, cov) = (&self.adjustment, &self.covariance);
+        let (robot, noise) = (&state.robot, &problem.noise);
+        let n = robot.chain.readings.len();
+        let mut own = vec![Tally::new(n); noise.joint.len()];
+        let mut local = Tally::new(n);
+        let mut tilt = Tally::new(noise.tilt.len());
+        for (k, LinearImage { image, slack, .. }) in self.linear().images().enumerate() {
+            let Slack::Joints(dq) = slack else { continue };
+            let c = cov.slack(k, dq.len());
+            for (r, value) in dq.iter().enumerate().skip(n) {
+                let prior = problem.slack_variance(image, r)[0];
+                tilt.add(image.series, *value, c[(r, r)], prior, prior);
+            }
+            for r in 0..n {
+                let [own_part, local_part] = problem.slack_variance(image, r);
+                let prior = own_part + local_part;
+                own[image.series].add(r, dq[r], c[(r, r)], prior, own_part);
+                if local_part > 0.0 {
+                    local.add(r, dq[r], c[(r, r)], prior, local_part);
+                }
+            }
+        }
+        let first = problem.layout.terms.start;
+        for c in problem.layout.locals.clone().filter(|&c| cov.system.touched(c)) {
+            let term = &robot.terms[c - first];
+            let prior = noise.local[term.reading].powi(2);
+            local.add(term.reading, term.value, cov.reduced[(c, c)], prior, prior);
+        }
+        Tallies { own, local, tilt }
+    }
 }
 
 /// Huber's weights take a little off the sum of squares of clean Gaussian data (two components); this gives it back.
@@ -161,19 +236,6 @@ fn normal_upper_tail(k: f64) -> f64 {
     (-0.5 * k * k).exp() / std::f64::consts::TAU.sqrt() / mills
 }
 
-/// Of every plate: sum of squares of the corrections of its markers in units of their prior, and how many coordinates the data tell.
-pub(super) fn marker_tallies(problem: &Problem, state: &State, cov: &Covariance) -> Vec<[f64; 2]> {
-    let of_plate = |(p, covariances): (usize, &Vec<Option<Matrix3<f64>>>)| {
-        let seen = covariances.iter().enumerate().filter_map(|(m, c)| c.map(|c| (m, c)));
-        seen.fold([0.0; 2], |[squares, told], (m, c)| {
-            let information = problem.marker_information(p, m);
-            let square = state.plates[p].corrections[m].norm_squared() * information;
-            [squares + square, told + 3.0 - c.trace() * information]
-        })
-    };
-    cov.markers().iter().enumerate().map(of_plate).collect()
-}
-
 /// New factors on the tolerances of the markers. A factor goes down by halves at most, so that it stays where the data stop telling.
 fn update_markers(tallies: &[[f64; 2]], noise: &mut Noise) -> f64 {
     let mut change: f64 = 0.0;
@@ -185,34 +247,6 @@ fn update_markers(tallies: &[[f64; 2]], noise: &mut Noise) -> f64 {
         }
     }
     change
-}
-
-/// Number of parameters that the pixels (and not the priors) determine, with so many `markers` coordinates among them.
-pub(super) fn effective_parameters(
-    problem: &Problem,
-    state: &State,
-    lin: &Linearised,
-    cov: &Covariance,
-    markers: f64,
-) -> f64 {
-    let columns = &problem.layout.columns;
-    let dense: f64 = (columns.iter().enumerate())
-        .filter(|(i, c)| c.free && cov.system.touched(*i))
-        .map(|(i, c)| 1.0 - cov.reduced[(i, i)] / (c.prior_sigma * c.prior_sigma))
-        .sum();
-    let mut slack = 0.0;
-    for (k, &i) in lin.images.iter().enumerate() {
-        let length = state.slack[i].len();
-        let c = cov.slack(k, length);
-        slack += match &state.slack[i] {
-            Slack::Joints(_) => {
-                let image = &problem.images[i];
-                (0..length).map(|r| 1.0 - c[(r, r)] * problem.slack_information(image, r)).sum()
-            }
-            _ => length as f64,
-        };
-    }
-    dense + slack + markers
 }
 
 /// Sums of squares of latents per reading, and how many of them the data determine.
@@ -287,64 +321,34 @@ struct Tallies {
     tilt: Tally,
 }
 
-fn tallies(problem: &Problem, state: &State, lin: &Linearised, cov: &Covariance) -> Tallies {
-    let (robot, noise) = (&state.robot, &problem.noise);
-    let n = robot.chain.readings.len();
-    let mut own = vec![Tally::new(n); noise.joint.len()];
-    let mut local = Tally::new(n);
-    let mut tilt = Tally::new(noise.tilt.len());
-    for (k, &i) in lin.images.iter().enumerate() {
-        let Slack::Joints(dq) = &state.slack[i] else { continue };
-        let (c, image) = (cov.slack(k, dq.len()), &problem.images[i]);
-        for (r, value) in dq.iter().enumerate().skip(n) {
-            let prior = problem.slack_variance(image, r)[0];
-            tilt.add(image.series, *value, c[(r, r)], prior, prior);
-        }
-        for r in 0..n {
-            let [own_part, local_part] = problem.slack_variance(image, r);
-            let prior = own_part + local_part;
-            own[image.series].add(r, dq[r], c[(r, r)], prior, own_part);
-            if local_part > 0.0 {
-                local.add(r, dq[r], c[(r, r)], prior, local_part);
+impl Tallies {
+    /// Noise of the stops by themselves, and local errors where stops share readings.
+    fn update_joint(&self, kinds: &[JointKind], noise: &mut Noise) -> f64 {
+        let n = kinds.len();
+        let Self { own, local, .. } = self;
+        let together = Tally::together(own, n);
+        let mut change: f64 = 0.0;
+        for group in noise.groups(kinds) {
+            if noise.local.get(group[0]).is_some_and(|s| *s > 0.0) {
+                // A few postures tell little of their local errors: they are drawn to the noise of all joints of the kind.
+                let alike: Vec<usize> = (0..n).filter(|&r| kinds[r] == kinds[group[0]]).collect();
+                let whole = local.clone().with(&together, |r| noise.local[r] == 0.0);
+                let common = whole.common(&alike);
+                change = change.max(share_out(&group, local, common, &mut noise.local));
+            }
+            let overall = Tally::usual(own.iter().map(|tally| (tally, group.clone())));
+            for (tally, sigma) in own.iter().zip(&mut noise.joint) {
+                change = change.max(share_out(&group, tally, tally.drawn(&group, overall), sigma));
             }
         }
+        change
     }
-    let first = problem.layout.terms.start;
-    for c in problem.layout.locals.clone().filter(|&c| cov.system.touched(c)) {
-        let term = &robot.terms[c - first];
-        let prior = noise.local[term.reading].powi(2);
-        local.add(term.reading, term.value, cov.reduced[(c, c)], prior, prior);
-    }
-    Tallies { own, local, tilt }
 }
 
 fn update_tilt(tilt: &Tally, noise: &mut Noise) -> f64 {
     let all: Vec<usize> = (0..tilt.squares.len()).collect();
     let usual = Tally::usual(all.iter().map(|&series| (tilt, vec![series])));
     share_out(&all, tilt, usual, &mut noise.tilt)
-}
-
-/// Noise of the stops by themselves, and local errors where stops share readings.
-fn update_joint(problem: &Problem, state: &State, found: &Tallies, noise: &mut Noise) -> f64 {
-    let kinds = &state.robot.chain.reading_kinds;
-    let n = kinds.len();
-    let Tallies { own, local, .. } = found;
-    let together = Tally::together(own, n);
-    let mut change: f64 = 0.0;
-    for group in problem.noise.groups(kinds) {
-        if noise.local.get(group[0]).is_some_and(|s| *s > 0.0) {
-            // A few postures tell little of their local errors: they are drawn to the noise of all joints of the kind.
-            let alike: Vec<usize> = (0..n).filter(|&r| kinds[r] == kinds[group[0]]).collect();
-            let whole = local.clone().with(&together, |r| noise.local[r] == 0.0);
-            let common = whole.common(&alike);
-            change = change.max(share_out(&group, local, common, &mut noise.local));
-        }
-        let overall = Tally::usual(own.iter().map(|tally| (tally, group.clone())));
-        for (tally, sigma) in own.iter().zip(&mut noise.joint) {
-            change = change.max(share_out(&group, tally, tally.drawn(&group, overall), sigma));
-        }
-    }
-    change
 }
 
 /// New noise from the sum of squares and the redundancy of each reading's latents; every reading is drawn to the common

@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
-use super::system::{Elimination, Linearised, System};
+use super::linear::LinearProblem;
+use super::system::{Elimination, System};
 use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
-use crate::problem::{Problem, State};
+use crate::problem::Problem;
 
 /// Covariance of the reduced unknowns (dense columns, then slack or markers), with what is needed for the eliminated family.
 #[derive(Debug, Clone)]
@@ -21,24 +22,21 @@ pub struct Covariance {
     pub(super) enlarged: Vec<(usize, f64)>,
 }
 
-/// Covariance at a solution; an error where the information is not positive definite.
-pub fn covariance(problem: &Problem, state: &State, lin: &Linearised) -> Result<Covariance, NotPositiveDefinite> {
-    covariance_by(Elimination::cheaper(lin, problem), problem, state, lin)
-}
+impl LinearProblem<'_> {
+    /// Covariance of its unknowns; an error where the information is not positive definite.
+    pub fn covariance(self) -> Result<Covariance, NotPositiveDefinite> {
+        self.covariance_by(Elimination::cheaper(self))
+    }
 
-/// As [`covariance`], by a given elimination.
-pub fn covariance_by(
-    which: Elimination,
-    problem: &Problem,
-    state: &State,
-    lin: &Linearised,
-) -> Result<Covariance, NotPositiveDefinite> {
-    let system = System::with(which, problem, state, lin, 0.0);
-    let factor = SymmetricFactor::new(&system.information)?;
-    let mut reduced = factor.inverse();
-    fixed_are_known(problem, &mut reduced);
-    let log_determinant = factor.log_determinant();
-    Ok(Covariance { reduced, log_determinant, system, added: None, enlarged: Vec::new() })
+    /// As [`LinearProblem::covariance`], by a given elimination.
+    pub fn covariance_by(self, which: Elimination) -> Result<Covariance, NotPositiveDefinite> {
+        let system = System::with(which, self, 0.0);
+        let factor = SymmetricFactor::new(&system.information)?;
+        let mut reduced = factor.inverse();
+        fixed_are_known(&self.adjustment.problem, &mut reduced);
+        let log_determinant = factor.log_determinant();
+        Ok(Covariance { reduced, log_determinant, system, added: None, enlarged: Vec::new() })
+    }
 }
 
 /// Fixed columns have no variance.
@@ -94,10 +92,5 @@ impl Covariance {
     /// plate frame that nominal markers define up to their tolerance).
     pub fn markers(&self) -> Vec<Vec<Option<Matrix3<f64>>>> {
         self.system.marker_covariances(&self.reduced)
-    }
-
-    /// Covariance of the position (plate modes and correction) of every marker that was seen, as [`Covariance::markers`].
-    pub fn positions(&self, problem: &Problem, state: &State) -> Vec<Vec<Option<Matrix3<f64>>>> {
-        self.system.position_covariances(problem, state, &self.reduced)
     }
 }

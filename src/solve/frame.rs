@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 use crate::error::{Error, Result};
 use crate::geom::{Pose, skew};
 use crate::model::plate_modes::MODES;
-use crate::problem::{PlateShape, Problem, Slack, State};
+use crate::problem::{Adjustment, PlateShape, Problem, Slack};
 
 /// Motions of a body.
 const RIGID: usize = 6;
@@ -53,29 +53,30 @@ pub struct PlateScale {
 ///
 /// # Errors
 /// Where the markers seen of a plate lie on a line, so that they define no frame.
-pub fn frames(problem: &Problem, state: &State) -> Result<Vec<Frame>> {
-    let shown: BTreeSet<usize> = problem.used().map(|(_, i)| i.plate).collect();
+pub fn frames(adjustment: &Adjustment) -> Result<Vec<Frame>> {
+    let shown: BTreeSet<usize> = adjustment.problem.used().map(|(_, i)| i.plate).collect();
     let mut frames: Vec<Frame> = Vec::new();
     for plate in shown {
         if !frames.iter().any(|f| f.plates.contains(&plate)) {
-            frames.push(Frame::of(problem, state, tied_to(problem, state, plate))?);
+            frames.push(Frame::of(adjustment, tied_to(adjustment, plate))?);
         }
     }
     Ok(frames)
 }
 
 /// The placement of every image on the robot, with its plate.
-fn placed<'a>(problem: &'a Problem, state: &'a State) -> impl Iterator<Item = (usize, usize)> + 'a {
-    let on_robot = |(i, _): &(usize, &_)| !matches!(state.slack[*i], Slack::Pose(_));
-    problem.used().filter(on_robot).map(|(_, i)| (i.placement, i.plate))
+fn placed(adjustment: &Adjustment) -> impl Iterator<Item = (usize, usize)> + '_ {
+    let on_robot = adjustment.used().filter(|(_, _, slack)| !matches!(slack, Slack::Pose(_)));
+    on_robot.map(|(_, i, _)| (i.placement, i.plate))
 }
 
-fn tied_to(problem: &Problem, state: &State, plate: usize) -> BTreeSet<usize> {
+/// Plates that move together with one.
+fn tied_to(adjustment: &Adjustment, plate: usize) -> BTreeSet<usize> {
     let mut plates = BTreeSet::from([plate]);
     loop {
         let own = |p: &(usize, usize)| plates.contains(&p.1);
-        let placements: BTreeSet<usize> = placed(problem, state).filter(own).map(|p| p.0).collect();
-        let tied = placed(problem, state).filter(|p| placements.contains(&p.0)).map(|p| p.1);
+        let placements: BTreeSet<usize> = placed(adjustment).filter(own).map(|p| p.0).collect();
+        let tied = placed(adjustment).filter(|p| placements.contains(&p.0)).map(|p| p.1);
         let all: BTreeSet<usize> = tied.chain(plates.iter().copied()).collect();
         if all.len() == plates.len() {
             return plates;
@@ -138,7 +139,7 @@ fn no_frame(plate: &str) -> Error {
 }
 
 impl Frame {
-    fn of(problem: &Problem, state: &State, plates: BTreeSet<usize>) -> Result<Self> {
+    fn of(Adjustment { problem, state }: &Adjustment, plates: BTreeSet<usize>) -> Result<Self> {
         let plates: Vec<usize> = plates.into_iter().collect();
         let images = problem.used().map(|(_, i)| i).filter(|i| plates.contains(&i.plate));
         let seen: BTreeSet<(usize, usize)> = images.flat_map(|i| i.used().map(|o| (i.plate, o.marker))).collect();
@@ -185,8 +186,7 @@ impl Frame {
     /// What moves a marker in this frame with the modes, by the first column of the modes of a plate.
     pub(super) fn moved_by_modes(
         &self,
-        problem: &Problem,
-        state: &State,
+        Adjustment { problem, state }: &Adjustment,
         (plate, marker): (usize, usize),
     ) -> Vec<(usize, SMatrix<f64, 3, MODES>)> {
         let shape = &state.plates[plate];

@@ -12,11 +12,12 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 use super::blocks::SeenMarkers;
 use super::covariance::{Covariance, fixed_are_known};
 use super::frame::{Frame, frames};
-use super::system::{Eliminated, Elimination, Linearised, System};
+use super::linear::{LinearImage, LinearProblem};
+use super::system::{Eliminated, Elimination, System};
 use crate::error::{Error, Result};
 use crate::linalg::SymmetricFactor;
 use crate::model::plate_modes::MODES;
-use crate::problem::{Problem, Slack, State};
+use crate::problem::{Adjustment, Problem, Slack};
 
 /// Index of the mode that is scale.
 const SCALE: usize = 0;
@@ -45,30 +46,25 @@ enum Place {
     Slack(usize),
 }
 
-/// Covariance with the plates in their frames, at the linearisation of `stated`, with what was added to that.
+/// Covariance with the plates in their frames, with what was added to the covariance `stated`.
 ///
 /// # Errors
 /// Markers that define no frame; normal equations that are singular.
-pub fn in_frame(problem: &Problem, state: &State, lin: &Linearised, stated: &Covariance) -> Result<InFrame> {
-    in_frame_by(Elimination::cheaper(lin, problem), problem, state, lin, stated)
+pub fn in_frame(linear: LinearProblem, stated: &Covariance) -> Result<InFrame> {
+    in_frame_by(Elimination::cheaper(linear), linear, stated)
 }
 
 /// As [`in_frame`] by a given elimination.
 ///
 /// # Errors
 /// As [`in_frame`].
-pub fn in_frame_by(
-    which: Elimination,
-    problem: &Problem,
-    state: &State,
-    lin: &Linearised,
-    stated: &Covariance,
-) -> Result<InFrame> {
-    let frames = frames(problem, state)?;
-    let mut system = System::with(which, problem, state, lin, 0.0);
-    let following = following(problem, state, lin, &system, &frames);
+pub fn in_frame_by(which: Elimination, linear: LinearProblem, stated: &Covariance) -> Result<InFrame> {
+    let problem = &linear.adjustment.problem;
+    let frames = frames(linear.adjustment)?;
+    let mut system = System::with(which, linear, 0.0);
+    let following = following(linear, &system, &frames);
     widen_scales(problem, &frames, &mut system);
-    let combinations = combinations(problem, lin, &frames);
+    let combinations = combinations(linear, &frames);
     let held = hold(&mut system, combinations, &following);
     let singular =
         |_| Error::unsolved("plate", "the normal equations are singular", "take images of more of the plate");
@@ -88,14 +84,14 @@ pub fn in_frame_by(
 }
 
 /// Poses that follow, of placements and of images without a tie to the robot.
-fn following(problem: &Problem, state: &State, lin: &Linearised, system: &System, frames: &[Frame]) -> Vec<Following> {
+fn following(linear: LinearProblem, system: &System, frames: &[Frame]) -> Vec<Following> {
+    let problem = &linear.adjustment.problem;
     let layout = &problem.layout;
     let mut all = Vec::new();
     let mut placements_done = vec![false; problem.placements.len()];
-    for (k, &i) in lin.images.iter().enumerate() {
-        let image = &problem.images[i];
+    for (k, LinearImage { image, slack, .. }) in linear.images().enumerate() {
         let Some(frame) = frames.iter().find(|f| f.plates.contains(&image.plate)) else { continue };
-        let (pose, by) = if let Slack::Pose(pose) = &state.slack[i] {
+        let (pose, by) = if let Slack::Pose(pose) = slack {
             let place = system.slack_start.get(k).map_or(Place::Slack(k), |s| Place::Reduced(*s));
             (place, frame.pose_by_modes(image.plate, pose))
         } else {
@@ -130,14 +126,14 @@ fn widen_scales(problem: &Problem, frames: &[Frame], system: &mut System) {
 }
 
 /// The combinations of corrections that the frames hold, 3 markers x motions.
-fn combinations(problem: &Problem, lin: &Linearised, frames: &[Frame]) -> DMatrix<f64> {
-    let seen = SeenMarkers::of(problem, lin);
+fn combinations(linear: LinearProblem, frames: &[Frame]) -> DMatrix<f64> {
+    let seen = SeenMarkers::of(linear);
     let motions = frames.iter().map(|f| f.by_modes.nrows()).sum();
     let mut combinations = DMatrix::zeros(3 * seen.order.len(), motions);
     let mut first = 0;
     for frame in frames {
         for (at, &(plate, marker)) in seen.order.iter().enumerate().filter(|(_, m)| frame.seen.contains(m)) {
-            let own = frame.held(problem, plate, marker);
+            let own = frame.held(&linear.adjustment.problem, plate, marker);
             combinations.view_mut((3 * at, first), own.shape()).copy_from(&own);
         }
         first += frame.by_modes.nrows();
@@ -217,9 +213,10 @@ impl InFrame {
 
     /// Covariance of the position (modes and correction, without the scale of the plate) of every marker, per plate. A marker that no
     /// image shows keeps its tolerance; a plate that no image shows its modes, too.
-    pub fn positions(&self, problem: &Problem, state: &State) -> Vec<Vec<Matrix3<f64>>> {
+    pub fn positions(&self, adjustment: &Adjustment) -> Vec<Vec<Matrix3<f64>>> {
+        let Adjustment { problem, state } = adjustment;
         let carried = |plate: usize, marker: usize| match self.frame(plate) {
-            Some(frame) => frame.moved_by_modes(problem, state, (plate, marker)),
+            Some(frame) => frame.moved_by_modes(adjustment, (plate, marker)),
             None => vec![(problem.layout.shapes[plate].start, state.plates[plate].modes_at(marker))],
         };
         let reduced = &self.covariance.reduced;

@@ -1,8 +1,10 @@
 //! Levenberg-Marquardt on the reduced system.
 
-use super::system::{Elimination, Linearised, System, linearise_all, linearise_some};
+use super::fit::Fit;
+use super::linear::{LinearProblem, Linearised};
+use super::system::{Elimination, System};
 use crate::linalg::SymmetricFactor;
-use crate::problem::{Problem, State, Step};
+use crate::problem::{Adjustment, State, Step};
 
 /// Bounds of the iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,12 +39,35 @@ pub enum Status {
 pub struct Outcome {
     /// How it ended.
     pub status: Status,
-    /// Best state.
-    pub state: State,
+    /// The adjustment at its best state.
+    pub adjustment: Adjustment,
     /// Its linearisation; `None` only for a bad start.
     pub linearised: Option<Linearised>,
     /// Steps tried.
     pub iterations: usize,
+}
+
+impl Outcome {
+    /// The linear problem at the best state; `None` only for a bad start.
+    pub fn linear(&self) -> Option<LinearProblem<'_>> {
+        Some(self.adjustment.linear(self.linearised.as_ref()?))
+    }
+
+    /// With its covariance.
+    ///
+    /// # Errors
+    /// Itself, stalled, where the normal equations are singular; as it is after a bad start.
+    pub fn fit(self) -> Result<Fit, Box<Self>> {
+        let covariance = self.linear().map(LinearProblem::covariance);
+        let Self { adjustment, linearised, iterations, .. } = self;
+        match (linearised, covariance) {
+            (Some(linearised), Some(Ok(covariance))) => Ok(Fit { adjustment, linearised, covariance }),
+            (Some(lin), _) => {
+                Err(Box::new(Self { status: Status::Stalled, adjustment, linearised: Some(lin), iterations }))
+            }
+            (None, _) => Err(Box::new(Self { status: Status::BadStart, adjustment, linearised: None, iterations })),
+        }
+    }
 }
 
 const FIRST_LAMBDA: f64 = 1e-6;
@@ -59,6 +84,10 @@ const WORTH_A_STEP: f64 = 0.1;
 /// A model serves for the next step, too, while steps shrink at least this much from one to the next.
 const CONTRACTION: f64 = 0.1;
 
+/// Damping where the information was not positive definite, at least.
+const LAMBDA_IF_SINGULAR: f64 = 1e-3;
+const SMALLEST_LAMBDA: f64 = 1e-12;
+
 /// Quadratic model of the cost.
 struct Model {
     system: System,
@@ -66,15 +95,15 @@ struct Model {
 }
 
 impl Model {
-    fn new(which: Elimination, problem: &Problem, state: &State, lin: &Linearised, lambda: f64) -> Option<Self> {
-        let system = System::with(which, problem, state, lin, lambda);
+    fn new(which: Elimination, linear: LinearProblem, lambda: f64) -> Option<Self> {
+        let system = System::with(which, linear, lambda);
         let factor = SymmetricFactor::new(&system.information).ok()?;
         Some(Self { system, factor })
     }
 
-    fn proposal(&self, problem: &Problem, lin: &Linearised) -> Proposal {
+    fn proposal(&self, linear: LinearProblem) -> Proposal {
         let x = self.factor.solve(&self.system.rhs);
-        Proposal { step: self.system.step(problem, lin, &x), decrement: self.system.decrement(&x), kept: false }
+        Proposal { step: self.system.step(linear, &x), decrement: self.system.decrement(&x), kept: false }
     }
 }
 
@@ -87,29 +116,32 @@ struct Proposal {
 }
 
 /// What proposes the steps.
-struct Proposer<'a> {
-    problem: &'a Problem,
+#[derive(Default)]
+struct Proposer {
     model: Option<Model>,
     /// Decrement of the step before, where that step was taken.
     before: Option<f64>,
 }
 
-impl Proposer<'_> {
+impl Proposer {
     /// The next step; `None` where the information is not positive definite.
-    fn propose(&mut self, state: &State, lin: &Linearised, lambda: f64) -> Option<Proposal> {
-        let problem = self.problem;
+    fn propose(&mut self, linear: LinearProblem, lambda: f64) -> Option<Proposal> {
         if let (Some(mut model), Some(before)) = (self.model.take(), self.before) {
-            model.system.take_gradient(problem, state, lin);
-            let proposal = model.proposal(problem, lin);
+            model.system.take_gradient(linear);
+            let proposal = model.proposal(linear);
             if proposal.decrement < CONTRACTION * before {
                 self.model = Some(model);
                 return Some(Proposal { kept: true, ..proposal });
             }
         }
-        let model = Model::new(Elimination::cheaper(lin, problem), problem, state, lin, lambda)?;
-        let proposal = model.proposal(problem, lin);
+        let model = Model::new(Elimination::cheaper(linear), linear, lambda)?;
+        let proposal = model.proposal(linear);
         self.model = Some(model);
         Some(proposal)
+    }
+
+    fn accepted(&mut self, proposal: &Proposal) {
+        self.before = Some(proposal.decrement);
     }
 
     fn refused(&mut self) {
@@ -117,80 +149,114 @@ impl Proposer<'_> {
     }
 }
 
+/// What the decrement of a step lets expect of it.
+struct Expected {
+    /// It is below the bound: nothing is left to gain.
+    small: bool,
+    /// The next one will be.
+    last: bool,
+    /// Its cost may be larger by rounding.
+    below_rounding: bool,
+}
+
+impl Expected {
+    fn of(decrement: f64, before: Option<f64>, cost: f64, settings: &Settings) -> Self {
+        let small = decrement < settings.decrement;
+        // Gauss-Newton contracts at least linearly: the next step will be shorter by the same factor, or more.
+        let shrunk = before.filter(|b| decrement < 0.1 * b);
+        let next = shrunk.map_or(f64::INFINITY, |b| decrement * decrement / b);
+        Self {
+            small,
+            last: small || next < PREDICTION_MARGIN * settings.decrement,
+            // Where the step promises less than the cost can resolve, the gradient is the better judge.
+            below_rounding: small || decrement * decrement < 10.0 * ROUNDING * cost,
+        }
+    }
+
+    fn accepts(&self, cost: f64, before: f64) -> bool {
+        cost <= before || (self.below_rounding && cost <= before * (1.0 + ROUNDING))
+    }
+}
+
+/// More damping.
+fn raised(lambda: f64, least: f64) -> f64 {
+    (lambda * 10.0).max(least)
+}
+
+/// Takes a step; returns the state before.
+fn take_step(adjustment: &mut Adjustment, step: &Step) -> State {
+    let moved = adjustment.state.moved(&adjustment.problem.layout, step);
+    std::mem::replace(&mut adjustment.state, moved)
+}
+
 /// Comes close to the optimum with some of the observations, no marker moved; returns how many steps were tried. A good start stays as it is.
-fn approach(problem: &Problem, state: &mut State, most: usize) -> usize {
+fn approach(adjustment: &mut Adjustment, most: usize) -> usize {
     let mut lambda = FIRST_LAMBDA;
-    let Some(mut lin) = linearise_some(problem, state, ENOUGH) else { return 0 };
+    let Some(mut lin) = adjustment.linearise_some(ENOUGH) else { return 0 };
     for tried in 0..most {
-        let model = Model::new(Elimination::SlackMarkersHeld, problem, state, &lin, lambda);
-        let Some(Proposal { step, decrement, .. }) = model.map(|m| m.proposal(problem, &lin)) else { return tried };
+        let linear = adjustment.linear(&lin);
+        let model = Model::new(Elimination::SlackMarkersHeld, linear, lambda);
+        let Some(Proposal { step, decrement, .. }) = model.map(|m| m.proposal(linear)) else { return tried };
         if 0.5 * decrement * decrement < WORTH_A_STEP * lin.cost {
             return tried;
         }
-        let moved = state.moved(&problem.layout, &step);
-        match linearise_some(problem, &moved, ENOUGH).filter(|better| better.cost < lin.cost) {
+        let before = take_step(adjustment, &step);
+        match adjustment.linearise_some(ENOUGH).filter(|better| better.cost < lin.cost) {
             Some(better) => {
-                (*state, lin) = (moved, better);
+                lin = better;
                 lambda *= 0.1;
             }
-            None => lambda = (lambda * 10.0).max(FIRST_LAMBDA),
+            None => {
+                adjustment.state = before;
+                lambda = raised(lambda, FIRST_LAMBDA);
+            }
         }
     }
     most
 }
 
-/// Minimises the cost from `start`.
-pub fn solve(problem: &Problem, start: State, settings: &Settings) -> Outcome {
-    let mut state = start.clone();
-    let mut iterations = approach(problem, &mut state, settings.iterations);
-    let mut linearised = linearise_all(problem, &state);
-    if linearised.is_none() {
-        state = start;
-        linearised = linearise_all(problem, &state);
-    }
+/// Minimises the cost from where the adjustment stands.
+pub fn solve(mut adjustment: Adjustment, settings: &Settings) -> Outcome {
+    let start = adjustment.state.clone();
+    let mut iterations = approach(&mut adjustment, settings.iterations);
+    let linearised = adjustment.linearise().or_else(|| {
+        adjustment.state = start;
+        adjustment.linearise()
+    });
     let Some(mut lin) = linearised else {
-        return Outcome { status: Status::BadStart, state, linearised: None, iterations };
+        return Outcome { status: Status::BadStart, adjustment, linearised: None, iterations };
     };
     let mut lambda = FIRST_LAMBDA;
     let mut status = Status::OutOfIterations;
-    let mut proposer = Proposer { problem, model: None, before: None };
+    let mut proposer = Proposer::default();
     while iterations < settings.iterations && lambda <= LARGEST_LAMBDA {
         iterations += 1;
-        let Some(Proposal { step, decrement, kept }) = proposer.propose(&state, &lin, lambda) else {
-            lambda = (lambda * 10.0).max(1e-3);
+        let Some(proposal) = proposer.propose(adjustment.linear(&lin), lambda) else {
+            lambda = raised(lambda, LAMBDA_IF_SINGULAR);
             continue;
         };
-        let moved = state.moved(&problem.layout, &step);
-        let tried = linearise_all(problem, &moved);
+        let Proposal { decrement, kept, .. } = proposal;
+        let expected = Expected::of(decrement, proposer.before, lin.cost, settings);
+        let before = take_step(&mut adjustment, &proposal.step);
+        let tried = adjustment.linearise();
         tracing::trace!(iterations, kept, lambda, decrement, from = lin.cost, to = tried.as_ref().map(|t| t.cost));
-        let small = decrement < settings.decrement;
-        // Gauss-Newton contracts at least linearly: the next step will be shorter by the same factor, or more.
-        let shrunk = proposer.before.filter(|b| decrement < 0.1 * b);
-        let next = shrunk.map_or(f64::INFINITY, |b| decrement * decrement / b);
-        let last = small || next < PREDICTION_MARGIN * settings.decrement;
-        // Where the step promises less than the cost can resolve, the gradient is the better judge.
-        let below_rounding = small || decrement * decrement < 10.0 * ROUNDING * lin.cost;
-        match tried {
-            Some(better)
-                if better.cost <= lin.cost || (below_rounding && better.cost <= lin.cost * (1.0 + ROUNDING)) =>
-            {
-                (state, lin) = (moved, better);
-                proposer.before = Some(decrement);
-                lambda = (lambda * 0.1).max(1e-12);
-                if last {
-                    status = Status::Converged;
-                    break;
-                }
-            }
-            _ if small => {
+        if let Some(better) = tried.filter(|t| expected.accepts(t.cost, lin.cost)) {
+            lin = better;
+            proposer.accepted(&proposal);
+            lambda = (lambda * 0.1).max(SMALLEST_LAMBDA);
+            if expected.last {
                 status = Status::Converged;
                 break;
             }
-            _ => {
-                proposer.refused();
-                if !kept {
-                    lambda = (lambda * 10.0).max(1e-6);
-                }
+        } else {
+            adjustment.state = before;
+            if expected.small {
+                status = Status::Converged;
+                break;
+            }
+            proposer.refused();
+            if !kept {
+                lambda = raised(lambda, FIRST_LAMBDA);
             }
         }
     }
@@ -198,5 +264,5 @@ pub fn solve(problem: &Problem, start: State, settings: &Settings) -> Outcome {
         status = Status::Stalled;
     }
     tracing::debug!(iterations, ?status, cost = lin.cost, "levenberg-marquardt");
-    Outcome { status, state, linearised: Some(lin), iterations }
+    Outcome { status, adjustment, linearised: Some(lin), iterations }
 }

@@ -7,10 +7,13 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::components::SHRINKAGE;
-use super::covariance::{Covariance, covariance_by};
-use super::system::{Elimination, Linearised};
+use super::covariance::Covariance;
+use super::fit::Fit;
+use super::linear::LinearImage;
+use super::system::Elimination;
 use crate::linalg::SymmetricFactor;
-use crate::problem::{Problem, Slack, State};
+use crate::problem::{Adjustment, Noise, Slack};
+use crate::urdf::JointKind;
 
 /// Latents up to which those of different images are taken together; of more, their coupling through the parameters is
 /// a small part, and leaving it out states too large a spread.
@@ -66,16 +69,12 @@ pub(super) struct Latent {
 }
 
 /// The information at a solution; `None` without joint noise, or where the data do not tell it at all.
-pub fn noise_information(
-    problem: &Problem,
-    state: &State,
-    lin: &Linearised,
-    cov: &Covariance,
-) -> Option<NoiseInformation> {
+pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
+    let (linear, Adjustment { problem, state }, cov) = (fit.linear(), &fit.adjustment, &fit.covariance);
     let (readings, series) = (state.robot.chain.readings.len(), problem.noise.joint.len());
-    let slack: usize = lin.images.iter().map(|&i| state.slack[i].len()).sum();
+    let slack: usize = linear.images().map(|i| i.slack.len()).sum();
     let coupled = if cov.system.slack_start.is_empty() && slack <= MOST_COUPLED {
-        Some(covariance_by(Elimination::Markers, problem, state, lin).ok()?)
+        Some(linear.covariance_by(Elimination::Markers).ok()?)
     } else {
         None
     };
@@ -90,12 +89,12 @@ pub fn noise_information(
         }
     };
     let first = series * readings;
-    let locals = local_latents(problem, state, cov, first);
+    let locals = local_latents(&fit.adjustment, |c| cov.system.touched(c), first);
     for a in &locals {
         locals.iter().for_each(|b| add(a, b, cov.reduced[(a.row, b.row)]));
     }
     let mut together = Vec::new();
-    let of_images: Vec<Vec<Latent>> = (0..lin.images.len()).map(|k| image_latents(problem, state, lin, k)).collect();
+    let of_images: Vec<Vec<Latent>> = linear.images().map(|image| image_latents(&fit.adjustment, image)).collect();
     if cov.system.slack_start.is_empty() {
         for (k, own) in of_images.iter().enumerate() {
             let c = cov.slack(k, own.len());
@@ -120,7 +119,7 @@ pub fn noise_information(
     let of_touched =
         |m: &DMatrix<f64>| DMatrix::from_fn(touched.len(), touched.len(), |a, b| m[(touched[a], touched[b])]);
     let from_data = of_touched(&information);
-    draw_together(problem, state, &variances, &touched, &mut information);
+    draw_together(&problem.noise, &state.robot.chain.reading_kinds, &variances, &touched, &mut information);
     let factor = SymmetricFactor::new(&of_touched(&information)).ok().filter(|_| !touched.is_empty())?;
     let covariance = factor.inverse();
     let scatter = &covariance * from_data * &covariance;
@@ -128,9 +127,13 @@ pub fn noise_information(
     Some(NoiseInformation { readings, series, locals, variances, covariance, touched, scatter, together, coupled })
 }
 
-fn local_latents(problem: &Problem, state: &State, cov: &Covariance, first: usize) -> Vec<Latent> {
+fn local_latents(
+    Adjustment { problem, state }: &Adjustment,
+    touched: impl Fn(usize) -> bool,
+    first: usize,
+) -> Vec<Latent> {
     let terms = problem.layout.terms.start;
-    let used = problem.layout.locals.clone().filter(|&c| cov.system.touched(c) && problem.layout.columns[c].free);
+    let used = problem.layout.locals.clone().filter(|&c| touched(c) && problem.layout.columns[c].free);
     let latent = |c: usize| {
         let reading = state.robot.terms[c - terms].reading;
         Latent { row: c, sigma: problem.noise.local[reading], parts: [(first + reading, 1.0), (first + reading, 0.0)] }
@@ -138,10 +141,9 @@ fn local_latents(problem: &Problem, state: &State, cov: &Covariance, first: usiz
     used.map(latent).filter(|l| l.sigma > 0.0).collect()
 }
 
-/// Latents of the k-th image in use, numbered within it.
-fn image_latents(problem: &Problem, state: &State, lin: &Linearised, k: usize) -> Vec<Latent> {
-    let image = &problem.images[lin.images[k]];
-    let Slack::Joints(dq) = &state.slack[lin.images[k]] else { return Vec::new() };
+/// Latents of an image, numbered within it.
+fn image_latents(Adjustment { problem, state }: &Adjustment, own: LinearImage) -> Vec<Latent> {
+    let LinearImage { image, slack: Slack::Joints(dq), .. } = own else { return Vec::new() };
     let n = state.robot.chain.readings.len();
     let first = problem.noise.joint.len() * n;
     let latent = |row: usize| {
@@ -157,15 +159,14 @@ fn image_latents(problem: &Problem, state: &State, lin: &Linearised, k: usize) -
 /// series, this and the tilt to that of all series, local errors to that of all readings of the kind, in which every variance counts with its size and its
 /// information.
 fn draw_together(
-    problem: &Problem,
-    state: &State,
+    noise: &Noise,
+    kinds: &[JointKind],
     variances: &[f64],
     touched: &[usize],
     information: &mut DMatrix<f64>,
 ) {
-    let kinds = &state.robot.chain.reading_kinds;
-    let (n, series) = (kinds.len(), problem.noise.joint.len());
-    let is_local = |r: usize| problem.noise.local.get(r).is_some_and(|s| *s > 0.0);
+    let (n, series) = (kinds.len(), noise.joint.len());
+    let is_local = |r: usize| noise.local.get(r).is_some_and(|s| *s > 0.0);
     let weight: Vec<f64> = variances.iter().enumerate().map(|(c, v)| v * information[(c, c)]).collect();
     let mean = |of: &[(usize, f64)]| {
         let of: Vec<_> = of.iter().filter(|(c, _)| touched.contains(c)).collect();
@@ -177,7 +178,7 @@ fn draw_together(
     let mut drawn = Vec::new();
     let mut draw = |from: &[(usize, f64)], to: &[(usize, f64)]| drawn.extend(mean(from).zip(mean(to)));
     let alone = |c: &usize| [(*c, 1.0)];
-    for group in problem.noise.groups(kinds) {
+    for group in noise.groups(kinds) {
         let own_of = |s: usize| group.iter().map(|r| s * n + r).collect::<Vec<_>>();
         let level_of = |s: usize| own_of(s).into_iter().map(|c| (c, 1.0)).collect::<Vec<_>>();
         let overall: Vec<_> = (0..series).flat_map(level_of).collect();
@@ -194,7 +195,7 @@ fn draw_together(
             local.iter().for_each(|c| draw(&alone(c), &common));
         }
     }
-    let tilts: Vec<usize> = (series * n + problem.noise.local.len()..variances.len()).collect();
+    let tilts: Vec<usize> = (series * n + noise.local.len()..variances.len()).collect();
     let all: Vec<_> = tilts.iter().flat_map(alone).collect();
     tilts.iter().for_each(|c| draw(&alone(c), &all));
     for (from, to) in drawn {

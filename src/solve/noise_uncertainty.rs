@@ -5,10 +5,9 @@
 use nalgebra::DMatrix;
 
 use super::components::JOINT_NOISE_FLOOR;
-use super::covariance::Covariance;
+use super::fit::Fit;
 use super::noise_information::{Latent, NoiseInformation};
 use crate::linalg::{SymmetricFactor, product};
-use crate::problem::Problem;
 
 /// Standard deviation of the logarithm of a variance up to which terms of second order mean anything; what the data do not tell at all, as
 /// the local error of a joint that never moved, would else be stated as an error of any size.
@@ -26,10 +25,10 @@ pub struct NoiseUncertainty {
 }
 
 impl NoiseUncertainty {
-    /// Beside the covariance `cov`; none where all variances count as known, and for so many images that it is nothing beside the
+    /// Beside the covariance of a fit; none where all variances count as known, and for so many images that it is nothing beside the
     /// rest. A variance at its floor counts as known.
-    pub fn of(told: &NoiseInformation, problem: &Problem, cov: &Covariance) -> Option<Self> {
-        let cov = told.coupled.as_ref().unwrap_or(cov);
+    pub fn of(told: &NoiseInformation, fit: &Fit) -> Option<Self> {
+        let cov = told.coupled.as_ref().unwrap_or(&fit.covariance);
         let place = |c: usize| {
             let is_estimated = told.variances[c] > JOINT_NOISE_FLOOR * JOINT_NOISE_FLOOR;
             told.touched.iter().position(|t| *t == c).filter(|_| is_estimated)
@@ -57,7 +56,7 @@ impl NoiseUncertainty {
             products.map(|(a, b, weight)| weight * bounded(a) * bounded(b) * told.scatter[(a, b)]).sum::<f64>()
         };
         let columns =
-            DMatrix::from_fn(problem.layout.len(), n, |c, i| cov.reduced[(c, latents[i].row)] / latents[i].sigma);
+            DMatrix::from_fn(fit.problem.layout.len(), n, |c, i| cov.reduced[(c, latents[i].row)] / latents[i].sigma);
         Some(Self { columns, shared: DMatrix::from_fn(n, n, shared), left: scaled(&cov.reduced, -1) + at_known })
     }
 

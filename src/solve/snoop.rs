@@ -1,9 +1,7 @@
 //! Rejection with reasons: single observations by their residual, whole images by the joint error that they would need.
 
-use super::levenberg::Outcome;
-use crate::problem::{
-    ImageRejection, Mismatch, ObservationRejection, Problem, Slack, State, Weighting, chained, predict,
-};
+use crate::model::robot::Robot;
+use crate::problem::{Adjustment, Image, ImageRejection, Mismatch, ObservationRejection, Slack, Weighting, predict};
 
 /// Normalised residual length beyond which an observation is left out (a clean one is so with probability 4e-5).
 const OBSERVATION_BOUND: f64 = 4.5;
@@ -17,12 +15,11 @@ const IMAGE_BOUND: f64 = 8.0;
 /// Smallest robust sigma of a joint that is believed in this test, rad or m.
 const IMAGE_SIGMA_FLOOR: f64 = 1e-4;
 
-/// Re-judges every observation at the outcome; returns how many verdicts changed.
-pub fn reject_observations(problem: &mut Problem, outcome: &Outcome) -> usize {
-    let state = &outcome.state;
+/// Re-judges every observation at the estimates; returns how many verdicts changed.
+pub fn reject_observations(Adjustment { problem, state }: &mut Adjustment) -> usize {
     let mut verdicts = Vec::new();
     for (i, image) in problem.used() {
-        let Some(chain) = chained(problem, state, image, &state.slack[i]) else { continue };
+        let Some(chain) = state.chained(&problem.layout, image, &state.slack[i]) else { continue };
         let w = Weighting::of(problem, image);
         for (k, o) in image.observations.iter().enumerate() {
             if o.rejected.is_some_and(|r| r != ObservationRejection::Residual) {
@@ -44,17 +41,18 @@ pub fn reject_observations(problem: &mut Problem, outcome: &Outcome) -> usize {
 }
 
 /// Noise and local error of every reading at a stop, rad or m.
-fn whole_error(problem: &Problem, state: &State, image: usize, noise: &[f64]) -> Vec<f64> {
-    let local = problem.images[image].stop.as_ref().map(|s| state.robot.local_errors(s)).unwrap_or_default();
+fn whole_error(robot: &Robot, image: &Image, noise: &[f64]) -> Vec<f64> {
+    let local = image.stop.as_ref().map(|s| robot.local_errors(s)).unwrap_or_default();
     noise.iter().zip(local).map(|(n, l)| n + l).collect()
 }
 
 /// Leaves out the image whose readings fit it worst, where they do not fit at all; returns its index.
-pub fn reject_images(problem: &mut Problem, outcome: &Outcome) -> Option<usize> {
+pub fn reject_images(adjustment: &mut Adjustment) -> Option<usize> {
+    let robot = &adjustment.state.robot;
     let mut noise = Vec::new();
-    for (i, _) in problem.used() {
-        if let Slack::Joints(dq) = &outcome.state.slack[i] {
-            noise.push((i, whole_error(problem, &outcome.state, i, dq)));
+    for (i, image, slack) in adjustment.used() {
+        if let Slack::Joints(dq) = slack {
+            noise.push((i, whole_error(robot, image, dq)));
         }
     }
     let joints = noise.first()?.1.len();
@@ -73,11 +71,8 @@ pub fn reject_images(problem: &mut Problem, outcome: &Outcome) -> Option<usize> 
     }
     let (joint, error) =
         dq.iter().enumerate().max_by(|a, b| (a.1 / sigma[a.0]).abs().total_cmp(&(b.1 / sigma[b.0]).abs()))?;
-    let reading = &outcome.state.robot.chain.readings[joint];
-    problem.images[*worst].rejected = Some(ImageRejection::WronglyPaired(Mismatch::JointError {
-        usual_errors: score(dq),
-        joint: reading.clone(),
-        error: *error,
-    }));
+    let rejection =
+        Mismatch::JointError { usual_errors: score(dq), joint: robot.chain.readings[joint].clone(), error: *error };
+    adjustment.problem.images[*worst].rejected = Some(ImageRejection::WronglyPaired(rejection));
     Some(*worst)
 }

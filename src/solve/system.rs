@@ -1,76 +1,13 @@
 //! Reduced normal equations: dense columns, and either the slack of the images or the markers; the other family is eliminated.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
-use rayon::prelude::*;
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix};
 
 use super::blocks::SeenMarkers;
 use super::by_markers::MarkersEliminated;
 use super::by_slack::SlackEliminated;
+use super::linear::LinearProblem;
 use crate::model::plate_modes::MODES;
-use crate::problem::{
-    Chained, Equations, ImageTerms, Problem, State, Step, Weighting, chained_from, equations, linearise,
-};
-
-/// All images linearised at one state.
-#[derive(Debug, Clone)]
-pub struct Linearised {
-    /// Indices of the images in use.
-    pub images: Vec<usize>,
-    /// Pixel blocks of each image in use.
-    pub terms: Vec<ImageTerms>,
-    /// Chain of each image in use.
-    pub chains: Vec<Chained>,
-    /// Robust cost of the pixels plus half the squares of priors and slack.
-    pub cost: f64,
-}
-
-impl Linearised {
-    /// Equations of the k-th image in use at the state that was linearised; `None` only at another one.
-    pub fn equations(&self, problem: &Problem, state: &State, k: usize) -> Option<Equations> {
-        let image = &problem.images[self.images[k]];
-        equations(image, state, &self.chains[k].pose, &Weighting::of(problem, image))
-    }
-}
-
-/// Linearises every image in use; `None` where a marker lies behind a camera.
-pub fn linearise_all(problem: &Problem, state: &State) -> Option<Linearised> {
-    linearise_some(problem, state, usize::MAX)
-}
-
-/// As [`linearise_all`] with about `enough` observations of every image, evenly chosen.
-pub(super) fn linearise_some(problem: &Problem, state: &State, enough: usize) -> Option<Linearised> {
-    let images: Vec<usize> = problem.used().map(|(i, _)| i).collect();
-    let origins = state.robot.moved_origins();
-    let parts: Option<Vec<(ImageTerms, Chained)>> = images
-        .par_iter()
-        .map(|&i| {
-            let image = &problem.images[i];
-            let chain = chained_from(&origins, problem, state, image, &state.slack[i])?;
-            let weighting = Weighting::of(problem, image).thinned(image, enough);
-            let terms = linearise(image, state, &chain.pose, &weighting)?;
-            Some((terms, chain))
-        })
-        .collect();
-    let (terms, chains): (Vec<_>, Vec<_>) = parts?.into_iter().unzip();
-    let pixels: f64 = terms.iter().map(|t| t.cost).sum();
-    let cost = pixels + prior_cost(problem, state, &images);
-    cost.is_finite().then_some(Linearised { images, terms, chains, cost })
-}
-
-fn prior_cost(problem: &Problem, state: &State, images: &[usize]) -> f64 {
-    let values = state.values(&problem.layout);
-    let dense: f64 = (problem.layout.columns.iter().zip(values.iter()))
-        .map(|(c, v)| ((v - c.prior_mean) / c.prior_sigma).powi(2))
-        .sum();
-    let held: f64 = problem.families.iter().map(|f| f.squares(&values)).sum();
-    let corrections = state.plates.iter().enumerate().flat_map(|(p, shape)| {
-        let of = move |(m, c): (usize, &Vector3<f64>)| c.norm_squared() * problem.marker_information(p, m);
-        shape.corrections.iter().enumerate().map(of)
-    });
-    let markers: f64 = corrections.sum();
-    let slack: f64 = images.iter().map(|&i| problem.slack_squares(&problem.images[i], &state.slack[i])).sum();
-    0.5 * (dense + held + markers + slack)
-}
+use crate::problem::{Adjustment, Problem, Step};
 
 /// Which family of unknowns is eliminated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,7 +22,8 @@ pub enum Elimination {
 
 impl Elimination {
     /// The cheaper one: the one that leaves fewer unknowns.
-    pub fn cheaper(lin: &Linearised, problem: &Problem) -> Self {
+    pub fn cheaper(linear: LinearProblem) -> Self {
+        let (problem, lin) = (&linear.adjustment.problem, linear.lin);
         let slack: usize = lin.chains.iter().map(|c| c.d_slack.ncols()).sum();
         let markers: usize = problem.plates.iter().map(|p| 3 * p.markers.len()).sum();
         if slack > markers { Self::Slack } else { Self::Markers }
@@ -118,21 +56,22 @@ pub struct System {
 impl System {
     /// Builds the system at a linearisation by the cheaper elimination, with Levenberg-Marquardt damping `lambda` on the
     /// scaled diagonal.
-    pub fn new(problem: &Problem, state: &State, lin: &Linearised, lambda: f64) -> Self {
-        Self::with(Elimination::cheaper(lin, problem), problem, state, lin, lambda)
+    pub fn new(linear: LinearProblem, lambda: f64) -> Self {
+        Self::with(Elimination::cheaper(linear), linear, lambda)
     }
 
     /// As [`System::new`] by a given elimination.
-    pub fn with(which: Elimination, problem: &Problem, state: &State, lin: &Linearised, lambda: f64) -> Self {
+    pub fn with(which: Elimination, linear: LinearProblem, lambda: f64) -> Self {
+        let problem = &linear.adjustment.problem;
         let (information, eliminated) = match which {
             Elimination::Markers => {
-                let (a, rest) = MarkersEliminated::build(problem, state, lin, lambda);
+                let (a, rest) = MarkersEliminated::build(linear, lambda);
                 (a, Eliminated::Markers(rest))
             }
             Elimination::Slack | Elimination::SlackMarkersHeld => {
                 let held = which == Elimination::SlackMarkersHeld;
-                let seen = if held { SeenMarkers::none(problem) } else { SeenMarkers::of(problem, lin) };
-                let (a, rest) = SlackEliminated::build(problem, state, lin, lambda, seen);
+                let seen = if held { SeenMarkers::none(problem) } else { SeenMarkers::of(linear) };
+                let (a, rest) = SlackEliminated::build(linear, lambda, seen);
                 (a, Eliminated::Slack(rest))
             }
         };
@@ -144,15 +83,16 @@ impl System {
             system.information[(i, i)] *= 1.0 + lambda;
         }
         system.hold_fixed(problem);
-        system.take_gradient(problem, state, lin);
+        system.take_gradient(linear);
         system
     }
 
     /// Takes over the right-hand sides at another linearisation; the information stays.
-    pub fn take_gradient(&mut self, problem: &Problem, state: &State, lin: &Linearised) {
+    pub fn take_gradient(&mut self, linear: LinearProblem) {
+        let Adjustment { problem, state } = linear.adjustment;
         self.rhs = match &mut self.eliminated {
-            Eliminated::Markers(e) => e.reduce_gradient(problem, state, lin),
-            Eliminated::Slack(e) => e.reduce_gradient(problem, state, lin),
+            Eliminated::Markers(e) => e.reduce_gradient(linear),
+            Eliminated::Slack(e) => e.reduce_gradient(linear),
         };
         let values = state.values(&problem.layout);
         for (i, c) in problem.layout.columns.iter().enumerate() {
@@ -206,10 +146,10 @@ impl System {
     }
 
     /// The whole step from the solution `x` of the reduced system.
-    pub fn step(&self, problem: &Problem, lin: &Linearised, x: &DVector<f64>) -> Step {
+    pub fn step(&self, linear: LinearProblem, x: &DVector<f64>) -> Step {
         match &self.eliminated {
-            Eliminated::Markers(e) => e.step(problem, lin, x),
-            Eliminated::Slack(e) => e.step(problem, lin, x),
+            Eliminated::Markers(e) => e.step(linear, x),
+            Eliminated::Slack(e) => e.step(linear, x),
         }
     }
 
@@ -235,20 +175,6 @@ impl System {
     /// Covariance of the correction of every marker that was seen, per plate and marker.
     pub fn marker_covariances(&self, reduced: &DMatrix<f64>) -> Vec<Vec<Option<Matrix3<f64>>>> {
         self.marker_covariances_with(reduced, None)
-    }
-
-    /// Covariance of the position (plate modes and correction) of every marker that was seen, per plate and marker.
-    pub fn position_covariances(
-        &self,
-        problem: &Problem,
-        state: &State,
-        reduced: &DMatrix<f64>,
-    ) -> Vec<Vec<Option<Matrix3<f64>>>> {
-        let carried = |plate: usize, marker: usize| {
-            let shape = &state.plates[plate];
-            vec![(problem.layout.shapes[plate].start, shape.modes_at(marker))]
-        };
-        self.marker_covariances_with(reduced, Some(&carried))
     }
 
     pub(super) fn marker_covariances_with(

@@ -8,7 +8,7 @@ use crate::assess::{Ratio, bootstrap_ratio, median, root_mean_square};
 use crate::error::{Error, Result};
 use crate::geom::{Pose, adjoint};
 use crate::identify::{Estimator, PoseStage, RobotModel, TruthError, build, estimate_all, truth_error};
-use crate::problem::{Problem, Slack, State, chained};
+use crate::problem::{Adjustment, Slack};
 use crate::series::{Plate, PlateKind};
 use crate::simulate::{SimulatedSeries, WorldRequest, series};
 use crate::urdf::Chain;
@@ -137,14 +137,15 @@ fn world(
 }
 
 /// The problem of a world, started at the true camera and poses with the nominal robot.
-fn problem(request: &StudyRequest, world: &SimulatedSeries) -> Result<(Problem, State)> {
+fn started(request: &StudyRequest, world: &SimulatedSeries) -> Result<Adjustment> {
     let robot = RobotModel::Rigid.robot(request.chain.clone());
-    let (problem, mut state) = build(&robot, &[measured(world, &request.chain)], true)?;
+    let mut start = build(&robot, &[measured(world, &request.chain)], true)?;
+    let state = &mut start.state;
     state.cameras = vec![world.truth.camera.clone()];
     state.mountings = vec![world.truth.camera_pose.pose()];
     state.placements = world.truth.plate_poses.values().map(|p| p.pose()).collect();
     state.slack = world.truth.stops.iter().map(|s| Slack::Pose(s.camera_from_plate.pose())).collect();
-    Ok((problem, state))
+    Ok(start)
 }
 
 /// Position sigma of a free pose (m), and position sigma of the camera per rad of joint noise (m), medians over images.
@@ -157,13 +158,14 @@ struct Scale {
 fn reference(request: &StudyRequest, lattice: (u32, u32)) -> Result<Scale> {
     let unsolved =
         || Error::unsolved("study", "the free poses of the reference world do not converge", "take more markers");
-    let (problem, state) = problem(request, &world(request, lattice, 0.0, 1)?)?;
-    let stage = PoseStage::adjusted(&problem, &state).ok_or_else(unsolved)?;
+    let start = started(request, &world(request, lattice, 0.0, 1)?)?;
+    let Adjustment { problem, state } = &start;
+    let stage = PoseStage::adjusted(&start).ok_or_else(unsolved)?;
     let (mut poses, mut levers) = (Vec::new(), Vec::new());
     for (k, &i) in stage.images.iter().enumerate() {
         let image = &problem.images[i];
         let joints = vec![0.0; request.chain.readings.len()];
-        let Some(chain) = chained(&problem, &state, image, &Slack::Joints(joints)) else { continue };
+        let Some(chain) = state.chained(&problem.layout, image, &Slack::Joints(joints)) else { continue };
         let block = stage.covariance.view((6 * k, 6 * k), (6, 6)).into_owned();
         let position = |pose: &Pose, c: nalgebra::DMatrix<f64>| {
             let ad = adjoint(pose);
@@ -182,9 +184,9 @@ fn cell(request: &StudyRequest, lattice: (u32, u32), ratio: f64, scale: Scale) -
         .into_par_iter()
         .map(|seed| {
             let world = world(request, lattice, joint_noise_rad, seed)?;
-            let (problem, state) = problem(request, &world)?;
+            let start = started(request, &world)?;
             let mut errors = [None; 6];
-            for (slot, (_, estimate)) in errors.iter_mut().zip(estimate_all(&problem, &state)) {
+            for (slot, (_, estimate)) in errors.iter_mut().zip(estimate_all(&start)) {
                 *slot = match estimate {
                     Some(e) => truth_error(&e.state, &world.truth)?,
                     None => None,

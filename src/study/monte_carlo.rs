@@ -20,16 +20,15 @@ use rayon::prelude::*;
 use super::simulated::measured;
 use crate::assess::NORMAL_95;
 use crate::error::Result;
+use crate::fit::Fit;
 use crate::geom::Pose;
 use crate::identify::{Options, RobotModel, Solution, identify};
 use crate::linalg::SymmetricFactor;
 use crate::model::robot::{Robot, Stop};
-use crate::problem::{Problem, Slack, State, chained};
+use crate::problem::{Adjustment, Problem, Slack, State};
 use crate::series::{Plate, PlateKind};
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
-use crate::solve::{
-    JOINT_NOISE_FLOOR, NoiseUncertainty, Settings, covariance, linearise_all, noise_information, solve,
-};
+use crate::solve::{JOINT_NOISE_FLOOR, NoiseUncertainty, Settings, noise_information, solve};
 use crate::urdf::{Chain, JointKind};
 
 /// What is tried.
@@ -176,25 +175,24 @@ fn judged(s: &Solution, world: &SimulatedSeries, chain: &Chain) -> Result<Option
     let truth = world.truth.robot(chain)?;
     let columns = robot_columns(s, &truth);
     let half_way = half_way_to_truth(s, &columns);
-    let robot_by = |problem: &Problem, joint_noise_is_estimated: bool| {
-        let lin = linearise_all(problem, &half_way)?;
-        let mut stated = covariance(problem, &half_way, &lin).ok()?;
+    let robot_by = |problem: Problem, joint_noise_is_estimated: bool| {
+        let mut stated = fit_at(Adjustment { problem, state: half_way.clone() })?;
         if !joint_noise_is_estimated {
-            return normalised(&robot_error(s, &columns, &stated.reduced));
+            return normalised(&robot_error(s, &columns, &stated.covariance.reduced));
         }
-        let told = noise_information(problem, &half_way, &lin, &stated)?;
-        let uncertainty = NoiseUncertainty::of(&told, problem, &stated);
-        uncertainty.iter().for_each(|u| stated.add(&u.added()));
-        let error = robot_error(s, &columns, &stated.reduced);
+        let told = noise_information(&stated)?;
+        let uncertainty = NoiseUncertainty::of(&told, &stated);
+        uncertainty.iter().for_each(|u| stated.covariance.add(&u.added()));
+        let error = robot_error(s, &columns, &stated.covariance.reduced);
         let places: Vec<usize> = columns.iter().map(|(c, _)| *c).collect();
         let common = uncertainty.map_or(Some(0.0), |u| u.of_normalised(&places, &error.1))?;
         normalised(&error).map(|n| Normalised { half_variance: n.half_variance + 0.5 * common, ..n })
     };
     let blocks = [
-        robot_by(&s.problem, true),
-        robot_by(&with_joint_noise(&s.problem, &world.truth.joint_noise_sigma), false),
-        normalised(&robot_error(s, &columns, &s.covariance.reduced)),
-        Some(single(&robot_error(s, &columns, &s.covariance.reduced))),
+        robot_by(s.fit.problem.clone(), true),
+        robot_by(with_joint_noise(&s.fit.problem, &world.truth.joint_noise_sigma), false),
+        normalised(&robot_error(s, &columns, &s.fit.covariance.reduced)),
+        Some(single(&robot_error(s, &columns, &s.fit.covariance.reduced))),
         normalised(&camera_error(s, world)),
         normalised(&mounting_error(s, world)),
         plate_error(s, world).and_then(|e| normalised(&e)),
@@ -247,11 +245,11 @@ fn single((error, covariance): &ErrorWithCovariance) -> Normalised {
 
 /// Columns of the robot with their true values.
 fn robot_columns(s: &Solution, truth: &Robot) -> Vec<(usize, f64)> {
-    let layout = &s.problem.layout;
+    let layout = &s.fit.problem.layout;
     let moving = truth.chain.joints.iter().enumerate().filter(|(_, j)| j.kind != JointKind::Fixed);
     let twists = moving.flat_map(|(k, _)| (0..6).map(move |a| (k, a)));
     let twists = twists.map(|(k, a)| (layout.twists.start + 6 * k + a, truth.twists[k][a]));
-    let terms = s.state.robot.terms.iter().take(layout.locals.start - layout.terms.start).enumerate();
+    let terms = s.fit.state.robot.terms.iter().take(layout.locals.start - layout.terms.start).enumerate();
     let terms = terms.map(|(k, t)| {
         let value = truth.terms.iter().find(|u| (u.reading, u.term) == (t.reading, t.term)).map_or(0.0, |u| u.value);
         (layout.terms.start + k, value)
@@ -260,7 +258,7 @@ fn robot_columns(s: &Solution, truth: &Robot) -> Vec<(usize, f64)> {
 }
 
 fn robot_error(s: &Solution, columns: &[(usize, f64)], reduced: &DMatrix<f64>) -> ErrorWithCovariance {
-    let estimates = s.state.values(&s.problem.layout);
+    let estimates = s.fit.state.values(&s.fit.problem.layout);
     let n = columns.len();
     let error = DVector::from_iterator(n, columns.iter().map(|&(c, value)| estimates[c] - value));
     (error, DMatrix::from_fn(n, n, |i, k| reduced[(columns[i].0, columns[k].0)]))
@@ -268,13 +266,21 @@ fn robot_error(s: &Solution, columns: &[(usize, f64)], reduced: &DMatrix<f64>) -
 
 /// The robot half-way to the truth, and everything else adjusted to that.
 fn half_way_to_truth(s: &Solution, columns: &[(usize, f64)]) -> State {
-    let (mut held, mut state) = (s.problem.clone(), s.state.clone());
-    let estimates = state.values(&held.layout);
+    let mut held = s.fit.adjustment.clone();
+    let Adjustment { problem, state } = &mut held;
+    let estimates = state.values(&problem.layout);
     for &(c, value) in columns {
-        state.set_value(&held.layout, c, 0.5 * (estimates[c] + value));
-        held.layout.columns[c].free = false;
+        state.set_value(&problem.layout, c, 0.5 * (estimates[c] + value));
+        problem.layout.columns[c].free = false;
     }
-    solve(&held, state, &Settings::default()).state
+    solve(held, &Settings::default()).adjustment.state
+}
+
+/// What is known where the adjustment stands, nothing solved.
+fn fit_at(adjustment: Adjustment) -> Option<Fit> {
+    let linearised = adjustment.linearise()?;
+    let covariance = adjustment.linear(&linearised).covariance().ok()?;
+    Some(Fit { adjustment, linearised, covariance })
 }
 
 /// The problem with another joint noise, rad or m per reading.
@@ -287,9 +293,9 @@ fn with_joint_noise(problem: &Problem, sigma: &[f64]) -> Problem {
 }
 
 fn camera_error(s: &Solution, world: &SimulatedSeries) -> ErrorWithCovariance {
-    let columns = s.problem.layout.cameras[0].clone();
-    let off = s.state.cameras[0].parameters.iter().zip(&world.truth.camera.parameters).map(|(a, b)| a - b);
-    let covariance = s.covariance.reduced.view((columns.start, columns.start), (columns.len(), columns.len()));
+    let columns = s.fit.problem.layout.cameras[0].clone();
+    let off = s.fit.state.cameras[0].parameters.iter().zip(&world.truth.camera.parameters).map(|(a, b)| a - b);
+    let covariance = s.fit.covariance.reduced.view((columns.start, columns.start), (columns.len(), columns.len()));
     (DVector::from_iterator(columns.len(), off), covariance.into_owned())
 }
 
@@ -299,13 +305,13 @@ fn pose_error(estimate: &Pose, truth: &Pose, covariance: &Matrix6<f64>) -> Error
 }
 
 fn mounting_error(s: &Solution, world: &SimulatedSeries) -> ErrorWithCovariance {
-    let block = s.covariance.block(s.problem.layout.mountings[0].start);
-    pose_error(&s.state.mountings[0], &world.truth.camera_pose.pose(), &block)
+    let block = s.fit.covariance.block(s.fit.problem.layout.mountings[0].start);
+    pose_error(&s.fit.state.mountings[0], &world.truth.camera_pose.pose(), &block)
 }
 
 fn plate_error(s: &Solution, world: &SimulatedSeries) -> Option<ErrorWithCovariance> {
-    let block = s.covariance.block(s.problem.layout.placements[0].start);
-    Some(pose_error(&s.state.placements[0], &world.truth.plate_poses.values().next()?.pose(), &block))
+    let block = s.fit.covariance.block(s.fit.problem.layout.placements[0].start);
+    Some(pose_error(&s.fit.state.placements[0], &world.truth.plate_poses.values().next()?.pose(), &block))
 }
 
 /// The free-pose adjustment states `camera_from_plate` for the plate frame of its priors, as the truth does.
@@ -318,17 +324,17 @@ fn free_pose_error(s: &Solution, world: &SimulatedSeries) -> Option<ErrorWithCov
 /// The flange in the plate frame at the first joint vector that was kept aside: the camera of the solution, as if it were exact, on
 /// the robot and plate of the solution against the same camera on the true ones. Its error (m, rad) and the stated covariance.
 pub fn flange_error(s: &Solution, world: &SimulatedSeries, truth: &Robot) -> Option<ErrorWithCovariance> {
-    let mut image = s.problem.images.iter().find(|i| i.stop.is_some())?.clone();
+    let mut image = s.fit.problem.images.iter().find(|i| i.stop.is_some())?.clone();
     let readings = &world.truth.held_out.first()?.readings;
     image.stop = Some(Stop::at(readings));
     let exact = Slack::exact(readings.len(), false);
-    let chain = chained(&s.problem, &s.state, &image, &exact)?;
-    let (theta, mounting) = (s.problem.layout.theta_len(), s.problem.layout.mountings[0].clone());
+    let chain = s.fit.state.chained(&s.fit.problem.layout, &image, &exact)?;
+    let (theta, mounting) = (s.fit.problem.layout.theta_len(), s.fit.problem.layout.mountings[0].clone());
     let mut g = chain.d_theta;
     g.columns_mut(mounting.start, 6).fill(0.0);
-    let covariance = &g * s.covariance.reduced.view((0, 0), (theta, theta)) * g.transpose();
+    let covariance = &g * s.fit.covariance.reduced.view((0, 0), (theta, theta)) * g.transpose();
     let plate = world.truth.plate_poses.values().next()?.pose();
-    let actual = image.mount.camera_from_plate(&s.state.mountings[0], &truth.base_from_tip(readings), &plate);
+    let actual = image.mount.camera_from_plate(&s.fit.state.mountings[0], &truth.base_from_tip(readings), &plate);
     let error: Vector6<f64> = (actual.inverse() * chain.pose).log();
     Some((DVector::from_column_slice(error.as_slice()), covariance))
 }

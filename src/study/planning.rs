@@ -19,6 +19,7 @@ use crate::plan::scene::{Scene, SceneOptions};
 use crate::plan::setting::{Setting, scale_sigma};
 use crate::plan::visibility::SightLimits;
 use crate::plan::{Budget, PlanRequest, Wish, choose, exact_covariance, flange_m};
+use crate::problem::Adjustment;
 use crate::series::{CameraMount, Plate, PlateKind, ScaleBar};
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
 use crate::urdf::{Chain, JointKind};
@@ -207,8 +208,8 @@ fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
     let planned = visited(choice.chosen.iter().map(|&k| choice.pool[k].readings.clone()).collect())?;
     let random = visited(random_postures(&chosen, &scene, request.random, RANDOM_SEED + seed)?)?;
     let held_out = workspace(&chosen.setting, &scene, HELD_OUT, 0.0, HELD_OUT_SEED + seed);
-    let weight = flange_weight(&choice.problem, &chosen.setting.robot, &held_out);
-    let predicted = |visits: &[Vec<f64>]| predict(&chosen, &choice.problem, &choice.state, visits, &weight);
+    let weight = flange_weight(&choice.adjustment.problem, &chosen.setting.robot, &held_out);
+    let predicted = |visits: &[Vec<f64>]| predict(&chosen, &choice.adjustment, visits, &weight);
     let kinds = &request.chain;
     let visits = |s: &SimulatedSeries| -> Vec<Vec<f64>> {
         measured(s, kinds).stops.into_iter().filter_map(|s| s.readings).collect()
@@ -243,16 +244,10 @@ fn joint_sigma(chain: &Chain) -> Vec<f64> {
     chain.reading_kinds.iter().map(one).collect()
 }
 
-fn predict(
-    request: &PlanRequest,
-    problem: &crate::problem::Problem,
-    state: &crate::problem::State,
-    visits: &[Vec<f64>],
-    weight: &DMatrix<f64>,
-) -> Result<f64> {
+fn predict(request: &PlanRequest, planned: &Adjustment, visits: &[Vec<f64>], weight: &DMatrix<f64>) -> Result<f64> {
     let setting = &request.setting;
-    let images = visits.iter().filter_map(|q| setting.image(state, "", q, 0)).collect();
-    Ok(flange_m(weight, &exact_covariance(problem, state, setting, images)?))
+    let images = visits.iter().filter_map(|q| setting.image(&planned.state, "", q, 0)).collect();
+    Ok(flange_m(weight, &exact_covariance(planned, setting, images)?))
 }
 
 /// Flange errors after the whole identification of a series, over two sets of joint vectors.
@@ -260,7 +255,7 @@ fn found(request: &PlanStudyRequest, series: &SimulatedSeries, sets: [&[(Vec<f64
     let options = Options { joint_noise: JointNoise::Estimated, model: RobotModel::Rigid, ..Options::default() };
     let solution = identify(request.chain.clone(), &[measured(series, &request.chain)], &options)?;
     // The frame in which the flange is measured is fitted: any will do.
-    let [a, b] = sets.map(|poses| flange_error_m(&solution.state.robot, &Pose::identity(), poses));
+    let [a, b] = sets.map(|poses| flange_error_m(&solution.fit.state.robot, &Pose::identity(), poses));
     a.zip(b).map(|(a, b)| [a, b]).ok_or_else(|| {
         crate::error::Error::unsolved("study", "the held-out joint vectors determine no error", "take more of them")
     })

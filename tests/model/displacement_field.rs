@@ -86,7 +86,8 @@ fn errors(camera: &Camera, truth: &Camera, last_column: f64) -> Vec<(Vector2<f64
 }
 
 fn rms(s: &Solution) -> f64 {
-    let all: Vec<f64> = s.linearised.terms.iter().flat_map(|t| &t.residuals).map(|r| r.duv.norm_squared()).collect();
+    let all: Vec<f64> =
+        s.fit.linearised.terms.iter().flat_map(|t| &t.residuals).map(|r| r.duv.norm_squared()).collect();
     (all.iter().sum::<f64>() / all.len() as f64 / 2.0).sqrt()
 }
 
@@ -105,17 +106,17 @@ fn a_lens_that_brown_cannot_fit_is_fitted_to_the_noise() {
     // The noise, less some three percent that parameters take up.
     assert!(rms(&plain) > 5.0 * NOISE_PX && (rms(&s) / NOISE_PX - 1.0).abs() < 0.06, "{} {}", rms(&plain), rms(&s));
     let covered = |e: &&(Vector2<f64>, f64)| observed(&brown, &e.0, 40.0) >= 8;
-    let all = errors(&s.state.cameras[0], &truth, COVERED_TO);
+    let all = errors(&s.fit.state.cameras[0], &truth, COVERED_TO);
     let over_field: Vec<f64> = all.iter().filter(covered).map(|e| e.1).collect();
     let worst = over_field.iter().copied().fold(0.0, f64::max);
     println!("projection error over {} covered places of {}: worst {worst:.4} px", over_field.len(), all.len());
     assert!(over_field.len() > all.len() / 2 && worst < 0.05, "{worst}");
-    let off_brown = errors(&plain.state.cameras[0], &truth, COVERED_TO);
+    let off_brown = errors(&plain.fit.state.cameras[0], &truth, COVERED_TO);
     assert!(off_brown.iter().filter(covered).any(|e| e.1 > 0.3), "Brown-Conrady can fit this lens");
     // The map is large where nothing was seen, and true where something was.
-    let camera = &s.state.cameras[0];
-    let range = s.problem.layout.cameras[0].clone();
-    let covariance = s.covariance.reduced.view((range.start, range.start), (range.len(), range.len())).into_owned();
+    let camera = &s.fit.state.cameras[0];
+    let range = s.fit.problem.layout.cameras[0].clone();
+    let covariance = s.fit.covariance.reduced.view((range.start, range.start), (range.len(), range.len())).into_owned();
     let map = ProjectionMap::new(camera, &covariance, 0.5);
     let (mut known, mut unknown) = (Vec::new(), Vec::new());
     for (k, sigma) in map.sigma_px.iter().enumerate() {

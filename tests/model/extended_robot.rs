@@ -32,7 +32,7 @@ fn error_mm(world: &SimulatedSeries, seen: &MeasuredSeries, model: RobotModel) -
     let poses: Vec<(Vec<f64>, Pose)> =
         world.truth.held_out.iter().map(|h| (h.readings.clone(), h.base_from_tip.pose())).collect();
     let evidences: Vec<String> = s.evidences.iter().map(|e| format!("{:?} {:.1}", e.model, e.log_evidence)).collect();
-    (1e3 * flange_error_m(&s.state.robot, &s.state.placements[0], &poses).unwrap(), evidences.join(", "))
+    (1e3 * flange_error_m(&s.fit.state.robot, &s.fit.state.placements[0], &poses).unwrap(), evidences.join(", "))
 }
 
 fn ratios(errors: RobotErrors, seeds: std::ops::RangeInclusive<u64>) -> Vec<f64> {
@@ -81,7 +81,7 @@ fn how_far_origins_are_off_is_told_by_the_robot_itself() {
     let factor = |errors: RobotErrors, selection: Selection| {
         let seen = measured(&world(errors, 3), &chain());
         let options = Options { model: RobotModel::Rigid, selection, ..Options::default() };
-        identify(chain(), &[seen], &options).unwrap().problem
+        identify(chain(), &[seen], &options).unwrap().fit.adjustment.problem
     };
     let usual = OriginPrior::default();
     let times = |f: f64| RobotErrors {

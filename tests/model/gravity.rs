@@ -74,9 +74,9 @@ fn sag_of_the_loaded_arm_is_found() {
     let error_mm = |model| {
         let options = Options { model, payload: Some(PAYLOAD), ..Options::default() };
         let solution = identify(chain("ur10e"), std::slice::from_ref(&seen), &options).unwrap();
-        let robot = &solution.state.robot;
+        let robot = &solution.fit.state.robot;
         assert_eq!(robot.chain.payload(), Some(PAYLOAD));
-        (1e3 * flange_error_m(robot, &solution.state.placements[0], &held).unwrap(), terms_of(robot, Term::Sag))
+        (1e3 * flange_error_m(robot, &solution.fit.state.placements[0], &held).unwrap(), terms_of(robot, Term::Sag))
     };
     let ((rigid, none), (full, sag)) = (error_mm(RobotModel::Rigid), error_mm(RobotModel::Full));
     println!("held out: rigid {rigid:.4} mm, full {full:.4} mm; sag {sag:?}");

@@ -12,7 +12,7 @@ use robotcal::geom::{Pose, exp_so3, log_so3, right_jacobian_se3, right_jacobian_
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::circle;
 use robotcal::model::joint_terms::Term;
-use robotcal::problem::{E, Image, Problem, Slack, State, Weighting, chained, equations, linearise, predict};
+use robotcal::problem::{E, Image, Problem, Slack, State, Weighting, equations, linearise, predict};
 use robotcal::series::CameraMount;
 use robotcal::urdf::JointKind;
 use std::f64::consts::PI;
@@ -314,7 +314,7 @@ fn problems(mount: CameraMount, deviation: f64, dice: &mut Dice) -> Vec<(Problem
 
 /// The camera pose and its derivatives by all columns that act through it, and by the slack.
 fn check_chained(problem: &Problem, state: &State, image: &Image, slack: &Slack) {
-    let library = chained(problem, state, image, slack).unwrap();
+    let library = state.chained(&problem.layout, image, slack).unwrap();
     let value = witness::camera_from_plate(state, &problem.layout, image, slack, None).map(|d| d.re);
     assert!((library.pose.matrix() - value).amax() < 1e-12, "pose of {}", image.name);
     let twist = |seed| body_twist(&witness::camera_from_plate(state, &problem.layout, image, slack, Some(seed)));
@@ -440,7 +440,7 @@ fn predictions_through_the_whole_chain() {
     for mount in [CameraMount::Hand, CameraMount::Fixed] {
         for (problem, state) in problems(mount, 1e-3, &mut dice) {
             for (i, image) in problem.images.iter().enumerate() {
-                let chain = chained(&problem, &state, image, &state.slack[i]).unwrap();
+                let chain = state.chained(&problem.layout, image, &state.slack[i]).unwrap();
                 for o in image.used() {
                     let p = predict(image, &state, &chain.pose, o).unwrap();
                     let through = p.d_pose * &chain.d_theta;

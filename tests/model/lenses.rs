@@ -103,8 +103,8 @@ fn the_joint_fit_tells_lenses_apart_and_states_what_ros_cannot_express() {
         let s = found(&world(lens, field_deg), Lens::Brown, LensChoice::All);
         let taken: Vec<Lens> = s.lenses.iter().filter(|l| l.taken).map(|l| l.lens).collect();
         println!("{lens:?}: {:?}", s.lenses);
-        assert_eq!((taken, s.state.cameras[0].lens), (vec![lens], lens));
-        let loss = s.state.cameras[0].in_ros(&depths_m(&s)[0]);
+        assert_eq!((taken, s.fit.state.cameras[0].lens), (vec![lens], lens));
+        let loss = s.fit.state.cameras[0].in_ros(&depths_m(&s)[0]);
         assert_eq!(loss.is_some(), lens == Lens::Parallax);
         let said = s.notices.iter().filter(|n| n.what.contains("camera.yaml")).count();
         assert_eq!(said, usize::from(loss.is_some()));
@@ -117,7 +117,7 @@ fn the_default_takes_a_lens_that_ros_can_express() {
     for (lens, field_deg) in [(Lens::Brown, 60.0), (Lens::Fisheye, 100.0), (Lens::Parallax, 60.0)] {
         let s = found(&world(lens, field_deg), Lens::Brown, LensChoice::Exported);
         println!("{lens:?}: {:?}", s.lenses);
-        let taken = s.state.cameras[0].lens;
+        let taken = s.fit.state.cameras[0].lens;
         assert!(s.lenses.iter().all(|l| l.lens.is_in_ros()) && taken.is_in_ros(), "{taken:?}");
         assert!(taken == lens || lens == Lens::Parallax, "{lens:?} taken for {taken:?}");
     }
@@ -129,8 +129,8 @@ fn prism_and_principal_point_are_kept_apart() {
     let made = world(Lens::Brown, 60.0);
     let sigma = |lens: Lens| {
         let s = found(&made, lens, LensChoice::Settled);
-        let first = s.problem.layout.cameras[0].start;
-        [2, 3].map(|k| s.covariance.sigma(first + k))
+        let first = s.fit.problem.layout.cameras[0].start;
+        [2, 3].map(|k| s.fit.covariance.sigma(first + k))
     };
     let (brown, prism) = (sigma(Lens::Brown), sigma(Lens::ThinPrism));
     println!("principal point known to {brown:?} px, with a prism to {prism:?} px");

@@ -338,7 +338,7 @@ fn what_is_stated_of_the_flange_is_what_the_exported_files_give() {
     let mut most_local = 0.0f64;
     for (q, at) in readings.iter().zip(&found) {
         assert_same("--at", at.pose, plate.inverse() * exported.base_from_tip(q));
-        most_local = most_local.max(solution.state.robot.base_from_tip(q).distance(&exported.base_from_tip(q)).1);
+        most_local = most_local.max(solution.fit.state.robot.base_from_tip(q).distance(&exported.base_from_tip(q)).1);
     }
     assert!(most_local > 1e-5, "the local errors of this series are too small to be missed: {most_local:e} m");
     for place in &record.workspace {

@@ -16,9 +16,9 @@ use robotcal::model::plate_modes::{MODES, basis};
 use robotcal::output::files;
 use robotcal::output::restore::measured_series;
 use robotcal::output::solution_json;
-use robotcal::problem::{Problem, Slack, State};
+use robotcal::problem::{Adjustment, Problem, Slack, State};
 use robotcal::series::CameraMount;
-use robotcal::solve::{Linearised, linearise_all};
+use robotcal::solve::LinearProblem;
 
 /// Covariance of all unknowns (dense columns, slack of each image, markers) with the priors: nothing is eliminated. It is brought into the
 /// frame of the nominal markers by the formula: `x - G g` with `g = (N' P G)^-1 N' P (x - n)`, poses following.
@@ -39,7 +39,8 @@ fn motions(x: &Vector3<f64>) -> DMatrix<f64> {
 }
 
 impl Whole {
-    fn new(problem: &Problem, state: &State, lin: &Linearised) -> Self {
+    fn new(linear: LinearProblem) -> Self {
+        let LinearProblem { adjustment: Adjustment { problem, state }, lin } = linear;
         let layout = &problem.layout;
         let mut slack_start = Vec::new();
         let mut n = layout.len();
@@ -66,7 +67,7 @@ impl Whole {
             h.view_mut((6, 0), (e, 6)).copy_from(&terms.pe.transpose());
             h.view_mut((6, 6), (e, e)).copy_from(&terms.ee);
             a += j.transpose() * h * &j;
-            let couplings = lin.equations(problem, state, k).unwrap().marker_couplings();
+            let couplings = linear.image(k).equations().unwrap().marker_couplings();
             for (own_terms, t) in terms.markers.iter().zip(&couplings) {
                 let mut c = DMatrix::<f64>::zeros(3, 6 + e);
                 c.view_mut((0, 0), (3, 6)).copy_from(&t.mp);
@@ -173,8 +174,8 @@ fn table(files: &BTreeMap<String, Vec<u8>>, name: &str) -> Vec<BTreeMap<String, 
 }
 
 fn check(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
-    let (problem, state) = (&solution.problem, &solution.state);
-    let joint = Whole::new(problem, state, &solution.linearised);
+    let Adjustment { problem, state } = &solution.fit.adjustment;
+    let joint = Whole::new(solution.fit.linear());
     #[derive(serde::Deserialize)]
     struct PoseYaml {
         covariance: Vec<f64>,
@@ -200,20 +201,19 @@ fn check(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
     let record: serde_json::Value = serde_json::from_slice(&files["solution.json"]).unwrap();
     let scale = record["plates"][0]["relative_scale"]["sigma"].as_f64().unwrap() / joint.scale_sigma() - 1.0;
     println!("markers {worst:e}, scale {scale:e}");
-    let without_frame = relative(&solution.covariance.block(problem.layout.placements[0].start), &expected);
+    let without_frame = relative(&solution.fit.covariance.block(problem.layout.placements[0].start), &expected);
     println!("without the frame {without_frame:e}");
     assert!(plate < TOLERANCE && camera < TOLERANCE && worst < TOLERANCE && scale.abs() < TOLERANCE);
     check_poses(solution, files);
 }
 
 fn check_poses(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
-    let mut problem = solution.problem.clone();
-    let theta = problem.layout.theta_len();
-    problem.layout.columns[..theta].iter_mut().for_each(|c| c.free = false);
-    problem.noise.pixel_factor = solution.free_poses.pixel_factor.clone();
     let state = &solution.free_poses.state;
-    let lin = linearise_all(&problem, state).unwrap();
-    let free = Whole::new(&problem, state, &lin);
+    let mut adjustment = Adjustment { problem: solution.fit.problem.clone(), state: state.clone() };
+    adjustment.hold_poses();
+    adjustment.problem.noise.pixel_factor = solution.free_poses.pixel_factor.clone();
+    let lin = adjustment.linearise().unwrap();
+    let free = Whole::new(adjustment.linear(&lin));
     let rows = table(files, "poses.csv");
     assert_eq!(rows.len(), lin.images.len());
     let positions: Vec<Vector3<f64>> = (0..48).map(|m| state.plates[0].position(m)).collect();

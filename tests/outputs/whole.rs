@@ -66,9 +66,9 @@ fn kinematics_of_the_reread_urdf_are_those_of_the_rigid_model() {
     let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
     let files = files(&solution, &context(&description)).unwrap();
     let reread = Robot::nominal(reread_chain(&files));
-    let mut rigid = solution.state.robot.clone();
+    let mut rigid = solution.fit.state.robot.clone();
     rigid.terms.retain(|t| t.term == Term::Offset);
-    for stop in solution.problem.images.iter().filter_map(|i| i.stop.as_ref()) {
+    for stop in solution.fit.problem.images.iter().filter_map(|i| i.stop.as_ref()) {
         let (angle, distance) = reread.base_from_tip(&stop.readings).distance(&rigid.base_from_tip(&stop.readings));
         assert!(distance < 1e-9 && angle < 1e-9, "{distance:e} m {angle:e} rad");
     }
@@ -118,11 +118,11 @@ fn files_chained_by_their_frames_give_the_camera_pose_of_the_solver() {
         assert_eq!((camera.child.as_str(), plate.child.as_str()), ("front", "plate"));
         // Both are given in frames of the robot: walk base -> camera and base -> plate.
         let reread = Robot::nominal(chain.clone());
-        for image in &solution.problem.images {
+        for image in &solution.fit.problem.images {
             let tip = reread.base_from_tip(&image.stop.as_ref().unwrap().readings);
             let base_from = |p: &PoseYaml| if p.parent == chain.tip { tip * p.pose() } else { p.pose() };
             let camera_from_plate = base_from(&camera).inverse() * base_from(&plate);
-            let solver = solution.state.camera_from_plate(image, &Slack::None).unwrap();
+            let solver = solution.fit.state.camera_from_plate(image, &Slack::None).unwrap();
             let (angle, distance) = camera_from_plate.distance(&solver);
             assert!(angle < 1e-9 && distance < 1e-9, "{mount:?} {}: {angle:e} {distance:e}", image.name);
         }
@@ -170,7 +170,7 @@ fn camera_yaml_is_a_ros_camera_info() {
     }
     // plumb_bob as the documentation of ROS image_geometry and OpenCV write it.
     let (k, d) = (&info.camera_matrix.data, &info.distortion_coefficients.data);
-    let camera = &solution.state.cameras[0];
+    let camera = &solution.fit.state.cameras[0];
     for point in [[0.1, 0.2, 1.0], [-0.5, 0.4, 1.3], [0.3, -0.35, 0.8]] {
         let (x, y) = (point[0] / point[2], point[1] / point[2]);
         let r2 = x * x + y * y;
@@ -194,7 +194,7 @@ fn the_corrected_plate_is_a_plate() {
     let plate = read_plate(&folder.path().join("plate.toml"), &mut Vec::new()).unwrap();
     assert_eq!(plate.markers.len(), 48);
     for (k, m) in plate.markers.iter().enumerate() {
-        assert_eq!(m.position_m, solution.state.plates[0].position(k));
+        assert_eq!(m.position_m, solution.fit.state.plates[0].position(k));
         // Better than the print tolerance, and not better than the pixels of 24 images allow (0.05 px at 1100 px and 0.15 m).
         let floor = 0.05 / 1100.0 * 0.15 / 24f64.sqrt();
         assert!((floor..1e-4).contains(&m.sigma_m), "marker {}: {:e}", m.id, m.sigma_m);
@@ -221,7 +221,7 @@ fn compensation_has_every_term_but_the_offset() {
     let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
     let files = files(&solution, &context(&description)).unwrap();
     let read: Compensation = toml::from_str(text(&files, "compensation.toml")).unwrap();
-    let robot = &solution.state.robot;
+    let robot = &solution.fit.state.robot;
     assert_eq!(read.joint.len(), robot.chain.readings.len());
     for t in &robot.terms {
         let joint = &read.joint[&robot.chain.readings[t.reading]];
@@ -246,14 +246,14 @@ fn compensation_has_every_term_but_the_offset() {
 fn observations_csv_has_all_observations_with_reasons_and_is_a_series_input() {
     let description = robot();
     let mut solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
-    solution.problem.images[3].rejected = Some(ImageRejection::Duplicate { of: "an image, \"really\"".into() });
-    solution.problem.images[5].observations[2].rejected = Some(ObservationRejection::Residual);
+    solution.fit.problem.images[3].rejected = Some(ImageRejection::Duplicate { of: "an image, \"really\"".into() });
+    solution.fit.problem.images[5].observations[2].rejected = Some(ObservationRejection::Residual);
     let files = files(&solution, &context(&description)).unwrap();
     let table = rows(&files, "observations.csv");
-    let all: usize = solution.problem.images.iter().map(|i| i.observations.len()).sum();
+    let all: usize = solution.fit.problem.images.iter().map(|i| i.observations.len()).sum();
     assert_eq!(table.len(), all);
     let left_out = table.iter().filter(|r| !r["reason"].is_empty()).count();
-    assert_eq!(left_out, solution.problem.images[3].observations.len() + 1);
+    assert_eq!(left_out, solution.fit.problem.images[3].observations.len() + 1);
     let squares: f64 = table.iter().flat_map(|r| ["du", "dv"].map(|c| r[c].parse::<f64>().unwrap().powi(2))).sum();
     // 0.05 px per axis.
     let rms = (squares / (2.0 * all as f64)).sqrt();
@@ -269,7 +269,7 @@ fn observations_csv_has_all_observations_with_reasons_and_is_a_series_input() {
         "format = 1\njoint_unit = \"rad\"\ncamera_mount = \"hand\"\nplate = \"plate.toml\"\n\
          [camera]\nwidth_px = 1280\nheight_px = 1024\n",
     );
-    let joints = solution.problem.images.iter().map(|i| format!("{},0.1\n", i.name)).collect::<String>();
+    let joints = solution.fit.problem.images.iter().map(|i| format!("{},0.1\n", i.name)).collect::<String>();
     write("joints.csv", &format!("image,joint_a1\n{joints}"));
     let series = robotcal::series::read(folder.path()).unwrap();
     let robotcal::series::Source::Observations(images) = series.source else { panic!("no observations") };
@@ -284,10 +284,10 @@ fn solution_json_reads_back_with_everything_in_it() {
     let files = files(&solution, &context(&description)).unwrap();
     let record = solution_json::read(&files["solution.json"]).unwrap();
     assert_eq!(record.files, files.keys().cloned().collect::<Vec<_>>());
-    let layout = &solution.problem.layout;
+    let layout = &solution.fit.problem.layout;
     assert_eq!(record.estimates.len(), layout.len());
     assert_eq!(record.covariance_lower.len(), layout.len() * (layout.len() + 1) / 2);
-    let values = solution.state.values(layout);
+    let values = solution.fit.state.values(layout);
     let mut diagonal = 0;
     for (k, e) in record.estimates.iter().enumerate() {
         assert_eq!(e.name, layout.columns[k].name);
@@ -300,7 +300,7 @@ fn solution_json_reads_back_with_everything_in_it() {
         assert!((variance.sqrt() - e.sigma.unwrap()).abs() <= 1e-12 * e.sigma.unwrap());
     }
     for (k, image) in record.images.iter().enumerate() {
-        let given = &solution.problem.images[k];
+        let given = &solution.fit.problem.images[k];
         assert_eq!(image.name, given.name);
         assert_eq!(image.readings.as_ref(), given.stop.as_ref().map(|s| &s.readings));
         assert_eq!(image.observations.uv.len(), given.observations.len());

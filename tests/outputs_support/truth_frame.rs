@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3, Vector6};
 use robotcal::geom::{Pose, project_to_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
-use robotcal::problem::{Measured, PlateShape, Slack, State};
+use robotcal::problem::{Adjustment, Measured, PlateShape, Slack, State};
 use robotcal::series::{Plate, PlateKind};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
-use robotcal::solve::{covariance, linearise_all};
+use robotcal::solve::Fit;
 use robotcal::study::measured;
 
 use super::{context, robot};
@@ -115,7 +115,7 @@ pub fn template() -> Solution {
 
 /// All files of a world of which cameras, plate and free poses are adjusted, from nothing, and nothing else.
 pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, Vec<u8>> {
-    let mut problem = template.problem.clone();
+    let mut problem = template.fit.problem.clone();
     let mut image = problem.images[0].clone();
     problem.images.clear();
     for seen in &world.observations {
@@ -135,15 +135,14 @@ pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, 
     let start = State {
         slack: vec![Slack::Pose(Pose::identity()); problem.images.len()],
         plates: vec![PlateShape::nominal(&world.plate)],
-        ..template.state.clone()
+        ..template.fit.state.clone()
     };
-    let (free_poses, _) = adjust_free_poses(&mut problem, start, &[None]).unwrap();
-    let theta = problem.layout.theta_len();
-    problem.layout.columns[..theta].iter_mut().for_each(|c| c.free = false);
-    let state = free_poses.state.clone();
-    let linearised = linearise_all(&problem, &state).unwrap();
-    let covariance = covariance(&problem, &state, &linearised).unwrap();
-    let solution = Solution { problem, state, linearised, covariance, free_poses, ..template.clone() };
+    let (mut adjustment, free_poses, _) = adjust_free_poses(Adjustment { problem, state: start }, &[None]).unwrap();
+    adjustment.hold_poses();
+    let linearised = adjustment.linearise().unwrap();
+    let covariance = adjustment.linear(&linearised).covariance().unwrap();
+    let fit = Fit { adjustment, linearised, covariance };
+    let solution = Solution { fit, free_poses, ..template.clone() };
     let description = robot();
     robotcal::output::files(&solution, &context(&description)).unwrap()
 }

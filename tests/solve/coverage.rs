@@ -41,10 +41,10 @@ fn errors(solution: &Solution, world: &SimulatedSeries, chain: &Chain) -> Vec<[V
     let truth = world.truth.robot(chain).unwrap();
     let camera = world.truth.camera_pose.pose();
     let plate = world.truth.plate_poses.values().next().unwrap().pose();
-    let view = View::first(&solution.problem).unwrap();
+    let view = View::first(&solution.fit.problem).unwrap();
     (world.truth.held_out.iter())
         .map(|h| {
-            let p = predict_pose(&solution.problem, &solution.state, &solution.covariance, view, &h.readings).unwrap();
+            let p = predict_pose(&solution.fit, view, &h.readings).unwrap();
             let actual =
                 CameraMount::Hand.camera_from_plate(&camera, &truth.base_from_tip(&h.readings), &plate).inverse();
             let off = (p.plate_from_camera.inverse() * actual).log();
@@ -84,14 +84,15 @@ fn held_out_poses_lie_within_their_stated_sigmas_and_are_ten_times_better_than_n
         let made = started.elapsed();
         let solution = identify(chain.clone(), &[measured(&world, &chain)], &Options::default()).unwrap();
         let found = errors(&solution, &world, &chain);
-        let (nominal, calibrated) = (flange_error(&nominal_robot, &world), flange_error(&solution.state.robot, &world));
+        let (nominal, calibrated) =
+            (flange_error(&nominal_robot, &world), flange_error(&solution.fit.state.robot, &world));
         let nees = found.iter().map(|[w, _]| w.norm_squared()).sum::<f64>() / (6.0 * found.len() as f64);
         println!(
             "seed {seed}: nominal {:.4} mm, calibrated {:.4} mm; mean squared normalised error {nees:.2}; joint noise {:?} urad; pixel {:.3}; {} markers; {made:?} {:?}",
             1e3 * nominal,
             1e3 * calibrated,
-            solution.problem.noise.joint[0].iter().map(|s| (s * 1e7).round() / 10.0).collect::<Vec<_>>(),
-            solution.problem.noise.pixel_factor[0],
+            solution.fit.problem.noise.joint[0].iter().map(|s| (s * 1e7).round() / 10.0).collect::<Vec<_>>(),
+            solution.fit.problem.noise.pixel_factor[0],
             solution.free_poses.observations,
             started.elapsed()
         );
@@ -151,9 +152,9 @@ fn without_and_with(seeds: std::ops::RangeInclusive<u64>, count: usize, stops: u
         let (all, world) = some_series(&chain, count, stops, seed);
         let errors = [&all[..count - 1], &all[..]].map(|some| {
             let solution = identify(chain.clone(), some, &options).unwrap();
-            let joint = solution.problem.noise.joint.iter();
+            let joint = solution.fit.problem.noise.joint.iter();
             let noise: Vec<f64> = joint.map(|own| 1e3 * own.iter().sum::<f64>() / own.len() as f64).collect();
-            let error = flange_error(&solution.state.robot, &world);
+            let error = flange_error(&solution.fit.state.robot, &world);
             println!("seed {seed}, {} series: {:.4} mm; joint noise {noise:.3?} mrad", some.len(), 1e3 * error);
             error
         });

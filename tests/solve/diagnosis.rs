@@ -76,7 +76,7 @@ fn images_that_fit_the_robot_found_are_not_left_out_for_missing_the_nominal_one(
     // Mastering off by five degrees: some images miss the nominal robot by far more than others.
     series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(|q| q[1] += 5f64.to_radians());
     let solution = identify(chain, &[series], &Options::default()).unwrap();
-    let left_out: Vec<_> = solution.problem.images.iter().filter_map(|i| i.rejected.as_ref()).collect();
+    let left_out: Vec<_> = solution.fit.problem.images.iter().filter_map(|i| i.rejected.as_ref()).collect();
     assert!(left_out.is_empty(), "{left_out:?}");
     let said: Vec<String> = solution.notices.iter().map(ToString::to_string).collect();
     assert!(said.iter().any(|n| n.contains("joint_a2.offset") && n.contains("mastering")), "{said:?}");

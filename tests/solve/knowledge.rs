@@ -163,10 +163,10 @@ fn solution_json_alone_gives_the_same_solution_again() {
     let chain = robot_description(&record).unwrap().chain(Some(&record.robot.base), Some(&record.robot.tip)).unwrap();
     let series = measured_series(&record).unwrap();
     let again = identify(chain.clone(), &series, &Options { model: RobotModel::Rigid, ..Options::default() }).unwrap();
-    let layout = &solution.problem.layout;
-    let (a, b) = (solution.state.values(layout), again.state.values(layout));
+    let layout = &solution.fit.problem.layout;
+    let (a, b) = (solution.fit.state.values(layout), again.fit.state.values(layout));
     for k in 0..layout.len() {
-        let sigma = solution.covariance.sigma(k).max(1e-15);
+        let sigma = solution.fit.covariance.sigma(k).max(1e-15);
         assert!((a[k] - b[k]).abs() < 1e-2 * sigma, "{}: {} {}", layout.columns[k].name, a[k], b[k]);
     }
     let same = compare_solutions(&record, &record_of(&again)).unwrap();
@@ -301,8 +301,16 @@ fn what_is_promised_of_the_flange_is_what_is_found() {
             })
             .collect();
         let whole = Robot {
-            terms: solution.state.robot.terms.iter().copied().filter(|t| !matches!(t.term, Term::Local(_))).collect(),
-            ..solution.state.robot.clone()
+            terms: solution
+                .fit
+                .state
+                .robot
+                .terms
+                .iter()
+                .copied()
+                .filter(|t| !matches!(t.term, Term::Local(_)))
+                .collect(),
+            ..solution.fit.state.robot.clone()
         };
         let mut urdf = whole.clone();
         urdf.terms.retain(|t| t.term == Term::Offset);
@@ -311,9 +319,10 @@ fn what_is_promised_of_the_flange_is_what_is_found() {
             readings: s.readings.clone(),
         };
         let points: Vec<MeasuredPoint> = places.iter().map(point).collect();
-        let stops: Vec<Stop> = solution.problem.used().filter_map(|(_, i)| i.stop.clone()).collect();
-        let of =
-            |robot: &Robot| relative_error_m((robot, &solution.state.placements[0]), (&truth, &plate), &stops, &places);
+        let stops: Vec<Stop> = solution.fit.problem.used().filter_map(|(_, i)| i.stop.clone()).collect();
+        let of = |robot: &Robot| {
+            relative_error_m((robot, &solution.fit.state.placements[0]), (&truth, &plate), &stops, &places)
+        };
         let left = [fit_points(&Robot::nominal(chain()), &points).unwrap().rms_m, of(&urdf), of(&whole)];
         let e = solution.worth.flange.unwrap();
         println!("seed {seed}: found {left:?}, stated {e:?}");
@@ -425,7 +434,7 @@ fn evidence_prefers_the_rigid_model_for_a_rigid_robot() {
     println!("{:?}", solution.evidences);
     let best = solution.evidences.iter().find(|e| e.log_evidence == 0.0).unwrap();
     assert_eq!(best.model, RobotModel::Rigid);
-    assert_eq!(solution.state.robot.terms.len(), 6);
+    assert_eq!(solution.fit.state.robot.terms.len(), 6);
 }
 
 #[test]
@@ -441,7 +450,7 @@ fn another_series_tells_a_calibrated_robot_from_the_nominal_one() {
         let (sum, count) = judged.iter().fold((0.0, 0.0), |(s, c), i| (s + i.error.mm2, c + i.error.count));
         (sum / f64::max(count, 1.0)).sqrt()
     };
-    let (nominal, calibrated) = (rms(&Robot::nominal(chain())), rms(&solution.state.robot));
+    let (nominal, calibrated) = (rms(&Robot::nominal(chain())), rms(&solution.fit.state.robot));
     println!("nominal {nominal:.3} mm, calibrated {calibrated:.3} mm");
     assert!(calibrated < 0.5 * nominal, "{nominal} {calibrated}");
 }

@@ -60,7 +60,7 @@ fn taken(made: &SimulatedSeries) -> Option<(Lens, f64, f64)> {
         Some(error.dot(&factor.solve(&error)) / 6.0)
     };
     let open = by(LensChoice::All)?;
-    let lens = open.state.cameras[0].lens;
+    let lens = open.fit.state.cameras[0].lens;
     let with_brown =
         if lens == Lens::Brown { normalised(&open)? } else { by(LensChoice::Settled).as_ref().and_then(normalised)? };
     Some((lens, normalised(&open)?, with_brown))

@@ -37,12 +37,13 @@ fn identified((columns, rows): (u32, u32), marker_sigma_m: f64, seed: u64) -> So
 fn the_tolerance_of_the_markers_is_found_beside_image_and_joint_noise() {
     let s = identified((12, 9), 0.05e-3, 1);
     // 108 markers have 324 coordinates, of which a frame and six modes are not told: 1 / sqrt(2 * 311) = 4 %; four sigmas.
-    let found = s.problem.noise.marker[0] * STATED_M;
+    let found = s.fit.problem.noise.marker[0] * STATED_M;
     assert!((found / 0.05e-3 - 1.0).abs() < 0.16, "markers are off by {found:e} m");
     // 120 latents, each told in part; and 4000 coordinates of images of 0.02 px, where 0.1 px is stated.
-    let noise = (s.problem.joint_sigma(0).iter().map(|v| v * v).sum::<f64>() / 6.0).sqrt();
+    let noise = (s.fit.problem.joint_sigma(0).iter().map(|v| v * v).sum::<f64>() / 6.0).sqrt();
     assert!((noise / JOINT_NOISE_RAD - 1.0).abs() < 0.5, "joint noise {noise:e} rad");
-    let image = s.problem.noise.pixel_factor[0] * s.problem.images[0].observations[0].information[(0, 0)].powf(-0.5);
+    let image =
+        s.fit.problem.noise.pixel_factor[0] * s.fit.problem.images[0].observations[0].information[(0, 0)].powf(-0.5);
     assert!((image / 0.02 - 1.0).abs() < 0.06, "image noise {image} px");
 }
 
@@ -50,12 +51,12 @@ fn the_tolerance_of_the_markers_is_found_beside_image_and_joint_noise() {
 fn markers_that_are_where_they_should_be_are_found_to_be() {
     let s = identified((12, 9), 0.0, 2);
     // A marker seen in 20 images is told to 0.02 px / 1100 px * 0.5 m / sqrt(20) = 2 um in the plane and some 6 um across.
-    let found = s.problem.noise.marker[0] * STATED_M;
+    let found = s.fit.problem.noise.marker[0] * STATED_M;
     assert!(found < 6e-6, "markers are off by {found:e} m");
 }
 
 #[test]
 fn few_markers_do_not_tell_how_far_they_are_off() {
     let s = identified((4, 4), 0.05e-3, 3);
-    assert_eq!(s.problem.noise.marker, [1.0]);
+    assert_eq!(s.fit.problem.noise.marker, [1.0]);
 }

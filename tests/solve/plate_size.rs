@@ -47,7 +47,7 @@ fn about_the_plate(solution: &Solution) -> Vec<&String> {
 
 /// By how much the way from one marker to another is longer than stated.
 fn stretch(solution: &Solution, from: usize, to: usize) -> f64 {
-    let (found, stated) = (&solution.state.plates[0], &solution.problem.plates[0].markers);
+    let (found, stated) = (&solution.fit.state.plates[0], &solution.fit.problem.plates[0].markers);
     let stated = (stated[from].position_m - stated[to].position_m).norm();
     (found.position(from) - found.position(to)).norm() / stated - 1.0
 }

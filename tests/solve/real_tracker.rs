@@ -5,12 +5,12 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
-use robotcal::assess::{MeasuredPoint, fit_points, folds, predict_image, refitted, without_images};
+use robotcal::assess::{MeasuredPoint, fit_points, folds, predict_image, refitted};
 use robotcal::identify::{Estimator, JointNoise, Options, PoseStage, Solution, fit_poses, identify, measure};
 use robotcal::model::camera::Lens;
 use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::Robot;
-use robotcal::problem::{LensChoice, MeasuredSeries, Problem, State};
+use robotcal::problem::{Adjustment, LensChoice, MeasuredSeries, State};
 use robotcal::solve::{ComponentOptions, estimate_components};
 
 const SERIES: [&str; 3] = ["nachi-2025-01-17", "nachi-2025-02-04", "nachi-2025-02-19"];
@@ -48,15 +48,15 @@ struct Judged {
 
 /// The robot as it is exported: without the local errors, which are latent noise of the series.
 fn judged(s: &Solution, points: &[MeasuredPoint]) -> Judged {
-    let columns = s.problem.layout.robot();
-    let mut robot = s.state.robot.clone();
-    robot.terms.truncate(columns.end - s.problem.layout.terms.start);
+    let columns = s.fit.problem.layout.robot();
+    let mut robot = s.fit.state.robot.clone();
+    robot.terms.truncate(columns.end - s.fit.problem.layout.terms.start);
     let fit = fit_points(&robot, points).unwrap();
-    let covariance = s.covariance.reduced.view((0, 0), (columns.end, columns.end)).into_owned();
-    let (own, local) = (&s.problem.noise.joint[0], &s.problem.noise.local);
+    let covariance = s.fit.covariance.reduced.view((0, 0), (columns.end, columns.end)).into_owned();
+    let (own, local) = (&s.fit.problem.noise.joint[0], &s.fit.problem.noise.local);
     let none = vec![0.0; own.len()];
     let local = if local.is_empty() { &none } else { local };
-    let together = s.problem.joint_sigma(0);
+    let together = s.fit.problem.joint_sigma(0);
     let density = |noise: [&[f64]; 2]| fit.log_density(&robot, points, &covariance, noise, DEVICE_M).unwrap();
     let sized = |share: f64| together.iter().map(|s| s * share).collect::<Vec<f64>>();
     let noises = [0.25, 0.5, 1.0, 2.0].map(|a| [0.0, 0.25, 0.5, 1.0, 2.0].map(|b| density([&sized(a), &sized(b)])));
@@ -100,14 +100,14 @@ fn study_of_series_on_the_tracker() {
                 println!(
                     "{} ({}): {:.3} mm, expected {:.3}, log density {:.1?}, best {:.1}, twists {:.2}, model {:?}, cost {:.1}, held out {:.3}, {:.0} s",
                     chosen.join(" + "),
-                    s.state.cameras[0].lens.name(),
+                    s.fit.state.cameras[0].lens.name(),
                     j.rms_mm,
                     j.expected_mm,
                     j.log_density,
                     j.best,
-                    s.problem.families.iter().find(|f| f.is_of_twists()).map_or(1.0, |f| f.factor),
+                    s.fit.problem.families.iter().find(|f| f.is_of_twists()).map_or(1.0, |f| f.factor),
                     s.evidences.iter().map(|e| (e.model, e.log_evidence)).collect::<Vec<_>>(),
-                    s.linearised.cost,
+                    s.fit.linearised.cost,
                     s.accuracy.calibrated.rms_mm,
                     start.elapsed().as_secs_f64()
                 );
@@ -131,10 +131,10 @@ fn the_tracker_confirms_model_and_stated_uncertainty() {
     let selections = [&measured[..1], &measured[1..2], &measured[2..], &measured[..]];
     for chosen in selections {
         let s = identify(chain.clone(), chosen, &Options::default()).unwrap();
-        let fit = fit_points(&s.state.robot, &points).unwrap();
-        let robot = s.problem.layout.terms.end;
-        let covariance = s.covariance.reduced.view((0, 0), (robot, robot)).into_owned();
-        let expected = fit.expected(&s.state.robot, &points, &covariance, &s.problem.joint_sigma(0)).unwrap();
+        let fit = fit_points(&s.fit.state.robot, &points).unwrap();
+        let robot = s.fit.problem.layout.terms.end;
+        let covariance = s.fit.covariance.reduced.view((0, 0), (robot, robot)).into_owned();
+        let expected = fit.expected(&s.fit.state.robot, &points, &covariance, &s.fit.problem.joint_sigma(0)).unwrap();
         let names: Vec<&str> = chosen.iter().map(|m| m.name.as_str()).collect();
         println!(
             "{}: {:.3} mm on the tracker (nominal {:.3}), expected {:.3}, with joint noise {:.3}",
@@ -145,7 +145,7 @@ fn the_tracker_confirms_model_and_stated_uncertainty() {
             1e3 * expected.with_joint_noise_m
         );
         let flange = s.worth.flange.unwrap();
-        let mut urdf = s.state.robot.clone();
+        let mut urdf = s.fit.state.robot.clone();
         urdf.terms.retain(|t| t.term == Term::Offset);
         let urdf = fit_points(&urdf, &points).unwrap().rms_m;
         println!("  stated in the region of the stops {flange:?}; URDF alone on the tracker {:.3} mm", 1e3 * urdf);
@@ -159,40 +159,40 @@ fn the_tracker_confirms_model_and_stated_uncertainty() {
     }
 }
 
-/// What is changed of the noise model: problem and state to change, and whether its sizes are then held.
-type Change = fn(&mut Problem, &mut State, &PoseStage) -> bool;
+/// What is changed of the noise model, and whether its sizes are then held.
+type Change = fn(&mut Adjustment, &PoseStage) -> bool;
 
 const CHANGES: [(&str, Change); 8] = [
-    ("as it is", |_, _, _| false),
-    ("no tilt", |p, _, _| {
-        p.noise.tilt.clear();
+    ("as it is", |_, _| false),
+    ("no tilt", |a, _| {
+        a.problem.noise.tilt.clear();
         false
     }),
-    ("no local errors", |p, s, _| {
-        p.without_local_errors(s);
+    ("no local errors", |a, _| {
+        a.without_local_errors();
         false
     }),
-    ("neither", |p, s, _| {
-        p.noise.tilt.clear();
-        p.without_local_errors(s);
+    ("neither", |a, _| {
+        a.problem.noise.tilt.clear();
+        a.without_local_errors();
         false
     }),
-    ("one noise for all joints", |p, s, _| {
-        let sigmas = p.joint_sigma(0);
+    ("one noise for all joints", |a, _| {
+        let sigmas = a.problem.joint_sigma(0);
         let common = (sigmas.iter().map(|s| s * s).sum::<f64>() / sigmas.len() as f64).sqrt();
-        p.without_local_errors(s);
-        p.noise.joint.iter_mut().flatten().for_each(|s| *s = common);
+        a.without_local_errors();
+        a.problem.noise.joint.iter_mut().flatten().for_each(|s| *s = common);
         true
     }),
-    ("tilt of every image free", |p, _, _| {
-        p.noise.tilt.fill(0.1);
+    ("tilt of every image free", |a, _| {
+        a.problem.noise.tilt.fill(0.1);
         true
     }),
-    ("pixels five times as noisy", |p, _, _| {
-        p.noise.pixel_factor.iter_mut().for_each(|f| *f *= 5.0);
+    ("pixels five times as noisy", |a, _| {
+        a.problem.noise.pixel_factor.iter_mut().for_each(|f| *f *= 5.0);
         true
     }),
-    ("camera and plate held as free poses have them", |p, s, stage| {
+    ("camera and plate held as free poses have them", |Adjustment { problem: p, state: s }, stage| {
         s.cameras.clone_from(&stage.state.cameras);
         s.plates.clone_from(&stage.state.plates);
         let ranges = p.layout.cameras.iter().chain(&p.layout.shapes).cloned();
@@ -205,12 +205,12 @@ const CHANGES: [(&str, Change); 8] = [
 ];
 
 /// Held-out error in mm, by `fit` of the images that are left.
-fn held_out_mm(problem: &Problem, fit: impl Fn(&Problem) -> Option<State>) -> Option<f64> {
+fn held_out_mm(adjustment: &Adjustment, fit: impl Fn(Adjustment) -> Option<State>) -> Option<f64> {
     let (mut squares, mut count) = (0.0, 0.0);
-    for fold in folds(problem)? {
-        let found = fit(&without_images(problem, &fold))?;
+    for fold in folds(&adjustment.problem)? {
+        let found = fit(adjustment.without_images(&fold))?;
         for i in fold {
-            let e = predict_image(problem, &found, i)?;
+            let e = predict_image(&adjustment.problem, &found, i)?;
             squares += e.mm2;
             count += e.count;
         }
@@ -242,7 +242,7 @@ fn parts_of_the_noise_model_switched_off() {
                     continue;
                 }
             };
-            let stage = PoseStage::adjusted(&solution.problem, &solution.state).unwrap();
+            let stage = PoseStage::adjusted(&solution.fit).unwrap();
             let judged = |found: Option<State>, held: Option<f64>| {
                 let on_tracker = found.and_then(|s| fit_points(&s.robot, &points)).map_or(f64::NAN, |f| 1e3 * f.rms_m);
                 format!("{:.3} | {on_tracker:.3}", held.unwrap_or(f64::NAN))
@@ -250,30 +250,29 @@ fn parts_of_the_noise_model_switched_off() {
             println!(
                 "\n{name}, {lens:?}: held out mm, tracker mm\n\n| | F | | C | | D | |\n|---|---|---|---|---|---|---|"
             );
-            let staged = |estimator: Estimator, problem: &Problem| {
-                let fit = |p: &Problem| {
-                    let stage = PoseStage::adjusted(p, &solution.state)?;
-                    Some(fit_poses(p, &stage, &solution.state, estimator, JointNoise::Estimated)?.state)
+            let staged = |estimator: Estimator, start: &Adjustment| {
+                let fit = |left: Adjustment| {
+                    Some(fit_poses(&left, &PoseStage::adjusted(&left)?, estimator, JointNoise::Estimated)?.state)
                 };
-                judged(fit(problem), held_out_mm(problem, fit))
+                judged(fit(start.clone()), held_out_mm(start, fit))
             };
             for (what, change) in CHANGES {
-                let (mut problem, mut state) = (solution.problem.clone(), solution.state.clone());
-                let held = change(&mut problem, &mut state, &stage);
-                let for_poses = problem.clone();
-                problem.start_slack(&mut state, false);
-                problem.hold_component_priors(&state.robot);
-                let state = match held {
-                    true => refitted(&problem, &state),
-                    false => estimate_components(&mut problem, state, &ComponentOptions::default()).state,
-                };
-                let joint = judged(Some(state.clone()), held_out_mm(&problem, |p| Some(refitted(p, &state))));
+                let mut changed = solution.fit.adjustment.clone();
+                let held = change(&mut changed, &stage);
+                let for_poses = Adjustment { problem: changed.problem.clone(), state: solution.fit.state.clone() };
+                changed.start_slack(false);
+                changed.hold_component_priors();
+                match held {
+                    true => changed.state = refitted(changed.clone()),
+                    false => changed = estimate_components(changed, &ComponentOptions::default()).adjustment,
+                }
+                let joint = judged(Some(changed.state.clone()), held_out_mm(&changed, |left| Some(refitted(left))));
                 let by_poses = |e| if held { "- | -".to_owned() } else { staged(e, &for_poses) };
                 let (c, d) = (by_poses(Estimator::BlocksAndRepeatability), by_poses(Estimator::FullAndRepeatability));
                 println!("| {what} | {joint} | {c} | {d} |");
             }
             for estimator in [Estimator::Isotropic, Estimator::Blocks] {
-                println!("{}: {}", estimator.letter(), staged(estimator, &solution.problem));
+                println!("{}: {}", estimator.letter(), staged(estimator, &solution.fit));
             }
         }
     }

@@ -9,20 +9,24 @@ use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::linalg::SymmetricFactor;
 use robotcal::model::joint_terms::Term;
-use robotcal::problem::{Image, ImageRejection, ObservationRejection, Problem, Slack, State, Step};
+use robotcal::problem::{Adjustment, Image, ImageRejection, ObservationRejection, Problem, Slack, State, Step};
 use robotcal::series::CameraMount;
 use robotcal::solve::{
-    ComponentOptions, Elimination, JOINT_NOISE_FLOOR, NoiseUncertainty, Outcome, Settings, Status, System, covariance,
-    covariance_by, estimate_components, linearise_all, noise_information, solve,
+    ComponentOptions, Covariance, Elimination, Fit, JOINT_NOISE_FLOOR, NoiseUncertainty, Outcome, Settings, Status,
+    System, estimate_components, noise_information, solve,
 };
 
 /// Iterates to where rounding ends it.
 const TIGHT: Settings = Settings { iterations: 200, decrement: 1e-9 };
 
 fn converged(problem: &Problem, start: State, settings: &Settings) -> Outcome {
-    let outcome = solve(problem, start, settings);
+    let outcome = solve(Adjustment { problem: problem.clone(), state: start }, settings);
     assert_eq!(outcome.status, Status::Converged);
     outcome
+}
+
+fn covariance(outcome: &Outcome) -> Covariance {
+    outcome.linear().unwrap().covariance().unwrap()
 }
 
 /// A marker that no image shows.
@@ -74,28 +78,28 @@ fn the_reduced_system_equals_the_dense_normal_equations() {
         let (problem, state) = awkward(mount);
         let state = shaken(&problem, &state);
         let dense = Dense::new(&problem, &state);
+        let adjustment = Adjustment { problem, state };
         let (cov, x, condition) = dense.solve();
         let bound = tolerance(condition);
         for which in [Elimination::Markers, Elimination::Slack] {
             println!("{mount:?} {which:?}");
-            check_step(which, &problem, &state, &dense, (&cov, &x), bound);
-            check_covariance(which, &problem, &state, &dense, &cov, bound);
+            check_step(which, &adjustment, &dense, (&cov, &x), bound);
+            check_covariance(which, &adjustment, &dense, &cov, bound);
         }
     }
 }
 
 fn check_step(
     which: Elimination,
-    problem: &Problem,
-    state: &State,
+    adjustment: &Adjustment,
     dense: &Dense,
     (cov, x): (&DMatrix<f64>, &DVector<f64>),
     bound: f64,
 ) {
-    let lin = linearise_all(problem, state).unwrap();
-    let system = System::with(which, problem, state, &lin, 0.0);
+    let lin = adjustment.linearise().unwrap();
+    let system = System::with(which, adjustment.linear(&lin), 0.0);
     let reduced = SymmetricFactor::new(&system.information).unwrap().solve(&system.rhs);
-    let step = system.step(problem, &lin, &reduced);
+    let step = system.step(adjustment.linear(&lin), &reduced);
     for (at, u) in dense.unknowns.iter().enumerate() {
         let got = match *u {
             Unknown::Column(c) => step.dense[c],
@@ -112,16 +116,10 @@ fn check_step(
     }
 }
 
-fn check_covariance(
-    which: Elimination,
-    problem: &Problem,
-    state: &State,
-    dense: &Dense,
-    truth: &DMatrix<f64>,
-    bound: f64,
-) {
-    let lin = linearise_all(problem, state).unwrap();
-    let library = covariance_by(which, problem, state, &lin).unwrap();
+fn check_covariance(which: Elimination, adjustment: &Adjustment, dense: &Dense, truth: &DMatrix<f64>, bound: f64) {
+    let Adjustment { problem, state } = adjustment;
+    let lin = adjustment.linearise().unwrap();
+    let library = adjustment.linear(&lin).covariance_by(which).unwrap();
     let index = |u: &Unknown| match *u {
         Unknown::Column(c) => Some(c),
         Unknown::Slack(i, k) => {
@@ -197,7 +195,10 @@ fn the_right_hand_side_is_the_slope_of_the_cost() {
                 slack: step.slack.iter().map(|s| s.iter().map(|x| x * h).collect()).collect(),
                 markers: step.markers.iter().map(|p| p.iter().map(|x| x * h).collect()).collect(),
             };
-            linearise_all(&problem, &state.moved(&problem.layout, &scaled)).unwrap().cost
+            Adjustment { problem: problem.clone(), state: state.moved(&problem.layout, &scaled) }
+                .linearise()
+                .unwrap()
+                .cost
         };
         // The cost is quadratic but for curvature of relative size 1e-3 and Huber's kinks: central differences at h are right
         // to h^2 and rounding of the cost over h.
@@ -209,11 +210,10 @@ fn the_right_hand_side_is_the_slope_of_the_cost() {
 }
 
 /// Poses of all images, robot and camera of two outcomes, in units of sigma of the first.
-fn assert_same_solution(a: (&Problem, &Outcome), b: &Outcome, names: impl Fn(&str) -> bool, bound: f64) {
-    let (problem, a) = a;
-    let lin = a.linearised.as_ref().unwrap();
-    let cov = covariance(problem, &a.state, lin).unwrap();
-    let (va, vb) = (a.state.values(&problem.layout), b.state.values(&problem.layout));
+fn assert_same_solution(a: &Outcome, b: &Outcome, names: impl Fn(&str) -> bool, bound: f64) {
+    let problem = &a.adjustment.problem;
+    let cov = covariance(a);
+    let [va, vb] = [a, b].map(|o| o.adjustment.state.values(&problem.layout));
     let mut compared = 0;
     for (c, column) in problem.layout.columns.iter().enumerate().filter(|(_, c)| names(&c.name)) {
         let sigma = cov.sigma(c);
@@ -247,14 +247,14 @@ fn another_base_frame_changes_nothing() {
     moved.placements.iter_mut().for_each(|p| *p = new_from_old * *p);
     let second = converged(&problem, moved, &TIGHT);
     assert!((cost(&first) - cost(&second)).abs() < 1e-9 * cost(&first));
-    assert_same_solution((&problem, &first), &second, |_| true, SAME);
+    assert_same_solution(&first, &second, |_| true, SAME);
     for (i, image) in problem.used() {
-        let [a, b] = [&first, &second].map(|o| o.state.camera_from_plate(image, &o.state.slack[i]).unwrap());
+        let [a, b] = [&first, &second]
+            .map(|o| o.adjustment.state.camera_from_plate(image, &o.adjustment.state.slack[i]).unwrap());
         let (angle, distance) = a.distance(&b);
         assert!(angle < 1e-9 && distance < 1e-9, "{}: {angle:e} rad {distance:e} m", image.name);
     }
-    let sigmas = |o: &Outcome| covariance(&problem, &o.state, o.linearised.as_ref().unwrap()).unwrap();
-    let (a, b) = (sigmas(&first), sigmas(&second));
+    let (a, b) = (covariance(&first), covariance(&second));
     for c in problem.layout.twists.start..problem.layout.terms.end {
         assert!((a.sigma(c) / b.sigma(c) - 1.0).abs() < 1e-6, "{}", problem.layout.columns[c].name);
     }
@@ -282,7 +282,7 @@ fn another_plate_frame_changes_nothing() {
     }
     let second = converged(&problem, start, &TIGHT);
     assert!((cost(&first) - cost(&second)).abs() < 1e-9 * cost(&first));
-    assert_same_solution((&problem, &first), &second, |n| !n.starts_with("plate"), SAME);
+    assert_same_solution(&first, &second, |n| !n.starts_with("plate"), SAME);
 }
 
 fn with_slack(state: &State, problem: &Problem, slack: impl Fn(usize, &Image) -> Slack) -> State {
@@ -295,11 +295,11 @@ fn free_poses(problem: &Problem, state: &State) -> State {
 }
 
 /// Largest difference of the camera columns in sigma, and of log sigma.
-fn camera_difference(problem: &Problem, a: &Outcome, b: &Outcome) -> (f64, f64) {
-    let covariance_of = |o: &Outcome| covariance(problem, &o.state, o.linearised.as_ref().unwrap()).unwrap();
-    let (ca, cb) = (covariance_of(a), covariance_of(b));
-    let (va, vb) = (a.state.values(&problem.layout), b.state.values(&problem.layout));
-    problem.layout.cameras[0].clone().fold((0.0, 0.0), |(value, sigma), c| {
+fn camera_difference(a: &Outcome, b: &Outcome) -> (f64, f64) {
+    let layout = &a.adjustment.problem.layout;
+    let (ca, cb) = (covariance(a), covariance(b));
+    let [va, vb] = [a, b].map(|o| o.adjustment.state.values(layout));
+    layout.cameras[0].clone().fold((0.0, 0.0), |(value, sigma), c| {
         let off = (va[c] - vb[c]).abs() / ca.sigma(c);
         (f64::max(value, off), f64::max(sigma, (ca.sigma(c) / cb.sigma(c)).ln().abs()))
     })
@@ -316,7 +316,7 @@ fn large_joint_noise_tends_to_the_free_poses() {
     let free = converged(&problem, free_poses(&problem, &state), &settings);
     let differences = [0.1, 1.0].map(|sigma| {
         problem.noise.joint = vec![vec![sigma; 6]];
-        camera_difference(&problem, &free, &converged(&problem, state.clone(), &settings))
+        camera_difference(&free, &converged(&problem, state.clone(), &settings))
     });
     println!("{differences:?}");
     // The slack pulls with (sigma of the free pose / joint noise)^2: a hundred times less for ten times the noise, of which a
@@ -334,32 +334,31 @@ fn vanishing_joint_noise_tends_to_the_hard_fit() {
     let soft = converged(&problem, state.clone(), &TIGHT);
     let hard = converged(&problem, with_slack(&state, &problem, |_, _| Slack::None), &TIGHT);
     // A pixel noise of 0.1 px over ten markers is some 1e-5 rad: (1e-9 / 1e-5)^2 of a sigma, and rounding at a condition of 1e10.
-    assert_same_solution((&problem, &hard), &soft, |_| true, 1e-4);
+    assert_same_solution(&hard, &soft, |_| true, 1e-4);
     assert!((cost(&hard) - cost(&soft)).abs() < 1e-6 * cost(&hard));
 }
 
 #[test]
 fn poses_mode_is_the_free_pose_adjustment() {
     let mut dice = Dice::new(33);
-    let (mut problem, state) = problem(&mut dice, &Request { images: 8, lattice: (5, 4), ..Request::default() });
+    let (problem, state) = problem(&mut dice, &Request { images: 8, lattice: (5, 4), ..Request::default() });
     // From nothing, with rejection and variance components ...
     let mut nothing = state.clone();
     nothing.plates[0].modes = [0.0; 6];
     nothing.plates[0].corrections.iter_mut().for_each(|c| *c = Vector3::zeros());
-    let (found, _) = adjust_free_poses(&mut problem, nothing, &[None]).unwrap();
+    let nothing = Adjustment { problem: problem.clone(), state: nothing };
+    let (Adjustment { problem, .. }, found, _) = adjust_free_poses(nothing, &[None]).unwrap();
     // ... and with the same weights from the truth, robot present but tied to nothing.
     let mode = converged(&problem, free_poses(&problem, &state), &TIGHT);
-    let cov = covariance(&problem, &mode.state, mode.linearised.as_ref().unwrap()).unwrap();
+    let cov = covariance(&mode);
     // The fit stops when no unknown moves by more than 1e-3 of its sigma.
-    assert_same_solution(
-        (&problem, &mode),
-        &Outcome { state: found.state.clone(), ..mode.clone() },
-        |n| n.starts_with("camera"),
-        2e-3,
-    );
+    let mut by_free_poses = mode.clone();
+    by_free_poses.adjustment.state = found.state.clone();
+    assert_same_solution(&mode, &by_free_poses, |n| n.starts_with("camera"), 2e-3);
     for (k, (i, image)) in problem.used().enumerate() {
         let pose = found.poses[i].as_ref().unwrap();
-        let direct = mode.state.camera_from_plate(image, &mode.state.slack[i]).unwrap();
+        let state = &mode.adjustment.state;
+        let direct = state.camera_from_plate(image, &state.slack[i]).unwrap();
         let off = (direct.inverse() * pose.camera_from_plate).log();
         let c = cov.slack(k, 6);
         for a in 0..6 {
@@ -376,11 +375,11 @@ fn poses_mode_is_the_free_pose_adjustment() {
 }
 
 /// Redundancy of the latents of every reading at a linearisation, for other sizes of the joint noise.
-fn redundancies(problem: &Problem, outcome: &Outcome, sigma: &[f64]) -> Vec<f64> {
-    let mut problem = problem.clone();
-    problem.noise.joint = vec![sigma.to_vec()];
+fn redundancies(outcome: &Outcome, sigma: &[f64]) -> Vec<f64> {
+    let mut adjustment = outcome.adjustment.clone();
+    adjustment.problem.noise.joint = vec![sigma.to_vec()];
     let lin = outcome.linearised.as_ref().unwrap();
-    let cov = covariance(&problem, &outcome.state, lin).unwrap();
+    let cov = adjustment.linear(lin).covariance().unwrap();
     let of = |k: usize, r: usize| 1.0 - cov.slack(k, sigma.len())[(r, r)] / sigma[r].powi(2);
     (0..sigma.len()).map(|r| (0..lin.images.len()).map(|k| of(k, r)).sum()).collect()
 }
@@ -393,12 +392,12 @@ fn the_information_on_the_joint_noise_is_the_slope_of_the_redundancies() {
     let sigma = [2e-4, 5e-5, 1e-4, 3e-4, 1e-5, 8e-5];
     problem.noise.joint = vec![sigma.to_vec()];
     let outcome = converged(&problem, state, &TIGHT);
-    let at = redundancies(&problem, &outcome, &sigma);
+    let at = redundancies(&outcome, &sigma);
     let h: f64 = 1e-4;
     let shifted = |a: usize, by: f64| {
         let mut moved = sigma;
         moved[a] *= (0.5 * by).exp();
-        redundancies(&problem, &outcome, &moved)
+        redundancies(&outcome, &moved)
     };
     let slopes: Vec<(Vec<f64>, Vec<f64>)> = (0..6).map(|a| (shifted(a, h), shifted(a, -h))).collect();
     let information = nalgebra::Matrix6::from_fn(|a, b| {
@@ -406,9 +405,7 @@ fn the_information_on_the_joint_noise_is_the_slope_of_the_redundancies() {
         // Joints are drawn together with the weight of five observations.
         0.5 * (f64::from(a == b) * at[b] - slope) + 2.5 * (f64::from(a == b) - 1.0 / 6.0)
     });
-    let lin = outcome.linearised.as_ref().unwrap();
-    let cov = covariance(&problem, &outcome.state, lin).unwrap();
-    let told = noise_information(&problem, &outcome.state, lin, &cov).unwrap();
+    let told = noise_information(&outcome.fit().unwrap()).unwrap();
     let expected = information.try_inverse().unwrap();
     for readings in [vec![0], vec![1], vec![4], vec![0, 3], vec![0, 1, 2, 3, 4, 5]] {
         let v = nalgebra::Vector6::from_fn(|r, _| {
@@ -430,9 +427,9 @@ fn what_the_uncertainty_of_the_joint_noise_adds_is_the_curvature_of_the_covarian
     let sigma = [2e-4, 5e-5, 1e-4, 3e-4, 2e-5, 8e-5];
     problem.noise.joint = vec![sigma.to_vec()];
     let outcome = converged(&problem, state, &TIGHT);
-    let lin = outcome.linearised.as_ref().unwrap();
-    let cov = covariance(&problem, &outcome.state, lin).unwrap();
-    let told = noise_information(&problem, &outcome.state, lin, &cov).unwrap();
+    let fit = outcome.fit().unwrap();
+    let told = noise_information(&fit).unwrap();
+    let cov = &fit.covariance;
     let variance = |readings: &[usize]| told.mean_variance(&[0], readings).sigma.powi(2);
     let w = nalgebra::Matrix6::from_fn(|a, b| match a == b {
         true => variance(&[a]),
@@ -445,9 +442,9 @@ fn what_the_uncertainty_of_the_joint_noise_adds_is_the_curvature_of_the_covarian
     let free: Vec<usize> = (0..problem.layout.len()).filter(|&c| cov.reduced[(c, c)] > 0.0).collect();
     let dense = |m: &DMatrix<f64>| DMatrix::from_fn(free.len(), free.len(), |i, k| m[(free[i], free[k])]);
     let at = |step: nalgebra::Vector6<f64>| {
-        let mut moved = problem.clone();
-        moved.noise.joint[0].iter_mut().zip(step.iter()).for_each(|(s, by)| *s = (*s * *s + by).sqrt());
-        dense(&covariance(&moved, &outcome.state, lin).unwrap().reduced)
+        let mut moved = fit.adjustment.clone();
+        moved.problem.noise.joint[0].iter_mut().zip(step.iter()).for_each(|(s, by)| *s = (*s * *s + by).sqrt());
+        dense(&moved.linear(&fit.linearised).covariance().unwrap().reduced)
     };
     let here = dense(&cov.reduced);
     let inverse = here.clone().try_inverse().unwrap();
@@ -461,7 +458,7 @@ fn what_the_uncertainty_of_the_joint_noise_adds_is_the_curvature_of_the_covarian
         let curvature = (&above + &below - 2.0 * &here) / (h * h);
         expected += &slope * &inverse * &slope - curvature;
     }
-    let added = dense(&NoiseUncertainty::of(&told, &problem, &cov).unwrap().added());
+    let added = dense(&NoiseUncertainty::of(&told, &fit).unwrap().added());
     let whitened = |m: &DMatrix<f64>| {
         DMatrix::from_fn(free.len(), free.len(), |i, k| m[(i, k)] / (here[(i, i)] * here[(k, k)]).sqrt())
     };
@@ -493,12 +490,12 @@ fn variance_components_recover_pixel_and_joint_noise() {
         problem.noise.pixel_factor = vec![3.0];
         problem.noise.joint = vec![vec![3e-3; 6]];
         let options = ComponentOptions { rounds: 100, ..ComponentOptions::default() };
-        let outcome = estimate_components(&mut problem, state, &options);
+        let outcome = estimate_components(Adjustment { problem, state }, &options);
         assert_eq!(outcome.status, Status::Converged);
-        let lin = outcome.linearised.as_ref().unwrap();
-        let cov = covariance(&problem, &outcome.state, lin).unwrap();
+        let fit = outcome.fit().unwrap();
+        let Fit { adjustment: Adjustment { problem, .. }, linearised: lin, .. } = &fit;
         let sigma = &problem.noise.joint[0];
-        let told = noise_information(&problem, &outcome.state, lin, &cov).unwrap();
+        let told = noise_information(&fit).unwrap();
         let spread = told.mean_variance(&[0], &[0, 1, 2, 3, 4, 5]);
         let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / 6.0).sqrt();
         assert!((spread.variance.sqrt() / mean - 1.0).abs() < 1e-12);
@@ -539,14 +536,14 @@ fn joint_noise_has_an_interval_where_it_is_estimated_and_none_where_it_is_given(
         identify(state.robot.chain.clone(), &[series(&problem)], &options).unwrap()
     };
     let estimated = run(JointNoise::Estimated);
-    let sigma = estimated.problem.joint_sigma(0);
+    let sigma = estimated.fit.problem.joint_sigma(0);
     assert_eq!(estimated.worth.joint_noise.len(), 1);
     assert_eq!(estimated.worth.joint_noise[0].len(), sigma.len());
     for (s, [low, high]) in sigma.iter().zip(&estimated.worth.joint_noise[0]) {
         assert!(low < s && s < high && high.is_finite(), "{low:e} {s:e} {high:e}");
     }
     let given = run(JointNoise::Known(3e-4));
-    assert_eq!(given.problem.joint_sigma(0), vec![3e-4; sigma.len()]);
+    assert_eq!(given.fit.problem.joint_sigma(0), vec![3e-4; sigma.len()]);
     assert!(given.worth.joint_noise.is_empty());
 }
 
@@ -558,7 +555,7 @@ fn joint_noise_that_is_not_told_from_none_counts_as_none() {
         let (problem, state) = problem(&mut dice, &request);
         let options = Options { joint_noise: JointNoise::Estimated, model: RobotModel::Rigid, ..Options::default() };
         let solution = identify(state.robot.chain.clone(), &[series(&problem)], &options).unwrap();
-        solution.problem.noise.joint[0].clone()
+        solution.fit.problem.noise.joint[0].clone()
     };
     let seeds = 0..8;
     // One of a hundred gets past: two of eight with a probability of 0.3 %.
@@ -572,15 +569,15 @@ fn joint_noise_that_is_not_told_from_none_counts_as_none() {
 fn assert_same_bits(one: &Solution, two: &Solution) {
     let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<u64>>();
     // Comparison of numbers takes 0 for -0, nothing else; none of these is NaN in a converged solution.
-    assert_eq!(one.problem.noise, two.problem.noise);
+    assert_eq!(one.fit.problem.noise, two.fit.problem.noise);
     assert_eq!(one.iterations, two.iterations);
-    assert_eq!(one.state, two.state);
+    assert_eq!(one.fit.state, two.fit.state);
     assert_eq!(one.free_poses.state, two.free_poses.state);
     assert_eq!(one.free_poses.poses, two.free_poses.poses);
     assert_eq!(one.accuracy, two.accuracy);
-    assert_eq!(bits(one.covariance.reduced.as_slice()), bits(two.covariance.reduced.as_slice()));
-    assert_eq!(one.linearised.cost.to_bits(), two.linearised.cost.to_bits());
-    let markers = |s: &Solution| s.covariance.markers();
+    assert_eq!(bits(one.fit.covariance.reduced.as_slice()), bits(two.fit.covariance.reduced.as_slice()));
+    assert_eq!(one.fit.linearised.cost.to_bits(), two.fit.linearised.cost.to_bits());
+    let markers = |s: &Solution| s.fit.covariance.markers();
     assert_eq!(markers(one), markers(two));
 }
 
@@ -594,7 +591,7 @@ fn fixed_columns_do_not_move() {
         |n: &str| n.contains("joint_3") || n.ends_with(".fx") || n.starts_with("hand_camera") || n.ends_with("skew");
     problem.layout.set_free(false, fixed);
     let outcome = converged(&problem, start.clone(), &Settings::default());
-    let (before, after) = (start.values(&problem.layout), outcome.state.values(&problem.layout));
+    let (before, after) = (start.values(&problem.layout), outcome.adjustment.state.values(&problem.layout));
     let mut moved = 0;
     for (c, column) in problem.layout.columns.iter().enumerate() {
         if fixed(&column.name) {
@@ -603,7 +600,7 @@ fn fixed_columns_do_not_move() {
             moved += usize::from(before[c] != after[c]);
         }
     }
-    assert_eq!(start.mountings, outcome.state.mountings);
+    assert_eq!(start.mountings, outcome.adjustment.state.mountings);
     assert!(moved > 30);
 }
 
@@ -620,8 +617,8 @@ fn what_no_data_touch_keeps_its_prior() {
     let backlash = problem.layout.find("robot/joint_1.backlash").unwrap();
     problem.layout.columns[backlash].prior_mean = 1e-4;
     let outcome = converged(&problem, state, &TIGHT);
-    let cov = covariance(&problem, &outcome.state, outcome.linearised.as_ref().unwrap()).unwrap();
-    let values = outcome.state.values(&problem.layout);
+    let cov = covariance(&outcome);
+    let values = outcome.adjustment.state.values(&problem.layout);
     let column = &problem.layout.columns[backlash];
     assert!((cov.sigma(backlash) / column.prior_sigma - 1.0).abs() < 1e-12);
     assert!((values[backlash] - 1e-4).abs() < 1e-9 * column.prior_sigma);

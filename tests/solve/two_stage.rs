@@ -12,18 +12,23 @@ use robotcal::identify::{
     identify, linear_step,
 };
 use robotcal::model::joint_terms::{JointTerm, Term};
-use robotcal::problem::{Layout, Problem, Slack, State};
+use robotcal::problem::{Adjustment, Layout, Problem, Slack, State};
 use robotcal::series::CameraMount;
-use robotcal::solve::{Settings, Status, covariance, linearise_all, solve};
+use robotcal::solve::{Covariance, Settings, Status, solve};
 
 fn hard(state: &State) -> State {
     State { slack: vec![Slack::None; state.slack.len()], ..state.clone() }
 }
 
-fn solved(problem: &Problem, start: State) -> State {
-    let outcome = solve(problem, start, &Settings { iterations: 200, decrement: 1e-9 });
+fn covariance(adjustment: &Adjustment) -> Covariance {
+    adjustment.linear(&adjustment.linearise().unwrap()).covariance().unwrap()
+}
+
+fn solved(problem: &Problem, start: State) -> Adjustment {
+    let start = Adjustment { problem: problem.clone(), state: start };
+    let outcome = solve(start, &Settings { iterations: 200, decrement: 1e-9 });
     assert_eq!(outcome.status, Status::Converged);
-    outcome.state
+    outcome.adjustment
 }
 
 #[test]
@@ -36,10 +41,9 @@ fn full_covariance_relinearised_at_the_hard_joint_solution_is_the_hard_joint_fit
         problem.images[2].observations[3].uv.y += 2.0;
         problem.layout.set_free(false, |n| n.ends_with("joint_2/origin.rz"));
         let joint = solved(&problem, hard(&state));
-        let stage = PoseStage::linearised(&problem, &joint).unwrap();
-        let (step, two_stage) = linear_step(&problem, &stage, &joint, 0.0).unwrap();
-        let lin = linearise_all(&problem, &joint).unwrap();
-        let one_stage = covariance(&problem, &joint, &lin).unwrap();
+        let stage = PoseStage::linearised(&joint).unwrap();
+        let (step, two_stage) = linear_step(&joint, &stage, 0.0).unwrap();
+        let one_stage = covariance(&joint);
         let offset = stage.offset.amax();
         assert!(offset > 1e-6, "the poses of the joint fit are not the free poses: {offset:e}");
         for (c, column) in problem.layout.columns.iter().enumerate().take(problem.layout.theta_len()) {
@@ -66,11 +70,10 @@ fn full_covariance_relinearised_at_the_joint_solution_is_the_joint_fit() {
     problem.noise.joint = vec![vec![sigma; 6]];
     let joint = solved(&problem, state);
     // The stage is linearised where the joint fit ended, joint noise of each stop included ...
-    let stage = PoseStage::linearised(&problem, &joint).unwrap();
+    let stage = PoseStage::linearised(&joint).unwrap();
     // ... and the charts start where the readings alone would put the camera: a second-order difference (0.3 mrad squared).
-    let (step, two_stage) = linear_step(&problem, &stage, &joint, sigma).unwrap();
-    let lin = linearise_all(&problem, &joint).unwrap();
-    let one_stage = covariance(&problem, &joint, &lin).unwrap();
+    let (step, two_stage) = linear_step(&joint, &stage, sigma).unwrap();
+    let one_stage = covariance(&joint);
     for (c, column) in problem.layout.columns.iter().enumerate().take(problem.layout.theta_len()) {
         let s = one_stage.sigma(c);
         assert!(step[c].abs() < 0.01 * s, "{}: step of {:e} sigma", column.name, step[c] / s);
@@ -88,7 +91,8 @@ fn estimators_find_the_truth_within_their_sigma_where_their_noise_model_is_true(
     start.robot.terms.iter_mut().for_each(|t| t.value = 0.0);
     start.plates[0].corrections.iter_mut().for_each(|c| *c = Vector3::zeros());
     let truth_values = truth.values(&problem.layout);
-    for (estimator, found) in estimate_all(&problem, &start) {
+    let start = Adjustment { problem: problem.clone(), state: start };
+    for (estimator, found) in estimate_all(&start) {
         let found = found.unwrap_or_else(|| panic!("{} has no solution", estimator.title()));
         let values = found.state.values(&problem.layout);
         // Mean squared error of robot columns over sigma; robot columns are many and correlated, so a loose bound.
@@ -110,8 +114,8 @@ fn estimators_find_the_truth_within_their_sigma_where_their_noise_model_is_true(
             assert!((common / 2e-4).ln().abs() < 0.24, "{}: joint noise {common:e}", estimator.title());
         }
     }
-    let stage = PoseStage::adjusted(&problem, &start).unwrap();
-    assert!(fit_poses(&problem, &stage, &start, Estimator::Joint, JointNoise::Estimated).is_none());
+    let stage = PoseStage::adjusted(&start).unwrap();
+    assert!(fit_poses(&start, &stage, Estimator::Joint, JointNoise::Estimated).is_none());
 }
 
 #[test]
@@ -126,13 +130,13 @@ fn every_estimator_has_a_solution_where_joints_came_back_to_readings() {
     problem.layout = Layout::new(&state, mountings, placements, cameras, &["plate".to_owned()]);
     assert_eq!(problem.layout.locals.len(), 12);
     problem.noise.local = vec![1e-3, 0.0, 0.0, 0.0, 0.0, 0.0];
-    for (estimator, found) in estimate_all(&problem, &state) {
+    for (estimator, found) in estimate_all(&Adjustment { problem, state }) {
         assert!(found.is_some(), "{}", estimator.title());
     }
 }
 
 /// Images in postures of `of_posture` stops each, which share the readings of the first three joints.
-fn in_postures(images: usize, of_posture: usize) -> (Problem, State) {
+fn in_postures(images: usize, of_posture: usize) -> Adjustment {
     let mut dice = Dice::new(77);
     let (mut problem, state) = problem(&mut dice, &Request { images, ..Request::default() });
     for (i, image) in problem.images.iter_mut().enumerate() {
@@ -142,7 +146,7 @@ fn in_postures(images: usize, of_posture: usize) -> (Problem, State) {
         let swing = 0.3 * posture * if (i / of_posture).is_multiple_of(2) { 1.0 } else { -1.0 };
         stop.readings[..3].copy_from_slice(&[swing, 0.1 + 0.01 * posture, 0.4 + 0.01 * posture]);
     }
-    (problem, state)
+    Adjustment { problem, state }
 }
 
 fn sets(folds: &[Vec<usize>]) -> BTreeSet<BTreeSet<usize>> {
@@ -151,8 +155,8 @@ fn sets(folds: &[Vec<usize>]) -> BTreeSet<BTreeSet<usize>> {
 
 #[test]
 fn regions_hold_whole_postures_out_and_are_not_the_folds_by_image() {
-    let (problem, state) = in_postures(24, 4);
-    let (by_image, by_region) = (folds(&problem).unwrap(), regions(&problem, &state).unwrap());
+    let seen = in_postures(24, 4);
+    let (by_image, by_region) = (folds(&seen.problem).unwrap(), regions(&seen).unwrap());
     assert_eq!((by_image.len(), by_region.len()), (6, 3));
     assert_ne!(sets(&by_image), sets(&by_region));
     let mut all: Vec<usize> = by_region.concat();
@@ -166,8 +170,8 @@ fn regions_hold_whole_postures_out_and_are_not_the_folds_by_image() {
     // Regions follow each other along the workspace: of the swings 0, -0.3, 0.6, -0.9, 1.2, -1.5 two neighbours each.
     let postures: BTreeSet<BTreeSet<usize>> = by_region.iter().map(|r| r.iter().map(|i| i / 4).collect()).collect();
     assert_eq!(postures, [[3, 5], [0, 1], [2, 4]].map(BTreeSet::from).into());
-    let (few, state) = in_postures(20, 4);
-    assert!(folds(&few).is_some() && regions(&few, &state).is_none());
+    let few = in_postures(20, 4);
+    assert!(folds(&few.problem).is_some() && regions(&few).is_none());
 }
 
 #[test]
@@ -192,11 +196,11 @@ fn identify_and_compare_answer_the_same_question_alike_and_a_two_stage_result_st
         // Its accuracy is the one that the joint fit's report states of it, and its robot that of the estimator.
         let row = beside.rows.iter().find(|r| r.estimator == estimator).unwrap();
         assert!((row.by_image.unwrap().rms_mm / staged.accuracy.calibrated.rms_mm - 1.0).abs() < 1e-9);
-        let stage = PoseStage::adjusted(&joint.problem, &joint.state).unwrap();
-        let found = fit_poses(&joint.problem, &stage, &joint.state, estimator, JointNoise::Estimated).unwrap();
-        assert_eq!(found.state.robot, staged.state.robot);
-        for c in staged.problem.layout.robot().filter(|&c| staged.problem.layout.columns[c].free) {
-            let (own, of_fit) = (staged.covariance.sigma(c), found.covariance[(c, c)].sqrt());
+        let stage = PoseStage::adjusted(&joint.fit).unwrap();
+        let found = fit_poses(&joint.fit, &stage, estimator, JointNoise::Estimated).unwrap();
+        assert_eq!(found.state.robot, staged.fit.state.robot);
+        for c in staged.fit.problem.layout.robot().filter(|&c| staged.fit.problem.layout.columns[c].free) {
+            let (own, of_fit) = (staged.fit.covariance.sigma(c), found.covariance[(c, c)].sqrt());
             let same = if estimator == Estimator::FullAndRepeatability { 0.3 } else { 1e-9 };
             assert!(own > 0.0 && (own / of_fit - 1.0).abs() < same || staged.worth.larger_stated, "{own} {of_fit}");
         }
