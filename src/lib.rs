@@ -16,10 +16,12 @@
 //! | [`simulate`], [`diagnose`] | a world with known truth; what the data contradict |
 //! | [`identify`] | series -> solution |
 //! | [`output`] | solution -> bytes |
+//! | [`calibration`] | the front door: robot and series -> calibration |
 //! | [`study`] | what the program reaches where the truth is known |
 //! | [`cli`] | the only room that prints |
 
 pub mod assess;
+pub mod calibration;
 pub mod cli;
 pub mod detect;
 pub mod diagnose;
@@ -42,4 +44,6 @@ pub mod solve;
 pub mod study;
 pub mod urdf;
 
+pub use calibration::{Calibration, calibrate};
 pub use error::{Error, ErrorKind, Notice, Result, closest_name, plain_name};
+pub use identify::Options;

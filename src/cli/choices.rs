@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use crate::error::{Error, Result};
-use crate::identify::{Config, Estimator, JointNoise, MarkerTolerance, Options, Parameters, RobotModel, Selection};
+use crate::identify::{Config, JointNoise, MarkerTolerance, Options, Parameters, RobotModel, Selection};
 
 /// Flags that `identify` shares with whatever solves.
 #[derive(Debug, Args)]
@@ -103,32 +103,6 @@ impl ChoiceArgs {
             payload: config.payload,
         })
     }
-}
-
-/// Options for the record.
-pub(super) fn in_words(options: &Options) -> Vec<(String, String)> {
-    let joint_noise = match options.joint_noise {
-        JointNoise::Estimated => "estimated".to_owned(),
-        JointNoise::Known(sigma) => format!("{sigma} rad"),
-    };
-    let mut model = format!("{:?}", options.model).to_lowercase();
-    if options.harmonics != Options::default().harmonics {
-        model += &format!(", {} harmonics", options.harmonics);
-    }
-    let mut words = vec![("joint noise".to_owned(), joint_noise), ("robot model".to_owned(), model)];
-    if options.marker_tolerance == MarkerTolerance::Estimated {
-        words.push(("marker tolerance".to_owned(), "estimated".to_owned()));
-    }
-    if options.estimator != Estimator::Joint {
-        words.push(("estimator".to_owned(), options.estimator.title().to_owned()));
-    }
-    words.extend(options.selection.in_words());
-    words.extend(
-        options
-            .payload
-            .map(|p| ("payload".to_owned(), format!("{} kg at {:?} m of the tip link", p.mass_kg, p.centre_m))),
-    );
-    words
 }
 
 /// Most harmonics of a gear: beyond, they are no property of a gear that fifty stops could tell.

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::choices::Model;
-use super::recording::{Pictures, RecordingArgs};
+use super::recording::RecordingArgs;
 use super::robot::read_chain;
 use super::say::{say, say_line};
-use super::{Verdict, identify, progress};
+use super::{Verdict, progress};
+use crate::calibration::{Ends, Inputs, Observed};
 use crate::error::{Error, Result};
 use crate::identify::Options;
 use crate::output::Place;
@@ -18,7 +19,6 @@ use crate::simulate::truth::Truth;
 use crate::study::monte_carlo_markdown;
 use crate::study::{MonteCarloRequest, StudyRequest};
 use crate::study::{study_html, study_markdown, study_verdict};
-use crate::urdf;
 
 /// Flags of `compare`.
 #[derive(Debug, Args)]
@@ -71,13 +71,10 @@ pub(super) fn run(args: &CompareArgs) -> Result<Verdict> {
 
 fn series(args: &CompareArgs) -> Result<Verdict> {
     let place = args.out.as_deref().map(Place::among).transpose()?;
-    let description = urdf::read(&args.urdf)?;
-    let all = identify::read_all(&args.series)?;
-    let chain = identify::chain(&description, &all, args.base.as_deref(), args.tip.as_deref())?;
-    let all = Pictures::new().of_recordings(all, &args.recording.options(&chain.readings)?)?;
-    let truth = truth_of(&all)?;
-    let mut notices = Vec::new();
-    let measured = identify::measure_all(&all, &chain, &mut notices)?;
+    let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
+    let inputs = Inputs::read(&args.urdf, &args.series, ends)?.with_recordings(&args.recording.options(&[])?)?;
+    let truth = truth_of(&inputs.series)?;
+    let Observed { chain, series: measured, .. } = inputs.observe(progress::of_series().as_ref())?;
     let options = Options { model: args.robot_model.into(), ..Options::default() };
     let solution = crate::identify::identify(chain, &measured, &options)?;
     let bar = progress::bar(1, "folds");

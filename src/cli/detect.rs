@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use rayon::prelude::*;
 
-use super::identify::require_unchanged;
 use super::image_study::{self, StudyArgs};
-use super::recording::{Pictures, RecordingArgs};
+use super::recording::RecordingArgs;
 use super::say::{say, say_line};
 use super::{Verdict, progress};
+use crate::calibration::{Pictures, require_unchanged};
 use crate::detect::load;
 use crate::error::{Error, Notice, Result};
 use crate::identify::SeenImage;

@@ -1,6 +1,8 @@
 //! A progress bar on a terminal, nothing elsewhere.
 
+use std::collections::BTreeMap;
 use std::io::IsTerminal;
+use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -15,4 +17,17 @@ pub(super) fn bar(length: usize, what: &str) -> ProgressBar {
     }
     bar.set_message(what.to_owned());
     bar
+}
+
+/// A bar for every series whose images are looked at.
+pub(super) fn of_series() -> Box<dyn Fn(&str, usize) + Sync> {
+    let bars: Mutex<BTreeMap<String, ProgressBar>> = Mutex::default();
+    Box::new(move |name, stops| {
+        let mut bars = bars.lock().unwrap_or_else(PoisonError::into_inner);
+        let bar = bars.entry(name.to_owned()).or_insert_with(|| bar(stops, name));
+        bar.inc(1);
+        if bar.position() >= stops as u64 {
+            bar.finish_and_clear();
+        }
+    })
 }

@@ -1,12 +1,9 @@
-//! Flags for recordings, and the place where their pictures wait while a command runs.
-
-use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+//! Flags for recordings.
 
 use clap::{Args, ValueEnum};
 
 use crate::error::{Error, Result};
-use crate::series::{Clock, Motion, Picking, RecordingOptions, Series, Source};
+use crate::series::{Clock, Motion, Picking, RecordingOptions};
 
 /// Flags that say how a recording is read.
 #[derive(Debug, Args)]
@@ -70,43 +67,5 @@ impl RecordingArgs {
             picking: if self.picture == PickingName::Average { Picking::Average } else { Picking::Sharpest },
             ..RecordingOptions::default()
         })
-    }
-}
-
-/// A folder for pictures of recordings, removed when it is dropped.
-pub(super) struct Pictures(PathBuf);
-
-impl Pictures {
-    /// A folder of this process alone; nothing is created before it is needed.
-    pub(super) fn new() -> Self {
-        // Processes that share the folder for temporary files need not share their numbers.
-        let time = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_nanos());
-        Self(std::env::temp_dir().join(format!("robotcal-{}-{time:x}", std::process::id())))
-    }
-
-    /// Takes the stops out of the recordings among `all`; the other series stay as they are.
-    pub(super) fn of_recordings(&self, all: Vec<Series>, options: &RecordingOptions) -> Result<Vec<Series>> {
-        let one = |series: Series| match series.source {
-            Source::Recording(_) => {
-                let images = self.0.join(&series.name);
-                series.with_recording(&images, options)
-            }
-            _ => Ok(series),
-        };
-        all.into_iter().map(one).collect()
-    }
-}
-
-impl Drop for Pictures {
-    fn drop(&mut self) {
-        remove(&self.0);
-    }
-}
-
-fn remove(folder: &Path) {
-    if folder.exists()
-        && let Err(error) = std::fs::remove_dir_all(folder)
-    {
-        tracing::warn!("{} could not be removed: {error}", folder.display());
     }
 }

@@ -2,16 +2,15 @@
 
 use std::path::Path;
 
-use super::identify::{chain, measure_all, read_all};
-use super::recording::{Pictures, RecordingArgs};
+use super::recording::RecordingArgs;
 use super::say::say_line;
 use super::verify_args::VerifyArgs;
 use super::{Verdict, progress};
 use crate::assess::{Ratio, bootstrap_ratio, by_cluster, root_mean_square};
+use crate::calibration::{Ends, Inputs, Observed};
 use crate::error::{Error, Result};
 use crate::identify::{JudgedImage, verify_series};
 use crate::output::compensated;
-use crate::urdf;
 
 /// Judges the model, and the nominal one where it is given, by the images that both predict.
 pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdict> {
@@ -52,11 +51,9 @@ fn judged(
     compensation: Option<&Path>,
     recording: &RecordingArgs,
 ) -> Result<Vec<JudgedImage>> {
-    let description = urdf::read(urdf)?;
-    let all = read_all(&args.series)?;
-    let chain = chain(&description, &all, args.base.as_deref(), args.tip.as_deref())?;
-    let all = Pictures::new().of_recordings(all, &recording.options(&chain.readings)?)?;
-    let measured = measure_all(&all, &chain, &mut Vec::new())?;
+    let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
+    let inputs = Inputs::read(urdf, &args.series, ends)?.with_recordings(&recording.options(&[])?)?;
+    let Observed { chain, series: measured, .. } = inputs.observe(progress::of_series().as_ref())?;
     let robot = compensated(chain, compensation)?;
     let bar = progress::bar(1, &urdf.display().to_string());
     let found = verify_series(&robot, &measured);

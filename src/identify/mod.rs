@@ -5,6 +5,7 @@ mod compare;
 mod dry_run;
 mod evidence;
 mod free_poses;
+mod in_words;
 mod joint;
 mod lens_choice;
 mod local_errors;

@@ -10,6 +10,7 @@ use crate::assess::Accuracy;
 use crate::assess::Worth;
 use crate::error::Notice;
 use crate::fit::{Fit, FreePoses};
+use crate::model::robot::Robot;
 use crate::problem::Adjustment;
 use crate::problem::MeasuredSeries;
 use crate::solve::Status;
@@ -63,6 +64,13 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// The identified robot as it is exported: without the local errors, which are latent noise of the series.
+    pub fn exported_robot(&self) -> Robot {
+        let mut robot = self.fit.state.robot.clone();
+        robot.terms.truncate(self.fit.problem.layout.robot().end - self.fit.problem.layout.terms.start);
+        robot
+    }
+
     /// Data and estimates of the joint fit, be it the result or not.
     pub fn joint_fit(&self) -> &Adjustment {
         self.joint.as_deref().unwrap_or(&self.fit)

@@ -92,4 +92,4 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
 }
 
 /// Name of the report.
-const REPORT: &str = "report.html";
+pub const REPORT: &str = "report.html";

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Rooms from the bottom up; rooms on one level are peers and do not import each other, but for the pairs in `PEERS`.
-const LEVELS: [&[&str]; 15] = [
+const LEVELS: [&[&str]; 16] = [
     &["error"],
     &["files", "geom", "linalg"],
     &["series", "urdf"],
@@ -20,6 +20,7 @@ const LEVELS: [&[&str]; 15] = [
     &["simulate", "diagnose"],
     &["identify"],
     &["output"],
+    &["calibration"],
     &["study"],
     &["cli"],
 ];

@@ -1,0 +1,178 @@
+//! From files to identified observations.
+
+use std::path::{Path, PathBuf};
+
+use super::pictures::Pictures;
+use crate::error::{Error, Notice, Result};
+use crate::identify::measure;
+use crate::output::{recover, restore, solution_json::SolutionRecord};
+use crate::problem::MeasuredSeries;
+use crate::series::{self, InputFile, RecordingOptions, Series};
+use crate::urdf::{self, Chain, RobotDescription};
+
+/// Links between which the robot is identified; those that are not given are as series.toml and the URDF say.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Ends<'a> {
+    /// Base link.
+    pub base: Option<&'a str>,
+    /// Tip link.
+    pub tip: Option<&'a str>,
+}
+
+/// Who wants to know of every image that was looked at: name of the series, number of its stops.
+pub type Watch<'a> = &'a (dyn Fn(&str, usize) + Sync);
+
+/// Robot and series as their files say; no image was looked at.
+#[derive(Debug)]
+pub struct Inputs {
+    /// The robot as read.
+    pub description: RobotDescription,
+    /// The part of it that is identified.
+    pub chain: Chain,
+    /// The series.
+    pub series: Vec<Series>,
+    /// What to say where the tip was chosen among several leaves.
+    pub tip_notice: Option<Notice>,
+    urdf: PathBuf,
+    pictures: Pictures,
+}
+
+/// Robot and observations: what a solve goes from.
+#[derive(Debug)]
+pub struct Observed {
+    /// The robot as read.
+    pub description: RobotDescription,
+    /// The part of it that is identified.
+    pub chain: Chain,
+    /// The series, with identified markers.
+    pub series: Vec<MeasuredSeries>,
+    /// What the user should know.
+    pub notices: Vec<Notice>,
+    /// All files that were read, with their hashes.
+    pub files: Vec<InputFile>,
+}
+
+impl Inputs {
+    /// Reads a URDF and series folders (or recordings, which are only opened).
+    ///
+    /// # Errors
+    /// Files that cannot be read or do not go together; links that the URDF does not have.
+    pub fn read(urdf: &Path, folders: &[PathBuf], ends: Ends) -> Result<Self> {
+        let description = urdf::read(urdf)?;
+        let series = read_all(folders)?;
+        let base = agreed("base", ends.base, &series, |s| s.manifest.base.as_deref())?;
+        let tip = agreed("tip", ends.tip, &series, |s| s.manifest.tip.as_deref())?;
+        let chain = description.chain(base, tip)?;
+        let tip_notice = description.tip_notice(base, tip);
+        Ok(Self { chain, tip_notice, urdf: urdf.to_path_buf(), pictures: Pictures::new(), series, description })
+    }
+
+    /// Takes the stops out of the recordings among the series.
+    ///
+    /// # Errors
+    /// Recordings without stops or images; those of [`Series::with_recording`].
+    pub fn with_recordings(self, options: &RecordingOptions) -> Result<Self> {
+        let options = RecordingOptions { joints: self.chain.readings.clone(), ..options.clone() };
+        let series = self.pictures.of_recordings(self.series, &options)?;
+        Ok(Self { series, ..self })
+    }
+
+    /// Looks at all images.
+    ///
+    /// # Errors
+    /// Series whose images show no plate; files that change meanwhile.
+    pub fn observe(self, watch: Watch) -> Result<Observed> {
+        let Self { description, chain, series: all, tip_notice, urdf, pictures: _until_the_end } = self;
+        let mut notices = description.notices.clone();
+        notices.extend(tip_notice);
+        let mut files = vec![InputFile::of_bytes(&urdf, description.text.as_bytes())];
+        for s in &all {
+            files.extend(s.inputs.iter().cloned());
+            files.extend(s.image_hashes()?);
+        }
+        let mut series = Vec::with_capacity(all.len());
+        for s in &all {
+            let measured = measure(s, &chain, all.len() > 1, |_| watch(&s.name, s.stops.stops.len()))?;
+            notices.extend(measured.notices);
+            series.push(measured.series);
+        }
+        all.iter().try_for_each(|s| require_unchanged(&files, &s.image_hashes()?))?;
+        Ok(Observed { description, chain, series, notices, files })
+    }
+}
+
+impl Observed {
+    /// What an earlier solution went from; `path` is its file.
+    ///
+    /// # Errors
+    /// A record that does not hang together; links with other joints between them.
+    pub fn of_record(record: &SolutionRecord, path: &Path, ends: Ends) -> Result<Self> {
+        let description = restore::robot_description(record)?;
+        let base = ends.base.unwrap_or(&record.robot.base);
+        let tip = ends.tip.unwrap_or(&record.robot.tip);
+        let chain = restore::chain(record, &description, base, tip)?;
+        if chain.readings != record.robot.readings {
+            let what = format!("is of the joints {}", record.robot.readings.join(", "));
+            return Err(Error::input(
+                path.display(),
+                what,
+                "choose --base and --tip with the same joints between them",
+            ));
+        }
+        let mut files = record.inputs.clone();
+        files.push(InputFile::of_file(path)?);
+        let notices = description.notices.clone();
+        Ok(Self { chain, series: restore::measured_series(record)?, notices, files, description })
+    }
+}
+
+/// The hashes in a result are those of what was looked at: a file must be the same before and after.
+///
+/// # Errors
+/// A file that changed.
+pub fn require_unchanged(before: &[InputFile], after: &[InputFile]) -> Result<()> {
+    let is_changed = |a: &&InputFile| before.iter().any(|b| b.path == a.path && b.sha256 != a.sha256);
+    after.iter().find(is_changed).map_or(Ok(()), |changed| {
+        let remedy = "wait until nothing writes to the series any more, then run again";
+        Err(Error::input(changed.path.display(), "changed while it was looked at", remedy))
+    })
+}
+
+fn read_all(folders: &[PathBuf]) -> Result<Vec<Series>> {
+    let mut all: Vec<Series> = Vec::new();
+    for folder in folders {
+        recover(&folder.join("series.toml"))?;
+        let s = series::read(folder)?;
+        if let Some(twin) = all.iter().find(|a| a.name == s.name) {
+            return Err(Error::input(
+                folder.display(),
+                format!("is named '{}' like the series in {}", s.name, twin.folder.display()),
+                "give every series folder a name of its own, and each series only once",
+            ));
+        }
+        all.push(s);
+    }
+    Ok(all)
+}
+
+/// A link that the flag or the manifests name; they must agree.
+fn agreed<'a>(
+    what: &str,
+    flag: Option<&'a str>,
+    all: &'a [Series],
+    of: impl Fn(&'a Series) -> Option<&'a str>,
+) -> Result<Option<&'a str>> {
+    if flag.is_some() {
+        return Ok(flag);
+    }
+    let mut named = all.iter().filter_map(|s| of(s).map(|link| (s, link)));
+    let Some((first, link)) = named.next() else { return Ok(None) };
+    match named.find(|(_, other)| *other != link) {
+        None => Ok(Some(link)),
+        Some((second, other)) => Err(Error::input(
+            second.folder.join("series.toml").display(),
+            format!("{what} = \"{other}\", while {} has {what} = \"{link}\"", first.name),
+            format!("series of one robot share base and tip: correct one, or give --{what}"),
+        )),
+    }
+}
