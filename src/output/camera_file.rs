@@ -19,13 +19,9 @@ pub(super) fn cameras(solution: &Solution) -> Result<Vec<(String, String)>> {
     file_names("camera", "yaml", names).into_iter().zip(texts).map(|(file, text)| Ok((file, text?))).collect()
 }
 
-/// Name in ROS of a lens that ROS has.
-fn ros_name(lens: Lens) -> &'static str {
-    match lens {
-        Lens::Fisheye => "equidistant",
-        Lens::Rational => "rational_polynomial",
-        _ => "plumb_bob",
-    }
+/// Name in ROS of the lens of a camera that ROS has.
+fn ros_name(camera: &Camera) -> &'static str {
+    camera.lens.ros_name().unwrap_or_default()
 }
 
 /// Text of one camera_info; pixel (0, 0) is the centre of the top-left pixel, as in OpenCV and ROS.
@@ -38,7 +34,7 @@ pub(super) fn camera_yaml(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> R
     let (camera, remark) = in_ros(name, camera, depths_m)?;
     let [fx, fy, cx, cy] = [0, 1, 2, 3].map(|k| camera.parameters[k]);
     // The coefficients of these lenses stand in the order of OpenCV.
-    let model = ros_name(camera.lens);
+    let model = ros_name(&camera);
     let coefficients = camera.parameters[4..].to_vec();
     let matrix = |rows: usize, columns: usize, data: &[f64]| {
         format!("\n  rows: {rows}\n  cols: {columns}\n  data: {}\n", list(data.iter().copied()))
@@ -72,7 +68,7 @@ fn in_ros(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<(Camera, S
     let remark = format!(
         "# NOT THE IDENTIFIED LENS ({lens}, see solution.json), for which ROS has no model, but the nearest {}:\n\
          # loss {:.3} px RMS over the image, at most {:.3} px, for points {:.3} to {:.3} m away.\n{}",
-        ros_name(fit.camera.lens),
+        ros_name(&fit.camera),
         fit.rms_px,
         fit.worst_px,
         depths_m[0],
@@ -106,7 +102,7 @@ pub(super) fn camera_info(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> R
     Ok(CameraInfo {
         width_px: camera.width_px,
         height_px: camera.height_px,
-        distortion_model: ros_name(camera.lens).into(),
+        distortion_model: ros_name(&camera).into(),
         distortion: p[4..].to_vec(),
         intrinsics: Some([p[0], p[1], p[2], p[3]]),
     })

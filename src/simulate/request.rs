@@ -110,7 +110,7 @@ pub fn typical_camera(width_px: u32, height_px: u32, field_rad: f64) -> Camera {
     camera.parameters[1] *= 1.0004;
     camera.parameters[2] += 0.006 * f64::from(width_px);
     camera.parameters[3] -= 0.004 * f64::from(height_px);
-    camera.parameters[4..].copy_from_slice(&[-0.11, 0.09, 4e-4, -3e-4, -0.02]);
+    camera.parameters[4..].copy_from_slice(Lens::Brown.common_coefficients());
     camera
 }
 
@@ -119,20 +119,12 @@ pub fn lens_camera(lens: Lens, width_px: u32, height_px: u32, field_rad: f64) ->
     let brown = typical_camera(width_px, height_px, field_rad);
     let mut camera = Camera::pinhole(lens, width_px, height_px, brown.parameters[0]);
     camera.parameters[..4].copy_from_slice(&brown.parameters[..4]);
-    let start: &[f64] = &brown.parameters[4..];
-    let coefficients = match lens {
-        Lens::Brown | Lens::BrownField => start.to_vec(),
-        Lens::Fisheye | Lens::FisheyeField => {
-            // Equidistant: the same field takes a shorter image.
-            let shorter = (field_rad / 2.0).tan() / (field_rad / 2.0);
-            camera.parameters[..2].iter_mut().for_each(|f| *f *= shorter);
-            vec![0.03, -0.015, 0.006, -0.002]
-        }
-        Lens::Rational => vec![0.42, 0.06, 3e-4, -2e-4, 0.002, 0.78, 0.18, 0.012],
-        Lens::ThinPrism => [start, &[3e-3, -2e-3, -2.5e-3, 1.5e-3]].concat(),
-        Lens::Parallax => [start, &[0.012, -0.008]].concat(),
-    };
-    camera.parameters[4..4 + coefficients.len()].copy_from_slice(&coefficients);
+    // An equidistant lens takes a shorter image of the same field.
+    let half = field_rad / 2.0;
+    let shorter = half.tan() / lens.ideal_radius(half);
+    camera.parameters[..2].iter_mut().for_each(|f| *f *= shorter);
+    let coefficients = lens.common_coefficients();
+    camera.parameters[4..4 + coefficients.len()].copy_from_slice(coefficients);
     let field = camera.parametric()..camera.parameters.len();
     let across = camera.lattice().map_or(1, |l| l.size()[0]);
     for (k, c) in camera.parameters[field].iter_mut().enumerate() {

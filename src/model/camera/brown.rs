@@ -2,10 +2,26 @@
 
 use nalgebra::Vector2;
 
+use super::formula::{Coefficients, Distorted, Formula};
 use super::radial::{radial_tangential, tangential_columns};
-use super::{Coefficients, Distorted};
 
-pub(super) const NAMES: [&str; 5] = ["k1", "k2", "p1", "p2", "k3"];
+/// The formula.
+pub(super) struct Brown;
+
+impl Formula for Brown {
+    const COEFFICIENTS: &'static [&'static str] = &["k1", "k2", "p1", "p2", "k3"];
+    const ROS: Option<&'static str> = Some("plumb_bob");
+    const COMMON: &'static [f64] = &[-0.11, 0.09, 4e-4, -3e-4, -0.02];
+
+    #[inline(always)]
+    fn distort(c: &[f64], point: &Vector2<f64>, _inverse_depth: f64) -> Distorted {
+        distort(c, point)
+    }
+
+    fn is_monotonic_to(c: &[f64], r2: f64, _inverse_depth: f64) -> bool {
+        is_monotonic_to(c, r2)
+    }
+}
 
 /// Distorts a point of the plane z = 1; `c` = k1 k2 p1 p2 k3.
 #[inline(always)]

@@ -5,10 +5,8 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use super::formula::{Coefficients, Distorted, Formula};
 use super::radial::grows_to;
-use super::{Coefficients, Distorted};
-
-pub(super) const NAMES: [&str; 4] = ["k1", "k2", "k3", "k4"];
 
 /// Below this distance from the axis the series is exact to rounding.
 const NEAR_AXIS: f64 = 1e-4;
@@ -20,8 +18,30 @@ fn image_of(c: &[f64], t: f64) -> (f64, f64) {
     (t * even, 1.0 + s * (3.0 * c[0] + s * (5.0 * c[1] + s * (7.0 * c[2] + s * 9.0 * c[3]))))
 }
 
+/// The formula.
+pub(super) struct Fisheye;
+
+impl Formula for Fisheye {
+    const COEFFICIENTS: &'static [&'static str] = &["k1", "k2", "k3", "k4"];
+    const ROS: Option<&'static str> = Some("equidistant");
+    const COMMON: &'static [f64] = &[0.03, -0.015, 0.006, -0.002];
+
+    fn ideal_radius(angle: f64) -> f64 {
+        angle
+    }
+
+    #[inline(always)]
+    fn distort(c: &[f64], point: &Vector2<f64>, _inverse_depth: f64) -> Distorted {
+        distort(c, point)
+    }
+
+    fn is_monotonic_to(c: &[f64], r2: f64, _inverse_depth: f64) -> bool {
+        is_monotonic_to(c, r2)
+    }
+}
+
 /// Distorts a point of the plane z = 1.
-pub(super) fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
+fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
     let r2 = point.norm_squared();
     let r = r2.sqrt();
     let t = r.atan();
@@ -35,7 +55,7 @@ pub(super) fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
     };
     let mut d_coefficients = Coefficients::zeros();
     let mut power = if r < NEAR_AXIS { 1.0 } else { t / r };
-    for k in 0..NAMES.len() {
+    for k in 0..Fisheye::COEFFICIENTS.len() {
         power *= t * t;
         d_coefficients.set_column(k, &(point * power));
     }
@@ -44,6 +64,6 @@ pub(super) fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
 }
 
 /// True while the image still moves outwards from the axis to `r2 = r^2`.
-pub(super) fn is_monotonic_to(c: &[f64], r2: f64) -> bool {
+fn is_monotonic_to(c: &[f64], r2: f64) -> bool {
     grows_to(r2.sqrt().atan(), |t| image_of(c, t).0)
 }

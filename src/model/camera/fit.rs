@@ -2,7 +2,9 @@
 
 use nalgebra::{SMatrix, SVector, Vector2, Vector3};
 
-use super::{Camera, Lens, MAX_PARAMETERS};
+use super::formula::MAX_PARAMETERS;
+use super::lens::Lens;
+use super::projection::Camera;
 
 /// Points across the image.
 const ACROSS: usize = 33;
@@ -18,6 +20,19 @@ pub struct LensFit {
     pub rms_px: f64,
     /// The most that it loses, px.
     pub worst_px: f64,
+}
+
+impl Camera {
+    /// The nearest camera that ROS has a model for, for points from the nearer to the farther depth (m), and its loss; `None` where ROS has this
+    /// one, or none that comes near.
+    pub fn in_ros(&self, depths_m: &[f64; 2]) -> Option<LensFit> {
+        let nearest = match self.lens.formula() {
+            _ if self.lens.is_in_ros() => return None,
+            Lens::Fisheye => Lens::Fisheye,
+            _ => Lens::Rational,
+        };
+        fit_lens(self, nearest, depths_m)
+    }
 }
 
 /// Fits a camera with the lens `lens` to `camera` over its whole image, for points from the nearer to the farther depth (m).

@@ -2,11 +2,8 @@
 
 use nalgebra::Vector2;
 
+use super::formula::{Coefficients, Distorted, Formula};
 use super::radial::{grows_to, radial_tangential, tangential_columns};
-use super::{Coefficients, Distorted};
-
-/// In the order of OpenCV and of ROS `rational_polynomial`.
-pub(super) const NAMES: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
 
 /// Numerator, denominator and their derivatives by r^2.
 fn parts(c: &[f64], r2: f64) -> [f64; 4] {
@@ -15,8 +12,33 @@ fn parts(c: &[f64], r2: f64) -> [f64; 4] {
     [n, m, dn, dm]
 }
 
+/// The formula.
+pub(super) struct Rational;
+
+impl Formula for Rational {
+    const COEFFICIENTS: &'static [&'static str] = &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
+    const ROS: Option<&'static str> = Some("rational_polynomial");
+    const COMMON: &'static [f64] = &[0.42, 0.06, 3e-4, -2e-4, 0.002, 0.78, 0.18, 0.012];
+
+    fn prior_sigma(coefficient: usize) -> f64 {
+        match coefficient {
+            5.. => 1.0,
+            _ => f64::INFINITY,
+        }
+    }
+
+    #[inline(always)]
+    fn distort(c: &[f64], point: &Vector2<f64>, _inverse_depth: f64) -> Distorted {
+        distort(c, point)
+    }
+
+    fn is_monotonic_to(c: &[f64], r2: f64, _inverse_depth: f64) -> bool {
+        is_monotonic_to(c, r2)
+    }
+}
+
 /// Distorts a point of the plane z = 1.
-pub(super) fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
+fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
     let (x, y) = (point.x, point.y);
     let r2 = x * x + y * y;
     let [n, m, dn, dm] = parts(c, r2);
@@ -38,7 +60,7 @@ pub(super) fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
 }
 
 /// True while the image still moves outwards from the axis to `r2 = r^2`.
-pub(super) fn is_monotonic_to(c: &[f64], r2: f64) -> bool {
+fn is_monotonic_to(c: &[f64], r2: f64) -> bool {
     grows_to(r2.sqrt(), |r| {
         let [n, m, ..] = parts(c, r * r);
         if m > 0.0 { r * n / m } else { f64::NAN }

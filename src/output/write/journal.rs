@@ -10,12 +10,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::tree::{self, RECORDS};
-use super::write_synced;
+use super::tree::{self, RECORDS, UNFINISHED, write_synced};
 use crate::error::{Error, Result};
 
-/// The folder within the target.
-pub(super) const UNFINISHED: &str = ".robotcal-unfinished";
 /// Its new files.
 const FILES: &str = "files";
 /// Its list.

@@ -1,14 +1,14 @@
 //! The folder that results go to, tried before the work that they cost.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
 use super::held::{Held, Taken};
+use super::staging::Staging;
 use super::strays::{bring_back, part_name, sweep_beside};
-use super::{NewResult, Staging, journal, tree, write_synced};
+use super::tree::write_synced;
+use super::{journal, tree};
 use crate::error::{Error, Result};
 
 /// A folder that can be written, for as long as this lives; folders that were made for it go again when nothing was written.
@@ -97,30 +97,12 @@ impl Place {
     }
 
     fn try_writing(&self) -> Result<()> {
-        let probe = self.target.join(format!("{}-{}", journal::UNFINISHED, std::process::id()));
+        let probe = self.target.join(format!("{}-{}", tree::UNFINISHED, std::process::id()));
         let tried = write_synced(&probe, b"tried").and_then(|()| fs::remove_file(&probe));
         tried.map_err(|e| {
             let _ = fs::remove_file(&probe);
             Error::io(&self.target, &e)
         })
-    }
-
-    /// Writes a whole result.
-    ///
-    /// # Errors
-    /// As [`write_all`](super::write_all).
-    pub fn write_all(self, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
-        let result = self.begin()?;
-        files.iter().try_for_each(|(name, bytes)| result.put(name, bytes))?;
-        result.finish()
-    }
-
-    /// Begins a result.
-    ///
-    /// # Errors
-    /// A folder that went away and cannot be made again.
-    pub fn begin(self) -> Result<NewResult> {
-        Ok(NewResult { staging: self.stage()?, names: Mutex::default(), place: self })
     }
 
     /// A folder for new files, beside the target where it can change places with it.

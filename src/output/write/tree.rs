@@ -7,12 +7,14 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::journal::UNFINISHED;
 use crate::output::detection_files::OVERLAY_FOLDER;
 use crate::output::{detection_files, plan_files, solution_json};
 
 /// Files that list all others of their result; the last to come and the last to go.
 pub(super) const RECORDS: [&str; 3] = [solution_json::FILE_NAME, plan_files::FILE_NAME, detection_files::FILE_NAME];
+
+/// The folder of a run at work within its target.
+pub(super) const UNFINISHED: &str = ".robotcal-unfinished";
 
 /// What is in a folder that gets a new result.
 #[derive(Debug, Default)]
@@ -125,4 +127,11 @@ pub(super) fn sync_below(folder: &Path) {
 /// Makes sure that the names in this folder are on the disk.
 pub(super) fn sync(folder: &Path) {
     let _ = fs::File::open(folder).and_then(|f| f.sync_all());
+}
+
+/// Writes a file through to the disk, so that a full disk is noticed here.
+pub(super) fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = fs::File::create_new(path)?;
+    io::Write::write_all(&mut file, bytes)?;
+    file.sync_all()
 }

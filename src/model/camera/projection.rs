@@ -1,0 +1,240 @@
+//! A camera: pinhole, lens and displacement field; points to pixels and pixels to rays.
+
+use std::borrow::Cow;
+
+use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::field::{Lattice, Touched};
+use super::formula::MAX_PARAMETERS;
+use super::lens::Lens;
+
+/// First guess of the displacements that a field has to make, px; the data decide.
+const FIELD_SIGMA_PX: f64 = 1.0;
+
+/// Names of the pinhole parameters, px, with which every camera starts.
+const PINHOLE: [&str; 4] = ["fx", "fy", "cx", "cy"];
+
+/// A camera: x right, y down, z forward; pixel (0, 0) is the centre of the top-left pixel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Camera {
+    /// Lens model.
+    pub lens: Lens,
+    /// Columns of the image.
+    pub width_px: u32,
+    /// Rows of the image.
+    pub height_px: u32,
+    /// fx, fy, cx, cy (px), then the coefficients of the lens, then the displacement field where there is one: u and v (px) of every
+    /// control point, row by row.
+    pub parameters: Vec<f64>,
+}
+
+/// The image of a point with its derivatives.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Projection {
+    /// Column and row, px.
+    pub uv: Vector2<f64>,
+    /// With respect to the point in the camera frame, px/m.
+    pub d_point: Matrix2x3<f64>,
+    /// With respect to the parameters of the formula; columns beyond their number are zero.
+    pub d_parameters: SMatrix<f64, 2, MAX_PARAMETERS>,
+    /// Basis functions of the displacement field: derivatives of u by its u components, and of v by its v components.
+    pub field: Option<Touched>,
+}
+
+impl Camera {
+    /// A camera without distortion: focal length `focal_px`, principal point in the middle of the image.
+    pub fn pinhole(lens: Lens, width_px: u32, height_px: u32, focal_px: f64) -> Self {
+        let middle = |n: u32| (f64::from(n) - 1.0) / 2.0;
+        let mut parameters = vec![focal_px, focal_px, middle(width_px), middle(height_px)];
+        let field = if lens.has_field() { 2 * Lattice::over(width_px, height_px).points() } else { 0 };
+        parameters.resize(4 + lens.coefficient_names().len() + field, 0.0);
+        Self { lens, width_px, height_px, parameters }
+    }
+
+    /// Names of all parameters, in their order: those of the field are `u_<column>_<row>` and `v_<column>_<row>` of its control points.
+    pub fn parameter_names(&self) -> impl Iterator<Item = Cow<'static, str>> {
+        let formula = PINHOLE.into_iter().chain(self.lens.coefficient_names().iter().copied()).map(Cow::Borrowed);
+        let lattice = self.lattice();
+        let points = lattice.map_or(0, |l| l.points());
+        let across = lattice.map_or(1, |l| l.size()[0]);
+        let at = move |k: usize| ["u", "v"].map(|c| Cow::Owned(format!("{c}_{}_{}", k % across, k / across)));
+        formula.chain((0..points).flat_map(at))
+    }
+
+    /// Number of parameters of pinhole and lens formula, which come first.
+    pub fn parametric(&self) -> usize {
+        PINHOLE.len() + self.lens.coefficient_names().len()
+    }
+
+    /// The lattice of the displacement field; `None` for a lens without one.
+    pub fn lattice(&self) -> Option<Lattice> {
+        self.lens.has_field().then(|| Lattice::over(self.width_px, self.height_px))
+    }
+
+    /// The camera without its displacement field.
+    pub fn without_field(&self) -> Self {
+        let parameters = self.parameters[..self.parametric()].to_vec();
+        Self { lens: self.lens.formula(), parameters, ..*self }
+    }
+
+    /// The same camera with a lens that has all the coefficients of this one, in this order, and others, which are zero; `None` for others.
+    pub fn extended(&self, lens: Lens) -> Option<Self> {
+        let holds = lens.coefficient_names().starts_with(self.lens.coefficient_names()) && !self.lens.has_field();
+        let mut next = Self::pinhole(lens, self.width_px, self.height_px, self.parameters[0]);
+        next.parameters.iter_mut().zip(&self.parameters).for_each(|(own, known)| *own = *known);
+        holds.then_some(next)
+    }
+
+    /// Distance of the farthest corner of the image from the principal point over the focal length.
+    pub fn corner(&self) -> f64 {
+        let p = &self.parameters;
+        let far = |centre: f64, n: u32, focal: f64| centre.max(f64::from(n) - 1.0 - centre) / focal;
+        far(p[2], self.width_px, p[0]).hypot(far(p[3], self.height_px, p[1]))
+    }
+
+    /// Prior sigma of parameter `index` about zero; infinite for none.
+    pub fn prior_sigma(&self, index: usize) -> f64 {
+        match index.checked_sub(PINHOLE.len()) {
+            None => f64::INFINITY,
+            Some(_) if index >= self.parametric() => FIELD_SIGMA_PX,
+            Some(k) => self.lens.prior_sigma(k),
+        }
+    }
+
+    /// Unit of parameter `index`: "px" or "1".
+    pub fn parameter_unit(&self, index: usize) -> &'static str {
+        if (PINHOLE.len()..self.parametric()).contains(&index) { "1" } else { "px" }
+    }
+
+    /// Block of parameter `index`: "pinhole", "lens" or "field".
+    pub fn parameter_block(&self, index: usize) -> &'static str {
+        match index {
+            0..4 => "pinhole",
+            k if k < self.parametric() => "lens",
+            _ => "field",
+        }
+    }
+
+    /// Image (px) of a point in the camera frame (m); `None` behind the camera or where the lens model folds over.
+    pub fn project(&self, x_camera: &Vector3<f64>) -> Option<Vector2<f64>> {
+        let x = normalised(x_camera)?;
+        let inverse_depth = 1.0 / x_camera.z;
+        if !self.lens.is_monotonic_to(&self.parameters[4..], x.norm_squared(), inverse_depth) {
+            return None;
+        }
+        let d = self.lens.distort(&self.parameters[4..], &x, inverse_depth);
+        let h = self.to_pixels(&d.point);
+        Some(h + self.displacement(&h).0)
+    }
+
+    /// As [`Camera::project`], with derivatives; `None` only behind the camera, so that an adjustment can pass through a poor state.
+    #[inline(always)]
+    pub fn project_with_jacobian(&self, x_camera: &Vector3<f64>) -> Option<Projection> {
+        let x = normalised(x_camera)?;
+        let iz = 1.0 / x_camera.z;
+        let d = self.lens.distort(&self.parameters[4..], &x, iz);
+        let scale = [self.parameters[0], self.parameters[1]];
+        let mut d_parameters = SMatrix::<f64, 2, MAX_PARAMETERS>::zeros();
+        let mut d_point = Matrix2x3::zeros();
+        for (c, focal) in scale.into_iter().enumerate() {
+            d_parameters[(c, c)] = d.point[c];
+            d_parameters[(c, 2 + c)] = 1.0;
+            for k in 0..MAX_PARAMETERS - 4 {
+                d_parameters[(c, 4 + k)] = focal * d.d_coefficients[(c, k)];
+            }
+            let [by_x, by_y] = [focal * iz * d.d_point[(c, 0)], focal * iz * d.d_point[(c, 1)]];
+            d_point[(c, 0)] = by_x;
+            d_point[(c, 1)] = by_y;
+            d_point[(c, 2)] = -by_x * x.x - by_y * x.y - focal * iz * iz * d.d_inverse_depth[c];
+        }
+        let h = self.to_pixels(&d.point);
+        let Some(lattice) = self.lattice() else {
+            return Some(Projection { uv: h, d_point, d_parameters, field: None });
+        };
+        let (shift, bend) = self.displacement(&h);
+        let by_h = Matrix2::identity() + bend;
+        Some(Projection {
+            uv: h + shift,
+            d_point: by_h * d_point,
+            d_parameters: by_h * d_parameters,
+            field: Some(lattice.touched(&h)),
+        })
+    }
+
+    /// Displacement (px) on top of the formula where that images a point at `h`, and its derivative.
+    fn displacement(&self, h: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+        let lattice = self.lattice();
+        lattice.map_or_else(Default::default, |l| l.displacement(&self.parameters[self.parametric()..], h))
+    }
+
+    /// Direction (z = 1) in the camera frame that is imaged at `uv` px; `None` where no direction is. A lens that sees the distance is
+    /// taken as it is far away.
+    pub fn ray(&self, uv: &Vector2<f64>) -> Option<Vector3<f64>> {
+        let p = &self.parameters;
+        let scale = Vector2::new(p[0], p[1]);
+        let target = (uv - Vector2::new(p[2], p[3])).component_div(&scale);
+        // Image on the plane z = 1, the field included, and its derivative.
+        let image = |x: &Vector2<f64>| {
+            let d = self.lens.distort(&p[4..], x, 0.0);
+            let (shift, bend) = self.displacement(&self.to_pixels(&d.point));
+            let bend = Matrix2::from_fn(|i, k| bend[(i, k)] * scale[k] / scale[i]);
+            (d.point + shift.component_div(&scale), (Matrix2::identity() + bend) * d.d_point)
+        };
+        let mut x = target;
+        for _ in 0..50 {
+            let (at, by_x) = image(&x);
+            let step = by_x.try_inverse()? * (target - at);
+            // A bounded step keeps Newton on the inner branch of the lens.
+            x += step * (0.5 / step.norm().max(0.5));
+            if step.norm() < 1e-14 {
+                break;
+            }
+        }
+        let reached = (image(&x).0 - target).norm() < 1e-9 && self.lens.is_monotonic_to(&p[4..], x.norm_squared(), 0.0);
+        reached.then(|| Vector3::new(x.x, x.y, 1.0))
+    }
+
+    /// True where `uv` lies on the sensor, at least `margin_px` from its border.
+    pub fn contains(&self, uv: &Vector2<f64>, margin_px: f64) -> bool {
+        let inside = |x: f64, n: u32| x >= margin_px - 0.5 && x <= f64::from(n) - 0.5 - margin_px;
+        inside(uv.x, self.width_px) && inside(uv.y, self.height_px)
+    }
+
+    #[inline(always)]
+    fn to_pixels(&self, x: &Vector2<f64>) -> Vector2<f64> {
+        let p = &self.parameters;
+        Vector2::new(p[0] * x.x + p[2], p[1] * x.y + p[3])
+    }
+}
+
+#[inline(always)]
+fn normalised(x: &Vector3<f64>) -> Option<Vector2<f64>> {
+    (x.z > 1e-6).then(|| Vector2::new(x.x / x.z, x.y / x.z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ray_inverts_projection() {
+        let mut camera = Camera::pinhole(Lens::Brown, 1280, 1024, 800.0);
+        camera.parameters[4..].copy_from_slice(&[-0.15, 0.03, 8e-4, -5e-4, 0.002]);
+        for (u, v) in [(0.0, 0.0), (640.0, 500.0), (1279.0, 12.5), (33.0, 1023.0)] {
+            let uv = Vector2::new(u, v);
+            let ray = camera.ray(&uv).unwrap();
+            assert!((camera.project(&ray).unwrap() - uv).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_point_beyond_the_fold_has_no_image() {
+        let mut camera = Camera::pinhole(Lens::Brown, 1280, 1024, 800.0);
+        camera.parameters[4] = -0.3;
+        // r (1 - 0.3 r^2) has its maximum at r = 1.054.
+        assert!(camera.project(&Vector3::new(1.0, 0.0, 1.0)).is_some());
+        assert!(camera.project(&Vector3::new(1.1, 0.0, 1.0)).is_none());
+        assert!(camera.project(&Vector3::new(0.0, 0.0, -1.0)).is_none());
+    }
+}

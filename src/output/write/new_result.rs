@@ -1,0 +1,153 @@
+//! Results and folders that take their place when they are complete.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::io;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+use super::place::Place;
+use super::staging::Staging;
+use super::tree::write_synced;
+use super::{journal, swap, tree};
+use crate::error::{Error, Result};
+
+impl Place {
+    /// Writes a whole result.
+    ///
+    /// # Errors
+    /// As [`write_all`](super::write_all).
+    pub fn write_all(self, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
+        let result = self.begin()?;
+        files.iter().try_for_each(|(name, bytes)| result.put(name, bytes))?;
+        result.finish()
+    }
+
+    /// Begins a result.
+    ///
+    /// # Errors
+    /// A folder that went away and cannot be made again.
+    pub fn begin(self) -> Result<NewResult> {
+        Ok(NewResult { staging: self.stage()?, names: Mutex::default(), place: self })
+    }
+}
+
+/// A result that is written file by file and takes the place of the earlier one in the end; dropped before, it leaves
+/// everything as it was.
+#[derive(Debug)]
+pub struct NewResult {
+    staging: Staging,
+    names: Mutex<BTreeSet<String>>,
+    place: Place,
+}
+
+impl NewResult {
+    /// Writes a file, from any thread; `name` may begin with a folder.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn put(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        if !tree::is_inside(Path::new(name)) {
+            return Err(Error::input(name, "is no name of a file in a result", "report this"));
+        }
+        let path = self.staging.path().join(name);
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
+        }
+        write_synced(&path, bytes).map_err(|e| Error::io(&path, &e))?;
+        self.names.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned());
+        Ok(())
+    }
+
+    /// Puts the result in the place of the earlier one.
+    ///
+    /// # Errors
+    /// When it cannot be moved there: the earlier one is kept. Where a file of the user is in the way, the new one is put
+    /// beside, and the error says where.
+    pub fn finish(self) -> Result<()> {
+        let Self { place, names, staging } = self;
+        let names = names.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let target = &place.target;
+        let io = |e: io::Error| Error::io(target, &e);
+        fs::create_dir_all(target).map_err(io)?;
+        let there = tree::there(target, &names).map_err(io)?;
+        if let Some(file) = there.in_the_way(&names) {
+            return Err(set_aside(&staging, target, file));
+        }
+        tree::sync_below(staging.path());
+        if let Staging::Beside(new) = &staging {
+            match swap::swap(target, new, &there.foreign) {
+                Ok(()) => return Ok(()),
+                Err(error) => tracing::debug!("{}: {error}; replaced file by file", target.display()),
+            }
+        }
+        let _inside = staging.inside(target, &names)?;
+        journal::commit(target, &names, &there.stale)
+    }
+}
+
+/// A folder that is filled by others and appears at its place when it is complete.
+#[derive(Debug)]
+pub struct NewFolder {
+    staging: Staging,
+    place: Place,
+}
+
+impl NewFolder {
+    /// Begins a folder; `dir` must be new or empty.
+    ///
+    /// # Errors
+    /// A folder with something in it, one that cannot be written, one that another run writes.
+    pub fn begin(dir: &Path) -> Result<Self> {
+        let place = Place::empty(dir)?;
+        Ok(Self { staging: place.stage()?, place })
+    }
+
+    /// Where it is to be filled.
+    pub fn path(&self) -> &Path {
+        self.staging.path()
+    }
+
+    /// Moves the folder to its place.
+    ///
+    /// # Errors
+    /// When something came there meanwhile, or it cannot be moved.
+    pub fn finish(self) -> Result<()> {
+        let Self { place, staging } = self;
+        let target = &place.target;
+        if let Staging::Beside(new) = &staging
+            && fs::rename(new, target).is_ok()
+        {
+            return Ok(());
+        }
+        let fail = |e: io::Error| Error::io(target, &e);
+        let listed = fs::read_dir(staging.path()).map_err(fail)?;
+        let names: BTreeSet<String> = listed.filter_map(|e| e.ok()?.file_name().into_string().ok()).collect();
+        let there = tree::there(target, &BTreeSet::new()).map_err(fail)?;
+        if let Some(file) = there.in_the_way(&names) {
+            return Err(set_aside(&staging, target, file));
+        }
+        let _inside = staging.inside(target, &names)?;
+        journal::commit(target, &names, &[])
+    }
+}
+
+/// Moves a result that has no place to where it can be found.
+fn set_aside(staging: &Staging, target: &Path, in_the_way: &Path) -> Error {
+    let name = target.file_name().map_or_else(|| "result".into(), |n| n.to_string_lossy());
+    let candidate = |k: u32| match staging {
+        Staging::Beside(_) => target.with_file_name(format!("{name}-{k}")),
+        Staging::Inside(_) => target.join(format!("result-{k}")),
+    };
+    let place = target.join(in_the_way);
+    let what = "would be overwritten, but is not of the earlier result in this folder";
+    let aside = (2..1000).map(candidate).find(|p| !p.exists());
+    match aside.filter(|aside| fs::rename(staging.path(), aside).is_ok()) {
+        Some(aside) => Error::input(
+            place.display(),
+            format!("{what}; the new result is in {}", aside.display()),
+            "move the file away before the next run",
+        ),
+        None => Error::input(place.display(), what, "move it away, or choose another folder"),
+    }
+}
