@@ -152,7 +152,9 @@ fn source(file: &Path, text: &str) -> Source {
                     source.globs.push(path[..path.len() - 1].to_vec());
                     continue;
                 }
-                if !handed_on {
+                // A name that is only handed on is no import.
+                let at_home = || tokens.iter().filter(|t| **t == name).count() > 1;
+                if !handed_on || at_home() {
                     source.used.insert(path.clone());
                 }
                 source.names.insert(name, path);
