@@ -6,11 +6,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::Solution;
-use super::joint::{Options, RobotModel, identify_model};
+use super::joint::{Options, identify_model};
 use super::lens_choice::{self, with_lenses};
 use super::two_stage::Estimator;
 use crate::error::Result;
 use crate::fit::log_evidence;
+use crate::model::joint_terms::RobotModel;
 use crate::problem::{Adjustment, MeasuredSeries};
 use crate::solve::{Settings, solve};
 use crate::urdf::Chain;

@@ -12,8 +12,7 @@ use crate::assess::{hold_out, refitted};
 use crate::diagnose::{Move, doubted_sizes, find_move, find_shifts, gates, left_out, remarks, undetermined};
 use crate::error::{Error, Notice, Result};
 use crate::fit::FreePoses;
-use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
-use crate::model::robot::Robot;
+use crate::model::joint_terms::{RobotModel, USUAL_HARMONICS};
 use crate::problem::MeasuredSeries;
 use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem, Slack};
 use crate::solve::{
@@ -31,20 +30,6 @@ pub enum JointNoise {
     Known(f64),
 }
 
-/// Which joint terms are fitted beside twists.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum RobotModel {
-    /// Joint offsets.
-    Rigid,
-    /// Offsets, gear scale, two harmonics.
-    Gear,
-    /// All of these, gravity and backlash.
-    Full,
-    /// The largest of these that no smaller one beats by evidence.
-    Auto,
-}
-
 /// What is assumed of how far the markers are from nominal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MarkerTolerance {
@@ -53,9 +38,6 @@ pub enum MarkerTolerance {
     /// A factor on it per plate, estimated from the data where they tell enough.
     Estimated,
 }
-
-/// Harmonics of a gear unless asked for otherwise.
-const HARMONICS: u8 = 2;
 
 /// How to identify.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,48 +64,11 @@ impl Default for Options {
             joint_noise: JointNoise::Estimated,
             marker_tolerance: MarkerTolerance::Stated,
             model: RobotModel::Auto,
-            harmonics: HARMONICS,
+            harmonics: USUAL_HARMONICS,
             selection: Selection::default(),
             estimator: Estimator::default(),
             payload: None,
         }
-    }
-}
-
-impl RobotModel {
-    /// True where this model has such a term.
-    pub fn has(self, term: Term) -> bool {
-        match term {
-            Term::Gear | Term::Cosine(_) | Term::Sine(_) => self != Self::Rigid,
-            Term::Gravity(_) | Term::Sag | Term::Backlash => matches!(self, Self::Full | Self::Auto),
-            _ => true,
-        }
-    }
-
-    /// The nominal robot with the terms of this model.
-    pub fn robot(self, chain: Chain) -> Robot {
-        self.robot_with(chain, HARMONICS)
-    }
-
-    /// As [`RobotModel::robot`], with this many harmonics of every gear.
-    pub fn robot_with(self, chain: Chain, harmonics: u8) -> Robot {
-        let mut terms = vec![Term::Offset];
-        if self != Self::Rigid {
-            terms.push(Term::Gear);
-            terms.extend((1..=harmonics).flat_map(|k| [Term::Cosine(k), Term::Sine(k)]));
-        }
-        if self.has(Term::Backlash) {
-            terms.extend((0..GRAVITY_TERMS).map(Term::Gravity));
-            if !chain.masses.is_empty() {
-                terms.push(Term::Sag);
-            }
-            terms.push(Term::Backlash);
-        }
-        let readings = 0..chain.readings.len();
-        let terms = readings
-            .flat_map(|reading| terms.iter().map(move |&term| JointTerm { reading, term, value: 0.0 }))
-            .collect();
-        Robot { terms, ..Robot::nominal(chain) }
     }
 }
 

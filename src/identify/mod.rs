@@ -20,12 +20,13 @@ mod suspects;
 mod two_stage;
 mod verify;
 
+pub use crate::model::joint_terms::RobotModel;
 pub use build::build;
 pub use compare::{Comparison, ComparisonRow, HeldOut, TruthError, beside_two_stages, compare, truth_error};
 pub use dry_run::dry_run;
 pub use evidence::{Evidence, identify};
 pub use free_poses::adjust_free_poses;
-pub use joint::{JointNoise, MarkerTolerance, Options, RobotModel};
+pub use joint::{JointNoise, MarkerTolerance, Options};
 pub use lens_choice::{LensEvidence, choose_lens, depths_m};
 pub use look::{SeenImage, look, look_at, pictures, require_some};
 pub use measure::{Measured, measure};

@@ -5,10 +5,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::RobotModel;
 use crate::assess::{minimal_set, structural};
 use crate::error::{Error, Result};
-use crate::model::joint_terms::Term;
+use crate::model::joint_terms::{RobotModel, Term};
 use crate::problem::{Layout, State, short_name};
 use crate::series::read_toml;
 use crate::urdf::Payload;

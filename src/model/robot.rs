@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use super::joint_terms::{GRAVITY_TERMS, JointTerm, Term, TermContext, levers};
+use super::joint_terms::{GRAVITY_TERMS, JointTerm, RobotModel, Term, TermContext, USUAL_HARMONICS, levers};
 use crate::geom::{Pose, adjoint, exp_so3, right_jacobian_se3};
 use crate::urdf::{CarriedMass, Chain, Joint, JointKind};
 
@@ -264,5 +264,25 @@ impl Robot {
             let next = driven.get(k + 1).map_or([0.0; 2], |&(next, _)| levers(next).map(moment));
             contexts[reading].gravity = [own[0], own[1], next[0], next[1]];
         }
+    }
+}
+
+impl RobotModel {
+    /// True where this model has such a term.
+    pub fn has(self, term: Term) -> bool {
+        term.model() <= self
+    }
+
+    /// The nominal robot with the terms of this model.
+    pub fn robot(self, chain: Chain) -> Robot {
+        self.robot_with(chain, USUAL_HARMONICS)
+    }
+
+    /// As [`RobotModel::robot`], with this many harmonics of every gear.
+    pub fn robot_with(self, chain: Chain, harmonics: u8) -> Robot {
+        let terms: Vec<Term> = Term::all(harmonics).into_iter().filter(|t| self.has(*t) && t.applies(&chain)).collect();
+        let of_joint = |reading: usize| terms.iter().map(move |&term| JointTerm { reading, term, value: 0.0 });
+        let terms = (0..chain.readings.len()).flat_map(of_joint).collect();
+        Robot { terms, ..Robot::nominal(chain) }
     }
 }

@@ -1,11 +1,12 @@
 //! compensation.toml: what the corrected URDF cannot say of the joints.
 
+use std::collections::BTreeMap;
+
 use super::Context;
 use super::controller_files::{exported, offsets_in_words};
 use super::text::{key, list, number};
-use crate::error::{Error, Result};
 use crate::identify::Solution;
-use crate::model::joint_terms::Term;
+use crate::model::joint_terms::{Exported, Term};
 use crate::urdf::Chain;
 
 /// Acceleration of gravity, m/s^2 (standard).
@@ -22,46 +23,37 @@ const HEADER: &str = "\
 # u is the unit vector along x (along y where |axis_x| >= 0.9) without its part along the axis.
 ";
 
-/// The values of one joint.
+/// The values of one joint by their keys: one number, or a list.
 #[derive(Default)]
 struct Joint {
-    gear_scale: Option<f64>,
-    /// Index 2 (k - 1) is the cosine of harmonic k, the next the sine.
-    harmonics: Vec<f64>,
-    gravity: Vec<f64>,
-    compliance: Option<f64>,
-    backlash: Option<f64>,
+    numbers: BTreeMap<&'static str, f64>,
+    lists: BTreeMap<&'static str, Vec<f64>>,
 }
 
 impl Joint {
     /// `largest_nm`: largest moment of gravity about the axis, N m.
-    fn take(&mut self, term: Term, value: f64, largest_nm: f64) -> Result<()> {
-        match term {
-            Term::Offset | Term::Local(_) => {}
-            Term::Gear => self.gear_scale = Some(value),
-            Term::Cosine(k) => put(&mut self.harmonics, harmonic(k)?, value),
-            Term::Sine(k) => put(&mut self.harmonics, harmonic(k)? + 1, value),
-            Term::Gravity(k) => put(&mut self.gravity, usize::from(k), value),
-            Term::Sag => self.compliance = (largest_nm > 0.0).then(|| value / largest_nm),
-            Term::Backlash => self.backlash = Some(value),
+    fn take(&mut self, term: Term, value: f64, largest_nm: f64) {
+        match term.exported() {
+            Exported::Nowhere => {}
+            Exported::Number(key) => drop(self.numbers.insert(key, value)),
+            Exported::PerMoment(key) if largest_nm > 0.0 => drop(self.numbers.insert(key, value / largest_nm)),
+            Exported::PerMoment(_) => {}
+            Exported::InList(key, place) => {
+                let list = self.lists.entry(key).or_default();
+                list.resize(list.len().max(place + 1), 0.0);
+                list[place] = value;
+            }
         }
-        Ok(())
     }
 
     fn text(&self) -> String {
-        let mut out = String::new();
-        let mut line = |name: &str, value: Option<String>| {
-            if let Some(value) = value {
-                out += &format!("{name} = {value}\n");
-            }
+        let mut keys: Vec<&str> = Term::all(1).into_iter().filter_map(|t| t.exported().key()).collect();
+        keys.dedup();
+        let value = |key: &str| {
+            let number_of = self.numbers.get(key).copied().map(number);
+            number_of.or_else(|| self.lists.get(key).map(|l| list(l.iter().copied())))
         };
-        let non_empty = |values: &Vec<f64>| (!values.is_empty()).then(|| list(values.iter().copied()));
-        line("gear_scale", self.gear_scale.map(number));
-        line("harmonics", non_empty(&self.harmonics));
-        line("gravity", non_empty(&self.gravity));
-        line("compliance_rad_per_nm", self.compliance.map(number));
-        line("backlash_rad", self.backlash.map(number));
-        out
+        keys.into_iter().filter_map(|key| Some(format!("{key} = {}\n", value(key)?))).collect()
     }
 }
 
@@ -71,34 +63,19 @@ pub(super) fn largest_nm(chain: &Chain, reading: usize) -> f64 {
     GRAVITY * joint.map_or(0.0, |j| chain.largest_moment(j))
 }
 
-fn harmonic(k: u8) -> Result<usize> {
-    let index = usize::from(k).checked_sub(1).map(|k| 2 * k);
-    index.ok_or_else(|| Error::unsolved("compensation.toml", "harmonics count from 1", "use an offset for a constant"))
-}
-
-fn put(values: &mut Vec<f64>, index: usize, value: f64) {
-    if values.len() <= index {
-        values.resize(index + 1, 0.0);
-    }
-    values[index] = value;
-}
-
 /// Text of compensation.toml; joints without any such term are not in it.
-///
-/// # Errors
-/// A harmonic of order 0.
-pub(super) fn compensation_toml(solution: &Solution, context: &Context) -> Result<String> {
+pub(super) fn compensation_toml(solution: &Solution, context: &Context) -> String {
     let robot = exported(solution, context);
     let mut joints: Vec<Joint> = robot.chain.readings.iter().map(|_| Joint::default()).collect();
     for t in &robot.terms {
-        joints[t.reading].take(t.term, t.value, largest_nm(&robot.chain, t.reading))?;
+        joints[t.reading].take(t.term, t.value, largest_nm(&robot.chain, t.reading));
     }
     let sections = robot.chain.readings.iter().zip(&joints).map(|(name, joint)| (name, joint.text()));
     let sections = sections.filter(|(_, text)| !text.is_empty());
     let payload = robot.chain.payload().map_or_else(String::new, |p| {
         format!("\n[payload]\nmass_kg = {}\ncentre_m = {}\n", number(p.mass_kg), list(p.centre_m.iter().copied()))
     });
-    Ok(sections.fold(format!("{HEADER}# {}\n{payload}", offsets_in_words(context)), |out, (name, text)| {
+    sections.fold(format!("{HEADER}# {}\n{payload}", offsets_in_words(context)), |out, (name, text)| {
         out + &format!("\n[joint.{}]\n{text}", key(name))
-    }))
+    })
 }

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::compensation::largest_nm;
 use crate::error::{Error, Result};
 use crate::files::{self, Kind};
-use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
+use crate::model::joint_terms::{Exported, JointTerm, Term};
 use crate::model::robot::Robot;
 use crate::urdf::{Chain, Payload};
 
@@ -17,19 +17,58 @@ use crate::urdf::{Chain, Payload};
 struct File {
     payload: Option<Payload>,
     #[serde(default)]
-    joint: BTreeMap<String, Joint>,
+    joint: BTreeMap<String, BTreeMap<String, Values>>,
 }
 
+/// What stands under a key of a joint.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Joint {
-    gear_scale: Option<f64>,
-    #[serde(default)]
-    harmonics: Vec<f64>,
-    #[serde(default)]
-    gravity: Vec<f64>,
-    compliance_rad_per_nm: Option<f64>,
-    backlash_rad: Option<f64>,
+#[serde(untagged)]
+enum Values {
+    Number(f64),
+    List(Vec<f64>),
+}
+
+impl Values {
+    fn list(&self) -> &[f64] {
+        match self {
+            Self::Number(_) => &[],
+            Self::List(list) => list,
+        }
+    }
+
+    fn number(&self) -> Option<f64> {
+        match self {
+            Self::Number(number) => Some(*number),
+            Self::List(_) => None,
+        }
+    }
+}
+
+/// The terms of a joint with what stands for them, in the order of the table; else what is wrong.
+fn terms_of(joint: &BTreeMap<String, Values>) -> std::result::Result<Vec<(Term, f64)>, String> {
+    let longest = joint.values().map(|v| v.list().len()).max().unwrap_or_default();
+    let all = Term::all(u8::try_from(longest / 2).unwrap_or(u8::MAX));
+    for (key, values) in joint {
+        let places: Vec<Exported> = all.iter().map(|t| t.exported()).filter(|e| e.key() == Some(key)).collect();
+        match (places.first(), values) {
+            (Some(Exported::InList(..)), Values::Number(_)) => return Err(format!("{key} is no list")),
+            (Some(Exported::Number(_) | Exported::PerMoment(_)), Values::List(_)) => {
+                return Err(format!("{key} is no number"));
+            }
+            (None, Values::List(list)) if list.is_empty() => {}
+            (None, _) => return Err(format!("{key} is no term of a joint")),
+            (_, values) if values.list().len() > places.len() => {
+                return Err("harmonics come in pairs (cosine, sine) and gravity in up to four terms".into());
+            }
+            _ => {}
+        }
+    }
+    let value = |term: Term| match term.exported() {
+        Exported::Nowhere => None,
+        Exported::Number(key) | Exported::PerMoment(key) => joint.get(key)?.number(),
+        Exported::InList(key, place) => joint.get(key)?.list().get(place).copied(),
+    };
+    Ok(all.into_iter().filter_map(|term| Some((term, value(term)?))).collect())
 }
 
 /// The robot of a chain, with the joint terms of a compensation.toml where there is one.
@@ -70,28 +109,17 @@ pub fn parse_compensation(path: &Path, text: &str, chain: Chain) -> Result<Robot
                 "use the compensation.toml of this robot",
             )
         })?;
-        if joint.harmonics.len() % 2 != 0 || joint.gravity.len() > usize::from(GRAVITY_TERMS) {
-            return Err(Error::input(
-                place(),
-                "harmonics come in pairs (cosine, sine) and gravity in up to four terms",
-                "use the compensation.toml that identify wrote",
-            ));
-        }
-        let mut add = |term: Term, value: f64| terms.push(JointTerm { reading, term, value });
-        joint.gear_scale.into_iter().for_each(|v| add(Term::Gear, v));
-        for (k, pair) in (1u8..).zip(joint.harmonics.chunks(2)) {
-            add(Term::Cosine(k), pair[0]);
-            add(Term::Sine(k), pair[1]);
-        }
-        (0..GRAVITY_TERMS).zip(&joint.gravity).for_each(|(k, v)| add(Term::Gravity(k), *v));
-        if let Some(compliance) = joint.compliance_rad_per_nm {
-            if chain.masses.is_empty() {
+        for (term, value) in terms_of(joint)
+            .map_err(|what| Error::input(place(), what, "use the compensation.toml that identify wrote"))?
+        {
+            if !term.applies(&chain) {
                 let what = "has a compliance_rad_per_nm, and the URDF states no masses";
                 return Err(Error::input(place(), what, "give the calibrated URDF that was written beside it"));
             }
-            add(Term::Sag, compliance * largest_nm(&chain, reading));
+            let per_moment = matches!(term.exported(), Exported::PerMoment(_));
+            let value = if per_moment { value * largest_nm(&chain, reading) } else { value };
+            terms.push(JointTerm { reading, term, value });
         }
-        joint.backlash_rad.into_iter().for_each(|v| add(Term::Backlash, v));
     }
     Ok(Robot { terms, ..Robot::nominal(chain) })
 }

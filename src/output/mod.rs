@@ -68,7 +68,7 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
     add("kinematics.xacro".into(), controller_files::xacro(solution, context));
     add("mdh.csv".into(), controller_files::mdh_csv(solution, context));
     add("mastering.csv".into(), controller_files::mastering_csv(solution, context));
-    add("compensation.toml".into(), compensation::compensation_toml(solution, context)?);
+    add("compensation.toml".into(), compensation::compensation_toml(solution, context));
     for (name, text) in camera_file::cameras(solution)? {
         add(name, text);
     }

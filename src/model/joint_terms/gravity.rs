@@ -1,0 +1,43 @@
+//! Sag under gravity where the masses are not known: the moment about the axis of a unit weight on a unit lever.
+
+use nalgebra::Vector3;
+
+use super::joint_error::{Exported, JointError, TermContext};
+use super::robot_model::RobotModel;
+
+/// Number of gravity basis functions of a joint.
+pub const GRAVITY_TERMS: u8 = 4;
+
+/// Levers 0 and 1 are fixed in the joint's own link, 2 and 3 in the link after the next moving joint.
+pub(super) struct Gravity;
+
+impl JointError for Gravity {
+    type Index = u8;
+
+    const NAME: &'static str = "gravity";
+    const PRIOR_SIGMA: f64 = 0.3e-3;
+    const MODEL: RobotModel = RobotModel::Full;
+
+    fn indices(_harmonics: u8) -> Vec<Self::Index> {
+        (0..GRAVITY_TERMS).collect()
+    }
+
+    fn exists(lever: u8) -> bool {
+        lever < GRAVITY_TERMS
+    }
+
+    fn basis(lever: Self::Index, context: &TermContext) -> f64 {
+        context.gravity[usize::from(lever)]
+    }
+
+    fn exported(lever: Self::Index) -> Exported {
+        Exported::InList("gravity", usize::from(lever))
+    }
+}
+
+/// Two unit vectors that complete `axis` to a right-handed frame: the levers of the gravity terms.
+pub(in crate::model) fn levers(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let helper = if axis.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+    let u = (helper - axis * axis.dot(&helper)).normalize();
+    [u, axis.cross(&u)]
+}
