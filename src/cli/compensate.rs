@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
 use super::Verdict;
@@ -12,7 +13,7 @@ use super::say::{say, say_line};
 use super::show::read_solution;
 use crate::error::{Error, Result};
 use crate::files;
-use crate::geom::{Pose, exp_so3};
+use crate::geom::Pose;
 use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
 use crate::output::corrections::{self, TABLE, Weight};
@@ -54,7 +55,7 @@ pub(super) struct CompensateArgs {
     out: PathBuf,
     /// Language [default: by the extension of the files]
     #[arg(long, value_enum)]
-    language: Option<LanguageName>,
+    language: Option<Language>,
     /// Base link: the frame in which the controller computes poses
     #[arg(long, value_name = "LINK")]
     base: Option<String>,
@@ -91,30 +92,6 @@ pub(super) struct CompensateArgs {
 enum Unit {
     Rad,
     Deg,
-}
-
-/// Names of the languages.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum LanguageName {
-    /// Table of joints or flange poses
-    Csv,
-    /// KUKA KRL
-    Krl,
-    /// ABB RAPID
-    Rapid,
-    /// Universal Robots URScript
-    Urscript,
-}
-
-impl From<LanguageName> for Language {
-    fn from(name: LanguageName) -> Self {
-        match name {
-            LanguageName::Csv => Self::Csv,
-            LanguageName::Krl => Self::Krl,
-            LanguageName::Rapid => Self::Rapid,
-            LanguageName::Urscript => Self::UrScript,
-        }
-    }
 }
 
 pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
@@ -238,9 +215,20 @@ fn expected(
     Ok(Ok(corrections::expected_errors(program, done, &found_model(&record)?)))
 }
 
+/// Languages as values of a flag.
+impl ValueEnum for Language {
+    fn value_variants<'a>() -> &'a [Self] {
+        Self::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name()).help(self.words()))
+    }
+}
+
 fn language(args: &CompensateArgs) -> Result<Language> {
     if let Some(name) = args.language {
-        return Ok(name.into());
+        return Ok(name);
     }
     let mut all = args.programs.iter().map(|p| Language::of_file(p).map(|l| (p, l)));
     let Some((first, language)) = all.next().transpose()? else {
@@ -330,24 +318,8 @@ fn frame(flag: &str, numbers: &[f64], language: Language) -> Result<Option<Pose>
     if numbers.is_empty() {
         return Ok(None);
     }
-    let bad = |remedy: &str| Error::input(flag, format!("{} numbers", numbers.len()), remedy);
-    match (language, numbers) {
-        (Language::UrScript, &[x, y, z, rx, ry, rz]) => {
-            Ok(Some(Pose::new(exp_so3(&[rx, ry, rz].into()), [x, y, z].into())))
-        }
-        (Language::UrScript, _) => Err(bad("give x,y,z,rx,ry,rz in m and rad")),
-        (Language::Krl, &[x, y, z, a, b, c]) => {
-            let [x, y, z] = [x, y, z].map(|v| 1e-3 * v);
-            Ok(Some(Pose::from_xyz_rpy([x, y, z], [c, b, a].map(f64::to_radians))))
-        }
-        (Language::Krl, _) => Err(bad("give X,Y,Z,A,B,C in mm and deg")),
-        (Language::Rapid, &[x, y, z, q1, q2, q3, q4]) => {
-            Ok(Some(Pose::from_xyz_quaternion([x, y, z].map(|v| 1e-3 * v), [q2, q3, q4, q1])))
-        }
-        (Language::Rapid, _) => Err(bad("give x,y,z,q1,q2,q3,q4 in mm, q1 the scalar part")),
-        (Language::Csv, &[x, y, z, qx, qy, qz, qw]) => Ok(Some(Pose::from_xyz_quaternion([x, y, z], [qx, qy, qz, qw]))),
-        (Language::Csv, _) => Err(bad("give x_m,y_m,z_m,qx,qy,qz,qw")),
-    }
+    let bad = |wanted| Error::input(flag, format!("{} numbers", numbers.len()), format!("give {wanted}"));
+    language.frame(numbers).map(Some).map_err(bad)
 }
 
 /// Targets listed one by one on the terminal; more only by their largest corrections.

@@ -4,7 +4,7 @@
 //! per format. Everything but markers stays outside the quiet field, a pitch away from the outermost markers.
 
 use crate::plan::plate_design::{Sheet, quiet_field_m};
-use crate::series::{Plate, PlateKind};
+use crate::series::{Ink, Plate};
 
 pub use super::plate_pdf::pdf;
 pub use super::plate_png::png;
@@ -58,7 +58,7 @@ fn advice(sheet: &Sheet) -> String {
 
 /// The printed field itself.
 fn marks(plate: &Plate) -> Vec<Figure> {
-    if matches!(plate.kind, PlateKind::Chessboard) {
+    if plate.kind.print().ink == Ink::Squares {
         return squares(plate);
     }
     let ring = |m: &crate::series::Marker| Figure::Ring {

@@ -6,7 +6,7 @@
 
 use super::plate_code::{CodeDistance, PlateCode, WINDOW_LONG, WINDOW_SHORT};
 use crate::error::{Error, Result};
-use crate::series::{Marker, Plate, PlateKind};
+use crate::series::{Ink, Marker, Plate, PlateKind};
 
 /// Outer radius of a small marker as a share of the pitch.
 pub const SMALL_RADIUS: f64 = 0.20;
@@ -147,9 +147,9 @@ impl Sheet {
 
 /// Half of the plate's printed field beyond the outermost marker centres, m (a whole square for a chessboard).
 fn widest_radius(plate: &Plate) -> f64 {
-    match plate.kind {
-        PlateKind::Chessboard | PlateKind::Charuco => plate.pitch_m,
-        _ => plate.markers.iter().fold(0.0, |r, m| m.outer_radius_m.max(r)),
+    match plate.kind.print().ink {
+        Ink::Squares | Ink::SquaresAndTags => plate.pitch_m,
+        Ink::Circles | Ink::Unknown => plate.markers.iter().fold(0.0, |r, m| m.outer_radius_m.max(r)),
     }
 }
 

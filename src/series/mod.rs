@@ -10,6 +10,7 @@ mod observation;
 mod observation_file;
 mod plate;
 mod plate_file;
+mod plate_kind;
 mod read;
 mod recorded;
 mod table;
@@ -27,7 +28,8 @@ pub use mcap::{
 };
 pub use observation::{Edge, ImageObservations, Observation};
 pub use observation_file::{observations_csv, parse_observations};
-pub use plate::{Aruco, Marker, Plate, PlateKind, ScaleBar};
+pub use plate::{Aruco, Marker, Plate, ScaleBar};
 pub use plate_file::{DEFAULT_TOLERANCE_M, parse_plate, plate_csv, plate_toml, read_plate};
+pub use plate_kind::{Ink, Places, PlateKind, Print};
 pub use read::{Series, Source, read, read_images};
 pub use recorded::convert_recording;

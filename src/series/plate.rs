@@ -6,21 +6,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// What is printed on the plate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PlateKind {
-    /// Discs and annuli of several sizes whose pattern codes the position.
-    CodedCircles,
-    /// A plain grid of dots.
-    CircleGrid,
-    /// A chessboard; the markers are its inner corners.
-    Chessboard,
-    /// A chessboard with ArUco markers in its light squares.
-    Charuco,
-    /// Points observed by someone else's detector.
-    Points,
-}
+use super::plate_kind::PlateKind;
 
 /// One marker in the plate frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

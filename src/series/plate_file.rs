@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::inputs::{InputFile, read_text};
 use super::manifest::{check_format, parse_toml, read_toml, require_positive, to_toml};
-use super::plate::{Aruco, Marker, Plate, PlateKind, ScaleBar};
+use super::plate::{Aruco, Marker, Plate, ScaleBar};
+use super::plate_kind::{Ink, Places, PlateKind};
 use super::table::{Row, Table, to_csv};
 use crate::files::Kind;
 use crate::{Error, Result};
@@ -85,16 +86,16 @@ pub(super) fn marker_file(path: &Path) -> Result<Option<PathBuf>> {
 /// The plate as its TOML alone describes it.
 fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
     let tolerance_m = file.tolerance_m.unwrap_or(DEFAULT_TOLERANCE_M);
-    let needs_file = matches!(file.kind, PlateKind::CodedCircles | PlateKind::Points);
-    if needs_file && file.markers.is_none() {
+    let print = file.kind.print();
+    if print.needs_marker_file && file.markers.is_none() {
         let what = "a plate of this kind needs a marker file";
         return Err(Error::input(path.display(), what, "add markers = \"plate.csv\""));
     }
-    if file.radius_m.is_some() && (file.kind != PlateKind::CircleGrid || file.markers.is_some()) {
+    if file.radius_m.is_some() && (!print.has_radius || file.markers.is_some()) {
         let what = "radius_m is only for a circle-grid without a marker file";
         return Err(Error::input(path.display(), what, "remove radius_m"));
     }
-    if file.kind == PlateKind::Points {
+    if print.places == Places::Anywhere {
         let (columns, rows) = (file.columns.unwrap_or(0), file.rows.unwrap_or(0));
         let pitch_m = file.pitch_m.unwrap_or(0.0);
         let scale = file.scale;
@@ -135,13 +136,15 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
 /// The markers of a ChArUco board, where they are stated; no other kind has any.
 fn aruco(path: &Path, file: &PlateFile, pitch_m: f64) -> Result<Option<Aruco>> {
     let place = path.display();
-    match (&file.aruco, file.kind) {
-        (Some(aruco), PlateKind::Charuco) if aruco.side_m > 0.0 && aruco.side_m < pitch_m => Ok(Some(aruco.clone())),
-        (Some(aruco), PlateKind::Charuco) => {
+    match (&file.aruco, file.kind.print().has_tags) {
+        (Some(aruco), true) if aruco.side_m > 0.0 && aruco.side_m < pitch_m => Ok(Some(aruco.clone())),
+        (Some(aruco), true) => {
             let what = format!("[aruco] side_m = {} does not fit into a square of {pitch_m} m", aruco.side_m);
             Err(Error::input(place, what, "give the side of a marker with its black border, in metres"))
         }
-        (Some(_), _) => Err(Error::input(place, "[aruco] is only for a charuco plate", "remove it or correct `kind`")),
+        (Some(_), false) => {
+            Err(Error::input(place, "[aruco] is only for a charuco plate", "remove it or correct `kind`"))
+        }
         (None, _) => Ok(None),
     }
 }
@@ -150,7 +153,7 @@ fn read_markers(table: &Table, plate: &Plate) -> Result<Vec<Marker>> {
     table.refuse_unknown(&KNOWN)?;
     let id = table.require("id")?;
     let xyz = [table.require("x_m")?, table.require("y_m")?, table.require("z_m")?];
-    let circles = matches!(plate.kind, PlateKind::CodedCircles | PlateKind::CircleGrid);
+    let circles = plate.kind.print().ink == Ink::Circles;
     let radius = |name: &str| if circles { table.require(name).map(Some) } else { Ok(table.column(name)) };
     let radii = [radius("outer_radius_m")?, radius("inner_radius_m")?];
     let sigmas = ["sigma_m", "sigma_x_m", "sigma_y_m", "sigma_z_m"].map(|name| table.column(name));
@@ -206,7 +209,7 @@ fn marker_sigma(table: &Table, row: Row<'_>, columns: [Option<usize>; 4]) -> Res
 
 /// Markers of a lattice lie where their id says: a mirrored, turned or millimetre plate is seen here.
 fn check_ids(csv: &Path, plate: &Plate) -> Result<()> {
-    if matches!(plate.kind, PlateKind::Points | PlateKind::CircleGrid) {
+    if plate.kind.print().places != Places::LatticeById {
         return Ok(());
     }
     let lattice = Plate::lattice(plate.kind, plate.columns, plate.rows, plate.pitch_m, plate.tolerance_m);
@@ -276,7 +279,7 @@ fn check_scale(path: &Path, plate: &Plate) -> Result<()> {
 /// # Errors
 /// None in practice: every field can be written as TOML.
 pub fn plate_toml(plate: &Plate, markers: Option<&str>) -> Result<String> {
-    let lattice = plate.kind != PlateKind::Points || plate.columns > 0;
+    let lattice = plate.kind.print().places != Places::Anywhere || plate.columns > 0;
     let radius = plate.markers.first().map(|m| m.outer_radius_m).filter(|r| *r > 0.0);
     to_toml(
         "plate.toml",
@@ -286,7 +289,7 @@ pub fn plate_toml(plate: &Plate, markers: Option<&str>) -> Result<String> {
             columns: lattice.then_some(plate.columns),
             rows: lattice.then_some(plate.rows),
             pitch_m: Some(plate.pitch_m).filter(|p| *p > 0.0),
-            radius_m: radius.filter(|_| plate.kind == PlateKind::CircleGrid && markers.is_none()),
+            radius_m: radius.filter(|_| plate.kind.print().has_radius && markers.is_none()),
             markers: markers.map(str::to_string),
             tolerance_m: Some(plate.tolerance_m),
             aruco: plate.aruco.clone(),

@@ -15,7 +15,7 @@ use crate::detect::Picture;
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
-use crate::series::{Marker, Plate, PlateKind};
+use crate::series::{Ink, Marker, Plate};
 
 /// Largest distance between a sampled outline and the true one, px.
 const OUTLINE_TOLERANCE_PX: f64 = 0.004;
@@ -27,13 +27,13 @@ const SIDE_SAMPLES: usize = 16;
 /// # Errors
 /// ChArUco boards, whose markers are not drawn; dots without a radius; points, which no print is described for.
 pub fn check_drawable(plate: &Plate) -> Result<()> {
-    let (what, remedy) = match plate.kind {
-        PlateKind::Chessboard => return Ok(()),
-        PlateKind::Charuco => {
+    let (what, remedy) = match plate.kind.print().ink {
+        Ink::Squares => return Ok(()),
+        Ink::SquaresAndTags => {
             ("the markers of a ChArUco board cannot be drawn", "give --observations, or a chessboard")
         }
-        _ if plate.markers.iter().all(|m| m.outer_radius_m > 0.0) => return Ok(()),
-        _ => (
+        Ink::Circles | Ink::Unknown if plate.markers.iter().all(|m| m.outer_radius_m > 0.0) => return Ok(()),
+        Ink::Circles | Ink::Unknown => (
             "dots without a radius cannot be drawn",
             "give radius_m or a table of markers with radii, or --observations",
         ),
@@ -196,7 +196,7 @@ struct Marks<'a> {
 
 impl Marks<'_> {
     fn is_chessboard(&self) -> bool {
-        self.plate.kind == PlateKind::Chessboard
+        self.plate.kind.print().ink == Ink::Squares
     }
 
     fn count(&self) -> usize {

@@ -1,0 +1,141 @@
+//! The table of languages of robot programs.
+
+use std::path::Path;
+
+use super::program::Program;
+use super::setting::Setting;
+use super::text_file::TextFile;
+use super::{krl, rapid, table, urscript};
+use crate::error::{Error, Result};
+use crate::geom::{Pose, exp_so3};
+
+/// What a language has to say of itself.
+struct Row {
+    /// Its name on the command line.
+    name: &'static str,
+    /// What it is, in words.
+    words: &'static str,
+    /// Extensions of its files, in lower case.
+    extensions: &'static [&'static str],
+    /// Finds the targets in the texts.
+    read: fn(Vec<TextFile>, &Setting<'_>) -> Result<Program>,
+    /// A frame as this language writes it, from its numbers; `None` for another count of them.
+    frame: fn(&[f64]) -> Option<Pose>,
+    /// These numbers in words.
+    frame_numbers: &'static str,
+}
+
+/// From rows to the enum and all that asks which language it is.
+macro_rules! languages {
+    ($($(#[$doc:meta])* $language:ident $row:tt)+) => {
+        /// Languages of programs.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum Language {
+            $($(#[$doc])* $language,)+
+        }
+
+        impl Language {
+            /// All languages.
+            pub const ALL: &[Self] = &[$(Self::$language),+];
+
+            fn row(self) -> Row {
+                match self { $(Self::$language => Row $row,)+ }
+            }
+        }
+    };
+}
+
+languages! {
+    /// A table of joint targets or flange poses.
+    Csv {
+        name: "csv",
+        words: "Table of joints or flange poses",
+        extensions: &["csv"],
+        read: table::read,
+        frame: |numbers| match *numbers {
+            [x, y, z, qx, qy, qz, qw] => Some(Pose::from_xyz_quaternion([x, y, z], [qx, qy, qz, qw])),
+            _ => None,
+        },
+        frame_numbers: "x_m,y_m,z_m,qx,qy,qz,qw",
+    }
+    /// KUKA KRL: .src and .dat.
+    Krl {
+        name: "krl",
+        words: "KUKA KRL",
+        extensions: &["src", "dat"],
+        read: krl::read,
+        frame: |numbers| match *numbers {
+            [x, y, z, a, b, c] => {
+                Some(Pose::from_xyz_rpy([x, y, z].map(|v| 1e-3 * v), [c, b, a].map(f64::to_radians)))
+            }
+            _ => None,
+        },
+        frame_numbers: "X,Y,Z,A,B,C in mm and deg",
+    }
+    /// ABB RAPID.
+    Rapid {
+        name: "rapid",
+        words: "ABB RAPID",
+        extensions: &["mod", "modx", "prg", "sys"],
+        read: rapid::read,
+        frame: |numbers| match *numbers {
+            [x, y, z, q1, q2, q3, q4] => Some(Pose::from_xyz_quaternion([x, y, z].map(|v| 1e-3 * v), [q2, q3, q4, q1])),
+            _ => None,
+        },
+        frame_numbers: "x,y,z,q1,q2,q3,q4 in mm, q1 the scalar part",
+    }
+    /// Universal Robots URScript.
+    UrScript {
+        name: "urscript",
+        words: "Universal Robots URScript",
+        extensions: &["script", "urscript"],
+        read: urscript::read,
+        frame: |numbers| match *numbers {
+            [x, y, z, rx, ry, rz] => Some(Pose::new(exp_so3(&[rx, ry, rz].into()), [x, y, z].into())),
+            _ => None,
+        },
+        frame_numbers: "x,y,z,rx,ry,rz in m and rad",
+    }
+}
+
+impl Language {
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// What it is, in words.
+    pub fn words(self) -> &'static str {
+        self.row().words
+    }
+
+    /// The language that the name of a file tells.
+    ///
+    /// # Errors
+    /// An extension that no language has.
+    pub fn of_file(path: &Path) -> Result<Self> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let found = Self::ALL.iter().find(|l| l.row().extensions.contains(&extension.as_str()));
+        found.copied().ok_or_else(|| {
+            let known: Vec<&str> = Self::ALL.iter().flat_map(|l| l.row().extensions).copied().collect();
+            let what = "its extension tells no language of programs";
+            Error::input(path.display(), what, format!("rename it (known are {}) or give --language", known.join(", ")))
+        })
+    }
+
+    /// A frame in the notation of the language, from its numbers.
+    ///
+    /// # Errors
+    /// Another count of numbers; the text says which are needed.
+    pub fn frame(self, numbers: &[f64]) -> std::result::Result<Pose, &'static str> {
+        (self.row().frame)(numbers).ok_or(self.row().frame_numbers)
+    }
+}
+
+/// Finds the targets of a program of one or more files (a module and its data).
+///
+/// # Errors
+/// Text that the language does not allow, by file and line.
+pub fn read(language: Language, files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
+    (language.row().read)(files, setting)
+}
