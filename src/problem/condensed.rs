@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::linearise::{Chained, E, ImageTerms};
+use super::equations::E;
+use super::linearise::{Chained, ImageTerms};
 use super::{Image, Layout};
 use crate::linalg::SymmetricFactor;
 

@@ -7,7 +7,6 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix3x2, Matrix6x2, SMatrix, SVector, Vector2, Vector3};
 
-use super::linearise::E;
 use crate::linalg::{gram, product_with_rows};
 use crate::model::camera::MAX_PARAMETERS;
 use crate::model::circle::Prediction;
@@ -23,6 +22,11 @@ const FORMULA: usize = RESIDUAL + 1;
 
 /// Control points of the displacement field that an observation touches, ascending, with the derivative by their u and v.
 type Field = Vec<(usize, Matrix2<f64>)>;
+
+/// Intrinsic unknowns of one image before its displacement field: camera parameters (padded), then plate modes.
+///
+/// The field follows: u and v of every control point.
+pub const E: usize = MAX_PARAMETERS + MODES;
 
 /// Whitened equations of one image, two an observation.
 #[derive(Debug, Clone)]

@@ -4,21 +4,15 @@
 //! pose (p, 6), intrinsics (e, camera parameters then plate modes) and markers (m, 3 each); the robot enters afterwards by
 //! `dp = G dtheta + L dslack` ([`State::chained`]).
 
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, Matrix6x2, Matrix6xX, Vector2, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, Matrix6xX, Vector2, Vector6};
 
-use super::equations::{Collector, Equations, MarkerTerms};
+use super::equations::{Collector, E, Equations, MarkerTerms};
+use super::state::{seen_centre, tilt_axes};
 use super::{Image, Layout, Measured, Problem, Slack, State};
 use crate::geom::{Pose, adjoint, right_jacobian_se3};
 use crate::linalg::wide;
-use crate::model::camera::MAX_PARAMETERS;
 use crate::model::circle::{self, Prediction};
-use crate::model::plate_modes::MODES;
 use crate::model::robot::MovedOrigins;
-
-/// Intrinsic unknowns of one image before its displacement field: camera parameters (padded), then plate modes.
-///
-/// The field follows: u and v of every control point.
-pub const E: usize = MAX_PARAMETERS + MODES;
 
 /// One residual with what the robust weighting made of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -207,23 +201,6 @@ pub struct Chained {
     pub d_theta: DMatrix<f64>,
     /// `L`, 6 x slack.
     pub d_slack: DMatrix<f64>,
-}
-
-/// Middle of the markers that an image shows, plate frame, m.
-pub(super) fn seen_centre(image: &Image, state: &State) -> Vector3<f64> {
-    let nominal = &state.plates[image.plate].nominal;
-    let sum: Vector3<f64> = image.observations.iter().map(|o| nominal[o.marker]).sum();
-    sum / image.observations.len().max(1) as f64
-}
-
-/// Body twists of `camera_from_plate` that turn the plate about its x and y axes through `centre`.
-pub(super) fn tilt_axes(centre: &Vector3<f64>) -> Matrix6x2<f64> {
-    let mut axes = Matrix6x2::zeros();
-    for (k, axis) in [Vector3::x(), Vector3::y()].into_iter().enumerate() {
-        axes.fixed_view_mut::<3, 1>(0, k).copy_from(&centre.cross(&axis));
-        axes.fixed_view_mut::<3, 1>(3, k).copy_from(&axis);
-    }
-    axes
 }
 
 impl State {

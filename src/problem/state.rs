@@ -1,9 +1,8 @@
 //! Every unknown, with its value.
 
-use nalgebra::{DVector, SMatrix, SVector, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix6x2, SMatrix, SVector, Vector2, Vector3, Vector6};
 
-use super::linearise::{seen_centre, tilt_axes};
-use super::{Image, Layout};
+use super::image::Image;
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::plate_modes::{MODES, basis};
@@ -53,7 +52,7 @@ impl Slack {
         }
     }
 
-    fn moved(&self, step: &[f64]) -> Self {
+    pub(super) fn moved(&self, step: &[f64]) -> Self {
         match self {
             Self::Pose(pose) => Self::Pose(pose.perturbed(&Vector6::from_column_slice(step))),
             Self::Joints(dq) => Self::Joints(dq.iter().zip(step).map(|(q, s)| q + s).collect()),
@@ -122,87 +121,7 @@ pub struct State {
     pub slack: Vec<Slack>,
 }
 
-/// A step of every unknown.
-#[derive(Debug, Clone)]
-pub struct Step {
-    /// Dense columns.
-    pub dense: DVector<f64>,
-    /// Slack of every image (empty for one that takes no part).
-    pub slack: Vec<Vec<f64>>,
-    /// Marker corrections, per plate.
-    pub markers: Vec<Vec<Vector3<f64>>>,
-}
-
-fn twist(step: &DVector<f64>, start: usize) -> Vector6<f64> {
-    step.fixed_rows::<6>(start).into_owned()
-}
-
 impl State {
-    /// The state after a step.
-    pub fn moved(&self, layout: &Layout, step: &Step) -> Self {
-        let mut next = self.clone();
-        let x = &step.dense;
-        for (k, xi) in next.robot.twists.iter_mut().enumerate() {
-            *xi += twist(x, layout.twists.start + 6 * k);
-        }
-        for (k, term) in next.robot.terms.iter_mut().enumerate() {
-            term.value += x[layout.terms.start + k];
-        }
-        for (pose, range) in next.mountings.iter_mut().zip(&layout.mountings) {
-            *pose = pose.perturbed(&twist(x, range.start));
-        }
-        for (pose, range) in next.placements.iter_mut().zip(&layout.placements) {
-            *pose = pose.perturbed(&twist(x, range.start));
-        }
-        for (camera, range) in next.cameras.iter_mut().zip(&layout.cameras) {
-            camera.parameters.iter_mut().zip(range.clone()).for_each(|(p, c)| *p += x[c]);
-        }
-        for (k, plate) in next.plates.iter_mut().enumerate() {
-            plate.modes.iter_mut().zip(layout.shapes[k].clone()).for_each(|(m, c)| *m += x[c]);
-            plate.corrections.iter_mut().zip(&step.markers[k]).for_each(|(m, s)| *m += s);
-        }
-        for (slack, s) in next.slack.iter_mut().zip(&step.slack) {
-            if !s.is_empty() {
-                *slack = slack.moved(s);
-            }
-        }
-        next
-    }
-
-    /// Values of the columns that have a prior (others are poses on a manifold and give zero).
-    pub fn values(&self, layout: &Layout) -> DVector<f64> {
-        let mut v = DVector::zeros(layout.len());
-        for (k, xi) in self.robot.twists.iter().enumerate() {
-            v.fixed_rows_mut::<6>(layout.twists.start + 6 * k).copy_from(xi);
-        }
-        for (k, term) in self.robot.terms.iter().enumerate() {
-            v[layout.terms.start + k] = term.value;
-        }
-        for (camera, range) in self.cameras.iter().zip(&layout.cameras) {
-            camera.parameters.iter().zip(range.clone()).for_each(|(p, c)| v[c] = *p);
-        }
-        for (plate, range) in self.plates.iter().zip(&layout.shapes) {
-            plate.modes.iter().zip(range.clone()).for_each(|(m, c)| v[c] = *m);
-        }
-        v
-    }
-
-    /// Sets the value of one column; components of poses have none and stay.
-    pub fn set_value(&mut self, layout: &Layout, column: usize, value: f64) {
-        if layout.twists.contains(&column) {
-            let k = column - layout.twists.start;
-            self.robot.twists[k / 6][k % 6] = value;
-        } else if layout.terms.contains(&column) {
-            self.robot.terms[column - layout.terms.start].value = value;
-        }
-        for (camera, range) in self.cameras.iter_mut().zip(&layout.cameras).filter(|(_, r)| r.contains(&column)) {
-            camera.parameters[column - range.start] = value;
-        }
-        for (plate, range) in self.plates.iter_mut().zip(&layout.shapes).filter(|(_, r)| r.contains(&column)) {
-            plate.modes[column - range.start] = value;
-        }
-    }
-
     /// Pose of the camera of an image as these unknowns say.
     pub fn camera_from_plate(&self, image: &Image, slack: &Slack) -> Option<Pose> {
         let exact;
@@ -221,4 +140,21 @@ impl State {
         let Some([x, y]) = slack.tilt(image.stop.as_ref()?.readings.len()) else { return Some(pose) };
         Some(pose * Pose::exp(&(tilt_axes(&seen_centre(image, self)) * Vector2::new(x, y))))
     }
+}
+
+/// Middle of the markers that an image shows, plate frame, m.
+pub(super) fn seen_centre(image: &Image, state: &State) -> Vector3<f64> {
+    let nominal = &state.plates[image.plate].nominal;
+    let sum: Vector3<f64> = image.observations.iter().map(|o| nominal[o.marker]).sum();
+    sum / image.observations.len().max(1) as f64
+}
+
+/// Body twists of `camera_from_plate` that turn the plate about its x and y axes through `centre`.
+pub(super) fn tilt_axes(centre: &Vector3<f64>) -> Matrix6x2<f64> {
+    let mut axes = Matrix6x2::zeros();
+    for (k, axis) in [Vector3::x(), Vector3::y()].into_iter().enumerate() {
+        axes.fixed_view_mut::<3, 1>(0, k).copy_from(&centre.cross(&axis));
+        axes.fixed_view_mut::<3, 1>(3, k).copy_from(&axis);
+    }
+    axes
 }

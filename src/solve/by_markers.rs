@@ -6,8 +6,8 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, slack_with_markers, times_right};
+use super::linear::Carried;
 use super::linear::LinearProblem;
-use super::system::Carried;
 use crate::linalg::{mirror_upper, orthonormal, product, subtract_gram};
 use crate::model::plate_modes::MODES;
 use crate::problem::Step;

@@ -6,8 +6,8 @@
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, SMatrix, Vector3};
 
 use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, slack_with_markers};
+use super::linear::Carried;
 use super::linear::{LinearImage, LinearProblem};
-use super::system::Carried;
 use crate::linalg::{gram, mirror_upper, orthonormal, product, subtract_gram};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Equations, Step};

@@ -1,8 +1,9 @@
 //! An adjustment linearised at its state.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, SMatrix, Vector3};
 use rayon::prelude::*;
 
+use crate::model::plate_modes::MODES;
 use crate::problem::{
     Adjustment, Chained, Equations, Image, ImageTerms, Problem, Slack, State, Weighting, equations, linearise,
 };
@@ -176,3 +177,6 @@ impl LinearImage<'_> {
         (0..self.slack.len()).map(known).collect()
     }
 }
+
+/// What moves a marker (plate, index) with the dense columns beside its correction: first columns, 3 x modes.
+pub(super) type Carried<'a> = dyn Fn(usize, usize) -> Vec<(usize, SMatrix<f64, 3, MODES>)> + Sync + 'a;

@@ -1,12 +1,11 @@
 //! Reduced normal equations: dense columns, and either the slack of the images or the markers; the other family is eliminated.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix};
+use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::blocks::SeenMarkers;
 use super::by_markers::MarkersEliminated;
 use super::by_slack::SlackEliminated;
-use super::linear::LinearProblem;
-use crate::model::plate_modes::MODES;
+use super::linear::{Carried, LinearProblem};
 use crate::problem::{Adjustment, Problem, Step};
 
 /// Which family of unknowns is eliminated.
@@ -29,9 +28,6 @@ impl Elimination {
         if slack > markers { Self::Slack } else { Self::Markers }
     }
 }
-
-/// What moves a marker (plate, index) with the dense columns beside its correction: first columns, 3 x modes.
-pub(super) type Carried<'a> = dyn Fn(usize, usize) -> Vec<(usize, SMatrix<f64, 3, MODES>)> + Sync + 'a;
 
 /// What is needed to get the eliminated family back.
 #[derive(Debug, Clone)]

@@ -2,11 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::joint_error::{Exported, JointError, TermContext};
+use super::joint_error::{Exported, GRAVITY_TERMS, JointError, TermContext};
 use super::robot_model::RobotModel;
-
-/// Number of gravity basis functions of a joint.
-pub const GRAVITY_TERMS: u8 = 4;
 
 /// Levers 0 and 1 are fixed in the joint's own link, 2 and 3 in the link after the next moving joint.
 pub(super) struct Gravity;

@@ -1,8 +1,10 @@
 //! What every kind of joint error has to say of itself.
 
-use super::gravity::GRAVITY_TERMS;
 use super::robot_model::RobotModel;
 use crate::urdf::Chain;
+
+/// Number of gravity basis functions of a joint.
+pub const GRAVITY_TERMS: u8 = 4;
 
 /// Posture-dependent quantities that the basis functions need, of one joint at one stop.
 #[derive(Debug, Clone, Copy)]

@@ -15,10 +15,9 @@ mod robot_model;
 mod sag;
 mod table;
 
-pub use gravity::GRAVITY_TERMS;
 pub(super) use gravity::levers;
 pub use harmonics::USUAL_HARMONICS;
-pub use joint_error::{Exported, TermContext};
+pub use joint_error::{Exported, GRAVITY_TERMS, TermContext};
 pub use local::LOCAL_RANGE;
 pub use robot_model::RobotModel;
 pub use table::{JointTerm, Term};

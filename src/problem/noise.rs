@@ -1,0 +1,40 @@
+//! Variance components.
+
+use crate::urdf::JointKind;
+
+/// Standard deviations that the data themselves decide (variance components).
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Noise {
+    /// Factor on the stated standard deviations of the observations, per camera.
+    pub pixel_factor: Vec<f64>,
+    /// Joint noise of every stop by itself, rad or m: per series, per reading.
+    pub joint: Vec<Vec<f64>>,
+    /// Local error of every reading, rad or m: common to stops at the same reading. Zero where no stops share readings.
+    pub local: Vec<f64>,
+    /// Apparent tilt of the plate in every image, rad: per series. Empty where it is not part of the slack.
+    pub tilt: Vec<f64>,
+    /// Factor on the stated tolerances of the markers, per plate. Empty where they are taken as stated.
+    pub marker: Vec<f64>,
+}
+
+impl Noise {
+    /// Every size of the slack at `first`, rad or m.
+    pub fn start_at(&mut self, first: f64) {
+        self.joint.iter_mut().flatten().for_each(|s| *s = first);
+        self.local.iter_mut().filter(|s| **s > 0.0).for_each(|s| *s = first);
+        self.tilt.fill(first);
+    }
+
+    /// Readings whose noise is alike: of one kind, with local errors told apart or not.
+    pub fn groups(&self, kinds: &[JointKind]) -> Vec<Vec<usize>> {
+        let apart = |r: usize| self.local.get(r).is_some_and(|s| *s > 0.0);
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for r in 0..kinds.len() {
+            match groups.iter_mut().find(|g| kinds[g[0]] == kinds[r] && apart(g[0]) == apart(r)) {
+                Some(group) => group.push(r),
+                None => groups.push(vec![r]),
+            }
+        }
+        groups
+    }
+}

@@ -1,0 +1,88 @@
+//! The unknowns as columns: their values, and the state after a step.
+
+use nalgebra::{DVector, Vector3, Vector6};
+
+use super::layout::Layout;
+use super::state::State;
+
+/// A step of every unknown.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// Dense columns.
+    pub dense: DVector<f64>,
+    /// Slack of every image (empty for one that takes no part).
+    pub slack: Vec<Vec<f64>>,
+    /// Marker corrections, per plate.
+    pub markers: Vec<Vec<Vector3<f64>>>,
+}
+
+fn twist(step: &DVector<f64>, start: usize) -> Vector6<f64> {
+    step.fixed_rows::<6>(start).into_owned()
+}
+
+impl State {
+    /// The state after a step.
+    pub fn moved(&self, layout: &Layout, step: &Step) -> Self {
+        let mut next = self.clone();
+        let x = &step.dense;
+        for (k, xi) in next.robot.twists.iter_mut().enumerate() {
+            *xi += twist(x, layout.twists.start + 6 * k);
+        }
+        for (k, term) in next.robot.terms.iter_mut().enumerate() {
+            term.value += x[layout.terms.start + k];
+        }
+        for (pose, range) in next.mountings.iter_mut().zip(&layout.mountings) {
+            *pose = pose.perturbed(&twist(x, range.start));
+        }
+        for (pose, range) in next.placements.iter_mut().zip(&layout.placements) {
+            *pose = pose.perturbed(&twist(x, range.start));
+        }
+        for (camera, range) in next.cameras.iter_mut().zip(&layout.cameras) {
+            camera.parameters.iter_mut().zip(range.clone()).for_each(|(p, c)| *p += x[c]);
+        }
+        for (k, plate) in next.plates.iter_mut().enumerate() {
+            plate.modes.iter_mut().zip(layout.shapes[k].clone()).for_each(|(m, c)| *m += x[c]);
+            plate.corrections.iter_mut().zip(&step.markers[k]).for_each(|(m, s)| *m += s);
+        }
+        for (slack, s) in next.slack.iter_mut().zip(&step.slack) {
+            if !s.is_empty() {
+                *slack = slack.moved(s);
+            }
+        }
+        next
+    }
+
+    /// Values of the columns that have a prior (others are poses on a manifold and give zero).
+    pub fn values(&self, layout: &Layout) -> DVector<f64> {
+        let mut v = DVector::zeros(layout.len());
+        for (k, xi) in self.robot.twists.iter().enumerate() {
+            v.fixed_rows_mut::<6>(layout.twists.start + 6 * k).copy_from(xi);
+        }
+        for (k, term) in self.robot.terms.iter().enumerate() {
+            v[layout.terms.start + k] = term.value;
+        }
+        for (camera, range) in self.cameras.iter().zip(&layout.cameras) {
+            camera.parameters.iter().zip(range.clone()).for_each(|(p, c)| v[c] = *p);
+        }
+        for (plate, range) in self.plates.iter().zip(&layout.shapes) {
+            plate.modes.iter().zip(range.clone()).for_each(|(m, c)| v[c] = *m);
+        }
+        v
+    }
+
+    /// Sets the value of one column; components of poses have none and stay.
+    pub fn set_value(&mut self, layout: &Layout, column: usize, value: f64) {
+        if layout.twists.contains(&column) {
+            let k = column - layout.twists.start;
+            self.robot.twists[k / 6][k % 6] = value;
+        } else if layout.terms.contains(&column) {
+            self.robot.terms[column - layout.terms.start].value = value;
+        }
+        for (camera, range) in self.cameras.iter_mut().zip(&layout.cameras).filter(|(_, r)| r.contains(&column)) {
+            camera.parameters[column - range.start] = value;
+        }
+        for (plate, range) in self.plates.iter_mut().zip(&layout.shapes).filter(|(_, r)| r.contains(&column)) {
+            plate.modes[column - range.start] = value;
+        }
+    }
+}
