@@ -3,35 +3,17 @@
 //! `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what the models share, with the whole information `N` (dense columns,
 //! slack and markers) at the optimum of each (D. MacKay, *Bayesian interpolation*, 1992).
 
-use serde::{Deserialize, Serialize};
-
-use super::Solution;
-use super::joint::{Options, identify_model};
-use super::lens_choice::{self, with_lenses};
-use super::two_stage::Estimator;
+use super::estimator::Estimator;
+use super::joint::identify_model;
+use super::lens_choice::{self, DECISIVE, with_lenses};
+use super::options::Options;
+use super::solution::{Evidence, Solution};
 use crate::error::Result;
 use crate::fit::log_evidence;
 use crate::model::joint_terms::RobotModel;
 use crate::problem::{Adjustment, MeasuredSeries};
 use crate::solve::{Settings, solve};
 use crate::urdf::Chain;
-
-/// Logarithm of the odds at which a smaller model takes the place of a larger one: "decisive" (H. Jeffreys, *Theory of
-/// probability*, 1961). Gears have errors and arms sag; that there is nothing of it must be plain.
-pub(super) const DECISIVE: f64 = 4.605;
-
-/// Evidence of a robot model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Evidence {
-    /// The model.
-    pub model: RobotModel,
-    /// Logarithm of its evidence less that of the best model; 0 for the best.
-    pub log_evidence: f64,
-    /// Cost at its optimum.
-    pub cost: f64,
-    /// Free parameters of the robot.
-    pub parameters: usize,
-}
 
 /// Identifies robot, cameras, mountings and plates from identified series. The automatic model is the largest that no smaller one
 /// beats decisively; whoever names a joint term wants all of them.

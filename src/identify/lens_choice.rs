@@ -2,13 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
-
 use super::build::build;
-use super::evidence::DECISIVE;
 use super::free_poses::adjust_free_poses;
-use super::joint::{Options, identify_model};
-use super::solution::Solution;
+use super::joint::identify_model;
+use super::options::Options;
+use super::solution::{LensEvidence, Solution};
 use crate::error::{Error, Notice, Result};
 use crate::fit::log_evidence;
 use crate::model::camera::{Camera, Lens, fit_lens};
@@ -16,6 +14,10 @@ use crate::model::robot::Robot;
 use crate::problem::{Adjustment, LensChoice, MeasuredSeries, predict};
 use crate::solve::{ComponentOptions, LinearProblem, Status, estimate_components};
 use crate::urdf::Chain;
+
+/// Logarithm of the odds at which a smaller model takes the place of a larger one: "decisive" (H. Jeffreys, *Theory of
+/// probability*, 1961). Gears have errors and arms sag; that there is nothing of it must be plain.
+pub(super) const DECISIVE: f64 = 4.605;
 
 /// One observation of so many is kept aside, in every image and of every marker in other images.
 const KEPT_ASIDE: usize = 4;
@@ -28,21 +30,6 @@ const OUTLIERS: f64 = 0.02;
 const FISHEYE_FROM: f64 = 1.0;
 /// Rounds in which image noise and fit follow the lens.
 const ROUNDS: usize = 3;
-
-/// Evidence of a lens for one camera.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LensEvidence {
-    /// Camera.
-    pub camera: String,
-    /// The lens.
-    pub lens: Lens,
-    /// Logarithm of its evidence less that of the best lens of this camera; 0 for the best.
-    pub log_evidence: f64,
-    /// Principal point, px.
-    pub centre_px: [f64; 2],
-    /// True for the one that was taken: the simplest that none beats decisively.
-    pub taken: bool,
-}
 
 /// The solution with one robot model and, for cameras whose lens is open, the lens that its evidence supports; and the series with these
 /// lenses.

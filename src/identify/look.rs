@@ -3,34 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::second_pass::second_pass;
-use crate::detect::{Detection, FlatField, Picture, SeriesImage, detect_series, load};
-use crate::error::{Error, Notice, Result};
+use super::seen_image::SeenImage;
+use crate::detect::{FlatField, Picture, SeriesImage, detect_series, load};
+use crate::error::{Error, Result};
 use crate::series::{Plate, Series, Source};
-
-/// An image with what was seen in it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SeenImage {
-    /// File name, the key of joints.csv.
-    pub name: String,
-    /// The file, where it is there.
-    pub path: Option<PathBuf>,
-    /// Width and height, px; `None` for an image that could not be read.
-    pub size: Option<(usize, usize)>,
-    /// What was found, or why the image cannot be used.
-    pub detection: Detection,
-}
-
-impl SeenImage {
-    fn new(name: &str, path: Option<&Path>, seen: SeriesImage) -> Self {
-        Self { name: name.to_owned(), path: path.map(Path::to_path_buf), size: seen.size, detection: seen.detection }
-    }
-
-    /// Notices of the detector, with the name of the image.
-    pub fn notices(&self) -> impl Iterator<Item = Notice> {
-        let named = |n: &Notice| Notice { place: format!("{}: {}", self.name, n.place), ..n.clone() };
-        self.detection.notices.iter().map(named)
-    }
-}
 
 /// Looks for the plate in the images of all stops, dark and white images taken into account, then again where a first
 /// solve predicts more markers; in the order of the stops.

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::look::{SeenImage, look, recording, require_some};
+use super::look::{look, recording, require_some};
+use super::seen_image::SeenImage;
+use super::stated::{lens_of, measured_series};
 use crate::detect::Detection;
 use crate::error::{Error, Notice, Result};
-use crate::model::camera::Lens;
-use crate::problem::{ImageRejection, LensChoice, MeasuredSeries, MeasuredStop};
-use crate::series::{CirclePoint, Observation, Series, Source, StopOrder};
+use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop};
+use crate::series::{CirclePoint, Observation, Series, Source};
 use crate::urdf::Chain;
 
 /// A seen series with what the user should know of it.
@@ -77,48 +78,6 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     // The detector measures centroids, whatever observations would mean.
     let centroid = found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid;
     Ok(Measured { series: measured_series(series, lens, (width_px, height_px), centroid, stops), notices })
-}
-
-/// A series with what its stops show.
-pub(super) fn measured_series(
-    series: &Series,
-    lens: Lens,
-    (width_px, height_px): (u32, u32),
-    centroid: bool,
-    stops: Vec<MeasuredStop>,
-) -> MeasuredSeries {
-    let plate_file = series.folder.join(&series.manifest.plate);
-    MeasuredSeries {
-        name: series.name.clone(),
-        camera: series.camera_name().to_owned(),
-        mounting: series.mounting().to_owned(),
-        mount: series.manifest.camera_mount,
-        width_px,
-        height_px,
-        focal_px: series.manifest.camera.focal_px,
-        lens,
-        lens_choice: match series.manifest.camera.model {
-            Some(_) => LensChoice::Settled,
-            None => LensChoice::Exported,
-        },
-        centroid,
-        plate: series.plate.clone(),
-        plate_name: plate_file.canonicalize().unwrap_or(plate_file).display().to_string(),
-        order_known: series.manifest.robot.order == StopOrder::Visited,
-        stops,
-    }
-}
-
-/// The lens model that a series states, or with which the choice begins.
-pub(super) fn lens_of(series: &Series) -> Result<Lens> {
-    let Some(name) = series.manifest.camera.model.as_deref() else { return Ok(Lens::Brown) };
-    Lens::from_name(name).ok_or_else(|| {
-        Error::input(
-            series.folder.join("series.toml").display(),
-            format!("[camera] model = \"{name}\" is not a lens model of this program"),
-            format!("use one of: {}", Lens::names().join(", ")),
-        )
-    })
 }
 
 /// What all stops show, and the size of the images.

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use super::build::build;
 use super::free_poses::adjust_free_poses;
-use super::look::SeenImage;
-use super::measure::{lens_of, measured_series};
+use super::seen_image::SeenImage;
+use super::stated::{lens_of, measured_series};
 use crate::detect::Picture;
 use crate::detect::circles::{Predicted, look_where_predicted};
 use crate::error::Result;

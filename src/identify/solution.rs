@@ -2,14 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::compare::Comparison;
-use super::evidence::Evidence;
-use super::lens_choice::LensEvidence;
-use super::two_stage::Estimator;
+use super::comparison::Comparison;
+use super::estimator::Estimator;
 use crate::assess::Accuracy;
 use crate::assess::Worth;
 use crate::error::Notice;
 use crate::fit::{Fit, FreePoses};
+use crate::model::camera::Lens;
+use crate::model::joint_terms::RobotModel;
 use crate::model::robot::Robot;
 use crate::problem::Adjustment;
 use crate::problem::MeasuredSeries;
@@ -26,6 +26,34 @@ pub struct StartVerdict {
     pub verdict: String,
     /// True for the one that was taken.
     pub won: bool,
+}
+
+/// Evidence of a robot model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// The model.
+    pub model: RobotModel,
+    /// Logarithm of its evidence less that of the best model; 0 for the best.
+    pub log_evidence: f64,
+    /// Cost at its optimum.
+    pub cost: f64,
+    /// Free parameters of the robot.
+    pub parameters: usize,
+}
+
+/// Evidence of a lens for one camera.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LensEvidence {
+    /// Camera.
+    pub camera: String,
+    /// The lens.
+    pub lens: Lens,
+    /// Logarithm of its evidence less that of the best lens of this camera; 0 for the best.
+    pub log_evidence: f64,
+    /// Principal point, px.
+    pub centre_px: [f64; 2],
+    /// True for the one that was taken: the simplest that none beats decisively.
+    pub taken: bool,
 }
 
 /// The result of a fit.

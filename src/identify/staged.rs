@@ -1,7 +1,8 @@
 //! A result in two stages, with everything that a joint one has: model, covariance, residuals, accuracy.
 
-use super::joint::JointNoise;
-use super::two_stage::{Estimate, Estimator, PoseStage, fit_poses, with_sizes};
+use super::estimator::Estimator;
+use super::options::JointNoise;
+use super::two_stage::{Estimate, PoseStage, fit_poses, with_sizes};
 use crate::error::{Error, Result};
 use crate::fit::Fit;
 use crate::problem::{Adjustment, State};

@@ -1,0 +1,57 @@
+//! How to identify.
+
+use super::estimator::Estimator;
+use super::selection::Selection;
+use crate::model::joint_terms::{RobotModel, USUAL_HARMONICS};
+use crate::urdf::Payload;
+
+/// What is assumed of the joint readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum JointNoise {
+    /// Noise per stop and joint, its size estimated from the data.
+    Estimated,
+    /// Known noise, rad or m; 0 takes the readings as exact.
+    Known(f64),
+}
+
+/// What is assumed of how far the markers are from nominal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MarkerTolerance {
+    /// As the plate says.
+    Stated,
+    /// A factor on it per plate, estimated from the data where they tell enough.
+    Estimated,
+}
+
+/// How to identify.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Joint noise.
+    pub joint_noise: JointNoise,
+    /// Tolerance of the markers.
+    pub marker_tolerance: MarkerTolerance,
+    /// Joint terms.
+    pub model: RobotModel,
+    /// Harmonics of the gear in the models that have them.
+    pub harmonics: u8,
+    /// Which parameters are estimated, and their priors.
+    pub selection: Selection,
+    /// How the robot is fitted: jointly, or in two stages.
+    pub estimator: Estimator,
+    /// What the tip carries; none where the chain says it or nobody does.
+    pub payload: Option<Payload>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            joint_noise: JointNoise::Estimated,
+            marker_tolerance: MarkerTolerance::Stated,
+            model: RobotModel::Auto,
+            harmonics: USUAL_HARMONICS,
+            selection: Selection::default(),
+            estimator: Estimator::default(),
+            payload: None,
+        }
+    }
+}

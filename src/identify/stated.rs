@@ -1,0 +1,48 @@
+//! What the manifest of a series states of its camera, beside what its stops show.
+
+use crate::error::{Error, Result};
+use crate::model::camera::Lens;
+use crate::problem::{LensChoice, MeasuredSeries, MeasuredStop};
+use crate::series::{Series, StopOrder};
+
+/// A series with what its stops show.
+pub(super) fn measured_series(
+    series: &Series,
+    lens: Lens,
+    (width_px, height_px): (u32, u32),
+    centroid: bool,
+    stops: Vec<MeasuredStop>,
+) -> MeasuredSeries {
+    let plate_file = series.folder.join(&series.manifest.plate);
+    MeasuredSeries {
+        name: series.name.clone(),
+        camera: series.camera_name().to_owned(),
+        mounting: series.mounting().to_owned(),
+        mount: series.manifest.camera_mount,
+        width_px,
+        height_px,
+        focal_px: series.manifest.camera.focal_px,
+        lens,
+        lens_choice: match series.manifest.camera.model {
+            Some(_) => LensChoice::Settled,
+            None => LensChoice::Exported,
+        },
+        centroid,
+        plate: series.plate.clone(),
+        plate_name: plate_file.canonicalize().unwrap_or(plate_file).display().to_string(),
+        order_known: series.manifest.robot.order == StopOrder::Visited,
+        stops,
+    }
+}
+
+/// The lens model that a series states, or with which the choice begins.
+pub(super) fn lens_of(series: &Series) -> Result<Lens> {
+    let Some(name) = series.manifest.camera.model.as_deref() else { return Ok(Lens::Brown) };
+    Lens::from_name(name).ok_or_else(|| {
+        Error::input(
+            series.folder.join("series.toml").display(),
+            format!("[camera] model = \"{name}\" is not a lens model of this program"),
+            format!("use one of: {}", Lens::names().join(", ")),
+        )
+    })
+}
