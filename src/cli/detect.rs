@@ -91,7 +91,7 @@ fn of_series(args: &DetectArgs, series: Series, pictures: &Pictures) -> Result<L
     let mut inputs = series.inputs.clone();
     inputs.extend(series.image_hashes()?);
     let bar = progress::bar(series.stops.stops.len(), &series.name);
-    let images = crate::identify::look(&series, |_| bar.inc(1))?;
+    let images = crate::identify::detect_stops(&series, |_| bar.inc(1))?;
     bar.finish_and_clear();
     require_unchanged(&inputs, &series.image_hashes()?)?;
     Ok(Looked { plate: series.plate.clone(), images, notices: series.notices.clone(), inputs, series: Some(series) })
@@ -108,7 +108,7 @@ fn of_images(images: &[PathBuf], plate: &Path) -> Result<Looked> {
     let hashes = || images.iter().filter(|i| i.is_file()).map(|i| InputFile::of_file(i)).collect::<Result<Vec<_>>>();
     inputs.extend(hashes()?);
     let bar = progress::bar(images.len(), "images");
-    let seen = crate::identify::look_at(images, &plate, |_| bar.inc(1));
+    let seen = crate::identify::detect_images(images, &plate, |_| bar.inc(1));
     bar.finish_and_clear();
     require_unchanged(&inputs, &hashes()?)?;
     Ok(Looked { series: None, plate, images: seen, notices: Vec::new(), inputs })

@@ -53,16 +53,20 @@ impl Dropped {
 }
 
 /// What the detector of circles found, with a notice when the point spread is asymmetric.
-impl From<circles::Detection> for Detection {
-    fn from(found: circles::Detection) -> Self {
+impl From<circles::CircleDetection> for Detection {
+    fn from(found: circles::CircleDetection) -> Self {
         let rings = found.inner_outer.filter(InnerOuter::asymmetric).map(|io| io.notice());
         let edges = found.lopsided.filter(|l| l.exceeds(LOPSIDED_PX)).map(lopsided_notice);
         let notices = rings.into_iter().chain(edges).collect();
         let failure = found.outcome.failure();
         let failure =
             failure.map(|(what, remedy)| Error::input("image", format!("{what}{}", found.dropped_summary()), remedy));
-        let dropped =
-            |d: &circles::Dropped| Dropped { uv: d.uv, reason: d.reason.name(), ellipse: d.ellipse, marker: d.marker };
+        let dropped = |d: &circles::DroppedCandidate| Dropped {
+            uv: d.uv,
+            reason: d.reason.name(),
+            ellipse: d.ellipse,
+            marker: d.marker,
+        };
         Self {
             observations: found.observations,
             dropped: found.dropped.iter().map(dropped).collect(),

@@ -1,10 +1,13 @@
-//! The manual: formulation, conventions, a tour of the program, how to take a series, how to read the result, decisions.
+//! The manual: formulation, conventions, glossary, a tour of the program, how to take a series, how to read the result, decisions.
 
 #[doc = include_str!("formulation.md")]
 pub mod formulation {}
 
 #[doc = include_str!("conventions.md")]
 pub mod conventions {}
+
+#[doc = include_str!("glossary.md")]
+pub mod glossary {}
 
 #[doc = include_str!("tour.md")]
 pub mod tour {}

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::look::{look, recording, require_some};
+use super::detections::{detect_stops, recording, require_some};
 use super::seen_image::SeenImage;
 use super::stated::{lens_of, measured_series};
 use crate::detect::Detection;
@@ -81,7 +81,7 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
 }
 
 /// What all stops show, and the size of the images.
-type Look = (Vec<Seen>, Option<(u32, u32)>);
+type SeenStops = (Vec<Seen>, Option<(u32, u32)>);
 
 /// The joint noise is estimated: what a data sheet states says nothing of what the robot model lacks, which is part of it.
 fn unused_repeatability(series: &Series) -> Option<Notice> {
@@ -93,8 +93,8 @@ fn unused_repeatability(series: &Series) -> Option<Notice> {
     ))
 }
 
-fn look_through(series: &Series, progress: impl Fn(&Path) + Sync, notices: &mut Vec<Notice>) -> Result<Look> {
-    let images = look(series, progress)?;
+fn look_through(series: &Series, progress: impl Fn(&Path) + Sync, notices: &mut Vec<Notice>) -> Result<SeenStops> {
+    let images = detect_stops(series, progress)?;
     notices.extend(images.iter().flat_map(SeenImage::notices));
     // The detector has refused all images of another size.
     let usable = images.iter().filter(|i| i.detection.failure.is_none());

@@ -11,7 +11,7 @@ use super::free_poses::adjust_free_poses;
 use super::seen_image::SeenImage;
 use super::stated::{lens_of, measured_series};
 use crate::detect::Picture;
-use crate::detect::circles::{Predicted, look_where_predicted};
+use crate::detect::circles::{Predicted, detect_predicted};
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::model::robot::Robot;
@@ -39,7 +39,7 @@ pub(super) fn second_pass(
         let (Some(pose), Some(path)) = (pose, &image.path) else { return };
         let predicted = predict(&state, &series.plate, image, &pose);
         if let Ok(picture) = picture(path).as_ref() {
-            look_where_predicted(picture, &mut image.detection, &predicted);
+            detect_predicted(picture, &mut image.detection, &predicted);
         }
     });
 }

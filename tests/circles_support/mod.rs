@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use robotcal::detect::Picture;
-use robotcal::detect::circles::Detection;
+use robotcal::detect::circles::CircleDetection;
 use robotcal::geom::{Pose, matrix_from_rpy};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::plan::plate_design::{PlateRequest, design};
@@ -149,7 +149,7 @@ impl Errors {
     }
 }
 
-pub fn errors(scene: &Scene, detection: &Detection) -> Errors {
+pub fn errors(scene: &Scene, detection: &CircleDetection) -> Errors {
     let mut e = Errors::default();
     for marker in 0..scene.plate.markers.len() {
         e.visible += usize::from(scene.visible(marker, 3.0));
@@ -168,7 +168,7 @@ pub fn errors(scene: &Scene, detection: &Detection) -> Errors {
     e
 }
 
-pub fn report(scene: &Scene, detection: &Detection, e: &Errors) {
+pub fn report(scene: &Scene, detection: &CircleDetection, e: &Errors) {
     let worst = e.residuals.iter().map(|(r, ..)| r[0].hypot(r[1])).fold(0.0, f64::max);
     println!(
         "visible {} found {} wrong {} rms {:.5} stated {:.5} nees {:.3} worst {:.4} blur {:.3} noise {:.3?} dropped {:?} io {:?}",

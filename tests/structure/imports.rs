@@ -19,6 +19,12 @@ struct Source {
     used: BTreeSet<Module>,
 }
 
+/// Files that import each other.
+pub struct Circle {
+    /// What ties them, a line an import.
+    pub ties: Vec<String>,
+}
+
 /// All source files of the crate by their modules.
 pub struct Sources(BTreeMap<Module, Source>);
 
@@ -132,8 +138,7 @@ fn from_root(own: &[String], path: &[String]) -> Option<Module> {
 fn source(file: &Path, text: &str) -> Source {
     let own = module_of(file);
     let tokens = tokens(text);
-    let mut source =
-        Source { file: file.to_owned(), names: BTreeMap::new(), globs: Vec::new(), used: BTreeSet::new() };
+    let mut source = Source { file: file.to_owned(), names: BTreeMap::new(), globs: Vec::new(), used: BTreeSet::new() };
     let children: BTreeSet<&String> =
         tokens.windows(3).filter(|w| w[0] == "mod" && w[2] == ";").map(|w| &w[1]).collect();
     let full = |path: &[String]| {
@@ -233,8 +238,8 @@ impl Sources {
         all
     }
 
-    /// Groups of files that import each other in a circle; each with what ties it, a line an import.
-    pub fn circles(&self) -> Vec<(Vec<&Path>, Vec<String>)> {
+    /// Groups of files that import each other in a circle.
+    pub fn circles(&self) -> Vec<Circle> {
         let imports = self.imports();
         let reached = |from: &Module| {
             let mut seen: BTreeSet<Module> = BTreeSet::new();
@@ -248,7 +253,8 @@ impl Sources {
         let mut circles = Vec::new();
         let mut done: BTreeSet<&Module> = BTreeSet::new();
         for module in self.0.keys().filter(|m| reach[m].contains(*m)) {
-            let circle: Vec<&Module> = self.0.keys().filter(|m| reach[module].contains(*m) && reach[m].contains(module)).collect();
+            let circle: Vec<&Module> =
+                self.0.keys().filter(|m| reach[module].contains(*m) && reach[m].contains(module)).collect();
             if done.contains(module) {
                 continue;
             }
@@ -261,7 +267,7 @@ impl Sources {
                     format!("{} -> {}: {}", file(a).display(), file(b).display(), names.join(", "))
                 })
             });
-            circles.push((circle.iter().map(|m| file(m)).collect(), ties.collect()));
+            circles.push(Circle { ties: ties.collect() });
         }
         circles
     }

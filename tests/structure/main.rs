@@ -1,3 +1,5 @@
 //! Tests of structure; one binary, a file a subject.
 
 mod architecture;
+mod circles;
+mod imports;

@@ -3,7 +3,7 @@
 use super::contour::{Contour, Encloses, contours};
 use super::ellipse::Ellipse;
 use super::levels::Levels;
-use super::types::{Dropped, Options, Reason};
+use super::types::{DroppedCandidate, Options, Reason};
 use crate::detect::Picture;
 
 /// A dark ellipse, perhaps with a light one in its middle.
@@ -25,7 +25,11 @@ pub(super) struct Candidate {
 const SPECK: usize = 10;
 
 /// Candidates in the order of the scan, and those dropped.
-pub(super) fn candidates(picture: &Picture, levels: &Levels, options: &Options) -> (Vec<Candidate>, Vec<Dropped>) {
+pub(super) fn candidates(
+    picture: &Picture,
+    levels: &Levels,
+    options: &Options,
+) -> (Vec<Candidate>, Vec<DroppedCandidate>) {
     let largest = largest_marker(picture, options);
     let found = contours(picture, levels, SPECK, (4.0 * largest) as usize);
     let holes = holes(&found, options);
@@ -34,7 +38,9 @@ pub(super) fn candidates(picture: &Picture, levels: &Levels, options: &Options) 
     for contour in found.iter().filter(|c| c.too_long || c.encloses == Encloses::Dark) {
         match candidate(contour, picture, levels, options, largest) {
             Ok(c) => kept.push(with_hole(c, &holes)),
-            Err((reason, ellipse)) => dropped.push(Dropped { uv: contour.middle, reason, ellipse, marker: None }),
+            Err((reason, ellipse)) => {
+                dropped.push(DroppedCandidate { uv: contour.middle, reason, ellipse, marker: None })
+            }
         }
     }
     (without_nested(kept, &mut dropped), dropped)
@@ -164,7 +170,7 @@ fn with_hole(candidate: Candidate, holes: &[([f64; 2], f64)]) -> Candidate {
 }
 
 /// Drops candidates that lie inside another one (a target in a target is none of ours).
-fn without_nested(candidates: Vec<Candidate>, dropped: &mut Vec<Dropped>) -> Vec<Candidate> {
+fn without_nested(candidates: Vec<Candidate>, dropped: &mut Vec<DroppedCandidate>) -> Vec<Candidate> {
     let mut order: Vec<usize> = (0..candidates.len()).collect();
     order.sort_by(|&a, &b| candidates[a].ellipse.centre[0].total_cmp(&candidates[b].ellipse.centre[0]));
     let reach = candidates.iter().map(|c| c.ellipse.half_extent()[0]).fold(0.0, f64::max);
@@ -181,7 +187,7 @@ fn without_nested(candidates: Vec<Candidate>, dropped: &mut Vec<Dropped>) -> Vec
     }
     for (c, _) in candidates.iter().zip(&nested).filter(|(_, n)| **n) {
         let ellipse = Some(c.ellipse);
-        dropped.push(Dropped { uv: c.ellipse.centre, reason: Reason::Nesting, ellipse, marker: None });
+        dropped.push(DroppedCandidate { uv: c.ellipse.centre, reason: Reason::Nesting, ellipse, marker: None });
     }
     candidates.into_iter().zip(nested).filter(|(_, n)| !n).map(|(c, _)| c).collect()
 }

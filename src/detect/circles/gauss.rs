@@ -5,7 +5,7 @@ pub(super) const LANES: usize = 8;
 
 /// Upper tail and density of the standard normal distribution, without branches.
 ///
-/// Tail: M. Abramowitz and I. Stegun, Handbook of Mathematical Functions, 26.2.17 (error below 7.5e-8).
+/// NearbyInk: M. Abramowitz and I. Stegun, Handbook of Mathematical Functions, 26.2.17 (error below 7.5e-8).
 #[inline(always)]
 pub(super) fn normal_tail(u: f32) -> (f32, f32) {
     let a = u.abs();

@@ -6,7 +6,7 @@ use super::ellipse::Ellipse;
 use super::lattice::Buckets;
 use super::levels::Levels;
 use super::refine::{Fit, Start, refine};
-use super::types::{Dropped, Measured, Options, Reason};
+use super::types::{DroppedCandidate, Measured, Options, Reason};
 use crate::detect::Picture;
 
 /// Threshold between the envelopes: a little above the middle, where small blurred markers keep their size.
@@ -54,7 +54,7 @@ impl Target {
             apart: [0.0; 2],
             third: None,
             tie_sigma: None,
-            tails: &[],
+            nearby: &[],
         }
     }
 }
@@ -132,7 +132,7 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 ///
 /// For plates without a code and for judging the image stage alone. Returns the markers in the order of the scan and
 /// the candidates that were dropped.
-pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<Dropped>) {
+pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<DroppedCandidate>) {
     let levels = Levels::of(picture, largest_marker(picture, options), THRESHOLD);
     let (candidates, mut dropped) = candidates(picture, &levels, options);
     let index = Buckets::of(&candidates);
@@ -179,6 +179,6 @@ pub(super) fn target_of(candidate: &Candidate, ratio: Option<f64>, clear: f64) -
     }
 }
 
-pub(super) fn drop_target(target: &Target, reason: Reason, marker: Option<u32>) -> Dropped {
-    Dropped { uv: target.ellipse.centre, reason, ellipse: Some(target.ellipse), marker }
+pub(super) fn drop_target(target: &Target, reason: Reason, marker: Option<u32>) -> DroppedCandidate {
+    DroppedCandidate { uv: target.ellipse.centre, reason, ellipse: Some(target.ellipse), marker }
 }

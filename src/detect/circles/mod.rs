@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! picture -> levels (envelopes, threshold) -> contour -> candidate (ellipse, tests)
-//!         -> lattice (neighbour to neighbour) -> code (position on the plate) -> vet (is every neighbour of one mind)
+//!         -> lattice (neighbour to neighbour) -> code (position on the plate) -> neighbour_check (is every neighbour of one mind)
 //!         -> refine (blurred edge) -> inner/outer agreement -> Detection
 //! ```
 //!
@@ -24,18 +24,18 @@ mod lattice;
 mod levels;
 mod local_map;
 mod measure;
+mod nearby_ink;
+mod neighbour_check;
+mod overlapping;
 mod pipeline;
 mod predicted;
 mod predicted_pass;
 mod refine;
-mod second_look;
+mod rescue;
 mod squares;
 #[cfg(test)]
 pub(crate) mod synth;
-mod tails;
-mod together;
 mod types;
-mod vet;
 
 pub use asymmetry::Drift;
 pub use ellipse::Ellipse;
@@ -43,5 +43,7 @@ pub use grid::detect_grid;
 pub use measure::measure;
 pub use pipeline::detect;
 pub use predicted::Predicted;
-pub use predicted_pass::{look_where_predicted, measure_predicted};
-pub use types::{Detection, Dropped, Found, Imaged, InnerOuter, LOPSIDED_PX, Measured, Options, Outcome, Reason};
+pub use predicted_pass::{detect_predicted, measure_predicted};
+pub use types::{
+    CircleDetection, DroppedCandidate, Found, Imaged, InnerOuter, LOPSIDED_PX, Measured, Options, Outcome, Reason,
+};

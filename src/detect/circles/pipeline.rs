@@ -11,11 +11,11 @@ use super::ellipse::Ellipse;
 use super::lattice::{Buckets, Cell, Lattice, lattices};
 use super::levels::Levels;
 use super::measure::{Camera, THRESHOLD, Target, drop_target, learn, median, target_of};
+use super::neighbour_check::{Board, Placed, around, check_neighbours, continuation, neighbourhood};
 use super::predicted::Predicted;
 use super::refine::{Fit, refine};
-use super::second_look::{Figure, Place, second_look};
-use super::types::{Detection, Dropped, Found, InnerOuter, Options, Outcome, Reason};
-use super::vet::{Board, Placed, around, continuation, neighbourhood, vet};
+use super::rescue::{Figure, Place, rescue};
+use super::types::{CircleDetection, DroppedCandidate, Found, InnerOuter, Options, Outcome, Reason};
 use crate::detect::Picture;
 use crate::series::Plate;
 use crate::{Error, Result};
@@ -26,12 +26,12 @@ const SMALLEST_LATTICE: usize = 9;
 /// Finds, identifies and measures the markers of a coded plate in one picture.
 ///
 /// `uv` of an observation is the area centroid of the contour's image, with the covariance of the fit. A picture
-/// without markers, or in which they cannot be identified, is no error: see [`Detection::outcome`].
+/// without markers, or in which they cannot be identified, is no error: see [`CircleDetection::outcome`].
 ///
 /// # Errors
 ///
 /// The plate has no code (its markers are no lattice of circles); the picture is empty.
-pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<Detection> {
+pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<CircleDetection> {
     let code = Code::of(plate).filter(|_| !plate.markers.is_empty()).ok_or_else(|| {
         let what = "its markers do not form a lattice of circles with a radius";
         Error::input("plate", what, "give a plate of kind coded-circles with plate.csv as made by `robotcal plate`")
@@ -46,7 +46,7 @@ pub(super) fn detect_coded(
     options: &Options,
     code: &Code,
     identify: impl FnOnce(&[Lattice], &[Candidate]) -> Result<(Board, Outcome)>,
-) -> Result<Detection> {
+) -> Result<CircleDetection> {
     if picture.width < 16 || picture.height < 16 || picture.pixels.len() != picture.width * picture.height {
         let what = format!("{} x {} pixels with {} values", picture.width, picture.height, picture.pixels.len());
         return Err(Error::input("image", what, "check the image file"));
@@ -55,10 +55,10 @@ pub(super) fn detect_coded(
     let (candidates, mut dropped) = candidates(picture, &levels, options);
     let lattices = lattices(&candidates, SMALLEST_LATTICE);
     let (mut board, outcome) = identify(&lattices, &candidates)?;
-    let mut vetted = vet(&mut board, code, &candidates);
+    let mut refused = check_neighbours(&mut board, code, &candidates);
     attach(&mut board, code, &candidates);
-    vetted.extend(vet(&mut board, code, &candidates));
-    drop_unused(&board, &vetted, &lattices, &candidates, &mut dropped);
+    refused.extend(check_neighbours(&mut board, code, &candidates));
+    drop_unused(&board, &refused, &lattices, &candidates, &mut dropped);
     let mut work = Work { picture, plate, code, candidates: &candidates, pixels: Pixels::default() };
     let measured = work.measure(&board, &levels, options, &mut dropped);
     Ok(work.detection(&board, measured, outcome, dropped))
@@ -170,16 +170,16 @@ fn attach(board: &mut Board, code: &Code, candidates: &[Candidate]) {
 
 fn drop_unused(
     board: &Board,
-    vetted: &[(Cell, usize, Reason)],
+    refused: &[(Cell, usize, Reason)],
     lattices: &[Lattice],
     candidates: &[Candidate],
-    dropped: &mut Vec<Dropped>,
+    dropped: &mut Vec<DroppedCandidate>,
 ) {
     let mut reasons: BTreeMap<usize, Reason> = (0..candidates.len()).map(|i| (i, Reason::OffLattice)).collect();
     for site in lattices.iter().flat_map(|l| l.cells.values()) {
         reasons.insert(site.candidate, Reason::NoIdentity);
     }
-    for (_, i, reason) in vetted {
+    for (_, i, reason) in refused {
         reasons.insert(*i, *reason);
     }
     for p in board.values() {
@@ -187,7 +187,7 @@ fn drop_unused(
     }
     for (i, reason) in reasons {
         let ellipse = candidates[i].ellipse;
-        dropped.push(Dropped { uv: ellipse.centre, reason, ellipse: Some(ellipse), marker: None });
+        dropped.push(DroppedCandidate { uv: ellipse.centre, reason, ellipse: Some(ellipse), marker: None });
     }
 }
 
@@ -246,7 +246,13 @@ impl Work<'_> {
         target
     }
 
-    fn measure(&mut self, board: &Board, levels: &Levels, options: &Options, dropped: &mut Vec<Dropped>) -> Harvest {
+    fn measure(
+        &mut self,
+        board: &Board,
+        levels: &Levels,
+        options: &Options,
+        dropped: &mut Vec<DroppedCandidate>,
+    ) -> Harvest {
         let guess = median(board.values().map(|p| self.candidates[p.candidate].blur_px).collect());
         let mut targets: Vec<Target> = board.iter().map(|(cell, p)| self.target(*cell, p, guess)).collect();
         let camera = learn(self.picture, &mut targets, guess, levels.noise, &mut self.pixels);
@@ -282,7 +288,7 @@ impl Work<'_> {
         let measured = entries.iter().filter_map(|e| place(e.cell, &e.fit.measured.outer.ellipse, Ok(e.fit)));
         let failed = refused.iter().filter_map(|(cell, target, _)| place(*cell, &target.ellipse, Err(*target)));
         let places: BTreeMap<_, _> = measured.chain(failed).collect();
-        let fits = second_look(self.picture, camera, &places, &figure);
+        let fits = rescue(self.picture, camera, &places, &figure);
         entries.retain(|e| !fits.contains_key(&e.cell));
         refused.retain(|(cell, ..)| !fits.contains_key(cell));
         let rescued = |cell: &Cell| places[cell].first.is_err();
@@ -290,7 +296,7 @@ impl Work<'_> {
     }
 
     /// Looks where the neighbours say that a marker must be.
-    fn rescue(&mut self, board: &Board, camera: &Camera, dropped: &mut Vec<Dropped>) -> Vec<Entry> {
+    fn rescue(&mut self, board: &Board, camera: &Camera, dropped: &mut Vec<DroppedCandidate>) -> Vec<Entry> {
         let mut found = Vec::new();
         for cell in open_cells(board, self.code, 1) {
             let enough = around(board, cell, 2).count() >= 6;
@@ -313,7 +319,7 @@ impl Work<'_> {
                     found.push(Entry { cell, fit, rescued: true });
                 }
                 Err(reason) => {
-                    dropped.push(Dropped { uv: outer.centre, reason, ellipse: Some(outer), marker: Some(id) });
+                    dropped.push(DroppedCandidate { uv: outer.centre, reason, ellipse: Some(outer), marker: Some(id) });
                 }
             }
         }
@@ -321,7 +327,7 @@ impl Work<'_> {
     }
 
     /// Drops annuli whose inner and outer centre do not agree.
-    fn agree(&self, entries: &mut Vec<Entry>, dropped: &mut Vec<Dropped>) -> Option<InnerOuter> {
+    fn agree(&self, entries: &mut Vec<Entry>, dropped: &mut Vec<DroppedCandidate>) -> Option<InnerOuter> {
         let seen: Vec<Seen> = entries.iter().filter_map(|e| self.seen(e)).collect();
         if seen.len() != entries.len() {
             return None;
@@ -333,7 +339,7 @@ impl Work<'_> {
             if !ok {
                 let ellipse = e.fit.measured.outer.ellipse;
                 let marker = self.marker(e.cell).map(|m| m.id);
-                dropped.push(Dropped {
+                dropped.push(DroppedCandidate {
                     uv: ellipse.centre,
                     reason: Reason::InnerOuter,
                     ellipse: Some(ellipse),
@@ -357,7 +363,13 @@ impl Work<'_> {
         Some(Seen { cell: entry.cell, outer_radius, outer: measured.outer.ellipse.centre, inner })
     }
 
-    fn detection(&self, board: &Board, harvest: Harvest, outcome: Outcome, dropped: Vec<Dropped>) -> Detection {
+    fn detection(
+        &self,
+        board: &Board,
+        harvest: Harvest,
+        outcome: Outcome,
+        dropped: Vec<DroppedCandidate>,
+    ) -> CircleDetection {
         let outcome = if board.is_empty() && matches!(outcome, Outcome::Identified { .. }) {
             Outcome::Ambiguous
         } else {
@@ -381,6 +393,15 @@ impl Work<'_> {
         };
         let size = [self.picture.width, self.picture.height];
         let lopsided = Drift::fit(harvest.entries.iter().map(skew), size);
-        Detection { observations, found, dropped, outcome, blur_px, noise, inner_outer: harvest.inner_outer, lopsided }
+        CircleDetection {
+            observations,
+            found,
+            dropped,
+            outcome,
+            blur_px,
+            noise,
+            inner_outer: harvest.inner_outer,
+            lopsided,
+        }
     }
 }

@@ -5,9 +5,9 @@ use super::candidate::Profile;
 use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
 use super::measure::{Camera, Target};
+use super::nearby_ink::NearbyInk;
 use super::refine::{Fit, Start, refine};
-use super::second_look::{is_thin, tie_sigma};
-use super::tails::Tail;
+use super::rescue::{is_thin, tie_sigma};
 use super::types::{Found, Imaged, Measured, Reason};
 use crate::detect::Picture;
 use crate::series::{Edge, Marker};
@@ -36,7 +36,7 @@ pub struct Predicted {
 /// What is known of the surroundings of a predicted marker.
 pub(super) struct Surroundings<'a> {
     /// Contours of neighbours whose ink reaches its pixels.
-    pub tails: &'a [Tail],
+    pub nearby: &'a [NearbyInk],
     /// Its centre and the light as they are believed to be.
     pub believed: &'a Measured,
 }
@@ -108,7 +108,7 @@ impl Predicted {
     /// shape is held to the prediction, so that a part of the contour determines the centre.
     pub(super) fn measure(&self, picture: &Picture, camera: &Camera, pixels: &mut Pixels) -> Result<Fit, Reason> {
         let believed = self.presumed(picture, camera);
-        let surroundings = Surroundings { tails: &[], believed: &believed };
+        let surroundings = Surroundings { nearby: &[], believed: &believed };
         let fit = self.measure_among(picture, camera, &surroundings, pixels)?;
         self.credible(&fit, camera)?;
         Ok(fit)
@@ -141,7 +141,7 @@ impl Predicted {
             apart: self.apart,
             third: self.third,
             tie_sigma: thin.then(|| tie_sigma(self.apart, major)),
-            tails: surroundings.tails,
+            nearby: surroundings.nearby,
             ..target.start(camera, BLUR_SIGMA)
         };
         refine(picture, &start, pixels)

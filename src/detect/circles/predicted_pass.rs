@@ -1,8 +1,8 @@
 //! The second pass: markers are measured where neighbours, or camera and pose, say that they are.
 
 use super::measure::{Camera, INK_SLOPE};
+use super::overlapping::{measure_alone, measure_beside};
 use super::predicted::Predicted;
-use super::together::{measure_alone, measure_beside};
 use super::types::{Found, Measured};
 use crate::detect::{Circles, Detection, Picture};
 
@@ -10,7 +10,7 @@ use crate::detect::{Circles, Detection, Picture};
 ///
 /// Markers across the border of the picture are measured from the part that is in it; those with neighbours within the reach
 /// of the blur together with them.
-pub fn look_where_predicted(picture: &Picture, detection: &mut Detection, predicted: &[Predicted]) {
+pub fn detect_predicted(picture: &Picture, detection: &mut Detection, predicted: &[Predicted]) {
     let Detection { observations, dropped, circles: Some(Circles { found, blur_px, noise, .. }), .. } = detection
     else {
         return;

@@ -4,8 +4,8 @@ use super::edge_model::{Lopsided, Pixels};
 use super::edge_state::{ANNULUS, CENTRE, DARK, DISC, INNER, LN_BLUR, LN_RATIO, SHAPE, State, THIRD, WHITE};
 use super::ellipse::Ellipse;
 use super::flat_zone::{Flat, Zone};
+use super::nearby_ink::{NearbyInk, lift};
 use super::squares::Squares;
-use super::tails::{Tail, lift};
 use super::types::{Imaged, Measured, Reason};
 use crate::detect::Picture;
 use crate::series::Edge;
@@ -36,7 +36,7 @@ pub(super) struct Start<'a> {
     /// How well `apart` is known per axis, px, where geometry tells it.
     pub tie_sigma: Option<f64>,
     /// Measured neighbours whose ink reaches the pixels of this marker.
-    pub tails: &'a [Tail],
+    pub nearby: &'a [NearbyInk],
 }
 
 /// A fit with what the caller needs to go on.
@@ -113,11 +113,11 @@ fn once(
         return Err(Reason::Saturated);
     }
     let visible = pixels.count as f64 / wanted.max(1) as f64;
-    if !start.tails.is_empty() {
-        lift(pixels, start.tails, anchor);
+    if !start.nearby.is_empty() {
+        lift(pixels, start.nearby, anchor);
     }
     // what lies beyond the border is missed less where the neighbours are taken off: the band is wider than it must be
-    let whole = start.tails.is_empty() && start.shape_sigma.is_none();
+    let whole = start.nearby.is_empty() && start.shape_sigma.is_none();
     if pixels.count < 2 * parameters || (whole && visible < WHOLE) || visible < 0.35 {
         return Err(Reason::CutByBorder);
     }
@@ -412,7 +412,7 @@ fn rings(start: &Start) -> Vec<(Ellipse, Use)> {
     let minor = start.ellipse.semi_axes()[1];
     let room = (start.clear - 1.0) * minor;
     let mut all: Vec<(Option<Ellipse>, Use)> = Vec::with_capacity(9);
-    if start.tails.is_empty() {
+    if start.nearby.is_empty() {
         let far = (even + EVEN * blur).min(room - 0.8 * blur);
         if far > even {
             all.push((start.ellipse.offset(far), Use::Paper));

@@ -109,7 +109,7 @@ impl fmt::Display for Reason {
 
 /// A candidate that was not used, where, and why.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Dropped {
+pub struct DroppedCandidate {
     /// Its place, px.
     pub uv: [f64; 2],
     /// Why.
@@ -221,13 +221,13 @@ impl Found {
 
 /// What was found in one picture.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Detection {
+pub struct CircleDetection {
     /// Identified contours ordered by marker and edge; `uv` is the area centroid of the contour's image.
     pub observations: Vec<Observation>,
     /// The same markers with all that was measured.
     pub found: Vec<Found>,
     /// Candidates that were not used.
-    pub dropped: Vec<Dropped>,
+    pub dropped: Vec<DroppedCandidate>,
     /// How the identification went.
     pub outcome: Outcome,
     /// Median blur, px; NaN without markers.
@@ -241,7 +241,7 @@ pub struct Detection {
     pub lopsided: Option<Drift>,
 }
 
-impl Detection {
+impl CircleDetection {
     /// Number of dropped candidates for every reason.
     pub fn dropped_counts(&self) -> BTreeMap<Reason, usize> {
         let mut counts = BTreeMap::new();

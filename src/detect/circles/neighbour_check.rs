@@ -20,7 +20,7 @@ pub(super) struct Placed {
 pub(super) type Board = BTreeMap<Cell, Placed>;
 
 /// Removes the cells that cannot be trusted, with the reason for each.
-pub(super) fn vet(board: &mut Board, code: &Code, candidates: &[Candidate]) -> Vec<(Cell, usize, Reason)> {
+pub(super) fn check_neighbours(board: &mut Board, code: &Code, candidates: &[Candidate]) -> Vec<(Cell, usize, Reason)> {
     let mut dropped = Vec::new();
     let judge = |board: &mut Board, verdict: &dyn Fn(&Board, Cell, &Placed) -> Option<Reason>, dropped: &mut Vec<_>| {
         let bad: Vec<(Cell, usize, Reason)> =

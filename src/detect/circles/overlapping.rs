@@ -8,10 +8,10 @@
 use super::edge_model::Pixels;
 use super::levels::noise_of;
 use super::measure::{Camera, INK_SLOPE, ink_slope, median};
+use super::nearby_ink::NearbyInk;
 use super::predicted::{Predicted, Surroundings};
 use super::refine::Fit;
-use super::second_look::{CROWDED, WITHIN_REACH};
-use super::tails::Tail;
+use super::rescue::{CROWDED, WITHIN_REACH};
 use super::types::Measured;
 use crate::detect::Picture;
 
@@ -31,7 +31,7 @@ pub(super) fn measure_beside(
     known: &[Measured],
     predicted: &[Predicted],
 ) -> Vec<Option<Fit>> {
-    let mut all = Together::of(picture, camera, SMALLEST_PX[0], known, predicted);
+    let mut all = Overlapping::of(picture, camera, SMALLEST_PX[0], known, predicted);
     all.settle(false);
     all.finish()
 }
@@ -40,17 +40,17 @@ pub(super) fn measure_beside(
 pub(super) fn measure_alone(picture: &Picture, predicted: &[Predicted]) -> Vec<Option<Fit>> {
     let variance = f64::from(noise_of(picture)).powi(2);
     let camera = Camera { blur_px: USUAL_BLUR_PX, noise: [variance; 2], ink_slope: INK_SLOPE };
-    let mut first = Together::of(picture, camera, SMALLEST_PX[1], &[], predicted);
+    let mut first = Overlapping::of(picture, camera, SMALLEST_PX[1], &[], predicted);
     first.settle(true);
     let fits: Vec<Fit> = first.fits.iter().flatten().copied().collect();
     let camera = Camera { ink_slope: ink_slope(&fits), ..first.camera };
-    let mut all = Together::of(picture, camera, SMALLEST_PX[1], &[], predicted);
+    let mut all = Overlapping::of(picture, camera, SMALLEST_PX[1], &[], predicted);
     (all.believed, all.fits) = (first.believed, first.fits);
     all.settle(true);
     all.finish()
 }
 
-struct Together<'a> {
+struct Overlapping<'a> {
     picture: &'a Picture,
     camera: Camera,
     predicted: &'a [Predicted],
@@ -64,7 +64,7 @@ struct Together<'a> {
     pixels: Pixels,
 }
 
-impl<'a> Together<'a> {
+impl<'a> Overlapping<'a> {
     fn of(
         picture: &'a Picture,
         camera: Camera,
@@ -110,8 +110,8 @@ impl<'a> Together<'a> {
     /// One marker with the others as they are believed to be; how far its centre has moved, px.
     fn measure(&mut self, k: usize) -> f64 {
         let (own, believed) = (self.known + k, &self.believed);
-        let tails: Vec<Tail> = self.neighbours[k].reaching().flat_map(|j| Tail::of(&believed[j])).collect();
-        let surroundings = Surroundings { tails: &tails, believed: &believed[own] };
+        let nearby: Vec<NearbyInk> = self.neighbours[k].reaching().flat_map(|j| NearbyInk::of(&believed[j])).collect();
+        let surroundings = Surroundings { nearby: &nearby, believed: &believed[own] };
         let fit = self.predicted[k].measure_among(self.picture, &self.camera, &surroundings, &mut self.pixels).ok();
         let measured = fit.map_or(believed[own], |f| f.measured);
         let [now, before] = [&measured, &believed[own]].map(|m| m.outer.ellipse.centre);

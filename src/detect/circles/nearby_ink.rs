@@ -18,7 +18,7 @@ const MOST_UNSEEN: f32 = 0.023;
 
 /// A contour of a neighbour and what it takes from the light.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Tail {
+pub(super) struct NearbyInk {
     /// Position in the picture.
     contour: Contour,
     /// Paper less ink at the centre, counts; negative for the hole of an annulus.
@@ -29,7 +29,7 @@ pub(super) struct Tail {
     most: f32,
 }
 
-impl Tail {
+impl NearbyInk {
     /// The contours of a measured marker.
     pub fn of(measured: &Measured) -> impl Iterator<Item = Self> {
         let one = |ellipse: &Ellipse, sign| Self { most: MOST, ..Self::at(ellipse, measured, sign) };
@@ -51,19 +51,19 @@ impl Tail {
 }
 
 /// Gives back to every pixel what the neighbours take, and leaves out the pixels that they cover.
-pub(super) fn lift(pixels: &mut Pixels, tails: &[Tail], anchor: [f64; 2]) {
+pub(super) fn lift(pixels: &mut Pixels, nearby: &[NearbyInk], anchor: [f64; 2]) {
     let n = pixels.x.len();
     let (mut covered, mut one, all) = (vec![0.0f32; n], vec![0.0f32; n], vec![true; n / LANES]);
-    for tail in tails {
-        let centre = [0, 1].map(|a| tail.contour.centre[a] - anchor[a]);
-        let contour = Contour { centre, ..tail.contour };
+    for ink in nearby {
+        let centre = [0, 1].map(|a| ink.contour.centre[a] - anchor[a]);
+        let contour = Contour { centre, ..ink.contour };
         contour.coverage(&pixels.x, &pixels.y, &all, &mut pixels.nodes, &mut one, &mut []);
-        let contrast = tail.contrast as f32;
-        let ([cx, cy], [gx, gy]) = (centre.map(|v| v as f32), tail.gradient.map(|v| v as f32));
+        let contrast = ink.contrast as f32;
+        let ([cx, cy], [gx, gy]) = (centre.map(|v| v as f32), ink.gradient.map(|v| v as f32));
         for (i, b) in one.iter().enumerate() {
             let light = 1.0 + gx * (pixels.x[i] - cx) + gy * (pixels.y[i] - cy);
             pixels.value[i] += contrast * light * b;
-            covered[i] += contrast.signum() * b / tail.most;
+            covered[i] += contrast.signum() * b / ink.most;
         }
     }
     let mut keep = 0;
@@ -98,8 +98,8 @@ mod tests {
             gradient: [0.0; 2],
             visible: 1.0,
         };
-        let tails: Vec<Tail> = Tail::of(&measured).collect();
-        let contour = Contour { centre: [12.0, 0.5], ..tails[0].contour };
+        let nearby: Vec<NearbyInk> = NearbyInk::of(&measured).collect();
+        let contour = Contour { centre: [12.0, 0.5], ..nearby[0].contour };
         let mut pixels = Pixels::default();
         (-15..=15).for_each(|y| pixels.push_row(-15.0, y as f32, &[200.0; 31]));
         pixels.finish();
@@ -108,7 +108,7 @@ mod tests {
         contour.coverage(&pixels.x, &pixels.y, &all, &mut pixels.nodes, &mut covered, &mut []);
         pixels.value.iter_mut().zip(&covered).for_each(|(v, b)| *v -= 180.0 * b);
         let before = pixels.count;
-        lift(&mut pixels, &tails, [100.0, 50.0]);
+        lift(&mut pixels, &nearby, [100.0, 50.0]);
         // the disc of radius 4 px covers 34 pixels fully at this place and 16 % of those 1.2 px beyond its edge
         assert!((50..110).contains(&(before - pixels.count)), "{}", before - pixels.count);
         assert!(pixels.value[..pixels.count].iter().all(|v| (v - 200.0).abs() < 1e-2));

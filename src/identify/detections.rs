@@ -14,7 +14,7 @@ use crate::series::{Plate, Series, Source};
 ///
 /// # Errors
 /// A series without images; dark and white images that are of no use.
-pub fn look(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<Vec<SeenImage>> {
+pub fn detect_stops(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<Vec<SeenImage>> {
     let picture = pictures(series)?;
     let paths: Vec<PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.clone()).collect();
     let mut found = detect_series(&paths, &series.plate, &picture, progress).into_iter();
@@ -56,7 +56,7 @@ pub fn pictures(series: &Series) -> Result<impl Fn(&Path) -> Result<Picture> + S
 }
 
 /// Looks for a plate in single images.
-pub fn look_at(images: &[PathBuf], plate: &Plate, progress: impl Fn(&Path) + Sync) -> Vec<SeenImage> {
+pub fn detect_images(images: &[PathBuf], plate: &Plate, progress: impl Fn(&Path) + Sync) -> Vec<SeenImage> {
     let name = |path: &Path| path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let found = detect_series(images, plate, |path| load(path, None), progress);
     images.iter().zip(found).map(|(path, seen)| SeenImage::new(&name(path), Some(path), seen)).collect()

@@ -1,7 +1,7 @@
 //! A second look at markers that are small against the blur, with what their neighbours tell.
 //!
 //! Two things make a small marker harder than a large one. Blur carries the ink of its neighbours into its pixels: once
-//! they are measured it is taken off ([`super::tails`]). And the two edges of a thin ring are not told apart: the centre of
+//! they are measured it is taken off ([`super::nearby_ink`]). And the two edges of a thin ring are not told apart: the centre of
 //! the one against that of the other costs three times the precision, although geometry knows it from the map between
 //! plate and image around the marker ([`tie`]). Such an annulus is one observation, not two.
 
@@ -13,8 +13,8 @@ use super::ellipse::Ellipse;
 use super::lattice::Cell;
 use super::local_map::LocalMap;
 use super::measure::{Camera, Target, median};
+use super::nearby_ink::NearbyInk;
 use super::refine::{Fit, Start, WHOLE, refine};
-use super::tails::Tail;
 use super::types::Measured;
 use crate::detect::Picture;
 
@@ -50,7 +50,7 @@ const WORSE: f64 = 1.15;
 
 /// Measures again what gains from it: small markers close to each other, thin rings, and those that were refused. New
 /// fits by cell; `figure` tells what the plate has in a cell.
-pub(super) fn second_look(
+pub(super) fn rescue(
     picture: &Picture,
     camera: &Camera,
     places: &BTreeMap<Cell, Place>,
@@ -62,8 +62,9 @@ pub(super) fn second_look(
     // the second round takes off neighbours that are themselves free of theirs
     for _ in 0..2 {
         let around = Around { known: &known, figure };
-        let mut look =
-            |(cell, place): (&Cell, &Place)| Some((*cell, around.look(*cell, place, picture, camera, &mut pixels)?));
+        let mut look = |(cell, place): (&Cell, &Place)| {
+            Some((*cell, around.measure_at(*cell, place, picture, camera, &mut pixels)?))
+        };
         let fits: Vec<(Cell, (Fit, bool))> = places.iter().filter_map(&mut look).collect();
         let crowded = fits.iter().any(|(_, (_, crowded))| *crowded);
         for (cell, (fit, _)) in fits {
@@ -88,7 +89,7 @@ struct Around<'a, F> {
 
 impl<F: Fn(Cell) -> Option<Figure>> Around<'_, F> {
     /// The new fit, and whether neighbours were taken off; `None` where nothing is to be gained.
-    fn look(
+    fn measure_at(
         &self,
         cell: Cell,
         place: &Place,
@@ -118,9 +119,9 @@ impl<F: Fn(Cell) -> Option<Figure>> Around<'_, F> {
         if tie.is_none() && !crowded && place.first.is_ok() {
             return None;
         }
-        let tails: Vec<Tail> = if crowded {
+        let nearby: Vec<NearbyInk> = if crowded {
             let near = gaps.iter().filter(|(_, gap)| *gap < WITHIN_REACH * blur_px);
-            near.flat_map(|(c, _)| self.tails(*c, cell, &map)).collect()
+            near.flat_map(|(c, _)| self.nearby(*c, cell, &map)).collect()
         } else {
             Vec::new()
         };
@@ -133,7 +134,7 @@ impl<F: Fn(Cell) -> Option<Figure>> Around<'_, F> {
         if let Some((apart, sigma)) = tie {
             (start.apart, start.tie_sigma) = (apart, Some(sigma));
         }
-        let fit = refine(picture, &Start { tails: &tails, ..start }, pixels).ok()?;
+        let fit = refine(picture, &Start { nearby: &nearby, ..start }, pixels).ok()?;
         Some((fit, crowded))
     }
 
@@ -193,15 +194,15 @@ impl<F: Fn(Cell) -> Option<Figure>> Around<'_, F> {
     }
 
     /// Contours of a neighbour: as measured, or as the map around `cell` has them.
-    fn tails(&self, neighbour: Cell, cell: Cell, map: &LocalMap) -> Vec<Tail> {
+    fn nearby(&self, neighbour: Cell, cell: Cell, map: &LocalMap) -> Vec<NearbyInk> {
         if let Some(fit) = self.known.get(&neighbour) {
-            return Tail::of(&fit.measured).collect();
+            return NearbyInk::of(&fit.measured).collect();
         }
         let Some((like, figure)) = self.typical(neighbour).zip((self.figure)(neighbour)) else { return Vec::new() };
         let centre = map.at([f64::from(neighbour.0 - cell.0), f64::from(neighbour.1 - cell.1)]);
         let one = |(ratio, sign): (f64, f64)| {
             let ellipse = map.ellipse(figure.radius * ratio).filter(|_| ratio > 0.0)?;
-            Some(Tail::at(&Ellipse { centre, ..ellipse }, like, sign))
+            Some(NearbyInk::at(&Ellipse { centre, ..ellipse }, like, sign))
         };
         let circles = [(1.0, 1.0), (figure.ratio.unwrap_or(0.0), -1.0)];
         circles.into_iter().filter_map(one).collect()
