@@ -109,7 +109,7 @@ pub struct Identifiability {
 
 /// Before the solve: what `stops` can tell.
 pub fn identifiability_of_stops(robot: &Robot, layout: &Layout, stops: &[Stop]) -> Option<Identifiability> {
-    let known = StopsKnowledge::new(robot, layout, stops).ok()?;
+    let known = StopsKnowledge::new(robot, layout, stops)?;
     let n = known.columns.len();
     let posterior = known.covariance.view((0, 0), (n, n)).into_owned();
     let (values, vectors) = symmetric_eigen(&known.information)?;
@@ -124,7 +124,7 @@ pub fn identifiability(
     stops: &[Stop],
     covariance: &DMatrix<f64>,
 ) -> Option<Identifiability> {
-    let known = StopsKnowledge::new(robot, layout, stops).ok()?;
+    let known = StopsKnowledge::new(robot, layout, stops)?;
     let (columns, scale) = (&known.columns, &known.scale);
     let n = columns.len();
     let k = DMatrix::from_fn(n, n, |i, j| covariance[(columns[i], columns[j])] / (scale[i] * scale[j]));

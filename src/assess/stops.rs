@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector, Matrix6};
 
 use crate::geom::adjoint;
-use crate::linalg::{NotPositiveDefinite, SymmetricFactor, product, symmetric_eigen};
+use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
 use crate::model::robot::{Robot, Stop};
 use crate::problem::Layout;
 use crate::urdf::JointKind;
@@ -50,11 +50,8 @@ pub struct StopsKnowledge {
 }
 
 impl StopsKnowledge {
-    /// Knowledge from `stops`.
-    ///
-    /// # Errors
-    /// Stops with readings that are not finite.
-    pub fn new(robot: &Robot, layout: &Layout, stops: &[Stop]) -> Result<Self, NotPositiveDefinite> {
+    /// Knowledge from `stops`; `None` where readings are not finite.
+    pub fn new(robot: &Robot, layout: &Layout, stops: &[Stop]) -> Option<Self> {
         let columns = robot_columns(layout);
         let scale: Vec<f64> = columns.iter().map(|&c| layout.columns[c].prior_sigma).collect();
         let n = columns.len();
@@ -62,21 +59,20 @@ impl StopsKnowledge {
         let mut all = DMatrix::zeros(n + FRAMES, n + FRAMES);
         for stop in stops {
             let (j, noise) = known.measurement(robot, layout, stop);
-            let Some(w) = noise.try_inverse() else { return Err(NotPositiveDefinite) };
-            let wj = DMatrix::from_column_slice(6, 6, w.as_slice()) * &j;
+            let wj = DMatrix::from_column_slice(6, 6, noise.try_inverse()?.as_slice()) * &j;
             all += product(&j.transpose(), &wj);
         }
         // Frames may be anywhere: a prior of 1 m and 1 rad says nothing beside the stops.
         let frames = all.view((n, n), (FRAMES, FRAMES)) + DMatrix::identity(FRAMES, FRAMES);
         let cross = all.view((0, n), (n, FRAMES)).into_owned();
-        let solved = SymmetricFactor::new(&frames)?.solve_many(&cross.transpose());
+        let solved = SymmetricFactor::new(&frames).ok()?.solve_many(&cross.transpose());
         let information = all.view((0, 0), (n, n)) - product(&cross, &solved);
         known.information = (&information + information.transpose()) * 0.5;
         for k in 0..n + FRAMES {
             all[(k, k)] += 1.0;
         }
-        known.covariance = SymmetricFactor::new(&all)?.inverse();
-        Ok(known)
+        known.covariance = SymmetricFactor::new(&all).ok()?.inverse();
+        Some(known)
     }
 
     /// Jacobian of the pose of the tip as a body twist (6 x parameters and frames) in units of the priors, and its noise.
@@ -178,10 +174,8 @@ pub fn structural(robot: &Robot, layout: &Layout) -> Structural {
     let columns = robot_columns(layout);
     let n = columns.len();
     match StopsKnowledge::new(robot, layout, &ideal_stops(robot)) {
-        Ok(known) => Structural { columns, directions: known.unknown(), information: known.information },
-        Err(NotPositiveDefinite) => {
-            Structural { columns, directions: DMatrix::identity(n, n), information: DMatrix::zeros(n, n) }
-        }
+        Some(known) => Structural { columns, directions: known.unknown(), information: known.information },
+        None => Structural { columns, directions: DMatrix::identity(n, n), information: DMatrix::zeros(n, n) },
     }
 }
 

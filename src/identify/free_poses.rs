@@ -272,7 +272,7 @@ fn finish(start: Adjustment) -> Result<(Adjustment, FreePoses)> {
             )
         }));
     }
-    let fit = outcome.fit().map_err(|_| undetermined("the normal equations are singular"))?;
+    let fit = outcome.fit().map_err(|e| undetermined(&e.to_string()))?;
     check_focal(&fit)?;
     let free = collect(&fit)?;
     Ok((fit.adjustment, free))

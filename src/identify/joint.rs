@@ -57,9 +57,8 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
             "look at the per-image table for images that do not belong, and at the starting values",
         ));
     }
-    let fit = outcome.fit().map_err(|_| {
-        Error::unsolved("joint fit", "the normal equations are singular", "take stops that move every joint")
-    })?;
+    let fit =
+        outcome.fit().map_err(|e| Error::unsolved("joint fit", e.to_string(), "take stops that move every joint"))?;
     let (estimator, noise) = (options.estimator, options.joint_noise);
     let fitted = |left: Adjustment| match estimator.is_two_stage() {
         true => refit(&left, estimator, noise),

@@ -29,7 +29,10 @@ pub struct SymmetricFactor {
 
 /// The matrix is not positive definite, or not finite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NotPositiveDefinite;
+pub struct NotPositiveDefinite {
+    /// The first row whose pivot is not positive: what it stands for follows from what the rows before it stand for.
+    pub row: usize,
+}
 
 fn view(m: &DMatrix<f64>) -> MatRef<'_, f64> {
     MatRef::from_column_major_slice(m.as_slice(), m.nrows(), m.ncols())
@@ -43,14 +46,17 @@ fn view_mut(m: &mut DMatrix<f64>) -> MatMut<'_, f64> {
 impl SymmetricFactor {
     /// Factorises `m` (its lower triangle is read).
     pub fn new(m: &DMatrix<f64>) -> Result<Self, NotPositiveDefinite> {
-        let diagonal_is_positive = m.diagonal().iter().all(|d| *d > 0.0 && d.is_finite());
-        if !diagonal_is_positive || m.nrows() != m.ncols() {
-            return Err(NotPositiveDefinite);
+        let is_told = |d: &f64| *d > 0.0 && d.is_finite();
+        if let Some(row) = m.diagonal().iter().position(|d| !is_told(d)) {
+            return Err(NotPositiveDefinite { row });
+        }
+        if m.nrows() != m.ncols() {
+            return Err(NotPositiveDefinite { row: m.nrows().min(m.ncols()) });
         }
         let scale = m.diagonal().map(|d| 1.0 / d.sqrt());
         let mut scaled = DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * scale[i] * scale[j]);
-        if !scaled.iter().all(|x| x.is_finite()) {
-            return Err(NotPositiveDefinite);
+        if let Some(row) = scaled.row_iter().position(|r| !r.iter().all(|x| x.is_finite())) {
+            return Err(NotPositiveDefinite { row });
         }
         let needed = factor::cholesky_in_place_scratch::<f64>(m.nrows(), Par::Seq, Default::default());
         let (mut memory, options) = (MemBuffer::new(needed), Default::default());
@@ -61,7 +67,7 @@ impl SymmetricFactor {
             MemStack::new(&mut memory),
             options,
         )
-        .map_err(|_| NotPositiveDefinite)?;
+        .map_err(|factor::LltError::NonPositivePivot { index }| NotPositiveDefinite { row: index })?;
         Ok(Self { scale, factor: scaled })
     }
 
@@ -184,6 +190,21 @@ mod tests {
         assert!(SymmetricFactor::new(&DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0])).is_err());
         assert!(SymmetricFactor::new(&DMatrix::from_row_slice(2, 2, &[1.0, f64::NAN, f64::NAN, 1.0])).is_err());
         assert!(SymmetricFactor::new(&DMatrix::zeros(2, 2)).is_err());
+    }
+
+    #[test]
+    fn a_row_that_follows_from_those_before_is_named() {
+        for (n, bad) in [(5, 3), (300, 200), (300, 7)] {
+            let mut m = DMatrix::from_fn(n, n, |i, j| if i == j { 2.0 } else { 0.5_f64.powi(i.abs_diff(j) as i32) });
+            for k in 0..n {
+                m[(bad, k)] = m[(bad - 1, k)];
+            }
+            for k in 0..n {
+                m[(k, bad)] = m[(k, bad - 1)];
+            }
+            m[(bad, bad)] -= 1e-9;
+            assert_eq!(SymmetricFactor::new(&m).err(), Some(NotPositiveDefinite { row: bad }));
+        }
     }
 
     #[test]

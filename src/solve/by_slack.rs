@@ -119,6 +119,11 @@ impl SlackEliminated {
         }
     }
 
+    /// Plate and index of the marker that an unknown behind the dense columns moves.
+    pub fn marker(&self, row: usize) -> (usize, usize) {
+        self.seen.order[(row - self.dense) / 3]
+    }
+
     /// `b' H^-1 b` of the right-hand sides of the slack.
     pub fn squares(&self) -> f64 {
         self.blocks.iter().map(|b| b.rhs.norm_squared()).sum()

@@ -60,7 +60,7 @@ pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Out
         let mut fit = match outcome.fit() {
             Ok(fit) => fit,
             Err(unsolved) => {
-                outcome = *unsolved;
+                outcome = unsolved.outcome;
                 break;
             }
         };

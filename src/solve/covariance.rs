@@ -3,8 +3,7 @@
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 use super::linear::LinearProblem;
-use super::system::{Elimination, System};
-use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
+use super::system::{Elimination, Singular, System};
 use crate::problem::Problem;
 
 /// Covariance of the reduced unknowns (dense columns, then slack or markers), with what is needed for the eliminated family.
@@ -23,15 +22,21 @@ pub struct Covariance {
 }
 
 impl LinearProblem<'_> {
-    /// Covariance of its unknowns; an error where the information is not positive definite.
-    pub fn covariance(self) -> Result<Covariance, NotPositiveDefinite> {
+    /// Covariance of its unknowns.
+    ///
+    /// # Errors
+    /// Information that is not positive definite.
+    pub fn covariance(self) -> Result<Covariance, Singular> {
         self.covariance_by(Elimination::cheaper(self))
     }
 
     /// As [`LinearProblem::covariance`], by a given elimination.
-    pub fn covariance_by(self, which: Elimination) -> Result<Covariance, NotPositiveDefinite> {
+    ///
+    /// # Errors
+    /// As [`LinearProblem::covariance`].
+    pub fn covariance_by(self, which: Elimination) -> Result<Covariance, Singular> {
         let system = System::with(which, self, 0.0);
-        let factor = SymmetricFactor::new(&system.information)?;
+        let factor = system.factor(self)?;
         let mut reduced = factor.inverse();
         fixed_are_known(&self.adjustment.problem, &mut reduced);
         let log_determinant = factor.log_determinant();

@@ -13,9 +13,8 @@ use super::blocks::SeenMarkers;
 use super::covariance::{Covariance, fixed_are_known};
 use super::frame::{Frame, frames};
 use super::linear::{LinearImage, LinearProblem};
-use super::system::{Eliminated, Elimination, System};
+use super::system::{Eliminated, Elimination, Singular, System};
 use crate::error::{Error, Result};
-use crate::linalg::SymmetricFactor;
 use crate::model::plate_modes::MODES;
 use crate::problem::{Adjustment, Problem, Slack};
 
@@ -66,9 +65,8 @@ pub fn in_frame_by(which: Elimination, linear: LinearProblem, stated: &Covarianc
     widen_scales(problem, &frames, &mut system);
     let combinations = combinations(linear, &frames);
     let held = hold(&mut system, combinations, &following);
-    let singular =
-        |_| Error::unsolved("plate", "the normal equations are singular", "take images of more of the plate");
-    let factor = SymmetricFactor::new(&system.information).map_err(singular)?;
+    let singular = |e: Singular| Error::unsolved("plate", e.to_string(), "take images of more of the plate");
+    let factor = system.factor(linear).map_err(singular)?;
     let mut reduced = factor.inverse();
     if let (Eliminated::Slack(e), Some(held)) = (&system.eliminated, &held) {
         e.project(held, &mut reduced);

@@ -1,8 +1,10 @@
 //! Levenberg-Marquardt on the reduced system.
 
+use std::fmt;
+
 use super::fit::Fit;
 use super::linear::{LinearProblem, Linearised};
-use super::system::{Elimination, System};
+use super::system::{Elimination, Singular, System};
 use crate::linalg::SymmetricFactor;
 use crate::problem::{Adjustment, State, Step};
 
@@ -56,16 +58,36 @@ impl Outcome {
     /// With its covariance.
     ///
     /// # Errors
-    /// Itself, stalled, where the normal equations are singular; as it is after a bad start.
-    pub fn fit(self) -> Result<Fit, Box<Self>> {
-        let covariance = self.linear().map(LinearProblem::covariance);
-        let Self { adjustment, linearised, iterations, .. } = self;
-        match (linearised, covariance) {
-            (Some(linearised), Some(Ok(covariance))) => Ok(Fit { adjustment, linearised, covariance }),
-            (Some(lin), _) => {
-                Err(Box::new(Self { status: Status::Stalled, adjustment, linearised: Some(lin), iterations }))
+    /// A bad start; singular normal equations.
+    pub fn fit(self) -> Result<Fit, Box<NoFit>> {
+        let covariance = self.linear().map(LinearProblem::covariance).transpose();
+        match (covariance, self) {
+            (Ok(Some(covariance)), Self { adjustment, linearised: Some(linearised), .. }) => {
+                Ok(Fit { adjustment, linearised, covariance })
             }
-            (None, _) => Err(Box::new(Self { status: Status::BadStart, adjustment, linearised: None, iterations })),
+            (Err(singular), outcome) => {
+                let outcome = Self { status: Status::Stalled, ..outcome };
+                Err(Box::new(NoFit { outcome, singular: Some(singular) }))
+            }
+            (_, outcome) => Err(Box::new(NoFit { outcome, singular: None })),
+        }
+    }
+}
+
+/// An outcome that is no fit.
+#[derive(Debug, Clone)]
+pub struct NoFit {
+    /// The outcome; stalled where the normal equations are singular.
+    pub outcome: Outcome,
+    /// Where they are; `None` after a bad start.
+    pub singular: Option<Singular>,
+}
+
+impl fmt::Display for NoFit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.singular {
+            Some(singular) => singular.fmt(f),
+            None => f.write_str("a marker lies behind its camera"),
         }
     }
 }
@@ -97,7 +119,7 @@ struct Model {
 impl Model {
     fn new(which: Elimination, linear: LinearProblem, lambda: f64) -> Option<Self> {
         let system = System::with(which, linear, lambda);
-        let factor = SymmetricFactor::new(&system.information).ok()?;
+        let factor = system.factor(linear).inspect_err(|singular| tracing::debug!(lambda, "{singular}")).ok()?;
         Some(Self { system, factor })
     }
 

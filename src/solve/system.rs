@@ -1,11 +1,14 @@
 //! Reduced normal equations: dense columns, and either the slack of the images or the markers; the other family is eliminated.
 
+use std::fmt;
+
 use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::blocks::SeenMarkers;
 use super::by_markers::MarkersEliminated;
 use super::by_slack::SlackEliminated;
 use super::linear::{Carried, LinearProblem};
+use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
 use crate::problem::{Adjustment, Problem, Step};
 
 /// Which family of unknowns is eliminated.
@@ -49,6 +52,19 @@ pub struct System {
     pub(super) eliminated: Eliminated,
 }
 
+/// The normal equations have no unique solution.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Singular {
+    /// The first unknown that cannot be told from those before it.
+    pub unknown: String,
+}
+
+impl fmt::Display for Singular {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the normal equations are singular at {}", self.unknown)
+    }
+}
+
 impl System {
     /// Builds the system at a linearisation by the cheaper elimination, with Levenberg-Marquardt damping `lambda` on the
     /// scaled diagonal.
@@ -81,6 +97,33 @@ impl System {
         system.hold_fixed(problem);
         system.take_gradient(linear);
         system
+    }
+
+    /// Factor of the information.
+    ///
+    /// # Errors
+    /// Information that is not positive definite.
+    pub fn factor(&self, linear: LinearProblem) -> Result<SymmetricFactor, Singular> {
+        let named = |NotPositiveDefinite { row }| Singular { unknown: self.unknown(linear, row) };
+        SymmetricFactor::new(&self.information).map_err(named)
+    }
+
+    /// Name of an unknown.
+    fn unknown(&self, linear: LinearProblem, row: usize) -> String {
+        let problem = &linear.adjustment.problem;
+        if let Some(column) = problem.layout.columns.get(row) {
+            return column.name.clone();
+        }
+        match &self.eliminated {
+            Eliminated::Markers(e) => {
+                let k = e.slack_start.partition_point(|start| *start <= row).saturating_sub(1);
+                format!("the deviation of {}", linear.image(k).image.name)
+            }
+            Eliminated::Slack(e) => {
+                let (plate, marker) = e.marker(row);
+                format!("marker {} of plate {plate}", problem.plates[plate].markers[marker].id)
+            }
+        }
     }
 
     /// Takes over the right-hand sides at another linearisation; the information stays.

@@ -58,7 +58,7 @@ fn information(outcome: Outcome) -> (Outcome, Option<NoiseInformation>) {
             let told = noise_information(&fit);
             (Outcome { status, iterations, adjustment: fit.adjustment, linearised: Some(fit.linearised) }, told)
         }
-        Err(unsolved) => (Outcome { status, ..*unsolved }, None),
+        Err(unsolved) => (Outcome { status, ..unsolved.outcome }, None),
     }
 }
 

@@ -30,7 +30,7 @@ const PEERS: [(&str, &str); 1] = [("series", "urdf")];
 
 const MOST_LINES: usize = 600;
 
-fn sources(folder: &Path, into: &mut Vec<PathBuf>) {
+pub fn sources(folder: &Path, into: &mut Vec<PathBuf>) {
     let mut entries: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
     entries.sort();
     for path in entries {

@@ -1,5 +1,6 @@
 //! Tests of structure; one binary, a file a subject.
 
+mod apart;
 mod architecture;
 mod circles;
 mod imports;
