@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use super::architecture::sources;
+use super::imports::files_below;
 
 /// Functions that may take them apart.
 const MOST_APART: usize = 15;
@@ -52,7 +52,7 @@ fn takes_apart(parameters: &str) -> bool {
 fn problem_state_linearisation_and_covariance_go_together() {
     let mut files = Vec::new();
     for folder in ["src", "benches"] {
-        sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut files);
+        files_below(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut files);
     }
     let mut apart = Vec::new();
     for path in files {

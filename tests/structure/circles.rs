@@ -1,8 +1,8 @@
 //! No two files import each other, directly or in a circle: what both need stands in a file of its own.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use crate::imports::Sources;
+use crate::imports::{Sources, rooms};
 
 /// Sources of a crate that is made up: path and text.
 fn crate_of(files: &[(&str, &str)]) -> Sources {
@@ -39,7 +39,8 @@ fn a_circle_is_found_however_it_is_written() {
 
 #[test]
 fn rooms_are_seen_through_nested_braces() {
-    let sources = crate_of(&[("a.rs", "use crate::{b::{X, Y as Z}, c};\nfn f() { crate::d::e() }")]);
-    let named: Vec<String> = sources.rooms().remove(0).1.into_iter().collect();
-    assert_eq!(named, ["b", "c", "d"]);
+    let text =
+        "use crate::{b::{X, Y as Z}, c};\nfn f() { crate::d::e() }\n#[cfg(test)]\nmod tests { use crate::{f::*}; }";
+    let named: Vec<String> = rooms(Path::new("a.rs"), text).into_iter().collect();
+    assert_eq!(named, ["b", "c", "d", "f"]);
 }

@@ -1,5 +1,5 @@
 //! Who imports whom, read from the sources: `use` lines with all their braces and the paths that stand in the code, each followed
-//! through re-exports to the file that defines the name. Unit tests inside a file do not count.
+//! through re-exports to the file that defines the name.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -47,9 +47,13 @@ fn module_of(file: &Path) -> Module {
     parts.filter(|p| !["mod", "lib", "main"].contains(&p.as_str())).collect()
 }
 
-/// Names, `::` and single signs; without comments, texts and what stands behind the first `#[cfg(test)]` module.
-fn tokens(text: &str) -> Vec<String> {
-    let code = text.split("#[cfg(test)]\nmod ").next().unwrap_or("");
+/// The code before the unit tests of a file.
+fn without_tests(text: &str) -> &str {
+    text.split("#[cfg(test)]\nmod ").next().unwrap_or("")
+}
+
+/// Names, `::` and single signs; without comments and texts.
+fn tokens(code: &str) -> Vec<String> {
     let part_of_name = |c: char| c.is_alphanumeric() || c == '_';
     let mut out = Vec::new();
     let mut rest = code;
@@ -183,6 +187,13 @@ fn source(file: &Path, text: &str) -> Source {
     source
 }
 
+/// Rooms that a file (its path inside `src`) names, in its unit tests, too.
+pub fn rooms(file: &Path, text: &str) -> BTreeSet<String> {
+    let source = source(file, text);
+    let paths = source.used.iter().chain(source.names.values()).chain(&source.globs);
+    paths.filter_map(|p| p.first().cloned()).collect()
+}
+
 impl Sources {
     /// The sources of this crate.
     pub fn read() -> Self {
@@ -197,14 +208,7 @@ impl Sources {
     /// Sources with the given paths and texts.
     pub fn of(files: Vec<(PathBuf, String)>) -> Self {
         let files = files.into_iter().filter(|(f, _)| !f.ends_with("main.rs"));
-        Self(files.map(|(file, text)| (module_of(&file), source(&file, &text))).collect())
-    }
-
-    /// Every file with the rooms that it names.
-    pub fn rooms(&self) -> Vec<(&Path, BTreeSet<String>)> {
-        let first = |p: &Module| p.first().cloned();
-        let rooms = |s: &Source| s.used.iter().chain(s.names.values()).chain(&s.globs).filter_map(first).collect();
-        self.0.values().map(|s| (s.file.as_path(), rooms(s))).collect()
+        Self(files.map(|(file, text)| (module_of(&file), source(&file, without_tests(&text)))).collect())
     }
 
     /// The module whose file defines what a full path names, and `None` for what names a whole module.
