@@ -125,7 +125,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
                 say!("{}", summary::of_stops(&dry_run(inputs.chain, &inputs.series, &options)?));
                 return Ok(Verdict::Good);
             }
-            (inputs.observe(progress::of_series().as_ref())?, Estimator::Joint)
+            (inputs.observe(&progress::of_series())?, Estimator::Joint)
         }
         (None, None) => {
             return Err(Error::input("identify", "no robot is given", "give --urdf and --series, or --from"));

@@ -20,14 +20,14 @@ pub(super) fn bar(length: usize, what: &str) -> ProgressBar {
 }
 
 /// A bar for every series whose images are looked at.
-pub(super) fn of_series() -> Box<dyn Fn(&str, usize) + Sync> {
+pub(super) fn of_series() -> impl Fn(&str, usize) + Sync {
     let bars: Mutex<BTreeMap<String, ProgressBar>> = Mutex::default();
-    Box::new(move |name, stops| {
+    move |name: &str, stops: usize| {
         let mut bars = bars.lock().unwrap_or_else(PoisonError::into_inner);
         let bar = bars.entry(name.to_owned()).or_insert_with(|| bar(stops, name));
         bar.inc(1);
         if bar.position() >= stops as u64 {
             bar.finish_and_clear();
         }
-    })
+    }
 }
