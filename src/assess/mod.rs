@@ -6,6 +6,7 @@ mod flange;
 mod hold_out;
 mod identifiability;
 mod in_base;
+mod limits;
 mod points;
 mod projection;
 mod promise;
@@ -27,6 +28,7 @@ pub use identifiability::{
     identifiability_of_stops,
 };
 pub use in_base::sigma_in_base;
+pub use limits::Limits;
 pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
 pub use projection::ProjectionMap;
 pub use promise::{FlangeErrors, usual_joint_sigma};

@@ -3,18 +3,14 @@
 use nalgebra::DMatrix;
 
 use crate::assess::{
-    FlangeErrors, FlangeModel, Identifiability, WorkspacePoint, clustered_covariance, identifiability,
+    FlangeErrors, FlangeModel, Identifiability, Limits, WorkspacePoint, clustered_covariance, identifiability,
     usual_joint_sigma,
 };
-use crate::error::Notice;
 use crate::geom::Pose;
 use crate::model::robot::Stop;
 use crate::problem::{Adjustment, Noise, Problem, Slack};
 use crate::series::CameraMount;
 use crate::solve::{Covariance, Fit, JOINT_NOISE_FLOOR, NoiseInformation, NoiseUncertainty, noise_information};
-
-/// Ratio of the sigma of the flange by clusters to that by the model from which the larger one is reported.
-const REPORT_LARGER: f64 = 1.5;
 
 /// Sigmas of a 95 % interval.
 pub const NORMAL_95: f64 = 1.96;
@@ -63,7 +59,7 @@ pub fn judge(
     fit: &mut Fit,
     joint_noise_is_estimated: bool,
     told_before: Option<NoiseInformation>,
-    notices: &mut Vec<Notice>,
+    limits: &Limits,
 ) -> Worth {
     let told = if joint_noise_is_estimated { noise_information(fit) } else { None };
     let uncertainty = told.as_ref().and_then(|told| NoiseUncertainty::of(told, fit));
@@ -87,17 +83,10 @@ pub fn judge(
         let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &clustered.model, &stops));
         worth.clustered_ratio = model.map(|m| m.ratio_of(&clustered.sandwich));
         let by_clusters: Vec<f64> = worth.model_sigma.iter().zip(clustered.ratios()).map(|(s, r)| s * r).collect();
-        if let Some(ratio) = worth.clustered_ratio.filter(|r| *r > REPORT_LARGER) {
+        if worth.clustered_ratio.is_some_and(|ratio| ratio > limits.scatter_ratio) {
             worth.larger_stated = true;
             enlarge(covariance, &worth.model_sigma, &by_clusters, problem.layout.theta_len());
             worth.identifiability = identifiability(&state.robot, layout, &stops, &covariance.reduced);
-            notices.push(Notice::new(
-                "uncertainty",
-                format!(
-                    "the images scatter {ratio:.1} times as much as the noise model says (flange, clusters of images); the larger sigmas are stated"
-                ),
-                "look for what changes from image to image: a loose camera or plate, motion, focus, light",
-            ));
         }
         worth.clustered_sigma = Some(by_clusters);
     }

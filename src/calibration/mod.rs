@@ -75,11 +75,10 @@ impl Calibration {
     /// # Errors
     /// As of [`identify`].
     pub fn of(observed: Observed, options: &Options) -> Result<Self> {
-        let Observed { description, chain, series: measured, mut notices, files } = observed;
+        let Observed { description, chain, series: measured, notices, files } = observed;
         let mut solution = identify(chain, &measured, options)?;
         solution.two_stage = beside_two_stages(&solution);
-        notices.append(&mut solution.notices);
-        solution.notices = notices;
+        solution.findings.splice(0..0, notices.into_iter().map(Into::into));
         let series = measured.into_iter().map(|s| s.name).collect();
         let robot = solution.exported_robot();
         Ok(Self { solution, robot, description, series, files, options: options.clone() })

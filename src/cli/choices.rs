@@ -31,7 +31,7 @@ pub(super) struct ChoiceArgs {
     /// Hold these parameters at nominal (camera.front.k3, joint_2)
     #[arg(long, value_name = "NAME")]
     fix: Vec<String>,
-    /// File with parameters, robot_model, free, fix and [prior] (see the guide); flags win
+    /// File with parameters, robot_model, free, fix, [prior] and [limits] (see the guide); flags win
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }
@@ -79,28 +79,33 @@ impl From<Model> for RobotModel {
 }
 
 impl ChoiceArgs {
-    /// Flags over the configuration file over defaults.
-    pub(super) fn options(&self) -> Result<Options> {
+    /// Flags over the configuration file over `defaults`: those of the program, or of an earlier result.
+    pub(super) fn options(&self, defaults: Options) -> Result<Options> {
         let config = self.config.as_deref().map_or(Ok(Config::default()), Config::read)?;
         let parameters = self.parameters.map(|s| if s == Set::Minimal { Parameters::Minimal } else { Parameters::All });
-        let joined = |a: &[String], b: &[String]| a.iter().chain(b).cloned().collect();
-        let defaults = Options::default();
+        let joined = |a: &[String], b: &[String], before: Vec<String>| {
+            let given: Vec<String> = a.iter().chain(b).cloned().collect();
+            if given.is_empty() { before } else { given }
+        };
+        let before = defaults.selection;
         Ok(Options {
             harmonics: harmonics(self.harmonics.or(config.harmonics))?.unwrap_or(defaults.harmonics),
-            joint_noise: joint_noise(self.joint_noise)?,
+            joint_noise: joint_noise(self.joint_noise)?.unwrap_or(defaults.joint_noise),
             marker_tolerance: match self.marker_tolerance {
                 Some(Tolerance::Estimated) => MarkerTolerance::Estimated,
-                _ => defaults.marker_tolerance,
+                Some(Tolerance::Stated) => MarkerTolerance::Stated,
+                None => defaults.marker_tolerance,
             },
             model: self.robot_model.map(Into::into).or(config.robot_model).unwrap_or(defaults.model),
             selection: Selection {
-                parameters: parameters.or(config.parameters).unwrap_or_default(),
-                free: joined(&config.free, &self.free),
-                fix: joined(&config.fix, &self.fix),
-                prior: config.prior,
+                parameters: parameters.or(config.parameters).unwrap_or(before.parameters),
+                free: joined(&config.free, &self.free, before.free),
+                fix: joined(&config.fix, &self.fix, before.fix),
+                prior: if config.prior.is_empty() { before.prior } else { config.prior },
             },
             estimator: defaults.estimator,
-            payload: config.payload,
+            payload: config.payload.or(defaults.payload),
+            limits: config.limits.unwrap_or(defaults.limits),
         })
     }
 }
@@ -117,10 +122,10 @@ fn harmonics(count: Option<u8>) -> Result<Option<u8>> {
     }
 }
 
-fn joint_noise(sigma: Option<f64>) -> Result<JointNoise> {
+fn joint_noise(sigma: Option<f64>) -> Result<Option<JointNoise>> {
     match sigma {
-        None => Ok(JointNoise::Estimated),
-        Some(s) if (0.0..0.1).contains(&s) => Ok(JointNoise::Known(s)),
+        None => Ok(None),
+        Some(s) if (0.0..0.1).contains(&s) => Ok(Some(JointNoise::Known(s))),
         Some(s) => Err(Error::input(
             "--joint-noise",
             format!("{s} is no joint noise in rad"),

@@ -14,7 +14,7 @@ use crate::calibration::{Calibration, Ends, Export, Inputs, Observed};
 use crate::error::{Error, Result};
 use crate::identify::{Estimator, Options, dry_run};
 use crate::output::solution_json::{self, FILE_NAME};
-use crate::output::{Offsets, Place, Poses, folder_name};
+use crate::output::{Offsets, Place, Poses, folder_name, restore};
 use crate::problem::{LensChoice, MeasuredSeries};
 
 /// Flags of `identify`.
@@ -26,7 +26,7 @@ pub(super) struct IdentifyArgs {
     /// Series folder or recording (.mcap, rosbag2 folder); give it several times to fit several series of the same robot together
     #[arg(long, value_name = "FOLDER", required_unless_present = "from")]
     series: Vec<PathBuf>,
-    /// Solve again from an earlier solution.json alone, with other options
+    /// Solve again from an earlier solution.json alone: with its options, or with those given
     #[arg(long, value_name = "SOLUTION", conflicts_with_all = ["urdf", "series", "dry_run"], requires = "out")]
     from: Option<PathBuf>,
     /// Only say what the stops of the series can tell of the robot, and what to add; no image is looked at
@@ -104,15 +104,13 @@ impl From<TwoStage> for Estimator {
 }
 
 pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
-    let options = args.choices.options()?;
+    let earlier = args.from.as_deref().map(read_solution).transpose()?;
+    let options = args.choices.options(earlier.as_ref().map_or_else(Options::default, restore::options))?;
     let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
     // Tried before the work that the result costs.
     let mut place = args.out.as_deref().filter(|_| !args.dry_run).map(Place::claim).transpose()?;
-    let (mut observed, estimator) = match (&args.from, &args.urdf) {
-        (Some(path), _) => {
-            let record = read_solution(path)?;
-            (Observed::of_record(&record, path, ends)?, record.estimator)
-        }
+    let mut observed = match (earlier.as_ref().zip(args.from.as_deref()), &args.urdf) {
+        (Some((record, path)), _) => Observed::of_record(record, path, ends)?,
         (None, Some(urdf)) => {
             let inputs = Inputs::read(urdf, &args.series, ends)?;
             if place.is_none() && !args.dry_run {
@@ -125,14 +123,14 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
                 say!("{}", summary::of_stops(&dry_run(inputs.chain, &inputs.series, &options)?));
                 return Ok(Verdict::Good);
             }
-            (inputs.observe(&progress::of_series())?, Estimator::Joint)
+            inputs.observe(&progress::of_series())?
         }
         (None, None) => {
             return Err(Error::input("identify", "no robot is given", "give --urdf and --series, or --from"));
         }
     };
     let place = place.ok_or_else(|| Error::input("identify", "no folder for the results is given", "give --out"))?;
-    let estimator = args.two_stage.map_or(estimator, Into::into);
+    let estimator = args.two_stage.map_or(options.estimator, Into::into);
     choose_lens(&mut observed.series, args.camera.as_deref())?;
     let calibration = Calibration::of(observed, &Options { estimator, ..options })?;
     write(args, &calibration, place)

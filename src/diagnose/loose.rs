@@ -1,14 +1,31 @@
 //! A camera that sits loosely on its mount: it tips over between two positions, and the joint noise shows two heaps.
 
-use super::shift::Shift;
-use crate::problem::{Problem, Slack, State};
+use std::fmt;
 
-/// Fewest images, in all and in the smaller heap, that tell two heaps from chance.
-const FEWEST_IMAGES: usize = 12;
-const FEWEST_IN_HEAP: usize = 3;
+use super::kind::{Kind, Quantity, Setting, Subject, some_of};
+use crate::assess::{Accuracy, Limits};
+use crate::fit::Fit;
+use crate::problem::{Adjustment, Slack};
 
-/// Smallest distance of the heaps that matters, rad.
-const LEAST_TURN: f64 = 0.2e-3;
+/// Most images that are named.
+const MOST_IMAGES: usize = 5;
+
+/// A camera tips over between two positions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LooseMounting {
+    /// Name of the mounting.
+    pub mounting: String,
+    /// About which axis of the camera: pitch, yaw, roll.
+    pub turn: &'static str,
+    /// Angle between the positions, rad.
+    pub angle_rad: f64,
+    /// Spread of either, rad.
+    pub spread_rad: f64,
+    /// Images in the rarer position.
+    pub images: Vec<String>,
+    /// Images in all.
+    pub of: usize,
+}
 
 /// What the axes of the camera do, in the order x, y, z.
 const TURNS: [&str; 3] = ["pitch", "yaw", "roll"];
@@ -30,7 +47,7 @@ struct Split {
     smaller: Vec<usize>,
 }
 
-fn split(values: &[f64]) -> Option<Split> {
+fn split(values: &[f64], fewest: usize) -> Option<Split> {
     let n = values.len();
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
@@ -38,7 +55,7 @@ fn split(values: &[f64]) -> Option<Split> {
         let mean = heap.iter().map(|&i| values[i]).sum::<f64>() / heap.len() as f64;
         (mean, heap.iter().map(|&i| (values[i] - mean).powi(2)).sum::<f64>())
     };
-    let cuts = FEWEST_IN_HEAP..=n.checked_sub(FEWEST_IN_HEAP)?;
+    let cuts = fewest..=n.checked_sub(fewest)?;
     let best = cuts
         .map(|k| {
             let ((low, a), (high, b)) = (moments(&order[..k]), moments(&order[k..]));
@@ -51,15 +68,14 @@ fn split(values: &[f64]) -> Option<Split> {
     Some(Split { distance, spread: (squares / (n - 2) as f64).sqrt(), smaller })
 }
 
-/// Names every mounting whose camera turned between two positions; with what to do.
-///
-/// Mountings whose images a displacement explains already are left out.
-pub fn loose_mountings(problem: &Problem, state: &State, shifts: &[Shift]) -> Vec<String> {
-    let open = |m: &usize| !shifts.iter().any(|s| s.explains(problem, *m));
-    (0..problem.mountings.len()).filter(open).filter_map(|m| loose(problem, state, m)).collect()
+/// Every mounting whose camera turned between two positions.
+pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &Setting) -> Vec<LooseMounting> {
+    let mountings = 0..fit.problem.mountings.len();
+    mountings.filter_map(|m| loose(fit, m, setting.limits)).collect()
 }
 
-fn loose(problem: &Problem, state: &State, mounting: usize) -> Option<String> {
+fn loose(fit: &Fit, mounting: usize, limits: &Limits) -> Option<LooseMounting> {
+    let Adjustment { problem, state } = &fit.adjustment;
     let turns: Vec<(usize, [f64; 3])> = problem
         .used()
         .filter(|(i, image)| image.mounting == mounting && matches!(state.slack[*i], Slack::Joints(_)))
@@ -70,27 +86,56 @@ fn loose(problem: &Problem, state: &State, mounting: usize) -> Option<String> {
             Some((i, [turn[3], turn[4], turn[5]]))
         })
         .collect();
-    if turns.len() < FEWEST_IMAGES {
+    if turns.len() < limits.loose_images {
         return None;
     }
     let (axis, found) = (0..3)
-        .filter_map(|axis| split(&turns.iter().map(|(_, t)| t[axis]).collect::<Vec<_>>()).map(|s| (axis, s)))
+        .filter_map(|axis| {
+            let about_axis: Vec<f64> = turns.iter().map(|(_, t)| t[axis]).collect();
+            split(&about_axis, limits.loose_images_in_heap).map(|s| (axis, s))
+        })
         .max_by(|a, b| (a.1.distance / a.1.spread).total_cmp(&(b.1.distance / b.1.spread)))?;
-    if found.distance < LEAST_TURN || found.distance < no_chance(turns.len()) * found.spread {
+    if found.distance < limits.loose_turn_rad || found.distance < no_chance(turns.len()) * found.spread {
         return None;
     }
-    let names: Vec<&str> = found.smaller.iter().map(|&k| problem.images[turns[k].0].name.as_str()).collect();
-    let more = names.len().saturating_sub(5);
-    Some(format!(
-        "camera mount {}: the {} of the camera has two values {:.2} mrad apart ({} of {} images: {}{}); the camera is loose on its mount, or slips: fasten it and take the series again",
-        problem.mountings[mounting],
-        TURNS[axis],
-        1e3 * found.distance,
-        names.len(),
-        turns.len(),
-        names[..names.len() - more].join(", "),
-        if more > 0 { format!(" and {more} more") } else { String::new() }
-    ))
+    Some(LooseMounting {
+        mounting: problem.mountings[mounting].clone(),
+        turn: TURNS[axis],
+        angle_rad: found.distance,
+        spread_rad: found.spread,
+        images: found.smaller.iter().map(|&k| problem.images[turns[k].0].name.clone()).collect(),
+        of: turns.len(),
+    })
+}
+
+impl fmt::Display for LooseMounting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "camera mount {}: the {} of the camera has two values {:.2} mrad apart ({} of {} images: {}); the camera is loose on its mount, or slips: fasten it and take the series again",
+            self.mounting,
+            self.turn,
+            1e3 * self.angle_rad,
+            self.images.len(),
+            self.of,
+            some_of(&self.images, MOST_IMAGES)
+        )
+    }
+}
+
+impl Kind for LooseMounting {
+    fn code(&self) -> &'static str {
+        "loose_mounting"
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        let body = Subject::Body(self.mounting.clone());
+        std::iter::once(body).chain(self.images.iter().cloned().map(Subject::Image)).collect()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![Quantity::new("angle", self.angle_rad, "rad").with_sigma(self.spread_rad)]
+    }
 }
 
 #[cfg(test)]
@@ -109,12 +154,12 @@ mod tests {
         let mut false_alarms = 0;
         for _ in 0..500 {
             let values: Vec<f64> = (0..24).map(|_| normal(&mut rng)).collect();
-            let s = split(&values).unwrap();
+            let s = split(&values, 3).unwrap();
             false_alarms += usize::from(s.distance > no_chance(24) * s.spread);
         }
         assert!(false_alarms <= 2, "{false_alarms} of 500");
         let values: Vec<f64> = (0..24).map(|k| normal(&mut rng) + if k % 5 == 0 { 10.0 } else { 0.0 }).collect();
-        let s = split(&values).unwrap();
+        let s = split(&values, 3).unwrap();
         assert!(s.distance > no_chance(24) * s.spread);
         assert_eq!(s.smaller, [0, 5, 10, 15, 20]);
     }

@@ -1,14 +1,47 @@
-//! What the data contradict: one file a check.
+//! What the data contradict: one file a check with what it finds and the sentence for it, one row in [`CHECKS`].
+//!
+//! To add one: a file with a function of the stage at which it runs and a type with `Display` and `Kind`; the type as a variant of
+//! [`Finding`]; the function as a row of [`CHECKS`]. Numbers that decide stand in [`crate::assess::Limits`].
 
+mod camera_model;
+mod checks;
+mod displaced;
+mod few_images;
+mod finding;
 mod focus;
-mod gates;
+mod joint_noise;
+mod kind;
+mod left_out_images;
+mod left_out_observations;
+mod lens_not_in_ros;
 mod loose;
+mod marker_off;
 mod moved;
+mod no_gain;
+mod noticed;
+mod parameter_off;
 mod plate_size;
+mod scatter;
 mod shift;
+mod undetermined;
 
-pub use focus::find_focus_change;
-pub use gates::{gates, left_out, remarks, undetermined};
-pub use moved::{Move, find_move};
-pub use plate_size::doubted_sizes;
-pub use shift::{Shift, find_shifts};
+pub use camera_model::CameraModelMisfit;
+pub use checks::{CHECKS, Check, Diagnosis, Stage};
+pub use displaced::{Carried, Displaced, Displacement};
+pub use few_images::FewImages;
+pub use finding::Finding;
+pub use focus::FocusChange;
+pub use joint_noise::{ImageValue, JointNoiseLarge};
+pub use kind::{Quantity, Setting, Subject, Weight};
+pub use left_out_images::ImagesLeftOut;
+pub use left_out_observations::ObservationsLeftOut;
+pub use lens_not_in_ros::LensNotInRos;
+pub use loose::LooseMounting;
+pub use marker_off::MarkerOff;
+pub use moved::{Moved, MovedBody};
+pub use no_gain::NoGain;
+pub use noticed::Noticed;
+pub use parameter_off::ParameterOff;
+pub use plate_size::DoubtedSize;
+pub use scatter::LargeScatter;
+pub use undetermined::FlangeUndetermined;

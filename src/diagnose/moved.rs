@@ -1,29 +1,44 @@
 //! Images that disagree with their readings but agree with each other: the plate or the camera was moved.
 
-use crate::fit::FreePoses;
+use std::fmt;
+
+use super::kind::{Kind, Quantity, Setting, Subject};
 use crate::geom::Pose;
 use crate::init::PosePair;
-use crate::problem::{ImageRejection, Problem, State};
+use crate::problem::{Adjustment, ImageRejection};
 
-/// Fewest wrongly paired images that make a new place of plate or camera credible.
-const FEWEST: usize = 3;
-
-/// Robust agreement of the new place over its images, as a share of the distance to the old one.
-const AGREEMENT: f64 = 0.2;
-
-/// What moved, and when.
+/// Plate or camera was moved within a series, by so much that its images were left out.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Move {
+pub struct Moved {
+    /// What was moved.
+    pub body: MovedBody,
+    /// Last image before and first image after it.
+    pub between: [String; 2],
     /// Images that saw the new place.
-    pub images: Vec<usize>,
-    /// In words.
-    pub what: String,
-    /// What to do.
-    pub remedy: String,
+    pub images: Vec<String>,
+    /// How far, m.
+    pub distance_m: f64,
+    /// By which angle, rad.
+    pub angle_rad: f64,
+}
+
+/// What can be moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MovedBody {
+    /// The plate.
+    Plate,
+    /// The camera on its mount.
+    Camera,
+}
+
+pub(super) fn check(adjustment: &Adjustment, setting: &Setting) -> Vec<Moved> {
+    let series = 0..setting.series.len();
+    series.filter_map(|k| find_move(adjustment, setting, k)).collect()
 }
 
 /// Looks for one common new place among the wrongly paired images of a series.
-pub fn find_move(problem: &Problem, state: &State, free: &FreePoses, series: usize) -> Option<Move> {
+fn find_move(Adjustment { problem, state }: &Adjustment, setting: &Setting, series: usize) -> Option<Moved> {
+    let free = setting.free;
     let mut wrong: Vec<(usize, PosePair)> = Vec::new();
     for (i, image) in problem.images.iter().enumerate().filter(|(_, image)| image.series == series) {
         let suspect = image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair);
@@ -37,38 +52,79 @@ pub fn find_move(problem: &Problem, state: &State, free: &FreePoses, series: usi
     let camera_at = |p: &PosePair| p.chain * plate * p.camera_from_plate.inverse();
     let plates: Vec<Pose> = wrong.iter().map(|(_, p)| plate_at(p)).collect();
     let cameras: Vec<Pose> = wrong.iter().map(|(_, p)| camera_at(p)).collect();
+    let (fewest, agreement) = (setting.limits.moved_images, setting.limits.moved_agreement);
     let candidates = [
-        (
-            "the plate",
-            common(&plates, &plate),
-            "give the rows after the move a placement of their own in joints.csv, and fix the plate better",
-        ),
-        (
-            "the camera on its mount",
-            common(&cameras, &camera),
-            "put the images after the move into a series of their own with another [camera] mounting",
-        ),
+        (MovedBody::Plate, common(&plates, &plate, fewest, agreement)),
+        (MovedBody::Camera, common(&cameras, &camera, fewest, agreement)),
     ];
-    let (name, place, remedy) = candidates
+    let (body, place) = candidates
         .into_iter()
-        .filter_map(|(n, c, r)| c.map(|c| (n, c, r)))
+        .filter_map(|(body, common)| common.map(|c| (body, c)))
         .min_by(|a, b| a.1.spread.total_cmp(&b.1.spread))?;
     let images: Vec<usize> = place.members.iter().map(|&k| wrong[k].0).collect();
     let (from, to) = (images.first()?, images.last()?);
     let own = |i: &usize| problem.images[*i].series == series;
     let neighbour = (*to + 1..problem.images.len()).find(own).or_else(|| (0..*from).rev().find(own))?;
     let (early, late) = if neighbour > *to { (*to, neighbour) } else { (neighbour, *from) };
-    let what = format!(
-        "{name} was moved between {} and {}: {} images, {} to {}, agree on a place {:.1} mm and {:.1} mrad from that of the others",
-        problem.images[early].name,
-        problem.images[late].name,
-        images.len(),
-        problem.images[*from].name,
-        problem.images[*to].name,
-        1e3 * place.moved.1,
-        1e3 * place.moved.0
-    );
-    Some(Move { images, what, remedy: remedy.to_owned() })
+    let name = |i: usize| problem.images[i].name.clone();
+    Some(Moved {
+        body,
+        between: [name(early), name(late)],
+        distance_m: place.moved.1,
+        angle_rad: place.moved.0,
+        images: images.into_iter().map(name).collect(),
+    })
+}
+
+impl Moved {
+    /// What was found, and what to do.
+    pub(super) fn what_and_remedy(&self) -> (String, &'static str) {
+        let (name, remedy) = match self.body {
+            MovedBody::Plate => (
+                "the plate",
+                "give the rows after the move a placement of their own in joints.csv, and fix the plate better",
+            ),
+            MovedBody::Camera => (
+                "the camera on its mount",
+                "put the images after the move into a series of their own with another [camera] mounting",
+            ),
+        };
+        let what = format!(
+            "{name} was moved between {} and {}: {} images, {} to {}, agree on a place {:.1} mm and {:.1} mrad from that of the others",
+            self.between[0],
+            self.between[1],
+            self.images.len(),
+            self.images.first().map_or("", String::as_str),
+            self.images.last().map_or("", String::as_str),
+            1e3 * self.distance_m,
+            1e3 * self.angle_rad
+        );
+        (what, remedy)
+    }
+}
+
+impl fmt::Display for Moved {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (what, remedy) = self.what_and_remedy();
+        write!(f, "{what}; {remedy}")
+    }
+}
+
+impl Kind for Moved {
+    fn code(&self) -> &'static str {
+        match self.body {
+            MovedBody::Plate => "plate_moved",
+            MovedBody::Camera => "camera_moved",
+        }
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        self.images.iter().cloned().map(Subject::Image).collect()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![Quantity::new("distance", self.distance_m, "m"), Quantity::new("angle", self.angle_rad, "rad")]
+    }
 }
 
 struct Place {
@@ -79,11 +135,11 @@ struct Place {
 }
 
 /// The place that most of the poses agree on, if they do and it is not the old one.
-fn common(poses: &[Pose], old: &Pose) -> Option<Place> {
+fn common(poses: &[Pose], old: &Pose, fewest: usize, agreement: f64) -> Option<Place> {
     let mut best: Option<Place> = None;
     for candidate in poses {
         let moved = old.distance(candidate);
-        let bound = AGREEMENT * (moved.0 + moved.1);
+        let bound = agreement * (moved.0 + moved.1);
         let mut members = Vec::new();
         let mut spread = 0.0;
         for (k, pose) in poses.iter().enumerate() {
@@ -95,7 +151,7 @@ fn common(poses: &[Pose], old: &Pose) -> Option<Place> {
         }
         spread /= (members.len().max(2) - 1) as f64;
         let more = best.as_ref().is_none_or(|b| (members.len(), -spread) > (b.members.len(), -b.spread));
-        if members.len() >= FEWEST && more {
+        if members.len() >= fewest && more {
             best = Some(Place { members, moved, spread });
         }
     }

@@ -13,26 +13,14 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
-use crate::assess::TellingImages;
+use super::displaced::{Carried, Displaced, Displacement};
+use super::kind::{Setting, Weight};
+use crate::assess::{Accuracy, Limits, TellingImages};
+use crate::fit::Fit;
 use crate::linalg::{SymmetricFactor, product};
 use crate::problem::{Adjustment, Problem, Slack};
 use crate::series::CameraMount;
 use crate::solve::LinearProblem;
-
-/// Fewest images on either side of a step.
-const FEWEST: usize = 3;
-
-/// Share of the squares of the slack that a step must explain.
-const LEAST_SHARE: f64 = 0.6;
-
-/// Probability, over all steps that are looked at, with which Gaussian noise may look like one.
-const FALSE_ALARMS: f64 = 1e-4;
-
-/// Displacements from which a result is not to be trusted: as far as a good robot repeats. m, rad.
-const MATTERS: (f64, f64) = (0.05e-3, 0.1e-3);
-
-/// Most steps in all.
-const MOST_STEPS: usize = 3;
 
 /// What stands elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,9 +40,9 @@ enum Order {
 
 /// A step of one body between two parts of a series.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shift {
+struct Shift {
     /// Index of the series.
-    pub series: usize,
+    series: usize,
     body: Body,
     order: Order,
     /// Images behind the step, in this order.
@@ -95,26 +83,30 @@ impl Row {
     }
 }
 
+pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &Setting) -> Vec<Displaced> {
+    find_shifts(fit, setting.limits).iter().map(|shift| shift.finding(&fit.problem, setting)).collect()
+}
+
 /// Steps that explain most of the joint noise, in the order of the images.
-pub fn find_shifts(fit: LinearProblem) -> Vec<Shift> {
-    let Adjustment { problem, state } = fit.adjustment;
-    let mut linear = Linear::of(fit);
+fn find_shifts(fit: &Fit, limits: &Limits) -> Vec<Shift> {
+    let Adjustment { problem, state } = &fit.adjustment;
+    let mut linear = Linear::of(fit.linear());
     let columns = linear.information.ncols();
     let squares = |row: &Row| problem.slack_squares(&problem.images[row.image], &state.slack[row.image]);
     let all: f64 = linear.images.iter().map(squares).sum();
     let (mut left, mut found, mut good) = (all, Vec::<Shift>::new(), Vec::new());
-    while found.len() < MOST_STEPS {
-        let tried = candidates(problem, &linear);
-        let Some(mut best) = linear.best(&tried) else { break };
+    while found.len() < limits.displacements {
+        let tried = candidates(problem, &linear, limits.displaced_images);
+        let Some(mut best) = linear.best(&tried, limits.displaced_images) else { break };
         best.share = best.fall / left;
         let chance = tried.len() as f64 * chance(best.share, left);
         tracing::debug!(?best.body, ?best.order, first = %problem.images[best.behind[0]].name, behind = best.behind.len(),
             fall = best.fall, left, share = best.share, chance, twist = ?best.twist, "step of a body");
-        if chance > FALSE_ALARMS {
+        if chance > limits.displaced_false_alarms {
             break;
         }
         let Some((next, step)) = linear.with(&best) else { break };
-        let enough = best.share > LEAST_SHARE;
+        let enough = best.share > limits.displaced_share;
         (linear, left) = (next, (left - best.fall).max(0.0));
         best.twist.fill(0.0);
         found.push(best);
@@ -150,11 +142,12 @@ struct Candidate {
     from: usize,
 }
 
-fn candidates(problem: &Problem, linear: &Linear) -> Vec<Candidate> {
+/// With at least so many images on either side.
+fn candidates(problem: &Problem, linear: &Linear, fewest: usize) -> Vec<Candidate> {
     let mut all = Vec::new();
     let mut divide = |series, body, order, rows: Vec<usize>| {
         let rows = std::rc::Rc::new(rows);
-        for from in (FEWEST..=rows.len().saturating_sub(FEWEST)).rev() {
+        for from in (fewest..=rows.len().saturating_sub(fewest)).rev() {
             all.push(Candidate { series, body, order, rows: rows.clone(), from });
         }
     };
@@ -220,13 +213,13 @@ impl Linear {
     }
 
     /// The step with the largest fall of the cost; where several are alike, the first, which is one in time.
-    fn best(&self, tried: &[Candidate]) -> Option<Shift> {
+    fn best(&self, tried: &[Candidate], fewest: usize) -> Option<Shift> {
         let covariance = SymmetricFactor::new(&self.information).ok()?.inverse();
         let mut best: Option<(f64, usize, Vector6<f64>, Matrix6<f64>)> = None;
         let mut sums = Sums::new(self.information.ncols());
         for (c, candidate) in tried.iter().enumerate() {
             let rows = &candidate.rows;
-            if candidate.from + FEWEST == rows.len() {
+            if candidate.from + fewest == rows.len() {
                 sums = Sums::new(self.information.ncols());
                 rows[candidate.from + 1..].iter().for_each(|&r| sums.add(&self.images[r], candidate.body));
             }
@@ -310,77 +303,33 @@ impl Sums {
 }
 
 impl Shift {
-    fn distance_m(&self) -> f64 {
-        self.twist.fixed_rows::<3>(0).norm()
-    }
-
-    fn angle_rad(&self) -> f64 {
-        self.twist.fixed_rows::<3>(3).norm()
-    }
-
-    /// True where it is beyond what a good robot repeats to.
-    pub fn matters(&self) -> bool {
-        self.distance_m() > MATTERS.0 || self.angle_rad() > MATTERS.1
-    }
-
-    /// True where it happened once, in images of this mounting.
-    pub fn explains(&self, problem: &Problem, mounting: usize) -> bool {
-        self.order == Order::Time && problem.images[self.behind[0]].mounting == mounting
-    }
-
-    /// What stands where, and what to do, in words.
-    pub fn in_words(&self, problem: &Problem, series: &str) -> (String, String) {
+    fn finding(&self, problem: &Problem, setting: &Setting) -> Displaced {
         let image = &problem.images[self.behind[0]];
-        let camera = matches!(self.body, Body::Mounting(_));
-        let in_hand = image.mount == CameraMount::Hand;
-        let (body, place) = match (camera, in_hand) {
-            (false, true) => ("plate", "stands"),
-            (false, false) => ("plate in the hand", "sits"),
-            (true, true) => ("camera on its mount", "sits"),
-            (true, false) => ("camera on its stand", "stands"),
+        let body = match (self.body, image.mount) {
+            (Body::Placement(_), CameraMount::Hand) => Carried::Plate,
+            (Body::Placement(_), CameraMount::Fixed) => Carried::PlateInHand,
+            (Body::Mounting(_), CameraMount::Hand) => Carried::CameraInHand,
+            (Body::Mounting(_), CameraMount::Fixed) => Carried::Camera,
         };
-        let sigma = |from: usize| {
+        let sized = |from: usize| {
             let variance: f64 = (from..from + 3).map(|k| self.covariance[(k, k)]).sum();
-            1e3 * (variance / 3.0).sqrt()
+            (self.twist.fixed_rows::<3>(from).norm(), (variance / 3.0).sqrt())
         };
-        let size = format!(
-            "{:.2} mm, {:.2} mrad (sigma at most {:.2} mm, {:.2} mrad per axis)",
-            1e3 * self.distance_m(),
-            1e3 * self.angle_rad(),
-            sigma(0),
-            sigma(3)
-        );
-        let gain = format!("what moved explains {:.0} % of the squares of the joint noise", 100.0 * self.share);
-        let first = &image.name;
-        let why = if camera { "it was moved, creeps, or its lens was touched" } else { "it was moved, or creeps" };
-        match self.order {
-            Order::Time => {
-                let what = format!(
-                    "series {series}: from {first} on the {body} {place} {size} elsewhere than before: {why}; {gain}"
-                );
-                let remedy = if camera {
-                    format!(
-                        "fasten the camera, and take the series again, or put the images from {first} on into a series of their own with the same [camera] name and another mounting"
-                    )
-                } else {
-                    format!(
-                        "write a column placement in joints.csv that differs from {first} on, or fasten the plate and take the series again"
-                    )
-                };
-                (what, remedy)
-            }
-            Order::Up(axis) => {
-                let names: Vec<&str> = self.behind.iter().take(5).map(|&i| problem.images[i].name.as_str()).collect();
-                let more = self.behind.len() - names.len();
-                let what = format!(
-                    "series {series}: where its {} axis points up the {body} sits {size} elsewhere ({} images: {}{}): it is loose, or bends under its weight; {gain}",
-                    ["x", "y", "z"][axis],
-                    self.behind.len(),
-                    names.join(", "),
-                    if more > 0 { format!(" and {more} more") } else { String::new() }
-                );
-                (what, "fasten it, and take the series again".into())
-            }
+        let (distance_m, angle_rad) = (sized(0), sized(3));
+        let matters = distance_m.0 > setting.limits.displaced_m || angle_rad.0 > setting.limits.displaced_rad;
+        Displaced {
+            series: setting.series[self.series].name.clone(),
+            body,
+            mounting: problem.mountings[image.mounting].clone(),
+            displacement: match self.order {
+                Order::Time => Displacement::FromThenOn,
+                Order::Up(axis) => Displacement::AxisUp(axis),
+            },
+            images: self.behind.iter().map(|&i| problem.images[i].name.clone()).collect(),
+            distance_m,
+            angle_rad,
+            share: self.share,
+            weight: if matters { Weight::Gate } else { Weight::Note },
         }
     }
 }

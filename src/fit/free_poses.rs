@@ -4,7 +4,7 @@ use nalgebra::Matrix6;
 
 use crate::geom::Pose;
 use crate::problem::State;
-use crate::solve::PlateScale;
+use crate::solve::{Linearised, PlateScale};
 
 /// Stand-alone pose of one image.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +45,6 @@ pub struct FreePoses {
     pub scales: Vec<Option<PlateScale>>,
     /// Pixel factors found.
     pub pixel_factor: Vec<f64>,
-    /// A change of focus or zoom within the images of a camera, in words.
-    pub focus_change: Option<String>,
+    /// Linearisation of this adjustment: residuals and weights of the images in use.
+    pub linearised: Linearised,
 }

@@ -11,7 +11,7 @@ use crate::problem::{
     Adjustment, Family, Image, ImageRejection, Layout, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape,
     Problem, Slack, State, hold_scale_bars,
 };
-use crate::series::{Edge, Plate};
+use crate::series::{Edge, Observation, Plate};
 
 /// Standard deviation of an observation whose source states none, px per axis.
 const DEFAULT_SIGMA_PX: f64 = 0.1;
@@ -128,6 +128,11 @@ fn first_local(state: &State, layout: &Layout) -> Vec<f64> {
     first
 }
 
+/// Covariance uu, uv, vv of an observation as the detector states it, px^2; the usual one where it states none.
+pub fn stated_covariance(observation: &Observation) -> [f64; 3] {
+    observation.covariance.unwrap_or([DEFAULT_SIGMA_PX.powi(2), 0.0, DEFAULT_SIGMA_PX.powi(2)])
+}
+
 fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<Measured>> {
     let mut observations = Vec::with_capacity(stop.observations.len());
     for o in &stop.observations {
@@ -135,7 +140,7 @@ fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<Measured>> {
         let marker = s.plate.index_of(o.marker).ok_or_else(|| {
             Error::input(place(), "the plate has no such marker", "check that plate.toml belongs to this series")
         })?;
-        let [uu, uv, vv] = o.covariance.unwrap_or([DEFAULT_SIGMA_PX.powi(2), 0.0, DEFAULT_SIGMA_PX.powi(2)]);
+        let [uu, uv, vv] = stated_covariance(o);
         let information =
             Matrix2::new(uu, uv, uv, vv).try_inverse().filter(|m| m[(0, 0)] > 0.0 && m.determinant() > 0.0);
         let radius_m = match o.edge {

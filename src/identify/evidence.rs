@@ -5,7 +5,7 @@
 
 use super::estimator::Estimator;
 use super::joint::identify_model;
-use super::lens_choice::{self, DECISIVE, with_lenses};
+use super::lens_choice::{self, with_lenses};
 use super::options::Options;
 use super::solution::{Evidence, Solution};
 use crate::error::Result;
@@ -37,14 +37,15 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
             Solution { lenses, ..identify_model(chain, &series, &Options { model, ..options.clone() })? }
         }
     };
-    solution.notices.extend(lens_choice::losses(&solution));
-    Ok(solution)
+    let losses = lens_choice::losses(&solution);
+    solution.findings.extend(losses.into_iter().map(Into::into));
+    Ok(Solution { options: options.clone(), ..solution })
 }
 
 /// The solution with the smallest robot model that the evidence supports, from that with the full one.
 fn best_model(chain: Chain, series: &[MeasuredSeries], options: &Options, full: Solution) -> Result<Solution> {
     let evidences = compare_models(&full);
-    let supported = evidences.iter().filter(|e| e.log_evidence > -DECISIVE);
+    let supported = evidences.iter().filter(|e| e.log_evidence > -options.limits.decisive_log_odds);
     let largest = supported.max_by_key(|e| e.parameters).map_or(RobotModel::Full, |e| e.model);
     let lenses = full.lenses.clone();
     let chosen = match largest {

@@ -3,7 +3,6 @@
 use nalgebra::{Matrix6, Vector2};
 
 use super::solution::StartVerdict;
-use crate::diagnose::find_focus_change;
 use crate::error::{Error, Result};
 use crate::fit::{FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
@@ -322,7 +321,7 @@ fn collect(fit: &Fit) -> Result<FreePoses> {
         state: state.clone(),
         scales,
         pixel_factor: problem.noise.pixel_factor.clone(),
-        focus_change: find_focus_change(fit),
+        linearised: lin.clone(),
     })
 }
 

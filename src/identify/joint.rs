@@ -6,10 +6,9 @@ use super::options::{JointNoise, MarkerTolerance, Options};
 use super::solution::Solution;
 use super::staged::{refit, staged};
 use super::start::{start_robot, take_back};
-use crate::assess::judge;
-use crate::assess::{hold_out, refitted};
-use crate::diagnose::{Move, doubted_sizes, find_move, find_shifts, gates, left_out, remarks, undetermined};
-use crate::error::{Error, Notice, Result};
+use crate::assess::{hold_out, judge, refitted};
+use crate::diagnose::{Diagnosis, Setting};
+use crate::error::{Error, Result};
 use crate::fit::FreePoses;
 use crate::problem::MeasuredSeries;
 use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem, Slack};
@@ -18,9 +17,6 @@ use crate::solve::{
     without_untold_noise,
 };
 use crate::urdf::Chain;
-
-/// Share left out beyond which there is no result.
-const HOPELESS_SHARE_LEFT_OUT: f64 = 0.5;
 
 /// Most rounds of rejection.
 const ROUNDS: usize = 12;
@@ -42,14 +38,13 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let (mut start, free, mut starts) = adjust_free_poses(start, &stated)?;
     let on_robot = start.problem.used().filter(|(_, i)| i.stop.is_some()).count();
     check_on_robot(&start.problem, on_robot)?;
-    let aside = start_robot(&mut start, &free, &mut starts)?;
+    let aside = start_robot(&mut start, &free, &mut starts, &options.limits)?;
     let (mut outcome, before) = fit(start, &free, &aside, options);
     let (status, iterations) = (outcome.status, outcome.iterations);
-    let mut notices = Vec::new();
     name_wrong_pairs(&mut outcome.adjustment, &free);
-    let Adjustment { problem, state } = &outcome.adjustment;
-    let moves: Vec<Move> = (0..series.len()).filter_map(|k| find_move(problem, state, &free, k)).collect();
-    check_left_out(problem, on_robot, &moves)?;
+    let mut diagnosis = Diagnosis::new(Setting { series, free: &free, on_robot, limits: &options.limits });
+    diagnosis.after_free_poses(&outcome.adjustment.problem);
+    diagnosis.after_left_out(&outcome.adjustment)?;
     if status != Status::Converged {
         return Err(Error::unsolved(
             "joint fit",
@@ -66,29 +61,17 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     };
     let accuracy = hold_out(&fit, &fitted)
         .ok_or_else(|| Error::unsolved("hold-out", "too few images to hold any out", "take more images"))?;
-    let shifts = if free.focus_change.is_some() { Vec::new() } else { find_shifts(fit.linear()) };
-    let Adjustment { problem, state } = &fit.adjustment;
-    let mut failed_gates = Vec::new();
-    for shift in &shifts {
-        let (what, remedy) = shift.in_words(problem, &series[shift.series].name);
-        if shift.matters() {
-            failed_gates.push(format!("{what}; {remedy}"));
-        } else {
-            notices.push(Notice::new("series", what, remedy));
-        }
-    }
-    failed_gates.extend(gates(problem, series, state, &free, &accuracy, &shifts, on_robot));
-    failed_gates.extend(doubted_sizes(&fit));
-    failed_gates.extend(moves.iter().map(|m| format!("{}; {}", m.what, m.remedy)));
-    remarks(problem, series, state, &accuracy, on_robot, &mut notices);
+    diagnosis.after_fit(&fit, &accuracy);
     let (mut fit, joint) = match estimator.is_two_stage() {
         true => (staged(&fit, estimator, noise)?, Some(Box::new(fit.adjustment))),
         false => (fit, None),
     };
     let estimated = noise == JointNoise::Estimated && joint.is_none();
-    let worth = judge(&mut fit, estimated, before, &mut notices);
-    failed_gates.extend(undetermined(&worth, &accuracy));
+    let worth = judge(&mut fit, estimated, before, &options.limits);
+    diagnosis.after_worth(&worth, &accuracy);
+    let findings = diagnosis.findings();
     Ok(Solution {
+        options: options.clone(),
         estimator,
         joint,
         series: series.to_vec(),
@@ -100,8 +83,7 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
         two_stage: None,
         accuracy,
         starts,
-        notices,
-        failed_gates,
+        findings,
         status,
         iterations,
     })
@@ -127,7 +109,7 @@ fn fit(
     let components =
         ComponentOptions { joint: options.joint_noise == JointNoise::Estimated, ..ComponentOptions::default() };
     let mut outcome = estimate_components(start, &components);
-    if take_back(&mut outcome.adjustment, free, aside) {
+    if take_back(&mut outcome.adjustment, free, aside, &options.limits) {
         outcome = estimate_components(outcome.adjustment, &components);
     }
     for _ in 0..ROUNDS {
@@ -186,24 +168,4 @@ fn check_on_robot(problem: &Problem, on_robot: usize) -> Result<()> {
             "look at them with `robotcal detect`: is the plate in view, sharp, and the one of plate.toml?",
         )),
     }
-}
-
-fn check_left_out(problem: &Problem, on_robot: usize, moves: &[Move]) -> Result<()> {
-    let out = left_out(problem, on_robot);
-    if out as f64 <= HOPELESS_SHARE_LEFT_OUT * on_robot as f64 {
-        return Ok(());
-    }
-    if let Some(m) = moves.first() {
-        return Err(Error::unsolved("joint readings", &m.what, &m.remedy));
-    }
-    let named: Vec<&str> = (problem.images.iter())
-        .filter(|i| i.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair))
-        .map(|i| i.name.as_str())
-        .take(5)
-        .collect();
-    Err(Error::unsolved(
-        "joint readings",
-        format!("{out} of {on_robot} images do not fit their joint readings ({} ...)", named.join(", ")),
-        "check joint_unit, the order and signs of the joints, that image names stand in the right rows, and that the plate did not move",
-    ))
 }

@@ -7,6 +7,7 @@ use super::free_poses::adjust_free_poses;
 use super::joint::identify_model;
 use super::options::Options;
 use super::solution::{LensEvidence, Solution};
+use crate::diagnose::LensNotInRos;
 use crate::error::{Error, Notice, Result};
 use crate::fit::log_evidence;
 use crate::model::camera::{Camera, Lens, fit_lens};
@@ -14,10 +15,6 @@ use crate::model::robot::Robot;
 use crate::problem::{Adjustment, LensChoice, MeasuredSeries, predict};
 use crate::solve::{ComponentOptions, LinearProblem, Status, estimate_components};
 use crate::urdf::Chain;
-
-/// Logarithm of the odds at which a smaller model takes the place of a larger one: "decisive" (H. Jeffreys, *Theory of
-/// probability*, 1961). Gears have errors and arms sag; that there is nothing of it must be plain.
-pub(super) const DECISIVE: f64 = 4.605;
 
 /// One observation of so many is kept aside, in every image and of every marker in other images.
 const KEPT_ASIDE: usize = 4;
@@ -58,7 +55,7 @@ pub(super) fn with_lenses(
         solution = identify_model(chain.clone(), &better, options)?;
         series = better;
     }
-    solution.notices.extend(notices);
+    solution.findings.extend(notices.into_iter().map(Into::into));
     Ok((Solution { lenses, ..solution }, series))
 }
 
@@ -96,7 +93,8 @@ fn compare_lenses(solution: &Solution, camera: &str, choice: LensChoice) -> Vec<
     let mut all: Vec<LensEvidence> = formulas.filter_map(|lens| evidence(solution, k, lens)).collect();
     let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     all.iter_mut().for_each(|e| e.log_evidence -= best);
-    if let Some(simplest) = all.iter_mut().find(|e| e.log_evidence > -DECISIVE) {
+    let decisive = solution.options.limits.decisive_log_odds;
+    if let Some(simplest) = all.iter_mut().find(|e| e.log_evidence > -decisive) {
         simplest.taken = true;
     }
     all
@@ -163,23 +161,14 @@ pub fn depths_m(solution: &Solution) -> Vec<[f64; 2]> {
 }
 
 /// What the cameras of ROS cannot say of the lenses that were identified.
-pub(super) fn losses(solution: &Solution) -> Vec<Notice> {
+pub(super) fn losses(solution: &Solution) -> Vec<LensNotInRos> {
     let named = solution.fit.problem.cameras.iter().zip(&solution.fit.state.cameras).zip(depths_m(solution));
-    let notice = |((name, camera), depths): ((&String, &Camera), [f64; 2])| {
+    let loss = |((name, camera), depths): ((&String, &Camera), [f64; 2])| {
         let fit = camera.in_ros(&depths)?;
-        let what = format!(
-            "camera.yaml cannot express its {} lens: it is off by {:.3} px RMS over the image, at most {:.3} px",
-            camera.lens.name(),
-            fit.rms_px,
-            fit.worst_px
-        );
-        Some(Notice::new(
-            format!("camera {name}"),
-            what,
-            "solution.json has the lens itself; --camera brown identifies one that camera.yaml can express",
-        ))
+        let (camera, lens) = (name.clone(), camera.lens.name());
+        Some(LensNotInRos { camera, lens, rms_px: fit.rms_px, worst_px: fit.worst_px })
     };
-    named.filter_map(notice).collect()
+    named.filter_map(loss).collect()
 }
 
 /// Sets the lens of `open` cameras by hold-out of free poses, and says why. Lenses with a displacement field are not among them: they cost three

@@ -26,7 +26,7 @@ mod two_stage;
 mod verify;
 
 pub use crate::model::joint_terms::RobotModel;
-pub use build::build;
+pub use build::{build, stated_covariance};
 pub use compare::{beside_two_stages, compare, truth_error};
 pub use comparison::{Comparison, ComparisonRow, HeldOut, TruthError};
 pub use detections::{detect_images, detect_stops, pictures, require_some};

@@ -1,12 +1,16 @@
 //! How to identify.
 
+use serde::{Deserialize, Serialize};
+
 use super::estimator::Estimator;
 use super::selection::Selection;
+use crate::assess::Limits;
 use crate::model::joint_terms::{RobotModel, USUAL_HARMONICS};
 use crate::urdf::Payload;
 
 /// What is assumed of the joint readings.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum JointNoise {
     /// Noise per stop and joint, its size estimated from the data.
     Estimated,
@@ -15,7 +19,8 @@ pub enum JointNoise {
 }
 
 /// What is assumed of how far the markers are from nominal.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum MarkerTolerance {
     /// As the plate says.
     Stated,
@@ -23,8 +28,9 @@ pub enum MarkerTolerance {
     Estimated,
 }
 
-/// How to identify.
-#[derive(Debug, Clone, PartialEq)]
+/// How to identify; recorded as used, so that the solve can be repeated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Options {
     /// Joint noise.
     pub joint_noise: JointNoise,
@@ -40,6 +46,8 @@ pub struct Options {
     pub estimator: Estimator,
     /// What the tip carries; none where the chain says it or nobody does.
     pub payload: Option<Payload>,
+    /// Numbers that decide verdicts.
+    pub limits: Limits,
 }
 
 impl Default for Options {
@@ -52,6 +60,7 @@ impl Default for Options {
             selection: Selection::default(),
             estimator: Estimator::default(),
             payload: None,
+            limits: Limits::default(),
         }
     }
 }

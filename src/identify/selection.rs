@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::assess::{minimal_set, structural};
+use crate::assess::{Limits, minimal_set, structural};
 use crate::error::{Error, Result};
 use crate::model::joint_terms::{RobotModel, Term};
 use crate::problem::{Layout, State, short_name};
@@ -77,6 +77,8 @@ pub struct Config {
     pub prior: BTreeMap<String, StatedPrior>,
     /// What the tip carries.
     pub payload: Option<Payload>,
+    /// Numbers that decide verdicts, instead of the defaults.
+    pub limits: Option<Limits>,
 }
 
 impl Config {
@@ -85,7 +87,9 @@ impl Config {
     /// # Errors
     /// Names file and line: unreadable text, unknown keys, wrong values.
     pub fn read(path: &Path) -> Result<Self> {
-        read_toml(path, &mut Vec::new())
+        let config: Self = read_toml(path, &mut Vec::new())?;
+        config.limits.map_or(Ok(()), |limits| limits.check())?;
+        Ok(config)
     }
 }
 

@@ -4,8 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::comparison::Comparison;
 use super::estimator::Estimator;
+use super::options::Options;
 use crate::assess::Accuracy;
 use crate::assess::Worth;
+use crate::diagnose::Finding;
 use crate::error::Notice;
 use crate::fit::{Fit, FreePoses};
 use crate::model::camera::Lens;
@@ -59,6 +61,8 @@ pub struct LensEvidence {
 /// The result of a fit.
 #[derive(Debug, Clone)]
 pub struct Solution {
+    /// What was asked for.
+    pub options: Options,
     /// How it was fitted.
     pub estimator: Estimator,
     /// Data and estimates of the joint fit, where the result is that of two stages.
@@ -81,10 +85,8 @@ pub struct Solution {
     pub two_stage: Option<Comparison>,
     /// Starting values with their verdicts.
     pub starts: Vec<StartVerdict>,
-    /// What the user should know.
-    pub notices: Vec<Notice>,
-    /// Quality gates that failed, in words; empty for a good result.
-    pub failed_gates: Vec<String>,
+    /// What was found out about the data: notes, and gates that failed.
+    pub findings: Vec<Finding>,
     /// How the last solve ended.
     pub status: Status,
     /// Steps tried in all.
@@ -92,6 +94,16 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// Quality gates that failed, in words; empty for a good result.
+    pub fn failed_gates(&self) -> Vec<String> {
+        self.findings.iter().filter(|f| f.fails()).map(ToString::to_string).collect()
+    }
+
+    /// What the user should know, though the result stands.
+    pub fn notices(&self) -> Vec<Notice> {
+        self.findings.iter().filter(|f| !f.fails()).map(Finding::notice).collect()
+    }
+
     /// The identified robot as it is exported: without the local errors, which are latent noise of the series.
     pub fn exported_robot(&self) -> Robot {
         let mut robot = self.fit.state.robot.clone();

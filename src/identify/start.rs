@@ -4,28 +4,13 @@ use std::collections::BTreeMap;
 
 use super::solution::StartVerdict;
 use super::suspects::Suspects;
-use crate::assess::median;
+use crate::assess::{Limits, median};
 use crate::error::{Error, Result};
 use crate::fit::FreePoses;
 use crate::geom::log_so3;
 use crate::init::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
 use crate::linalg::symmetric_eigen;
 use crate::problem::{Adjustment, Image, ImageRejection, Misfit, Mismatch, Problem, Slack, State, predict};
-
-/// Robust spread (rad + m) of the best closed form beyond which readings and images do not belong together.
-const WORST_SPREAD: f64 = 0.08;
-
-/// An image is set aside before the joint fit when it misses by more than this many times the robust spread ...
-const SET_ASIDE_FACTOR: f64 = 6.0;
-
-/// ... and by more than this, rad + m: what a robot far from nominal may miss by.
-const SET_ASIDE_FLOOR: f64 = 0.03;
-
-/// Smallest rotation between stops about a second axis, rad, RMS.
-const LEAST_ROTATION: f64 = 0.05;
-
-/// Fewest images of the robot in a group with a hand-camera offset and plate pose of its own.
-const FEWEST_IMAGES: usize = 5;
 
 /// Closed forms whose pixel cost is compared.
 const COMPARED: usize = 4;
@@ -35,6 +20,7 @@ pub(super) fn start_robot(
     adjustment: &mut Adjustment,
     free: &FreePoses,
     verdicts: &mut Vec<StartVerdict>,
+    limits: &Limits,
 ) -> Result<Vec<usize>> {
     let mut aside = Vec::new();
     let mut groups: BTreeMap<(usize, usize), Vec<(usize, PosePair)>> = BTreeMap::new();
@@ -59,11 +45,11 @@ pub(super) fn start_robot(
             (None, Some(plate)) => {
                 closest(&poses, |p| HandEye { camera: (p.chain * plate) * p.camera_from_plate.inverse(), plate })
             }
-            (None, None) => closed_form(adjustment, pairs, &poses, (*mounting, *placement), &of, verdicts)?,
+            (None, None) => closed_form(adjustment, pairs, &poses, (*mounting, *placement), &of, verdicts, limits)?,
         };
         cameras.insert(*mounting, solution.camera);
         plates.insert(*placement, solution.plate);
-        aside.extend(set_aside(&mut adjustment.problem, pairs, &solution));
+        aside.extend(set_aside(&mut adjustment.problem, pairs, &solution, limits));
     }
     for (k, pose) in adjustment.state.mountings.iter_mut().enumerate() {
         *pose = cameras.get(&k).copied().unwrap_or(*pose);
@@ -95,18 +81,20 @@ fn closed_form(
     (mounting, placement): (usize, usize),
     of: &str,
     verdicts: &mut Vec<StartVerdict>,
+    limits: &Limits,
 ) -> Result<HandEye> {
-    if pairs.len() < FEWEST_IMAGES {
+    let fewest = limits.hand_eye_images;
+    if pairs.len() < fewest {
         return Err(Error::unsolved(
             of,
             format!(
-                "only {} images of the robot show the plate, at least {FEWEST_IMAGES} are needed and some 30 to 50 wanted",
+                "only {} images of the robot show the plate, at least {fewest} are needed and some 30 to 50 wanted",
                 pairs.len()
             ),
             "take more images, or give series that share camera mounting and plate placement the same names",
         ));
     }
-    check_rotations(of, poses)?;
+    check_rotations(of, poses, limits.hand_eye_rotation_rad)?;
     let starts = solve_hand_eye(poses);
     let cost = |s: &HandEyeStart| {
         let mut trial = state.clone();
@@ -135,7 +123,7 @@ fn closed_form(
     if let Some(cause) = suspects.better_than(best.median_error) {
         return Err(Error::unsolved(of, cause.what, cause.remedy));
     }
-    if best.median_error > WORST_SPREAD {
+    if best.median_error > limits.hand_eye_spread {
         return Err(no_fit(
             of,
             &format!("even the best start leaves a median misfit of {:.0} (mm + mrad)", 1e3 * best.median_error),
@@ -169,7 +157,7 @@ fn upper_median(mut values: Vec<f64>) -> f64 {
 }
 
 /// Hand-camera and plate pose need rotations about at least two axes.
-fn check_rotations(of: &str, poses: &[PosePair]) -> Result<()> {
+fn check_rotations(of: &str, poses: &[PosePair], least: f64) -> Result<()> {
     let mut m = nalgebra::DMatrix::<f64>::zeros(3, 3);
     let (mut largest, first) = (0.0_f64, &poses[0]);
     let mut travel = 0.0_f64;
@@ -180,7 +168,7 @@ fn check_rotations(of: &str, poses: &[PosePair]) -> Result<()> {
         m += nalgebra::DMatrix::from_column_slice(3, 3, (v * v.transpose()).as_slice()) / poses.len() as f64;
     }
     let second = symmetric_eigen(&m).map_or(0.0, |(values, _)| values[1].max(0.0).sqrt());
-    if second > LEAST_ROTATION {
+    if second > least {
         return Ok(());
     }
     Err(Error::unsolved(
@@ -194,10 +182,10 @@ fn check_rotations(of: &str, poses: &[PosePair]) -> Result<()> {
     ))
 }
 
-fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &HandEye) -> Vec<usize> {
+fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &HandEye, limits: &Limits) -> Vec<usize> {
     let mut aside = Vec::new();
     let sizes: Vec<f64> = pairs.iter().map(|(_, p)| solution.error(p)).map(|(a, d)| a + d).collect();
-    let bound = (SET_ASIDE_FACTOR * upper_median(sizes)).max(SET_ASIDE_FLOOR);
+    let bound = (limits.set_aside_factor * upper_median(sizes)).max(limits.set_aside_floor);
     for (i, pair) in pairs {
         let (angle_rad, distance_m) = solution.error(pair);
         if angle_rad + distance_m > bound {
@@ -210,14 +198,14 @@ fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &Hand
 }
 
 /// Takes images back that were set `aside` with the nominal robot, and fit the robot that was found as the others do. True where there are some.
-pub(super) fn take_back(adjustment: &mut Adjustment, free: &FreePoses, aside: &[usize]) -> bool {
+pub(super) fn take_back(adjustment: &mut Adjustment, free: &FreePoses, aside: &[usize], limits: &Limits) -> bool {
     let size = |i: usize| {
         let (angle, distance) = adjustment.misfit(&free.poses[i].as_ref()?.camera_from_plate, i)?;
         Some(angle + distance)
     };
     let on_robot = adjustment.problem.used().filter(|(_, image)| image.stop.is_some());
     let Some(usual) = median(&on_robot.filter_map(|(i, _)| size(i)).collect::<Vec<f64>>()) else { return false };
-    let fits = |i: &usize| size(*i).is_some_and(|s| s < SET_ASIDE_FACTOR * usual);
+    let fits = |i: &usize| size(*i).is_some_and(|s| s < limits.set_aside_factor * usual);
     let back: Vec<usize> = aside.iter().copied().filter(fits).collect();
     back.iter().for_each(|&i| adjustment.problem.images[i].rejected = None);
     !back.is_empty()

@@ -3,6 +3,7 @@
 use super::build::build;
 use super::free_poses::adjust_free_poses;
 use super::start::start_robot;
+use crate::assess::Limits;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
 use crate::error::{Error, Result};
 use crate::model::robot::Robot;
@@ -37,7 +38,7 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();
     let (mut adjustment, free, mut starts) = adjust_free_poses(adjustment, &stated)?;
-    start_robot(&mut adjustment, &free, &mut starts)?;
+    start_robot(&mut adjustment, &free, &mut starts, &Limits::default())?;
     adjustment.start_slack(false);
     let outcome = estimate_components(adjustment, &ComponentOptions::default());
     if outcome.status != Status::Converged {

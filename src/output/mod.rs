@@ -15,6 +15,7 @@ pub mod detection_files;
 pub mod difference;
 mod dot_font;
 mod estimates;
+mod finding_record;
 pub mod flange_table;
 mod gauge;
 mod kinematics_file;

@@ -8,6 +8,7 @@ use super::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecor
 use crate::assess::FlangeModel;
 use crate::error::{Error, Result};
 use crate::geom::Pose;
+use crate::identify::Options;
 use crate::model::camera::Camera;
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes::MODES;
@@ -27,6 +28,12 @@ fn damaged(what: impl std::fmt::Display) -> Error {
 /// A text that is no URDF.
 pub fn robot_description(record: &SolutionRecord) -> Result<RobotDescription> {
     RobotDescription::from_text(Path::new(&record.urdf.file), record.urdf.text.clone())
+}
+
+/// The options that were used; of older files, which have them in words, those that change what is fitted.
+pub fn options(record: &SolutionRecord) -> Options {
+    let in_part = || Options { estimator: record.estimator, payload: record.robot.payload, ..Options::default() };
+    record.options.clone().unwrap_or_else(in_part)
 }
 
 /// The chain that was solved for.
@@ -75,7 +82,7 @@ fn stop(image: &ImageRecord, series: &str, placements: &[String]) -> Result<Meas
         image: image.name.strip_prefix(&prefix).unwrap_or(&image.name).to_owned(),
         readings: image.readings.clone(),
         placement: placement.ok_or_else(|| damaged(format!("image {} has no placement", image.name)))?.clone(),
-        left_out: image.rejection().filter(|_| observations.is_empty()),
+        left_out: image.rejection().filter(|r| observations.is_empty() || r.is_of_detection()),
         observations,
     })
 }

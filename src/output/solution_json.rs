@@ -7,10 +7,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
+use super::finding_record::FindingRecord;
 use crate::assess::{Cause, Errors, FlangeErrors, Identifiability, ProjectionMap, WorkspacePoint};
 use crate::error::{Notice, Result, plain_name};
 use crate::geom::Pose;
-use crate::identify::{Comparison, Estimator, Evidence, LensEvidence, StartVerdict};
+use crate::identify::{Comparison, Estimator, Evidence, LensEvidence, Options, StartVerdict};
 use crate::model::camera::Lens;
 use crate::problem::{ImageRejection, LensChoice, ObservationRejection, short_name};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
@@ -437,6 +438,9 @@ pub struct SolutionRecord {
     /// How the robot was fitted; files that do not say it are of joint fits.
     #[serde(default)]
     pub estimator: Estimator,
+    /// Options and limits as used; absent in files of earlier versions.
+    #[serde(default)]
+    pub options: Option<Options>,
     /// How the last solve ended.
     pub status: String,
     /// Steps tried in all.
@@ -449,6 +453,10 @@ pub struct SolutionRecord {
     pub statistics: StatisticsRecord,
     /// What the user should know.
     pub notices: Vec<Notice>,
+    /// All that was found out about the data, for programs: the gates that failed and the notices are its sentences. Absent in files of
+    /// earlier versions.
+    #[serde(default)]
+    pub findings: Vec<FindingRecord>,
     /// Starting values.
     pub starts: Vec<StartVerdict>,
     /// Robot.
@@ -560,7 +568,7 @@ impl SolutionRecord {
 impl ImageRecord {
     /// Why the image is left out; of files that have it in words alone, these.
     pub fn rejection(&self) -> Option<ImageRejection> {
-        let in_words = || self.reason.clone().map(|what| ImageRejection::Unusable { what });
+        let in_words = || self.reason.clone().map(|what| ImageRejection::InWords { what });
         self.rejection.clone().or_else(in_words)
     }
 }

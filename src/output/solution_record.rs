@@ -18,10 +18,11 @@ use super::solution_json::{
 use crate::assess::{ProjectionMap, median};
 use crate::error::Result;
 use crate::geom::Pose;
-use crate::identify::{Solution, depths_m};
+use crate::identify::{Solution, depths_m, stated_covariance};
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes;
 use crate::problem::{Image, Problem, Slack, State};
+use crate::series::Observation;
 
 /// The record of a solution.
 ///
@@ -45,12 +46,14 @@ pub(super) fn record(
         files,
         inputs: context.inputs.clone(),
         estimator: solution.estimator,
+        options: Some(solution.options.clone()),
         status: format!("{:?}", solution.status).to_lowercase(),
         iterations: solution.iterations,
-        failed_gates: solution.failed_gates.clone(),
+        failed_gates: solution.failed_gates(),
         accuracy: AccuracyRecord { nominal: accuracy.nominal, calibrated: accuracy.calibrated, folds: accuracy.folds },
         statistics: statistics(solution),
-        notices: solution.notices.clone(),
+        notices: solution.notices(),
+        findings: solution.findings.iter().map(Into::into).collect(),
         starts: solution.starts.clone(),
         robot: robot(&solution.fit.state, solution.fit.problem.twist_factor()),
         cameras: cameras(solution),
@@ -314,17 +317,26 @@ pub(super) fn rms_px(solution: &Solution, image: usize) -> Option<f64> {
     Some((squares / residuals.len().max(1) as f64).sqrt())
 }
 
+/// Covariances as they were stated, in the order of the observations of the image: inverted twice they would be others in the last bit.
+fn stated(solution: &Solution, image: usize) -> Vec<[f64; 3]> {
+    let images = &solution.fit.problem.images;
+    let series = images[image].series;
+    let before = images[..image].iter().filter(|i| i.series == series).count();
+    let series = &solution.series[series];
+    let mut all: Vec<&Observation> = series.stops[before].observations.iter().collect();
+    all.sort_by_key(|o| (series.plate.index_of(o.marker), o.edge));
+    all.into_iter().map(stated_covariance).collect()
+}
+
 fn observations(solution: &Solution, image: usize, pose: Option<&Pose>) -> ObservationColumns {
     let i = &solution.fit.problem.images[image];
     let markers = &solution.fit.problem.plates[i.plate].markers;
-    let mut columns = ObservationColumns::default();
+    let mut columns = ObservationColumns { covariance: stated(solution, image), ..ObservationColumns::default() };
     for (o, residual) in i.observations.iter().zip(residuals(solution, image, pose)) {
-        let c = o.information.try_inverse().unwrap_or_default();
         columns.marker.push(markers[o.marker].id);
         columns.edge.push(o.edge);
         columns.radius_m.push(o.radius_m);
         columns.uv.push(o.uv.into());
-        columns.covariance.push([c[(0, 0)], c[(0, 1)], c[(1, 1)]]);
         columns.duv.push(residual.map(Into::into));
         columns.reason.push(o.rejected);
     }

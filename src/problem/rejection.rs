@@ -13,6 +13,11 @@ pub enum ImageRejection {
         /// What the reader or the detector says.
         what: String,
     },
+    /// A file of an earlier version says why in words alone.
+    InWords {
+        /// These words.
+        what: String,
+    },
     /// observations.csv has none of it.
     NoObservations,
     /// Another image shows exactly the same.
@@ -80,6 +85,11 @@ pub struct FitsReadings {
 }
 
 impl ImageRejection {
+    /// True where reader or detector refused it, whatever was seen in it.
+    pub fn is_of_detection(&self) -> bool {
+        matches!(self, Self::Unusable { .. } | Self::NoObservations)
+    }
+
     /// True where image and readings do not belong together.
     pub fn is_wrong_pair(&self) -> bool {
         matches!(self, Self::WronglyPaired(_))
@@ -89,7 +99,7 @@ impl ImageRejection {
 impl fmt::Display for ImageRejection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Unusable { what } => f.write_str(what),
+            Self::Unusable { what } | Self::InWords { what } => f.write_str(what),
             Self::NoObservations => f.write_str("no observations are given"),
             Self::Duplicate { of } => write!(f, "duplicate: it shows exactly what {of} shows"),
             Self::TooFewMarkers { found, needed } => write!(f, "only {found} markers found, {needed} are needed"),

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use robotcal::assess::WorkspacePoint;
+use robotcal::diagnose::Finding;
 use robotcal::identify::{JointNoise, Options, identify};
 use robotcal::problem::MeasuredSeries;
 use robotcal::series::{CameraMount, Plate, PlateKind};
@@ -78,8 +79,8 @@ fn images_that_fit_the_robot_found_are_not_left_out_for_missing_the_nominal_one(
     let solution = identify(chain, &[series], &Options::default()).unwrap();
     let left_out: Vec<_> = solution.fit.problem.images.iter().filter_map(|i| i.rejected.as_ref()).collect();
     assert!(left_out.is_empty(), "{left_out:?}");
-    let said: Vec<String> = solution.notices.iter().map(ToString::to_string).collect();
-    assert!(said.iter().any(|n| n.contains("joint_a2.offset") && n.contains("mastering")), "{said:?}");
+    let off = |f: &Finding| matches!(f, Finding::ParameterOff(p) if p.parameter == "robot/joint_a2.offset");
+    assert!(solution.findings.iter().any(off), "{:?}", solution.findings);
 }
 
 #[test]

@@ -11,6 +11,7 @@ use robotcal::ErrorKind;
 use robotcal::assess::{
     Cause, Identifiability, MeasuredPoint, fit_points, ideal_stops, identifiability_of_stops, minimal_set, structural,
 };
+use robotcal::diagnose::Subject;
 use robotcal::geom::Pose;
 use robotcal::identify::{
     Config, JointNoise, Options, Parameters, RobotModel, Selection, Solution, StatedPrior, identify, verify_series,
@@ -405,9 +406,10 @@ fn blurred_images_of_a_moving_robot_are_named() {
     }
     let solution =
         identify(chain(), &[moving.clone()], &Options { model: RobotModel::Rigid, ..Options::default() }).unwrap();
-    let noise = solution.notices.iter().find(|n| n.place.starts_with("series ")).unwrap();
+    let noise = solution.findings.iter().find(|f| f.code() == "joint_noise_large").unwrap();
     for k in [7, 19] {
-        assert!(noise.what.contains(&moving.stops[k].image), "{noise}");
+        let image = Subject::Image(moving.stops[k].image.clone());
+        assert!(noise.subjects().contains(&image), "{noise}");
     }
 }
 

@@ -5,6 +5,7 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
+use robotcal::diagnose::Finding;
 use robotcal::identify::{Options, Solution, identify};
 use robotcal::problem::MeasuredSeries;
 use robotcal::series::{Plate, PlateKind, ScaleBar};
@@ -41,8 +42,10 @@ fn stated(x: f64, y: f64, bar: Option<(u32, u32)>) -> Solution {
     identify(chain, &[series], &Options::default()).unwrap()
 }
 
-fn about_the_plate(solution: &Solution) -> Vec<&String> {
-    solution.failed_gates.iter().filter(|g| g.starts_with("plate:")).collect()
+/// What is doubted of the plate, and by how much it is larger than its file says.
+fn doubts(solution: &Solution) -> Vec<(&'static str, f64)> {
+    let doubted = solution.findings.iter().filter(|f| matches!(f, Finding::DoubtedSize(_)));
+    doubted.map(|f| (f.code(), f.quantities()[0].value)).collect()
 }
 
 /// By how much the way from one marker to another is longer than stated.
@@ -54,17 +57,19 @@ fn stretch(solution: &Solution, from: usize, to: usize) -> f64 {
 
 #[test]
 fn a_plate_as_stated_is_not_doubted() {
-    assert_eq!(stated(1.0, 1.0, None).failed_gates, Vec::<String>::new());
+    assert_eq!(stated(1.0, 1.0, None).failed_gates(), Vec::<String>::new());
 }
 
 #[test]
 fn a_plate_two_percent_off_is_doubted_and_a_measured_distance_mends_it() {
-    for (factor, word) in [(1.02, "smaller"), (0.98, "larger")] {
+    for factor in [1.02, 0.98] {
         let wrong = stated(factor, factor, None);
-        let said = about_the_plate(&wrong);
-        assert!(said.len() == 1 && said[0].contains(word) && said[0].contains("[scale]"), "{said:?}");
+        let said = doubts(&wrong);
+        assert!(matches!(said[..], [("plate_size_contradicted", _)]), "{said:?}");
+        // The links are found to a few parts in a thousand.
+        assert!((said[0].1 - (1.0 / factor - 1.0)).abs() < 5e-3, "{said:?}");
         let measured = stated(factor, factor, Some((0, 7)));
-        assert_eq!(measured.failed_gates, Vec::<String>::new());
+        assert_eq!(measured.failed_gates(), Vec::<String>::new());
         let off = stretch(&measured, 0, 47) - (1.0 / factor - 1.0);
         assert!(off.abs() < 3e-4, "{off}");
     }
@@ -73,11 +78,12 @@ fn a_plate_two_percent_off_is_doubted_and_a_measured_distance_mends_it() {
 #[test]
 fn a_plate_that_a_printer_stretched_is_doubted_and_a_measured_distance_mends_it_in_any_direction() {
     let wrong = stated(1.004, 1.0, None);
-    let said = about_the_plate(&wrong);
-    assert!(said.iter().any(|s| s.contains("rows and columns differ in scale by 0.")), "{said:?}");
+    let said = doubts(&wrong);
+    // The stretch is 0.4 %.
+    assert!(said.iter().any(|(code, off)| *code == "plate_uneven" && (1e-3..1e-2).contains(&off.abs())), "{said:?}");
     for bar in [(0, 7), (0, 40), (0, 47)] {
         let measured = stated(1.004, 1.0, Some(bar));
-        assert_eq!(measured.failed_gates, Vec::<String>::new());
+        assert_eq!(measured.failed_gates(), Vec::<String>::new());
         assert!((stretch(&measured, 0, 7) - (1.0 / 1.004 - 1.0)).abs() < 3e-4, "{bar:?}: {}", stretch(&measured, 0, 7));
         assert!(stretch(&measured, 0, 40).abs() < 3e-4, "{bar:?}: {}", stretch(&measured, 0, 40));
     }

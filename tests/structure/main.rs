@@ -4,3 +4,4 @@ mod apart;
 mod architecture;
 mod circles;
 mod imports;
+mod limits;

@@ -1,5 +1,6 @@
 //! Tests of world; one binary, a file a subject.
 
+mod again;
 mod bad;
 mod commands;
 mod golden;

@@ -1,0 +1,42 @@
+//! Does the camera model explain the images, with a pose of its own for every one of them?
+
+use std::fmt;
+
+use super::kind::{Kind, Quantity, Setting, Subject};
+use crate::problem::Problem;
+
+/// The stand-alone camera poses leave too much.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraModelMisfit {
+    /// RMS of the lengths of their residuals, px per point.
+    pub rms_px: f64,
+}
+
+pub(super) fn check(_: &Problem, setting: &Setting) -> Option<CameraModelMisfit> {
+    let rms_px = setting.free.rms_px;
+    (rms_px > setting.limits.free_rms_px).then_some(CameraModelMisfit { rms_px })
+}
+
+impl fmt::Display for CameraModelMisfit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "camera: free poses leave {:.2} px per point; the camera model or the plate does not describe these images",
+            self.rms_px
+        )
+    }
+}
+
+impl Kind for CameraModelMisfit {
+    fn code(&self) -> &'static str {
+        "camera_model_misfit"
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        Vec::new()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![Quantity::new("free_pose_rms", self.rms_px, "px")]
+    }
+}

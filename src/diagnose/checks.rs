@@ -1,0 +1,157 @@
+//! The table of checks: at which stage each runs, and what its findings explain away.
+
+use super::finding::Finding;
+use super::kind::{Setting, Weight};
+use super::{
+    camera_model, few_images, focus, joint_noise, left_out_images, left_out_observations, loose, marker_off, moved,
+    no_gain, parameter_off, plate_size, scatter, shift, undetermined,
+};
+use crate::assess::{Accuracy, Worth};
+use crate::error::{Error, Result};
+use crate::fit::Fit;
+use crate::problem::{Adjustment, Problem};
+
+/// When a check runs, and with what beside the setting.
+#[derive(Clone, Copy)]
+pub enum Stage {
+    /// After the stand-alone camera poses.
+    FreePoses(fn(&Problem, &Setting) -> Vec<Finding>),
+    /// After wrong pairs and outliers were left out.
+    LeftOut(fn(&Adjustment, &Setting) -> Vec<Finding>),
+    /// After the fit, with the accuracy on images that it had not seen.
+    Fit(fn(&Fit, &Accuracy, &Setting) -> Vec<Finding>),
+    /// After it is known what the result is worth.
+    Worth(fn(&Worth, &Accuracy, &Setting) -> Vec<Finding>),
+}
+
+/// One check.
+#[derive(Clone, Copy)]
+pub struct Check {
+    /// Its name: that of its file.
+    pub name: &'static str,
+    /// When it runs.
+    pub stage: Stage,
+    /// True where a finding of this check explains another away, which is then not reported.
+    pub explains: fn(&Finding, &Finding) -> bool,
+}
+
+const fn check(name: &'static str, stage: Stage) -> Check {
+    Check { name, stage, explains: |_, _| false }
+}
+
+fn found<T: Into<Finding>>(all: impl IntoIterator<Item = T>) -> Vec<Finding> {
+    all.into_iter().map(Into::into).collect()
+}
+
+/// All checks, in the order in which their findings are reported.
+pub const CHECKS: [Check; 15] = [
+    Check {
+        // What moved once has two places.
+        explains: |own, other| match (own, other) {
+            (Finding::Displaced(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
+            _ => false,
+        },
+        ..check("shift", Stage::Fit(|a, b, s| found(shift::check(a, b, s))))
+    },
+    Check {
+        // Another focal length looks like a plate that stands elsewhere.
+        explains: |_, other| matches!(other, Finding::Displaced(_)),
+        ..check("focus", Stage::FreePoses(|p, s| found(focus::check(p, s))))
+    },
+    check("camera_model", Stage::FreePoses(|p, s| found(camera_model::check(p, s)))),
+    check("few_images", Stage::Fit(|a, b, s| found(few_images::check(a, b, s)))),
+    check("joint_noise", Stage::Fit(|a, b, s| found(joint_noise::check(a, b, s)))),
+    check("loose", Stage::Fit(|a, b, s| found(loose::check(a, b, s)))),
+    check("left_out_images", Stage::LeftOut(|a, s| found(left_out_images::check(a, s)))),
+    check("left_out_observations", Stage::LeftOut(|a, s| found(left_out_observations::check(a, s)))),
+    check("no_gain", Stage::Fit(|a, b, s| found(no_gain::check(a, b, s)))),
+    check("plate_size", Stage::Fit(|a, b, s| found(plate_size::check(a, b, s)))),
+    check("moved", Stage::LeftOut(|a, s| found(moved::check(a, s)))),
+    check("marker_off", Stage::Fit(|a, b, s| found(marker_off::check(a, b, s)))),
+    check("parameter_off", Stage::Fit(|a, b, s| found(parameter_off::check(a, b, s)))),
+    check("scatter", Stage::Worth(|a, b, s| found(scatter::check(a, b, s)))),
+    check("undetermined", Stage::Worth(|a, b, s| found(undetermined::check(a, b, s)))),
+];
+
+/// What the checks have found so far.
+pub struct Diagnosis<'a> {
+    setting: Setting<'a>,
+    /// Findings of every row of [`CHECKS`].
+    found: [Vec<Finding>; CHECKS.len()],
+}
+
+impl<'a> Diagnosis<'a> {
+    /// Nothing is found yet.
+    pub fn new(setting: Setting<'a>) -> Self {
+        Self { setting, found: Default::default() }
+    }
+
+    /// Runs the checks of a stage in their order.
+    fn run(&mut self, of_stage: impl Fn(&Stage, &Setting) -> Option<Vec<Finding>>) {
+        for (row, check) in CHECKS.iter().enumerate() {
+            let Some(mut found) = of_stage(&check.stage, &self.setting) else { continue };
+            found.retain(|f| !self.is_explained(f));
+            self.found[row] = found;
+        }
+    }
+
+    fn is_explained(&self, finding: &Finding) -> bool {
+        CHECKS.iter().zip(&self.found).any(|(check, own)| own.iter().any(|f| (check.explains)(f, finding)))
+    }
+
+    /// Checks of the stand-alone camera poses.
+    pub fn after_free_poses(&mut self, problem: &Problem) {
+        self.run(|stage, setting| match stage {
+            Stage::FreePoses(check) => Some(check(problem, setting)),
+            _ => None,
+        });
+    }
+
+    /// Checks of what was left out.
+    ///
+    /// # Errors
+    /// Where too little is left for a result.
+    pub fn after_left_out(&mut self, adjustment: &Adjustment) -> Result<()> {
+        self.run(|stage, setting| match stage {
+            Stage::LeftOut(check) => Some(check(adjustment, setting)),
+            _ => None,
+        });
+        self.refusal().map_or(Ok(()), Err)
+    }
+
+    /// Checks of the fit.
+    pub fn after_fit(&mut self, fit: &Fit, accuracy: &Accuracy) {
+        self.run(|stage, setting| match stage {
+            Stage::Fit(check) => Some(check(fit, accuracy, setting)),
+            _ => None,
+        });
+    }
+
+    /// Checks of what the result is worth.
+    pub fn after_worth(&mut self, worth: &Worth, accuracy: &Accuracy) {
+        self.run(|stage, setting| match stage {
+            Stage::Worth(check) => Some(check(worth, accuracy, setting)),
+            _ => None,
+        });
+    }
+
+    /// All findings, in the order of the table.
+    pub fn findings(self) -> Vec<Finding> {
+        self.found.into_iter().flatten().collect()
+    }
+
+    /// Why there can be no result: what was moved where that is known.
+    fn refusal(&self) -> Option<Error> {
+        let all = || self.found.iter().flatten();
+        let refusal = all().find(|f| f.weight() == Weight::Refusal)?;
+        let moved = all().find_map(|f| if let Finding::Moved(m) = f { Some(m) } else { None });
+        let (what, remedy) = moved.map_or_else(
+            || {
+                let remedy = "check joint_unit, the order and signs of the joints, that image names stand in the right rows, and that the plate did not move";
+                (refusal.to_string(), remedy)
+            },
+            |m| m.what_and_remedy(),
+        );
+        Some(Error::unsolved("joint readings", what, remedy))
+    }
+}

@@ -1,0 +1,163 @@
+//! The finding that a plate or a camera stands elsewhere in some of the images; [`super::shift`] looks for it.
+
+use std::fmt;
+
+use super::kind::{Kind, Quantity, Subject, Weight, some_of};
+use crate::error::Notice;
+
+/// Most images that are named.
+const MOST_IMAGES: usize = 5;
+
+/// What stands elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Carried {
+    /// The plate that stands still.
+    Plate,
+    /// The plate in the hand.
+    PlateInHand,
+    /// The camera on its mount in the hand.
+    CameraInHand,
+    /// The camera that stands still.
+    Camera,
+}
+
+/// In which images it stands elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Displacement {
+    /// From the first of them on: moved once.
+    FromThenOn,
+    /// Where its axis x, y or z (0, 1, 2) points up: held by its weight only.
+    AxisUp(usize),
+}
+
+/// A body stands elsewhere in some images, by too little for any of them to be left out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Displaced {
+    /// Series.
+    pub series: String,
+    /// What.
+    pub body: Carried,
+    /// Name of the mounting of its images.
+    pub mounting: String,
+    /// How the images are divided.
+    pub displacement: Displacement,
+    /// Images in which it stands elsewhere, in this order.
+    pub images: Vec<String>,
+    /// How far, m, and sigma per axis.
+    pub distance_m: (f64, f64),
+    /// By which angle, rad, and sigma per axis.
+    pub angle_rad: (f64, f64),
+    /// Share of the squares of the joint noise that this and the other displacements explain.
+    pub share: f64,
+    /// Gate where it is beyond what a good robot repeats to.
+    pub weight: Weight,
+}
+
+impl Displaced {
+    /// True where it happened once, in images of this mounting.
+    pub(super) fn explains_two_places_of(&self, mounting: &str) -> bool {
+        self.displacement == Displacement::FromThenOn && self.mounting == mounting
+    }
+
+    fn is_camera(&self) -> bool {
+        matches!(self.body, Carried::CameraInHand | Carried::Camera)
+    }
+
+    fn body(&self) -> &'static str {
+        match self.body {
+            Carried::Plate => "plate",
+            Carried::PlateInHand => "plate in the hand",
+            Carried::CameraInHand => "camera on its mount",
+            Carried::Camera => "camera on its stand",
+        }
+    }
+
+    fn what_and_remedy(&self) -> (String, String) {
+        let (series, body) = (&self.series, self.body());
+        let size = format!(
+            "{:.2} mm, {:.2} mrad (sigma at most {:.2} mm, {:.2} mrad per axis)",
+            1e3 * self.distance_m.0,
+            1e3 * self.angle_rad.0,
+            1e3 * self.distance_m.1,
+            1e3 * self.angle_rad.1
+        );
+        let gain = format!("what moved explains {:.0} % of the squares of the joint noise", 100.0 * self.share);
+        let first = self.images.first().map_or("", String::as_str);
+        match self.displacement {
+            Displacement::FromThenOn => {
+                let stands = match self.body {
+                    Carried::Plate | Carried::Camera => "stands",
+                    Carried::PlateInHand | Carried::CameraInHand => "sits",
+                };
+                let (why, remedy) = if self.is_camera() {
+                    let remedy = format!(
+                        "fasten the camera, and take the series again, or put the images from {first} on into a series of their own with the same [camera] name and another mounting"
+                    );
+                    ("it was moved, creeps, or its lens was touched", remedy)
+                } else {
+                    let remedy = format!(
+                        "write a column placement in joints.csv that differs from {first} on, or fasten the plate and take the series again"
+                    );
+                    ("it was moved, or creeps", remedy)
+                };
+                let what = format!(
+                    "series {series}: from {first} on the {body} {stands} {size} elsewhere than before: {why}; {gain}"
+                );
+                (what, remedy)
+            }
+            Displacement::AxisUp(axis) => {
+                let what = format!(
+                    "series {series}: where its {} axis points up the {body} sits {size} elsewhere ({} images: {}): it is loose, or bends under its weight; {gain}",
+                    ["x", "y", "z"][axis],
+                    self.images.len(),
+                    some_of(&self.images, MOST_IMAGES)
+                );
+                (what, "fasten it, and take the series again".into())
+            }
+        }
+    }
+}
+
+impl fmt::Display for Displaced {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (what, remedy) = self.what_and_remedy();
+        match self.weight {
+            Weight::Note => self.notice().fmt(f),
+            _ => write!(f, "{what}; {remedy}"),
+        }
+    }
+}
+
+impl Kind for Displaced {
+    fn code(&self) -> &'static str {
+        match (self.displacement, self.is_camera()) {
+            (Displacement::FromThenOn, false) => "plate_displaced",
+            (Displacement::FromThenOn, true) => "camera_displaced",
+            (Displacement::AxisUp(_), false) => "plate_loose",
+            (Displacement::AxisUp(_), true) => "camera_loose",
+        }
+    }
+
+    fn weight(&self) -> Weight {
+        self.weight
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        let mut all = vec![Subject::Series(self.series.clone()), Subject::Body(self.body().to_owned())];
+        all.extend(self.images.iter().cloned().map(Subject::Image));
+        all
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![
+            Quantity::new("distance", self.distance_m.0, "m").with_sigma(self.distance_m.1),
+            Quantity::new("angle", self.angle_rad.0, "rad").with_sigma(self.angle_rad.1),
+            Quantity::new("share_of_joint_noise", self.share, "1"),
+        ]
+    }
+
+    fn notice(&self) -> Notice {
+        let (what, remedy) = self.what_and_remedy();
+        Notice::new("series", what, remedy)
+    }
+}

@@ -1,0 +1,55 @@
+//! Are there enough images of the robot?
+
+use std::fmt;
+
+use super::kind::{Kind, Quantity, Setting, Subject, Weight};
+use crate::assess::Accuracy;
+use crate::error::Notice;
+use crate::fit::Fit;
+
+/// Few images of the robot.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FewImages {
+    /// Images of the robot.
+    pub images: usize,
+}
+
+pub(super) fn check(_: &Fit, _: &Accuracy, setting: &Setting) -> Option<FewImages> {
+    let images = setting.on_robot;
+    (images < setting.limits.few_images).then_some(FewImages { images })
+}
+
+impl fmt::Display for FewImages {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.notice().fmt(f)
+    }
+}
+
+impl Kind for FewImages {
+    fn code(&self) -> &'static str {
+        "few_images"
+    }
+
+    fn weight(&self) -> Weight {
+        Weight::Note
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        Vec::new()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![Quantity::new("images", self.images as f64, "1")]
+    }
+
+    fn notice(&self) -> Notice {
+        Notice::new(
+            "series",
+            format!(
+                "{} images of the robot are few: expect the prior (nominal model) to decide much of the result",
+                self.images
+            ),
+            "take 30 to 50 stops that move every joint through its range",
+        )
+    }
+}

@@ -1,0 +1,112 @@
+//! What the program found out about the data: a closed set, one file and one sentence each.
+
+use std::fmt;
+
+use super::camera_model::CameraModelMisfit;
+use super::displaced::Displaced;
+use super::few_images::FewImages;
+use super::focus::FocusChange;
+use super::joint_noise::JointNoiseLarge;
+use super::kind::{Kind, Quantity, Subject, Weight};
+use super::left_out_images::ImagesLeftOut;
+use super::left_out_observations::ObservationsLeftOut;
+use super::lens_not_in_ros::LensNotInRos;
+use super::loose::LooseMounting;
+use super::marker_off::MarkerOff;
+use super::moved::Moved;
+use super::no_gain::NoGain;
+use super::noticed::Noticed;
+use super::parameter_off::ParameterOff;
+use super::plate_size::DoubtedSize;
+use super::scatter::LargeScatter;
+use super::undetermined::FlangeUndetermined;
+use crate::error::Notice;
+
+macro_rules! findings {
+    ($($kind:ident,)+) => {
+        /// One finding. A new kind is a file in this folder, its name in the list below, and a row in [`super::CHECKS`].
+        #[derive(Debug, Clone, PartialEq)]
+        #[allow(missing_docs)] // Each variant is named after its type, which says what it is.
+        pub enum Finding {
+            $($kind($kind),)+
+        }
+
+        impl Finding {
+            fn kind(&self) -> &dyn Kind {
+                match self {
+                    $(Self::$kind(f) => f,)+
+                }
+            }
+        }
+
+        $(impl From<$kind> for Finding {
+            fn from(found: $kind) -> Self {
+                Self::$kind(found)
+            }
+        })+
+    };
+}
+
+findings! {
+    CameraModelMisfit,
+    Displaced,
+    DoubtedSize,
+    FewImages,
+    FlangeUndetermined,
+    FocusChange,
+    ImagesLeftOut,
+    JointNoiseLarge,
+    LargeScatter,
+    LensNotInRos,
+    LooseMounting,
+    MarkerOff,
+    Moved,
+    NoGain,
+    Noticed,
+    ObservationsLeftOut,
+    ParameterOff,
+}
+
+impl Finding {
+    /// Stable name of its kind for programs, `snake_case`.
+    pub fn code(&self) -> &'static str {
+        self.kind().code()
+    }
+
+    /// How much it weighs.
+    pub fn weight(&self) -> Weight {
+        self.kind().weight()
+    }
+
+    /// What it is about.
+    pub fn subjects(&self) -> Vec<Subject> {
+        self.kind().subjects()
+    }
+
+    /// Its numbers.
+    pub fn quantities(&self) -> Vec<Quantity> {
+        self.kind().quantities()
+    }
+
+    /// Place, sentence and remedy of a note.
+    pub fn notice(&self) -> Notice {
+        self.kind().notice()
+    }
+
+    /// True where the result is not to be trusted.
+    pub fn fails(&self) -> bool {
+        self.weight() != Weight::Note
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.kind().fmt(f)
+    }
+}
+
+impl From<Notice> for Finding {
+    fn from(notice: Notice) -> Self {
+        Self::Noticed(Noticed(notice))
+    }
+}

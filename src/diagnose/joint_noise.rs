@@ -1,0 +1,149 @@
+//! Do the joint readings explain the images as well as those of robots usually do?
+
+use std::fmt;
+
+use super::kind::{Kind, Quantity, Setting, Subject, Weight, some_of};
+use crate::assess::{Accuracy, median};
+use crate::error::Notice;
+use crate::fit::Fit;
+use crate::problem::Problem;
+
+/// Most images that are named.
+const MOST_IMAGES: usize = 4;
+
+/// An image with a number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageValue {
+    /// Its name.
+    pub image: String,
+    /// Its value.
+    pub value: f64,
+}
+
+/// The joint noise of a series is larger than robots in order have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointNoiseLarge {
+    /// Series.
+    pub series: String,
+    /// Joint with the largest noise.
+    pub joint: String,
+    /// Its noise, rad or m.
+    pub sigma: f64,
+    /// Images that the others predict far worse than usual, mm.
+    pub worst_predicted: Vec<ImageValue>,
+    /// Images whose markers are known far less well than usual, sigma in px: blurred, badly lit, far away.
+    pub badly_seen: Vec<ImageValue>,
+    /// Gate or note.
+    pub weight: Weight,
+}
+
+pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &Setting) -> Vec<JointNoiseLarge> {
+    let limits = setting.limits;
+    let of_series = |(k, of): (usize, &crate::problem::MeasuredSeries)| {
+        let (joint, sigma) = noisiest_joint(fit, k)?;
+        let weight = match sigma {
+            s if s > limits.joint_noise => Weight::Gate,
+            s if s >= limits.unusual_joint_noise => Weight::Note,
+            _ => return None,
+        };
+        let problem = &fit.problem;
+        let errors = |i: usize| accuracy.per_image_mm[i].map(|[_, calibrated]| calibrated);
+        let sigma_px = |i: usize| {
+            let sigmas: Vec<f64> = problem.images[i].used().map(|o| o.information.determinant().powf(-0.25)).collect();
+            median(&sigmas)
+        };
+        Some(JointNoiseLarge {
+            series: of.name.clone(),
+            joint: joint.to_owned(),
+            sigma,
+            worst_predicted: standing_out(problem, k, errors, limits.times_usual_error),
+            badly_seen: standing_out(problem, k, sigma_px, limits.times_usual_blur),
+            weight,
+        })
+    };
+    setting.series.iter().enumerate().filter_map(of_series).collect()
+}
+
+/// The reading with the largest joint noise in a series, and its size, rad or m.
+fn noisiest_joint(fit: &Fit, series: usize) -> Option<(&str, f64)> {
+    let sigmas = fit.problem.joint_sigma(series).into_iter();
+    let named = fit.state.robot.chain.readings.iter().map(String::as_str).zip(sigmas);
+    named.max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Images of a series of which something is more than so many times its median, the largest first.
+fn standing_out(problem: &Problem, series: usize, of: impl Fn(usize) -> Option<f64>, times: f64) -> Vec<ImageValue> {
+    let own = problem.used().filter(|(_, image)| image.series == series);
+    let mut all: Vec<(f64, &str)> =
+        own.filter_map(|(i, image)| of(i).map(|value| (value, image.name.as_str()))).collect();
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let usual = all.get(all.len() / 2).map_or(0.0, |e| e.0);
+    all.retain(|e| e.0 > times * usual);
+    all.into_iter().map(|(value, image)| ImageValue { image: image.to_owned(), value }).collect()
+}
+
+fn in_words(what: &str, images: &[ImageValue], shown: impl Fn(f64) -> String) -> String {
+    let named: Vec<String> = images.iter().map(|i| format!("{} ({})", i.image, shown(i.value))).collect();
+    if named.is_empty() { String::new() } else { format!("{what} {}", some_of(&named, MOST_IMAGES)) }
+}
+
+impl JointNoiseLarge {
+    fn worst(&self) -> String {
+        in_words("; the others predict worst", &self.worst_predicted, |mm| format!("{mm:.1} mm"))
+    }
+}
+
+impl fmt::Display for JointNoiseLarge {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.weight == Weight::Note {
+            return self.notice().fmt(f);
+        }
+        write!(
+            f,
+            "joint noise: {:.1} mrad ({} most) in series {}; the readings do not explain the images: look for loose camera or plate, motion, wrong robot model{}",
+            1e3 * self.sigma,
+            self.joint,
+            self.series,
+            self.worst()
+        )
+    }
+}
+
+impl Kind for JointNoiseLarge {
+    fn code(&self) -> &'static str {
+        "joint_noise_large"
+    }
+
+    fn weight(&self) -> Weight {
+        self.weight
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        let images = self.worst_predicted.iter().chain(&self.badly_seen).map(|i| Subject::Image(i.image.clone()));
+        let mut all = vec![Subject::Series(self.series.clone()), Subject::Joint(self.joint.clone())];
+        images.for_each(|image| {
+            if !all.contains(&image) {
+                all.push(image);
+            }
+        });
+        all
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![Quantity::new("joint_noise", self.sigma, "rad or m")]
+    }
+
+    fn notice(&self) -> Notice {
+        Notice::new(
+            format!("series {}", self.series),
+            format!(
+                "the joint noise is {:.2} mrad ({} most); robots repeat to some 0.1 mrad{}{}",
+                1e3 * self.sigma,
+                self.joint,
+                self.worst(),
+                in_words("; blurred or badly seen", &self.badly_seen, |px| format!("sigma {px:.3} px"))
+            ),
+            "did plate or camera move, were images taken before the arm stood still, are readings rounded? the stated sigmas contain it",
+        )
+    }
+}

@@ -1,0 +1,110 @@
+//! What every finding answers, and what its checks look at.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::assess::Limits;
+use crate::error::Notice;
+use crate::fit::FreePoses;
+use crate::problem::MeasuredSeries;
+
+/// What every check may look at.
+#[derive(Clone, Copy)]
+pub struct Setting<'a> {
+    /// The series as measured.
+    pub series: &'a [MeasuredSeries],
+    /// The stand-alone camera poses.
+    pub free: &'a FreePoses,
+    /// Images of the robot before any was left out.
+    pub on_robot: usize,
+    /// Numbers that decide.
+    pub limits: &'a Limits,
+}
+
+/// How much a finding weighs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Weight {
+    /// The user should know; the result stands.
+    Note,
+    /// A quality gate failed: the result is not to be trusted.
+    Gate,
+    /// There is no result.
+    Refusal,
+}
+
+/// What a finding is about.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", content = "name", rename_all = "snake_case")]
+pub enum Subject {
+    /// A file, line, or another place in words.
+    Place(String),
+    /// A series.
+    Series(String),
+    /// An image (a row of joints.csv).
+    Image(String),
+    /// A camera.
+    Camera(String),
+    /// A joint, by its URDF name.
+    Joint(String),
+    /// Plate or mounting.
+    Body(String),
+    /// A marker, by its id.
+    Marker(u32),
+    /// A parameter, by its name in the layout.
+    Parameter(String),
+}
+
+/// A number of a finding.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Quantity {
+    /// What it is.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// Its unit; 1 for a number without.
+    pub unit: String,
+    /// Its standard deviation, where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<f64>,
+}
+
+impl Quantity {
+    /// A quantity without stated sigma.
+    pub(super) fn new(name: &str, value: f64, unit: &str) -> Self {
+        Self { name: name.to_owned(), value, unit: unit.to_owned(), sigma: None }
+    }
+
+    /// With its standard deviation.
+    pub(super) fn with_sigma(self, sigma: f64) -> Self {
+        Self { sigma: Some(sigma), ..self }
+    }
+}
+
+/// What every kind of finding answers; its sentence is its `Display`.
+pub(super) trait Kind: fmt::Display {
+    /// Stable name for programs.
+    fn code(&self) -> &'static str;
+    /// How much it weighs.
+    fn weight(&self) -> Weight {
+        Weight::Gate
+    }
+    /// What it is about.
+    fn subjects(&self) -> Vec<Subject>;
+    /// Its numbers, in SI units but for px.
+    fn quantities(&self) -> Vec<Quantity> {
+        Vec::new()
+    }
+    /// Place, sentence and remedy apart, so that what is said of several places can be said once.
+    fn notice(&self) -> Notice {
+        Notice::new("result", self, "")
+    }
+}
+
+/// Names of the first few, and how many more there are.
+pub(super) fn some_of(names: &[String], most: usize) -> String {
+    let more = names.len().saturating_sub(most);
+    let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{}{rest}", names[..names.len() - more].join(", "))
+}

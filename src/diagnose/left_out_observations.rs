@@ -1,0 +1,56 @@
+//! Do most observations agree with the others?
+
+use std::fmt;
+
+use super::kind::{Kind, Quantity, Setting, Subject};
+use crate::problem::Adjustment;
+
+/// Many single observations were left out of images in use.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObservationsLeftOut {
+    /// Share of all.
+    pub share: f64,
+    /// Image that lost the largest share, and this share.
+    pub worst: (String, f64),
+}
+
+pub(super) fn check(adjustment: &Adjustment, setting: &Setting) -> Option<ObservationsLeftOut> {
+    let (mut out, mut all, mut worst) = (0, 0, (0.0, ""));
+    for (_, image) in adjustment.problem.used() {
+        let (n, rejected) = (image.observations.len(), image.observations.len() - image.used().count());
+        (out, all) = (out + rejected, all + n);
+        let share = rejected as f64 / n.max(1) as f64;
+        if share > worst.0 {
+            worst = (share, image.name.as_str());
+        }
+    }
+    let share = f64::from(out as u32) / f64::from(all.max(1) as u32);
+    let found = ObservationsLeftOut { share, worst: (worst.1.to_owned(), worst.0) };
+    (share > setting.limits.share_of_observations_left_out).then_some(found)
+}
+
+impl fmt::Display for ObservationsLeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "observations: {:.0} % were left out, {:.0} % in {}; look for markers taken for others, a bent plate, changed focus",
+            100.0 * self.share,
+            100.0 * self.worst.1,
+            self.worst.0
+        )
+    }
+}
+
+impl Kind for ObservationsLeftOut {
+    fn code(&self) -> &'static str {
+        "observations_left_out"
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        vec![Subject::Image(self.worst.0.clone())]
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![Quantity::new("share", self.share, "1"), Quantity::new("share_in_image", self.worst.1, "1")]
+    }
+}

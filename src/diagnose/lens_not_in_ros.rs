@@ -1,0 +1,54 @@
+//! Can camera.yaml express the lens that was found?
+
+use std::fmt;
+
+use super::kind::{Kind, Quantity, Subject, Weight};
+use crate::error::Notice;
+
+/// camera.yaml cannot express the lens of a camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LensNotInRos {
+    /// Camera.
+    pub camera: String,
+    /// Its lens.
+    pub lens: &'static str,
+    /// What is lost, RMS over the image, px.
+    pub rms_px: f64,
+    /// The most, px.
+    pub worst_px: f64,
+}
+
+impl fmt::Display for LensNotInRos {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.notice().fmt(f)
+    }
+}
+
+impl Kind for LensNotInRos {
+    fn code(&self) -> &'static str {
+        "lens_not_in_ros"
+    }
+
+    fn weight(&self) -> Weight {
+        Weight::Note
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        vec![Subject::Camera(self.camera.clone())]
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![Quantity::new("rms", self.rms_px, "px"), Quantity::new("worst", self.worst_px, "px")]
+    }
+
+    fn notice(&self) -> Notice {
+        Notice::new(
+            format!("camera {}", self.camera),
+            format!(
+                "camera.yaml cannot express its {} lens: it is off by {:.3} px RMS over the image, at most {:.3} px",
+                self.lens, self.rms_px, self.worst_px
+            ),
+            "solution.json has the lens itself; --camera brown identifies one that camera.yaml can express",
+        )
+    }
+}

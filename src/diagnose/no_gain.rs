@@ -1,0 +1,47 @@
+//! Does the corrected robot predict images that it has not seen better than the nominal one?
+
+use std::fmt;
+
+use super::kind::{Kind, Quantity, Setting, Subject};
+use crate::assess::Accuracy;
+use crate::fit::Fit;
+
+/// The corrected robot is no better than the nominal one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoGain {
+    /// Held-out error of the corrected robot, mm RMS.
+    pub calibrated_mm: f64,
+    /// Of the nominal one, mm RMS.
+    pub nominal_mm: f64,
+}
+
+pub(super) fn check(_: &Fit, accuracy: &Accuracy, _: &Setting) -> Option<NoGain> {
+    let found = NoGain { calibrated_mm: accuracy.calibrated.rms_mm, nominal_mm: accuracy.nominal.rms_mm };
+    (found.calibrated_mm > found.nominal_mm).then_some(found)
+}
+
+impl fmt::Display for NoGain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "hold-out: the corrected robot predicts images no better than the nominal one ({:.3} mm against {:.3} mm)",
+            self.calibrated_mm, self.nominal_mm
+        )
+    }
+}
+
+impl Kind for NoGain {
+    fn code(&self) -> &'static str {
+        "no_gain"
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        Vec::new()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        [("calibrated", self.calibrated_mm), ("nominal", self.nominal_mm)]
+            .map(|(name, mm)| Quantity::new(name, 1e-3 * mm, "m"))
+            .into()
+    }
+}

@@ -1,0 +1,71 @@
+//! Is the robot as far from nominal as robots are?
+
+use std::fmt;
+
+use super::kind::{Kind, Quantity, Setting, Subject, Weight};
+use crate::assess::Accuracy;
+use crate::error::Notice;
+use crate::fit::Fit;
+
+/// A parameter of the robot is far from nominal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterOff {
+    /// Its name.
+    pub parameter: String,
+    /// Its value.
+    pub value: f64,
+    /// Its unit.
+    pub unit: &'static str,
+    /// How many times what robots usually deviate by.
+    pub usual_deviations: f64,
+}
+
+pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &Setting) -> Vec<ParameterOff> {
+    let problem = &fit.problem;
+    let values = fit.state.values(&problem.layout);
+    let of_column = |c: usize| {
+        let column = &problem.layout.columns[c];
+        let usual_deviations = ((values[c] - column.prior_mean) / problem.stated_sigma(c)).abs();
+        (usual_deviations > setting.limits.sigmas_beyond_tolerance).then(|| {
+            let parameter = column.name.clone();
+            ParameterOff { parameter, value: values[c], unit: column.unit, usual_deviations }
+        })
+    };
+    problem.layout.robot().filter_map(of_column).collect()
+}
+
+impl fmt::Display for ParameterOff {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.notice().fmt(f)
+    }
+}
+
+impl Kind for ParameterOff {
+    fn code(&self) -> &'static str {
+        "parameter_off"
+    }
+
+    fn weight(&self) -> Weight {
+        Weight::Note
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        vec![Subject::Parameter(self.parameter.clone())]
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![
+            Quantity::new("value", self.value, self.unit),
+            Quantity::new("usual_deviations", self.usual_deviations, "1"),
+        ]
+    }
+
+    fn notice(&self) -> Notice {
+        let Self { value, unit, usual_deviations, .. } = self;
+        Notice::new(
+            &self.parameter,
+            format!("{value:.3e} {unit} is {usual_deviations:.0} times what robots usually deviate by"),
+            "check that the URDF is of this robot, and its mastering",
+        )
+    }
+}

@@ -1,0 +1,54 @@
+//! Do the images scatter as the noise model says?
+
+use std::fmt;
+
+use super::kind::{Kind, Quantity, Setting, Subject, Weight};
+use crate::assess::{Accuracy, Worth};
+use crate::error::Notice;
+
+/// The images scatter more than the noise model says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LargeScatter {
+    /// Sigma of the flange by clusters of images over that by the noise model.
+    pub ratio: f64,
+}
+
+pub(super) fn check(worth: &Worth, _: &Accuracy, _: &Setting) -> Option<LargeScatter> {
+    let ratio = worth.clustered_ratio.filter(|_| worth.larger_stated);
+    ratio.map(|ratio| LargeScatter { ratio })
+}
+
+impl fmt::Display for LargeScatter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.notice().fmt(f)
+    }
+}
+
+impl Kind for LargeScatter {
+    fn code(&self) -> &'static str {
+        "large_scatter"
+    }
+
+    fn weight(&self) -> Weight {
+        Weight::Note
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        Vec::new()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![Quantity::new("flange_ratio", self.ratio, "1")]
+    }
+
+    fn notice(&self) -> Notice {
+        Notice::new(
+            "uncertainty",
+            format!(
+                "the images scatter {:.1} times as much as the noise model says (flange, clusters of images); the larger sigmas are stated",
+                self.ratio
+            ),
+            "look for what changes from image to image: a loose camera or plate, motion, focus, light",
+        )
+    }
+}
