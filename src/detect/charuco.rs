@@ -3,10 +3,10 @@
 //! The `calib-targets` library decodes the markers and so tells which corner is which; the positions are measured as on
 //! a plain chessboard, from the pixels along the edges that the markers leave free.
 
-use calib_targets::aruco::{Dictionary, builtins, resolve_dictionary};
-use calib_targets::charuco::{CharucoBoardSpec, CharucoDetection, CharucoDetector, CharucoParams};
-use calib_targets::chessboard::{ChessCorner, detect_corners};
-use calib_targets::core::GrayImageView;
+use calib_targets_aruco::{Dictionary, builtins, resolve_dictionary};
+use calib_targets_charuco::{CharucoBoardSpec, CharucoDetection, CharucoDetector, CharucoParams};
+use calib_targets_chessboard::{ChessCorner, detect_corners};
+use calib_targets_core::GrayImageView;
 
 use super::board_labels::{BoardSize, Lattice, Placement};
 use super::chessboard::{WINDOW, board_size, corner_config, to_8_bit};

@@ -3,9 +3,8 @@
 //! The lattice of corners comes from the `calib-targets` library; which corner is which, the sub-pixel position in the
 //! full depth of the picture and its covariance are found here.
 
-use calib_targets::chessboard::{ChessboardDetector, ChessboardParams, detect_corners};
-use calib_targets::core::GrayImageView;
-use calib_targets::detect::{DetectorConfig, ImageRefiner, default_chess_config};
+use calib_targets_chessboard::{ChessboardDetector, ChessboardParams, detect_corners};
+use calib_targets_core::{DetectorConfig, GrayImageView, ImageRefiner, default_chess_config};
 
 use super::board_labels::{BoardSize, Label, Labelling, Lattice, label};
 use super::corners::measure;

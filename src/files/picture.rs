@@ -14,7 +14,7 @@ use crate::Result;
 pub const MOST_SIDE_PX: u32 = 32_768;
 
 /// Memory of one decoded picture together with its grey values of four bytes each.
-const MOST_BYTES: u64 = 950_000_000;
+const MOST_BYTES: u64 = 910_000_000;
 
 const GREY_BYTES: u64 = 4;
 

@@ -2,7 +2,7 @@
 
 #![allow(dead_code)]
 
-use calib_targets::aruco::Dictionary;
+use calib_targets_aruco::Dictionary;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};

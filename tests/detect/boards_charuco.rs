@@ -3,7 +3,7 @@
 #![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
 
 use crate::boards_scene::{Print, Scene, View};
-use calib_targets::aruco::builtins::DICT_4X4_50;
+use calib_targets_aruco::builtins::DICT_4X4_50;
 use nalgebra::Vector3;
 use robotcal::detect::{Detection, Picture, detect};
 use robotcal::series::{Aruco, Edge, Plate, PlateKind};
