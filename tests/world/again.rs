@@ -37,7 +37,7 @@ fn from_its_own_file_a_result_is_solved_again_bit_for_bit_with_its_own_options()
     assert_eq!(first["options"], again["options"]);
     assert_eq!(first["options"]["model"], "rigid");
     for part in ["estimates", "covariance_lower", "images", "cameras", "plates"] {
-        assert!(first[part].to_string() == again[part].to_string(), "{part} differs");
+        assert!(first[part] == again[part], "{part} differs");
     }
 
     // Limits of a file take the place of the recorded ones; a name that is none is refused.
