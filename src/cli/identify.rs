@@ -104,11 +104,11 @@ impl From<TwoStage> for Estimator {
 }
 
 pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
+    // Tried before the work that the result costs.
+    let mut place = args.out.as_deref().filter(|_| !args.dry_run).map(Place::claim).transpose()?;
     let earlier = args.from.as_deref().map(read_solution).transpose()?;
     let options = args.choices.options(earlier.as_ref().map_or_else(Options::default, restore::options))?;
     let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
-    // Tried before the work that the result costs.
-    let mut place = args.out.as_deref().filter(|_| !args.dry_run).map(Place::claim).transpose()?;
     let mut observed = match (earlier.as_ref().zip(args.from.as_deref()), &args.urdf) {
         (Some((record, path)), _) => Observed::of_record(record, path, ends)?,
         (None, Some(urdf)) => {

@@ -142,8 +142,9 @@ pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, 
     let linearised = adjustment.linearise().unwrap();
     let covariance = adjustment.linear(&linearised).covariance().unwrap();
     let fit = Fit { adjustment, linearised, covariance };
-    let solution = Solution { fit, free_poses, ..template.clone() };
     let description = robot();
+    let series = vec![measured(world, &description.chain(None, None).unwrap())];
+    let solution = Solution { fit, free_poses, series, ..template.clone() };
     robotcal::output::files(&solution, &context(&description)).unwrap()
 }
 

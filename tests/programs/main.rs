@@ -6,5 +6,6 @@ mod programs_support;
 mod krl;
 mod plan_choice;
 mod plan_poses;
+mod promise;
 mod rapid;
 mod urscript;
