@@ -18,6 +18,7 @@ pub use pictures::Pictures;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::diagnose::Finding;
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::identify::{Options, Solution, beside_two_stages, identify};
@@ -87,6 +88,11 @@ impl Calibration {
     /// The fit with everything that was found.
     pub fn solution(&self) -> &Solution {
         &self.solution
+    }
+
+    /// What was found out about the data, doubts and failed gates among it.
+    pub fn findings(&self) -> &[Finding] {
+        &self.solution.findings
     }
 
     /// The identified robot, as the exported files describe it.
