@@ -183,7 +183,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Verdict> {
 
 fn named_fault(name: &str) -> Result<Fault> {
     Fault::from_name(name).ok_or_else(|| {
-        let known = crate::closest_name(name, FAULTS.iter().map(|e| e.name));
+        let known = crate::error::closest_name(name, FAULTS.iter().map(|e| e.name));
         let remedy = known.map_or_else(|| "--fault list shows all".to_owned(), |k| format!("is \"{k}\" meant?"));
         Error::input("--fault", format!("there is no fault \"{name}\""), remedy)
     })

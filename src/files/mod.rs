@@ -8,7 +8,7 @@ use std::path::Path;
 
 pub use picture::{MOST_SIDE_PX, batches, decode_picture, decoded_bytes, picture_size};
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// What a file is; says how long it may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

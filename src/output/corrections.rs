@@ -147,7 +147,8 @@ pub fn expected_finding(expected: std::result::Result<&[Option<f64>], &str>, sub
 /// # Errors
 /// None in practice: every field can be written as JSON.
 pub fn findings_json(findings: &[Finding]) -> Result<String> {
-    let line = |f: &Finding| serde_json::to_string(f).map_err(|e| crate::Error::unsolved(FINDINGS, e, "report this"));
+    let line =
+        |f: &Finding| serde_json::to_string(f).map_err(|e| crate::error::Error::unsolved(FINDINGS, e, "report this"));
     let lines: Vec<String> = findings.iter().map(line).collect::<Result<_>>()?;
     Ok(format!("[\n{}\n]\n", lines.join(",\n")))
 }

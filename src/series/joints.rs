@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::inputs::InputFile;
 use super::table::{Row, Table};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// The placement of a series that names none.
 pub const DEFAULT_PLACEMENT: &str = "placement_0";

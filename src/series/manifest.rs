@@ -6,8 +6,8 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::inputs::{InputFile, read_text};
+use crate::error::{Error, Result, closest_name, plain_name};
 use crate::files::Kind;
-use crate::{Error, Result, closest_name, plain_name};
 
 /// Unit of the revolute columns of joints.csv.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use super::inputs::InputFile;
 use super::observation::{Edge, ImageObservations, Observation};
 use super::plate::Plate;
 use super::table::{Row, Table, to_csv};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 const KNOWN: [&str; 11] = ["image", "marker", "u", "v", "edge", "cov_uu", "cov_uv", "cov_vv", "du", "dv", "reason"];
 const COVARIANCE: [&str; 3] = ["cov_uu", "cov_uv", "cov_vv"];

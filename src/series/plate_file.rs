@@ -10,8 +10,8 @@ use super::manifest::{check_format, parse_toml, read_toml, require_positive, to_
 use super::plate::{Aruco, Marker, Plate, ScaleBar};
 use super::plate_kind::{Ink, Places, PlateKind};
 use super::table::{Row, Table, to_csv};
+use crate::error::{Error, Result};
 use crate::files::Kind;
-use crate::{Error, Result};
 
 /// Prior sigma of a printed marker where the plate states none, m.
 pub const DEFAULT_TOLERANCE_M: f64 = 1e-4;

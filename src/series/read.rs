@@ -14,8 +14,8 @@ use super::observation_file;
 use super::plate::Plate;
 use super::plate_file::read_plate;
 use super::units;
+use crate::error::{Error, Notice, Result, plain_name};
 use crate::urdf::Chain;
-use crate::{Error, Notice, Result, plain_name};
 
 const IMAGE_EXTENSIONS: [&str; 9] = ["png", "tif", "tiff", "pgm", "pnm", "ppm", "jpg", "jpeg", "bmp"];
 

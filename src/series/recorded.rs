@@ -5,7 +5,7 @@ use std::path::Path;
 use super::manifest::{AngleUnit, CameraMount, Manifest};
 use super::mcap::{CameraInfo, Extracted, RecordingOptions, extract};
 use super::read::{Series, Source, file_name, manifest_beside, optional_images};
-use crate::{Error, Notice, Result};
+use crate::error::{Error, Notice, Result};
 
 impl Series {
     /// The same series with the stops of its recording: pictures are written to `images`. A series that has no recording

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::inputs::{InputFile, read_text};
+use crate::error::{Error, Result, closest_name, plain_name};
 use crate::files::Kind;
-use crate::{Error, Result, closest_name, plain_name};
 
 /// One data row.
 #[derive(Debug, Clone, Copy)]

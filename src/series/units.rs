@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::joints::Stops;
 use super::manifest::AngleUnit;
+use crate::error::{Error, Notice, Result};
 use crate::urdf::{Chain, Joint, JointKind};
-use crate::{Error, Notice, Result};
 
 /// No joint of an arm turns further than two full turns from zero on most of its stops.
 const TWO_TURNS_RAD: f64 = 4.0 * std::f64::consts::PI;

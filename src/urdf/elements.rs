@@ -7,8 +7,8 @@ use nalgebra::Vector3;
 use roxmltree::Node;
 use urdf_rs::JointType;
 
+use crate::error::{Error, Notice, Result, closest_name};
 use crate::geom::Pose;
-use crate::{Error, Notice, Result, closest_name};
 
 /// Elements that URDF knows below `<joint>`.
 const KNOWN_CHILDREN: [&str; 9] =

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use roxmltree::Node;
 
 use super::elements::{Source, child, numbers};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// Mass of a link.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::chain::{CarriedMass, Chain, JointKind};
 use super::read::RobotDescription;
+use crate::error::{Error, Result};
 use crate::geom::Pose;
-use crate::{Error, Result};
 
 /// What the tip carries beside the links of the URDF: tool, camera, workpiece.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -8,8 +8,8 @@ use roxmltree::{Attribute, Node};
 
 use super::elements::{child, numbers};
 use super::read::{elements, parse, version};
+use crate::error::{Error, Result};
 use crate::geom::Pose;
-use crate::{Error, Result};
 
 /// What a re-read origin may differ from the wanted one: rounding of three angles and their sines (m and rad).
 const ROUNDING: f64 = 1e-13;

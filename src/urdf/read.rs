@@ -7,8 +7,8 @@ use roxmltree::{Document, Node};
 
 use super::elements::{JointElement, Source};
 use super::inertial::{Inertial, inertial};
+use crate::error::{Error, Notice, Result, closest_name, plain_name};
 use crate::files::{self, Kind};
-use crate::{Error, Notice, Result, closest_name, plain_name};
 
 /// A robot as its URDF describes it, with the text it came from.
 #[derive(Debug, Clone)]

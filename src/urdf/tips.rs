@@ -6,7 +6,7 @@ use urdf_rs::JointType;
 
 use super::elements::JointElement;
 use super::read::RobotDescription;
-use crate::{Error, Notice, Result};
+use crate::error::{Error, Notice, Result};
 
 /// Most links that a message lists.
 const MOST_LISTED: usize = 8;

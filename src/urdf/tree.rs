@@ -9,8 +9,8 @@ use super::chain::{Chain, Drive, Joint, JointKind};
 use super::elements::JointElement;
 use super::read::{RobotDescription, suggest};
 use super::tips::listed;
+use crate::error::{Error, Result};
 use crate::geom::Pose;
-use crate::{Error, Result};
 
 /// Links of an arm together are shorter, m; the smallest arms in millimetres are longer.
 const LONGEST_ARM_M: f64 = 50.0;

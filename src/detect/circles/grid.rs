@@ -14,8 +14,8 @@ use super::neighbour_check::{Board, Placed};
 use super::pipeline::detect_coded;
 use super::types::{Options, Outcome};
 use crate::detect::{Detection, Picture};
+use crate::error::{Error, Notice, Result};
 use crate::series::Plate;
-use crate::{Error, Notice, Result};
 
 /// How far a marker may be from its place on the lattice, in steps.
 const OFF_LATTICE: f64 = 0.2;

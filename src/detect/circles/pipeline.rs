@@ -17,8 +17,8 @@ use super::refine::{Fit, refine};
 use super::rescue::{Figure, Place, rescue};
 use super::types::{CircleDetection, DroppedCandidate, Found, InnerOuter, Options, Outcome, Reason};
 use crate::detect::Picture;
+use crate::error::{Error, Result};
 use crate::series::Plate;
-use crate::{Error, Result};
 
 /// Smallest lattice that is worth a try; below it chance cannot be excluded.
 const SMALLEST_LATTICE: usize = 9;

@@ -5,7 +5,7 @@ use std::fmt;
 
 use super::asymmetry::Drift;
 use super::ellipse::Ellipse;
-use crate::Notice;
+use crate::error::Notice;
 use crate::series::{Edge, Observation};
 
 /// What the detector looks for.

@@ -14,9 +14,9 @@ use super::motion::{Interpolated, Posture, interpolate};
 use super::options::{Picking, RecordingOptions};
 use super::pixels::{self, Mean};
 use super::scan::time_ns;
+use crate::error::{Error, Result};
 use crate::files::batches;
 use crate::series::{DEFAULT_PLACEMENT, Stop};
-use crate::{Error, Result};
 
 /// Memory of messages that wait for others of their stop, bytes.
 const MOST_HELD: usize = 256 << 20;

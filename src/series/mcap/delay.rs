@@ -14,7 +14,7 @@ use super::messages;
 use super::motion::{Posture, Standstill, moved};
 use super::options::Clock;
 use super::scan::time_ns;
-use crate::Notice;
+use crate::error::Notice;
 
 const MS: i64 = 1_000_000;
 /// Longest delay that is looked for, ns.

@@ -9,8 +9,8 @@ use super::messages::CameraInfo;
 use super::motion::{Posture, Standstill, interpolate, postures, standstills};
 use super::options::{Motion, RecordingOptions};
 use super::scan::{Scan, scan};
+use crate::error::{Error, Notice, Result};
 use crate::series::{InputFile, Stops};
-use crate::{Error, Notice, Result};
 
 /// Of a long standstill so many pictures are looked at.
 const MOST_PICTURES: usize = 9;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::message::Message;
 use super::{records, sqlite};
+use crate::error::{Error, Notice, Result, plain_name};
 use crate::files::{self, Kind};
-use crate::{Error, Notice, Result, plain_name};
 
 /// The files of a recording, in the order in which they were written: one file, or a rosbag2 folder.
 ///

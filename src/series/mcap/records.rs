@@ -10,8 +10,8 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::message::Message;
+use crate::error::{Error, Notice, Result};
 use crate::files::{self, Kind};
-use crate::{Error, Notice, Result};
 
 const FOOTER: u8 = 2;
 const SCHEMA: u8 = 3;

@@ -9,8 +9,8 @@ use super::file::{files_of, for_each};
 use super::message::Message;
 use super::messages::{self, CameraInfo, JointState};
 use super::options::{Clock, RecordingOptions};
+use crate::error::{Error, Notice, Result, plain_name};
 use crate::series::InputFile;
-use crate::{Error, Notice, Result, plain_name};
 
 /// Some joints at one time.
 #[derive(Debug, Clone)]

@@ -9,8 +9,8 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::message::Message;
+use crate::error::{Error, Notice, Result};
 use crate::files::{self, Kind};
-use crate::{Error, Notice, Result};
 
 /// First bytes of such a file.
 pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";

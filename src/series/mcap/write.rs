@@ -11,10 +11,10 @@ use mcap::{Compression, WriteOptions, Writer};
 
 use super::interfaces::{ANNOTATIONS, TRANSFORMS, definition};
 use super::messages::{CAMERA_INFO, COMPRESSED_IMAGE, CameraInfo, JOINT_STATE};
+use crate::error::{Error, Notice, Result};
 use crate::files::{self, Kind, decode_picture};
 use crate::geom::Pose;
 use crate::series::{ImageObservations, Series, Stop};
-use crate::{Error, Notice, Result};
 
 /// Joint states are written this often while the robot stands, ns.
 const PERIOD_NS: i64 = 20_000_000;

@@ -6,8 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeSet;
 
 use super::view::{Direction, ring};
-use crate::Result;
 use crate::detect::circles::{self, Drift, InnerOuter};
+use crate::error::Result;
 use crate::model::camera::{Camera, Lens};
 use crate::model::circle::centroid_uv;
 use crate::plan::plate_design::LEAST_MINOR_AXIS_PX;
