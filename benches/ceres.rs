@@ -13,7 +13,7 @@ use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::adjust_free_poses;
 use robotcal::init::{PosePair, solve_hand_eye};
 use robotcal::model::camera::{Camera, Lens};
-use robotcal::model::robot::{Robot, Stop};
+use robotcal::model::robot::{Posture, Robot};
 use robotcal::problem::{Adjustment, Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State};
 use robotcal::series::{CameraMount, Edge, Marker, Plate, PlateKind};
 use robotcal::solve::{Outcome, Settings, solve};
@@ -83,7 +83,7 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
         placement: 0,
         plate: 0,
         mount: CameraMount::Hand,
-        stop: Some(Stop::at(&joints[i][1..])),
+        stop: Some(Posture::at(&joints[i][1..])),
         observations,
         local_share: Vec::new(),
         rejected: None,

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use super::stops::{StopsKnowledge, Structural, range_of};
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 use crate::problem::Layout;
 use crate::urdf::JointKind;
 
@@ -61,7 +61,7 @@ impl<'a> Adviser<'a> {
     pub fn new(
         robot: &'a Robot,
         layout: &Layout,
-        stops: &[Stop],
+        stops: &[Posture],
         known: &StopsKnowledge,
         never: &'a Structural,
     ) -> Self {
@@ -77,7 +77,7 @@ impl<'a> Adviser<'a> {
                 let (low, high) = range_of(robot, reading);
                 for k in 0..VALUES {
                     let value = low + (high - low) * k as f64 / (VALUES - 1) as f64;
-                    let mut stop = Stop::at(&base.readings);
+                    let mut stop = Posture::at(&base.readings);
                     stop.readings[reading] = value;
                     let (j, noise) = known.measurement(robot, layout, &stop);
                     let jc = &j * &known.covariance;

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::root_mean_square;
 use super::stops::{halton_stops, range_of};
 use crate::geom::{Pose, adjoint};
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 use crate::problem::Layout;
 
 /// Samples of the workspace: so many in the region of the stops, as many within all joint limits.
@@ -78,7 +78,7 @@ impl<'a> FlangeModel<'a> {
         layout: &'a Layout,
         (still, still_column): (Pose, usize),
         covariance: &'a DMatrix<f64>,
-        stops: &[Stop],
+        stops: &[Posture],
     ) -> Option<Self> {
         let known = (still_column..still_column + 6).all(|c| layout.columns[c].free && covariance[(c, c)] > 0.0);
         if stops.is_empty() || !known {
@@ -106,7 +106,7 @@ impl<'a> FlangeModel<'a> {
     }
 
     /// Pose relative to what stands still, and `J`, 6 x columns that act through the camera poses.
-    fn derivative(&self, stop: &Stop) -> (Pose, DMatrix<f64>) {
+    fn derivative(&self, stop: &Posture) -> (Pose, DMatrix<f64>) {
         let kinematics = self.robot.kinematics(stop, &vec![0.0; stop.readings.len()]);
         let pose = self.still.inverse() * self.exported.pose_at(stop, &vec![0.0; stop.readings.len()]);
         let mut j = DMatrix::zeros(6, self.layout.theta_len());
@@ -123,7 +123,7 @@ impl<'a> FlangeModel<'a> {
 
     /// Flange at joint readings (rad or m), approach unknown.
     pub fn at(&self, readings: &[f64]) -> PredictedFlange {
-        let (pose, j) = self.derivative(&Stop::at(readings));
+        let (pose, j) = self.derivative(&Posture::at(readings));
         let covariance = self.propagated(&j, self.covariance);
         let outside = (self.covered.iter().zip(readings).zip(&self.robot.chain.readings))
             .filter(|(((low, high), q), _)| {
@@ -144,13 +144,13 @@ impl<'a> FlangeModel<'a> {
     }
 
     /// Samples of the region of the stops.
-    pub(super) fn region(&self) -> Vec<Stop> {
+    pub(super) fn region(&self) -> Vec<Posture> {
         halton_stops(&self.covered, SAMPLES)
     }
 
     /// Sigma of the position over samples, RMS of the length, m.
-    pub(super) fn sigma_m(&self, samples: &[Stop]) -> f64 {
-        let square = |s: &Stop| {
+    pub(super) fn sigma_m(&self, samples: &[Posture]) -> f64 {
+        let square = |s: &Posture| {
             let c = self.propagated(&self.derivative(s).1, self.covariance);
             (0..3).map(|k| c[(k, k)]).sum::<f64>().max(0.0)
         };

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::advice::{Advice, Adviser};
 use super::stops::{LEAST_SHARE, StopsKnowledge, Structural, structural};
 use crate::linalg::symmetric_eigen;
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 use crate::problem::{Layout, short_name};
 
 /// Correlation from which two parameters are hard to tell apart.
@@ -108,7 +108,7 @@ pub struct Identifiability {
 }
 
 /// Before the solve: what `stops` can tell.
-pub fn identifiability_of_stops(robot: &Robot, layout: &Layout, stops: &[Stop]) -> Option<Identifiability> {
+pub fn identifiability_of_stops(robot: &Robot, layout: &Layout, stops: &[Posture]) -> Option<Identifiability> {
     let known = StopsKnowledge::new(robot, layout, stops)?;
     let n = known.columns.len();
     let posterior = known.covariance.view((0, 0), (n, n)).into_owned();
@@ -121,7 +121,7 @@ pub fn identifiability_of_stops(robot: &Robot, layout: &Layout, stops: &[Stop]) 
 pub fn identifiability(
     robot: &Robot,
     layout: &Layout,
-    stops: &[Stop],
+    stops: &[Posture],
     covariance: &DMatrix<f64>,
 ) -> Option<Identifiability> {
     let known = StopsKnowledge::new(robot, layout, stops)?;
@@ -144,7 +144,7 @@ pub fn identifiability(
 fn judge(
     robot: &Robot,
     layout: &Layout,
-    stops: &[Stop],
+    stops: &[Posture],
     known: StopsKnowledge,
     values: &DVector<f64>,
     vectors: &DMatrix<f64>,
@@ -181,7 +181,7 @@ fn judge(
 }
 
 /// Smallest and largest reading of every joint.
-fn covered(robot: &Robot, stops: &[Stop]) -> Vec<(String, f64, f64)> {
+fn covered(robot: &Robot, stops: &[Posture]) -> Vec<(String, f64, f64)> {
     let range = |r: usize| {
         let readings = stops.iter().map(|s| s.readings[r]);
         (readings.clone().fold(f64::INFINITY, f64::min), readings.fold(f64::NEG_INFINITY, f64::max))

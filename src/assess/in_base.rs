@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, Matrix6};
 
 use crate::geom::{Pose, adjoint};
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 use crate::problem::Layout;
 
 /// Root of the summed variances of the three axes of a point of the tip in the base frame, m.
@@ -19,7 +19,7 @@ pub fn sigma_in_base(
     readings: &[f64],
     tip_from_tool: &Pose,
 ) -> f64 {
-    let kinematics = robot.kinematics(&Stop::at(readings), &vec![0.0; readings.len()]);
+    let kinematics = robot.kinematics(&Posture::at(readings), &vec![0.0; readings.len()]);
     let to_tool = adjoint(&tip_from_tool.inverse());
     let mut j = DMatrix::zeros(6, layout.theta_len());
     for (k, d) in kinematics.d_twists.iter().enumerate() {

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3x6, Vector3, Vector6};
 use crate::geom::{Pose, skew};
 use crate::linalg::{SymmetricFactor, product};
 use crate::model::joint_terms::LOCAL_RANGE;
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 
 /// One point as a tracker saw it.
 #[derive(Debug, Clone, PartialEq)]
@@ -177,7 +177,7 @@ impl PointFit {
         let mut by_noise = DMatrix::zeros(3 * n, n * readings);
         let mut fitted = DMatrix::zeros(3 * n, 9);
         for (k, p) in points.iter().enumerate() {
-            let kinematics = robot.kinematics(&Stop::at(&p.readings), &vec![0.0; readings]);
+            let kinematics = robot.kinematics(&Posture::at(&p.readings), &vec![0.0; readings]);
             let tip = kinematics.base_from_tip;
             let turned = self.device_from_base.rotation * tip.rotation;
             let mut moved = Matrix3x6::zeros();

@@ -12,7 +12,7 @@ use super::flange::FlangeModel;
 use super::points::{MeasuredPoint, fit_points};
 use super::root_mean_square;
 use crate::model::joint_terms::Term;
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 
 /// Expected error of the position of the flange in the region of the stops, RMS of the length, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -29,7 +29,7 @@ pub struct FlangeErrors {
 
 impl FlangeErrors {
     /// `joint_sigma` is that of the readings at a stop, rad or m; `None` where the nominal robot cannot be laid over the model.
-    pub fn new(model: &FlangeModel, robot: &Robot, joint_sigma: &[f64], stops: &[Stop]) -> Option<Self> {
+    pub fn new(model: &FlangeModel, robot: &Robot, joint_sigma: &[f64], stops: &[Posture]) -> Option<Self> {
         let samples = model.region();
         // Local errors belong to single readings of the series: at others they are noise.
         let whole = with(robot, |t| !matches!(t, Term::Local(_)));
@@ -52,13 +52,13 @@ fn with(robot: &Robot, kept: impl Fn(Term) -> bool) -> Robot {
     robot
 }
 
-fn exact(robot: &Robot, stop: &Stop) -> crate::geom::Pose {
+fn exact(robot: &Robot, stop: &Posture) -> crate::geom::Pose {
     robot.pose_at(stop, &vec![0.0; stop.readings.len()])
 }
 
 /// Distance of the flange between two robots, RMS over samples, right on average over the stops, m.
-fn displacement(a: &Robot, b: &Robot, samples: &[Stop], stops: &[Stop]) -> f64 {
-    let twist = |s: &Stop| (exact(a, s).inverse() * exact(b, s)).log();
+fn displacement(a: &Robot, b: &Robot, samples: &[Posture], stops: &[Posture]) -> f64 {
+    let twist = |s: &Posture| (exact(a, s).inverse() * exact(b, s)).log();
     let mean = stops.iter().map(twist).sum::<Vector6<f64>>() / stops.len().max(1) as f64;
     let squares: Vec<(f64, f64)> =
         samples.iter().map(|s| ((twist(s) - mean).fixed_rows::<3>(0).norm_squared(), 1.0)).collect();
@@ -66,8 +66,8 @@ fn displacement(a: &Robot, b: &Robot, samples: &[Stop], stops: &[Stop]) -> f64 {
 }
 
 /// What the noise of a stop does to the position of the flange, RMS over samples, m.
-fn scatter_m(robot: &Robot, joint_sigma: &[f64], samples: &[Stop]) -> f64 {
-    let square = |s: &Stop| {
+fn scatter_m(robot: &Robot, joint_sigma: &[f64], samples: &[Posture]) -> f64 {
+    let square = |s: &Posture| {
         let by_readings = robot.kinematics(s, &vec![0.0; s.readings.len()]).d_readings;
         by_readings.iter().zip(joint_sigma).map(|(d, sigma)| d.fixed_rows::<3>(0).norm_squared() * sigma * sigma).sum()
     };

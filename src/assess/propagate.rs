@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Matrix6};
 
 use crate::geom::{Pose, adjoint};
-use crate::model::robot::Stop;
+use crate::model::robot::Posture;
 use crate::problem::{Image, Problem, Slack};
 use crate::solve::Fit;
 
@@ -60,7 +60,7 @@ pub fn predict_pose(fit: &Fit, view: View, readings: &[f64]) -> Option<Predicted
         placement: view.placement,
         plate: 0,
         mount: view.mount,
-        stop: Some(Stop::at(readings)),
+        stop: Some(Posture::at(readings)),
         observations: Vec::new(),
         local_share: Vec::new(),
         rejected: None,

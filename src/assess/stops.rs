@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix6};
 
 use crate::geom::adjoint;
 use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 use crate::problem::Layout;
 use crate::urdf::JointKind;
 
@@ -51,7 +51,7 @@ pub struct StopsKnowledge {
 
 impl StopsKnowledge {
     /// Knowledge from `stops`; `None` where readings are not finite.
-    pub fn new(robot: &Robot, layout: &Layout, stops: &[Stop]) -> Option<Self> {
+    pub fn new(robot: &Robot, layout: &Layout, stops: &[Posture]) -> Option<Self> {
         let columns = robot_columns(layout);
         let scale: Vec<f64> = columns.iter().map(|&c| layout.columns[c].prior_sigma).collect();
         let n = columns.len();
@@ -76,7 +76,7 @@ impl StopsKnowledge {
     }
 
     /// Jacobian of the pose of the tip as a body twist (6 x parameters and frames) in units of the priors, and its noise.
-    pub fn measurement(&self, robot: &Robot, layout: &Layout, stop: &Stop) -> (DMatrix<f64>, Matrix6<f64>) {
+    pub fn measurement(&self, robot: &Robot, layout: &Layout, stop: &Posture) -> (DMatrix<f64>, Matrix6<f64>) {
         let readings = stop.readings.len();
         let kinematics = robot.kinematics(stop, &vec![0.0; readings]);
         let n = self.columns.len();
@@ -137,13 +137,13 @@ fn halton(mut index: usize, base: usize) -> f64 {
 const PRIMES: [usize; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
 
 /// Stops that fill the whole range of all joints, reached from all sides.
-pub fn ideal_stops(robot: &Robot) -> Vec<Stop> {
+pub fn ideal_stops(robot: &Robot) -> Vec<Posture> {
     let ranges: Vec<(f64, f64)> = (0..robot.chain.readings.len()).map(|r| range_of(robot, r)).collect();
     halton_stops(&ranges, IDEAL_STOPS)
 }
 
 /// Stops that fill ranges (rad or m) of all readings evenly.
-pub(super) fn halton_stops(ranges: &[(f64, f64)], count: usize) -> Vec<Stop> {
+pub(super) fn halton_stops(ranges: &[(f64, f64)], count: usize) -> Vec<Posture> {
     let readings = ranges.len();
     let point = |index: usize, r: usize| halton(index + 7 * (r / PRIMES.len()), PRIMES[r % PRIMES.len()]);
     (1..=count)
@@ -153,7 +153,7 @@ pub(super) fn halton_stops(ranges: &[(f64, f64)], count: usize) -> Vec<Stop> {
                 low + (high - low) * point(k, r)
             };
             let approach = (0..readings).map(|r| point(k + 311, r) - 0.5).collect();
-            Stop { readings: (0..readings).map(at).collect(), approach: Some(approach) }
+            Posture { readings: (0..readings).map(at).collect(), approach: Some(approach) }
         })
         .collect()
 }

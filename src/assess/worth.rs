@@ -7,7 +7,7 @@ use crate::assess::{
     usual_joint_sigma,
 };
 use crate::geom::Pose;
-use crate::model::robot::Stop;
+use crate::model::robot::Posture;
 use crate::problem::{Adjustment, Noise, Problem, Slack};
 use crate::series::CameraMount;
 use crate::solve::{Covariance, Fit, JOINT_NOISE_FLOOR, NoiseInformation, NoiseUncertainty, noise_information};
@@ -39,7 +39,7 @@ pub struct Worth {
 }
 
 /// Stops of the images in use.
-pub fn stops(problem: &Problem) -> Vec<Stop> {
+pub fn stops(problem: &Problem) -> Vec<Posture> {
     problem.used().filter_map(|(_, i)| i.stop.clone()).collect()
 }
 

@@ -6,7 +6,7 @@ use super::local_errors::{local_share, local_terms};
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 use crate::problem::{
     Adjustment, Family, Image, ImageRejection, Layout, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape,
     Problem, Slack, State, hold_scale_bars,
@@ -83,7 +83,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool) -> Re
                 placement: intern(&mut placements, &stop.placement),
                 plate,
                 mount: s.mount,
-                stop: stop.readings.clone().map(|readings| Stop { readings, approach }),
+                stop: stop.readings.clone().map(|readings| Posture { readings, approach }),
                 observations,
                 local_share: Vec::new(),
                 rejected,

@@ -5,20 +5,20 @@ use crate::assess::{Identifiability, identifiability_of_stops};
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
-use crate::model::robot::Stop;
+use crate::model::robot::Posture;
 use crate::problem::{Layout, PlateShape, State};
 use crate::series::{Series, StopOrder};
 use crate::urdf::Chain;
 
 /// Stops of series with the step from the stop before, in the order of the rows.
-fn stops(series: &[Series], chain: &Chain) -> Result<Vec<Stop>> {
+fn stops(series: &[Series], chain: &Chain) -> Result<Vec<Posture>> {
     let mut stops = Vec::new();
     for s in series {
         let known = s.manifest.robot.order == StopOrder::Visited;
         let mut previous: Option<Vec<f64>> = None;
         for readings in s.readings_for(chain)?.into_iter().flatten() {
             let step = |before: &Vec<f64>| readings.iter().zip(before).map(|(b, a)| b - a).collect();
-            stops.push(Stop { approach: previous.as_ref().filter(|_| known).map(step), readings: readings.clone() });
+            stops.push(Posture { approach: previous.as_ref().filter(|_| known).map(step), readings: readings.clone() });
             previous = Some(readings);
         }
     }

@@ -7,7 +7,7 @@ use nalgebra::{Matrix6, Vector6};
 use rand::{Rng, RngExt};
 
 use crate::geom::Pose;
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 use crate::urdf::{Chain, JointKind};
 
 /// Newton steps before a start is given up.
@@ -76,9 +76,9 @@ pub struct Stalled {
 
 impl Reach<'_> {
     /// The stop at these readings, with its approach.
-    pub fn stop(&self, readings: &[f64]) -> Stop {
+    pub fn stop(&self, readings: &[f64]) -> Posture {
         let approach = self.previous.map(|p| readings.iter().zip(p).map(|(q, p)| q - p).collect());
-        Stop { readings: readings.to_vec(), approach }
+        Posture { readings: readings.to_vec(), approach }
     }
 
     /// Readings that bring the tip to `base_from_tip`: of all steps that lead there the shortest ones from `start`.

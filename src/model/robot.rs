@@ -8,14 +8,14 @@ use crate::urdf::{CarriedMass, Chain, Joint, JointKind};
 
 /// Where the robot stood: readings in the order of [`Chain::readings`], rad or m.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stop {
+pub struct Posture {
     /// Readings.
     pub readings: Vec<f64>,
     /// Step of every reading from the stop before; `None` for the first stop or an unknown order.
     pub approach: Option<Vec<f64>>,
 }
 
-impl Stop {
+impl Posture {
     /// A stop that was reached from nowhere in particular.
     pub fn at(readings: &[f64]) -> Self {
         Self { readings: readings.to_vec(), approach: None }
@@ -76,11 +76,11 @@ impl Robot {
 
     /// Pose of the tip for exact readings at a stop of unknown approach.
     pub fn base_from_tip(&self, readings: &[f64]) -> Pose {
-        self.pose_at(&Stop::at(readings), &vec![0.0; readings.len()])
+        self.pose_at(&Posture::at(readings), &vec![0.0; readings.len()])
     }
 
     /// Pose of the tip at a stop whose true positions lie `noise` (rad or m) beside what readings and terms say.
-    pub fn pose_at(&self, stop: &Stop, noise: &[f64]) -> Pose {
+    pub fn pose_at(&self, stop: &Posture, noise: &[f64]) -> Pose {
         let positions = self.positions(stop, noise).0;
         let mut pose = Pose::identity();
         for (i, joint) in self.chain.joints.iter().enumerate() {
@@ -91,7 +91,7 @@ impl Robot {
 
     /// Pose behind every joint of the chain, in the base frame, for exact readings.
     pub fn link_poses(&self, readings: &[f64]) -> Vec<Pose> {
-        let positions = self.positions(&Stop::at(readings), &vec![0.0; readings.len()]).0;
+        let positions = self.positions(&Posture::at(readings), &vec![0.0; readings.len()]).0;
         let mut pose = Pose::identity();
         let behind = |(i, joint): (usize, &Joint)| {
             pose = pose * joint.origin * Pose::exp(&self.twists[i]) * motion(joint, positions[i]);
@@ -108,12 +108,12 @@ impl Robot {
     }
 
     /// As [`Robot::pose_at`], with all derivatives.
-    pub fn kinematics(&self, stop: &Stop, noise: &[f64]) -> Kinematics {
+    pub fn kinematics(&self, stop: &Posture, noise: &[f64]) -> Kinematics {
         self.kinematics_from(&self.moved_origins(), stop, noise)
     }
 
     /// As [`Robot::kinematics`], where the origins of this robot are at hand.
-    pub fn kinematics_from(&self, origins: &MovedOrigins, stop: &Stop, noise: &[f64]) -> Kinematics {
+    pub fn kinematics_from(&self, origins: &MovedOrigins, stop: &Posture, noise: &[f64]) -> Kinematics {
         let (positions, contexts) = self.positions(stop, noise);
         let joints = &self.chain.joints;
         let mut d_twists = vec![Matrix6::zeros(); joints.len()];
@@ -135,7 +135,7 @@ impl Robot {
     }
 
     /// Local error of every reading at a stop, rad or m.
-    pub fn local_errors(&self, stop: &Stop) -> Vec<f64> {
+    pub fn local_errors(&self, stop: &Posture) -> Vec<f64> {
         let mut errors = vec![0.0; stop.readings.len()];
         for t in &self.terms {
             errors[t.reading] += t.local_basis(stop.readings[t.reading]).map_or(0.0, |basis| t.value * basis);
@@ -214,7 +214,7 @@ impl Robot {
     }
 
     /// True position of every joint of the chain, and the context of the terms of every reading.
-    fn positions(&self, stop: &Stop, noise: &[f64]) -> (Vec<f64>, Vec<TermContext>) {
+    fn positions(&self, stop: &Posture, noise: &[f64]) -> (Vec<f64>, Vec<TermContext>) {
         let mut contexts: Vec<TermContext> = (0..stop.readings.len())
             .map(|r| TermContext {
                 reading: stop.readings[r],

@@ -12,7 +12,7 @@ use crate::geom::Pose;
 use crate::identify::RobotModel;
 use crate::model::camera::{Camera, Lens};
 use crate::model::joint_terms::JointTerm;
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 use crate::plan::setting::Setting;
 use crate::problem::{Image, Measured};
 use crate::series::{Marker, Plate};
@@ -158,7 +158,7 @@ fn plate(record: &SolutionRecord, index: usize) -> Plate {
 /// An image of the solution with the observations in use, at the place where they are predicted.
 fn taken(image: &ImageRecord, pixel_factor: f64, record: &SolutionRecord) -> Image {
     let plate = &record.plates[image.plate];
-    let stop = image.readings.clone().map(|readings| Stop { readings, approach: image.approach.clone() });
+    let stop = image.readings.clone().map(|readings| Posture { readings, approach: image.approach.clone() });
     Image {
         name: image.name.clone(),
         series: 0,

@@ -12,7 +12,7 @@ use crate::identify::Options;
 use crate::model::camera::Camera;
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes::MODES;
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 use crate::problem::{Layout, PlateShape, Slack, State};
 use crate::problem::{MeasuredSeries, MeasuredStop};
 use crate::series::{CameraMount, Marker, Observation, Plate};
@@ -135,7 +135,7 @@ pub struct FoundModel {
     /// Covariance of the columns of `layout`, m and rad.
     pub covariance: DMatrix<f64>,
     /// Stops of the images in use.
-    pub stops: Vec<Stop>,
+    pub stops: Vec<Posture>,
 }
 
 /// The model of a record.
@@ -181,7 +181,7 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
     }
     let at = |i: usize, j: usize| record.covariance_lower[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
     let used = || record.images.iter().filter(|i| i.reason.is_none());
-    let stop = |i: &ImageRecord| i.readings.clone().map(|readings| Stop { readings, approach: i.approach.clone() });
+    let stop = |i: &ImageRecord| i.readings.clone().map(|readings| Posture { readings, approach: i.approach.clone() });
     let still = used().find(|i| i.readings.is_some()).map(|i| match i.camera_mount {
         CameraMount::Hand => (state.placements[i.placement], layout.placements[i.placement].start),
         CameraMount::Fixed => (state.mountings[i.mounting], layout.mountings[i.mounting].start),

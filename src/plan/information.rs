@@ -7,7 +7,7 @@ use super::criterion::Criterion;
 use super::setting::Setting;
 use crate::geom::skew;
 use crate::linalg::{product, symmetric_eigen};
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 use crate::problem::{self, Adjustment, Image, Problem, Weighting, by_columns, linearise};
 
 /// Information of an image about all columns; `None` where it shows nothing.
@@ -155,7 +155,7 @@ pub fn flange_weight(problem: &Problem, robot: &Robot, targets: &[Vec<f64>]) -> 
     let mut d = DMatrix::zeros(rows, layout.len());
     let mut gauge = DMatrix::zeros(rows, GAUGE);
     for (k, readings) in targets.iter().enumerate() {
-        let kinematics = robot.kinematics(&Stop::at(readings), &vec![0.0; readings.len()]);
+        let kinematics = robot.kinematics(&Posture::at(readings), &vec![0.0; readings.len()]);
         let tip = kinematics.base_from_tip;
         for (i, twist) in kinematics.d_twists.iter().enumerate() {
             let moved = tip.rotation * twist.fixed_rows::<3>(0);

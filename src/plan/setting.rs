@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Matrix2, Vector2};
 use super::visibility::seen_markers;
 use crate::geom::Pose;
 use crate::model::camera::Camera;
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 use crate::problem::{Adjustment, Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State, predict};
 use crate::series::{CameraMount, Edge, Plate};
 
@@ -94,7 +94,7 @@ impl Setting {
             placement,
             plate: 0,
             mount: self.mount,
-            stop: Some(Stop::at(readings)),
+            stop: Some(Posture::at(readings)),
             observations: Vec::new(),
             local_share: Vec::new(),
             rejected: None,

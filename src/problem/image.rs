@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::rejection::{ImageRejection, ObservationRejection};
-use crate::model::robot::Stop;
+use crate::model::robot::Posture;
 use crate::series::{CameraMount, Edge};
 
 /// One observation, ready for the adjustment.
@@ -41,7 +41,7 @@ pub struct Image {
     /// Where the camera is.
     pub mount: CameraMount,
     /// Joint readings; `None` for an image taken off the robot.
-    pub stop: Option<Stop>,
+    pub stop: Option<Posture>,
     /// Observations, ordered by marker.
     pub observations: Vec<Measured>,
     /// Share of the local variance of each reading that the local errors of this stop cover; empty where there are none.

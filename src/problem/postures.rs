@@ -1,7 +1,7 @@
 //! Stops that share joint readings: what a joint is off by there, it is off by at all of them.
 
 use super::Image;
-use crate::model::robot::Stop;
+use crate::model::robot::Posture;
 
 /// Readings closer than this, rad or m, are the same posture of a joint.
 const SAME_READING: f64 = 2e-3;
@@ -10,7 +10,7 @@ const SAME_READING: f64 = 2e-3;
 const FEWEST_IN_COMMON: usize = 2;
 
 /// Readings that two stops have in common; empty where it may be chance.
-pub fn common_readings(a: &Stop, b: &Stop) -> Vec<usize> {
+pub fn common_readings(a: &Posture, b: &Posture) -> Vec<usize> {
     let same: Vec<usize> = (a.readings.iter().zip(&b.readings).enumerate())
         .filter(|(_, (a, b))| (*a - *b).abs() < SAME_READING)
         .map(|(r, _)| r)
@@ -55,7 +55,8 @@ mod tests {
 
     #[test]
     fn one_reading_in_common_is_chance_two_are_a_posture() {
-        let (a, b, c) = (Stop::at(&[0.1, 0.2, 0.3]), Stop::at(&[0.1005, 0.9, 0.8]), Stop::at(&[0.1, 0.2, -0.3]));
+        let (a, b, c) =
+            (Posture::at(&[0.1, 0.2, 0.3]), Posture::at(&[0.1005, 0.9, 0.8]), Posture::at(&[0.1, 0.2, -0.3]));
         assert!(common_readings(&a, &b).is_empty());
         assert_eq!(common_readings(&a, &c), [0, 1]);
     }

@@ -11,7 +11,7 @@ use nalgebra::{Vector3, Vector6};
 use super::field::Edit;
 use super::text_file::TextFile;
 use crate::geom::{adjoint, exp_so3};
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 
 /// An angle this near to a border (rad) belongs to both sides.
 const BORDER: f64 = 1e-5;
@@ -55,7 +55,7 @@ pub struct Branch {
 impl Branch {
     /// Of the arm with these six axes (readings) at `q`; the base frame's x is forward.
     pub fn of(robot: &Robot, axes: &[usize; 6], q: &[f64]) -> Self {
-        let k = robot.kinematics(&Stop::at(q), &vec![0.0; q.len()]);
+        let k = robot.kinematics(&Posture::at(q), &vec![0.0; q.len()]);
         let to_base = adjoint(&k.base_from_tip);
         let line = |axis: usize| {
             let twist: Vector6<f64> = to_base * k.d_readings[axes[axis]];

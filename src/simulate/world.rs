@@ -22,7 +22,7 @@ use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::plate_modes::{PRIOR_SIGMA, basis};
-use crate::model::robot::{Robot, Stop as Visit};
+use crate::model::robot::{Posture, Robot};
 use crate::series::{AngleUnit, CameraSection, ImageObservations, Manifest, Plate, Stop, Stops};
 use crate::urdf::JointKind;
 
@@ -158,7 +158,7 @@ impl World<'_> {
             let approach = before.map(|b| readings.iter().zip(b).map(|(q, p)| q - p).collect());
             let noise: Vec<f64> =
                 kinds.iter().map(|&k| normal(scaled(request.joint_noise_rad, k), &mut self.rng)).collect();
-            let tip = self.actual.pose_at(&Visit { readings: readings.clone(), approach }, &noise);
+            let tip = self.actual.pose_at(&Posture { readings: readings.clone(), approach }, &noise);
             let camera_from_plate = self.setup.camera_from_plate(request.mount, &tip, at);
             let seen =
                 observe(&self.true_plate, &request.camera, &camera_from_plate, request.pixel_sigma_px, &mut self.rng);

@@ -24,7 +24,7 @@ use crate::fit::Fit;
 use crate::geom::Pose;
 use crate::identify::{Options, RobotModel, Solution, identify};
 use crate::linalg::SymmetricFactor;
-use crate::model::robot::{Robot, Stop};
+use crate::model::robot::{Posture, Robot};
 use crate::problem::{Adjustment, Problem, Slack, State};
 use crate::series::{Plate, PlateKind};
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
@@ -326,7 +326,7 @@ fn free_pose_error(s: &Solution, world: &SimulatedSeries) -> Option<ErrorWithCov
 pub fn flange_error(s: &Solution, world: &SimulatedSeries, truth: &Robot) -> Option<ErrorWithCovariance> {
     let mut image = s.fit.problem.images.iter().find(|i| i.stop.is_some())?.clone();
     let readings = &world.truth.held_out.first()?.readings;
-    image.stop = Some(Stop::at(readings));
+    image.stop = Some(Posture::at(readings));
     let exact = Slack::exact(readings.len(), false);
     let chain = s.fit.state.chained(&s.fit.problem.layout, &image, &exact)?;
     let (theta, mounting) = (s.fit.problem.layout.theta_len(), s.fit.problem.layout.mountings[0].clone());

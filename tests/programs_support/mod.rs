@@ -11,7 +11,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use robotcal::geom::Pose;
 use robotcal::model::joint_terms::{JointTerm, Term};
-use robotcal::model::robot::{Robot, Stop};
+use robotcal::model::robot::{Posture, Robot};
 use robotcal::urdf::{Chain, patch_origins, read};
 
 /// A nominal robot, and the real one as corrected URDF and compensation.toml.
@@ -102,7 +102,7 @@ impl Cell {
                 .iter()
                 .map(|(low, high)| self.rng.random_range(low.max(-2.5) + 0.2..high.min(2.5) - 0.2))
                 .collect();
-            let mut columns = self.nominal.kinematics(&Stop::at(&q), &vec![0.0; q.len()]).d_readings;
+            let mut columns = self.nominal.kinematics(&Posture::at(&q), &vec![0.0; q.len()]).d_readings;
             held.into_iter().for_each(|h| columns[h].fill(0.0));
             let jacobian = nalgebra::Matrix6xX::from_columns(&columns);
             if (jacobian.clone() * jacobian.transpose()).symmetric_eigenvalues().min() > 0.1f64.powi(2) {
@@ -114,7 +114,7 @@ impl Cell {
     /// Where the real robot ends at `q`, coming from `before`.
     pub fn real_at(&self, q: &[f64], before: Option<&[f64]>) -> Pose {
         let approach = before.map(|b| q.iter().zip(b).map(|(q, b)| q - b).collect());
-        self.real.pose_at(&Stop { readings: q.to_vec(), approach }, &vec![0.0; q.len()])
+        self.real.pose_at(&Posture { readings: q.to_vec(), approach }, &vec![0.0; q.len()])
     }
 
     pub fn write(&self, name: &str, text: &[u8]) -> PathBuf {

@@ -17,7 +17,7 @@ use robotcal::identify::{
     Config, JointNoise, Options, Parameters, RobotModel, Selection, Solution, StatedPrior, identify, verify_series,
 };
 use robotcal::model::joint_terms::{JointTerm, Term};
-use robotcal::model::robot::{Robot, Stop};
+use robotcal::model::robot::{Posture, Robot};
 use robotcal::output::difference::compare_solutions;
 use robotcal::output::restore::{found_model, measured_series, robot_description};
 use robotcal::output::{files, solution_json};
@@ -57,7 +57,7 @@ fn a_six_axis_arm_has_eighteen_geometric_parameters_of_its_own() {
     assert!(found.unknown.iter().all(|d| d.cause != Cause::Stops));
 }
 
-fn told(stops: &[Stop], model: RobotModel) -> Identifiability {
+fn told(stops: &[Posture], model: RobotModel) -> Identifiability {
     let (robot, layout) = layout(model);
     identifiability_of_stops(&robot, &layout, stops).unwrap()
 }
@@ -89,7 +89,7 @@ fn a_joint_that_stands_still_is_named_with_what_to_do() {
 fn visiting_every_stop_twice_doubles_the_information() {
     let (robot, _) = layout(RobotModel::Rigid);
     let once = ideal_stops(&robot);
-    let twice: Vec<Stop> = once.iter().chain(&once).cloned().collect();
+    let twice: Vec<Posture> = once.iter().chain(&once).cloned().collect();
     let (a, b) = (told(&once, RobotModel::Rigid).observability, told(&twice, RobotModel::Rigid).observability);
     let (a, b) = (a.unwrap(), b.unwrap());
     let root = 2f64.sqrt();
@@ -214,13 +214,13 @@ fn the_flange_scatters_as_its_covariance_says() {
             }
         }
         let moved = still.perturbed(&twist);
-        let error = |stop: &Stop| {
+        let error = |stop: &Posture| {
             let noise = vec![0.0; 6];
             let before = still.inverse() * model.robot.pose_at(stop, &noise);
             (before.inverse() * (moved.inverse() * robot.pose_at(stop, &noise))).log()
         };
         let mean = model.stops.iter().map(error).sum::<Vector6<f64>>() / model.stops.len() as f64;
-        let e = error(&Stop::at(&readings)) - mean;
+        let e = error(&Posture::at(&readings)) - mean;
         sum += e * e.transpose();
     }
     let found = sum / DRAWS as f64;
@@ -265,8 +265,13 @@ fn true_robot(truth: &Truth) -> Robot {
 }
 
 /// Error of the flange relative to the plate at `q`, right on average over the stops, RMS, m; `still` is the plate in the base.
-fn relative_error_m(found: (&Robot, &Pose), truth: (&Robot, &Pose), stops: &[Stop], q: &[(Stop, Vec<f64>)]) -> f64 {
-    let error = |stop: &Stop, noise: &[f64]| {
+fn relative_error_m(
+    found: (&Robot, &Pose),
+    truth: (&Robot, &Pose),
+    stops: &[Posture],
+    q: &[(Posture, Vec<f64>)],
+) -> f64 {
+    let error = |stop: &Posture, noise: &[f64]| {
         let model = found.1.inverse() * found.0.pose_at(stop, &[0.0; 6]);
         (model.inverse() * (truth.1.inverse() * truth.0.pose_at(stop, noise))).log()
     };
@@ -289,7 +294,7 @@ fn what_is_promised_of_the_flange_is_what_is_found() {
         let plate = made.truth.plate_poses.values().next().unwrap().pose();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let covered = &solution.worth.identifiability.as_ref().unwrap().covered;
-        let places: Vec<(Stop, Vec<f64>)> = (0..400)
+        let places: Vec<(Posture, Vec<f64>)> = (0..400)
             .map(|_| {
                 let readings: Vec<f64> = covered.iter().map(|(_, low, high)| rng.random_range(*low..*high)).collect();
                 let noise = (0..6)
@@ -298,7 +303,7 @@ fn what_is_promised_of_the_flange_is_what_is_found() {
                         x * SIGMA
                     })
                     .collect();
-                (Stop::at(&readings), noise)
+                (Posture::at(&readings), noise)
             })
             .collect();
         let whole = Robot {
@@ -315,12 +320,12 @@ fn what_is_promised_of_the_flange_is_what_is_found() {
         };
         let mut urdf = whole.clone();
         urdf.terms.retain(|t| t.term == Term::Offset);
-        let point = |(s, noise): &(Stop, Vec<f64>)| MeasuredPoint {
+        let point = |(s, noise): &(Posture, Vec<f64>)| MeasuredPoint {
             position_m: truth.pose_at(s, noise).translation,
             readings: s.readings.clone(),
         };
         let points: Vec<MeasuredPoint> = places.iter().map(point).collect();
-        let stops: Vec<Stop> = solution.fit.problem.used().filter_map(|(_, i)| i.stop.clone()).collect();
+        let stops: Vec<Posture> = solution.fit.problem.used().filter_map(|(_, i)| i.stop.clone()).collect();
         let of = |robot: &Robot| {
             relative_error_m((robot, &solution.fit.state.placements[0]), (&truth, &plate), &stops, &places)
         };

@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal, Uniform};
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
-use robotcal::model::robot::{Robot, Stop};
+use robotcal::model::robot::{Posture, Robot};
 use robotcal::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State, predict};
 use robotcal::problem::{MeasuredSeries, MeasuredStop};
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
@@ -199,7 +199,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
             placement: i % request.placements,
             plate: 0,
             mount: request.mount,
-            stop: Some(Stop {
+            stop: Some(Posture {
                 readings: centre.iter().map(|c| c + dice.between(-0.3, 0.3)).collect(),
                 approach: (i > 0).then(|| (0..readings).map(|_| dice.normal(2e-3)).collect()),
             }),

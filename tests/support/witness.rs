@@ -8,7 +8,7 @@ use num_dual::{Dual64, DualNum};
 use robotcal::geom::Pose;
 use robotcal::model::camera::Lens;
 use robotcal::model::joint_terms::Term;
-use robotcal::model::robot::{Robot, Stop};
+use robotcal::model::robot::{Posture, Robot};
 use robotcal::problem::{Image, Layout, Measured, Slack, State};
 use robotcal::series::CameraMount;
 use robotcal::urdf::{Chain, JointKind};
@@ -101,7 +101,7 @@ fn levers(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
 
 /// Moment of gravity on the axis of `reading`: how fast a unit lever, fixed in its own link (`which` 0, 1) or in the link after
 /// the next moving joint (2, 3), comes down as the joint moves. For a prismatic joint: how fast the link comes down.
-fn gravity(chain: &Chain, stop: &Stop, reading: usize, which: usize) -> f64 {
+fn gravity(chain: &Chain, stop: &Posture, reading: usize, which: usize) -> f64 {
     let own = chain.joints.iter().position(|j| j.drive.is_some_and(|d| d.reading == reading)).unwrap();
     let next = (own + 1..chain.joints.len()).find(|&k| chain.joints[k].drive.is_some());
     let Some(carrier) = (if which < 2 { Some(own) } else { next }) else { return 0.0 };
@@ -120,7 +120,7 @@ fn gravity(chain: &Chain, stop: &Stop, reading: usize, which: usize) -> f64 {
 }
 
 /// Moment of the masses behind a joint over the largest that it can be: how fast they come down together.
-fn sag(chain: &Chain, stop: &Stop, reading: usize) -> f64 {
+fn sag(chain: &Chain, stop: &Posture, reading: usize) -> f64 {
     let own = chain.joints.iter().position(|j| j.drive.is_some_and(|d| d.reading == reading)).unwrap();
     let mut pose = D4::identity();
     let (mut falls, mut largest) = (0.0, 0.0);
@@ -143,7 +143,7 @@ fn sag(chain: &Chain, stop: &Stop, reading: usize) -> f64 {
     falls / largest
 }
 
-fn phi(robot: &Robot, stop: &Stop, reading: usize, term: Term) -> f64 {
+fn phi(robot: &Robot, stop: &Posture, reading: usize, term: Term) -> f64 {
     let q = stop.readings[reading];
     match term {
         Term::Offset => 1.0,
@@ -158,7 +158,7 @@ fn phi(robot: &Robot, stop: &Stop, reading: usize, term: Term) -> f64 {
 }
 
 /// `base_from_tip`.
-pub fn base_from_tip(robot: &Robot, layout: &Layout, stop: &Stop, noise: &[f64], seed: Option<Seed>) -> D4 {
+pub fn base_from_tip(robot: &Robot, layout: &Layout, stop: &Posture, noise: &[f64], seed: Option<Seed>) -> D4 {
     let column = |c: usize, x: f64| variable(x, seed == Some(Seed::Column(c)));
     let mut moved: Vec<D> = (0..stop.readings.len())
         .map(|r| constant(stop.readings[r]) + variable(noise[r], seed == Some(Seed::Slack(r))))

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 use robotcal::model::circle;
 use robotcal::model::inverse;
-use robotcal::model::robot::{Robot, Stop};
+use robotcal::model::robot::{Posture, Robot};
 use robotcal::plan::plate_design::{PlateRequest, design};
 use robotcal::series::{AngleUnit, CameraMount, Edge, Plate, Source};
 use robotcal::simulate::conditions::ImagingConditions;
@@ -52,7 +52,7 @@ fn assert_consistent(made: &SimulatedSeries, chain: &Chain) {
         let readings = si_readings(made, k);
         let approach = before.as_ref().map(|b| readings.iter().zip(b).map(|(q, p)| q - p).collect());
         before = Some(readings.clone());
-        let tip = robot.pose_at(&Stop { readings, approach }, &stop.joint_noise);
+        let tip = robot.pose_at(&Posture { readings, approach }, &stop.joint_noise);
         let plate = made.truth.plate_poses[&stop.placement].pose();
         let expected = made.truth.camera_mount.camera_from_plate(&camera, &tip, &plate);
         let (angle, distance) = expected.distance(&stop.camera_from_plate.pose());
