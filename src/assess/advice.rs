@@ -6,6 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
+use super::limits::Limits;
 use super::stops::{StopsKnowledge, Structural, range_of};
 use crate::model::robot::{Posture, Robot};
 use crate::problem::Layout;
@@ -17,14 +18,8 @@ const VALUES: usize = 13;
 /// Stops of which one joint is changed.
 const BASES: usize = 4;
 
-/// Share of the variance that a stop must remove to be worth a word.
-const LEAST_GAIN: f64 = 0.02;
-
 /// Most proposals.
 const MOST_NEXT: usize = 4;
-
-/// Range of readings below which a joint stands still, rad or m.
-const STANDS_STILL: f64 = 0.02;
 
 /// A proposal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -55,6 +50,7 @@ pub(super) struct Adviser<'a> {
     covariance: DMatrix<f64>,
     covered: Vec<(f64, f64)>,
     candidates: Vec<Candidate>,
+    limits: &'a Limits,
 }
 
 impl<'a> Adviser<'a> {
@@ -64,6 +60,7 @@ impl<'a> Adviser<'a> {
         stops: &[Posture],
         known: &StopsKnowledge,
         never: &'a Structural,
+        limits: &'a Limits,
     ) -> Self {
         let readings = robot.chain.readings.len();
         let n = known.columns.len();
@@ -96,6 +93,7 @@ impl<'a> Adviser<'a> {
             covariance: known.covariance.view((0, 0), (n, n)).into_owned(),
             covered: (0..readings).map(range).collect(),
             candidates,
+            limits,
         }
     }
 
@@ -131,7 +129,7 @@ impl<'a> Adviser<'a> {
 
     /// What to do about one direction.
     pub fn in_words(&self, direction: Option<&DVector<f64>>) -> String {
-        match self.ranked(direction).first().filter(|(_, _, gain)| *gain > LEAST_GAIN) {
+        match self.ranked(direction).first().filter(|(_, _, gain)| *gain > self.limits.advised_gain) {
             Some(&(reading, value, _)) => self.words(reading, value),
             None => "no single stop helps much: take more stops over the whole range of all joints".into(),
         }
@@ -142,7 +140,7 @@ impl<'a> Adviser<'a> {
         let mut next: Vec<Advice> = Vec::new();
         for (reading, value, gain) in self.ranked(None) {
             let joint = &self.robot.chain.readings[reading];
-            if gain < LEAST_GAIN || next.len() == MOST_NEXT {
+            if gain < self.limits.advised_gain || next.len() == MOST_NEXT {
                 break;
             }
             if next.iter().all(|a| a.joint != *joint) {
@@ -165,7 +163,7 @@ impl<'a> Adviser<'a> {
             JointKind::Prismatic => format!("{:.0} mm", 1e3 * v),
             _ => format!("{:.0} deg", v.to_degrees()),
         };
-        if high - low < STANDS_STILL {
+        if high - low < self.limits.stands_still {
             return format!(
                 "move {joint}, which stands at {} in all stops: add stops with {joint} near {}",
                 shown(low),

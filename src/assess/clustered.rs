@@ -12,15 +12,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::limits::Limits;
 use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
 use crate::problem::{E, Layout, by_columns, condensed};
 use crate::solve::{LinearImage, LinearProblem};
-
-/// Largest part of the scatter of one image that counts as taken: beyond it the image alone decides what it is compared with.
-const MOST_TAKEN: f64 = 0.8;
-
-/// Fewest images whose scatter says anything.
-const FEWEST_IMAGES: usize = 10;
 
 /// Covariances of the dense columns with known markers.
 #[derive(Debug, Clone)]
@@ -40,8 +35,8 @@ impl Clustered {
 }
 
 /// Both covariances; `None` for too few images.
-pub fn clustered_covariance(linear: LinearProblem) -> Option<Clustered> {
-    if linear.images().len() < FEWEST_IMAGES {
+pub fn clustered_covariance(linear: LinearProblem, limits: &Limits) -> Option<Clustered> {
+    if linear.images().len() < limits.scatter_images {
         return None;
     }
     let n = linear.adjustment.problem.layout.len();
@@ -51,7 +46,8 @@ pub fn clustered_covariance(linear: LinearProblem) -> Option<Clustered> {
     let mut sandwich = product(&by_prior, &by_prior.transpose());
     for told in &images {
         let d = &told.by_free;
-        let influence = &model * d.tr_mul(&told.restored(&product(d, &product(&model, &d.transpose())))?);
+        let influence =
+            &model * d.tr_mul(&told.restored(&product(d, &product(&model, &d.transpose())), limits.scatter_taken)?);
         sandwich.ger(1.0, &influence, &influence, 1.0);
     }
     let whole = |part: &DMatrix<f64>| {
@@ -118,10 +114,10 @@ impl Told {
         Some(Self { place: k, score: inverse * score, by_root, by_free })
     }
 
-    /// The score with what the fit took of its scatter, of which `taken` is `R' Q R`.
-    fn restored(&self, taken: &DMatrix<f64>) -> Option<DVector<f64>> {
+    /// The score with what the fit took of its scatter, of which `taken` is `R' Q R`; at most `most` of any direction counts.
+    fn restored(&self, taken: &DMatrix<f64>, most: f64) -> Option<DVector<f64>> {
         let (taken, directions) = symmetric_eigen(taken)?;
-        let back = taken.map(|h| (1.0 - h.clamp(0.0, MOST_TAKEN)).sqrt().recip());
+        let back = taken.map(|h| (1.0 - h.clamp(0.0, most)).sqrt().recip());
         Some(&directions * back.component_mul(&directions.tr_mul(&self.score)))
     }
 }

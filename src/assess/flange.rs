@@ -9,6 +9,7 @@
 use nalgebra::{DMatrix, Matrix6};
 use serde::{Deserialize, Serialize};
 
+use super::limits::Limits;
 use super::root_mean_square;
 use super::stops::{halton_stops, range_of};
 use crate::geom::{Pose, adjoint};
@@ -17,9 +18,6 @@ use crate::problem::Layout;
 
 /// Samples of the workspace: so many in the region of the stops, as many within all joint limits.
 const SAMPLES: usize = 250;
-
-/// Part of its covered range by which a joint may lie outside and still count as covered.
-const MARGIN: f64 = 0.05;
 
 /// A flange pose with its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,6 +66,7 @@ pub struct FlangeModel<'a> {
     covariance: &'a DMatrix<f64>,
     mean: DMatrix<f64>,
     covered: Vec<(f64, f64)>,
+    margin: f64,
 }
 
 impl<'a> FlangeModel<'a> {
@@ -79,6 +78,7 @@ impl<'a> FlangeModel<'a> {
         (still, still_column): (Pose, usize),
         covariance: &'a DMatrix<f64>,
         stops: &[Posture],
+        limits: &Limits,
     ) -> Option<Self> {
         let known = (still_column..still_column + 6).all(|c| layout.columns[c].free && covariance[(c, c)] > 0.0);
         if stops.is_empty() || !known {
@@ -99,6 +99,7 @@ impl<'a> FlangeModel<'a> {
             covariance,
             mean: DMatrix::zeros(6, layout.theta_len()),
             covered: (0..readings).map(range).collect(),
+            margin: limits.covered_margin,
         };
         let sum = stops.iter().fold(model.mean.clone(), |sum, s| sum + model.derivative(s).1);
         model.mean = sum / stops.len() as f64;
@@ -127,7 +128,7 @@ impl<'a> FlangeModel<'a> {
         let covariance = self.propagated(&j, self.covariance);
         let outside = (self.covered.iter().zip(readings).zip(&self.robot.chain.readings))
             .filter(|(((low, high), q), _)| {
-                let margin = MARGIN * (high - low);
+                let margin = self.margin * (high - low);
                 **q < low - margin || **q > high + margin
             })
             .map(|(_, name)| name.clone())

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::{DMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::limits::Limits;
 use crate::geom::Pose;
 use crate::init::resect;
 use crate::linalg::symmetric_eigen;
@@ -43,17 +44,13 @@ pub type Refit<'a> = dyn Fn(Adjustment) -> Option<State> + 'a;
 
 const FOLDS: usize = 6;
 
-/// Fewest postures that make up a region of the workspace, and fewest regions: one posture is what a fold leaves out.
-const FEWEST_POSTURES: usize = 2;
-const FEWEST_REGIONS: usize = 3;
-
 /// Joint error that a nominal robot is allowed per stop, rad or m, so that its geometric errors do not bend camera and plate.
 const NOMINAL_JOINT_ERROR: f64 = 3e-3;
 
 /// Predicts every image on the robot by models that have not seen it: of what is calibrated by `fitted`, from the images that are left, which is
 /// [`refitted`] for the joint fit.
-pub fn hold_out(fit: &Adjustment, fitted: &Refit) -> Option<Accuracy> {
-    let folds = folds(&fit.problem)?;
+pub fn hold_out(fit: &Adjustment, fitted: &Refit, limits: &Limits) -> Option<Accuracy> {
+    let folds = folds(&fit.problem, limits)?;
     let nominal = predictions(&nominal(fit), &folds, &joint)?;
     let calibrated = predictions(fit, &folds, fitted)?;
     let mut per_image_mm = vec![None; fit.problem.images.len()];
@@ -77,8 +74,8 @@ fn nominal(fit: &Adjustment) -> Adjustment {
 }
 
 /// Error of every image on the robot, predicted by fits of the free columns to the images of the other folds; `None` for too few.
-pub fn hold_out_images(fit: &Adjustment) -> Option<Vec<(usize, ImageError)>> {
-    predictions(fit, &folds(&fit.problem)?, &joint)
+pub fn hold_out_images(fit: &Adjustment, limits: &Limits) -> Option<Vec<(usize, ImageError)>> {
+    predictions(fit, &folds(&fit.problem, limits)?, &joint)
 }
 
 fn joint(adjustment: Adjustment) -> Option<State> {
@@ -114,24 +111,24 @@ fn summary(errors: &[(usize, ImageError)]) -> Errors {
 }
 
 /// Images on the robot that share joint readings: they are off by the same local errors, and one of them would tell of the others.
-/// Each by itself where there are not three such sets to compare.
-fn clusters(problem: &Problem) -> Vec<Vec<usize>> {
+/// Each by itself where there are too few such sets to compare.
+fn clusters(problem: &Problem, limits: &Limits) -> Vec<Vec<usize>> {
     let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
     let groups = posture_groups(&problem.images, &on_robot);
-    if groups.len() < 3 { on_robot.into_iter().map(|i| vec![i]).collect() } else { groups }
+    if groups.len() < limits.regions { on_robot.into_iter().map(|i| vec![i]).collect() } else { groups }
 }
 
 /// Index of the set of every image whose errors are its own: images on the robot that share joint readings have one set.
-pub fn cluster_of_images(problem: &Problem) -> Vec<usize> {
-    let clusters = clusters(problem);
+pub fn cluster_of_images(problem: &Problem, limits: &Limits) -> Vec<usize> {
+    let clusters = clusters(problem, limits);
     let mut found: Vec<usize> = (clusters.len()..).take(problem.images.len()).collect();
     clusters.iter().enumerate().for_each(|(k, images)| images.iter().for_each(|&i| found[i] = k));
     found
 }
 
 /// Images that are held out together, fold by fold; those that share joint readings stay together. `None` for too few images on the robot.
-pub fn folds(problem: &Problem) -> Option<Vec<Vec<usize>>> {
-    let groups = clusters(problem);
+pub fn folds(problem: &Problem, limits: &Limits) -> Option<Vec<Vec<usize>>> {
+    let groups = clusters(problem, limits);
     if groups.len() < 2 {
         return None;
     }
@@ -143,12 +140,12 @@ pub fn folds(problem: &Problem) -> Option<Vec<Vec<usize>>> {
 
 /// Regions of the workspace that are held out one after the other: postures (images that share joint readings) next to each other along the direction
 /// in which the tip moved most. `None` for too few postures, and where these would be the folds once more.
-pub fn regions(fit: &Adjustment) -> Option<Vec<Vec<usize>>> {
+pub fn regions(fit: &Adjustment, limits: &Limits) -> Option<Vec<Vec<usize>>> {
     let problem = &fit.problem;
     let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
     let postures = posture_groups(&problem.images, &on_robot);
-    let count = FOLDS.min(postures.len() / FEWEST_POSTURES);
-    if count < FEWEST_REGIONS {
+    let count = FOLDS.min(postures.len() / limits.region_postures.max(1));
+    if count < limits.regions {
         return None;
     }
     let mut regions = vec![Vec::new(); count];
@@ -163,8 +160,8 @@ pub fn regions(fit: &Adjustment) -> Option<Vec<Vec<usize>>> {
     let sets = |folds: &[Vec<usize>]| -> BTreeSet<BTreeSet<usize>> {
         folds.iter().map(|fold| fold.iter().copied().collect()).collect()
     };
-    let repeated = folds(problem).is_some_and(|folds| sets(&folds) == sets(&regions));
-    (regions.len() >= FEWEST_REGIONS && !repeated).then_some(regions)
+    let repeated = folds(problem, limits).is_some_and(|folds| sets(&folds) == sets(&regions));
+    (regions.len() >= limits.regions && !repeated).then_some(regions)
 }
 
 /// Postures in the order of their mean place along the direction in which the tip moved most.

@@ -8,25 +8,17 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use super::advice::{Advice, Adviser};
-use super::stops::{LEAST_SHARE, StopsKnowledge, Structural, structural};
+use super::limits::Limits;
+use super::stops::{StopsKnowledge, Structural, information_of_share, structural};
 use crate::linalg::symmetric_eigen;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{Layout, short_name};
 
-/// Correlation from which two parameters are hard to tell apart.
-pub const STRONG_CORRELATION: f64 = 0.9;
-
 /// Most pairs that are kept.
 const MOST_PAIRS: usize = 60;
 
-/// Part of a direction, beside its largest, below which a parameter is not named.
-const LEAST_PART: f64 = 0.1;
-
 /// Relative difference of two lengths that rounding may make.
 const AS_LONG: f64 = 1e-6;
-
-/// Part of a direction outside the structural ones from which it counts as one of its own.
-const OUTSIDE: f64 = 0.5;
 
 /// Why a direction is unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -108,13 +100,18 @@ pub struct Identifiability {
 }
 
 /// Before the solve: what `stops` can tell.
-pub fn identifiability_of_stops(robot: &Robot, layout: &Layout, stops: &[Posture]) -> Option<Identifiability> {
+pub fn identifiability_of_stops(
+    robot: &Robot,
+    layout: &Layout,
+    stops: &[Posture],
+    limits: &Limits,
+) -> Option<Identifiability> {
     let known = StopsKnowledge::new(robot, layout, stops)?;
     let n = known.columns.len();
     let posterior = known.covariance.view((0, 0), (n, n)).into_owned();
     let (values, vectors) = symmetric_eigen(&known.information)?;
     let names: Vec<String> = known.columns.iter().map(|&c| short_name(&layout.columns[c].name)).collect();
-    judge(robot, layout, stops, known, &values, &vectors, &posterior, &names)
+    judge(robot, layout, stops, known, &values, &vectors, &posterior, &names, limits)
 }
 
 /// After the solve: `covariance` of the dense columns of `layout`, m and rad.
@@ -123,6 +120,7 @@ pub fn identifiability(
     layout: &Layout,
     stops: &[Posture],
     covariance: &DMatrix<f64>,
+    limits: &Limits,
 ) -> Option<Identifiability> {
     let known = StopsKnowledge::new(robot, layout, stops)?;
     let (columns, scale) = (&known.columns, &known.scale);
@@ -137,7 +135,7 @@ pub fn identifiability(
         .collect();
     let names: Vec<String> = listed.iter().map(|&c| short_name(&layout.columns[c].name)).collect();
     let all = DMatrix::from_fn(listed.len(), listed.len(), |i, j| covariance[(listed[i], listed[j])]);
-    judge(robot, layout, stops, known, &values, &vectors, &all, &names)
+    judge(robot, layout, stops, known, &values, &vectors, &all, &names, limits)
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -150,29 +148,30 @@ fn judge(
     vectors: &DMatrix<f64>,
     covariance: &DMatrix<f64>,
     covariance_names: &[String],
+    limits: &Limits,
 ) -> Option<Identifiability> {
-    let never = structural(robot, layout);
-    let least = LEAST_SHARE / (1.0 - LEAST_SHARE);
+    let never = structural(robot, layout, limits.share_of_data);
+    let least = information_of_share(limits.share_of_data);
     let names: Vec<String> = known.columns.iter().map(|&c| short_name(&layout.columns[c].name)).collect();
     let told: Vec<f64> = values.iter().copied().filter(|v| *v >= least).map(f64::sqrt).collect();
     let silent: Vec<usize> = (0..values.len()).filter(|&k| values[k] < least).collect();
-    let own = beyond(&never, &vectors.select_columns(&silent));
-    let adviser = Adviser::new(robot, layout, stops, &known, &never);
+    let own = beyond(&never, &vectors.select_columns(&silent), limits.own_direction);
+    let adviser = Adviser::new(robot, layout, stops, &known, &never, limits);
     let mut unknown: Vec<UnknownDirection> = sparse(&own)
         .into_iter()
         .map(|v| UnknownDirection {
             cause: Cause::Stops,
-            parameters: named(&v, &names),
+            parameters: named(&v, &names, limits.named_part),
             remedy: Some(adviser.in_words(Some(&v))),
         })
         .collect();
-    unknown.extend(structural_in_words(robot, &never, &names));
+    unknown.extend(structural_in_words(robot, &never, &names, limits.named_part));
     let tellable = names.len() - never.directions.ncols();
     Some(Identifiability {
         parameters: names.len(),
         tellable,
         rank: tellable - own.ncols(),
-        correlations: correlations(covariance, covariance_names, &names, &never, &adviser),
+        correlations: correlations(covariance, covariance_names, &names, &never, &adviser, limits),
         unknown,
         observability: observability(&told, stops.len()),
         covered: covered(robot, stops),
@@ -205,14 +204,14 @@ fn observability(singular: &[f64], images: usize) -> Option<Observability> {
 }
 
 /// Orthonormal basis of what `silent` directions hold beyond the structural ones.
-fn beyond(never: &Structural, silent: &DMatrix<f64>) -> DMatrix<f64> {
+fn beyond(never: &Structural, silent: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
     let rest = silent - &never.directions * (never.directions.transpose() * silent);
     let none = DMatrix::zeros(silent.nrows(), 0);
     if rest.ncols() == 0 {
         return none;
     }
     let Some((values, vectors)) = symmetric_eigen(&(&rest * rest.transpose())) else { return none };
-    let kept: Vec<usize> = (0..values.len()).rev().filter(|&k| values[k] > OUTSIDE).collect();
+    let kept: Vec<usize> = (0..values.len()).rev().filter(|&k| values[k] > least).collect();
     vectors.select_columns(&kept)
 }
 
@@ -234,10 +233,10 @@ fn sparse(basis: &DMatrix<f64>) -> Vec<DVector<f64>> {
     (basis * inverse).column_iter().map(|c| c.into_owned()).collect()
 }
 
-fn named(v: &DVector<f64>, names: &[String]) -> Vec<(String, f64)> {
+fn named(v: &DVector<f64>, names: &[String], least_part: f64) -> Vec<(String, f64)> {
     let largest = v.amax();
     let mut parts: Vec<(usize, f64)> =
-        v.iter().copied().enumerate().filter(|(_, x)| x.abs() >= LEAST_PART * largest).collect();
+        v.iter().copied().enumerate().filter(|(_, x)| x.abs() >= least_part * largest).collect();
     let size = |x: f64| (x.abs() / (AS_LONG * largest)).round();
     parts.sort_by(|a, b| size(b.1).total_cmp(&size(a.1)).then(a.0.cmp(&b.0)));
     parts.into_iter().map(|(k, x)| (names[k].clone(), x)).collect()
@@ -261,7 +260,7 @@ fn within(name: &str, blocks: &[String]) -> bool {
     blocks.iter().any(|b| name.strip_prefix(b.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.')))
 }
 
-fn structural_in_words(robot: &Robot, never: &Structural, names: &[String]) -> Vec<UnknownDirection> {
+fn structural_in_words(robot: &Robot, never: &Structural, names: &[String], least_part: f64) -> Vec<UnknownDirection> {
     let [first, last] = frame_parameters(robot);
     let cause = |parameters: &[(String, f64)]| {
         let all = |blocks: &[String]| parameters.iter().all(|(name, _)| within(name, blocks));
@@ -275,7 +274,7 @@ fn structural_in_words(robot: &Robot, never: &Structural, names: &[String]) -> V
     sparse(&never.directions)
         .into_iter()
         .map(|v| {
-            let parameters = named(&v, names);
+            let parameters = named(&v, names, least_part);
             UnknownDirection { cause: cause(&parameters), parameters, remedy: None }
         })
         .collect()
@@ -288,6 +287,7 @@ fn correlations(
     robot: &[String],
     never: &Structural,
     adviser: &Adviser,
+    limits: &Limits,
 ) -> Vec<Correlation> {
     let shares = never.shares();
     let place = |name: &String| robot.iter().position(|r| r == name);
@@ -296,8 +296,8 @@ fn correlations(
         for j in 0..i {
             let rho = covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
             let (a, b) = (place(&all[j]), place(&all[i]));
-            let expressed = [a, b].iter().flatten().any(|&k| shares[k] > LEAST_SHARE);
-            if rho.abs() > STRONG_CORRELATION && !expressed && !share_a_frame(&all[j], &all[i]) {
+            let expressed = [a, b].iter().flatten().any(|&k| shares[k] > limits.share_of_data);
+            if rho.abs() > limits.strong_correlation && !expressed && !share_a_frame(&all[j], &all[i]) {
                 pairs.push((j, i, rho, a, b));
             }
         }

@@ -67,6 +67,11 @@ limits! {
     loose_images_in_heap: usize = 3;
     /// Smallest distance of the heaps that matters, rad: twice what a good robot repeats to.
     loose_turn_rad: f64 = 0.2e-3;
+    /// Distance of two heaps in units of their own spread from which they are no chance, of many images: normal samples of 16 to 72
+    /// values reach less than this and the next together with a probability of 0.999 (best of all splits, simulated).
+    loose_spreads: f64 = 4.5;
+    /// What few images add to it, over their number.
+    loose_spreads_of_few: f64 = 30.0;
 
     /// Fewest wrongly paired images that make a new place of plate or camera credible.
     moved_images: usize = 3;
@@ -108,6 +113,65 @@ limits! {
     decisive_log_odds: f64 = 4.605;
     /// Ratio of the sigma of the flange by clusters of images to that by the model from which the larger one is reported.
     scatter_ratio: f64 = 1.5;
+    /// Fewest images whose scatter says anything: of ten, the standard deviation is known to a quarter.
+    scatter_images: usize = 10;
+    /// Largest part of the scatter of one image that counts as taken by the fit: beyond it, dividing by the rest makes a single
+    /// image decide.
+    scatter_taken: f64 = 0.8;
+
+    /// Fewest observations of an image that takes part: four give its pose, two more a margin.
+    image_observations: usize = 6;
+    /// Largest angle between two views of a camera below which all its images are alike, rad (5 degrees).
+    alike_views_rad: f64 = 0.09;
+    /// Largest tilt of the plate below which all images of a camera face it, rad (8 degrees): the cosine that tells focal length
+    /// from distance differs from 1 by less than a hundredth.
+    facing_tilt_rad: f64 = 0.14;
+    /// Relative sigma of the focal length beyond which the images do not determine it: data sheets of lenses know it as well.
+    focal_sigma: f64 = 0.02;
+    /// Tangent of the angle off the axis at the corner of the image from which on a fisheye is tried: nearer to the axis the series
+    /// of its formula and of the radial ones converge to the same functions, and it only lacks decentring, which real lenses have.
+    fisheye_tangent: f64 = 1.0;
+    /// Relative difference of held-out errors within which the simpler lens is taken: the lenses of `tests/model/lenses.rs` that are
+    /// needed gain more.
+    lens_as_good: f64 = 0.01;
+
+    /// Misfit of readings and images, rad + m, below which no mistake is looked for: nominal robots miss by as much.
+    suspicious_misfit: f64 = 0.025;
+    /// Median misfit of distances, with directions that fit, from which the links are those of another robot, m.
+    other_lengths_m: f64 = 0.025;
+    /// A mistake explains the misfit where undoing it leaves less than this share of it.
+    mistake_explains: f64 = 0.25;
+    /// Relative error of the scale of the plate that is told from errors of the robot: nominal links are right to a percent.
+    scale_error: f64 = 0.015;
+    /// Correcting the scale must leave less than this share of the misfit.
+    scale_explains: f64 = 0.6;
+    /// The readings of another row are named for an image where they leave less than this share of its misfit.
+    other_readings_explain: f64 = 0.1;
+
+    /// Share of the stops that must have a reading in common with others before the local errors of that joint are told apart: a
+    /// few coincidences tell too little.
+    stops_in_common: f64 = 0.5;
+    /// Share of the prior variance that the data must remove before they count as telling of a parameter, or of a direction.
+    share_of_data: f64 = 0.1;
+    /// Part of a direction outside those that no series can tell from which it counts as one of its own: more in than out.
+    own_direction: f64 = 0.5;
+    /// Part in a direction, beside the largest one, below which a parameter is not named with it.
+    named_part: f64 = 0.1;
+    /// Correlation from which two parameters are hard to tell apart: were one known, the other would be known twice as well.
+    strong_correlation: f64 = 0.9;
+    /// Share of the variance in question that one more stop must remove to be proposed.
+    advised_gain: f64 = 0.02;
+    /// Range of its readings below which a joint stands still, rad or m.
+    stands_still: f64 = 0.02;
+    /// Part of its covered range by which a joint may lie outside and still count as covered.
+    covered_margin: f64 = 0.05;
+
+    /// Fewest images of the robot for a comparison of estimators: some are held out, the others must still tell the robot.
+    compared_images: usize = 12;
+    /// Fewest postures that make up a region of the workspace: one is what a fold leaves out.
+    region_postures: usize = 2;
+    /// Fewest regions, and fewest postures that are held out as wholes: a fit needs two others to hold on to.
+    regions: usize = 3;
 }
 
 impl Limits {

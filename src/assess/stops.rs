@@ -21,9 +21,6 @@ pub const JOINT_SIGMA: f64 = 5e-5;
 /// Base and tip frame.
 const FRAMES: usize = 12;
 
-/// Share of the prior variance from which the data count as saying something of a direction.
-pub const LEAST_SHARE: f64 = 0.1;
-
 /// Stops of the ideal series.
 const IDEAL_STOPS: usize = 150;
 
@@ -103,15 +100,20 @@ impl StopsKnowledge {
         (j, noise)
     }
 
-    /// Directions (columns, orthonormal, in units of the priors) of which the stops say less than [`LEAST_SHARE`].
-    pub fn unknown(&self) -> DMatrix<f64> {
+    /// Directions (columns, orthonormal, in units of the priors) of which the stops say less than this share.
+    pub fn unknown(&self, least_share: f64) -> DMatrix<f64> {
         let Some((values, vectors)) = symmetric_eigen(&self.information) else {
             return DMatrix::zeros(self.scale.len(), 0);
         };
-        let least = LEAST_SHARE / (1.0 - LEAST_SHARE);
+        let least = information_of_share(least_share);
         let count = values.iter().filter(|v| **v < least).count();
         vectors.columns(0, count).into_owned()
     }
+}
+
+/// Information in units of that of the prior by which data remove this share of the prior variance.
+pub fn information_of_share(share: f64) -> f64 {
+    share / (1.0 - share)
 }
 
 /// Range of a reading that stops may take: its limits, or a turn to both sides.
@@ -167,16 +169,19 @@ pub struct Structural {
     pub directions: DMatrix<f64>,
     /// Information of the ideal series.
     pub information: DMatrix<f64>,
+    /// Share of the prior variance that data must remove to count as telling.
+    pub least_share: f64,
 }
 
-/// What even stops over the whole range of every joint do not tell.
-pub fn structural(robot: &Robot, layout: &Layout) -> Structural {
+/// What even stops over the whole range of every joint do not tell: less than this share of the prior variance is removed.
+pub fn structural(robot: &Robot, layout: &Layout, least_share: f64) -> Structural {
     let columns = robot_columns(layout);
     let n = columns.len();
-    match StopsKnowledge::new(robot, layout, &ideal_stops(robot)) {
-        Some(known) => Structural { columns, directions: known.unknown(), information: known.information },
-        None => Structural { columns, directions: DMatrix::identity(n, n), information: DMatrix::zeros(n, n) },
-    }
+    let (directions, information) = match StopsKnowledge::new(robot, layout, &ideal_stops(robot)) {
+        Some(known) => (known.unknown(least_share), known.information),
+        None => (DMatrix::identity(n, n), DMatrix::zeros(n, n)),
+    };
+    Structural { columns, directions, information, least_share }
 }
 
 impl Structural {
@@ -195,7 +200,7 @@ impl Structural {
 pub fn minimal_set(robot: &Robot, layout: &Layout, structural: &Structural) -> Vec<usize> {
     debug_assert_eq!(robot.twists.len() * 6, layout.twists.len());
     let mut left = structural.information.clone();
-    let least = LEAST_SHARE / (1.0 - LEAST_SHARE);
+    let least = information_of_share(structural.least_share);
     let mut kept = Vec::new();
     let wanted = structural.columns.len() - structural.directions.ncols();
     while kept.len() < wanted {

@@ -63,7 +63,7 @@ pub fn judge(
 ) -> Worth {
     let told = if joint_noise_is_estimated { noise_information(fit) } else { None };
     let uncertainty = told.as_ref().and_then(|told| NoiseUncertainty::of(told, fit));
-    let clustered = clustered_covariance(fit.linear()).filter(|_| images_know_the_robot(fit));
+    let clustered = clustered_covariance(fit.linear(), limits).filter(|_| images_know_the_robot(fit));
     let still = still(fit);
     let Fit { adjustment: Adjustment { problem, state }, covariance, .. } = fit;
     let layout = &problem.layout;
@@ -71,7 +71,7 @@ pub fn judge(
     let stops = stops(problem);
     let sigmas = |c: &DMatrix<f64>| (0..n).map(|k| c[(k, k)].max(0.0).sqrt()).collect::<Vec<f64>>();
     let mut worth = Worth {
-        identifiability: identifiability(&state.robot, layout, &stops, &covariance.reduced),
+        identifiability: identifiability(&state.robot, layout, &stops, &covariance.reduced, limits),
         ..Worth::default()
     };
     uncertainty.iter().for_each(|u| covariance.add(&u.added()));
@@ -80,17 +80,17 @@ pub fn judge(
     }
     worth.model_sigma = sigmas(&covariance.reduced);
     if let Some(clustered) = clustered {
-        let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &clustered.model, &stops));
+        let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &clustered.model, &stops, limits));
         worth.clustered_ratio = model.map(|m| m.ratio_of(&clustered.sandwich));
         let by_clusters: Vec<f64> = worth.model_sigma.iter().zip(clustered.ratios()).map(|(s, r)| s * r).collect();
         if worth.clustered_ratio.is_some_and(|ratio| ratio > limits.scatter_ratio) {
             worth.larger_stated = true;
             enlarge(covariance, &worth.model_sigma, &by_clusters, problem.layout.theta_len());
-            worth.identifiability = identifiability(&state.robot, layout, &stops, &covariance.reduced);
+            worth.identifiability = identifiability(&state.robot, layout, &stops, &covariance.reduced, limits);
         }
         worth.clustered_sigma = Some(by_clusters);
     }
-    let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops));
+    let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops, limits));
     let noise: Vec<Vec<f64>> =
         problem.used().filter(|(_, i)| i.stop.is_some()).map(|(_, i)| problem.joint_sigma(i.series)).collect();
     let promise = |m: &FlangeModel| FlangeErrors::new(m, &state.robot, &usual_joint_sigma(&noise), &stops);

@@ -30,10 +30,9 @@ pub struct LooseMounting {
 /// What the axes of the camera do, in the order x, y, z.
 const TURNS: [&str; 3] = ["pitch", "yaw", "roll"];
 
-/// Distance of two heaps in units of their own spread from which they are no chance: normal samples of 16 to 72 values reach
-/// less with a probability of 0.999 (best of all splits).
-fn no_chance(images: usize) -> f64 {
-    4.5 + 30.0 / images as f64
+/// Distance of two heaps in units of their own spread from which they are no chance.
+fn no_chance(images: usize, limits: &Limits) -> f64 {
+    limits.loose_spreads + limits.loose_spreads_of_few / images as f64
 }
 
 /// The best split of values into two heaps.
@@ -95,7 +94,7 @@ fn loose(fit: &Fit, mounting: usize, limits: &Limits) -> Option<LooseMounting> {
             split(&about_axis, limits.loose_images_in_heap).map(|s| (axis, s))
         })
         .max_by(|a, b| (a.1.distance / a.1.spread).total_cmp(&(b.1.distance / b.1.spread)))?;
-    if found.distance < limits.loose_turn_rad || found.distance < no_chance(turns.len()) * found.spread {
+    if found.distance < limits.loose_turn_rad || found.distance < no_chance(turns.len(), limits) * found.spread {
         return None;
     }
     Some(LooseMounting {
@@ -155,12 +154,12 @@ mod tests {
         for _ in 0..500 {
             let values: Vec<f64> = (0..24).map(|_| normal(&mut rng)).collect();
             let s = split(&values, 3).unwrap();
-            false_alarms += usize::from(s.distance > no_chance(24) * s.spread);
+            false_alarms += usize::from(s.distance > no_chance(24, &Limits::default()) * s.spread);
         }
         assert!(false_alarms <= 2, "{false_alarms} of 500");
         let values: Vec<f64> = (0..24).map(|k| normal(&mut rng) + if k % 5 == 0 { 10.0 } else { 0.0 }).collect();
         let s = split(&values, 3).unwrap();
-        assert!(s.distance > no_chance(24) * s.spread);
+        assert!(s.distance > no_chance(24, &Limits::default()) * s.spread);
         assert_eq!(s.smaller, [0, 5, 10, 15, 20]);
     }
 }

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::local_errors::{local_share, local_terms};
+use crate::assess::Limits;
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
@@ -22,9 +23,6 @@ const FIRST_JOINT_NOISE: f64 = 3e-3;
 /// First guess of the apparent tilt of the plate in an image: from above, rad.
 const FIRST_TILT: f64 = 1e-3;
 
-/// Fewest observations that fix a camera pose with a margin.
-const FEWEST_OBSERVATIONS: usize = 6;
-
 /// Huber bound: the 95 % point of the length of a 2-D standard normal vector.
 const HUBER: f64 = 2.45;
 
@@ -38,7 +36,7 @@ fn intern(names: &mut Vec<String>, name: &str) -> usize {
 /// The problem at a state whose poses and focal lengths are still unknown (identities; pinhole of one image width).
 ///
 /// With `local_errors` the errors of readings that stops have in common become columns.
-pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool) -> Result<Adjustment> {
+pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limits: &Limits) -> Result<Adjustment> {
     let (mut cameras, mut mountings, mut placements, mut plate_names) = (vec![], vec![], vec![], vec![]);
     let (mut lenses, mut plates, mut images): (Vec<Camera>, Vec<Plate>, Vec<Image>) = (vec![], vec![], vec![]);
     for (index, s) in series.iter().enumerate() {
@@ -72,8 +70,8 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool) -> Re
             let duplicate = twin.map(|t| ImageRejection::Duplicate { of: t.image.clone() });
             let rejected = stop.left_out.clone().or(duplicate).or_else(|| {
                 let found = observations.len();
-                (found < FEWEST_OBSERVATIONS)
-                    .then_some(ImageRejection::TooFewMarkers { found, needed: FEWEST_OBSERVATIONS })
+                let needed = limits.image_observations;
+                (found < needed).then_some(ImageRejection::TooFewMarkers { found, needed })
             });
             images.push(Image {
                 name: stop.image.clone(),
@@ -92,7 +90,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool) -> Re
     }
     let mut robot = robot.clone();
     if local_errors {
-        robot.terms.extend(local_terms(&images, robot.chain.readings.len()));
+        robot.terms.extend(local_terms(&images, robot.chain.readings.len(), limits.stops_in_common));
         let shares: Vec<Vec<f64>> = images.iter().map(|image| local_share(&robot.terms, image)).collect();
         images.iter_mut().zip(shares).for_each(|(image, share)| image.local_share = share);
     }

@@ -15,9 +15,6 @@ use crate::problem::{Adjustment, Problem, State};
 use crate::series::CameraMount;
 use crate::simulate::truth::Truth;
 
-/// Fewest images on the robot that leave enough for a fit when some are held out.
-const FEWEST_IMAGES: usize = 12;
-
 /// Compares on the observations of a solution: its outliers and rejected images are left out for all estimators.
 ///
 /// The joint fit keeps the noise components of the solution, as in its accuracy; those of the others are from the images that are left.
@@ -26,16 +23,16 @@ const FEWEST_IMAGES: usize = 12;
 /// Too few images on the robot.
 pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usize, usize)) -> Result<Comparison> {
     let joint = solution.joint_fit();
-    let problem = &joint.problem;
+    let (problem, limits) = (&joint.problem, &solution.options.limits);
     let images = on_robot(problem);
-    let Some(by_image) = folds(problem).filter(|_| images >= FEWEST_IMAGES) else {
+    let Some(by_image) = folds(problem, limits).filter(|_| images >= limits.compared_images) else {
         return Err(Error::unsolved(
             "comparison",
             format!("{images} images of the robot are too few to hold some out"),
-            format!("take at least {FEWEST_IMAGES}, better 30"),
+            format!("take at least {}, better 30", limits.compared_images),
         ));
     };
-    let by_region = regions(joint).unwrap_or_default();
+    let by_region = regions(joint, limits).unwrap_or_default();
     let all = Estimator::ALL;
     let total = by_image.len() + by_region.len() + 1;
     let mut done = 0;
@@ -49,7 +46,7 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
     let region_errors = held_out(joint, &by_region, &all, &mut tick);
     let of_truth = |k: usize| against_truth.as_ref().and_then(|t| t[k]);
     let held = [Some(&image_errors), Some(&region_errors).filter(|e| !e.is_empty())];
-    let rows = rows(problem, &all, held, of_truth);
+    let rows = rows(&cluster_of_images(problem, limits), &all, held, of_truth);
     Ok(Comparison { rows, images, folds: [by_image.len(), by_region.len()] })
 }
 
@@ -57,12 +54,12 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
 /// `None` for too few images.
 pub fn beside_two_stages(solution: &Solution) -> Option<Comparison> {
     let joint = solution.joint_fit();
-    let problem = &joint.problem;
+    let (problem, limits) = (&joint.problem, &solution.options.limits);
     let images = on_robot(problem);
-    let folds = folds(problem).filter(|_| images >= FEWEST_IMAGES)?;
+    let folds = folds(problem, limits).filter(|_| images >= limits.compared_images)?;
     let taking_part: Vec<Estimator> = Estimator::ALL.into_iter().filter(|e| *e != Estimator::HardJoint).collect();
     let errors = held_out(joint, &folds, &taking_part, &mut || ());
-    let rows = rows(problem, &taking_part, [Some(&errors), None], |_| None);
+    let rows = rows(&cluster_of_images(problem, limits), &taking_part, [Some(&errors), None], |_| None);
     Some(Comparison { rows, images, folds: [folds.len(), 0] })
 }
 
@@ -71,14 +68,13 @@ fn on_robot(problem: &Problem) -> usize {
 }
 
 fn rows(
-    problem: &Problem,
+    clusters: &[usize],
     estimators: &[Estimator],
     [by_image, by_region]: [Option<&Errors>; 2],
     truth: impl Fn(usize) -> Option<TruthError>,
 ) -> Vec<ComparisonRow> {
-    let clusters = cluster_of_images(problem);
     let joint = estimators.iter().position(|e| *e == Estimator::Joint);
-    let of = |errors: Option<&Errors>, k: usize| summary(errors?, &clusters, k, joint);
+    let of = |errors: Option<&Errors>, k: usize| summary(errors?, clusters, k, joint);
     let row = |(k, &estimator): (usize, &Estimator)| ComparisonRow {
         estimator,
         by_image: of(by_image, k),

@@ -42,7 +42,7 @@ fn layout(options: &Options, chain: Chain, series: &[Series]) -> Result<(Layout,
     };
     let names: Vec<String> = series.iter().map(|s| s.name.clone()).collect();
     let mut layout = Layout::new(&state, &mountings, &placements, &cameras, &names);
-    options.selection.apply(&mut layout, &mut state)?;
+    options.selection.apply(&mut layout, &mut state, &options.limits)?;
     Ok((layout, state))
 }
 
@@ -57,6 +57,6 @@ pub fn dry_run(chain: Chain, series: &[Series], options: &Options) -> Result<Ide
         return Err(Error::input("joints.csv", "no row has joint readings", "record the joints of every stop"));
     }
     let (layout, state) = layout(options, chain, series)?;
-    identifiability_of_stops(&state.robot, &layout, &stops)
+    identifiability_of_stops(&state.robot, &layout, &stops, &options.limits)
         .ok_or_else(|| Error::unsolved("stops", "their information is not finite", "check the readings in joints.csv"))
 }

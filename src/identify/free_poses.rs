@@ -3,6 +3,7 @@
 use nalgebra::{Matrix6, Vector2};
 
 use super::solution::StartVerdict;
+use crate::assess::Limits;
 use crate::error::{Error, Result};
 use crate::fit::{FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
@@ -17,9 +18,6 @@ use crate::solve::{
 /// RMS of a start, px per point, from which no further focal length is tried.
 const GOOD_START_PX: f64 = 2.0;
 
-/// Relative sigma of the focal length beyond which the images do not determine it.
-const WORST_FOCAL_SIGMA: f64 = 0.02;
-
 /// Most rounds of rejection.
 const ROUNDS: usize = 6;
 
@@ -30,6 +28,7 @@ const ROUNDS: usize = 6;
 pub fn adjust_free_poses(
     mut adjustment: Adjustment,
     stated_focal_px: &[Option<f64>],
+    limits: &Limits,
 ) -> Result<(Adjustment, FreePoses, Vec<StartVerdict>)> {
     let free_before: Vec<bool> = adjustment.problem.layout.columns.iter().map(|c| c.free).collect();
     adjustment.hold_poses();
@@ -38,7 +37,7 @@ pub fn adjust_free_poses(
     for (camera, stated) in stated_focal_px.iter().enumerate() {
         adjustment.state = start_camera(&adjustment, camera, &homographies, *stated, &mut verdicts)?;
     }
-    let (mut adjustment, free) = finish(adjustment)?;
+    let (mut adjustment, free) = finish(adjustment, limits)?;
     for (column, free) in adjustment.problem.layout.columns.iter_mut().zip(free_before) {
         column.free = free;
     }
@@ -206,16 +205,13 @@ fn rms_px(lin: &Linearised) -> f64 {
     (sum / count.max(1) as f64).sqrt()
 }
 
-/// Largest angle between two views of a camera below which all images are alike, rad.
-const LEAST_TURN: f64 = 0.09;
-
 /// A camera is determined by views from different directions only.
-fn check_views(adjustment: &Adjustment) -> Result<()> {
+fn check_views(adjustment: &Adjustment, least_turn: f64) -> Result<()> {
     for (camera, name) in adjustment.problem.cameras.iter().enumerate() {
         let views: Vec<&Pose> = views(adjustment, camera).collect();
         let Some(first) = views.first() else { continue };
         let turn = views.iter().map(|v| first.distance(v).0).fold(0.0, f64::max);
-        if turn < LEAST_TURN {
+        if turn < least_turn {
             return Err(undetermined(&format!(
                 "the images of {name} are all alike: they differ by {:.1} degrees at most",
                 turn.to_degrees()
@@ -231,17 +227,14 @@ fn views(adjustment: &Adjustment, camera: usize) -> impl Iterator<Item = &Pose> 
     own.filter_map(|(_, _, slack)| if let Slack::Pose(pose) = slack { Some(pose) } else { None })
 }
 
-/// Largest tilt of the plate against the image below which all images of a camera face it, rad.
-const LEAST_TILT: f64 = 0.14;
-
 /// Names a camera that looked at the plate from straight ahead only, whatever its distance and roll: a longer focal length and a
 /// greater distance show the same.
-fn facing(adjustment: &Adjustment) -> Option<Error> {
+fn facing(adjustment: &Adjustment, least_tilt: f64) -> Option<Error> {
     let tilt = |pose: &Pose| pose.rotation[(2, 2)].abs().min(1.0).acos();
     adjustment.problem.cameras.iter().enumerate().find_map(|(camera, name)| {
         let tilts: Vec<f64> = views(adjustment, camera).map(tilt).collect();
         let largest = tilts.iter().copied().reduce(f64::max)?;
-        (largest < LEAST_TILT).then(|| {
+        (largest < least_tilt).then(|| {
             undetermined(&format!(
                 "all {} images of {name} look straight at the plate (tilted by {:.1} degrees at most), so that focal length and distance \
                  cannot be told apart",
@@ -252,8 +245,8 @@ fn facing(adjustment: &Adjustment) -> Option<Error> {
     })
 }
 
-fn finish(start: Adjustment) -> Result<(Adjustment, FreePoses)> {
-    check_views(&start)?;
+fn finish(start: Adjustment, limits: &Limits) -> Result<(Adjustment, FreePoses)> {
+    check_views(&start, limits.alike_views_rad)?;
     let options = ComponentOptions { joint: false, rounds: 20, ..ComponentOptions::default() };
     let mut outcome = estimate_components(start, &options);
     for _ in 0..ROUNDS {
@@ -263,7 +256,7 @@ fn finish(start: Adjustment) -> Result<(Adjustment, FreePoses)> {
         outcome = estimate_components(outcome.adjustment, &options);
     }
     if outcome.status != Status::Converged {
-        return Err(facing(&outcome.adjustment).unwrap_or_else(|| {
+        return Err(facing(&outcome.adjustment, limits.facing_tilt_rad).unwrap_or_else(|| {
             Error::unsolved(
                 "free camera poses",
                 format!("the adjustment ended without converging ({:?})", outcome.status),
@@ -272,7 +265,7 @@ fn finish(start: Adjustment) -> Result<(Adjustment, FreePoses)> {
         }));
     }
     let fit = outcome.fit().map_err(|e| undetermined(&e.to_string()))?;
-    check_focal(&fit)?;
+    check_focal(&fit, limits)?;
     let free = collect(&fit)?;
     Ok((fit.adjustment, free))
 }
@@ -285,15 +278,15 @@ fn undetermined(what: &str) -> Error {
     )
 }
 
-fn check_focal(fit: &Fit) -> Result<()> {
+fn check_focal(fit: &Fit, limits: &Limits) -> Result<()> {
     let (Adjustment { problem, state }, cov) = (&fit.adjustment, &fit.covariance);
     for (k, range) in problem.layout.cameras.iter().enumerate() {
         for (c, axis) in [(range.start, "fx"), (range.start + 1, "fy")] {
             let focal = state.cameras[k].parameters[c - range.start];
             let relative = cov.sigma(c) / focal.abs();
-            if problem.layout.columns[c].free && (relative.is_nan() || relative > WORST_FOCAL_SIGMA || focal <= 0.0) {
+            if problem.layout.columns[c].free && (relative.is_nan() || relative > limits.focal_sigma || focal <= 0.0) {
                 let what = format!("{axis} of {} is known to {:.1} % only", problem.cameras[k], 100.0 * relative);
-                return Err(facing(fit).unwrap_or_else(|| undetermined(&what)));
+                return Err(facing(fit, limits.facing_tilt_rad).unwrap_or_else(|| undetermined(&what)));
             }
         }
     }

@@ -24,9 +24,9 @@ const ROUNDS: usize = 12;
 /// As [`super::identify`] with one robot model.
 pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
     let robot = options.model.robot_with(chain, options.harmonics);
-    let mut start = build(&robot, series, options.joint_noise == JointNoise::Estimated)?;
+    let mut start = build(&robot, series, options.joint_noise == JointNoise::Estimated, &options.limits)?;
     let Adjustment { problem, state } = &mut start;
-    options.selection.apply(&mut problem.layout, state)?;
+    options.selection.apply(&mut problem.layout, state, &options.limits)?;
     let stated = options.selection.with_priors(&problem.layout)?;
     problem.families.extend(Family::of_twists(&problem.layout, |c| stated.contains(&c)));
     if options.marker_tolerance == MarkerTolerance::Estimated {
@@ -35,13 +35,13 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let stated: Vec<Option<f64>> = (problem.cameras.iter())
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();
-    let (mut start, free, mut starts) = adjust_free_poses(start, &stated)?;
+    let (mut start, free, mut starts) = adjust_free_poses(start, &stated, &options.limits)?;
     let on_robot = start.problem.used().filter(|(_, i)| i.stop.is_some()).count();
     check_on_robot(&start.problem, on_robot)?;
     let aside = start_robot(&mut start, &free, &mut starts, &options.limits)?;
     let (mut outcome, before) = fit(start, &free, &aside, options);
     let (status, iterations) = (outcome.status, outcome.iterations);
-    name_wrong_pairs(&mut outcome.adjustment, &free);
+    name_wrong_pairs(&mut outcome.adjustment, &free, options.limits.other_readings_explain);
     let mut diagnosis = Diagnosis::new(Setting { series, free: &free, on_robot, limits: &options.limits });
     diagnosis.after_free_poses(&outcome.adjustment.problem);
     diagnosis.after_left_out(&outcome.adjustment)?;
@@ -59,7 +59,7 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
         true => refit(&left, estimator, noise),
         false => Some(refitted(left)),
     };
-    let accuracy = hold_out(&fit, &fitted)
+    let accuracy = hold_out(&fit, &fitted, &options.limits)
         .ok_or_else(|| Error::unsolved("hold-out", "too few images to hold any out", "take more images"))?;
     diagnosis.after_fit(&fit, &accuracy);
     let (mut fit, joint) = match estimator.is_two_stage() {
@@ -123,7 +123,7 @@ fn fit(
 }
 
 /// Adds to every wrongly paired image by how much its readings miss, and whose readings would fit it.
-fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses) {
+fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f64) {
     let Adjustment { problem, state } = &*adjustment;
     let mut remarks = Vec::new();
     for (i, image) in problem.images.iter().enumerate() {
@@ -141,7 +141,7 @@ fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses) {
                 Some((a + d, k))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0));
-        let better = better.filter(|(size, _)| *size < 0.1 * (angle_rad + distance_m));
+        let better = better.filter(|(size, _)| *size < explained * (angle_rad + distance_m));
         let fits = better.map(|(misfit, k)| FitsReadings { of: problem.images[k].name.clone(), misfit });
         remarks.push((i, Mismatch::Fit { misfit: Misfit { distance_m, angle_rad }, fits }));
     }

@@ -7,6 +7,7 @@ use super::free_poses::adjust_free_poses;
 use super::joint::identify_model;
 use super::options::Options;
 use super::solution::{LensEvidence, Solution};
+use crate::assess::Limits;
 use crate::diagnose::LensNotInRos;
 use crate::error::{Error, Notice, Result};
 use crate::fit::log_evidence;
@@ -18,13 +19,8 @@ use crate::urdf::Chain;
 
 /// One observation of so many is kept aside, in every image and of every marker in other images.
 const KEPT_ASIDE: usize = 4;
-/// A simpler lens is taken where its error is within this share of the best.
-const AS_GOOD: f64 = 0.01;
 /// Share of the largest errors that does not count: what is wrongly identified says nothing of the lens.
 const OUTLIERS: f64 = 0.02;
-/// Tangent of the angle off the axis at the corner of the image from which on a fisheye is tried: nearer to the axis the series of its formula and
-/// of the radial ones converge to the same functions, and it only lacks decentring, which real lenses have.
-const FISHEYE_FROM: f64 = 1.0;
 /// Rounds in which image noise and fit follow the lens.
 const ROUNDS: usize = 3;
 
@@ -79,7 +75,8 @@ fn by_hold_out(
 ) -> Option<(Solution, Vec<Notice>)> {
     let first: Vec<Lens> = series.iter().map(|s| s.lens).collect();
     let names: Vec<String> = open.keys().cloned().collect();
-    let notices = if open.is_empty() { return None } else { choose_lens(chain, series, &names).ok()? };
+    let notices =
+        if open.is_empty() { return None } else { choose_lens(chain, series, &names, &options.limits).ok()? };
     let is_another = series.iter().zip(first).any(|(s, first)| s.lens != first);
     let solution = if is_another { identify_model(chain.clone(), series, options).ok()? } else { return None };
     Some((solution, notices))
@@ -88,7 +85,7 @@ fn by_hold_out(
 /// Evidence of every lens formula for a camera, from the fit with its present one.
 fn compare_lenses(solution: &Solution, camera: &str, choice: LensChoice) -> Vec<LensEvidence> {
     let Some(k) = solution.fit.problem.cameras.iter().position(|c| c == camera) else { return Vec::new() };
-    let is_wide = solution.fit.state.cameras[k].corner() > FISHEYE_FROM;
+    let is_wide = solution.fit.state.cameras[k].corner() > solution.options.limits.fisheye_tangent;
     let formulas = Lens::ALL.into_iter().filter(|l| choice.has(*l) && (*l != Lens::Fisheye || is_wide));
     let mut all: Vec<LensEvidence> = formulas.filter_map(|lens| evidence(solution, k, lens)).collect();
     let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
@@ -176,11 +173,16 @@ pub(super) fn losses(solution: &Solution) -> Vec<LensNotInRos> {
 ///
 /// # Errors
 /// Those of the adjustment, when no lens explains the images at all.
-pub fn choose_lens(chain: &Chain, series: &mut [MeasuredSeries], open: &[String]) -> Result<Vec<Notice>> {
+pub fn choose_lens(
+    chain: &Chain,
+    series: &mut [MeasuredSeries],
+    open: &[String],
+    limits: &Limits,
+) -> Result<Vec<Notice>> {
     let mut trials: Vec<(Lens, Vec<(String, f64)>)> = Vec::new();
     let mut last_error = None;
     for lens in Lens::ALL.into_iter().filter(|l| !l.has_field()) {
-        match held_out_errors(chain, series, lens) {
+        match held_out_errors(chain, series, lens, limits) {
             Ok(errors) => trials.push((lens, errors)),
             Err(error) => last_error = Some(error),
         }
@@ -193,7 +195,7 @@ pub fn choose_lens(chain: &Chain, series: &mut [MeasuredSeries], open: &[String]
     for (camera, name) in names.iter().enumerate().filter(|(_, name)| open.contains(name)) {
         let errors: Vec<(Lens, f64)> = trials.iter().map(|(lens, e)| (*lens, e[camera].1)).collect();
         let best = errors.iter().fold(f64::INFINITY, |m, e| m.min(e.1));
-        let Some((lens, error)) = errors.iter().find(|e| e.1 <= (1.0 + AS_GOOD) * best) else {
+        let Some((lens, error)) = errors.iter().find(|e| e.1 <= (1.0 + limits.lens_as_good) * best) else {
             let what = "shows nothing that could tell one lens from another";
             return Err(Error::unsolved(format!("camera {name}"), what, "name its lens with --camera"));
         };
@@ -204,7 +206,7 @@ pub fn choose_lens(chain: &Chain, series: &mut [MeasuredSeries], open: &[String]
              lens wins where it is within {:.0} % of the best",
             lens.name(),
             all.join(", "),
-            100.0 * AS_GOOD
+            100.0 * limits.lens_as_good
         );
         notices.push(Notice::new(format!("camera {name}"), what, ""));
     }
@@ -212,20 +214,25 @@ pub fn choose_lens(chain: &Chain, series: &mut [MeasuredSeries], open: &[String]
 }
 
 /// Error of every camera over the observations kept aside, px RMS per point.
-fn held_out_errors(chain: &Chain, series: &[MeasuredSeries], lens: Lens) -> Result<Vec<(String, f64)>> {
+fn held_out_errors(
+    chain: &Chain,
+    series: &[MeasuredSeries],
+    lens: Lens,
+    limits: &Limits,
+) -> Result<Vec<(String, f64)>> {
     let robot = Robot::nominal(chain.clone());
     let mut all = series.to_vec();
     all.iter_mut().for_each(|s| s.lens = lens);
-    let full = build(&robot, &all, false)?.problem;
+    let full = build(&robot, &all, false, limits)?.problem;
     let aside = |image: usize, marker: usize| (marker + 7 * image).is_multiple_of(KEPT_ASIDE);
-    let mut thinned = build(&robot, &all, false)?;
+    let mut thinned = build(&robot, &all, false, limits)?;
     for (i, image) in thinned.problem.images.iter_mut().enumerate() {
         image.observations.retain(|o| !aside(i, o.marker));
     }
     let stated: Vec<Option<f64>> = (full.cameras.iter())
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();
-    let (_, free, _) = adjust_free_poses(thinned, &stated)?;
+    let (_, free, _) = adjust_free_poses(thinned, &stated, limits)?;
     let mut squares: Vec<Vec<f64>> = vec![Vec::new(); full.cameras.len()];
     for (i, image) in full.images.iter().enumerate() {
         let Some(pose) = &free.poses[i] else { continue };

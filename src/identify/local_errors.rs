@@ -3,12 +3,8 @@
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::problem::{Image, common_readings, joined};
 
-/// Share of the stops that must have a reading in common with others before the local errors of that joint are told apart:
-/// a few coincidences tell too little.
-const LEAST_SHARE_TIED: f64 = 0.5;
-
-/// Terms for the readings that stops have in common, in the order of the readings.
-pub(super) fn local_terms(images: &[Image], readings: usize) -> Vec<JointTerm> {
+/// Terms for the readings that at least this share of the stops has in common with others, in the order of the readings.
+pub(super) fn local_terms(images: &[Image], readings: usize, least_share: f64) -> Vec<JointTerm> {
     let stops: Vec<&[f64]> = images.iter().filter_map(|i| i.stop.as_ref()).map(|s| s.readings.as_slice()).collect();
     let on_robot: Vec<_> = images.iter().filter_map(|i| i.stop.as_ref()).collect();
     let mut pairs: Vec<Vec<(usize, usize)>> = vec![Vec::new(); readings];
@@ -24,7 +20,7 @@ pub(super) fn local_terms(images: &[Image], readings: usize) -> Vec<JointTerm> {
         let mut sets = joined(stops.len(), pairs.into_iter());
         sets.retain(|set| set.len() > 1);
         let tied: usize = sets.iter().map(Vec::len).sum();
-        if (tied as f64) < LEAST_SHARE_TIED * stops.len() as f64 {
+        if (tied as f64) < least_share * stops.len() as f64 {
             continue;
         }
         for set in sets {

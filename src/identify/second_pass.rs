@@ -10,6 +10,7 @@ use super::build::build;
 use super::free_poses::adjust_free_poses;
 use super::seen_image::SeenImage;
 use super::stated::{lens_of, measured_series};
+use crate::assess::Limits;
 use crate::detect::Picture;
 use crate::detect::circles::{Predicted, detect_predicted};
 use crate::error::Result;
@@ -58,9 +59,11 @@ fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Opti
     };
     let stops = images.iter().map(stop).collect();
     let measured = measured_series(series, lens_of(series).ok()?, (width as u32, height as u32), true, stops);
+    // What is seen does not hang on what is decided of it later.
+    let limits = Limits::default();
     let nobody = Robot::nominal(Chain::empty());
-    let nothing = build(&nobody, &[measured], false).ok()?;
-    let (_, free, _) = adjust_free_poses(nothing, &[series.manifest.camera.focal_px]).ok()?;
+    let nothing = build(&nobody, &[measured], false, &limits).ok()?;
+    let (_, free, _) = adjust_free_poses(nothing, &[series.manifest.camera.focal_px], &limits).ok()?;
     let pose = |k: usize| free.poses[k].as_ref().map(|p| p.camera_from_plate);
     // The adjustment takes one of two images that show the same; they stay the same when both have its pose.
     let original =

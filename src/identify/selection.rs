@@ -134,11 +134,11 @@ impl Selection {
     ///
     /// # Errors
     /// Unknown names with the closest ones, units that do not belong, and poses, which nothing but the images can tell.
-    pub fn apply(&self, layout: &mut Layout, state: &mut State) -> Result<()> {
+    pub fn apply(&self, layout: &mut Layout, state: &mut State, limits: &Limits) -> Result<()> {
         self.set_priors(layout, state)?;
         let robot = layout.robot();
         if self.parameters == Parameters::Minimal {
-            let kept = minimal_set(&state.robot, layout, &structural(&state.robot, layout));
+            let kept = minimal_set(&state.robot, layout, &structural(&state.robot, layout, limits.share_of_data));
             robot.clone().filter(|c| !kept.contains(c)).for_each(|c| layout.columns[c].free = false);
         } else if !self.free.is_empty() {
             robot.clone().for_each(|c| layout.columns[c].free = false);

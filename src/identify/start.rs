@@ -119,7 +119,7 @@ fn closed_form(
             won: s.origin == winner,
         });
     }
-    let suspects = Suspects { problem, robot: &state.robot, pairs };
+    let suspects = Suspects { problem, robot: &state.robot, pairs, limits };
     if let Some(cause) = suspects.better_than(best.median_error) {
         return Err(Error::unsolved(of, cause.what, cause.remedy));
     }

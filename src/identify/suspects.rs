@@ -1,25 +1,11 @@
 //! When readings and images do not fit: the usual mistakes, tried one by one, named where one of them explains it.
 
+use crate::assess::Limits;
 use crate::init::{PosePair, plate_scale, solve_hand_eye};
 use crate::model::robot::Robot;
 use crate::problem::Problem;
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
-
-/// Misfit (rad + m) below which nobody is suspected: within what a robot misses nominal by.
-const UNSUSPICIOUS: f64 = 0.025;
-
-/// Median misfit of distances that no calibration of a robot explains, m.
-const WRONG_LENGTHS_M: f64 = 0.025;
-
-/// A mistake explains the misfit when undoing it leaves less than this share of it.
-const EXPLAINS: f64 = 0.25;
-
-/// Relative error of the plate's scale that is told from errors of the robot ...
-const SCALE_ERROR: f64 = 0.015;
-
-/// ... when correcting it leaves less than this share of the misfit.
-const SCALE_EXPLAINS: f64 = 0.6;
 
 /// A mistake that explains the misfit.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,26 +21,27 @@ pub(super) struct Suspects<'a> {
     pub problem: &'a Problem,
     pub robot: &'a Robot,
     pub pairs: &'a [(usize, PosePair)],
+    pub limits: &'a Limits,
 }
 
 impl Suspects<'_> {
     /// The mistake that, undone, fits far better than `misfit`, if there is one.
     pub fn better_than(&self, misfit: f64) -> Option<Cause> {
-        if let Some((_, cause)) = self.wrong_scale().filter(|(error, _)| *error < SCALE_EXPLAINS * misfit) {
+        if let Some((_, cause)) = self.wrong_scale().filter(|(error, _)| *error < self.limits.scale_explains * misfit) {
             return Some(cause);
         }
-        if misfit < UNSUSPICIOUS {
+        if misfit < self.limits.suspicious_misfit {
             return None;
         }
         let mut best: Option<(f64, Cause)> = None;
         for (readings, cause) in self.hypotheses() {
             let error = self.misfit(&readings);
-            if error < EXPLAINS * misfit && best.as_ref().is_none_or(|(e, _)| error < *e) {
+            if error < self.limits.mistake_explains * misfit && best.as_ref().is_none_or(|(e, _)| error < *e) {
                 best = Some((error, cause));
             }
         }
         let (error, mount) = self.wrong_mount();
-        if error < EXPLAINS * misfit && best.as_ref().is_none_or(|(e, _)| error < *e) {
+        if error < self.limits.mistake_explains * misfit && best.as_ref().is_none_or(|(e, _)| error < *e) {
             return Some(mount);
         }
         best.map(|(_, cause)| cause).or_else(|| self.other_lengths())
@@ -102,7 +89,7 @@ impl Suspects<'_> {
         angles.sort_by(f64::total_cmp);
         distances.sort_by(f64::total_cmp);
         let (angle, distance) = (angles[angles.len() / 2], distances[distances.len() / 2]);
-        (angle < UNSUSPICIOUS && distance > WRONG_LENGTHS_M).then(|| Cause {
+        (angle < self.limits.suspicious_misfit && distance > self.limits.other_lengths_m).then(|| Cause {
             what: format!(
                 "directions fit the joint readings (median {:.1} mrad), distances do not (median {:.0} mm): these are the axes of \
                  such an arm with other link lengths",
@@ -216,7 +203,7 @@ impl Suspects<'_> {
         let poses: Vec<PosePair> = self.pairs.iter().map(|(_, p)| *p).collect();
         let start = solve_hand_eye(&poses).into_iter().next()?;
         let scale = plate_scale(&poses, &start.solution)?;
-        if (scale - 1.0).abs() < SCALE_ERROR {
+        if (scale - 1.0).abs() < self.limits.scale_error {
             return None;
         }
         let scaled: Vec<PosePair> = poses

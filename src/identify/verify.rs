@@ -30,15 +30,16 @@ pub struct JudgedImage {
 /// # Errors
 /// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset.
 pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<JudgedImage>> {
-    let mut adjustment = build(robot, series, false)?;
+    let limits = &Limits::default();
+    let mut adjustment = build(robot, series, false, limits)?;
     let layout = &mut adjustment.problem.layout;
     let columns = layout.robot();
     layout.columns[columns].iter_mut().for_each(|c| c.free = false);
     let stated: Vec<Option<f64>> = (adjustment.problem.cameras.iter())
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();
-    let (mut adjustment, free, mut starts) = adjust_free_poses(adjustment, &stated)?;
-    start_robot(&mut adjustment, &free, &mut starts, &Limits::default())?;
+    let (mut adjustment, free, mut starts) = adjust_free_poses(adjustment, &stated, limits)?;
+    start_robot(&mut adjustment, &free, &mut starts, limits)?;
     adjustment.start_slack(false);
     let outcome = estimate_components(adjustment, &ComponentOptions::default());
     if outcome.status != Status::Converged {
@@ -48,11 +49,11 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
             "check that URDF, base, tip and series belong together",
         ));
     }
-    let errors = hold_out_images(&outcome.adjustment).ok_or_else(|| {
+    let errors = hold_out_images(&outcome.adjustment, limits).ok_or_else(|| {
         Error::unsolved("verification", "too few images to hold any out", "take at least 12 images of the robot")
     })?;
     let problem = &outcome.adjustment.problem;
-    let postures = cluster_of_images(problem);
+    let postures = cluster_of_images(problem, limits);
     let judged = |(i, error): (usize, ImageError)| JudgedImage {
         series: problem.images[i].series,
         name: problem.images[i].name.clone(),

@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::{DMatrix, Vector3, Vector6};
 
 use super::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
-use crate::assess::FlangeModel;
+use crate::assess::{FlangeModel, Limits};
 use crate::error::{Error, Result};
 use crate::geom::Pose;
 use crate::identify::Options;
@@ -136,6 +136,8 @@ pub struct FoundModel {
     pub covariance: DMatrix<f64>,
     /// Stops of the images in use.
     pub stops: Vec<Posture>,
+    /// Numbers that decide.
+    pub limits: Limits,
 }
 
 /// The model of a record.
@@ -187,6 +189,7 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
         CameraMount::Fixed => (state.mountings[i.mounting], layout.mountings[i.mounting].start),
     });
     Ok(FoundModel {
+        limits: record.limits(),
         covariance: DMatrix::from_fn(n, n, at),
         stops: used().filter_map(stop).collect(),
         robot: robot.without_local_errors(),
@@ -198,6 +201,6 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
 impl FoundModel {
     /// The flange anywhere; `None` where robot and plate (or fixed camera) are not tied.
     pub fn flange(&self) -> Option<FlangeModel<'_>> {
-        FlangeModel::new(&self.robot, &self.layout, self.still?, &self.covariance, &self.stops)
+        FlangeModel::new(&self.robot, &self.layout, self.still?, &self.covariance, &self.stops, &self.limits)
     }
 }

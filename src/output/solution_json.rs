@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use super::finding_record::FindingRecord;
-use crate::assess::{Cause, Errors, FlangeErrors, Identifiability, ProjectionMap, WorkspacePoint};
+use crate::assess::{Cause, Errors, FlangeErrors, Identifiability, Limits, ProjectionMap, WorkspacePoint};
 use crate::error::{Notice, Result, plain_name};
 use crate::geom::Pose;
 use crate::identify::{Comparison, Estimator, Evidence, LensEvidence, Options, StartVerdict};
@@ -497,10 +497,17 @@ pub struct SolutionRecord {
     pub images: Vec<ImageRecord>,
 }
 
-/// Share of the prior variance below which a parameter counts as not determined by the data.
-pub const LEAST_SHARE: f64 = 0.1;
-
 impl SolutionRecord {
+    /// Numbers that decided its verdicts; the usual ones where a file of an earlier version holds none.
+    pub fn limits(&self) -> Limits {
+        self.options.as_ref().map(|o| o.limits).unwrap_or_default()
+    }
+
+    /// True where the data say less of a parameter than counts.
+    pub fn hardly_determines(&self, estimate: &EstimateRecord) -> bool {
+        estimate.share_of_data.is_some_and(|share| share < self.limits().share_of_data)
+    }
+
     /// Names go into programs, file names and the terminal.
     pub(super) fn plain_names(&self) -> Result<()> {
         let robot = &self.robot;
@@ -533,7 +540,7 @@ impl SolutionRecord {
             .flat_map(|d| d.parameters.iter().map(|(name, _)| name.as_str()))
             .collect();
         (self.robot_parameters())
-            .filter(|e| e.share_of_data.is_some_and(|s| s < LEAST_SHARE))
+            .filter(|e| self.hardly_determines(e))
             .filter(|e| !frames.contains(short_name(&e.name).as_str()))
             .collect()
     }

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::simulated::measured;
-use crate::assess::{Ratio, bootstrap_ratio, median, root_mean_square};
+use crate::assess::{Limits, Ratio, bootstrap_ratio, median, root_mean_square};
 use crate::error::{Error, Result};
 use crate::geom::{Pose, adjoint};
 use crate::identify::{Estimator, PoseStage, RobotModel, TruthError, build, estimate_all, truth_error};
@@ -139,7 +139,7 @@ fn world(
 /// The problem of a world, started at the true camera and poses with the nominal robot.
 fn started(request: &StudyRequest, world: &SimulatedSeries) -> Result<Adjustment> {
     let robot = RobotModel::Rigid.robot(request.chain.clone());
-    let mut start = build(&robot, &[measured(world, &request.chain)], true)?;
+    let mut start = build(&robot, &[measured(world, &request.chain)], true, &Limits::default())?;
     let state = &mut start.state;
     state.cameras = vec![world.truth.camera.clone()];
     state.mountings = vec![world.truth.camera_pose.pose()];

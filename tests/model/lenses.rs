@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use robotcal::assess::Limits;
 use robotcal::identify::{Options, RobotModel, Solution, choose_lens, depths_m, identify};
 use robotcal::model::camera::{Camera, Lens, fit_lens};
 use robotcal::plan::plate_design::{PlateRequest, design};
@@ -42,7 +43,7 @@ fn hold_out_tells_lenses_apart() {
         let made = world(lens, field_deg);
         let mut seen = vec![measured(&made, &chain())];
         seen[0].lens = Lens::Brown;
-        let notices = choose_lens(&chain(), &mut seen, &["camera".into()]).unwrap();
+        let notices = choose_lens(&chain(), &mut seen, &["camera".into()], &Limits::default()).unwrap();
         println!("{lens:?}: {}", notices[0]);
         let chosen = seen[0].lens;
         assert!(!not.contains(&chosen), "{lens:?} taken for {chosen:?}: {}", notices[0]);

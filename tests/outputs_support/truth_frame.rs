@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3, Vector6};
+use robotcal::assess::Limits;
 use robotcal::geom::{Pose, project_to_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::problem::{Adjustment, Measured, PlateShape, Slack, State};
@@ -137,7 +138,8 @@ pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, 
         plates: vec![PlateShape::nominal(&world.plate)],
         ..template.fit.state.clone()
     };
-    let (mut adjustment, free_poses, _) = adjust_free_poses(Adjustment { problem, state: start }, &[None]).unwrap();
+    let (mut adjustment, free_poses, _) =
+        adjust_free_poses(Adjustment { problem, state: start }, &[None], &Limits::default()).unwrap();
     adjustment.hold_poses();
     let linearised = adjustment.linearise().unwrap();
     let covariance = adjustment.linear(&linearised).covariance().unwrap();

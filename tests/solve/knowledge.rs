@@ -9,7 +9,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use robotcal::ErrorKind;
 use robotcal::assess::{
-    Cause, Identifiability, MeasuredPoint, fit_points, ideal_stops, identifiability_of_stops, minimal_set, structural,
+    Cause, Identifiability, Limits, MeasuredPoint, fit_points, ideal_stops, identifiability_of_stops, minimal_set,
+    structural,
 };
 use robotcal::diagnose::Subject;
 use robotcal::geom::Pose;
@@ -50,16 +51,16 @@ fn layout(model: RobotModel) -> (Robot, Layout) {
 fn a_six_axis_arm_has_eighteen_geometric_parameters_of_its_own() {
     // 4 per revolute joint and 6 for the tip, less 12 for base and tip frame (Everett, Driels, Mooring 1987).
     let (robot, layout) = layout(RobotModel::Rigid);
-    let kept = minimal_set(&robot, &layout, &structural(&robot, &layout));
+    let kept = minimal_set(&robot, &layout, &structural(&robot, &layout, Limits::default().share_of_data));
     assert_eq!(kept.len(), 18, "{:?}", kept.iter().map(|&c| &layout.columns[c].name).collect::<Vec<_>>());
-    let found = identifiability_of_stops(&robot, &layout, &ideal_stops(&robot)).unwrap();
+    let found = identifiability_of_stops(&robot, &layout, &ideal_stops(&robot), &Limits::default()).unwrap();
     assert_eq!((found.tellable, found.rank), (18, 18));
     assert!(found.unknown.iter().all(|d| d.cause != Cause::Stops));
 }
 
 fn told(stops: &[Posture], model: RobotModel) -> Identifiability {
     let (robot, layout) = layout(model);
-    identifiability_of_stops(&robot, &layout, stops).unwrap()
+    identifiability_of_stops(&robot, &layout, stops, &Limits::default()).unwrap()
 }
 
 #[test]
@@ -112,7 +113,7 @@ fn names_choose_what_is_free_and_wrong_ones_are_answered() {
         State { robot, mountings: vec![], placements: vec![], cameras: vec![], plates: vec![], slack: vec![] };
     let mut apply = |selection: &Selection| {
         let mut layout = fresh.clone();
-        selection.apply(&mut layout, &mut state).map(|()| layout)
+        selection.apply(&mut layout, &mut state, &Limits::default()).map(|()| layout)
     };
     let names = |l: &Layout| l.columns.iter().filter(|c| c.free).map(|c| short_name(&c.name)).collect::<Vec<_>>();
     let only = Selection { free: vec!["joint_a2.offset".into(), "joint_a3.origin.rx".into()], ..Selection::default() };
@@ -354,7 +355,7 @@ fn no_more_directions_are_told_than_any_series_could_tell() {
         layout.columns.iter().map(|c| (1e-3 * c.prior_sigma).powi(2)),
     ));
     let stops = ideal_stops(&robot);
-    let found = robotcal::assess::identifiability(&robot, &layout, &stops, &known).unwrap();
+    let found = robotcal::assess::identifiability(&robot, &layout, &stops, &known, &Limits::default()).unwrap();
     assert_eq!((found.rank, found.tellable), (18, 18));
     let little = told(&stops[..4], RobotModel::Full);
     let untold = little.unknown.iter().filter(|d| d.cause == Cause::Stops).count();

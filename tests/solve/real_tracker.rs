@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
-use robotcal::assess::{MeasuredPoint, fit_points, folds, predict_image, refitted};
+use robotcal::assess::{Limits, MeasuredPoint, fit_points, folds, predict_image, refitted};
 use robotcal::identify::{Estimator, JointNoise, Options, PoseStage, Solution, fit_poses, identify, measure};
 use robotcal::model::camera::Lens;
 use robotcal::model::joint_terms::Term;
@@ -207,7 +207,7 @@ const CHANGES: [(&str, Change); 8] = [
 /// Held-out error in mm, by `fit` of the images that are left.
 fn held_out_mm(adjustment: &Adjustment, fit: impl Fn(Adjustment) -> Option<State>) -> Option<f64> {
     let (mut squares, mut count) = (0.0, 0.0);
-    for fold in folds(&adjustment.problem)? {
+    for fold in folds(&adjustment.problem, &Limits::default())? {
         let found = fit(adjustment.without_images(&fold))?;
         for i in fold {
             let e = predict_image(&adjustment.problem, &found, i)?;

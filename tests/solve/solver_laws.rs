@@ -5,6 +5,7 @@
 use crate::support::dense::{Dense, Unknown};
 use crate::support::small::{Dice, Part, Request, problem, series};
 use nalgebra::{DMatrix, DVector, Vector3};
+use robotcal::assess::Limits;
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::linalg::SymmetricFactor;
@@ -347,7 +348,7 @@ fn poses_mode_is_the_free_pose_adjustment() {
     nothing.plates[0].modes = [0.0; 6];
     nothing.plates[0].corrections.iter_mut().for_each(|c| *c = Vector3::zeros());
     let nothing = Adjustment { problem: problem.clone(), state: nothing };
-    let (Adjustment { problem, .. }, found, _) = adjust_free_poses(nothing, &[None]).unwrap();
+    let (Adjustment { problem, .. }, found, _) = adjust_free_poses(nothing, &[None], &Limits::default()).unwrap();
     // ... and with the same weights from the truth, robot present but tied to nothing.
     let mode = converged(&problem, free_poses(&problem, &state), &TIGHT);
     let cov = covariance(&mode);

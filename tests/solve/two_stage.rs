@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use crate::support::small::{Dice, Request, problem, series};
 use nalgebra::Vector3;
-use robotcal::assess::{folds, regions};
+use robotcal::assess::{Limits, folds, regions};
 use robotcal::identify::{
     Estimator, JointNoise, Options, PoseStage, RobotModel, beside_two_stages, compare, estimate_all, fit_poses,
     identify, linear_step,
@@ -156,7 +156,8 @@ fn sets(folds: &[Vec<usize>]) -> BTreeSet<BTreeSet<usize>> {
 #[test]
 fn regions_hold_whole_postures_out_and_are_not_the_folds_by_image() {
     let seen = in_postures(24, 4);
-    let (by_image, by_region) = (folds(&seen.problem).unwrap(), regions(&seen).unwrap());
+    let limits = Limits::default();
+    let (by_image, by_region) = (folds(&seen.problem, &limits).unwrap(), regions(&seen, &limits).unwrap());
     assert_eq!((by_image.len(), by_region.len()), (6, 3));
     assert_ne!(sets(&by_image), sets(&by_region));
     let mut all: Vec<usize> = by_region.concat();
@@ -171,7 +172,7 @@ fn regions_hold_whole_postures_out_and_are_not_the_folds_by_image() {
     let postures: BTreeSet<BTreeSet<usize>> = by_region.iter().map(|r| r.iter().map(|i| i / 4).collect()).collect();
     assert_eq!(postures, [[3, 5], [0, 1], [2, 4]].map(BTreeSet::from).into());
     let few = in_postures(20, 4);
-    assert!(folds(&few.problem).is_some() && regions(&few).is_none());
+    assert!(folds(&few.problem, &limits).is_some() && regions(&few, &limits).is_none());
 }
 
 #[test]

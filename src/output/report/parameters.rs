@@ -8,7 +8,7 @@ use super::figure::figure;
 use super::maps;
 use super::words::{fixed, grouped, is_local, parameter, plus_minus, short, significant, split, unit};
 use crate::geom::Pose;
-use crate::output::solution_json::{EstimateRecord, LEAST_SHARE, PlacedRecord, SolutionRecord};
+use crate::output::solution_json::{EstimateRecord, PlacedRecord, SolutionRecord};
 use crate::series::CameraMount;
 
 /// Most corrections in the list of the strongest.
@@ -115,7 +115,7 @@ fn grid<'a>(r: &'a SolutionRecord, head: &str, row: impl Fn(&'a str, &'a str) ->
         thead { tr { th { (head) } @for c in &columns { th.n { (column_head(c)) } } } }
         tbody { @for (name, cells) in &rows { tr {
             td { (name) }
-            @for c in &columns { (cells.get(component_of(c)).map_or_else(|| html! { td {} }, |e| cell(e, c))) }
+            @for c in &columns { (cells.get(component_of(c)).map_or_else(|| html! { td {} }, |e| cell(r, e, c))) }
         } } }
     } } }
 }
@@ -132,11 +132,11 @@ fn column_head(e: &EstimateRecord) -> Markup {
     }
 }
 
-fn cell(e: &EstimateRecord, head: &EstimateRecord) -> Markup {
+fn cell(r: &SolutionRecord, e: &EstimateRecord, head: &EstimateRecord) -> Markup {
     let Some((value, sigma)) = known(e) else { return html! { td.grid { "fixed" } } };
     let (factor, own) = unit(e);
     let share = 100.0 * e.share_of_data.unwrap_or(1.0);
-    let class = if share < 100.0 * LEAST_SHARE { "weak" } else { "" };
+    let class = if r.hardly_determines(e) { "weak" } else { "" };
     html! { td.grid {
         (plus_minus(factor * value, factor * sigma)) @if own != unit(head).1 { " " (own) }
         span.bar title={ (format!("{share:.0}")) " % from the data" } { i class=(class) style={ "width:" (format!("{share:.0}")) "%" } {} }
@@ -147,15 +147,14 @@ fn cell(e: &EstimateRecord, head: &EstimateRecord) -> Markup {
 pub(super) fn undetermined(r: &SolutionRecord) -> Markup {
     let weak: Vec<&str> = r.undetermined().iter().map(|e| e.name.as_str()).collect();
     let others = || r.estimates.iter().filter(|e| e.free && !e.name.starts_with("robot/"));
-    let silent: Vec<&str> =
-        others().filter(|e| e.share_of_data.is_some_and(|s| s < LEAST_SHARE)).map(|e| e.name.as_str()).collect();
+    let silent: Vec<&str> = others().filter(|e| r.hardly_determines(e)).map(|e| e.name.as_str()).collect();
     html! {
         h2 { "What the data could not determine" }
         @if weak.is_empty() {
             p { "Nothing: the data say something about every parameter of the robot." }
         } @else {
             p {
-                (weak.len()) " of " (r.robot_parameters().count()) " robot parameters stay near nominal, because the data decide less than 10 % of them: "
+                (weak.len()) " of " (r.robot_parameters().count()) " robot parameters stay near nominal, because the data decide less than " (format!("{:.0}", 100.0 * r.limits().share_of_data)) " % of them: "
                 "stops that move these joints further would. What only the pose of the plate or of the camera takes up is not among them."
             }
             ul { @for line in grouped(weak.iter().copied()) { li { (line) } } }
