@@ -183,7 +183,12 @@ impl Limits {
         let bad = self.named().into_iter().find(|(_, value)| !(value.is_finite() && *value >= 0.0));
         bad.map_or(Ok(()), |(name, value)| {
             let what = format!("{name} = {value}");
-            Err(crate::error::Error::input("[limits]", what, "give a number that is not negative"))
+            Err(crate::error::Error::new(
+                crate::error::Code::SettingRange,
+                "[limits]",
+                what,
+                "give a number that is not negative",
+            ))
         })
     }
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::pictures::Pictures;
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::identify::measure;
 use crate::output::{recover, restore, solution_json::SolutionRecord};
 use crate::problem::MeasuredSeries;
@@ -113,7 +113,8 @@ impl Observed {
         let chain = restore::chain(record, &description, base, tip)?;
         if chain.readings != record.robot.readings {
             let what = format!("is of the joints {}", record.robot.readings.join(", "));
-            return Err(Error::input(
+            return Err(Error::new(
+                Code::SolutionDiffers,
                 path.display(),
                 what,
                 "choose --base and --tip with the same joints between them",
@@ -134,7 +135,7 @@ pub fn require_unchanged(before: &[InputFile], after: &[InputFile]) -> Result<()
     let is_changed = |a: &&InputFile| before.iter().any(|b| b.path == a.path && b.sha256 != a.sha256);
     after.iter().find(is_changed).map_or(Ok(()), |changed| {
         let remedy = "wait until nothing writes to the series any more, then run again";
-        Err(Error::input(changed.path.display(), "changed while it was looked at", remedy))
+        Err(Error::new(Code::SeriesChanged, changed.path.display(), "changed while it was looked at", remedy))
     })
 }
 
@@ -144,7 +145,8 @@ fn read_all(folders: &[PathBuf]) -> Result<Vec<Series>> {
         recover(&folder.join("series.toml"))?;
         let s = series::read(folder)?;
         if let Some(twin) = all.iter().find(|a| a.name == s.name) {
-            return Err(Error::input(
+            return Err(Error::new(
+                Code::SeriesTwice,
                 folder.display(),
                 format!("is named '{}' like the series in {}", s.name, twin.folder.display()),
                 "give every series folder a name of its own, and each series only once",
@@ -169,7 +171,8 @@ fn agreed<'a>(
     let Some((first, link)) = named.next() else { return Ok(None) };
     match named.find(|(_, other)| *other != link) {
         None => Ok(Some(link)),
-        Some((second, other)) => Err(Error::input(
+        Some((second, other)) => Err(Error::new(
+            Code::SeriesDisagree,
             second.folder.join("series.toml").display(),
             format!("{what} = \"{other}\", while {} has {what} = \"{link}\"", first.name),
             format!("series of one robot share base and tip: correct one, or give --{what}"),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::identify::{Config, JointNoise, MarkerTolerance, Options, Parameters, RobotModel, Selection};
 
 /// Flags that `identify` shares with whatever solves.
@@ -115,9 +115,12 @@ const MOST_HARMONICS: u8 = 6;
 
 fn harmonics(count: Option<u8>) -> Result<Option<u8>> {
     match count {
-        Some(k) if k > MOST_HARMONICS => {
-            Err(Error::input("harmonics", format!("{k} are too many"), format!("give 0 to {MOST_HARMONICS}")))
-        }
+        Some(k) if k > MOST_HARMONICS => Err(Error::new(
+            Code::OptionRange,
+            "harmonics",
+            format!("{k} are too many"),
+            format!("give 0 to {MOST_HARMONICS}"),
+        )),
         other => Ok(other),
     }
 }
@@ -126,7 +129,8 @@ fn joint_noise(sigma: Option<f64>) -> Result<Option<JointNoise>> {
     match sigma {
         None => Ok(None),
         Some(s) if (0.0..0.1).contains(&s) => Ok(Some(JointNoise::Known(s))),
-        Some(s) => Err(Error::input(
+        Some(s) => Err(Error::new(
+            Code::OptionRange,
             "--joint-noise",
             format!("{s} is no joint noise in rad"),
             "give 0 for exact readings or a value like 0.00005 (0.05 mrad)",

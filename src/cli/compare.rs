@@ -10,7 +10,7 @@ use super::robot::read_chain;
 use super::say::{say, say_line};
 use super::{Verdict, progress};
 use crate::calibration::{Ends, Inputs, Observed};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::identify::Options;
 use crate::output::Place;
 use crate::output::comparison::comparison_markdown;
@@ -105,7 +105,12 @@ fn study(args: &CompareArgs) -> Result<Verdict> {
     let place = args.place()?;
     let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
     if args.seeds < 2 {
-        return Err(Error::input("--seeds", "fewer than 2 worlds give no interval", "give 30 or more"));
+        return Err(Error::new(
+            Code::OptionRange,
+            "--seeds",
+            "fewer than 2 worlds give no interval",
+            "give 30 or more",
+        ));
     }
     let request = StudyRequest { seeds: args.seeds, ..StudyRequest::full(chain) };
     let bar = progress::bar(1, "cells");

@@ -11,7 +11,7 @@ use super::Verdict;
 use super::robot::noted_chain;
 use super::say::{say, say_line};
 use super::show::read_solution;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::files;
 use crate::geom::Pose;
 use crate::model::joint_terms::Term;
@@ -129,7 +129,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     if let (None, Some(t)) = (&args.nominal, program.targets.iter().find(needs_controller)) {
         let place = format!("{}:{} {}", program.files[t.file].name, t.line, t.name);
         let what = "is a pose, which the controller turns into joints by its own model";
-        return Err(Error::input(place, what, "give that model with --nominal"));
+        return Err(Error::new(Code::ProgramModelMissing, place, what, "give that model with --nominal"));
     }
     if args.nearest_posture {
         for target in &mut program.targets {
@@ -208,7 +208,12 @@ fn expected(
     if !same {
         let what = format!("is not the solution from which {} came", args.urdf.display());
         return match args.solution {
-            Some(_) => Err(Error::input(path.display(), what, "give the solution.json that was written beside it")),
+            Some(_) => Err(Error::new(
+                Code::SolutionDiffers,
+                path.display(),
+                what,
+                "give the solution.json that was written beside it",
+            )),
             None => Ok(Err(format!("{} {what}", path.display()))),
         };
     }
@@ -232,13 +237,18 @@ fn language(args: &CompensateArgs) -> Result<Language> {
     }
     let mut all = args.programs.iter().map(|p| Language::of_file(p).map(|l| (p, l)));
     let Some((first, language)) = all.next().transpose()? else {
-        return Err(Error::input("compensate", "no program is given", "name at least one file"));
+        return Err(Error::new(Code::OptionMissing, "compensate", "no program is given", "name at least one file"));
     };
     for other in all {
         let (path, other) = other?;
         if other != language {
             let what = format!("is of another language than {}", first.display());
-            return Err(Error::input(path.display(), what, "give programs of one language, or --language"));
+            return Err(Error::new(
+                Code::ProgramLanguage,
+                path.display(),
+                what,
+                "give programs of one language, or --language",
+            ));
         }
     }
     Ok(language)
@@ -248,7 +258,12 @@ fn text_file(path: &Path) -> Result<TextFile> {
     let bytes = files::read(path, files::Kind::Program)?;
     if bytes.contains(&0) {
         let what = "is not a text of single bytes (it holds zero bytes, as UTF-16 does)";
-        return Err(Error::input(path.display(), what, "save it as UTF-8 or as the controller writes it"));
+        return Err(Error::new(
+            Code::TextEncoding,
+            path.display(),
+            what,
+            "save it as UTF-8 or as the controller writes it",
+        ));
     }
     Ok(TextFile { name: path.display().to_string(), bytes })
 }
@@ -266,7 +281,8 @@ fn same_joints(file: &Path, chain: &Chain, other_file: &Path, other: &Chain) -> 
         file.display(),
         chain.readings.join(", ")
     );
-    Err(Error::input(
+    Err(Error::new(
+        Code::RobotDiffers,
         other_file.display(),
         what,
         "give descriptions of the same type of robot; choose --base and --tip",
@@ -276,7 +292,7 @@ fn same_joints(file: &Path, chain: &Chain, other_file: &Path, other: &Chain) -> 
 fn known(flag: &str, name: &str, chain: &Chain) -> Result<usize> {
     chain.readings.iter().position(|r| r == name).ok_or_else(|| {
         let what = format!("\"{name}\" is no joint of the chain");
-        Error::input(flag, what, format!("its joints are {}", chain.readings.join(", ")))
+        Error::new(Code::JointUnknown, flag, what, format!("its joints are {}", chain.readings.join(", ")))
     })
 }
 
@@ -290,7 +306,7 @@ fn axes(args: &CompensateArgs, chain: &Chain) -> Result<Vec<usize>> {
     let axes: Vec<usize> = args.axes.iter().map(|name| known("--axes", name, chain)).collect::<Result<_>>()?;
     let all = (0..n).all(|i| axes.iter().filter(|a| **a == i).count() == 1);
     let remedy = format!("name each of {} once", chain.readings.join(", "));
-    if all { Ok(axes) } else { Err(Error::input("--axes", "does not name every joint once", remedy)) }
+    if all { Ok(axes) } else { Err(Error::new(Code::OptionRange, "--axes", "does not name every joint once", remedy)) }
 }
 
 fn postures(args: &CompensateArgs, chain: &Chain, axes: &[usize]) -> Result<Postures> {
@@ -303,7 +319,7 @@ fn postures(args: &CompensateArgs, chain: &Chain, axes: &[usize]) -> Result<Post
     }
     if args.start.len() != axes.len() {
         let what = format!("{} values for {} joints", args.start.len(), axes.len());
-        return Err(Error::input("--start", what, "give one value for each joint, in deg (mm)"));
+        return Err(Error::new(Code::OptionRange, "--start", what, "give one value for each joint, in deg (mm)"));
     }
     let mut start = vec![0.0; axes.len()];
     for (&reading, value) in axes.iter().zip(&args.start) {
@@ -318,7 +334,8 @@ fn frame(flag: &str, numbers: &[f64], language: Language) -> Result<Option<Pose>
     if numbers.is_empty() {
         return Ok(None);
     }
-    let bad = |wanted| Error::input(flag, format!("{} numbers", numbers.len()), format!("give {wanted}"));
+    let bad =
+        |wanted| Error::new(Code::OptionRange, flag, format!("{} numbers", numbers.len()), format!("give {wanted}"));
     language.frame(numbers).map(Some).map_err(bad)
 }
 
@@ -373,7 +390,7 @@ fn text(program: &Program, outcomes: &[Outcome], left: &[Left], chain: &Chain) -
         );
     }
     for notice in &program.notices {
-        let _ = writeln!(out, "note      {notice}");
+        let _ = writeln!(out, "note      {}", notice.coded());
     }
     let mut told: BTreeMap<&str, usize> = BTreeMap::new();
     for l in left {

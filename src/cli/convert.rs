@@ -9,7 +9,7 @@ use super::recording::RecordingArgs;
 use super::robot::read_chain;
 use super::say::{say, say_line};
 use super::show::read_solution;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::files::picture_size;
 use crate::model::robot::Robot;
 use crate::output::recording::{MAGNIFIED, overlay};
@@ -69,7 +69,12 @@ fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<()> {
     let _tried = Place::among(folder)?;
     let Some(chain) = chain else {
         let what = "the joints of a series mean nothing without their robot";
-        return Err(Error::input(args.from.display(), what, "add --urdf robot.urdf (and --base, --tip if needed)"));
+        return Err(Error::new(
+            Code::OptionMissing,
+            args.from.display(),
+            what,
+            "add --urdf robot.urdf (and --base, --tip if needed)",
+        ));
     };
     let series = series::read_images(&args.from)?;
     let readings = series.readings_for(&chain)?;
@@ -89,7 +94,7 @@ fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<()> {
         say_line!("overlay   green: used, orange: left out, red: residuals, {MAGNIFIED} times their length");
     }
     for notice in series.notices.iter().chain(&series.reading_notices(&chain)).chain(&notices) {
-        say_line!("note      {notice}");
+        say_line!("note      {}", notice.coded());
     }
     Ok(())
 }
@@ -141,7 +146,7 @@ fn text(extracted: &Extracted) -> String {
         text += &format!("noise     {rms:.2} counts in one image\n");
     }
     for notice in &extracted.notices {
-        text += &format!("note      {notice}\n");
+        text += &format!("note      {}\n", notice.coded());
     }
     text
 }

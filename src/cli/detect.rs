@@ -11,7 +11,7 @@ use super::say::{say, say_line};
 use super::{Verdict, progress};
 use crate::calibration::{Pictures, require_unchanged};
 use crate::detect::load;
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::identify::SeenImage;
 use crate::output::detection_files::{DetectionContext, detection_files, dropped_counts, marker_counts, picture_names};
 use crate::output::overlay::{Palette, overlay_png};
@@ -66,7 +66,12 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
         (Some(series), _) => of_series(args, series, &pictures)?,
         (None, Some(plate)) => of_images(&args.images, plate)?,
         (None, None) => {
-            return Err(Error::input("detect", "no images are given", "give --series, or --plate and images"));
+            return Err(Error::new(
+                Code::OptionMissing,
+                "detect",
+                "no images are given",
+                "give --series, or --plate and images",
+            ));
         }
     };
     let out = place.path().to_path_buf();
@@ -74,7 +79,7 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
     say!("{}", text(&looked.images));
     let notices: Vec<Notice> =
         looked.notices.iter().cloned().chain(looked.images.iter().flat_map(SeenImage::notices)).collect();
-    Notice::said_once(&notices).iter().for_each(|n| say_line!("note      {n}"));
+    Notice::said_once(&notices).iter().for_each(|n| say_line!("note      {}", n.coded()));
     say_line!("results   {} ({written} files)", out.display());
     let failures: Vec<&Error> = looked.images.iter().filter_map(|i| i.detection.failure.as_ref()).collect();
     let seen = |i: &SeenImage| (i.detection.observations.len(), i.detection.failure.as_ref().map(|f| f.what.clone()));
@@ -86,7 +91,7 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
 fn of_series(args: &DetectArgs, series: Series, pictures: &Pictures) -> Result<Looked> {
     let mut all = pictures.of_recordings(vec![series], &args.recording.options(&[])?)?;
     let Some(series) = all.pop() else {
-        return Err(Error::input("detect", "the series was lost", "report this"));
+        return Err(Error::new(Code::OptionMissing, "detect", "the series was lost", "report this"));
     };
     let mut inputs = series.inputs.clone();
     inputs.extend(series.image_hashes()?);
@@ -103,7 +108,12 @@ fn of_images(images: &[PathBuf], plate: &Path) -> Result<Looked> {
     let name = |path: &PathBuf| path.file_name().map(|n| n.to_owned());
     if let Some((k, twin)) = images.iter().enumerate().find(|(k, i)| images[..*k].iter().any(|j| name(i) == name(j))) {
         let what = format!("has the name of image {} as well", k);
-        return Err(Error::input(twin.display(), what, "images are told apart by their names: rename one"));
+        return Err(Error::new(
+            Code::ImageTwice,
+            twin.display(),
+            what,
+            "images are told apart by their names: rename one",
+        ));
     }
     let hashes = || images.iter().filter(|i| i.is_file()).map(|i| InputFile::of_file(i)).collect::<Result<Vec<_>>>();
     inputs.extend(hashes()?);

@@ -11,7 +11,7 @@ use super::say::{say, say_line};
 use super::show::read_solution;
 use super::{Verdict, progress, summary};
 use crate::calibration::{Calibration, Ends, Export, Inputs, Observed};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::identify::{Estimator, Options, dry_run};
 use crate::output::solution_json::{self, FILE_NAME};
 use crate::output::{Offsets, Place, Poses, folder_name, restore};
@@ -119,17 +119,24 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
             }
             let inputs = inputs.with_recordings(&args.recording.options(&[])?)?;
             if args.dry_run {
-                inputs.tip_notice.iter().for_each(|notice| say_line!("note      {notice}"));
+                inputs.tip_notice.iter().for_each(|notice| say_line!("note      {}", notice.coded()));
                 say!("{}", summary::of_stops(&dry_run(inputs.chain, &inputs.series, &options)?));
                 return Ok(Verdict::Good);
             }
             inputs.observe(&progress::of_series())?
         }
         (None, None) => {
-            return Err(Error::input("identify", "no robot is given", "give --urdf and --series, or --from"));
+            return Err(Error::new(
+                Code::OptionMissing,
+                "identify",
+                "no robot is given",
+                "give --urdf and --series, or --from",
+            ));
         }
     };
-    let place = place.ok_or_else(|| Error::input("identify", "no folder for the results is given", "give --out"))?;
+    let place = place.ok_or_else(|| {
+        Error::new(Code::OptionMissing, "identify", "no folder for the results is given", "give --out")
+    })?;
     let estimator = args.two_stage.map_or(options.estimator, Into::into);
     choose_lens(&mut observed.series, args.camera.as_deref())?;
     let calibration = Calibration::of(observed, &Options { estimator, ..options })?;

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::say::say_line;
 use super::{Verdict, progress};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::identify::SeenImage;
 use crate::output::Place;
 use crate::output::overlay::{Palette, overlay_png};
@@ -59,7 +59,7 @@ impl StudyArgs {
 /// Runs the parts and writes the report into `out`; with `overlay` also pictures of the views that failed (of a single view in any case).
 pub(super) fn run(args: &StudyArgs, out: &Path, overlay: bool) -> Result<Verdict> {
     if args.views == 0 {
-        return Err(Error::input("--views", "0 views show nothing", "give 1 or more"));
+        return Err(Error::new(Code::OptionRange, "--views", "0 views show nothing", "give 1 or more"));
     }
     let place = Place::among(out)?;
     let mut sections = Vec::new();

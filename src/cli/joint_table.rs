@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::ValueEnum;
 
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::files::{self, Kind};
 use crate::urdf::JointKind;
 
@@ -26,30 +26,40 @@ pub(super) fn read(
     kinds: &[JointKind],
     unit: Unit,
 ) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
-    let bad = |line: u64, what: String, remedy: &str| Error::input(format!("{}:{line}", path.display()), what, remedy);
+    let bad = |code, line: u64, what: String, remedy: &str| {
+        Error::new(code, format!("{}:{line}", path.display()), what, remedy)
+    };
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(files::open(path, Kind::Table)?.0);
-    let header = reader.headers().map_err(|e| bad(1, e.to_string(), "the first line names the columns"))?.clone();
+    let header = reader
+        .headers()
+        .map_err(|e| bad(Code::CsvSyntax, 1, e.to_string(), "the first line names the columns"))?
+        .clone();
     let column = |name: &str| {
         header.iter().position(|h| h == name).ok_or_else(|| {
             let present: Vec<&str> = header.iter().collect();
             let what = format!("no column '{name}' (present: {})", present.join(", "));
             let named: Vec<&str> = first.iter().copied().chain(joints.iter().map(String::as_str)).collect();
-            bad(1, what, &format!("name the columns {}", named.join(", ")))
+            bad(Code::CsvColumnMissing, 1, what, &format!("name the columns {}", named.join(", ")))
         })
     };
     let plain: Vec<usize> = first.iter().map(|name| column(name)).collect::<Result<_>>()?;
     let joints: Vec<usize> = joints.iter().map(|j| column(j)).collect::<Result<_>>()?;
     let mut rows = Vec::new();
     for record in reader.records() {
-        let record =
-            record.map_err(|e| Error::input(path.display(), e, "every row has the columns of the first line"))?;
+        let record = record.map_err(|e| {
+            Error::new(Code::CsvSyntax, path.display(), e, "every row has the columns of the first line")
+        })?;
         let line = record.position().map_or(0, csv::Position::line);
         let number = |c: usize| {
             let cell = record.get(c).unwrap_or("");
-            cell.parse::<f64>()
-                .ok()
-                .filter(|v| v.is_finite())
-                .ok_or_else(|| bad(line, format!("'{cell}' in column {} is no number", &header[c]), "correct the cell"))
+            cell.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
+                bad(
+                    Code::CsvNumber,
+                    line,
+                    format!("'{cell}' in column {} is no number", &header[c]),
+                    "correct the cell",
+                )
+            })
         };
         let plain = plain.iter().map(|c| number(*c)).collect::<Result<_>>()?;
         let mut readings = Vec::with_capacity(joints.len());
@@ -60,7 +70,7 @@ pub(super) fn read(
         rows.push((plain, readings));
     }
     if rows.is_empty() {
-        return Err(bad(1, "no row of numbers".into(), "write one joint vector per row"));
+        return Err(bad(Code::FileEmpty, 1, "no row of numbers".into(), "write one joint vector per row"));
     }
     Ok(rows)
 }

@@ -7,7 +7,7 @@
 use std::io::Write;
 use std::process::{Command, ExitCode, ExitStatus};
 
-use crate::error::Error;
+use crate::error::{Code, Error};
 
 /// Tells a child how many threads it may have: as many as it likes, or one.
 const CHILD: &str = "ROBOTCAL_IN_LIMITED_MEMORY";
@@ -28,8 +28,13 @@ pub(super) fn in_a_child() -> Option<ExitCode> {
         }
     }
     let what = format!("the address space is limited to {} MB, and that was not enough", limit / 1_000_000);
-    let error = Error::input("memory", what, "raise the limit (ulimit -v), or give fewer or smaller images");
-    let _ = writeln!(std::io::stderr(), "error: {error}");
+    let error = Error::new(
+        Code::MemoryExhausted,
+        "memory",
+        what,
+        "raise the limit (ulimit -v), or give fewer or smaller images",
+    );
+    let _ = writeln!(std::io::stderr(), "error[{}]: {error}", error.code);
     Some(ExitCode::from(error.exit_code()))
 }
 

@@ -34,7 +34,7 @@ use clap::{Parser, Subcommand};
 use tracing_subscriber::filter::filter_fn;
 use tracing_subscriber::prelude::*;
 
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use arguments::command_line;
 use verdict::Verdict;
 
@@ -114,9 +114,12 @@ pub fn main() -> ExitCode {
     start_log(cli.verbose);
     memory::set_threads(cli.threads);
     let ended = cli.command.run().and_then(|verdict| match say::failure() {
-        Some(error) => {
-            Err(Error::input("stdout", error, "check where the output goes; results that were named are written"))
-        }
+        Some(error) => Err(Error::new(
+            Code::OutputFailed,
+            "stdout",
+            error,
+            "check where the output goes; results that were named are written",
+        )),
         None => Ok(verdict),
     });
     match ended {
@@ -124,7 +127,7 @@ pub fn main() -> ExitCode {
         Ok(Verdict::GateFailed) => ExitCode::from(1),
         Err(error) => {
             // Nobody is left to hear that stderr is closed.
-            let _ = writeln!(std::io::stderr(), "error: {error}");
+            let _ = writeln!(std::io::stderr(), "error[{}]: {error}", error.code);
             ExitCode::from(error.exit_code())
         }
     }

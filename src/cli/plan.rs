@@ -13,7 +13,7 @@ use super::robot::{noted_chain, read_chain};
 use super::say::say;
 use super::show::read_solution;
 use super::simulate::Mount;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::{OrientedBox, Pose};
 use crate::identify::RobotModel;
 use crate::model::camera::Camera;
@@ -151,7 +151,12 @@ pub(super) struct PlanArgs {
 fn numbers(flag: &str, text: &str, count: usize, remedy: &str) -> Result<Vec<f64>> {
     let all: Vec<f64> = text.split(',').filter_map(|p| p.trim().parse().ok()).filter(|v: &f64| v.is_finite()).collect();
     if all.len() != count || text.split(',').count() != count {
-        return Err(Error::input(flag, format!("\"{text}\" is not {count} numbers with commas between"), remedy));
+        return Err(Error::new(
+            Code::OptionRange,
+            flag,
+            format!("\"{text}\" is not {count} numbers with commas between"),
+            remedy,
+        ));
     }
     Ok(all)
 }
@@ -283,16 +288,26 @@ fn check(args: &PlanArgs) -> Result<()> {
         ("--tilt-deg", args.tilt_deg),
     ];
     if let Some((flag, value)) = positive.iter().find(|(_, v)| !(*v > 0.0 && v.is_finite())) {
-        return Err(Error::input(flag, format!("is {value}"), "give a positive number"));
+        return Err(Error::new(Code::OptionRange, flag, format!("is {value}"), "give a positive number"));
     }
     if args.distance_m[1] < args.distance_m[0] {
-        return Err(Error::input("--distance-m", "the farthest is nearer than the nearest", "give NEARxFAR"));
+        return Err(Error::new(
+            Code::OptionRange,
+            "--distance-m",
+            "the farthest is nearer than the nearest",
+            "give NEARxFAR",
+        ));
     }
     if args.tilt_deg >= 85.0 || args.camera_fov_deg >= 170.0 {
-        return Err(Error::input("--tilt-deg, --camera-fov-deg", "too large", "give less than 85 and 170 degrees"));
+        return Err(Error::new(
+            Code::OptionRange,
+            "--tilt-deg, --camera-fov-deg",
+            "too large",
+            "give less than 85 and 170 degrees",
+        ));
     }
     if args.count == 0 {
-        return Err(Error::input("--count", "is 0", "ask for one image at least"));
+        return Err(Error::new(Code::OptionRange, "--count", "is 0", "ask for one image at least"));
     }
     Ok(())
 }
@@ -365,7 +380,12 @@ fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
     let column = |name: &String| {
         let at = stops.joints.iter().position(|j| j == name);
         at.ok_or_else(|| {
-            Error::input(path.display(), format!("has no column \"{name}\""), "name every joint of the chain")
+            Error::new(
+                Code::JointMissing,
+                path.display(),
+                format!("has no column \"{name}\""),
+                "name every joint of the chain",
+            )
         })
     };
     let columns: Vec<usize> = chain.readings.iter().map(column).collect::<Result<_>>()?;
@@ -381,7 +401,8 @@ fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
             "{} targets are too few: base frame and a point of the flange are brought together there, which three fit exactly",
             targets.len()
         );
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::TargetsTooFew,
             path.display(),
             what,
             format!("give at least {LEAST_TARGETS}, spread over where the robot works"),
@@ -400,7 +421,10 @@ fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<Image>)> {
         }
         return Ok((setting, taken));
     }
-    let plate = args.plate.as_ref().ok_or_else(|| Error::input("--plate", "is missing", "give plate.toml"))?;
+    let plate = args
+        .plate
+        .as_ref()
+        .ok_or_else(|| Error::new(Code::OptionMissing, "--plate", "is missing", "give plate.toml"))?;
     let plate = read_plate(plate, &mut Vec::new())?;
     let robot = model.robot(chain);
     let mount: CameraMount = args.mount.into();
@@ -408,7 +432,8 @@ fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<Image>)> {
         (Some(text), _) => pose("--hand-camera", text)?,
         (None, CameraMount::Hand) => Pose::from_xyz_rpy([0.0, 0.0, 0.08], [0.0; 3]),
         (None, CameraMount::Fixed) => {
-            return Err(Error::input(
+            return Err(Error::new(
+                Code::OptionMissing,
                 "--hand-camera",
                 "is missing",
                 "say where the fixed camera stands in the base frame",

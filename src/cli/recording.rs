@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::series::{Clock, Motion, Picking, RecordingOptions};
 
 /// Flags that say how a recording is read.
@@ -50,12 +50,17 @@ impl RecordingArgs {
             None => Motion::Refuse,
             Some(interval_s) if interval_s > 0.0 && interval_s.is_finite() => Motion::Accept { interval_s },
             Some(s) => {
-                return Err(Error::input("--in-motion", format!("{s} is no time"), "give seconds, for example 0.5"));
+                return Err(Error::new(
+                    Code::OptionRange,
+                    "--in-motion",
+                    format!("{s} is no time"),
+                    "give seconds, for example 0.5",
+                ));
             }
         };
         if let Some(delay_s) = self.image_delay.filter(|s| s.abs() > LONGEST_DELAY_S || s.is_nan()) {
             let what = format!("{delay_s} is no delay of images");
-            return Err(Error::input("--image-delay", what, "give seconds, for example 0.25"));
+            return Err(Error::new(Code::OptionRange, "--image-delay", what, "give seconds, for example 0.25"));
         }
         Ok(RecordingOptions {
             joints: joints.to_vec(),

@@ -15,7 +15,7 @@ pub(super) fn read_chain(file: &Path, base: Option<&str>, tip: Option<&str>) -> 
 pub(super) fn noted_chain(description: &RobotDescription, base: Option<&str>, tip: Option<&str>) -> Result<Chain> {
     let chain = description.chain(base, tip)?;
     if let Some(notice) = description.tip_notice(base, tip) {
-        say_line!("note      {notice}");
+        say_line!("note      {}", notice.coded());
     }
     Ok(chain)
 }

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use super::robot::read_chain;
 use super::say::{say, say_line};
 use super::{Verdict, progress};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::model::camera::Lens;
 use crate::output::NewFolder;
 use crate::plan::plate_design::{PlateRequest, design};
@@ -165,7 +165,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Verdict> {
     if let Some(fault) = fault {
         if args.observations && fault.expectation().needs_images {
             let place = format!("--fault {}", fault.expectation().name);
-            return Err(Error::input(place, "shows in images only", "leave --observations out"));
+            return Err(Error::new(Code::OptionConflict, place, "shows in images only", "leave --observations out"));
         }
         fault.apply(&mut made)?;
         if args.outer_only {
@@ -185,7 +185,7 @@ fn named_fault(name: &str) -> Result<Fault> {
     Fault::from_name(name).ok_or_else(|| {
         let known = crate::error::closest_name(name, FAULTS.iter().map(|e| e.name));
         let remedy = known.map_or_else(|| "--fault list shows all".to_owned(), |k| format!("is \"{k}\" meant?"));
-        Error::input("--fault", format!("there is no fault \"{name}\""), remedy)
+        Error::new(Code::FaultUnknown, "--fault", format!("there is no fault \"{name}\""), remedy)
     })
 }
 
@@ -195,13 +195,18 @@ fn conditions(args: &SimulateArgs) -> Result<ImagingConditions> {
         Some(path) => {
             let text = crate::files::read_text(path, crate::files::Kind::Settings)?;
             toml::from_str(&text).map_err(|e| {
-                Error::input(path.display(), e.message(), "see the fields of ImagingConditions in the manual")
+                Error::new(
+                    Code::SettingSyntax,
+                    path.display(),
+                    e.message(),
+                    "see the fields of ImagingConditions in the manual",
+                )
             })?
         }
     };
     conditions.bits = args.bits.unwrap_or(conditions.bits);
     if ![8, 10, 12, 16].contains(&conditions.bits) {
-        return Err(Error::input("--bits", conditions.bits, "give 8, 10, 12 or 16"));
+        return Err(Error::new(Code::OptionRange, "--bits", conditions.bits, "give 8, 10, 12 or 16"));
     }
     Ok(conditions)
 }
@@ -210,7 +215,7 @@ fn conditions(args: &SimulateArgs) -> Result<ImagingConditions> {
 pub(super) fn lens(name: &str) -> Result<Lens> {
     Lens::from_name(name).ok_or_else(|| {
         let remedy = format!("use one of: {}", Lens::names().join(", "));
-        Error::input("lens", format!("'{name}' is not a lens model of this program"), remedy)
+        Error::new(Code::LensUnknown, "lens", format!("'{name}' is not a lens model of this program"), remedy)
     })
 }
 
@@ -223,7 +228,7 @@ fn request(args: &SimulateArgs) -> Result<WorldRequest> {
         && args.height_px >= 64;
     if !sane {
         let remedy = "near-m > 0, far-m >= near-m, tilt below 85 degrees, field of 5 to 140 degrees, at least 64x64 px";
-        return Err(Error::input("simulate", "the camera or its views cannot be", remedy));
+        return Err(Error::new(Code::OptionRange, "simulate", "the camera or its views cannot be", remedy));
     }
     let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
     Ok(WorldRequest {

@@ -111,7 +111,7 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     if let Some(found) = &r.identifiability {
         identifiability(out, found, "the data tell", MOST_ADVICE)?;
     }
-    limited(out, "note", Notice::said_once(&r.notices).iter().map(ToString::to_string))
+    limited(out, "note", Notice::said_once(&r.notices).iter().map(Notice::coded))
 }
 
 fn verdict(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {

@@ -10,7 +10,7 @@ use super::say::say_line;
 use super::verify_args::VerifyArgs;
 use super::{Verdict, verify_series};
 use crate::assess::{MeasuredPoint, fit_points};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::output::compensated;
 use crate::urdf::Chain;
 
@@ -30,7 +30,8 @@ fn points(args: &VerifyArgs, points_file: &std::path::Path, unit: Unit) -> Resul
         let points = read_points(points_file, &chain, unit)?;
         let robot = compensated(chain, compensation.map(PathBuf::as_path))?;
         let fit = fit_points(&robot, &points).ok_or_else(|| {
-            Error::unsolved(
+            Error::new(
+                Code::PointsUndetermined,
                 points_file.display(),
                 "the points do not determine the frame of the device and the reflector",
                 "measure at least 10 points that differ in position and in hand orientation",
@@ -43,7 +44,7 @@ fn points(args: &VerifyArgs, points_file: &std::path::Path, unit: Unit) -> Resul
                 file.display()
             );
             let remedy = "check --joint-unit, the order of the joint columns, and the unit of the points (m)";
-            return Err(Error::unsolved(points_file.display(), what, remedy));
+            return Err(Error::new(Code::PointsContradict, points_file.display(), what, remedy));
         }
         let worst = fit.residuals_m.iter().map(Vector3::norm).fold(0.0, f64::max);
         Ok((points.len(), 1e3 * fit.rms_m, 1e3 * worst))

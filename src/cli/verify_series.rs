@@ -8,7 +8,7 @@ use super::verify_args::VerifyArgs;
 use super::{Verdict, progress};
 use crate::assess::{Ratio, bootstrap_ratio, by_cluster, root_mean_square};
 use crate::calibration::{Ends, Inputs, Observed};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::identify::{JudgedImage, verify_series};
 use crate::output::compensated;
 
@@ -33,7 +33,12 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let postures: Vec<usize> = model.iter().map(|i| i.posture).collect();
     let of_postures = |images: &[&JudgedImage]| by_cluster(&postures, &units(images));
     let ratio = bootstrap_ratio(&of_postures(&model), &of_postures(&nominal)).ok_or_else(|| {
-        Error::unsolved("verification", "the models have no image in common", "check that both URDFs are of this robot")
+        Error::new(
+            Code::FitUndetermined,
+            "verification",
+            "the models have no image in common",
+            "check that both URDFs are of this robot",
+        )
     })?;
     let Ratio { value, low, high } = ratio;
     let share = format!("{:.0} % of the nominal error ({:.0} to {:.0} %)", 100.0 * value, 100.0 * low, 100.0 * high);

@@ -13,7 +13,7 @@ use super::chessboard::{WINDOW, board_size, corner_config, to_8_bit};
 use super::corners::measure;
 use super::saddle::Window;
 use super::{Detection, Picture};
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::series::Plate;
 
 /// Blur of a marker's border that the window of a corner stays clear of, px.
@@ -113,7 +113,8 @@ fn decode(
     let mut params = CharucoParams::for_board(spec);
     params.chess = corner_config();
     let detector = CharucoDetector::new(params).map_err(|e| {
-        Error::input(
+        Error::new(
+            Code::PlateNotDetectable,
             "plate",
             format!("the ChArUco board is impossible: {e}"),
             "check `columns`, `rows` (inner corners) and [aruco] of the plate file",
@@ -126,7 +127,8 @@ fn decode(
 fn prints(plate: &Plate) -> Result<Vec<Print>> {
     if let Some(aruco) = &plate.aruco {
         let dictionary = resolve_dictionary(&aruco.dictionary).ok_or_else(|| {
-            Error::input(
+            Error::new(
+                Code::DictionaryUnknown,
                 "plate",
                 format!("the dictionary {:?} is not known", aruco.dictionary),
                 "use a name of OpenCV, such as DICT_4X4_50 or DICT_APRILTAG_36h11",
@@ -143,6 +145,7 @@ fn prints(plate: &Plate) -> Result<Vec<Print>> {
 
 fn found_print(print: &Print) -> Notice {
     Notice::new(
+        Code::DictionaryGuessed,
         "plate",
         format!("markers of {} with a side of about {} squares were found", print.dictionary.name(), print.ratio),
         "write dictionary and side_m under [aruco] in the plate file, which is faster and safer",
@@ -156,9 +159,14 @@ fn no_board(plate: &Plate) -> Error {
     };
     let remedy =
         "check that the board is in view and sharp, and columns, rows (inner corners) and [aruco] of the plate file";
-    Error::input("image", what, remedy)
+    Error::new(Code::PlateNotFound, "image", what, remedy)
 }
 
 fn mirrored_board() -> Error {
-    Error::input("image", "the board is mirrored", "turn off mirroring in the camera or in the image export")
+    Error::new(
+        Code::PlateMirrored,
+        "image",
+        "the board is mirrored",
+        "turn off mirroring in the camera or in the image export",
+    )
 }

@@ -10,7 +10,7 @@ use super::board_labels::{BoardSize, Label, Labelling, Lattice, label};
 use super::corners::measure;
 use super::saddle::Window;
 use super::{Detection, Picture};
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::series::Plate;
 
 /// Pixels for one corner: as far along the edges as the next corners do not disturb, and near enough that the lens
@@ -53,7 +53,8 @@ pub(super) fn board_size(plate: &Plate) -> Result<BoardSize> {
     let size = (i32::try_from(plate.columns), i32::try_from(plate.rows));
     match size {
         (Ok(columns @ 2..=1000), Ok(rows @ 2..=1000)) => Ok(BoardSize { columns, rows }),
-        _ => Err(Error::input(
+        _ => Err(Error::new(
+            Code::PlateNotDetectable,
             "plate",
             format!("a chessboard of {} x {} inner corners", plate.columns, plate.rows),
             "set `columns` and `rows` of the plate file to the numbers of inner corners, each from 2 to 1000",
@@ -112,7 +113,8 @@ fn bright_level(picture: &Picture) -> f32 {
 }
 
 fn no_board() -> Error {
-    Error::input(
+    Error::new(
+        Code::PlateNotFound,
         "image",
         "no chessboard found",
         "check that the board is in view, sharp and evenly lit, and that `kind` of the plate file is right",
@@ -120,7 +122,8 @@ fn no_board() -> Error {
 }
 
 fn ambiguous() -> Error {
-    Error::input(
+    Error::new(
+        Code::PlateIncomplete,
         "image",
         "too little of the chessboard's outline is in view to tell which part of the board it is",
         "take the image so that at least two neighbouring sides of the board are in view",
@@ -128,7 +131,8 @@ fn ambiguous() -> Error {
 }
 
 fn mirrored() -> Error {
-    Error::input(
+    Error::new(
+        Code::PlateMirrored,
         "image",
         "the chessboard is mirrored, or its top-left square is light",
         "turn off mirroring in the camera or in the image export; the plate's first square must be dark",
@@ -136,7 +140,8 @@ fn mirrored() -> Error {
 }
 
 fn contradiction(board: BoardSize) -> Error {
-    Error::input(
+    Error::new(
+        Code::PlateContradicted,
         "image",
         format!("the squares do not have the colours of a board of {} x {} inner corners", board.columns, board.rows),
         "check `columns` and `rows` of the plate file (inner corners) and that the top-left square is dark",
@@ -145,6 +150,7 @@ fn contradiction(board: BoardSize) -> Error {
 
 fn symmetric_notice(board: BoardSize) -> Notice {
     Notice::new(
+        Code::PlateSymmetric,
         "plate",
         format!(
             "a board of {} x {} inner corners looks the same after a turn; ids assume that its top is up in the image",
@@ -156,6 +162,7 @@ fn symmetric_notice(board: BoardSize) -> Notice {
 
 fn blank_line_notice(board: BoardSize) -> Notice {
     Notice::new(
+        Code::PlateLineHidden,
         "image",
         "a whole line of the chessboard's squares is not seen where it should be",
         format!("if nothing covers it, the board has fewer than {} x {} inner corners", board.columns, board.rows),

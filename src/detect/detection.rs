@@ -1,7 +1,7 @@
 //! What a detector hands back for one image.
 
 use super::circles::{self, Drift, Ellipse, Found, InnerOuter, LOPSIDED_PX, Outcome};
-use crate::error::{Error, Notice};
+use crate::error::{Code, Error, Notice};
 use crate::series::Observation;
 
 /// Identified observations of one image, and what was seen but not used.
@@ -59,8 +59,9 @@ impl From<circles::CircleDetection> for Detection {
         let edges = found.lopsided.filter(|l| l.exceeds(LOPSIDED_PX)).map(lopsided_notice);
         let notices = rings.into_iter().chain(edges).collect();
         let failure = found.outcome.failure();
-        let failure =
-            failure.map(|(what, remedy)| Error::input("image", format!("{what}{}", found.dropped_summary()), remedy));
+        let failure = failure.map(|(code, what, remedy)| {
+            Error::new(code, "image", format!("{what}{}", found.dropped_summary()), remedy)
+        });
         let dropped = |d: &circles::DroppedCandidate| Dropped {
             uv: d.uv,
             reason: d.reason.name(),
@@ -89,5 +90,5 @@ fn lopsided_notice(drift: Drift) -> Notice {
          along the radius in the corner",
         drift.corner_px
     );
-    Notice::new("image", what, "look for coma (stop the lens down) or motion during the exposure")
+    Notice::new(Code::BlurAsymmetric, "image", what, "look for coma (stop the lens down) or motion during the exposure")
 }

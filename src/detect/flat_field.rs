@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{Picture, load};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 
 /// White over dark below this share of the usual difference is a pixel without signal.
 const DEAD: f32 = 0.02;
@@ -31,7 +31,8 @@ impl FlatField {
         if let (Some((_, d)), Some((place, w))) = (&dark_mean, &white_mean)
             && !same_kind(d, w)
         {
-            return Err(Error::input(
+            return Err(Error::new(
+                Code::ImageSizeDiffers,
                 place.display(),
                 format!("white images are {} and dark images {}", kind(w), kind(d)),
                 "record dark and white images with the camera and the settings of the series",
@@ -56,7 +57,8 @@ impl FlatField {
     /// A picture of another size or depth than the dark and white images.
     pub fn apply(&self, picture: Picture) -> Result<Picture> {
         if (picture.width, picture.height, picture.full_scale) != (self.width, self.height, self.full_scale) {
-            return Err(Error::input(
+            return Err(Error::new(
+                Code::ImageSizeDiffers,
                 "image",
                 format!(
                     "is {}, but the dark and white images are {} x {} px up to {}",
@@ -112,7 +114,8 @@ fn average(paths: &[PathBuf], bits: Option<u32>) -> Result<Option<(&Path, Pictur
     for path in rest {
         let picture = load(path, bits)?;
         if !same_kind(&picture, &mean) {
-            return Err(Error::input(
+            return Err(Error::new(
+                Code::ImageSizeDiffers,
                 path.display(),
                 format!("is {}, but {} is {}", kind(&picture), first.display(), kind(&mean)),
                 "keep images of one camera and one setting in the folder",
@@ -136,14 +139,16 @@ fn gains(white: &Picture, dark: &[f32], place: &Path) -> Result<Vec<f32>> {
     let dead = signal.iter().filter(|&&s| s < DEAD * top).count();
     let share = |count: usize| count as f64 / signal.len() as f64;
     if top <= 0.0 || share(dead) > DEAD_SHARE {
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::FlatFieldUseless,
             place.display(),
             "the white images are not brighter than the dark ones everywhere",
             "photograph an evenly lit white surface that fills the whole view",
         ));
     }
     if share(clipped) > DEAD_SHARE {
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::FlatFieldUseless,
             place.display(),
             format!("{:.0} % of the pixels of the white images are saturated", 100.0 * share(clipped)),
             "shorten the exposure of the white images",

@@ -6,7 +6,7 @@ use std::path::Path;
 use image::{DynamicImage, ImageError};
 
 use super::Picture;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::files::{self, Kind, MOST_SIDE_PX, decode_picture};
 
 /// Weights of red, green and blue in the grey value (luma of ITU-R BT.709), applied to the stored counts.
@@ -22,7 +22,12 @@ pub const LUMA_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
 pub fn load(path: &Path, bits: Option<u32>) -> Result<Picture> {
     let (file, length) = files::open(path, Kind::Image)?;
     if length == 0 {
-        return Err(Error::input(path.display(), "the file is empty", "record or copy the image again"));
+        return Err(Error::new(
+            Code::ImageTruncated,
+            path.display(),
+            "the file is empty",
+            "record or copy the image again",
+        ));
     }
     load_from(path, BufReader::new(file), bits)
 }
@@ -39,7 +44,8 @@ fn load_from(path: &Path, source: impl BufRead + Seek, bits: Option<u32>) -> Res
     let decoded = decode_picture(source).map_err(|e| decode_error(path, &e))?;
     let picture = to_picture(&decoded);
     if picture.width < 2 || picture.height < 2 {
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::ImageSizeImpossible,
             path.display(),
             format!("is {} x {} px", picture.width, picture.height),
             "check the recording: an image needs at least 2 x 2 px",
@@ -54,18 +60,23 @@ fn load_from(path: &Path, source: impl BufRead + Seek, bits: Option<u32>) -> Res
 fn decode_error(path: &Path, error: &ImageError) -> Error {
     let place = path.display();
     match error {
-        ImageError::Unsupported(e) => {
-            Error::input(place, format!("not a supported image: {e}"), "convert it to png, tif, pgm, jpg or bmp")
-        }
-        ImageError::Limits(e) => Error::input(
+        ImageError::Unsupported(e) => Error::new(
+            Code::ImageUnreadable,
+            place,
+            format!("not a supported image: {e}"),
+            "convert it to png, tif, pgm, jpg or bmp",
+        ),
+        ImageError::Limits(e) => Error::new(
+            Code::ImageSizeImpossible,
             place,
             format!("the image is too large: {e}"),
             format!("check the file header; sides up to {MOST_SIDE_PX} px and some hundred megapixels are read"),
         ),
         ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
-            Error::input(place, "the file is truncated", "copy or record the image again")
+            Error::new(Code::ImageTruncated, place, "the file is truncated", "copy or record the image again")
         }
-        other => Error::input(
+        other => Error::new(
+            Code::ImageUnreadable,
             place,
             format!("cannot be decoded: {other}"),
             "open it in an image viewer; copy or record it again if it is damaged",
@@ -75,7 +86,8 @@ fn decode_error(path: &Path, error: &ImageError) -> Error {
 
 fn with_bits(picture: Picture, bits: u32, path: &Path) -> Result<Picture> {
     if !(1..=16).contains(&bits) {
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::ImageDepth,
             path.display(),
             format!("bits = {bits} is not a pixel depth"),
             "set `bits` under [camera] in series.toml to 8, 10, 12, 14 or 16, or remove it",
@@ -84,7 +96,8 @@ fn with_bits(picture: Picture, bits: u32, path: &Path) -> Result<Picture> {
     let full_scale = ((1u32 << bits) - 1) as f32;
     let peak = picture.pixels.iter().copied().fold(0.0_f32, f32::max);
     if peak > full_scale {
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::ImageDepth,
             path.display(),
             format!("holds the count {peak}, above {full_scale} of bits = {bits}"),
             "correct `bits` under [camera] in series.toml; remove it when the counts fill the whole file depth",

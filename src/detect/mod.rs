@@ -20,7 +20,7 @@ pub use load::{LUMA_WEIGHTS, load, load_bytes};
 pub use picture::Picture;
 pub use run::{SeriesImage, detect_series};
 
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::series::{Plate, PlateKind};
 
 /// Finds and identifies the markers of a plate in a picture.
@@ -46,7 +46,8 @@ fn by_kind(picture: &Picture, plate: &Plate) -> Result<Detection> {
         PlateKind::CodedCircles => circles::detect(picture, plate, &circles::Options::default()).map(Detection::from),
         PlateKind::CircleGrid => circles::detect_grid(picture, plate, &circles::Options::default()),
         PlateKind::Charuco => charuco::detect(picture, plate),
-        PlateKind::Points => Err(Error::input(
+        PlateKind::Points => Err(Error::new(
+            Code::PlateNotDetectable,
             "plate",
             "a plate of kind \"points\" has no markers that can be seen in an image",
             "give observations.csv in the series folder, or set the `kind` that is printed",

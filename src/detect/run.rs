@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::{Detection, Picture, examine};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::files::{batches, picture_size};
 use crate::series::Plate;
 
@@ -74,7 +74,8 @@ fn refuse_odd_sizes(images: &[PathBuf], found: &mut [SeriesImage]) {
     for (path, image) in images.iter().zip(found) {
         if let Some(size) = image.size.filter(|s| *s != usual && image.detection.failure.is_none()) {
             image.detection.observations.clear();
-            image.detection.failure = Some(Error::input(
+            image.detection.failure = Some(Error::new(
+                Code::ImageSizeDiffers,
                 path.display(),
                 format!("is {} x {} px, but {count} images are {} x {} px", size.0, size.1, usual.0, usual.1),
                 "record a series with one camera at one resolution; put other images into a series of their own",

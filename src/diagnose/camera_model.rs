@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject};
+use crate::error::Code;
 use crate::problem::Problem;
 
 /// The stand-alone camera poses leave too much.
@@ -28,8 +29,8 @@ impl fmt::Display for CameraModelMisfit {
 }
 
 impl Kind for CameraModelMisfit {
-    fn code(&self) -> &'static str {
-        "camera_model_misfit"
+    fn code(&self) -> Code {
+        Code::CameraModelMisfit
     }
 
     fn subjects(&self) -> Vec<Subject> {

@@ -145,13 +145,16 @@ impl<'a> Diagnosis<'a> {
         let all = || self.found.iter().flatten();
         let refusal = all().find(|f| f.weight() == Weight::Refusal)?;
         let moved = all().find_map(|f| if let Finding::Moved(m) = f { Some(m) } else { None });
-        let (what, remedy) = moved.map_or_else(
+        let (code, what, remedy) = moved.map_or_else(
             || {
                 let remedy = "check joint_unit, the order and signs of the joints, that image names stand in the right rows, and that the plate did not move";
-                (refusal.to_string(), remedy)
+                (refusal.code(), refusal.to_string(), remedy)
             },
-            |m| m.what_and_remedy(),
+            |m| {
+                let (what, remedy) = m.what_and_remedy();
+                (Finding::from(m.clone()).code(), what, remedy)
+            },
         );
-        Some(Error::unsolved("joint readings", what, remedy))
+        Some(Error::new(code, "joint readings", what, remedy))
     }
 }

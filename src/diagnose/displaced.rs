@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::kind::{Kind, Quantity, Subject, Weight, some_of};
-use crate::error::Notice;
+use crate::error::{Code, Notice};
 
 /// Most images that are named.
 const MOST_IMAGES: usize = 5;
@@ -129,12 +129,12 @@ impl fmt::Display for Displaced {
 }
 
 impl Kind for Displaced {
-    fn code(&self) -> &'static str {
+    fn code(&self) -> Code {
         match (self.displacement, self.is_camera()) {
-            (Displacement::FromThenOn, false) => "plate_displaced",
-            (Displacement::FromThenOn, true) => "camera_displaced",
-            (Displacement::AxisUp(_), false) => "plate_loose",
-            (Displacement::AxisUp(_), true) => "camera_loose",
+            (Displacement::FromThenOn, false) => Code::PlateDisplaced,
+            (Displacement::FromThenOn, true) => Code::CameraDisplaced,
+            (Displacement::AxisUp(_), false) => Code::PlateLoose,
+            (Displacement::AxisUp(_), true) => Code::CameraLoose,
         }
     }
 
@@ -158,6 +158,6 @@ impl Kind for Displaced {
 
     fn notice(&self) -> Notice {
         let (what, remedy) = self.what_and_remedy();
-        Notice::new("series", what, remedy)
+        Notice::new(self.code(), "series", what, remedy)
     }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject, Weight};
 use crate::assess::Accuracy;
-use crate::error::Notice;
+use crate::error::{Code, Notice};
 use crate::fit::Fit;
 
 /// Few images of the robot.
@@ -26,8 +26,8 @@ impl fmt::Display for FewImages {
 }
 
 impl Kind for FewImages {
-    fn code(&self) -> &'static str {
-        "few_images"
+    fn code(&self) -> Code {
+        Code::FewImages
     }
 
     fn weight(&self) -> Weight {
@@ -44,6 +44,7 @@ impl Kind for FewImages {
 
     fn notice(&self) -> Notice {
         Notice::new(
+            self.code(),
             "series",
             format!(
                 "{} images of the robot are few: expect the prior (nominal model) to decide much of the result",

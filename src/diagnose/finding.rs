@@ -20,7 +20,7 @@ use super::parameter_off::ParameterOff;
 use super::plate_size::DoubtedSize;
 use super::scatter::LargeScatter;
 use super::undetermined::FlangeUndetermined;
-use crate::error::Notice;
+use crate::error::{Code, Notice};
 
 macro_rules! findings {
     ($($kind:ident,)+) => {
@@ -69,7 +69,7 @@ findings! {
 
 impl Finding {
     /// Stable name of its kind for programs, `snake_case`.
-    pub fn code(&self) -> &'static str {
+    pub fn code(&self) -> Code {
         self.kind().code()
     }
 

@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::SVector;
 
 use super::kind::{Kind, Quantity, Setting, Subject};
+use crate::error::Code;
 use crate::problem::{E, ImageTerms, Problem};
 
 /// From an image on the focal length differs.
@@ -82,8 +83,8 @@ impl fmt::Display for FocusChange {
 }
 
 impl Kind for FocusChange {
-    fn code(&self) -> &'static str {
-        "focus_changed"
+    fn code(&self) -> Code {
+        Code::FocusChanged
     }
 
     fn subjects(&self) -> Vec<Subject> {

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject, Weight, some_of};
 use crate::assess::{Accuracy, median};
-use crate::error::Notice;
+use crate::error::{Code, Notice};
 use crate::fit::Fit;
 use crate::problem::Problem;
 
@@ -110,8 +110,8 @@ impl fmt::Display for JointNoiseLarge {
 }
 
 impl Kind for JointNoiseLarge {
-    fn code(&self) -> &'static str {
-        "joint_noise_large"
+    fn code(&self) -> Code {
+        Code::JointNoiseLarge
     }
 
     fn weight(&self) -> Weight {
@@ -135,6 +135,7 @@ impl Kind for JointNoiseLarge {
 
     fn notice(&self) -> Notice {
         Notice::new(
+            self.code(),
             format!("series {}", self.series),
             format!(
                 "the joint noise is {:.2} mrad ({} most); robots repeat to some 0.1 mrad{}{}",

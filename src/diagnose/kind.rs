@@ -5,7 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::assess::Limits;
-use crate::error::Notice;
+use crate::error::{Code, Notice};
 use crate::fit::FreePoses;
 use crate::problem::MeasuredSeries;
 
@@ -85,7 +85,7 @@ impl Quantity {
 /// What every kind of finding answers; its sentence is its `Display`.
 pub(super) trait Kind: fmt::Display {
     /// Stable name for programs.
-    fn code(&self) -> &'static str;
+    fn code(&self) -> Code;
     /// How much it weighs.
     fn weight(&self) -> Weight {
         Weight::Gate
@@ -98,7 +98,7 @@ pub(super) trait Kind: fmt::Display {
     }
     /// Place, sentence and remedy apart, so that what is said of several places can be said once.
     fn notice(&self) -> Notice {
-        Notice::new("result", self, "")
+        Notice::new(self.code(), "result", self, "")
     }
 }
 

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject, Weight};
+use crate::error::Code;
 use crate::problem::{Adjustment, ImageRejection};
 
 /// Many images of the robot were left out.
@@ -44,8 +45,8 @@ impl fmt::Display for ImagesLeftOut {
 }
 
 impl Kind for ImagesLeftOut {
-    fn code(&self) -> &'static str {
-        "images_left_out"
+    fn code(&self) -> Code {
+        Code::ImagesLeftOut
     }
 
     fn weight(&self) -> Weight {

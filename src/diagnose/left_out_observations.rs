@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject};
+use crate::error::Code;
 use crate::problem::Adjustment;
 
 /// Many single observations were left out of images in use.
@@ -42,8 +43,8 @@ impl fmt::Display for ObservationsLeftOut {
 }
 
 impl Kind for ObservationsLeftOut {
-    fn code(&self) -> &'static str {
-        "observations_left_out"
+    fn code(&self) -> Code {
+        Code::ObservationsLeftOut
     }
 
     fn subjects(&self) -> Vec<Subject> {

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::kind::{Kind, Quantity, Subject, Weight};
-use crate::error::Notice;
+use crate::error::{Code, Notice};
 
 /// camera.yaml cannot express the lens of a camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,8 +25,8 @@ impl fmt::Display for LensNotInRos {
 }
 
 impl Kind for LensNotInRos {
-    fn code(&self) -> &'static str {
-        "lens_not_in_ros"
+    fn code(&self) -> Code {
+        Code::LensNotInRos
     }
 
     fn weight(&self) -> Weight {
@@ -43,6 +43,7 @@ impl Kind for LensNotInRos {
 
     fn notice(&self) -> Notice {
         Notice::new(
+            self.code(),
             format!("camera {}", self.camera),
             format!(
                 "camera.yaml cannot express its {} lens: it is off by {:.3} px RMS over the image, at most {:.3} px",

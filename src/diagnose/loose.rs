@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject, some_of};
 use crate::assess::{Accuracy, Limits};
+use crate::error::Code;
 use crate::fit::Fit;
 use crate::problem::{Adjustment, Slack};
 
@@ -123,8 +124,8 @@ impl fmt::Display for LooseMounting {
 }
 
 impl Kind for LooseMounting {
-    fn code(&self) -> &'static str {
-        "loose_mounting"
+    fn code(&self) -> Code {
+        Code::LooseMounting
     }
 
     fn subjects(&self) -> Vec<Subject> {

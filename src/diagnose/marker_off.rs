@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject, Weight};
 use crate::assess::Accuracy;
-use crate::error::Notice;
+use crate::error::{Code, Notice};
 use crate::fit::Fit;
 
 /// A marker lies elsewhere than its plate file says.
@@ -33,8 +33,8 @@ impl fmt::Display for MarkerOff {
 }
 
 impl Kind for MarkerOff {
-    fn code(&self) -> &'static str {
-        "marker_off"
+    fn code(&self) -> Code {
+        Code::MarkerOff
     }
 
     fn weight(&self) -> Weight {
@@ -51,6 +51,7 @@ impl Kind for MarkerOff {
 
     fn notice(&self) -> Notice {
         Notice::new(
+            self.code(),
             format!("marker {}", self.marker),
             format!("lies {:.2} mm from where the plate file says, far beyond its tolerance", 1e3 * self.distance_m),
             "printed wrongly, moved, or taken for another? its corrected position stands in plate.csv",

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject};
+use crate::error::Code;
 use crate::geom::Pose;
 use crate::init::PosePair;
 use crate::problem::{Adjustment, ImageRejection};
@@ -111,10 +112,10 @@ impl fmt::Display for Moved {
 }
 
 impl Kind for Moved {
-    fn code(&self) -> &'static str {
+    fn code(&self) -> Code {
         match self.body {
-            MovedBody::Plate => "plate_moved",
-            MovedBody::Camera => "camera_moved",
+            MovedBody::Plate => Code::PlateMoved,
+            MovedBody::Camera => Code::CameraMoved,
         }
     }
 

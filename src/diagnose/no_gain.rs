@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject};
 use crate::assess::Accuracy;
+use crate::error::Code;
 use crate::fit::Fit;
 
 /// The corrected robot is no better than the nominal one.
@@ -31,8 +32,8 @@ impl fmt::Display for NoGain {
 }
 
 impl Kind for NoGain {
-    fn code(&self) -> &'static str {
-        "no_gain"
+    fn code(&self) -> Code {
+        Code::NoGain
     }
 
     fn subjects(&self) -> Vec<Subject> {

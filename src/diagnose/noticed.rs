@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::kind::{Kind, Subject, Weight};
-use crate::error::Notice;
+use crate::error::{Code, Notice};
 
 /// A notice of a room below.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -16,8 +16,8 @@ impl fmt::Display for Noticed {
 }
 
 impl Kind for Noticed {
-    fn code(&self) -> &'static str {
-        "noticed"
+    fn code(&self) -> Code {
+        self.0.code
     }
 
     fn weight(&self) -> Weight {

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject, Weight};
 use crate::assess::Accuracy;
-use crate::error::Notice;
+use crate::error::{Code, Notice};
 use crate::fit::Fit;
 
 /// A parameter of the robot is far from nominal.
@@ -41,8 +41,8 @@ impl fmt::Display for ParameterOff {
 }
 
 impl Kind for ParameterOff {
-    fn code(&self) -> &'static str {
-        "parameter_off"
+    fn code(&self) -> Code {
+        Code::ParameterOff
     }
 
     fn weight(&self) -> Weight {
@@ -63,6 +63,7 @@ impl Kind for ParameterOff {
     fn notice(&self) -> Notice {
         let Self { value, unit, usual_deviations, .. } = self;
         Notice::new(
+            self.code(),
             &self.parameter,
             format!("{value:.3e} {unit} is {usual_deviations:.0} times what robots usually deviate by"),
             "check that the URDF is of this robot, and its mastering",

@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject};
 use crate::assess::{Accuracy, refitted};
+use crate::error::Code;
 use crate::fit::Fit;
 use crate::problem::{Adjustment, Problem, SCALE, State, seen_markers};
 
@@ -88,10 +89,10 @@ impl fmt::Display for DoubtedSize {
 }
 
 impl Kind for DoubtedSize {
-    fn code(&self) -> &'static str {
+    fn code(&self) -> Code {
         match self {
-            Self::Contradicted { .. } => "plate_size_contradicted",
-            Self::Uneven { .. } => "plate_uneven",
+            Self::Contradicted { .. } => Code::PlateSizeContradicted,
+            Self::Uneven { .. } => Code::PlateUneven,
         }
     }
 

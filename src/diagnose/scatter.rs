@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject, Weight};
 use crate::assess::{Accuracy, Worth};
-use crate::error::Notice;
+use crate::error::{Code, Notice};
 
 /// The images scatter more than the noise model says.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,8 +25,8 @@ impl fmt::Display for LargeScatter {
 }
 
 impl Kind for LargeScatter {
-    fn code(&self) -> &'static str {
-        "large_scatter"
+    fn code(&self) -> Code {
+        Code::LargeScatter
     }
 
     fn weight(&self) -> Weight {
@@ -43,6 +43,7 @@ impl Kind for LargeScatter {
 
     fn notice(&self) -> Notice {
         Notice::new(
+            self.code(),
             "uncertainty",
             format!(
                 "the images scatter {:.1} times as much as the noise model says (flange, clusters of images); the larger sigmas are stated",

@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::kind::{Kind, Quantity, Setting, Subject};
 use crate::assess::{Accuracy, Worth, median};
+use crate::error::Code;
 
 /// The stops do not determine the robot.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,8 +35,8 @@ impl fmt::Display for FlangeUndetermined {
 }
 
 impl Kind for FlangeUndetermined {
-    fn code(&self) -> &'static str {
-        "flange_undetermined"
+    fn code(&self) -> Code {
+        Code::FlangeUndetermined
     }
 
     fn subjects(&self) -> Vec<Subject> {

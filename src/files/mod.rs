@@ -8,7 +8,7 @@ use std::path::Path;
 
 pub use picture::{MOST_SIDE_PX, batches, decode_picture, decoded_bytes, picture_size};
 
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 
 /// What a file is; says how long it may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,11 +62,16 @@ pub fn open(path: &Path, kind: Kind) -> Result<(File, u64)> {
 
 fn refuse_special(path: &Path, metadata: &std::fs::Metadata) -> Result<()> {
     if metadata.is_dir() {
-        return Err(Error::input(path.display(), "is a folder, not a file", "name the file itself"));
+        return Err(Error::new(
+            Code::FileNotRegular,
+            path.display(),
+            "is a folder, not a file",
+            "name the file itself",
+        ));
     }
     if !metadata.is_file() {
         let what = "is a pipe, a socket or a device, not a file";
-        return Err(Error::input(path.display(), what, "write its content to a file first"));
+        return Err(Error::new(Code::FileNotRegular, path.display(), what, "write its content to a file first"));
     }
     Ok(())
 }
@@ -77,7 +82,7 @@ fn refuse_long(path: &Path, bytes: u64, kind: Kind) -> Result<()> {
         return Ok(());
     }
     let what = format!("has {bytes} bytes; a file of this kind ({kind:?}) has at most {most}").to_lowercase();
-    Err(Error::input(path.display(), what, "check that it is the right file"))
+    Err(Error::new(Code::FileTooLarge, path.display(), what, "check that it is the right file"))
 }
 
 /// The bytes of a regular file.
@@ -107,12 +112,12 @@ pub fn read_text(path: &Path, kind: Kind) -> Result<String> {
 pub fn text(origin: &Path, bytes: Vec<u8>) -> Result<String> {
     let remedy = "save it as UTF-8 (in a spreadsheet: CSV UTF-8)";
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        return Err(Error::input(origin.display(), "is UTF-16 text", remedy));
+        return Err(Error::new(Code::TextEncoding, origin.display(), "is UTF-16 text", remedy));
     }
     let mut text = String::from_utf8(bytes).map_err(|e| {
         let valid = e.utf8_error().valid_up_to();
         let line = 1 + e.as_bytes()[..valid].iter().filter(|b| **b == b'\n').count();
-        Error::input(format!("{}:{line}", origin.display()), "is not UTF-8 text", remedy)
+        Error::new(Code::TextEncoding, format!("{}:{line}", origin.display()), "is not UTF-8 text", remedy)
     })?;
     if text.starts_with('\u{feff}') {
         text.drain(..'\u{feff}'.len_utf8());

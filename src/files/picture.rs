@@ -8,7 +8,7 @@ use image::error::{ImageFormatHint, LimitError, LimitErrorKind, UnsupportedError
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Limits};
 
 use super::{Kind, open};
-use crate::error::Result;
+use crate::error::{Code, Result};
 
 /// Longest side that is accepted, px; the largest industrial sensors have about 20 000.
 pub const MOST_SIDE_PX: u32 = 32_768;
@@ -74,7 +74,12 @@ pub fn picture_size(path: &Path) -> Result<(u32, u32)> {
     let (file, _) = open(path, Kind::Image)?;
     let size = decoder(BufReader::new(file)).map(|d| d.dimensions());
     size.map_err(|e| {
-        crate::error::Error::input(path.display(), e, "open it in an image viewer; record it again if it is damaged")
+        crate::error::Error::new(
+            Code::ImageUnreadable,
+            path.display(),
+            e,
+            "open it in an image viewer; record it again if it is damaged",
+        )
     })
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::local_errors::{local_share, local_terms};
 use crate::assess::Limits;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
@@ -45,7 +45,8 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
             lenses.push(Camera::pinhole(s.lens, s.width_px, s.height_px, f64::from(s.width_px)));
         }
         if (lenses[camera].width_px, lenses[camera].height_px) != (s.width_px, s.height_px) {
-            return Err(Error::input(
+            return Err(Error::new(
+                Code::SeriesDisagree,
                 format!("series {}", s.name),
                 format!(
                     "camera '{}' has images of {}x{} px here and of {}x{} px in an earlier series",
@@ -136,7 +137,12 @@ fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<Measured>> {
     for o in &stop.observations {
         let place = || format!("image {}, marker {}", stop.image, o.marker);
         let marker = s.plate.index_of(o.marker).ok_or_else(|| {
-            Error::input(place(), "the plate has no such marker", "check that plate.toml belongs to this series")
+            Error::new(
+                Code::MarkerUnknown,
+                place(),
+                "the plate has no such marker",
+                "check that plate.toml belongs to this series",
+            )
         })?;
         let [uu, uv, vv] = stated_covariance(o);
         let information =
@@ -151,7 +157,12 @@ fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<Measured>> {
             radius_m: if s.centroid { radius_m } else { 0.0 },
             uv: Vector2::from(o.uv),
             information: information.ok_or_else(|| {
-                Error::input(place(), "the covariance is not positive definite", "check cov_uu, cov_uv, cov_vv")
+                Error::new(
+                    Code::CsvRange,
+                    place(),
+                    "the covariance is not positive definite",
+                    "check cov_uu, cov_uv, cov_vv",
+                )
             })?,
             rejected: None,
         });

@@ -9,7 +9,7 @@ use crate::assess::{
     ImageError, bootstrap_ratio, by_cluster, camera_errors_m, cluster_of_images, flange_error_m, folds, predict_image,
     refitted, regions, root_mean_square,
 };
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::problem::{Adjustment, Problem, State};
 use crate::series::CameraMount;
@@ -26,7 +26,8 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
     let (problem, limits) = (&joint.problem, &solution.options.limits);
     let images = on_robot(problem);
     let Some(by_image) = folds(problem, limits).filter(|_| images >= limits.compared_images) else {
-        return Err(Error::unsolved(
+        return Err(Error::new(
+            Code::ImagesTooFew,
             "comparison",
             format!("{images} images of the robot are too few to hold some out"),
             format!("take at least {}, better 30", limits.compared_images),

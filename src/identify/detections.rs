@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::second_pass::second_pass;
 use super::seen_image::SeenImage;
 use crate::detect::{FlatField, Picture, SeriesImage, detect_series, load};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::series::{Plate, Series, Source};
 
 /// Looks for the plate in the images of all stops, dark and white images taken into account, then again where a first
@@ -20,7 +20,7 @@ pub fn detect_stops(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<
     let mut found = detect_series(&paths, &series.plate, &picture, progress).into_iter();
     let missing = |image: &str| {
         let remedy = "copy it into images/, or remove its row from joints.csv";
-        SeriesImage::failed(Error::input(image, "the image file is missing", remedy))
+        SeriesImage::failed(Error::new(Code::ImageNotThere, image, "the image file is missing", remedy))
     };
     let seen = series.stops.stops.iter().map(|stop| {
         let image = stop.path.as_ref().and_then(|_| found.next()).unwrap_or_else(|| missing(&stop.image));
@@ -41,7 +41,12 @@ pub fn pictures(series: &Series) -> Result<impl Fn(&Path) -> Result<Picture> + S
         Source::Recording(path) => return Err(recording(path)),
         Source::Observations(_) => {
             let what = "has observations and no images";
-            return Err(Error::input(series.folder.display(), what, "add the images, or use the observations"));
+            return Err(Error::new(
+                Code::ImagesMissing,
+                series.folder.display(),
+                what,
+                "add the images, or use the observations",
+            ));
         }
     };
     let bits = series.manifest.camera.bits;
@@ -64,7 +69,8 @@ pub fn detect_images(images: &[PathBuf], plate: &Plate, progress: impl Fn(&Path)
 
 /// A recording must be taken apart before its images can be looked at.
 pub(super) fn recording(path: &Path) -> Error {
-    Error::input(
+    Error::new(
+        Code::RecordingNotConverted,
         path.display(),
         "is a recording, not a series folder",
         "convert it first: robotcal convert run1.mcap run1/",
@@ -85,7 +91,8 @@ pub fn require_some<'a>(place: &str, images: impl Iterator<Item = (&'a str, usiz
             reasons.push(format!("{name}: {}", failure.unwrap_or("no marker found")));
         }
     }
-    Err(Error::input(
+    Err(Error::new(
+        Code::PlateNowhere,
         place,
         format!("no image can be used ({})", reasons.join("; ")),
         "look at one of the images: is the plate in it, sharp, and the one that plate.toml describes?",

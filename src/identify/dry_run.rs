@@ -2,7 +2,7 @@
 
 use super::options::Options;
 use crate::assess::{Identifiability, identifiability_of_stops};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
 use crate::model::robot::Posture;
@@ -54,9 +54,20 @@ pub fn dry_run(chain: Chain, series: &[Series], options: &Options) -> Result<Ide
     let chain = chain.carrying(options.payload.as_ref())?;
     let stops = stops(series, &chain)?;
     if stops.is_empty() {
-        return Err(Error::input("joints.csv", "no row has joint readings", "record the joints of every stop"));
+        return Err(Error::new(
+            Code::ReadingsMissing,
+            "joints.csv",
+            "no row has joint readings",
+            "record the joints of every stop",
+        ));
     }
     let (layout, state) = layout(options, chain, series)?;
-    identifiability_of_stops(&state.robot, &layout, &stops, &options.limits)
-        .ok_or_else(|| Error::unsolved("stops", "their information is not finite", "check the readings in joints.csv"))
+    identifiability_of_stops(&state.robot, &layout, &stops, &options.limits).ok_or_else(|| {
+        Error::new(
+            Code::FitUndetermined,
+            "stops",
+            "their information is not finite",
+            "check the readings in joints.csv",
+        )
+    })
 }

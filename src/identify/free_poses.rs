@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Vector2};
 
 use super::solution::StartVerdict;
 use crate::assess::Limits;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::fit::{FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
@@ -60,7 +60,8 @@ fn fit_homographies(Adjustment { problem, state }: &mut Adjustment) -> Result<Ve
         let reasons: Vec<String> = (problem.images.iter().take(3))
             .map(|i| format!("{}: {}", i.name, i.rejected.as_ref().map(ToString::to_string).unwrap_or_default()))
             .collect();
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::PlateNowhere,
             "images",
             format!("no image shows the plate ({})", reasons.join("; ")),
             "check that plate.toml describes the plate in the images, and look at one of them",
@@ -125,7 +126,8 @@ fn start_camera(
     let own: Vec<Homography> =
         problem.used().filter(|(_, i)| i.camera == camera).filter_map(|(i, _)| homographies[i]).collect();
     if own.is_empty() {
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::PlateNowhere,
             format!("camera {name}"),
             "none of its images shows the plate",
             "check that plate.toml describes the plate in the images",
@@ -151,13 +153,15 @@ fn start_camera(
         }
     }
     match best {
-        Some((rms, _, behind)) if rms.is_finite() && 2 * behind > own.len() => Err(Error::input(
+        Some((rms, _, behind)) if rms.is_finite() && 2 * behind > own.len() => Err(Error::new(
+            Code::PlateMirrored,
             format!("camera {name}"),
             format!("{behind} of {} images show the plate mirrored, as if seen from behind", own.len()),
             "check that the images are not flipped, and that the plate was not printed or described mirrored",
         )),
         Some((rms, state, _)) if rms.is_finite() => Ok(state),
-        _ => Err(Error::unsolved(
+        _ => Err(Error::new(
+            Code::FocalNotFound,
             format!("camera {name}"),
             "no starting focal length leads to camera poses that explain the markers",
             "check pitch, columns and rows in plate.toml, or state focal_px in [camera] of series.toml",
@@ -212,10 +216,10 @@ fn check_views(adjustment: &Adjustment, least_turn: f64) -> Result<()> {
         let Some(first) = views.first() else { continue };
         let turn = views.iter().map(|v| first.distance(v).0).fold(0.0, f64::max);
         if turn < least_turn {
-            return Err(undetermined(&format!(
-                "the images of {name} are all alike: they differ by {:.1} degrees at most",
-                turn.to_degrees()
-            )));
+            return Err(undetermined(
+                Code::ViewsAlike,
+                &format!("the images of {name} are all alike: they differ by {:.1} degrees at most", turn.to_degrees()),
+            ));
         }
     }
     Ok(())
@@ -235,7 +239,7 @@ fn facing(adjustment: &Adjustment, least_tilt: f64) -> Option<Error> {
         let tilts: Vec<f64> = views(adjustment, camera).map(tilt).collect();
         let largest = tilts.iter().copied().reduce(f64::max)?;
         (largest < least_tilt).then(|| {
-            undetermined(&format!(
+            undetermined(Code::ViewsFrontal, &format!(
                 "all {} images of {name} look straight at the plate (tilted by {:.1} degrees at most), so that focal length and distance \
                  cannot be told apart",
                 tilts.len(),
@@ -257,21 +261,23 @@ fn finish(start: Adjustment, limits: &Limits) -> Result<(Adjustment, FreePoses)>
     }
     if outcome.status != Status::Converged {
         return Err(facing(&outcome.adjustment, limits.facing_tilt_rad).unwrap_or_else(|| {
-            Error::unsolved(
+            Error::new(
+                Code::NotConverged,
                 "free camera poses",
                 format!("the adjustment ended without converging ({:?})", outcome.status),
                 "look at the images for a wrong plate, motion blur or changed focus",
             )
         }));
     }
-    let fit = outcome.fit().map_err(|e| undetermined(&e.to_string()))?;
+    let fit = outcome.fit().map_err(|e| undetermined(Code::CameraUndetermined, &e.to_string()))?;
     check_focal(&fit, limits)?;
     let free = collect(&fit)?;
     Ok((fit.adjustment, free))
 }
 
-fn undetermined(what: &str) -> Error {
-    Error::unsolved(
+fn undetermined(code: Code, what: &str) -> Error {
+    Error::new(
+        code,
         "camera",
         format!("{what}: the images do not determine the camera"),
         "take images from different directions: tilt the camera by 20 to 45 degrees to all sides, at two or more distances, rolled by 90 degrees",
@@ -286,7 +292,8 @@ fn check_focal(fit: &Fit, limits: &Limits) -> Result<()> {
             let relative = cov.sigma(c) / focal.abs();
             if problem.layout.columns[c].free && (relative.is_nan() || relative > limits.focal_sigma || focal <= 0.0) {
                 let what = format!("{axis} of {} is known to {:.1} % only", problem.cameras[k], 100.0 * relative);
-                return Err(facing(fit, limits.facing_tilt_rad).unwrap_or_else(|| undetermined(&what)));
+                return Err(facing(fit, limits.facing_tilt_rad)
+                    .unwrap_or_else(|| undetermined(Code::CameraUndetermined, &what)));
             }
         }
     }
@@ -339,7 +346,8 @@ fn placed_cameras(fit: &Fit) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale
         }
     }
     let moved = Adjustment { problem: problem.clone(), state: moved };
-    let lin = moved.linearise().ok_or_else(|| undetermined("a marker lies behind its camera"))?;
+    let lin =
+        moved.linearise().ok_or_else(|| undetermined(Code::CameraUndetermined, "a marker lies behind its camera"))?;
     let covariance = in_frame(moved.linear(&lin), &fit.covariance)?;
     let placed = lin.chains.iter().enumerate().map(|(k, c)| PlacedCamera::of(&c.pose, &covariance.pose(k)));
     Ok((placed.collect(), scales))

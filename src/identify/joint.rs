@@ -8,7 +8,7 @@ use super::staged::{refit, staged};
 use super::start::{start_robot, take_back};
 use crate::assess::{hold_out, judge, refitted};
 use crate::diagnose::{Diagnosis, Setting};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::fit::FreePoses;
 use crate::problem::MeasuredSeries;
 use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem, Slack};
@@ -46,21 +46,24 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     diagnosis.after_free_poses(&outcome.adjustment.problem);
     diagnosis.after_left_out(&outcome.adjustment)?;
     if status != Status::Converged {
-        return Err(Error::unsolved(
+        return Err(Error::new(
+            Code::NotConverged,
             "joint fit",
             format!("ended without converging ({status:?})"),
             "look at the per-image table for images that do not belong, and at the starting values",
         ));
     }
-    let fit =
-        outcome.fit().map_err(|e| Error::unsolved("joint fit", e.to_string(), "take stops that move every joint"))?;
+    let fit = outcome.fit().map_err(|e| {
+        Error::new(Code::FitUndetermined, "joint fit", e.to_string(), "take stops that move every joint")
+    })?;
     let (estimator, noise) = (options.estimator, options.joint_noise);
     let fitted = |left: Adjustment| match estimator.is_two_stage() {
         true => refit(&left, estimator, noise),
         false => Some(refitted(left)),
     };
-    let accuracy = hold_out(&fit, &fitted, &options.limits)
-        .ok_or_else(|| Error::unsolved("hold-out", "too few images to hold any out", "take more images"))?;
+    let accuracy = hold_out(&fit, &fitted, &options.limits).ok_or_else(|| {
+        Error::new(Code::NothingHeldOut, "hold-out", "too few images to hold any out", "take more images")
+    })?;
     diagnosis.after_fit(&fit, &accuracy);
     let (mut fit, joint) = match estimator.is_two_stage() {
         true => (staged(&fit, estimator, noise)?, Some(Box::new(fit.adjustment))),
@@ -155,14 +158,16 @@ fn check_on_robot(problem: &Problem, on_robot: usize) -> Result<()> {
     let all = problem.images.len();
     match problem.images.iter().filter(|i| i.stop.is_some()).count() {
         _ if on_robot > 0 => Ok(()),
-        0 => Err(Error::input(
+        0 => Err(Error::new(
+            Code::ReadingsMissing,
             "joints.csv",
             format!(
                 "no row has joint readings: all {all} images were taken off the robot, and tell of the camera and the plate only"
             ),
             "record the joints of every stop; a row with empty joint cells is an image off the robot",
         )),
-        given => Err(Error::unsolved(
+        given => Err(Error::new(
+            Code::ImagesTooFew,
             "images",
             format!("none of the {given} images of the robot can be used, {all} images in all"),
             "look at them with `robotcal detect`: is the plate in view, sharp, and the one of plate.toml?",

@@ -9,7 +9,7 @@ use super::options::Options;
 use super::solution::{LensEvidence, Solution};
 use crate::assess::Limits;
 use crate::diagnose::LensNotInRos;
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::fit::log_evidence;
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
@@ -197,7 +197,7 @@ pub fn choose_lens(
         let best = errors.iter().fold(f64::INFINITY, |m, e| m.min(e.1));
         let Some((lens, error)) = errors.iter().find(|e| e.1 <= (1.0 + limits.lens_as_good) * best) else {
             let what = "shows nothing that could tell one lens from another";
-            return Err(Error::unsolved(format!("camera {name}"), what, "name its lens with --camera"));
+            return Err(Error::new(Code::LensUndecided, format!("camera {name}"), what, "name its lens with --camera"));
         };
         series.iter_mut().filter(|s| s.camera == *name).for_each(|s| s.lens = *lens);
         let all: Vec<String> = errors.iter().map(|(l, e)| format!("{} {e:.4}", l.name())).collect();
@@ -208,7 +208,7 @@ pub fn choose_lens(
             all.join(", "),
             100.0 * limits.lens_as_good
         );
-        notices.push(Notice::new(format!("camera {name}"), what, ""));
+        notices.push(Notice::new(Code::LensChosen, format!("camera {name}"), what, ""));
     }
     Ok(notices)
 }

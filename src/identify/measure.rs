@@ -7,7 +7,7 @@ use super::detections::{detect_stops, recording, require_some};
 use super::seen_image::SeenImage;
 use super::stated::{lens_of, measured_series};
 use crate::detect::Detection;
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop};
 use crate::series::{CirclePoint, Observation, Series, Source};
 use crate::urdf::Chain;
@@ -59,7 +59,8 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     )?;
     let stated = camera.width_px.zip(camera.height_px);
     let (width_px, height_px) = found_size.or(stated).ok_or_else(|| {
-        Error::input(
+        Error::new(
+            Code::SettingMissing,
             series.folder.join("series.toml").display(),
             "the size of the images is not known: there are observations and no images",
             "state width_px and height_px under [camera]",
@@ -87,6 +88,7 @@ type SeenStops = (Vec<Seen>, Option<(u32, u32)>);
 fn unused_repeatability(series: &Series) -> Option<Notice> {
     let stated = series.manifest.robot.repeatability_m?;
     Some(Notice::new(
+        Code::RepeatabilityUnused,
         "series.toml",
         format!("robot.repeatability_m = {stated} is not used: the joint noise is estimated from the images"),
         "give --joint-noise where it is known",
@@ -101,7 +103,10 @@ fn look_through(series: &Series, progress: impl Fn(&Path) + Sync, notices: &mut 
     let size = usable.filter_map(|i| i.size).next().map(|(w, h)| (w as u32, h as u32));
     let seen = |image: SeenImage| {
         let Detection { observations, failure, .. } = image.detection;
-        Seen { observations, left_out: failure.map(|error| ImageRejection::Unusable { what: error.what }) }
+        Seen {
+            observations,
+            left_out: failure.map(|error| ImageRejection::Unusable { why: error.code, what: error.what }),
+        }
     };
     Ok((images.into_iter().map(seen).collect(), size))
 }

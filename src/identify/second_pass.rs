@@ -55,7 +55,11 @@ fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Opti
         readings: None,
         placement: DEFAULT_PLACEMENT.to_owned(),
         observations: image.detection.observations.clone(),
-        left_out: image.detection.failure.as_ref().map(|e| ImageRejection::Unusable { what: e.what.clone() }),
+        left_out: image
+            .detection
+            .failure
+            .as_ref()
+            .map(|e| ImageRejection::Unusable { why: e.code, what: e.what.clone() }),
     };
     let stops = images.iter().map(stop).collect();
     let measured = measured_series(series, lens_of(series).ok()?, (width as u32, height as u32), true, stops);

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::assess::{Limits, minimal_set, structural};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::model::joint_terms::{RobotModel, Term};
 use crate::problem::{Layout, State, short_name};
 use crate::series::read_toml;
@@ -99,7 +99,8 @@ impl StatedPrior {
         let key = if unit == "1" { "sigma".to_owned() } else { format!("sigma_{unit}") };
         if let Some((other, _)) = given.iter().find(|(u, v)| *u != unit && v.is_some()) {
             let other = if *other == "1" { "no unit".into() } else { format!("unit {other}") };
-            return Err(Error::input(
+            return Err(Error::new(
+                Code::PriorUnit,
                 place,
                 format!("the prior of {} is given with {other}", short_name(name)),
                 format!(
@@ -109,9 +110,12 @@ impl StatedPrior {
         }
         let sigma = given.iter().find(|(u, _)| *u == unit).and_then(|(_, v)| *v);
         match sigma {
-            Some(s) if !(s > 0.0 && s.is_finite()) => {
-                Err(Error::input(place, format!("{key} = {s}"), "give a positive number; --fix holds a parameter"))
-            }
+            Some(s) if !(s > 0.0 && s.is_finite()) => Err(Error::new(
+                Code::SettingRange,
+                place,
+                format!("{key} = {s}"),
+                "give a positive number; --fix holds a parameter",
+            )),
             _ => Ok(sigma),
         }
     }
@@ -151,7 +155,8 @@ impl Selection {
             let columns = layout.named("--fix", name)?;
             let pose = |c: &&usize| layout.mountings.iter().chain(&layout.placements).any(|r| r.contains(c));
             if columns.iter().find(pose).is_some() {
-                return Err(Error::input(
+                return Err(Error::new(
+                    Code::ParameterNotFixable,
                     "--fix",
                     format!("'{name}' is a pose of camera or plate, which has no nominal value"),
                     "fix parameters of robot, camera or plate shape",
@@ -189,13 +194,19 @@ impl Selection {
                 let is_pose = layout.mountings.iter().chain(&layout.placements).any(|r| r.contains(&c));
                 if is_pose {
                     let what = format!("{} is part of a pose, which takes no prior", short_name(&column.name));
-                    return Err(Error::input(place, what, "give priors for robot, camera or plate shape"));
+                    return Err(Error::new(
+                        Code::ParameterNotFixable,
+                        place,
+                        what,
+                        "give priors for robot, camera or plate shape",
+                    ));
                 }
                 let camera = layout.cameras.iter().any(|r| r.contains(&c));
                 if camera && (prior.mean.is_none() || prior == &StatedPrior { mean: prior.mean, ..Default::default() })
                 {
                     let what = format!("the prior of {} needs mean and sigma", short_name(&column.name));
-                    return Err(Error::input(
+                    return Err(Error::new(
+                        Code::SettingMissing,
                         place,
                         what,
                         "a camera has no nominal values: write { mean = ..., sigma... = ... }",
@@ -203,7 +214,12 @@ impl Selection {
                 }
                 let sigma = prior.sigma_in(&place, &column.name, column.unit)?;
                 if let Some(mean) = prior.mean.filter(|m| !m.is_finite()) {
-                    return Err(Error::input(place, format!("mean = {mean}"), "give a finite number"));
+                    return Err(Error::new(
+                        Code::SettingRange,
+                        place,
+                        format!("mean = {mean}"),
+                        "give a finite number",
+                    ));
                 }
                 let column = &mut layout.columns[c];
                 column.prior_sigma = sigma.unwrap_or(column.prior_sigma);

@@ -3,13 +3,18 @@
 use super::estimator::Estimator;
 use super::options::JointNoise;
 use super::two_stage::{Estimate, PoseStage, fit_poses, with_sizes};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::fit::Fit;
 use crate::problem::{Adjustment, State};
 
 fn unsolved(estimator: Estimator) -> Error {
     let remedy = "take more stops, or leave --two-stage away: the joint fit has a solution";
-    Error::unsolved("two-stage fit", format!("\"{}\" has no solution here", estimator.title()), remedy)
+    Error::new(
+        Code::FitUndetermined,
+        "two-stage fit",
+        format!("\"{}\" has no solution here", estimator.title()),
+        remedy,
+    )
 }
 
 /// The two-stage fit of the observations that a joint fit used, from its result.
@@ -23,7 +28,7 @@ fn unsolved(estimator: Estimator) -> Error {
 pub(super) fn staged(joint: &Fit, estimator: Estimator, noise: JointNoise) -> Result<Fit> {
     if noise != JointNoise::Estimated && !estimator.has_joint_noise() {
         let what = format!("--joint-noise is given, but \"{}\" has no joint noise", estimator.title());
-        return Err(Error::input("--two-stage", what, "take C or D, or leave --joint-noise away"));
+        return Err(Error::new(Code::OptionConflict, "--two-stage", what, "take C or D, or leave --joint-noise away"));
     }
     let none = || unsolved(estimator);
     let stage = PoseStage::adjusted(joint).ok_or_else(none)?;

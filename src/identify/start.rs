@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::solution::StartVerdict;
 use super::suspects::Suspects;
 use crate::assess::{Limits, median};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::fit::FreePoses;
 use crate::geom::log_so3;
 use crate::init::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
@@ -85,7 +85,8 @@ fn closed_form(
 ) -> Result<HandEye> {
     let fewest = limits.hand_eye_images;
     if pairs.len() < fewest {
-        return Err(Error::unsolved(
+        return Err(Error::new(
+            Code::ImagesTooFew,
             of,
             format!(
                 "only {} images of the robot show the plate, at least {fewest} are needed and some 30 to 50 wanted",
@@ -121,7 +122,8 @@ fn closed_form(
     }
     let suspects = Suspects { problem, robot: &state.robot, pairs, limits };
     if let Some(cause) = suspects.better_than(best.median_error) {
-        return Err(Error::unsolved(of, cause.what, cause.remedy));
+        let place = if cause.joints.is_empty() { of.to_owned() } else { cause.joints.join(", ") };
+        return Err(Error::new(cause.code, place, cause.what, cause.remedy));
     }
     if best.median_error > limits.hand_eye_spread {
         return Err(no_fit(
@@ -133,7 +135,8 @@ fn closed_form(
 }
 
 fn no_fit(of: &str, what: &str) -> Error {
-    Error::unsolved(
+    Error::new(
+        Code::ReadingsContradict,
         of,
         format!("joint readings and images do not belong together: {what}"),
         "check joint_unit, the order and signs of the joints in joints.csv, that image names stand in the right rows, that the URDF is of this robot, base and tip, and that the plate did not move",
@@ -171,7 +174,8 @@ fn check_rotations(of: &str, poses: &[PosePair], least: f64) -> Result<()> {
     if second > least {
         return Ok(());
     }
-    Err(Error::unsolved(
+    Err(Error::new(
+        Code::StopsAlike,
         of,
         format!(
             "the stops are too much alike: the hand turned by at most {:.1} degrees, about a second axis by {:.1} degrees only",

@@ -1,6 +1,6 @@
 //! What the manifest of a series states of its camera, beside what its stops show.
 
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::model::camera::Lens;
 use crate::problem::{LensChoice, MeasuredSeries, MeasuredStop};
 use crate::series::{Series, StopOrder};
@@ -39,7 +39,8 @@ pub(super) fn measured_series(
 pub(super) fn lens_of(series: &Series) -> Result<Lens> {
     let Some(name) = series.manifest.camera.model.as_deref() else { return Ok(Lens::Brown) };
     Lens::from_name(name).ok_or_else(|| {
-        Error::input(
+        Error::new(
+            Code::LensUnknown,
             series.folder.join("series.toml").display(),
             format!("[camera] model = \"{name}\" is not a lens model of this program"),
             format!("use one of: {}", Lens::names().join(", ")),

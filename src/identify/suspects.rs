@@ -1,6 +1,7 @@
 //! When readings and images do not fit: the usual mistakes, tried one by one, named where one of them explains it.
 
 use crate::assess::Limits;
+use crate::error::Code;
 use crate::init::{PosePair, plate_scale, solve_hand_eye};
 use crate::model::robot::Robot;
 use crate::problem::Problem;
@@ -10,6 +11,10 @@ use crate::urdf::JointKind;
 /// A mistake that explains the misfit.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Cause {
+    /// Which mistake it is.
+    pub code: Code,
+    /// Joints that it is about; none where it is about all.
+    pub joints: Vec<String>,
     /// What was found.
     pub what: String,
     /// What to do.
@@ -78,7 +83,10 @@ impl Suspects<'_> {
         };
         let what = format!("{is}: read so, the images fit");
         let remedy = format!("write camera_mount = \"{word}\" in series.toml");
-        (self.misfit_mounted(&self.readings(), exchanged), Cause { what, remedy })
+        (
+            self.misfit_mounted(&self.readings(), exchanged),
+            Cause { code: Code::CameraMountWrong, joints: Vec::new(), what, remedy },
+        )
     }
 
     /// Directions fit and distances do not: the axes of this arm with other lengths.
@@ -90,6 +98,8 @@ impl Suspects<'_> {
         distances.sort_by(f64::total_cmp);
         let (angle, distance) = (angles[angles.len() / 2], distances[distances.len() / 2]);
         (angle < self.limits.suspicious_misfit && distance > self.limits.other_lengths_m).then(|| Cause {
+            code: Code::LinkLengthsWrong,
+            joints: Vec::new(),
             what: format!(
                 "directions fit the joint readings (median {:.1} mrad), distances do not (median {:.0} mm): these are the axes of \
                  such an arm with other link lengths",
@@ -106,13 +116,16 @@ impl Suspects<'_> {
         let (names, kinds) = (&self.robot.chain.readings, &self.robot.chain.reading_kinds);
         let n = names.len();
         let mut all = Vec::new();
-        let mut add = |change: &dyn Fn(&mut Vec<f64>), what: String, remedy: String| {
+        let mut add = |code, joints: &[&String], change: &dyn Fn(&mut Vec<f64>), what: String, remedy: String| {
             let mut changed = given.clone();
             changed.iter_mut().for_each(change);
-            all.push((changed, Cause { what, remedy }));
+            let joints = joints.iter().map(|name| (*name).clone()).collect();
+            all.push((changed, Cause { code, joints, what, remedy }));
         };
         for (k, name) in names.iter().enumerate() {
             add(
+                Code::JointSignWrong,
+                &[name],
                 &|q| q[k] = -q[k],
                 format!("the readings of {name} have the wrong sign: with {name} negated the images fit"),
                 format!(
@@ -121,11 +134,15 @@ impl Suspects<'_> {
             );
             for (other, other_name) in names.iter().enumerate().skip(k + 1) {
                 add(
+                    Code::JointOrderWrong,
+                    &[name, other_name],
                     &|q| q.swap(k, other),
                     format!("the joints stand in another order: with {name} and {other_name} exchanged the images fit"),
                     format!("exchange the column names {name} and {other_name} in joints.csv"),
                 );
                 add(
+                    Code::JointSignWrong,
+                    &[name, other_name],
                     &|q| (q[k], q[other]) = (-q[k], -q[other]),
                     format!(
                         "the readings of {name} and {other_name} have the wrong sign: with both negated the images fit"
@@ -135,6 +152,8 @@ impl Suspects<'_> {
                 for (third, third_name) in names.iter().enumerate().skip(other + 1) {
                     for (a, b) in [(other, third), (third, other)] {
                         add(
+                            Code::JointOrderWrong,
+                            &[name, other_name, third_name],
                             &|q| (q[k], q[a], q[b]) = (q[a], q[b], q[k]),
                             format!(
                                 "the joints stand in another order: with the columns {name}, {}, {} taken for {}, {name}, {} the images fit",
@@ -150,6 +169,8 @@ impl Suspects<'_> {
                     [(1f64.to_radians(), "degrees", "radians"), (1f64.to_degrees(), "radians", "degrees")]
                 {
                     add(
+                        Code::JointUnitWrong,
+                        &[name],
                         &|q| q[k] *= factor,
                         format!("the readings of {name} alone are {is}, read as {read_as}: converted, the images fit"),
                         format!("bring the column {name} of joints.csv to the unit of the others"),
@@ -168,17 +189,23 @@ impl Suspects<'_> {
         };
         let (to_rad, to_deg) = (1f64.to_radians(), 1f64.to_degrees());
         add(
+            Code::JointUnitWrong,
+            &[],
             &turned(to_rad),
             "the joint values are degrees, read as radians: converted, the images fit".into(),
             "write joint_unit = \"deg\" in series.toml".into(),
         );
         add(
+            Code::JointUnitWrong,
+            &[],
             &turned(to_deg),
             "the joint values are radians, read as degrees: converted, the images fit".into(),
             "write joint_unit = \"rad\" in series.toml".into(),
         );
         let reversed: Vec<usize> = (0..n).rev().collect();
         add(
+            Code::JointOrderWrong,
+            &[],
             &|q| *q = reversed.iter().map(|&k| q[k]).collect(),
             "the joints stand in reverse order: reversed, the images fit".into(),
             "reverse the column names in joints.csv".into(),
@@ -189,6 +216,8 @@ impl Suspects<'_> {
             all.push((
                 shifted,
                 Cause {
+                    code: Code::RowsShifted,
+                    joints: Vec::new(),
                     what: format!(
                         "images and joint readings are shifted by one row: every image fits the readings of {words}"
                     ),
@@ -226,6 +255,8 @@ impl Suspects<'_> {
         Some((
             error,
             Cause {
+                code: Code::PlatePitchWrong,
+                joints: Vec::new(),
                 what,
                 remedy: "measure the pitch of the plate with a ruler and correct pitch_m in plate.toml; if it is right, the URDF is of another size of this robot".into(),
             },

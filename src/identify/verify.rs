@@ -5,7 +5,7 @@ use super::free_poses::adjust_free_poses;
 use super::start::start_robot;
 use crate::assess::Limits;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::model::robot::Robot;
 use crate::problem::MeasuredSeries;
 use crate::solve::{ComponentOptions, Status, estimate_components};
@@ -43,14 +43,20 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
     adjustment.start_slack(false);
     let outcome = estimate_components(adjustment, &ComponentOptions::default());
     if outcome.status != Status::Converged {
-        return Err(Error::unsolved(
+        return Err(Error::new(
+            Code::NotConverged,
             "verification",
             format!("camera and plate do not converge with this robot ({:?})", outcome.status),
             "check that URDF, base, tip and series belong together",
         ));
     }
     let errors = hold_out_images(&outcome.adjustment, limits).ok_or_else(|| {
-        Error::unsolved("verification", "too few images to hold any out", "take at least 12 images of the robot")
+        Error::new(
+            Code::NothingHeldOut,
+            "verification",
+            "too few images to hold any out",
+            "take at least 12 images of the robot",
+        )
     })?;
     let problem = &outcome.adjustment.problem;
     let postures = cluster_of_images(problem, limits);

@@ -2,7 +2,7 @@
 
 use super::names::file_names;
 use super::text::{list, quoted};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::identify::{Solution, depths_m};
 use crate::model::camera::{Camera, Lens};
 use crate::series::CameraInfo;
@@ -59,7 +59,8 @@ fn in_ros(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<(Camera, S
     }
     let lens = camera.lens.name();
     let fit = camera.in_ros(depths_m).ok_or_else(|| {
-        Error::unsolved(
+        Error::new(
+            Code::CameraFileImpossible,
             format!("camera {name}"),
             format!("no camera model of ROS comes near to its {lens} lens"),
             "identify with --camera brown or rational",

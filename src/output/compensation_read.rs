@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::compensation::largest_nm;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::files::{self, Kind};
 use crate::model::joint_terms::{Exported, JointTerm, Term};
 use crate::model::robot::Robot;
@@ -96,25 +96,33 @@ pub fn read_compensation(path: &Path, chain: Chain) -> Result<Robot> {
 /// # Errors
 /// Those of [`read_compensation`].
 pub fn parse_compensation(path: &Path, text: &str, chain: Chain) -> Result<Robot> {
-    let file: File = toml::from_str(text)
-        .map_err(|e| Error::input(path.display(), e, "use the compensation.toml that identify wrote"))?;
-    let chain = chain.carrying(file.payload.as_ref()).map_err(|e| Error::input(path.display(), e.what, e.remedy))?;
+    let file: File = toml::from_str(text).map_err(|e| {
+        Error::new(Code::SettingSyntax, path.display(), e, "use the compensation.toml that identify wrote")
+    })?;
+    let chain =
+        chain.carrying(file.payload.as_ref()).map_err(|e| Error::new(e.code, path.display(), e.what, e.remedy))?;
     let mut terms = Vec::new();
     for (name, joint) in &file.joint {
         let place = || format!("{}: [joint.{name}]", path.display());
         let reading = chain.readings.iter().position(|r| r == name).ok_or_else(|| {
-            Error::input(
+            Error::new(
+                Code::JointUnknown,
                 place(),
                 format!("the robot has no such joint (it has {})", chain.readings.join(", ")),
                 "use the compensation.toml of this robot",
             )
         })?;
-        for (term, value) in terms_of(joint)
-            .map_err(|what| Error::input(place(), what, "use the compensation.toml that identify wrote"))?
-        {
+        for (term, value) in terms_of(joint).map_err(|what| {
+            Error::new(Code::SettingRange, place(), what, "use the compensation.toml that identify wrote")
+        })? {
             if !term.applies(&chain) {
                 let what = "has a compliance_rad_per_nm, and the URDF states no masses";
-                return Err(Error::input(place(), what, "give the calibrated URDF that was written beside it"));
+                return Err(Error::new(
+                    Code::UrdfMassesMissing,
+                    place(),
+                    what,
+                    "give the calibrated URDF that was written beside it",
+                ));
             }
             let per_moment = matches!(term.exported(), Exported::PerMoment(_));
             let value = if per_moment { value * largest_nm(&chain, reading) } else { value };

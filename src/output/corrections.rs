@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::restore::FoundModel;
 use crate::assess::sigma_in_base;
-use crate::error::Result;
+use crate::error::{Code, Result};
 use crate::geom::Pose;
 use crate::programs::compensate::{Compensated, RESIDUAL};
 use crate::programs::{Kind, Outcome, Program};
@@ -147,8 +147,10 @@ pub fn expected_finding(expected: std::result::Result<&[Option<f64>], &str>, sub
 /// # Errors
 /// None in practice: every field can be written as JSON.
 pub fn findings_json(findings: &[Finding]) -> Result<String> {
-    let line =
-        |f: &Finding| serde_json::to_string(f).map_err(|e| crate::error::Error::unsolved(FINDINGS, e, "report this"));
+    let line = |f: &Finding| {
+        serde_json::to_string(f)
+            .map_err(|e| crate::error::Error::new(Code::RecordNotWritten, FINDINGS, e, "report this"))
+    };
     let lines: Vec<String> = findings.iter().map(line).collect::<Result<_>>()?;
     Ok(format!("[\n{}\n]\n", lines.join(",\n")))
 }

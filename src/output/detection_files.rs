@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::names::file_parts;
 use super::text::csv;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::identify::SeenImage;
 use crate::series::{
     CirclePoint, Edge, ImageObservations, InputFile, Plate, Series, observations_csv, plate_csv, plate_toml,
@@ -77,14 +77,15 @@ pub fn detection_files(images: &[SeenImage], context: &DetectionContext) -> Resu
     names.extend(context.pictures.iter().cloned());
     names.insert(FILE_NAME.to_owned());
     let record = Record {
-        format: 1,
+        format: 2,
         program: concat!("robotcal ", env!("CARGO_PKG_VERSION")),
         command: &context.command,
         files: names,
         inputs: &context.inputs,
         images: images.iter().map(ImageRecord::of).collect(),
     };
-    let mut json = serde_json::to_vec_pretty(&record).map_err(|e| Error::unsolved(FILE_NAME, e, "report this"))?;
+    let mut json = serde_json::to_vec_pretty(&record)
+        .map_err(|e| Error::new(Code::RecordNotWritten, FILE_NAME, e, "report this"))?;
     json.push(b'\n');
     files.insert(FILE_NAME.to_owned(), json);
     Ok(files)
@@ -135,6 +136,13 @@ struct Record<'a> {
     images: Vec<ImageRecord>,
 }
 
+/// What is wrong with an image, or was noticed in it.
+#[derive(Serialize)]
+struct Said {
+    code: Code,
+    text: String,
+}
+
 #[derive(Serialize)]
 struct ImageRecord {
     name: String,
@@ -149,8 +157,8 @@ struct ImageRecord {
     blur_px: Option<f64>,
     /// Noise on paper and on ink, counts.
     noise: Option<[f64; 2]>,
-    failure: Option<String>,
-    notices: Vec<String>,
+    failure: Option<Said>,
+    notices: Vec<Said>,
 }
 
 impl ImageRecord {
@@ -168,8 +176,8 @@ impl ImageRecord {
             dropped: dropped_counts(std::iter::once(image)),
             blur_px: circles.map(|c| c.blur_px),
             noise: circles.map(|c| c.noise),
-            failure: detection.failure.as_ref().map(ToString::to_string),
-            notices: detection.notices.iter().map(ToString::to_string).collect(),
+            failure: detection.failure.as_ref().map(|e| Said { code: e.code, text: e.to_string() }),
+            notices: detection.notices.iter().map(|n| Said { code: n.code, text: n.to_string() }).collect(),
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::restore::{FoundModel, found_model};
 use super::solution_json::SolutionRecord;
 use crate::assess::{MeasuredPoint, fit_points};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::problem::short_name;
 
 /// Sigmas of the difference from which two estimates disagree.
@@ -47,7 +47,7 @@ pub struct Comparison {
 pub fn compare_solutions(a: &SolutionRecord, b: &SolutionRecord) -> Result<Comparison> {
     if a.robot.readings != b.robot.readings {
         let what = format!("joints {} against {}", a.robot.readings.join(", "), b.robot.readings.join(", "));
-        return Err(Error::input("solutions", what, "compare solutions of the same robot"));
+        return Err(Error::new(Code::RobotDiffers, "solutions", what, "compare solutions of the same robot"));
     }
     let (first, second) = (found_model(a)?, found_model(b)?);
     let places: Vec<Place> = [(a, &second), (b, &first)]
@@ -62,8 +62,9 @@ pub fn compare_solutions(a: &SolutionRecord, b: &SolutionRecord) -> Result<Compa
         .collect();
     let all: Vec<&Place> = places.iter().collect();
     let covered: Vec<&Place> = places.iter().filter(|p| p.covered).collect();
-    let everywhere = difference(&first, &second, &all)
-        .ok_or_else(|| Error::input("solutions", "they have no workspace map in common", "identify both again"))?;
+    let everywhere = difference(&first, &second, &all).ok_or_else(|| {
+        Error::new(Code::SolutionDiffers, "solutions", "they have no workspace map in common", "identify both again")
+    })?;
     Ok(Comparison {
         covered: difference(&first, &second, &covered),
         everywhere,

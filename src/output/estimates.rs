@@ -3,7 +3,7 @@
 use super::Context;
 use super::names::column_names;
 use super::solution_json::EstimateRecord;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::identify::Solution;
 
 /// Posterior sigma of a column in its unit; `None` where it was held fixed or nothing touches it.
@@ -33,7 +33,12 @@ pub(super) fn estimates(solution: &Solution, context: &Context) -> Result<Vec<Es
         let sigma = sigma(solution, k);
         if !values[k].is_finite() || sigma.is_some_and(|s| !s.is_finite()) {
             let what = "its estimate is not finite";
-            return Err(Error::unsolved(name, what, "look at the images and joint readings that determine it"));
+            return Err(Error::new(
+                Code::EstimateNotFinite,
+                name,
+                what,
+                "look at the images and joint readings that determine it",
+            ));
         }
         let prior = column.prior_sigma.is_finite();
         all.push(EstimateRecord {

@@ -3,12 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use crate::diagnose::{Finding, Quantity, Subject, Weight};
+use crate::error::Code;
 
 /// A finding: what kind it is, what it is about, its numbers, and the sentence for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FindingRecord {
     /// Stable name of its kind.
-    pub code: String,
+    pub code: Code,
     /// How much it weighs.
     pub weight: Weight,
     /// What it is about; empty where it is about the whole result.
@@ -22,7 +23,7 @@ pub struct FindingRecord {
 impl From<&Finding> for FindingRecord {
     fn from(finding: &Finding) -> Self {
         Self {
-            code: finding.code().to_owned(),
+            code: finding.code(),
             weight: finding.weight(),
             subject: finding.subjects(),
             quantities: finding.quantities(),

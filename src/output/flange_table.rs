@@ -3,7 +3,7 @@
 use super::restore::FoundModel;
 use super::text::{csv, number};
 use crate::assess::PredictedFlange;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 
 /// The flange at every joint vector (rad or m, in the order of the chain).
 ///
@@ -11,7 +11,12 @@ use crate::error::{Error, Result};
 /// A solution in which robot and plate (or fixed camera) are not tied.
 pub fn flange_at(model: &FoundModel, readings: &[Vec<f64>]) -> Result<Vec<PredictedFlange>> {
     let flange = model.flange().ok_or_else(|| {
-        Error::unsolved("flange", "nothing ties the robot to the plate", "solve with images that the robot took")
+        Error::new(
+            Code::FitUndetermined,
+            "flange",
+            "nothing ties the robot to the plate",
+            "solve with images that the robot took",
+        )
     })?;
     Ok(readings.iter().map(|q| flange.at(q)).collect())
 }

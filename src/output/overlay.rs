@@ -10,7 +10,7 @@ use super::canvas::{Canvas, Colour, GROUND, text_width};
 use super::detection_files::{dropped_counts, marker_counts};
 use crate::detect::Picture;
 use crate::detect::circles::{Ellipse, Found, Outcome};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::PlaneMap;
 use crate::identify::SeenImage;
 use crate::series::{Edge, Plate};
@@ -67,7 +67,8 @@ const MOST_PIXELS: f64 = 1.4e7;
 /// # Errors
 /// A picture that is too large to be drawn on.
 pub fn overlay_png(picture: &Picture, image: &SeenImage, plate: &Plate, palette: &Palette) -> Result<Vec<u8>> {
-    let too_large = || Error::input(&image.name, "is too large to be drawn on", "leave --overlay out");
+    let too_large =
+        || Error::new(Code::ImageSizeImpossible, &image.name, "is too large to be drawn on", "leave --overlay out");
     let pitch = pitch_px(image);
     let scale = enlargement(picture, pitch);
     let width = picture.width as f64 * scale;
@@ -93,7 +94,7 @@ pub fn overlay_png(picture: &Picture, image: &SeenImage, plate: &Plate, palette:
     let mut bytes = Cursor::new(Vec::new());
     let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub);
     let encoded = encoder.write_image(&canvas.rgb(), size[0], size[1], ExtendedColorType::Rgb8);
-    encoded.map_err(|e| Error::input(&image.name, e, "leave --overlay out"))?;
+    encoded.map_err(|e| Error::new(Code::OutputFailed, &image.name, e, "leave --overlay out"))?;
     Ok(bytes.into_inner())
 }
 

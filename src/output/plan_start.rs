@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Vector2, Vector6};
 use serde::Deserialize;
 
 use super::solution_json::{ImageRecord, ObservationColumns, SolutionRecord};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::files::{self, Kind};
 use crate::geom::Pose;
 use crate::identify::RobotModel;
@@ -48,9 +48,12 @@ fn text(path: &Path) -> Result<String> {
 /// # Errors
 /// Unreadable files, distortion models other than plumb_bob.
 pub fn read_camera(path: &Path) -> Result<Camera> {
-    let info: CameraInfo = serde_saphyr::from_str(&text(path)?)
-        .map_err(|e| Error::input(path.display(), e, "give a ROS camera_info file, or --camera-fov-deg"))?;
-    let refuse = |what: String| Error::input(path.display(), what, "give a plumb_bob camera with five coefficients");
+    let info: CameraInfo = serde_saphyr::from_str(&text(path)?).map_err(|e| {
+        Error::new(Code::SettingSyntax, path.display(), e, "give a ROS camera_info file, or --camera-fov-deg")
+    })?;
+    let refuse = |what: String| {
+        Error::new(Code::SettingRange, path.display(), what, "give a plumb_bob camera with five coefficients")
+    };
     if info.distortion_model != "plumb_bob" {
         return Err(refuse(format!("distortion model \"{}\"", info.distortion_model)));
     }
@@ -74,11 +77,12 @@ pub fn read_camera(path: &Path) -> Result<Camera> {
 /// Unreadable files, no rotation.
 pub fn read_pose(path: &Path) -> Result<Pose> {
     let remedy = "give a file with xyz_m and quat_xyzw or rpy_rad, as identify writes hand_camera.yaml";
-    let file: PoseFile = serde_saphyr::from_str(&text(path)?).map_err(|e| Error::input(path.display(), e, remedy))?;
+    let file: PoseFile =
+        serde_saphyr::from_str(&text(path)?).map_err(|e| Error::new(Code::SettingSyntax, path.display(), e, remedy))?;
     match (file.quat_xyzw, file.rpy_rad) {
         (Some(q), _) => Ok(Pose::from_xyz_quaternion(file.xyz_m, q)),
         (None, Some(rpy)) => Ok(Pose::from_xyz_rpy(file.xyz_m, rpy)),
-        (None, None) => Err(Error::input(path.display(), "has no rotation", remedy)),
+        (None, None) => Err(Error::new(Code::SettingMissing, path.display(), "has no rotation", remedy)),
     }
 }
 
@@ -89,7 +93,7 @@ pub fn read_pose(path: &Path) -> Result<Pose> {
 /// # Errors
 /// A solution of another robot, or without images on the robot.
 pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -> Result<(Setting, Vec<Image>)> {
-    let refuse = |what: String, remedy: &str| Error::input("solution.json", what, remedy);
+    let refuse = |what: String, remedy: &str| Error::new(Code::SolutionDiffers, "solution.json", what, remedy);
     if record.robot.readings != chain.readings {
         let what = format!("is of joints {}", record.robot.readings.join(", "));
         return Err(refuse(what, "give the URDF, --base and --tip with which it was made"));

@@ -6,7 +6,7 @@ use image::{GrayImage, ImageFormat};
 
 use super::dot_font::glyph;
 use super::plate_drawing::{Caption, Figure, figures};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::series::Plate;
 
 /// Samples per pixel and axis.
@@ -21,7 +21,12 @@ pub fn png(plate: &Plate, caption: &Caption, dpi: f64) -> Result<Vec<u8>> {
     let [width, height] = [caption.sheet.width_m, caption.sheet.height_m].map(|m| (m * scale).round());
     let pixels = width * height;
     if !(1.0..4e8).contains(&pixels) {
-        return Err(Error::input("--dpi", format!("{dpi} gives {width} x {height} pixels"), "take 50 to 600"));
+        return Err(Error::new(
+            Code::OptionRange,
+            "--dpi",
+            format!("{dpi} gives {width} x {height} pixels"),
+            "take 50 to 600",
+        ));
     }
     let mut canvas = Canvas { image: GrayImage::from_pixel(width as u32, height as u32, image::Luma([255])), scale };
     figures(plate, caption).iter().for_each(|f| canvas.draw(f));
@@ -29,7 +34,7 @@ pub fn png(plate: &Plate, caption: &Caption, dpi: f64) -> Result<Vec<u8>> {
     canvas
         .image
         .write_to(&mut bytes, ImageFormat::Png)
-        .map_err(|e| Error::input("plate picture", e, "take another --dpi"))?;
+        .map_err(|e| Error::new(Code::OutputFailed, "plate picture", e, "take another --dpi"))?;
     Ok(bytes.into_inner())
 }
 

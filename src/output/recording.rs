@@ -3,7 +3,7 @@
 use super::camera_file;
 use super::restore::{camera, found_model};
 use super::solution_json::{ImageRecord, SolutionRecord};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::series::{CameraInfo, CameraMount, FramePoses, ImageMarks, MarkKind, MarkLayer};
 
@@ -34,7 +34,7 @@ pub fn overlay(record: &SolutionRecord, names: &[&str], readings: &[Option<Vec<f
     let own: Vec<Option<&ImageRecord>> = names.iter().map(|name| image(record, name)).collect();
     let Some(first) = own.iter().flatten().next() else {
         let remedy = "give the solution.json that was identified from this series";
-        return Err(Error::input("solution.json", "has none of the images of the series", remedy));
+        return Err(Error::new(Code::SolutionDiffers, "solution.json", "has none of the images of the series", remedy));
     };
     let found = &record.cameras[first.camera];
     let depths = own.iter().flatten().filter_map(|i| i.camera_from_plate.as_ref()).map(|p| p.xyz_m[2]);

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, Vector3, Vector6};
 
 use super::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
 use crate::assess::{FlangeModel, Limits};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::identify::Options;
 use crate::model::camera::Camera;
@@ -19,7 +19,12 @@ use crate::series::{CameraMount, Marker, Observation, Plate};
 use crate::urdf::{Chain, RobotDescription};
 
 fn damaged(what: impl std::fmt::Display) -> Error {
-    Error::input(super::solution_json::FILE_NAME, what, "give the solution.json as `robotcal identify` wrote it")
+    Error::new(
+        Code::SolutionDamaged,
+        super::solution_json::FILE_NAME,
+        what,
+        "give the solution.json as `robotcal identify` wrote it",
+    )
 }
 
 /// The robot as it was read.

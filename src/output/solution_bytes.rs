@@ -5,7 +5,7 @@ use std::io;
 use serde::{Deserialize, Serialize};
 
 use super::solution_json::{FILE_NAME, FORMAT, SolutionRecord, TermRecord};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::model::joint_terms::Term;
 
 /// Bytes of solution.json: one line for each field of [`SolutionRecord`].
@@ -15,7 +15,7 @@ use crate::model::joint_terms::Term;
 pub fn to_bytes(record: &SolutionRecord) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut serializer = serde_json::Serializer::with_formatter(&mut bytes, FieldPerLine::default());
-    record.serialize(&mut serializer).map_err(|e| Error::unsolved(FILE_NAME, e, "report this"))?;
+    record.serialize(&mut serializer).map_err(|e| Error::new(Code::RecordNotWritten, FILE_NAME, e, "report this"))?;
     bytes.push(b'\n');
     Ok(bytes)
 }
@@ -73,8 +73,9 @@ pub fn read(bytes: &[u8]) -> Result<SolutionRecord> {
     struct Version {
         format: u32,
     }
-    let refuse =
-        |e: serde_json::Error| Error::input(FILE_NAME, e, "give the solution.json that `robotcal identify` wrote");
+    let refuse = |e: serde_json::Error| {
+        Error::new(Code::SolutionDamaged, FILE_NAME, e, "give the solution.json that `robotcal identify` wrote")
+    };
     let version: Version = serde_json::from_slice(bytes).map_err(refuse)?;
     if version.format != FORMAT {
         let what = format!("format = {}", version.format);
@@ -82,7 +83,7 @@ pub fn read(bytes: &[u8]) -> Result<SolutionRecord> {
             true => "an earlier version wrote it: identify again".to_owned(),
             false => format!("this program reads format = {FORMAT}; a newer one may be needed"),
         };
-        return Err(Error::input(FILE_NAME, what, remedy));
+        return Err(Error::new(Code::SettingVersion, FILE_NAME, what, remedy));
     }
     let mut record: SolutionRecord = serde_json::from_slice(bytes).map_err(refuse)?;
     record.plain_names()?;

@@ -6,7 +6,7 @@ use super::restore;
 use super::solution_json::{
     CameraRecord, FILE_NAME, ImageRecord, PlacedRecord, PlateRecord, PoseRecord, SolutionRecord,
 };
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::files::MOST_SIDE_PX;
 use crate::model::camera::Camera;
 
@@ -37,7 +37,12 @@ pub(super) fn check(r: &SolutionRecord) -> Result<()> {
 }
 
 fn refuse(field: &str, what: impl std::fmt::Display) -> Error {
-    Error::input(format!("{FILE_NAME}: {field}"), what, "give the solution.json as `robotcal identify` wrote it")
+    Error::new(
+        Code::SolutionDamaged,
+        format!("{FILE_NAME}: {field}"),
+        what,
+        "give the solution.json as `robotcal identify` wrote it",
+    )
 }
 
 fn length(field: &str, given: usize, wanted: usize) -> Result<()> {

@@ -11,7 +11,7 @@ use super::scene::{Scene, arm_length_m};
 use super::setting::Setting;
 use super::viewpoint::{View, ViewRange};
 use super::visibility::{SightLimits, seen_markers};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::inverse::{random_readings, reading_limits, solve_from};
 use crate::series::CameraMount;
@@ -235,7 +235,12 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
     let markers = setting.plate.markers.len();
     if markers < sight.least_markers {
         let what = format!("every view shall show {} markers, the plate has {markers}", sight.least_markers);
-        return Error::input("plan: --markers", what, "ask for fewer markers, or give a plate with more");
+        return Error::new(
+            Code::PlanContradiction,
+            "plan: --markers",
+            what,
+            "ask for fewer markers, or give a plate with more",
+        );
     }
     if tally.unseen == tally.views {
         let what = format!(
@@ -248,7 +253,7 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
         );
         let remedy = "allow other distances (--distance-m), fewer markers (--markers), a wider focus (--focus-m), or use a \
                       plate whose markers suit the camera (robotcal plate --focal-px)";
-        return Error::unsolved("plan: views", what, remedy);
+        return Error::new(Code::PlanViewless, "plan: views", what, remedy);
     }
     let arm = arm_length_m(&setting.robot);
     if tally.out_of_reach + tally.unseen == tally.views {
@@ -278,7 +283,7 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
             "none of {} workable views is in reach: the {thing} stands {distance:.2} m from the base, the arm is {arm:.2} m long",
             tally.out_of_reach
         );
-        return Error::unsolved(format!("plan: {thing}"), what, remedy);
+        return Error::new(Code::PlanOutOfReach, format!("plan: {thing}"), what, remedy);
     }
     let example = (0..64).find_map(|k| {
         let mut rng = ChaCha8Rng::seed_from_u64(k);
@@ -292,7 +297,7 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
     );
     let remedy = "check boxes and table (--box, --table-z-m), allow less clearance (--clearance-mm) or thinner links \
                   (--link-radius-mm), or put the plate elsewhere";
-    Error::unsolved("plan: collisions", what, remedy)
+    Error::new(Code::PlanCollides, "plan: collisions", what, remedy)
 }
 
 /// Random postures over the joint ranges that touch nothing: the workspace over which accuracy is meant.

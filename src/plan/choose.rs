@@ -5,7 +5,7 @@ use std::time::Instant;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::linalg::LinearRow;
 use crate::plan::candidates::{Candidate, CandidateOptions, Search, Tally, candidates, workspace};
 use crate::plan::criterion::Criterion;
@@ -243,7 +243,12 @@ pub(super) fn criterion(wish: &Wish, layout: &Layout, weight: &DMatrix<f64>) -> 
                         Some(c) => format!("did you mean \"{c}\"?"),
                         None => format!("give a joint or one of {}", known.take(8).collect::<Vec<_>>().join(", ")),
                     };
-                    return Err(Error::input("--parameters", format!("there is no parameter \"{name}\""), remedy));
+                    return Err(Error::new(
+                        Code::ParameterUnknown,
+                        "--parameters",
+                        format!("there is no parameter \"{name}\""),
+                        remedy,
+                    ));
                 }
                 for k in wanted {
                     b = b.insert_column(0, 0.0);
@@ -306,17 +311,20 @@ fn legs(pool: &[Candidate], chosen: &[usize], scene: &Scene, placements: usize) 
 fn no_plan(reason: NoDesign, request: &PlanRequest, pool: usize) -> Error {
     let count = request.count;
     match reason {
-        NoDesign::TooFew => Error::unsolved(
+        NoDesign::TooFew => Error::new(
+            Code::PlanTooFewPoses,
             "plan",
             format!("only {pool} workable poses were found, {count} are wanted"),
             "ask for fewer images, search longer (--candidates), or loosen --markers, --tilt-deg, --distance-m",
         ),
-        NoDesign::Contradiction => Error::input(
+        NoDesign::Contradiction => Error::new(
+            Code::PlanContradiction,
             "plan",
             format!("no choice of {count} images fulfils the limits per placement, per posture and of travel"),
             "loosen --per-placement, --per-posture or --travel-rad, or ask for another --count",
         ),
-        NoDesign::Numerical => Error::unsolved(
+        NoDesign::Numerical => Error::new(
+            Code::PlanUndetermined,
             "plan",
             "the information of the candidates is not positive definite",
             "check --pixel-sigma-px and --joint-noise-mrad, and the size of the plate",

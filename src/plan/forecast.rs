@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::choose::{Plan, PlanRequest, Wish};
 use crate::assess::root_mean_square;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::linalg::SymmetricFactor;
 use crate::plan::criterion::Criterion;
 use crate::plan::setting::Setting;
@@ -111,7 +111,12 @@ pub fn exact_covariance(planned: &Adjustment, setting: &Setting, images: Vec<Ima
     planned.problem.images = images;
     let singular = || {
         let what = format!("{count} images do not determine camera, plate and hand-camera offset");
-        Error::unsolved("plan: forecast", what, "plan more images, or views that differ more in tilt and distance")
+        Error::new(
+            Code::PlanUndetermined,
+            "plan: forecast",
+            what,
+            "plan more images, or views that differ more in tilt and distance",
+        )
     };
     let lin = planned.linearise().ok_or_else(singular)?;
     let all = planned.linear(&lin).covariance().map_err(|_| singular())?;
@@ -307,7 +312,7 @@ pub fn check_wish(request: &PlanRequest, forecast: &Forecast) -> Result<()> {
         };
         let best = asked.iter().map(|p| p.sigma / p.prior_sigma).fold(1.0, f64::min);
         let what = format!("{name} would stay unknown (sigma {:.0} % of its tolerance): {what}", 1e2 * best);
-        return Err(Error::unsolved("plan: --parameters", what, remedy));
+        return Err(Error::new(Code::PlanUndetermined, "plan: --parameters", what, remedy));
     }
     Ok(())
 }

@@ -5,7 +5,7 @@
 //! changes by the same factor.
 
 use super::plate_code::{CodeDistance, PlateCode, WINDOW_LONG, WINDOW_SHORT};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::series::{Ink, Marker, Plate, PlateKind};
 
 /// Outer radius of a small marker as a share of the pitch.
@@ -179,7 +179,8 @@ pub fn design(request: &PlateRequest) -> Result<PlateDesign> {
     let code = PlateCode::search(columns as usize, rows as usize, request.seed, TRIES);
     let distance = code.distance();
     if distance.rotated < LEAST_CODE_DISTANCE {
-        return Err(Error::unsolved(
+        return Err(Error::new(
+            Code::PlateCodeWeak,
             "plate code",
             format!("windows of {WINDOW_SHORT}x{WINDOW_LONG} markers differ in only {} cells", distance.rotated),
             "try another --seed or fewer markers",
@@ -218,7 +219,8 @@ fn shape(request: &PlateRequest) -> Result<(u32, u32)> {
     };
     let (short, long) = (columns.min(rows) as usize, columns.max(rows) as usize);
     if short < WINDOW_SHORT || long < WINDOW_LONG {
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::PlateImpossible,
             "plate",
             format!(
                 "{columns} x {rows} markers are too few: identity is read from windows of {WINDOW_SHORT}x{WINDOW_LONG}"
@@ -227,7 +229,8 @@ fn shape(request: &PlateRequest) -> Result<(u32, u32)> {
         ));
     }
     if columns * rows > 5000 {
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::PlateImpossible,
             "plate",
             format!("{columns} x {rows} markers are more than the code search handles (5000)"),
             "ask for fewer markers with a larger pitch",
@@ -254,7 +257,7 @@ fn pitch(request: &PlateRequest, columns: u32, rows: u32) -> Result<f64> {
         return if pitch_m.is_finite() && pitch_m > 0.0 {
             Ok(pitch_m)
         } else {
-            Err(Error::input("plate", format!("a pitch of {pitch_m} m"), "give a positive --pitch-mm"))
+            Err(Error::new(Code::OptionRange, "plate", format!("a pitch of {pitch_m} m"), "give a positive --pitch-mm"))
         };
     }
     let largest = request.sheet_m.map(|sheet| largest_pitch(sheet, columns, rows));
@@ -286,7 +289,8 @@ fn check_sheet(request: &PlateRequest, columns: u32, rows: u32, pitch_m: f64) ->
     let Some(sheet) = request.sheet_m else { return Ok(()) };
     let needed = needed_size(columns, rows, pitch_m, pitch_m * LARGE_RADIUS);
     if pitch_m <= 0.0 || needed[0] > sheet[0] + 1e-9 || needed[1] > sheet[1] + 1e-9 {
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::PlateImpossible,
             "plate",
             format!(
                 "{columns} x {rows} markers with a pitch of {:.1} mm need a sheet of {:.0} x {:.0} mm, not {:.0} x {:.0} mm",
@@ -309,7 +313,8 @@ fn check_sheet(request: &PlateRequest, columns: u32, rows: u32, pitch_m: f64) ->
 fn check_viewing(v: &Viewing, columns: u32, rows: u32, pitch_m: f64) -> Result<f64> {
     let sane = v.focal_px > 0.0 && v.near_m > 0.0 && v.far_m >= v.near_m && (0.0..1.4).contains(&v.tilt_rad);
     if !sane {
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::OptionRange,
             "camera",
             format!(
                 "focal length {} px, distances {} to {} m, tilt {:.2} rad",
@@ -320,7 +325,8 @@ fn check_viewing(v: &Viewing, columns: u32, rows: u32, pitch_m: f64) -> Result<f
     }
     let minor_axis_px = 2.0 * SMALL_RADIUS * pitch_m * v.focal_px / v.far_m * v.tilt_rad.cos();
     if minor_axis_px < LEAST_MINOR_AXIS_PX {
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::PlateImpossible,
             "plate",
             format!(
                 "the camera cannot resolve it: at {:.2} m and {:.0} degrees the smallest markers are {minor_axis_px:.1} px wide, \
@@ -336,7 +342,8 @@ fn check_viewing(v: &Viewing, columns: u32, rows: u32, pitch_m: f64) -> Result<f
     let (short, long) = (seen(wide.min(high)), seen(wide.max(high)));
     let enough = f64::from(columns.min(rows)).min(short) >= WINDOW_SHORT as f64 && long >= WINDOW_LONG as f64;
     if !enough {
-        return Err(Error::input(
+        return Err(Error::new(
+            Code::PlateImpossible,
             "plate",
             format!(
                 "at {:.2} m the camera sees only {long:.1} x {short:.1} pitches: identity needs windows of \

@@ -4,12 +4,17 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::error::Code;
+
 /// Why an image is left out. The name of the variant is the code in solution.json.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "code", rename_all = "snake_case")]
 pub enum ImageRejection {
     /// It cannot be read, or the detector does not find the plate in it.
     Unusable {
+        /// What is wrong with it.
+        #[serde(default = "Code::of_earlier_versions")]
+        why: Code,
         /// What the reader or the detector says.
         what: String,
     },
@@ -99,7 +104,7 @@ impl ImageRejection {
 impl fmt::Display for ImageRejection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Unusable { what } | Self::InWords { what } => f.write_str(what),
+            Self::Unusable { what, .. } | Self::InWords { what } => f.write_str(what),
             Self::NoObservations => f.write_str("no observations are given"),
             Self::Duplicate { of } => write!(f, "duplicate: it shows exactly what {of} shows"),
             Self::TooFewMarkers { found, needed } => write!(f, "only {found} markers found, {needed} are needed"),

@@ -4,7 +4,7 @@
 //! `camera.front.k3` needs no `lens`; `*` stands for any letters (`*.cos_1`).
 
 use super::Layout;
-use crate::error::{Error, Result, closest_name};
+use crate::error::{Code, Error, Result, closest_name};
 
 /// Most names that a message proposes.
 const MOST_PROPOSED: usize = 3;
@@ -48,7 +48,7 @@ impl Layout {
         }
         let known: Vec<String> = self.columns.iter().map(|c| short_name(&c.name)).collect();
         let remedy = proposals(pattern, &known);
-        Err(Error::input(place, format!("there is no parameter '{pattern}'"), remedy))
+        Err(Error::new(Code::ParameterUnknown, place, format!("there is no parameter '{pattern}'"), remedy))
     }
 }
 

@@ -18,7 +18,7 @@ const BORDER: f64 = 1e-5;
 
 /// A whole number in the text.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Code {
+pub struct PostureCode {
     /// Index of the file.
     pub file: usize,
     /// Its bytes.
@@ -33,12 +33,12 @@ pub enum Codes {
     /// `S` and `T`.
     Krl {
         /// Bit 0: overhead; bit 1: axis 3 beyond the stretched arm; bit 2: axis 5 negative.
-        status: Option<Code>,
+        status: Option<PostureCode>,
         /// Bit n: axis n + 1 negative.
-        turn: Option<Code>,
+        turn: Option<PostureCode>,
     },
     /// `[cf1, cf4, cf6, cfx]`: quadrants of axes 1, 4 and 6, and the alternative.
-    Rapid(Box<[Code; 4]>),
+    Rapid(Box<[PostureCode; 4]>),
 }
 
 /// The alternatives of a posture.
@@ -134,7 +134,7 @@ impl Codes {
 
     /// In words, for messages.
     pub fn shown(&self) -> String {
-        let value = |c: &Option<Code>| c.as_ref().map_or("-".to_owned(), |c| c.value.to_string());
+        let value = |c: &Option<PostureCode>| c.as_ref().map_or("-".to_owned(), |c| c.value.to_string());
         match self {
             Self::Krl { status, turn } => format!("S {}, T {}", value(status), value(turn)),
             Self::Rapid(cf) => format!("[{},{},{},{}]", cf[0].value, cf[1].value, cf[2].value, cf[3].value),
@@ -144,7 +144,7 @@ impl Codes {
     /// Edits for what changes in the codes between the programmed and the corrected posture.
     pub fn edits(&self, before: (&[f64; 6], Branch), after: (&[f64; 6], Branch), files: &[TextFile]) -> Vec<Edit> {
         let mut edits = Vec::new();
-        let mut set = |code: &Code, value: i64| {
+        let mut set = |code: &PostureCode, value: i64| {
             if value != code.value {
                 let old = &files[code.file].bytes[code.range.clone()];
                 edits.push(Edit { file: code.file, range: code.range.clone(), text: written(value, old) });

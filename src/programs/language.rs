@@ -6,7 +6,7 @@ use super::program::Program;
 use super::setting::Setting;
 use super::text_file::TextFile;
 use super::{krl, rapid, table, urscript};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, exp_so3};
 
 /// What a language has to say of itself.
@@ -119,7 +119,12 @@ impl Language {
         found.copied().ok_or_else(|| {
             let known: Vec<&str> = Self::ALL.iter().flat_map(|l| l.row().extensions).copied().collect();
             let what = "its extension tells no language of programs";
-            Error::input(path.display(), what, format!("rename it (known are {}) or give --language", known.join(", ")))
+            Error::new(
+                Code::ProgramLanguage,
+                path.display(),
+                what,
+                format!("rename it (known are {}) or give --language", known.join(", ")),
+            )
         })
     }
 

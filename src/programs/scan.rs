@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::text_file::TextFile;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 
 /// One token.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,7 +80,12 @@ pub(super) fn tokens(file: &TextFile, dialect: Dialect) -> Result<Vec<Token>> {
                 Some(end) => (Some(TokenKind::Text), end + 2),
                 None => {
                     let place = format!("{}:{line}", file.name);
-                    return Err(Error::input(place, "a text in quotes does not end on its line", "close the quotes"));
+                    return Err(Error::new(
+                        Code::ProgramSyntax,
+                        place,
+                        "a text in quotes does not end on its line",
+                        "close the quotes",
+                    ));
                 }
             },
             b => (Some(TokenKind::Mark(b)), 1),

@@ -9,7 +9,7 @@ use super::Setting;
 use super::field::{Edit, Field, Place};
 use super::program::{Approach, JointTarget, Kind, PoseTarget, Posture, Program, RotationFields, Target};
 use super::text_file::TextFile;
-use crate::error::{Error, Result, closest_name};
+use crate::error::{Code, Error, Result, closest_name};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
 
@@ -79,7 +79,12 @@ fn columns(file: &TextFile, header: &Row, setting: &Setting<'_>) -> Result<Colum
     let names: Vec<String> = header.cells.iter().map(text).collect();
     let place = || format!("{}:{}", file.name, header.line);
     if let Some(twice) = (1..names.len()).find(|&i| names[..i].contains(&names[i])) {
-        return Err(Error::input(place(), format!("two columns are named \"{}\"", names[twice]), "rename one"));
+        return Err(Error::new(
+            Code::CsvColumnTwice,
+            place(),
+            format!("two columns are named \"{}\"", names[twice]),
+            "rename one",
+        ));
     }
     let find = |name: &str| names.iter().position(|n| n == name);
     let all = |wanted: &[&str]| -> Result<Vec<usize>> {
@@ -91,7 +96,7 @@ fn columns(file: &TextFile, header: &Row, setting: &Setting<'_>) -> Result<Colum
                     Some(meant) => format!("rename \"{meant}\" to \"{name}\""),
                     None => format!("add it: {} belong together", wanted.join(", ")),
                 };
-                Err(Error::input(place(), what, remedy))
+                Err(Error::new(Code::CsvColumnMissing, place(), what, remedy))
             }
             _ => Ok(there.into_iter().filter_map(find).collect()),
         }
@@ -102,7 +107,7 @@ fn columns(file: &TextFile, header: &Row, setting: &Setting<'_>) -> Result<Colum
     if pose.is_none() && joints.is_empty() {
         let what = format!("has neither joint columns nor pose columns (its columns are {})", names.join(", "));
         let remedy = format!("name them {}, or {}", readings.join(", "), POSE_COLUMNS.join(", "));
-        return Err(Error::input(place(), what, remedy));
+        return Err(Error::new(Code::CsvColumnMissing, place(), what, remedy));
     }
     Ok(Columns { names, pose, joints })
 }
@@ -115,7 +120,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Progra
         let file = &program.files[index];
         let (rows, separator) = rows(file);
         let Some((header, rows)) = rows.split_first() else {
-            return Err(Error::input(&file.name, "is empty", "its first line names the columns"));
+            return Err(Error::new(Code::FileEmpty, &file.name, "is empty", "its first line names the columns"));
         };
         let columns = columns(file, header, setting)?;
         let table = Table { file, index, columns, separator, setting };
@@ -149,7 +154,12 @@ impl Table<'_> {
         if row.cells.len() != self.columns.names.len() {
             let what = format!("{} cells under {} column names", row.cells.len(), self.columns.names.len());
             let place = format!("{}:{}", self.file.name, row.line);
-            return Err(Error::input(place, what, "give every row all cells; numbers need a decimal point"));
+            return Err(Error::new(
+                Code::CsvCellCount,
+                place,
+                what,
+                "give every row all cells; numbers need a decimal point",
+            ));
         }
         let kind = match self.columns.pose {
             None => Kind::Joints(self.joints(row)?),
@@ -176,7 +186,12 @@ impl Table<'_> {
         let kinds = &self.setting.chain.reading_kinds;
         let Some(rad) = self.setting.rad_per_unit else {
             let what = "does not tell whether its joints are in rad or deg";
-            return Err(Error::input(&self.file.name, what, "add --joint-unit rad or --joint-unit deg"));
+            return Err(Error::new(
+                Code::JointUnitMissing,
+                &self.file.name,
+                what,
+                "add --joint-unit rad or --joint-unit deg",
+            ));
         };
         let unit = |kind: &JointKind| match kind {
             JointKind::Prismatic => (1.0, DECIMALS),
@@ -192,7 +207,8 @@ impl Table<'_> {
         let norm = q.iter().map(|f| f.value().powi(2)).sum::<f64>().sqrt();
         if (norm - 1.0).abs() > 1e-3 {
             let place = format!("{}:{}", self.file.name, row.line);
-            return Err(Error::input(
+            return Err(Error::new(
+                Code::ProgramQuaternion,
                 place,
                 format!("the quaternion has the norm {norm}, not 1"),
                 "order: qx, qy, qz, qw",
@@ -233,7 +249,7 @@ impl Table<'_> {
         let written = cell.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
             let place = format!("{}:{}", self.file.name, row.line);
             let what = format!("column {}: \"{cell}\" is not a number", self.columns.names[column]);
-            Error::input(place, what, "write a finite number with a decimal point")
+            Error::new(Code::CsvNumber, place, what, "write a finite number with a decimal point")
         })?;
         Ok(Field { file: self.index, place: Place::At(range), written, si, decimals })
     }

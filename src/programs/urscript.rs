@@ -11,7 +11,7 @@ use super::program::{
 };
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, exp_so3};
 
 const DIALECT: Dialect = Dialect { comment: b'#', quotes: b"\"'", header: None, based_numbers: false };
@@ -166,13 +166,23 @@ impl Script<'_> {
         let name = String::from_utf8_lossy(self.reader.word().unwrap_or_default()).into_owned();
         let open = self.reader.at + 1;
         let Some(close) = self.reader.closing(open) else {
-            return Err(Error::input(self.reader.place(), format!("the bracket of {name}( is not closed"), "close it"));
+            return Err(Error::new(
+                Code::ProgramSyntax,
+                self.reader.place(),
+                format!("the bracket of {name}( is not closed"),
+                "close it",
+            ));
         };
         self.reader.at = open + 1;
         for k in 0..count {
             if self.reader.at >= close {
                 let what = format!("{name}(..) has {k} targets, not {count}");
-                return Err(Error::input(format!("{}:{line}", self.reader.file.name), what, "complete the call"));
+                return Err(Error::new(
+                    Code::ProgramTargets,
+                    format!("{}:{line}", self.reader.file.name),
+                    what,
+                    "complete the call",
+                ));
             }
             let argument = self.target_argument(way)?;
             self.visit(&name, line, argument)?;
@@ -260,7 +270,12 @@ impl Script<'_> {
             return Ok(Value::Expression);
         }
         let Some(close) = self.reader.closing(self.reader.at) else {
-            return Err(Error::input(self.reader.place(), "a list [ is not closed", "close it with ]"));
+            return Err(Error::new(
+                Code::ProgramSyntax,
+                self.reader.place(),
+                "a list [ is not closed",
+                "close it with ]",
+            ));
         };
         self.reader.at += 1;
         let mut fields = Vec::new();
@@ -287,7 +302,12 @@ impl Script<'_> {
         let count = fields.len();
         let fields = <[Field; 6]>::try_from(fields).map_err(|_| {
             let place = format!("{}:{line}", self.reader.file.name);
-            Error::input(place, format!("a pose p[..] has 6 numbers, this one has {count}"), "x, y, z, rx, ry, rz")
+            Error::new(
+                Code::ProgramTargets,
+                place,
+                format!("a pose p[..] has 6 numbers, this one has {count}"),
+                "x, y, z, rx, ry, rz",
+            )
         })?;
         Ok(Value::Pose(Box::new(fields), line))
     }
@@ -320,7 +340,8 @@ impl Script<'_> {
             && fields.len() != self.setting.axes.len()
         {
             let what = format!("{} joint values for the {} joints of the robot", fields.len(), self.setting.axes.len());
-            return Err(Error::input(
+            return Err(Error::new(
+                Code::ProgramTargets,
                 format!("{}:{line}", self.reader.file.name),
                 what,
                 "give one value for each joint",

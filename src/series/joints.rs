@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::inputs::InputFile;
 use super::table::{Row, Table};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 
 /// The placement of a series that names none.
 pub const DEFAULT_PLACEMENT: &str = "placement_0";
@@ -69,12 +69,18 @@ impl Stops {
             let name = image_name(table, row, image)?;
             if let Some(first) = seen.insert(name.clone(), row.line) {
                 let what = format!("is the image of line {first} already");
-                return Err(table.refuse(row, image, &what, "give every image one row"));
+                return Err(table.refuse(Code::CsvRowTwice, row, image, &what, "give every image one row"));
             }
             let placement = match placement.filter(|_| placements_named) {
                 None => DEFAULT_PLACEMENT.to_string(),
                 Some(c) if row.cell(c).is_empty() => {
-                    return Err(table.refuse(row, c, "names no placement", "name it as in the other rows"));
+                    return Err(table.refuse(
+                        Code::CsvCellEmpty,
+                        row,
+                        c,
+                        "names no placement",
+                        "name it as in the other rows",
+                    ));
                 }
                 Some(c) => row.cell(c).to_string(),
             };
@@ -88,7 +94,12 @@ impl Stops {
             });
         }
         if stops.is_empty() {
-            return Err(Error::input(table.place_of_header(), "has no rows", "give one row for every image"));
+            return Err(Error::new(
+                Code::FileEmpty,
+                table.place_of_header(),
+                "has no rows",
+                "give one row for every image",
+            ));
         }
         Ok(Self { joints, stops })
     }
@@ -119,10 +130,16 @@ impl Stops {
 fn image_name(table: &Table, row: Row<'_>, column: usize) -> Result<String> {
     let name = row.cell(column);
     if name.is_empty() {
-        return Err(table.refuse(row, column, "names no image", "name the image of the stop"));
+        return Err(table.refuse(Code::CsvCellEmpty, row, column, "names no image", "name the image of the stop"));
     }
     if name.contains(['/', '\\']) {
-        return Err(table.refuse(row, column, "is a path", "write the file name alone; images lie in images/"));
+        return Err(table.refuse(
+            Code::CsvName,
+            row,
+            column,
+            "is a path",
+            "write the file name alone; images lie in images/",
+        ));
     }
     Ok(name.to_string())
 }
@@ -134,7 +151,7 @@ fn readings(table: &Table, row: Row<'_>, columns: &[usize]) -> Result<Option<Vec
     }
     if let Some(&column) = columns.iter().find(|&&c| row.cell(c).is_empty()) {
         let remedy = "give all joints, or none for an image that was taken off the robot";
-        return Err(table.refuse(row, column, "among joint readings", remedy));
+        return Err(table.refuse(Code::CsvCellEmpty, row, column, "among joint readings", remedy));
     }
     columns.iter().map(|&c| table.number(row, c)).collect::<Result<_>>().map(Some)
 }

@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::inputs::{InputFile, read_text};
-use crate::error::{Error, Result, closest_name, plain_name};
+use crate::error::{Code, Error, Result, closest_name, plain_name};
 use crate::files::Kind;
 
 /// Unit of the revolute columns of joints.csv.
@@ -203,11 +203,16 @@ impl Manifest {
         }
         if let Some(bits) = camera.bits.filter(|b| !(8..=16).contains(b)) {
             let what = format!("camera.bits = {bits}");
-            return Err(Error::input(path.display(), what, "give 8 to 16, the bits that the sensor delivers"));
+            return Err(Error::new(
+                Code::SettingRange,
+                path.display(),
+                what,
+                "give 8 to 16, the bits that the sensor delivers",
+            ));
         }
         if camera.width_px.is_some() != camera.height_px.is_some() {
             let what = "one of camera.width_px and camera.height_px is missing";
-            return Err(Error::input(path.display(), what, "give both or none"));
+            return Err(Error::new(Code::SettingConflict, path.display(), what, "give both or none"));
         }
         Ok(manifest)
     }
@@ -218,7 +223,7 @@ impl Manifest {
             return Ok(());
         }
         let remedy = "write joint_unit = \"deg\" or joint_unit = \"rad\"; there is no default on purpose";
-        Err(Error::input(path.display(), "does not say the unit of the joint readings", remedy))
+        Err(Error::new(Code::JointUnitMissing, path.display(), "does not say the unit of the joint readings", remedy))
     }
 }
 
@@ -226,7 +231,7 @@ impl Manifest {
 pub(super) fn require_positive(path: &Path, key: &str, value: Option<f64>) -> Result<()> {
     match value {
         Some(v) if !(v > 0.0 && v.is_finite()) => {
-            Err(Error::input(path.display(), format!("{key} = {v}"), "give a positive number"))
+            Err(Error::new(Code::SettingRange, path.display(), format!("{key} = {v}"), "give a positive number"))
         }
         _ => Ok(()),
     }
@@ -238,12 +243,13 @@ pub(super) fn check_format(path: &Path, format: u32) -> Result<()> {
         return Ok(());
     }
     let remedy = "this program reads format = 1; a newer one may be needed";
-    Err(Error::input(path.display(), format!("format = {format}"), remedy))
+    Err(Error::new(Code::SettingVersion, path.display(), format!("format = {format}"), remedy))
 }
 
 /// Text of a TOML file.
 pub(super) fn to_toml(file: &str, value: &impl Serialize) -> Result<String> {
-    toml::to_string(value).map_err(|e| Error::input(file, format!("cannot be written: {e}"), "report this"))
+    toml::to_string(value)
+        .map_err(|e| Error::new(Code::OutputFailed, file, format!("cannot be written: {e}"), "report this"))
 }
 
 /// Reads a TOML file; unknown keys and wrong values are named with their line.
@@ -258,7 +264,7 @@ pub(super) fn parse_toml<T: DeserializeOwned>(path: &Path, text: &str) -> Result
         let place = line.map_or_else(|| path.display().to_string(), |l| format!("{}:{l}", path.display()));
         let message = error.message().trim().replace('\n', "; ");
         let remedy = toml_remedy(&message);
-        Error::input(place, message, remedy)
+        Error::new(Code::SettingSyntax, place, message, remedy)
     })?;
     plain_toml(path, text)?;
     Ok(value)

@@ -7,7 +7,7 @@ use super::inputs::InputFile;
 use super::observation::{Edge, ImageObservations, Observation};
 use super::plate::Plate;
 use super::table::{Row, Table, to_csv};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 
 const KNOWN: [&str; 11] = ["image", "marker", "u", "v", "edge", "cov_uu", "cov_uv", "cov_vv", "du", "dv", "reason"];
 const COVARIANCE: [&str; 3] = ["cov_uu", "cov_uv", "cov_vv"];
@@ -55,13 +55,13 @@ fn from_table(
         }
         let image = row.cell(reader.image);
         if image.is_empty() {
-            return Err(table.refuse(row, reader.image, "names no image", "name the image"));
+            return Err(table.refuse(Code::CsvCellEmpty, row, reader.image, "names no image", "name the image"));
         }
         let observation = reader.observation(row)?;
         let key = (image, observation.marker, observation.edge);
         if let Some(first) = seen.insert(key, row.line) {
             let what = format!("was observed in {image} by line {first} already");
-            return Err(table.refuse(row, reader.marker, &what, "remove one of the two rows"));
+            return Err(table.refuse(Code::CsvRowTwice, row, reader.marker, &what, "remove one of the two rows"));
         }
         let entry = images
             .entry(image.to_string())
@@ -117,13 +117,19 @@ impl<'a> Reader<'a> {
                 (Some(first), Some(last)) => format!("the plate has ids {first} to {last}; is it the right plate?"),
                 _ => "the plate has no markers".into(),
             };
-            return Err(self.table.refuse(row, self.marker, "is no marker of the plate", &remedy));
+            return Err(self.table.refuse(Code::MarkerUnknown, row, self.marker, "is no marker of the plate", &remedy));
         };
         let edge = self.edge(row)?;
         if edge == Edge::Inner && self.plate.markers[index].inner_radius_m == 0.0 {
             let column = self.edge.unwrap_or(self.marker);
             let what = format!("of marker {id}, which is a disc on the plate");
-            return Err(self.table.refuse(row, column, &what, "only annuli have an inner edge; check the plate"));
+            return Err(self.table.refuse(
+                Code::CsvName,
+                row,
+                column,
+                &what,
+                "only annuli have an inner edge; check the plate",
+            ));
         }
         Ok(Observation { marker: id, edge, uv: self.point(row)?, covariance: self.covariance(row)? })
     }
@@ -133,7 +139,7 @@ impl<'a> Reader<'a> {
         match row.cell(column) {
             "" | "outer" => Ok(Edge::Outer),
             "inner" => Ok(Edge::Inner),
-            _ => Err(self.table.refuse(row, column, "is no edge", "write outer or inner")),
+            _ => Err(self.table.refuse(Code::CsvName, row, column, "is no edge", "write outer or inner")),
         }
     }
 
@@ -144,7 +150,7 @@ impl<'a> Reader<'a> {
             if !(-0.5..=f64::from(size) - 0.5).contains(&value) {
                 let what = format!("is outside the image of {width} x {height} px");
                 let remedy = "check width_px and height_px; (0, 0) is the centre of the top-left pixel";
-                return Err(self.table.refuse(row, column, &what, remedy));
+                return Err(self.table.refuse(Code::CsvRange, row, column, &what, remedy));
             }
         }
         Ok(uv)
@@ -159,7 +165,13 @@ impl<'a> Reader<'a> {
         let (uu, uv, vv) = (uu?, uv?, vv?);
         if !(uu > 0.0 && vv > 0.0 && uu * vv - uv * uv > 0.0) {
             let remedy = "cov_uu and cov_vv are variances in px^2, and |cov_uv| is below the root of their product";
-            return Err(self.table.refuse(row, columns[0], "begins a covariance that is not positive", remedy));
+            return Err(self.table.refuse(
+                Code::CsvRange,
+                row,
+                columns[0],
+                "begins a covariance that is not positive",
+                remedy,
+            ));
         }
         Ok(Some([uu, uv, vv]))
     }
@@ -202,7 +214,12 @@ pub(super) fn in_order<'a>(
 pub(super) fn require_some(path: &Path, images: &[ImageObservations]) -> Result<()> {
     if images.is_empty() {
         let what = "has no usable observation of any image in joints.csv";
-        return Err(Error::input(path.display(), what, "compare the image names in both files"));
+        return Err(Error::new(
+            Code::ObservationsMissing,
+            path.display(),
+            what,
+            "compare the image names in both files",
+        ));
     }
     Ok(())
 }

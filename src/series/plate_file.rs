@@ -10,7 +10,7 @@ use super::manifest::{check_format, parse_toml, read_toml, require_positive, to_
 use super::plate::{Aruco, Marker, Plate, ScaleBar};
 use super::plate_kind::{Ink, Places, PlateKind};
 use super::table::{Row, Table, to_csv};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::files::Kind;
 
 /// Prior sigma of a printed marker where the plate states none, m.
@@ -89,11 +89,11 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
     let print = file.kind.print();
     if print.needs_marker_file && file.markers.is_none() {
         let what = "a plate of this kind needs a marker file";
-        return Err(Error::input(path.display(), what, "add markers = \"plate.csv\""));
+        return Err(Error::new(Code::SettingMissing, path.display(), what, "add markers = \"plate.csv\""));
     }
     if file.radius_m.is_some() && (!print.has_radius || file.markers.is_some()) {
         let what = "radius_m is only for a circle-grid without a marker file";
-        return Err(Error::input(path.display(), what, "remove radius_m"));
+        return Err(Error::new(Code::SettingConflict, path.display(), what, "remove radius_m"));
     }
     if print.places == Places::Anywhere {
         let (columns, rows) = (file.columns.unwrap_or(0), file.rows.unwrap_or(0));
@@ -112,15 +112,20 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
     }
     let (Some(columns), Some(rows), Some(pitch_m)) = (file.columns, file.rows, file.pitch_m) else {
         let what = "columns, rows and pitch_m are needed for a plate of this kind";
-        return Err(Error::input(path.display(), what, "add what is missing (pitch in metres)"));
+        return Err(Error::new(Code::SettingMissing, path.display(), what, "add what is missing (pitch in metres)"));
     };
     if !(2..=1000).contains(&columns) || !(2..=1000).contains(&rows) {
         let what = format!("columns = {columns}, rows = {rows}");
-        return Err(Error::input(path.display(), what, "give 2 to 1000 of each (inner corners of a chessboard)"));
+        return Err(Error::new(
+            Code::SettingRange,
+            path.display(),
+            what,
+            "give 2 to 1000 of each (inner corners of a chessboard)",
+        ));
     }
     if pitch_m >= 1.0 {
         let what = format!("pitch_m = {pitch_m} makes a plate of {:.0} m", pitch_m * f64::from(columns));
-        return Err(Error::input(path.display(), what, "pitch_m is in metres: 18 mm are 0.018"));
+        return Err(Error::new(Code::PlateUnitUnlikely, path.display(), what, "pitch_m is in metres: 18 mm are 0.018"));
     }
     let mut plate = Plate {
         aruco: aruco(path, file, pitch_m)?,
@@ -140,11 +145,19 @@ fn aruco(path: &Path, file: &PlateFile, pitch_m: f64) -> Result<Option<Aruco>> {
         (Some(aruco), true) if aruco.side_m > 0.0 && aruco.side_m < pitch_m => Ok(Some(aruco.clone())),
         (Some(aruco), true) => {
             let what = format!("[aruco] side_m = {} does not fit into a square of {pitch_m} m", aruco.side_m);
-            Err(Error::input(place, what, "give the side of a marker with its black border, in metres"))
+            Err(Error::new(
+                Code::SettingRange,
+                place,
+                what,
+                "give the side of a marker with its black border, in metres",
+            ))
         }
-        (Some(_), false) => {
-            Err(Error::input(place, "[aruco] is only for a charuco plate", "remove it or correct `kind`"))
-        }
+        (Some(_), false) => Err(Error::new(
+            Code::SettingConflict,
+            place,
+            "[aruco] is only for a charuco plate",
+            "remove it or correct `kind`",
+        )),
         (None, _) => Ok(None),
     }
 }
@@ -167,13 +180,18 @@ fn read_markers(table: &Table, plate: &Plate) -> Result<Vec<Marker>> {
         markers.push((row.line, Marker { id, position_m, outer_radius_m, inner_radius_m, sigma_m }));
     }
     if markers.is_empty() {
-        return Err(Error::input(table.place_of_header(), "has no markers", "give one row for every marker"));
+        return Err(Error::new(
+            Code::FileEmpty,
+            table.place_of_header(),
+            "has no markers",
+            "give one row for every marker",
+        ));
     }
     markers.sort_by_key(|(line, m)| (m.id, *line));
     if let Some(pair) = markers.windows(2).find(|p| p[0].1.id == p[1].1.id) {
         let place = table.place_of_line(pair[1].0);
         let what = format!("marker {} stands in line {} already", pair[1].1.id, pair[0].0);
-        return Err(Error::input(place, what, "give every marker one row"));
+        return Err(Error::new(Code::CsvRowTwice, place, what, "give every marker one row"));
     }
     Ok(markers.into_iter().map(|(_, m)| m).collect())
 }
@@ -185,11 +203,23 @@ fn marker_radii(table: &Table, row: Row<'_>, columns: [Option<usize>; 2], circle
     let (outer, inner) = (outer?, inner?);
     let [Some(outer_column), inner_column] = columns else { return Ok([outer, inner]) };
     if outer < 0.0 || (circles && outer == 0.0) {
-        return Err(table.refuse(row, outer_column, "is no radius", "give a positive radius in metres"));
+        return Err(table.refuse(
+            Code::CsvRange,
+            row,
+            outer_column,
+            "is no radius",
+            "give a positive radius in metres",
+        ));
     }
     if inner < 0.0 || inner > 0.0 && inner >= outer {
         let what = format!("is not inside the outer radius {outer}");
-        return Err(table.refuse(row, inner_column.unwrap_or(outer_column), &what, "0 is a disc, else below outer"));
+        return Err(table.refuse(
+            Code::CsvRange,
+            row,
+            inner_column.unwrap_or(outer_column),
+            &what,
+            "0 is a disc, else below outer",
+        ));
     }
     Ok([outer, inner])
 }
@@ -200,7 +230,7 @@ fn marker_sigma(table: &Table, row: Row<'_>, columns: [Option<usize>; 4]) -> Res
     for column in columns.into_iter().flatten() {
         let value = table.optional_number(row, Some(column))?;
         if value.is_some_and(|v| v <= 0.0) {
-            return Err(table.refuse(row, column, "is no sigma", "give a positive number of metres"));
+            return Err(table.refuse(Code::CsvRange, row, column, "is no sigma", "give a positive number of metres"));
         }
         sigma = value.into_iter().chain(sigma).reduce(f64::max);
     }
@@ -217,7 +247,7 @@ fn check_ids(csv: &Path, plate: &Plate) -> Result<()> {
         let place = || format!("{}, marker {}", csv.display(), marker.id);
         let Some(wanted) = lattice.index_of(marker.id).map(|i| lattice.markers[i].position_m) else {
             let what = format!("does not exist on a plate of {} x {}", plate.columns, plate.rows);
-            return Err(Error::input(place(), what, "ids are row-major from 0 at the top-left"));
+            return Err(Error::new(Code::MarkerUnknown, place(), what, "ids are row-major from 0 at the top-left"));
         };
         let at = marker.position_m;
         if (at - wanted).norm() > 0.5 * plate.pitch_m {
@@ -227,7 +257,7 @@ fn check_ids(csv: &Path, plate: &Plate) -> Result<()> {
             );
             let remedy =
                 "metres; origin at the plate's centre, x right, y UP on the printed face, ids row-major from top-left";
-            return Err(Error::input(place(), what, remedy));
+            return Err(Error::new(Code::MarkerMisplaced, place(), what, remedy));
         }
     }
     Ok(())
@@ -246,7 +276,12 @@ fn check_overlap(path: &Path, plate: &Plate) -> Result<()> {
             if distance <= a.outer_radius_m + b.outer_radius_m + 1e-6 {
                 let (first, second) = (a.id.min(b.id), a.id.max(b.id));
                 let what = format!("markers {first} and {second} overlap: their centres are {distance} m apart");
-                return Err(Error::input(path.display(), what, "check positions and radii (not diameters), in metres"));
+                return Err(Error::new(
+                    Code::MarkersOverlap,
+                    path.display(),
+                    what,
+                    "check positions and radii (not diameters), in metres",
+                ));
             }
         }
     }
@@ -260,7 +295,7 @@ fn check_scale(path: &Path, plate: &Plate) -> Result<()> {
     let position = |id: u32| {
         plate.index_of(id).map(|i| plate.markers[i].position_m).ok_or_else(|| {
             let what = format!("[scale] names marker {id}, which does not exist");
-            Error::input(path.display(), what, "name two markers of the plate")
+            Error::new(Code::MarkerUnknown, path.display(), what, "name two markers of the plate")
         })
     };
     let nominal = (position(scale.from)? - position(scale.to)?).norm();
@@ -269,7 +304,12 @@ fn check_scale(path: &Path, plate: &Plate) -> Result<()> {
             "[scale] distance_m = {}, but markers {} and {} are nominally {nominal} m apart",
             scale.distance_m, scale.from, scale.to
         );
-        return Err(Error::input(path.display(), what, "check the marker ids and the unit (metres)"));
+        return Err(Error::new(
+            Code::PlateScaleUnlikely,
+            path.display(),
+            what,
+            "check the marker ids and the unit (metres)",
+        ));
     }
     Ok(())
 }

@@ -14,7 +14,7 @@ use super::observation_file;
 use super::plate::Plate;
 use super::plate_file::read_plate;
 use super::units;
-use crate::error::{Error, Notice, Result, plain_name};
+use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::urdf::Chain;
 
 const IMAGE_EXTENSIONS: [&str; 9] = ["png", "tif", "tiff", "pgm", "pnm", "ppm", "jpg", "jpeg", "bmp"];
@@ -125,7 +125,7 @@ fn folder_name(folder: &Path) -> Result<String> {
     let full = folder.canonicalize().map_err(|e| Error::io(folder, &e))?;
     if !full.is_dir() {
         let remedy = "give the folder that holds series.toml";
-        return Err(Error::input(folder.display(), "is not a series folder", remedy));
+        return Err(Error::new(Code::SeriesMissing, folder.display(), "is not a series folder", remedy));
     }
     let name = full.file_name().map_or_else(|| "series".into(), |n| n.to_string_lossy().into_owned());
     plain_name("series", &name, folder.display())?;
@@ -147,6 +147,7 @@ fn observed(
     if !strange.is_empty() {
         let what = format!("observes {} that joints.csv does not name: {}", count(strange.len()), some(&strange));
         notices.push(Notice::new(
+            Code::ImageUnlisted,
             path.display(),
             what,
             "they are not used; add rows with empty joint cells to use them",
@@ -156,7 +157,7 @@ fn observed(
     let unseen: Vec<_> = stops.stops.iter().map(|s| s.image.clone()).filter(|i| !seen.contains(i.as_str())).collect();
     if !unseen.is_empty() {
         let what = format!("has no observation of {} in joints.csv: {}", count(unseen.len()), some(&unseen));
-        notices.push(Notice::new(path.display(), what, "they are left out"));
+        notices.push(Notice::new(Code::ObservationsMissing, path.display(), what, "they are left out"));
     }
     Ok(Source::Observations(ordered))
 }
@@ -188,17 +189,18 @@ fn pictured(folder: &Path, stops: &mut Stops, notices: &mut Vec<Notice>) -> Resu
             stops.stops.len(),
             names.len()
         );
-        return Err(Error::input(format!("{}:{line}", csv.display()), what, remedy(name)));
+        return Err(Error::new(Code::ImageNotThere, format!("{}:{line}", csv.display()), what, remedy(name)));
     }
     for (line, name) in &missing {
         let what = format!("image \"{name}\" is not in {} and is left out", images.display());
-        notices.push(Notice::new(format!("{}:{line}", csv.display()), what, remedy(name)));
+        notices.push(Notice::new(Code::ImageNotThere, format!("{}:{line}", csv.display()), what, remedy(name)));
     }
     let named: BTreeSet<&str> = stops.stops.iter().map(|s| s.image.as_str()).collect();
     let unnamed: Vec<String> = names.iter().filter(|n| !named.contains(n.as_str())).cloned().collect();
     if !unnamed.is_empty() {
         let what = format!("{} that no row of joints.csv names: {}", count(unnamed.len()), some(&unnamed));
         notices.push(Notice::new(
+            Code::ImageUnlisted,
             images.display(),
             what,
             "they are not used; add a row with empty joint cells to use one",
@@ -282,7 +284,12 @@ impl Series {
     pub fn readings_for(&self, chain: &Chain) -> Result<Vec<Option<Vec<f64>>>> {
         if let Source::Recording(path) = &self.source {
             let what = "the stops have not been taken out of this recording";
-            return Err(Error::input(path.display(), what, "convert it first: robotcal convert run1.mcap run1/"));
+            return Err(Error::new(
+                Code::RecordingNotConverted,
+                path.display(),
+                what,
+                "convert it first: robotcal convert run1.mcap run1/",
+            ));
         }
         units::readings_for(&self.readings_file(), &self.stops, self.joint_unit(), chain)
     }
@@ -330,6 +337,6 @@ pub(super) fn manifest_beside(recording: &Path) -> Result<PathBuf> {
         );
         let remedy =
             "write one: format = 1, camera_mount = \"hand\", plate = \"plate.toml\", and base and tip if needed";
-        Error::input(recording.display(), what, remedy)
+        Error::new(Code::SeriesMissing, recording.display(), what, remedy)
     })
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::manifest::{AngleUnit, CameraMount, Manifest};
 use super::mcap::{CameraInfo, Extracted, RecordingOptions, extract};
 use super::read::{Series, Source, file_name, manifest_beside, optional_images};
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 
 impl Series {
     /// The same series with the stops of its recording: pictures are written to `images`. A series that has no recording
@@ -47,7 +47,12 @@ fn fill_camera(manifest: &mut Manifest, info: Option<&CameraInfo>) {
 pub fn convert_recording(recording: &Path, folder: &Path, options: &RecordingOptions) -> Result<Extracted> {
     let is_empty = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
     if folder.exists() && !is_empty {
-        return Err(Error::input(folder.display(), "exists already", "name a new folder, or remove this one"));
+        return Err(Error::new(
+            Code::OutputExists,
+            folder.display(),
+            "exists already",
+            "name a new folder, or remove this one",
+        ));
     }
     if is_empty {
         return write_folder(recording, folder, folder, options);
@@ -93,7 +98,7 @@ fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extract
             known = false;
             let what = "nothing beside it says where the camera is and which plate was seen";
             let remedy = "add camera_mount = \"hand\" or \"fixed\" to series.toml and put plate.toml into the folder";
-            extracted.notices.push(Notice::new(recording.display(), what, remedy));
+            extracted.notices.push(Notice::new(Code::RecordingManifest, recording.display(), what, remedy));
             Manifest::plain(CameraMount::Hand, "plate.toml")
         }
     };

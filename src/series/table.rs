@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::inputs::{InputFile, read_text};
-use crate::error::{Error, Result, closest_name, plain_name};
+use crate::error::{Code, Error, Result, closest_name, plain_name};
 use crate::files::Kind;
 
 /// One data row.
@@ -65,7 +65,12 @@ impl Table {
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
         let file = path.display().to_string();
         if text.len() as u64 > Kind::Table.most_bytes() {
-            return Err(Error::input(file, "is too long for a table", "check that it is the right file"));
+            return Err(Error::new(
+                Code::FileTooLarge,
+                file,
+                "is too long for a table",
+                "check that it is the right file",
+            ));
         }
         refuse_other_separators(&file, text)?;
         let mut reader = csv::ReaderBuilder::new()
@@ -79,7 +84,7 @@ impl Table {
         loop {
             let more = reader.read_record(&mut record);
             let remedy = "correct the line (quotes must be closed)";
-            if !more.map_err(|e| Error::input(&table.file, e, remedy))? {
+            if !more.map_err(|e| Error::new(Code::CsvSyntax, &table.file, e, remedy))? {
                 break;
             }
             // The position of the csv reader may stand before line ends that it has yet to skip.
@@ -90,7 +95,7 @@ impl Table {
             table.push(line, &record)?;
         }
         match table.headers.is_empty() {
-            true => Err(Error::input(table.file, "is empty", "its first line names the columns")),
+            true => Err(Error::new(Code::FileEmpty, table.file, "is empty", "its first line names the columns")),
             false => Ok(table),
         }
     }
@@ -104,7 +109,7 @@ impl Table {
         if record.len() != self.headers.len() {
             let what = format!("{} cells under {} column names", record.len(), self.headers.len());
             let remedy = "give every row all cells; numbers need a decimal point, not a comma";
-            return Err(Error::input(self.place_of_line(line), what, remedy));
+            return Err(Error::new(Code::CsvCellCount, self.place_of_line(line), what, remedy));
         }
         self.lines.push(line);
         for (cell, column) in record.iter().zip(&self.headers) {
@@ -120,11 +125,16 @@ impl Table {
             plain_name("column", name, self.place_of_header())?;
             if name.is_empty() {
                 let what = format!("column {} has no name", i + 1);
-                return Err(Error::input(self.place_of_header(), what, "name it or remove the extra comma"));
+                return Err(Error::new(
+                    Code::CsvColumnUnknown,
+                    self.place_of_header(),
+                    what,
+                    "name it or remove the extra comma",
+                ));
             }
             if !seen.insert(name) {
                 let what = format!("two columns are named \"{name}\"");
-                return Err(Error::input(self.place_of_header(), what, "remove or rename one"));
+                return Err(Error::new(Code::CsvColumnTwice, self.place_of_header(), what, "remove or rename one"));
             }
         }
         Ok(())
@@ -154,7 +164,7 @@ impl Table {
                 Some(meant) => format!("rename \"{meant}\" to \"{name}\""),
                 None => format!("add the column \"{name}\""),
             };
-            Error::input(self.place_of_header(), what, remedy)
+            Error::new(Code::CsvColumnMissing, self.place_of_header(), what, remedy)
         })
     }
 
@@ -168,7 +178,7 @@ impl Table {
                     Some(meant) => format!("is \"{meant}\" meant?"),
                     None => format!("known columns are: {}", known.join(", ")),
                 };
-                Err(Error::input(self.place_of_header(), what, remedy))
+                Err(Error::new(Code::CsvColumnUnknown, self.place_of_header(), what, remedy))
             }
         }
     }
@@ -183,7 +193,7 @@ impl Table {
                     true => "write numbers with a decimal point",
                     false => "write a finite number",
                 };
-                Err(self.refuse(row, column, "is not a number", remedy))
+                Err(self.refuse(Code::CsvNumber, row, column, "is not a number", remedy))
             }
         }
     }
@@ -198,18 +208,18 @@ impl Table {
 
     /// A marker id.
     pub fn id(&self, row: Row<'_>, column: usize) -> Result<u32> {
-        let bad = || self.refuse(row, column, "is not a marker id", "ids are whole numbers from 0 on");
+        let bad = || self.refuse(Code::CsvNumber, row, column, "is not a marker id", "ids are whole numbers from 0 on");
         row.cell(column).parse().map_err(|_| bad())
     }
 
     /// Complaint about one cell.
-    pub fn refuse(&self, row: Row<'_>, column: usize, what: &str, remedy: &str) -> Error {
+    pub fn refuse(&self, code: Code, row: Row<'_>, column: usize, what: &str, remedy: &str) -> Error {
         let cell = row.cell(column);
         let what = match cell.is_empty() {
             true => format!("column {}: an empty cell {what}", self.headers[column]),
             false => format!("column {}: \"{cell}\" {what}", self.headers[column]),
         };
-        Error::input(self.place(row), what, remedy)
+        Error::new(code, self.place(row), what, remedy)
     }
 }
 
@@ -227,7 +237,7 @@ fn refuse_other_separators(file: &str, text: &str) -> Result<()> {
     let decimal = if comma { " and its numbers have a decimal comma" } else { "" };
     let what = format!("its columns are separated by {name}{decimal}");
     let remedy = "save it with commas between columns and decimal points (spreadsheet language: English)";
-    Err(Error::input(format!("{file}:1"), what, remedy))
+    Err(Error::new(Code::CsvSeparator, format!("{file}:1"), what, remedy))
 }
 
 /// Text of a table, quoted where needed.

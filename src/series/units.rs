@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::joints::Stops;
 use super::manifest::AngleUnit;
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::urdf::{Chain, Joint, JointKind};
 
 /// No joint of an arm turns further than two full turns from zero on most of its stops.
@@ -53,7 +53,7 @@ fn columns_of(file: &Path, stops: &Stops, chain: &Chain) -> Result<Vec<usize>> {
         stops.joints.join(", ")
     );
     let remedy = "name the columns as the joints in the URDF, or choose another base or tip";
-    Err(Error::input(file.display(), what, remedy))
+    Err(Error::new(Code::JointMissing, file.display(), what, remedy))
 }
 
 fn to_si(chain: &Chain, unit: AngleUnit, raw: &[f64]) -> Vec<f64> {
@@ -111,7 +111,7 @@ fn refuse_degrees_as_radians(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Res
         false => "more than two turns as radians",
     };
     let what = format!("joint_unit is rad, but {joint} reads {low} to {high}: most rows are {why}");
-    Err(Error::input(file.display(), what, "write joint_unit = \"deg\" in series.toml"))
+    Err(Error::new(Code::DegreesAsRadians, file.display(), what, "write joint_unit = \"deg\" in series.toml"))
 }
 
 fn refuse_radians_as_degrees(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
@@ -131,7 +131,7 @@ fn refuse_radians_as_degrees(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Res
     );
     let remedy =
         "write joint_unit = \"rad\" in series.toml (if they are degrees, convert them to radians in joints.csv)";
-    Err(Error::input(file.display(), what, remedy))
+    Err(Error::new(Code::RadiansAsDegrees, file.display(), what, remedy))
 }
 
 fn refuse_millimetres(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
@@ -148,7 +148,12 @@ fn refuse_millimetres(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()>
         "{} reads {low} to {high}, beyond the limits in the URDF, which it keeps if it is in millimetres",
         chain.readings[reading]
     );
-    Err(Error::input(file.display(), what, "prismatic joints are metres: divide the column by 1000"))
+    Err(Error::new(
+        Code::MillimetresAsMetres,
+        file.display(),
+        what,
+        "prismatic joints are metres: divide the column by 1000",
+    ))
 }
 
 /// Name and range of the revolute reading that reaches furthest from zero.
@@ -168,7 +173,12 @@ pub(super) fn notices(file: &Path, stops: &Stops, unit: AngleUnit, chain: &Chain
     let extra: Vec<&str> = stops.joints.iter().filter(|j| !chain.readings.contains(j)).map(String::as_str).collect();
     if !extra.is_empty() {
         let what = format!("columns that are no joints between {} and {}: {}", chain.base, chain.tip, extra.join(", "));
-        notices.push(Notice::new(file.display(), what, "they are not used; check the spelling if they should be"));
+        notices.push(Notice::new(
+            Code::JointUnused,
+            file.display(),
+            what,
+            "they are not used; check the spelling if they should be",
+        ));
     }
     let Ok(columns) = columns_of(file, stops, chain) else { return notices };
     for (reading, column) in columns.into_iter().enumerate() {
@@ -206,5 +216,5 @@ fn beyond_limits(
         stops.stops.len()
     );
     let place = format!("{}:{}, image {}", file.display(), stop.line, stop.image);
-    Some(Notice::new(place, what, "check the joint's unit and sign, or correct the limits"))
+    Some(Notice::new(Code::JointBeyondLimits, place, what, "check the joint's unit and sign, or correct the limits"))
 }

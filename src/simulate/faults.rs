@@ -14,7 +14,7 @@ use super::observe::observe;
 use super::truth::PoseRecord;
 use super::world::SimulatedSeries;
 use crate::detect::{Picture, load};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::series::{AngleUnit, CameraMount, Plate};
@@ -145,7 +145,8 @@ impl Fault {
         let (stops, joints) = (series.stops.stops.len(), series.stops.joints.len());
         if stops < 6 || joints < 6 {
             let what = format!("{stops} stops and {joints} joints are too few to show it");
-            return Err(Error::input(
+            return Err(Error::new(
+                Code::OptionConflict,
                 format!("fault {}", self.expectation().name),
                 what,
                 "take 16 stops of a 6-axis arm",

@@ -11,7 +11,7 @@ use super::conditions::ImagingConditions;
 use super::render::check_drawable;
 use super::world::SimulatedSeries;
 use crate::detect::Picture;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::series::{observations_csv, plate_csv, plate_toml};
 
 /// What stands for the measurements.
@@ -35,7 +35,12 @@ pub enum Content<'a> {
 pub fn write(folder: &Path, series: &SimulatedSeries, content: Content<'_>) -> Result<()> {
     let is_used = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     if is_used {
-        return Err(Error::input(folder.display(), "is not empty", "give a new folder, or remove this one"));
+        return Err(Error::new(
+            Code::OutputExists,
+            folder.display(),
+            "is not empty",
+            "give a new folder, or remove this one",
+        ));
     }
     if matches!(content, Content::Images { .. }) {
         check_drawable(&series.plate)?;
@@ -98,5 +103,6 @@ pub fn save(path: &Path, picture: &Picture) -> Result<()> {
         let bytes: Vec<u8> = picture.pixels.iter().flat_map(|&v| (v as u16).to_ne_bytes()).collect();
         encoder.write_image(&bytes, width, height, ExtendedColorType::L16)
     };
-    written.map_err(|e| Error::input(path.display(), e, "check that the disk is writable and not full"))
+    written
+        .map_err(|e| Error::new(Code::OutputFailed, path.display(), e, "check that the disk is writable and not full"))
 }

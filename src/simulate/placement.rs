@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, RngExt};
 
 use super::request::WorldRequest;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::inverse;
 use crate::model::robot::Robot;
@@ -128,7 +128,8 @@ fn best(
         }
     }
     if (winner.0 as f64) < LEAST_SHARE * TRIALS as f64 {
-        return Err(Error::unsolved(
+        return Err(Error::new(
+            Code::SimulationOutOfReach,
             format!("robot {}", request.chain.robot),
             "hardly any view of the plate is in reach, wherever the plate stands",
             "allow nearer views, or choose a plate that suits the robot's size",

@@ -12,7 +12,7 @@ use super::psf::Psf;
 use super::raster::{Patch, PixelRect, Plane, Rasteriser};
 use super::{scenery, sensor};
 use crate::detect::Picture;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::series::{Ink, Marker, Plate};
@@ -38,7 +38,7 @@ pub fn check_drawable(plate: &Plate) -> Result<()> {
             "give radius_m or a table of markers with radii, or --observations",
         ),
     };
-    Err(Error::input("plate.toml", what, remedy))
+    Err(Error::new(Code::PlateImpossible, "plate.toml", what, remedy))
 }
 
 /// Renders the whole picture of `plate` seen by `camera` at `camera_from_plate`.

@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::joint_terms::{JointTerm, Term};
@@ -125,11 +125,16 @@ impl Truth {
     pub fn read(path: &Path) -> Result<Self> {
         let text = crate::files::read_text(path, crate::files::Kind::Settings)?;
         let truth: Self = toml::from_str(&text).map_err(|e| {
-            Error::input(path.display(), e.message(), "write it with robotcal simulate of this version")
+            Error::new(
+                Code::SettingSyntax,
+                path.display(),
+                e.message(),
+                "write it with robotcal simulate of this version",
+            )
         })?;
         if truth.format != 1 {
             let what = format!("format = {}", truth.format);
-            return Err(Error::input(path.display(), what, "this program reads format = 1"));
+            return Err(Error::new(Code::SettingVersion, path.display(), what, "this program reads format = 1"));
         }
         Ok(truth)
     }
@@ -139,7 +144,7 @@ impl Truth {
     /// # Errors
     /// None in practice: every field can be written as TOML.
     pub fn to_toml(&self) -> Result<String> {
-        toml::to_string(self).map_err(|e| Error::input("truth.toml", e, "report this"))
+        toml::to_string(self).map_err(|e| Error::new(Code::OutputFailed, "truth.toml", e, "report this"))
     }
 
     /// The true robot on its nominal chain.
@@ -149,7 +154,8 @@ impl Truth {
     pub fn robot(&self, chain: &Chain) -> Result<Robot> {
         let mut robot = Robot::nominal(chain.clone());
         let unknown = |name: &str| {
-            Error::input(
+            Error::new(
+                Code::JointUnknown,
                 "truth.toml",
                 format!("joint \"{name}\" is not in the chain"),
                 "give the URDF that it was made with",

@@ -18,7 +18,7 @@ use super::render::render;
 use super::request::WorldRequest;
 use super::truth::{HeldOutRecord, PoseRecord, StopRecord, TermRecord, Truth};
 use crate::detect::Picture;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use crate::model::plate_modes::{PRIOR_SIGMA, basis};
@@ -169,7 +169,8 @@ impl World<'_> {
                 return Ok(Seen { readings, raw, noise, placement: at, camera_from_plate, observations });
             }
         }
-        Err(Error::unsolved(
+        Err(Error::new(
+            Code::SimulationOutOfReach,
             format!("simulated stop {index}"),
             format!("no workable pose in {ATTEMPTS} attempts: none in reach shows {} markers", request.least_markers),
             "allow more distance, less tilt, fewer markers, or a plate that suits the robot's size",
@@ -181,7 +182,8 @@ impl World<'_> {
         let posture =
             (0..ATTEMPTS).find_map(|_| self.setup.random_posture(self.request, &self.nominal, at, &mut self.rng));
         let readings = posture.ok_or_else(|| {
-            Error::unsolved(
+            Error::new(
+                Code::SimulationOutOfReach,
                 "simulated joint vectors",
                 "no view of the plate is in reach",
                 "choose another plate or robot",

@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, skew};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Adjustment, PlateShape, Problem, Slack};
@@ -131,7 +131,8 @@ impl Normal {
 }
 
 fn no_frame(plate: &str) -> Error {
-    Error::unsolved(
+    Error::new(
+        Code::FitUndetermined,
         plate,
         "the markers that were seen lie on a line and define no frame",
         "take images of more of the plate",

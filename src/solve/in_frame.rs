@@ -14,7 +14,7 @@ use super::covariance::{Covariance, fixed_are_known};
 use super::frame::{Frame, frames};
 use super::linear::{LinearImage, LinearProblem};
 use super::system::{Eliminated, Elimination, Singular, System};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Adjustment, Problem, Slack};
 
@@ -65,7 +65,8 @@ pub fn in_frame_by(which: Elimination, linear: LinearProblem, stated: &Covarianc
     widen_scales(problem, &frames, &mut system);
     let combinations = combinations(linear, &frames);
     let held = hold(&mut system, combinations, &following);
-    let singular = |e: Singular| Error::unsolved("plate", e.to_string(), "take images of more of the plate");
+    let singular =
+        |e: Singular| Error::new(Code::FitUndetermined, "plate", e.to_string(), "take images of more of the plate");
     let factor = system.factor(linear).map_err(singular)?;
     let mut reduced = factor.inverse();
     if let (Eliminated::Slack(e), Some(held)) = (&system.eliminated, &held) {

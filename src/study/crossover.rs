@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::simulated::measured;
 use crate::assess::{Limits, Ratio, bootstrap_ratio, median, root_mean_square};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, adjoint};
 use crate::identify::{Estimator, PoseStage, RobotModel, TruthError, build, estimate_all, truth_error};
 use crate::problem::{Adjustment, Slack};
@@ -156,8 +156,14 @@ struct Scale {
 }
 
 fn reference(request: &StudyRequest, lattice: (u32, u32)) -> Result<Scale> {
-    let unsolved =
-        || Error::unsolved("study", "the free poses of the reference world do not converge", "take more markers");
+    let unsolved = || {
+        Error::new(
+            Code::NotConverged,
+            "study",
+            "the free poses of the reference world do not converge",
+            "take more markers",
+        )
+    };
     let start = started(request, &world(request, lattice, 0.0, 1)?)?;
     let Adjustment { problem, state } = &start;
     let stage = PoseStage::adjusted(&start).ok_or_else(unsolved)?;

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::simulated::measured;
 use crate::assess::{Ratio, bootstrap_ratio, flange_error_m, root_mean_square};
-use crate::error::Result;
+use crate::error::{Code, Result};
 use crate::geom::Pose;
 use crate::identify::{JointNoise, Options, RobotModel, identify};
 use crate::model::camera::{Camera, Lens};
@@ -257,6 +257,11 @@ fn found(request: &PlanStudyRequest, series: &SimulatedSeries, sets: [&[(Vec<f64
     // The frame in which the flange is measured is fitted: any will do.
     let [a, b] = sets.map(|poses| flange_error_m(&solution.fit.state.robot, &Pose::identity(), poses));
     a.zip(b).map(|(a, b)| [a, b]).ok_or_else(|| {
-        crate::error::Error::unsolved("study", "the held-out joint vectors determine no error", "take more of them")
+        crate::error::Error::new(
+            Code::PlanUndetermined,
+            "study",
+            "the held-out joint vectors determine no error",
+            "take more of them",
+        )
     })
 }

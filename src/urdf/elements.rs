@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use roxmltree::Node;
 use urdf_rs::JointType;
 
-use crate::error::{Error, Notice, Result, closest_name};
+use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::geom::Pose;
 
 /// Elements that URDF knows below `<joint>`.
@@ -61,21 +61,26 @@ impl Source<'_> {
         1 + self.line_ends.partition_point(|end| *end < node.range().start) as u32
     }
 
-    fn refuse(&self, node: Node<'_, '_>, joint: &str, what: String, remedy: &str) -> Error {
-        Error::input(format!("{}, joint \"{joint}\"", self.place(node)), what, remedy)
+    fn refuse(&self, code: Code, node: Node<'_, '_>, joint: &str, what: String, remedy: &str) -> Error {
+        Error::new(code, format!("{}, joint \"{joint}\"", self.place(node)), what, remedy)
     }
 
     /// Checks the text of a joint before `urdf-rs` reads it.
     pub fn check(&self, node: Node<'_, '_>) -> Result<()> {
         let name = node.attribute("name").unwrap_or_default();
         if name.trim().is_empty() {
-            return Err(Error::input(self.place(node), "a <joint> without a name", "give the joint a name"));
+            return Err(Error::new(
+                Code::UrdfElement,
+                self.place(node),
+                "a <joint> without a name",
+                "give the joint a name",
+            ));
         }
         match node.attribute("type") {
             Some(kind) if TYPES.contains(&kind) => {}
             kind => {
                 let what = format!("joint type {kind:?} is none of {}", TYPES.join(", "));
-                return Err(self.refuse(node, name, what, "correct the type attribute"));
+                return Err(self.refuse(Code::UrdfElement, node, name, what, "correct the type attribute"));
             }
         }
         self.check_children(node, name)?;
@@ -83,7 +88,7 @@ impl Source<'_> {
             let found = child(node, element).and_then(|n| n.attribute(attribute));
             if found.is_none_or(str::is_empty) {
                 let what = format!("no <{element} {attribute}=\"...\"/>");
-                return Err(self.refuse(node, name, what, "name the link"));
+                return Err(self.refuse(Code::UrdfElement, node, name, what, "name the link"));
             }
         }
         Ok(())
@@ -95,13 +100,19 @@ impl Source<'_> {
             if !KNOWN_CHILDREN.contains(&tag) {
                 if let Some(meant) = closest_name(tag, ["origin", "axis", "mimic", "limit"]) {
                     let what = format!("unknown element <{tag}>, and without <{meant}> a default would be used");
-                    return Err(self.refuse(element, name, what, &format!("write <{meant}> if that is meant")));
+                    return Err(self.refuse(
+                        Code::UrdfElement,
+                        element,
+                        name,
+                        what,
+                        &format!("write <{meant}> if that is meant"),
+                    ));
                 }
                 continue;
             }
             if child(joint, tag) != Some(element) {
                 let what = format!("<{tag}> stands twice");
-                return Err(self.refuse(element, name, what, "remove the one that does not hold"));
+                return Err(self.refuse(Code::UrdfTwice, element, name, what, "remove the one that does not hold"));
             }
             self.check_attributes(element, name)?;
         }
@@ -122,12 +133,18 @@ impl Source<'_> {
             match known.iter().find(|(name, _)| *name == key) {
                 Some((_, count)) if numbers(value, *count).is_none() => {
                     let what = format!("{tag} {key}=\"{value}\" is not {count} finite number(s) separated by blanks");
-                    return Err(self.refuse(element, joint, what, "correct the numbers (point as decimal mark)"));
+                    return Err(self.refuse(
+                        Code::UrdfNumber,
+                        element,
+                        joint,
+                        what,
+                        "correct the numbers (point as decimal mark)",
+                    ));
                 }
                 None if matches!(tag, "origin" | "axis") => {
                     let what = format!("<{tag}> has an unknown attribute {key}=\"{value}\"");
                     let names = known.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-                    return Err(self.refuse(element, joint, what, &format!("known are {names}")));
+                    return Err(self.refuse(Code::UrdfElement, element, joint, what, &format!("known are {names}")));
                 }
                 _ => {}
             }
@@ -141,16 +158,22 @@ impl Source<'_> {
     fn check_quaternion(&self, origin: Node<'_, '_>, joint: &str) -> Result<()> {
         if !self.has_quaternions {
             let what = "quat_xyzw counts only from URDF 1.1 on, older files mean no rotation by it".to_string();
-            return Err(self.refuse(origin, joint, what, "write <robot version=\"1.1\"> or use rpy"));
+            return Err(self.refuse(
+                Code::UrdfRotation,
+                origin,
+                joint,
+                what,
+                "write <robot version=\"1.1\"> or use rpy",
+            ));
         }
         if origin.has_attribute("rpy") {
             let what = "both rpy and quat_xyzw are given".to_string();
-            return Err(self.refuse(origin, joint, what, "remove the one that does not hold"));
+            return Err(self.refuse(Code::UrdfTwice, origin, joint, what, "remove the one that does not hold"));
         }
         let norm = origin.attribute("quat_xyzw").and_then(|q| numbers(q, 4)).map_or(0.0, |q| norm(&q));
         if (norm - 1.0).abs() > 1e-3 {
             let what = format!("quat_xyzw has the norm {norm}, not 1");
-            return Err(self.refuse(origin, joint, what, "correct the quaternion (order x y z w)"));
+            return Err(self.refuse(Code::UrdfRotation, origin, joint, what, "correct the quaternion (order x y z w)"));
         }
         Ok(())
     }
@@ -160,7 +183,7 @@ impl Source<'_> {
         let place = self.place(node);
         if node.attribute("name") != Some(read.name.as_str()) {
             let what = format!("two readers disagree on the name of this joint (\"{}\")", read.name);
-            return Err(Error::input(place, what, "write the name without XML entities"));
+            return Err(Error::new(Code::UrdfSyntax, place, what, "write the name without XML entities"));
         }
         let origin = match child(node, "origin").and_then(|o| o.attribute("quat_xyzw")).and_then(|q| numbers(q, 4)) {
             Some(q) => Pose::from_xyz_quaternion(read.origin.xyz.0, [q[0], q[1], q[2], q[3]]),
@@ -169,7 +192,7 @@ impl Source<'_> {
         let at = || format!("{place}, joint \"{}\"", read.name);
         if read.origin.rpy.0.iter().any(|a| a.abs() > 2.0 * std::f64::consts::PI + 0.01) {
             let what = format!("rpy {:?} exceeds a full turn; URDF angles are radians", read.origin.rpy.0);
-            notices.push(Notice::new(at(), what, "convert degrees to radians"));
+            notices.push(Notice::new(Code::UrdfAngleUnit, at(), what, "convert degrees to radians"));
         }
         Ok(JointElement {
             axis: self.axis(node, read, notices)?,
@@ -195,17 +218,28 @@ impl Source<'_> {
         let place = || format!("{}, joint \"{}\"", self.place(node), read.name);
         if child(node, "axis").is_none_or(|a| !a.has_attribute("xyz")) {
             let what = "moves but states no axis; URDF means 1 0 0 by that";
-            notices.push(Notice::new(place(), what, "write <axis xyz=\"...\"/> if another axis is meant"));
+            notices.push(Notice::new(
+                Code::UrdfAxis,
+                place(),
+                what,
+                "write <axis xyz=\"...\"/> if another axis is meant",
+            ));
         }
         let axis = Vector3::from(read.axis.xyz.0);
         let norm = axis.norm();
         if norm < 1e-9 {
             let remedy = "state the axis of motion, for example 0 0 1";
-            return Err(self.refuse(node, &read.name, format!("its axis {:?} is zero", read.axis.xyz.0), remedy));
+            return Err(self.refuse(
+                Code::UrdfAxis,
+                node,
+                &read.name,
+                format!("its axis {:?} is zero", read.axis.xyz.0),
+                remedy,
+            ));
         }
         if (norm - 1.0).abs() > 1e-6 {
             let what = format!("its axis {:?} has the length {norm}; the direction alone is used", read.axis.xyz.0);
-            notices.push(Notice::new(place(), what, "write a unit vector"));
+            notices.push(Notice::new(Code::UrdfAxis, place(), what, "write a unit vector"));
         }
         Ok(axis / norm)
     }
@@ -230,7 +264,7 @@ fn limits(
         return Some((lower, upper));
     }
     let what = format!("its limits, lower {lower} and upper {upper}, leave no room to move and are not used");
-    notices.push(Notice::new(place(), what, "correct the <limit>"));
+    notices.push(Notice::new(Code::UrdfLimits, place(), what, "correct the <limit>"));
     None
 }
 

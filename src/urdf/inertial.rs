@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use roxmltree::Node;
 
 use super::elements::{Source, child, numbers};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 
 /// Mass of a link.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,11 +23,11 @@ pub(super) fn inertial(source: &Source<'_>, node: Node<'_, '_>, link: &urdf_rs::
         && numbers(xyz, 3).is_none()
     {
         let what = format!("centre of mass \"{xyz}\" is not 3 finite numbers");
-        return Err(Error::input(place(), what, "correct the numbers (point as decimal mark)"));
+        return Err(Error::new(Code::UrdfNumber, place(), what, "correct the numbers (point as decimal mark)"));
     }
     let mass_kg = link.inertial.mass.value;
     if !(mass_kg >= 0.0 && mass_kg.is_finite()) {
-        return Err(Error::input(place(), format!("mass {mass_kg} kg"), "a mass is zero or positive"));
+        return Err(Error::new(Code::UrdfNumber, place(), format!("mass {mass_kg} kg"), "a mass is zero or positive"));
     }
     Ok(Some(Inertial { mass_kg, centre_m: link.inertial.origin.xyz.0.into() }))
 }

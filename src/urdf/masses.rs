@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::chain::{CarriedMass, Chain, JointKind};
 use super::read::RobotDescription;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 
 /// What the tip carries beside the links of the URDF: tool, camera, workpiece.
@@ -37,27 +37,36 @@ impl Chain {
     /// A mass or a centre that is none or in other units, and a URDF that states no masses: the payload alone says little of the moments.
     pub fn carrying(mut self, payload: Option<&Payload>) -> Result<Self> {
         let Some(payload) = payload else { return Ok(self) };
-        let refuse = |what: String, remedy: &str| Err(Error::input("payload", what, remedy));
+        let refuse = |code, what: String, remedy: &str| Err(Error::new(code, "payload", what, remedy));
         if !(payload.mass_kg >= 0.0 && payload.mass_kg.is_finite()) || payload.centre_m.iter().any(|x| !x.is_finite()) {
             return refuse(
+                Code::PayloadRange,
                 format!("{} kg at {:?} m", payload.mass_kg, payload.centre_m),
                 "give a mass and three numbers",
             );
         }
         if Vector3::from(payload.centre_m).norm() > FARTHEST_PAYLOAD_M {
             let what = format!("its centre of mass lies at {:?} m in the frame of the tip link", payload.centre_m);
-            return refuse(what, "give centre_m in metres, not millimetres");
+            return refuse(Code::PayloadRange, what, "give centre_m in metres, not millimetres");
         }
         self.masses.retain(|m| m.link != PAYLOAD);
         let Some(joint) = self.joints.len().checked_sub(1).filter(|_| !self.masses.is_empty()) else {
             let what =
                 "the URDF states no masses of its links, without which a payload does not give the moments of gravity";
-            return refuse(what.into(), "leave the payload out, or add <inertial> to the links");
+            return refuse(
+                Code::UrdfMassesMissing,
+                what.into(),
+                "leave the payload out, or add <inertial> to the links",
+            );
         };
         let links: f64 = self.masses.iter().map(|m| m.mass_kg).sum();
         if payload.mass_kg > links {
             let what = format!("{} kg, more than the moving links of the arm ({links:.1} kg)", payload.mass_kg);
-            return refuse(what, "give mass_kg in kilograms, not grams; or correct the masses in the URDF");
+            return refuse(
+                Code::PayloadRange,
+                what,
+                "give mass_kg in kilograms, not grams; or correct the masses in the URDF",
+            );
         }
         self.masses.push(CarriedMass {
             link: PAYLOAD.into(),

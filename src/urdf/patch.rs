@@ -8,7 +8,7 @@ use roxmltree::{Attribute, Node};
 
 use super::elements::{child, numbers};
 use super::read::{elements, parse, version};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 
 /// What a re-read origin may differ from the wanted one: rounding of three angles and their sines (m and rad).
@@ -32,7 +32,7 @@ pub fn patch_origins(text: &str, new: &BTreeMap<String, Pose>) -> Result<String>
         let wanted = &new[name];
         if !wanted.rotation.iter().chain(wanted.translation.iter()).all(|v| v.is_finite()) {
             let what = "its new origin is not finite";
-            return Err(Error::unsolved(place(name), what, "look at the solution, not at the URDF"));
+            return Err(Error::new(Code::OriginNotWritten, place(name), what, "look at the solution, not at the URDF"));
         }
         edits.extend(joint_edits(text, joint, wanted, has_quaternions)?);
         Ok(())
@@ -62,7 +62,7 @@ fn visit(
     match seen.into_iter().find(|(_, count)| *count != 1) {
         Some((name, count)) => {
             let what = format!("stands {count} times in the URDF, not once");
-            Err(Error::input(place(name), what, "correct the URDF or the name"))
+            Err(Error::new(Code::UrdfTwice, place(name), what, "correct the URDF or the name"))
         }
         None => Ok(()),
     }
@@ -112,7 +112,12 @@ fn insert_origin(text: &str, joint: Node<'_, '_>, wanted: &Pose) -> Result<Optio
     let open_end = text[tail..].find('>').map(|i| tail + i + 1);
     let Some(at) = open_end.filter(|end| !text[tail..*end].contains('/')) else {
         let name = joint.attribute("name").unwrap_or_default();
-        return Err(Error::input(place(name), "is an empty element", "give the joint its parent and child"));
+        return Err(Error::new(
+            Code::UrdfLayout,
+            place(name),
+            "is an empty element",
+            "give the joint its parent and child",
+        ));
     };
     let rest = &text[at..];
     let indent = &rest[..rest.len() - rest.trim_start_matches([' ', '\t', '\r', '\n']).len()];
@@ -129,7 +134,7 @@ fn pose_of(joint: Node<'_, '_>, has_quaternions: bool) -> Result<Pose> {
         Some(value) => numbers(value, default.len()).ok_or_else(|| {
             let name = joint.attribute("name").unwrap_or_default();
             let what = format!("origin {key}=\"{value}\" is not {} finite numbers", default.len());
-            Error::input(place(name), what, "correct the numbers (point as decimal mark)")
+            Error::new(Code::UrdfNumber, place(name), what, "correct the numbers (point as decimal mark)")
         }),
     };
     let xyz = read("xyz", &[0.0; 3])?;
@@ -151,7 +156,7 @@ fn value_range(text: &str, attribute: &Attribute<'_, '_>) -> Result<Range<usize>
         (Some(b'"'), Some(b'"')) | (Some(b'\''), Some(b'\'')) => Ok(range),
         _ => {
             let what = format!("the attribute {} is laid out in a way that cannot be edited", attribute.name());
-            Err(Error::input("URDF", what, "write it as name=\"value\" without blanks around ="))
+            Err(Error::new(Code::UrdfLayout, "URDF", what, "write it as name=\"value\" without blanks around ="))
         }
     }
 }
@@ -194,6 +199,6 @@ fn check(patched: &str, new: &BTreeMap<String, Pose>) -> Result<()> {
             return Ok(());
         }
         let what = format!("its new origin does not read back as written (rotation off by {rotation:.1e})");
-        Err(Error::unsolved(place(name), what, "give a rotation that is orthonormal"))
+        Err(Error::new(Code::OriginNotWritten, place(name), what, "give a rotation that is orthonormal"))
     })
 }

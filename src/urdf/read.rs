@@ -7,7 +7,7 @@ use roxmltree::{Document, Node};
 
 use super::elements::{JointElement, Source};
 use super::inertial::{Inertial, inertial};
-use crate::error::{Error, Notice, Result, closest_name, plain_name};
+use crate::error::{Code, Error, Notice, Result, closest_name, plain_name};
 use crate::files::{self, Kind};
 
 /// A robot as its URDF describes it, with the text it came from.
@@ -39,7 +39,7 @@ pub fn read(path: &Path) -> Result<RobotDescription> {
     let bytes = files::read(path, Kind::Robot)?;
     let text = String::from_utf8(bytes).map_err(|e| {
         let what = format!("is not UTF-8 text (byte {})", e.utf8_error().valid_up_to());
-        Error::input(path.display(), what, "convert it: iconv -t UTF-8 in.urdf > out.urdf")
+        Error::new(Code::TextEncoding, path.display(), what, "convert it: iconv -t UTF-8 in.urdf > out.urdf")
     })?;
     RobotDescription::from_text(path, text)
 }
@@ -61,7 +61,7 @@ impl RobotDescription {
         refuse_xacro(&source)?;
         if robot.tag_name().name() != "robot" {
             let what = format!("the root element is <{}>, not <robot>", robot.tag_name().name());
-            return Err(Error::input(source.place(robot), what, "give a URDF file"));
+            return Err(Error::new(Code::UrdfSyntax, source.place(robot), what, "give a URDF file"));
         }
         plain_name("robot", robot.attribute("name").unwrap_or_default(), source.place(robot))?;
         let links = named(&source, robot, "link")?;
@@ -71,11 +71,11 @@ impl RobotDescription {
 
         let read = urdf_rs::read_from_string(text.trim_start_matches('\u{feff}')).map_err(|e| {
             let remedy = "check the file with check_urdf; every joint <limit> needs velocity, every link mass a value";
-            Error::input(path.display(), format!("urdf-rs cannot read it: {e}"), remedy)
+            Error::new(Code::UrdfSyntax, path.display(), format!("urdf-rs cannot read it: {e}"), remedy)
         })?;
         if read.joints.len() != joint_nodes.len() || read.links.len() != links.len() {
             let what = "two readers disagree on the number of its links and joints";
-            return Err(Error::input(path.display(), what, "check the file with check_urdf"));
+            return Err(Error::new(Code::UrdfSyntax, path.display(), what, "check the file with check_urdf"));
         }
         let mut notices = Vec::new();
         let joints = joint_nodes
@@ -103,7 +103,12 @@ impl RobotDescription {
         if let Some(mass) = description.placeholder_mass() {
             let what =
                 format!("all links have the same mass ({mass} kg): a placeholder, not used for the sag of the joints");
-            description.notices.push(Notice::new(path.display(), what, "state the true masses and centres, or none"));
+            description.notices.push(Notice::new(
+                Code::UrdfMassPlaceholder,
+                path.display(),
+                what,
+                "state the true masses and centres, or none",
+            ));
         }
         Ok(Self { text, ..description })
     }
@@ -137,7 +142,12 @@ fn refuse_depth(path: &Path, text: &str) -> Result<()> {
         if depth > DEEPEST {
             let line = 1 + text[..text.len() - rest.len()].matches('\n').count();
             let what = format!("elements are nested more than {DEEPEST} deep");
-            return Err(Error::input(format!("{}:{line}", path.display()), what, "give a URDF that describes a robot"));
+            return Err(Error::new(
+                Code::UrdfSyntax,
+                format!("{}:{line}", path.display()),
+                what,
+                "give a URDF that describes a robot",
+            ));
         }
         let mut quote = None;
         let end = rest.bytes().position(|byte| {
@@ -162,7 +172,12 @@ pub(super) fn parse<'a>(path: &Path, text: &'a str) -> Result<Document<'a>> {
         roxmltree::Error::UnknownNamespace(prefix, at) if prefix == "xacro" => xacro(path, at.row),
         _ => {
             let what = format!("is not well-formed XML: {error}");
-            Error::input(format!("{}:{}", path.display(), error.pos().row), what, "correct the XML there")
+            Error::new(
+                Code::UrdfSyntax,
+                format!("{}:{}", path.display(), error.pos().row),
+                what,
+                "correct the XML there",
+            )
         }
     })
 }
@@ -172,7 +187,7 @@ fn xacro(path: &Path, line: u32) -> Error {
     let stem = file.split('.').next().unwrap_or("out");
     let what = "is an unexpanded xacro, not a URDF: it describes no robot yet";
     let remedy = format!("expand it first: xacro {file} > {stem}.expanded.urdf");
-    Error::input(format!("{}:{line}", path.display()), what, remedy)
+    Error::new(Code::UrdfXacro, format!("{}:{line}", path.display()), what, remedy)
 }
 
 /// Refuses macros, and substitutions in the attributes of links and joints.
@@ -206,12 +221,17 @@ fn named(source: &Source<'_>, robot: Node<'_, '_>, tag: &'static str) -> Result<
     for node in elements(robot, tag) {
         let name = node.attribute("name").unwrap_or_default();
         if name.trim().is_empty() {
-            return Err(Error::input(source.place(node), format!("a <{tag}> without a name"), "give it a name"));
+            return Err(Error::new(
+                Code::UrdfElement,
+                source.place(node),
+                format!("a <{tag}> without a name"),
+                "give it a name",
+            ));
         }
         plain_name(tag, name, source.place(node))?;
         if !seen.insert(name) {
             let what = format!("a second {tag} named \"{name}\"");
-            return Err(Error::input(source.place(node), what, "rename one of them"));
+            return Err(Error::new(Code::UrdfTwice, source.place(node), what, "rename one of them"));
         }
         names.push(name.to_string());
     }

@@ -6,7 +6,7 @@ use urdf_rs::JointType;
 
 use super::elements::JointElement;
 use super::read::RobotDescription;
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 
 /// Most links that a message lists.
 const MOST_LISTED: usize = 8;
@@ -36,7 +36,12 @@ impl RobotDescription {
             choice.tip,
             listed(&choice.others)
         );
-        Some(Notice::new(self.path.display(), what, "give --tip, or tip in series.toml, for another one"))
+        Some(Notice::new(
+            Code::TipChosen,
+            self.path.display(),
+            what,
+            "give --tip, or tip in series.toml, for another one",
+        ))
     }
 
     fn choose_tip<'a>(&'a self, base: &'a str) -> Result<Choice<'a>> {
@@ -75,7 +80,7 @@ impl RobotDescription {
             Some(link) => format!("name the tip: tip = \"...\" in series.toml or --tip (\"{link}\" is there)"),
             None => "name the tip: tip = \"...\" in series.toml or --tip, the link that carries camera or plate".into(),
         };
-        Err(Error::input(self.path.display(), what, remedy))
+        Err(Error::new(Code::TipAmbiguous, self.path.display(), what, remedy))
     }
 
     /// Joints above a link, nearest first.

@@ -9,7 +9,7 @@ use super::chain::{Chain, Drive, Joint, JointKind};
 use super::elements::JointElement;
 use super::read::{RobotDescription, suggest};
 use super::tips::listed;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 
 /// Links of an arm together are shorter, m; the smallest arms in millimetres are longer.
@@ -57,7 +57,12 @@ impl RobotDescription {
         let (up, down) = self.path(base, tip)?;
         if up.len() + down.len() > MOST_JOINTS {
             let what = format!("has {} joints between \"{base}\" and \"{tip}\"", up.len() + down.len());
-            return Err(Error::input(self.path.display(), what, "choose a base and a tip of the arm alone"));
+            return Err(Error::new(
+                Code::ChainImpossible,
+                self.path.display(),
+                what,
+                "choose a base and a tip of the arm alone",
+            ));
         }
         chain.joints.extend(up.into_iter().map(upwards));
         for element in down {
@@ -66,7 +71,12 @@ impl RobotDescription {
         }
         if chain.readings.is_empty() {
             let what = format!("no joint moves between \"{base}\" and \"{tip}\"");
-            return Err(Error::input(self.path.display(), what, "choose another base or tip link"));
+            return Err(Error::new(
+                Code::ChainImpossible,
+                self.path.display(),
+                what,
+                "choose another base or tip link",
+            ));
         }
         self.refuse_millimetres(&chain)?;
         chain.masses = self.stated_masses(&chain);
@@ -84,7 +94,7 @@ impl RobotDescription {
             format!("the links between \"{}\" and \"{}\" are {length:.0} m long together", chain.base, chain.tip);
         let remedy =
             "a URDF has metres: if these are millimetres, divide the xyz of all origins by 1000 (and scale the meshes)";
-        Err(Error::input(self.path.display(), what, remedy))
+        Err(Error::new(Code::UrdfLengthUnit, self.path.display(), what, remedy))
     }
 
     /// The joint above a link.
@@ -119,7 +129,12 @@ impl RobotDescription {
     pub(super) fn check_tree(&self) -> Result<()> {
         let links: BTreeSet<&str> = self.links().collect();
         if links.is_empty() {
-            return Err(Error::input(self.path.display(), "has no links", "give a URDF that describes a robot"));
+            return Err(Error::new(
+                Code::UrdfElement,
+                self.path.display(),
+                "has no links",
+                "give a URDF that describes a robot",
+            ));
         }
         let mut parents: BTreeMap<&str, &JointElement> = BTreeMap::new();
         for joint in &self.joints {
@@ -127,12 +142,12 @@ impl RobotDescription {
             for link in [&joint.parent, &joint.child] {
                 if !links.contains(link.as_str()) {
                     let what = format!("names the link \"{link}\", which does not exist");
-                    return Err(Error::input(place(), what, suggest(link, self.links())));
+                    return Err(Error::new(Code::LinkUnknown, place(), what, suggest(link, self.links())));
                 }
             }
             if let Some(other) = parents.insert(&joint.child, joint) {
                 let what = format!("link \"{}\" has a second parent (the first by \"{}\")", joint.child, other.name);
-                return Err(Error::input(place(), what, "a URDF is a tree: remove one of the joints"));
+                return Err(Error::new(Code::TreeBroken, place(), what, "a URDF is a tree: remove one of the joints"));
             }
         }
         // Links that a root is known to be above.
@@ -143,7 +158,12 @@ impl RobotDescription {
                 if !way.insert(current) {
                     let what = format!("links form a loop through \"{current}\"");
                     let place = format!("{}, joint \"{}\"", joint.place, joint.name);
-                    return Err(Error::input(place, what, "a URDF is a tree: remove the joint that closes the loop"));
+                    return Err(Error::new(
+                        Code::TreeBroken,
+                        place,
+                        what,
+                        "a URDF is a tree: remove the joint that closes the loop",
+                    ));
                 }
                 current = &joint.parent;
             }
@@ -187,7 +207,7 @@ impl RobotDescription {
     fn known_link(&self, name: &str, role: &str) -> Result<&str> {
         self.links().find(|l| *l == name).ok_or_else(|| {
             let what = format!("has no link \"{name}\" (wanted as {role})");
-            Error::input(self.path.display(), what, suggest(name, self.links()))
+            Error::new(Code::LinkUnknown, self.path.display(), what, suggest(name, self.links()))
         })
     }
 
@@ -197,7 +217,12 @@ impl RobotDescription {
             return Ok(one);
         }
         let what = format!("has {} root links: {}", roots.len(), listed(&roots));
-        Err(Error::input(self.path.display(), what, "name one: base = \"...\" in series.toml or --base"))
+        Err(Error::new(
+            Code::RootAmbiguous,
+            self.path.display(),
+            what,
+            "name one: base = \"...\" in series.toml or --base",
+        ))
     }
 
     pub(super) fn roots(&self) -> Vec<&str> {
@@ -222,7 +247,7 @@ impl RobotDescription {
                 [] => format!("\"{tip}\" is the root itself; are base and tip exchanged?"),
                 _ => format!("links above the tip are: {}", above.join(", ")),
             };
-            return Err(Error::input(self.path.display(), what, remedy));
+            return Err(Error::new(Code::ChainImpossible, self.path.display(), what, remedy));
         };
         let mut down = Vec::new();
         let mut current = tip;
@@ -257,21 +282,26 @@ impl RobotDescription {
             let place = format!("{}, joint \"{}\"", driver.place, driver.name);
             if !followed.insert(&driver.name) {
                 let what = "mimic joints follow each other in a loop";
-                return Err(Error::input(place, what, "let one of them move by itself"));
+                return Err(Error::new(Code::MimicBroken, place, what, "let one of them move by itself"));
             }
             // q = m (m' r + o') + o
             offset += multiplier * mimic.offset;
             multiplier *= mimic.multiplier;
             driver = self.joints.iter().find(|j| j.name == mimic.joint).ok_or_else(|| {
                 let what = format!("mimics \"{}\", which does not exist", mimic.joint);
-                Error::input(place, what, suggest(&mimic.joint, self.joints.iter().map(|j| j.name.as_str())))
+                Error::new(
+                    Code::MimicBroken,
+                    place,
+                    what,
+                    suggest(&mimic.joint, self.joints.iter().map(|j| j.name.as_str())),
+                )
             })?;
         }
         let kind = kind(driver)?;
         if kind == JointKind::Fixed {
             let place = format!("{}, joint \"{}\"", element.place, element.name);
             let what = format!("mimics \"{}\", which is fixed", driver.name);
-            return Err(Error::input(place, what, "name a joint that moves"));
+            return Err(Error::new(Code::MimicBroken, place, what, "name a joint that moves"));
         }
         let known = chain.readings.iter().position(|r| *r == driver.name);
         let reading = known.unwrap_or_else(|| {
@@ -305,7 +335,7 @@ fn kind(element: &JointElement) -> Result<JointKind> {
             let place = format!("{}, joint \"{}\"", element.place, element.name);
             let what = format!("is {:?} and has no single reading", element.joint_type).to_lowercase();
             let remedy = format!("choose a base below it, for example base = \"{}\"", element.child);
-            Err(Error::input(place, what, remedy))
+            Err(Error::new(Code::ChainImpossible, place, what, remedy))
         }
     }
 }

@@ -527,11 +527,11 @@ fn every_command_tries_its_folder_before_it_reads_anything() {
             let args: Vec<&str> = args.split(' ').chain(["--out", out]).collect();
             let (code, said) = robotcal(root.path(), &args);
             assert_eq!(code, Some(2), "{args:?}: {said}");
-            assert!(said.starts_with(&format!("error: {out}")), "{args:?}: {said}");
+            assert!(said.starts_with(&format!("error[output_name]: {out}")), "{args:?}: {said}");
         }
     }
     let (code, said) = robotcal(root.path(), &["convert", "missing.mcap", "file"]);
-    assert!(code == Some(2) && said.starts_with("error: file"), "{said}");
+    assert!(code == Some(2) && said.starts_with("error[output_exists]: file"), "{said}");
     assert_eq!(all_below(root.path()), before);
 }
 

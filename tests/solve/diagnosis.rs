@@ -10,6 +10,7 @@ use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{WorldRequest, series};
 use robotcal::study::measured;
 use robotcal::urdf::Chain;
+use robotcal::{Code, Error};
 use std::path::Path;
 
 fn chain() -> Chain {
@@ -27,10 +28,10 @@ fn seen(chain: &Chain) -> MeasuredSeries {
     measured(&series(&request(chain)).unwrap(), chain)
 }
 
-fn diagnosis(chain: Chain, series: MeasuredSeries) -> String {
+fn diagnosis(chain: Chain, series: MeasuredSeries) -> Error {
     let error = identify(chain, &[series], &Options::default()).map(|_| ()).unwrap_err();
     assert_eq!(error.exit_code(), 3, "{error}");
-    error.to_string()
+    error
 }
 
 #[test]
@@ -42,7 +43,7 @@ fn a_larger_robot_of_the_same_build_is_named() {
     let elbow = larger.joints.iter().position(|j| j.name == "joint_a5").unwrap();
     larger.joints[elbow].origin.translation *= 1.6;
     let said = diagnosis(larger, series);
-    assert!(said.contains("link lengths") && said.contains("URDF is of this robot"), "{said}");
+    assert_eq!(said.code, Code::LinkLengthsWrong, "{said}");
 }
 
 #[test]
@@ -51,7 +52,8 @@ fn an_exchanged_camera_mount_is_named() {
     let mut series = seen(&chain);
     series.mount = CameraMount::Fixed;
     let said = diagnosis(chain, series);
-    assert!(said.contains("camera_mount = \"hand\""), "{said}");
+    assert_eq!(said.code, Code::CameraMountWrong, "{said}");
+    assert!(said.remedy.contains("\"hand\""), "{said}");
 }
 
 #[test]
@@ -63,11 +65,12 @@ fn mistakes_in_single_columns_are_named() {
         diagnosis(chain.clone(), series)
     };
     let said = with(&|q| q[4] = q[4].to_radians());
-    assert!(said.contains("joint_a5 alone are radians"), "{said}");
+    assert_eq!((said.code, said.place.as_str()), (Code::JointUnitWrong, "joint_a5"), "{said}");
     let said = with(&|q| (q[3], q[5]) = (-q[3], -q[5]));
-    assert!(said.contains("joint_a4 and joint_a6 have the wrong sign"), "{said}");
+    assert_eq!((said.code, said.place.as_str()), (Code::JointSignWrong, "joint_a4, joint_a6"), "{said}");
     let said = with(&|q| (q[3], q[4], q[5]) = (q[4], q[5], q[3]));
-    assert!(said.contains("columns joint_a4, joint_a6, joint_a5 taken for joint_a5, joint_a4, joint_a6"), "{said}");
+    assert_eq!((said.code, said.place.as_str()), (Code::JointOrderWrong, "joint_a4, joint_a5, joint_a6"), "{said}");
+    assert!(said.what.contains("joint_a4, joint_a6, joint_a5"), "{said}");
 }
 
 #[test]

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use nalgebra::Vector6;
+use robotcal::Code;
 use robotcal::diagnose::{Carried, Displaced, Displacement, Finding};
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
@@ -107,7 +108,7 @@ fn a_camera_turned_once_is_not_called_loose() {
     let found = told(&solution);
     assert_eq!((found.body, found.displacement), (Carried::CameraInHand, Displacement::FromThenOn), "{found}");
     assert_eq!(found.images[0], series.stops.stops[10].image, "{found}");
-    assert!(!solution.findings.iter().any(|f| f.code() == "loose_mounting"), "{:?}", solution.findings);
+    assert!(!solution.findings.iter().any(|f| f.code() == Code::LooseMounting), "{:?}", solution.findings);
 }
 
 #[test]

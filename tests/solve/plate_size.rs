@@ -5,6 +5,7 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
+use robotcal::Code;
 use robotcal::diagnose::Finding;
 use robotcal::identify::{Options, Solution, identify};
 use robotcal::problem::MeasuredSeries;
@@ -43,7 +44,7 @@ fn stated(x: f64, y: f64, bar: Option<(u32, u32)>) -> Solution {
 }
 
 /// What is doubted of the plate, and by how much it is larger than its file says.
-fn doubts(solution: &Solution) -> Vec<(&'static str, f64)> {
+fn doubts(solution: &Solution) -> Vec<(Code, f64)> {
     let doubted = solution.findings.iter().filter(|f| matches!(f, Finding::DoubtedSize(_)));
     doubted.map(|f| (f.code(), f.quantities()[0].value)).collect()
 }
@@ -65,7 +66,7 @@ fn a_plate_two_percent_off_is_doubted_and_a_measured_distance_mends_it() {
     for factor in [1.02, 0.98] {
         let wrong = stated(factor, factor, None);
         let said = doubts(&wrong);
-        assert!(matches!(said[..], [("plate_size_contradicted", _)]), "{said:?}");
+        assert!(matches!(said[..], [(Code::PlateSizeContradicted, _)]), "{said:?}");
         // The links are found to a few parts in a thousand.
         assert!((said[0].1 - (1.0 / factor - 1.0)).abs() < 5e-3, "{said:?}");
         let measured = stated(factor, factor, Some((0, 7)));
@@ -80,7 +81,7 @@ fn a_plate_that_a_printer_stretched_is_doubted_and_a_measured_distance_mends_it_
     let wrong = stated(1.004, 1.0, None);
     let said = doubts(&wrong);
     // The stretch is 0.4 %.
-    assert!(said.iter().any(|(code, off)| *code == "plate_uneven" && (1e-3..1e-2).contains(&off.abs())), "{said:?}");
+    assert!(said.iter().any(|(code, off)| *code == Code::PlateUneven && (1e-3..1e-2).contains(&off.abs())), "{said:?}");
     for bar in [(0, 7), (0, 40), (0, 47)] {
         let measured = stated(1.004, 1.0, Some(bar));
         assert_eq!(measured.failed_gates(), Vec::<String>::new());

@@ -98,7 +98,7 @@ fn output_that_cannot_be_written_is_an_error() {
     let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
     let output = robotcal_into(full, &["show", &root("reports/kr6_small/solution.json")]);
     assert_eq!(output.status.code(), Some(2), "{}", text(&output));
-    assert!(text(&output).starts_with("error: stdout"), "{}", text(&output));
+    assert!(text(&output).starts_with("error[output_failed]: stdout"), "{}", text(&output));
 }
 
 #[test]

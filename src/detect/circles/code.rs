@@ -17,7 +17,7 @@ struct Class {
 
 /// The pattern of classes on a plate.
 #[derive(Debug, Clone)]
-pub(super) struct Code {
+pub(super) struct MarkerCode {
     columns: i32,
     rows: i32,
     classes: Vec<Class>,
@@ -72,7 +72,7 @@ const MARGIN: usize = 3;
 const PART: i32 = 6;
 const LEAST_PART: usize = 12;
 
-impl Code {
+impl MarkerCode {
     /// Code of a plate of circles; `None` when its markers do not form a lattice.
     pub fn of(plate: &Plate) -> Option<Self> {
         let (columns, rows) = (plate.columns as i32, plate.rows as i32);
@@ -276,13 +276,18 @@ mod tests {
     use super::*;
     use crate::detect::circles::synth::random_plate;
 
-    fn window(code: &Code, placement: impl Fn(Cell) -> Cell, columns: i32, rows: i32) -> BTreeMap<Cell, Option<u8>> {
+    fn window(
+        code: &MarkerCode,
+        placement: impl Fn(Cell) -> Cell,
+        columns: i32,
+        rows: i32,
+    ) -> BTreeMap<Cell, Option<u8>> {
         (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).map(|c| (c, code.class_at(placement(c)))).collect()
     }
 
     #[test]
     fn a_window_is_placed_in_every_rotation_and_a_mirrored_one_refused() {
-        let code = Code::of(&random_plate(28, 18, 0.018, 7)).unwrap();
+        let code = MarkerCode::of(&random_plate(28, 18, 0.018, 7)).unwrap();
         for turns in 0..4 {
             for mirrored in [false, true] {
                 // invert the turn by trying all four: the verdict must map back onto the plate
@@ -305,20 +310,20 @@ mod tests {
 
     #[test]
     fn errors_are_tolerated_and_noise_is_not_placed() {
-        let code = Code::of(&random_plate(28, 18, 0.018, 7)).unwrap();
+        let code = MarkerCode::of(&random_plate(28, 18, 0.018, 7)).unwrap();
         let mut cells = window(&code, |(i, j)| (i + 3, j + 4), 7, 6);
         for k in 0..4 {
             cells.insert((k, k), Some((code.class_at((k + 3, k + 4)).unwrap() + 1) % 4));
         }
         assert!(matches!(code.locate(&cells), Verdict::Placed { disagreeing: 4, .. }));
-        let other = Code::of(&random_plate(28, 18, 0.018, 8)).unwrap();
+        let other = MarkerCode::of(&random_plate(28, 18, 0.018, 8)).unwrap();
         assert_eq!(code.locate(&window(&other, |(i, j)| (i + 3, j + 4), 7, 6)), Verdict::Ambiguous);
         assert_eq!(code.locate(&BTreeMap::new()), Verdict::Ambiguous);
     }
 
     #[test]
     fn a_lattice_that_slipped_is_placed_in_parts() {
-        let code = Code::of(&random_plate(28, 18, 0.018, 7)).unwrap();
+        let code = MarkerCode::of(&random_plate(28, 18, 0.018, 7)).unwrap();
         // the right half lies one row too low
         let truth = |(i, j): Cell| (i + 5, j + if i < 7 { 2 } else { 3 });
         let cells = window(&code, truth, 14, 9);
@@ -329,7 +334,7 @@ mod tests {
             let right = part.keys().filter(|c| placement.apply(**c) == truth(**c)).count();
             assert!(2 * right >= part.len(), "{right} of {}", part.len());
         }
-        let other = Code::of(&random_plate(28, 18, 0.018, 8)).unwrap();
+        let other = MarkerCode::of(&random_plate(28, 18, 0.018, 8)).unwrap();
         assert!(other.locate_parts(&cells).is_empty());
     }
 

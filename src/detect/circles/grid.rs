@@ -8,13 +8,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::candidate::Candidate;
-use super::code::Code;
+use super::code::MarkerCode;
 use super::lattice::{Cell, Lattice};
 use super::neighbour_check::{Board, Placed};
 use super::pipeline::detect_coded;
 use super::types::{Options, Outcome};
 use crate::detect::{Detection, Picture};
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::series::Plate;
 
 /// How far a marker may be from its place on the lattice, in steps.
@@ -31,7 +31,7 @@ const LEAST_SEEN: f64 = 0.7;
 /// the dots show it (a grid without larger dots is mostly its own mirror image): see [`Detection::failure`].
 pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Result<Detection> {
     let (cells, step_m) = cells(plate).ok_or_else(no_lattice)?;
-    let code = Code::of_cells(plate, &cells, step_m).ok_or_else(no_lattice)?;
+    let code = MarkerCode::of_cells(plate, &cells, step_m).ok_or_else(no_lattice)?;
     let mut symmetric = false;
     let on_lattice = Plate { pitch_m: step_m, ..plate.clone() };
     let found = detect_coded(picture, &on_lattice, options, &code, |lattices, candidates| {
@@ -120,7 +120,7 @@ fn turned((i, j): Cell, turns: u8, mirrored: bool) -> Cell {
 }
 
 /// Puts the lattice on the grid; true where the grid looks the same after a turn.
-fn place(code: &Code, cells: &[Cell], lattice: &Lattice, candidates: &[Candidate]) -> (Board, Outcome, bool) {
+fn place(code: &MarkerCode, cells: &[Cell], lattice: &Lattice, candidates: &[Candidate]) -> (Board, Outcome, bool) {
     let classes = code.classes_of(lattice, candidates);
     let mut laid = ways(code, cells, &classes);
     laid.sort_by_key(|l| std::cmp::Reverse(l.score()));
@@ -155,7 +155,7 @@ fn place(code: &Code, cells: &[Cell], lattice: &Lattice, candidates: &[Candidate
 }
 
 /// All ways in which the lattice overlaps the grid.
-fn ways(code: &Code, cells: &[Cell], classes: &BTreeMap<Cell, Option<u8>>) -> Vec<Laid> {
+fn ways(code: &MarkerCode, cells: &[Cell], classes: &BTreeMap<Cell, Option<u8>>) -> Vec<Laid> {
     let size = extent(cells);
     let mut all = Vec::new();
     for (turns, mirrored) in (0..4).flat_map(|t| [(t, false), (t, true)]) {
@@ -204,7 +204,8 @@ fn lean(laid: &Laid, lattice: &Lattice) -> f64 {
 }
 
 fn no_lattice() -> Error {
-    Error::input(
+    Error::new(
+        Code::PlateNotDetectable,
         "plate",
         "the markers do not lie on a square lattice of circles with a radius",
         "check positions and radii in the plate file: a symmetric grid, or every other row shifted by half a step",
@@ -213,6 +214,7 @@ fn no_lattice() -> Error {
 
 fn symmetric_notice() -> Notice {
     Notice::new(
+        Code::PlateSymmetric,
         "plate",
         "the grid of dots looks the same after a turn; ids assume that its top is up in the image",
         "keep the camera within 90 degrees of upright, or use an asymmetric grid or one with a larger dot",

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::candidate::Candidate;
-use super::code::Code;
+use super::code::MarkerCode;
 use super::lattice::Cell;
 use super::local_map::LocalMap;
 use super::types::Reason;
@@ -20,7 +20,11 @@ pub(super) struct Placed {
 pub(super) type Board = BTreeMap<Cell, Placed>;
 
 /// Removes the cells that cannot be trusted, with the reason for each.
-pub(super) fn check_neighbours(board: &mut Board, code: &Code, candidates: &[Candidate]) -> Vec<(Cell, usize, Reason)> {
+pub(super) fn check_neighbours(
+    board: &mut Board,
+    code: &MarkerCode,
+    candidates: &[Candidate],
+) -> Vec<(Cell, usize, Reason)> {
     let mut dropped = Vec::new();
     let judge = |board: &mut Board, verdict: &dyn Fn(&Board, Cell, &Placed) -> Option<Reason>, dropped: &mut Vec<_>| {
         let bad: Vec<(Cell, usize, Reason)> =
@@ -50,7 +54,7 @@ pub(super) fn check_neighbours(board: &mut Board, code: &Code, candidates: &[Can
 }
 
 /// Too few of the markers around have the class of their cell: the lattice has slipped here.
-fn disputed(board: &Board, cell: Cell, code: &Code) -> bool {
+fn disputed(board: &Board, cell: Cell, code: &MarkerCode) -> bool {
     let (mut agree, mut differ) = (0, 0);
     for (c, p) in around(board, cell, 2).filter(|(c, _)| *c != cell) {
         match p.class {

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::agreement::{Inner, Seen, agreement};
 use super::asymmetry::Drift;
 use super::candidate::{Candidate, candidates, largest_marker};
-use super::code::{Code, Verdict};
+use super::code::{MarkerCode, Verdict};
 use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
 use super::lattice::{Buckets, Cell, Lattice, lattices};
@@ -17,7 +17,7 @@ use super::refine::{Fit, refine};
 use super::rescue::{Figure, Place, rescue};
 use super::types::{CircleDetection, DroppedCandidate, Found, InnerOuter, Options, Outcome, Reason};
 use crate::detect::Picture;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::series::Plate;
 
 /// Smallest lattice that is worth a try; below it chance cannot be excluded.
@@ -32,9 +32,14 @@ const SMALLEST_LATTICE: usize = 9;
 ///
 /// The plate has no code (its markers are no lattice of circles); the picture is empty.
 pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<CircleDetection> {
-    let code = Code::of(plate).filter(|_| !plate.markers.is_empty()).ok_or_else(|| {
+    let code = MarkerCode::of(plate).filter(|_| !plate.markers.is_empty()).ok_or_else(|| {
         let what = "its markers do not form a lattice of circles with a radius";
-        Error::input("plate", what, "give a plate of kind coded-circles with plate.csv as made by `robotcal plate`")
+        Error::new(
+            Code::PlateNotDetectable,
+            "plate",
+            what,
+            "give a plate of kind coded-circles with plate.csv as made by `robotcal plate`",
+        )
     })?;
     detect_coded(picture, plate, options, &code, |lattices, candidates| Ok(identify(&code, lattices, candidates)))
 }
@@ -44,12 +49,12 @@ pub(super) fn detect_coded(
     picture: &Picture,
     plate: &Plate,
     options: &Options,
-    code: &Code,
+    code: &MarkerCode,
     identify: impl FnOnce(&[Lattice], &[Candidate]) -> Result<(Board, Outcome)>,
 ) -> Result<CircleDetection> {
     if picture.width < 16 || picture.height < 16 || picture.pixels.len() != picture.width * picture.height {
         let what = format!("{} x {} pixels with {} values", picture.width, picture.height, picture.pixels.len());
-        return Err(Error::input("image", what, "check the image file"));
+        return Err(Error::new(Code::ImageSizeImpossible, "image", what, "check the image file"));
     }
     let levels = Levels::of(picture, largest_marker(picture, options), THRESHOLD);
     let (candidates, mut dropped) = candidates(picture, &levels, options);
@@ -67,7 +72,7 @@ pub(super) fn detect_coded(
 /// As [`place`]; a picture that nothing fits is looked at once more turned over: what is placed then is a mirror image.
 ///
 /// Lattices grow in an order that has a handedness, so that a mirror image may slip where its original does not.
-fn identify(code: &Code, grown: &[Lattice], candidates: &[Candidate]) -> (Board, Outcome) {
+fn identify(code: &MarkerCode, grown: &[Lattice], candidates: &[Candidate]) -> (Board, Outcome) {
     let (board, outcome) = place(code, grown, candidates);
     if outcome != Outcome::Ambiguous {
         return (board, outcome);
@@ -82,7 +87,7 @@ fn identify(code: &Code, grown: &[Lattice], candidates: &[Candidate]) -> (Board,
 }
 
 /// Puts the lattices on the plate; where none fits as a whole, their parts.
-fn place(code: &Code, lattices: &[Lattice], candidates: &[Candidate]) -> (Board, Outcome) {
+fn place(code: &MarkerCode, lattices: &[Lattice], candidates: &[Candidate]) -> (Board, Outcome) {
     let mut board = Board::new();
     let mut outcome = match (candidates.is_empty(), lattices.is_empty()) {
         (true, _) => Outcome::NoCandidates,
@@ -131,7 +136,7 @@ fn put(lattice: &Lattice, classes: &Classes, verdict: Verdict, board: &mut Board
 }
 
 /// Cells of the plate at most `reach` from known ones that are not on the board.
-fn open_cells(board: &Board, code: &Code, reach: i32) -> impl Iterator<Item = Cell> {
+fn open_cells(board: &Board, code: &MarkerCode, reach: i32) -> impl Iterator<Item = Cell> {
     let is_open = move |cell: &Cell| !board.contains_key(cell) && around(board, *cell, reach).next().is_some();
     code.occupied().filter(is_open)
 }
@@ -141,7 +146,7 @@ const GAP: i32 = 3;
 const ROUNDS: usize = 8;
 
 /// Takes up candidates that no lattice reached but that lie where the plate has a marker of their class.
-fn attach(board: &mut Board, code: &Code, candidates: &[Candidate]) {
+fn attach(board: &mut Board, code: &MarkerCode, candidates: &[Candidate]) {
     let mut used: BTreeSet<usize> = board.values().map(|p| p.candidate).collect();
     let index = Buckets::of(candidates);
     for _ in 0..ROUNDS {
@@ -201,7 +206,7 @@ struct Entry {
 struct Work<'a> {
     picture: &'a Picture,
     plate: &'a Plate,
-    code: &'a Code,
+    code: &'a MarkerCode,
     candidates: &'a [Candidate],
     pixels: Pixels,
 }

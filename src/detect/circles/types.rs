@@ -5,7 +5,7 @@ use std::fmt;
 
 use super::asymmetry::Drift;
 use super::ellipse::Ellipse;
-use crate::error::Notice;
+use crate::error::{Code, Notice};
 use crate::series::{Edge, Observation};
 
 /// What the detector looks for.
@@ -189,15 +189,22 @@ pub enum Outcome {
 
 impl Outcome {
     /// What went wrong and what to try; `None` where markers were identified.
-    pub(in crate::detect) fn failure(self) -> Option<(&'static str, &'static str)> {
+    pub(in crate::detect) fn failure(self) -> Option<(Code, &'static str, &'static str)> {
         match self {
             Self::Identified { .. } => None,
-            Self::NoCandidates => Some(("nothing looks like a marker", "check focus, exposure and view")),
-            Self::NoLattice => Some(("markers, but no lattice of them", "bring more of the plate into the view")),
-            Self::Ambiguous => {
-                Some(("the place on the plate cannot be told", "check that plate.toml is the plate in the picture"))
+            Self::NoCandidates => {
+                Some((Code::PlateNotFound, "nothing looks like a marker", "check focus, exposure and view"))
             }
+            Self::NoLattice => {
+                Some((Code::PlateNotFound, "markers, but no lattice of them", "bring more of the plate into the view"))
+            }
+            Self::Ambiguous => Some((
+                Code::PlateIncomplete,
+                "the place on the plate cannot be told",
+                "check that plate.toml is the plate in the picture",
+            )),
             Self::Mirrored => Some((
+                Code::PlateMirrored,
                 "the plate is seen in a mirror: left and right are exchanged",
                 "switch off the mirroring in the camera driver, or look at the plate without a mirror",
             )),
@@ -287,7 +294,12 @@ impl InnerOuter {
             "inner and outer circles are off by ({u:.4}, {v:.4}) px on the mean of {} annuli: the blur is asymmetric",
             self.count
         );
-        Notice::new("image", what, "look for coma (stop the lens down) or motion during the exposure")
+        Notice::new(
+            Code::BlurAsymmetric,
+            "image",
+            what,
+            "look for coma (stop the lens down) or motion during the exposure",
+        )
     }
 }
 

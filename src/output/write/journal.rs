@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::tree::{self, RECORDS, UNFINISHED, write_synced};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 
 /// Its new files.
 const FILES: &str = "files";
@@ -89,10 +89,17 @@ pub(super) fn complete(target: &Path) -> Result<()> {
     let todo: List = serde_json::from_slice(&bytes)
         .ok()
         .filter(|l: &List| l.move_in.iter().chain(&l.remove).all(|n| tree::is_inside(Path::new(n))))
-        .ok_or_else(|| Error::input(list.display(), "is not of this program", "remove the folder that it is in"))?;
+        .ok_or_else(|| {
+            Error::new(Code::OutputForeign, list.display(), "is not of this program", "remove the folder that it is in")
+        })?;
     run(target, &unfinished.join(FILES), &todo).map_err(|e| {
         let what = format!("a new result is only partly in its place: {e}");
-        Error::input(target.display(), what, "make the folder writable and run again: it is completed then")
+        Error::new(
+            Code::OutputFailed,
+            target.display(),
+            what,
+            "make the folder writable and run again: it is completed then",
+        )
     })?;
     tree::sync(target);
     let _ = fs::remove_file(&list).and_then(|()| fs::remove_dir_all(&unfinished));

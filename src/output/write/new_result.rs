@@ -10,7 +10,7 @@ use super::place::Place;
 use super::staging::Staging;
 use super::tree::write_synced;
 use super::{journal, swap, tree};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 
 impl Place {
     /// Writes a whole result.
@@ -48,7 +48,7 @@ impl NewResult {
     /// When it cannot be written.
     pub fn put(&self, name: &str, bytes: &[u8]) -> Result<()> {
         if !tree::is_inside(Path::new(name)) {
-            return Err(Error::input(name, "is no name of a file in a result", "report this"));
+            return Err(Error::new(Code::OutputName, name, "is no name of a file in a result", "report this"));
         }
         let path = self.staging.path().join(name);
         if let Some(folder) = path.parent() {
@@ -143,11 +143,12 @@ fn set_aside(staging: &Staging, target: &Path, in_the_way: &Path) -> Error {
     let what = "would be overwritten, but is not of the earlier result in this folder";
     let aside = (2..1000).map(candidate).find(|p| !p.exists());
     match aside.filter(|aside| fs::rename(staging.path(), aside).is_ok()) {
-        Some(aside) => Error::input(
+        Some(aside) => Error::new(
+            Code::OutputForeign,
             place.display(),
             format!("{what}; the new result is in {}", aside.display()),
             "move the file away before the next run",
         ),
-        None => Error::input(place.display(), what, "move it away, or choose another folder"),
+        None => Error::new(Code::OutputForeign, place.display(), what, "move it away, or choose another folder"),
     }
 }

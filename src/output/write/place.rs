@@ -9,7 +9,7 @@ use super::staging::Staging;
 use super::strays::{bring_back, part_name, sweep_beside};
 use super::tree::write_synced;
 use super::{journal, tree};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 
 /// A folder that can be written, for as long as this lives; folders that were made for it go again when nothing was written.
 #[derive(Debug)]
@@ -32,7 +32,7 @@ impl Place {
         if place.holds_something()? && tree::earlier_files(&place.target).is_none() {
             let what = "is not empty and holds no earlier result of this program";
             let remedy = "choose another folder for the results, or empty this one";
-            return Err(Error::input(place.target.display(), what, remedy));
+            return Err(Error::new(Code::OutputForeign, place.target.display(), what, remedy));
         }
         Ok(place)
     }
@@ -44,7 +44,12 @@ impl Place {
     pub(super) fn empty(dir: &Path) -> Result<Self> {
         let place = Self::locked(dir)?;
         match place.holds_something()? {
-            true => Err(Error::input(dir.display(), "is not empty", "give a new folder, or remove this one")),
+            true => Err(Error::new(
+                Code::OutputExists,
+                dir.display(),
+                "is not empty",
+                "give a new folder, or remove this one",
+            )),
             false => Ok(place),
         }
     }
@@ -80,7 +85,7 @@ impl Place {
         let mut place = Self::made(dir)?;
         place.held = Held::at_once(&place.target).map_err(|Taken| {
             let remedy = "wait until it is done, or choose another folder";
-            Error::input(place.target.display(), "another run is writing its results here", remedy)
+            Error::new(Code::OutputBusy, place.target.display(), "another run is writing its results here", remedy)
         })?;
         if place.held.is_some() {
             journal::complete(&place.target)?;
@@ -128,7 +133,8 @@ impl Place {
             self.require_its_own(name, inputs)?;
             if files[..k].iter().any(|(other, _)| other == name) {
                 let path = target.join(name);
-                return Err(Error::input(
+                return Err(Error::new(
+                    Code::OutputName,
                     path.display(),
                     "is the name of two files",
                     "correct them one after the other",
@@ -152,10 +158,15 @@ impl Place {
         let path = self.target.join(name);
         let real = path.canonicalize().unwrap_or_else(|_| path.clone());
         if !tree::is_inside(Path::new(name)) || path.is_dir() {
-            return Err(Error::input(path.display(), "cannot be a file", "rename it"));
+            return Err(Error::new(Code::OutputName, path.display(), "cannot be a file", "rename it"));
         }
         if inputs.iter().any(|i| i.canonicalize().is_ok_and(|i| i == real)) {
-            return Err(Error::input(path.display(), "is the input itself", "choose another folder with --out"));
+            return Err(Error::new(
+                Code::OutputIsInput,
+                path.display(),
+                "is the input itself",
+                "choose another folder with --out",
+            ));
         }
         Ok(())
     }
@@ -170,9 +181,9 @@ impl Drop for Place {
 
 /// Folders that have to be made, the outermost first.
 fn missing(dir: &Path) -> Result<Vec<PathBuf>> {
-    let bad = |what: &str| Error::input(dir.display(), what, "name a folder for the results");
+    let bad = |what: &str| Error::new(Code::OutputName, dir.display(), what, "name a folder for the results");
     if dir.as_os_str().is_empty() {
-        return Err(Error::input("results folder", "has no name", "name a folder for the results"));
+        return Err(Error::new(Code::OutputName, "results folder", "has no name", "name a folder for the results"));
     }
     if dir.is_dir() {
         return Ok(Vec::new());

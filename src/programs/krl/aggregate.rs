@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, matrix_from_rpy};
-use crate::programs::codes::Code;
+use crate::programs::codes::PostureCode;
 use crate::programs::field::{Field, Place};
 use crate::programs::program::{JointTarget, Posture, RotationFields};
 use crate::programs::scan::Reader;
@@ -47,13 +47,18 @@ impl Aggregate {
         loop {
             let Some(name) = reader.name() else {
                 let what = format!("{} stands where the name of a component belongs", reader.shown());
-                return Err(Error::input(reader.place(), what, "write {X 1.0,Y 2.0,...} with decimal points"));
+                return Err(Error::new(
+                    Code::ProgramSyntax,
+                    reader.place(),
+                    what,
+                    "write {X 1.0,Y 2.0,...} with decimal points",
+                ));
             };
             reader.at += 1;
             let name = name + &index(reader);
             if aggregate.elements.iter().any(|(n, _)| *n == name) {
                 let what = format!("the component {name} stands twice");
-                return Err(Error::input(reader.place(), what, "remove the one that does not hold"));
+                return Err(Error::new(Code::ProgramSyntax, reader.place(), what, "remove the one that does not hold"));
             }
             let element = element(reader, &name)?;
             aggregate.elements.push((name, element));
@@ -119,10 +124,10 @@ impl Aggregate {
         Some(Pose::new(matrix_from_rpy([c?, b?, a?]), [x?, y?, z?].into()))
     }
 
-    fn code(&self, name: &str) -> Option<Code> {
+    fn code(&self, name: &str) -> Option<PostureCode> {
         match self.element(name) {
             Some(Element::Number(value, range)) => {
-                Some(Code { file: self.file, range: range.clone(), value: *value as i64 })
+                Some(PostureCode { file: self.file, range: range.clone(), value: *value as i64 })
             }
             _ => None,
         }
@@ -193,7 +198,7 @@ fn element(reader: &mut Reader<'_>, name: &str) -> Result<Element> {
         if reader.at_line_end() {
             let what = format!("the brace is not closed behind the component {name}");
             let place = format!("{}:{}", reader.file.name, reader.line_of(reader.at.saturating_sub(1)));
-            return Err(Error::input(place, what, "close it on its line"));
+            return Err(Error::new(Code::ProgramSyntax, place, what, "close it on its line"));
         }
         if matches!(element, Element::Other)
             && reader.at == start
@@ -209,7 +214,12 @@ fn element(reader: &mut Reader<'_>, name: &str) -> Result<Element> {
     }
     if reader.at == start && matches!(element, Element::Other) {
         let what = format!("the component {name} has no value");
-        return Err(Error::input(reader.place(), what, "write its number, or leave the component out"));
+        return Err(Error::new(
+            Code::ProgramSyntax,
+            reader.place(),
+            what,
+            "write its number, or leave the component out",
+        ));
     }
     Ok(element)
 }

@@ -11,7 +11,7 @@ use super::itinerary::Itinerary;
 use super::program::{Approach, Kind, Left, PoseTarget, Posture, Program, Target, Understood};
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
 
@@ -176,7 +176,7 @@ impl Module<'_> {
         match (self.values.get(name), value) {
             (Some(Value::Aggregate(a)), Value::Aggregate(b)) if a.file != b.file => {
                 let what = format!("{name} has a value in another of the files already");
-                Err(Error::input(reader.place(), what, "correct modules one after the other"))
+                Err(Error::new(Code::ProgramTwin, reader.place(), what, "correct modules one after the other"))
             }
             _ => Ok(()),
         }
@@ -359,11 +359,21 @@ impl Module<'_> {
         for k in 0..count {
             if k > 0 && !reader.take_mark(b',') {
                 let what = format!("{name} has {k} targets, not {count}");
-                return Err(Error::input(format!("{}:{line}", reader.file.name), what, "complete the motion"));
+                return Err(Error::new(
+                    Code::ProgramTargets,
+                    format!("{}:{line}", reader.file.name),
+                    what,
+                    "complete the motion",
+                ));
             }
             if reader.at_line_end() {
                 let what = format!("{name} has no target");
-                return Err(Error::input(format!("{}:{line}", reader.file.name), what, "complete the motion"));
+                return Err(Error::new(
+                    Code::ProgramTargets,
+                    format!("{}:{line}", reader.file.name),
+                    what,
+                    "complete the motion",
+                ));
             }
             let value = self.value(reader)?;
             // To where the robot stands already.

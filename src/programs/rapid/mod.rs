@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::Setting;
-use super::codes::{Code, Codes};
+use super::codes::{Codes, PostureCode};
 use super::field::{Field, Place};
 use super::itinerary::Itinerary;
 use super::program::{
@@ -14,7 +14,7 @@ use super::program::{
 };
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
 use value::{Displacement, Node, frame, node, numbers};
@@ -146,7 +146,7 @@ impl Task<'_> {
             reader.skip_line_ends();
             if !reader.is_mark(b';') {
                 let what = format!("{name} does not end with a semicolon");
-                return Err(Error::input(place, what, "write TYPE name:=[..];"));
+                return Err(Error::new(Code::ProgramSyntax, place, what, "write TYPE name:=[..];"));
             }
             check(&kind, &name, &read, &place)?;
             value = Some(read);
@@ -154,7 +154,12 @@ impl Task<'_> {
         let twin = self.data.get(&name);
         if let Some(twin) = twin.filter(|t| t.file != reader.index) {
             let what = format!("{name} is declared in {} already", twin.line);
-            return Err(Error::input(reader.place(), what, "correct modules with equal names one after the other"));
+            return Err(Error::new(
+                Code::ProgramTwin,
+                reader.place(),
+                what,
+                "correct modules with equal names one after the other",
+            ));
         }
         // Two data of one name in one file belong to different routines.
         let value = if twin.is_some() { None } else { value };
@@ -233,7 +238,12 @@ impl Task<'_> {
             reader.skip_line_ends();
             if reader.done() || (nothing && reader.is_mark(b';')) {
                 let what = format!("{name} does not end with a semicolon");
-                return Err(Error::input(format!("{}:{line}", reader.file.name), what, "complete the instruction"));
+                return Err(Error::new(
+                    Code::ProgramSyntax,
+                    format!("{}:{line}", reader.file.name),
+                    what,
+                    "complete the instruction",
+                ));
             }
             if reader.take_mark(b'\\') {
                 let switch = reader.name().unwrap_or_default();
@@ -424,7 +434,7 @@ impl Task<'_> {
         let posture = match axes.get(..6).and_then(|a| <[usize; 6]>::try_from(a).ok()) {
             None => Posture::Nearest,
             Some(six) => {
-                let cf = cf.map(|(value, range)| Code { file, range, value: value as i64 });
+                let cf = cf.map(|(value, range)| PostureCode { file, range, value: value as i64 });
                 Posture::Coded(Codes::Rapid(Box::new(cf)), six)
             }
         };
@@ -549,13 +559,14 @@ fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result<()> {
     let found: Vec<usize> = parts.iter().map(count).collect();
     if found != shape {
         let what = format!("{name} has {found:?} numbers in its brackets, a {} has {shape:?}", kind.to_lowercase());
-        return Err(Error::input(place, what, "complete it"));
+        return Err(Error::new(Code::ProgramTargets, place, what, "complete it"));
     }
     let norm = (kind == "ROBTARGET").then(|| numbers::<4>(&parts[1])).flatten();
     if let Some(q) = norm {
         let norm = q.iter().map(|(v, _)| v * v).sum::<f64>().sqrt();
         if (norm - 1.0).abs() > 0.01 {
-            return Err(Error::input(
+            return Err(Error::new(
+                Code::ProgramQuaternion,
                 place,
                 format!("the quaternion of {name} has the norm {norm:.4}, not 1"),
                 "correct it",

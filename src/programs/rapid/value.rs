@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::programs::scan::Reader;
 
@@ -100,7 +100,7 @@ pub(super) fn node(reader: &mut Reader<'_>) -> Result<Node> {
         return Ok(name.map_or(Node::Other, Node::Word));
     }
     let Some(close) = reader.closing(reader.at) else {
-        return Err(Error::input(reader.place(), "a list [ is not closed", "close it with ]"));
+        return Err(Error::new(Code::ProgramSyntax, reader.place(), "a list [ is not closed", "close it with ]"));
     };
     reader.at += 1;
     let mut list = Vec::new();

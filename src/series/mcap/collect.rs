@@ -14,7 +14,7 @@ use super::motion::{Interpolated, Posture, interpolate};
 use super::options::{Picking, RecordingOptions};
 use super::pixels::{self, Mean};
 use super::scan::time_ns;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::files::batches;
 use crate::series::{DEFAULT_PLACEMENT, Stop};
 
@@ -193,7 +193,12 @@ impl<'a> Collector<'a> {
     fn write_png(&self, time: i64, picture: &DynamicImage) -> Result<String> {
         let mut bytes = std::io::Cursor::new(Vec::new());
         picture.write_to(&mut bytes, ImageFormat::Png).map_err(|e| {
-            Error::input(self.images.display(), format!("a picture cannot be written: {e}"), "report this")
+            Error::new(
+                Code::OutputFailed,
+                self.images.display(),
+                format!("a picture cannot be written: {e}"),
+                "report this",
+            )
         })?;
         self.write(time, "png", bytes.get_ref())
     }

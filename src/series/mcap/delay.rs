@@ -14,7 +14,7 @@ use super::messages;
 use super::motion::{Posture, Standstill, moved};
 use super::options::Clock;
 use super::scan::time_ns;
-use crate::error::Notice;
+use crate::error::{Code, Notice};
 
 const MS: i64 = 1_000_000;
 /// Longest delay that is looked for, ns.
@@ -60,7 +60,7 @@ impl Delay {
             1e3 * self.sigma_s
         );
         let remedy = "the delay is taken off; --image-delay 0 takes the stamps as they are";
-        Notice::new(recording.display(), what, remedy)
+        Notice::new(Code::ImageDelayFound, recording.display(), what, remedy)
     }
 }
 

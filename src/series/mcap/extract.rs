@@ -9,7 +9,7 @@ use super::messages::CameraInfo;
 use super::motion::{Posture, Standstill, interpolate, postures, standstills};
 use super::options::{Motion, RecordingOptions};
 use super::scan::{Scan, scan};
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::series::{InputFile, Stops};
 
 /// Of a long standstill so many pictures are looked at.
@@ -74,19 +74,29 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         let what = taken
             .malformed
             .map_or("no image can be read".into(), |(_, reason)| format!("no image can be read: one {reason}"));
-        return Err(Error::input(place, what, "record as mono8, mono16, rgb8, bayer or compressed (jpeg, png)"));
+        return Err(Error::new(
+            Code::MessagesUnreadable,
+            place,
+            what,
+            "record as mono8, mono16, rgb8, bayer or compressed (jpeg, png)",
+        ));
     }
     let mut notices = std::mem::take(&mut scan.notices);
     if let Some((count, reason)) = taken.malformed {
         let place = format!("{}, topic {image_topic}", recording.display());
-        notices.push(Notice::new(place, format!("{count} images cannot be read: one {reason}"), "they are left out"));
+        notices.push(Notice::new(
+            Code::MessagesUnreadable,
+            place,
+            format!("{count} images cannot be read: one {reason}"),
+            "they are left out",
+        ));
     }
     let image_delay_s = scan.delay_s(&image_topic) - scan.delay_s(&joint_topic);
     if image_delay_s.abs() > NOTABLE_DELAY_S {
         let sign = if image_delay_s < 0.0 { "earlier" } else { "later" };
         let what = format!("images arrive {:.3} s {sign} after their stamp than joint states", image_delay_s.abs());
         let remedy = "check that camera and robot stamp by the same clock; a robot that stands is not affected";
-        notices.push(Notice::new(recording.display(), what, remedy));
+        notices.push(Notice::new(Code::ImagesDelayed, recording.display(), what, remedy));
     }
     let (stops, reports) = taken.rows.into_values().unzip();
     Ok(Extracted {
@@ -130,7 +140,7 @@ fn require_overlap(scan: &Scan, postures: &[Posture], times: &[i64]) -> Result<(
     let place = scan.recording.display();
     let (Some(first), Some(last)) = (postures.first(), postures.last()) else {
         let what = "its joint states never tell all joints";
-        return Err(Error::input(place, what, "record all publishers of the joint states"));
+        return Err(Error::new(Code::JointMissing, place, what, "record all publishers of the joint states"));
     };
     let (Some(&from), Some(&to)) = (times.first(), times.last()) else { return Ok(()) };
     if from <= last.time_ns && first.time_ns <= to {
@@ -144,7 +154,12 @@ fn require_overlap(scan: &Scan, postures: &[Posture], times: &[i64]) -> Result<(
         seconds(first.time_ns),
         seconds(last.time_ns)
     );
-    Err(Error::input(place, what, "synchronise the clocks, or use the times of recording (--clock log)"))
+    Err(Error::new(
+        Code::ClocksApart,
+        place,
+        what,
+        "synchronise the clocks, or use the times of recording (--clock log)",
+    ))
 }
 
 fn groups(scan: &mut Scan, postures: &[Posture], times: &[i64], options: &RecordingOptions) -> Result<Vec<Group>> {
@@ -179,11 +194,16 @@ fn groups(scan: &mut Scan, postures: &[Posture], times: &[i64], options: &Record
             times.len() - used,
             times.len()
         );
-        scan.notices.push(Notice::new(&place, what, ""));
+        scan.notices.push(Notice::new(Code::ImagesInMotion, &place, what, ""));
     }
     if empty > 0 {
         let what = format!("{empty} of {} standstills have no image", still.len());
-        scan.notices.push(Notice::new(&place, what, "wait longer at each stop, or check the stamps of the images"));
+        scan.notices.push(Notice::new(
+            Code::StandstillWithoutImage,
+            &place,
+            what,
+            "wait longer at each stop, or check the stamps of the images",
+        ));
     }
     if groups.is_empty() {
         return Err(no_stop(&place, postures, still.len(), options));
@@ -195,7 +215,12 @@ fn groups(scan: &mut Scan, postures: &[Posture], times: &[i64], options: &Record
 fn no_stop(place: &str, postures: &[Posture], standstills: usize, options: &RecordingOptions) -> Error {
     if standstills > 0 {
         let what = format!("none of its images was taken in one of the {standstills} standstills of the robot");
-        return Error::input(place, what, "check the stamps of images and joint states (--clock log)");
+        return Error::new(
+            Code::ImagesInMotion,
+            place,
+            what,
+            "check the stamps of images and joint states (--clock log)",
+        );
     }
     let mut steps: Vec<i64> = postures.windows(2).map(|w| w[1].time_ns - w[0].time_ns).collect();
     steps.sort_unstable();
@@ -205,7 +230,7 @@ fn no_stop(place: &str, postures: &[Posture], standstills: usize, options: &Reco
         options.least_still_s, options.still_speed
     );
     let remedy = "stop the robot for each image; images in motion are taken only on demand (--in-motion SECONDS)";
-    Error::input(place, what, remedy)
+    Error::new(Code::RobotNeverStill, place, what, remedy)
 }
 
 fn shrunk(standstill: Standstill) -> Standstill {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::message::Message;
 use super::{records, sqlite};
-use crate::error::{Error, Notice, Result, plain_name};
+use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::files::{self, Kind};
 
 /// The files of a recording, in the order in which they were written: one file, or a rosbag2 folder.
@@ -32,7 +32,7 @@ pub(super) fn files_of(recording: &Path) -> Result<Vec<PathBuf>> {
         return Err(not_recording(other, &head(other)?));
     }
     let remedy = "give an .mcap file, or a rosbag2 folder with .mcap or .db3 files";
-    Err(Error::input(recording.display(), "holds no .mcap or .db3 file", remedy))
+    Err(Error::new(Code::RecordingFormat, recording.display(), "holds no .mcap or .db3 file", remedy))
 }
 
 /// Refuses other kinds of recordings, with the command that converts them.
@@ -75,7 +75,7 @@ fn not_recording(path: &Path, head: &[u8]) -> Error {
     } else {
         ("is not a recording", "check the file: it begins neither as MCAP nor as sqlite does".to_string())
     };
-    Error::input(shown, what, remedy)
+    Error::new(Code::RecordingFormat, shown, what, remedy)
 }
 
 /// Calls `visit` for every message of a file in the order of the file, and returns a notice where the file is damaged.

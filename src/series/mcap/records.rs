@@ -10,7 +10,7 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::message::Message;
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::files::{self, Kind};
 
 const FOOTER: u8 = 2;
@@ -202,7 +202,12 @@ impl Contents {
                 format!("is damaged at {places} (the first: {reason}); {used}")
             }
         };
-        Some(Notice::new(path.display(), what, "copy it again; stops that were lost have to be recorded again"))
+        Some(Notice::new(
+            Code::RecordingDamaged,
+            path.display(),
+            what,
+            "copy it again; stops that were lost have to be recorded again",
+        ))
     }
 
     /// All records of a chunk.

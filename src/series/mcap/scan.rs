@@ -9,7 +9,7 @@ use super::file::{files_of, for_each};
 use super::message::Message;
 use super::messages::{self, CameraInfo, JointState};
 use super::options::{Clock, RecordingOptions};
-use crate::error::{Error, Notice, Result, plain_name};
+use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::series::InputFile;
 
 /// Some joints at one time.
@@ -155,22 +155,32 @@ impl Scan {
             let what = format!("holds ROS 1 messages ({name}: {})", topic.schema);
             let remedy =
                 format!("convert it: pip install rosbags; rosbags-convert --src {shown} --dst run1 --dst-storage mcap");
-            return Err(Error::input(shown, what, remedy));
+            return Err(Error::new(Code::RecordingFormat, shown, what, remedy));
         }
         if self.held > MOST_HELD {
             let what = format!("holds more joint states than {} MiB of memory", MOST_HELD >> 20);
-            return Err(Error::input(shown, what, "cut it into parts: ros2 bag convert with max_bagfile_size"));
+            return Err(Error::new(
+                Code::FileTooLarge,
+                shown,
+                what,
+                "cut it into parts: ros2 bag convert with max_bagfile_size",
+            ));
         }
         for (name, topic) in &self.topics {
             let place = format!("{shown}, topic {name}");
             if topic.malformed > 0 {
                 let what =
                     format!("{} of {} messages cannot be read: one {}", topic.malformed, topic.messages, topic.reason);
-                self.notices.push(Notice::new(&place, what, "they are left out"));
+                self.notices.push(Notice::new(Code::MessagesUnreadable, &place, what, "they are left out"));
             }
             if topic.unstamped {
                 let what = "messages without a stamp: the time of recording stands for it";
-                self.notices.push(Notice::new(&place, what, "let the driver stamp its messages"));
+                self.notices.push(Notice::new(
+                    Code::MessagesUnstamped,
+                    &place,
+                    what,
+                    "let the driver stamp its messages",
+                ));
             }
         }
         Ok(())
@@ -191,17 +201,17 @@ impl Scan {
             (Some(asked), _) if candidates.contains(&asked) => Ok(asked),
             (Some(asked), _) => {
                 let said = format!("topic {asked} has no {what}; its topics are: {}", all());
-                Err(Error::input(place(), said, format!("name another {flag}")))
+                Err(Error::new(Code::TopicMissing, place(), said, format!("name another {flag}")))
             }
             (None, [one]) => Ok(one),
             (None, []) => {
                 let damage: String = self.notices.iter().map(|n| format!(" ({})", n.what)).collect();
                 let said = format!("has no {what}{damage}; its topics are: {}", all());
-                Err(Error::input(place(), said, "record them as well (ros2 bag record -s mcap -a)"))
+                Err(Error::new(Code::TopicMissing, place(), said, "record them as well (ros2 bag record -s mcap -a)"))
             }
             (None, several) => {
                 let said = format!("has several topics with {what}: {}", several.join(", "));
-                Err(Error::input(place(), said, format!("name one with {flag}")))
+                Err(Error::new(Code::TopicAmbiguous, place(), said, format!("name one with {flag}")))
             }
         }
     }
@@ -239,13 +249,18 @@ impl Scan {
         }
         if !missing.is_empty() {
             let what = format!("has no positions of {}; its joints are: {}", missing.join(", "), names.join(", "));
-            return Err(Error::input(place, what, "compare with the joint names in the URDF, or choose another tip"));
+            return Err(Error::new(
+                Code::JointMissing,
+                place,
+                what,
+                "compare with the joint names in the URDF, or choose another tip",
+            ));
         }
         let joints = if options.joints.is_empty() { names.clone() } else { options.joints.clone() };
         let extra: Vec<&str> = names.iter().filter(|n| !joints.contains(n)).map(String::as_str).collect();
         if !extra.is_empty() {
             let what = format!("joints that the chain does not need: {}", extra.join(", "));
-            self.notices.push(Notice::new(place, what, "they are ignored"));
+            self.notices.push(Notice::new(Code::JointUnused, place, what, "they are ignored"));
         }
         Ok((topic.clone(), self.joints.remove(&topic).unwrap_or_default(), joints))
     }
@@ -273,7 +288,12 @@ impl Scan {
         let reason = self.topics.get(topic).map_or("", |t| t.reason.as_str());
         let place = format!("{}, topic {topic}", self.recording.display());
         let reason = if reason.is_empty() { String::new() } else { format!(": one {reason}") };
-        Error::input(place, format!("none of its {what} can be used{reason}"), "record it again")
+        Error::new(
+            Code::MessagesUnreadable,
+            place,
+            format!("none of its {what} can be used{reason}"),
+            "record it again",
+        )
     }
 
     /// The camera info beside an image topic, or the only one.

@@ -9,7 +9,7 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::message::Message;
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::files::{self, Kind};
 
 /// First bytes of such a file.
@@ -40,7 +40,7 @@ pub(super) fn for_each(path: &Path, mut visit: impl FnMut(Message<'_>) -> Result
     })?;
     let (Some(&topics), Some(&messages)) = (roots.get("topics"), roots.get("messages")) else {
         let what = "is a sqlite database without the tables topics and messages";
-        return Err(Error::input(path.display(), what, "give a recording of rosbag2"));
+        return Err(Error::new(Code::RecordingFormat, path.display(), what, "give a recording of rosbag2"));
     };
     let mut known: BTreeMap<i64, [String; 3]> = BTreeMap::new();
     base.rows(topics, &mut lost, |row| {
@@ -88,13 +88,21 @@ impl Lost {
                 self.parts
             );
             return Some(Notice::new(
+                Code::RecordingDamaged,
                 path.display(),
                 what,
                 "copy it again; stops that were lost have to be recorded again",
             ));
         }
         let what = "the recorder did not close it: messages in its -wal file are missing";
-        unmerged.then(|| Notice::new(path.display(), what, "merge them: sqlite3 FILE.db3 'PRAGMA wal_checkpoint'"))
+        unmerged.then(|| {
+            Notice::new(
+                Code::RecordingDamaged,
+                path.display(),
+                what,
+                "merge them: sqlite3 FILE.db3 'PRAGMA wal_checkpoint'",
+            )
+        })
     }
 }
 
@@ -186,7 +194,9 @@ struct Base {
 
 impl Base {
     fn open(path: &Path) -> Result<Self> {
-        let refuse = |what: &str| Error::input(path.display(), what, "copy it again, or convert it: ros2 bag convert");
+        let refuse = |what: &str| {
+            Error::new(Code::RecordingDamaged, path.display(), what, "copy it again, or convert it: ros2 bag convert")
+        };
         let (mut file, length) = files::open(path, Kind::Recording)?;
         let mut header = [0; FILE_HEADER];
         file.read_exact(&mut header).map_err(|_| refuse("is cut off within its header"))?;

@@ -11,7 +11,7 @@ use mcap::{Compression, WriteOptions, Writer};
 
 use super::interfaces::{ANNOTATIONS, TRANSFORMS, definition};
 use super::messages::{CAMERA_INFO, COMPRESSED_IMAGE, CameraInfo, JOINT_STATE};
-use crate::error::{Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::files::{self, Kind, decode_picture};
 use crate::geom::Pose;
 use crate::series::{ImageObservations, Series, Stop};
@@ -119,7 +119,9 @@ pub fn write_recording(path: &Path, series: &Series, shown: Shown<'_>) -> Result
 /// As the name says.
 pub fn require_new(path: &Path) -> Result<()> {
     match path.symlink_metadata() {
-        Ok(_) => Err(Error::input(path.display(), "exists already", "name a new file, or remove this one")),
+        Ok(_) => {
+            Err(Error::new(Code::OutputExists, path.display(), "exists already", "name a new file, or remove this one"))
+        }
         Err(_) => Ok(()),
     }
 }
@@ -143,12 +145,17 @@ fn write_stops(path: &Path, series: &Series, shown: Shown<'_>) -> Result<Vec<Not
         .collect();
     if usable.is_empty() {
         let what = "has no stop with both an image and joint readings";
-        return Err(Error::input(series.folder.display(), what, "look at joints.csv and images/"));
+        return Err(Error::new(
+            Code::StopsNotRecorded,
+            series.folder.display(),
+            what,
+            "look at joints.csv and images/",
+        ));
     }
     let left_out = series.stops.stops.len() - usable.len();
     if left_out > 0 {
         let what = format!("{left_out} images off the robot, or missing, are not in the recording");
-        notices.push(Notice::new(series.folder.display(), what, ""));
+        notices.push(Notice::new(Code::StopsNotRecorded, series.folder.display(), what, ""));
     }
     let times = times(&usable.iter().map(|(_, stop, ..)| *stop).collect::<Vec<_>>());
     for (time, (i, stop, readings, image)) in times.into_iter().zip(usable) {
@@ -223,7 +230,8 @@ impl Recording {
 
     fn image(&mut self, time_ns: i64, path: &Path) -> Result<()> {
         let mut bytes = files::read(path, Kind::Image)?;
-        let unreadable = |e: image::ImageError| Error::input(path.display(), e, "remove the image or its row");
+        let unreadable =
+            |e: image::ImageError| Error::new(Code::ImageUnreadable, path.display(), e, "remove the image or its row");
         let format = match image::guess_format(&bytes) {
             Ok(ImageFormat::Jpeg) => "jpeg",
             Ok(ImageFormat::Png) => "png",
@@ -306,7 +314,12 @@ impl Recording {
 }
 
 fn refused(path: &Path, error: &mcap::McapError) -> Error {
-    Error::input(path.display(), format!("cannot be written: {error}"), "check that the disk is not full")
+    Error::new(
+        Code::OutputFailed,
+        path.display(),
+        format!("cannot be written: {error}"),
+        "check that the disk is not full",
+    )
 }
 
 /// Seconds and nanoseconds of a stamp.

@@ -1,16 +1,11 @@
 //! One error type for the whole program: where, what, and what to do about it.
 
+mod code;
+
 use std::fmt;
 use std::path::Path;
 
-/// What kind of failure it was; fixes the exit code of the program.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ErrorKind {
-    /// Input or usage is wrong: exit code 2.
-    Input,
-    /// The problem was understood but not converged or not identifiable: exit code 3.
-    Unsolved,
-}
+pub use code::{Code, ErrorKind};
 
 /// A failure that a person can act on.
 ///
@@ -18,8 +13,8 @@ pub enum ErrorKind {
 /// `remedy` says the first thing to look at.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Error {
-    /// Kind of failure.
-    pub kind: ErrorKind,
+    /// What is wrong with what.
+    pub code: Code,
     /// File, line, image, joint or parameter.
     pub place: String,
     /// What was found there.
@@ -32,29 +27,26 @@ pub struct Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// Bad input or usage.
-    pub fn input(place: impl fmt::Display, what: impl fmt::Display, remedy: impl fmt::Display) -> Self {
-        Self { kind: ErrorKind::Input, place: place.to_string(), what: what.to_string(), remedy: remedy.to_string() }
-    }
-
-    /// A well-formed problem without a trustworthy solution.
-    pub fn unsolved(place: impl fmt::Display, what: impl fmt::Display, remedy: impl fmt::Display) -> Self {
-        Self { kind: ErrorKind::Unsolved, ..Self::input(place, what, remedy) }
+    /// A failure; its code says whether it is of the input or of the solution.
+    pub fn new(code: Code, place: impl fmt::Display, what: impl fmt::Display, remedy: impl fmt::Display) -> Self {
+        Self { code, place: place.to_string(), what: what.to_string(), remedy: remedy.to_string() }
     }
 
     /// A file that could not be read or written.
     pub fn io(path: &Path, error: &std::io::Error) -> Self {
-        let remedy = match error.kind() {
-            std::io::ErrorKind::NotFound => "check the path and its spelling",
-            std::io::ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
-            _ => "check that the disk is readable and not full",
+        let (code, remedy) = match error.kind() {
+            std::io::ErrorKind::NotFound => (Code::FileMissing, "check the path and its spelling"),
+            std::io::ErrorKind::PermissionDenied => {
+                (Code::FileForbidden, "check the permissions of the file and its folder")
+            }
+            _ => (Code::FileFailed, "check that the disk is readable and not full"),
         };
-        Self::input(path.display(), error, remedy)
+        Self::new(code, path.display(), error, remedy)
     }
 
     /// Exit code of the program for this failure.
     pub fn exit_code(&self) -> u8 {
-        match self.kind {
+        match self.code.kind() {
             ErrorKind::Input => 2,
             ErrorKind::Unsolved => 3,
         }
@@ -75,6 +67,9 @@ const MOST_PLACES: usize = 4;
 /// Something seen on the way that the user should know of, though the work went on.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Notice {
+    /// What was noticed of what.
+    #[serde(default = "Code::of_earlier_versions")]
+    pub code: Code,
     /// File, line, image, joint or parameter.
     pub place: String,
     /// What was seen and why it matters.
@@ -85,9 +80,14 @@ pub struct Notice {
 
 impl Notice {
     /// A notice about `place`.
-    pub fn new(place: impl fmt::Display, what: impl fmt::Display, remedy: impl fmt::Display) -> Self {
+    pub fn new(code: Code, place: impl fmt::Display, what: impl fmt::Display, remedy: impl fmt::Display) -> Self {
         let [place, what, remedy] = [place.to_string(), what.to_string(), remedy.to_string()].map(|t| shown(&t));
-        Self { place, what, remedy }
+        Self { code, place, what, remedy }
+    }
+
+    /// The notice with its code behind it.
+    pub fn coded(&self) -> String {
+        format!("{self} [{}]", self.code)
     }
 
     /// Notices that say the same of several places, in the order of the first of each.
@@ -109,6 +109,9 @@ impl Notice {
 
     /// Apart from numbers that stand by themselves.
     fn says_the_same_as(&self, other: &Self) -> bool {
+        if self.code != other.code {
+            return false;
+        }
         let alike = self.place != other.place && without_numbers(&self.what) == without_numbers(&other.what);
         self.remedy == other.remedy && (self.what == other.what || alike)
     }
@@ -164,7 +167,7 @@ pub fn plain_name<'a>(kind: &str, name: &'a str, place: impl fmt::Display) -> Re
         return Ok(name);
     }
     let what = format!("the name of a {kind} has control characters: \"{}\"", name.escape_debug());
-    Err(Error::input(place, what, "give it a name of letters, digits, - and _"))
+    Err(Error::new(Code::NameUnprintable, place, what, "give it a name of letters, digits, - and _"))
 }
 
 /// Text of files for the terminal: what cannot be seen is escaped, line ends and tabs stay.
@@ -210,7 +213,7 @@ fn edit_distance(a: &[char], b: &[char]) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::{Error, Notice, closest_name, plain_name};
+    use super::{Code, Error, Notice, closest_name, plain_name};
 
     #[test]
     fn names_with_control_characters_are_refused_and_never_shown_raw() {
@@ -223,14 +226,17 @@ mod tests {
             assert_eq!(plain_name("joint", good, "x"), Ok(good));
         }
         let raw = "\u{1b}]0;x\u{7}";
-        assert!(!Error::input(raw, raw, raw).to_string().contains(['\u{1b}', '\u{7}']));
-        assert!(!Notice::new(raw, raw, raw).what.contains('\u{1b}'));
+        assert!(!Error::new(Code::FileFailed, raw, raw, raw).to_string().contains(['\u{1b}', '\u{7}']));
+        assert!(!Notice::new(Code::ImageTruncated, raw, raw, raw).what.contains('\u{1b}'));
     }
 
     #[test]
     fn what_is_said_of_several_places_is_said_once_with_their_number() {
-        let of = |place: &str, px: f64| Notice::new(place, format!("off by ({px:.4}, 0.1) px"), "look");
-        let joint = |name: &str| Notice::new("joints.csv", format!("{name} is 2 deg beyond"), "look");
+        let of = |place: &str, px: f64| {
+            Notice::new(Code::BlurAsymmetric, place, format!("off by ({px:.4}, 0.1) px"), "look")
+        };
+        let joint =
+            |name: &str| Notice::new(Code::JointBeyondLimits, "joints.csv", format!("{name} is 2 deg beyond"), "look");
         let all = [of("a.png", 0.1), joint("joint_1"), of("b.png", 0.2), of("c.png", -0.1), joint("joint_2")];
         let said = Notice::said_once(&all);
         assert_eq!(said.len(), 3, "{said:?}");

@@ -1,0 +1,295 @@
+//! The closed set of what can be wrong, and of what is worth a word: one code for each kind of thing.
+//!
+//! To add one: a row in the table below. Name, exit code and the table of the guide follow from it.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// What kind of failure it was; fixes the exit code of the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// Input or usage is wrong: exit code 2.
+    Input,
+    /// The problem was understood but not converged or not identifiable: exit code 3.
+    Unsolved,
+}
+
+macro_rules! codes {
+    ($($kind:ident $title:literal { $($code:ident $name:literal $meaning:literal,)+ })+) => {
+        /// What is wrong with what, or what was noticed of what: errors, notices and findings say it, and programs may rely on its name.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        pub enum Code {
+            $($(
+                #[doc = $meaning]
+                #[serde(rename = $name)]
+                $code,
+            )+)+
+        }
+
+        impl Code {
+            /// Every code, in the order of the table.
+            pub const ALL: &[Self] = &[$($(Self::$code,)+)+];
+
+            /// Stable name for programs, `snake_case`.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $($(Self::$code => $name,)+)+
+                }
+            }
+
+            /// What it says, in a phrase.
+            pub const fn meaning(self) -> &'static str {
+                match self {
+                    $($(Self::$code => $meaning,)+)+
+                }
+            }
+
+            /// What it is about.
+            pub const fn group(self) -> &'static str {
+                match self {
+                    $($(Self::$code)|+ => $title,)+
+                }
+            }
+
+            /// What kind of failure an error of this code is.
+            pub const fn kind(self) -> ErrorKind {
+                match self {
+                    $($(Self::$code)|+ => ErrorKind::$kind,)+
+                }
+            }
+        }
+    };
+}
+
+codes! {
+    Input "Files and folders" {
+        FileMissing "file_missing" "a file or folder is not there",
+        FileForbidden "file_forbidden" "the permissions of a file or folder do not allow it",
+        FileFailed "file_failed" "the system could not read or write a file",
+        FileNotRegular "file_not_regular" "a folder, pipe or device stands where a file is wanted",
+        FileTooLarge "file_too_large" "a file is larger than files of its kind are, or than fits into memory",
+        FileEmpty "file_empty" "a file has no content, rows or markers",
+        TextEncoding "text_encoding" "a text is not UTF-8, or holds zero bytes",
+        NameUnprintable "name_unprintable" "a name has control characters",
+    }
+    Input "Results" {
+        OutputExists "output_exists" "the file or folder to be written exists already",
+        OutputForeign "output_foreign" "a folder for results holds what this program did not write",
+        OutputBusy "output_busy" "another run is writing into the folder",
+        OutputName "output_name" "a file or folder of the result cannot have this name",
+        OutputIsInput "output_is_input" "a file of the result would overwrite the input",
+        OutputFailed "output_failed" "a result could not be encoded or written",
+        MemoryExhausted "memory_exhausted" "the memory that the program may take was not enough",
+    }
+    Input "Command line and settings" {
+        OptionMissing "option_missing" "an option that is needed is not given",
+        OptionRange "option_range" "the value of an option is out of its range",
+        OptionConflict "option_conflict" "two options exclude each other",
+        PlanContradiction "plan_contradiction" "no plan fulfils the limits that were asked for",
+        ParameterUnknown "parameter_unknown" "no parameter has this name",
+        ParameterNotFixable "parameter_not_fixable" "a pose has no nominal value to fix or to give a prior",
+        PriorUnit "prior_unit" "a prior is given in another unit than its parameter has",
+        LensUnknown "lens_unknown" "no lens model has this name",
+        FaultUnknown "fault_unknown" "no fault of a simulation has this name",
+        SettingSyntax "setting_syntax" "a settings file is no TOML, JSON or YAML, or has unknown keys or values of another type",
+        SettingVersion "setting_version" "a file has another format number than this program reads",
+        SettingMissing "setting_missing" "a key that is needed is missing",
+        SettingRange "setting_range" "the value of a key is out of its range",
+        SettingConflict "setting_conflict" "keys exclude each other, or one of a pair is missing",
+        LensChosen "lens_chosen" "of several lenses the simplest that explains the markers was chosen",
+        RepeatabilityUnused "repeatability_unused" "a stated repeatability is not used: the joint noise is estimated",
+    }
+    Input "Tables" {
+        CsvSyntax "csv_syntax" "a line is no CSV",
+        CsvSeparator "csv_separator" "columns are separated by something else than commas",
+        CsvCellCount "csv_cell_count" "a row has more or fewer cells than there are columns",
+        CsvColumnMissing "csv_column_missing" "a column that is needed is missing",
+        CsvColumnUnknown "csv_column_unknown" "a column has no name, or one that is not known",
+        CsvColumnTwice "csv_column_twice" "two columns have one name",
+        CsvCellEmpty "csv_cell_empty" "a cell that is needed is empty",
+        CsvNumber "csv_number" "a cell is not a number",
+        CsvRange "csv_range" "the value of a cell is out of its range",
+        CsvName "csv_name" "a cell does not name what its column wants",
+        CsvRowTwice "csv_row_twice" "two rows say the same thing",
+    }
+    Input "Robot description" {
+        UrdfSyntax "urdf_syntax" "a robot description is no well-formed URDF, or readers take it differently",
+        UrdfXacro "urdf_xacro" "a robot description is an unexpanded xacro",
+        UrdfTwice "urdf_twice" "two links or joints have one name, or an element of a joint is given twice",
+        UrdfElement "urdf_element" "a name, an element or attribute of a joint is missing, misspelt or of an unknown kind",
+        UrdfNumber "urdf_number" "an attribute is not as many finite numbers as it should be",
+        UrdfRotation "urdf_rotation" "a quaternion or rotation is none",
+        UrdfAngleUnit "urdf_angle_unit" "angles exceed a full turn: degrees for radians?",
+        UrdfLengthUnit "urdf_length_unit" "links are too long: millimetres for metres?",
+        UrdfAxis "urdf_axis" "the axis of a joint is zero, missing or not of unit length",
+        UrdfLimits "urdf_limits" "the limits of a joint leave no room to move",
+        UrdfMassPlaceholder "urdf_mass_placeholder" "all links have one mass: a placeholder",
+        UrdfMassesMissing "urdf_masses_missing" "gravity is to be taken into account, and the links have no masses",
+        UrdfLayout "urdf_layout" "the text of a robot description cannot be edited in place",
+        PayloadRange "payload_range" "a payload has no possible mass or centre",
+        LinkUnknown "link_unknown" "no link has this name",
+        TreeBroken "tree_broken" "links and joints form no tree",
+        RootAmbiguous "root_ambiguous" "there are several root links, and none was named as base",
+        TipAmbiguous "tip_ambiguous" "there are several leaf links, and none was named as tip",
+        TipChosen "tip_chosen" "of several leaf links one was chosen as tip",
+        ChainImpossible "chain_impossible" "between base and tip no joint moves, or there is no way, or a joint without a single reading",
+        MimicBroken "mimic_broken" "a mimic joint follows nothing that moves",
+        JointUnknown "joint_unknown" "the robot has no joint of this name",
+        RobotDiffers "robot_differs" "two descriptions, or a result and a description, are not of the same chain",
+    }
+    Input "Joint readings" {
+        JointUnitMissing "joint_unit_missing" "nothing states whether joint readings are degrees or radians",
+        DegreesAsRadians "degrees_as_radians" "readings said to be radians are degrees",
+        RadiansAsDegrees "radians_as_degrees" "readings said to be degrees are radians",
+        MillimetresAsMetres "millimetres_as_metres" "readings of a prismatic joint are millimetres",
+        JointMissing "joint_missing" "a joint of the chain has no readings",
+        JointUnused "joint_unused" "readings are of no joint of the chain",
+        JointBeyondLimits "joint_beyond_limits" "readings are beyond the limits of the joint",
+        ReadingsMissing "readings_missing" "no row has joint readings",
+    }
+    Input "Series" {
+        SeriesMissing "series_missing" "a folder is no series",
+        SeriesTwice "series_twice" "two series have one name",
+        SeriesChanged "series_changed" "a file changed while it was read",
+        SeriesDisagree "series_disagree" "series that share robot or camera contradict each other",
+        ImageNotThere "image_not_there" "the file of an image that a table names is missing",
+        ImageUnlisted "image_unlisted" "an image that no row names is not used",
+        ImageTwice "image_twice" "two images have one name",
+        ImagesMissing "images_missing" "images are needed, and there are none",
+        ObservationsMissing "observations_missing" "images of joints.csv have no observations",
+        MarkerUnknown "marker_unknown" "the plate has no such marker",
+    }
+    Input "Plate" {
+        MarkerMisplaced "marker_misplaced" "a marker is not where its id puts it",
+        MarkersOverlap "markers_overlap" "two markers overlap",
+        PlateScaleUnlikely "plate_scale_unlikely" "a measured distance is far from the nominal one",
+        PlateUnitUnlikely "plate_unit_unlikely" "a plate is too large: millimetres for metres?",
+        PlateNotDetectable "plate_not_detectable" "no detector can find a plate as described",
+        DictionaryUnknown "dictionary_unknown" "no dictionary of markers has this name",
+        DictionaryGuessed "dictionary_guessed" "dictionary and size of the tags were found by trial",
+        PlateSymmetric "plate_symmetric" "the plate looks the same after a turn",
+        PlateImpossible "plate_impossible" "a plate cannot be designed, resolved, drawn or fitted on its sheet as asked for",
+    }
+    Input "Images" {
+        ImageTruncated "image_truncated" "the file of an image is empty or cut off",
+        ImageUnreadable "image_unreadable" "the file of an image cannot be decoded",
+        ImageSizeImpossible "image_size_impossible" "an image is too small to show anything, or larger than is read or drawn",
+        ImageSizeDiffers "image_size_differs" "an image has another size or depth than the others",
+        ImageDepth "image_depth" "pixels do not fit the stated number of bits",
+        FlatFieldUseless "flat_field_useless" "white images are saturated, or not brighter than dark ones",
+    }
+    Input "Detection" {
+        PlateNotFound "plate_not_found" "nothing in the image looks like the plate",
+        PlateIncomplete "plate_incomplete" "too little of the plate is seen to tell which part it is",
+        PlateMirrored "plate_mirrored" "the plate is seen in a mirror, or described mirrored",
+        PlateContradicted "plate_contradicted" "the pattern that is seen is not that of the plate file",
+        PlateLineHidden "plate_line_hidden" "a whole line of the plate is not seen where it should be",
+        PlateNowhere "plate_nowhere" "no image can be used",
+        BlurAsymmetric "blur_asymmetric" "edges are blurred more to one side: coma or motion",
+    }
+    Input "Recordings" {
+        RecordingFormat "recording_format" "a file is no recording that can be read",
+        RecordingNotConverted "recording_not_converted" "a recording stands where a series folder is wanted",
+        RecordingDamaged "recording_damaged" "a recording is damaged, cut off, or was not closed",
+        RecordingManifest "recording_manifest" "nothing beside a recording describes camera and plate",
+        TopicMissing "topic_missing" "no topic carries what is needed",
+        TopicAmbiguous "topic_ambiguous" "several topics carry what is needed",
+        MessagesUnreadable "messages_unreadable" "messages of a topic cannot be read",
+        MessagesUnstamped "messages_unstamped" "messages have no stamp",
+        ClocksApart "clocks_apart" "images and joint states were not taken at the same time",
+        ImagesDelayed "images_delayed" "images arrive later or earlier than joint states of the same stamp",
+        ImageDelayFound "image_delay_found" "motion in the images tells of a delay, which is taken off",
+        RobotNeverStill "robot_never_still" "the robot never stands still long enough",
+        ImagesInMotion "images_in_motion" "images were taken while the robot moved",
+        StandstillWithoutImage "standstill_without_image" "a standstill has no image",
+        StopsNotRecorded "stops_not_recorded" "stops are not in the recording: images or readings are missing",
+    }
+    Input "Robot programs" {
+        ProgramLanguage "program_language" "nothing tells the language of a program, or programs are of several languages",
+        ProgramSyntax "program_syntax" "a program cannot be read at this place",
+        ProgramTargets "program_targets" "a motion or target has another number of values than it needs",
+        ProgramQuaternion "program_quaternion" "the quaternion of a target is not of unit length",
+        ProgramTwin "program_twin" "a name is declared in several of the files",
+        ProgramModelMissing "program_model_missing" "a target is a pose, and the model in the controller is not given",
+        TargetsTooFew "targets_too_few" "too few targets tell of an error",
+    }
+    Input "Earlier results" {
+        SolutionDamaged "solution_damaged" "a solution.json is not as the program wrote it",
+        SolutionDiffers "solution_differs" "a solution.json is of another robot or series",
+    }
+    Unsolved "Geometry that does not fit" {
+        CameraUndetermined "camera_undetermined" "the images do not determine the camera",
+        ViewsAlike "views_alike" "the images are all alike",
+        FocalNotFound "focal_not_found" "no focal length explains the markers",
+        LensUndecided "lens_undecided" "nothing tells one lens from another",
+        ImagesTooFew "images_too_few" "too few images of the robot show the plate",
+        StopsAlike "stops_alike" "the stops turn the hand too little",
+        ReadingsContradict "readings_contradict" "joint readings and images do not belong together",
+        JointSignWrong "joint_sign_wrong" "with joints negated the images fit",
+        JointOrderWrong "joint_order_wrong" "with joints exchanged the images fit",
+        JointUnitWrong "joint_unit_wrong" "with the unit of single joints changed the images fit",
+        RowsShifted "rows_shifted" "with the rows of joints.csv shifted by one the images fit",
+        CameraMountWrong "camera_mount_wrong" "with the camera mounted the other way the images fit",
+        LinkLengthsWrong "link_lengths_wrong" "directions fit and distances do not: another size of robot",
+        PlatePitchWrong "plate_pitch_wrong" "with a plate of another size the images fit",
+    }
+    Unsolved "Fit" {
+        NotConverged "not_converged" "the adjustment ended without converging",
+        ViewsFrontal "views_frontal" "all views look straight at the plate",
+        FitUndetermined "fit_undetermined" "the data do not determine all unknowns",
+        EstimateNotFinite "estimate_not_finite" "an estimate is not finite",
+        NothingHeldOut "nothing_held_out" "too few images to hold any out",
+        PointsUndetermined "points_undetermined" "measured points do not determine the frame of the device",
+        PointsContradict "points_contradict" "measured points and readings do not belong together",
+        CameraFileImpossible "camera_file_impossible" "no camera model of ROS comes near to a lens",
+        OriginNotWritten "origin_not_written" "an origin cannot be written into the robot description",
+        RecordNotWritten "record_not_written" "a record cannot be encoded",
+    }
+    Unsolved "Findings" {
+        Noticed "noticed" "a notice of an earlier version of the program, which gave it no code of its own",
+        CameraModelMisfit "camera_model_misfit" "the camera model does not explain the markers",
+        FewImages "few_images" "few images: the nominal model decides much of the result",
+        FocusChanged "focus_changed" "focus or zoom changed during the series",
+        JointNoiseLarge "joint_noise_large" "the joint noise is larger than robots have",
+        PlateMoved "plate_moved" "the plate was moved: images were left out",
+        CameraMoved "camera_moved" "the camera was moved on its mount: images were left out",
+        PlateDisplaced "plate_displaced" "the plate stands a little elsewhere from some image on",
+        CameraDisplaced "camera_displaced" "the camera sits a little elsewhere from some image on",
+        PlateLoose "plate_loose" "the plate tilts with gravity",
+        CameraLoose "camera_loose" "the camera tilts with gravity",
+        PlateSizeContradicted "plate_size_contradicted" "robot and plate file disagree on the size of the plate",
+        PlateUneven "plate_uneven" "the plate is stretched more one way than the other",
+        ImagesLeftOut "images_left_out" "many images were left out",
+        ObservationsLeftOut "observations_left_out" "many observations were left out",
+        LensNotInRos "lens_not_in_ros" "camera.yaml cannot express the lens",
+        LooseMounting "loose_mounting" "camera or plate is loose on its mount",
+        MarkerOff "marker_off" "a marker is far from where the plate file says",
+        NoGain "no_gain" "the calibrated robot is no better than the nominal one",
+        ParameterOff "parameter_off" "a parameter is far from what robots usually have",
+        LargeScatter "large_scatter" "images scatter more than the noise model says",
+        FlangeUndetermined "flange_undetermined" "the data do not determine the flange",
+    }
+    Unsolved "Planning and simulation" {
+        PlanTooFewPoses "plan_too_few_poses" "too few workable poses were found",
+        PlanUndetermined "plan_undetermined" "planned images do not determine what they shall",
+        PlanViewless "plan_viewless" "no view shows enough of the plate",
+        PlanOutOfReach "plan_out_of_reach" "no workable view is in reach",
+        PlanCollides "plan_collides" "every view in reach collides or is beyond the limits",
+        PlateCodeWeak "plate_code_weak" "windows of a plate's code differ in too few cells",
+        SimulationOutOfReach "simulation_out_of_reach" "no view of the plate is in reach of a simulated robot",
+    }
+}
+
+impl Code {
+    /// What stands for the code of a notice that an earlier version wrote without one.
+    pub(crate) const fn of_earlier_versions() -> Self {
+        Self::Noticed
+    }
+}
+
+impl fmt::Display for Code {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
