@@ -67,7 +67,7 @@ codes! {
         FileMissing "file_missing" "a file or folder is not there",
         FileForbidden "file_forbidden" "the permissions of a file or folder do not allow it",
         FileFailed "file_failed" "the system could not read or write a file",
-        FileNotRegular "file_not_regular" "a folder, pipe or device stands where a file is wanted",
+        FileNotRegular "file_not_regular" "a folder, pipe or device stands where a file is wanted, or a file where a folder is",
         FileTooLarge "file_too_large" "a file is larger than files of its kind are, or than fits into memory",
         FileEmpty "file_empty" "a file has no content, rows or markers",
         TextEncoding "text_encoding" "a text is not UTF-8, or holds zero bytes",

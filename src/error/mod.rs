@@ -39,6 +39,9 @@ impl Error {
             std::io::ErrorKind::PermissionDenied => {
                 (Code::FileForbidden, "check the permissions of the file and its folder")
             }
+            std::io::ErrorKind::NotADirectory => {
+                (Code::FileNotRegular, "a file stands where a folder is wanted: check the path")
+            }
             _ => (Code::FileFailed, "check that the disk is readable and not full"),
         };
         Self::new(code, path.display(), error, remedy)

@@ -523,11 +523,11 @@ fn every_command_tries_its_folder_before_it_reads_anything() {
         "compensate missing.src --nominal missing --urdf missing",
         "plate",
     ] {
-        for out in ["file", "file/below"] {
+        for (out, why) in [("file", "output_name"), ("file/below", "file_not_regular")] {
             let args: Vec<&str> = args.split(' ').chain(["--out", out]).collect();
             let (code, said) = robotcal(root.path(), &args);
             assert_eq!(code, Some(2), "{args:?}: {said}");
-            assert!(said.starts_with(&format!("error[output_name]: {out}")), "{args:?}: {said}");
+            assert!(said.starts_with(&format!("error[{why}]: {out}")), "{args:?}: {said}");
         }
     }
     let (code, said) = robotcal(root.path(), &["convert", "missing.mcap", "file"]);
