@@ -531,7 +531,7 @@ fn every_command_tries_its_folder_before_it_reads_anything() {
         }
     }
     let (code, said) = robotcal(root.path(), &["convert", "missing.mcap", "file"]);
-    assert!(code == Some(2) && said.starts_with("error[output_exists]: file"), "{said}");
+    assert!(code == Some(2) && said.starts_with("error[output_name]: file"), "{said}");
     assert_eq!(all_below(root.path()), before);
 }
 
