@@ -2,7 +2,7 @@
 //!
 //! Markers count as known here: every one is told by many images, and a shift of all of them is none of the plate. With the
 //! information `S = R R'` of an image about its pose and intrinsics, joint noise eliminated, and their derivatives `T` by the
-//! columns, the covariance is `K = (sum T' S T + P)^-1` with the prior information `P`. With the scores `b` of the images (the slack
+//! columns, the covariance is `K = (sum T' S T + P)^-1` with the prior information `P`. With the scores `b` of the images (the latents
 //! included, whose own score is zero at the optimum) the sandwich is `K (sum T' b b' T + P) K`; priors count as the observations that
 //! they stand for.
 //!
@@ -107,7 +107,7 @@ impl Told {
     /// Of the k-th image in use.
     fn of(k: usize, own: LinearImage, layout: &Layout, free: &[usize]) -> Option<Self> {
         let LinearImage { image, terms, chain, .. } = own;
-        let (root, inverse) = roots(&condensed(terms, &chain.d_slack, &own.prior_of_slack())?)?;
+        let (root, inverse) = roots(&condensed(terms, &chain.d_latent, &own.prior_of_latents())?)?;
         let score = DVector::from_iterator(6 + E, terms.bp.iter().chain(terms.be.iter().take(E)).copied());
         let by_root = product(&root.transpose(), &by_columns(layout, image, chain));
         let by_free = by_root.select_columns(free);

@@ -10,7 +10,7 @@ use crate::geom::Pose;
 use crate::init::resect;
 use crate::linalg::symmetric_eigen;
 use crate::model::robot::Robot;
-use crate::problem::{Adjustment, Image, Problem, Slack, State, Weighting, posture_groups, predict};
+use crate::problem::{Adjustment, Image, Problem, State, TakenFrom, Weighting, posture_groups, predict};
 use crate::solve::{Settings, solve};
 
 /// Errors of predicted images.
@@ -113,8 +113,8 @@ fn summary(errors: &[(usize, ImageError)]) -> Errors {
 /// Images on the robot that share joint readings: they are off by the same local errors, and one of them would tell of the others.
 /// Each by itself where there are too few such sets to compare.
 fn clusters(problem: &Problem, limits: &Limits) -> Vec<Vec<usize>> {
-    let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
-    let groups = posture_groups(&problem.images, &on_robot);
+    let on_robot: Vec<usize> = problem.used_on_robot().collect();
+    let groups = posture_groups(problem, &on_robot);
     if groups.len() < limits.regions { on_robot.into_iter().map(|i| vec![i]).collect() } else { groups }
 }
 
@@ -142,8 +142,8 @@ pub fn folds(problem: &Problem, limits: &Limits) -> Option<Vec<Vec<usize>>> {
 /// in which the tip moved most. `None` for too few postures, and where these would be the folds once more.
 pub fn regions(fit: &Adjustment, limits: &Limits) -> Option<Vec<Vec<usize>>> {
     let problem = &fit.problem;
-    let on_robot: Vec<usize> = problem.used().filter(|(_, i)| i.stop.is_some()).map(|(i, _)| i).collect();
-    let postures = posture_groups(&problem.images, &on_robot);
+    let on_robot: Vec<usize> = problem.used_on_robot().collect();
+    let postures = posture_groups(problem, &on_robot);
     let count = FOLDS.min(postures.len() / limits.region_postures.max(1));
     if count < limits.regions {
         return None;
@@ -167,7 +167,7 @@ pub fn regions(fit: &Adjustment, limits: &Limits) -> Option<Vec<Vec<usize>>> {
 /// Postures in the order of their mean place along the direction in which the tip moved most.
 fn along_the_workspace(Adjustment { problem, state }: &Adjustment, postures: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
     let place = |i: &usize| {
-        let readings = problem.images[*i].stop.as_ref().map(|s| s.readings.as_slice()).unwrap_or_default();
+        let readings = problem.posture(*i).map(|s| s.readings.as_slice()).unwrap_or_default();
         state.robot.base_from_tip(readings).translation
     };
     let mean_of = |images: &[usize]| images.iter().map(place).sum::<Vector3<f64>>() / images.len().max(1) as f64;
@@ -204,8 +204,8 @@ pub fn refitted(adjustment: Adjustment) -> State {
 /// Error of an image that `state` was not fitted to, predicted from its joint readings alone; `None` off the robot, or where
 /// its markers do not give a pose.
 pub fn predict_image(problem: &Problem, state: &State, image: usize) -> Option<ImageError> {
-    let image = &problem.images[image];
-    let predicted = state.camera_from_plate(image, &Slack::None)?;
+    let (image, posture) = (&problem.images[image], problem.posture(image)?);
+    let predicted = state.camera_from_plate(image, TakenFrom::exact(posture))?;
     let (seen, _) = resect(image, state, &predicted, &Weighting::of(problem, image))?;
     Some(image_error(image, state, &predicted, &seen))
 }

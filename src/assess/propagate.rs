@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Matrix6};
 
 use crate::geom::{Pose, adjoint};
 use crate::model::robot::Posture;
-use crate::problem::{Image, Problem, Slack};
+use crate::problem::{Image, Problem, TakenFrom, Tie};
 use crate::solve::Fit;
 
 /// Which camera looks at which plate.
@@ -41,7 +41,8 @@ impl PredictedPose {
 impl View {
     /// The view of the first image on the robot; `None` where there is none.
     pub fn first(problem: &Problem) -> Option<Self> {
-        let image = problem.images.iter().find(|i| i.stop.is_some())?;
+        let first = (0..problem.images.len()).find(|&i| problem.on_robot(i))?;
+        let image = &problem.images[first];
         let Image { series, mounting, placement, mount, .. } = *image;
         Some(Self { series, mounting, placement, mount })
     }
@@ -55,22 +56,23 @@ pub fn predict_pose(fit: &Fit, view: View, readings: &[f64]) -> Option<Predicted
     let image = Image {
         name: String::new(),
         series: view.series,
+        stop: 0,
         camera: 0,
         mounting: view.mounting,
         placement: view.placement,
         plate: 0,
         mount: view.mount,
-        stop: Some(Posture::at(readings)),
         observations: Vec::new(),
-        local_share: Vec::new(),
         rejected: None,
     };
-    let chain = fit.state.chained(layout, &image, &Slack::Joints(vec![0.0; readings.len()]))?;
+    let (posture, exact) = (Posture::at(readings), vec![0.0; readings.len()]);
+    let from = TakenFrom { posture: Some(&posture), joint_errors: &exact, tie: &Tie::Rigid };
+    let chain = fit.state.chained(layout, &image, from)?;
     let theta = layout.theta_len();
     let of_theta = fit.covariance.reduced.view((0, 0), (theta, theta));
     let model = &chain.d_theta * of_theta * chain.d_theta.transpose();
     let noise = nalgebra::DVector::from_vec(fit.problem.joint_sigma(view.series)).map(|s| s * s);
-    let noise = &chain.d_slack * DMatrix::from_diagonal(&noise) * chain.d_slack.transpose();
+    let noise = &chain.d_latent * DMatrix::from_diagonal(&noise) * chain.d_latent.transpose();
     // A body twist d of camera_from_plate is the body twist -Ad d of its inverse.
     let turned = |c: DMatrix<f64>| {
         let ad = adjoint(&chain.pose);

@@ -8,7 +8,7 @@ use crate::assess::{
 };
 use crate::geom::Pose;
 use crate::model::robot::Posture;
-use crate::problem::{Adjustment, Noise, Problem, Slack};
+use crate::problem::{Adjustment, Noise, Problem};
 use crate::series::CameraMount;
 use crate::solve::{Covariance, Fit, JOINT_NOISE_FLOOR, NoiseInformation, NoiseUncertainty, noise_information};
 
@@ -40,13 +40,15 @@ pub struct Worth {
 
 /// Stops of the images in use.
 pub fn stops(problem: &Problem) -> Vec<Posture> {
-    problem.used().filter_map(|(_, i)| i.stop.clone()).collect()
+    let mut stops: Vec<usize> = problem.used().map(|(_, image)| image.stop).collect();
+    stops.dedup();
+    stops.into_iter().filter_map(|s| problem.stops[s].posture.clone()).collect()
 }
 
 /// What stands still in the base frame for the first image on the robot, with its first column: the plate, or a fixed camera.
 pub fn still(Adjustment { problem, state }: &Adjustment) -> Option<(Pose, usize)> {
     let layout = &problem.layout;
-    let (_, image) = problem.used().find(|(_, i)| i.stop.is_some())?;
+    let image = &problem.images[problem.used_on_robot().next()?];
     Some(match image.mount {
         CameraMount::Hand => (state.placements[image.placement], layout.placements[image.placement].start),
         CameraMount::Fixed => (state.mountings[image.mounting], layout.mountings[image.mounting].start),
@@ -92,7 +94,7 @@ pub fn judge(
     }
     let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops, limits));
     let noise: Vec<Vec<f64>> =
-        problem.used().filter(|(_, i)| i.stop.is_some()).map(|(_, i)| problem.joint_sigma(i.series)).collect();
+        problem.used_on_robot().map(|i| problem.joint_sigma(problem.images[i].series)).collect();
     let promise = |m: &FlangeModel| FlangeErrors::new(m, &state.robot, &usual_joint_sigma(&noise), &stops);
     worth.flange = model.as_ref().and_then(promise);
     worth.workspace = model.map(|m| m.workspace()).unwrap_or_default();
@@ -131,5 +133,5 @@ fn enlarge(covariance: &mut Covariance, model: &[f64], clusters: &[f64], theta: 
 
 /// False where every image has a pose of its own that does not know of the robot.
 fn images_know_the_robot(fit: &Adjustment) -> bool {
-    fit.used().any(|(_, image, slack)| image.stop.is_some() && !matches!(slack, Slack::Pose(_)))
+    fit.used().any(|(i, _, tie)| fit.problem.on_robot(i) && !tie.is_free())
 }

@@ -21,14 +21,13 @@ use crate::output::{Place, plan_files, plan_html, plan_programs, plan_start, sig
 use crate::plan::candidates::CandidateOptions;
 use crate::plan::refine::USUAL_ROUNDS;
 use crate::plan::scene::{self, SceneOptions, arm_length_m};
-use crate::plan::setting::Setting;
+use crate::plan::setting::{PlannedStop, Setting};
 use crate::plan::viewpoint::ViewRange;
 use crate::plan::visibility::SightLimits;
 use crate::plan::{
     Budget, Forecast, PlaceForecast, Plan, PlanRequest, Wish, check_wish, choose, compare_places, forecast, image_name,
     place_words, plan,
 };
-use crate::problem::Image;
 use crate::series::{CameraMount, Stops, read_plate};
 use crate::simulate::typical_camera;
 use crate::study::{PlanStudyRequest, plan_study};
@@ -411,7 +410,7 @@ fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
     Ok(targets)
 }
 
-fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<Image>)> {
+fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)> {
     let model: RobotModel = args.robot_model.into();
     if let Some(path) = &args.from {
         let record = read_solution(path)?;

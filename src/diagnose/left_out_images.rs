@@ -21,7 +21,7 @@ pub struct ImagesLeftOut {
 
 pub(super) fn check(adjustment: &Adjustment, setting: &Setting) -> Option<ImagesLeftOut> {
     let (problem, on_robot) = (&adjustment.problem, setting.on_robot);
-    let left_out = on_robot - problem.used().filter(|(_, i)| i.stop.is_some()).count();
+    let left_out = on_robot - problem.used_on_robot().count();
     let share = |limit: f64| left_out as f64 > limit * on_robot as f64;
     let weight = match () {
         () if share(setting.limits.hopeless_share_of_images_left_out) => Weight::Refusal,

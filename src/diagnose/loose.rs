@@ -6,7 +6,6 @@ use super::kind::{Kind, Quantity, Setting, Subject, some_of};
 use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
 use crate::fit::Fit;
-use crate::problem::{Adjustment, Slack};
 
 /// Most images that are named.
 const MOST_IMAGES: usize = 5;
@@ -75,13 +74,12 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &Setting) -> Vec<LooseMoun
 }
 
 fn loose(fit: &Fit, mounting: usize, limits: &Limits) -> Option<LooseMounting> {
-    let Adjustment { problem, state } = &fit.adjustment;
+    let problem = &fit.problem;
     let turns: Vec<(usize, [f64; 3])> = problem
         .used()
-        .filter(|(i, image)| image.mounting == mounting && matches!(state.slack[*i], Slack::Joints(_)))
-        .filter_map(|(i, image)| {
-            let seen = state.camera_from_plate(image, &state.slack[i])?;
-            let predicted = state.camera_from_plate(image, &Slack::None)?;
+        .filter(|(i, image)| image.mounting == mounting && fit.taken_from(*i).joints() > 0)
+        .filter_map(|(i, _)| {
+            let (seen, predicted) = (fit.camera_from_plate(i)?, fit.camera_by_readings(i)?);
             let turn = (seen * predicted.inverse()).log();
             Some((i, [turn[3], turn[4], turn[5]]))
         })

@@ -43,7 +43,7 @@ fn find_move(Adjustment { problem, state }: &Adjustment, setting: &Setting, seri
     let mut wrong: Vec<(usize, PosePair)> = Vec::new();
     for (i, image) in problem.images.iter().enumerate().filter(|(_, image)| image.series == series) {
         let suspect = image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair);
-        if let (true, Some(stop), Some(pose)) = (suspect, &image.stop, &free.poses[i]) {
+        if let (true, Some(stop), Some(pose)) = (suspect, problem.posture(i), &free.poses[i]) {
             wrong.push((i, PosePair::of_stop(&state.robot, image.mount, &stop.readings, pose.camera_from_plate)));
         }
     }

@@ -7,9 +7,11 @@
 //! moved, and `x = J^-1 g` with the covariance `J^-1`.
 //!
 //! The estimated joint noise has grown with the fault, so that `D` is small beside what the sizes say; it is compared with the squares
-//! `R` of the slack, which are as many as the degrees of freedom that the robot left. `D / R` has a beta distribution where noise
+//! `R` of the latent joint errors and tilts, which are as many as the degrees of freedom that the robot left. `D / R` has a beta distribution where noise
 //! is Gaussian. Real robots err alike in postures that are alike, so that chance alone does not acquit them: the step must also
 //! explain most of `R`.
+
+use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
@@ -18,7 +20,7 @@ use super::kind::{Setting, Weight};
 use crate::assess::{Accuracy, Limits, TellingImages};
 use crate::fit::Fit;
 use crate::linalg::{SymmetricFactor, product};
-use crate::problem::{Adjustment, Problem, Slack};
+use crate::problem::{Adjustment, Problem};
 use crate::series::CameraMount;
 use crate::solve::LinearProblem;
 
@@ -53,7 +55,7 @@ struct Shift {
     covariance: Matrix6<f64>,
     /// Fall of the cost, `D`.
     fall: f64,
-    /// Share of the squares of the slack that this and the other steps explain.
+    /// Share of the squares `R` that this and the other steps explain.
     share: f64,
 }
 
@@ -92,8 +94,10 @@ fn find_shifts(fit: &Fit, limits: &Limits) -> Vec<Shift> {
     let Adjustment { problem, state } = &fit.adjustment;
     let mut linear = Linear::of(fit.linear());
     let columns = linear.information.ncols();
-    let squares = |row: &Row| problem.slack_squares(&problem.images[row.image], &state.slack[row.image]);
-    let all: f64 = linear.images.iter().map(squares).sum();
+    let errors = |&stop: &usize| problem.joint_error_squares(stop, &state.joint_errors[stop]);
+    let ties = |row: &Row| problem.tie_squares(&problem.images[row.image], &state.ties[row.image]);
+    let stops: BTreeSet<usize> = linear.images.iter().map(|row| problem.images[row.image].stop).collect();
+    let all = stops.iter().map(errors).sum::<f64>() + linear.images.iter().map(ties).sum::<f64>();
     let (mut left, mut found, mut good) = (all, Vec::<Shift>::new(), Vec::new());
     while found.len() < limits.displacements {
         let tried = candidates(problem, &linear, limits.displaced_images);
@@ -191,7 +195,7 @@ impl Linear {
         for told in all {
             let i = lin.images[told.place];
             let image = &problem.images[i];
-            if !matches!(state.slack[i], Slack::Joints(_)) {
+            if state.joint_errors[image.stop].is_empty() || state.ties[i].is_free() {
                 continue;
             }
             let camera_from_plate = lin.chains[told.place].pose;

@@ -4,7 +4,7 @@ use crate::linalg::SymmetricFactor;
 use crate::solve::{Elimination, LinearProblem, SeenMarkers, System};
 
 /// `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what models of the same data share, with the whole information `N`
-/// (dense columns, slack and markers) at the optimum; `None` where it is not finite.
+/// (dense columns, latents and markers) at the optimum; `None` where it is not finite.
 pub fn log_evidence(linear: LinearProblem) -> Option<f64> {
     let system = System::with(Elimination::Markers, linear, 0.0);
     let reduced = SymmetricFactor::new(&system.information).ok()?.log_determinant();

@@ -10,7 +10,7 @@ use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
     Adjustment, Family, Image, ImageRejection, Layout, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape,
-    Problem, Slack, State, hold_scale_bars,
+    Problem, State, Stop, Tie, hold_scale_bars,
 };
 use crate::series::{Edge, Observation, Plate};
 
@@ -38,7 +38,8 @@ fn intern(names: &mut Vec<String>, name: &str) -> usize {
 /// With `local_errors` the errors of readings that stops have in common become columns.
 pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limits: &Limits) -> Result<Adjustment> {
     let (mut cameras, mut mountings, mut placements, mut plate_names) = (vec![], vec![], vec![], vec![]);
-    let (mut lenses, mut plates, mut images): (Vec<Camera>, Vec<Plate>, Vec<Image>) = (vec![], vec![], vec![]);
+    let (mut lenses, mut plates): (Vec<Camera>, Vec<Plate>) = (vec![], vec![]);
+    let (mut stops, mut images): (Vec<Stop>, Vec<Image>) = (vec![], vec![]);
     for (index, s) in series.iter().enumerate() {
         let camera = intern(&mut cameras, &s.camera);
         if camera == lenses.len() {
@@ -77,23 +78,25 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
             images.push(Image {
                 name: stop.image.clone(),
                 series: index,
+                stop: stops.len(),
                 camera,
                 mounting,
                 placement: intern(&mut placements, &stop.placement),
                 plate,
                 mount: s.mount,
-                stop: stop.readings.clone().map(|readings| Posture { readings, approach }),
                 observations,
-                local_share: Vec::new(),
                 rejected,
             });
+            let posture = stop.readings.clone().map(|readings| Posture { readings, approach });
+            stops.push(Stop { series: index, posture, local_share: Vec::new() });
         }
     }
     let mut robot = robot.clone();
     if local_errors {
-        robot.terms.extend(local_terms(&images, robot.chain.readings.len(), limits.stops_in_common));
-        let shares: Vec<Vec<f64>> = images.iter().map(|image| local_share(&robot.terms, image)).collect();
-        images.iter_mut().zip(shares).for_each(|(image, share)| image.local_share = share);
+        robot.terms.extend(local_terms(&stops, robot.chain.readings.len(), limits.stops_in_common));
+        for stop in &mut stops {
+            stop.local_share = stop.posture.as_ref().map(|p| local_share(&robot.terms, p)).unwrap_or_default();
+        }
     }
     let readings = robot.chain.readings.len();
     let state = State {
@@ -101,7 +104,8 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         mountings: vec![Pose::identity(); mountings.len()],
         placements: vec![Pose::identity(); placements.len()],
         plates: plates.iter().map(PlateShape::nominal).collect(),
-        slack: vec![Slack::Pose(Pose::identity()); images.len()],
+        joint_errors: vec![Vec::new(); stops.len()],
+        ties: vec![Tie::Free(Pose::identity()); images.len()],
         cameras: lenses,
     };
     let layout = Layout::new(&state, &mountings, &placements, &cameras, &plate_names);
@@ -113,7 +117,8 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         marker: Vec::new(),
     };
     let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
-    let problem = Problem { layout, plates, placements, mountings, cameras, images, noise, families, huber: HUBER };
+    let problem =
+        Problem { layout, plates, placements, mountings, cameras, stops, images, noise, families, huber: HUBER };
     let mut adjustment = Adjustment { problem, state };
     hold_scale_bars(&mut adjustment);
     Ok(adjustment)

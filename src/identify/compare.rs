@@ -65,7 +65,7 @@ pub fn beside_two_stages(solution: &Solution) -> Option<Comparison> {
 }
 
 fn on_robot(problem: &Problem) -> usize {
-    problem.used().filter(|(_, i)| i.stop.is_some()).count()
+    problem.used_on_robot().count()
 }
 
 fn rows(

@@ -38,7 +38,8 @@ fn layout(options: &Options, chain: Chain, series: &[Series]) -> Result<(Layout,
         placements: vec![Pose::identity(); placements.len()],
         cameras: series.iter().map(|s| Camera::pinhole(lens(s), 1, 1, 1.0)).collect(),
         plates: series.iter().map(|s| PlateShape::nominal(&s.plate)).collect(),
-        slack: Vec::new(),
+        joint_errors: Vec::new(),
+        ties: Vec::new(),
     };
     let names: Vec<String> = series.iter().map(|s| s.name.clone()).collect();
     let mut layout = Layout::new(&state, &mountings, &placements, &cameras, &names);

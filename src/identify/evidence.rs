@@ -1,7 +1,7 @@
 //! Which robot model the data support: Laplace's approximation of the evidence, at the same noise components.
 //!
 //! `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what the models share, with the whole information `N` (dense columns,
-//! slack and markers) at the optimum of each (D. MacKay, *Bayesian interpolation*, 1992).
+//! latents and markers) at the optimum of each (D. MacKay, *Bayesian interpolation*, 1992).
 
 use super::estimator::Estimator;
 use super::joint::identify_model;

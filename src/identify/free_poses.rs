@@ -9,10 +9,10 @@ use crate::fit::{FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
-use crate::problem::{Adjustment, ImageRejection, Problem, Slack, State, Weighting, hold_scale_bars, size_by_bar};
+use crate::problem::{Adjustment, ImageRejection, Problem, State, Tie, Weighting, hold_scale_bars, size_by_bar};
 use crate::solve::{
-    ComponentOptions, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status, estimate_components,
-    frames, in_frame, reject_observations, solve,
+    ComponentOptions, Fit, LinearImage, LinearStop, Linearised, PlateScale, Settings, Similarity, Status,
+    estimate_components, frames, in_frame, reject_observations, solve,
 };
 
 /// RMS of a start, px per point, from which no further focal length is tried.
@@ -76,7 +76,7 @@ fn start_poses(
     camera: usize,
     homographies: &[Option<Homography>],
 ) -> [usize; 2] {
-    let mut slack = state.slack.clone();
+    let mut ties = state.ties.clone();
     let (mut behind, mut failed) = (0, 0);
     let lens = &state.cameras[camera];
     let centre = Vector2::new(lens.parameters[2], lens.parameters[3]);
@@ -90,9 +90,9 @@ fn start_poses(
         let weighting = Weighting::of(problem, image);
         let tries = [planar, planar.flipped()].map(|p| resect(image, state, &p.camera_from_plate, &weighting));
         let best = tries.into_iter().flatten().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-        slack[i] = Slack::Pose(best.map_or(planar.camera_from_plate, |(pose, _)| pose));
+        ties[i] = Tie::Free(best.map_or(planar.camera_from_plate, |(pose, _)| pose));
     }
-    state.slack = slack;
+    state.ties = ties;
     [behind, failed]
 }
 
@@ -228,7 +228,7 @@ fn check_views(adjustment: &Adjustment, least_turn: f64) -> Result<()> {
 /// The free poses of a camera.
 fn views(adjustment: &Adjustment, camera: usize) -> impl Iterator<Item = &Pose> {
     let own = adjustment.used().filter(move |(_, image, _)| image.camera == camera);
-    own.filter_map(|(_, _, slack)| if let Slack::Pose(pose) = slack { Some(pose) } else { None })
+    own.filter_map(|(_, _, tie)| tie.free_pose())
 }
 
 /// Names a camera that looked at the plate from straight ahead only, whatever its distance and roll: a longer focal length and a
@@ -304,9 +304,10 @@ fn collect(fit: &Fit) -> Result<FreePoses> {
     let Fit { adjustment: Adjustment { problem, state }, linearised: lin, covariance } = fit;
     let (placed, scales) = placed_cameras(fit)?;
     let mut poses = vec![None; problem.images.len()];
-    for ((k, LinearImage { index, terms, chain, .. }), in_frame) in fit.linear().images().enumerate().zip(placed) {
+    let images = fit.linear().stops().flat_map(|stop| stop.images().map(move |image| (stop.clone(), image)));
+    for ((stop, own @ LinearImage { index, terms, chain, .. }), in_frame) in images.zip(placed) {
         let squares: f64 = terms.residuals.iter().map(|r| r.duv.norm_squared()).sum();
-        let c = covariance.slack(k, 6);
+        let c = own.part_of(&covariance.latents(&stop));
         poses[index] = Some(FreePose {
             camera_from_plate: chain.pose,
             covariance: Matrix6::from_column_slice(c.as_slice()),
@@ -338,7 +339,7 @@ fn placed_cameras(fit: &Fit) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale
                 .unwrap_or_else(|| (1.0, frame.scale_sigma_of_priors(problem, plate)));
             moved.plates[plate] = similarity.shape(&state.plates[plate], size);
             for (i, _) in problem.used().filter(|(_, image)| image.plate == plate) {
-                if let Slack::Pose(pose) = &mut moved.slack[i] {
+                if let Tie::Free(pose) = &mut moved.ties[i] {
                     *pose = similarity.pose(pose, size);
                 }
             }
@@ -348,9 +349,13 @@ fn placed_cameras(fit: &Fit) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale
     let moved = Adjustment { problem: problem.clone(), state: moved };
     let lin =
         moved.linearise().ok_or_else(|| undetermined(Code::CameraUndetermined, "a marker lies behind its camera"))?;
-    let covariance = in_frame(moved.linear(&lin), &fit.covariance)?;
-    let placed = lin.chains.iter().enumerate().map(|(k, c)| PlacedCamera::of(&c.pose, &covariance.pose(k)));
-    Ok((placed.collect(), scales))
+    let linear = moved.linear(&lin);
+    let covariance = in_frame(linear, &fit.covariance)?;
+    let of_stop = |stop: LinearStop| -> Vec<PlacedCamera> {
+        let placed = |own: LinearImage| PlacedCamera::of(&own.chain.pose, &covariance.pose(&stop, &own));
+        stop.images().map(placed).collect()
+    };
+    Ok((linear.stops().flat_map(of_stop).collect(), scales))
 }
 
 impl PlacedCamera {

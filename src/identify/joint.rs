@@ -11,7 +11,7 @@ use crate::diagnose::{Diagnosis, Setting};
 use crate::error::{Code, Error, Result};
 use crate::fit::FreePoses;
 use crate::problem::MeasuredSeries;
-use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem, Slack};
+use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem};
 use crate::solve::{
     ComponentOptions, NoiseInformation, Outcome, Status, estimate_components, reject_images, reject_observations,
     without_untold_noise,
@@ -36,7 +36,7 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
         .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
         .collect();
     let (mut start, free, mut starts) = adjust_free_poses(start, &stated, &options.limits)?;
-    let on_robot = start.problem.used().filter(|(_, i)| i.stop.is_some()).count();
+    let on_robot = start.problem.used_on_robot().count();
     check_on_robot(&start.problem, on_robot)?;
     let aside = start_robot(&mut start, &free, &mut starts, &options.limits)?;
     let (mut outcome, before) = fit(start, &free, &aside, options);
@@ -105,7 +105,7 @@ fn fit(
     if exact {
         start.problem.noise.tilt.clear();
     }
-    start.start_slack(exact);
+    start.tie_to_readings(exact);
     if let JointNoise::Known(sigma) = options.joint_noise {
         start.problem.noise.joint.iter_mut().flatten().for_each(|s| *s = sigma.max(f64::MIN_POSITIVE));
     }
@@ -127,7 +127,7 @@ fn fit(
 
 /// Adds to every wrongly paired image by how much its readings miss, and whose readings would fit it.
 fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f64) {
-    let Adjustment { problem, state } = &*adjustment;
+    let problem = &adjustment.problem;
     let mut remarks = Vec::new();
     for (i, image) in problem.images.iter().enumerate() {
         let wrong = image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair);
@@ -137,10 +137,7 @@ fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f6
         let better = (0..problem.images.len())
             .filter(|&k| k != i && problem.images[k].series == image.series)
             .filter_map(|k| {
-                let mut swapped = problem.images[i].clone();
-                swapped.stop = problem.images[k].stop.clone();
-                let predicted = state.camera_from_plate(&swapped, &Slack::None)?;
-                let (a, d) = predicted.distance(pose);
+                let (a, d) = adjustment.camera_by_readings_of(i, k)?.distance(pose);
                 Some((a + d, k))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0));
@@ -156,7 +153,7 @@ fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f6
 /// Without images of the robot there is no robot to fit.
 fn check_on_robot(problem: &Problem, on_robot: usize) -> Result<()> {
     let all = problem.images.len();
-    match problem.images.iter().filter(|i| i.stop.is_some()).count() {
+    match (0..all).filter(|&i| problem.on_robot(i)).count() {
         _ if on_robot > 0 => Ok(()),
         0 => Err(Error::new(
             Code::ReadingsMissing,

@@ -1,12 +1,12 @@
 //! Local errors of the joints: one column for every reading to which a joint came back, or at which it stood still.
 
 use crate::model::joint_terms::{JointTerm, Term};
-use crate::problem::{Image, common_readings, joined};
+use crate::model::robot::Posture;
+use crate::problem::{Stop, common_readings, joined};
 
 /// Terms for the readings that at least this share of the stops has in common with others, in the order of the readings.
-pub(super) fn local_terms(images: &[Image], readings: usize, least_share: f64) -> Vec<JointTerm> {
-    let stops: Vec<&[f64]> = images.iter().filter_map(|i| i.stop.as_ref()).map(|s| s.readings.as_slice()).collect();
-    let on_robot: Vec<_> = images.iter().filter_map(|i| i.stop.as_ref()).collect();
+pub(super) fn local_terms(stops: &[Stop], readings: usize, least_share: f64) -> Vec<JointTerm> {
+    let on_robot: Vec<&Posture> = stops.iter().filter_map(|s| s.posture.as_ref()).collect();
     let mut pairs: Vec<Vec<(usize, usize)>> = vec![Vec::new(); readings];
     for (b, later) in on_robot.iter().enumerate() {
         for (a, earlier) in on_robot[..b].iter().enumerate() {
@@ -17,26 +17,25 @@ pub(super) fn local_terms(images: &[Image], readings: usize, least_share: f64) -
     }
     let mut terms = Vec::new();
     for (reading, pairs) in pairs.into_iter().enumerate() {
-        let mut sets = joined(stops.len(), pairs.into_iter());
+        let mut sets = joined(on_robot.len(), pairs.into_iter());
         sets.retain(|set| set.len() > 1);
         let tied: usize = sets.iter().map(Vec::len).sum();
-        if (tied as f64) < least_share * stops.len() as f64 {
+        if (tied as f64) < least_share * on_robot.len() as f64 {
             continue;
         }
         for set in sets {
-            let mean = set.iter().map(|&k| stops[k][reading]).sum::<f64>() / set.len() as f64;
+            let mean = set.iter().map(|&k| on_robot[k].readings[reading]).sum::<f64>() / set.len() as f64;
             terms.push(JointTerm { reading, term: Term::local(mean), value: 0.0 });
         }
     }
     terms
 }
 
-/// Sum of the squares of the local basis functions of every reading at the stop of an image.
-pub(super) fn local_share(terms: &[JointTerm], image: &Image) -> Vec<f64> {
-    let Some(stop) = &image.stop else { return Vec::new() };
-    let mut share = vec![0.0; stop.readings.len()];
+/// Sum of the squares of the local basis functions of every reading at a posture.
+pub(super) fn local_share(terms: &[JointTerm], posture: &Posture) -> Vec<f64> {
+    let mut share = vec![0.0; posture.readings.len()];
     for t in terms {
-        share[t.reading] += t.local_basis(stop.readings[t.reading]).map_or(0.0, |basis| basis * basis);
+        share[t.reading] += t.local_basis(posture.readings[t.reading]).map_or(0.0, |basis| basis * basis);
     }
     share
 }

@@ -10,7 +10,7 @@ use crate::fit::FreePoses;
 use crate::geom::log_so3;
 use crate::init::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
 use crate::linalg::symmetric_eigen;
-use crate::problem::{Adjustment, Image, ImageRejection, Misfit, Mismatch, Problem, Slack, State, predict};
+use crate::problem::{Adjustment, ImageRejection, Misfit, Mismatch, Problem, State, TakenFrom, predict};
 
 /// Closed forms whose pixel cost is compared.
 const COMPARED: usize = 4;
@@ -25,7 +25,7 @@ pub(super) fn start_robot(
     let mut aside = Vec::new();
     let mut groups: BTreeMap<(usize, usize), Vec<(usize, PosePair)>> = BTreeMap::new();
     for (i, image, _) in adjustment.used() {
-        let (Some(stop), Some(pose)) = (&image.stop, &free.poses[i]) else { continue };
+        let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
         let pair = PosePair::of_stop(&adjustment.state.robot, image.mount, &stop.readings, pose.camera_from_plate);
         groups.entry((image.mounting, image.placement)).or_default().push((i, pair));
     }
@@ -101,7 +101,7 @@ fn closed_form(
         let mut trial = state.clone();
         trial.mountings[mounting] = s.solution.camera;
         trial.placements[placement] = s.solution.plate;
-        let errors = pairs.iter().map(|(i, _)| pixels(&problem.images[*i], &trial).unwrap_or(f64::INFINITY));
+        let errors = pairs.iter().map(|(i, _)| pixels(problem, &trial, *i).unwrap_or(f64::INFINITY));
         upper_median(errors.collect())
     };
     let mut ranked: Vec<(f64, &HandEyeStart)> = starts.iter().take(COMPARED).map(|s| (cost(s), s)).collect();
@@ -144,8 +144,9 @@ fn no_fit(of: &str, what: &str) -> Error {
 }
 
 /// RMS pixel error of an image at the pose that its readings predict; `None` where a marker lies behind the camera.
-fn pixels(image: &Image, state: &State) -> Option<f64> {
-    let pose = state.camera_from_plate(image, &Slack::None)?;
+fn pixels(problem: &Problem, state: &State, image: usize) -> Option<f64> {
+    let (image, posture) = (&problem.images[image], problem.posture(image)?);
+    let pose = state.camera_from_plate(image, TakenFrom::exact(posture))?;
     let (mut sum, mut count) = (0.0, 0.0);
     for o in image.used() {
         sum += (o.uv - predict(image, state, &pose, o)?.uv).norm_squared();
@@ -207,8 +208,8 @@ pub(super) fn take_back(adjustment: &mut Adjustment, free: &FreePoses, aside: &[
         let (angle, distance) = adjustment.misfit(&free.poses[i].as_ref()?.camera_from_plate, i)?;
         Some(angle + distance)
     };
-    let on_robot = adjustment.problem.used().filter(|(_, image)| image.stop.is_some());
-    let Some(usual) = median(&on_robot.filter_map(|(i, _)| size(i)).collect::<Vec<f64>>()) else { return false };
+    let on_robot = adjustment.problem.used_on_robot();
+    let Some(usual) = median(&on_robot.filter_map(size).collect::<Vec<f64>>()) else { return false };
     let fits = |i: &usize| size(*i).is_some_and(|s| s < limits.set_aside_factor * usual);
     let back: Vec<usize> = aside.iter().copied().filter(fits).collect();
     back.iter().for_each(|&i| adjustment.problem.images[i].rejected = None);

@@ -53,8 +53,10 @@ impl Suspects<'_> {
     }
 
     fn readings(&self) -> Vec<Vec<f64>> {
-        let stop = |i: usize| self.problem.images[i].stop.as_ref();
-        self.pairs.iter().map(|(i, _)| stop(*i).map(|s| s.readings.clone()).unwrap_or_default()).collect()
+        self.pairs
+            .iter()
+            .map(|(i, _)| self.problem.posture(*i).map(|s| s.readings.clone()).unwrap_or_default())
+            .collect()
     }
 
     fn misfit(&self, readings: &[Vec<f64>]) -> f64 {

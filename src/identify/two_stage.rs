@@ -12,8 +12,10 @@ use crate::assess::refitted;
 use crate::fit::Fit;
 use crate::geom::{Pose, right_jacobian_se3};
 use crate::linalg::{SymmetricFactor, product};
-use crate::problem::{Adjustment, Chained, Problem, Slack, State, Step};
-use crate::solve::{ComponentOptions, Elimination, Settings, Status, System, Tally, estimate_components, share_out};
+use crate::problem::{Adjustment, Chained, Problem, State, Step, TakenFrom, Tie};
+use crate::solve::{
+    ComponentOptions, Elimination, LinearImage, Settings, Status, System, Tally, estimate_components, share_out,
+};
 
 use super::estimator::Estimator;
 use super::options::JointNoise;
@@ -67,16 +69,17 @@ impl PoseStage {
         let system = System::with(Elimination::Markers, free.linear(&lin), 0.0);
         let factor = SymmetricFactor::new(&system.information).ok()?;
         let (x, all) = (factor.solve(&system.rhs), factor.inverse());
-        let on_robot: Vec<usize> =
-            (0..lin.images.len()).filter(|&k| free.problem.images[lin.images[k]].stop.is_some()).collect();
-        let rows: Vec<usize> = on_robot
-            .iter()
-            .flat_map(|&k| (0..6).map(move |c| (k, c)))
-            .map(|(k, c)| system.slack_start[k] + c)
-            .collect();
+        let linear = free.linear(&lin);
+        let on_robot = linear.stops().filter(|stop| stop.stop.posture.is_some());
+        let start = |at: usize| system.latent_start[at];
+        let (images, rows): (Vec<LinearImage>, Vec<_>) = on_robot
+            .flat_map(|stop| stop.images().map(move |image| (stop.at, image)))
+            .map(|(at, image)| (image, image.latents().into_iter().flatten().map(move |c| start(at) + c)))
+            .unzip();
+        let rows: Vec<usize> = rows.into_iter().flatten().collect();
         Some(Self {
-            images: on_robot.iter().map(|&k| lin.images[k]).collect(),
-            references: on_robot.iter().map(|&k| lin.chains[k].pose).collect(),
+            images: images.iter().map(|own| own.index).collect(),
+            references: images.iter().map(|own| own.chain.pose).collect(),
             offset: DVector::from_iterator(rows.len(), rows.iter().map(|&r| x[r])),
             covariance: DMatrix::from_fn(rows.len(), rows.len(), |i, j| all[(rows[i], rows[j])]),
             state: free.state,
@@ -93,14 +96,17 @@ impl PoseStage {
 fn with_free_poses(start: &Adjustment) -> Option<Adjustment> {
     let mut free = start.clone();
     free.hold_poses();
-    for (i, image, slack) in start.used() {
-        free.state.slack[i] = Slack::Pose(start.state.camera_from_plate(image, slack)?);
+    free.state.joint_errors.fill(Vec::new());
+    for (i, ..) in start.used() {
+        free.state.ties[i] = Tie::Free(start.camera_from_plate(i)?);
     }
     Some(free)
 }
 
-/// Latent noise of one pose: `L` (6 x n) and the component that each of its columns belongs to.
+/// Latent noise of some poses that follow each other: `L` (6 a pose x n) and the component that each of its columns belongs to.
 struct Latent {
+    /// The first of the poses.
+    first: usize,
     enters_by: DMatrix<f64>,
     component: Vec<usize>,
     /// Known variance beside that of the component.
@@ -157,45 +163,59 @@ impl ErrorModel {
         Some(Self { estimator, known, blocks, sizes, estimated })
     }
 
-    fn latent(&self, problem: &Problem, image: usize, k: usize, d_slack: &DMatrix<f64>) -> Option<Latent> {
-        Some(match self.estimator {
-            Estimator::Isotropic => {
-                Latent { enters_by: DMatrix::identity(6, 6), component: vec![0, 0, 0, 1, 1, 1], beside: vec![0.0; 6] }
-            }
-            Estimator::Blocks => {
-                let root = self.blocks[k].cholesky()?.l();
-                Latent {
-                    enters_by: DMatrix::from_column_slice(6, 6, root.as_slice()),
-                    component: vec![0; 6],
-                    beside: vec![0.0; 6],
-                }
-            }
-            _ => {
-                let image = &problem.images[image];
-                let per_series = sizes_per_series(problem);
-                let component = |k: usize| image.series * per_series + k.min(per_series - 1);
-                Latent {
-                    enters_by: d_slack.clone(),
-                    component: (0..d_slack.ncols()).map(component).collect(),
-                    beside: (0..d_slack.ncols()).map(|k| problem.slack_variance(image, k)[1]).collect(),
-                }
-            }
-        })
+    /// Of a pose by itself.
+    fn of_pose(&self, first: usize) -> Option<Latent> {
+        let (enters_by, component) = match self.estimator {
+            Estimator::Isotropic => (Matrix6::identity(), vec![0, 0, 0, 1, 1, 1]),
+            _ => (self.blocks[first].cholesky()?.l(), vec![0; 6]),
+        };
+        let enters_by = DMatrix::from_column_slice(6, 6, enters_by.as_slice());
+        Some(Latent { first, enters_by, component, beside: vec![0.0; 6] })
+    }
+
+    /// Of the poses of one stop: they have the errors of its readings in common, and each its own tilt.
+    fn of_stop(problem: &Problem, first: usize, images: &[usize], d_latent: &[DMatrix<f64>]) -> Latent {
+        let stop = &problem.stops[problem.images[images[0]].stop];
+        let (n, per_series) = (stop.readings(), sizes_per_series(problem));
+        let all = n + d_latent.iter().map(|l| l.ncols() - n).sum::<usize>();
+        let mut enters_by = DMatrix::zeros(6 * images.len(), all);
+        let mut tilt = n;
+        for (k, l) in d_latent.iter().enumerate() {
+            enters_by.view_mut((6 * k, 0), (6, n)).copy_from(&l.columns(0, n));
+            enters_by.view_mut((6 * k, tilt), (6, l.ncols() - n)).copy_from(&l.columns_range(n..));
+            tilt += l.ncols() - n;
+        }
+        Latent {
+            first,
+            enters_by,
+            component: (0..all).map(|k| stop.series * per_series + k.min(per_series - 1)).collect(),
+            beside: (0..all).map(|k| if k < n { problem.joint_error_variance(stop, k)[1] } else { 0.0 }).collect(),
+        }
     }
 
     /// Those of all poses.
     fn latents(&self, problem: &Problem, stage: &PoseStage, p: &Predicted) -> Option<Vec<Latent>> {
-        let poses = stage.images.iter().zip(&p.d_slack).enumerate();
-        poses.map(|(k, (&i, l))| self.latent(problem, i, k, l)).collect()
+        if !self.estimator.has_joint_noise() {
+            return (0..stage.images.len()).map(|k| self.of_pose(k)).collect();
+        }
+        let stop_of = |i: &usize| problem.images[*i].stop;
+        let mut first = 0;
+        let of_stop = |images: &[usize]| {
+            let poses = first..first + images.len();
+            first = poses.end;
+            Some(Self::of_stop(problem, poses.start, images, &p.d_latent[poses]))
+        };
+        stage.images.chunk_by(|a, b| stop_of(a) == stop_of(b)).map(of_stop).collect()
     }
 
     /// `V`.
     fn covariance(&self, latents: &[Latent]) -> DMatrix<f64> {
         let mut v = self.known.clone();
-        for (k, l) in latents.iter().enumerate() {
+        for l in latents {
             let variances = l.component.iter().zip(&l.beside).map(|(&c, beside)| self.sizes[c].powi(2) + beside);
             let sizes = DVector::from_iterator(l.component.len(), variances);
-            let mut block = v.view_mut((6 * k, 6 * k), (6, 6));
+            let (start, rows) = (6 * l.first, l.enters_by.nrows());
+            let mut block = v.view_mut((start, start), (rows, rows));
             block += &l.enters_by * DMatrix::from_diagonal(&sizes) * l.enters_by.transpose();
         }
         v
@@ -213,9 +233,10 @@ impl ErrorModel {
         projected: &DMatrix<f64>,
     ) -> f64 {
         let mut tally = Tally::new(self.sizes.len());
-        for (k, l) in latents.iter().enumerate() {
-            let pull = l.enters_by.transpose() * weighted.rows(6 * k, 6);
-            let share = l.enters_by.transpose() * projected.view((6 * k, 6 * k), (6, 6)) * &l.enters_by;
+        for l in latents {
+            let (start, rows) = (6 * l.first, l.enters_by.nrows());
+            let pull = l.enters_by.transpose() * weighted.rows(start, rows);
+            let share = l.enters_by.transpose() * projected.view((start, start), (rows, rows)) * &l.enters_by;
             for (a, &c) in l.component.iter().enumerate() {
                 let variance = self.sizes[c].powi(2);
                 tally.squares[c] += (variance * pull[a]).powi(2);
@@ -260,25 +281,27 @@ struct Predicted {
     residual: DVector<f64>,
     /// Derivative of the prediction by the columns that act through the poses; fixed columns are zero.
     jacobian: DMatrix<f64>,
-    /// Derivative of each prediction by its joint readings.
-    d_slack: Vec<DMatrix<f64>>,
+    /// Derivative of each prediction by the errors of its joint readings and its tilt.
+    d_latent: Vec<DMatrix<f64>>,
 }
 
 fn predict(Adjustment { problem, state }: &Adjustment, stage: &PoseStage) -> Option<Predicted> {
     let theta = problem.layout.theta_len();
     let n = stage.offset.len();
-    let mut p = Predicted { residual: stage.offset.clone(), jacobian: DMatrix::zeros(n, theta), d_slack: Vec::new() };
+    let mut p = Predicted { residual: stage.offset.clone(), jacobian: DMatrix::zeros(n, theta), d_latent: Vec::new() };
+    let (exact, upright) = (vec![0.0; state.robot.chain.readings.len()], problem.upright_tie());
     for (k, &i) in stage.images.iter().enumerate() {
         let image = &problem.images[i];
-        let exact = problem.exact_slack(image);
-        let Chained { pose, d_theta, d_slack } = state.chained(&problem.layout, image, &exact)?;
+        let posture = problem.posture(i)?;
+        let from = TakenFrom { posture: Some(posture), joint_errors: &exact, tie: &upright };
+        let Chained { pose, d_theta, d_latent } = state.chained(&problem.layout, image, from)?;
         let x: Vector6<f64> = (stage.references[k].inverse() * pose).log();
         let chart = right_jacobian_se3(&x).try_inverse()?;
         let chart = DMatrix::from_column_slice(6, 6, chart.as_slice());
         let mut residual = p.residual.fixed_rows_mut::<6>(6 * k);
         residual -= x;
         p.jacobian.rows_mut(6 * k, 6).copy_from(&(&chart * d_theta));
-        p.d_slack.push(chart * d_slack);
+        p.d_latent.push(chart * d_latent);
     }
     for (c, column) in problem.layout.columns[..theta].iter().enumerate().filter(|(_, c)| !c.free) {
         debug_assert!(!column.free);
@@ -317,12 +340,8 @@ fn normal(Adjustment { problem, state }: &Adjustment, p: &Predicted, weight: &DM
 fn moved(Adjustment { problem, state }: &Adjustment, step: &DVector<f64>) -> State {
     let mut dense = DVector::zeros(problem.layout.len());
     dense.rows_mut(0, step.len()).copy_from(step);
-    let step = Step {
-        dense,
-        slack: vec![Vec::new(); state.slack.len()],
-        markers: state.plates.iter().map(|p| vec![nalgebra::Vector3::zeros(); p.nominal.len()]).collect(),
-    };
-    state.moved(&problem.layout, &step)
+    let markers = state.plates.iter().map(|p| vec![nalgebra::Vector3::zeros(); p.nominal.len()]).collect();
+    state.moved(&problem.layout, &Step::of(dense, markers, state))
 }
 
 /// The robot from free poses, by one of the four two-stage estimators; `None` where it has no solution.
@@ -333,7 +352,8 @@ pub fn fit_poses(start: &Adjustment, stage: &PoseStage, estimator: Estimator, no
     let mut at = start.clone();
     at.state.cameras.clone_from(&stage.state.cameras);
     at.state.plates.clone_from(&stage.state.plates);
-    at.state.slack.clone_from(&stage.state.slack);
+    at.state.joint_errors.clone_from(&stage.state.joint_errors);
+    at.state.ties.clone_from(&stage.state.ties);
     if matches!(estimator, Estimator::Isotropic | Estimator::Blocks) || noise != JointNoise::Estimated {
         at.without_local_errors();
     }
@@ -369,7 +389,7 @@ fn with_cameras_for_the_robot(at: Adjustment, sizes: &[f64]) -> State {
     let problem = with_sizes(&at.problem, Estimator::FullAndRepeatability, sizes);
     let mut given = Adjustment { problem, state: at.state };
     given.hold_poses();
-    given.start_slack(sizes.iter().all(|s| *s == 0.0));
+    given.tie_to_readings(sizes.iter().all(|s| *s == 0.0));
     refitted(given)
 }
 
@@ -429,7 +449,7 @@ pub fn linear_step(start: &Adjustment, stage: &PoseStage, sigma: f64) -> Option<
 pub fn fit_joint(start: &Adjustment, estimator: Estimator, noise: JointNoise) -> Option<(Problem, Estimate)> {
     let mut own = start.clone();
     let hard = estimator == Estimator::HardJoint || noise == JointNoise::Known(0.0);
-    own.start_slack(hard);
+    own.tie_to_readings(hard);
     let first = if let JointNoise::Known(sigma) = noise { sigma } else { FIRST_JOINT_NOISE };
     own.problem.noise.start_at(first.max(f64::MIN_POSITIVE));
     if hard || noise != JointNoise::Estimated {

@@ -40,7 +40,7 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
         .collect();
     let (mut adjustment, free, mut starts) = adjust_free_poses(adjustment, &stated, limits)?;
     start_robot(&mut adjustment, &free, &mut starts, limits)?;
-    adjustment.start_slack(false);
+    adjustment.tie_to_readings(false);
     let outcome = estimate_components(adjustment, &ComponentOptions::default());
     if outcome.status != Status::Converged {
         return Err(Error::new(

@@ -13,7 +13,7 @@ use crate::identify::RobotModel;
 use crate::model::camera::{Camera, Lens};
 use crate::model::joint_terms::JointTerm;
 use crate::model::robot::{Posture, Robot};
-use crate::plan::setting::Setting;
+use crate::plan::setting::{PlannedStop, Setting};
 use crate::problem::{Image, Measured};
 use crate::series::{Marker, Plate};
 use crate::urdf::Chain;
@@ -92,7 +92,7 @@ pub fn read_pose(path: &Path) -> Result<Pose> {
 ///
 /// # Errors
 /// A solution of another robot, or without images on the robot.
-pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -> Result<(Setting, Vec<Image>)> {
+pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -> Result<(Setting, Vec<PlannedStop>)> {
     let refuse = |what: String, remedy: &str| Error::new(Code::SolutionDiffers, "solution.json", what, remedy);
     if record.robot.readings != chain.readings {
         let what = format!("is of joints {}", record.robot.readings.join(", "));
@@ -111,7 +111,8 @@ pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -
     let used = |i: &&ImageRecord| {
         on_robot(i) && (i.camera, i.mounting, i.plate) == (first.camera, first.mounting, first.plate)
     };
-    let images: Vec<Image> = record.images.iter().filter(used).map(|i| taken(i, camera.pixel_factor, record)).collect();
+    let stops: Vec<PlannedStop> =
+        record.images.iter().filter(used).filter_map(|i| taken(i, camera.pixel_factor, record)).collect();
     let setting = Setting {
         robot: calibrated(record, chain, model),
         camera: lens,
@@ -119,10 +120,10 @@ pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -
         mounting: (&record.mountings[first.mounting].pose).into(),
         placements: record.placements.iter().map(|p| (p.name.clone(), (&p.pose).into())).collect(),
         plate: plate(record, first.plate),
-        pixel_sigma_px: typical_sigma(&images),
+        pixel_sigma_px: typical_sigma(&stops),
         joint_sigma: camera.joint_noise.clone(),
     };
-    Ok((setting, images))
+    Ok((setting, stops))
 }
 
 /// The robot with the twists and terms of the solution; terms of the model that it has not stand at zero.
@@ -159,23 +160,23 @@ fn plate(record: &SolutionRecord, index: usize) -> Plate {
     plate
 }
 
-/// An image of the solution with the observations in use, at the place where they are predicted.
-fn taken(image: &ImageRecord, pixel_factor: f64, record: &SolutionRecord) -> Image {
+/// A stop of the solution, with the observations in use at the place where they are predicted; `None` off the robot.
+fn taken(image: &ImageRecord, pixel_factor: f64, record: &SolutionRecord) -> Option<PlannedStop> {
     let plate = &record.plates[image.plate];
-    let stop = image.readings.clone().map(|readings| Posture { readings, approach: image.approach.clone() });
-    Image {
+    let posture = Posture { readings: image.readings.clone()?, approach: image.approach.clone() };
+    let image = Image {
         name: image.name.clone(),
         series: 0,
+        stop: 0,
         camera: 0,
         mounting: 0,
         placement: image.placement,
         plate: 0,
         mount: image.camera_mount,
-        stop,
         observations: observations(&image.observations, pixel_factor, &plate.id),
-        local_share: Vec::new(),
         rejected: None,
-    }
+    };
+    Some(PlannedStop { posture, image })
 }
 
 fn observations(columns: &ObservationColumns, pixel_factor: f64, ids: &[u32]) -> Vec<Measured> {
@@ -201,10 +202,10 @@ fn observations(columns: &ObservationColumns, pixel_factor: f64, ids: &[u32]) ->
 }
 
 /// Median standard deviation of an observation, px.
-fn typical_sigma(images: &[Image]) -> f64 {
-    let mut all: Vec<f64> = images
+fn typical_sigma(stops: &[PlannedStop]) -> f64 {
+    let mut all: Vec<f64> = stops
         .iter()
-        .flat_map(|i| &i.observations)
+        .flat_map(|s| &s.image.observations)
         .map(|o| (2.0 / o.information.trace().max(f64::MIN_POSITIVE)).sqrt())
         .collect();
     all.sort_by(f64::total_cmp);

@@ -56,7 +56,8 @@ pub(super) fn determined(solution: &Solution, start: usize) -> bool {
 }
 
 fn first_on_robot(solution: &Solution, which: impl Fn(&Image) -> bool) -> Option<&Image> {
-    solution.fit.problem.used().map(|(_, i)| i).find(|i| i.stop.is_some() && which(i))
+    let problem = &solution.fit.problem;
+    problem.used_on_robot().map(|i| &problem.images[i]).find(|i| which(i))
 }
 
 /// `flange_from_camera` (or `base_from_camera`) of every mounting that the robot's images determine.

@@ -4,15 +4,13 @@ use nalgebra::Vector2;
 
 use crate::geom::Pose;
 use crate::identify::Solution;
-use crate::problem::{Slack, predict};
+use crate::problem::predict;
 
 /// Where each image was taken from, as the estimates say: with its joint noise for images in use, from the readings alone
 /// for those left out, `None` where there is neither.
 pub(super) fn poses(solution: &Solution) -> Vec<Option<Pose>> {
-    let (problem, state) = (&solution.fit.problem, &solution.fit.state);
-    let mut poses: Vec<Option<Pose>> = (problem.images.iter())
-        .map(|i| i.stop.as_ref().and_then(|_| state.camera_from_plate(i, &Slack::None)))
-        .collect();
+    let images = 0..solution.fit.problem.images.len();
+    let mut poses: Vec<Option<Pose>> = images.map(|i| solution.fit.camera_by_readings(i)).collect();
     for (&i, chain) in solution.fit.linearised.images.iter().zip(&solution.fit.linearised.chains) {
         poses[i] = Some(chain.pose);
     }

@@ -13,7 +13,7 @@ use crate::model::camera::Camera;
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes::MODES;
 use crate::model::robot::{Posture, Robot};
-use crate::problem::{Layout, PlateShape, Slack, State};
+use crate::problem::{Layout, PlateShape, State};
 use crate::problem::{MeasuredSeries, MeasuredStop};
 use crate::series::{CameraMount, Marker, Observation, Plate};
 use crate::urdf::{Chain, RobotDescription};
@@ -170,7 +170,8 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
         placements: record.placements.iter().map(|p| (&p.pose).into()).collect(),
         cameras: record.cameras.iter().map(camera).collect(),
         plates: record.plates.iter().map(|p| plate(p).map(|p| PlateShape::nominal(&p))).collect::<Result<_>>()?,
-        slack: record.images.iter().map(|_| Slack::None).collect(),
+        joint_errors: Vec::new(),
+        ties: Vec::new(),
     };
     let names = |all: &[super::solution_json::PlacedRecord]| all.iter().map(|p| p.name.clone()).collect::<Vec<_>>();
     let cameras: Vec<String> = record.cameras.iter().map(|c| c.name.clone()).collect();

@@ -21,7 +21,7 @@ use crate::geom::Pose;
 use crate::identify::{Solution, depths_m, stated_covariance};
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes;
-use crate::problem::{Image, Problem, Slack, State};
+use crate::problem::{Image, Problem, State};
 use crate::series::Observation;
 
 /// The record of a solution.
@@ -277,10 +277,8 @@ fn images(solution: &Solution, context: &Context) -> Vec<ImageRecord> {
     let names = ImageNames::new(problem, context);
     let poses = poses(solution);
     let image = |(k, i): (usize, &Image)| {
-        let joint_noise = match (&solution.fit.state.slack[k], &i.rejected, &i.stop) {
-            (Slack::Joints(dq), None, Some(_)) => Some(dq[..solution.fit.state.robot.chain.readings.len()].to_vec()),
-            _ => None,
-        };
+        let from = solution.fit.taken_from(k);
+        let joint_noise = Some(from.joint_errors.to_vec()).filter(|_| i.rejected.is_none() && from.joints() > 0);
         let observations = observations(solution, k, poses[k].as_ref());
         ImageRecord {
             name: names.of(k).to_owned(),
@@ -290,8 +288,8 @@ fn images(solution: &Solution, context: &Context) -> Vec<ImageRecord> {
             placement: i.placement,
             plate: i.plate,
             camera_mount: i.mount,
-            readings: i.stop.as_ref().map(|s| s.readings.clone()),
-            approach: i.stop.as_ref().and_then(|s| s.approach.clone()),
+            readings: from.posture.map(|p| p.readings.clone()),
+            approach: from.posture.and_then(|p| p.approach.clone()),
             joint_noise,
             camera_from_plate: poses[k].as_ref().map(Into::into),
             free_pose: solution.free_poses.poses[k].as_ref().map(|free| FreePoseRecord {

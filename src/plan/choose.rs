@@ -9,14 +9,14 @@ use crate::error::{Code, Error, Result};
 use crate::linalg::LinearRow;
 use crate::plan::candidates::{Candidate, CandidateOptions, Search, Tally, candidates, workspace};
 use crate::plan::criterion::Criterion;
-use crate::plan::information::{Told, candidate_information, flange_weight, image_information};
+use crate::plan::information::{Told, candidate_information, flange_weight, stop_information};
 use crate::plan::order::{Leg, imbalance, tour};
 use crate::plan::refine::{Refined, Refinement};
 use crate::plan::relax::{Design, NoDesign};
 use crate::plan::rounding::round;
 use crate::plan::scene::{Scene, SceneOptions};
-use crate::plan::setting::{Setting, rough_knowledge};
-use crate::problem::{Adjustment, Image, Layout};
+use crate::plan::setting::{PlannedStop, Setting, rough_knowledge};
+use crate::problem::{Adjustment, Layout};
 
 /// What the user wants to know.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,7 +50,7 @@ pub struct PlanRequest {
     /// What is roughly known.
     pub setting: Setting,
     /// Images that were taken already.
-    pub taken: Vec<Image>,
+    pub taken: Vec<PlannedStop>,
     /// Images.
     pub count: usize,
     /// Criterion.
@@ -138,8 +138,8 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
     let problem = &adjustment.problem;
     let mut known = rough_knowledge(problem, &setting.camera);
     let prior: Vec<f64> = known.diagonal().iter().map(|m| 1.0 / m).collect();
-    for image in &request.taken {
-        if let Some(m) = image_information(&adjustment, setting, image) {
+    for stop in &request.taken {
+        if let Some(m) = stop_information(&adjustment, stop) {
             known += m;
         }
     }

@@ -8,8 +8,8 @@ use crate::assess::root_mean_square;
 use crate::error::{Code, Error, Result};
 use crate::linalg::SymmetricFactor;
 use crate::plan::criterion::Criterion;
-use crate::plan::setting::Setting;
-use crate::problem::{Adjustment, Image};
+use crate::plan::setting::{PlannedStop, Setting};
+use crate::problem::Adjustment;
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
 
@@ -104,11 +104,9 @@ const WORTH_NAMING: f64 = 0.25;
 ///
 /// # Errors
 /// Where the images do not determine camera, plate or hand-camera offset.
-pub fn exact_covariance(planned: &Adjustment, setting: &Setting, images: Vec<Image>) -> Result<DMatrix<f64>> {
-    let mut planned = planned.clone();
-    planned.state.slack = vec![setting.slack(); images.len()];
-    let (n, count) = (planned.problem.layout.len(), images.len());
-    planned.problem.images = images;
+pub fn exact_covariance(planned: &Adjustment, setting: &Setting, stops: Vec<PlannedStop>) -> Result<DMatrix<f64>> {
+    let (n, count) = (planned.problem.layout.len(), stops.len());
+    let planned = setting.with_stops(planned, stops);
     let singular = || {
         let what = format!("{count} images do not determine camera, plate and hand-camera offset");
         Error::new(
@@ -129,13 +127,13 @@ pub fn flange_m(weight: &DMatrix<f64>, covariance: &DMatrix<f64>) -> f64 {
 }
 
 impl Plan {
-    /// The images of planned stops (indices into the legs).
-    fn images(&self, setting: &Setting, legs: impl Iterator<Item = usize>) -> Vec<Image> {
-        let image = |k: usize| {
+    /// Planned stops (indices into the legs).
+    fn stops(&self, setting: &Setting, legs: impl Iterator<Item = usize>) -> Vec<PlannedStop> {
+        let stop = |k: usize| {
             let c = &self.pool[self.legs[k].stop];
-            setting.image(&self.adjustment.state, &image_name(k), &c.readings, c.placement)
+            setting.stop(&self.adjustment.state, &image_name(k), &c.readings, c.placement)
         };
-        legs.filter_map(image).collect()
+        legs.filter_map(stop).collect()
     }
 }
 
@@ -153,21 +151,21 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
     let n = plan.legs.len();
     let importance = importance(plan);
     let exact = |legs: &[usize]| {
-        let mut images = request.taken.clone();
-        images.extend(plan.images(setting, legs.iter().copied()));
-        exact_covariance(&plan.adjustment, setting, images)
+        let mut stops = request.taken.clone();
+        stops.extend(plan.stops(setting, legs.iter().copied()));
+        exact_covariance(&plan.adjustment, setting, stops)
     };
     let whole = exact(&(0..n).collect::<Vec<_>>())?;
     let random = |count: usize| -> Option<f64> {
         let step = plan.drawn as f64 / count as f64;
         let one = |draw: usize| {
-            let mut images = request.taken.clone();
-            images.extend((0..count).filter_map(|k| {
+            let mut stops = request.taken.clone();
+            stops.extend((0..count).filter_map(|k| {
                 let shift = draw as f64 / RANDOM_DRAWS as f64;
                 let c = &plan.pool[((k as f64 + shift) * step) as usize];
-                setting.image(&plan.adjustment.state, "", &c.readings, c.placement)
+                setting.stop(&plan.adjustment.state, "", &c.readings, c.placement)
             }));
-            let covariance = exact_covariance(&plan.adjustment, setting, images).ok()?;
+            let covariance = exact_covariance(&plan.adjustment, setting, stops).ok()?;
             Some((flange_m(&plan.weight, &covariance).powi(2), 1.0))
         };
         let squares: Vec<(f64, f64)> = (0..RANDOM_DRAWS).into_par_iter().filter_map(one).collect();

@@ -4,18 +4,18 @@ use nalgebra::{DMatrix, Vector3};
 
 use super::candidates::Candidate;
 use super::criterion::Criterion;
-use super::setting::Setting;
+use super::setting::{PlannedStop, Setting};
 use crate::geom::skew;
 use crate::linalg::{product, symmetric_eigen};
 use crate::model::robot::{Posture, Robot};
-use crate::problem::{self, Adjustment, Image, Problem, Weighting, by_columns, linearise};
+use crate::problem::{self, Adjustment, Problem, TakenFrom, Tie, Weighting, by_columns, linearise};
 
-/// Information of an image about all columns; `None` where it shows nothing.
+/// Information of the image of a stop about all columns; `None` where it shows nothing.
 ///
 /// Joint noise is eliminated (Schur complement); the corrections of single markers and the displacement field of a lens are taken as
 /// known.
-pub fn image_information(planned: &Adjustment, setting: &Setting, image: &Image) -> Option<DMatrix<f64>> {
-    let (h, t) = condensed(planned, setting, image)?;
+pub fn stop_information(planned: &Adjustment, stop: &PlannedStop) -> Option<DMatrix<f64>> {
+    let (h, t) = condensed(planned, stop)?;
     Some(carried(&h, &t))
 }
 
@@ -28,14 +28,14 @@ fn carried(h: &DMatrix<f64>, t: &DMatrix<f64>) -> DMatrix<f64> {
 /// Information `H` of an image about its camera pose and intrinsics, and their derivatives `T` by all columns.
 fn condensed(
     Adjustment { problem, state }: &Adjustment,
-    setting: &Setting,
-    image: &Image,
+    PlannedStop { posture, image }: &PlannedStop,
 ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-    let slack = setting.slack();
-    let chain = state.chained(&problem.layout, image, &slack)?;
+    let prior: Vec<f64> = problem.noise.joint[image.series].iter().map(|s| s.powi(-2)).collect();
+    let exact = vec![0.0; prior.len()];
+    let from = TakenFrom { posture: Some(posture), joint_errors: &exact, tie: &Tie::Rigid };
+    let chain = state.chained(&problem.layout, image, from)?;
     let terms = linearise(image, state, &chain.pose, &Weighting::of(problem, image))?;
-    let slack: Vec<f64> = problem.noise.joint[image.series].iter().map(|s| s.powi(-2)).collect();
-    let h = problem::condensed(&terms, &chain.d_slack, &slack)?;
+    let h = problem::condensed(&terms, &chain.d_latent, &prior)?;
     let t = by_columns(&problem.layout, image, &chain);
     Some((h, t))
 }
@@ -45,8 +45,8 @@ fn condensed_candidate(
     setting: &Setting,
     candidate: &Candidate,
 ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-    let image = setting.image(&planned.state, "", &candidate.readings, candidate.placement)?;
-    condensed(planned, setting, &image)
+    let stop = setting.stop(&planned.state, "", &candidate.readings, candidate.placement)?;
+    condensed(planned, &stop)
 }
 
 /// Directions in the space of the columns about which images tell something, and those about which none does.

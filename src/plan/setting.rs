@@ -6,7 +6,7 @@ use super::visibility::seen_markers;
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
-use crate::problem::{Adjustment, Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State, predict};
+use crate::problem::{Adjustment, Image, Layout, Measured, Noise, PlateShape, Problem, State, Stop, Tie, predict};
 use crate::series::{CameraMount, Edge, Plate};
 
 /// Huber bound of planned images; predictions have no residuals, so that it never acts.
@@ -33,6 +33,15 @@ pub struct Setting {
     pub joint_sigma: Vec<f64>,
 }
 
+/// A stop with the one image that is taken at it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedStop {
+    /// Joint readings.
+    pub posture: Posture,
+    /// The image.
+    pub image: Image,
+}
+
 /// The least joint noise that is planned with, rad or m.
 pub const LEAST_JOINT_SIGMA: f64 = 1e-6;
 
@@ -47,7 +56,8 @@ impl Setting {
             placements: self.placements.iter().map(|p| p.1).collect(),
             cameras: vec![self.camera.clone()],
             plates: vec![PlateShape::nominal(&self.plate)],
-            slack: Vec::new(),
+            joint_errors: Vec::new(),
+            ties: Vec::new(),
         };
         let mut layout = Layout::new(&state, &one("hand_camera"), &names, &one("camera"), &one("plate"));
         if let Some(sigma) = scale_sigma(&self.plate) {
@@ -60,12 +70,25 @@ impl Setting {
             placements: names,
             mountings: one("hand_camera"),
             cameras: one("camera"),
+            stops: Vec::new(),
             images: Vec::new(),
             noise: Noise { pixel_factor: vec![1.0], joint: vec![joint], ..Noise::default() },
             families: Vec::new(),
             huber: HUBER,
         };
         Adjustment { problem, state }
+    }
+
+    /// An adjustment of this setting with the images of some stops, nothing known yet of their joint errors.
+    pub fn with_stops(&self, planned: &Adjustment, stops: Vec<PlannedStop>) -> Adjustment {
+        let mut with = planned.clone();
+        for (k, PlannedStop { posture, image }) in stops.into_iter().enumerate() {
+            with.problem.images.push(Image { stop: k, ..image });
+            with.problem.stops.push(Stop { series: 0, posture: Some(posture), local_share: Vec::new() });
+        }
+        with.state.joint_errors = vec![vec![0.0; self.joint_sigma.len()]; with.problem.stops.len()];
+        with.state.ties = vec![Tie::Rigid; with.problem.images.len()];
+        with
     }
 
     /// `camera_from_plate` at joint readings.
@@ -83,20 +106,19 @@ impl Setting {
         }
     }
 
-    /// The image that would be taken: every marker seen, observed where it is predicted. `None` where nothing is seen.
-    pub fn image(&self, state: &State, name: &str, readings: &[f64], placement: usize) -> Option<Image> {
+    /// The stop with the image that would be taken: every marker seen, observed where it is predicted. `None` where nothing is seen.
+    pub fn stop(&self, state: &State, name: &str, readings: &[f64], placement: usize) -> Option<PlannedStop> {
         let pose = self.camera_from_plate(readings, placement);
         let mut image = Image {
             name: name.to_owned(),
             series: 0,
+            stop: 0,
             camera: 0,
             mounting: 0,
             placement,
             plate: 0,
             mount: self.mount,
-            stop: Some(Posture::at(readings)),
             observations: Vec::new(),
-            local_share: Vec::new(),
             rejected: None,
         };
         let information = Matrix2::identity() * self.pixel_sigma_px.powi(-2);
@@ -111,12 +133,8 @@ impl Setting {
                 image.observations.push(o);
             }
         }
-        (!image.observations.is_empty()).then_some(image)
-    }
-
-    /// The slack of a planned image: joint noise, of which nothing is known yet.
-    pub fn slack(&self) -> Slack {
-        Slack::Joints(vec![0.0; self.joint_sigma.len()])
+        let posture = Posture::at(readings);
+        (!image.observations.is_empty()).then_some(PlannedStop { posture, image })
     }
 }
 

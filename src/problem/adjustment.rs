@@ -1,6 +1,6 @@
 //! A problem and where its solution stands.
 
-use super::{Image, ImageRejection, Problem, Slack, State};
+use super::{Chained, Image, ImageRejection, Problem, State, TakenFrom, Tie};
 use crate::geom::Pose;
 
 /// A problem with a value of every unknown: what a solve starts from and what it leaves.
@@ -13,9 +13,35 @@ pub struct Adjustment {
 }
 
 impl Adjustment {
-    /// The images that take part, with their indices and what they deviate by.
-    pub fn used(&self) -> impl Iterator<Item = (usize, &Image, &Slack)> {
-        self.problem.used().map(|(i, image)| (i, image, &self.state.slack[i]))
+    /// The images that take part, with their indices and ties.
+    pub fn used(&self) -> impl Iterator<Item = (usize, &Image, &Tie)> {
+        self.problem.used().map(|(i, image)| (i, image, &self.state.ties[i]))
+    }
+
+    /// Where an image was taken from, as the unknowns stand.
+    pub fn taken_from(&self, image: usize) -> TakenFrom<'_> {
+        let joint_errors = &self.state.joint_errors[self.problem.images[image].stop];
+        TakenFrom { posture: self.problem.posture(image), joint_errors, tie: &self.state.ties[image] }
+    }
+
+    /// Camera pose of an image as the unknowns say; `None` off the robot without a free pose.
+    pub fn camera_from_plate(&self, image: usize) -> Option<Pose> {
+        self.state.camera_from_plate(&self.problem.images[image], self.taken_from(image))
+    }
+
+    /// Camera pose of an image as its joint readings say; `None` off the robot.
+    pub fn camera_by_readings(&self, image: usize) -> Option<Pose> {
+        self.camera_by_readings_of(image, image)
+    }
+
+    /// Camera pose of an image as the joint readings of another say; `None` where that one was taken off the robot.
+    pub fn camera_by_readings_of(&self, image: usize, other: usize) -> Option<Pose> {
+        self.state.camera_from_plate(&self.problem.images[image], TakenFrom::exact(self.problem.posture(other)?))
+    }
+
+    /// Camera pose of an image with its derivatives by the columns and by what is latent; `None` off the robot without a free pose.
+    pub fn chained(&self, image: usize) -> Option<Chained> {
+        self.state.chained(&self.problem.layout, &self.problem.images[image], self.taken_from(image))
     }
 
     /// The adjustment without some of its images: they are held out.
@@ -49,11 +75,14 @@ impl Adjustment {
         }
     }
 
-    /// Starts all stops of the robot at right readings: [`Problem::exact_slack`], or none at all for readings that count as exact.
-    pub fn start_slack(&mut self, readings_are_exact: bool) {
+    /// Ties all images of the robot to their readings, without an error; no latent errors at all for readings that count as exact.
+    pub fn tie_to_readings(&mut self, readings_are_exact: bool) {
         let Self { problem, state } = self;
-        for (slack, image) in state.slack.iter_mut().zip(&problem.images).filter(|(_, i)| i.stop.is_some()) {
-            *slack = if readings_are_exact { Slack::None } else { problem.exact_slack(image) };
+        for (stop, errors) in problem.stops.iter().zip(&mut state.joint_errors) {
+            *errors = vec![0.0; if readings_are_exact { 0 } else { stop.readings() }];
+        }
+        for i in (0..problem.images.len()).filter(|&i| problem.on_robot(i)) {
+            state.ties[i] = if readings_are_exact { Tie::Rigid } else { problem.upright_tie() };
         }
     }
 
@@ -65,7 +94,6 @@ impl Adjustment {
 
     /// Error of rotation (rad) and of position (m) of the pose that the readings of an image say, against another; `None` off the robot.
     pub fn misfit(&self, pose: &Pose, image: usize) -> Option<(f64, f64)> {
-        let predicted = self.state.camera_from_plate(&self.problem.images[image], &Slack::None)?;
-        Some(predicted.distance(pose))
+        Some(self.camera_by_readings(image)?.distance(pose))
     }
 }

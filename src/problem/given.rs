@@ -4,7 +4,8 @@ use super::family::Family;
 use super::image::Image;
 use super::layout::Layout;
 use super::noise::Noise;
-use super::state::Slack;
+use super::stop::{Stop, Tie};
+use crate::model::robot::Posture;
 use crate::series::Plate;
 
 /// Smallest prior sigma of a marker coordinate, m: below it a marker counts as fixed.
@@ -23,7 +24,9 @@ pub struct Problem {
     pub mountings: Vec<String>,
     /// Names of the cameras.
     pub cameras: Vec<String>,
-    /// Images, in the order of series and row.
+    /// Stops, in the order of series and row.
+    pub stops: Vec<Stop>,
+    /// Images, in the order of their stops.
     pub images: Vec<Image>,
     /// Variance components.
     pub noise: Noise,
@@ -34,35 +37,58 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Variances of the slack of one reading (behind the readings: of the tilt) at a stop, rad^2 or m^2: its own part, and the part of the local error that no
-    /// column stands for.
-    pub fn slack_variance(&self, image: &Image, reading: usize) -> [f64; 2] {
-        let Some(own) = self.noise.joint[image.series].get(reading) else {
-            return [self.noise.tilt[image.series].powi(2), 0.0];
-        };
-        let covered = image.local_share.get(reading).map_or(0.0, |s| s.min(1.0));
+    /// Joint readings of an image; `None` where it was taken off the robot.
+    pub fn posture(&self, image: usize) -> Option<&Posture> {
+        self.stops[self.images[image].stop].posture.as_ref()
+    }
+
+    /// True for an image taken on the robot.
+    pub fn on_robot(&self, image: usize) -> bool {
+        self.posture(image).is_some()
+    }
+
+    /// Indices of the images in use that were taken on the robot.
+    pub fn used_on_robot(&self) -> impl Iterator<Item = usize> {
+        self.used().map(|(i, _)| i).filter(|&i| self.on_robot(i))
+    }
+
+    /// Variances of the latent error of one reading at a stop, rad^2 or m^2: its own part, and the part of the local error that no column
+    /// stands for.
+    pub fn joint_error_variance(&self, stop: &Stop, reading: usize) -> [f64; 2] {
+        let own = self.noise.joint[stop.series][reading];
+        let covered = stop.local_share.get(reading).map_or(0.0, |s| s.min(1.0));
         let local = self.noise.local.get(reading).map_or(0.0, |s| s * s);
         [own * own, (1.0 - covered) * local]
     }
 
-    /// Information (inverse of the variance) of the slack of one reading at a stop.
-    pub fn slack_information(&self, image: &Image, reading: usize) -> f64 {
-        let [own, local] = self.slack_variance(image, reading);
+    /// Information (inverse of the variance) of the latent error of one reading at a stop.
+    pub fn joint_error_information(&self, stop: &Stop, reading: usize) -> f64 {
+        let [own, local] = self.joint_error_variance(stop, reading);
         1.0 / (own + local)
     }
 
-    /// Squares of the slack of a stop in units of their variances; none for a free pose.
-    pub fn slack_squares(&self, image: &Image, slack: &Slack) -> f64 {
-        match slack {
-            Slack::Joints(dq) => dq.iter().enumerate().map(|(r, q)| q * q * self.slack_information(image, r)).sum(),
-            _ => 0.0,
+    /// Squares of the latent errors of a stop in units of their variances.
+    pub fn joint_error_squares(&self, stop: usize, errors: &[f64]) -> f64 {
+        let stop = &self.stops[stop];
+        errors.iter().enumerate().map(|(r, q)| q * q * self.joint_error_information(stop, r)).sum()
+    }
+
+    /// Variance of a component of the apparent tilt of an image, rad^2.
+    pub fn tilt_variance(&self, image: &Image) -> f64 {
+        self.noise.tilt[image.series].powi(2)
+    }
+
+    /// Squares of a tie in units of their variances; none for a free pose.
+    pub fn tie_squares(&self, image: &Image, tie: &Tie) -> f64 {
+        match tie {
+            Tie::Tilted(tilt) => tilt.iter().map(|t| t * t * (1.0 / self.tilt_variance(image))).sum(),
+            Tie::Rigid | Tie::Free(_) => 0.0,
         }
     }
 
-    /// Slack of a stop whose readings are right: joint noise, and tilt where it has a size.
-    pub fn exact_slack(&self, image: &Image) -> Slack {
-        let readings = image.stop.as_ref().map_or(0, |s| s.readings.len());
-        Slack::exact(readings, !self.noise.tilt.is_empty())
+    /// Tie of an image to its readings: rigid, or tilted by nothing where tilt has a size.
+    pub fn upright_tie(&self) -> Tie {
+        if self.noise.tilt.is_empty() { Tie::Rigid } else { Tie::Tilted([0.0; 2]) }
     }
 
     /// Factor on the stated sizes of the twists; 1 where they are held at what is stated.

@@ -3,7 +3,6 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::rejection::{ImageRejection, ObservationRejection};
-use crate::model::robot::Posture;
 use crate::series::{CameraMount, Edge};
 
 /// One observation, ready for the adjustment.
@@ -30,6 +29,8 @@ pub struct Image {
     pub name: String,
     /// Index of its series.
     pub series: usize,
+    /// Index of the stop at which it was taken; images of one stop follow each other.
+    pub stop: usize,
     /// Index of its camera.
     pub camera: usize,
     /// Index of its mounting (camera pose).
@@ -40,12 +41,8 @@ pub struct Image {
     pub plate: usize,
     /// Where the camera is.
     pub mount: CameraMount,
-    /// Joint readings; `None` for an image taken off the robot.
-    pub stop: Option<Posture>,
     /// Observations, ordered by marker.
     pub observations: Vec<Measured>,
-    /// Share of the local variance of each reading that the local errors of this stop cover; empty where there are none.
-    pub local_share: Vec<f64>,
     /// Why the image is left out; `None` while it is used.
     pub rejected: Option<ImageRejection>,
 }

@@ -23,7 +23,7 @@ pub struct Column {
 }
 
 /// Columns of the dense part: robot, mountings and placements (which act through the camera poses), then cameras and plate
-/// shapes (which act on the pixels directly). Markers and the slack of the images have no columns of their own.
+/// shapes (which act on the pixels directly). Markers and what is latent at stops have no columns of their own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     /// All columns.

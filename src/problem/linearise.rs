@@ -2,13 +2,13 @@
 //!
 //! Pixels know the robot only through the six degrees of freedom of the camera pose. So the pixels are condensed to blocks of
 //! pose (p, 6), intrinsics (e, camera parameters then plate modes) and markers (m, 3 each); the robot enters afterwards by
-//! `dp = G dtheta + L dslack` ([`State::chained`]).
+//! `dp = G dtheta + L dl`, `l` what is latent ([`State::chained`]).
 
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, Matrix6xX, Vector2, Vector6};
 
 use super::equations::{Collector, E, Equations, MarkerTerms};
 use super::state::{seen_centre, tilt_axes};
-use super::{Image, Layout, Measured, Problem, Slack, State};
+use super::{Image, Layout, Measured, Problem, State, TakenFrom, Tie};
 use crate::geom::{Pose, adjoint, right_jacobian_se3};
 use crate::linalg::wide;
 use crate::model::circle::{self, Prediction};
@@ -192,21 +192,21 @@ impl ImageTerms {
     }
 }
 
-/// How the camera pose of one image depends on the dense columns that act through it, and on its slack.
+/// How the camera pose of one image depends on the dense columns that act through it, and on what is latent.
 #[derive(Debug, Clone)]
 pub struct Chained {
     /// `camera_from_plate`.
     pub pose: Pose,
     /// `G`, 6 x theta, all theta columns.
     pub d_theta: DMatrix<f64>,
-    /// `L`, 6 x slack.
-    pub d_slack: DMatrix<f64>,
+    /// `L`, 6 x unknowns of [`TakenFrom`]: joint errors of the stop, then the tie.
+    pub d_latent: DMatrix<f64>,
 }
 
 impl State {
     /// Pose of an image and its derivatives as body twists; `None` for an image off the robot that has no free pose.
-    pub fn chained(&self, layout: &Layout, image: &Image, slack: &Slack) -> Option<Chained> {
-        self.chained_from(&self.robot.moved_origins(), layout, image, slack)
+    pub fn chained(&self, layout: &Layout, image: &Image, from: TakenFrom) -> Option<Chained> {
+        self.chained_from(&self.robot.moved_origins(), layout, image, from)
     }
 
     /// As [`State::chained`], where the origins of the robot are at hand.
@@ -215,16 +215,13 @@ impl State {
         origins: &MovedOrigins,
         layout: &Layout,
         image: &Image,
-        slack: &Slack,
+        from: TakenFrom,
     ) -> Option<Chained> {
         let theta = layout.theta_len();
-        if let Slack::Pose(pose) = slack {
-            return Some(Chained { pose: *pose, d_theta: DMatrix::zeros(6, theta), d_slack: DMatrix::identity(6, 6) });
+        if let Tie::Free(pose) = from.tie {
+            return Some(Chained { pose: *pose, d_theta: DMatrix::zeros(6, theta), d_latent: DMatrix::identity(6, 6) });
         }
-        let stop = image.stop.as_ref()?;
-        let zero = vec![0.0; stop.readings.len()];
-        let noise = if let Slack::Joints(dq) = slack { dq } else { &zero };
-        let kinematics = self.robot.kinematics_from(origins, stop, noise);
+        let kinematics = self.robot.kinematics_from(origins, from.posture?, &from.errors());
         let mounted = image.mount.linearised(
             &self.mountings[image.mounting],
             &kinematics.base_from_tip,
@@ -239,13 +236,14 @@ impl State {
         }
         g.fixed_view_mut::<6, 6>(0, layout.mountings[image.mounting].start).copy_from(&mounted.d_camera);
         g.fixed_view_mut::<6, 6>(0, layout.placements[image.placement].start).copy_from(&Matrix6::identity());
-        let mut l = DMatrix::zeros(6, slack.len());
-        for (k, d) in kinematics.d_readings.iter().enumerate().take(slack.len()) {
+        let joints = from.joints();
+        let mut l = DMatrix::zeros(6, from.unknowns());
+        for (k, d) in kinematics.d_readings.iter().enumerate().take(joints) {
             l.fixed_view_mut::<6, 1>(0, k).copy_from(&(mounted.d_robot * d));
         }
         let pose = mounted.camera_from_plate;
-        let Some([x, y]) = slack.tilt(stop.readings.len()) else {
-            return Some(Chained { pose, d_theta: g, d_slack: l });
+        let Tie::Tilted([x, y]) = *from.tie else {
+            return Some(Chained { pose, d_theta: g, d_latent: l });
         };
         let axes = tilt_axes(&seen_centre(image, self));
         let tilt = axes * Vector2::new(x, y);
@@ -254,7 +252,7 @@ impl State {
         let carry = adjoint(&turned.inverse());
         let carry = DMatrix::from_column_slice(6, 6, carry.as_slice());
         let mut l = &carry * l;
-        l.view_mut((0, stop.readings.len()), (6, 2)).copy_from(&(right_jacobian_se3(&tilt) * axes));
-        Some(Chained { pose: pose * turned, d_theta: carry * g, d_slack: l })
+        l.view_mut((0, joints), (6, 2)).copy_from(&(right_jacobian_se3(&tilt) * axes));
+        Some(Chained { pose: pose * turned, d_theta: carry * g, d_latent: l })
     }
 }

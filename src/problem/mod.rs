@@ -19,6 +19,7 @@ mod scale_bar;
 mod select;
 mod state;
 mod step;
+mod stop;
 
 pub use adjustment::Adjustment;
 pub use condensed::{by_columns, condensed};
@@ -34,5 +35,6 @@ pub use postures::{common_readings, joined, posture_groups};
 pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};
 pub use scale_bar::{SCALE, hold_scale_bars, seen_markers, size_by_bar};
 pub use select::short_name;
-pub use state::{PlateShape, Slack, State};
+pub use state::{PlateShape, State};
 pub use step::Step;
+pub use stop::{Stop, TakenFrom, Tie};

@@ -7,18 +7,18 @@ use crate::urdf::JointKind;
 pub struct Noise {
     /// Factor on the stated standard deviations of the observations, per camera.
     pub pixel_factor: Vec<f64>,
-    /// Joint noise of every stop by itself, rad or m: per series, per reading.
+    /// Latent joint error of every stop by itself, rad or m: per series, per reading.
     pub joint: Vec<Vec<f64>>,
     /// Local error of every reading, rad or m: common to stops at the same reading. Zero where no stops share readings.
     pub local: Vec<f64>,
-    /// Apparent tilt of the plate in every image, rad: per series. Empty where it is not part of the slack.
+    /// Apparent tilt of the plate in every image, rad: per series. Empty where there is none.
     pub tilt: Vec<f64>,
     /// Factor on the stated tolerances of the markers, per plate. Empty where they are taken as stated.
     pub marker: Vec<f64>,
 }
 
 impl Noise {
-    /// Every size of the slack at `first`, rad or m.
+    /// Every size of latent joint errors and tilts at `first`, rad or m.
     pub fn start_at(&mut self, first: f64) {
         self.joint.iter_mut().flatten().for_each(|s| *s = first);
         self.local.iter_mut().filter(|s| **s > 0.0).for_each(|s| *s = first);

@@ -1,6 +1,6 @@
 //! Stops that share joint readings: what a joint is off by there, it is off by at all of them.
 
-use super::Image;
+use super::Problem;
 use crate::model::robot::Posture;
 
 /// Readings closer than this, rad or m, are the same posture of a joint.
@@ -41,11 +41,11 @@ pub fn joined(count: usize, pairs: impl Iterator<Item = (usize, usize)>) -> Vec<
 }
 
 /// Images of `among` in groups that share readings, directly or through others; an image off the robot is alone.
-pub fn posture_groups(images: &[Image], among: &[usize]) -> Vec<Vec<usize>> {
-    let stop = |k: usize| images[among[k]].stop.as_ref();
+pub fn posture_groups(problem: &Problem, among: &[usize]) -> Vec<Vec<usize>> {
+    let posture = |k: usize| problem.posture(among[k]);
     let related = (0..among.len())
         .flat_map(|a| (0..a).map(move |b| (b, a)))
-        .filter(|&(a, b)| stop(a).zip(stop(b)).is_some_and(|(a, b)| !common_readings(a, b).is_empty()));
+        .filter(|&(a, b)| posture(a).zip(posture(b)).is_some_and(|(a, b)| !common_readings(a, b).is_empty()));
     joined(among.len(), related).into_iter().map(|set| set.into_iter().map(|k| among[k]).collect()).collect()
 }
 

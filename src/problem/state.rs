@@ -1,65 +1,14 @@
 //! Every unknown, with its value.
 
-use nalgebra::{Matrix6x2, SMatrix, SVector, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix6x2, SMatrix, SVector, Vector2, Vector3};
 
 use super::image::Image;
+use super::stop::{TakenFrom, Tie};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::plate_modes::{MODES, basis};
 use crate::model::robot::Robot;
 use crate::series::Plate;
-
-/// Number of tilts behind the joint noise of a stop.
-const TILTS: usize = 2;
-
-/// What an image may deviate by from the pose that the robot says.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Slack {
-    /// Free camera pose: the image has no tie to the robot (`camera_from_plate`).
-    Pose(Pose),
-    /// Joint noise of this stop, rad or m per reading; where two values follow, they are the apparent tilt of the plate about
-    /// its x and y axes, rad: what smooth errors of an image (lens, focus, air) do to the pose that it shows.
-    Joints(Vec<f64>),
-    /// None: readings are exact.
-    None,
-}
-
-impl Slack {
-    /// Joint noise of a stop, with or without tilt, all zero.
-    pub fn exact(readings: usize, tilts: bool) -> Self {
-        Self::Joints(vec![0.0; readings + if tilts { TILTS } else { 0 }])
-    }
-
-    /// Number of unknowns.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Pose(_) => 6,
-            Self::Joints(dq) => dq.len(),
-            Self::None => 0,
-        }
-    }
-
-    /// True where there is no unknown.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Apparent tilt of the plate about its x and y axes, rad; `None` where there is none for a robot with this many readings.
-    pub fn tilt(&self, readings: usize) -> Option<[f64; 2]> {
-        match self {
-            Self::Joints(values) => values.get(readings..).and_then(|t| t.try_into().ok()),
-            _ => None,
-        }
-    }
-
-    pub(super) fn moved(&self, step: &[f64]) -> Self {
-        match self {
-            Self::Pose(pose) => Self::Pose(pose.perturbed(&Vector6::from_column_slice(step))),
-            Self::Joints(dq) => Self::Joints(dq.iter().zip(step).map(|(q, s)| q + s).collect()),
-            Self::None => Self::None,
-        }
-    }
-}
 
 /// Deviation of a plate from nominal.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,27 +66,22 @@ pub struct State {
     pub cameras: Vec<Camera>,
     /// Plates.
     pub plates: Vec<PlateShape>,
-    /// Slack of every image.
-    pub slack: Vec<Slack>,
+    /// Latent errors of the readings of every stop, rad or m; empty where the readings count as exact, and off the robot.
+    pub joint_errors: Vec<Vec<f64>>,
+    /// Tie of every image to its stop.
+    pub ties: Vec<Tie>,
 }
 
 impl State {
-    /// Pose of the camera of an image as these unknowns say.
-    pub fn camera_from_plate(&self, image: &Image, slack: &Slack) -> Option<Pose> {
-        let exact;
-        let dq = match (slack, &image.stop) {
-            (Slack::Pose(pose), _) => return Some(*pose),
-            (Slack::Joints(dq), Some(_)) => dq,
-            (_, Some(stop)) => {
-                exact = vec![0.0; stop.readings.len()];
-                &exact
-            }
-            (_, None) => return None,
-        };
-        let tip = self.robot.pose_at(image.stop.as_ref()?, dq);
+    /// Pose of the camera of an image as these unknowns say; `None` off the robot without a free pose.
+    pub fn camera_from_plate(&self, image: &Image, from: TakenFrom) -> Option<Pose> {
+        if let Tie::Free(pose) = from.tie {
+            return Some(*pose);
+        }
+        let tip = self.robot.pose_at(from.posture?, &from.errors());
         let pose =
             image.mount.camera_from_plate(&self.mountings[image.mounting], &tip, &self.placements[image.placement]);
-        let Some([x, y]) = slack.tilt(image.stop.as_ref()?.readings.len()) else { return Some(pose) };
+        let Tie::Tilted([x, y]) = *from.tie else { return Some(pose) };
         Some(pose * Pose::exp(&(tilt_axes(&seen_centre(image, self)) * Vector2::new(x, y))))
     }
 }

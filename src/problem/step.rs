@@ -10,10 +10,20 @@ use super::state::State;
 pub struct Step {
     /// Dense columns.
     pub dense: DVector<f64>,
-    /// Slack of every image (empty for one that takes no part).
-    pub slack: Vec<Vec<f64>>,
+    /// Latent errors of every stop (empty for one that takes no part).
+    pub joint_errors: Vec<Vec<f64>>,
+    /// Tie of every image (empty for one that takes no part).
+    pub ties: Vec<Vec<f64>>,
     /// Marker corrections, per plate.
     pub markers: Vec<Vec<Vector3<f64>>>,
+}
+
+impl Step {
+    /// A step of dense columns and markers alone.
+    pub fn of(dense: DVector<f64>, markers: Vec<Vec<Vector3<f64>>>, state: &State) -> Self {
+        let (stops, images) = (state.joint_errors.len(), state.ties.len());
+        Self { dense, joint_errors: vec![Vec::new(); stops], ties: vec![Vec::new(); images], markers }
+    }
 }
 
 fn twist(step: &DVector<f64>, start: usize) -> Vector6<f64> {
@@ -44,10 +54,11 @@ impl State {
             plate.modes.iter_mut().zip(layout.shapes[k].clone()).for_each(|(m, c)| *m += x[c]);
             plate.corrections.iter_mut().zip(&step.markers[k]).for_each(|(m, s)| *m += s);
         }
-        for (slack, s) in next.slack.iter_mut().zip(&step.slack) {
-            if !s.is_empty() {
-                *slack = slack.moved(s);
-            }
+        for (errors, step) in next.joint_errors.iter_mut().zip(&step.joint_errors) {
+            errors.iter_mut().zip(step).for_each(|(q, s)| *q += s);
+        }
+        for (tie, step) in next.ties.iter_mut().zip(&step.ties).filter(|(_, step)| !step.is_empty()) {
+            *tie = tie.moved(step);
         }
         next
     }

@@ -174,16 +174,16 @@ fn add_combination(into: &mut [f64], [a, b]: [&[f64]; 2], [s, t]: [f64; 2]) {
     }
 }
 
-/// Markers of an image, each once, and their coupling with its slack through `l`: slack x 3 markers.
-pub(super) fn slack_with_markers(l: &DMatrix<f64>, equations: &Equations) -> (Vec<usize>, DMatrix<f64>) {
-    let by_slack = equations.through_pose(&l.transpose());
+/// Markers of an image, each once, and their coupling with what is latent through `l`: latent x 3 markers.
+pub(super) fn latents_with_markers(l: &DMatrix<f64>, equations: &Equations) -> (Vec<usize>, DMatrix<f64>) {
+    let by_latents = equations.through_pose(&l.transpose());
     let mut markers = equations.markers.clone();
     markers.dedup();
     let mut coupling = DMatrix::zeros(l.ncols(), 3 * markers.len());
     let mut at = 0;
     for (o, (&marker, sight)) in equations.markers.iter().zip(equations.sights()).enumerate() {
         at += usize::from(markers[at] != marker);
-        let (a, b) = (by_slack.column(2 * o), by_slack.column(2 * o + 1));
+        let (a, b) = (by_latents.column(2 * o), by_latents.column(2 * o + 1));
         for (d, w) in sight.by_marker().row_iter().enumerate() {
             let mut column = coupling.column_mut(3 * at + d);
             add_combination(column.as_mut_slice(), [a.as_slice(), b.as_slice()], [w[0], w[1]]);

@@ -1,11 +1,11 @@
-//! Markers eliminated: the dense columns and the slack of the images stay.
+//! Markers eliminated: the dense columns and what is latent at stops stay.
 //!
 //! With the information `V = F F'` of a marker (all images and the prior) and its coupling `B` with what stays, `Y = B F^-T`: the reduced
 //! information is the information without the elimination less `sum Y Y'`, one Gram product.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, slack_with_markers, times_right};
+use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, latents_with_markers, times_right};
 use super::linear::Carried;
 use super::linear::LinearProblem;
 use crate::linalg::{mirror_upper, orthonormal, product, subtract_gram};
@@ -16,8 +16,8 @@ use crate::problem::Step;
 #[derive(Debug, Clone)]
 pub(super) struct MarkersEliminated {
     seen: SeenMarkers,
-    /// First unknown of the slack of each image in use.
-    pub slack_start: Vec<usize>,
+    /// First unknown of what is latent at each stop in use.
+    pub latent_start: Vec<usize>,
     /// `F^-1` of each that was seen.
     inverse_factors: Vec<Matrix3<f64>>,
     /// `Y`, unknowns that stay x 3 markers; without what is held.
@@ -29,12 +29,12 @@ pub(super) struct MarkersEliminated {
 }
 
 impl MarkersEliminated {
-    /// Information with the priors of slack and markers, without those of the dense columns.
+    /// Information with the priors of latents and markers, without those of the dense columns.
     pub fn build(linear: LinearProblem, lambda: f64) -> (DMatrix<f64>, Self) {
         let mut n = linear.adjustment.problem.layout.len();
-        let slack_start: Vec<usize> = (linear.images())
-            .map(|image| {
-                let own = image.chain.d_slack.ncols();
+        let latent_start: Vec<usize> = (linear.stops())
+            .map(|stop| {
+                let own = stop.unknowns();
                 n += own;
                 n - own
             })
@@ -42,11 +42,16 @@ impl MarkersEliminated {
         let mut a = DMatrix::zeros(n, n);
         let poses = PoseRows::new(linear);
         poses.add_to(linear, &mut a);
-        for (k, (image, &start)) in linear.images().zip(&slack_start).enumerate() {
-            let l = &image.chain.d_slack;
-            let with_dense = poses.coupling.rows(6 * k, 6).tr_mul(l);
-            a.view_mut((0, start), with_dense.shape()).copy_from(&with_dense);
-            a.view_mut((start, start), (l.ncols(), l.ncols())).copy_from(&image.slack_information());
+        for (stop, &start) in linear.stops().zip(&latent_start) {
+            for (k, image) in stop.places().zip(stop.images()) {
+                let with_dense = poses.coupling.rows(6 * k, 6).tr_mul(&image.chain.d_latent);
+                for (row, own) in image.latents().into_iter().flatten().zip(with_dense.column_iter()) {
+                    let mut column = a.view_mut((0, start + row), (with_dense.nrows(), 1));
+                    column += own;
+                }
+            }
+            let own = stop.information();
+            a.view_mut((start, start), own.shape()).copy_from(&own);
         }
         let seen = SeenMarkers::of(linear);
         let damped = |mut v: Matrix3<f64>| {
@@ -54,12 +59,12 @@ impl MarkersEliminated {
             v.cholesky().and_then(|c| c.l().try_inverse()).unwrap_or_else(Matrix3::zeros)
         };
         let inverse_factors: Vec<Matrix3<f64>> = seen.information(linear).into_iter().map(damped).collect();
-        let y = whitened_coupling(linear, &seen, &inverse_factors, (n, &slack_start));
+        let y = whitened_coupling(linear, &seen, &inverse_factors, (n, &latent_start));
         subtract_gram(&mut a, &y);
         mirror_upper(&mut a);
         let rhs = DVector::zeros(3 * seen.order.len());
         let held = DMatrix::zeros(rhs.len(), 0);
-        (a, Self { seen, slack_start, inverse_factors, y, held, rhs })
+        (a, Self { seen, latent_start, inverse_factors, y, held, rhs })
     }
 
     /// Holds combinations of markers (3 markers x held): `Y` becomes `Y (1 - O O')` with the orthonormal basis `O` of `F^-1` times the
@@ -86,8 +91,8 @@ impl MarkersEliminated {
     /// Takes over the right-hand side of the markers at a linearisation; returns the reduced one, without the priors of the dense columns.
     pub fn reduce_gradient(&mut self, linear: LinearProblem) -> DVector<f64> {
         let mut reduced = linear.dense_gradient().resize_vertically(self.y.nrows(), 0.0);
-        for (image, &start) in linear.images().zip(&self.slack_start) {
-            let own = image.slack_gradient();
+        for (stop, &start) in linear.stops().zip(&self.latent_start) {
+            let own = stop.gradient();
             reduced.rows_mut(start, own.len()).copy_from(&own);
         }
         self.rhs = self.seen.gradient(linear);
@@ -106,16 +111,17 @@ impl MarkersEliminated {
 
     /// The whole step from the solution `x` of the reduced system.
     pub fn step(&self, linear: LinearProblem, x: &DVector<f64>) -> Step {
-        let mut slack = vec![Vec::new(); linear.adjustment.problem.images.len()];
-        for (image, &start) in linear.images().zip(&self.slack_start) {
-            slack[image.index] = x.rows(start, image.chain.d_slack.ncols()).as_slice().to_vec();
-        }
+        let dense = x.rows(0, linear.adjustment.problem.layout.len()).into_owned();
         let mut own = self.rhs.clone();
         own.gemv_tr(-1.0, &self.y, x, 1.0);
         let of = |at: usize| self.inverse_factors[at].transpose() * own.fixed_rows::<3>(3 * at);
         let step = |at: &Option<usize>| at.map_or(Vector3::zeros(), of);
         let markers = self.seen.number.iter().map(|plate| plate.iter().map(step).collect()).collect();
-        Step { dense: x.rows(0, linear.adjustment.problem.layout.len()).into_owned(), slack, markers }
+        let mut step = Step::of(dense, markers, &linear.adjustment.state);
+        for (stop, &start) in linear.stops().zip(&self.latent_start) {
+            stop.put(x.rows(start, stop.unknowns()).as_slice(), &mut step);
+        }
+        step
     }
 
     /// Covariance of every marker that was seen: `V^-1 + D cov(x) D'` with `D = V^-1 B'`, less what moves the marker with `x`
@@ -151,19 +157,25 @@ fn whitened_coupling(
     linear: LinearProblem,
     seen: &SeenMarkers,
     inverse_factors: &[Matrix3<f64>],
-    (n, slack_start): (usize, &[usize]),
+    (n, latent_start): (usize, &[usize]),
 ) -> DMatrix<f64> {
     let mut y = DMatrix::zeros(n, 3 * seen.order.len());
     let mut dense = DenseCoupling::new(&linear.adjustment.problem, seen);
-    for (own, &start) in linear.images().zip(slack_start) {
+    let of_stops = linear.stops().zip(latent_start);
+    for (own, start) in of_stops.flat_map(|(stop, start)| stop.images().map(move |image| (image, *start))) {
         let Some(equations) = own.equations() else { continue };
         dense.add(own, linear.adjustment.problem.layout.intrinsics(own.image), seen, &equations);
         let number = &seen.number[own.image.plate];
-        let (markers, mut coupling) = slack_with_markers(&own.chain.d_slack, &equations);
+        let [joints, tie] = own.latents();
+        let (markers, mut coupling) = latents_with_markers(&own.chain.d_latent, &equations);
         for (m, &marker) in markers.iter().enumerate() {
             let Some(at) = number[marker] else { continue };
             times_right(&mut coupling, 3 * m, &inverse_factors[at].transpose());
-            y.view_mut((start, 3 * at), (coupling.nrows(), 3)).copy_from(&coupling.columns(3 * m, 3));
+            let coupling = coupling.columns(3 * m, 3);
+            let mut of_joints = y.view_mut((start + joints.start, 3 * at), (joints.len(), 3));
+            of_joints += coupling.rows(0, joints.len());
+            let mut of_tie = y.view_mut((start + tie.start, 3 * at), (tie.len(), 3));
+            of_tie += coupling.rows(joints.len(), tie.len());
         }
     }
     dense.times_right(inverse_factors.iter().map(Matrix3::transpose));

@@ -7,8 +7,8 @@ use nalgebra::Matrix3;
 
 use super::fit::Fit;
 use super::levenberg::{Outcome, Settings, Status, solve};
-use super::linear::LinearImage;
-use crate::problem::{Adjustment, Noise, Slack};
+use super::linear::{LinearImage, LinearStop};
+use crate::problem::{Adjustment, Noise, Tie};
 use crate::urdf::JointKind;
 
 /// What is estimated and how long.
@@ -170,19 +170,20 @@ impl Fit {
             .filter(|(i, c)| c.free && cov.system.touched(*i))
             .map(|(i, c)| 1.0 - cov.reduced[(i, i)] / (c.prior_sigma * c.prior_sigma))
             .sum();
-        let mut slack = 0.0;
-        for (k, LinearImage { image, slack: own, .. }) in self.linear().images().enumerate() {
-            let length = own.len();
-            let c = cov.slack(k, length);
-            slack += match own {
-                Slack::Joints(_) => (0..length).map(|r| 1.0 - c[(r, r)] * problem.slack_information(image, r)).sum(),
-                _ => length as f64,
-            };
+        let mut latent = 0.0;
+        for stop in self.linear().stops() {
+            let c = cov.latents(&stop);
+            let ties = stop.images().flat_map(|image| {
+                let [joints, tie] = image.latents();
+                tie.zip(image.prior_of_latents().into_iter().skip(joints.len()))
+            });
+            let joints = (0..stop.joint_errors.len()).map(|r| (r, problem.joint_error_information(stop.stop, r)));
+            latent += joints.chain(ties).map(|(k, prior)| 1.0 - c[(k, k)] * prior).sum::<f64>();
         }
-        dense + slack + markers
+        dense + latent + markers
     }
 
-    /// What the latents of the slack tell of their sizes.
+    /// What is latent at the stops tells of the sizes.
     fn tallies(&self) -> Tallies {
         let (Adjustment { problem, state }, cov) = (&self.adjustment, &self.covariance);
         let (robot, noise) = (&state.robot, &problem.noise);
@@ -190,19 +191,20 @@ impl Fit {
         let mut own = vec![Tally::new(n); noise.joint.len()];
         let mut local = Tally::new(n);
         let mut tilt = Tally::new(noise.tilt.len());
-        for (k, LinearImage { image, slack, .. }) in self.linear().images().enumerate() {
-            let Slack::Joints(dq) = slack else { continue };
-            let c = cov.slack(k, dq.len());
-            for (r, value) in dq.iter().enumerate().skip(n) {
-                let prior = problem.slack_variance(image, r)[0];
-                tilt.add(image.series, *value, c[(r, r)], prior, prior);
+        for at in self.linear().stops() {
+            let LinearStop { stop, joint_errors, .. } = at;
+            let c = cov.latents(&at);
+            for image in at.images() {
+                let Tie::Tilted(values) = image.tie else { continue };
+                let ([_, places], prior) = (image.latents(), problem.tilt_variance(image.image));
+                places.zip(values).for_each(|(k, value)| tilt.add(stop.series, *value, c[(k, k)], prior, prior));
             }
-            for r in 0..n {
-                let [own_part, local_part] = problem.slack_variance(image, r);
+            for (r, value) in joint_errors.iter().enumerate() {
+                let [own_part, local_part] = problem.joint_error_variance(stop, r);
                 let prior = own_part + local_part;
-                own[image.series].add(r, dq[r], c[(r, r)], prior, own_part);
+                own[stop.series].add(r, *value, c[(r, r)], prior, own_part);
                 if local_part > 0.0 {
-                    local.add(r, dq[r], c[(r, r)], prior, local_part);
+                    local.add(r, *value, c[(r, r)], prior, local_part);
                 }
             }
         }
@@ -312,7 +314,7 @@ impl Tally {
     }
 }
 
-/// What the latents of the slack tell of each size.
+/// What is latent at the stops tells of each size.
 struct Tallies {
     /// Noise of the stops by themselves, per series.
     own: Vec<Tally>,

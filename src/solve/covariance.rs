@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
-use super::linear::LinearProblem;
+use super::linear::{LinearProblem, LinearStop};
 use super::system::{Elimination, Singular, System};
 use crate::problem::Problem;
 
-/// Covariance of the reduced unknowns (dense columns, then slack or markers), with what is needed for the eliminated family.
+/// Covariance of the reduced unknowns (dense columns, then latents or markers), with what is needed for the eliminated family.
 #[derive(Debug, Clone)]
 pub struct Covariance {
     /// Covariance of the unknowns of the reduced system; fixed columns have zero variance.
@@ -88,9 +88,9 @@ impl Covariance {
         self.reduced.fixed_view::<6, 6>(start, start).into_owned()
     }
 
-    /// Covariance of the slack of the k-th image in use.
-    pub fn slack(&self, k: usize, length: usize) -> DMatrix<f64> {
-        self.system.slack_covariance(&self.reduced, k, length)
+    /// Covariance of what is latent at a stop: errors of its readings, then the ties of its images.
+    pub fn latents(&self, stop: &LinearStop) -> DMatrix<f64> {
+        self.system.latent_covariance(&self.reduced, stop)
     }
 
     /// Covariance of the correction of every marker that was seen, m^2, per plate and marker, in the frame of the priors (the

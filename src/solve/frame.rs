@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, skew};
 use crate::model::plate_modes::MODES;
-use crate::problem::{Adjustment, PlateShape, Problem, Slack};
+use crate::problem::{Adjustment, PlateShape, Problem};
 
 /// Motions of a body.
 const RIGID: usize = 6;
@@ -66,7 +66,7 @@ pub fn frames(adjustment: &Adjustment) -> Result<Vec<Frame>> {
 
 /// The placement of every image on the robot, with its plate.
 fn placed(adjustment: &Adjustment) -> impl Iterator<Item = (usize, usize)> + '_ {
-    let on_robot = adjustment.used().filter(|(_, _, slack)| !matches!(slack, Slack::Pose(_)));
+    let on_robot = adjustment.used().filter(|(_, _, tie)| !tie.is_free());
     on_robot.map(|(_, i, _)| (i.placement, i.plate))
 }
 

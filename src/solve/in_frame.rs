@@ -7,16 +7,18 @@
 //! tolerances leave open of it becomes a part of the mode that is scale. (2) Poses `T = T' + A s` follow what the modes `s` move
 //! of the frame, a congruence of the information. What is left is known from images, as positive definite as they make it.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 use super::blocks::SeenMarkers;
 use super::covariance::{Covariance, fixed_are_known};
 use super::frame::{Frame, frames};
-use super::linear::{LinearImage, LinearProblem};
+use super::linear::{LinearImage, LinearProblem, LinearStop};
 use super::system::{Eliminated, Elimination, Singular, System};
 use crate::error::{Code, Error, Result};
 use crate::model::plate_modes::MODES;
-use crate::problem::{Adjustment, Problem, Slack};
+use crate::problem::{Adjustment, Problem};
 
 /// Index of the mode that is scale.
 const SCALE: usize = 0;
@@ -31,7 +33,7 @@ pub struct InFrame {
 
 /// Six unknowns of a pose that follow the modes of plates.
 struct Following {
-    /// First unknown; of the slack of an image in use where it was eliminated.
+    /// Its first unknown.
     pose: Place,
     /// First column of the modes.
     modes: usize,
@@ -42,7 +44,8 @@ struct Following {
 #[derive(Clone, Copy)]
 enum Place {
     Reduced(usize),
-    Slack(usize),
+    /// Eliminated: a stop by its place among those in use, and the first among what is latent there.
+    Latent(usize, usize),
 }
 
 /// Covariance with the plates in their frames, with what was added to the covariance `stated`.
@@ -69,7 +72,7 @@ pub fn in_frame_by(which: Elimination, linear: LinearProblem, stated: &Covarianc
         |e: Singular| Error::new(Code::FitUndetermined, "plate", e.to_string(), "take images of more of the plate");
     let factor = system.factor(linear).map_err(singular)?;
     let mut reduced = factor.inverse();
-    if let (Eliminated::Slack(e), Some(held)) = (&system.eliminated, &held) {
+    if let (Eliminated::Stops(e), Some(held)) = (&system.eliminated, &held) {
         e.project(held, &mut reduced);
     }
     fixed_are_known(problem, &mut reduced);
@@ -88,10 +91,12 @@ fn following(linear: LinearProblem, system: &System, frames: &[Frame]) -> Vec<Fo
     let layout = &problem.layout;
     let mut all = Vec::new();
     let mut placements_done = vec![false; problem.placements.len()];
-    for (k, LinearImage { image, slack, .. }) in linear.images().enumerate() {
+    let images = linear.stops().flat_map(|stop| stop.images().map(move |image| (stop.at, image)));
+    for (at, own @ LinearImage { image, tie, .. }) in images {
         let Some(frame) = frames.iter().find(|f| f.plates.contains(&image.plate)) else { continue };
-        let (pose, by) = if let Slack::Pose(pose) = slack {
-            let place = system.slack_start.get(k).map_or(Place::Slack(k), |s| Place::Reduced(*s));
+        let (pose, by) = if let Some(pose) = tie.free_pose() {
+            let [_, Range { start, .. }] = own.latents();
+            let place = system.latent_start.get(at).map_or(Place::Latent(at, start), |s| Place::Reduced(s + start));
             (place, frame.pose_by_modes(image.plate, pose))
         } else {
             let start = layout.placements[image.placement].start;
@@ -148,7 +153,7 @@ fn hold(system: &mut System, combinations: DMatrix<f64>, following: &[Following]
             system.information += &taken * taken.transpose();
             None
         }
-        Eliminated::Slack(e) => Some(e.hold(combinations, &mut system.information)),
+        Eliminated::Stops(e) => Some(e.hold(combinations, &mut system.information)),
     };
     for Following { pose, modes, by } in following {
         match (pose, &mut system.eliminated) {
@@ -164,8 +169,8 @@ fn hold(system: &mut System, combinations: DMatrix<f64>, following: &[Following]
                     e.carry(*pose, *modes, by);
                 }
             }
-            (Place::Slack(k), Eliminated::Slack(e)) => e.carry(*k, *modes, by),
-            (Place::Slack(_), Eliminated::Markers(_)) => {}
+            (Place::Latent(stop, first), Eliminated::Stops(e)) => e.carry((*stop, *first), *modes, by),
+            (Place::Latent(..), Eliminated::Markers(_)) => {}
         }
     }
     held
@@ -199,9 +204,9 @@ impl InFrame {
         self.covariance.block(start)
     }
 
-    /// Covariance of the free camera pose of the k-th image in use.
-    pub fn pose(&self, k: usize) -> Matrix6<f64> {
-        let c = Matrix6::from_column_slice(self.covariance.slack(k, 6).as_slice());
+    /// Covariance of the free camera pose of an image of a stop.
+    pub fn pose(&self, stop: &LinearStop, image: &LinearImage) -> Matrix6<f64> {
+        let c = Matrix6::from_column_slice(image.part_of(&self.covariance.latents(stop)).as_slice());
         0.5 * (c + c.transpose())
     }
 

@@ -217,7 +217,7 @@ fn approach(adjustment: &mut Adjustment, most: usize) -> usize {
     let Some(mut lin) = adjustment.linearise_some(ENOUGH) else { return 0 };
     for tried in 0..most {
         let linear = adjustment.linear(&lin);
-        let model = Model::new(Elimination::SlackMarkersHeld, linear, lambda);
+        let model = Model::new(Elimination::StopsMarkersHeld, linear, lambda);
         let Some(Proposal { step, decrement, .. }) = model.map(|m| m.proposal(linear)) else { return tried };
         if 0.5 * decrement * decrement < WORTH_A_STEP * lin.cost {
             return tried;

@@ -1,11 +1,13 @@
 //! An adjustment linearised at its state.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector, SMatrix, Vector3};
 use rayon::prelude::*;
 
 use crate::model::plate_modes::MODES;
 use crate::problem::{
-    Adjustment, Chained, Equations, Image, ImageTerms, Problem, Slack, State, Weighting, equations, linearise,
+    Adjustment, Chained, Equations, Image, ImageTerms, Problem, State, Step, Stop, Tie, Weighting, equations, linearise,
 };
 
 /// Blocks of all images, linearised at one state.
@@ -13,11 +15,13 @@ use crate::problem::{
 pub struct Linearised {
     /// Indices of the images in use, ascending.
     pub images: Vec<usize>,
+    /// Stops of the images in use: index, and which of those images were taken at it.
+    pub stops: Vec<(usize, Range<usize>)>,
     /// Pixel blocks of each image in use.
     pub terms: Vec<ImageTerms>,
     /// Chain of each image in use.
     pub chains: Vec<Chained>,
-    /// Robust cost of the pixels plus half the squares of priors and slack.
+    /// Robust cost of the pixels plus half the squares of priors and of what is latent at stops.
     pub cost: f64,
 }
 
@@ -47,12 +51,31 @@ pub struct LinearImage<'a> {
     pub index: usize,
     /// The image.
     pub image: &'a Image,
-    /// What it deviates by.
-    pub slack: &'a Slack,
+    /// Its tie to its stop.
+    pub tie: &'a Tie,
     /// Its pixel blocks.
     pub terms: &'a ImageTerms,
     /// Its chain.
     pub chain: &'a Chained,
+    /// Number of joint errors of its stop.
+    joints: usize,
+    /// Place of its tie among what is latent at its stop.
+    tie_start: usize,
+}
+
+/// One stop of a linear problem. Latent at it are the errors of its readings, then the ties of its images.
+#[derive(Debug, Clone)]
+pub struct LinearStop<'a> {
+    linear: LinearProblem<'a>,
+    /// Its index among all stops.
+    pub index: usize,
+    /// The stop.
+    pub stop: &'a Stop,
+    /// Latent errors of its readings.
+    pub joint_errors: &'a [f64],
+    /// Its place among the stops in use.
+    pub at: usize,
+    images: Range<usize>,
 }
 
 impl Adjustment {
@@ -70,7 +93,7 @@ impl Adjustment {
             .par_iter()
             .map(|&i| {
                 let image = &problem.images[i];
-                let chain = state.chained_from(&origins, &problem.layout, image, &state.slack[i])?;
+                let chain = state.chained_from(&origins, &problem.layout, image, self.taken_from(i))?;
                 let weighting = Weighting::of(problem, image).thinned(image, enough);
                 let terms = linearise(image, state, &chain.pose, &weighting)?;
                 Some((terms, chain))
@@ -78,12 +101,24 @@ impl Adjustment {
             .collect();
         let (terms, chains): (Vec<_>, Vec<_>) = parts?.into_iter().unzip();
         let pixels: f64 = terms.iter().map(|t| t.cost).sum();
-        let cost = pixels + self.prior_cost(&images);
-        cost.is_finite().then_some(Linearised { images, terms, chains, cost })
+        let stops = self.stops_of(&images);
+        let cost = pixels + self.prior_cost(&images, &stops);
+        cost.is_finite().then_some(Linearised { images, stops, terms, chains, cost })
     }
 
-    /// Half the squares of priors and of the slack of some images.
-    fn prior_cost(&self, images: &[usize]) -> f64 {
+    /// Stops of some images, ascending.
+    fn stops_of(&self, images: &[usize]) -> Vec<(usize, Range<usize>)> {
+        let stop_of = |i: &usize| self.problem.images[*i].stop;
+        let mut first = 0;
+        let stops = images.chunk_by(|a, b| stop_of(a) == stop_of(b)).map(|own| {
+            first += own.len();
+            (stop_of(&own[0]), first - own.len()..first)
+        });
+        stops.collect()
+    }
+
+    /// Half the squares of priors and of what is latent at some stops and their images.
+    fn prior_cost(&self, images: &[usize], stops: &[(usize, Range<usize>)]) -> f64 {
         let Self { problem, state } = self;
         let values = state.values(&problem.layout);
         let dense: f64 = (problem.layout.columns.iter().zip(values.iter()))
@@ -95,8 +130,9 @@ impl Adjustment {
             shape.corrections.iter().enumerate().map(of)
         });
         let markers: f64 = corrections.sum();
-        let slack: f64 = images.iter().map(|&i| problem.slack_squares(&problem.images[i], &state.slack[i])).sum();
-        0.5 * (dense + held + markers + slack)
+        let errors: f64 = stops.iter().map(|(s, _)| problem.joint_error_squares(*s, &state.joint_errors[*s])).sum();
+        let ties: f64 = images.iter().map(|&i| problem.tie_squares(&problem.images[i], &state.ties[i])).sum();
+        0.5 * (dense + held + markers + errors + ties)
     }
 
     /// With its linearisation.
@@ -111,12 +147,34 @@ impl<'a> LinearProblem<'a> {
         (0..self.lin.images.len()).map(move |k| self.image(k))
     }
 
+    /// The stops of the images in use.
+    pub fn stops(self) -> impl ExactSizeIterator<Item = LinearStop<'a>> + Clone {
+        (0..self.lin.stops.len()).map(move |at| self.stop(at))
+    }
+
+    /// A stop by its place among those in use.
+    pub fn stop(self, at: usize) -> LinearStop<'a> {
+        let Adjustment { problem, state } = self.adjustment;
+        let (index, images) = self.lin.stops[at].clone();
+        let (stop, joint_errors) = (&problem.stops[index], state.joint_errors[index].as_slice());
+        LinearStop { linear: self, index, stop, joint_errors, at, images }
+    }
+
+    /// The stop of the k-th image in use.
+    pub fn stop_of(self, k: usize) -> LinearStop<'a> {
+        self.stop(self.lin.stops.partition_point(|(_, images)| images.end <= k))
+    }
+
     /// The k-th image in use.
     pub fn image(self, k: usize) -> LinearImage<'a> {
         let Self { adjustment: Adjustment { problem, state }, lin } = self;
         let index = lin.images[k];
-        let (image, slack) = (&problem.images[index], &state.slack[index]);
-        LinearImage { problem, state, index, image, slack, terms: &lin.terms[k], chain: &lin.chains[k] }
+        let (image, tie) = (&problem.images[index], &state.ties[index]);
+        let joints = state.joint_errors[image.stop].len();
+        let before = (0..k).rev().map(|k| lin.images[k]).take_while(|&i| problem.images[i].stop == image.stop);
+        let tie_start = joints + before.map(|i| state.ties[i].len()).sum::<usize>();
+        let (terms, chain) = (&lin.terms[k], &lin.chains[k]);
+        LinearImage { problem, state, index, image, tie, terms, chain, joints, tie_start }
     }
 
     /// Right-hand side of the dense columns, without their priors.
@@ -139,25 +197,25 @@ impl LinearImage<'_> {
         equations(self.image, self.state, &self.chain.pose, &Weighting::of(self.problem, self.image))
     }
 
-    /// Information of the slack, prior included.
-    pub(super) fn slack_information(&self) -> DMatrix<f64> {
-        let l = &self.chain.d_slack;
-        let mut information = l.tr_mul(&(self.terms.pp * l));
-        if let Slack::Joints(dq) = self.slack {
-            (0..dq.len()).for_each(|s| information[(s, s)] += self.problem.slack_information(self.image, s));
-        }
-        information
+    /// Places, among what is latent at its stop, of the unknowns that move its pose, in the order of the columns of
+    /// [`Chained::d_latent`]: joint errors, then its tie.
+    pub fn latents(&self) -> [Range<usize>; 2] {
+        let joints = if self.tie.is_free() { 0 } else { self.joints };
+        [0..joints, self.tie_start..self.tie_start + self.tie.len()]
     }
 
-    /// Right-hand side of the slack, prior included.
-    pub(super) fn slack_gradient(&self) -> DVector<f64> {
-        let mut gradient = self.chain.d_slack.tr_mul(&self.terms.bp);
-        if let Slack::Joints(dq) = self.slack {
-            for (s, q) in dq.iter().enumerate() {
-                gradient[s] -= q * self.problem.slack_information(self.image, s);
-            }
-        }
-        gradient
+    /// The part of a matrix over what is latent at its stop that belongs to the image.
+    pub fn part_of(&self, of_stop: &DMatrix<f64>) -> DMatrix<f64> {
+        let own: Vec<usize> = self.latents().into_iter().flatten().collect();
+        of_stop.select_rows(&own).select_columns(&own)
+    }
+
+    /// Information of what moves its pose beside the columns, by its prior alone; zero for a free pose.
+    pub fn prior_of_latents(&self) -> Vec<f64> {
+        let stop = &self.problem.stops[self.image.stop];
+        let [joints, tie] = self.latents();
+        let known = |_| if self.tie.is_free() { 0.0 } else { 1.0 / self.problem.tilt_variance(self.image) };
+        joints.map(|r| self.problem.joint_error_information(stop, r)).chain(tie.map(known)).collect()
     }
 
     /// Dense columns that it depends on and that are free.
@@ -167,14 +225,72 @@ impl LinearImage<'_> {
         let all = (0..layout.theta_len()).chain(intrinsics.into_iter().flatten());
         all.filter(|&c| layout.columns[c].free).collect()
     }
+}
 
-    /// Information of the slack by its prior alone; zero for a free pose.
-    pub fn prior_of_slack(&self) -> Vec<f64> {
-        let known = |r: usize| match self.slack {
-            Slack::Joints(_) => self.problem.slack_information(self.image, r),
-            _ => 0.0,
-        };
-        (0..self.slack.len()).map(known).collect()
+impl<'a> LinearStop<'a> {
+    /// Its images in use.
+    pub fn images(&self) -> impl Iterator<Item = LinearImage<'a>> + use<'a> {
+        let linear = self.linear;
+        self.images.clone().map(move |k| linear.image(k))
+    }
+
+    /// Places of its images among those in use.
+    pub fn places(&self) -> Range<usize> {
+        self.images.clone()
+    }
+
+    /// Number of unknowns that are latent at it.
+    pub fn unknowns(&self) -> usize {
+        self.joint_errors.len() + self.images().map(|image| image.tie.len()).sum::<usize>()
+    }
+
+    /// Information of what is latent at it, prior included.
+    pub(super) fn information(&self) -> DMatrix<f64> {
+        let problem = &self.linear.adjustment.problem;
+        let n = self.unknowns();
+        let mut information = DMatrix::zeros(n, n);
+        for r in 0..self.joint_errors.len() {
+            information[(r, r)] = problem.joint_error_information(self.stop, r);
+        }
+        for image in self.images() {
+            let l = &image.chain.d_latent;
+            let own = l.tr_mul(&(image.terms.pp * l));
+            let places: Vec<usize> = image.latents().into_iter().flatten().collect();
+            for (b, &column) in places.iter().enumerate() {
+                places.iter().enumerate().for_each(|(a, &row)| information[(row, column)] += own[(a, b)]);
+            }
+            if let Tie::Tilted(_) = image.tie {
+                let [_, tilt] = image.latents();
+                tilt.for_each(|k| information[(k, k)] += 1.0 / problem.tilt_variance(image.image));
+            }
+        }
+        information
+    }
+
+    /// Right-hand side of what is latent at it, prior included.
+    pub(super) fn gradient(&self) -> DVector<f64> {
+        let problem = &self.linear.adjustment.problem;
+        let mut gradient = DVector::zeros(self.unknowns());
+        for (r, q) in self.joint_errors.iter().enumerate() {
+            gradient[r] = -q * problem.joint_error_information(self.stop, r);
+        }
+        for image in self.images() {
+            let own = image.chain.d_latent.tr_mul(&image.terms.bp);
+            image.latents().into_iter().flatten().zip(own.iter()).for_each(|(row, g)| gradient[row] += g);
+            if let Tie::Tilted(tilt) = image.tie {
+                let [_, places] = image.latents();
+                places.zip(tilt).for_each(|(k, t)| gradient[k] -= t / problem.tilt_variance(image.image));
+            }
+        }
+        gradient
+    }
+
+    /// Puts its part of a step where it belongs.
+    pub(super) fn put(&self, own: &[f64], step: &mut Step) {
+        step.joint_errors[self.index] = own[..self.joint_errors.len()].to_vec();
+        for image in self.images() {
+            step.ties[image.index] = own[image.tie_start..image.tie_start + image.tie.len()].to_vec();
+        }
     }
 }
 

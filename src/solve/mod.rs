@@ -2,7 +2,7 @@
 
 mod blocks;
 mod by_markers;
-mod by_slack;
+mod by_stops;
 mod components;
 mod covariance;
 mod fit;
@@ -23,7 +23,7 @@ pub use fit::Fit;
 pub use frame::{Frame, PlateScale, Similarity, frames};
 pub use in_frame::{InFrame, in_frame, in_frame_by};
 pub use levenberg::{NoFit, Outcome, Settings, Status, solve};
-pub use linear::{LinearImage, LinearProblem, Linearised};
+pub use linear::{LinearImage, LinearProblem, LinearStop, Linearised};
 pub use noise_information::{NoiseInformation, Spread, noise_information};
 pub use noise_uncertainty::NoiseUncertainty;
 pub use snoop::{reject_images, reject_observations};

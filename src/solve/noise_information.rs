@@ -9,13 +9,13 @@ use nalgebra::{DMatrix, DVector};
 use super::components::SHRINKAGE;
 use super::covariance::Covariance;
 use super::fit::Fit;
-use super::linear::LinearImage;
+use super::linear::LinearStop;
 use super::system::Elimination;
 use crate::linalg::SymmetricFactor;
-use crate::problem::{Adjustment, Noise, Slack};
+use crate::problem::{Adjustment, Noise, Tie};
 use crate::urdf::JointKind;
 
-/// Latents up to which those of different images are taken together; of more, their coupling through the parameters is
+/// Latents up to which those of different stops are taken together; of more, their coupling through the parameters is
 /// a small part, and leaving it out states too large a spread.
 const MOST_COUPLED: usize = 1200;
 
@@ -32,7 +32,7 @@ pub struct NoiseInformation {
     pub(super) touched: Vec<usize>,
     /// Covariance of what is found of joints that are alike: drawing them together then takes scatter away and adds no bias.
     pub(super) scatter: DMatrix<f64>,
-    /// Latents of all images, where they are taken together, with the covariance that has them among its unknowns, where it is
+    /// Latents of all stops, where they are taken together, with the covariance that has them among its unknowns, where it is
     /// not the given one.
     pub(super) together: Vec<Latent>,
     pub(super) coupled: Option<Covariance>,
@@ -72,8 +72,8 @@ pub(super) struct Latent {
 pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
     let (linear, Adjustment { problem, state }, cov) = (fit.linear(), &fit.adjustment, &fit.covariance);
     let (readings, series) = (state.robot.chain.readings.len(), problem.noise.joint.len());
-    let slack: usize = linear.images().map(|i| i.slack.len()).sum();
-    let coupled = if cov.system.slack_start.is_empty() && slack <= MOST_COUPLED {
+    let latent: usize = linear.stops().map(|stop| stop.unknowns()).sum();
+    let coupled = if cov.system.latent_start.is_empty() && latent <= MOST_COUPLED {
         Some(linear.covariance_by(Elimination::Markers).ok()?)
     } else {
         None
@@ -94,15 +94,15 @@ pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
         locals.iter().for_each(|b| add(a, b, cov.reduced[(a.row, b.row)]));
     }
     let mut together = Vec::new();
-    let of_images: Vec<Vec<Latent>> = linear.images().map(|image| image_latents(&fit.adjustment, image)).collect();
-    if cov.system.slack_start.is_empty() {
-        for (k, own) in of_images.iter().enumerate() {
-            let c = cov.slack(k, own.len());
+    let of_stops: Vec<Vec<Latent>> = linear.stops().map(|stop| stop_latents(&fit.adjustment, &stop)).collect();
+    if cov.system.latent_start.is_empty() {
+        for (stop, own) in linear.stops().zip(&of_stops) {
+            let c = cov.latents(&stop);
             own.iter().for_each(|a| own.iter().for_each(|b| add(a, b, c[(a.row, b.row)])));
         }
     } else {
-        let starts = cov.system.slack_start.iter();
-        let placed = of_images.into_iter().zip(starts);
+        let starts = cov.system.latent_start.iter();
+        let placed = of_stops.into_iter().zip(starts);
         let all: Vec<Latent> = (placed.flat_map(|(own, start)| own.into_iter().map(move |l| (l, *start))))
             .map(|(l, start)| Latent { row: start + l.row, ..l })
             .collect();
@@ -141,18 +141,25 @@ fn local_latents(
     used.map(latent).filter(|l| l.sigma > 0.0).collect()
 }
 
-/// Latents of an image, numbered within it.
-fn image_latents(Adjustment { problem, state }: &Adjustment, own: LinearImage) -> Vec<Latent> {
-    let LinearImage { image, slack: Slack::Joints(dq), .. } = own else { return Vec::new() };
+/// What is latent at a stop and has a variance, numbered within it.
+fn stop_latents(Adjustment { problem, state }: &Adjustment, at: &LinearStop) -> Vec<Latent> {
+    let LinearStop { stop, joint_errors, .. } = at;
     let n = state.robot.chain.readings.len();
     let first = problem.noise.joint.len() * n;
-    let latent = |row: usize| {
-        let [own, local] = problem.slack_variance(image, row);
-        let a = if row < n { image.series * n + row } else { first + problem.noise.local.len() + image.series };
+    let error = |row: usize| {
+        let [own, local] = problem.joint_error_variance(stop, row);
+        let a = stop.series * n + row;
         let b = if local > 0.0 { first + row } else { a };
         Latent { row, sigma: (own + local).sqrt(), parts: [(a, own / (own + local)), (b, local / (own + local))] }
     };
-    (0..dq.len()).map(latent).collect()
+    let tilted = at.images().filter(|image| matches!(image.tie, Tie::Tilted(_)));
+    let tilts = tilted.flat_map(|image| {
+        let component = first + problem.noise.local.len() + stop.series;
+        let sigma = problem.tilt_variance(image.image).sqrt();
+        let [_, tilt] = image.latents();
+        tilt.map(move |row| Latent { row, sigma, parts: [(component, 1.0), (component, 0.0)] })
+    });
+    (0..joint_errors.len()).map(error).chain(tilts).collect()
 }
 
 /// Every variance is drawn to a common one as by so many observations, as in the estimate: joint noise to that of the readings of its group in the

@@ -13,7 +13,7 @@ use crate::linalg::{SymmetricFactor, product};
 /// the local error of a joint that never moved, would else be stated as an error of any size.
 const MOST_SPREAD: f64 = 2.0;
 
-/// The latents of all images, and how the estimated variances of each two of them scatter together.
+/// The latents of all stops, and how the estimated variances of each two of them scatter together.
 #[derive(Debug, Clone)]
 pub struct NoiseUncertainty {
     /// Covariance of dense columns and latents in units of the latents' sigmas, `Y`.

@@ -1,7 +1,6 @@
 //! Rejection with reasons: single observations by their residual, whole images by the joint error that they would need.
 
-use crate::model::robot::Robot;
-use crate::problem::{Adjustment, Image, ImageRejection, Mismatch, ObservationRejection, Slack, Weighting, predict};
+use crate::problem::{Adjustment, ImageRejection, Mismatch, ObservationRejection, Weighting, predict};
 
 /// Normalised residual length beyond which an observation is left out (a clean one is so with probability 4e-5).
 const OBSERVATION_BOUND: f64 = 4.5;
@@ -16,16 +15,17 @@ const IMAGE_BOUND: f64 = 8.0;
 const IMAGE_SIGMA_FLOOR: f64 = 1e-4;
 
 /// Re-judges every observation at the estimates; returns how many verdicts changed.
-pub fn reject_observations(Adjustment { problem, state }: &mut Adjustment) -> usize {
+pub fn reject_observations(adjustment: &mut Adjustment) -> usize {
     let mut verdicts = Vec::new();
+    let Adjustment { problem, state } = &*adjustment;
     for (i, image) in problem.used() {
-        let Some(chain) = state.chained(&problem.layout, image, &state.slack[i]) else { continue };
+        let Some(pose) = adjustment.camera_from_plate(i) else { continue };
         let w = Weighting::of(problem, image);
         for (k, o) in image.observations.iter().enumerate() {
             if o.rejected.is_some_and(|r| r != ObservationRejection::Residual) {
                 continue;
             }
-            let Some(p) = predict(image, state, &chain.pose, o) else { continue };
+            let Some(p) = predict(image, state, &pose, o) else { continue };
             let r = o.uv - p.uv;
             let length = (r.dot(&(o.information * r))).max(0.0).sqrt() / w.pixel_factor;
             let out = length > if o.rejected.is_some() { OBSERVATION_RETURN } else { OBSERVATION_BOUND };
@@ -35,26 +35,23 @@ pub fn reject_observations(Adjustment { problem, state }: &mut Adjustment) -> us
         }
     }
     for &(i, k, out) in &verdicts {
-        problem.images[i].observations[k].rejected = out.then_some(ObservationRejection::Residual);
+        adjustment.problem.images[i].observations[k].rejected = out.then_some(ObservationRejection::Residual);
     }
     verdicts.len()
 }
 
-/// Noise and local error of every reading at a stop, rad or m.
-fn whole_error(robot: &Robot, image: &Image, noise: &[f64]) -> Vec<f64> {
-    let local = image.stop.as_ref().map(|s| robot.local_errors(s)).unwrap_or_default();
-    noise.iter().zip(local).map(|(n, l)| n + l).collect()
+/// Latent and local error of every reading at the stop of an image, rad or m; `None` for one that its readings do not hold.
+fn whole_error(adjustment: &Adjustment, image: usize) -> Option<Vec<f64>> {
+    let from = adjustment.taken_from(image);
+    let local = adjustment.state.robot.local_errors(from.posture.filter(|_| from.joints() > 0)?);
+    Some(from.joint_errors.iter().zip(local).map(|(n, l)| n + l).collect())
 }
 
 /// Leaves out the image whose readings fit it worst, where they do not fit at all; returns its index.
 pub fn reject_images(adjustment: &mut Adjustment) -> Option<usize> {
     let robot = &adjustment.state.robot;
-    let mut noise = Vec::new();
-    for (i, image, slack) in adjustment.used() {
-        if let Slack::Joints(dq) = slack {
-            noise.push((i, whole_error(robot, image, dq)));
-        }
-    }
+    let used = adjustment.used().filter_map(|(i, ..)| Some((i, whole_error(adjustment, i)?)));
+    let noise: Vec<(usize, Vec<f64>)> = used.collect();
     let joints = noise.first()?.1.len();
     let noise: Vec<(usize, &[f64])> = noise.iter().map(|(i, dq)| (*i, dq.as_slice())).collect();
     let sigma: Vec<f64> = (0..joints)

@@ -1,4 +1,4 @@
-//! Reduced normal equations: dense columns, and either the slack of the images or the markers; the other family is eliminated.
+//! Reduced normal equations: dense columns, and either what is latent at stops or the markers; the other family is eliminated.
 
 use std::fmt;
 
@@ -6,29 +6,28 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::blocks::SeenMarkers;
 use super::by_markers::MarkersEliminated;
-use super::by_slack::SlackEliminated;
-use super::linear::{Carried, LinearProblem};
+use super::by_stops::StopsEliminated;
+use super::linear::{Carried, LinearProblem, LinearStop};
 use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
 use crate::problem::{Adjustment, Problem, Step};
 
 /// Which family of unknowns is eliminated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Elimination {
-    /// Markers, by their 3x3 blocks: the slack of the images stays. Cheaper for up to some 250 images.
+    /// Markers, by their 3x3 blocks: what is latent at stops stays. Cheaper for up to some 250 stops.
     Markers,
-    /// Slack, image by image: the markers stay. Cheaper for many images.
-    Slack,
-    /// Slack, and no marker moves: costs next to nothing beside the others.
-    SlackMarkersHeld,
+    /// What is latent, stop by stop: the markers stay. Cheaper for many stops.
+    Stops,
+    /// The same, and no marker moves: costs next to nothing beside the others.
+    StopsMarkersHeld,
 }
 
 impl Elimination {
     /// The cheaper one: the one that leaves fewer unknowns.
     pub fn cheaper(linear: LinearProblem) -> Self {
-        let (problem, lin) = (&linear.adjustment.problem, linear.lin);
-        let slack: usize = lin.chains.iter().map(|c| c.d_slack.ncols()).sum();
-        let markers: usize = problem.plates.iter().map(|p| 3 * p.markers.len()).sum();
-        if slack > markers { Self::Slack } else { Self::Markers }
+        let latent: usize = linear.stops().map(|stop| stop.unknowns()).sum();
+        let markers: usize = linear.adjustment.problem.plates.iter().map(|p| 3 * p.markers.len()).sum();
+        if latent > markers { Self::Stops } else { Self::Markers }
     }
 }
 
@@ -36,7 +35,7 @@ impl Elimination {
 #[derive(Debug, Clone)]
 pub(super) enum Eliminated {
     Markers(MarkersEliminated),
-    Slack(SlackEliminated),
+    Stops(StopsEliminated),
 }
 
 /// Reduced normal equations; unknowns in the order dense columns, then the family that stays.
@@ -46,8 +45,8 @@ pub struct System {
     pub information: DMatrix<f64>,
     /// Right-hand side.
     pub rhs: DVector<f64>,
-    /// First unknown of the slack of each image in use; empty where the slack was eliminated.
-    pub slack_start: Vec<usize>,
+    /// First unknown of what is latent at each stop in use; empty where that was eliminated.
+    pub latent_start: Vec<usize>,
     touched: Vec<bool>,
     pub(super) eliminated: Eliminated,
 }
@@ -80,16 +79,16 @@ impl System {
                 let (a, rest) = MarkersEliminated::build(linear, lambda);
                 (a, Eliminated::Markers(rest))
             }
-            Elimination::Slack | Elimination::SlackMarkersHeld => {
-                let held = which == Elimination::SlackMarkersHeld;
+            Elimination::Stops | Elimination::StopsMarkersHeld => {
+                let held = which == Elimination::StopsMarkersHeld;
                 let seen = if held { SeenMarkers::none(problem) } else { SeenMarkers::of(linear) };
-                let (a, rest) = SlackEliminated::build(linear, lambda, seen);
-                (a, Eliminated::Slack(rest))
+                let (a, rest) = StopsEliminated::build(linear, lambda, seen);
+                (a, Eliminated::Stops(rest))
             }
         };
-        let slack_start = if let Eliminated::Markers(e) = &eliminated { e.slack_start.clone() } else { Vec::new() };
+        let latent_start = if let Eliminated::Markers(e) = &eliminated { e.latent_start.clone() } else { Vec::new() };
         let rhs = DVector::zeros(information.nrows());
-        let mut system = Self { information, rhs, slack_start, touched: Vec::new(), eliminated };
+        let mut system = Self { information, rhs, latent_start, touched: Vec::new(), eliminated };
         system.add_priors(problem);
         for i in 0..system.rhs.len() {
             system.information[(i, i)] *= 1.0 + lambda;
@@ -116,10 +115,11 @@ impl System {
         }
         match &self.eliminated {
             Eliminated::Markers(e) => {
-                let k = e.slack_start.partition_point(|start| *start <= row).saturating_sub(1);
-                format!("the deviation of {}", linear.image(k).image.name)
+                let at = e.latent_start.partition_point(|start| *start <= row).saturating_sub(1);
+                let first = linear.stop(at).places().start;
+                format!("the deviation of {}", linear.image(first).image.name)
             }
-            Eliminated::Slack(e) => {
+            Eliminated::Stops(e) => {
                 let (plate, marker) = e.marker(row);
                 format!("marker {} of plate {plate}", problem.plates[plate].markers[marker].id)
             }
@@ -131,7 +131,7 @@ impl System {
         let Adjustment { problem, state } = linear.adjustment;
         self.rhs = match &mut self.eliminated {
             Eliminated::Markers(e) => e.reduce_gradient(linear),
-            Eliminated::Slack(e) => e.reduce_gradient(linear),
+            Eliminated::Stops(e) => e.reduce_gradient(linear),
         };
         let values = state.values(&problem.layout);
         for (i, c) in problem.layout.columns.iter().enumerate() {
@@ -188,7 +188,7 @@ impl System {
     pub fn step(&self, linear: LinearProblem, x: &DVector<f64>) -> Step {
         match &self.eliminated {
             Eliminated::Markers(e) => e.step(linear, x),
-            Eliminated::Slack(e) => e.step(linear, x),
+            Eliminated::Stops(e) => e.step(linear, x),
         }
     }
 
@@ -196,18 +196,19 @@ impl System {
     pub fn decrement(&self, x: &DVector<f64>) -> f64 {
         let eliminated = match &self.eliminated {
             Eliminated::Markers(e) => e.squares(),
-            Eliminated::Slack(e) => e.squares(),
+            Eliminated::Stops(e) => e.squares(),
         };
         (x.dot(&self.rhs) + eliminated).max(0.0).sqrt()
     }
 
-    /// Covariance of the slack of the k-th image in use, from the covariance of the reduced unknowns.
-    pub fn slack_covariance(&self, reduced: &DMatrix<f64>, k: usize, length: usize) -> DMatrix<f64> {
+    /// Covariance of what is latent at a stop, from the covariance of the reduced unknowns.
+    pub fn latent_covariance(&self, reduced: &DMatrix<f64>, stop: &LinearStop) -> DMatrix<f64> {
         match &self.eliminated {
-            Eliminated::Markers(_) => {
-                reduced.view((self.slack_start[k], self.slack_start[k]), (length, length)).into_owned()
+            Eliminated::Markers(e) => {
+                let (start, n) = (e.latent_start[stop.at], stop.unknowns());
+                reduced.view((start, start), (n, n)).into_owned()
             }
-            Eliminated::Slack(e) => e.slack_covariance(reduced, k),
+            Eliminated::Stops(e) => e.latent_covariance(reduced, stop.at),
         }
     }
 
@@ -223,7 +224,7 @@ impl System {
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         match &self.eliminated {
             Eliminated::Markers(e) => e.marker_covariances(reduced, carried),
-            Eliminated::Slack(e) => e.marker_covariances(reduced, carried),
+            Eliminated::Stops(e) => e.marker_covariances(reduced, carried),
         }
     }
 }

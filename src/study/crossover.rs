@@ -8,7 +8,7 @@ use crate::assess::{Limits, Ratio, bootstrap_ratio, median, root_mean_square};
 use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, adjoint};
 use crate::identify::{Estimator, PoseStage, RobotModel, TruthError, build, estimate_all, truth_error};
-use crate::problem::{Adjustment, Slack};
+use crate::problem::{Adjustment, TakenFrom, Tie};
 use crate::series::{Plate, PlateKind};
 use crate::simulate::{SimulatedSeries, WorldRequest, series};
 use crate::urdf::Chain;
@@ -144,7 +144,7 @@ fn started(request: &StudyRequest, world: &SimulatedSeries) -> Result<Adjustment
     state.cameras = vec![world.truth.camera.clone()];
     state.mountings = vec![world.truth.camera_pose.pose()];
     state.placements = world.truth.plate_poses.values().map(|p| p.pose()).collect();
-    state.slack = world.truth.stops.iter().map(|s| Slack::Pose(s.camera_from_plate.pose())).collect();
+    state.ties = world.truth.stops.iter().map(|s| Tie::Free(s.camera_from_plate.pose())).collect();
     Ok(start)
 }
 
@@ -167,11 +167,11 @@ fn reference(request: &StudyRequest, lattice: (u32, u32)) -> Result<Scale> {
     let start = started(request, &world(request, lattice, 0.0, 1)?)?;
     let Adjustment { problem, state } = &start;
     let stage = PoseStage::adjusted(&start).ok_or_else(unsolved)?;
+    let exact = vec![0.0; request.chain.readings.len()];
     let (mut poses, mut levers) = (Vec::new(), Vec::new());
     for (k, &i) in stage.images.iter().enumerate() {
-        let image = &problem.images[i];
-        let joints = vec![0.0; request.chain.readings.len()];
-        let Some(chain) = state.chained(&problem.layout, image, &Slack::Joints(joints)) else { continue };
+        let from = TakenFrom { posture: problem.posture(i), joint_errors: &exact, tie: &Tie::Rigid };
+        let Some(chain) = state.chained(&problem.layout, &problem.images[i], from) else { continue };
         let block = stage.covariance.view((6 * k, 6 * k), (6, 6)).into_owned();
         let position = |pose: &Pose, c: nalgebra::DMatrix<f64>| {
             let ad = adjoint(pose);
@@ -179,7 +179,7 @@ fn reference(request: &StudyRequest, lattice: (u32, u32)) -> Result<Scale> {
             ((0..3).map(|a| turned[(a, a)]).sum::<f64>() / 3.0).sqrt()
         };
         poses.push(position(&stage.references[k], block));
-        levers.push(position(&chain.pose, &chain.d_slack * chain.d_slack.transpose()));
+        levers.push(position(&chain.pose, &chain.d_latent * chain.d_latent.transpose()));
     }
     Ok(Scale { pose_m: median(&poses).ok_or_else(unsolved)?, lever_m: median(&levers).ok_or_else(unsolved)? })
 }

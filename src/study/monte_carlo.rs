@@ -25,7 +25,7 @@ use crate::geom::Pose;
 use crate::identify::{Options, RobotModel, Solution, identify};
 use crate::linalg::SymmetricFactor;
 use crate::model::robot::{Posture, Robot};
-use crate::problem::{Adjustment, Problem, Slack, State};
+use crate::problem::{Adjustment, Problem, State, TakenFrom};
 use crate::series::{Plate, PlateKind};
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
 use crate::solve::{JOINT_NOISE_FLOOR, NoiseUncertainty, Settings, noise_information, solve};
@@ -324,12 +324,12 @@ fn free_pose_error(s: &Solution, world: &SimulatedSeries) -> Option<ErrorWithCov
 /// The flange in the plate frame at the first joint vector that was kept aside: the camera of the solution, as if it were exact, on
 /// the robot and plate of the solution against the same camera on the true ones. Its error (m, rad) and the stated covariance.
 pub fn flange_error(s: &Solution, world: &SimulatedSeries, truth: &Robot) -> Option<ErrorWithCovariance> {
-    let mut image = s.fit.problem.images.iter().find(|i| i.stop.is_some())?.clone();
+    let problem = &s.fit.problem;
+    let image = &problem.images[(0..problem.images.len()).find(|&i| problem.on_robot(i))?];
     let readings = &world.truth.held_out.first()?.readings;
-    image.stop = Some(Posture::at(readings));
-    let exact = Slack::exact(readings.len(), false);
-    let chain = s.fit.state.chained(&s.fit.problem.layout, &image, &exact)?;
-    let (theta, mounting) = (s.fit.problem.layout.theta_len(), s.fit.problem.layout.mountings[0].clone());
+    let posture = Posture::at(readings);
+    let chain = s.fit.state.chained(&problem.layout, image, TakenFrom::exact(&posture))?;
+    let (theta, mounting) = (problem.layout.theta_len(), problem.layout.mountings[0].clone());
     let mut g = chain.d_theta;
     g.columns_mut(mounting.start, 6).fill(0.0);
     let covariance = &g * s.fit.covariance.reduced.view((0, 0), (theta, theta)) * g.transpose();

@@ -246,8 +246,8 @@ fn joint_sigma(chain: &Chain) -> Vec<f64> {
 
 fn predict(request: &PlanRequest, planned: &Adjustment, visits: &[Vec<f64>], weight: &DMatrix<f64>) -> Result<f64> {
     let setting = &request.setting;
-    let images = visits.iter().filter_map(|q| setting.image(&planned.state, "", q, 0)).collect();
-    Ok(flange_m(weight, &exact_covariance(planned, setting, images)?))
+    let stops = visits.iter().filter_map(|q| setting.stop(&planned.state, "", q, 0)).collect();
+    Ok(flange_m(weight, &exact_covariance(planned, setting, stops)?))
 }
 
 /// Flange errors after the whole identification of a series, over two sets of joint vectors.

@@ -1,13 +1,15 @@
-//! Slack eliminated image by image: the dense columns and the markers stay.
+//! What is latent eliminated stop by stop: the dense columns and the markers stay.
 //!
-//! With the information `H = F F'` of the slack of an image (pixels through `L`, and the prior) and its coupling `B` with what stays,
-//! `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product.
+//! With the information `H = F F'` of what is latent at a stop (pixels of its images through `L`, and the priors) and its coupling `B` with
+//! what stays, `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product.
+
+use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, SMatrix, Vector3};
 
-use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, slack_with_markers};
+use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, latents_with_markers};
 use super::linear::Carried;
-use super::linear::{LinearImage, LinearProblem};
+use super::linear::{LinearImage, LinearProblem, LinearStop};
 use crate::linalg::{gram, mirror_upper, orthonormal, product, subtract_gram};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Equations, Step};
@@ -15,33 +17,33 @@ use crate::problem::{Equations, Step};
 /// What moves a marker with the modes of a plate.
 type Modes = SMatrix<f64, 3, MODES>;
 
-/// Images whose couplings form one Gram product.
-const IMAGES_A_PRODUCT: usize = 48;
+/// Stops whose couplings form one Gram product.
+const STOPS_A_PRODUCT: usize = 48;
 
-/// The slack of one image with its elimination.
+/// What is latent at one stop, with its elimination.
 #[derive(Debug, Clone)]
 struct Block {
     /// `F^-1`.
     inverse_factor: DMatrix<f64>,
-    /// Unknowns that stay and that the image touches.
+    /// Unknowns that stay and that its images touch, ascending.
     rows: Vec<usize>,
-    /// `Y`, `rows` x slack.
+    /// `Y`, `rows` x latent.
     y: DMatrix<f64>,
     /// `F^-1` times the right-hand side.
     rhs: DVector<f64>,
 }
 
-/// Every image's slack with its elimination.
+/// Every stop in use with its elimination.
 #[derive(Debug, Clone)]
-pub(super) struct SlackEliminated {
+pub(super) struct StopsEliminated {
     blocks: Vec<Block>,
     seen: SeenMarkers,
     /// Number of dense columns: the first unknown of the markers.
     dense: usize,
 }
 
-impl SlackEliminated {
-    /// Information with the priors of slack and markers, without those of the dense columns; markers that are not among those `seen` stay
+impl StopsEliminated {
+    /// Information with the priors of latents and markers, without those of the dense columns; markers that are not among those `seen` stay
     /// where they are.
     pub fn build(linear: LinearProblem, lambda: f64, seen: SeenMarkers) -> (DMatrix<f64>, Self) {
         let layout = &linear.adjustment.problem.layout;
@@ -54,15 +56,18 @@ impl SlackEliminated {
             a.fixed_view_mut::<3, 3>(dense + 3 * at, dense + 3 * at).copy_from(information);
         }
         let mut coupling = DenseCoupling::new(&linear.adjustment.problem, &seen);
-        let mut blocks = Vec::with_capacity(linear.images().len());
-        for (k, image) in linear.images().enumerate() {
-            let equations = if seen.order.is_empty() { None } else { image.equations() };
-            equations.iter().for_each(|e| coupling.add(image, layout.intrinsics(image.image), &seen, e));
-            let of_pose = poses.coupling.rows(6 * k, 6);
-            blocks.push(Block::new(image, of_pose, lambda, (dense, &seen, equations.as_ref())));
+        let mut blocks = Vec::with_capacity(linear.stops().len());
+        for stop in linear.stops() {
+            let mut own = Vec::with_capacity(stop.places().len());
+            for (k, image) in stop.places().zip(stop.images()) {
+                let equations = if seen.order.is_empty() { None } else { image.equations() };
+                equations.iter().for_each(|e| coupling.add(image, layout.intrinsics(image.image), &seen, e));
+                own.push(Coupled::new(image, poses.coupling.rows(6 * k, 6), (dense, &seen, equations.as_ref())));
+            }
+            blocks.push(Block::new(&stop, &own, lambda));
         }
         coupling.copy_to(&mut a, dense);
-        for part in blocks.chunks(IMAGES_A_PRODUCT) {
+        for part in blocks.chunks(STOPS_A_PRODUCT) {
             let mut y = DMatrix::zeros(n, part.iter().map(|b| b.y.ncols()).sum());
             let mut into = y.column_iter_mut();
             for column in part.iter().flat_map(|b| b.y.column_iter().map(|column| (&b.rows, column))) {
@@ -75,13 +80,13 @@ impl SlackEliminated {
         (a, Self { blocks, seen, dense })
     }
 
-    /// Takes over the right-hand sides of the slack at a linearisation; returns the reduced one, without the priors of the dense columns.
+    /// Takes over the right-hand sides of the latents at a linearisation; returns the reduced one, without the priors of the dense columns.
     pub fn reduce_gradient(&mut self, linear: LinearProblem) -> DVector<f64> {
         let dense = self.dense;
         let mut reduced = linear.dense_gradient().resize_vertically(dense + 3 * self.seen.order.len(), 0.0);
         reduced.rows_range_mut(dense..).copy_from(&self.seen.gradient(linear));
-        for (block, image) in self.blocks.iter_mut().zip(linear.images()) {
-            block.rhs = &block.inverse_factor * image.slack_gradient();
+        for (block, stop) in self.blocks.iter_mut().zip(linear.stops()) {
+            block.rhs = &block.inverse_factor * stop.gradient();
             let taken = &block.y * &block.rhs;
             block.rows.iter().zip(taken.iter()).for_each(|(&row, value)| reduced[row] -= value);
         }
@@ -108,11 +113,11 @@ impl SlackEliminated {
         columns -= taken;
     }
 
-    /// Takes what moves the slack of the k-th image in use along with the unknowns from `to` on out of it.
-    pub fn carry(&mut self, k: usize, to: usize, by: &DMatrix<f64>) {
-        let block = &mut self.blocks[k];
+    /// Takes what moves some of the latents of a stop, from `first` on, along with the unknowns from `to` on out of them.
+    pub fn carry(&mut self, (stop, first): (usize, usize), to: usize, by: &DMatrix<f64>) {
+        let block = &mut self.blocks[stop];
         let Some(factor) = block.inverse_factor.clone().try_inverse() else { return };
-        let carried = by.tr_mul(&factor);
+        let carried = by.tr_mul(&factor.rows(first, by.nrows()));
         for (at, row) in block.rows.iter().enumerate().filter(|(_, r)| (to..to + by.ncols()).contains(r)) {
             let mut own = block.y.row_mut(at);
             own += carried.row(row - to);
@@ -124,28 +129,28 @@ impl SlackEliminated {
         self.seen.order[(row - self.dense) / 3]
     }
 
-    /// `b' H^-1 b` of the right-hand sides of the slack.
+    /// `b' H^-1 b` of the right-hand sides of the latents.
     pub fn squares(&self) -> f64 {
         self.blocks.iter().map(|b| b.rhs.norm_squared()).sum()
     }
 
     /// The whole step from the solution `x` of the reduced system.
     pub fn step(&self, linear: LinearProblem, x: &DVector<f64>) -> Step {
-        let mut slack = vec![Vec::new(); linear.adjustment.problem.images.len()];
-        for (block, &image) in self.blocks.iter().zip(&linear.lin.images) {
-            let own = DVector::from_iterator(block.rows.len(), block.rows.iter().map(|&c| x[c]));
-            let dl = block.inverse_factor.tr_mul(&(&block.rhs - block.y.tr_mul(&own)));
-            slack[image] = dl.as_slice().to_vec();
-        }
         let of = |at: usize| x.fixed_rows::<3>(self.dense + 3 * at).into_owned();
         let step = |at: &Option<usize>| at.map_or(Vector3::zeros(), of);
         let markers = self.seen.number.iter().map(|plate| plate.iter().map(step).collect()).collect();
-        Step { dense: x.rows(0, self.dense).into_owned(), slack, markers }
+        let mut step = Step::of(x.rows(0, self.dense).into_owned(), markers, &linear.adjustment.state);
+        for (block, stop) in self.blocks.iter().zip(linear.stops()) {
+            let own = DVector::from_iterator(block.rows.len(), block.rows.iter().map(|&c| x[c]));
+            let dl = block.inverse_factor.tr_mul(&(&block.rhs - block.y.tr_mul(&own)));
+            stop.put(dl.as_slice(), &mut step);
+        }
+        step
     }
 
-    /// `H^-1 + H^-1 B' cov(x) B H^-1`.
-    pub fn slack_covariance(&self, reduced: &DMatrix<f64>, k: usize) -> DMatrix<f64> {
-        let block = &self.blocks[k];
+    /// `H^-1 + H^-1 B' cov(x) B H^-1`, of a stop by its place among those in use.
+    pub fn latent_covariance(&self, reduced: &DMatrix<f64>, at: usize) -> DMatrix<f64> {
+        let block = &self.blocks[at];
         let n = block.rows.len();
         let own = DMatrix::from_fn(n, n, |i, j| reduced[(block.rows[i], block.rows[j])]);
         let d = &block.y * &block.inverse_factor;
@@ -175,33 +180,59 @@ impl SlackEliminated {
     }
 }
 
-impl Block {
-    /// Of an image with the coupling of its pose with the `dense` columns, and of the markers that were seen where they stay.
+/// One image with its coupling.
+struct Coupled<'a> {
+    image: LinearImage<'a>,
+    /// Unknowns that stay and that it touches, ascending.
+    rows: Vec<usize>,
+    /// Columns of its [`crate::problem::Chained::d_latent`] x `rows`.
+    coupling: DMatrix<f64>,
+}
+
+impl<'a> Coupled<'a> {
+    /// With the coupling of its pose with the `dense` columns, and of the markers that were seen where they stay.
     fn new(
-        own: LinearImage,
+        image: LinearImage<'a>,
         of_pose: DMatrixView<f64>,
-        lambda: f64,
         (dense, seen, equations): (usize, &SeenMarkers, Option<&Equations>),
     ) -> Self {
-        let l = &own.chain.d_slack;
-        let mut h = own.slack_information();
-        (0..h.nrows()).for_each(|s| h[(s, s)] *= 1.0 + lambda);
-        let factor = h.cholesky().and_then(|c| c.l().try_inverse());
-        let inverse_factor = factor.unwrap_or_else(|| DMatrix::zeros(l.ncols(), l.ncols()));
+        let l = &image.chain.d_latent;
         // Columns that stay at their value take no part, nor in the back-substitution.
-        let mut rows = own.free_columns();
+        let mut rows = image.free_columns();
         let columns = rows.iter().map(|&c| l.tr_mul(&of_pose.fixed_view::<6, 1>(0, c)));
         let mut coupling = DMatrix::from_iterator(l.ncols(), rows.len(), columns.flat_map(|c| c.as_slice().to_vec()));
         if let Some(equations) = equations {
-            let number = &seen.number[own.image.plate];
-            let (markers, with_markers) = slack_with_markers(l, equations);
+            let number = &seen.number[image.image.plate];
+            let (markers, with_markers) = latents_with_markers(l, equations);
             let first = rows.len();
             let starts = markers.iter().filter_map(|&m| number[m].map(|at| dense + 3 * at));
             rows.extend(starts.flat_map(|start| start..start + 3));
             coupling = coupling.resize_horizontally(rows.len(), 0.0);
             coupling.columns_range_mut(first..).copy_from(&with_markers);
         }
-        let y = product(&coupling.transpose(), &inverse_factor.transpose());
-        Self { inverse_factor, rows, y, rhs: DVector::zeros(l.ncols()) }
+        Self { image, rows, coupling }
+    }
+}
+
+impl Block {
+    fn new(stop: &LinearStop, images: &[Coupled], lambda: f64) -> Self {
+        let n = stop.unknowns();
+        let mut h = stop.information();
+        (0..n).for_each(|s| h[(s, s)] *= 1.0 + lambda);
+        let factor = h.cholesky().and_then(|c| c.l().try_inverse());
+        let inverse_factor = factor.unwrap_or_else(|| DMatrix::zeros(n, n));
+        let rows: BTreeSet<usize> = images.iter().flat_map(|own| own.rows.iter().copied()).collect();
+        let rows: Vec<usize> = rows.into_iter().collect();
+        let mut coupling = DMatrix::zeros(rows.len(), n);
+        for Coupled { image, rows: touched, coupling: own } in images {
+            let mut at = 0;
+            for (row, own) in touched.iter().zip(own.column_iter()) {
+                at += rows[at..].partition_point(|r| r < row);
+                let latents = image.latents().into_iter().flatten();
+                latents.zip(own.iter()).for_each(|(latent, value)| coupling[(at, latent)] += value);
+            }
+        }
+        let y = product(&coupling, &inverse_factor.transpose());
+        Self { inverse_factor, rows, y, rhs: DVector::zeros(n) }
     }
 }

@@ -1,0 +1,112 @@
+//! A stop, and what ties the images that were taken at it to its joint readings.
+
+use nalgebra::Vector6;
+
+use crate::geom::Pose;
+use crate::model::robot::Posture;
+
+/// Number of components of a tilt.
+const TILT: usize = 2;
+
+/// One standstill of the robot: what was read there, with one latent error of every reading.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stop {
+    /// Index of its series.
+    pub series: usize,
+    /// Joint readings; `None` off the robot.
+    pub posture: Option<Posture>,
+    /// Share of the local variance of each reading that the local errors cover here; empty where there are none.
+    pub local_share: Vec<f64>,
+}
+
+impl Stop {
+    /// Number of readings; none off the robot.
+    pub fn readings(&self) -> usize {
+        self.posture.as_ref().map_or(0, |p| p.readings.len())
+    }
+}
+
+/// What ties the camera pose of an image to the stop at which it was taken.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Tie {
+    /// It is as the robot says.
+    Rigid,
+    /// The robot, and an apparent tilt of the plate about its x and y axes, rad: what smooth errors of an image (lens, focus, air) do
+    /// to the pose that it shows.
+    Tilted([f64; TILT]),
+    /// Nothing: a free camera pose (`camera_from_plate`).
+    Free(Pose),
+}
+
+impl Tie {
+    /// Number of unknowns.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Rigid => 0,
+            Self::Tilted(_) => TILT,
+            Self::Free(_) => 6,
+        }
+    }
+
+    /// True where there is no unknown.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// True for a camera pose that no robot holds.
+    pub fn is_free(&self) -> bool {
+        matches!(self, Self::Free(_))
+    }
+
+    /// The free camera pose (`camera_from_plate`).
+    pub fn free_pose(&self) -> Option<&Pose> {
+        match self {
+            Self::Free(pose) => Some(pose),
+            _ => None,
+        }
+    }
+
+    pub(super) fn moved(&self, step: &[f64]) -> Self {
+        match self {
+            Self::Rigid => Self::Rigid,
+            Self::Tilted(tilt) => Self::Tilted(std::array::from_fn(|k| tilt[k] + step[k])),
+            Self::Free(pose) => Self::Free(pose.perturbed(&Vector6::from_column_slice(step))),
+        }
+    }
+}
+
+/// Where an image was taken from: the readings of its stop with their latent errors, and its tie to them.
+#[derive(Debug, Clone, Copy)]
+pub struct TakenFrom<'a> {
+    /// Joint readings; `None` off the robot.
+    pub posture: Option<&'a Posture>,
+    /// Latent errors of the readings, rad or m; empty where the readings count as exact.
+    pub joint_errors: &'a [f64],
+    /// Tie of the image.
+    pub tie: &'a Tie,
+}
+
+impl<'a> TakenFrom<'a> {
+    /// A posture that is as it was read.
+    pub fn exact(posture: &'a Posture) -> Self {
+        Self { posture: Some(posture), joint_errors: &[], tie: &Tie::Rigid }
+    }
+
+    /// Number of joint errors that the pose depends on.
+    pub fn joints(&self) -> usize {
+        if self.tie.is_free() { 0 } else { self.joint_errors.len() }
+    }
+
+    /// Number of unknowns that the pose depends on: joint errors, then the tie.
+    pub fn unknowns(&self) -> usize {
+        self.joints() + self.tie.len()
+    }
+
+    /// The errors of all readings, zero where they count as exact.
+    pub(super) fn errors(&self) -> Vec<f64> {
+        match self.joint_errors {
+            [] => vec![0.0; self.posture.map_or(0, |p| p.readings.len())],
+            errors => errors.to_vec(),
+        }
+    }
+}
