@@ -14,7 +14,7 @@ use robotcal::identify::adjust_free_poses;
 use robotcal::init::{PosePair, solve_hand_eye};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::{Posture, Robot};
-use robotcal::problem::{Adjustment, Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State};
+use robotcal::problem::{Adjustment, Image, Layout, Measured, Noise, PlateShape, Problem, State, Stop, Tie};
 use robotcal::series::{CameraMount, Edge, Marker, Plate, PlateKind};
 use robotcal::solve::{Outcome, Settings, solve};
 
@@ -78,32 +78,34 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
     let image = |(i, observations): (usize, Vec<Measured>)| Image {
         name: format!("{i}"),
         series: 0,
+        stop: i,
         camera: 0,
         mounting: 0,
         placement: 0,
         plate: 0,
         mount: CameraMount::Hand,
-        stop: Some(Posture::at(&joints[i][1..])),
         observations,
-        local_share: Vec::new(),
         rejected: None,
     };
     let images: Vec<Image> = observations.into_iter().enumerate().map(image).collect();
-    let slack = match mode {
+    let stop = |i: usize| Stop { series: 0, posture: Some(Posture::at(&joints[i][1..])), local_share: Vec::new() };
+    let stops: Vec<Stop> = (0..images.len()).map(stop).collect();
+    let ties = match mode {
         Mode::Poses => table(&folder.join("init_poses.csv"))?
             .iter()
-            .map(|r| Slack::Pose(Pose::new(exp_so3(&Vector3::new(r[1], r[2], r[3])), Vector3::new(r[4], r[5], r[6]))))
+            .map(|r| Tie::Free(Pose::new(exp_so3(&Vector3::new(r[1], r[2], r[3])), Vector3::new(r[4], r[5], r[6]))))
             .collect(),
-        Mode::Exact => vec![Slack::None; images.len()],
-        Mode::Joint => vec![Slack::exact(readings, false); images.len()],
+        Mode::Exact | Mode::Joint => vec![Tie::Rigid; images.len()],
     };
+    let joint_errors = vec![vec![0.0; if mode == Mode::Joint { readings } else { 0 }]; images.len()];
     let state = State {
         robot: Robot::nominal(chain),
         mountings: vec![pose(&guess["T_flange_cam"])?],
         placements: vec![pose(&guess["T_base_plate"])?],
         cameras: vec![camera],
         plates: vec![PlateShape::nominal(&plate)],
-        slack,
+        joint_errors,
+        ties,
     };
     let names = |name: &str| vec![name.to_owned()];
     let mut layout = Layout::new(&state, &names("hand"), &names("plate"), &names("camera"), &names("plate"));
@@ -127,6 +129,7 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
         placements: names("plate"),
         mountings: names("hand"),
         cameras: names("camera"),
+        stops,
         images,
         noise,
         families: Vec::new(),
@@ -139,11 +142,11 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
 fn start_from_images(mut guess: Adjustment) -> Fallible<Adjustment> {
     let focal_px = guess.state.cameras[0].parameters[0];
     let (_, free, _) = adjust_free_poses(guess.clone(), &[Some(focal_px)], &robotcal::assess::Limits::default())?;
-    let pair = |(image, free): (&Image, &Option<FreePose>)| {
-        let chain = guess.state.robot.base_from_tip(&image.stop.as_ref()?.readings).inverse();
+    let pair = |(i, free): (usize, &Option<FreePose>)| {
+        let chain = guess.state.robot.base_from_tip(&guess.problem.posture(i)?.readings).inverse();
         Some(PosePair { camera_from_plate: free.as_ref()?.camera_from_plate, chain })
     };
-    let pairs: Vec<PosePair> = guess.problem.images.iter().zip(&free.poses).filter_map(pair).collect();
+    let pairs: Vec<PosePair> = free.poses.iter().enumerate().filter_map(pair).collect();
     let best = solve_hand_eye(&pairs).first().ok_or("no closed form has a solution")?.solution;
     (guess.state.mountings, guess.state.placements) = (vec![best.camera], vec![best.plate]);
     guess.state.cameras = free.state.cameras;

@@ -12,7 +12,9 @@ use robotcal::geom::{Pose, exp_so3, log_so3, right_jacobian_se3, right_jacobian_
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::circle;
 use robotcal::model::joint_terms::Term;
-use robotcal::problem::{E, Image, Problem, Slack, State, Weighting, equations, linearise, predict};
+use robotcal::problem::{
+    Adjustment, E, Image, Problem, State, TakenFrom, Tie, Weighting, equations, linearise, predict,
+};
 use robotcal::series::CameraMount;
 use robotcal::urdf::JointKind;
 use std::f64::consts::PI;
@@ -312,39 +314,41 @@ fn problems(mount: CameraMount, deviation: f64, dice: &mut Dice) -> Vec<(Problem
         .collect()
 }
 
-/// The camera pose and its derivatives by all columns that act through it, and by the slack.
-fn check_chained(problem: &Problem, state: &State, image: &Image, slack: &Slack) {
-    let library = state.chained(&problem.layout, image, slack).unwrap();
-    let value = witness::camera_from_plate(state, &problem.layout, image, slack, None).map(|d| d.re);
+/// The camera pose and its derivatives by all columns that act through it, and by what is latent.
+fn check_chained(problem: &Problem, state: &State, image: &Image, from: TakenFrom) {
+    let library = state.chained(&problem.layout, image, from).unwrap();
+    let value = witness::camera_from_plate(state, &problem.layout, image, from, None).map(|d| d.re);
     assert!((library.pose.matrix() - value).amax() < 1e-12, "pose of {}", image.name);
-    let twist = |seed| body_twist(&witness::camera_from_plate(state, &problem.layout, image, slack, Some(seed)));
+    let twist = |seed| body_twist(&witness::camera_from_plate(state, &problem.layout, image, from, Some(seed)));
     for (c, column) in problem.layout.columns.iter().enumerate().take(problem.layout.theta_len()) {
         let (g, w) = (library.d_theta.column(c).into_owned(), twist(Seed::Column(c)));
         // Levers of up to some metres multiply the rounding.
         let off = (&g - w).amax();
         assert!(off <= CHAIN * w.amax().max(1.0), "{} by {}: {off:e}\n{g}{w}", image.name, column.name);
     }
-    for k in 0..slack.len() {
-        let (l, w) = (library.d_slack.column(k).into_owned(), twist(Seed::Slack(k)));
-        assert!((&l - w).amax() <= CHAIN * w.amax().max(1.0), "{} by slack {k}\n{l}{w}", image.name);
+    assert_eq!(library.d_latent.ncols(), from.unknowns());
+    for k in 0..from.unknowns() {
+        let (l, w) = (library.d_latent.column(k).into_owned(), twist(Seed::Latent(k)));
+        assert!((&l - w).amax() <= CHAIN * w.amax().max(1.0), "{} by latent {k}\n{l}{w}", image.name);
     }
 }
 
 #[test]
-fn camera_poses_by_robot_terms_mounts_and_slack() {
+fn camera_poses_by_robot_terms_mounts_and_latents() {
     let mut dice = Dice::new(5);
     for mount in [CameraMount::Hand, CameraMount::Fixed] {
         // From usual deviations to twists and joint noise of a radian.
         for deviation in [0.0, 1e-3, 1.0] {
             for (problem, state) in problems(mount, deviation, &mut dice) {
                 for (i, image) in problem.images.iter().enumerate() {
-                    check_chained(&problem, &state, image, &state.slack[i]);
-                    check_chained(&problem, &state, image, &Slack::None);
-                    let Slack::Joints(noise) = &state.slack[i] else { unreachable!() };
-                    let tilted = [noise.as_slice(), &[deviation, -0.7 * deviation]].concat();
-                    check_chained(&problem, &state, image, &Slack::Joints(tilted));
-                    let free = state.camera_from_plate(image, &state.slack[i]).unwrap();
-                    check_chained(&problem, &state, image, &Slack::Pose(free));
+                    let given = Adjustment { problem: problem.clone(), state: state.clone() };
+                    let from = given.taken_from(i);
+                    check_chained(&problem, &state, image, from);
+                    check_chained(&problem, &state, image, TakenFrom::exact(from.posture.unwrap()));
+                    let tie = Tie::Tilted([deviation, -0.7 * deviation]);
+                    check_chained(&problem, &state, image, TakenFrom { tie: &tie, ..from });
+                    let tie = Tie::Free(given.camera_from_plate(i).unwrap());
+                    check_chained(&problem, &state, image, TakenFrom { tie: &tie, ..from });
                 }
             }
         }
@@ -359,15 +363,16 @@ fn normal_equations_of_an_image() {
         for (mut problem, state) in problems(mount, 1e-3, &mut dice) {
             problem.huber = 1.0;
             for (i, image) in problem.images.iter().enumerate() {
-                let pose = state.camera_from_plate(image, &state.slack[i]).unwrap();
-                check_image(&problem, &state, image, &Slack::Pose(pose));
+                let given = Adjustment { problem: problem.clone(), state: state.clone() };
+                check_image(&problem, &state, image, &given.camera_from_plate(i).unwrap());
             }
         }
     }
 }
 
-fn check_image(problem: &Problem, state: &State, image: &Image, slack: &Slack) {
-    let Slack::Pose(pose) = slack else { return };
+fn check_image(problem: &Problem, state: &State, image: &Image, pose: &Pose) {
+    let tie = Tie::Free(*pose);
+    let from = TakenFrom { posture: None, joint_errors: &[], tie: &tie };
     let layout = &problem.layout;
     let weighting = Weighting::of(problem, image);
     let library = linearise(image, state, pose, &weighting).unwrap();
@@ -380,11 +385,11 @@ fn check_image(problem: &Problem, state: &State, image: &Image, slack: &Slack) {
     assert_eq!(couplings.len(), library.markers.len());
     for ((o, terms), coupling) in image.used().zip(&library.markers).zip(&couplings) {
         let by = |seed| {
-            let d = witness::predict(state, layout, image, slack, o, Some(seed));
+            let d = witness::predict(state, layout, image, from, o, Some(seed));
             [d[0].eps, d[1].eps]
         };
-        let uv = witness::predict(state, layout, image, slack, o, None).map(|d| d.re);
-        let jp = SMatrix::<f64, 2, 6>::from_columns(&std::array::from_fn::<_, 6, _>(|k| by(Seed::Slack(k)).into()));
+        let uv = witness::predict(state, layout, image, from, o, None).map(|d| d.re);
+        let jp = SMatrix::<f64, 2, 6>::from_columns(&std::array::from_fn::<_, 6, _>(|k| by(Seed::Latent(k)).into()));
         let jm = SMatrix::<f64, 2, 3>::from_columns(&std::array::from_fn::<_, 3, _>(|k| {
             by(Seed::Marker(o.marker, k)).into()
         }));
@@ -440,14 +445,14 @@ fn predictions_through_the_whole_chain() {
     for mount in [CameraMount::Hand, CameraMount::Fixed] {
         for (problem, state) in problems(mount, 1e-3, &mut dice) {
             for (i, image) in problem.images.iter().enumerate() {
-                let chain = state.chained(&problem.layout, image, &state.slack[i]).unwrap();
+                let given = Adjustment { problem: problem.clone(), state: state.clone() };
+                let (from, chain) = (given.taken_from(i), given.chained(i).unwrap());
                 for o in image.used() {
                     let p = predict(image, &state, &chain.pose, o).unwrap();
                     let through = p.d_pose * &chain.d_theta;
                     let scale = through.amax();
                     for c in 0..problem.layout.theta_len() {
-                        let w =
-                            witness::predict(&state, &problem.layout, image, &state.slack[i], o, Some(Seed::Column(c)));
+                        let w = witness::predict(&state, &problem.layout, image, from, o, Some(Seed::Column(c)));
                         let off = (through[(0, c)] - w[0].eps).abs().max((through[(1, c)] - w[1].eps).abs());
                         assert!(off < CIRCLE * scale, "{}: {off:e} of {scale:e}", problem.layout.columns[c].name);
                     }

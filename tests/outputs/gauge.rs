@@ -16,15 +16,15 @@ use robotcal::model::plate_modes::{MODES, basis};
 use robotcal::output::files;
 use robotcal::output::restore::measured_series;
 use robotcal::output::solution_json;
-use robotcal::problem::{Adjustment, Problem, Slack, State};
+use robotcal::problem::{Adjustment, Problem, State};
 use robotcal::series::CameraMount;
 use robotcal::solve::LinearProblem;
 
-/// Covariance of all unknowns (dense columns, slack of each image, markers) with the priors: nothing is eliminated. It is brought into the
+/// Covariance of all unknowns (dense columns, latents of each stop with its one image, markers) with the priors: nothing is eliminated. It is brought into the
 /// frame of the nominal markers by the formula: `x - G g` with `g = (N' P G)^-1 N' P (x - n)`, poses following.
 struct Whole {
     covariance: DMatrix<f64>,
-    slack_start: Vec<usize>,
+    latent_start: Vec<usize>,
     marker_start: usize,
     /// `g` by all unknowns.
     off_frame: DMatrix<f64>,
@@ -42,11 +42,11 @@ impl Whole {
     fn new(linear: LinearProblem) -> Self {
         let LinearProblem { adjustment: Adjustment { problem, state }, lin } = linear;
         let layout = &problem.layout;
-        let mut slack_start = Vec::new();
+        let mut latent_start = Vec::new();
         let mut n = layout.len();
         for chain in &lin.chains {
-            slack_start.push(n);
-            n += chain.d_slack.ncols();
+            latent_start.push(n);
+            n += chain.d_latent.ncols();
         }
         let (marker_start, markers) = (n, &problem.plates[0].markers);
         n += 3 * markers.len();
@@ -58,7 +58,7 @@ impl Whole {
             let e = MAX_PARAMETERS + MODES;
             let mut j = DMatrix::<f64>::zeros(6 + e, n);
             j.view_mut((0, 0), (6, layout.theta_len())).copy_from(&chain.d_theta);
-            j.view_mut((0, slack_start[k]), chain.d_slack.shape()).copy_from(&chain.d_slack);
+            j.view_mut((0, latent_start[k]), chain.d_latent.shape()).copy_from(&chain.d_latent);
             (0..camera.len()).for_each(|c| j[(6 + c, camera.start + c)] = 1.0);
             (0..MODES).for_each(|c| j[(6 + MAX_PARAMETERS + c, layout.shapes[0].start + c)] = 1.0);
             let mut h = DMatrix::<f64>::zeros(6 + e, 6 + e);
@@ -81,11 +81,8 @@ impl Whole {
                 let mut columns = a.columns_mut(at, 3);
                 columns += row.transpose();
             }
-            if let Slack::Joints(dq) = &state.slack[lin.images[k]] {
-                for r in 0..dq.len() {
-                    a[(slack_start[k] + r, slack_start[k] + r)] +=
-                        problem.slack_information(&problem.images[lin.images[k]], r);
-                }
+            for (r, information) in linear.image(k).prior_of_latents().into_iter().enumerate() {
+                a[(latent_start[k] + r, latent_start[k] + r)] += information;
             }
         }
         for (c, column) in layout.columns.iter().enumerate() {
@@ -113,7 +110,7 @@ impl Whole {
         for (c, _) in layout.columns.iter().enumerate().filter(|(_, c)| !c.free) {
             covariance[(c, c)] = 0.0;
         }
-        Self { covariance, slack_start, marker_start, off_frame }
+        Self { covariance, latent_start, marker_start, off_frame }
     }
 
     fn of(&self, functional: &DMatrix<f64>) -> DMatrix<f64> {
@@ -132,7 +129,7 @@ impl Whole {
     }
 
     fn camera_pose(&self, k: usize, pose: &Pose) -> Matrix6<f64> {
-        let mut follows = self.six(self.slack_start[k]) + self.off_frame.rows(0, 6);
+        let mut follows = self.six(self.latent_start[k]) + self.off_frame.rows(0, 6);
         let mut translation = follows.rows_mut(0, 3);
         translation -= (pose.rotation.transpose() * pose.translation) * self.off_frame.row(6);
         Matrix6::from_column_slice(self.of(&follows).as_slice())

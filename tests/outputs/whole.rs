@@ -10,7 +10,7 @@ use robotcal::identify::RobotModel;
 use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::Robot;
 use robotcal::output::{files, plan_start, restore, solution_json};
-use robotcal::problem::{ImageRejection, ObservationRejection, Slack};
+use robotcal::problem::{ImageRejection, ObservationRejection};
 use robotcal::series::{CameraMount, read_plate};
 use serde::Deserialize;
 use serde_json::Value;
@@ -68,7 +68,7 @@ fn kinematics_of_the_reread_urdf_are_those_of_the_rigid_model() {
     let reread = Robot::nominal(reread_chain(&files));
     let mut rigid = solution.fit.state.robot.clone();
     rigid.terms.retain(|t| t.term == Term::Offset);
-    for stop in solution.fit.problem.images.iter().filter_map(|i| i.stop.as_ref()) {
+    for stop in solution.fit.problem.stops.iter().filter_map(|s| s.posture.as_ref()) {
         let (angle, distance) = reread.base_from_tip(&stop.readings).distance(&rigid.base_from_tip(&stop.readings));
         assert!(distance < 1e-9 && angle < 1e-9, "{distance:e} m {angle:e} rad");
     }
@@ -118,11 +118,11 @@ fn files_chained_by_their_frames_give_the_camera_pose_of_the_solver() {
         assert_eq!((camera.child.as_str(), plate.child.as_str()), ("front", "plate"));
         // Both are given in frames of the robot: walk base -> camera and base -> plate.
         let reread = Robot::nominal(chain.clone());
-        for image in &solution.fit.problem.images {
-            let tip = reread.base_from_tip(&image.stop.as_ref().unwrap().readings);
+        for (i, image) in solution.fit.problem.images.iter().enumerate() {
+            let tip = reread.base_from_tip(&solution.fit.problem.posture(i).unwrap().readings);
             let base_from = |p: &PoseYaml| if p.parent == chain.tip { tip * p.pose() } else { p.pose() };
             let camera_from_plate = base_from(&camera).inverse() * base_from(&plate);
-            let solver = solution.fit.state.camera_from_plate(image, &Slack::None).unwrap();
+            let solver = solution.fit.camera_by_readings(i).unwrap();
             let (angle, distance) = camera_from_plate.distance(&solver);
             assert!(angle < 1e-9 && distance < 1e-9, "{mount:?} {}: {angle:e} {distance:e}", image.name);
         }
@@ -302,7 +302,7 @@ fn solution_json_reads_back_with_everything_in_it() {
     for (k, image) in record.images.iter().enumerate() {
         let given = &solution.fit.problem.images[k];
         assert_eq!(image.name, given.name);
-        assert_eq!(image.readings.as_ref(), given.stop.as_ref().map(|s| &s.readings));
+        assert_eq!(image.readings.as_ref(), solution.fit.problem.posture(k).map(|p| &p.readings));
         assert_eq!(image.observations.uv.len(), given.observations.len());
         assert!(image.free_pose.is_some() && image.held_out_mm.is_some());
     }

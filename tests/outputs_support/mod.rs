@@ -65,8 +65,8 @@ fn scene(mount: CameraMount, nominal: &Robot) -> Scene {
     }
 }
 
-/// Stops: with 24 the slack of the images (6 each) are no more unknowns than the 48 markers, with 26 they are, so that the solver
-/// eliminates markers in the one case and slack in the other.
+/// Stops: with 24 what is latent at the stops (6 each) is no more unknowns than the 48 markers, with 26 they are, so that the solver
+/// eliminates markers in the one case and what is latent in the other.
 fn stops(mount: CameraMount) -> usize {
     match mount {
         CameraMount::Hand => 24,

@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3, Vector6};
 use robotcal::assess::Limits;
 use robotcal::geom::{Pose, project_to_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
-use robotcal::problem::{Adjustment, Measured, PlateShape, Slack, State};
+use robotcal::problem::{Adjustment, Measured, PlateShape, State, Tie};
 use robotcal::series::{Plate, PlateKind};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
 use robotcal::solve::Fit;
@@ -134,7 +134,8 @@ pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, 
     }
     problem.noise.pixel_factor = vec![1.0];
     let start = State {
-        slack: vec![Slack::Pose(Pose::identity()); problem.images.len()],
+        joint_errors: vec![Vec::new(); problem.stops.len()],
+        ties: vec![Tie::Free(Pose::identity()); problem.images.len()],
         plates: vec![PlateShape::nominal(&world.plate)],
         ..template.fit.state.clone()
     };

@@ -41,7 +41,8 @@ fn layout(model: RobotModel) -> (Robot, Layout) {
         placements: vec![],
         cameras: vec![],
         plates: vec![],
-        slack: vec![],
+        joint_errors: vec![],
+        ties: vec![],
     };
     let layout = Layout::new(&state, &[], &[], &[], &[]);
     (robot, layout)
@@ -109,8 +110,15 @@ fn visiting_every_stop_twice_doubles_the_information() {
 #[test]
 fn names_choose_what_is_free_and_wrong_ones_are_answered() {
     let (robot, fresh) = layout(RobotModel::Full);
-    let mut state =
-        State { robot, mountings: vec![], placements: vec![], cameras: vec![], plates: vec![], slack: vec![] };
+    let mut state = State {
+        robot,
+        mountings: vec![],
+        placements: vec![],
+        cameras: vec![],
+        plates: vec![],
+        joint_errors: vec![],
+        ties: vec![],
+    };
     let mut apply = |selection: &Selection| {
         let mut layout = fresh.clone();
         selection.apply(&mut layout, &mut state, &Limits::default()).map(|()| layout)
@@ -334,7 +342,7 @@ fn what_is_promised_of_the_flange_is_what_is_found() {
             readings: s.readings.clone(),
         };
         let points: Vec<MeasuredPoint> = places.iter().map(point).collect();
-        let stops: Vec<Posture> = solution.fit.problem.used().filter_map(|(_, i)| i.stop.clone()).collect();
+        let stops: Vec<Posture> = solution.fit.problem.stops.iter().filter_map(|s| s.posture.clone()).collect();
         let of = |robot: &Robot| {
             relative_error_m((robot, &solution.fit.state.placements[0]), (&truth, &plate), &stops, &places)
         };

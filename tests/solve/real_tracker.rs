@@ -260,7 +260,7 @@ fn parts_of_the_noise_model_switched_off() {
                 let mut changed = solution.fit.adjustment.clone();
                 let held = change(&mut changed, &stage);
                 let for_poses = Adjustment { problem: changed.problem.clone(), state: solution.fit.state.clone() };
-                changed.start_slack(false);
+                changed.tie_to_readings(false);
                 changed.hold_component_priors();
                 match held {
                     true => changed.state = refitted(changed.clone()),

@@ -10,7 +10,7 @@ use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::linalg::SymmetricFactor;
 use robotcal::model::joint_terms::Term;
-use robotcal::problem::{Adjustment, Image, ImageRejection, ObservationRejection, Problem, Slack, State, Step};
+use robotcal::problem::{Adjustment, ImageRejection, ObservationRejection, Problem, State, Step, Tie};
 use robotcal::series::CameraMount;
 use robotcal::solve::{
     ComponentOptions, Covariance, Elimination, Fit, JOINT_NOISE_FLOOR, NoiseUncertainty, Outcome, Settings, Status,
@@ -38,9 +38,9 @@ fn awkward(mount: CameraMount) -> (Problem, State) {
     let mut dice = Dice::new(11);
     let terms = vec![Term::Offset, Term::Gear, Term::Gravity(0)];
     let (mut problem, mut state) = problem(&mut dice, &Request { terms, mount, images: 7, ..Request::default() });
-    state.slack[4] = Slack::None;
-    state.slack[5] = Slack::Pose(state.camera_from_plate(&problem.images[5], &state.slack[5]).unwrap());
-    problem.images[5].stop = None;
+    state = free_poses(&problem, &state, |i| i == 5);
+    state.joint_errors[4] = Vec::new();
+    problem.stops[5].posture = None;
     problem.images[6].rejected = Some(ImageRejection::Excluded);
     for image in &mut problem.images {
         image.observations[UNSEEN].rejected = Some(ObservationRejection::Excluded);
@@ -61,7 +61,8 @@ fn shaken(problem: &Problem, state: &State) -> State {
             problem.layout.len(),
             problem.layout.columns.iter().map(|c| if c.free { dice.normal(0.3 * prior(c.prior_sigma)) } else { 0.0 }),
         ),
-        slack: state.slack.iter().map(|s| vec![3e-4; s.len()]).collect(),
+        joint_errors: state.joint_errors.iter().map(|s| vec![3e-4; s.len()]).collect(),
+        ties: state.ties.iter().map(|t| vec![3e-4; t.len()]).collect(),
         markers: state.plates.iter().map(|p| vec![Vector3::new(1e-5, -2e-5, 3e-5); p.nominal.len()]).collect(),
     };
     state.moved(&problem.layout, &step)
@@ -76,18 +77,71 @@ fn tolerance(condition: f64) -> f64 {
 #[test]
 fn the_reduced_system_equals_the_dense_normal_equations() {
     for mount in [CameraMount::Hand, CameraMount::Fixed] {
-        let (problem, state) = awkward(mount);
-        let state = shaken(&problem, &state);
-        let dense = Dense::new(&problem, &state);
-        let adjustment = Adjustment { problem, state };
-        let (cov, x, condition) = dense.solve();
-        let bound = tolerance(condition);
-        for which in [Elimination::Markers, Elimination::Slack] {
-            println!("{mount:?} {which:?}");
-            check_step(which, &adjustment, &dense, (&cov, &x), bound);
-            check_covariance(which, &adjustment, &dense, &cov, bound);
+        check_against_dense(awkward(mount));
+    }
+}
+
+#[test]
+fn the_images_of_a_stop_have_its_joint_errors_in_common() {
+    for mount in [CameraMount::Hand, CameraMount::Fixed] {
+        let mut dice = Dice::new(14);
+        let request = Request { mount, images: 12, images_a_stop: 2, ..Request::default() };
+        let (mut problem, mut state) = problem(&mut dice, &request);
+        for image in &mut problem.images {
+            image.observations[UNSEEN].rejected = Some(ObservationRejection::Excluded);
+        }
+        // One camera of a stop is left out, one is held by nothing, and plates seem to be tilted.
+        problem.images[4].rejected = Some(ImageRejection::Excluded);
+        state = free_poses(&problem, &state, |i| i == 7);
+        problem.noise.tilt = vec![2e-4];
+        for i in [0, 1, 9] {
+            state.ties[i] = Tie::Tilted([1e-4, -2e-4]);
+        }
+        check_against_dense((problem, state));
+    }
+}
+
+/// Step and covariance at a state near that one, by both eliminations.
+fn check_against_dense((problem, state): (Problem, State)) {
+    let state = shaken(&problem, &state);
+    let adjustment = Adjustment { problem, state };
+    let dense = Dense::new(&adjustment);
+    let (cov, x, condition) = dense.solve();
+    let bound = tolerance(condition);
+    for which in [Elimination::Markers, Elimination::Stops] {
+        println!("{which:?}");
+        check_step(which, &adjustment, &dense, (&cov, &x), bound);
+        check_covariance(which, &adjustment, &dense, &cov, bound);
+    }
+}
+
+/// With free camera poses of some images, where their readings put them.
+fn free_poses(problem: &Problem, state: &State, which: impl Fn(usize) -> bool) -> State {
+    let given = Adjustment { problem: problem.clone(), state: state.clone() };
+    let mut free = state.clone();
+    for i in (0..problem.images.len()).filter(|&i| which(i)) {
+        free.ties[i] = Tie::Free(given.camera_from_plate(i).unwrap());
+        // A stop whose images are all free has nothing latent of its own.
+        if problem.images.iter().enumerate().all(|(k, image)| image.stop != problem.images[i].stop || which(k)) {
+            free.joint_errors[problem.images[i].stop] = Vec::new();
         }
     }
+    free
+}
+
+/// A part of what is latent at a stop in a step.
+fn latent_step<'a>(step: &'a mut Step, adjustment: &Adjustment, stop: usize, k: usize) -> &'a mut f64 {
+    if k < step.joint_errors[stop].len() {
+        return &mut step.joint_errors[stop][k];
+    }
+    let mut left = k - step.joint_errors[stop].len();
+    for (i, _) in adjustment.problem.used().filter(|(_, image)| image.stop == stop) {
+        if left < step.ties[i].len() {
+            return &mut step.ties[i][left];
+        }
+        left -= step.ties[i].len();
+    }
+    panic!("{k} is not latent at stop {stop}")
 }
 
 fn check_step(
@@ -100,11 +154,11 @@ fn check_step(
     let lin = adjustment.linearise().unwrap();
     let system = System::with(which, adjustment.linear(&lin), 0.0);
     let reduced = SymmetricFactor::new(&system.information).unwrap().solve(&system.rhs);
-    let step = system.step(adjustment.linear(&lin), &reduced);
+    let mut step = system.step(adjustment.linear(&lin), &reduced);
     for (at, u) in dense.unknowns.iter().enumerate() {
         let got = match *u {
             Unknown::Column(c) => step.dense[c],
-            Unknown::Slack(i, k) => step.slack[i][k],
+            Unknown::Latent(stop, k) => *latent_step(&mut step, adjustment, stop, k),
             // An unseen marker gets no step, though its prior asks for one: nothing depends on it.
             Unknown::Marker(UNSEEN, k) => {
                 assert_eq!(step.markers[0][UNSEEN][k], 0.0);
@@ -118,14 +172,14 @@ fn check_step(
 }
 
 fn check_covariance(which: Elimination, adjustment: &Adjustment, dense: &Dense, truth: &DMatrix<f64>, bound: f64) {
-    let Adjustment { problem, state } = adjustment;
+    let problem = &adjustment.problem;
     let lin = adjustment.linearise().unwrap();
     let library = adjustment.linear(&lin).covariance_by(which).unwrap();
     let index = |u: &Unknown| match *u {
         Unknown::Column(c) => Some(c),
-        Unknown::Slack(i, k) => {
-            let position = lin.images.iter().position(|&used| used == i).unwrap();
-            library.system.slack_start.get(position).map(|start| start + k)
+        Unknown::Latent(stop, k) => {
+            let position = lin.stops.iter().position(|(used, _)| *used == stop).unwrap();
+            library.system.latent_start.get(position).map(|start| start + k)
         }
         Unknown::Marker(..) => None,
     };
@@ -143,14 +197,14 @@ fn check_covariance(which: Elimination, adjustment: &Adjustment, dense: &Dense, 
     for (c, column) in problem.layout.columns.iter().enumerate().filter(|(_, c)| !c.free) {
         assert_eq!(library.sigma(c), 0.0, "{}", column.name);
     }
-    for (k, &i) in lin.images.iter().enumerate().filter(|(_, i)| !state.slack[**i].is_empty()) {
-        let n = state.slack[i].len();
-        let at = dense.find(Unknown::Slack(i, 0)).unwrap();
+    for stop in adjustment.linear(&lin).stops().filter(|stop| stop.unknowns() > 0) {
+        let (i, n) = (stop.index, stop.unknowns());
+        let at = dense.find(Unknown::Latent(i, 0)).unwrap();
         let expected = truth.view((at, at), (n, n));
-        let got = library.slack(k, n);
+        let got = library.latents(&stop);
         for (a, b) in (0..n).flat_map(|a| (0..n).map(move |b| (a, b))) {
             let unit = (expected[(a, a)] * expected[(b, b)]).sqrt();
-            assert!((got[(a, b)] - expected[(a, b)]).abs() < bound * unit, "slack of image {i}\n{got}{expected}");
+            assert!((got[(a, b)] - expected[(a, b)]).abs() < bound * unit, "latents of stop {i}\n{got}{expected}");
         }
     }
     let markers = &library.markers()[0];
@@ -170,13 +224,16 @@ fn check_covariance(which: Elimination, adjustment: &Adjustment, dense: &Dense, 
 fn the_right_hand_side_is_the_slope_of_the_cost() {
     let (problem, state) = awkward(CameraMount::Hand);
     let state = shaken(&problem, &state);
-    let dense = Dense::new(&problem, &state);
+    let adjustment = Adjustment { problem, state };
+    let dense = Dense::new(&adjustment);
+    let Adjustment { problem, state } = &adjustment;
     let (cov, ..) = dense.solve();
     let mut dice = Dice::new(13);
     for _ in 0..10 {
         let mut step = Step {
             dense: DVector::zeros(problem.layout.len()),
-            slack: state.slack.iter().map(|s| vec![0.0; s.len()]).collect(),
+            joint_errors: state.joint_errors.iter().map(|s| vec![0.0; s.len()]).collect(),
+            ties: state.ties.iter().map(|t| vec![0.0; t.len()]).collect(),
             markers: vec![vec![Vector3::zeros(); problem.plates[0].markers.len()]],
         };
         let mut slope = 0.0;
@@ -186,14 +243,15 @@ fn the_right_hand_side_is_the_slope_of_the_cost() {
             slope -= d * dense.rhs[at];
             match *u {
                 Unknown::Column(c) => step.dense[c] = d,
-                Unknown::Slack(i, k) => step.slack[i][k] = d,
+                Unknown::Latent(stop, k) => *latent_step(&mut step, &adjustment, stop, k) = d,
                 Unknown::Marker(m, k) => step.markers[0][m][k] = d,
             }
         }
         let cost = |h: f64| {
             let scaled = Step {
                 dense: &step.dense * h,
-                slack: step.slack.iter().map(|s| s.iter().map(|x| x * h).collect()).collect(),
+                joint_errors: step.joint_errors.iter().map(|s| s.iter().map(|x| x * h).collect()).collect(),
+                ties: step.ties.iter().map(|t| t.iter().map(|x| x * h).collect()).collect(),
                 markers: step.markers.iter().map(|p| p.iter().map(|x| x * h).collect()).collect(),
             };
             Adjustment { problem: problem.clone(), state: state.moved(&problem.layout, &scaled) }
@@ -250,8 +308,7 @@ fn another_base_frame_changes_nothing() {
     assert!((cost(&first) - cost(&second)).abs() < 1e-9 * cost(&first));
     assert_same_solution(&first, &second, |_| true, SAME);
     for (i, image) in problem.used() {
-        let [a, b] = [&first, &second]
-            .map(|o| o.adjustment.state.camera_from_plate(image, &o.adjustment.state.slack[i]).unwrap());
+        let [a, b] = [&first, &second].map(|o| o.adjustment.camera_from_plate(i).unwrap());
         let (angle, distance) = a.distance(&b);
         assert!(angle < 1e-9 && distance < 1e-9, "{}: {angle:e} rad {distance:e} m", image.name);
     }
@@ -276,23 +333,14 @@ fn another_plate_frame_changes_nothing() {
     }
     start.plates[0].corrections.iter_mut().for_each(|c| *c = new_from_old.rotation * *c);
     start.placements.iter_mut().for_each(|p| *p = *p * new_from_old.inverse());
-    for slack in &mut start.slack {
-        if let Slack::Pose(p) = slack {
+    for tie in &mut start.ties {
+        if let Tie::Free(p) = tie {
             *p = *p * new_from_old.inverse();
         }
     }
     let second = converged(&problem, start, &TIGHT);
     assert!((cost(&first) - cost(&second)).abs() < 1e-9 * cost(&first));
     assert_same_solution(&first, &second, |n| !n.starts_with("plate"), SAME);
-}
-
-fn with_slack(state: &State, problem: &Problem, slack: impl Fn(usize, &Image) -> Slack) -> State {
-    let slack = problem.images.iter().enumerate().map(|(i, image)| slack(i, image)).collect();
-    State { slack, ..state.clone() }
-}
-
-fn free_poses(problem: &Problem, state: &State) -> State {
-    with_slack(state, problem, |i, image| Slack::Pose(state.camera_from_plate(image, &state.slack[i]).unwrap()))
 }
 
 /// Largest difference of the camera columns in sigma, and of log sigma.
@@ -314,13 +362,13 @@ fn large_joint_noise_tends_to_the_free_poses() {
     let (mut problem, state) = problem(&mut dice, &Request { parts, ..Request::default() });
     // The valley along which joints trade against twists is long and curved: many steps.
     let settings = Settings { iterations: 1000, decrement: 1e-5 };
-    let free = converged(&problem, free_poses(&problem, &state), &settings);
+    let free = converged(&problem, free_poses(&problem, &state, |_| true), &settings);
     let differences = [0.1, 1.0].map(|sigma| {
         problem.noise.joint = vec![vec![sigma; 6]];
         camera_difference(&free, &converged(&problem, state.clone(), &settings))
     });
     println!("{differences:?}");
-    // The slack pulls with (sigma of the free pose / joint noise)^2: a hundred times less for ten times the noise, of which a
+    // The latent joint errors pull with (sigma of the free pose / joint noise)^2: a hundred times less for ten times the noise, of which a
     // factor of five is granted to curvature (the images of one plate share their error in depth, some centimetres).
     let [(value, sigma), (less, least)] = differences;
     assert!(value < 0.1 && less < value / 20.0, "{differences:?}");
@@ -333,7 +381,8 @@ fn vanishing_joint_noise_tends_to_the_hard_fit() {
     let (mut problem, state) = problem(&mut dice, &Request { joint_noise: 0.0, ..Request::default() });
     problem.noise.joint = vec![vec![1e-9; 6]];
     let soft = converged(&problem, state.clone(), &TIGHT);
-    let hard = converged(&problem, with_slack(&state, &problem, |_, _| Slack::None), &TIGHT);
+    let exact = State { joint_errors: vec![Vec::new(); problem.stops.len()], ..state };
+    let hard = converged(&problem, exact, &TIGHT);
     // A pixel noise of 0.1 px over ten markers is some 1e-5 rad: (1e-9 / 1e-5)^2 of a sigma, and rounding at a condition of 1e10.
     assert_same_solution(&hard, &soft, |_| true, 1e-4);
     assert!((cost(&hard) - cost(&soft)).abs() < 1e-6 * cost(&hard));
@@ -350,18 +399,17 @@ fn poses_mode_is_the_free_pose_adjustment() {
     let nothing = Adjustment { problem: problem.clone(), state: nothing };
     let (Adjustment { problem, .. }, found, _) = adjust_free_poses(nothing, &[None], &Limits::default()).unwrap();
     // ... and with the same weights from the truth, robot present but tied to nothing.
-    let mode = converged(&problem, free_poses(&problem, &state), &TIGHT);
+    let mode = converged(&problem, free_poses(&problem, &state, |_| true), &TIGHT);
     let cov = covariance(&mode);
     // The fit stops when no unknown moves by more than 1e-3 of its sigma.
     let mut by_free_poses = mode.clone();
     by_free_poses.adjustment.state = found.state.clone();
     assert_same_solution(&mode, &by_free_poses, |n| n.starts_with("camera"), 2e-3);
-    for (k, (i, image)) in problem.used().enumerate() {
+    for (stop, (i, image)) in mode.linear().unwrap().stops().zip(problem.used()) {
         let pose = found.poses[i].as_ref().unwrap();
-        let state = &mode.adjustment.state;
-        let direct = state.camera_from_plate(image, &state.slack[i]).unwrap();
+        let direct = mode.adjustment.camera_from_plate(i).unwrap();
         let off = (direct.inverse() * pose.camera_from_plate).log();
-        let c = cov.slack(k, 6);
+        let c = cov.latents(&stop);
         for a in 0..6 {
             assert!(off[a].abs() < 2e-3 * c[(a, a)].sqrt(), "{}: {off}", image.name);
             let ratio = pose.covariance[(a, a)] / c[(a, a)];
@@ -381,8 +429,9 @@ fn redundancies(outcome: &Outcome, sigma: &[f64]) -> Vec<f64> {
     adjustment.problem.noise.joint = vec![sigma.to_vec()];
     let lin = outcome.linearised.as_ref().unwrap();
     let cov = adjustment.linear(lin).covariance().unwrap();
-    let of = |k: usize, r: usize| 1.0 - cov.slack(k, sigma.len())[(r, r)] / sigma[r].powi(2);
-    (0..sigma.len()).map(|r| (0..lin.images.len()).map(|k| of(k, r)).sum()).collect()
+    let latents: Vec<_> = adjustment.linear(lin).stops().map(|stop| cov.latents(&stop)).collect();
+    let of = |c: &DMatrix<f64>, r: usize| 1.0 - c[(r, r)] / sigma[r].powi(2);
+    (0..sigma.len()).map(|r| latents.iter().map(|c| of(c, r)).sum()).collect()
 }
 
 #[test]
@@ -513,7 +562,7 @@ fn variance_components_recover_pixel_and_joint_noise() {
 
 #[test]
 fn one_thread_and_two_give_the_same_bits() {
-    // Many markers: they are eliminated; few: the slack is.
+    // Many markers: they are eliminated; few: what is latent at stops is.
     for lattice in [(7, 6), (4, 3)] {
         let mut dice = Dice::new(51);
         let request = Request { images: 14, lattice, radius_m: 0.0, joint_noise: 1e-4, ..Request::default() };
@@ -611,8 +660,8 @@ fn what_no_data_touch_keeps_its_prior() {
     let request =
         Request { parts: vec![Part::Revolute; 6], terms: vec![Term::Offset, Term::Backlash], ..Request::default() };
     let (mut problem, mut state) = problem(&mut dice, &request);
-    for image in &mut problem.images {
-        image.stop.as_mut().unwrap().approach = None;
+    for stop in &mut problem.stops {
+        stop.posture.as_mut().unwrap().approach = None;
     }
     state.robot.terms.iter_mut().filter(|t| t.term == Term::Backlash).for_each(|t| t.value = 0.0);
     let backlash = problem.layout.find("robot/joint_1.backlash").unwrap();

@@ -12,12 +12,12 @@ use robotcal::identify::{
     identify, linear_step,
 };
 use robotcal::model::joint_terms::{JointTerm, Term};
-use robotcal::problem::{Adjustment, Layout, Problem, Slack, State};
+use robotcal::problem::{Adjustment, Layout, Problem, State};
 use robotcal::series::CameraMount;
 use robotcal::solve::{Covariance, Settings, Status, solve};
 
 fn hard(state: &State) -> State {
-    State { slack: vec![Slack::None; state.slack.len()], ..state.clone() }
+    State { joint_errors: vec![Vec::new(); state.joint_errors.len()], ..state.clone() }
 }
 
 fn covariance(adjustment: &Adjustment) -> Covariance {
@@ -122,8 +122,8 @@ fn estimators_find_the_truth_within_their_sigma_where_their_noise_model_is_true(
 fn every_estimator_has_a_solution_where_joints_came_back_to_readings() {
     let mut dice = Dice::new(76);
     let (mut problem, mut state) = problem(&mut dice, &Request { images: 12, ..Request::default() });
-    for image in &problem.images {
-        let reading = image.stop.as_ref().unwrap().readings[0];
+    for stop in &problem.stops {
+        let reading = stop.posture.as_ref().unwrap().readings[0];
         state.robot.terms.push(JointTerm { reading: 0, term: Term::local(reading), value: 0.0 });
     }
     let (mountings, placements, cameras) = (&problem.mountings, &problem.placements, &problem.cameras);
@@ -139,8 +139,8 @@ fn every_estimator_has_a_solution_where_joints_came_back_to_readings() {
 fn in_postures(images: usize, of_posture: usize) -> Adjustment {
     let mut dice = Dice::new(77);
     let (mut problem, state) = problem(&mut dice, &Request { images, ..Request::default() });
-    for (i, image) in problem.images.iter_mut().enumerate() {
-        let stop = image.stop.as_mut().unwrap();
+    for (i, stop) in problem.stops.iter_mut().enumerate() {
+        let stop = stop.posture.as_mut().unwrap();
         let posture = (i / of_posture) as f64;
         // Visited from side to side, so that neighbours in time are none in space.
         let swing = 0.3 * posture * if (i / of_posture).is_multiple_of(2) { 1.0 } else { -1.0 };

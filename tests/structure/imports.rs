@@ -151,7 +151,8 @@ fn source(file: &Path, text: &str) -> Source {
     };
     let mut at = 0;
     while at < tokens.len() {
-        if tokens[at] == "use" {
+        // `use<'a>` says what an `impl` captures.
+        if tokens[at] == "use" && tokens.get(at + 1).is_some_and(|t| t != "<") {
             let handed_on = at > 0 && (tokens[at - 1] == "pub" || tokens[at - 1] == ")");
             let mut leaves = Vec::new();
             at = use_tree(&tokens, at + 1, &[], &mut leaves);

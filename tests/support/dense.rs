@@ -1,11 +1,11 @@
 //! The whole adjustment as one dense least-squares problem, from dual numbers: no elimination, no blocks.
 
 use nalgebra::{DMatrix, DVector};
-use robotcal::problem::{Problem, Slack, State};
+use robotcal::problem::{Adjustment, Problem, State, Tie};
 
 use super::witness::{self, Seed};
 
-/// Normal equations in the order free dense columns, slack of every image in use, three coordinates of every marker.
+/// Normal equations in the order free dense columns, what is latent at every stop in use, three coordinates of every marker.
 pub struct Dense {
     pub unknowns: Vec<Unknown>,
     pub information: DMatrix<f64>,
@@ -15,30 +15,54 @@ pub struct Dense {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Unknown {
     Column(usize),
-    Slack(usize, usize),
+    /// Of a stop: errors of its readings, then the ties of its images in use.
+    Latent(usize, usize),
     Marker(usize, usize),
+}
+
+/// Place of the tie of an image among what is latent at its stop; of an image behind all, how much is latent.
+fn tie_start(problem: &Problem, state: &State, stop: usize, image: usize) -> usize {
+    let before = problem.used().filter(|(i, other)| other.stop == stop && *i < image);
+    state.joint_errors[stop].len() + before.map(|(i, _)| state.ties[i].len()).sum::<usize>()
+}
+
+/// What a latent is off by and its sigma, where it is a tilt.
+fn tilt(problem: &Problem, state: &State, stop: usize, k: usize) -> Option<(f64, f64)> {
+    let own = problem.used().filter(|(_, image)| image.stop == stop);
+    own.into_iter().find_map(|(i, image)| {
+        let Tie::Tilted(tilt) = &state.ties[i] else { return None };
+        let component = k.checked_sub(tie_start(problem, state, stop, i))?;
+        Some((-tilt.get(component)?, problem.noise.tilt[image.series]))
+    })
 }
 
 impl Dense {
     /// One plate.
-    pub fn new(problem: &Problem, state: &State) -> Self {
+    pub fn new(adjustment: &Adjustment) -> Self {
+        let Adjustment { problem, state } = adjustment;
         let mut unknowns: Vec<Unknown> =
             (0..problem.layout.len()).filter(|&c| problem.layout.columns[c].free).map(Unknown::Column).collect();
-        for (i, _) in problem.used() {
-            unknowns.extend((0..state.slack[i].len()).map(|k| Unknown::Slack(i, k)));
+        let mut stops: Vec<usize> = problem.used().map(|(_, image)| image.stop).collect();
+        stops.dedup();
+        for stop in stops {
+            let latent = tie_start(problem, state, stop, usize::MAX);
+            unknowns.extend((0..latent).map(|k| Unknown::Latent(stop, k)));
         }
         unknowns.extend((0..problem.plates[0].markers.len()).flat_map(|m| (0..3).map(move |k| Unknown::Marker(m, k))));
         let n = unknowns.len();
         let mut dense = Self { unknowns, information: DMatrix::zeros(n, n), rhs: DVector::zeros(n) };
-        dense.add_pixels(problem, state);
+        dense.add_pixels(adjustment);
         dense.add_priors(problem, state);
         dense
     }
 
-    fn add_pixels(&mut self, problem: &Problem, state: &State) {
+    fn add_pixels(&mut self, adjustment: &Adjustment) {
+        let Adjustment { problem, state } = adjustment;
         for (i, image) in problem.used() {
+            let from = adjustment.taken_from(i);
+            let tie_start = tie_start(problem, state, image.stop, i);
             for o in image.used() {
-                let by = |seed| witness::predict(state, &problem.layout, image, &state.slack[i], o, seed);
+                let by = |seed| witness::predict(state, &problem.layout, image, from, o, seed);
                 let uv = by(None);
                 let r = o.uv - nalgebra::Vector2::new(uv[0].re, uv[1].re);
                 let information = o.information / problem.noise.pixel_factor[image.camera].powi(2);
@@ -48,7 +72,15 @@ impl Dense {
                 for (at, u) in self.unknowns.iter().enumerate() {
                     let seed = match *u {
                         Unknown::Column(c) => Seed::Column(c),
-                        Unknown::Slack(image, k) if image == i => Seed::Slack(k),
+                        Unknown::Latent(stop, k) if stop == image.stop => {
+                            if k < from.joints() {
+                                Seed::Latent(k)
+                            } else if (tie_start..tie_start + from.tie.len()).contains(&k) {
+                                Seed::Latent(from.joints() + k - tie_start)
+                            } else {
+                                continue;
+                            }
+                        }
                         Unknown::Marker(m, k) if m == o.marker => Seed::Marker(m, k),
                         _ => continue,
                     };
@@ -73,9 +105,9 @@ impl Dense {
                     let column = &problem.layout.columns[c];
                     (column.prior_mean - values[c], column.prior_sigma)
                 }
-                Unknown::Slack(i, k) => match &state.slack[i] {
-                    Slack::Joints(dq) => (-dq[k], problem.noise.joint[problem.images[i].series][k]),
-                    _ => (0.0, f64::INFINITY),
+                Unknown::Latent(stop, k) => match state.joint_errors[stop].get(k) {
+                    Some(error) => (-error, problem.noise.joint[problem.stops[stop].series][k]),
+                    None => tilt(problem, state, stop, k).unwrap_or((0.0, f64::INFINITY)),
                 },
                 Unknown::Marker(m, k) => (-state.plates[0].corrections[m][k], problem.plates[0].markers[m].sigma_m),
             };

@@ -8,8 +8,8 @@ use robotcal::geom::{Pose, exp_so3};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use robotcal::model::robot::{Posture, Robot};
-use robotcal::problem::{Image, Layout, Measured, Noise, PlateShape, Problem, Slack, State, predict};
-use robotcal::problem::{MeasuredSeries, MeasuredStop};
+use robotcal::problem::{Image, Layout, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape, Problem};
+use robotcal::problem::{State, Stop, TakenFrom, Tie, predict};
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 use robotcal::urdf::{CarriedMass, Chain, Drive, Joint, JointKind};
 
@@ -107,9 +107,11 @@ pub struct Request {
     pub mount: CameraMount,
     /// Spread of the deviations from nominal: twists (m, rad) and joint terms (rad or m).
     pub deviation: f64,
-    /// Sigma of the slack, rad or m.
+    /// Sigma of the latent joint errors, rad or m.
     pub joint_noise: f64,
     pub images: usize,
+    /// Images of every stop, each of a camera of its own.
+    pub images_a_stop: usize,
     /// Image i sees placement i modulo this.
     pub placements: usize,
     pub lattice: (u32, u32),
@@ -127,6 +129,7 @@ impl Default for Request {
             deviation: 1e-3,
             joint_noise: 1e-3,
             images: 6,
+            images_a_stop: 1,
             placements: 1,
             lattice: (4, 3),
             radius_m: 0.006,
@@ -177,54 +180,72 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
     let mut camera = Camera::pinhole(Lens::Brown, 1280, 1024, 1000.0);
     camera.parameters = vec![1010.0, 990.0, 655.0, 505.0, -0.15, 0.03, 8e-4, -5e-4, 0.004];
     let mounting = dice.pose(0.2, 3.0);
-    let mut noise = || Slack::Joints((0..readings).map(|_| dice.normal(request.joint_noise)).collect());
-    let slack = (0..request.images).map(|_| noise()).collect();
+    let mut noise = || (0..readings).map(|_| dice.normal(request.joint_noise)).collect();
+    let joint_errors = (0..request.images / request.images_a_stop).map(|_| noise()).collect();
     let mut state = State {
         robot,
         mountings: vec![mounting],
         placements: Vec::new(),
-        cameras: vec![camera],
+        cameras: vec![camera; request.images_a_stop],
         plates: vec![shape],
-        slack,
+        joint_errors,
+        ties: vec![Tie::Rigid; request.images],
     };
-    let mut images: Vec<Image> = Vec::new();
+    let (mut stops, mut images): (Vec<Stop>, Vec<Image>) = (Vec::new(), Vec::new());
     let centre: Vec<f64> = (0..readings).map(|_| dice.between(-2.0, 2.0)).collect();
     while images.len() < request.images {
-        let i = images.len();
-        let image = Image {
-            name: format!("{i:03}.png"),
-            series: 0,
-            camera: 0,
-            mounting: 0,
-            placement: i % request.placements,
-            plate: 0,
-            mount: request.mount,
-            stop: Some(Posture {
-                readings: centre.iter().map(|c| c + dice.between(-0.3, 0.3)).collect(),
-                approach: (i > 0).then(|| (0..readings).map(|_| dice.normal(2e-3)).collect()),
-            }),
-            observations: Vec::new(),
-            local_share: Vec::new(),
-            rejected: None,
+        let posture = Posture {
+            readings: centre.iter().map(|c| c + dice.between(-0.3, 0.3)).collect(),
+            approach: (!images.is_empty()).then(|| (0..readings).map(|_| dice.normal(2e-3)).collect()),
         };
-        if state.placements.len() == i && i < request.placements {
-            state.placements.push(Pose::identity());
-            let wanted = view(dice);
-            let seen_as = state.camera_from_plate(&image, &state.slack[i]).unwrap();
-            // Both mounts have the plate's pose as the last factor.
-            state.placements[i] = seen_as.inverse() * wanted;
+        let mut own = Vec::new();
+        for camera in 0..request.images_a_stop {
+            let i = images.len() + camera;
+            let image = Image {
+                name: format!("{i:03}.png"),
+                series: 0,
+                stop: stops.len(),
+                camera,
+                mounting: camera,
+                placement: i % request.placements,
+                plate: 0,
+                mount: request.mount,
+                observations: Vec::new(),
+                rejected: None,
+            };
+            let joint_errors = &state.joint_errors[stops.len()];
+            let from = TakenFrom { posture: Some(&posture), joint_errors, tie: &Tie::Rigid };
+            if state.placements.len() == i && i < request.placements {
+                state.placements.push(Pose::identity());
+                let wanted = view(dice);
+                let seen_as = state.camera_from_plate(&image, from).unwrap();
+                // Both mounts have the plate's pose as the last factor.
+                state.placements[i] = seen_as.inverse() * wanted;
+            }
+            if state.mountings.len() == camera {
+                let wanted = view(dice);
+                let before = Image { mounting: 0, ..image.clone() };
+                let seen_as = state.camera_from_plate(&before, from).unwrap();
+                // camera_from_plate begins with the inverse of the camera's pose.
+                state.mountings.push(state.mountings[0] * (seen_as * wanted.inverse()));
+            }
+            let image = observed(dice, request, &plate, &state, image, from);
+            if image.observations.len() == plate.markers.len() {
+                own.push(image);
+            }
         }
-        let image = observed(dice, request, &plate, &state, image, i);
-        if image.observations.len() == plate.markers.len() {
-            images.push(image);
+        if own.len() == request.images_a_stop {
+            images.extend(own);
+            stops.push(Stop { series: 0, posture: Some(posture), local_share: Vec::new() });
         }
     }
     let names = |n: usize, what: &str| (0..n).map(|k| format!("{what}_{k}")).collect::<Vec<_>>();
-    let (mountings, placements) = (names(1, "mounting"), names(state.placements.len(), "placement"));
-    let cameras = vec!["front".to_owned()];
+    let count = request.images_a_stop;
+    let (mountings, placements) = (names(count, "mounting"), names(state.placements.len(), "placement"));
+    let cameras = if count == 1 { vec!["front".to_owned()] } else { names(count, "camera") };
     let layout = Layout::new(&state, &mountings, &placements, &cameras, &["plate".to_owned()]);
     let noise = Noise {
-        pixel_factor: vec![request.pixel_factor],
+        pixel_factor: vec![request.pixel_factor; count],
         joint: vec![vec![request.joint_noise.max(1e-6); readings]],
         local: Vec::new(),
         tilt: Vec::new(),
@@ -237,6 +258,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
             placements,
             mountings,
             cameras,
+            stops,
             images,
             noise,
             families: Vec::new(),
@@ -257,8 +279,15 @@ fn view(dice: &mut Dice) -> Pose {
 }
 
 /// The image with every marker that is in front of the camera and within 45 degrees of its axis.
-fn observed(dice: &mut Dice, request: &Request, plate: &Plate, state: &State, mut image: Image, i: usize) -> Image {
-    let pose = state.camera_from_plate(&image, &state.slack[i]).unwrap();
+fn observed(
+    dice: &mut Dice,
+    request: &Request,
+    plate: &Plate,
+    state: &State,
+    mut image: Image,
+    from: TakenFrom,
+) -> Image {
+    let pose = state.camera_from_plate(&image, from).unwrap();
     for marker in 0..plate.markers.len() {
         let x = pose.transform(&state.plates[0].position(marker));
         if x.z < 0.12 || x.xy().norm() > x.z {
@@ -287,7 +316,7 @@ pub fn series(problem: &Problem) -> MeasuredSeries {
     let plate = problem.plates[0].clone();
     let stop = |image: &Image| MeasuredStop {
         image: image.name.clone(),
-        readings: image.stop.as_ref().map(|s| s.readings.clone()),
+        readings: problem.stops[image.stop].posture.as_ref().map(|p| p.readings.clone()),
         placement: problem.placements[image.placement].clone(),
         observations: (image.observations.iter())
             .map(|o| {

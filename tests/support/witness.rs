@@ -9,7 +9,7 @@ use robotcal::geom::Pose;
 use robotcal::model::camera::Lens;
 use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::{Posture, Robot};
-use robotcal::problem::{Image, Layout, Measured, Slack, State};
+use robotcal::problem::{Image, Layout, Measured, State, TakenFrom, Tie};
 use robotcal::series::CameraMount;
 use robotcal::urdf::{Chain, JointKind};
 use std::f64::consts::TAU;
@@ -22,8 +22,8 @@ pub type D4 = SMatrix<D, 4, 4>;
 pub enum Seed {
     /// A dense column.
     Column(usize),
-    /// A component of the slack of the image.
-    Slack(usize),
+    /// A component of what is latent in the pose of the image: joint errors of its stop, then its tie.
+    Latent(usize),
     /// A coordinate of the correction of a marker.
     Marker(usize, usize),
 }
@@ -161,7 +161,7 @@ fn phi(robot: &Robot, stop: &Posture, reading: usize, term: Term) -> f64 {
 pub fn base_from_tip(robot: &Robot, layout: &Layout, stop: &Posture, noise: &[f64], seed: Option<Seed>) -> D4 {
     let column = |c: usize, x: f64| variable(x, seed == Some(Seed::Column(c)));
     let mut moved: Vec<D> = (0..stop.readings.len())
-        .map(|r| constant(stop.readings[r]) + variable(noise[r], seed == Some(Seed::Slack(r))))
+        .map(|r| constant(stop.readings[r]) + variable(noise[r], seed == Some(Seed::Latent(r))))
         .collect();
     for (k, t) in robot.terms.iter().enumerate() {
         moved[t.reading] += column(layout.terms.start + k, t.value) * constant(phi(robot, stop, t.reading, t.term));
@@ -180,13 +180,13 @@ fn perturbed(pose: &Pose, start: usize, seed: Option<Seed>) -> D4 {
 }
 
 /// `camera_from_plate` of an image.
-pub fn camera_from_plate(state: &State, layout: &Layout, image: &Image, slack: &Slack, seed: Option<Seed>) -> D4 {
-    if let Slack::Pose(pose) = slack {
-        return lift(&pose.matrix()) * exp(&std::array::from_fn(|c| variable(0.0, seed == Some(Seed::Slack(c)))));
+pub fn camera_from_plate(state: &State, layout: &Layout, image: &Image, from: TakenFrom, seed: Option<Seed>) -> D4 {
+    if let Tie::Free(pose) = from.tie {
+        return lift(&pose.matrix()) * exp(&std::array::from_fn(|c| variable(0.0, seed == Some(Seed::Latent(c)))));
     }
-    let stop = image.stop.as_ref().unwrap();
+    let stop = from.posture.unwrap();
     let zero = vec![0.0; stop.readings.len()];
-    let noise = if let Slack::Joints(dq) = slack { dq } else { &zero };
+    let noise = if from.joint_errors.is_empty() { &zero } else { from.joint_errors };
     let tip = base_from_tip(&state.robot, layout, stop, noise, seed);
     let camera = perturbed(&state.mountings[image.mounting], layout.mountings[image.mounting].start, seed);
     let plate = perturbed(&state.placements[image.placement], layout.placements[image.placement].start, seed);
@@ -194,16 +194,13 @@ pub fn camera_from_plate(state: &State, layout: &Layout, image: &Image, slack: &
         CameraMount::Hand => inverse(&(tip * camera)) * plate,
         CameraMount::Fixed => inverse(&camera) * tip * plate,
     };
-    if noise.len() == stop.readings.len() {
-        return pose;
-    }
+    let Tie::Tilted(tilt) = from.tie else { return pose };
     // The plate turns about axes through the middle of what is seen: shift, turn, shift back.
     let seen = image.observations.iter().map(|o| state.plates[image.plate].nominal[o.marker]);
     let centre = seen.sum::<Vector3<f64>>() / image.observations.len() as f64;
     let mut turn = [constant(0.0); 6];
     for k in 0..2 {
-        let reading = stop.readings.len() + k;
-        turn[3 + k] = variable(noise[reading], seed == Some(Seed::Slack(reading)));
+        turn[3 + k] = variable(tilt[k], seed == Some(Seed::Latent(from.joint_errors.len() + k)));
     }
     let shift = |sign: f64| lift(&nalgebra::Matrix4::new_translation(&(centre * sign)));
     pose * shift(1.0) * exp(&turn) * shift(-1.0)
@@ -361,11 +358,11 @@ pub fn predict(
     state: &State,
     layout: &Layout,
     image: &Image,
-    slack: &Slack,
+    from: TakenFrom,
     observation: &Measured,
     seed: Option<Seed>,
 ) -> [D; 2] {
-    let pose = camera_from_plate(state, layout, image, slack, seed);
+    let pose = camera_from_plate(state, layout, image, from, seed);
     let centre = marker(state, layout, image.plate, observation.marker, seed);
     let range = layout.cameras[image.camera].clone();
     let parameters: Vec<D> = (state.cameras[image.camera].parameters.iter().zip(range))
