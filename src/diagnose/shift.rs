@@ -97,7 +97,7 @@ fn find_shifts(fit: &Fit, limits: &Limits) -> Vec<Shift> {
     let errors = |&stop: &usize| problem.joint_error_squares(stop, &state.joint_errors[stop]);
     let ties = |row: &Row| problem.tie_squares(&problem.images[row.image], &state.ties[row.image]);
     let stops: BTreeSet<usize> = linear.images.iter().map(|row| problem.images[row.image].stop).collect();
-    let all = stops.iter().map(errors).sum::<f64>() + linear.images.iter().map(ties).sum::<f64>();
+    let all = stops.iter().flat_map(errors).chain(linear.images.iter().flat_map(ties)).sum::<f64>();
     let (mut left, mut found, mut good) = (all, Vec::<Shift>::new(), Vec::new());
     while found.len() < limits.displacements {
         let tried = candidates(problem, &linear, limits.displaced_images);

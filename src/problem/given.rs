@@ -68,9 +68,9 @@ impl Problem {
     }
 
     /// Squares of the latent errors of a stop in units of their variances.
-    pub fn joint_error_squares(&self, stop: usize, errors: &[f64]) -> f64 {
+    pub fn joint_error_squares(&self, stop: usize, errors: &[f64]) -> impl Iterator<Item = f64> {
         let stop = &self.stops[stop];
-        errors.iter().enumerate().map(|(r, q)| q * q * self.joint_error_information(stop, r)).sum()
+        errors.iter().enumerate().map(|(r, q)| q * q * self.joint_error_information(stop, r))
     }
 
     /// Variance of a component of the apparent tilt of an image, rad^2.
@@ -78,12 +78,15 @@ impl Problem {
         self.noise.tilt[image.series].powi(2)
     }
 
+    /// Information (inverse of the variance) of a component of the apparent tilt of an image.
+    pub fn tilt_information(&self, image: &Image) -> f64 {
+        1.0 / self.tilt_variance(image)
+    }
+
     /// Squares of a tie in units of their variances; none for a free pose.
-    pub fn tie_squares(&self, image: &Image, tie: &Tie) -> f64 {
-        match tie {
-            Tie::Tilted(tilt) => tilt.iter().map(|t| t * t * (1.0 / self.tilt_variance(image))).sum(),
-            Tie::Rigid | Tie::Free(_) => 0.0,
-        }
+    pub fn tie_squares(&self, image: &Image, tie: &Tie) -> impl Iterator<Item = f64> {
+        let tilt = if let Tie::Tilted(tilt) = tie { tilt.as_slice() } else { &[] };
+        tilt.iter().map(|t| t * t * self.tilt_information(image))
     }
 
     /// Tie of an image to its readings: rigid, or tilted by nothing where tilt has a size.

@@ -130,9 +130,12 @@ impl Adjustment {
             shape.corrections.iter().enumerate().map(of)
         });
         let markers: f64 = corrections.sum();
-        let errors: f64 = stops.iter().map(|(s, _)| problem.joint_error_squares(*s, &state.joint_errors[*s])).sum();
-        let ties: f64 = images.iter().map(|&i| problem.tie_squares(&problem.images[i], &state.ties[i])).sum();
-        0.5 * (dense + held + markers + errors + ties)
+        let latent = |(stop, own): &(usize, Range<usize>)| -> f64 {
+            let ties =
+                images[own.clone()].iter().flat_map(|&i| problem.tie_squares(&problem.images[i], &state.ties[i]));
+            problem.joint_error_squares(*stop, &state.joint_errors[*stop]).chain(ties).sum()
+        };
+        0.5 * (dense + held + markers + stops.iter().map(latent).sum::<f64>())
     }
 
     /// With its linearisation.
@@ -214,7 +217,7 @@ impl LinearImage<'_> {
     pub fn prior_of_latents(&self) -> Vec<f64> {
         let stop = &self.problem.stops[self.image.stop];
         let [joints, tie] = self.latents();
-        let known = |_| if self.tie.is_free() { 0.0 } else { 1.0 / self.problem.tilt_variance(self.image) };
+        let known = |_| if self.tie.is_free() { 0.0 } else { self.problem.tilt_information(self.image) };
         joints.map(|r| self.problem.joint_error_information(stop, r)).chain(tie.map(known)).collect()
     }
 
@@ -261,7 +264,7 @@ impl<'a> LinearStop<'a> {
             }
             if let Tie::Tilted(_) = image.tie {
                 let [_, tilt] = image.latents();
-                tilt.for_each(|k| information[(k, k)] += 1.0 / problem.tilt_variance(image.image));
+                tilt.for_each(|k| information[(k, k)] += problem.tilt_information(image.image));
             }
         }
         information
@@ -279,7 +282,7 @@ impl<'a> LinearStop<'a> {
             image.latents().into_iter().flatten().zip(own.iter()).for_each(|(row, g)| gradient[row] += g);
             if let Tie::Tilted(tilt) = image.tie {
                 let [_, places] = image.latents();
-                places.zip(tilt).for_each(|(k, t)| gradient[k] -= t / problem.tilt_variance(image.image));
+                places.zip(tilt).for_each(|(k, t)| gradient[k] -= t * problem.tilt_information(image.image));
             }
         }
         gradient
