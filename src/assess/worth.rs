@@ -93,8 +93,7 @@ pub fn judge(
         worth.clustered_sigma = Some(by_clusters);
     }
     let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops, limits));
-    let noise: Vec<Vec<f64>> =
-        problem.used_on_robot().map(|i| problem.joint_sigma(problem.images[i].series)).collect();
+    let noise: Vec<Vec<f64>> = problem.used_on_robot().map(|i| problem.joint_sigma(problem.images[i].series)).collect();
     let promise = |m: &FlangeModel| FlangeErrors::new(m, &state.robot, &usual_joint_sigma(&noise), &stops);
     worth.flange = model.as_ref().and_then(promise);
     worth.workspace = model.map(|m| m.workspace()).unwrap_or_default();
