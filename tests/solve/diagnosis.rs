@@ -110,3 +110,27 @@ fn joints_that_never_moved_do_not_make_the_others_uncertain() {
     assert!(estimated.0 < 2.0 * known.0 && estimated.0 < 1e-3, "{} m, with known noise {} m", estimated.0, known.0);
     assert!(estimated.1 > 10.0 * estimated.0, "{} m where the arm never was", estimated.1);
 }
+
+#[test]
+fn views_straight_at_the_plate_do_not_determine_the_camera_and_some_tilted_ones_do() {
+    let chain = chain();
+    let mut straight = request(&chain);
+    (straight.views.tilt_rad, straight.views.aside_rad, straight.views.near_m) = (0.0, 0.0, 0.3);
+    straight.pixel_sigma_px = 0.05;
+    let world = series(&straight).unwrap();
+    let error = identify(chain.clone(), &[measured(&world, &chain)], &Options::default()).map(|_| ()).unwrap_err();
+    // The camera is at fault: neither the iterations of some adjustment nor the robot.
+    assert_eq!((error.exit_code(), error.place.as_str()), (3, "camera"), "{error}");
+    // The wrist nods at every other of these stops: 0.35 rad, some 20 degrees.
+    let readings = measured(&world, &chain).stops.into_iter().map(|s| s.readings.unwrap()).enumerate();
+    let nodding = readings.map(|(k, mut q)| {
+        q[4] += [0.0, 0.35, 0.0, -0.35][k % 4];
+        q
+    });
+    let world = series(&WorldRequest { postures: Some(nodding.collect()), ..straight.clone() }).unwrap();
+    let solution = identify(chain.clone(), &[measured(&world, &chain)], &Options::default()).unwrap();
+    let column = solution.fit.problem.layout.cameras[0].start;
+    let (found, true_focal) = (solution.fit.state.cameras[0].parameters[0], world.truth.camera.parameters[0]);
+    let sigma = solution.fit.covariance.sigma(column);
+    assert!((found - true_focal).abs() < 4.0 * sigma && sigma < 1e-3 * true_focal, "{found} +- {sigma}: {true_focal}");
+}
