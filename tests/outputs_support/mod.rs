@@ -15,7 +15,7 @@ use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::Robot;
 use robotcal::output::{Context, Offsets, Poses};
 use robotcal::problem::{MeasuredSeries, MeasuredStop};
-use robotcal::series::{CameraMount, Edge, InputFile, Observation, Plate, PlateKind};
+use robotcal::series::{CameraMount, Edge, InputFile, Observation, Plate, PlateKind, ScaleBar};
 use robotcal::urdf::RobotDescription;
 
 pub const SEED: u64 = 20;
@@ -79,8 +79,32 @@ pub fn series(mount: CameraMount, description: &RobotDescription) -> MeasuredSer
     series_in_postures(mount, description, 1)
 }
 
+/// As [`series`] with the camera in the hand; the plate stands in two places by turns, and the distance of two of its markers was measured.
+#[allow(dead_code)]
+pub fn series_with_bar_in_two_places(description: &RobotDescription) -> MeasuredSeries {
+    let mut series = series_where(CameraMount::Hand, description, 1, |stop| match stop % 2 {
+        0 => Pose::identity(),
+        _ => Pose::from_xyz_rpy([0.03, -0.05, 0.04], [0.2, -0.1, 0.7]),
+    });
+    for (k, stop) in series.stops.iter_mut().enumerate() {
+        stop.placement = format!("placement_{}", k % 2);
+    }
+    series.plate.scale = Some(ScaleBar { from: 0, to: 47, distance_m: 0.25812, sigma_m: 1e-5 });
+    series
+}
+
 /// As [`series`], the first three joints at the same readings, and off by the same, in so many stops one after the other.
 pub fn series_in_postures(mount: CameraMount, description: &RobotDescription, stops_each: usize) -> MeasuredSeries {
+    series_where(mount, description, stops_each, |_| Pose::identity())
+}
+
+/// As [`series_in_postures`], the plate moved by a pose of its own at every stop.
+fn series_where(
+    mount: CameraMount,
+    description: &RobotDescription,
+    stops_each: usize,
+    moved_plate: impl Fn(usize) -> Pose,
+) -> MeasuredSeries {
     let mut noise = Normal(ChaCha8Rng::seed_from_u64(SEED));
     println!("seed {SEED}");
     let chain = description.chain(None, None).unwrap();
@@ -113,7 +137,8 @@ pub fn series_in_postures(mount: CameraMount, description: &RobotDescription, st
         let local =
             |i: usize| if stops_each > 1 && i < 3 { 4e-4 * (3.0 * posture + 5.0 * i as f64).sin() } else { 0.0 };
         let moved: Vec<f64> = q.iter().enumerate().map(|(i, v)| v + noise.draw(2e-5) + local(i)).collect();
-        let pose = mount.camera_from_plate(&scene.camera, &truth.base_from_tip(&moved), &scene.plate);
+        let plate_at = scene.plate * moved_plate(stops.len());
+        let pose = mount.camera_from_plate(&scene.camera, &truth.base_from_tip(&moved), &plate_at);
         let distance = pose.translation.norm();
         if pose.rotation.column(2).dot(&pose.translation) > -0.6 * distance || !(0.15..0.6).contains(&distance) {
             continue;

@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3, Vector6};
 use robotcal::assess::Limits;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use robotcal::geom::{Pose, project_to_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::problem::{Adjustment, Measured, PlateShape, State, Tie};
-use robotcal::series::{Plate, PlateKind};
+use robotcal::series::{Plate, PlateKind, ScaleBar};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
 use robotcal::solve::Fit;
 use robotcal::study::measured;
@@ -91,8 +94,20 @@ fn normalised(error: &Vector6<f64>, covariance: &Matrix6<f64>) -> f64 {
     scaled.cholesky().map_or(f64::NAN, |c| error.dot(&c.solve(&error)) / 6.0)
 }
 
+/// What else there is in a world.
+#[derive(Debug, Clone, Copy)]
+pub struct Setup {
+    /// Places where the plate stands.
+    pub placements: usize,
+    /// Standard deviation of the measured distance of the outermost two markers, m.
+    pub bar_sigma_m: Option<f64>,
+}
+
+/// One place, nothing measured.
+pub const PLAIN: Setup = Setup { placements: 1, bar_sigma_m: None };
+
 /// A world of the plate tolerances of the estimator, 24 to 30 images.
-pub fn world(pixel_sigma_px: f64, seed: u64) -> SimulatedSeries {
+pub fn world(pixel_sigma_px: f64, seed: u64, setup: Setup) -> SimulatedSeries {
     let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 1e-4);
     plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.01);
     let wanted = WorldRequest {
@@ -100,26 +115,35 @@ pub fn world(pixel_sigma_px: f64, seed: u64) -> SimulatedSeries {
         pixel_sigma_px,
         marker_sigma_m: 1e-4,
         plate_modes: true,
+        placements: setup.placements,
         held_out: 1,
         seed,
         ..WorldRequest::typical(robot().chain(None, None).unwrap(), plate)
     };
-    series(&wanted).unwrap()
+    let mut world = series(&wanted).unwrap();
+    world.plate.scale = setup.bar_sigma_m.map(|sigma_m| {
+        let ends = [0, 47].map(|m| world.true_plate.markers[m].position_m);
+        let error: f64 = StandardNormal.sample(&mut ChaCha8Rng::seed_from_u64(seed));
+        ScaleBar { from: 0, to: 47, distance_m: (ends[0] - ends[1]).norm() + sigma_m * error, sigma_m }
+    });
+    world
 }
 
 /// A solution of a world with the images that every world has, whose robot, report and so on the files of others have, too.
-pub fn template() -> Solution {
+pub fn template(setup: Setup) -> Solution {
     let chain = robot().chain(None, None).unwrap();
     let options = Options { model: RobotModel::Rigid, joint_noise: JointNoise::Known(2e-5), ..Options::default() };
-    identify(chain.clone(), &[measured(&world(0.05, 0), &chain)], &options).unwrap()
+    identify(chain.clone(), &[measured(&world(0.05, 0, setup), &chain)], &options).unwrap()
 }
 
 /// All files of a world of which cameras, plate and free poses are adjusted, from nothing, and nothing else.
 pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, Vec<u8>> {
     let mut problem = template.fit.problem.clone();
-    let mut image = problem.images[0].clone();
-    problem.images.clear();
-    for seen in &world.observations {
+    problem.plates = vec![world.plate.clone()];
+    let images = std::mem::take(&mut problem.images);
+    for (k, seen) in world.observations.iter().enumerate() {
+        // The places of the plate take turns in every world.
+        let mut image = images[k % problem.placements.len()].clone();
         image.name = seen.image.clone();
         let measured = seen.observations.iter().map(|o| Measured {
             marker: o.marker as usize,
@@ -130,7 +154,7 @@ pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, 
             rejected: None,
         });
         image.observations = measured.collect();
-        problem.images.push(image.clone());
+        problem.images.push(image);
     }
     problem.noise.pixel_factor = vec![1.0];
     let start = State {
