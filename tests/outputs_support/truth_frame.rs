@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3, Vector6};
-use robotcal::assess::Limits;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use robotcal::assess::Limits;
 use robotcal::geom::{Pose, project_to_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::problem::{Adjustment, Measured, PlateShape, State, Tie};
