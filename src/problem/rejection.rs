@@ -90,6 +90,20 @@ pub struct FitsReadings {
 }
 
 impl ImageRejection {
+    /// What is wrong with the image.
+    pub fn code(&self) -> Code {
+        match self {
+            Self::Unusable { why, .. } => *why,
+            Self::InWords { .. } => Code::Noticed,
+            Self::NoObservations => Code::ObservationsMissing,
+            Self::Duplicate { .. } => Code::ImageDuplicate,
+            Self::TooFewMarkers { .. } => Code::MarkersTooFew,
+            Self::Collinear => Code::MarkersCollinear,
+            Self::WronglyPaired(_) => Code::WronglyPaired,
+            Self::Excluded => Code::ImageExcluded,
+        }
+    }
+
     /// True where reader or detector refused it, whatever was seen in it.
     pub fn is_of_detection(&self) -> bool {
         matches!(self, Self::Unusable { .. } | Self::NoObservations)

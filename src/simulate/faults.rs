@@ -83,8 +83,10 @@ pub struct Expectation {
     pub needs_images: bool,
     /// Exit codes that are right.
     pub exit_codes: &'static [u8],
-    /// Words that the diagnosis must have (any case).
-    pub words: &'static [&'static str],
+    /// What must be said: codes of the error, of findings, or of images that are left out.
+    pub codes: &'static [Code],
+    /// Images, joints, links, lines of files and markers that must be named.
+    pub names: &'static [&'static str],
 }
 
 const fn row(
@@ -92,37 +94,52 @@ const fn row(
     name: &'static str,
     needs_images: bool,
     exit_codes: &'static [u8],
-    words: &'static [&'static str],
+    codes: &'static [Code],
+    names: &'static [&'static str],
 ) -> Expectation {
-    Expectation { fault, name, needs_images, exit_codes, words }
+    Expectation { fault, name, needs_images, exit_codes, codes, names }
 }
 
 /// Every fault.
 pub const FAULTS: [Expectation; 24] = [
-    row(Fault::DegreesAsRadians, "degrees-as-radians", false, &[2], &["joints.csv", "deg"]),
-    row(Fault::RadiansAsDegrees, "radians-as-degrees", false, &[2], &["joints.csv", "rad"]),
-    row(Fault::UnknownJoint, "unknown-joint", false, &[2], &["joints.csv", "joint_a3"]),
-    row(Fault::UnknownTip, "unknown-tip", false, &[2], &["gripper_tip"]),
-    row(Fault::MissingImage, "missing-image", true, &[0, 1], &["img_003.png"]),
-    row(Fault::MissingImages, "missing-images", true, &[2], &["img_002.png"]),
-    row(Fault::UnreadableImage, "unreadable-image", true, &[0, 1], &["img_003.png"]),
-    row(Fault::ImageOfOtherSize, "image-of-other-size", true, &[0, 1], &["img_003.png"]),
-    row(Fault::EmptyCell, "empty-cell", false, &[2], &["joints.csv:5", "joint_a3"]),
-    row(Fault::NotANumber, "not-a-number", false, &[2], &["joints.csv:5", "joint_a3"]),
-    row(Fault::NoMarkers, "no-markers", true, &[2, 3], &["marker"]),
-    row(Fault::TooFewImages, "too-few-images", false, &[2, 3], &["images"]),
-    row(Fault::AllAlike, "all-alike", false, &[2, 3], &["alike"]),
-    row(Fault::WrongPairs, "wrong-pairs", false, &[0, 1], &["img_004.png", "img_009.png", "img_012.png"]),
-    row(Fault::MirroredPlate, "mirrored-plate", false, &[2, 3], &["mirror"]),
-    row(Fault::MovedPlate, "moved-plate", false, &[1, 3], &["moved", "img_010.png"]),
-    row(Fault::NegatedJoint, "negated-joint", false, &[1, 2, 3], &["joint_a5", "sign"]),
-    row(Fault::SwappedJoints, "swapped-joints", false, &[1, 2, 3], &["joint_a4", "joint_a6"]),
-    row(Fault::WrongPitch, "wrong-pitch", false, &[1, 2, 3], &["pitch"]),
-    row(Fault::DuplicateImages, "duplicate-images", false, &[0, 1, 2], &["img_006.png", "img_011.png"]),
-    row(Fault::ChangedFocus, "changed-focus", false, &[1, 3], &["focus", "img_010.png"]),
-    row(Fault::MovingRobot, "moving-robot", false, &[0, 1], &["img_005.png", "img_013.png"]),
-    row(Fault::MovedMarkers, "moved-markers", false, &[0, 1], &["marker 17", "marker 40"]),
-    row(Fault::LooseCamera, "loose-camera", false, &[1], &["camera mount", "roll", "loose"]),
+    row(Fault::DegreesAsRadians, "degrees-as-radians", false, &[2], &[Code::DegreesAsRadians], &["joints.csv"]),
+    row(Fault::RadiansAsDegrees, "radians-as-degrees", false, &[2], &[Code::RadiansAsDegrees], &["joints.csv"]),
+    row(Fault::UnknownJoint, "unknown-joint", false, &[2], &[Code::JointMissing], &["joints.csv", "joint_a3"]),
+    row(Fault::UnknownTip, "unknown-tip", false, &[2], &[Code::LinkUnknown], &["gripper_tip"]),
+    row(Fault::MissingImage, "missing-image", true, &[0, 1], &[Code::ImageNotThere], &["img_003.png"]),
+    row(Fault::MissingImages, "missing-images", true, &[2], &[Code::ImageNotThere], &["img_002.png"]),
+    row(Fault::UnreadableImage, "unreadable-image", true, &[0, 1], &[Code::ImageTruncated], &["img_003.png"]),
+    row(Fault::ImageOfOtherSize, "image-of-other-size", true, &[0, 1], &[Code::ImageSizeDiffers], &["img_003.png"]),
+    row(Fault::EmptyCell, "empty-cell", false, &[2], &[Code::CsvCellEmpty], &["joints.csv:5", "joint_a3"]),
+    row(Fault::NotANumber, "not-a-number", false, &[2], &[Code::CsvNumber], &["joints.csv:5", "joint_a3"]),
+    row(Fault::NoMarkers, "no-markers", true, &[2, 3], &[Code::PlateNowhere], &["img_000.png"]),
+    row(Fault::TooFewImages, "too-few-images", false, &[2, 3], &[Code::ImagesTooFew], &[]),
+    row(Fault::AllAlike, "all-alike", false, &[2, 3], &[Code::ViewsAlike], &[]),
+    row(
+        Fault::WrongPairs,
+        "wrong-pairs",
+        false,
+        &[0, 1],
+        &[Code::WronglyPaired],
+        &["img_004.png", "img_009.png", "img_012.png"],
+    ),
+    row(Fault::MirroredPlate, "mirrored-plate", false, &[2, 3], &[Code::PlateMirrored], &[]),
+    row(Fault::MovedPlate, "moved-plate", false, &[1, 3], &[Code::PlateMoved], &["img_010.png"]),
+    row(Fault::NegatedJoint, "negated-joint", false, &[1, 2, 3], &[Code::JointSignWrong], &["joint_a5"]),
+    row(Fault::SwappedJoints, "swapped-joints", false, &[1, 2, 3], &[Code::JointOrderWrong], &["joint_a4", "joint_a6"]),
+    row(Fault::WrongPitch, "wrong-pitch", false, &[1, 2, 3], &[Code::PlatePitchWrong], &["plate.toml"]),
+    row(
+        Fault::DuplicateImages,
+        "duplicate-images",
+        false,
+        &[0, 1, 2],
+        &[Code::ImageDuplicate],
+        &["img_006.png", "img_011.png"],
+    ),
+    row(Fault::ChangedFocus, "changed-focus", false, &[1, 3], &[Code::FocusChanged], &["img_010.png"]),
+    row(Fault::MovingRobot, "moving-robot", false, &[0, 1], &[Code::WronglyPaired], &["img_005.png", "img_013.png"]),
+    row(Fault::MovedMarkers, "moved-markers", false, &[0, 1], &[Code::MarkerOff], &["17", "40"]),
+    row(Fault::LooseCamera, "loose-camera", false, &[1], &[Code::LooseMounting], &["loose-camera"]),
 ];
 
 impl Fault {
@@ -216,9 +233,10 @@ impl Fault {
 
 impl Expectation {
     fn expected_toml(&self) -> String {
-        let codes: Vec<String> = self.exit_codes.iter().map(u8::to_string).collect();
-        let words: Vec<String> = self.words.iter().map(|w| format!("\"{w}\"")).collect();
-        format!("exit_codes = [{}]\nwords = [{}]\n", codes.join(", "), words.join(", "))
+        let quoted = |all: Vec<&str>| all.iter().map(|w| format!("\"{w}\"")).collect::<Vec<_>>().join(", ");
+        let exits: Vec<String> = self.exit_codes.iter().map(u8::to_string).collect();
+        let codes = quoted(self.codes.iter().map(|c| c.name()).collect());
+        format!("exit_codes = [{}]\ncodes = [{codes}]\nnames = [{}]\n", exits.join(", "), quoted(self.names.to_vec()))
     }
 }
 

@@ -2,9 +2,13 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use robotcal::Code;
+use robotcal::output::solution_json;
+use robotcal::problem::ImageRejection;
 use robotcal::simulate::faults::FAULTS;
 
 fn root() -> &'static Path {
@@ -12,8 +16,17 @@ fn root() -> &'static Path {
 }
 
 struct Answer {
-    code: u8,
+    exit_code: u8,
+    /// What it said.
     text: String,
+    /// Codes of the error, of the findings, and of the images that were left out.
+    codes: BTreeSet<Code>,
+}
+
+/// The code of `error[code]: ..`.
+fn code_of_error(text: &str) -> Option<Code> {
+    let name = text.lines().find_map(|l| l.strip_prefix("error[")?.split(']').next())?;
+    Some(*Code::ALL.iter().find(|c| c.name() == name).unwrap())
 }
 
 fn identify(series: &Path, out: &Path) -> Answer {
@@ -27,18 +40,36 @@ fn identify(series: &Path, out: &Path) -> Answer {
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    let mut codes: BTreeSet<Code> = code_of_error(&text).into_iter().collect();
+    if let Ok(bytes) = std::fs::read(out.join("solution.json")) {
+        let record = solution_json::read(&bytes).unwrap();
+        codes.extend(record.findings.iter().map(|f| f.code));
+        codes.extend(record.images.iter().filter_map(|i| i.rejection.as_ref()).map(ImageRejection::code));
+    }
     // A crash has no exit code of its own: 101 of a panic is in no list.
-    Answer { code: output.status.code().map_or(255, |c| c as u8), text: text.to_lowercase() }
+    Answer { exit_code: output.status.code().map_or(255, |c| c as u8), text: text.into_owned(), codes }
+}
+
+fn expected(series: &Path) -> toml::Table {
+    std::fs::read_to_string(series.join("expected.toml")).unwrap().parse().unwrap()
+}
+
+fn texts<'a>(expected: &'a toml::Table, key: &str) -> Vec<&'a str> {
+    expected[key].as_array().unwrap().iter().map(|v| v.as_str().unwrap()).collect()
 }
 
 /// What is missing from an answer; `None` when it is right.
 fn shortcoming(answer: &Answer, expected: &toml::Table) -> Option<String> {
-    let codes: Vec<i64> = expected["exit_codes"].as_array().unwrap().iter().map(|v| v.as_integer().unwrap()).collect();
-    if !codes.contains(&i64::from(answer.code)) {
-        return Some(format!("exit code {} is not in {codes:?}", answer.code));
+    let exits: Vec<i64> = expected["exit_codes"].as_array().unwrap().iter().map(|v| v.as_integer().unwrap()).collect();
+    if !exits.contains(&i64::from(answer.exit_code)) {
+        return Some(format!("exit code {} is not in {exits:?}", answer.exit_code));
     }
-    let words = expected["words"].as_array().unwrap().iter().map(|v| v.as_str().unwrap());
-    words.filter(|w| !answer.text.contains(&w.to_lowercase())).map(|w| format!("does not say \"{w}\"")).next()
+    let given = |code: &str| answer.codes.iter().any(|c| c.name() == code);
+    if let Some(code) = texts(expected, "codes").into_iter().find(|code| !given(code)) {
+        return Some(format!("has no code {code} among {:?}", answer.codes));
+    }
+    let name = texts(expected, "names").into_iter().find(|name| !answer.text.contains(name));
+    name.map(|name| format!("does not name {name}"))
 }
 
 #[test]
@@ -47,10 +78,9 @@ fn every_bad_series_is_diagnosed() {
     let mut wrong = Vec::new();
     for fault in FAULTS.iter().map(|e| e.name) {
         let series: PathBuf = root().join("datasets/bad").join(fault);
-        let expected: toml::Table = std::fs::read_to_string(series.join("expected.toml")).unwrap().parse().unwrap();
         let answer = identify(&series, &out.path().join(fault));
-        assert!(answer.code < 4, "{fault}: the program crashed:\n{}", answer.text);
-        if let Some(what) = shortcoming(&answer, &expected) {
+        assert!(answer.exit_code < 4, "{fault}: the program crashed:\n{}", answer.text);
+        if let Some(what) = shortcoming(&answer, &expected(&series)) {
             wrong.push(format!("{fault}: {what}; it said:\n{}", answer.text));
         }
     }
@@ -69,4 +99,19 @@ fn the_folders_are_those_of_the_table() {
     let mut names: Vec<String> = FAULTS.iter().map(|e| e.name.to_owned()).collect();
     names.sort();
     assert_eq!(folders, names);
+}
+
+#[test]
+fn the_expectations_are_those_of_the_table() {
+    for fault in &FAULTS {
+        let expected = expected(&root().join("datasets/bad").join(fault.name));
+        let codes: Vec<&str> = fault.codes.iter().map(|c| c.name()).collect();
+        assert_eq!(
+            (texts(&expected, "codes"), texts(&expected, "names")),
+            (codes, fault.names.to_vec()),
+            "{}",
+            fault.name
+        );
+        assert!(!fault.codes.is_empty(), "{}", fault.name);
+    }
 }

@@ -195,7 +195,7 @@ fn each_fault_changes_the_series_and_states_what_is_expected() {
         made.truth.fault = None;
         let changes_files_only = e.needs_images || matches!(e.fault, Fault::EmptyCell | Fault::NotANumber);
         assert_eq!(made == clean, changes_files_only, "{}", e.name);
-        assert!(!e.words.is_empty() && !e.exit_codes.is_empty());
+        assert!(!e.codes.is_empty() && !e.exit_codes.is_empty());
     }
 }
 
