@@ -3,8 +3,10 @@
 #![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
 
 use crate::boards_scene::{Print, Scene, View};
+use crate::said::assert_says;
 use calib_targets_aruco::builtins::DICT_4X4_50;
 use nalgebra::Vector3;
+use robotcal::Code;
 use robotcal::detect::{Detection, Picture, detect};
 use robotcal::series::{Aruco, Edge, Plate, PlateKind};
 
@@ -70,13 +72,13 @@ fn an_unstated_dictionary_is_found_and_a_wrong_one_or_a_mirror_refused() {
     let picture = charuco_scene(0.1).render(0);
     let detection = detect(&picture, &charuco_plate(None)).unwrap();
     assert_eq!(detection.observations.len(), 40);
-    assert!(detection.notices[0].what.contains("4X4") && detection.notices[0].what.contains("0.7"));
+    assert_says(&detection.notices[0], Code::DictionaryGuessed, &["4X4", "0.7"]);
     let wrong = detect(&picture, &charuco_plate(Some(("DICT_6X6_250", 0.7)))).expect_err("another dictionary");
-    assert!(wrong.what.contains("DICT_6X6_250"), "{wrong}");
+    assert_says(&wrong, Code::PlateNotFound, &["DICT_6X6_250"]);
     let unknown = detect(&picture, &charuco_plate(Some(("DICT_9X9", 0.7)))).expect_err("no such dictionary");
-    assert!(unknown.what.contains("DICT_9X9"), "{unknown}");
+    assert_says(&unknown, Code::DictionaryUnknown, &["DICT_9X9"]);
     let mirrored = detect(&mirror(&picture), &charuco_plate(Some(("DICT_4X4_50", 0.7)))).expect_err("mirrored");
-    assert!(mirrored.what.contains("mirrored"), "{mirrored}");
+    assert_eq!(mirrored.code, Code::PlateMirrored, "{mirrored}");
 }
 
 /// A grid of dots of 0.25 steps radius; `large` have 0.36.
@@ -148,7 +150,7 @@ fn plain_grids_are_identified() {
 fn a_mirrored_or_incomplete_grid_is_refused() {
     let (plate, scene) = dots("symmetric", &[12]);
     let error = detect(&mirror(&scene.render(0)), &plate).expect_err("mirrored");
-    assert!(error.what.contains("mirror"), "{error}");
+    assert_eq!(error.code, Code::PlateMirrored, "{error}");
     let (plate, scene) = dots("symmetric", &[]);
     let view = View::new(1, 1, [110.0, 240.4], 44.0, 0.0, [0.0, 0.0]);
     assert!(detect(&Scene { view, ..scene }.render(0), &plate).is_err());

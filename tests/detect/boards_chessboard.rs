@@ -3,6 +3,7 @@
 #![allow(missing_docs, clippy::expect_used, clippy::panic)]
 
 use crate::boards_scene::{Scene, View};
+use robotcal::Code;
 use robotcal::detect::{Detection, Picture, detect};
 use robotcal::series::{Plate, PlateKind};
 
@@ -120,7 +121,7 @@ fn a_board_cut_by_the_edge_of_the_image_keeps_its_ids() {
 fn a_board_beyond_two_opposite_edges_is_refused() {
     let scene = Scene::new(15, 6, View::new(15, 6, [320.0, 240.0], 60.0, 0.02, [0.0, 0.0]));
     let error = detect(&scene.render(0), &plate(15, 6)).expect_err("the place on the board is unknown");
-    assert!(error.what.contains("outline"), "{error}");
+    assert_eq!(error.code, Code::PlateIncomplete, "{error}");
 }
 
 #[test]
@@ -145,7 +146,7 @@ fn a_mirrored_board_is_refused_where_its_colours_show_it() {
     let picture = scene.render(0);
     let mirrored = mirror(&picture);
     let error = detect(&mirrored, &plate(9, 7)).expect_err("mirrored");
-    assert!(error.what.contains("mirrored"), "{error}");
+    assert_eq!(error.code, Code::PlateMirrored, "{error}");
     assert!(detect(&picture, &plate(9, 7)).is_ok());
 }
 
@@ -161,7 +162,7 @@ fn a_board_that_is_its_own_half_turn_is_upright_with_a_notice() {
     for (columns, rows) in [(9, 7), (8, 6)] {
         let scene = tilted(columns, rows, 0.4);
         let detection = found(&scene, 0);
-        assert_eq!(detection.notices.len(), 1, "{:?}", detection.notices);
+        assert!(matches!(&detection.notices[..], [n] if n.code == Code::PlateSymmetric), "{:?}", detection.notices);
         assert!(rms(&errors(&scene, &detection)) < 0.004);
     }
 }
@@ -176,9 +177,9 @@ fn another_board_than_the_plate_file_says_is_refused_or_noted() {
     // Lines more than printed differ from covered lines by nothing in the picture.
     for (columns, rows) in [(10, 6), (9, 7), (12, 9)] {
         let larger = detect(&picture, &plate(columns, rows)).expect("a part of the larger board");
-        assert!(larger.notices.iter().any(|n| n.what.contains("whole line")), "{:?}", larger.notices);
+        assert!(larger.notices.iter().any(|n| n.code == Code::PlateLineHidden), "{:?}", larger.notices);
     }
     let empty = Picture { pixels: vec![80.0; picture.pixels.len()], ..picture };
     let error = detect(&empty, &plate(9, 6)).expect_err("nothing there");
-    assert!(error.what.contains("no chessboard"), "{error}");
+    assert_eq!(error.code, Code::PlateNotFound, "{error}");
 }

@@ -5,7 +5,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::said::assert_says;
 use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Rgb};
+use robotcal::Code;
 use robotcal::Error;
 use robotcal::detect::{FlatField, Picture, detect_series, load};
 use robotcal::series::{Plate, PlateKind};
@@ -67,8 +69,8 @@ fn bits_in_the_low_end_set_the_saturation() {
         ImageBuffer::from_fn(8, 8, |x, _| Luma([if x == 3 { 4095 } else { 7 }]));
     DynamicImage::ImageLuma16(image).save(&path).unwrap();
     assert_eq!(load(&path, Some(12)).unwrap().full_scale, 4095.0);
-    assert!(refused(&path, Some(10)).what.contains("4095"));
-    assert!(refused(&path, Some(40)).what.contains("40"));
+    assert_says(&refused(&path, Some(10)), Code::ImageDepth, &["4095"]);
+    assert_says(&refused(&path, Some(40)), Code::ImageDepth, &["40"]);
 }
 
 #[test]
@@ -78,22 +80,22 @@ fn broken_files_are_named() {
     let whole = at("whole.png");
     DynamicImage::ImageLuma8(GrayImage::from_fn(200, 100, |x, y| Luma([(x * y) as u8]))).save(&whole).unwrap();
     let bytes = std::fs::read(&whole).unwrap();
-    refused(&at("missing.png"), None);
-    for (name, content) in [
-        ("empty.png", Vec::new()),
-        ("truncated.png", bytes[..bytes.len() / 2].to_vec()),
-        ("header.png", bytes[..20].to_vec()),
-        ("text.png", b"image,joint_1\n".to_vec()),
-        ("huge.pgm", b"P5 4000000000 4000000000 255\n0".to_vec()),
-        ("wide.pgm", b"P5 60000 2 255\n0".to_vec()),
-        ("large.pgm", b"P5 32000 32000 65535\n0".to_vec()),
-        ("single.pgm", b"P5 1 1 255\n0".to_vec()),
+    assert_eq!(refused(&at("missing.png"), None).code, Code::FileMissing);
+    for (name, code, content) in [
+        ("empty.png", Code::ImageTruncated, Vec::new()),
+        ("truncated.png", Code::ImageTruncated, bytes[..bytes.len() / 2].to_vec()),
+        ("header.png", Code::ImageTruncated, bytes[..20].to_vec()),
+        ("text.png", Code::ImageUnreadable, b"image,joint_1\n".to_vec()),
+        ("huge.pgm", Code::ImageSizeImpossible, b"P5 4000000000 4000000000 255\n0".to_vec()),
+        ("wide.pgm", Code::ImageSizeImpossible, b"P5 60000 2 255\n0".to_vec()),
+        ("large.pgm", Code::ImageSizeImpossible, b"P5 32000 32000 65535\n0".to_vec()),
+        ("single.pgm", Code::ImageSizeImpossible, b"P5 1 1 255\n0".to_vec()),
     ] {
         std::fs::write(at(name), content).unwrap();
-        refused(&at(name), None);
+        assert_eq!(refused(&at(name), None).code, code, "{name}");
     }
     let error = load(folder.path(), None).expect_err("a folder");
-    assert!(error.what.contains("folder"), "{error}");
+    assert_eq!(error.code, Code::FileNotRegular, "{error}");
 }
 
 fn save(path: &Path, picture: &Picture) {
@@ -142,9 +144,9 @@ fn flat_field_takes_out_dark_counts_and_vignetting() {
     }
     assert!(FlatField::from_images(&[], &[], None).unwrap().is_none());
     let small = Picture { width: 10, height: 10, pixels: vec![0.0; 100], full_scale: 65535.0 };
-    assert!(field.apply(small).expect_err("another size").what.contains("60 x 40"));
+    assert_says(&field.apply(small).expect_err("another size"), Code::ImageSizeDiffers, &["60 x 40"]);
     let error = FlatField::from_images(&paths[1], &paths[0], None).expect_err("swapped");
-    assert!(error.what.contains("not brighter"), "{error}");
+    assert_eq!(error.code, Code::FlatFieldUseless, "{error}");
 }
 
 #[test]
@@ -173,8 +175,8 @@ fn one_bad_image_does_not_fail_the_series() {
     assert_eq!(seen.load(Ordering::Relaxed), 10);
     assert_eq!(one[0].detection.observations.len(), 30);
     assert_eq!(one[0], one[3]);
-    for (index, name, text) in [(1, "odd.png", "320 x 240"), (2, "broken.png", "empty")] {
+    for (index, name, code) in [(1, "odd.png", Code::ImageSizeDiffers), (2, "broken.png", Code::ImageTruncated)] {
         let error = one[index].detection.failure.as_ref().expect(name);
-        assert!(error.place.contains(name) && error.what.contains(text), "{error}");
+        assert_says(error, code, &[name]);
     }
 }

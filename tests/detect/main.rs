@@ -4,6 +4,8 @@
 mod boards_scene;
 #[path = "../circles_support/mod.rs"]
 mod circles_support;
+#[path = "../said/mod.rs"]
+mod said;
 
 mod boards_charuco;
 mod boards_chessboard;

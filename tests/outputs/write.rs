@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use robotcal::Code;
 use robotcal::output::{NewFolder, Place, recover, write_all, write_beside};
 
 type Files = BTreeMap<String, Vec<u8>>;
@@ -73,8 +74,7 @@ fn a_folder_with_other_things_is_left_alone() {
     fs::write(series.join("plate.toml"), "the plate of a series").unwrap();
     let before = found(&series);
     let error = write_all(&series, &result(&["plate.toml"], "new")).unwrap_err();
-    assert!(error.what.contains("no earlier result"), "{error}");
-    assert_eq!(error.exit_code(), 2);
+    assert_eq!(error.code, Code::OutputForeign, "{error}");
     assert_eq!(found(&series), before);
     assert_eq!(names(root.path()), ["run1"]);
 }
@@ -101,7 +101,7 @@ fn a_file_in_the_place_of_the_folder_is_named() {
     let out = root.path().join("out");
     fs::write(&out, "a file").unwrap();
     let error = write_all(&out, &result(&[], "")).unwrap_err();
-    assert!(error.what.contains("is a file"), "{error}");
+    assert_eq!(error.code, Code::OutputName, "{error}");
     assert_eq!(fs::read(&out).unwrap(), b"a file");
     let below = write_all(&out.join("deeper"), &result(&[], "")).unwrap_err();
     assert_eq!(below.exit_code(), 2);
@@ -135,7 +135,7 @@ fn a_folder_without_permission_is_named() {
         return;
     }
     let error = write_all(&locked.join("out"), &result(&["camera.yaml"], "new")).unwrap_err();
-    assert!(error.remedy.contains("permissions"), "{error}");
+    assert_eq!(error.code, Code::FileForbidden, "{error}");
     fs::set_permissions(&locked, fs::Permissions::from_mode(0o755)).unwrap();
     assert_eq!(names(&locked), Vec::<String>::new());
 }
@@ -493,7 +493,7 @@ fn a_full_disk_keeps_the_earlier_result() {
         assert_eq!(all_below(&root.path().join("copy")), two_results()[0]);
         fs::remove_dir_all(root.path().join("copy")).unwrap();
         let listed = fs::read_to_string(root.path().join("listed")).unwrap();
-        assert!(!listed.contains(".out") && !listed.contains("unfinished"), "{listed}");
+        assert!(!listed.contains(".out") && !listed.contains("robotcal-unfinished"), "{listed}");
     }
 }
 
@@ -548,7 +548,7 @@ fn a_read_only_disk_is_named_before_the_work() {
     for out in ["disk", "disk/below"] {
         let Some(ended) = with_mounts(&script.replace("$PLACE", out), root.path()) else { return };
         let said = String::from_utf8_lossy(&ended.stderr).into_owned();
-        assert!(ended.status.success() && said.contains(out) && !said.contains("missing"), "{said}");
+        assert!(ended.status.success() && said.contains(out) && !said.contains("[file_missing]"), "{said}");
         assert_eq!(fs::read_to_string(root.path().join("code")).unwrap().trim(), "2");
     }
 }

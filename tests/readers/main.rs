@@ -4,6 +4,8 @@
 mod readers;
 #[path = "../recording_support/mod.rs"]
 mod recording_support;
+#[path = "../said/mod.rs"]
+mod said;
 
 mod hostile;
 mod mcap;

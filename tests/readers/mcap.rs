@@ -3,8 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::said::assert_says;
 use image::DynamicImage;
 use robotcal::series::{Clock, Extracted, Motion, Picking, RecordingOptions, extract};
+use robotcal::{Code, Error};
 use tempfile::TempDir;
 
 const STOPS: usize = 5;
@@ -29,12 +31,12 @@ fn read(path: &Path, options: &RecordingOptions) -> (TempDir, Extracted) {
     (folder, extracted)
 }
 
-fn refusal(path: &Path, options: &RecordingOptions) -> String {
+fn refusal(path: &Path, options: &RecordingOptions) -> Error {
     let folder = tempfile::tempdir().unwrap();
     let error = extract(path, folder.path(), options).unwrap_err();
     assert_eq!(error.exit_code(), 2);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is left behind");
-    error.to_string()
+    error
 }
 
 /// The formulas of make_recordings.py.
@@ -91,8 +93,9 @@ fn a_rosbag2_folder_gives_the_sharpest_picture_of_every_standstill() {
     );
     // Images are recorded 30 ms after their stamp, joints 1 ms.
     assert!((extracted.image_delay_s - 0.029).abs() < 1e-9);
-    let said: String = extracted.notices.iter().map(|n| format!("{n}\n")).collect();
-    assert!(said.contains("does not need: gripper") && said.contains("outside the standstills"), "{said}");
+    let noticed = |code| extracted.notices.iter().find(|n| n.code == code).unwrap();
+    assert_says(noticed(Code::JointUnused), Code::JointUnused, &["gripper"]);
+    assert_says(noticed(Code::ImagesInMotion), Code::ImagesInMotion, &["29 of 70"]);
     assert_eq!(extracted.inputs.len(), 1);
     assert_eq!(extracted.inputs[0].sha256.len(), 64);
 }
@@ -172,7 +175,7 @@ fn the_clock_of_recording_can_be_used_instead_of_stamps() {
 fn a_robot_that_never_stands_is_refused_unless_asked_for() {
     let restless = RecordingOptions { least_still_s: 5.0, ..three() };
     let message = refusal(&recording("mono8"), &restless);
-    assert!(message.contains("never stands still for 5 s") && message.contains("every 0.010 s"), "{message}");
+    assert_says(&message, Code::RobotNeverStill, &["5 s", "0.010 s"]);
     let accepting = RecordingOptions { motion: Motion::Accept { interval_s: 0.45 }, ..restless };
     let (_folder, extracted) = read(&recording("mono8"), &accepting);
     // Images every 0.1 s over 7.0 s, at least 0.45 s apart: every fifth.
@@ -188,30 +191,29 @@ fn a_robot_that_never_stands_is_refused_unless_asked_for() {
 #[test]
 fn missing_joints_and_topics_are_listed() {
     let message = refusal(&recording("mono8"), &options(&["joint_1", "joint_7"]));
-    assert!(message.contains("no positions of joint_7") && message.contains("gripper, joint_1"), "{message}");
+    assert_says(&message, Code::JointMissing, &["joint_7", "gripper, joint_1"]);
     let topic = |joint: Option<&str>, image: Option<&str>| RecordingOptions {
         joint_topic: joint.map(String::from),
         image_topic: image.map(String::from),
         ..three()
     };
     let message = refusal(&recording("mono8"), &topic(Some("/note"), None));
-    assert!(message.contains("/note has no joint states") && message.contains("/joint_states"), "{message}");
+    assert_says(&message, Code::TopicMissing, &["/note", "/joint_states"]);
     let message = refusal(&recording("mono8"), &topic(None, Some("/camera/other")));
-    assert!(message.contains("/camera/image_raw (sensor_msgs/msg/Image, 70)"), "{message}");
+    assert_says(&message, Code::TopicMissing, &["/camera/image_raw (sensor_msgs/msg/Image, 70)"]);
     let (_folder, extracted) = read(&recording("mono8"), &topic(Some("/joint_states"), Some("/camera/image_raw")));
     assert_stops(&extracted, 4);
 }
 
 #[test]
 fn other_recordings_are_refused_with_the_command_that_converts_them() {
-    for (name, words) in [
-        ("old.bag", ["ROS 1 bag", "rosbags-convert --src"]),
-        ("zipped_messages", ["compressed by itself", "message compression"]),
-        ("nothing.mcap", ["nothing.mcap", "path"]),
-        ("../make_recordings.py", ["not a recording", "begin"]),
+    for (name, code, named) in [
+        ("old.bag", Code::RecordingFormat, "rosbags-convert --src"),
+        ("zipped_messages", Code::MessagesUnreadable, "zipped_messages"),
+        ("nothing.mcap", Code::FileMissing, "nothing.mcap"),
+        ("../make_recordings.py", Code::RecordingFormat, "make_recordings.py"),
     ] {
-        let message = refusal(&recording(name), &three());
-        assert!(words.iter().all(|w| message.contains(w)), "{name}: {message}");
+        assert_says(&refusal(&recording(name), &three()), code, &[named]);
     }
 }
 
@@ -226,7 +228,7 @@ fn a_cut_or_damaged_file_gives_what_stands_before_the_damage() {
         let (_images, extracted) = read(&path, &three());
         let stops = extracted.stops.stops.len();
         assert!(stops <= last && stops >= 1, "{stops} stops of {share} tenths");
-        assert!(extracted.notices.iter().any(|n| n.what.contains("cut off")), "{:?}", extracted.notices);
+        assert!(extracted.notices.iter().any(|n| n.code == Code::RecordingDamaged), "{:?}", extracted.notices);
         last = stops;
         for (k, stop) in extracted.stops.stops.iter().enumerate() {
             let wanted = posture(k);
@@ -237,7 +239,7 @@ fn a_cut_or_damaged_file_gives_what_stands_before_the_damage() {
     // Nothing at all before the damage.
     fs::write(&path, &whole[..40]).unwrap();
     let message = refusal(&path, &three());
-    assert!(message.contains("no joint states"), "{message}");
+    assert_says(&message, Code::TopicMissing, &["cut.mcap"]);
 }
 
 /// Three wrong bytes in one chunk: its own messages are lost, those of the chunks behind it are not.
@@ -259,7 +261,7 @@ fn damage_costs_its_own_chunk_alone() {
                 let (_images, extracted) = read(&path, &three());
                 // A chunk of this recording spans less than two stops.
                 assert!(extracted.stops.stops.len() >= STOPS - 2, "{name}: {} stops", extracted.stops.stops.len());
-                assert!(extracted.notices.iter().any(|n| n.what.contains("damaged")), "{:?}", extracted.notices);
+                assert!(extracted.notices.iter().any(|n| n.code == Code::RecordingDamaged), "{:?}", extracted.notices);
                 for stop in &extracted.stops.stops {
                     let q = stop.raw_readings.as_ref().unwrap();
                     assert!((0..STOPS).any(|k| q.iter().zip(posture(k)).all(|(q, w)| (q - w).abs() < 1e-12)));
@@ -320,6 +322,7 @@ fn topics_and_joints_with_control_characters_are_refused() {
         let path = folder.path().join("hidden.mcap");
         fs::write(&path, bytes).unwrap();
         let message = refusal(&path, &RecordingOptions::default());
-        assert!(message.contains("control characters") && !message.contains(hidden), "{message:?}");
+        assert_eq!(message.code, Code::NameUnprintable, "{message}");
+        assert!(!message.to_string().contains(hidden), "{message:?}");
     }
 }

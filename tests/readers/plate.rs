@@ -5,7 +5,10 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 use robotcal::series::{Marker, Plate, PlateKind, ScaleBar, plate_csv, plate_toml, read_plate};
+use robotcal::{Code, Error};
 use tempfile::TempDir;
+
+use crate::said::assert_says;
 
 fn plate_file(toml: &str, csv: &str) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
@@ -20,18 +23,11 @@ fn plate(toml: &str, csv: &str) -> Plate {
     read_plate(&path, &mut Vec::new()).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn refusal(toml: &str, csv: &str) -> String {
+fn refusal(toml: &str, csv: &str) -> Error {
     let (_folder, path) = plate_file(toml, csv);
     let error = read_plate(&path, &mut Vec::new()).unwrap_err();
     assert_eq!(error.exit_code(), 2);
-    error.to_string()
-}
-
-#[track_caller]
-fn assert_says(message: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(message.contains(part), "{part:?} not in:\n{message}");
-    }
+    error
 }
 
 const CODED: &str = "format = 1\nkind = \"coded-circles\"\ncolumns = 2\nrows = 2\npitch_m = 0.02\n\
@@ -62,38 +58,50 @@ fn lattices_need_no_marker_file() {
         let toml = format!("format = 1\nkind = \"{kind}\"\ncolumns = 4\nrows = 3\npitch_m = 0.01\n");
         let read = plate(&toml, "");
         assert_eq!(read, Plate::lattice(expected, 4, 3, 0.01, 1e-4));
-        assert_says(&refusal(&toml.replace("rows = 3\n", ""), ""), &["columns, rows and pitch_m"]);
-        assert_says(&refusal(&toml.replace("rows = 3", "rows = 1"), ""), &["rows = 1"]);
-        assert_says(&refusal(&toml.replace("0.01", "10"), ""), &["pitch_m = 10", "metres"]);
-        assert_says(&refusal(&toml.replace("0.01", "0"), ""), &["pitch_m = 0", "positive"]);
+        assert_says(&refusal(&toml.replace("rows = 3\n", ""), ""), Code::SettingMissing, &["rows"]);
+        assert_says(&refusal(&toml.replace("rows = 3", "rows = 1"), ""), Code::SettingRange, &["rows = 1"]);
+        assert_says(&refusal(&toml.replace("0.01", "10"), ""), Code::PlateUnitUnlikely, &["pitch_m = 10"]);
+        assert_says(&refusal(&toml.replace("0.01", "0"), ""), Code::SettingRange, &["pitch_m = 0"]);
     }
     let dots = "format = 1\nkind = \"circle-grid\"\ncolumns = 4\nrows = 3\npitch_m = 0.01\nradius_m = 0.003\n";
     assert!(plate(dots, "").markers.iter().all(|m| m.outer_radius_m == 0.003));
-    assert_says(&refusal(&dots.replace("0.003", "0.006"), ""), &["0 and 4", "overlap", "diameters"]);
-    assert_says(&refusal(&dots.replace("circle-grid", "chessboard"), ""), &["radius_m"]);
+    assert_says(&refusal(&dots.replace("0.003", "0.006"), ""), Code::MarkersOverlap, &["0 and 4"]);
+    assert_says(&refusal(&dots.replace("circle-grid", "chessboard"), ""), Code::SettingConflict, &["radius_m"]);
 }
 
 #[test]
 fn a_bad_plate_names_line_column_and_marker() {
-    assert_says(&refusal(&CODED.replace("pitch_m", "pitch"), ""), &["plate.toml:5", "`pitch`", "\"pitch_m\" meant"]);
-    assert_says(&refusal(&CODED.replace("coded-circles", "coded"), ""), &["plate.toml:2", "`coded`"]);
-    assert_says(&refusal(&CODED.replace("markers = \"plate.csv\"\n", ""), ""), &["marker file", "plate.csv"]);
-    assert_says(&refusal(CODED, ""), &["plate.csv", "empty"]);
-    assert_says(&refusal(CODED, HEADER), &["plate.csv", "no markers"]);
+    assert_says(
+        &refusal(&CODED.replace("pitch_m", "pitch"), ""),
+        Code::SettingSyntax,
+        &["plate.toml:5", "`pitch`", "\"pitch_m\""],
+    );
+    assert_says(
+        &refusal(&CODED.replace("coded-circles", "coded"), ""),
+        Code::SettingSyntax,
+        &["plate.toml:2", "`coded`"],
+    );
+    assert_says(&refusal(&CODED.replace("markers = \"plate.csv\"\n", ""), ""), Code::SettingMissing, &["plate.csv"]);
+    assert_says(&refusal(CODED, ""), Code::FileEmpty, &["plate.csv"]);
+    assert_says(&refusal(CODED, HEADER), Code::FileEmpty, &["plate.csv"]);
     let bad = |from: &str, to: &str| refusal(CODED, &table(from, to));
-    assert_says(&bad("outer_radius_m", "radius"), &["plate.csv:1", "\"radius\""]);
-    assert_says(&bad(",outer_radius_m", ",outer_radius"), &["plate.csv:1", "outer_radius", "\"outer_radius_m\" meant"]);
-    assert_says(&bad("0.006,0.003", "0.003,0.006"), &["plate.csv:2", "inner_radius_m", "0.006"]);
-    assert_says(&bad("0.006,0.003", "0,0"), &["plate.csv:2", "outer_radius_m"]);
-    assert_says(&bad("0.00005", "-1"), &["plate.csv:3", "sigma_m"]);
-    assert_says(&bad("3,0.01,-0.01", "1,0.01,-0.01"), &["plate.csv:5", "marker 1", "line 4"]);
-    assert_says(&bad("3,0.01,-0.01", "4,0.01,-0.01"), &["marker 4", "2 x 2"]);
-    assert_says(&bad("0.004,0,", "0.015,0,"), &["overlap"]);
-    assert_says(&bad("3,0.01,-0.01,0,", "3,10,-10,0,"), &["marker 3", "metres"]);
+    assert_says(&bad("outer_radius_m", "radius"), Code::CsvColumnUnknown, &["plate.csv:1", "\"radius\""]);
+    assert_says(
+        &bad(",outer_radius_m", ",outer_radius"),
+        Code::CsvColumnUnknown,
+        &["plate.csv:1", "\"outer_radius\"", "\"outer_radius_m\""],
+    );
+    assert_says(&bad("0.006,0.003", "0.003,0.006"), Code::CsvRange, &["plate.csv:2", "inner_radius_m", "0.006"]);
+    assert_says(&bad("0.006,0.003", "0,0"), Code::CsvRange, &["plate.csv:2", "outer_radius_m"]);
+    assert_says(&bad("0.00005", "-1"), Code::CsvRange, &["plate.csv:3", "sigma_m"]);
+    assert_says(&bad("3,0.01,-0.01", "1,0.01,-0.01"), Code::CsvRowTwice, &["plate.csv:5", "marker 1", "line 4"]);
+    assert_says(&bad("3,0.01,-0.01", "4,0.01,-0.01"), Code::MarkerUnknown, &["marker 4", "2 x 2"]);
+    assert_says(&bad("0.004,0,", "0.015,0,"), Code::MarkersOverlap, &[]);
+    assert_says(&bad("3,0.01,-0.01,0,", "3,10,-10,0,"), Code::MarkerMisplaced, &["marker 3"]);
     // y down is a mirrored plate
     let mirrored =
         table("", "").replace("0.01,-0.01", "T").replace("0.01,0.01", "0.01,-0.01").replace("T", "0.01,0.01");
-    assert_says(&refusal(CODED, &mirrored), &["marker", "y UP"]);
+    assert_says(&refusal(CODED, &mirrored), Code::MarkerMisplaced, &["marker 0"]);
 }
 
 #[test]
@@ -103,10 +111,10 @@ fn a_scale_bar_must_be_possible() {
     };
     let read = plate(&scaled(0, 1, 0.02001), &table("", ""));
     assert_eq!(read.scale, Some(ScaleBar { from: 0, to: 1, distance_m: 0.02001, sigma_m: 2e-5 }));
-    assert_says(&refusal(&scaled(0, 9, 0.02), &table("", "")), &["[scale]", "marker 9"]);
-    assert_says(&refusal(&scaled(0, 1, 20.0), &table("", "")), &["distance_m = 20", "unit"]);
-    assert_says(&refusal(&scaled(1, 1, 0.02), &table("", "")), &["marker ids"]);
-    assert_says(&refusal(&scaled(0, 1, -0.02), &table("", "")), &["positive"]);
+    assert_says(&refusal(&scaled(0, 9, 0.02), &table("", "")), Code::MarkerUnknown, &["[scale]", "marker 9"]);
+    assert_says(&refusal(&scaled(0, 1, 20.0), &table("", "")), Code::PlateScaleUnlikely, &["distance_m = 20"]);
+    assert_says(&refusal(&scaled(1, 1, 0.02), &table("", "")), Code::PlateScaleUnlikely, &[]);
+    assert_says(&refusal(&scaled(0, 1, -0.02), &table("", "")), Code::SettingRange, &["distance_m = -0.02"]);
 }
 
 #[test]
@@ -116,7 +124,7 @@ fn points_and_corrected_plates() {
     let read = plate(toml, csv);
     assert_eq!(read.index_of(7), Some(1));
     assert_eq!((read.markers[0].sigma_m, read.markers[1].sigma_m), (0.001, 0.3));
-    assert_says(&refusal(toml, "id,x_m,y_m,z_m\n1,0,0,0\n2,0,0,0\n"), &["1 and 2", "overlap"]);
+    assert_says(&refusal(toml, "id,x_m,y_m,z_m\n1,0,0,0\n2,0,0,0\n"), Code::MarkersOverlap, &["1 and 2"]);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Reading and writing series folders: what is accepted, what is refused, and with which words.
+//! Reading and writing series folders: what is accepted, what is refused, and with which code.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,10 @@ use robotcal::series::{
     Stops, observations_csv, read, read_images,
 };
 use robotcal::urdf::{Chain, RobotDescription};
+use robotcal::{Code, Error};
 use tempfile::TempDir;
+
+use crate::said::assert_says;
 
 const MANIFEST: &str = "format = 1\njoint_unit = \"rad\"\ncamera_mount = \"hand\"\nplate = \"plate.toml\"\n";
 const PLATE: &str = "format = 1\nkind = \"chessboard\"\ncolumns = 3\nrows = 2\npitch_m = 0.02\ntolerance_m = 0.0001\n";
@@ -32,18 +35,11 @@ fn series_with(changes: &[(&str, &str)]) -> TempDir {
     folder(&[&good[..], &images[..], changes].concat())
 }
 
-fn refusal(changes: &[(&str, &str)]) -> String {
+fn refusal(changes: &[(&str, &str)]) -> Error {
     let folder = series_with(changes);
     let error = read(folder.path()).unwrap_err();
     assert_eq!(error.exit_code(), 2);
-    error.to_string()
-}
-
-#[track_caller]
-fn assert_says(message: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(message.contains(part), "{part:?} not in:\n{message}");
-    }
+    error
 }
 
 fn chain() -> Chain {
@@ -99,43 +95,51 @@ fn byte_order_marks_crlf_blanks_and_quotes_do_not_matter() {
 #[test]
 fn a_bad_manifest_names_line_and_key() {
     let with = |line: &str| refusal(&[("series.toml", &format!("{MANIFEST}{line}\n"))]);
-    assert_says(&with("tipp = \"flange\""), &["series.toml:5", "`tipp`", "\"tip\" meant"]);
-    assert_says(&with("[camera]\nfocal_mm = 8"), &["series.toml:6", "`focal_mm`"]);
-    assert_says(&with("[camera]\nfocal_px = \"8\""), &["series.toml:6", "string"]);
-    assert_says(&with("[camera]\nfocal_px = -1"), &["focal_px = -1"]);
-    assert_says(&with("[camera]\nwidth_px = 100"), &["height_px"]);
-    assert_says(&with("[robot]\norder = \"random\""), &["series.toml:6", "`random`", "unknown"]);
+    assert_says(&with("tipp = \"flange\""), Code::SettingSyntax, &["series.toml:5", "`tipp`", "\"tip\""]);
+    assert_says(&with("[camera]\nfocal_mm = 8"), Code::SettingSyntax, &["series.toml:6", "`focal_mm`"]);
+    assert_says(&with("[camera]\nfocal_px = \"8\""), Code::SettingSyntax, &["series.toml:6"]);
+    assert_says(&with("[camera]\nfocal_px = -1"), Code::SettingRange, &["focal_px = -1"]);
+    assert_says(&with("[camera]\nwidth_px = 100"), Code::SettingConflict, &["height_px"]);
+    assert_says(&with("[robot]\norder = \"random\""), Code::SettingSyntax, &["series.toml:6", "`random`", "`unknown`"]);
     let replaced = |from: &str, to: &str| refusal(&[("series.toml", &MANIFEST.replace(from, to))]);
-    assert_says(&replaced("joint_unit = \"rad\"\n", ""), &["series.toml", "joint_unit = \"deg\" or", "no default"]);
-    assert_says(&replaced("\"rad\"", "\"degree\""), &["series.toml:2", "`degree`", "`deg`"]);
-    assert_says(&replaced("format = 1", "format = 2"), &["format = 2", "format = 1"]);
-    assert_says(&replaced("camera_mount = \"hand\"\n", ""), &["camera_mount"]);
-    assert_says(&replaced("plate.toml", "plat.toml"), &["plat.toml"]);
-    assert_says(&read(Path::new("no/such/folder")).unwrap_err().to_string(), &["no/such/folder", "path"]);
+    assert_says(
+        &replaced("joint_unit = \"rad\"\n", ""),
+        Code::JointUnitMissing,
+        &["series.toml", "joint_unit = \"deg\""],
+    );
+    assert_says(&replaced("\"rad\"", "\"degree\""), Code::SettingSyntax, &["series.toml:2", "`degree`", "`deg`"]);
+    assert_says(&replaced("format = 1", "format = 2"), Code::SettingVersion, &["format = 2", "format = 1"]);
+    assert_says(&replaced("camera_mount = \"hand\"\n", ""), Code::SettingSyntax, &["camera_mount"]);
+    assert_says(&replaced("plate.toml", "plat.toml"), Code::FileMissing, &["plat.toml"]);
+    assert_says(&read(Path::new("no/such/folder")).unwrap_err(), Code::FileMissing, &["no/such/folder"]);
 }
 
 #[test]
 fn a_bad_joint_table_names_line_and_column() {
     let with = |text: &str| refusal(&[("joints.csv", text)]);
-    assert_says(&with(&JOINTS.replace("1.5", "")), &["joints.csv:3", "column j2", "empty cell", "off the robot"]);
-    assert_says(&with(&JOINTS.replace("1.5", "x1")), &["joints.csv:3", "column j2", "\"x1\" is not a number"]);
-    assert_says(&with(&JOINTS.replace("1.5", "nan")), &["joints.csv:3", "nan"]);
-    assert_says(&with(&JOINTS.replace("1.5", "\"1,5\"")), &["joints.csv:3", "decimal point"]);
-    assert_says(&with(&JOINTS.replace("1.5", "1,5")), &["joints.csv:3", "5 cells under 4", "decimal point"]);
-    assert_says(&with(&JOINTS.replace("b.png", "a.png")), &["joints.csv:3", "\"a.png\"", "line 2"]);
-    assert_says(&with(&JOINTS.replace("b.png", "images/b.png")), &["joints.csv:3", "file name alone"]);
-    assert_says(&with(&JOINTS.replace("image", "picture")), &["joints.csv:1", "no column \"image\"", "picture, j1"]);
-    assert_says(&with(&JOINTS.replace("j2", "j1")), &["joints.csv:1", "two columns", "j1"]);
-    assert_says(&with("image,j1\n"), &["joints.csv", "no rows"]);
-    assert_says(&with(""), &["joints.csv", "empty"]);
+    assert_says(&with(&JOINTS.replace("1.5", "")), Code::CsvCellEmpty, &["joints.csv:3", "column j2"]);
+    assert_says(&with(&JOINTS.replace("1.5", "x1")), Code::CsvNumber, &["joints.csv:3", "column j2", "\"x1\""]);
+    assert_says(&with(&JOINTS.replace("1.5", "nan")), Code::CsvNumber, &["joints.csv:3", "nan"]);
+    assert_says(&with(&JOINTS.replace("1.5", "\"1,5\"")), Code::CsvNumber, &["joints.csv:3", "\"1,5\""]);
+    assert_says(&with(&JOINTS.replace("1.5", "1,5")), Code::CsvCellCount, &["joints.csv:3", "5 cells under 4"]);
+    assert_says(&with(&JOINTS.replace("b.png", "a.png")), Code::CsvRowTwice, &["joints.csv:3", "\"a.png\"", "line 2"]);
+    assert_says(&with(&JOINTS.replace("b.png", "images/b.png")), Code::CsvName, &["joints.csv:3", "images/b.png"]);
+    assert_says(
+        &with(&JOINTS.replace("image", "picture")),
+        Code::CsvColumnMissing,
+        &["joints.csv:1", "\"image\"", "picture, j1"],
+    );
+    assert_says(&with(&JOINTS.replace("j2", "j1")), Code::CsvColumnTwice, &["joints.csv:1", "j1"]);
+    assert_says(&with("image,j1\n"), Code::FileEmpty, &["joints.csv"]);
+    assert_says(&with(""), Code::FileEmpty, &["joints.csv"]);
     let german = "image;j1;j2;x\na.png;0,1;1,25;0,5\n";
-    assert_says(&with(german), &["joints.csv:1", "semicolons", "decimal comma", "decimal points"]);
-    assert_says(&with(&german.replace(';', "\t")), &["joints.csv:1", "tabs", "decimal comma"]);
+    assert_says(&with(german), Code::CsvSeparator, &["joints.csv:1", "semicolons"]);
+    assert_says(&with(&german.replace(';', "\t")), Code::CsvSeparator, &["joints.csv:1", "tabs"]);
     let folder = series_with(&[]);
     fs::write(folder.path().join("joints.csv"), [0xff, 0xfe, b'i', 0]).unwrap();
-    assert_says(&read(folder.path()).unwrap_err().to_string(), &["UTF-16", "UTF-8"]);
+    assert_says(&read(folder.path()).unwrap_err(), Code::TextEncoding, &["UTF-16", "UTF-8"]);
     fs::write(folder.path().join("joints.csv"), b"image,j1\na.png,1\n\xfcber.png,2\n").unwrap();
-    assert_says(&read(folder.path()).unwrap_err().to_string(), &["joints.csv:3", "UTF-8"]);
+    assert_says(&read(folder.path()).unwrap_err(), Code::TextEncoding, &["joints.csv:3", "UTF-8"]);
 }
 
 #[test]
@@ -145,7 +149,7 @@ fn placements_are_all_named_or_none() {
     let got: Vec<_> = series.stops.stops.iter().map(|s| (s.placement.as_str(), s.time_s)).collect();
     assert_eq!(got, [("left", Some(10.5)), ("right", None)]);
     let message = refusal(&[("joints.csv", &named.replace("right", ""))]);
-    assert_says(&message, &["joints.csv:3", "placement"]);
+    assert_says(&message, Code::CsvCellEmpty, &["joints.csv:3", "placement"]);
     let empty = named.replace("right", "").replace("left", "");
     assert_eq!(read(series_with(&[("joints.csv", &empty)]).path()).unwrap().stops.stops[0].placement, "placement_0");
 }
@@ -158,14 +162,14 @@ fn images_and_rows_are_held_against_each_other() {
     assert_eq!(series.stops.stops.len(), 3, "a stop without its image was visited all the same");
     assert_eq!(series.stops.stops[1].path, None);
     assert_eq!(series.notices.len(), 2, "{:?}", series.notices);
-    assert_says(&series.notices[0].to_string(), &["joints.csv:3", "\"b.png\"", "left out"]);
-    assert_says(&series.notices[1].to_string(), &["1 image", "extra.png"]);
+    assert_says(&series.notices[0], Code::ImageNotThere, &["joints.csv:3", "\"b.png\""]);
+    assert_says(&series.notices[1], Code::ImageUnlisted, &["extra.png"]);
     let Source::Images { dark, white, .. } = &series.source else { panic!("{:?}", series.source) };
     assert_eq!((dark.len(), white.len()), (1, 0));
     let message = refusal(&[("joints.csv", &JOINTS.replace(".png", ".PNG"))]);
-    assert_says(&message, &["joints.csv:2", "a.PNG", "3 of 3", "\"a.png\" is there"]);
+    assert_says(&message, Code::ImageNotThere, &["joints.csv:2", "a.PNG", "3 of 3", "\"a.png\""]);
     let message = refusal(&[("joints.csv", &JOINTS.replace(".png", ""))]);
-    assert_says(&message, &["\"a.png\" is there"]);
+    assert_says(&message, Code::ImageNotThere, &["\"a.png\""]);
 }
 
 #[test]
@@ -185,12 +189,12 @@ fn readings_are_matched_by_name_in_si() {
     assert_eq!(readings[1], None);
     let notices = series.reading_notices(&chain);
     assert_eq!(notices.len(), 1);
-    assert_says(&notices[0].to_string(), &["spare", "not used"]);
+    assert_says(&notices[0], Code::JointUnused, &["spare"]);
 
     let renamed = joints.replace("j1", "joint1");
     let series = read(series_with(&[("series.toml", &degrees), ("joints.csv", &renamed)]).path()).unwrap();
-    let error = series.readings_for(&chain).unwrap_err().to_string();
-    assert_says(&error, &["joints.csv", "no readings of j1", "j2, x, spare, joint1"]);
+    let error = series.readings_for(&chain).unwrap_err();
+    assert_says(&error, Code::JointMissing, &["joints.csv", "j1", "j2, x, spare, joint1"]);
 }
 
 #[test]
@@ -200,17 +204,17 @@ fn values_beyond_limits_are_noticed_by_name() {
     assert!(series.readings_for(&chain()).is_ok());
     let notices = series.reading_notices(&chain());
     assert_eq!(notices.len(), 1, "{notices:?}");
-    assert_says(&notices[0].to_string(), &["joints.csv:2", "a.png", "j2", "2.25", "-2 to 2", "1 of 3"]);
+    assert_says(&notices[0], Code::JointBeyondLimits, &["joints.csv:2", "a.png", "j2", "2.25", "-2 to 2", "1 of 3"]);
 }
 
 /// Readings of three joints x, j1, j2 of `chain` from a table of that order.
-fn with_readings(unit: AngleUnit, rows: &[[f64; 3]]) -> Result<(), String> {
+fn with_readings(unit: AngleUnit, rows: &[[f64; 3]]) -> Result<(), Error> {
     let mut series = read(series_with(&[]).path()).unwrap();
     series.manifest.joint_unit = Some(unit);
     series.stops.joints = ["x", "j1", "j2"].map(String::from).into();
     let stop = series.stops.stops[0].clone();
     series.stops.stops = rows.iter().map(|row| Stop { raw_readings: Some(row.to_vec()), ..stop.clone() }).collect();
-    series.readings_for(&chain()).map(|_| ()).map_err(|e| e.to_string())
+    series.readings_for(&chain()).map(|_| ())
 }
 
 #[test]
@@ -220,8 +224,8 @@ fn an_impossible_unit_is_refused_and_a_possible_one_is_not() {
     let radians: Vec<[f64; 3]> = degrees.iter().map(|[x, a, b]| [*x, a.to_radians(), b.to_radians()]).collect();
     assert_eq!(with_readings(Deg, &degrees), Ok(()));
     assert_eq!(with_readings(Rad, &radians), Ok(()));
-    assert_says(&with_readings(Rad, &degrees).unwrap_err(), &["joints.csv", "j1", "-100", "joint_unit = \"deg\""]);
-    assert_says(&with_readings(Deg, &radians).unwrap_err(), &["joints.csv", "j1", "joint_unit = \"rad\""]);
+    assert_says(&with_readings(Rad, &degrees).unwrap_err(), Code::DegreesAsRadians, &["joints.csv", "j1", "-100"]);
+    assert_says(&with_readings(Deg, &radians).unwrap_err(), Code::RadiansAsDegrees, &["joints.csv", "j1"]);
     // A whole turn where the description allows half a one, on every stop.
     let turned: Vec<[f64; 3]> = radians.iter().map(|[x, a, b]| [*x, a - 4.2, *b]).collect();
     assert!(turned.iter().all(|q| q[1] < -3.0));
@@ -236,7 +240,7 @@ fn an_impossible_unit_is_refused_and_a_possible_one_is_not() {
     let near: Vec<[f64; 3]> = (0..6).map(|i| [0.5, 45.0 + 0.1 * f64::from(i), 1.0]).collect();
     assert_eq!(with_readings(Deg, &near), Ok(()));
     let millimetres: Vec<[f64; 3]> = radians.iter().map(|[x, a, b]| [x * 1000.0, *a, *b]).collect();
-    assert_says(&with_readings(Rad, &millimetres).unwrap_err(), &["x reads 500", "millimetres"]);
+    assert_says(&with_readings(Rad, &millimetres).unwrap_err(), Code::MillimetresAsMetres, &["x reads 500"]);
 }
 
 #[test]
@@ -254,25 +258,25 @@ fn observations_replace_images_and_are_checked_by_line() {
     assert_eq!(images[0].observations[1].covariance, Some([0.01, 0.001, 0.02]));
     assert_eq!(images[0].observations[1].uv, [10.5, 20.25]);
     assert_eq!(series.notices.len(), 2);
-    assert_says(&series.notices[0].to_string(), &["gone.png", "joints.csv does not name"]);
-    assert_says(&series.notices[1].to_string(), &["a.png", "no observation"]);
+    assert_says(&series.notices[0], Code::ImageUnlisted, &["gone.png"]);
+    assert_says(&series.notices[1], Code::ObservationsMissing, &["a.png"]);
     let images = read_images(series_with(&[("observations.csv", &good)]).path()).unwrap();
     assert!(matches!(images.source, Source::Images { .. }));
 
     let sized = format!("{MANIFEST}[camera]\nwidth_px = 100\nheight_px = 80\n");
     let with = |rows: &str| refusal(&[("series.toml", &sized), ("observations.csv", &format!("{header}{rows}\n"))]);
-    assert_says(&with("a.png,6,1,2,,,,,,,"), &["observations.csv:2", "\"6\"", "0 to 5"]);
-    assert_says(&with("a.png,-1,1,2,,,,,,,"), &["observations.csv:2", "marker id"]);
-    assert_says(&with("a.png,1,x,2,,,,,,,"), &["observations.csv:2", "column u", "\"x\""]);
-    assert_says(&with("a.png,1,1,80,,,,,,,"), &["observations.csv:2", "column v", "outside the image of 100 x 80"]);
-    assert_says(&with("a.png,1,1,2,middle,,,,,,"), &["observations.csv:2", "middle", "outer or inner"]);
-    assert_says(&with("a.png,1,1,2,inner,,,,,,"), &["observations.csv:2", "disc"]);
-    assert_says(&with("a.png,1,1,2,,1,2,1,,,"), &["observations.csv:2", "not positive"]);
-    assert_says(&with("a.png,1,1,2,,1,,1,,,"), &["observations.csv:2", "cov_uv"]);
-    assert_says(&with("a.png,1,1,2,,,,,,,\na.png,1,1,3,,,,,,,"), &["observations.csv:3", "line 2"]);
-    assert_says(&with("c.png,1,1,2,,,,,,,"), &["observations.csv", "no usable observation"]);
+    assert_says(&with("a.png,6,1,2,,,,,,,"), Code::MarkerUnknown, &["observations.csv:2", "\"6\"", "0 to 5"]);
+    assert_says(&with("a.png,-1,1,2,,,,,,,"), Code::CsvNumber, &["observations.csv:2", "\"-1\""]);
+    assert_says(&with("a.png,1,x,2,,,,,,,"), Code::CsvNumber, &["observations.csv:2", "column u", "\"x\""]);
+    assert_says(&with("a.png,1,1,80,,,,,,,"), Code::CsvRange, &["observations.csv:2", "column v", "100 x 80"]);
+    assert_says(&with("a.png,1,1,2,middle,,,,,,"), Code::CsvName, &["observations.csv:2", "middle"]);
+    assert_says(&with("a.png,1,1,2,inner,,,,,,"), Code::CsvName, &["observations.csv:2", "inner"]);
+    assert_says(&with("a.png,1,1,2,,1,2,1,,,"), Code::CsvRange, &["observations.csv:2", "cov_uu"]);
+    assert_says(&with("a.png,1,1,2,,1,,1,,,"), Code::CsvNumber, &["observations.csv:2", "cov_uv"]);
+    assert_says(&with("a.png,1,1,2,,,,,,,\na.png,1,1,3,,,,,,,"), Code::CsvRowTwice, &["observations.csv:3", "line 2"]);
+    assert_says(&with("c.png,1,1,2,,,,,,,"), Code::ObservationsMissing, &["observations.csv"]);
     let misspelt = refusal(&[("observations.csv", "image,marker,u,v,egde\na.png,1,1,2,inner\n")]);
-    assert_says(&misspelt, &["observations.csv:1", "egde", "\"edge\" meant"]);
+    assert_says(&misspelt, Code::CsvColumnUnknown, &["observations.csv:1", "egde", "\"edge\""]);
 }
 
 #[test]
@@ -335,7 +339,7 @@ fn names_with_control_characters_are_refused_wherever_they_are_read() {
     for (name, text, place) in cases {
         let folder = series_with(&[(name, &text)]);
         let error = read(folder.path()).unwrap_err();
-        assert_eq!(error.exit_code(), 2);
+        assert_eq!(error.code, Code::NameUnprintable);
         assert!(error.place.ends_with(place), "{name}: {}", error.place);
         assert!(!error.to_string().contains(|c: char| c.is_control() && c != '\n'), "{error:?}");
         assert!(!error.what.contains('\n'), "{error:?}");

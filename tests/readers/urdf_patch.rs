@@ -5,7 +5,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::said::assert_says;
 use nalgebra::Vector6;
+use robotcal::Code;
 use robotcal::geom::Pose;
 use robotcal::urdf::{JointKind, RobotDescription, patch_origins, read};
 
@@ -80,13 +82,14 @@ fn what_cannot_be_patched_is_refused() {
     let text = shell(&format!("{OPEN}<origin xyz='1 2 3' rpy='.5 0 -0'/>{TAIL}"));
     let same = Pose::from_xyz_rpy([1.0, 2.0, 3.0], [0.5, 0.0, 0.0]);
     assert_eq!(patch(&text, same), text);
-    let refuse = |name: &str, pose: Pose| {
-        patch_origins(&text, &BTreeMap::from([(name.to_string(), pose)])).unwrap_err().to_string()
-    };
-    assert!(refuse("k", same).contains("\"k\""));
-    assert!(refuse("j", Pose::from_xyz_rpy([f64::NAN, 0.0, 0.0], [0.0; 3])).contains("not finite"));
+    let refuse =
+        |name: &str, pose: Pose| patch_origins(&text, &BTreeMap::from([(name.to_string(), pose)])).unwrap_err();
+    assert_says(&refuse("k", same), Code::UrdfTwice, &["\"k\""]);
+    let missing = refuse("j", Pose::from_xyz_rpy([f64::NAN, 0.0, 0.0], [0.0; 3]));
+    assert_eq!(missing.code, Code::OriginNotWritten, "{missing}");
     let sheared = Pose::new(same.rotation * 1.001, same.translation);
-    assert!(refuse("j", sheared).contains("orthonormal"));
+    let refused = refuse("j", sheared);
+    assert_eq!(refused.code, Code::OriginNotWritten, "{refused}");
 }
 
 #[test]
@@ -168,8 +171,7 @@ fn real_descriptions_are_read_and_patched_byte_for_byte() {
 #[test]
 fn real_xacros_are_refused() {
     for file in shared_files("xacro") {
-        let error = read(&file).unwrap_err().to_string();
-        assert!(error.contains("expand it first: xacro kr6"), "{error}");
+        assert_says(&read(&file).unwrap_err(), Code::UrdfXacro, &["xacro kr6"]);
     }
 }
 

@@ -1,0 +1,90 @@
+//! Why a target of a program stays as it is.
+
+use serde::Serialize;
+
+/// The closed set of reasons; their names stand in corrections.csv and, with counts, in findings.json.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reason {
+    /// It is computed, not written in numbers.
+    Computed,
+    /// It is relative to the position before.
+    Relative,
+    /// It stands in none of the files.
+    Undeclared,
+    /// It is no target of the language.
+    NotATarget,
+    /// Numbers are left out, and the target before it is not known.
+    Incomplete,
+    /// Its tool is not known.
+    ToolUnknown,
+    /// Its work frame is not known.
+    FrameUnknown,
+    /// It is used with different tools or frames.
+    FramesDiffer,
+    /// No motion of the files goes there, and so much of it is not known.
+    Unvisited,
+    /// Nothing tells its posture, or two are possible.
+    PostureUnknown,
+    /// The model in the controller does not reach it.
+    OutOfReach,
+    /// The program itself is beyond a limit.
+    ProgramBeyondLimit,
+    /// The correction would lead beyond a limit.
+    BeyondLimit,
+    /// It lies next to a singular posture.
+    Singular,
+    /// The decimals of the text, or the point that it starts from, leave too much.
+    Coarse,
+}
+
+impl Reason {
+    /// Stable name for programs, `snake_case`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Computed => "computed",
+            Self::Relative => "relative",
+            Self::Undeclared => "undeclared",
+            Self::NotATarget => "not_a_target",
+            Self::Incomplete => "incomplete",
+            Self::ToolUnknown => "tool_unknown",
+            Self::FrameUnknown => "frame_unknown",
+            Self::FramesDiffer => "frames_differ",
+            Self::Unvisited => "unvisited",
+            Self::PostureUnknown => "posture_unknown",
+            Self::OutOfReach => "out_of_reach",
+            Self::ProgramBeyondLimit => "program_beyond_limit",
+            Self::BeyondLimit => "beyond_limit",
+            Self::Singular => "singular",
+            Self::Coarse => "coarse",
+        }
+    }
+}
+
+/// A reason with its sentence.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Why {
+    /// The reason.
+    pub reason: Reason,
+    /// Declared name that it is about, where it is about one.
+    pub about: Option<String>,
+    /// The sentence.
+    pub words: String,
+}
+
+impl Why {
+    /// A reason with its sentence.
+    pub(super) fn new(reason: Reason, words: impl Into<String>) -> Self {
+        Self { reason, about: None, words: words.into() }
+    }
+
+    /// A reason that is about a declared name.
+    pub(super) fn of(name: &str, reason: Reason, words: impl Into<String>) -> Self {
+        Self { about: Some(name.to_owned()), ..Self::new(reason, words) }
+    }
+
+    /// The target is not written in numbers.
+    pub(super) fn computed() -> Self {
+        Self::new(Reason::Computed, "its target is computed, not written in numbers")
+    }
+}
