@@ -137,13 +137,10 @@ impl From<Mount> for CameraMount {
 
 impl From<Errors> for RobotErrors {
     fn from(errors: Errors) -> Self {
-        let rigid = Self::default();
         match errors {
-            Errors::None => Self { translation_m: 0.0, rotation_rad: 0.0, offset_rad: 0.0, ..rigid },
-            Errors::Rigid => rigid,
-            Errors::Full => {
-                Self { gear: 3e-4, harmonic_rad: 0.1e-3, gravity_rad: 0.2e-3, backlash_rad: 0.1e-3, ..rigid }
-            }
+            Errors::None => Self::NONE,
+            Errors::Rigid => Self::default(),
+            Errors::Full => Self::full(),
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::error::Result;
 use crate::geom::Pose;
 use crate::model::robot::Robot;
 use crate::problem::{ImageRejection, MeasuredStop, State};
-use crate::series::{DEFAULT_PLACEMENT, Marker, Plate, PlateKind, Series};
+use crate::series::{DEFAULT_PLACEMENT, Marker, Plate, Series};
 use crate::urdf::Chain;
 
 /// Fewest images for a first solve.
@@ -32,7 +32,7 @@ pub(super) fn second_pass(
     images: &mut [SeenImage],
     picture: impl Fn(&Path) -> Result<Picture> + Sync,
 ) {
-    if series.plate.kind != PlateKind::CodedCircles {
+    if !series.plate.kind.print().is_predicted {
         return;
     }
     let Some((state, poses)) = first_solve(series, images) else { return };

@@ -12,16 +12,19 @@ use crate::urdf::Chain;
 /// Acceleration of gravity, m/s^2 (standard).
 const GRAVITY: f64 = 9.80665;
 
-const HEADER: &str = "\
-# What the corrected URDF cannot say, for `robotcal compensate`. With q the reading and the URDF's own origins, the joint stands at
-#   q + gear_scale q + sum_k [a_k cos kq + b_k sin kq] + sum_i gravity_i m_i(q) + compliance_rad_per_nm T(q) + backlash_rad tanh(step / 0.002)
-# harmonics = [a1, b1, a2, b2, ..] and gravity in rad (m for a prismatic joint), step from the previous stop in rad (m).
-# m_1, m_2: moment about the axis of a unit weight (along -z of the root) at unit levers u and axis x u of the joint's own link;
-# m_3, m_4: the same about this axis for levers u' and axis' x u' of the link after the next moving joint.
-# T: moment of gravity about the axis, N m (force along it, N, for a prismatic joint), of the masses in the URDF and the [payload]
-# (centre in the frame of the tip link).
-# u is the unit vector along x (along y where |axis_x| >= 0.9) without its part along the axis.
-";
+/// What the numbers of the file mean, by the table of joint terms.
+fn header() -> String {
+    let mut terms = Term::all(1);
+    terms.retain(|t| !t.summand().is_empty());
+    terms.dedup_by_key(|t| t.summand());
+    let sum = terms.iter().fold("q".to_owned(), |sum, t| format!("{sum} + {}", t.summand()));
+    let symbols = terms.iter().flat_map(|t| t.symbols()).map(|line| format!("# {line}\n"));
+    format!(
+        "# What the corrected URDF cannot say, for `robotcal compensate`. With q the reading and the URDF's own origins, the joint stands at\n\
+         #   {sum}\n{}",
+        symbols.collect::<String>()
+    )
+}
 
 /// The values of one joint by their keys: one number, or a list.
 #[derive(Default)]
@@ -38,7 +41,7 @@ impl Joint {
             Exported::Number(key) => drop(self.numbers.insert(key, value)),
             Exported::PerMoment(key) if largest_nm > 0.0 => drop(self.numbers.insert(key, value / largest_nm)),
             Exported::PerMoment(_) => {}
-            Exported::InList(key, place) => {
+            Exported::InList { key, place, .. } => {
                 let list = self.lists.entry(key).or_default();
                 list.resize(list.len().max(place + 1), 0.0);
                 list[place] = value;
@@ -75,7 +78,22 @@ pub(super) fn compensation_toml(solution: &Solution, context: &Context) -> Strin
     let payload = robot.chain.payload().map_or_else(String::new, |p| {
         format!("\n[payload]\nmass_kg = {}\ncentre_m = {}\n", number(p.mass_kg), list(p.centre_m.iter().copied()))
     });
-    sections.fold(format!("{HEADER}# {}\n{payload}", offsets_in_words(context)), |out, (name, text)| {
+    sections.fold(format!("{}# {}\n{payload}", header(), offsets_in_words(context)), |out, (name, text)| {
         out + &format!("\n[joint.{}]\n{text}", key(name))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_head_names_every_key_of_the_file() {
+        let head = header();
+        for key in Term::all(1).into_iter().filter_map(|t| t.exported().key()) {
+            assert!(head.contains(key), "{key} is not in\n{head}");
+        }
+        assert!(head.lines().all(|l| l.starts_with('#')), "{head}");
+        println!("{head}");
+    }
 }

@@ -44,29 +44,42 @@ impl Values {
     }
 }
 
+/// What the head of the file says of a key.
+fn meaning(key: &str) -> &'static str {
+    let of_key = Term::all(1).into_iter().find(|t| t.exported().key() == Some(key));
+    of_key.and_then(|t| t.symbols().first().copied()).unwrap_or_default()
+}
+
 /// The terms of a joint with what stands for them, in the order of the table; else what is wrong.
 fn terms_of(joint: &BTreeMap<String, Values>) -> std::result::Result<Vec<(Term, f64)>, String> {
-    let longest = joint.values().map(|v| v.list().len()).max().unwrap_or_default();
-    let all = Term::all(u8::try_from(longest / 2).unwrap_or(u8::MAX));
+    let longest = joint.values().map(|v| v.list().len()).max().unwrap_or_default().max(1);
+    let all = Term::all(u8::try_from(longest).unwrap_or(u8::MAX));
     for (key, values) in joint {
         let places: Vec<Exported> = all.iter().map(|t| t.exported()).filter(|e| e.key() == Some(key)).collect();
         match (places.first(), values) {
-            (Some(Exported::InList(..)), Values::Number(_)) => return Err(format!("{key} is no list")),
-            (Some(Exported::Number(_) | Exported::PerMoment(_)), Values::List(_)) => {
-                return Err(format!("{key} is no number"));
+            (Some(Exported::InList { together, .. }), Values::List(list)) => {
+                let (given, most) = (list.len(), places.len());
+                if given % together > 0 {
+                    return Err(format!(
+                        "{key} has {given} numbers, and they come {together} together: {}",
+                        meaning(key)
+                    ));
+                }
+                if given > most {
+                    return Err(format!("{key} has {given} numbers, and there are {most} at most: {}", meaning(key)));
+                }
             }
+            (Some(Exported::InList { .. }), Values::Number(_)) => return Err(format!("{key} is no list")),
+            (Some(_), Values::List(_)) => return Err(format!("{key} is no number")),
             (None, Values::List(list)) if list.is_empty() => {}
             (None, _) => return Err(format!("{key} is no term of a joint")),
-            (_, values) if values.list().len() > places.len() => {
-                return Err("harmonics come in pairs (cosine, sine) and gravity in up to four terms".into());
-            }
-            _ => {}
+            (Some(_), Values::Number(_)) => {}
         }
     }
     let value = |term: Term| match term.exported() {
         Exported::Nowhere => None,
         Exported::Number(key) | Exported::PerMoment(key) => joint.get(key)?.number(),
-        Exported::InList(key, place) => joint.get(key)?.list().get(place).copied(),
+        Exported::InList { key, place, .. } => joint.get(key)?.list().get(place).copied(),
     };
     Ok(all.into_iter().filter_map(|term| Some((term, value(term)?))).collect())
 }
@@ -130,4 +143,33 @@ pub fn parse_compensation(path: &Path, text: &str, chain: Chain) -> Result<Robot
         }
     }
     Ok(Robot { terms, ..Robot::nominal(chain) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(joint: &str) -> std::result::Result<Vec<(Term, f64)>, String> {
+        terms_of(&toml::from_str(joint).unwrap())
+    }
+
+    #[test]
+    fn harmonics_come_in_pairs() {
+        let terms = read("harmonics = [1.0, 2.0, 3.0, 4.0]").unwrap();
+        assert_eq!(terms.len(), 4);
+        assert_eq!(terms[3], (Term::Sine(2), 4.0));
+        for odd in ["harmonics = [1e-4]", "harmonics = [1e-4, 0, 2e-4]"] {
+            let what = read(odd).unwrap_err();
+            assert!(what.contains("2 together") && what.contains("[a1, b1"), "{what}");
+        }
+    }
+
+    #[test]
+    fn what_a_key_cannot_hold_is_named_with_it() {
+        assert!(read("gravity = [0, 0, 0, 0, 0]").unwrap_err().contains("4 at most"));
+        assert_eq!(read("gravity = [0.0, 0.0, 0.5]").unwrap()[2], (Term::Gravity(2), 0.5));
+        assert!(read("gear_scale = [1.0]").unwrap_err().contains("gear_scale is no number"));
+        assert!(read("harmonics = 1.0").unwrap_err().contains("harmonics is no list"));
+        assert!(read("offset = 1.0").unwrap_err().contains("offset is no term"));
+    }
 }

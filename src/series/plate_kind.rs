@@ -1,24 +1,9 @@
 //! The table of what can be printed on a plate.
 //!
-//! To add a kind: a variant with its row in [`PlateKind::print`], a detector (a file in `detect`), and its row there; the compiler names both rows.
+//! To add a kind: a row below, and a detector (a file in `detect`) with its row there, which the compiler asks for. This room reads
+//! files and knows no pixels, hence the second row.
 
 use serde::{Deserialize, Serialize};
-
-/// What is printed on the plate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PlateKind {
-    /// Discs and annuli of several sizes whose pattern codes the position.
-    CodedCircles,
-    /// A plain grid of dots.
-    CircleGrid,
-    /// A chessboard; the markers are its inner corners.
-    Chessboard,
-    /// A chessboard with ArUco markers in its light squares.
-    Charuco,
-    /// Points observed by someone else's detector.
-    Points,
-}
 
 /// What dark figures a plate has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,47 +42,49 @@ pub struct Print {
     pub has_radius: bool,
     /// Whether plate.toml may state tags (`[aruco]`).
     pub has_tags: bool,
+    /// Whether markers that were missed, or are cut by the border, are looked for where a first solve predicts them.
+    pub is_predicted: bool,
 }
 
-impl PlateKind {
-    /// The row of a kind.
-    pub fn print(self) -> Print {
-        match self {
-            Self::CodedCircles => Print {
-                ink: Ink::Circles,
-                places: Places::LatticeById,
-                needs_marker_file: true,
-                has_radius: false,
-                has_tags: false,
-            },
-            Self::CircleGrid => Print {
-                ink: Ink::Circles,
-                places: Places::Lattice,
-                needs_marker_file: false,
-                has_radius: true,
-                has_tags: false,
-            },
-            Self::Chessboard => Print {
-                ink: Ink::Squares,
-                places: Places::LatticeById,
-                needs_marker_file: false,
-                has_radius: false,
-                has_tags: false,
-            },
-            Self::Charuco => Print {
-                ink: Ink::SquaresAndTags,
-                places: Places::LatticeById,
-                needs_marker_file: false,
-                has_radius: false,
-                has_tags: true,
-            },
-            Self::Points => Print {
-                ink: Ink::Unknown,
-                places: Places::Anywhere,
-                needs_marker_file: true,
-                has_radius: false,
-                has_tags: false,
-            },
+/// What most kinds have in common.
+const PLAIN: Print = Print {
+    ink: Ink::Unknown,
+    places: Places::LatticeById,
+    needs_marker_file: false,
+    has_radius: false,
+    has_tags: false,
+    is_predicted: false,
+};
+
+macro_rules! plate_kinds {
+    ($($(#[$doc:meta])+ $kind:ident { $($field:ident: $value:expr),* $(,)? })+) => {
+        /// What is printed on the plate.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+        #[serde(rename_all = "kebab-case")]
+        pub enum PlateKind {
+            $($(#[$doc])+ $kind,)+
         }
-    }
+
+        impl PlateKind {
+            /// The row of a kind.
+            pub fn print(self) -> Print {
+                match self {
+                    $(Self::$kind => Print { $($field: $value,)* ..PLAIN },)+
+                }
+            }
+        }
+    };
+}
+
+plate_kinds! {
+    /// Discs and annuli of several sizes whose pattern codes the position.
+    CodedCircles { ink: Ink::Circles, needs_marker_file: true, is_predicted: true }
+    /// A plain grid of dots.
+    CircleGrid { ink: Ink::Circles, places: Places::Lattice, has_radius: true }
+    /// A chessboard; the markers are its inner corners.
+    Chessboard { ink: Ink::Squares }
+    /// A chessboard with ArUco markers in its light squares.
+    Charuco { ink: Ink::SquaresAndTags, has_tags: true }
+    /// Points observed by someone else's detector.
+    Points { places: Places::Anywhere, needs_marker_file: true }
 }

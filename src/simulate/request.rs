@@ -1,7 +1,9 @@
 //! What world is wanted: robot, plate, camera and their errors.
 
 use crate::model::camera::{Camera, Lens};
+use crate::model::joint_terms::{RobotModel, TermKind, TermSizes};
 use crate::plan::viewpoint::ViewRange;
+use crate::problem::OriginPrior;
 use crate::series::{AngleUnit, CameraMount, Plate};
 use crate::urdf::Chain;
 
@@ -12,30 +14,36 @@ pub struct RobotErrors {
     pub translation_m: f64,
     /// Tilt of each moving joint's origin, rad per axis.
     pub rotation_rad: f64,
-    /// Offset of each joint, rad (a tenth of it in m for a prismatic joint).
-    pub offset_rad: f64,
-    /// Gear scale, as a share.
-    pub gear: f64,
-    /// First and second harmonic, rad.
-    pub harmonic_rad: f64,
-    /// Sag for a unit moment, rad.
-    pub gravity_rad: f64,
-    /// Backlash, rad.
-    pub backlash_rad: f64,
+    /// Joint terms.
+    pub terms: TermSizes,
 }
 
 impl Default for RobotErrors {
     /// Typical geometric errors: 0.3 mm, 1 mrad, offsets of 3 mrad; nothing beyond rigid geometry.
     fn default() -> Self {
-        Self {
-            translation_m: 0.3e-3,
-            rotation_rad: 1e-3,
-            offset_rad: 3e-3,
-            gear: 0.0,
-            harmonic_rad: 0.0,
-            gravity_rad: 0.0,
-            backlash_rad: 0.0,
-        }
+        Self { translation_m: 0.3e-3, rotation_rad: 1e-3, terms: TermSizes::typical(RobotModel::Rigid) }
+    }
+}
+
+impl RobotErrors {
+    /// A robot that is as its description says.
+    pub const NONE: Self = Self { translation_m: 0.0, rotation_rad: 0.0, terms: TermSizes::NONE };
+
+    /// Typical errors, beyond rigid geometry, too.
+    pub fn full() -> Self {
+        Self { terms: TermSizes::typical(RobotModel::Full), ..Self::default() }
+    }
+
+    /// Errors that the priors of the fit describe.
+    pub fn of_priors() -> Self {
+        let OriginPrior { translation_m, rotation_rad } = OriginPrior::default();
+        Self { translation_m, rotation_rad, terms: TermSizes::of_priors(RobotModel::Full) }
+    }
+
+    /// With another size of one kind of joint term, in the unit of its parameter.
+    #[must_use]
+    pub fn with(self, kind: TermKind, size: f64) -> Self {
+        Self { terms: self.terms.with(kind, size), ..self }
     }
 }
 

@@ -20,7 +20,7 @@ use super::truth::{HeldOutRecord, PoseRecord, StopRecord, TermRecord, Truth};
 use crate::detect::Picture;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
-use crate::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
+use crate::model::joint_terms::{JointTerm, Term, USUAL_HARMONICS};
 use crate::model::plate_modes::{PRIOR_SIGMA, basis};
 use crate::model::robot::{Posture, Robot};
 use crate::series::{AngleUnit, CameraSection, ImageObservations, Manifest, Plate, Stop, Stops};
@@ -88,23 +88,13 @@ fn true_robot(request: &WorldRequest, rng: &mut impl Rng) -> Robot {
         }
     }
     for (reading, &kind) in request.chain.reading_kinds.iter().enumerate() {
-        let mut add = |term: Term, sigma: f64| {
+        for term in Term::all(USUAL_HARMONICS).into_iter().filter(|t| t.is_drawn(&request.chain)) {
+            let sigma = term.of_joint(e.terms.of(term), kind);
             let value = normal(sigma, rng);
             if sigma > 0.0 {
                 robot.terms.push(JointTerm { reading, term, value });
             }
-        };
-        add(Term::Offset, scaled(e.offset_rad, kind));
-        add(Term::Gear, e.gear);
-        for k in [1, 2] {
-            add(Term::Cosine(k), scaled(e.harmonic_rad, kind));
-            add(Term::Sine(k), scaled(e.harmonic_rad, kind));
         }
-        match request.chain.masses.is_empty() {
-            true => (0..GRAVITY_TERMS).for_each(|k| add(Term::Gravity(k), scaled(e.gravity_rad, kind))),
-            false => add(Term::Sag, scaled(e.gravity_rad, kind)),
-        }
-        add(Term::Backlash, scaled(e.backlash_rad, kind));
     }
     robot
 }

@@ -116,19 +116,6 @@ pub fn monte_carlo(request: &MonteCarloRequest, progress: impl Fn(usize, usize))
     Ok(cells)
 }
 
-/// Errors that the estimator's own priors describe.
-fn errors_of_the_priors() -> RobotErrors {
-    RobotErrors {
-        translation_m: 1e-3,
-        rotation_rad: 2e-3,
-        offset_rad: 10e-3,
-        gear: 5e-4,
-        harmonic_rad: 0.1e-3,
-        gravity_rad: 0.3e-3,
-        backlash_rad: 0.3e-3,
-    }
-}
-
 /// One world.
 #[derive(Debug, Clone, Copy)]
 struct World {
@@ -153,7 +140,7 @@ fn world(request: &MonteCarloRequest, joint_noise_rad: f64, seed: u64) -> Result
     plate.markers.iter_mut().for_each(|m| m.outer_radius_m = RADIUS_M);
     let wanted = WorldRequest {
         images: request.images,
-        errors: errors_of_the_priors(),
+        errors: RobotErrors::of_priors(),
         joint_noise_rad,
         pixel_sigma_px: PIXEL_SIGMA_PX,
         marker_sigma_m: MARKER_SIGMA_M,

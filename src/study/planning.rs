@@ -13,6 +13,7 @@ use crate::error::{Code, Result};
 use crate::geom::Pose;
 use crate::identify::{JointNoise, Options, RobotModel, identify};
 use crate::model::camera::{Camera, Lens};
+use crate::model::joint_terms::TermSizes;
 use crate::plan::candidates::{CandidateOptions, candidates, workspace};
 use crate::plan::information::flange_weight;
 use crate::plan::scene::{Scene, SceneOptions};
@@ -145,7 +146,7 @@ pub fn plan_study(request: &PlanStudyRequest, progress: impl Fn(u64) + Sync) -> 
 
 fn world_request(request: &PlanStudyRequest, plate: Plate, seed: u64) -> WorldRequest {
     let mut world = WorldRequest::typical(request.chain.clone(), plate);
-    world.errors = RobotErrors { translation_m: 1e-3, rotation_rad: 2e-3, offset_rad: 10e-3, ..RobotErrors::default() };
+    world.errors = RobotErrors { terms: TermSizes::of_priors(RobotModel::Rigid), ..RobotErrors::of_priors() };
     world.mount = request.mount;
     world.joint_noise_rad = JOINT_SIGMA_RAD;
     world.pixel_sigma_px = PIXEL_SIGMA_PX;

@@ -63,14 +63,7 @@ fn terms_that_are_absent_cost_nothing() {
 
 #[test]
 fn terms_that_are_present_are_found() {
-    let errors = RobotErrors {
-        gear: 3e-4,
-        harmonic_rad: 0.1e-3,
-        gravity_rad: 0.2e-3,
-        backlash_rad: 0.1e-3,
-        ..RobotErrors::default()
-    };
-    let all = ratios(errors, 1..=seeds());
+    let all = ratios(RobotErrors::full(), 1..=seeds());
     println!("present: {all:?}");
     assert!(all.iter().all(|r| *r < 1.0 / 3.0), "{all:?}");
 }

@@ -8,7 +8,7 @@ use robotcal::Code;
 use robotcal::assess::flange_error_m;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, identify};
-use robotcal::model::joint_terms::{JointTerm, Term};
+use robotcal::model::joint_terms::{JointTerm, Term, TermKind};
 use robotcal::model::robot::Robot;
 use robotcal::output::read_compensation;
 use robotcal::series::{Plate, PlateKind};
@@ -65,7 +65,7 @@ fn a_stretched_arm_has_the_moment_of_its_masses() {
 fn sag_of_the_loaded_arm_is_found() {
     let loaded = chain("ur10e").carrying(Some(&PAYLOAD)).unwrap();
     let plate = Plate::lattice(PlateKind::Points, 8, 6, 0.03, 0.03e-3);
-    let errors = RobotErrors { gravity_rad: 0.5e-3, ..RobotErrors::default() };
+    let errors = RobotErrors::default().with(TermKind::Sag, 0.5e-3);
     let request =
         WorldRequest { images: 40, held_out: 60, errors, seed: 3, ..WorldRequest::typical(loaded.clone(), plate) };
     let world = series(&request).unwrap();

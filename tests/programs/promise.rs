@@ -15,16 +15,6 @@ use robotcal::simulate::{RobotErrors, WorldRequest, series};
 use robotcal::study::measured;
 use robotcal::urdf::{Chain, read};
 
-const ERRORS_OF_THE_PRIORS: RobotErrors = RobotErrors {
-    translation_m: 1e-3,
-    rotation_rad: 2e-3,
-    offset_rad: 10e-3,
-    gear: 5e-4,
-    harmonic_rad: 0.1e-3,
-    gravity_rad: 0.3e-3,
-    backlash_rad: 0.3e-3,
-};
-
 /// Targets of every program.
 const TARGETS: usize = 20;
 
@@ -75,7 +65,8 @@ fn world(errors: RobotErrors, seed: u64) -> [f64; 3] {
 fn study_of_the_expected_error_of_programs() {
     let worlds: u64 = std::env::var("WORLDS").map_or(40, |n| n.parse().unwrap());
     let smaller = RobotErrors::default();
-    for (what, errors) in [("errors of the priors", ERRORS_OF_THE_PRIORS), ("0.3 mm, 1 mrad, offsets 3 mrad", smaller)]
+    for (what, errors) in
+        [("errors of the priors", RobotErrors::of_priors()), ("0.3 mm, 1 mrad, offsets 3 mrad", smaller)]
     {
         let all: Vec<[f64; 3]> = (1..=worlds).into_par_iter().map(|seed| world(errors, seed)).collect();
         let n = all.len() as f64;
@@ -89,6 +80,10 @@ fn study_of_the_expected_error_of_programs() {
             1e3 * mean(1).sqrt(),
             mean(2)
         );
-        assert!(errors != ERRORS_OF_THE_PRIORS || (mean(2) - 1.0).abs() <= half_width, "{} +-{half_width}", mean(2));
+        assert!(
+            errors != RobotErrors::of_priors() || (mean(2) - 1.0).abs() <= half_width,
+            "{} +-{half_width}",
+            mean(2)
+        );
     }
 }

@@ -17,7 +17,7 @@ use robotcal::geom::Pose;
 use robotcal::identify::{
     Config, JointNoise, Options, Parameters, RobotModel, Selection, Solution, StatedPrior, identify, verify_series,
 };
-use robotcal::model::joint_terms::{JointTerm, Term};
+use robotcal::model::joint_terms::{JointTerm, Term, TermKind};
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::output::difference::compare_solutions;
 use robotcal::output::restore::{found_model, measured_series, robot_description};
@@ -304,7 +304,7 @@ fn what_is_promised_of_the_flange_is_what_is_found() {
     let full = Options { model: RobotModel::Full, ..Options::default() };
     let (mut found, mut stated) = ([0.0; 3], [0.0; 3]);
     for seed in 11..=14 {
-        let errors = RobotErrors { gear: 5e-4, gravity_rad: 0.2e-3, ..RobotErrors::default() };
+        let errors = RobotErrors::default().with(TermKind::Gear, 5e-4).with(TermKind::Gravity, 0.2e-3);
         let made = series(&WorldRequest { errors, ..request(seed, SIGMA) }).unwrap();
         let solution = identify(chain(), &[measured(&made, &chain())], &full).unwrap();
         let truth = true_robot(&made.truth);

@@ -15,17 +15,6 @@ use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera
 use robotcal::study::{flange_error, measured};
 use robotcal::urdf::{Chain, read};
 
-/// Errors of the size of the priors of the fit, beyond rigid geometry, too.
-const ERRORS: RobotErrors = RobotErrors {
-    translation_m: 1e-3,
-    rotation_rad: 2e-3,
-    offset_rad: 10e-3,
-    gear: 5e-4,
-    harmonic_rad: 0.1e-3,
-    gravity_rad: 0.3e-3,
-    backlash_rad: 0.3e-3,
-};
-
 fn chain() -> Chain {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
     read(&path).unwrap().chain(Some("base_link"), Some("link_6")).unwrap()
@@ -37,7 +26,7 @@ fn world(lens: Lens, images: usize, joint_noise_rad: f64, seed: u64) -> Simulate
     let request = WorldRequest {
         camera: lens_camera(lens, 1280, 1024, field_deg.to_radians()),
         images,
-        errors: ERRORS,
+        errors: RobotErrors::of_priors(),
         joint_noise_rad,
         plate_modes: true,
         held_out: 1,

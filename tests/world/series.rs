@@ -28,11 +28,6 @@ fn small_plate() -> Plate {
     design(&PlateRequest { shape: Some((10, 8)), ..PlateRequest::default() }).unwrap().plate
 }
 
-fn full_errors() -> RobotErrors {
-    let rigid = RobotErrors::default();
-    RobotErrors { gear: 3e-4, harmonic_rad: 1e-4, gravity_rad: 2e-4, backlash_rad: 1e-4, ..rigid }
-}
-
 fn small(name: &str, seed: u64) -> WorldRequest {
     let typical = WorldRequest::typical(chain(name), small_plate());
     WorldRequest { images: 16, held_out: 12, seed, ..typical }
@@ -68,7 +63,8 @@ fn assert_consistent(made: &SimulatedSeries, chain: &Chain) {
 fn truth_and_readings_explain_every_camera_pose() {
     for (k, name) in ROBOTS.into_iter().enumerate() {
         for mount in [CameraMount::Hand, CameraMount::Fixed] {
-            let request = WorldRequest { mount, placements: 2, errors: full_errors(), ..small(name, 3 + k as u64) };
+            let request =
+                WorldRequest { mount, placements: 2, errors: RobotErrors::full(), ..small(name, 3 + k as u64) };
             let made = series(&request).unwrap();
             assert_eq!(made.truth.plate_poses.len(), 2, "{name} {mount:?}");
             assert_consistent(&made, &request.chain);

@@ -14,7 +14,10 @@ impl JointError for Backlash {
 
     const NAME: &'static str = "backlash";
     const PRIOR_SIGMA: f64 = 0.3e-3;
+    const TYPICAL: f64 = 0.1e-3;
     const MODEL: RobotModel = RobotModel::Full;
+    const SUMMAND: &'static str = "backlash_rad tanh(step / 0.002)";
+    const SYMBOLS: &'static [&'static str] = &["step from the previous stop in rad (m)."];
 
     fn indices(_harmonics: u8) -> Vec<Self::Index> {
         vec![()]

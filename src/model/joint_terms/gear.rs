@@ -12,7 +12,9 @@ impl JointError for Gear {
     const NAME: &'static str = "gear";
     const IS_RATIO: bool = true;
     const PRIOR_SIGMA: f64 = 5e-4;
+    const TYPICAL: f64 = 3e-4;
     const MODEL: RobotModel = RobotModel::Gear;
+    const SUMMAND: &'static str = "gear_scale q";
 
     fn indices(_harmonics: u8) -> Vec<Self::Index> {
         vec![()]

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::joint_error::{Exported, GRAVITY_TERMS, JointError, TermContext};
 use super::robot_model::RobotModel;
+use crate::urdf::Chain;
 
 /// Levers 0 and 1 are fixed in the joint's own link, 2 and 3 in the link after the next moving joint.
 pub(super) struct Gravity;
@@ -13,10 +14,23 @@ impl JointError for Gravity {
 
     const NAME: &'static str = "gravity";
     const PRIOR_SIGMA: f64 = 0.3e-3;
+    const TYPICAL: f64 = 0.2e-3;
     const MODEL: RobotModel = RobotModel::Full;
+    const SUMMAND: &'static str = "sum_i gravity_i m_i(q)";
+    const SYMBOLS: &'static [&'static str] = &[
+        "gravity in rad (m for a prismatic joint).",
+        "m_1, m_2: moment about the axis of a unit weight (along -z of the root) at unit levers u and axis x u of the joint's own link;",
+        "m_3, m_4: the same about this axis for levers u' and axis' x u' of the link after the next moving joint.",
+        "u is the unit vector along x (along y where |axis_x| >= 0.9) without its part along the axis.",
+    ];
 
     fn indices(_harmonics: u8) -> Vec<Self::Index> {
         (0..GRAVITY_TERMS).collect()
+    }
+
+    fn is_drawn(chain: &Chain) -> bool {
+        // Where masses are known their sag stands for it.
+        chain.masses.is_empty()
     }
 
     fn exists(lever: u8) -> bool {
@@ -28,7 +42,7 @@ impl JointError for Gravity {
     }
 
     fn exported(lever: Self::Index) -> Exported {
-        Exported::InList("gravity", usize::from(lever))
+        Exported::InList { key: "gravity", place: usize::from(lever), together: 1 }
     }
 }
 

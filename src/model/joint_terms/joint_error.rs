@@ -26,8 +26,15 @@ pub enum Exported {
     Nowhere,
     /// Under a key of its own.
     Number(&'static str),
-    /// In the list under a key, at this place.
-    InList(&'static str, usize),
+    /// In the list under a key, whose numbers come so many together.
+    InList {
+        /// The key.
+        key: &'static str,
+        /// Place in the list, from 0.
+        place: usize,
+        /// How many numbers belong together.
+        together: usize,
+    },
     /// Under a key of its own, over the largest moment of gravity about the axis, N m (N for a prismatic joint).
     PerMoment(&'static str),
 }
@@ -77,6 +84,15 @@ pub(super) trait JointError {
     /// Default prior sigma: rad, or the number; a tenth of it in m for a prismatic joint.
     const PRIOR_SIGMA: f64;
 
+    /// Standard deviation in robots in use, as `simulate` draws it: unit as of the prior sigma.
+    const TYPICAL: f64;
+
+    /// What the term adds to the reading, by the symbols of compensation.toml; empty where that has nothing of it.
+    const SUMMAND: &'static str;
+
+    /// What these symbols mean, for the head of compensation.toml, line by line.
+    const SYMBOLS: &'static [&'static str] = &[];
+
     /// The smallest robot model that has terms of this kind; larger ones have them, too.
     const MODEL: RobotModel;
 
@@ -86,6 +102,11 @@ pub(super) trait JointError {
     /// False where a chain does not say what the basis function needs.
     fn applies(_chain: &Chain) -> bool {
         true
+    }
+
+    /// False where another term stands for the same in simulated robots of a chain.
+    fn is_drawn(chain: &Chain) -> bool {
+        Self::applies(chain)
     }
 
     /// False for an index that no term has.
@@ -105,7 +126,7 @@ impl Exported {
     pub fn key(self) -> Option<&'static str> {
         match self {
             Self::Nowhere => None,
-            Self::Number(key) | Self::InList(key, _) | Self::PerMoment(key) => Some(key),
+            Self::Number(key) | Self::InList { key, .. } | Self::PerMoment(key) => Some(key),
         }
     }
 }

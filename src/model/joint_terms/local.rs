@@ -31,7 +31,9 @@ impl JointError for Local {
 
     const NAME: &'static str = "local";
     const PRIOR_SIGMA: f64 = 3e-3;
+    const TYPICAL: f64 = 0.0;
     const MODEL: RobotModel = RobotModel::Rigid;
+    const SUMMAND: &'static str = "";
 
     fn indices(_harmonics: u8) -> Vec<Self::Index> {
         // They come from the stops, not from the chain.

@@ -20,4 +20,4 @@ pub use harmonics::USUAL_HARMONICS;
 pub use joint_error::{Exported, GRAVITY_TERMS, TermContext};
 pub use local::LOCAL_RANGE;
 pub use robot_model::RobotModel;
-pub use table::{JointTerm, Term};
+pub use table::{JointTerm, Term, TermKind, TermSizes};

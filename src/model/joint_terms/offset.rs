@@ -11,7 +11,9 @@ impl JointError for Offset {
 
     const NAME: &'static str = "offset";
     const PRIOR_SIGMA: f64 = 10e-3;
+    const TYPICAL: f64 = 3e-3;
     const MODEL: RobotModel = RobotModel::Rigid;
+    const SUMMAND: &'static str = "";
 
     fn indices(_harmonics: u8) -> Vec<Self::Index> {
         vec![()]

@@ -24,6 +24,18 @@ macro_rules! joint_terms {
             $($($(#[$doc])* $term$(($type))?,)+)+
         }
 
+        /// The kinds of joint errors, without their indices.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[allow(missing_docs)] // Each is named after its variant of [`Term`].
+        pub enum TermKind {
+            $($($term,)+)+
+        }
+
+        impl TermKind {
+            /// All of them, in the order of the rows.
+            pub const ALL: &'static [Self] = &[$($(Self::$term,)+)+];
+        }
+
         impl Term {
             /// Name in parameter blocks.
             pub fn name(self) -> String {
@@ -66,6 +78,31 @@ macro_rules! joint_terms {
             /// Where compensation.toml has the parameter.
             pub fn exported(self) -> Exported {
                 match self { $($(Self::$term$(($index))? => $term::exported({ $($index)? }),)+)+ }
+            }
+
+            /// Standard deviation in robots in use, for a revolute joint, in the unit of the parameter.
+            fn revolute_typical(self) -> f64 {
+                match self { $($(Self::$term { .. } => $term::TYPICAL,)+)+ }
+            }
+
+            /// What the term adds to the reading, by the symbols of compensation.toml; empty where that has nothing of it.
+            pub fn summand(self) -> &'static str {
+                match self { $($(Self::$term { .. } => $term::SUMMAND,)+)+ }
+            }
+
+            /// What these symbols mean, line by line.
+            pub fn symbols(self) -> &'static [&'static str] {
+                match self { $($(Self::$term { .. } => $term::SYMBOLS,)+)+ }
+            }
+
+            /// Which kind of term it is.
+            pub fn kind(self) -> TermKind {
+                match self { $($(Self::$term { .. } => TermKind::$term,)+)+ }
+            }
+
+            /// True where simulated robots of a chain have it.
+            pub fn is_drawn(self, chain: &Chain) -> bool {
+                match self { $($(Self::$term { .. } => $term::is_drawn(chain),)+)+ }
             }
 
             /// False where a chain does not say what the basis function needs.
@@ -146,8 +183,49 @@ impl Term {
 
     /// Default prior sigma, in the unit of the parameter.
     pub fn prior_sigma(self, kind: JointKind) -> f64 {
+        self.of_joint(self.revolute_sigma(), kind)
+    }
+
+    /// A size of a revolute joint for a joint of `kind`: for a prismatic one a tenth of it in m, where it is no pure number.
+    pub fn of_joint(self, revolute: f64, kind: JointKind) -> f64 {
         let per_metre = if kind == JointKind::Prismatic && !self.is_ratio() { 0.1 } else { 1.0 };
-        self.revolute_sigma() * per_metre
+        revolute * per_metre
+    }
+}
+
+/// A standard deviation for every kind of term, of a revolute joint, in the unit of the parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TermSizes([f64; TermKind::ALL.len()]);
+
+impl TermSizes {
+    /// No errors.
+    pub const NONE: Self = Self([0.0; TermKind::ALL.len()]);
+
+    fn of_model(model: RobotModel, size: impl Fn(Term) -> f64) -> Self {
+        let terms = Term::all(1).into_iter().filter(|t| t.model() <= model);
+        terms.fold(Self::NONE, |sizes, t| sizes.with(t.kind(), size(t)))
+    }
+
+    /// As robots in use have them, of the terms of a model.
+    pub fn typical(model: RobotModel) -> Self {
+        Self::of_model(model, Term::revolute_typical)
+    }
+
+    /// The prior sigmas, of the terms of a model.
+    pub fn of_priors(model: RobotModel) -> Self {
+        Self::of_model(model, Term::revolute_sigma)
+    }
+
+    /// With another size of one kind.
+    #[must_use]
+    pub fn with(mut self, kind: TermKind, size: f64) -> Self {
+        self.0[kind as usize] = size;
+        self
+    }
+
+    /// The size of a term.
+    pub fn of(&self, term: Term) -> f64 {
+        self.0[term.kind() as usize]
     }
 }
 
