@@ -1,50 +1,52 @@
-//! Covariance that trusts the scatter between images more than the model of the noise.
+//! Covariance that trusts the scatter between stops more than the model of the noise.
 //!
 //! Markers count as known here: every one is told by many images, and a shift of all of them is none of the plate. With the
-//! information `S = R R'` of an image about its pose and intrinsics, joint noise eliminated, and their derivatives `T` by the
-//! columns, the covariance is `K = (sum T' S T + P)^-1` with the prior information `P`. With the scores `b` of the images (the latents
+//! information `S = R R'` of the images of a stop about their poses and intrinsics, joint noise eliminated, and their derivatives `T` by the
+//! columns, the covariance is `K = (sum T' S T + P)^-1` with the prior information `P`. With the scores `b` of the stops (the latents
 //! included, whose own score is zero at the optimum) the sandwich is `K (sum T' b b' T + P) K`; priors count as the observations that
 //! they stand for.
 //!
-//! The fit has taken a part of the scatter of every image: `b` has the covariance `S - S Q S`, `Q = T K T'`, in the place of `S`.
+//! The fit has taken a part of the scatter of every stop: `b` has the covariance `S - S Q S`, `Q = T K T'`, in the place of `S`.
 //! `R (1 - R' Q R)^-1/2 R^-1 b` has `S` again (R. Bell, D. McCaffrey 2002). Where noise is as the model says the sandwich has the
 //! expectation `K` (K.-Y. Liang, S. Zeger 1986).
+
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::limits::Limits;
 use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
-use crate::problem::{E, Layout, by_columns, condensed};
-use crate::solve::{LinearImage, LinearProblem};
+use crate::problem::{E, Layout, SeenAtStop, by_columns, condensed};
+use crate::solve::{LinearProblem, LinearStop};
 
 /// Covariances of the dense columns with known markers.
 #[derive(Debug, Clone)]
 pub struct Clustered {
     /// By the model of the noise, `K`.
     pub model: DMatrix<f64>,
-    /// By the scatter between images.
+    /// By the scatter between stops.
     pub sandwich: DMatrix<f64>,
 }
 
 impl Clustered {
-    /// Sigma of every column by the scatter between images over that by the model; 1 where there is nothing to compare.
+    /// Sigma of every column by the scatter between stops over that by the model; 1 where there is nothing to compare.
     pub fn ratios(&self) -> impl Iterator<Item = f64> {
         let variances = (0..self.model.nrows()).map(|k| (self.model[(k, k)], self.sandwich[(k, k)]));
         variances.map(|(model, sandwich)| if model > 0.0 { (sandwich / model).max(0.0).sqrt() } else { 1.0 })
     }
 }
 
-/// Both covariances; `None` for too few images.
+/// Both covariances; `None` for too few stops.
 pub fn clustered_covariance(linear: LinearProblem, limits: &Limits) -> Option<Clustered> {
-    if linear.images().len() < limits.scatter_images {
+    if linear.stops().len() < limits.scatter_images {
         return None;
     }
     let n = linear.adjustment.problem.layout.len();
-    let TellingImages { images, free, prior, information } = TellingImages::of(linear);
+    let TellingStops { stops, free, prior, information } = TellingStops::of(linear);
     let model = SymmetricFactor::new(&information).ok()?.inverse();
     let by_prior = &model * DMatrix::from_diagonal(&prior);
     let mut sandwich = product(&by_prior, &by_prior.transpose());
-    for told in &images {
+    for told in &stops {
         let d = &told.by_free;
         let influence =
             &model * d.tr_mul(&told.restored(&product(d, &product(&model, &d.transpose())), limits.scatter_taken)?);
@@ -60,11 +62,11 @@ pub fn clustered_covariance(linear: LinearProblem, limits: &Limits) -> Option<Cl
     Some(Clustered { model: whole(&model), sandwich: whole(&sandwich) })
 }
 
-/// What all images tell of the free columns together, markers known and joint noise eliminated.
+/// What all stops tell of the free columns together, markers known and joint noise eliminated.
 #[derive(Debug, Clone)]
-pub struct TellingImages {
-    /// The images.
-    pub images: Vec<Told>,
+pub struct TellingStops {
+    /// The stops.
+    pub stops: Vec<Told>,
     /// Free columns.
     free: Vec<usize>,
     /// Inverse prior sigma of each.
@@ -73,7 +75,7 @@ pub struct TellingImages {
     pub information: DMatrix<f64>,
 }
 
-impl TellingImages {
+impl TellingStops {
     /// At a linearised fit.
     pub fn of(linear: LinearProblem) -> Self {
         let layout = &linear.adjustment.problem.layout;
@@ -81,37 +83,42 @@ impl TellingImages {
         let free: Vec<usize> = (0..columns.len()).filter(|&c| columns[c].free).collect();
         let prior = DVector::from_iterator(free.len(), free.iter().map(|&c| columns[c].prior_sigma.recip()));
         let mut information = DMatrix::from_diagonal(&prior.component_mul(&prior));
-        let told = |(k, image)| Told::of(k, image, layout, &free);
-        let images: Vec<Told> = linear.images().enumerate().filter_map(told).collect();
-        for d in images.iter().map(|told| &told.by_free) {
+        let stops: Vec<Told> = linear.stops().filter_map(|stop| Told::of(&stop, layout, &free)).collect();
+        for d in stops.iter().map(|told| &told.by_free) {
             information += product(&d.transpose(), d);
         }
-        Self { images, free, prior, information }
+        Self { stops, free, prior, information }
     }
 }
 
-/// What one image tells.
+/// What the images of one stop tell.
 #[derive(Debug, Clone)]
 pub struct Told {
-    /// Its place among the images in use.
-    pub place: usize,
+    /// Places of its images among those in use.
+    pub places: Range<usize>,
     /// `R^-1 b`.
     pub score: DVector<f64>,
-    /// `R' T`.
+    /// `R' T`, rows x all columns.
     pub by_root: DMatrix<f64>,
     /// Its free columns.
     pub by_free: DMatrix<f64>,
 }
 
 impl Told {
-    /// Of the k-th image in use.
-    fn of(k: usize, own: LinearImage, layout: &Layout, free: &[usize]) -> Option<Self> {
-        let LinearImage { image, terms, chain, .. } = own;
-        let (root, inverse) = roots(&condensed(terms, &chain.d_latent, &own.prior_of_latents())?)?;
-        let score = DVector::from_iterator(6 + E, terms.bp.iter().chain(terms.be.iter().take(E)).copied());
-        let by_root = product(&root.transpose(), &by_columns(layout, image, chain));
+    fn of(stop: &LinearStop, layout: &Layout, free: &[usize]) -> Option<Self> {
+        let (n, size) = (stop.unknowns(), 6 + E);
+        let images: Vec<SeenAtStop> = stop.images().map(|own| (own.terms, own.by_latents(n))).collect();
+        let (root, inverse) = roots(&condensed(&images, &stop.prior())?)?;
+        let mut score = DVector::zeros(size * images.len());
+        let mut t = DMatrix::zeros(size * images.len(), layout.len());
+        for (k, own) in stop.images().enumerate() {
+            score.rows_mut(size * k, 6).copy_from(&own.terms.bp);
+            score.rows_mut(size * k + 6, E).copy_from(&own.terms.be.rows(0, E));
+            t.rows_mut(size * k, size).copy_from(&by_columns(layout, own.image, own.chain));
+        }
+        let by_root = product(&root.transpose(), &t);
         let by_free = by_root.select_columns(free);
-        Some(Self { place: k, score: inverse * score, by_root, by_free })
+        Some(Self { places: stop.places(), score: inverse * score, by_root, by_free })
     }
 
     /// The score with what the fit took of its scatter, of which `taken` is `R' Q R`; at most `most` of any direction counts.

@@ -17,7 +17,7 @@ mod truth;
 mod worth;
 
 pub use advice::Advice;
-pub use clustered::{Clustered, TellingImages, Told, clustered_covariance};
+pub use clustered::{Clustered, TellingStops, Told, clustered_covariance};
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
 pub use hold_out::{
     Accuracy, Errors, ImageError, Refit, cluster_of_images, folds, hold_out, hold_out_images, predict_image, refitted,

@@ -1,7 +1,7 @@
 //! A plate or a camera that stands elsewhere from some image on, by too little for any image to be left out.
 //!
-//! Rao's score test on the linearised fit: what an image tells of its pose, joint noise eliminated, has the root score `s` and the
-//! derivatives `T` by all columns ([`TellingImages`]). Let the pose of one body differ by a constant `x` in the images of a part `P` of a
+//! Rao's score test on the linearised fit: what the images of a stop tell of their poses, joint noise eliminated, has the root score `s` and
+//! the derivatives `T` by all columns ([`TellingStops`]). Let the pose of one body differ by a constant `x` at the stops of a part `P` of a
 //! series, `A` its columns of `T`. With `K` the covariance of all columns, `g = sum_P A' s` and
 //! `J = sum_P A' A - V' K V`, `V = sum_P T' A`, the cost falls by `D = g' J^-1 g`, chi-squared with six degrees of freedom where nothing
 //! moved, and `x = J^-1 g` with the covariance `J^-1`.
@@ -11,16 +11,17 @@
 //! is Gaussian. Real robots err alike in postures that are alike, so that chance alone does not acquit them: the step must also
 //! explain most of `R`.
 
-use std::collections::BTreeSet;
+use std::ops::Range;
+use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::displaced::{Carried, Displaced, Displacement};
 use super::kind::{Setting, Weight};
-use crate::assess::{Accuracy, Limits, TellingImages};
+use crate::assess::{Accuracy, Limits, TellingStops, Told};
 use crate::fit::Fit;
 use crate::linalg::{SymmetricFactor, product};
-use crate::problem::{Adjustment, Problem};
+use crate::problem::{Adjustment, Image, Layout, Problem};
 use crate::series::CameraMount;
 use crate::solve::LinearProblem;
 
@@ -61,27 +62,53 @@ struct Shift {
 
 /// The fit, linearised.
 struct Linear {
-    /// Index of the image, its root score, derivatives by the free columns, derivatives by placement and mounting.
-    images: Vec<Row>,
+    stops: Vec<Row>,
     information: DMatrix<f64>,
 }
 
+/// One stop.
 struct Row {
-    image: usize,
+    images: Vec<Shown>,
+    /// Root score.
     score: DVector<f64>,
     by_free: DMatrix<f64>,
-    by_placement: DMatrix<f64>,
-    by_mounting: DMatrix<f64>,
+    /// Derivatives by all columns.
+    by_columns: Rc<DMatrix<f64>>,
+}
+
+/// An image of a stop.
+#[derive(Debug, Clone, Copy)]
+struct Shown {
+    image: usize,
     /// Up in the axes of what the robot carries.
     up: [f64; 3],
 }
 
-impl Row {
-    fn by(&self, body: Body) -> &DMatrix<f64> {
-        match body {
-            Body::Placement(_) => &self.by_placement,
-            Body::Mounting(_) => &self.by_mounting,
+impl Body {
+    fn is_of(self, image: &Image) -> bool {
+        match self {
+            Self::Placement(p) => image.placement == p,
+            Self::Mounting(m) => image.mounting == m,
         }
+    }
+
+    fn columns(self, layout: &Layout) -> Range<usize> {
+        match self {
+            Self::Placement(p) => layout.placements[p].clone(),
+            Self::Mounting(m) => layout.mountings[m].clone(),
+        }
+    }
+}
+
+impl Row {
+    /// Derivatives by a body.
+    fn by(&self, columns: &Range<usize>) -> DMatrix<f64> {
+        self.by_columns.columns_range(columns.clone()).into_owned()
+    }
+
+    /// Its images of a body.
+    fn of(&self, problem: &Problem, body: Body) -> impl Iterator<Item = Shown> {
+        self.images.iter().copied().filter(move |shown| body.is_of(&problem.images[shown.image]))
     }
 }
 
@@ -94,14 +121,17 @@ fn find_shifts(fit: &Fit, limits: &Limits) -> Vec<Shift> {
     let Adjustment { problem, state } = &fit.adjustment;
     let mut linear = Linear::of(fit.linear());
     let columns = linear.information.ncols();
-    let errors = |&stop: &usize| problem.joint_error_squares(stop, &state.joint_errors[stop]);
-    let ties = |row: &Row| problem.tie_squares(&problem.images[row.image], &state.ties[row.image]);
-    let stops: BTreeSet<usize> = linear.images.iter().map(|row| problem.images[row.image].stop).collect();
-    let all = stops.iter().flat_map(errors).chain(linear.images.iter().flat_map(ties)).sum::<f64>();
+    let errors = |row: &Row| {
+        let stop = problem.images[row.images[0].image].stop;
+        let ties =
+            row.images.iter().flat_map(|own| problem.tie_squares(&problem.images[own.image], &state.ties[own.image]));
+        problem.joint_error_squares(stop, &state.joint_errors[stop]).chain(ties).sum::<f64>()
+    };
+    let all: f64 = linear.stops.iter().map(errors).sum();
     let (mut left, mut found, mut good) = (all, Vec::<Shift>::new(), Vec::new());
     while found.len() < limits.displacements {
         let tried = candidates(problem, &linear, limits.displaced_images);
-        let Some(mut best) = linear.best(&tried, limits.displaced_images) else { break };
+        let Some(mut best) = linear.best(problem, &tried, limits.displaced_images) else { break };
         best.share = best.fall / left;
         let chance = tried.len() as f64 * chance(best.share, left);
         tracing::debug!(?best.body, ?best.order, first = %problem.images[best.behind[0]].name, behind = best.behind.len(),
@@ -109,7 +139,7 @@ fn find_shifts(fit: &Fit, limits: &Limits) -> Vec<Shift> {
         if chance > limits.displaced_false_alarms {
             break;
         }
-        let Some((next, step)) = linear.with(&best) else { break };
+        let Some((next, step)) = linear.with(problem, &best) else { break };
         let enough = best.share > limits.displaced_share;
         (linear, left) = (next, (left - best.fall).max(0.0));
         best.twist.fill(0.0);
@@ -136,21 +166,21 @@ fn chance(share: f64, squares: f64) -> f64 {
     (1.0 - x).powf(b) * (1.0 + b * x + 0.5 * b * (b + 1.0) * x * x)
 }
 
-/// Every way to divide the images of a series: the rows of [`Linear`] behind the step, from the last on.
+/// Every way to divide the stops of a series: the rows of [`Linear`] behind the step, from the last on.
 struct Candidate {
     series: usize,
     body: Body,
     order: Order,
     /// Rows in order; the step lies before `from`.
-    rows: std::rc::Rc<Vec<usize>>,
+    rows: Rc<Vec<usize>>,
     from: usize,
 }
 
-/// With at least so many images on either side.
+/// With at least so many stops on either side.
 fn candidates(problem: &Problem, linear: &Linear, fewest: usize) -> Vec<Candidate> {
     let mut all = Vec::new();
     let mut divide = |series, body, order, rows: Vec<usize>| {
-        let rows = std::rc::Rc::new(rows);
+        let rows = Rc::new(rows);
         for from in (fewest..=rows.len().saturating_sub(fewest)).rev() {
             all.push(Candidate { series, body, order, rows: rows.clone(), from });
         }
@@ -158,25 +188,20 @@ fn candidates(problem: &Problem, linear: &Linear, fewest: usize) -> Vec<Candidat
     let count = problem.images.iter().map(|i| i.series + 1).max().unwrap_or(0);
     for series in 0..count {
         let of_series = |body: Body| -> Vec<usize> {
-            let belongs = |r: &usize| {
-                let image = &problem.images[linear.images[*r].image];
-                let same = match body {
-                    Body::Placement(p) => image.placement == p,
-                    Body::Mounting(m) => image.mounting == m,
-                };
-                image.series == series && same
-            };
-            (0..linear.images.len()).filter(belongs).collect()
+            let in_series = |shown: Shown| problem.images[shown.image].series == series;
+            let belongs = |r: &usize| linear.stops[*r].of(problem, body).any(in_series);
+            (0..linear.stops.len()).filter(belongs).collect()
         };
         let placements = (0..problem.placements.len()).map(Body::Placement);
         for body in placements.chain((0..problem.mountings.len()).map(Body::Mounting)) {
             let rows = of_series(body);
-            let Some(&first) = rows.first() else { continue };
-            let in_hand = problem.images[linear.images[first].image].mount == CameraMount::Hand;
+            let Some(first) = rows.first().and_then(|&r| linear.stops[r].of(problem, body).next()) else { continue };
+            let in_hand = problem.images[first.image].mount == CameraMount::Hand;
             if in_hand == matches!(body, Body::Mounting(_)) {
                 for axis in 0..3 {
                     let mut rows = rows.clone();
-                    rows.sort_by(|a, b| linear.images[*a].up[axis].total_cmp(&linear.images[*b].up[axis]));
+                    let up = |r: &usize| linear.stops[*r].of(problem, body).next().map_or(0.0, |shown| shown.up[axis]);
+                    rows.sort_by(|a, b| up(a).total_cmp(&up(b)));
                     divide(series, body, Order::Up(axis), rows);
                 }
             }
@@ -189,45 +214,40 @@ fn candidates(problem: &Problem, linear: &Linear, fewest: usize) -> Vec<Candidat
 impl Linear {
     fn of(linear: LinearProblem) -> Self {
         let Adjustment { problem, state } = linear.adjustment;
-        let (layout, lin) = (&problem.layout, linear.lin);
-        let TellingImages { images: all, information, .. } = TellingImages::of(linear);
-        let mut images = Vec::new();
-        for told in all {
-            let i = lin.images[told.place];
-            let image = &problem.images[i];
-            if state.joint_errors[image.stop].is_empty() || state.ties[i].is_free() {
-                continue;
+        let lin = linear.lin;
+        let TellingStops { stops: all, information, .. } = TellingStops::of(linear);
+        let shown = |k: usize| {
+            let image = &problem.images[lin.images[k]];
+            if state.joint_errors[image.stop].is_empty() || state.ties[lin.images[k]].is_free() {
+                return None;
             }
-            let camera_from_plate = lin.chains[told.place].pose;
+            let camera_from_plate = lin.chains[k].pose;
             let carried = match image.mount {
                 CameraMount::Hand => state.placements[image.placement] * camera_from_plate.inverse(),
                 CameraMount::Fixed => state.mountings[image.mounting] * camera_from_plate,
             };
-            let columns = |range: &std::ops::Range<usize>| told.by_root.columns(range.start, 6).into_owned();
-            images.push(Row {
-                image: i,
-                by_placement: columns(&layout.placements[image.placement]),
-                by_mounting: columns(&layout.mountings[image.mounting]),
-                score: told.score,
-                by_free: told.by_free,
-                up: [0, 1, 2].map(|axis| carried.rotation[(2, axis)]),
-            });
-        }
-        Self { images, information }
+            Some(Shown { image: lin.images[k], up: [0, 1, 2].map(|axis| carried.rotation[(2, axis)]) })
+        };
+        let row = |told: Told| {
+            let images: Vec<Shown> = told.places.filter_map(shown).collect();
+            let by_columns = Rc::new(told.by_root);
+            (!images.is_empty()).then_some(Row { images, score: told.score, by_free: told.by_free, by_columns })
+        };
+        Self { stops: all.into_iter().filter_map(row).collect(), information }
     }
 
     /// The step with the largest fall of the cost; where several are alike, the first, which is one in time.
-    fn best(&self, tried: &[Candidate], fewest: usize) -> Option<Shift> {
+    fn best(&self, problem: &Problem, tried: &[Candidate], fewest: usize) -> Option<Shift> {
         let covariance = SymmetricFactor::new(&self.information).ok()?.inverse();
         let mut best: Option<(f64, usize, Vector6<f64>, Matrix6<f64>)> = None;
         let mut sums = Sums::new(self.information.ncols());
         for (c, candidate) in tried.iter().enumerate() {
-            let rows = &candidate.rows;
+            let (rows, columns) = (&candidate.rows, candidate.body.columns(&problem.layout));
             if candidate.from + fewest == rows.len() {
                 sums = Sums::new(self.information.ncols());
-                rows[candidate.from + 1..].iter().for_each(|&r| sums.add(&self.images[r], candidate.body));
+                rows[candidate.from + 1..].iter().for_each(|&r| sums.add(&self.stops[r], &columns));
             }
-            sums.add(&self.images[rows[candidate.from]], candidate.body);
+            sums.add(&self.stops[rows[candidate.from]], &columns);
             let Some((fall, twist, own)) = sums.step(&covariance) else { continue };
             if best.as_ref().is_none_or(|b| fall > b.0) {
                 best = Some((fall, c, twist, own));
@@ -235,20 +255,22 @@ impl Linear {
         }
         let (fall, c, twist, covariance) = best?;
         let Candidate { series, body, order, rows, from } = &tried[c];
-        let behind = rows[*from..].iter().map(|&r| self.images[r].image).collect();
+        let images = rows[*from..].iter().flat_map(|&r| self.stops[r].of(problem, *body));
+        let behind = images.map(|shown| shown.image).collect();
         Some(Shift { series: *series, body: *body, order: *order, behind, twist, covariance, fall, share: 0.0 })
     }
 
     /// With the pose of the body behind the step as six more columns, at the optimum; and the way there.
-    fn with(&self, shift: &Shift) -> Option<(Self, DVector<f64>)> {
+    fn with(&self, problem: &Problem, shift: &Shift) -> Option<(Self, DVector<f64>)> {
         let n = self.information.ncols();
         let mut information = self.information.clone().resize(n + 6, n + 6, 0.0);
         let mut gradient = DVector::zeros(n + 6);
-        let mut images = Vec::with_capacity(self.images.len());
-        for row in &self.images {
+        let mut derivatives = Vec::with_capacity(self.stops.len());
+        let columns = shift.body.columns(&problem.layout);
+        for row in &self.stops {
             let mut by_free = row.by_free.clone().resize_horizontally(n + 6, 0.0);
-            if shift.behind.contains(&row.image) {
-                by_free.columns_mut(n, 6).copy_from(row.by(shift.body));
+            if row.images.iter().any(|shown| shift.behind.contains(&shown.image)) {
+                by_free.columns_mut(n, 6).copy_from(&row.by(&columns));
                 let own = by_free.columns(n, 6).into_owned();
                 let coupling = by_free.tr_mul(&own);
                 let mut right = information.columns_mut(n, 6);
@@ -258,24 +280,22 @@ impl Linear {
                 let mut rest = gradient.rows_mut(n, 6);
                 rest += own.tr_mul(&row.score);
             }
-            images.push(by_free);
+            derivatives.push(by_free);
         }
         let step = SymmetricFactor::new(&information).ok()?.solve(&gradient);
-        let images = (self.images.iter().zip(images))
+        let stops = (self.stops.iter().zip(derivatives))
             .map(|(row, by_free)| Row {
-                image: row.image,
+                images: row.images.clone(),
                 score: &row.score - &by_free * &step,
                 by_free,
-                by_placement: row.by_placement.clone(),
-                by_mounting: row.by_mounting.clone(),
-                up: row.up,
+                by_columns: row.by_columns.clone(),
             })
             .collect();
-        Some((Self { images, information }, step))
+        Some((Self { stops, information }, step))
     }
 }
 
-/// Sums over the images behind a step.
+/// Sums over the stops behind a step.
 struct Sums {
     score: Vector6<f64>,
     own: Matrix6<f64>,
@@ -287,8 +307,8 @@ impl Sums {
         Self { score: Vector6::zeros(), own: Matrix6::zeros(), coupling: DMatrix::zeros(columns, 6) }
     }
 
-    fn add(&mut self, row: &Row, body: Body) {
-        let by = row.by(body);
+    fn add(&mut self, row: &Row, columns: &Range<usize>) {
+        let by = &row.by(columns);
         let (score, own) = (by.tr_mul(&row.score), by.tr_mul(by));
         self.score += score.fixed_rows::<6>(0);
         self.own += own.fixed_view::<6, 6>(0, 0);

@@ -35,7 +35,7 @@ fn condensed(
     let from = TakenFrom { posture: Some(posture), joint_errors: &exact, tie: &Tie::Rigid };
     let chain = state.chained(&problem.layout, image, from)?;
     let terms = linearise(image, state, &chain.pose, &Weighting::of(problem, image))?;
-    let h = problem::condensed(&terms, &chain.d_latent, &prior)?;
+    let h = problem::condensed(&[(&terms, chain.d_latent.clone())], &prior)?;
     let t = by_columns(&problem.layout, image, &chain);
     Some((h, t))
 }

@@ -22,7 +22,7 @@ mod step;
 mod stop;
 
 pub use adjustment::Adjustment;
-pub use condensed::{by_columns, condensed};
+pub use condensed::{SeenAtStop, by_columns, condensed};
 pub use equations::{E, Equations, MarkerCoupling, MarkerTerms, Sight};
 pub use family::Family;
 pub use given::Problem;

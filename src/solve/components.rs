@@ -173,12 +173,7 @@ impl Fit {
         let mut latent = 0.0;
         for stop in self.linear().stops() {
             let c = cov.latents(&stop);
-            let ties = stop.images().flat_map(|image| {
-                let [joints, tie] = image.latents();
-                tie.zip(image.prior_of_latents().into_iter().skip(joints.len()))
-            });
-            let joints = (0..stop.joint_errors.len()).map(|r| (r, problem.joint_error_information(stop.stop, r)));
-            latent += joints.chain(ties).map(|(k, prior)| 1.0 - c[(k, k)] * prior).sum::<f64>();
+            latent += stop.prior().into_iter().enumerate().map(|(k, prior)| 1.0 - c[(k, k)] * prior).sum::<f64>();
         }
         dense + latent + markers
     }

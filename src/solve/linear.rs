@@ -213,12 +213,12 @@ impl LinearImage<'_> {
         of_stop.select_rows(&own).select_columns(&own)
     }
 
-    /// Information of what moves its pose beside the columns, by its prior alone; zero for a free pose.
-    pub fn prior_of_latents(&self) -> Vec<f64> {
-        let stop = &self.problem.stops[self.image.stop];
-        let [joints, tie] = self.latents();
-        let known = |_| if self.tie.is_free() { 0.0 } else { self.problem.tilt_information(self.image) };
-        joints.map(|r| self.problem.joint_error_information(stop, r)).chain(tie.map(known)).collect()
+    /// `L` by everything that is latent at its stop, 6 x latent.
+    pub fn by_latents(&self, latent: usize) -> DMatrix<f64> {
+        let mut by = DMatrix::zeros(6, latent);
+        let columns = self.latents().into_iter().flatten().zip(self.chain.d_latent.column_iter());
+        columns.for_each(|(latent, column)| by.column_mut(latent).copy_from(&column));
+        by
     }
 
     /// Dense columns that it depends on and that are free.
@@ -247,24 +247,26 @@ impl<'a> LinearStop<'a> {
         self.joint_errors.len() + self.images().map(|image| image.tie.len()).sum::<usize>()
     }
 
+    /// Information of what is latent at it, by its prior alone; zero for a free pose.
+    pub fn prior(&self) -> Vec<f64> {
+        let problem = &self.linear.adjustment.problem;
+        let errors = (0..self.joint_errors.len()).map(|r| problem.joint_error_information(self.stop, r));
+        let ties = self.images().flat_map(|own| {
+            let information = if own.tie.is_free() { 0.0 } else { problem.tilt_information(own.image) };
+            std::iter::repeat_n(information, own.tie.len())
+        });
+        errors.chain(ties).collect()
+    }
+
     /// Information of what is latent at it, prior included.
     pub(super) fn information(&self) -> DMatrix<f64> {
-        let problem = &self.linear.adjustment.problem;
-        let n = self.unknowns();
-        let mut information = DMatrix::zeros(n, n);
-        for r in 0..self.joint_errors.len() {
-            information[(r, r)] = problem.joint_error_information(self.stop, r);
-        }
+        let mut information = DMatrix::from_diagonal(&DVector::from_vec(self.prior()));
         for image in self.images() {
             let l = &image.chain.d_latent;
             let own = l.tr_mul(&(image.terms.pp * l));
             let places: Vec<usize> = image.latents().into_iter().flatten().collect();
             for (b, &column) in places.iter().enumerate() {
                 places.iter().enumerate().for_each(|(a, &row)| information[(row, column)] += own[(a, b)]);
-            }
-            if let Tie::Tilted(_) = image.tie {
-                let [_, tilt] = image.latents();
-                tilt.for_each(|k| information[(k, k)] += problem.tilt_information(image.image));
             }
         }
         information
