@@ -252,7 +252,8 @@ impl<'a> LinearStop<'a> {
         let problem = &self.linear.adjustment.problem;
         let errors = (0..self.joint_errors.len()).map(|r| problem.joint_error_information(self.stop, r));
         let ties = self.images().flat_map(|own| {
-            let information = if own.tie.is_free() { 0.0 } else { problem.tilt_information(own.image) };
+            let is_tilted = matches!(own.tie, Tie::Tilted(_));
+            let information = if is_tilted { problem.tilt_information(own.image) } else { 0.0 };
             std::iter::repeat_n(information, own.tie.len())
         });
         errors.chain(ties).collect()

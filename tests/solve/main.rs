@@ -11,6 +11,7 @@ mod knowledge;
 mod lens_study;
 mod marker_tolerance;
 mod moved_in_time;
+mod normal_equations;
 mod plate_size;
 mod real_tracker;
 mod second_pass;

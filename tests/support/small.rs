@@ -8,8 +8,8 @@ use robotcal::geom::{Pose, exp_so3};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use robotcal::model::robot::{Posture, Robot};
+use robotcal::problem::{Adjustment, State, Stop, TakenFrom, Tie, predict};
 use robotcal::problem::{Image, Layout, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape, Problem};
-use robotcal::problem::{State, Stop, TakenFrom, Tie, predict};
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 use robotcal::urdf::{CarriedMass, Chain, Drive, Joint, JointKind};
 
@@ -343,4 +343,18 @@ pub fn series(problem: &Problem) -> MeasuredSeries {
         stops: problem.images.iter().map(stop).collect(),
         plate,
     }
+}
+
+/// With free camera poses of some images, where their readings put them.
+pub fn free_poses(problem: &Problem, state: &State, which: impl Fn(usize) -> bool) -> State {
+    let given = Adjustment { problem: problem.clone(), state: state.clone() };
+    let mut free = state.clone();
+    for i in (0..problem.images.len()).filter(|&i| which(i)) {
+        free.ties[i] = Tie::Free(given.camera_from_plate(i).unwrap());
+        // A stop whose images are all free has nothing latent of its own.
+        if problem.images.iter().enumerate().all(|(k, image)| image.stop != problem.images[i].stop || which(k)) {
+            free.joint_errors[problem.images[i].stop] = Vec::new();
+        }
+    }
+    free
 }
