@@ -14,7 +14,7 @@ use robotcal::identify::adjust_free_poses;
 use robotcal::init::{PosePair, solve_hand_eye};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::{Posture, Robot};
-use robotcal::problem::{Adjustment, Image, Layout, Measured, Noise, PlateShape, Problem, State, Stop, Tie};
+use robotcal::problem::{Adjustment, Image, Layout, Mark, Measured, Noise, PlateShape, Problem, State, Stop, Tie};
 use robotcal::series::{CameraMount, Edge, Marker, Plate, PlateKind};
 use robotcal::solve::{Outcome, Settings, solve};
 
@@ -69,7 +69,7 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
         observations.resize(observations.len().max(row[0] as usize + 1), Vec::new());
         let uv = Vector2::new(row[2], row[3]);
         let marker = row[1] as usize;
-        let own = Measured { marker, edge: Edge::Outer, radius_m: 0.0, uv, information, rejected: None };
+        let own = Measured { marker, edge: Edge::Outer, mark: Mark::Corner, uv, information, rejected: None };
         observations[row[0] as usize].push(own);
     }
     let chain = robotcal::urdf::read(&folder.join("nominal.urdf"))?.chain(None, Some("tool0"))?;

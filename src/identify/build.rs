@@ -9,7 +9,7 @@ use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
-    Adjustment, Family, Image, ImageRejection, Layout, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape,
+    Adjustment, Family, Image, ImageRejection, Layout, Mark, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape,
     Problem, State, Stop, Tie, hold_scale_bars,
 };
 use crate::series::{Edge, Observation, Plate};
@@ -159,7 +159,7 @@ fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<Measured>> {
         observations.push(Measured {
             marker,
             edge: o.edge,
-            radius_m: if s.centroid { radius_m } else { 0.0 },
+            mark: if s.centroid { Mark::of_radius(radius_m) } else { Mark::Corner },
             uv: Vector2::from(o.uv),
             information: information.ok_or_else(|| {
                 Error::new(

@@ -9,7 +9,7 @@ use crate::fit::{FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
-use crate::problem::{Adjustment, ImageRejection, Problem, State, Tie, Weighting, hold_scale_bars, size_by_bar};
+use crate::problem::{Adjustment, ImageRejection, Mark, Problem, State, Tie, Weighting, hold_scale_bars, size_by_bar};
 use crate::solve::{
     ComponentOptions, Fit, LinearImage, LinearStop, Linearised, PlateScale, Settings, Similarity, Status,
     estimate_components, frames, in_frame, reject_observations, solve,
@@ -103,7 +103,7 @@ fn quick_problem(problem: &Problem, camera: usize) -> Problem {
         if image.camera != camera && image.rejected.is_none() {
             image.rejected = Some(ImageRejection::Excluded);
         }
-        image.observations.iter_mut().for_each(|o| o.radius_m = 0.0);
+        image.observations.iter_mut().for_each(|o| o.mark = Mark::Corner);
     }
     quick.plates.iter_mut().flat_map(|p| &mut p.markers).for_each(|m| m.sigma_m = 0.0);
     let shapes = quick.layout.shapes.clone();

@@ -14,7 +14,7 @@ use crate::model::camera::{Camera, Lens};
 use crate::model::joint_terms::JointTerm;
 use crate::model::robot::{Posture, Robot};
 use crate::plan::setting::{PlannedStop, Setting};
-use crate::problem::{Image, Measured};
+use crate::problem::{Image, Mark, Measured};
 use crate::series::{Marker, Plate};
 use crate::urdf::Chain;
 
@@ -190,7 +190,7 @@ fn observations(columns: &ObservationColumns, pixel_factor: f64, ids: &[u32]) ->
         Some(Measured {
             marker: ids.iter().position(|id| *id == columns.marker[k])?,
             edge: columns.edge[k],
-            radius_m: columns.radius_m[k],
+            mark: Mark::of_radius(columns.radius_m[k]),
             uv,
             information,
             rejected: None,

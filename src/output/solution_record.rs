@@ -333,7 +333,7 @@ fn observations(solution: &Solution, image: usize, pose: Option<&Pose>) -> Obser
     for (o, residual) in i.observations.iter().zip(residuals(solution, image, pose)) {
         columns.marker.push(markers[o.marker].id);
         columns.edge.push(o.edge);
-        columns.radius_m.push(o.radius_m);
+        columns.radius_m.push(o.mark.radius_m());
         columns.uv.push(o.uv.into());
         columns.duv.push(residual.map(Into::into));
         columns.reason.push(o.rejected);

@@ -6,7 +6,9 @@ use super::visibility::seen_markers;
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
-use crate::problem::{Adjustment, Image, Layout, Measured, Noise, PlateShape, Problem, State, Stop, Tie, predict};
+use crate::problem::{
+    Adjustment, Image, Layout, Mark, Measured, Noise, PlateShape, Problem, State, Stop, Tie, predict,
+};
 use crate::series::{CameraMount, Edge, Plate};
 
 /// Huber bound of planned images; predictions have no residuals, so that it never acts.
@@ -128,7 +130,14 @@ impl Setting {
                 if edge == Edge::Inner && radius_m <= 0.0 {
                     continue;
                 }
-                let mut o = Measured { marker, edge, radius_m, uv: Vector2::zeros(), information, rejected: None };
+                let mut o = Measured {
+                    marker,
+                    edge,
+                    mark: Mark::of_radius(radius_m),
+                    uv: Vector2::zeros(),
+                    information,
+                    rejected: None,
+                };
                 o.uv = predict(&image, state, &pose, &o)?.uv;
                 image.observations.push(o);
             }

@@ -1,26 +1,8 @@
 //! An image of the problem: what it shows, and what it belongs to.
 
-use nalgebra::{Matrix2, Vector2};
-
-use super::rejection::{ImageRejection, ObservationRejection};
-use crate::series::{CameraMount, Edge};
-
-/// One observation, ready for the adjustment.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
-    /// Index of the marker on its plate.
-    pub marker: usize,
-    /// Contour.
-    pub edge: Edge,
-    /// Radius of the observed circle, m; 0 for a point or where the observation is of the imaged centre.
-    pub radius_m: f64,
-    /// Measured image, px.
-    pub uv: Vector2<f64>,
-    /// Inverse of the covariance that the detector states, px^-2.
-    pub information: Matrix2<f64>,
-    /// Why it is left out; `None` while it is used.
-    pub rejected: Option<ObservationRejection>,
-}
+use super::measured::Measured;
+use super::rejection::ImageRejection;
+use crate::series::CameraMount;
 
 /// One image with what belongs to it.
 #[derive(Debug, Clone, PartialEq)]

@@ -11,7 +11,7 @@ use super::state::{seen_centre, tilt_axes};
 use super::{Image, Layout, Measured, Problem, State, TakenFrom, Tie};
 use crate::geom::{Pose, adjoint, right_jacobian_se3};
 use crate::linalg::wide;
-use crate::model::circle::{self, Prediction};
+use crate::model::circle::Prediction;
 use crate::model::robot::MovedOrigins;
 
 /// One residual with what the robust weighting made of it.
@@ -83,7 +83,7 @@ impl Weighting {
 /// Prediction of one observation; `None` where the marker is behind the camera.
 pub fn predict(image: &Image, state: &State, pose: &Pose, observation: &Measured) -> Option<Prediction> {
     let position = state.plates[image.plate].position(observation.marker);
-    circle::centroid(&state.cameras[image.camera], pose, &position, observation.radius_m)
+    observation.mark.predict(&state.cameras[image.camera], pose, &position)
 }
 
 /// Normal-equation blocks of one image at a camera pose; `None` where an observed marker is behind the camera.
@@ -128,7 +128,7 @@ fn whitened(
     let mut stated = (Matrix2::zeros(), Matrix2::zeros());
     for (observation, o) in used.step_by(weighting.every) {
         let modes = plate.modes_at(o.marker);
-        let p = circle::centroid(camera, pose, &plate.position_by(&modes, o.marker), o.radius_m)?;
+        let p = o.mark.predict(camera, pose, &plate.position_by(&modes, o.marker))?;
         let duv = o.uv - p.uv;
         // Observations one after the other are often alike.
         if stated.0 != o.information {

@@ -94,11 +94,11 @@ impl DenseCoupling {
     }
 
     /// Adds an image with its intrinsic columns.
-    pub fn add(&mut self, own: LinearImage, intrinsics: Vec<Option<usize>>, seen: &SeenMarkers, equations: &Equations) {
+    pub fn add(&mut self, own: LinearImage, seen: &SeenMarkers, equations: &Equations) {
         let (image, theta) = (own.image, self.theta);
         let by_theta = equations.through_pose(&own.chain.d_theta.select_columns(&self.free[..theta]).transpose());
-        let intrinsics = intrinsics.into_iter();
-        let intrinsics: Vec<_> = intrinsics.map(|c| c.and_then(|c| self.free.binary_search(&c).ok())).collect();
+        let intrinsics: Vec<_> =
+            own.columns().into_iter().map(|c| c.and_then(|c| self.free.binary_search(&c).ok())).collect();
         let runs = runs((0..E).filter_map(|e| Some((equations.intrinsic_row(e)?, intrinsics[e]?))));
         for (o, (&marker, sight)) in equations.markers.iter().zip(equations.sights()).enumerate() {
             let Some(at) = seen.number[image.plate][marker] else { continue };
@@ -206,10 +206,11 @@ impl PoseRows {
         let (theta, dense) = (layout.theta_len(), layout.len());
         let rows = 6 * linear.images().len();
         let (mut chain, mut coupling) = (DMatrix::zeros(rows, theta), DMatrix::zeros(rows, dense));
-        for (k, LinearImage { image, terms, chain: own, .. }) in linear.images().enumerate() {
-            chain.rows_mut(6 * k, 6).copy_from(&own.d_theta);
-            coupling.view_mut((6 * k, 0), (6, theta)).copy_from(&(terms.pp * &own.d_theta));
-            for (e, c) in layout.intrinsics(image).iter().enumerate() {
+        for (k, own) in linear.images().enumerate() {
+            let LinearImage { terms, chain: by_theta, .. } = own;
+            chain.rows_mut(6 * k, 6).copy_from(&by_theta.d_theta);
+            coupling.view_mut((6 * k, 0), (6, theta)).copy_from(&(terms.pp * &by_theta.d_theta));
+            for (e, c) in own.columns().iter().enumerate() {
                 if let Some(c) = *c {
                     coupling.fixed_view_mut::<6, 1>(6 * k, c).copy_from(&terms.pe.column(e));
                 }
@@ -224,8 +225,8 @@ impl PoseRows {
         let (theta, dense) = (layout.theta_len(), layout.len());
         let mut upper = a.view_mut((0, 0), (theta, dense));
         upper += product(&self.chain.transpose(), &self.coupling);
-        for LinearImage { image, terms, .. } in linear.images() {
-            let columns = layout.intrinsics(image);
+        for own in linear.images() {
+            let (columns, terms) = (own.columns(), own.terms);
             let used = || columns.iter().enumerate().filter_map(|(e, c)| c.map(|c| (e, c)));
             for (e, c) in used() {
                 used().filter(|(_, d)| *d <= c).for_each(|(f, d)| a[(d, c)] += terms.ee[(f, e)]);

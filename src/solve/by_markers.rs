@@ -164,7 +164,7 @@ fn whitened_coupling(
     let of_stops = linear.stops().zip(latent_start);
     for (own, start) in of_stops.flat_map(|(stop, start)| stop.images().map(move |image| (image, *start))) {
         let Some(equations) = own.equations() else { continue };
-        dense.add(own, linear.adjustment.problem.layout.intrinsics(own.image), seen, &equations);
+        dense.add(own, seen, &equations);
         let number = &seen.number[own.image.plate];
         let [joints, tie] = own.latents();
         let (markers, mut coupling) = latents_with_markers(&own.chain.d_latent, &equations);

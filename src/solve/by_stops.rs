@@ -46,8 +46,7 @@ impl StopsEliminated {
     /// Information with the priors of latents and markers, without those of the dense columns; markers that are not among those `seen` stay
     /// where they are.
     pub fn build(linear: LinearProblem, lambda: f64, seen: SeenMarkers) -> (DMatrix<f64>, Self) {
-        let layout = &linear.adjustment.problem.layout;
-        let dense = layout.len();
+        let dense = linear.adjustment.problem.layout.len();
         let n = dense + 3 * seen.order.len();
         let mut a = DMatrix::zeros(n, n);
         let poses = PoseRows::new(linear);
@@ -61,7 +60,7 @@ impl StopsEliminated {
             let mut own = Vec::with_capacity(stop.places().len());
             for (k, image) in stop.places().zip(stop.images()) {
                 let equations = if seen.order.is_empty() { None } else { image.equations() };
-                equations.iter().for_each(|e| coupling.add(image, layout.intrinsics(image.image), &seen, e));
+                equations.iter().for_each(|e| coupling.add(image, &seen, e));
                 own.push(Coupled::new(image, poses.coupling.rows(6 * k, 6), (dense, &seen, equations.as_ref())));
             }
             blocks.push(Block::new(&stop, &own, lambda));

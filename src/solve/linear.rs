@@ -184,9 +184,10 @@ impl<'a> LinearProblem<'a> {
     pub(super) fn dense_gradient(self) -> DVector<f64> {
         let layout = &self.adjustment.problem.layout;
         let mut gradient = DVector::zeros(layout.len());
-        for LinearImage { image, terms, chain, .. } in self.images() {
+        for own in self.images() {
+            let LinearImage { terms, chain, .. } = own;
             gradient.rows_mut(0, layout.theta_len()).gemv_tr(1.0, &chain.d_theta, &terms.bp, 1.0);
-            for (e, c) in layout.intrinsics(image).iter().enumerate() {
+            for (e, c) in own.columns().iter().enumerate() {
                 c.iter().for_each(|&c| gradient[c] += terms.be[e]);
             }
         }
@@ -195,6 +196,11 @@ impl<'a> LinearProblem<'a> {
 }
 
 impl LinearImage<'_> {
+    /// Columns that act on it directly and not through its pose, in the order of its blocks; `None` for padding.
+    pub fn columns(&self) -> Vec<Option<usize>> {
+        self.problem.layout.intrinsics(self.image)
+    }
+
     /// The equations that its blocks are sums of.
     pub fn equations(&self) -> Option<Equations> {
         equations(self.image, self.state, &self.chain.pose, &Weighting::of(self.problem, self.image))
@@ -224,8 +230,7 @@ impl LinearImage<'_> {
     /// Dense columns that it depends on and that are free.
     pub(super) fn free_columns(&self) -> Vec<usize> {
         let layout = &self.problem.layout;
-        let intrinsics = layout.intrinsics(self.image);
-        let all = (0..layout.theta_len()).chain(intrinsics.into_iter().flatten());
+        let all = (0..layout.theta_len()).chain(self.columns().into_iter().flatten());
         all.filter(|&c| layout.columns[c].free).collect()
     }
 }

@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 use robotcal::assess::Limits;
 use robotcal::geom::{Pose, project_to_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
-use robotcal::problem::{Adjustment, Measured, PlateShape, State, Tie};
+use robotcal::problem::{Adjustment, Mark, Measured, PlateShape, State, Tie};
 use robotcal::series::{Plate, PlateKind, ScaleBar};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
 use robotcal::solve::Fit;
@@ -148,7 +148,7 @@ pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, 
         let measured = seen.observations.iter().map(|o| Measured {
             marker: o.marker as usize,
             edge: o.edge,
-            radius_m: world.plate.markers[o.marker as usize].outer_radius_m,
+            mark: Mark::of_radius(world.plate.markers[o.marker as usize].outer_radius_m),
             uv: o.uv.into(),
             information: Matrix2::from_diagonal_element(1.0 / o.covariance.unwrap()[0]),
             rejected: None,

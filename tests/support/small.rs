@@ -9,7 +9,7 @@ use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::problem::{Adjustment, State, Stop, TakenFrom, Tie, predict};
-use robotcal::problem::{Image, Layout, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape, Problem};
+use robotcal::problem::{Image, Layout, Mark, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape, Problem};
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 use robotcal::urdf::{CarriedMass, Chain, Drive, Joint, JointKind};
 
@@ -299,7 +299,7 @@ fn observed(
         let mut o = Measured {
             marker,
             edge: Edge::Outer,
-            radius_m: if marker % 5 == 4 { 0.0 } else { request.radius_m },
+            mark: if marker % 5 == 4 { Mark::Corner } else { Mark::of_radius(request.radius_m) },
             uv: Vector2::zeros(),
             information: covariance.try_inverse().unwrap(),
             rejected: None,

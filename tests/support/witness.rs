@@ -368,6 +368,6 @@ pub fn predict(
     let parameters: Vec<D> = (state.cameras[image.camera].parameters.iter().zip(range))
         .map(|(p, c)| variable(*p, seed == Some(Seed::Column(c))))
         .collect();
-    let samples = samples(&pose, &centre, observation.radius_m);
-    circle(&parameters, &pose, &centre, observation.radius_m, samples)
+    let samples = samples(&pose, &centre, observation.mark.radius_m());
+    circle(&parameters, &pose, &centre, observation.mark.radius_m(), samples)
 }
