@@ -148,6 +148,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     findings.extend(corrections::displaced_finding(&program, &done));
     let subject = args.urdf.display().to_string();
     findings.push(corrections::expected_finding(expected.as_deref().map_err(|why| why.as_str()), &subject));
+    findings.extend(corrections::left_finding(&left, &subject));
     let report = corrections::table(&program, &done, expected.as_deref().ok(), &controller.chain);
     let said = corrections::findings_json(&findings)?;
     let mut written: Vec<(String, &[u8])> = Vec::new();
@@ -159,8 +160,9 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     written.push((corrections::FINDINGS.to_owned(), said.as_bytes()));
     place.write_beside(&written, &args.programs)?;
     say!("{}", text(&program, &done.outcomes, &left, &controller.chain));
-    for f in &findings {
-        say_line!("{}{}", if f.weight == Weight::Gate { "GATE      " } else { "note      " }, f.text);
+    // Targets that are left are listed already.
+    for f in findings.iter().filter(|f| f.code != Code::TargetsLeft) {
+        say_line!("{}{} [{}]", if f.weight == Weight::Gate { "GATE      " } else { "note      " }, f.text, f.code);
     }
     say_line!("results   {} ({} files)", args.out.display(), written.len());
     let good = left.is_empty() && findings.iter().all(|f| f.weight == Weight::Note);
@@ -394,10 +396,10 @@ fn text(program: &Program, outcomes: &[Outcome], left: &[Left], chain: &Chain) -
     }
     let mut told: BTreeMap<&str, usize> = BTreeMap::new();
     for l in left {
-        let count = told.entry(&l.why).or_default();
+        let count = told.entry(&l.why.words).or_default();
         *count += 1;
         if *count <= SHOWN {
-            let _ = writeln!(out, "left      {}:{} {}: {}", program.files[l.file].name, l.line, l.name, l.why);
+            let _ = writeln!(out, "left      {}:{} {}: {}", program.files[l.file].name, l.line, l.name, l.why.words);
         }
     }
     for (why, count) in told.iter().filter(|(_, count)| **count > SHOWN) {

@@ -219,6 +219,16 @@ codes! {
         ProgramModelMissing "program_model_missing" "a target is a pose, and the model in the controller is not given",
         TargetsTooFew "targets_too_few" "too few targets tell of an error",
     }
+    Input "Corrected programs" {
+        TargetsLeft "targets_left" "targets stay as they are; their reasons are counted",
+        NominalIsControllers "nominal_is_controllers" "the nominal model is the one in the controller",
+        NominalDiffers "nominal_differs" "the nominal model is not the one in the controller",
+        TaughtWithOtherFrames "taught_with_other_frames" "joints and poses were taught with another tool or base",
+        FramesDiffer "frames_differ" "base or tool are not those of the program",
+        DisplacedOrientation "displaced_orientation" "displaced targets are turned as the points that they start from",
+        ExpectedError "expected_error" "how far the tool is expected from where the program meant it",
+        ExpectedErrorUnknown "expected_error_unknown" "it is not known how far the tool will be from where the program meant it",
+    }
     Input "Earlier results" {
         SolutionDamaged "solution_damaged" "a solution.json is not as the program wrote it",
         SolutionDiffers "solution_differs" "a solution.json is of another robot or series",

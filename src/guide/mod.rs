@@ -1,4 +1,4 @@
-//! The manual: formulation, conventions, glossary, a tour of the program, how to take a series, how to read the result, decisions.
+//! The manual: formulation, conventions, glossary, a tour of the program, how to take a series, how to read the result, codes, decisions.
 
 #[doc = include_str!("formulation.md")]
 pub mod formulation {}
@@ -17,6 +17,9 @@ pub mod capture {}
 
 #[doc = include_str!("reading_the_result.md")]
 pub mod reading_the_result {}
+
+#[doc = include_str!("codes.md")]
+pub mod codes {}
 
 #[doc = include_str!("circles.md")]
 pub mod circles {}

@@ -10,7 +10,7 @@ use crate::assess::sigma_in_base;
 use crate::error::{Code, Result};
 use crate::geom::Pose;
 use crate::programs::compensate::{Compensated, RESIDUAL};
-use crate::programs::{Kind, Outcome, Program};
+use crate::programs::{Kind, Left, Outcome, Program};
 use crate::urdf::Chain;
 
 /// Name of the table of corrections.
@@ -36,7 +36,7 @@ pub enum Weight {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
     /// Code that stays the same in every version.
-    pub code: &'static str,
+    pub code: Code,
     /// Its weight.
     pub weight: Weight,
     /// File that it is about.
@@ -72,17 +72,17 @@ pub fn nominal_findings(program: &Program, done: &Compensated) -> Vec<Finding> {
             findings.push(Finding { code, weight, subject: file.name.clone(), quantities, text });
         };
         if !same.is_empty() && rms(&same) <= SAME_MODEL {
-            add("nominal_is_controllers", Weight::Note, &same, "it is the model in the controller");
+            add(Code::NominalIsControllers, Weight::Note, &same, "it is the model in the controller");
         } else if !same.is_empty() {
             let words = "it is not the model in the controller, and the corrected poses keep an error of that size; give the controller's own model with --nominal (Universal Robots: the one that ur_calibration reads from the robot)";
-            add("nominal_differs", Weight::Gate, &same, words);
+            add(Code::NominalDiffers, Weight::Gate, &same, words);
         }
         if !same.is_empty() && !other.is_empty() {
             let words = "taught with another tool or base; they tell the posture only";
-            add("taught_with_other_frames", Weight::Note, &other, words);
+            add(Code::TaughtWithOtherFrames, Weight::Note, &other, words);
         } else if !other.is_empty() {
             let words = "the base frame or the tool is not that of the program: look at --base (the controllers of Universal Robots compute in `base`, half a turn about z from `base_link` of ur_description), --work and set_tcp";
-            add("frames_differ", Weight::Gate, &other, words);
+            add(Code::FramesDiffer, Weight::Gate, &other, words);
         }
     }
     findings
@@ -97,12 +97,21 @@ pub fn displaced_finding(program: &Program, done: &Compensated) -> Option<Findin
     let mrad: Vec<f64> = done.outcomes.iter().filter_map(left).collect();
     let max_mrad = largest(&mrad);
     (!mrad.is_empty()).then(|| Finding {
-        code: "displaced_orientation",
+        code: Code::DisplacedOrientation,
         weight: Weight::Note,
         subject: program.files.first().map_or_else(String::new, |f| f.name.clone()),
         quantities: BTreeMap::from([("targets", mrad.len() as f64), ("max_mrad", max_mrad)]),
         text: format!("{} displaced targets are exact in place and turned as the points that they start from: {max_mrad:.4} mrad at most are left (RelTool can turn, Offs cannot)", mrad.len()),
     })
+}
+
+/// Targets that stay as they are: how many, and how many for each reason.
+pub fn left_finding(left: &[Left], subject: &str) -> Option<Finding> {
+    let mut quantities = BTreeMap::from([("targets", left.len() as f64)]);
+    left.iter().for_each(|l| *quantities.entry(l.why.reason.name()).or_default() += 1.0);
+    let text = format!("{} targets stay as they are, each with its reason in {TABLE}", left.len());
+    let (code, weight, subject) = (Code::TargetsLeft, Weight::Gate, subject.to_owned());
+    (!left.is_empty()).then_some(Finding { code, weight, subject, quantities, text })
 }
 
 /// Expected error of every corrected target with base and tool unknown, m.
@@ -131,13 +140,13 @@ pub fn expected_finding(expected: std::result::Result<&[Option<f64>], &str>, sub
             let text = format!(
                 "in the base frame the tool is expected {rms_mm:.2} mm RMS ({max_mm:.2} mm at most) from where the program meant it: images do not tell where base and tool stand; {remedy}"
             );
-            finding("expected_error", quantities, text)
+            finding(Code::ExpectedError, quantities, text)
         }
         Err(why) => {
             let text = format!(
                 "how far in the base frame the tool will be from where the program meant it is not known ({why}); base and tool stand where the description says, usually wrong by millimetres; {remedy}"
             );
-            finding("expected_error_unknown", BTreeMap::new(), text)
+            finding(Code::ExpectedErrorUnknown, BTreeMap::new(), text)
         }
     }
 }
@@ -158,7 +167,7 @@ pub fn findings_json(findings: &[Finding]) -> Result<String> {
 /// One row for every target: what the correction is, or why there is none.
 pub fn table(program: &Program, done: &Compensated, expected: Option<&[Option<f64>]>, chain: &Chain) -> String {
     let mut out = String::from(
-        "file,line,target,correction_mm,correction_mrad,largest_joint_change,joint,residual_m,residual_rad,left_because,posture,expected_mm,taught_mm\n",
+        "file,line,target,correction_mm,correction_mrad,largest_joint_change,joint,residual_m,residual_rad,left_because,posture,expected_mm,taught_mm,reason\n",
     );
     let cell = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
     let millimetres = |m: Option<f64>| m.map_or_else(String::new, |m| format!("{:.4}", 1e3 * m));
@@ -174,15 +183,17 @@ pub fn table(program: &Program, done: &Compensated, expected: Option<&[Option<f6
                 let posture = c.posture.word();
                 writeln!(
                     out,
-                    "{head},{mm:.4},{mrad:.4},{change:.9},{name},{rest_m:.2e},{rest_rad:.2e},,{posture},{expected},{taught}"
+                    "{head},{mm:.4},{mrad:.4},{change:.9},{name},{rest_m:.2e},{rest_rad:.2e},,{posture},{expected},{taught},"
                 )
             }
-            Outcome::Left(why) => writeln!(out, "{head},,,,,,,{},,,{taught}", cell(why)),
+            Outcome::Left(why) => {
+                writeln!(out, "{head},,,,,,,{},,,{taught},{}", cell(&why.words), why.reason.name())
+            }
         };
     }
     for l in &program.left {
         let (file, name) = (cell(&program.files[l.file].name), cell(&l.name));
-        let _ = writeln!(out, "{file},{},{name},,,,,,,{},,,", l.line, cell(&l.why));
+        let _ = writeln!(out, "{file},{},{name},,,,,,,{},,,,{}", l.line, cell(&l.why.words), l.why.reason.name());
     }
     out
 }

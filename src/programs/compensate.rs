@@ -12,6 +12,7 @@ use super::codes::Branch;
 use super::field::{Edit, Place, splice};
 use super::posture::{Before, Finder, Known};
 use super::program::{Approach, Displaced, Kind, Left, PoseTarget, Posture, Program, Target, Understood, write_joints};
+use super::reason::{Reason, Why};
 use crate::geom::Pose;
 use crate::model::inverse::{self, Reach, Stalled};
 use crate::model::robot::Robot;
@@ -50,7 +51,7 @@ pub enum Outcome {
     /// Corrected.
     Done(Correction),
     /// Left as it is, for this reason.
-    Left(String),
+    Left(Why),
 }
 
 /// A corrected target.
@@ -255,7 +256,7 @@ impl<'a> Work<'a> {
         let beyond = residual_m > RESIDUAL || residual_rad > RESIDUAL;
         if beyond {
             let rest = in_words(residual_m, residual_rad);
-            return Err(format!("the decimals of the text leave {rest}"));
+            return Err(Why::new(Reason::Coarse, format!("the decimals of the text leave {rest}")));
         }
         if let Kind::Pose(pose) = kind
             && later.is_none()
@@ -306,7 +307,7 @@ impl<'a> Work<'a> {
 
     fn commanded(&self, base_from_flange: &Pose, held: &[bool], near: &[f64]) -> Understood<Vec<f64>> {
         let read = reach(self.models.controller, &self.limits, held, None).solve_from(base_from_flange, near);
-        read.map_err(|_| "the corrected pose is singular for the controller's model".to_owned())
+        read.map_err(|_| Why::new(Reason::Singular, "the corrected pose is singular for the controller's model"))
     }
 
     /// Edits of a displaced target: its place is exact; so is its orientation where the displacement can turn, else it is that of the
@@ -334,14 +335,14 @@ impl<'a> Work<'a> {
         let turns = displaced.turned.is_none() && correction.residual_rad <= correction.turn_rad + RESIDUAL;
         if correction.residual_m > RESIDUAL || (correction.residual_rad > RESIDUAL && !turns) {
             let rest = in_words(correction.residual_m, correction.residual_rad);
-            return Err(format!("the point that it starts from leaves {rest}"));
+            return Err(Why::new(Reason::Coarse, format!("the point that it starts from leaves {rest}")));
         }
         Ok(edits)
     }
 
     /// The target with what its text leaves out, which is what the target before it says.
     fn completed(&self, target: &Target, before: Option<&[f64]>) -> Understood<Kind> {
-        let unknown = || "it leaves numbers out, and the target before it is not known".to_owned();
+        let unknown = || Why::new(Reason::Incomplete, "it leaves numbers out, and the target before it is not known");
         let mut kind = target.kind.clone();
         match &mut kind {
             Kind::Joints(joints) => {
@@ -373,7 +374,8 @@ impl<'a> Work<'a> {
     fn reached(&self, to: &Reach<'_>, wanted: &Pose, start: &[f64]) -> Understood<Vec<f64>> {
         let beyond = |q: &[f64]| (0..q.len()).find(|&i| q[i] < self.limits[i].0 || q[i] > self.limits[i].1);
         if let Some(i) = beyond(start) {
-            return Err(format!("the program itself puts {}", self.beyond(i, start[i])));
+            let words = format!("the program itself puts {}", self.beyond(i, start[i]));
+            return Err(Why::new(Reason::ProgramBeyondLimit, words));
         }
         let found = within_limits(to, wanted, start).map_err(|stalled| {
             let free: Vec<_> = start.iter().map(|_| (f64::NEG_INFINITY, f64::INFINITY)).collect();
@@ -382,19 +384,21 @@ impl<'a> Work<'a> {
                     let all = (0..q.len())
                         .filter(|&i| beyond(&q).is_some() && (q[i] < self.limits[i].0 || q[i] > self.limits[i].1));
                     let all: Vec<String> = all.map(|i| self.beyond(i, q[i])).collect();
-                    format!("it would take {}", all.join(" and "))
+                    Why::new(Reason::BeyondLimit, format!("it would take {}", all.join(" and ")))
                 }
-                _ => format!(
-                    "no posture next to that of the program reaches it; {} remain",
-                    twist_in_words(&stalled.error)
-                ),
+                _ => {
+                    let remain = twist_in_words(&stalled.error);
+                    let words = format!("no posture next to that of the program reaches it; {remain} remain");
+                    Why::new(Reason::OutOfReach, words)
+                }
             }
         })?;
         let (i, change) = largest_change(start, &found);
         if change.abs() > MOST_JOINT_CHANGE {
             let name = &self.models.to.chain.readings[i];
             let change = self.amount(i, change);
-            return Err(format!("{name} would have to move by {change}: the target lies next to a singular posture"));
+            let words = format!("{name} would have to move by {change}: the target lies next to a singular posture");
+            return Err(Why::new(Reason::Singular, words));
         }
         Ok(found)
     }

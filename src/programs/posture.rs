@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::codes::{Branch, Codes};
 use super::program::{PoseTarget, Posture, Understood};
+use super::reason::{Reason, Why};
 use crate::geom::Pose;
 use crate::model::inverse::{self, Reach};
 use crate::model::robot::Robot;
@@ -93,9 +94,9 @@ fn farthest(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-fn unreached(posture: &str) -> String {
+fn unreached(posture: &str) -> Why {
     let remedy = "look at the base and tip link, and at tool and work frame";
-    format!("the controller's model does not reach this pose{posture} ({remedy})")
+    Why::new(Reason::OutOfReach, format!("the controller's model does not reach this pose{posture} ({remedy})"))
 }
 
 impl<'a> Finder<'a> {
@@ -136,8 +137,9 @@ impl<'a> Finder<'a> {
             (None, Some(start)) => Ok((self.near(pose, held, start, written)?, Known::Start)),
             (None, None) if written => Ok((self.near(pose, held, &self.middle.clone(), true)?, Known::Any)),
             (None, None) => {
-                Err("its posture is not known: nothing tells the joints from which the robot comes (give --start)"
-                    .into())
+                let words =
+                    "its posture is not known: nothing tells the joints from which the robot comes (give --start)";
+                Err(Why::new(Reason::PostureUnknown, words))
             }
         }
     }
@@ -160,11 +162,14 @@ impl<'a> Finder<'a> {
         let second = all.get(1).filter(|_| !any && !redundant);
         match second.filter(|second| farthest(&near, second) < AMBIGUOUS * farthest(&near, best)) {
             None => Ok(best.clone()),
-            Some(second) => Err(format!(
-                "its posture is not known: two lie about equally far from where the robot comes ({:.0} and {:.0} deg)",
-                farthest(&near, best).to_degrees(),
-                farthest(&near, second).to_degrees()
-            )),
+            Some(second) => {
+                let words = format!(
+                    "its posture is not known: two lie about equally far from where the robot comes ({:.0} and {:.0} deg)",
+                    farthest(&near, best).to_degrees(),
+                    farthest(&near, second).to_degrees()
+                );
+                Err(Why::new(Reason::PostureUnknown, words))
+            }
         }
     }
 
@@ -207,7 +212,8 @@ impl<'a> Finder<'a> {
             .find_map(|start| self.solved(&wanted, start, &near, held, Some(codes)));
         let found = direct.or_else(|| self.searched(&wanted, &near, held, codes)).ok_or_else(|| {
             let posture = format!(" in the posture {}", codes.0.shown());
-            unreached(&posture) + "; --nearest-posture heeds no codes"
+            let why = unreached(&posture);
+            Why::new(why.reason, why.words + "; --nearest-posture heeds no codes")
         })?;
         self.by_code.insert(codes.0.shown(), found.clone());
         Ok((found, Known::Codes))
@@ -223,10 +229,11 @@ impl<'a> Finder<'a> {
     ) -> Understood<(Vec<f64>, Known)> {
         let open = "its posture is not known: other routines switch the check of configurations off, and its confdata";
         let remedy = "(--nearest-posture heeds no confdata)";
+        let unknown = |why: &str| Err(Why::new(Reason::PostureUnknown, format!("{open} {why} {remedy}")));
         match (self.by_codes(pose, held, before, codes), self.by_approach(pose, held, before)) {
             (Ok(coded), Ok((near, _))) if farthest(&coded.0, &near) < SAME => Ok(coded),
-            (Ok(_), Ok(_)) => Err(format!("{open} mean another one than the way there {remedy}")),
-            (Ok(_), Err(_)) => Err(format!("{open} may not count {remedy}")),
+            (Ok(_), Ok(_)) => unknown("mean another one than the way there"),
+            (Ok(_), Err(_)) => unknown("may not count"),
             (Err(_), near) => near,
         }
     }

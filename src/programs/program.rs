@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use super::codes::Codes;
 use super::field::{Edit, Field, Place};
+use super::reason::Why;
 use super::text_file::TextFile;
 use crate::error::Notice;
 use crate::geom::{Pose, exp_so3, log_so3, matrix_from_rpy, rpy_from_matrix};
@@ -33,11 +34,11 @@ pub struct Left {
     /// Name in the program, or the instruction.
     pub name: String,
     /// Why.
-    pub why: String,
+    pub why: Why,
 }
 
 /// A value, or why its target stays as it is.
-pub(super) type Understood<T> = std::result::Result<T, String>;
+pub(super) type Understood<T> = std::result::Result<T, Why>;
 
 /// One target.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,6 +9,7 @@ use super::itinerary::Itinerary;
 use super::program::{
     Approach, JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, Understood,
 };
+use super::reason::{Reason, Why};
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
@@ -368,20 +369,21 @@ impl Script<'_> {
                 let pose = self.pose(*fields, argument.posture)?;
                 (Kind::Pose(Box::new(PoseTarget { taught: argument.taught, ..pose })), line)
             }
-            Value::Expression => return Err("its target is computed, not written in numbers".into()),
+            Value::Expression => return Err(Why::computed()),
         };
         let file = self.reader.index;
         let target = Target { file, line, name: name.to_owned(), approach: Approach::Unknown, visited: true, kind };
         if self.way.visit(target) {
             Ok(())
         } else {
-            Err("it is used with different tools; give it a pose for each".into())
+            Err(Why::new(Reason::FramesDiffer, "it is used with different tools; give it a pose for each"))
         }
     }
 
     fn pose(&self, fields: [Field; 6], posture: Posture) -> Understood<PoseTarget> {
         let Tool::Known(tool) = self.tool else {
-            return Err("its tool is not known: no set_tcp(p[..]) with numbers before it; give --tool".into());
+            let words = "its tool is not known: no set_tcp(p[..]) with numbers before it; give --tool";
+            return Err(Why::new(Reason::ToolUnknown, words));
         };
         let [x, y, z, rx, ry, rz] = fields;
         let readings = self.setting.chain.readings.len();

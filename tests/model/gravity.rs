@@ -106,7 +106,7 @@ fn compliance_and_payload_survive_their_file() {
     let refused = read_compensation(&write(without), chain("kuka_kr6_r900")).unwrap_err();
     assert!(refused.code == Code::UrdfMassesMissing && refused.place.contains("joint_a2"), "{refused}");
     let heavy = chain("ur10e").carrying(Some(&Payload { mass_kg: f64::NAN, ..PAYLOAD })).unwrap_err();
-    assert!(heavy.code == Code::PayloadRange && heavy.what.contains("NaN"), "{heavy}");
+    assert!(heavy.code == Code::PayloadRange && heavy.what.starts_with(&f64::NAN.to_string()), "{heavy}");
 }
 
 #[test]

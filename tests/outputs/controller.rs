@@ -100,10 +100,12 @@ fn xacro_properties_are_the_origins_of_the_urdf() {
     }
     for (name, bytes) in &files {
         let text = String::from_utf8_lossy(bytes);
+        // words: a key of the driver of Universal Robots, which means something else.
         assert!(!text.contains("rising"), "{name}: <calibration rising> means something else");
     }
     for name in ["kinematics.yaml", "kinematics.xacro", "mdh.csv", "mastering.csv", "compensation.toml"] {
-        assert!(text(&files, name).contains("for ") || text(&files, name).contains("reads"), "{name} names no reader");
+        // words: the head of a file is for people, and says who reads it.
+        assert!(["for ", "reads"].iter().any(|word| text(&files, name).contains(word)), "{name} names no reader");
     }
 }
 
@@ -277,7 +279,7 @@ fn kinematics_yaml_of_a_franka_and_of_an_xarm_is_what_their_descriptions_read() 
         let robot = off(&description, None);
         let text = kinematics_yaml(&robot, &description, "");
         let file: BTreeMap<String, BTreeMap<String, Origin>> = serde_saphyr::from_str(&text).unwrap();
-        assert!(text.contains("xarm_description reads"), "{text}");
+        assert!(text.contains("xarm_description"), "{text}");
         let joints = &file["kinematics"];
         assert_eq!(joints.len(), count);
         let turns = q[..count].iter().enumerate();
@@ -354,7 +356,8 @@ fn mdh_parameters_say_what_they_leave() {
     let files = files(&solution, &context(&description)).unwrap();
     let real = Robot::nominal(reread(&files).chain);
     let mdh = text(&files, "mdh.csv");
-    assert!(mdh.contains("WARNING: nearly parallel axes") && mdh.contains("joint_a2 and joint_a3"), "{mdh}");
+    let warned = |l: &str| ["# ", "joint_a2", "joint_a3"].iter().all(|name| l.contains(name));
+    assert!(mdh.lines().any(warned), "the nearly parallel axes are named: {mdh}");
     let numbers = |line: &str| -> Vec<f64> {
         let parts = line.split([' ', ',']);
         parts.filter_map(|p| p.parse().ok()).collect()

@@ -90,7 +90,7 @@ fn what_may_be_promised_stands_first() {
     assert!(at(1e3 * e.urdf_m) < held_out && at(1e3 * e.model_m) < held_out);
     let [weak, all] = [record.undetermined().len(), record.robot_parameters().count()];
     assert!(all == record.identifiability.as_ref().unwrap().parameters, "{all}");
-    assert!(weak > 0 && page.contains(&format!("{weak} of {all} robot parameters")));
+    assert!(weak > 0 && page.contains(&format!("{weak} of {all} ")));
 }
 
 #[test]
@@ -117,14 +117,17 @@ fn the_fits_in_two_stages_stand_beside_the_joint_one() {
 fn the_verdict_follows_the_gates_and_then_the_doubts() {
     let mut record = record();
     assert!(report_html(&record).contains("class=\"verdict good\""));
+    let good = record.clone();
     record.accuracy.calibrated.worst_mm = 10.0 * record.accuracy.calibrated.rms_mm;
     let page = report_html(&record);
-    assert!(page.contains("class=\"verdict care\"") && page.contains("One image is off"));
-    record.accuracy.nominal.rms_mm = record.accuracy.calibrated.rms_mm;
-    assert!(report_html(&record).contains("The gain is small"));
-    record.failed_gates.push("joint noise: 12.0 mrad".into());
+    assert!(page.contains("class=\"verdict care\""));
+    let mut without_gain = good;
+    without_gain.accuracy.nominal.rms_mm = without_gain.accuracy.calibrated.rms_mm;
+    assert!(report_html(&without_gain).contains("class=\"verdict care\""));
+    let gate = "joint noise: 12.0 mrad";
+    record.failed_gates.push(gate.into());
     let page = report_html(&record);
-    assert!(page.contains("class=\"verdict failed\"") && page.contains("joint noise: 12.0 mrad"));
+    assert!(page.contains("class=\"verdict failed\"") && page.contains(gate));
 }
 
 #[test]
@@ -173,6 +176,7 @@ fn a_result_without_robot_terms_plots_or_covariances_still_has_a_page() {
         image.observations = solution_json::ObservationColumns::default();
     }
     let page = report_html(&record);
+    // words: the page is for people, and no number stands where nothing was estimated.
     assert!(page.contains("The readings were taken as exact."));
     assert!(!page.contains("NaN"));
 }

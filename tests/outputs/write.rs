@@ -530,8 +530,9 @@ fn every_command_tries_its_folder_before_it_reads_anything() {
             assert!(said.starts_with(&format!("error[{why}]: {out}")), "{args:?}: {said}");
         }
     }
-    let (code, said) = robotcal(root.path(), &["convert", "missing.mcap", "file"]);
-    assert!(code == Some(2) && said.starts_with("error[output_name]: file"), "{said}");
+    let file = "file";
+    let (code, said) = robotcal(root.path(), &["convert", "missing.mcap", file]);
+    assert!(code == Some(2) && said.starts_with(&format!("error[output_name]: {file}")), "{said}");
     assert_eq!(all_below(root.path()), before);
 }
 

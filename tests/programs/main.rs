@@ -2,6 +2,8 @@
 
 #[path = "../programs_support/mod.rs"]
 mod programs_support;
+#[path = "../said/mod.rs"]
+mod said;
 
 mod krl;
 mod plan_choice;

@@ -5,8 +5,11 @@
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
 use crate::programs_support::{Cell, assert_meets, numbers, shape, status_turn};
+use crate::said::assert_says;
+use robotcal::Code;
 use robotcal::geom::Pose;
 use robotcal::model::inverse;
+use robotcal::programs::Reason;
 
 const MODULE: &str = "%%%\r\n  VERSION:1\r\n  LANGUAGE:ENGLISH\r\n%%%\r\n\r\nMODULE MainModule\r\n\
   ! [[1.0,2.0,3.0],[1,0,0,0]] is no target\r\n\
@@ -73,12 +76,10 @@ fn rapid_keeps_every_other_byte_and_meets_every_target() {
     }
     let file = cell.write("MainModule.mod", text.as_bytes());
     let run = cell.compensate(&[&file], &["--unordered"]);
-    let said = run.said();
     let run = run.expect(1);
-    assert!(said.contains("6 corrected, 2 left"), "{said}");
-    for left in [":23 MoveL: PHERE is computed", ":12 PLOST: no move of the files goes there"] {
-        assert!(said.contains(left), "{left}: {said}");
-    }
+    let told = run.told();
+    assert_eq!((told.corrected, told.left.len()), (6, 2), "{told:?}");
+    assert!(told.has(23, "MoveL", Reason::Computed) && told.has(12, "PLOST", Reason::Unvisited), "{told:?}");
     let new = run.text("MainModule.mod");
     assert_eq!(String::from_utf8_lossy(&shape(new.as_bytes())), String::from_utf8_lossy(&shape(text.as_bytes())));
     for same in ["tGun:=", "wTable:=", "pLost:="] {
@@ -106,16 +107,20 @@ fn rapid_keeps_every_other_byte_and_meets_every_target() {
 #[test]
 fn malformed_modules_are_refused_with_their_line() {
     let cell = Cell::kuka(32);
-    for (text, words) in [
-        ("CONST robtarget p:=[[1,2,3],[1,0,0,0],[0,0,0,0]];\n", [":1", "[3, 4, 4, 6]"]),
-        ("\nCONST jointtarget p:=[[1,2,3,4,5],[9E9,9E9,9E9,9E9,9E9,9E9]];\n", [":2", "[6, 6]"]),
-        ("CONST robtarget p:=[[1,2,3],[1,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n", [":1", "norm 1.4142"]),
-        ("CONST robtarget p:=[[1,2,3],[1,0,0,0];\n", [":1", "not closed"]),
-        ("MODULE m\nPROC p()\nMoveL p10,v100,z1,tool0\n", [":3", "semicolon"]),
+    for (text, code, names) in [
+        ("CONST robtarget p:=[[1,2,3],[1,0,0,0],[0,0,0,0]];\n", Code::ProgramTargets, [":1", "[3, 4, 4, 6]"]),
+        ("\nCONST jointtarget p:=[[1,2,3,4,5],[9E9,9E9,9E9,9E9,9E9,9E9]];\n", Code::ProgramTargets, [":2", "[6, 6]"]),
+        (
+            "CONST robtarget p:=[[1,2,3],[1,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n",
+            Code::ProgramQuaternion,
+            [":1", "1.4142"],
+        ),
+        ("CONST robtarget p:=[[1,2,3],[1,0,0,0];\n", Code::ProgramSyntax, [":1", "["]),
+        ("MODULE m\nPROC p()\nMoveL p10,v100,z1,tool0\n", Code::ProgramSyntax, [":3", "MoveL"]),
     ] {
         let file = cell.write("m.mod", text.as_bytes());
         let run = cell.compensate(&[&file], &[]).expect(2);
-        assert!(words.iter().all(|w| run.said().contains(w)), "{text}: {}", run.said());
+        assert_says(&run.said(), code, &names);
     }
 }
 
@@ -304,8 +309,8 @@ fn displaced_points_are_exact_and_the_points_they_start_from_are_corrected() {
             complete += 1;
         }
         assert_eq!(text.lines().nth(11), new.lines().nth(11), "a computed displacement stays");
-        let left = run.text("corrections.csv");
-        assert_eq!(left.lines().filter(|l| l.contains("computed")).count(), 1, "{left}");
+        let left = run.told().left;
+        assert_eq!(left.iter().filter(|(.., reason)| *reason == Reason::Computed.name()).count(), 1, "{left:?}");
         let found: Vec<serde_json::Value> = serde_json::from_str(&run.text("findings.json")).unwrap();
         let turned = found.iter().find(|f| f["code"] == "displaced_orientation").unwrap();
         let mrad = turned["quantities"]["max_mrad"].as_f64().unwrap();

@@ -8,9 +8,12 @@
 use std::time::Instant;
 
 use crate::programs_support::{Cell, assert_meets, numbers, shape};
+use crate::said::assert_says;
+use robotcal::Code;
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::model::inverse;
 use robotcal::model::robot::Robot;
+use robotcal::programs::Reason;
 use robotcal::programs::{self, Language, Models, Outcome, Postures, Setting, TextFile};
 
 fn csv(header: &str, rows: &[Vec<f64>]) -> String {
@@ -41,7 +44,8 @@ fn joint_targets_of_a_table_bring_the_real_robot_to_the_meant_poses() {
         assert!(change < 0.3, "row {k} left its posture: {change}");
     }
     assert!(farthest > 1e-3, "a robot without errors proves nothing: {farthest}");
-    assert!(run.said().contains("200 corrected, 0 left"), "{}", run.said());
+    let told = run.told();
+    assert!(told.corrected == 200 && told.left.is_empty(), "{told:?}");
 }
 
 #[test]
@@ -166,12 +170,16 @@ fn what_a_script_does_not_say_in_numbers_is_named_and_left() {
     );
     let file = cell.write("p.script", text.as_bytes());
     let run = cell.compensate(&[&file], &[]).expect(1);
-    let said = run.said();
-    assert!(said.contains("p.script:3 movel: its target is computed"), "{said}");
-    assert!(said.contains("p.script:4 movel: its tool is not known"), "{said}");
+    let told = run.told();
+    assert!(told.has(3, "movel", Reason::Computed) && told.has(4, "movel", Reason::ToolUnknown), "{told:?}");
+    let (weight, counts) = &findings(&run)["targets_left"];
+    assert_eq!(weight, "gate");
+    assert_eq!(
+        [&counts["targets"], &counts["computed"]].map(|n| n.as_f64()),
+        [Some(told.left.len() as f64), Some(1.0)]
+    );
     let run = cell.compensate(&[&file], &["--tool", "0,0,0,0,0,0"]).expect(1);
-    let said = run.said();
-    assert!(said.contains("p.script:5 movel: the controller's model does not reach"), "{said}");
+    assert!(run.told().has(5, "movel", Reason::OutOfReach), "{:?}", run.told());
     let new = run.text("p.script");
     for (k, (a, b)) in text.lines().zip(new.lines()).enumerate() {
         assert_eq!(a == b, ![1, 3, 5].contains(&k), "line {}: {b}", k + 1);
@@ -193,7 +201,7 @@ fn targets_beyond_the_limits_are_named_by_line_and_left() {
     let text = csv(&names.join(","), &table);
     let file = cell.write("targets.csv", text.as_bytes());
     let run = cell.compensate(&[&file], &["--joint-unit", "rad", "--unordered"]).expect(1);
-    let (said, new) = (run.said(), run.text("targets.csv"));
+    let (told, new) = (run.told(), run.text("targets.csv"));
     let mut left = 0;
     for (k, (a, b)) in text.lines().zip(new.lines()).enumerate().skip(1) {
         let row = k - 1;
@@ -202,12 +210,12 @@ fn targets_beyond_the_limits_are_named_by_line_and_left() {
             assert!(numbers(b).iter().zip(&limits).all(within), "line {}: {b}", k + 1);
         } else if row < 12 {
             left += 1;
-            let words = format!(":{} row {}: it would take {} at", k + 1, k + 1, names[row / 2]);
-            assert!(said.contains(&words), "{words}: {said}");
+            assert!(told.has(k + 1, &format!("row {}", k + 1), Reason::BeyondLimit), "{told:?}");
+            assert!(run.said().contains(&names[row / 2]), "{}", run.said());
         }
     }
-    assert!((2..=10).contains(&left), "{left}: {said}");
-    assert!(said.contains(&format!(":14 row 14: the program itself puts {}", names[1])), "{said}");
+    assert!((2..=10).contains(&left), "{left}: {told:?}");
+    assert!(told.has(14, "row 14", Reason::ProgramBeyondLimit), "{told:?}");
     assert_eq!(run.text("corrections.csv").lines().count(), 14);
 }
 
@@ -251,28 +259,33 @@ fn redundant_axes_stay_close_and_held_ones_stay() {
 fn bad_input_is_refused_with_its_line() {
     let cell = Cell::ur(10);
     let joints = cell.nominal.chain.readings.join(",");
-    for (name, text, words) in [
-        ("a.csv", format!("{joints}\n0,0,0,0,0,0\n0,0,0,0,x,0\n"), ["a.csv:3", "\"x\" is not a number"]),
-        ("b.csv", format!("{joints}\n0,0,0,0,0\n"), ["b.csv:2", "5 cells under 6"]),
-        ("c.csv", "a,b\n1,2\n".to_owned(), ["c.csv:1", "neither joint columns nor pose"]),
-        ("d.csv", joints.replace("wrist_3_joint", "wrist_joint_3") + "\n", ["d.csv:1", "no column \"wrist_3_joint\""]),
-        ("e.csv", "x_m,y_m,z_m,qx,qy,qz,qw\n0,0,0,1,1,1,1\n".to_owned(), ["e.csv:2", "norm 2"]),
-        ("f.script", "def f():\n movej([0.0, 0.1\nend\n".to_owned(), ["f.script:2", "not closed"]),
-        ("g.script", "x=1\nmovel(p[0.1,0.2,0.3], a=1)\n".to_owned(), ["g.script:2", "has 6 numbers, this one has 3"]),
-        ("h.script", "movej([0.1,0.2,0.3])\n".to_owned(), ["h.script:1", "3 joint values for the 6 joints"]),
-        ("i.script", "textmsg(\"a)\n".to_owned(), ["i.script:1", "does not end"]),
-        ("j.doc", "movej([0.1,0.2,0.3])\n".to_owned(), ["j.doc", "no language"]),
+    for (name, text, code, names) in [
+        ("a.csv", format!("{joints}\n0,0,0,0,0,0\n0,0,0,0,x,0\n"), Code::CsvNumber, ["a.csv:3", "\"x\""]),
+        ("b.csv", format!("{joints}\n0,0,0,0,0\n"), Code::CsvCellCount, ["b.csv:2", "5 cells under 6"]),
+        ("c.csv", "a,b\n1,2\n".to_owned(), Code::CsvColumnMissing, ["c.csv:1", "a, b"]),
+        (
+            "d.csv",
+            joints.replace("wrist_3_joint", "wrist_joint_3") + "\n",
+            Code::CsvColumnMissing,
+            ["d.csv:1", "\"wrist_3_joint\""],
+        ),
+        ("e.csv", "x_m,y_m,z_m,qx,qy,qz,qw\n0,0,0,1,1,1,1\n".to_owned(), Code::ProgramQuaternion, ["e.csv:2", " 2,"]),
+        ("f.script", "def f():\n movej([0.0, 0.1\nend\n".to_owned(), Code::ProgramSyntax, ["f.script:2", "["]),
+        ("g.script", "x=1\nmovel(p[0.1,0.2,0.3], a=1)\n".to_owned(), Code::ProgramTargets, ["g.script:2", "p[..]"]),
+        ("h.script", "movej([0.1,0.2,0.3])\n".to_owned(), Code::ProgramTargets, ["h.script:1", "3"]),
+        ("i.script", "textmsg(\"a)\n".to_owned(), Code::ProgramSyntax, ["i.script:1", "i.script"]),
+        ("j.doc", "movej([0.1,0.2,0.3])\n".to_owned(), Code::ProgramLanguage, ["j.doc", "--language"]),
     ] {
         let file = cell.write(name, text.as_bytes());
         let run = cell.compensate(&[&file], &["--joint-unit", "rad"]).expect(2);
-        assert!(words.iter().all(|w| run.said().contains(w)) && run.said().contains("try:"), "{name}: {}", run.said());
+        assert_says(&run.said(), code, &names);
         assert!(!run.out.exists());
     }
     let file = cell.write("k.csv", format!("{joints}\n0,0,0,0,0,0\n").as_bytes());
-    assert!(cell.compensate(&[&file], &[]).expect(2).said().contains("--joint-unit"));
+    assert_says(&cell.compensate(&[&file], &[]).expect(2).said(), Code::JointUnitMissing, &["--joint-unit"]);
     let folder = cell.folder.path().to_str().unwrap();
     let run = cell.compensate(&[&file], &["--joint-unit", "rad", "--out", folder]);
-    assert!(run.said().contains("cannot be used multiple times"), "{}", run.said());
+    assert!(run.output.status.code() == Some(2) && run.said().contains("--out"), "{}", run.said());
 }
 
 /// Ten thousand targets in under a second, by release code (the development profile is about three times slower).

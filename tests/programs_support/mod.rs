@@ -12,6 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use robotcal::geom::Pose;
 use robotcal::model::joint_terms::{JointTerm, Term};
 use robotcal::model::robot::{Posture, Robot};
+use robotcal::programs::Reason;
 use robotcal::urdf::{Chain, patch_origins, read};
 
 /// A nominal robot, and the real one as corrected URDF and compensation.toml.
@@ -159,6 +160,37 @@ impl Run {
 
     pub fn text(&self, name: &str) -> String {
         String::from_utf8(self.file(name)).unwrap()
+    }
+}
+
+/// What became of the targets of a call, by corrections.csv.
+#[derive(Debug)]
+pub struct Told {
+    pub corrected: usize,
+    /// Line, name and reason of the targets that stay as they are.
+    pub left: Vec<(usize, String, String)>,
+}
+
+impl Run {
+    pub fn told(&self) -> Told {
+        let text = self.text("corrections.csv");
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let headers = reader.headers().unwrap().clone();
+        let cell =
+            |row: &csv::StringRecord, name: &str| row[headers.iter().position(|h| h == name).unwrap()].to_owned();
+        let rows: Vec<csv::StringRecord> = reader.records().map(|r| r.unwrap()).collect();
+        let left = |row: &&csv::StringRecord| !cell(row, "reason").is_empty();
+        let of =
+            |row: &csv::StringRecord| (cell(row, "line").parse().unwrap(), cell(row, "target"), cell(row, "reason"));
+        let left: Vec<_> = rows.iter().filter(left).map(of).collect();
+        Told { corrected: rows.len() - left.len(), left }
+    }
+}
+
+impl Told {
+    /// True where the target of that line and name was left for that reason.
+    pub fn has(&self, line: usize, target: &str, reason: Reason) -> bool {
+        self.left.iter().any(|(l, t, r)| (*l, t.as_str(), r.as_str()) == (line, target, reason.name()))
     }
 }
 

@@ -77,7 +77,7 @@ fn a_joint_that_stands_still_is_named_with_what_to_do() {
         .iter()
         .find(|d| d.cause == Cause::Stops && d.parameters.iter().any(|(p, _)| *p == format!("{name}.gear")));
     let remedy = gear.unwrap().remedy.as_ref().unwrap();
-    assert!(remedy.contains(&format!("move {name}, which stands at 29 deg in all stops")), "{remedy}");
+    assert!(remedy.contains(name) && remedy.contains("29"), "{remedy}");
     assert!(found.next.iter().any(|a| a.joint == *name), "{:?}", found.next);
     // Joints that move through all of their range are known.
     let other = &robot.chain.readings[3];

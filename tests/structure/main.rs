@@ -3,5 +3,7 @@
 mod apart;
 mod architecture;
 mod circles;
+mod codes;
 mod imports;
 mod limits;
+mod sentences;

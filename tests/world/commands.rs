@@ -100,13 +100,14 @@ fn output_that_cannot_be_written_is_an_error() {
     let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
     let output = robotcal_into(full, &["show", &root("reports/kr6_small/solution.json")]);
     assert_eq!(output.status.code(), Some(2), "{}", text(&output));
-    assert!(text(&output).starts_with("error[output_failed]: stdout"), "{}", text(&output));
+    assert!(text(&output).starts_with("error[output_failed]: "), "{}", text(&output));
 }
 
 #[test]
 fn the_verdict_stands_first_and_the_flange_after_it() {
     let output = robotcal(&["show", &root("reports/kr6_small/solution.json")]);
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    // words: what stands first on the terminal is what is tested.
     assert!(said.starts_with("verdict   good\n"), "{said}");
     assert_eq!(said.lines().filter(|l| l.starts_with("verdict")).count(), 1);
 }

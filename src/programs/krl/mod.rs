@@ -9,6 +9,7 @@ use aggregate::{Aggregate, index};
 use super::Setting;
 use super::itinerary::Itinerary;
 use super::program::{Approach, Kind, Left, PoseTarget, Posture, Program, Target, Understood};
+use super::reason::{Reason, Why};
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
@@ -118,7 +119,8 @@ impl Module<'_> {
             if moves && let Some((_, count)) = MOVES.iter().find(|(name, _)| *name == word) {
                 self.motion(&mut reader, &word, *count)?;
             } else if moves && RELATIVE.contains(&word.as_str()) {
-                self.leave_at(reader.index, reader.line(), &word, "it is relative to the position before".into());
+                let why = Why::new(Reason::Relative, "it is relative to the position before");
+                self.leave_at(reader.index, reader.line(), &word, why);
             } else if moves && self.flow(&reader, &word) {
                 // Frames of a spline block hold for all of it.
                 if word == "SPLINE" {
@@ -207,13 +209,16 @@ impl Module<'_> {
                 Value::Aggregate(a) => return Ok((a, name)),
                 Value::Name(n) => {
                     name = Some(n.as_str());
-                    let missing = || format!("{n} is in none of the files (give its .dat, or $config.dat, as well)");
+                    let missing = || {
+                        let words = format!("{n} is in none of the files (give its .dat, or $config.dat, as well)");
+                        Why::of(n, Reason::Undeclared, words)
+                    };
                     value = self.values.get(n).ok_or_else(missing)?;
                 }
                 Value::Expression => break,
             }
         }
-        Err("its target is computed, not written in numbers".into())
+        Err(Why::computed())
     }
 
     fn frame(&self, value: &Value) -> FrameIs {
@@ -227,7 +232,10 @@ impl Module<'_> {
                 Some(frame) => FrameIs::Known(frame),
                 None => FrameIs::Unknown("not all of X, Y, Z, A, B, C are given".into()),
             },
-            Err(why) => FrameIs::Unknown(why.replace("its target", "it")),
+            Err(why) if why.reason == Reason::Computed => {
+                FrameIs::Unknown("it is computed, not written in numbers".into())
+            }
+            Err(why) => FrameIs::Unknown(why.words),
         }
     }
 
@@ -417,7 +425,7 @@ impl Module<'_> {
         true
     }
 
-    fn leave_at(&mut self, file: usize, line: usize, name: &str, why: String) {
+    fn leave_at(&mut self, file: usize, line: usize, name: &str, why: Why) {
         // Status and turn may mean another posture, but on a path of the tool it goes on.
         let same_posture = !name.starts_with("PTP") && !name.starts_with("SPTP");
         self.way.leave(Left { file, line, name: name.to_owned(), why }, same_posture);
@@ -458,7 +466,7 @@ impl Module<'_> {
         let clash = format!("{named} is used with different $TOOL or $BASE; give it a position for each");
         let (file, line) = place;
         let target = Target { file, line, name: named, approach: Approach::Unknown, visited: true, kind };
-        if self.way.visit(target) { Ok(()) } else { Err(clash) }
+        if self.way.visit(target) { Ok(()) } else { Err(Why::new(Reason::FramesDiffer, clash)) }
     }
 
     fn kind(&self, a: &Aggregate, tool: &FrameIs, base: &FrameIs) -> Understood<Kind> {
@@ -467,19 +475,23 @@ impl Module<'_> {
             return Ok(Kind::Joints(a.joints(axes, &self.prismatic)));
         }
         if !a.has(&POSE_NAMES) {
-            return Err("it has neither axes A1 to A6 nor components X to C".into());
+            let words = "it has neither axes A1 to A6 nor components X to C";
+            return Err(Why::new(Reason::NotATarget, words));
         }
-        let frame = |name: &str, is: &FrameIs, flag: Option<Pose>, flag_name: &str| match (is, flag) {
+        let frame = |reason, name: &str, is: &FrameIs, flag: Option<Pose>, flag_name: &str| match (is, flag) {
             (FrameIs::Known(pose), _) => Ok(*pose),
             (_, Some(pose)) => Ok(pose),
-            (FrameIs::Unknown(why), _) => Err(format!("{name} is not known: {why}, or give {flag_name}")),
-            (FrameIs::Unset, _) => Err(format!("{name} is not set before it; give {flag_name}")),
+            (FrameIs::Unknown(why), _) => {
+                Err(Why::new(reason, format!("{name} is not known: {why}, or give {flag_name}")))
+            }
+            (FrameIs::Unset, _) => Err(Why::new(reason, format!("{name} is not set before it; give {flag_name}"))),
         };
         Ok(Kind::Pose(Box::new(PoseTarget {
             position: a.position(),
             rotation: a.rotation(),
-            base_from_work: self.setting.base * frame("$BASE", base, self.setting.work, "--work")?,
-            flange_from_tool: frame("$TOOL", tool, self.setting.tool, "--tool")?,
+            base_from_work: self.setting.base
+                * frame(Reason::FrameUnknown, "$BASE", base, self.setting.work, "--work")?,
+            flange_from_tool: frame(Reason::ToolUnknown, "$TOOL", tool, self.setting.tool, "--tool")?,
             fixed: a.external(axes, &self.prismatic),
             posture: a.posture(axes),
             taught: None,
@@ -512,7 +524,8 @@ impl Module<'_> {
                 self.way.declare(Target { file, line, name: name.clone(), approach, visited: true, kind });
             });
             if let Err(why) = done {
-                self.leave_at(file, line, &name, format!("no motion of the files goes there, and {why}"));
+                let words = format!("no motion of the files goes there, and {}", why.words);
+                self.leave_at(file, line, &name, Why::new(Reason::Unvisited, words));
             }
         }
     }

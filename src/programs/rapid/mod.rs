@@ -12,12 +12,13 @@ use super::itinerary::Itinerary;
 use super::program::{
     Approach, Displaced, JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, Understood,
 };
+use super::reason::{Reason, Why};
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
-use value::{Displacement, Node, frame, node, numbers};
+use value::{Displacement, Node, computed, frame, node, numbers, undeclared};
 
 const DIALECT: Dialect = Dialect { comment: b'!', quotes: b"\"", header: None, based_numbers: false };
 /// Beginnings of the names of instructions that move the robot to their first arguments.
@@ -282,7 +283,7 @@ impl Task<'_> {
         for k in 0..count {
             let done = match plain[k] {
                 true => self.visit(&arguments[k], &name, (reader.index, line), &tool, work.as_ref())?,
-                false => Err("its target is computed, not written in numbers".to_owned()),
+                false => Err(Why::computed()),
             };
             if let Err(why) = done {
                 self.leave((reader.index, line), &name, why);
@@ -306,7 +307,7 @@ impl Task<'_> {
         rest.iter().filter_map(word).find(is_tool).or_else(|| rest.get(2).and_then(word))
     }
 
-    fn leave(&mut self, (file, line): (usize, usize), name: &str, why: String) {
+    fn leave(&mut self, (file, line): (usize, usize), name: &str, why: Why) {
         // Confdata may mean another posture, but on a path of the tool it goes on.
         let upper = name.to_ascii_uppercase();
         let same_posture =
@@ -334,10 +335,10 @@ impl Task<'_> {
             }
             Node::Word(word) => match self.data.get(word) {
                 Some(Datum { value: Some(value), file, line, .. }) => (value.clone(), (*file, *line), word.clone()),
-                Some(_) => return Ok(Err(format!("{word} is computed, not written in numbers"))),
-                None => return Ok(Err(format!("{word} is in none of the files (give its module as well)"))),
+                Some(_) => return Ok(Err(computed(word))),
+                None => return Ok(Err(undeclared(word))),
             },
-            _ => return Ok(Err("its target is computed, not written in numbers".into())),
+            _ => return Ok(Err(Why::computed())),
         };
         let kind = self.kind(&value, place.0, tool.as_deref(), work);
         Ok(kind.and_then(|kind| self.add(named, place, self.with_posture(kind, name))))
@@ -367,16 +368,21 @@ impl Task<'_> {
         work: Option<&Node>,
     ) -> Understood<()> {
         let point = &displaced.point;
-        let by = displaced.by.clone().ok_or("its displacement is computed, not written in numbers")?;
+        let by = displaced
+            .by
+            .clone()
+            .ok_or_else(|| Why::new(Reason::Computed, "its displacement is computed, not written in numbers"))?;
         let (value, file, line) = match self.data.get(point) {
             Some(Datum { value: Some(value), file, line, .. }) => (value.clone(), *file, *line),
-            Some(_) => return Err(format!("{point} is computed, not written in numbers")),
-            None => return Err(format!("{point} is in none of the files (give its module as well)")),
+            Some(_) => return Err(computed(point)),
+            None => return Err(undeclared(point)),
         };
         let base = self.kind(&value, file, tool, work)?;
         let base = self.with_posture(base, name);
         let place = (file, base.first_byte());
-        let Kind::Pose(mut pose) = base.clone() else { return Err(format!("{point} is no robtarget")) };
+        let Kind::Pose(mut pose) = base.clone() else {
+            return Err(Why::of(point, Reason::NotATarget, format!("{point} is no robtarget")));
+        };
         let field = |(written, range): (f64, Range<usize>), si: f64, decimals: usize| Field {
             file: displaced.file,
             place: Place::At(range),
@@ -399,7 +405,8 @@ impl Task<'_> {
         });
         let index = self.way.program.targets.len();
         let words = if displaced.of_tool { "RelTool" } else { "Offs" };
-        self.add(format!("{words}({point})"), from, Kind::Pose(pose))?;
+        self.add(format!("{words}({point})"), from, Kind::Pose(pose))
+            .map_err(|why| Why { about: Some(point.clone()), ..why })?;
         // Its posture is that of the displaced point, where nothing else tells it.
         let approach = Approach::Beyond(index);
         let target = Target { file, line, name: point.clone(), approach, visited: false, kind: base };
@@ -409,17 +416,20 @@ impl Task<'_> {
 
     fn add(&mut self, name: String, (file, line): (usize, usize), kind: Kind) -> Understood<()> {
         let clash = format!("{name} is used with different tools or work objects; give it a robtarget for each");
+        let named = name.clone();
         let target = Target { file, line, name, approach: Approach::Unknown, visited: true, kind };
-        if self.way.visit(target) { Ok(()) } else { Err(clash) }
+        if self.way.visit(target) { Ok(()) } else { Err(Why::of(&named, Reason::FramesDiffer, clash)) }
     }
 
     fn kind(&self, value: &Node, file: usize, tool: Option<&str>, work: Option<&Node>) -> Understood<Kind> {
-        let Node::List(parts) = value else { return Err("it is no robtarget and no jointtarget".into()) };
+        let Node::List(parts) = value else {
+            return Err(Why::new(Reason::NotATarget, "it is no robtarget and no jointtarget"));
+        };
         let external = parts.last().and_then(numbers::<6>).unwrap_or_default();
         if parts.len() == 2 {
             return Ok(Kind::Joints(self.joints(&parts[0], &external, file)?));
         }
-        let computed = || "it is computed, not written in numbers".to_owned();
+        let computed = || Why::new(Reason::Computed, "it is computed, not written in numbers");
         let trans = numbers::<3>(&parts[0]).ok_or_else(computed)?;
         let [w, x, y, z] = numbers::<4>(&parts[1]).ok_or_else(computed)?;
         let cf = numbers::<4>(&parts[2]).ok_or_else(computed)?;
@@ -464,7 +474,8 @@ impl Task<'_> {
     }
 
     fn joints(&self, axes: &Node, external: &[(f64, Range<usize>); 6], file: usize) -> Understood<JointTarget> {
-        let values = numbers::<6>(axes).ok_or("it is computed, not written in numbers")?;
+        let values =
+            numbers::<6>(axes).ok_or_else(|| Why::new(Reason::Computed, "it is computed, not written in numbers"))?;
         let n = self.setting.axes.len();
         let mut target = JointTarget { readings: vec![f64::NAN; n], fields: vec![None; n] };
         for (&reading, (written, range)) in self.setting.axes.iter().zip(values.iter().chain(external)) {
@@ -479,24 +490,30 @@ impl Task<'_> {
         Ok(target)
     }
 
-    fn datum(&self, name: &str, kind: &str, flag: &str) -> Understood<&Node> {
+    fn datum(&self, name: &str, kind: &str, flag: &str, reason: Reason) -> Understood<&Node> {
         let of_kind = self.data.get(name).filter(|d| d.kind == kind);
-        let missing = || format!("{name} is not written in numbers in the files (give its module as well, or {flag})");
+        let missing = || {
+            let words = format!("{name} is not written in numbers in the files (give its module as well, or {flag})");
+            Why::new(reason, words)
+        };
         of_kind.and_then(|d| d.value.as_ref()).ok_or_else(missing)
     }
 
     fn tool(&self, name: Option<&str>) -> Understood<Pose> {
         let read = || {
-            let name = name.ok_or("its tool is not named; give --tool")?;
+            let unknown = |words: String| Why::new(Reason::ToolUnknown, words);
+            let name = name.ok_or_else(|| unknown("its tool is not named; give --tool".into()))?;
             if name == "TOOL0" {
                 return Ok(Pose::identity());
             }
-            let Node::List(parts) = self.datum(name, "TOOLDATA", "--tool")? else { return Err(String::new()) };
+            let numbers = || unknown(format!("{name} is not written in numbers"));
+            let found = self.datum(name, "TOOLDATA", "--tool", Reason::ToolUnknown)?;
+            let Node::List(parts) = found else { return Err(numbers()) };
             match parts.first() {
                 Some(Node::Word(w)) if w == "TRUE" => {}
-                _ => return Err(format!("{name} is a tool fixed in the room")),
+                _ => return Err(unknown(format!("{name} is a tool fixed in the room"))),
             }
-            parts.get(1).and_then(frame).ok_or_else(|| format!("{name} is not written in numbers"))
+            parts.get(1).and_then(frame).ok_or_else(numbers)
         };
         read().or_else(|why| self.setting.tool.ok_or(why))
     }
@@ -506,16 +523,18 @@ impl Task<'_> {
             None => return Ok(self.setting.work.unwrap_or_else(Pose::identity)),
             Some(Node::Word(name)) if name == "WOBJ0" => return Ok(Pose::identity()),
             Some(Node::Word(name)) => name,
-            Some(_) => return Err("its work object is computed".into()),
+            Some(_) => return Err(Why::new(Reason::FrameUnknown, "its work object is computed")),
         };
         let read = || {
-            let Node::List(parts) = self.datum(name, "WOBJDATA", "--work")? else { return Err(String::new()) };
+            let unknown = |words: &str| Why::new(Reason::FrameUnknown, format!("{name} {words}"));
+            let found = self.datum(name, "WOBJDATA", "--work", Reason::FrameUnknown)?;
+            let Node::List(parts) = found else { return Err(unknown("is not written in numbers")) };
             match (parts.first(), parts.get(1)) {
                 (Some(Node::Word(held)), Some(Node::Word(fixed))) if held == "FALSE" && fixed == "TRUE" => {}
-                _ => return Err(format!("{name} is held by the robot or moved by a unit")),
+                _ => return Err(unknown("is held by the robot or moved by a unit")),
             }
             let frames = parts.get(3).and_then(frame).zip(parts.get(4).and_then(frame));
-            frames.map(|(user, object)| user * object).ok_or_else(|| format!("{name} is not written in numbers"))
+            frames.map(|(user, object)| user * object).ok_or_else(|| unknown("is not written in numbers"))
         };
         read().or_else(|why| self.setting.work.ok_or(why))
     }
@@ -526,7 +545,7 @@ impl Task<'_> {
         for (name, datum) in all.into_iter().filter(|(_, d)| d.kind.ends_with("TARGET")) {
             let seen =
                 self.way.program.targets.iter().any(|t| t.file == datum.file && t.line == datum.line && t.name == name);
-            let known = self.way.program.left.iter().any(|l| l.why.contains(&name));
+            let known = self.way.program.left.iter().any(|l| l.why.about.as_deref() == Some(&name));
             let Some(value) = datum.value.filter(|_| !seen && (!known || self.bases.contains_key(&name))) else {
                 continue;
             };
@@ -540,7 +559,8 @@ impl Task<'_> {
                 self.way.declare(Target { file, line, name: name.clone(), approach, visited: true, kind });
             });
             if let Err(why) = done {
-                self.leave(place, &name, format!("no move of the files goes there, and {why}"));
+                let words = format!("no move of the files goes there, and {}", why.words);
+                self.leave(place, &name, Why::new(Reason::Unvisited, words));
             }
         }
         Ok(())

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
+use crate::programs::reason::{Reason, Why};
 use crate::programs::scan::Reader;
 
 /// `[..]` with what is in it.
@@ -135,4 +136,14 @@ pub(super) fn frame(node: &Node) -> Option<Pose> {
     let trans = numbers::<3>(trans)?.map(|(v, _)| 1e-3 * v);
     let [w, x, y, z] = numbers::<4>(rot)?.map(|(v, _)| v);
     Some(Pose::from_xyz_quaternion(trans, [x, y, z, w]))
+}
+
+/// A declared name whose value is computed.
+pub(super) fn computed(name: &str) -> Why {
+    Why::of(name, Reason::Computed, format!("{name} is computed, not written in numbers"))
+}
+
+/// A name that none of the files declares.
+pub(super) fn undeclared(name: &str) -> Why {
+    Why::of(name, Reason::Undeclared, format!("{name} is in none of the files (give its module as well)"))
 }
