@@ -142,6 +142,15 @@ fn searches_for_words(text: &str) -> Vec<(usize, &str)> {
             }
         }
     }
+    // What a list of names must hold is searched for as well.
+    for (at, call) in text.match_indices("assert_says(") {
+        let Some(close) = closing(text, at + call.len() - 1) else { continue };
+        let list = text[at..close].rsplit("&[").next().unwrap_or("");
+        if list.split('"').skip(1).step_by(2).any(|literal| words(literal) > 1) {
+            let line = text[..at].matches('\n').count();
+            found.push((line, text.lines().nth(line).unwrap_or("").trim()));
+        }
+    }
     found.sort_unstable();
     found.dedup();
     found
@@ -187,7 +196,9 @@ fn an_assertion_on_words_is_seen() {
         assert!(names.contains("image") && n.starts_with("plate"));
         assert!(error.remedy.contains("--joint-unit") && chosen.contains(&index));
         assert!((0.5..2.0).contains(&ratio), "the ratio is {ratio}");
+        assert_says(&error, Code::CsvNumber, &["joints.csv:5", "is not a number"]);
+        assert_says(&error, Code::CsvNumber, &["joints.csv:5", "marker 4"]);
     "#;
     let found: Vec<usize> = searches_for_words(text).into_iter().map(|(line, _)| line).collect();
-    assert_eq!(found, [1, 2, 3, 4, 5, 6, 7]);
+    assert_eq!(found, [1, 2, 3, 4, 5, 6, 7, 12]);
 }
