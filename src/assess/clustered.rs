@@ -42,7 +42,7 @@ pub fn clustered_covariance(linear: LinearProblem, limits: &Limits) -> Option<Cl
         return None;
     }
     let n = linear.adjustment.problem.layout.len();
-    let TellingStops { stops, free, prior, information } = TellingStops::of(linear);
+    let StopInformation { stops, free, prior, information } = StopInformation::of(linear);
     let model = SymmetricFactor::new(&information).ok()?.inverse();
     let by_prior = &model * DMatrix::from_diagonal(&prior);
     let mut sandwich = product(&by_prior, &by_prior.transpose());
@@ -64,9 +64,9 @@ pub fn clustered_covariance(linear: LinearProblem, limits: &Limits) -> Option<Cl
 
 /// What all stops tell of the free columns together, markers known and joint noise eliminated.
 #[derive(Debug, Clone)]
-pub struct TellingStops {
+pub struct StopInformation {
     /// The stops.
-    pub stops: Vec<Told>,
+    pub stops: Vec<RootInformation>,
     /// Free columns.
     free: Vec<usize>,
     /// Inverse prior sigma of each.
@@ -75,7 +75,7 @@ pub struct TellingStops {
     pub information: DMatrix<f64>,
 }
 
-impl TellingStops {
+impl StopInformation {
     /// At a linearised fit.
     pub fn of(linear: LinearProblem) -> Self {
         let layout = &linear.adjustment.problem.layout;
@@ -83,7 +83,8 @@ impl TellingStops {
         let free: Vec<usize> = (0..columns.len()).filter(|&c| columns[c].free).collect();
         let prior = DVector::from_iterator(free.len(), free.iter().map(|&c| columns[c].prior_sigma.recip()));
         let mut information = DMatrix::from_diagonal(&prior.component_mul(&prior));
-        let stops: Vec<Told> = linear.stops().filter_map(|stop| Told::of(&stop, layout, &free)).collect();
+        let stops: Vec<RootInformation> =
+            linear.stops().filter_map(|stop| RootInformation::of(&stop, layout, &free)).collect();
         for d in stops.iter().map(|told| &told.by_free) {
             information += product(&d.transpose(), d);
         }
@@ -93,7 +94,7 @@ impl TellingStops {
 
 /// What the images of one stop tell.
 #[derive(Debug, Clone)]
-pub struct Told {
+pub struct RootInformation {
     /// Places of its images among those in use.
     pub places: Range<usize>,
     /// `R^-1 b`.
@@ -104,7 +105,7 @@ pub struct Told {
     pub by_free: DMatrix<f64>,
 }
 
-impl Told {
+impl RootInformation {
     fn of(stop: &LinearStop, layout: &Layout, free: &[usize]) -> Option<Self> {
         let (n, size) = (stop.unknowns(), 6 + E);
         let images: Vec<SeenAtStop> = stop.images().map(|own| (own.terms, own.by_latents(n))).collect();

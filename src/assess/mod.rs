@@ -1,4 +1,4 @@
-//! What a result is worth: hold-out, identifiability, points of another device.
+//! How far a result can be trusted: hold-out, identifiability, points of another device.
 
 mod advice;
 mod clustered;
@@ -14,10 +14,10 @@ mod propagate;
 mod statistics;
 mod stops;
 mod truth;
-mod worth;
+mod uncertainty;
 
 pub use advice::Advice;
-pub use clustered::{Clustered, TellingStops, Told, clustered_covariance};
+pub use clustered::{Clustered, RootInformation, StopInformation, clustered_covariance};
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
 pub use hold_out::{
     Accuracy, Errors, ImageError, Refit, cluster_of_images, folds, hold_out, hold_out_images, predict_image, refitted,
@@ -36,4 +36,4 @@ pub use propagate::{PredictedPose, View, predict_pose};
 pub use statistics::{Ratio, bootstrap_ratio, by_cluster, median, root_mean_square};
 pub use stops::{Structural, ideal_stops, minimal_set, structural};
 pub use truth::{camera_errors_m, flange_error_m};
-pub use worth::{NORMAL_95, Worth, judge, still, stops};
+pub use uncertainty::{NORMAL_95, Uncertainty, judge, still, stops};

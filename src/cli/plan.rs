@@ -23,10 +23,10 @@ use crate::plan::refine::USUAL_ROUNDS;
 use crate::plan::scene::{self, SceneOptions, arm_length_m};
 use crate::plan::setting::{PlannedStop, Setting};
 use crate::plan::viewpoint::ViewRange;
-use crate::plan::visibility::SightLimits;
+use crate::plan::visibility::VisibilityLimits;
 use crate::plan::{
-    Budget, Forecast, PlaceForecast, Plan, PlanRequest, Wish, check_wish, choose, compare_places, forecast, image_name,
-    place_words, plan,
+    Budget, Demand, Forecast, PlaceForecast, Plan, PlanRequest, check_demand, choose, compare_places, forecast,
+    image_name, place_words, plan,
 };
 use crate::series::{CameraMount, Stops, read_plate};
 use crate::simulate::typical_camera;
@@ -195,7 +195,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
         words.extend(place_words(&compare_places(&request, &plan)?));
     }
     forecast.words.extend(words);
-    check_wish(&request, &forecast)?;
+    check_demand(&request, &forecast)?;
     let command: Vec<String> = super::command_line().into_iter().skip(1).collect();
     let command = format!("robotcal {}", command.join(" "));
     let mut more = plan_programs::programs(&request, &plan);
@@ -312,7 +312,7 @@ fn check(args: &PlanArgs) -> Result<()> {
 }
 
 fn request(args: &PlanArgs, chain: Chain) -> Result<PlanRequest> {
-    let wish = wish(args, &chain)?;
+    let demand = demand(args, &chain)?;
     let (setting, taken) = setting(args, chain)?;
     let boxes = args.r#box.iter().map(|text| {
         let v = numbers("--box", text, 6, "give middle and edges: x,y,z,a,b,c in m")?;
@@ -323,7 +323,7 @@ fn request(args: &PlanArgs, chain: Chain) -> Result<PlanRequest> {
     Ok(PlanRequest {
         taken,
         count: args.count,
-        wish,
+        demand,
         budget: Budget {
             most_per_placement: args.per_placement,
             least_per_placement: None,
@@ -338,7 +338,7 @@ fn request(args: &PlanArgs, chain: Chain) -> Result<PlanRequest> {
                 tilt_rad,
                 ..ViewRange::default()
             },
-            sight: SightLimits {
+            sight: VisibilityLimits {
                 least_markers: args.markers,
                 incidence_rad: (tilt_rad + 0.35).min(1.4),
                 focus_m: args.focus_m.map_or((0.0, f64::INFINITY), |[a, b]| (a, b)),
@@ -359,14 +359,14 @@ fn request(args: &PlanArgs, chain: Chain) -> Result<PlanRequest> {
     })
 }
 
-fn wish(args: &PlanArgs, chain: &Chain) -> Result<Wish> {
+fn demand(args: &PlanArgs, chain: &Chain) -> Result<Demand> {
     if let Some(path) = &args.targets {
-        return Ok(Wish::Targets(targets(path, chain)?));
+        return Ok(Demand::Targets(targets(path, chain)?));
     }
     Ok(match (args.d_optimal, args.parameters.is_empty()) {
-        (true, _) => Wish::Parameters,
-        (_, false) => Wish::Named(args.parameters.clone()),
-        _ => Wish::Workspace,
+        (true, _) => Demand::Parameters,
+        (_, false) => Demand::Named(args.parameters.clone()),
+        _ => Demand::Workspace,
     })
 }
 

@@ -91,7 +91,7 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     limited(
         out,
         "start",
-        r.starts.iter().filter(|v| v.won).map(|v| format!("{}: {} ({})", v.of, v.origin, v.verdict)),
+        r.starts.iter().filter(|v| v.won).map(|v| format!("{}: {} ({})", v.of, v.origin, v.reached)),
     )?;
     cameras(out, r)?;
     writeln!(
@@ -356,7 +356,7 @@ fn gauge(found: &Identifiability) -> String {
     match (of(Cause::Base), of(Cause::Tip)) {
         (base, tip) if base.is_empty() && tip.is_empty() => "no freedom is left between robot, plate and camera".into(),
         (base, tip) => format!(
-            "{} cannot be told from the pose of the plate, {} not from that of the camera: they need not be",
+            "{} cannot be separated from the pose of the plate, {} not from that of the camera: they need not be",
             if base.is_empty() { "nothing" } else { &base },
             if tip.is_empty() { "nothing" } else { &tip }
         ),
@@ -380,7 +380,7 @@ fn identifiability(out: &mut String, found: &Identifiability, who: &str, most: u
     at_most(
         most,
         out,
-        "untold",
+        "unknown",
         by_stops.map(|d| format!("{}: {}", direction(d), d.remedy.as_deref().unwrap_or("more stops"))),
     )?;
     at_most(

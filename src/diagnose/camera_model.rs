@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject};
+use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
 use crate::problem::Problem;
 
@@ -13,7 +13,7 @@ pub struct CameraModelMisfit {
     pub rms_px: f64,
 }
 
-pub(super) fn check(_: &Problem, setting: &Setting) -> Option<CameraModelMisfit> {
+pub(super) fn check(_: &Problem, setting: &CheckContext) -> Option<CameraModelMisfit> {
     let rms_px = setting.free.rms_px;
     (rms_px > setting.limits.free_rms_px).then_some(CameraModelMisfit { rms_px })
 }

@@ -1,12 +1,12 @@
 //! The table of checks: at which stage each runs, and what its findings explain away.
 
 use super::finding::Finding;
-use super::kind::{Setting, Weight};
+use super::kind::{CheckContext, Weight};
 use super::{
     camera_model, few_images, focus, joint_noise, left_out_images, left_out_observations, loose, marker_off, moved,
-    no_gain, parameter_off, plate_size, scatter, shift, undetermined,
+    no_gain, parameter_off, plate_size, pose_step, scatter, undetermined,
 };
-use crate::assess::{Accuracy, Worth};
+use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
 use crate::fit::Fit;
 use crate::problem::{Adjustment, Problem};
@@ -15,13 +15,13 @@ use crate::problem::{Adjustment, Problem};
 #[derive(Clone, Copy)]
 pub enum Stage {
     /// After the stand-alone camera poses.
-    FreePoses(fn(&Problem, &Setting) -> Vec<Finding>),
+    FreePoses(fn(&Problem, &CheckContext) -> Vec<Finding>),
     /// After wrong pairs and outliers were left out.
-    LeftOut(fn(&Adjustment, &Setting) -> Vec<Finding>),
+    LeftOut(fn(&Adjustment, &CheckContext) -> Vec<Finding>),
     /// After the fit, with the accuracy on images that it had not seen.
-    Fit(fn(&Fit, &Accuracy, &Setting) -> Vec<Finding>),
-    /// After it is known what the result is worth.
-    Worth(fn(&Worth, &Accuracy, &Setting) -> Vec<Finding>),
+    Fit(fn(&Fit, &Accuracy, &CheckContext) -> Vec<Finding>),
+    /// After it is known how far the result can be trusted.
+    Uncertainty(fn(&Uncertainty, &Accuracy, &CheckContext) -> Vec<Finding>),
 }
 
 /// One check.
@@ -51,7 +51,7 @@ pub const CHECKS: [Check; 15] = [
             (Finding::Displaced(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             _ => false,
         },
-        ..check("shift", Stage::Fit(|a, b, s| found(shift::check(a, b, s))))
+        ..check("pose_step", Stage::Fit(|a, b, s| found(pose_step::check(a, b, s))))
     },
     Check {
         // Another focal length looks like a plate that stands elsewhere.
@@ -69,25 +69,25 @@ pub const CHECKS: [Check; 15] = [
     check("moved", Stage::LeftOut(|a, s| found(moved::check(a, s)))),
     check("marker_off", Stage::Fit(|a, b, s| found(marker_off::check(a, b, s)))),
     check("parameter_off", Stage::Fit(|a, b, s| found(parameter_off::check(a, b, s)))),
-    check("scatter", Stage::Worth(|a, b, s| found(scatter::check(a, b, s)))),
-    check("undetermined", Stage::Worth(|a, b, s| found(undetermined::check(a, b, s)))),
+    check("scatter", Stage::Uncertainty(|a, b, s| found(scatter::check(a, b, s)))),
+    check("undetermined", Stage::Uncertainty(|a, b, s| found(undetermined::check(a, b, s)))),
 ];
 
 /// What the checks have found so far.
 pub struct Diagnosis<'a> {
-    setting: Setting<'a>,
+    setting: CheckContext<'a>,
     /// Findings of every row of [`CHECKS`].
     found: [Vec<Finding>; CHECKS.len()],
 }
 
 impl<'a> Diagnosis<'a> {
     /// Nothing is found yet.
-    pub fn new(setting: Setting<'a>) -> Self {
+    pub fn new(setting: CheckContext<'a>) -> Self {
         Self { setting, found: Default::default() }
     }
 
     /// Runs the checks of a stage in their order.
-    fn run(&mut self, of_stage: impl Fn(&Stage, &Setting) -> Option<Vec<Finding>>) {
+    fn run(&mut self, of_stage: impl Fn(&Stage, &CheckContext) -> Option<Vec<Finding>>) {
         for (row, check) in CHECKS.iter().enumerate() {
             let Some(mut found) = of_stage(&check.stage, &self.setting) else { continue };
             found.retain(|f| !self.is_explained(f));
@@ -127,10 +127,10 @@ impl<'a> Diagnosis<'a> {
         });
     }
 
-    /// Checks of what the result is worth.
-    pub fn after_worth(&mut self, worth: &Worth, accuracy: &Accuracy) {
+    /// Checks of how far the result can be trusted.
+    pub fn after_uncertainty(&mut self, uncertainty: &Uncertainty, accuracy: &Accuracy) {
         self.run(|stage, setting| match stage {
-            Stage::Worth(check) => Some(check(worth, accuracy, setting)),
+            Stage::Uncertainty(check) => Some(check(uncertainty, accuracy, setting)),
             _ => None,
         });
     }

@@ -1,4 +1,4 @@
-//! The finding that a plate or a camera stands elsewhere in some of the images; [`super::shift`] looks for it.
+//! The finding that a plate or a camera stands elsewhere in some of the images; [`super::pose_step`] looks for it.
 
 use std::fmt;
 

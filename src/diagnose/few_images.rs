@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::Accuracy;
 use crate::error::{Code, Notice};
 use crate::fit::Fit;
@@ -14,7 +14,7 @@ pub struct FewImages {
     pub images: usize,
 }
 
-pub(super) fn check(_: &Fit, _: &Accuracy, setting: &Setting) -> Option<FewImages> {
+pub(super) fn check(_: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<FewImages> {
     let images = setting.on_robot;
     (images < setting.limits.few_images).then_some(FewImages { images })
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use nalgebra::SVector;
 
-use super::kind::{Kind, Quantity, Setting, Subject};
+use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
 use crate::problem::{E, ImageTerms, Problem};
 
@@ -34,7 +34,7 @@ fn vote(terms: &ImageTerms, fx: f64, fy: f64, least_information: f64) -> Option<
 }
 
 /// The most significant change along the order of the images of a camera; of the first camera that has one.
-pub(super) fn check(problem: &Problem, setting: &Setting) -> Option<FocusChange> {
+pub(super) fn check(problem: &Problem, setting: &CheckContext) -> Option<FocusChange> {
     let (free, limits) = (setting.free, setting.limits);
     for (camera, name) in problem.cameras.iter().enumerate() {
         let p = &free.state.cameras[camera].parameters;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject, Weight, some_of};
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::assess::{Accuracy, median};
 use crate::error::{Code, Notice};
 use crate::fit::Fit;
@@ -37,7 +37,7 @@ pub struct JointNoiseLarge {
     pub weight: Weight,
 }
 
-pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &Setting) -> Vec<JointNoiseLarge> {
+pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> Vec<JointNoiseLarge> {
     let limits = setting.limits;
     let of_series = |(k, of): (usize, &crate::problem::MeasuredSeries)| {
         let (joint, sigma) = noisiest_joint(fit, k)?;

@@ -11,7 +11,7 @@ use crate::problem::MeasuredSeries;
 
 /// What every check may look at.
 #[derive(Clone, Copy)]
-pub struct Setting<'a> {
+pub struct CheckContext<'a> {
     /// The series as measured.
     pub series: &'a [MeasuredSeries],
     /// The stand-alone camera poses.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 use crate::problem::{Adjustment, ImageRejection};
 
@@ -19,7 +19,7 @@ pub struct ImagesLeftOut {
     pub weight: Weight,
 }
 
-pub(super) fn check(adjustment: &Adjustment, setting: &Setting) -> Option<ImagesLeftOut> {
+pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<ImagesLeftOut> {
     let (problem, on_robot) = (&adjustment.problem, setting.on_robot);
     let left_out = on_robot - problem.used_on_robot().count();
     let share = |limit: f64| left_out as f64 > limit * on_robot as f64;

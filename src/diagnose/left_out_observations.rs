@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject};
+use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
 use crate::problem::Adjustment;
 
@@ -15,7 +15,7 @@ pub struct ObservationsLeftOut {
     pub worst: (String, f64),
 }
 
-pub(super) fn check(adjustment: &Adjustment, setting: &Setting) -> Option<ObservationsLeftOut> {
+pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<ObservationsLeftOut> {
     let (mut out, mut all, mut worst) = (0, 0, (0.0, ""));
     for (_, image) in adjustment.problem.used() {
         let (n, rejected) = (image.observations.len(), image.observations.len() - image.used().count());

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject, some_of};
+use super::kind::{CheckContext, Kind, Quantity, Subject, some_of};
 use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
 use crate::fit::Fit;
@@ -68,7 +68,7 @@ fn split(values: &[f64], fewest: usize) -> Option<Split> {
 }
 
 /// Every mounting whose camera turned between two positions.
-pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &Setting) -> Vec<LooseMounting> {
+pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<LooseMounting> {
     let mountings = 0..fit.problem.mountings.len();
     mountings.filter_map(|m| loose(fit, m, setting.limits)).collect()
 }

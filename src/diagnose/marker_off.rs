@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::Accuracy;
 use crate::error::{Code, Notice};
 use crate::fit::Fit;
@@ -16,7 +16,7 @@ pub struct MarkerOff {
     pub distance_m: f64,
 }
 
-pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &Setting) -> Vec<MarkerOff> {
+pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<MarkerOff> {
     let plates = fit.problem.plates.iter().zip(&fit.state.plates);
     let markers = plates.flat_map(|(plate, shape)| plate.markers.iter().zip(&shape.corrections));
     markers

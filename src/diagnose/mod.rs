@@ -21,8 +21,9 @@ mod no_gain;
 mod noticed;
 mod parameter_off;
 mod plate_size;
+mod pose_step;
 mod scatter;
-mod shift;
+
 mod undetermined;
 
 pub use camera_model::CameraModelMisfit;
@@ -32,7 +33,7 @@ pub use few_images::FewImages;
 pub use finding::Finding;
 pub use focus::FocusChange;
 pub use joint_noise::{ImageValue, JointNoiseLarge};
-pub use kind::{Quantity, Setting, Subject, Weight};
+pub use kind::{CheckContext, Quantity, Subject, Weight};
 pub use left_out_images::ImagesLeftOut;
 pub use left_out_observations::ObservationsLeftOut;
 pub use lens_not_in_ros::LensNotInRos;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject};
+use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
 use crate::geom::Pose;
 use crate::init::PosePair;
@@ -32,13 +32,13 @@ pub enum MovedBody {
     Camera,
 }
 
-pub(super) fn check(adjustment: &Adjustment, setting: &Setting) -> Vec<Moved> {
+pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<Moved> {
     let series = 0..setting.series.len();
     series.filter_map(|k| find_move(adjustment, setting, k)).collect()
 }
 
 /// Looks for one common new place among the wrongly paired images of a series.
-fn find_move(Adjustment { problem, state }: &Adjustment, setting: &Setting, series: usize) -> Option<Moved> {
+fn find_move(Adjustment { problem, state }: &Adjustment, setting: &CheckContext, series: usize) -> Option<Moved> {
     let free = setting.free;
     let mut wrong: Vec<(usize, PosePair)> = Vec::new();
     for (i, image) in problem.images.iter().enumerate().filter(|(_, image)| image.series == series) {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject};
+use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::assess::Accuracy;
 use crate::error::Code;
 use crate::fit::Fit;
@@ -16,7 +16,7 @@ pub struct NoGain {
     pub nominal_mm: f64,
 }
 
-pub(super) fn check(_: &Fit, accuracy: &Accuracy, _: &Setting) -> Option<NoGain> {
+pub(super) fn check(_: &Fit, accuracy: &Accuracy, _: &CheckContext) -> Option<NoGain> {
     let found = NoGain { calibrated_mm: accuracy.calibrated.rms_mm, nominal_mm: accuracy.nominal.rms_mm };
     (found.calibrated_mm > found.nominal_mm).then_some(found)
 }

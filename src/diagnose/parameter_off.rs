@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::Accuracy;
 use crate::error::{Code, Notice};
 use crate::fit::Fit;
@@ -20,7 +20,7 @@ pub struct ParameterOff {
     pub usual_deviations: f64,
 }
 
-pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &Setting) -> Vec<ParameterOff> {
+pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<ParameterOff> {
     let problem = &fit.problem;
     let values = fit.state.values(&problem.layout);
     let of_column = |c: usize| {

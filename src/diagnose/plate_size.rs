@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject};
+use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::assess::{Accuracy, refitted};
 use crate::error::Code;
 use crate::fit::Fit;
@@ -34,7 +34,7 @@ pub enum DoubtedSize {
     },
 }
 
-pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &Setting) -> Vec<DoubtedSize> {
+pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<DoubtedSize> {
     let Adjustment { problem, state } = &fit.adjustment;
     let limits = setting.limits;
     let mut doubts = Vec::new();

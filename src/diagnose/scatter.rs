@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject, Weight};
-use crate::assess::{Accuracy, Worth};
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Code, Notice};
 
 /// The images scatter more than the noise model says.
@@ -13,8 +13,8 @@ pub struct LargeScatter {
     pub ratio: f64,
 }
 
-pub(super) fn check(worth: &Worth, _: &Accuracy, _: &Setting) -> Option<LargeScatter> {
-    let ratio = worth.clustered_ratio.filter(|_| worth.larger_stated);
+pub(super) fn check(uncertainty: &Uncertainty, _: &Accuracy, _: &CheckContext) -> Option<LargeScatter> {
+    let ratio = uncertainty.clustered_ratio.filter(|_| uncertainty.larger_stated);
     ratio.map(|ratio| LargeScatter { ratio })
 }
 

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Setting, Subject};
-use crate::assess::{Accuracy, Worth, median};
+use super::kind::{CheckContext, Kind, Quantity, Subject};
+use crate::assess::{Accuracy, Uncertainty, median};
 use crate::error::Code;
 
 /// The stops do not determine the robot.
@@ -15,8 +15,12 @@ pub struct FlangeUndetermined {
     pub nominal_mm: f64,
 }
 
-pub(super) fn check(worth: &Worth, accuracy: &Accuracy, setting: &Setting) -> Option<FlangeUndetermined> {
-    let covered = worth.workspace.iter().filter(|w| w.covered);
+pub(super) fn check(
+    uncertainty: &Uncertainty,
+    accuracy: &Accuracy,
+    setting: &CheckContext,
+) -> Option<FlangeUndetermined> {
+    let covered = uncertainty.workspace.iter().filter(|w| w.covered);
     let usual = median(&covered.map(|w| w.sigma_m).collect::<Vec<f64>>()).map(|m| 1e3 * m);
     let nominal_mm = accuracy.nominal.rms_mm;
     let found = usual.filter(|mm| *mm > nominal_mm.max(setting.limits.flange_sigma_mm));

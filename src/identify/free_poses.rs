@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix6, Vector2};
 
-use super::solution::StartVerdict;
+use super::start_verdict::{StartReached, StartVerdict};
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::fit::{FreePose, FreePoses, PlacedCamera};
@@ -135,17 +135,19 @@ fn start_camera(
     }
     let (width, height) = (state.cameras[camera].width_px, state.cameras[camera].height_px);
     let mut best: Option<(f64, State, usize)> = None;
+    let before = verdicts.len();
     for FocalCandidate { focal_px, origin } in focal_candidates(&own, width, height, stated) {
         let of = format!("focal length of camera {name}");
         let origin = format!("{origin}: {focal_px:.0} px");
         if best.as_ref().is_some_and(|b| b.0 < GOOD_START_PX) {
-            verdicts.push(StartVerdict { of, origin, verdict: "not needed".into(), won: false });
+            verdicts.push(StartVerdict { of, origin, reached: StartReached::NotNeeded, won: false });
             continue;
         }
         let (rms, candidate, behind) = try_focal(adjustment, camera, homographies, focal_px);
-        verdicts.push(StartVerdict { of, origin, verdict: format!("reached {rms:.3} px per point"), won: false });
+        let reached = StartReached::CameraPoses { rms_px: Some(rms).filter(|rms| rms.is_finite()) };
+        verdicts.push(StartVerdict { of, origin, reached, won: false });
         if best.as_ref().is_none_or(|b| rms < b.0) {
-            verdicts.iter_mut().filter(|v| v.of.ends_with(&format!("camera {name}"))).for_each(|v| v.won = false);
+            verdicts[before..].iter_mut().for_each(|v| v.won = false);
             if let Some(last) = verdicts.last_mut() {
                 last.won = rms.is_finite();
             }

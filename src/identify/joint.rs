@@ -7,7 +7,7 @@ use super::solution::Solution;
 use super::staged::{refit, staged};
 use super::start::{start_robot, take_back};
 use crate::assess::{hold_out, judge, refitted};
-use crate::diagnose::{Diagnosis, Setting};
+use crate::diagnose::{CheckContext, Diagnosis};
 use crate::error::{Code, Error, Result};
 use crate::fit::FreePoses;
 use crate::problem::MeasuredSeries;
@@ -42,7 +42,7 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let (mut outcome, before) = fit(start, &free, &aside, options);
     let (status, iterations) = (outcome.status, outcome.iterations);
     name_wrong_pairs(&mut outcome.adjustment, &free, options.limits.other_readings_explain);
-    let mut diagnosis = Diagnosis::new(Setting { series, free: &free, on_robot, limits: &options.limits });
+    let mut diagnosis = Diagnosis::new(CheckContext { series, free: &free, on_robot, limits: &options.limits });
     diagnosis.after_free_poses(&outcome.adjustment.problem);
     diagnosis.after_left_out(&outcome.adjustment)?;
     if status != Status::Converged {
@@ -70,15 +70,15 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
         false => (fit, None),
     };
     let estimated = noise == JointNoise::Estimated && joint.is_none();
-    let worth = judge(&mut fit, estimated, before, &options.limits);
-    diagnosis.after_worth(&worth, &accuracy);
+    let uncertainty = judge(&mut fit, estimated, before, &options.limits);
+    diagnosis.after_uncertainty(&uncertainty, &accuracy);
     let findings = diagnosis.findings();
     Ok(Solution {
         options: options.clone(),
         estimator,
         joint,
         series: series.to_vec(),
-        worth,
+        uncertainty,
         evidences: Vec::new(),
         lenses: Vec::new(),
         fit,

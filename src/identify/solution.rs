@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 use super::comparison::Comparison;
 use super::estimator::Estimator;
 use super::options::Options;
+use super::start_verdict::StartVerdict;
 use crate::assess::Accuracy;
-use crate::assess::Worth;
+use crate::assess::Uncertainty;
 use crate::diagnose::Finding;
 use crate::error::Notice;
 use crate::fit::{Fit, FreePoses};
@@ -16,19 +17,6 @@ use crate::model::robot::Robot;
 use crate::problem::Adjustment;
 use crate::problem::MeasuredSeries;
 use crate::solve::Status;
-
-/// How one starting value fared.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StartVerdict {
-    /// What was started: "focal length of front", "hand-camera and plate pose".
-    pub of: String,
-    /// Where the value came from.
-    pub origin: String,
-    /// What it reached, in words with unit.
-    pub verdict: String,
-    /// True for the one that was taken.
-    pub won: bool,
-}
 
 /// Evidence of a robot model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -74,7 +62,7 @@ pub struct Solution {
     /// What the solve went from.
     pub series: Vec<MeasuredSeries>,
     /// Identifiability, sigmas by clusters, workspace map.
-    pub worth: Worth,
+    pub uncertainty: Uncertainty,
     /// Evidence of the robot models where the data chose among them.
     pub evidences: Vec<Evidence>,
     /// Evidence of the lenses of cameras whose lens was open.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::solution::StartVerdict;
+use super::start_verdict::{StartReached, StartVerdict};
 use super::suspects::Suspects;
 use crate::assess::{Limits, median};
 use crate::error::{Code, Error, Result};
@@ -111,12 +111,11 @@ fn closed_form(
     };
     let winner = best.origin.clone();
     for s in &starts {
-        let pixels = ranked.iter().find(|(_, r)| r.origin == s.origin).map(|(c, _)| format!("median {c:.1} px, "));
-        let spread = format!("median spread {:.2} mrad + mm", 1e3 * s.median_error);
+        let median_px = ranked.iter().find(|(_, r)| r.origin == s.origin).map(|(c, _)| *c).filter(|c| c.is_finite());
         verdicts.push(StartVerdict {
             of: of.to_owned(),
             origin: s.origin.clone(),
-            verdict: pixels.unwrap_or_default() + &spread,
+            reached: StartReached::HandEye { median_px, misfit: s.median_error },
             won: s.origin == winner,
         });
     }

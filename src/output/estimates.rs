@@ -48,8 +48,8 @@ pub(super) fn estimates(solution: &Solution, context: &Context) -> Result<Vec<Es
             sigma,
             prior_mean: prior.then_some(column.prior_mean),
             prior_sigma: prior.then_some(column.prior_sigma),
-            sigma_model: sigma.and_then(|_| solution.worth.model_sigma.get(k).copied()),
-            sigma_clustered: sigma.and_then(|_| solution.worth.clustered_sigma.as_ref()?.get(k).copied()),
+            sigma_model: sigma.and_then(|_| solution.uncertainty.model_sigma.get(k).copied()),
+            sigma_clustered: sigma.and_then(|_| solution.uncertainty.clustered_sigma.as_ref()?.get(k).copied()),
             free: column.free,
             share_of_data: share_of_data(solution, k),
         });

@@ -65,16 +65,16 @@ pub(super) fn record(
             text: context.robot.text.clone(),
         },
         series: series(solution, context),
-        identifiability: solution.worth.identifiability.clone(),
+        identifiability: solution.uncertainty.identifiability.clone(),
         evidences: solution.evidences.clone(),
-        flange: solution.worth.flange,
+        flange: solution.uncertainty.flange,
         lenses: solution.lenses.clone(),
         two_stage: solution.two_stage.clone(),
-        scatter: solution.worth.clustered_sigma.as_ref().map(|_| ScatterRecord {
-            flange_ratio: solution.worth.clustered_ratio,
-            larger_stated: solution.worth.larger_stated,
+        scatter: solution.uncertainty.clustered_sigma.as_ref().map(|_| ScatterRecord {
+            flange_ratio: solution.uncertainty.clustered_ratio,
+            larger_stated: solution.uncertainty.larger_stated,
         }),
-        workspace: solution.worth.workspace.clone(),
+        workspace: solution.uncertainty.workspace.clone(),
         estimates: estimates(solution, context)?,
         covariance_lower: lower_triangle(solution),
         images: images(solution, context),
@@ -199,7 +199,7 @@ fn stop_noise(solution: &Solution, series: &[usize]) -> StopNoise {
     let readings = problem.noise.joint.first().map_or(0, Vec::len);
     let sigmas: Vec<Vec<f64>> = (0..problem.noise.joint.len()).map(|s| problem.joint_sigma(s)).collect();
     let interval = |r: usize| {
-        let ends = solution.worth.joint_noise_of(series, r)?;
+        let ends = solution.uncertainty.joint_noise_of(series, r)?;
         Some(ends.map(|v| Some(v).filter(|v| v.is_finite())))
     };
     StopNoise {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::scene::{Scene, arm_length_m};
 use super::setting::Setting;
 use super::viewpoint::{View, ViewRange};
-use super::visibility::{SightLimits, seen_markers};
+use super::visibility::{VisibilityLimits, seen_markers};
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::inverse::{random_readings, reading_limits, solve_from};
@@ -41,7 +41,7 @@ pub struct CandidateOptions {
     /// Range of views.
     pub views: ViewRange,
     /// What a view must fulfil.
-    pub sight: SightLimits,
+    pub sight: VisibilityLimits,
     /// Distance kept from joint limits, rad or m.
     pub limit_margin: f64,
     /// Seed.
@@ -53,7 +53,7 @@ impl Default for CandidateOptions {
         Self {
             count: 1000,
             views: ViewRange { tilt_rad: 55_f64.to_radians(), ..ViewRange::default() },
-            sight: SightLimits::default(),
+            sight: VisibilityLimits::default(),
             limit_margin: 0.02,
             seed: 1,
         }

@@ -9,7 +9,7 @@ use crate::error::{Code, Error, Result};
 use crate::linalg::LinearRow;
 use crate::plan::candidates::{Candidate, CandidateOptions, Search, Tally, candidates, workspace};
 use crate::plan::criterion::Criterion;
-use crate::plan::information::{Told, candidate_information, flange_weight, stop_information};
+use crate::plan::information::{Identified, candidate_information, flange_weight, stop_information};
 use crate::plan::order::{Leg, imbalance, tour};
 use crate::plan::refine::{Refined, Refinement};
 use crate::plan::relax::{Design, NoDesign};
@@ -20,7 +20,7 @@ use crate::problem::{Adjustment, Layout};
 
 /// What the user wants to know.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Wish {
+pub enum Demand {
     /// The position of the flange over the workspace (I-optimal).
     Workspace,
     /// The position of the flange at these joint vectors (I-optimal).
@@ -54,7 +54,7 @@ pub struct PlanRequest {
     /// Images.
     pub count: usize,
     /// Criterion.
-    pub wish: Wish,
+    pub demand: Demand,
     /// Limits on the choice.
     pub budget: Budget,
     /// Candidates.
@@ -113,7 +113,7 @@ pub struct Choice {
     /// Information before the first image, as [`Choice::told`] has it.
     pub known: DMatrix<f64>,
     /// What images tell.
-    pub told: Told,
+    pub identified: Identified,
     /// The problem without images, at the state about which it is linearised.
     pub adjustment: Adjustment,
 }
@@ -144,26 +144,26 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
         }
     }
     let margin = request.candidates.limit_margin;
-    let targets = match &request.wish {
-        Wish::Targets(list) => list.clone(),
+    let targets = match &request.demand {
+        Demand::Targets(list) => list.clone(),
         _ => workspace(setting, &scene, TARGETS, margin, request.candidates.seed),
     };
     let targets = if targets.is_empty() { pool.iter().map(|c| c.readings.clone()).collect() } else { targets };
     let weight = flange_weight(problem, &setting.robot, &targets);
-    let criterion = criterion(&request.wish, &problem.layout, &weight)?;
+    let criterion = criterion(&request.demand, &problem.layout, &weight)?;
     let (drawn, count) = (pool.len(), request.count);
-    let (told, known, information) = timed("information", || {
+    let (identified, known, information) = timed("information", || {
         let whole: Vec<DMatrix<f64>> =
             pool.par_iter().map(|c| candidate_information(&adjustment, setting, c)).collect();
-        let told = told(&criterion, &prior, &known, &whole);
-        let information: Vec<DMatrix<f64>> = whole.par_iter().map(|m| told.information(m)).collect();
-        let known = told.known(&known);
-        (told, known, information)
+        let identified = identified(&criterion, &prior, &known, &whole);
+        let information: Vec<DMatrix<f64>> = whole.par_iter().map(|m| identified.information(m)).collect();
+        let known = identified.known(&known);
+        (identified, known, information)
     });
-    let criterion = told.criterion(&criterion);
+    let criterion = identified.criterion(&criterion);
     let refinement = Refinement {
         search: &Search::new(setting, &scene, &request.candidates),
-        inform: &|candidate| told.of_candidate(&adjustment, setting, candidate),
+        inform: &|candidate| identified.of_candidate(&adjustment, setting, candidate),
         rows: &|pool| rows(&request.budget, pool, drawn, setting.placements.len()),
         known: &known,
         criterion: &criterion,
@@ -193,7 +193,7 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
         pool,
         information,
         known,
-        told,
+        identified,
     })
 }
 
@@ -211,23 +211,23 @@ pub fn plan(request: &PlanRequest) -> Result<Plan> {
 }
 
 /// What the images tell that were taken (they are in `known`) and those that could be; all columns where the criterion needs them.
-fn told(criterion: &Criterion, prior: &[f64], known: &DMatrix<f64>, all: &[DMatrix<f64>]) -> Told {
+fn identified(criterion: &Criterion, prior: &[f64], known: &DMatrix<f64>, all: &[DMatrix<f64>]) -> Identified {
     match criterion {
-        Criterion::Volume(_) => Told::everything(prior.len()),
+        Criterion::Volume(_) => Identified::everything(prior.len()),
         Criterion::MeanVariance(_) => {
             let mut sum = all.iter().fold(known.clone(), |sum, m| sum + m);
             (0..prior.len()).for_each(|k| sum[(k, k)] -= 1.0 / prior[k]);
-            Told::of(&sum, prior)
+            Identified::of(&sum, prior)
         }
     }
 }
 
-pub(super) fn criterion(wish: &Wish, layout: &Layout, weight: &DMatrix<f64>) -> Result<Criterion> {
+pub(super) fn criterion(demand: &Demand, layout: &Layout, weight: &DMatrix<f64>) -> Result<Criterion> {
     let robot = layout.terms.end;
-    match wish {
-        Wish::Workspace | Wish::Targets(_) => Ok(Criterion::weighted(weight)),
-        Wish::Parameters => Ok(Criterion::Volume(robot)),
-        Wish::Named(names) => {
+    match demand {
+        Demand::Workspace | Demand::Targets(_) => Ok(Criterion::weighted(weight)),
+        Demand::Parameters => Ok(Criterion::Volume(robot)),
+        Demand::Named(names) => {
             let mut b = DMatrix::zeros(layout.len(), 0);
             for name in names {
                 let wanted: Vec<usize> = (0..robot)

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::choose::{Plan, PlanRequest, Wish};
+use super::choose::{Demand, Plan, PlanRequest};
 use crate::assess::root_mean_square;
 use crate::error::{Code, Error, Result};
 use crate::linalg::SymmetricFactor;
@@ -97,7 +97,7 @@ const LEAST_SHARE: f64 = 0.3;
 /// Range of a joint that is called small, rad.
 const SMALL_RANGE_RAD: f64 = 0.6;
 /// Effect on the flange from which an unknown parameter is named, as a share of the predicted error.
-const WORTH_NAMING: f64 = 0.25;
+const NAMED_FROM: f64 = 0.25;
 
 /// Covariance of all columns from taken and planned images, markers and joint noise eliminated; columns without a prior start
 /// from nothing.
@@ -204,7 +204,7 @@ fn counts(n: usize) -> Vec<usize> {
 
 /// Mean squared error of the flange, of what images tell.
 fn flange_criterion(plan: &Plan) -> Criterion {
-    plan.told.criterion(&Criterion::weighted(&plan.weight))
+    plan.identified.criterion(&Criterion::weighted(&plan.weight))
 }
 
 /// Stops by importance: the one that is missed least is taken out first.
@@ -237,7 +237,7 @@ fn importance(plan: &Plan) -> Vec<usize> {
 fn among_others(plan: &Plan, leg: usize) -> Option<[DMatrix<f64>; 2]> {
     let own = |k: usize| &plan.information[plan.legs[k].stop];
     let others = (0..plan.legs.len()).filter(|k| *k != leg).fold(plan.known.clone(), |m, k| m + own(k));
-    let inverse = |m: &DMatrix<f64>| SymmetricFactor::new(m).ok().map(|f| plan.told.covariance(&f.inverse()));
+    let inverse = |m: &DMatrix<f64>| SymmetricFactor::new(m).ok().map(|f| plan.identified.covariance(&f.inverse()));
     Some([inverse(&others)?, inverse(&(others + own(leg)))?])
 }
 
@@ -272,7 +272,7 @@ fn scale_word(plan: &Plan, covariance: &DMatrix<f64>, flange: f64) -> Option<Str
         true => "measure the distance in [scale] of plate.toml more exactly, or that of markers farther apart",
         false => "measure the distance of two far markers and put it into [scale] of plate.toml",
     };
-    (part > WORTH_NAMING * flange).then(|| {
+    (part > NAMED_FROM * flange).then(|| {
         format!(
             "{:.3} mm of the expected {:.3} mm come from the scale of the plate, known to {:.1e}: no further image helps there; {remedy}",
             1e3 * part,
@@ -286,8 +286,8 @@ fn scale_word(plan: &Plan, covariance: &DMatrix<f64>, flange: f64) -> Option<Str
 ///
 /// # Errors
 /// Names the parameter, how far its joint moves, and what to change.
-pub fn check_wish(request: &PlanRequest, forecast: &Forecast) -> Result<()> {
-    let Wish::Named(names) = &request.wish else { return Ok(()) };
+pub fn check_demand(request: &PlanRequest, forecast: &Forecast) -> Result<()> {
+    let Demand::Named(names) = &request.demand else { return Ok(()) };
     for name in names {
         let asked: Vec<&ParameterForecast> = forecast.parameters.iter().filter(|p| p.name.starts_with(name)).collect();
         if asked.iter().any(|p| p.share_of_data() > LEAST_SHARE) {
@@ -301,7 +301,7 @@ pub fn check_wish(request: &PlanRequest, forecast: &Forecast) -> Result<()> {
                 "widen the limits of this joint in the URDF, or put the plate where it has to move more (--plate-pose)",
             ),
             _ => (
-                "at these poses it cannot be told apart from the pose of the plate, the camera on the flange or a \
+                "at these poses it cannot be separated from the pose of the plate, the camera on the flange or a \
                  neighbouring link"
                     .to_owned(),
                 "ask for the accuracy of the flange instead (leave --parameters out), or put the plate at several places \
@@ -389,7 +389,7 @@ fn words(
         };
         let named: Vec<String> = unknown
             .iter()
-            .filter(|p| p.flange_m > WORTH_NAMING * flange)
+            .filter(|p| p.flange_m > NAMED_FROM * flange)
             .map(|p| format!("{} (up to {:.3} mm at the flange)", short(&p.name), 1e3 * p.flange_m))
             .collect();
         if !named.is_empty() {

@@ -60,20 +60,20 @@ fn condensed_candidate(
 ///
 /// The second part stands in a last row of its own, of which the information is always one.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Told {
+pub struct Identified {
     /// `V_1`, columns by directions.
-    told: DMatrix<f64>,
+    identified: DMatrix<f64>,
     /// `V_0`; without columns where all directions count as told.
-    untold: DMatrix<f64>,
+    unidentified: DMatrix<f64>,
 }
 
 /// Share of its prior variance that all candidates together must take from a direction for it to count as told.
-const TOLD: f64 = 1e-3;
+const IDENTIFIED_FROM: f64 = 1e-3;
 
-impl Told {
+impl Identified {
     /// All columns as they are.
     pub fn everything(columns: usize) -> Self {
-        Self { told: DMatrix::identity(columns, columns), untold: DMatrix::zeros(columns, 0) }
+        Self { identified: DMatrix::identity(columns, columns), unidentified: DMatrix::zeros(columns, 0) }
     }
 
     /// What images of the information `sum` tell beside the variances `prior` of the columns.
@@ -81,22 +81,22 @@ impl Told {
         let n = prior.len();
         let scaled = DMatrix::from_fn(n, n, |i, j| sum[(i, j)] * (prior[i] * prior[j]).sqrt());
         let Some((values, vectors)) = symmetric_eigen(&scaled) else { return Self::everything(n) };
-        let columns = |is_told: bool| {
-            let which: Vec<usize> = (0..n).filter(|&k| (values[k] > TOLD) == is_told).collect();
+        let columns = |is_identified: bool| {
+            let which: Vec<usize> = (0..n).filter(|&k| (values[k] > IDENTIFIED_FROM) == is_identified).collect();
             DMatrix::from_fn(n, which.len(), |i, k| vectors[(i, which[k])] * prior[i].sqrt())
         };
-        Self { told: columns(true), untold: columns(false) }
+        Self { identified: columns(true), unidentified: columns(false) }
     }
 
     /// Number of rows of what is given back here.
     pub fn rows(&self) -> usize {
-        self.told.ncols() + usize::from(self.untold.ncols() > 0)
+        self.identified.ncols() + usize::from(self.unidentified.ncols() > 0)
     }
 
-    fn with_last(&self, told: &DMatrix<f64>, last: f64) -> DMatrix<f64> {
-        let (n, r) = (self.rows(), self.told.ncols());
+    fn with_last(&self, identified: &DMatrix<f64>, last: f64) -> DMatrix<f64> {
+        let (n, r) = (self.rows(), self.identified.ncols());
         DMatrix::from_fn(n, n, |i, j| match (i < r, j < r) {
-            (true, true) => told[(i, j)],
+            (true, true) => identified[(i, j)],
             (false, false) => last,
             _ => 0.0,
         })
@@ -104,19 +104,19 @@ impl Told {
 
     /// Information before the first image, from that of the columns.
     pub fn known(&self, known: &DMatrix<f64>) -> DMatrix<f64> {
-        self.with_last(&carried(known, &self.told), 1.0)
+        self.with_last(&carried(known, &self.identified), 1.0)
     }
 
     /// Information of an image, from that of the columns.
     pub fn information(&self, information: &DMatrix<f64>) -> DMatrix<f64> {
-        self.with_last(&carried(information, &self.told), 0.0)
+        self.with_last(&carried(information, &self.identified), 0.0)
     }
 
     /// Information of a candidate; zero where its image would show nothing.
     pub fn of_candidate(&self, planned: &Adjustment, setting: &Setting, candidate: &Candidate) -> DMatrix<f64> {
         condensed_candidate(planned, setting, candidate).map_or_else(
             || DMatrix::zeros(self.rows(), self.rows()),
-            |(h, t)| self.with_last(&carried(&h, &product(&t, &self.told)), 0.0),
+            |(h, t)| self.with_last(&carried(&h, &product(&t, &self.identified)), 0.0),
         )
     }
 
@@ -124,8 +124,11 @@ impl Told {
     pub fn criterion(&self, criterion: &Criterion) -> Criterion {
         match criterion {
             Criterion::MeanVariance(b) => {
-                let [told, untold] = [&self.told, &self.untold].map(|v| product(&v.transpose(), b));
-                Criterion::weighted(&self.with_last(&product(&told, &told.transpose()), untold.norm_squared()))
+                let [identified, unidentified] =
+                    [&self.identified, &self.unidentified].map(|v| product(&v.transpose(), b));
+                Criterion::weighted(
+                    &self.with_last(&product(&identified, &identified.transpose()), unidentified.norm_squared()),
+                )
             }
             volume => volume.clone(),
         }
@@ -133,9 +136,9 @@ impl Told {
 
     /// Covariance of the columns.
     pub fn covariance(&self, covariance: &DMatrix<f64>) -> DMatrix<f64> {
-        let r = self.told.ncols();
-        let told = carried(&covariance.view((0, 0), (r, r)).into_owned(), &self.told.transpose());
-        told + product(&self.untold, &self.untold.transpose())
+        let r = self.identified.ncols();
+        let identified = carried(&covariance.view((0, 0), (r, r)).into_owned(), &self.identified.transpose());
+        identified + product(&self.unidentified, &self.unidentified.transpose())
     }
 }
 

@@ -20,9 +20,9 @@ pub mod setting;
 pub mod viewpoint;
 pub mod visibility;
 
-pub use choose::{Budget, Choice, Plan, PlanRequest, Wish, choose, plan};
+pub use choose::{Budget, Choice, Demand, Plan, PlanRequest, choose, plan};
 pub use forecast::{
-    CurvePoint, Forecast, Gain, JointRange, ParameterForecast, check_wish, exact_covariance, flange_m, forecast,
+    CurvePoint, Forecast, Gain, JointRange, ParameterForecast, check_demand, exact_covariance, flange_m, forecast,
     image_name,
 };
 pub use places::{PlaceForecast, compare_places, place_words};

@@ -31,7 +31,7 @@ pub struct PlaceForecast {
 /// Where a parameter asked for is unknown.
 pub fn compare_places(request: &PlanRequest, choice: &Choice) -> Result<Vec<PlaceForecast>> {
     let criterion =
-        choice.told.criterion(&criterion(&request.wish, &choice.adjustment.problem.layout, &choice.weight)?);
+        choice.identified.criterion(&criterion(&request.demand, &choice.adjustment.problem.layout, &choice.weight)?);
     let one = |(placement, (name, _)): (usize, &(String, crate::geom::Pose))| {
         let drawn = choice.pool.iter().zip(&choice.information).take(choice.drawn);
         let here = drawn.filter(|(c, _)| c.placement == placement);
@@ -46,7 +46,7 @@ pub fn compare_places(request: &PlanRequest, choice: &Choice) -> Result<Vec<Plac
         let chosen = design.relax().ok().and_then(|r| round(&design, &r)).map(|r| r.chosen);
         let covariance = chosen.and_then(|chosen| {
             let m = chosen.iter().fold(choice.known.clone(), |m, &k| m + &candidates[k]);
-            SymmetricFactor::new(&m).ok().map(|f| choice.told.covariance(&f.inverse()))
+            SymmetricFactor::new(&m).ok().map(|f| choice.identified.covariance(&f.inverse()))
         });
         PlaceForecast {
             placement,

@@ -266,13 +266,13 @@ fn pitch(request: &PlateRequest, columns: u32, rows: u32) -> Result<f64> {
         let fill = |pixels: u32, n: u32| 0.9 * f64::from(pixels) * middle_m / v.focal_px / f64::from(n);
         fill(v.width_px, columns).min(fill(v.height_px, rows)).max(resolvable_pitch(&v))
     });
-    let wish = match (suited, largest) {
+    let demand = match (suited, largest) {
         (Some(s), Some(l)) => s.min(l),
         (Some(s), None) => (s * 1e4).ceil() / 1e4,
         (None, Some(l)) => l,
         (None, None) => return Ok(DEFAULT_PITCH_M),
     };
-    Ok(if largest.is_some_and(|l| wish >= l) { (wish * 1e4).floor() } else { (wish * 1e4).round() } / 1e4)
+    Ok(if largest.is_some_and(|l| demand >= l) { (demand * 1e4).floor() } else { (demand * 1e4).round() } / 1e4)
 }
 
 fn largest_pitch(sheet_m: [f64; 2], columns: u32, rows: u32) -> f64 {

@@ -32,7 +32,7 @@ pub fn is_seen(marker: &Marker, camera: &Camera, camera_from_plate: &Pose) -> bo
 
 /// What a view must fulfil to be workable.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SightLimits {
+pub struct VisibilityLimits {
     /// Markers wholly in the image, at least.
     pub least_markers: usize,
     /// Largest angle between a line of sight to a marker and the plate's normal, rad.
@@ -41,7 +41,7 @@ pub struct SightLimits {
     pub focus_m: (f64, f64),
 }
 
-impl Default for SightLimits {
+impl Default for VisibilityLimits {
     /// Twenty markers, 60 degrees, sharp everywhere.
     fn default() -> Self {
         Self { least_markers: 20, incidence_rad: 60_f64.to_radians(), focus_m: (0.0, f64::INFINITY) }
@@ -57,7 +57,7 @@ pub fn seen_markers(plate: &Plate, camera: &Camera, camera_from_plate: &Pose) ->
     seen.map(|(k, _)| k).collect()
 }
 
-impl SightLimits {
+impl VisibilityLimits {
     /// True where the markers that are seen (indices) are enough, sharp and not too oblique.
     pub fn allow(&self, plate: &Plate, camera_from_plate: &Pose, seen: &[usize]) -> bool {
         let eye = camera_from_plate.inverse().translation;

@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::folder::save;
 use super::observe::observe;
-use super::truth::PoseRecord;
+use super::truth::TruePose;
 use super::world::SimulatedSeries;
 use crate::detect::{Picture, load};
 use crate::error::{Code, Error, Result};
@@ -316,7 +316,7 @@ fn observe_again(
         let (mut camera, mut plate) = (series.truth.camera.clone(), series.true_plate.clone());
         let mut pose = series.truth.stops[k].camera_from_plate.pose();
         change(&mut pose, &mut camera, &mut plate);
-        series.truth.stops[k].camera_from_plate = PoseRecord::from(&pose);
+        series.truth.stops[k].camera_from_plate = TruePose::from(&pose);
         series.observations[k].observations = observe(&plate, &camera, &pose, sigma, &mut rng);
     }
 }

@@ -17,20 +17,20 @@ use crate::urdf::Chain;
 /// A pose as in the other files of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct PoseRecord {
+pub struct TruePose {
     /// Translation, m.
     pub xyz_m: [f64; 3],
     /// Unit quaternion.
     pub quat_xyzw: [f64; 4],
 }
 
-impl From<&Pose> for PoseRecord {
+impl From<&Pose> for TruePose {
     fn from(pose: &Pose) -> Self {
         Self { xyz_m: pose.xyz(), quat_xyzw: pose.quaternion_xyzw() }
     }
 }
 
-impl PoseRecord {
+impl TruePose {
     /// The pose.
     pub fn pose(&self) -> Pose {
         Pose::from_xyz_quaternion(self.xyz_m, self.quat_xyzw)
@@ -40,7 +40,7 @@ impl PoseRecord {
 /// One joint term: `value` times the basis function `term` of the reading of `joint`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TermRecord {
+pub struct TrueTerm {
     /// Name of the joint's reading.
     pub joint: String,
     /// Which term.
@@ -60,7 +60,7 @@ pub struct StopRecord {
     /// True position minus reading and terms, rad or m, in the order of `joints`.
     pub joint_noise: Vec<f64>,
     /// True camera pose.
-    pub camera_from_plate: PoseRecord,
+    pub camera_from_plate: TruePose,
 }
 
 /// A joint vector that took no part, for judging the accuracy of a calibrated model.
@@ -70,7 +70,7 @@ pub struct HeldOutRecord {
     /// Readings, rad or m, in the order of `joints`.
     pub readings: Vec<f64>,
     /// True pose of the tip there, without joint noise and backlash.
-    pub base_from_tip: PoseRecord,
+    pub base_from_tip: TruePose,
 }
 
 /// Everything that was put in.
@@ -97,14 +97,14 @@ pub struct Truth {
     /// The camera.
     pub camera: Camera,
     /// `flange_from_camera` (camera in the hand) or `base_from_camera` (fixed camera).
-    pub camera_pose: PoseRecord,
+    pub camera_pose: TruePose,
     /// `base_from_plate` (camera in the hand) or `flange_from_plate` (fixed camera) of each placement.
-    pub plate_poses: BTreeMap<String, PoseRecord>,
+    pub plate_poses: BTreeMap<String, TruePose>,
     /// Body twist `[rho (m), phi (rad)]` on the origin of each joint of the chain that has one.
     pub twists: BTreeMap<String, [f64; 6]>,
     /// Joint terms.
     #[serde(default)]
-    pub terms: Vec<TermRecord>,
+    pub terms: Vec<TrueTerm>,
     /// True minus nominal position of each marker in the plate frame, m, in the order of the ids.
     #[serde(default)]
     pub marker_errors_m: Vec<[f64; 3]>,

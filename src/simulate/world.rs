@@ -16,7 +16,7 @@ use super::observe::observe;
 use super::placement::{self, Setup};
 use super::render::render;
 use super::request::WorldRequest;
-use super::truth::{HeldOutRecord, PoseRecord, StopRecord, TermRecord, Truth};
+use super::truth::{HeldOutRecord, StopRecord, TruePose, TrueTerm, Truth};
 use crate::detect::Picture;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
@@ -179,7 +179,7 @@ impl World<'_> {
                 "choose another plate or robot",
             )
         })?;
-        let base_from_tip = PoseRecord::from(&self.actual.base_from_tip(&readings));
+        let base_from_tip = TruePose::from(&self.actual.base_from_tip(&readings));
         Ok(HeldOutRecord { readings, base_from_tip })
     }
 
@@ -191,7 +191,7 @@ impl World<'_> {
             image: s.observations.image.clone(),
             placement: names(s.placement),
             joint_noise: s.noise.clone(),
-            camera_from_plate: PoseRecord::from(&s.camera_from_plate),
+            camera_from_plate: TruePose::from(&s.camera_from_plate),
         };
         let truth = Truth {
             format: 1,
@@ -203,7 +203,7 @@ impl World<'_> {
             joint_noise_sigma: chain.reading_kinds.iter().map(|&k| scaled(request.joint_noise_rad, k)).collect(),
             pixel_sigma_px: Some(request.pixel_sigma_px),
             camera: request.camera.clone(),
-            camera_pose: PoseRecord::from(&self.setup.camera),
+            camera_pose: TruePose::from(&self.setup.camera),
             plate_poses: self.setup.plates.iter().enumerate().map(|(k, p)| (names(k), p.into())).collect(),
             twists: twists_by_name(&self.actual),
             terms: terms_by_name(&self.actual),
@@ -261,9 +261,9 @@ fn twists_by_name(robot: &Robot) -> BTreeMap<String, [f64; 6]> {
     moving.map(|(j, t)| (j.name.clone(), (*t).into())).collect()
 }
 
-fn terms_by_name(robot: &Robot) -> Vec<TermRecord> {
+fn terms_by_name(robot: &Robot) -> Vec<TrueTerm> {
     let name = |reading: usize| robot.chain.readings[reading].clone();
-    robot.terms.iter().map(|t| TermRecord { joint: name(t.reading), term: t.term, value: t.value }).collect()
+    robot.terms.iter().map(|t| TrueTerm { joint: name(t.reading), term: t.term, value: t.value }).collect()
 }
 
 fn marker_errors(nominal: &Plate, actual: &Plate) -> Vec<[f64; 3]> {

@@ -186,7 +186,7 @@ fn judged(s: &Solution, world: &SimulatedSeries, chain: &Chain) -> Result<Option
         free_pose_error(s, world).and_then(|e| normalised(&e)),
         flange_error(s, world, &truth).and_then(|e| normalised(&e)),
     ];
-    let Some(told) = &s.worth.told else { return Ok(None) };
+    let Some(told) = &s.uncertainty.noise_information else { return Ok(None) };
     let mut found = [Normalised::default(); BLOCKS.len()];
     for (slot, block) in found.iter_mut().zip(blocks) {
         let Some(block) = block else { return Ok(None) };

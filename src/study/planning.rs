@@ -18,8 +18,8 @@ use crate::plan::candidates::{CandidateOptions, candidates, workspace};
 use crate::plan::information::flange_weight;
 use crate::plan::scene::{Scene, SceneOptions};
 use crate::plan::setting::{Setting, scale_sigma};
-use crate::plan::visibility::SightLimits;
-use crate::plan::{Budget, PlanRequest, Wish, choose, exact_covariance, flange_m};
+use crate::plan::visibility::VisibilityLimits;
+use crate::plan::{Budget, Demand, PlanRequest, choose, exact_covariance, flange_m};
 use crate::problem::Adjustment;
 use crate::series::{CameraMount, Plate, PlateKind, ScaleBar};
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
@@ -187,12 +187,12 @@ fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
         setting,
         taken: Vec::new(),
         count: request.planned,
-        wish: Wish::Workspace,
+        demand: Demand::Workspace,
         budget: Budget::default(),
         candidates: CandidateOptions {
             count: request.candidates,
             views: wanted.views,
-            sight: SightLimits { least_markers: wanted.least_markers, ..SightLimits::default() },
+            sight: VisibilityLimits { least_markers: wanted.least_markers, ..VisibilityLimits::default() },
             seed,
             ..CandidateOptions::default()
         },

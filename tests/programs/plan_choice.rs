@@ -10,7 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use robotcal::linalg::{LinearRow, SymmetricFactor};
 use robotcal::plan::criterion::Criterion;
-use robotcal::plan::information::Told;
+use robotcal::plan::information::Identified;
 use robotcal::plan::relax::{Design, NoDesign};
 use robotcal::plan::rounding::round;
 
@@ -268,7 +268,7 @@ fn what_no_image_tells_is_left_out_without_changing_the_criterion() {
     let prior: Vec<f64> = sigma.iter().map(|s| s * s).collect();
     let known = DMatrix::from_fn(COLUMNS, COLUMNS, |i, j| if i == j { 1.0 / prior[i] } else { 0.0 });
     let whole = candidates.iter().fold(DMatrix::zeros(COLUMNS, COLUMNS), |sum, m| sum + m);
-    let told = Told::of(&whole, &prior);
+    let told = Identified::of(&whole, &prior);
     assert_eq!(told.rows(), SEEN + 1);
     let b = DMatrix::from_fn(COLUMNS, 4, |i, _| rng.random_range(-1.0..1.0) / sigma[i]);
     let criterion = Criterion::MeanVariance(b);
@@ -288,7 +288,7 @@ fn what_no_image_tells_is_left_out_without_changing_the_criterion() {
     let off =
         DMatrix::from_fn(COLUMNS, COLUMNS, |i, j| (covariance[(i, j)] - at.covariance[(i, j)]) / (sigma[i] * sigma[j]));
     assert!(off.amax() < 1e-9, "{}", off.amax());
-    assert_eq!(Told::everything(COLUMNS).information(&candidates[0]), candidates[0]);
+    assert_eq!(Identified::everything(COLUMNS).information(&candidates[0]), candidates[0]);
 }
 
 #[test]

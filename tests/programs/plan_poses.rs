@@ -12,7 +12,7 @@ use robotcal::plan::candidates::CandidateOptions;
 use robotcal::plan::criterion::Criterion;
 use robotcal::plan::scene::{Capsule, Scene, SceneOptions, arm_length_m};
 use robotcal::plan::setting::Setting;
-use robotcal::plan::{Budget, Choice, Plan, PlanRequest, Wish, choose, forecast, plan};
+use robotcal::plan::{Budget, Choice, Demand, Plan, PlanRequest, choose, forecast, plan};
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::urdf::{Chain, JointKind};
 use robotcal::{Code, ErrorKind};
@@ -45,7 +45,7 @@ fn request(name: &str, count: usize) -> PlanRequest {
         },
         taken: Vec::new(),
         count,
-        wish: Wish::Workspace,
+        demand: Demand::Workspace,
         budget: Budget { most_per_placement: Some(count * 2 / 3), ..Budget::default() },
         candidates: CandidateOptions { count: 160, ..CandidateOptions::default() },
         rounds: 4,
@@ -238,7 +238,7 @@ fn rounds_of_search_only_improve_and_are_the_same_with_any_number_of_threads() {
     assert!(one.values.windows(2).all(|w| w[1] <= w[0] * 1.002), "{:?}", one.values);
     // The bound that was certified for the drawn candidates alone is beaten by whole images: the search found what they lack.
     let value = |c: &Choice| c.chosen.iter().fold(c.known.clone(), |m, &k| m + &c.information[k]);
-    let variance = |c: &Choice| c.told.criterion(&Criterion::weighted(&c.weight)).value(&value(c)).unwrap();
+    let variance = |c: &Choice| c.identified.criterion(&Criterion::weighted(&c.weight)).value(&value(c)).unwrap();
     let (before, after) = (variance(&drawn), variance(&two));
     println!("{before:.3e} {after:.3e}");
     assert!(after < before * drawn.efficiency[1], "{before} {after}");

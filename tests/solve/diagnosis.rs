@@ -101,9 +101,10 @@ fn joints_that_never_moved_do_not_make_the_others_uncertain() {
         let options = Options { joint_noise, ..Options::default() };
         let solution = identify(chain.clone(), &[measured(&world, &chain)], &options).unwrap();
         let inside = |w: &&WorkspacePoint| w.covered;
-        let mut inside: Vec<f64> = solution.worth.workspace.iter().filter(inside).map(|w| w.sigma_m).collect();
+        let mut inside: Vec<f64> = solution.uncertainty.workspace.iter().filter(inside).map(|w| w.sigma_m).collect();
         inside.sort_by(f64::total_cmp);
-        let outside = solution.worth.workspace.iter().filter(|w| !w.covered).map(|w| w.sigma_m).fold(0.0, f64::max);
+        let outside =
+            solution.uncertainty.workspace.iter().filter(|w| !w.covered).map(|w| w.sigma_m).fold(0.0, f64::max);
         (inside[inside.len() / 2], outside)
     };
     let (known, estimated) = (sigmas(JointNoise::Known(2e-5)), sigmas(JointNoise::Estimated));

@@ -24,7 +24,7 @@ use robotcal::output::restore::{found_model, measured_series, robot_description}
 use robotcal::output::{files, solution_json};
 use robotcal::problem::{Layout, State, short_name};
 use robotcal::series::{CameraMount, Marker, Observation, Plate, PlateKind};
-use robotcal::simulate::truth::{TermRecord, Truth};
+use robotcal::simulate::truth::{TrueTerm, Truth};
 use robotcal::simulate::{RobotErrors, WorldRequest, series};
 use robotcal::study::measured;
 use robotcal::urdf::Chain;
@@ -272,7 +272,7 @@ fn true_robot(truth: &Truth) -> Robot {
         *twist = truth.twists.get(&joint.name).map_or_else(Vector6::zeros, |t| Vector6::from_column_slice(t));
     }
     let readings = &robot.chain.readings;
-    let term = |t: &TermRecord| JointTerm {
+    let term = |t: &TrueTerm| JointTerm {
         reading: readings.iter().position(|r| *r == t.joint).unwrap(),
         term: t.term,
         value: t.value,
@@ -310,7 +310,7 @@ fn what_is_promised_of_the_flange_is_what_is_found() {
         let truth = true_robot(&made.truth);
         let plate = made.truth.plate_poses.values().next().unwrap().pose();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let covered = &solution.worth.identifiability.as_ref().unwrap().covered;
+        let covered = &solution.uncertainty.identifiability.as_ref().unwrap().covered;
         let places: Vec<(Posture, Vec<f64>)> = (0..400)
             .map(|_| {
                 let readings: Vec<f64> = covered.iter().map(|(_, low, high)| rng.random_range(*low..*high)).collect();
@@ -347,7 +347,7 @@ fn what_is_promised_of_the_flange_is_what_is_found() {
             relative_error_m((robot, &solution.fit.state.placements[0]), (&truth, &plate), &stops, &places)
         };
         let left = [fit_points(&Robot::nominal(chain()), &points).unwrap().rms_m, of(&urdf), of(&whole)];
-        let e = solution.worth.flange.unwrap();
+        let e = solution.uncertainty.flange.unwrap();
         println!("seed {seed}: found {left:?}, stated {e:?}");
         for (k, (f, s)) in left.into_iter().zip([e.nominal_m, e.urdf_m, e.model_m]).enumerate() {
             (found[k], stated[k]) = (found[k] + f * f, stated[k] + s * s);
@@ -439,7 +439,7 @@ fn blurred_images_of_a_moving_robot_are_named() {
 fn clusters_contradict_a_wrong_noise_model_and_no_right_one() {
     let ratio = |seed: u64, model: RobotModel, joint_noise: JointNoise| {
         let options = Options { model, joint_noise, ..Options::default() };
-        identify(chain(), &[world(seed, 1e-4)], &options).unwrap().worth
+        identify(chain(), &[world(seed, 1e-4)], &options).unwrap().uncertainty
     };
     let right: Vec<f64> = (1..=4)
         .flat_map(|seed| [RobotModel::Rigid, RobotModel::Full].map(|m| ratio(seed, m, JointNoise::Estimated)))

@@ -144,7 +144,7 @@ fn the_tracker_confirms_model_and_stated_uncertainty() {
             1e3 * expected.model_m,
             1e3 * expected.with_joint_noise_m
         );
-        let flange = s.worth.flange.unwrap();
+        let flange = s.uncertainty.flange.unwrap();
         let mut urdf = s.fit.state.robot.clone();
         urdf.terms.retain(|t| t.term == Term::Offset);
         let urdf = fit_points(&urdf, &points).unwrap().rms_m;

@@ -346,14 +346,14 @@ fn joint_noise_has_an_interval_where_it_is_estimated_and_none_where_it_is_given(
     };
     let estimated = run(JointNoise::Estimated);
     let sigma = estimated.fit.problem.joint_sigma(0);
-    assert_eq!(estimated.worth.joint_noise.len(), 1);
-    assert_eq!(estimated.worth.joint_noise[0].len(), sigma.len());
-    for (s, [low, high]) in sigma.iter().zip(&estimated.worth.joint_noise[0]) {
+    assert_eq!(estimated.uncertainty.joint_noise.len(), 1);
+    assert_eq!(estimated.uncertainty.joint_noise[0].len(), sigma.len());
+    for (s, [low, high]) in sigma.iter().zip(&estimated.uncertainty.joint_noise[0]) {
         assert!(low < s && s < high && high.is_finite(), "{low:e} {s:e} {high:e}");
     }
     let given = run(JointNoise::Known(3e-4));
     assert_eq!(given.fit.problem.joint_sigma(0), vec![3e-4; sigma.len()]);
-    assert!(given.worth.joint_noise.is_empty());
+    assert!(given.uncertainty.joint_noise.is_empty());
 }
 
 #[test]

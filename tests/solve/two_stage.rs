@@ -203,7 +203,10 @@ fn identify_and_compare_answer_the_same_question_alike_and_a_two_stage_result_st
         for c in staged.fit.problem.layout.robot().filter(|&c| staged.fit.problem.layout.columns[c].free) {
             let (own, of_fit) = (staged.fit.covariance.sigma(c), found.covariance[(c, c)].sqrt());
             let same = if estimator == Estimator::FullAndRepeatability { 0.3 } else { 1e-9 };
-            assert!(own > 0.0 && (own / of_fit - 1.0).abs() < same || staged.worth.larger_stated, "{own} {of_fit}");
+            assert!(
+                own > 0.0 && (own / of_fit - 1.0).abs() < same || staged.uncertainty.larger_stated,
+                "{own} {of_fit}"
+            );
         }
         let again = beside_two_stages(&staged).unwrap();
         assert_eq!(again.rows, beside.rows);

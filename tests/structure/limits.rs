@@ -24,7 +24,7 @@ const NUMERICAL: [(&str, &str); 44] = [
     ("assess/stops.rs POSE_SIGMA_RAD", "noise of the ideal series"),
     ("assess/stops.rs WIDEST_M", "range of the ideal series"),
     ("assess/stops.rs WIDEST_RAD", "range of the ideal series"),
-    ("assess/worth.rs NORMAL_95", "quantile of the normal distribution"),
+    ("assess/uncertainty.rs NORMAL_95", "quantile of the normal distribution"),
     ("diagnose/displaced.rs MOST_IMAGES", "how many are named"),
     ("diagnose/joint_noise.rs MOST_IMAGES", "how many are named"),
     ("diagnose/loose.rs MOST_IMAGES", "how many are named"),

@@ -16,7 +16,7 @@ const MOST_PAIRS: usize = 20;
 const MOST_NAMED: usize = 5;
 
 /// Rank, directions that stay unknown, observability indices, what to measure next.
-pub(super) fn told(r: &SolutionRecord) -> Markup {
+pub(super) fn identifiable(r: &SolutionRecord) -> Markup {
     let Some(found) = &r.identifiability else { return html! {} };
     let of = |causes: &'static [Cause]| found.unknown.iter().filter(move |d| causes.contains(&d.cause));
     html! {

@@ -37,7 +37,7 @@ pub fn report_html(record: &SolutionRecord) -> String {
         (sections::residuals(record))
         (parameters::robot(record))
         (parameters::undetermined(record))
-        (knowledge::told(record))
+        (knowledge::identifiable(record))
         (parameters::placed(record))
         (parameters::cameras(record))
         (sections::plates(record))

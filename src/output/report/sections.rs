@@ -7,6 +7,7 @@ use super::verdict::verdict;
 use super::words::{count, fixed, plus_minus, significant, unit};
 use super::{maps, plots};
 use crate::error::Notice;
+use crate::identify::StartReached;
 use crate::output::solution_json::SolutionRecord;
 
 /// Title, verdict and the numbers that matter most.
@@ -226,12 +227,9 @@ pub(super) fn plates(r: &SolutionRecord) -> Markup {
     }
 }
 
-/// Verdict of a start that was spared.
-const NOT_NEEDED: &str = "not needed";
-
 /// Where the solution started.
 pub(super) fn starts(r: &SolutionRecord) -> Markup {
-    let tried = || r.starts.iter().filter(|s| s.verdict != NOT_NEEDED);
+    let tried = || r.starts.iter().filter(|s| s.reached != StartReached::NotNeeded);
     let spared = r.starts.len() - tried().count();
     html! {
         h2 { "Starting values" }
@@ -242,8 +240,8 @@ pub(super) fn starts(r: &SolutionRecord) -> Markup {
         div.wide.long { table {
             thead { tr { th { "Of" } th { "from" } th { "reached" } } }
             tbody { @for s in tried() { tr {
-                @if s.won { td { b { (s.of) } } td { b { (s.origin) } } td { b { (s.verdict) } } }
-                @else { td { (s.of) } td { (s.origin) } td { (s.verdict) } }
+                @if s.won { td { b { (s.of) } } td { b { (s.origin) } } td { b { (s.reached.to_string()) } } }
+                @else { td { (s.of) } td { (s.origin) } td { (s.reached.to_string()) } }
             } } }
         } }
     }

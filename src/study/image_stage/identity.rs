@@ -24,7 +24,7 @@ pub struct IdentityRequest {
 
 /// What a view was made to show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Sight {
+pub enum Appearance {
     /// The plate.
     Plate,
     /// The plate, and then its mirror image.
@@ -33,7 +33,7 @@ pub enum Sight {
     OtherPlate,
 }
 
-impl Sight {
+impl Appearance {
     /// Four views of five show the plate, of the fifth half a mirror image and half another plate.
     fn of(seed: u64) -> Self {
         match seed % 10 {
@@ -50,7 +50,7 @@ pub struct IdentityView {
     /// Its seed.
     pub seed: u64,
     /// What it shows.
-    pub sight: Sight,
+    pub sight: Appearance,
     /// Tilt of the plate, degrees.
     pub tilt_deg: f64,
     /// What disturbs it.
@@ -147,8 +147,8 @@ pub fn identity(request: IdentityRequest, progress: impl Fn() + Sync) -> Result<
 pub fn identity_view(plates: &Plates, seed: u64) -> (IdentityView, Picture, Detection) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let truth = RandomView::of(&plates.own, &mut rng);
-    let sight = Sight::of(seed);
-    let shown = if sight == Sight::OtherPlate { &plates.other } else { &plates.own };
+    let sight = Appearance::of(seed);
+    let shown = if sight == Appearance::OtherPlate { &plates.other } else { &plates.own };
     let picture = truth.picture(shown, seed);
     let detection = detect(&picture, &plates.own);
     let mut view = IdentityView {
@@ -164,13 +164,13 @@ pub fn identity_view(plates: &Plates, seed: u64) -> (IdentityView, Picture, Dete
         missed: BTreeMap::new(),
         mirror: None,
     };
-    if sight == Sight::OtherPlate {
+    if sight == Appearance::OtherPlate {
         view.wrong = detection.observations.len();
         view.visible = 0;
         return (view, picture, detection);
     }
     judge(&mut view, &truth, &plates.own, &detection);
-    if sight == Sight::Mirror {
+    if sight == Appearance::Mirror {
         let mirrored = mirrored(&picture);
         let seen = detect(&mirrored, &plates.own);
         let answer = mirror_answer(&seen, view.identified);

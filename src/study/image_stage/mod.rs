@@ -9,7 +9,7 @@ mod view;
 
 pub use bias::{Bias, BiasCase, COMA_CONTRAST_TO_NOISE, Cause, bias, bias_cases};
 pub use identity::{
-    DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityRequest, IdentityView, MirrorAnswer, Plates, Sight, identity,
-    identity_view,
+    Appearance, DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityRequest, IdentityView, MirrorAnswer, Plates,
+    identity, identity_view,
 };
 pub use precision::{MAP_OFF_PX, Precision, PrecisionCell, precision, precision_cells};

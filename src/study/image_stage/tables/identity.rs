@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::{Claim, Section};
 use crate::output::report::svg::{Anchor, Svg};
 use crate::plan::plate_design::LEAST_MINOR_AXIS_PX;
-use crate::study::image_stage::{DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityView, MirrorAnswer, Sight};
+use crate::study::image_stage::{Appearance, DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityView, MirrorAnswer};
 
 /// Share of the wholly visible markers that must be found.
 const LEAST_RECALL: f64 = 0.99;
@@ -72,7 +72,7 @@ fn by_disturbance() -> Vec<Group> {
 
 /// What the study of identity says.
 pub fn identity_section(study: &Identity) -> Section {
-    let of_plate: Vec<&IdentityView> = study.views.iter().filter(|v| v.sight != Sight::OtherPlate).collect();
+    let of_plate: Vec<&IdentityView> = study.views.iter().filter(|v| v.sight != Appearance::OtherPlate).collect();
     let all = Sums::of(of_plate.iter().copied());
     let tables = [("markers visible", by_count()), ("tilt, degrees", by_tilt()), ("disturbed by", by_disturbance())];
     let mut text = setup(study);
@@ -103,7 +103,7 @@ pub fn identity_section(study: &Identity) -> Section {
 
 fn claims(study: &Identity, all: &Sums) -> Vec<Claim> {
     let wrong: usize = study.views.iter().map(|v| v.wrong).sum();
-    let strange = study.views.iter().filter(|v| v.sight == Sight::OtherPlate);
+    let strange = study.views.iter().filter(|v| v.sight == Appearance::OtherPlate);
     let (strange, taken) = strange.fold((0, 0), |(n, taken), v| (n + 1, taken + usize::from(v.identified)));
     let answers = |answer: MirrorAnswer| study.views.iter().filter(|v| v.mirror == Some(answer)).count();
     let mirrors = study.views.iter().filter(|v| v.mirror.is_some()).count();
@@ -164,8 +164,11 @@ fn misses(views: &[&IdentityView]) -> String {
 /// The views with failures, with their seeds.
 fn failures(study: &Identity) -> String {
     let mut worst: Vec<&IdentityView> = study.views.iter().filter(|v| v.failed()).collect();
-    let mut missed: Vec<&IdentityView> =
-        study.views.iter().filter(|v| !v.failed() && v.sight != Sight::OtherPlate && v.found < v.visible).collect();
+    let mut missed: Vec<&IdentityView> = study
+        .views
+        .iter()
+        .filter(|v| !v.failed() && v.sight != Appearance::OtherPlate && v.found < v.visible)
+        .collect();
     missed.sort_by_key(|v| (std::cmp::Reverse(v.visible - v.found), v.seed));
     worst.extend(missed);
     if worst.is_empty() {

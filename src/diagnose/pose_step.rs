@@ -1,7 +1,7 @@
 //! A plate or a camera that stands elsewhere from some image on, by too little for any image to be left out.
 //!
 //! Rao's score test on the linearised fit: what the images of a stop tell of their poses, joint noise eliminated, has the root score `s` and
-//! the derivatives `T` by all columns ([`TellingStops`]). Let the pose of one body differ by a constant `x` at the stops of a part `P` of a
+//! the derivatives `T` by all columns ([`StopInformation`]). Let the pose of one body differ by a constant `x` at the stops of a part `P` of a
 //! series, `A` its columns of `T`. With `K` the covariance of all columns, `g = sum_P A' s` and
 //! `J = sum_P A' A - V' K V`, `V = sum_P T' A`, the cost falls by `D = g' J^-1 g`, chi-squared with six degrees of freedom where nothing
 //! moved, and `x = J^-1 g` with the covariance `J^-1`.
@@ -17,8 +17,8 @@ use std::rc::Rc;
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::displaced::{Carried, Displaced, Displacement};
-use super::kind::{Setting, Weight};
-use crate::assess::{Accuracy, Limits, TellingStops, Told};
+use super::kind::{CheckContext, Weight};
+use crate::assess::{Accuracy, Limits, RootInformation, StopInformation};
 use crate::fit::Fit;
 use crate::linalg::{SymmetricFactor, product};
 use crate::problem::{Adjustment, Image, Layout, Problem};
@@ -43,7 +43,7 @@ enum Order {
 
 /// A step of one body between two parts of a series.
 #[derive(Debug, Clone, PartialEq)]
-struct Shift {
+struct PoseStep {
     /// Index of the series.
     series: usize,
     body: Body,
@@ -112,12 +112,12 @@ impl Row {
     }
 }
 
-pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &Setting) -> Vec<Displaced> {
-    find_shifts(fit, setting.limits).iter().map(|shift| shift.finding(&fit.problem, setting)).collect()
+pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Displaced> {
+    find_steps(fit, setting.limits).iter().map(|step| step.finding(&fit.problem, setting)).collect()
 }
 
 /// Steps that explain most of the joint noise, in the order of the images.
-fn find_shifts(fit: &Fit, limits: &Limits) -> Vec<Shift> {
+fn find_steps(fit: &Fit, limits: &Limits) -> Vec<PoseStep> {
     let Adjustment { problem, state } = &fit.adjustment;
     let mut linear = Linear::of(fit.linear());
     let columns = linear.information.ncols();
@@ -128,7 +128,7 @@ fn find_shifts(fit: &Fit, limits: &Limits) -> Vec<Shift> {
         problem.joint_error_squares(stop, &state.joint_errors[stop]).chain(ties).sum::<f64>()
     };
     let all: f64 = linear.stops.iter().map(errors).sum();
-    let (mut left, mut found, mut good) = (all, Vec::<Shift>::new(), Vec::new());
+    let (mut left, mut found, mut good) = (all, Vec::<PoseStep>::new(), Vec::new());
     while found.len() < limits.displacements {
         let tried = candidates(problem, &linear, limits.displaced_images);
         let Some(mut best) = linear.best(problem, &tried, limits.displaced_images) else { break };
@@ -144,9 +144,9 @@ fn find_shifts(fit: &Fit, limits: &Limits) -> Vec<Shift> {
         (linear, left) = (next, (left - best.fall).max(0.0));
         best.twist.fill(0.0);
         found.push(best);
-        for (k, shift) in found.iter_mut().enumerate() {
-            shift.twist += step.fixed_rows::<6>(columns + 6 * k);
-            shift.share = 1.0 - left / all;
+        for (k, own) in found.iter_mut().enumerate() {
+            own.twist += step.fixed_rows::<6>(columns + 6 * k);
+            own.share = 1.0 - left / all;
         }
         if enough {
             good.clone_from(&found);
@@ -215,7 +215,7 @@ impl Linear {
     fn of(linear: LinearProblem) -> Self {
         let Adjustment { problem, state } = linear.adjustment;
         let lin = linear.lin;
-        let TellingStops { stops: all, information, .. } = TellingStops::of(linear);
+        let StopInformation { stops: all, information, .. } = StopInformation::of(linear);
         let shown = |k: usize| {
             let image = &problem.images[lin.images[k]];
             if state.joint_errors[image.stop].is_empty() || state.ties[lin.images[k]].is_free() {
@@ -228,7 +228,7 @@ impl Linear {
             };
             Some(Shown { image: lin.images[k], up: [0, 1, 2].map(|axis| carried.rotation[(2, axis)]) })
         };
-        let row = |told: Told| {
+        let row = |told: RootInformation| {
             let images: Vec<Shown> = told.places.filter_map(shown).collect();
             let by_columns = Rc::new(told.by_root);
             (!images.is_empty()).then_some(Row { images, score: told.score, by_free: told.by_free, by_columns })
@@ -237,7 +237,7 @@ impl Linear {
     }
 
     /// The step with the largest fall of the cost; where several are alike, the first, which is one in time.
-    fn best(&self, problem: &Problem, tried: &[Candidate], fewest: usize) -> Option<Shift> {
+    fn best(&self, problem: &Problem, tried: &[Candidate], fewest: usize) -> Option<PoseStep> {
         let covariance = SymmetricFactor::new(&self.information).ok()?.inverse();
         let mut best: Option<(f64, usize, Vector6<f64>, Matrix6<f64>)> = None;
         let mut sums = Sums::new(self.information.ncols());
@@ -257,19 +257,19 @@ impl Linear {
         let Candidate { series, body, order, rows, from } = &tried[c];
         let images = rows[*from..].iter().flat_map(|&r| self.stops[r].of(problem, *body));
         let behind = images.map(|shown| shown.image).collect();
-        Some(Shift { series: *series, body: *body, order: *order, behind, twist, covariance, fall, share: 0.0 })
+        Some(PoseStep { series: *series, body: *body, order: *order, behind, twist, covariance, fall, share: 0.0 })
     }
 
     /// With the pose of the body behind the step as six more columns, at the optimum; and the way there.
-    fn with(&self, problem: &Problem, shift: &Shift) -> Option<(Self, DVector<f64>)> {
+    fn with(&self, problem: &Problem, step: &PoseStep) -> Option<(Self, DVector<f64>)> {
         let n = self.information.ncols();
         let mut information = self.information.clone().resize(n + 6, n + 6, 0.0);
         let mut gradient = DVector::zeros(n + 6);
         let mut derivatives = Vec::with_capacity(self.stops.len());
-        let columns = shift.body.columns(&problem.layout);
+        let columns = step.body.columns(&problem.layout);
         for row in &self.stops {
             let mut by_free = row.by_free.clone().resize_horizontally(n + 6, 0.0);
-            if row.images.iter().any(|shown| shift.behind.contains(&shown.image)) {
+            if row.images.iter().any(|shown| step.behind.contains(&shown.image)) {
                 by_free.columns_mut(n, 6).copy_from(&row.by(&columns));
                 let own = by_free.columns(n, 6).into_owned();
                 let coupling = by_free.tr_mul(&own);
@@ -326,8 +326,8 @@ impl Sums {
     }
 }
 
-impl Shift {
-    fn finding(&self, problem: &Problem, setting: &Setting) -> Displaced {
+impl PoseStep {
+    fn finding(&self, problem: &Problem, setting: &CheckContext) -> Displaced {
         let image = &problem.images[self.behind[0]];
         let body = match (self.body, image.mount) {
             (Body::Placement(_), CameraMount::Hand) => Carried::Plate,

@@ -1,4 +1,4 @@
-//! What a solution is worth: identifiability, the covariance by clusters of images, the workspace map.
+//! How far a solution can be trusted: identifiability, the covariance by clusters of images, the workspace map.
 
 use nalgebra::DMatrix;
 
@@ -15,9 +15,9 @@ use crate::solve::{Covariance, Fit, JOINT_NOISE_FLOOR, NoiseInformation, NoiseUn
 /// Sigmas of a 95 % interval.
 pub const NORMAL_95: f64 = 1.96;
 
-/// What a solution is worth.
+/// How far a solution can be trusted.
 #[derive(Debug, Clone, Default)]
-pub struct Worth {
+pub struct Uncertainty {
     /// What the data tell; none without stops.
     pub identifiability: Option<Identifiability>,
     /// Sigmas of the dense columns by the noise model alone.
@@ -28,10 +28,10 @@ pub struct Worth {
     pub clustered_ratio: Option<f64>,
     /// True where the sigmas by clusters are the ones stated.
     pub larger_stated: bool,
-    /// 95 % interval of the joint noise of every series and reading, rad or m; empty where it is not told.
+    /// 95 % interval of the joint noise of every series and reading, rad or m; empty where it is not identifiable.
     pub joint_noise: Vec<Vec<[f64; 2]>>,
     /// What the data tell of the joint noise, also of that which counts as none; none where it was given.
-    pub told: Option<NoiseInformation>,
+    pub noise_information: Option<NoiseInformation>,
     /// Expected error of the flange where the stops were, before and after; none without stops.
     pub flange: Option<FlangeErrors>,
     /// Workspace map; empty where plate (or fixed camera) and robot are not tied.
@@ -62,7 +62,7 @@ pub fn judge(
     joint_noise_is_estimated: bool,
     told_before: Option<NoiseInformation>,
     limits: &Limits,
-) -> Worth {
+) -> Uncertainty {
     let told = if joint_noise_is_estimated { noise_information(fit) } else { None };
     let uncertainty = told.as_ref().and_then(|told| NoiseUncertainty::of(told, fit));
     let clustered = clustered_covariance(fit.linear(), limits).filter(|_| images_know_the_robot(fit));
@@ -72,52 +72,52 @@ pub fn judge(
     let n = layout.len();
     let stops = stops(problem);
     let sigmas = |c: &DMatrix<f64>| (0..n).map(|k| c[(k, k)].max(0.0).sqrt()).collect::<Vec<f64>>();
-    let mut worth = Worth {
+    let mut found = Uncertainty {
         identifiability: identifiability(&state.robot, layout, &stops, &covariance.reduced, limits),
-        ..Worth::default()
+        ..Uncertainty::default()
     };
     uncertainty.iter().for_each(|u| covariance.add(&u.added()));
     if let Some(told) = told_before.or(told) {
-        worth.tell_joint_noise(&problem.noise, told.of_sizes());
+        found.set_joint_noise(&problem.noise, told.of_sizes());
     }
-    worth.model_sigma = sigmas(&covariance.reduced);
+    found.model_sigma = sigmas(&covariance.reduced);
     if let Some(clustered) = clustered {
         let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &clustered.model, &stops, limits));
-        worth.clustered_ratio = model.map(|m| m.ratio_of(&clustered.sandwich));
-        let by_clusters: Vec<f64> = worth.model_sigma.iter().zip(clustered.ratios()).map(|(s, r)| s * r).collect();
-        if worth.clustered_ratio.is_some_and(|ratio| ratio > limits.scatter_ratio) {
-            worth.larger_stated = true;
-            enlarge(covariance, &worth.model_sigma, &by_clusters, problem.layout.theta_len());
-            worth.identifiability = identifiability(&state.robot, layout, &stops, &covariance.reduced, limits);
+        found.clustered_ratio = model.map(|m| m.ratio_of(&clustered.sandwich));
+        let by_clusters: Vec<f64> = found.model_sigma.iter().zip(clustered.ratios()).map(|(s, r)| s * r).collect();
+        if found.clustered_ratio.is_some_and(|ratio| ratio > limits.scatter_ratio) {
+            found.larger_stated = true;
+            enlarge(covariance, &found.model_sigma, &by_clusters, problem.layout.theta_len());
+            found.identifiability = identifiability(&state.robot, layout, &stops, &covariance.reduced, limits);
         }
-        worth.clustered_sigma = Some(by_clusters);
+        found.clustered_sigma = Some(by_clusters);
     }
     let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops, limits));
     let noise: Vec<Vec<f64>> = problem.used_on_robot().map(|i| problem.joint_sigma(problem.images[i].series)).collect();
     let promise = |m: &FlangeModel| FlangeErrors::new(m, &state.robot, &usual_joint_sigma(&noise), &stops);
-    worth.flange = model.as_ref().and_then(promise);
-    worth.workspace = model.map(|m| m.workspace()).unwrap_or_default();
-    worth
+    found.flange = model.as_ref().and_then(promise);
+    found.workspace = model.map(|m| m.workspace()).unwrap_or_default();
+    found
 }
 
-impl Worth {
-    /// 95 % interval of the joint noise of a reading, root mean square over some series, rad or m; none where it is not told.
+impl Uncertainty {
+    /// 95 % interval of the joint noise of a reading, root mean square over some series, rad or m; none where it is not identifiable.
     pub fn joint_noise_of(&self, series: &[usize], reading: usize) -> Option<[f64; 2]> {
         match series {
             [one] => self.joint_noise.get(*one)?.get(reading).copied(),
-            _ => Some(self.told.as_ref()?.mean_variance(series, &[reading]).interval(NORMAL_95)),
+            _ => Some(self.noise_information.as_ref()?.mean_variance(series, &[reading]).interval(NORMAL_95)),
         }
     }
 
     /// Takes over what is known of the joint noise. The interval of what counts as none starts at none.
-    fn tell_joint_noise(&mut self, noise: &Noise, told: NoiseInformation) {
+    fn set_joint_noise(&mut self, noise: &Noise, told: NoiseInformation) {
         let interval = |series: usize, reading: usize| {
             let [low, high] = told.mean_variance(&[series], &[reading]).interval(NORMAL_95);
             [if noise.joint[series][reading] > JOINT_NOISE_FLOOR { low } else { 0.0 }, high]
         };
         let of_series = |(s, own): (usize, &Vec<f64>)| (0..own.len()).map(|r| interval(s, r)).collect();
         self.joint_noise = noise.joint.iter().enumerate().map(of_series).collect();
-        self.told = Some(told);
+        self.noise_information = Some(told);
     }
 }
 
