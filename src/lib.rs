@@ -19,9 +19,14 @@
 //! | [`calibration`] | the front door: robot and series -> calibration |
 //! | [`study`] | what the program reaches where the truth is known |
 //! | [`cli`] | the only room that prints |
+//!
+//! Features, all on by default: `cli` (the program; it takes the others along), `report` (report.html, plan.html, [`study`]), `draw` (plates as
+//! PDF, SVG and PNG, marks on pictures), `mcap` (recordings in MCAP; those in sqlite are always read). Without them
+//! (`default-features = false`) nothing of clap, maud, pdf-writer, tiny-skia and mcap is compiled.
 
 pub mod assess;
 pub mod calibration;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod detect;
 pub mod diagnose;
@@ -41,6 +46,7 @@ pub mod programs;
 pub mod series;
 pub mod simulate;
 pub mod solve;
+#[cfg(feature = "report")]
 pub mod study;
 pub mod urdf;
 

@@ -125,6 +125,7 @@ impl Calibration {
     ///
     /// # Errors
     /// As of [`Calibration::files`].
+    #[cfg(feature = "report")]
     pub fn report_html(&self) -> Result<String> {
         let page = self.files(&Export::default())?.remove(output::REPORT).unwrap_or_default();
         Ok(String::from_utf8_lossy(&page).into_owned())

@@ -5,6 +5,7 @@ use super::text::{list, quoted};
 use crate::error::{Code, Error, Result};
 use crate::identify::{Solution, depths_m};
 use crate::model::camera::{Camera, Lens};
+#[cfg(feature = "mcap")]
 use crate::series::CameraInfo;
 
 /// One file for each camera, as (file name, text).
@@ -97,6 +98,7 @@ fn for_opencv(camera: &Camera) -> String {
 ///
 /// # Errors
 /// A lens that no model of ROS comes near to.
+#[cfg(feature = "mcap")]
 pub(super) fn camera_info(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<CameraInfo> {
     let (camera, _) = in_ros(name, camera, depths_m)?;
     let p = &camera.parameters;

@@ -4,6 +4,7 @@
 //! A new exporter is one file here and one row in [`files`].
 
 mod camera_file;
+#[cfg(feature = "draw")]
 mod canvas;
 pub mod comparison;
 mod compensation;
@@ -13,6 +14,7 @@ mod controller_files;
 pub mod corrections;
 pub mod detection_files;
 pub mod difference;
+#[cfg(feature = "draw")]
 mod dot_font;
 mod estimates;
 mod finding_record;
@@ -21,17 +23,24 @@ mod gauge;
 mod kinematics_file;
 mod names;
 mod observation_table;
+#[cfg(feature = "draw")]
 pub mod overlay;
 pub mod plan_files;
 pub mod plan_programs;
 pub mod plan_start;
+#[cfg(feature = "draw")]
 pub mod plate_drawing;
 mod plate_files;
+#[cfg(feature = "draw")]
 mod plate_pdf;
+#[cfg(feature = "draw")]
 mod plate_png;
+#[cfg(feature = "draw")]
 mod plate_svg;
 mod pose_files;
+#[cfg(feature = "mcap")]
 pub mod recording;
+#[cfg(feature = "report")]
 pub(crate) mod report;
 mod residuals;
 pub mod restore;
@@ -48,6 +57,7 @@ pub use context::{Context, Offsets, Poses};
 pub use controller_files::kinematics_xacro;
 pub use kinematics_file::kinematics_yaml;
 pub use names::folder_name;
+#[cfg(feature = "report")]
 pub use report::{plan_html, report_html, sigma_text};
 pub use write::{NewFolder, NewResult, Place, recover, write_all, write_beside};
 
@@ -84,13 +94,17 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
     }
     add("observations.csv".into(), observation_table::observations_csv(solution, context));
     let mut names: Vec<String> = files.keys().cloned().collect();
-    names.extend([REPORT.to_owned(), solution_json::FILE_NAME.to_owned()]);
+    names.push(solution_json::FILE_NAME.to_owned());
+    #[cfg(feature = "report")]
+    names.push(REPORT.to_owned());
     names.sort();
     let record = solution_record::record(solution, context, &gauge, names)?;
+    #[cfg(feature = "report")]
     files.insert(REPORT.into(), report::report_html(&record).into_bytes());
     files.insert(solution_json::FILE_NAME.into(), solution_json::to_bytes(&record)?);
     Ok(files)
 }
 
 /// Name of the report.
+#[cfg(feature = "report")]
 pub const REPORT: &str = "report.html";

@@ -22,10 +22,9 @@ pub(crate) use manifest::read_toml;
 pub use manifest::{
     AngleUnit, CameraMount, CameraSection, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder,
 };
-pub use mcap::{
-    CameraInfo, Clock, Delay, Extracted, FramePoses, ImageMarks, MarkKind, MarkLayer, Motion, Picking,
-    RecordingOptions, Shown, StopReport, extract, require_new, write_recording,
-};
+pub use mcap::{CameraInfo, Clock, Delay, Extracted, Motion, Picking, RecordingOptions, StopReport, extract};
+#[cfg(feature = "mcap")]
+pub use mcap::{FramePoses, ImageMarks, MarkKind, MarkLayer, Shown, require_new, write_recording};
 pub use observation::{Edge, ImageObservations, Observation};
 pub use observation_file::{observations_csv, parse_observations};
 pub use plate::{Aruco, Marker, Plate, ScaleBar};

@@ -4,6 +4,7 @@ mod apart;
 mod architecture;
 mod circles;
 mod codes;
+mod features;
 mod imports;
 mod limits;
 mod sentences;

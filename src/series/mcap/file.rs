@@ -4,9 +4,14 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::message::Message;
-use super::{records, sqlite};
+#[cfg(feature = "mcap")]
+use super::records;
+use super::sqlite;
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::files::{self, Kind};
+
+/// How an MCAP file begins.
+pub(super) const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
 /// The files of a recording, in the order in which they were written: one file, or a rosbag2 folder.
 ///
@@ -42,7 +47,7 @@ pub(super) fn files_of(recording: &Path) -> Result<Vec<PathBuf>> {
 pub(in crate::series) fn require_recording(recording: &Path) -> Result<()> {
     for path in files_of(recording)? {
         let head = head(&path)?;
-        if !head.starts_with(mcap::MAGIC) && !head.starts_with(sqlite::MAGIC) {
+        if !head.starts_with(MCAP) && !head.starts_with(sqlite::MAGIC) {
             return Err(not_recording(&path, &head));
         }
     }
@@ -86,8 +91,18 @@ pub(super) fn for_each(path: &Path, mut visit: impl FnMut(Message<'_>) -> Result
     };
     let head = head(path)?;
     match () {
-        () if head.starts_with(mcap::MAGIC) => records::for_each(path, visit),
+        () if head.starts_with(MCAP) => mcap_messages(path, visit),
         () if head.starts_with(sqlite::MAGIC) => sqlite::for_each(path, visit),
         () => Err(not_recording(path, &head)),
     }
+}
+
+#[cfg(feature = "mcap")]
+use records::for_each as mcap_messages;
+
+/// What a build without the feature says of MCAP.
+#[cfg(not(feature = "mcap"))]
+fn mcap_messages(path: &Path, _: impl FnMut(Message<'_>) -> Result<()>) -> Result<Option<Notice>> {
+    let remedy = "build robotcal with the feature mcap";
+    Err(Error::new(Code::RecordingFormat, path.display(), "is MCAP, which this build does not read", remedy))
 }

@@ -11,15 +11,18 @@ mod delay;
 mod extract;
 mod file;
 mod frame;
+#[cfg(feature = "mcap")]
 mod interfaces;
 mod message;
 mod messages;
 mod motion;
 mod options;
 mod pixels;
+#[cfg(feature = "mcap")]
 mod records;
 mod scan;
 mod sqlite;
+#[cfg(feature = "mcap")]
 mod write;
 
 pub use collect::StopReport;
@@ -28,4 +31,5 @@ pub use extract::{Extracted, extract};
 pub(super) use file::require_recording;
 pub use messages::CameraInfo;
 pub use options::{Clock, Motion, Picking, RecordingOptions};
+#[cfg(feature = "mcap")]
 pub use write::{FramePoses, ImageMarks, MarkKind, MarkLayer, Shown, require_new, write_recording};

@@ -9,6 +9,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
+use super::file::MCAP;
 use super::message::Message;
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::{self, Kind};
@@ -36,7 +37,7 @@ pub(super) fn for_each(path: &Path, visit: impl FnMut(Message<'_>) -> Result<()>
     let (file, length) = files::open(path, Kind::Recording)?;
     let file = BufReader::with_capacity(1 << 16, file);
     let mut walk = Walk { path, file, length, at: 0, contents: Contents::default(), starts: None, visit };
-    walk.seek(mcap::MAGIC.len() as u64)?;
+    walk.seek(MCAP.len() as u64)?;
     walk.run()
 }
 
@@ -139,7 +140,7 @@ impl<V: FnMut(Message<'_>) -> Result<()>> Walk<'_, V> {
     /// Learns the channels from the summary at the end of the file and returns where its chunks begin; none without a summary.
     fn learn_summary(&mut self) -> Result<Vec<u64>> {
         let mut starts = Vec::new();
-        let tail = HEAD + FOOTER_LENGTH + mcap::MAGIC.len() as u64;
+        let tail = HEAD + FOOTER_LENGTH + MCAP.len() as u64;
         let Some(footer) = self.length.checked_sub(tail) else { return Ok(starts) };
         self.seek(footer)?;
         if self.head()? != (FOOTER, FOOTER_LENGTH) {
