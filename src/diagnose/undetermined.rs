@@ -32,7 +32,7 @@ impl fmt::Display for FlangeUndetermined {
         write!(
             f,
             "flange: its place is known to {:.1} mm only in the region of the stops, and the nominal robot is off by {:.2} mm: these stops do \
-             not determine the robot; see what is untold, and what to add",
+             not determine the robot; see what is unknown, and what to add",
             self.sigma_mm, self.nominal_mm
         )
     }

@@ -14,7 +14,7 @@ use crate::problem::MeasuredSeries;
 use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem};
 use crate::solve::{
     ComponentOptions, NoiseInformation, Outcome, Status, estimate_components, reject_images, reject_observations,
-    without_untold_noise,
+    without_unidentified_noise,
 };
 use crate::urdf::Chain;
 
@@ -122,7 +122,7 @@ fn fit(
         }
         outcome = estimate_components(outcome.adjustment, &components);
     }
-    if components.joint { without_untold_noise(outcome, &components.settings) } else { (outcome, None) }
+    if components.joint { without_unidentified_noise(outcome, &components.settings) } else { (outcome, None) }
 }
 
 /// Adds to every wrongly paired image by how much its readings miss, and whose readings would fit it.

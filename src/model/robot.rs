@@ -48,7 +48,7 @@ pub struct Kinematics {
 
 /// What all stops of a robot share: `origin_i Exp(xi_i)` of every joint, and the right Jacobian of its twist.
 #[derive(Debug, Clone)]
-pub struct MovedOrigins(Vec<(Pose, Matrix6<f64>)>);
+pub struct LinearOrigins(Vec<(Pose, Matrix6<f64>)>);
 
 fn motion(joint: &Joint, position: f64) -> Pose {
     match joint.kind {
@@ -101,19 +101,19 @@ impl Robot {
     }
 
     /// What the kinematics of all stops share.
-    pub fn moved_origins(&self) -> MovedOrigins {
+    pub fn linear_origins(&self) -> LinearOrigins {
         let moved =
             |(joint, twist): (&Joint, &Vector6<f64>)| (joint.origin.perturbed(twist), right_jacobian_se3(twist));
-        MovedOrigins(self.chain.joints.iter().zip(&self.twists).map(moved).collect())
+        LinearOrigins(self.chain.joints.iter().zip(&self.twists).map(moved).collect())
     }
 
     /// As [`Robot::pose_at`], with all derivatives.
     pub fn kinematics(&self, stop: &Posture, noise: &[f64]) -> Kinematics {
-        self.kinematics_from(&self.moved_origins(), stop, noise)
+        self.kinematics_from(&self.linear_origins(), stop, noise)
     }
 
     /// As [`Robot::kinematics`], where the origins of this robot are at hand.
-    pub fn kinematics_from(&self, origins: &MovedOrigins, stop: &Posture, noise: &[f64]) -> Kinematics {
+    pub fn kinematics_from(&self, origins: &LinearOrigins, stop: &Posture, noise: &[f64]) -> Kinematics {
         let (positions, contexts) = self.positions(stop, noise);
         let joints = &self.chain.joints;
         let mut d_twists = vec![Matrix6::zeros(); joints.len()];

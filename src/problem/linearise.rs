@@ -12,7 +12,7 @@ use super::{Image, Layout, Measured, Problem, State, TakenFrom, Tie};
 use crate::geom::{Pose, adjoint, right_jacobian_se3};
 use crate::linalg::wide;
 use crate::model::circle::Prediction;
-use crate::model::robot::MovedOrigins;
+use crate::model::robot::LinearOrigins;
 
 /// One residual with what the robust weighting made of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -206,13 +206,13 @@ pub struct Chained {
 impl State {
     /// Pose of an image and its derivatives as body twists; `None` for an image off the robot that has no free pose.
     pub fn chained(&self, layout: &Layout, image: &Image, from: TakenFrom) -> Option<Chained> {
-        self.chained_from(&self.robot.moved_origins(), layout, image, from)
+        self.chained_from(&self.robot.linear_origins(), layout, image, from)
     }
 
     /// As [`State::chained`], where the origins of the robot are at hand.
     pub fn chained_from(
         &self,
-        origins: &MovedOrigins,
+        origins: &LinearOrigins,
         layout: &Layout,
         image: &Image,
         from: TakenFrom,

@@ -88,7 +88,7 @@ impl Adjustment {
     pub(super) fn linearise_some(&self, enough: usize) -> Option<Linearised> {
         let Self { problem, state } = self;
         let images: Vec<usize> = problem.used().map(|(i, _)| i).collect();
-        let origins = state.robot.moved_origins();
+        let origins = state.robot.linear_origins();
         let parts: Option<Vec<(ImageTerms, Chained)>> = images
             .par_iter()
             .map(|&i| {

@@ -14,7 +14,7 @@ mod noise_information;
 mod noise_uncertainty;
 mod snoop;
 mod system;
-mod untold;
+mod unidentified_noise;
 
 pub use blocks::SeenMarkers;
 pub use components::{ComponentOptions, JOINT_NOISE_FLOOR, Tally, estimate_components, share_out};
@@ -28,4 +28,4 @@ pub use noise_information::{NoiseInformation, Spread, noise_information};
 pub use noise_uncertainty::NoiseUncertainty;
 pub use snoop::{reject_images, reject_observations};
 pub use system::{Elimination, Singular, System};
-pub use untold::without_untold_noise;
+pub use unidentified_noise::without_unidentified_noise;

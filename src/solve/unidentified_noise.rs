@@ -1,4 +1,4 @@
-//! Joint noise that the data do not tell from none counts as none.
+//! Joint noise that the data do not separate from none counts as none.
 //!
 //! An estimate cannot be below zero: of a robot without joint noise half of the series find some, and their covariances are too
 //! large. The estimate is compared with its spread where there is no noise (the test of a component on the edge of its range;
@@ -10,23 +10,23 @@ use super::noise_information::{NoiseInformation, noise_information};
 use crate::problem::Adjustment;
 
 /// Sigmas of an estimate where there is no noise that it must reach: one of a hundred robots without noise gets past.
-const TOLD: f64 = 2.326;
+const IDENTIFIED: f64 = 2.326;
 
-/// Sigmas by its own spread from which on an estimate is told without asking further.
+/// Sigmas by its own spread from which on an estimate is identified without asking further.
 const PLAIN: f64 = 3.0;
 
 /// Readings of one kind, in all series: one of them alone may have too few stops to tell what all together do.
 type Group = Vec<usize>;
 
 /// The outcome with such noise at its floor, and what was known of all noise before, where that changed.
-pub fn without_untold_noise(outcome: Outcome, settings: &Settings) -> (Outcome, Option<NoiseInformation>) {
-    let (outcome, told) = information(outcome);
-    let Some(told) = told else { return (outcome, None) };
+pub fn without_unidentified_noise(outcome: Outcome, settings: &Settings) -> (Outcome, Option<NoiseInformation>) {
+    let (outcome, found) = information(outcome);
+    let Some(found) = found else { return (outcome, None) };
     let noise = &outcome.adjustment.problem.noise;
     let series: Vec<usize> = (0..noise.joint.len()).collect();
     let above_floor = |r: &usize| noise.joint.iter().any(|own| own[*r] > JOINT_NOISE_FLOOR);
     let in_doubt: Vec<Group> = groups(&outcome.adjustment)
-        .filter(|group| told.mean_variance(&series, group).interval(PLAIN)[0] == 0.0)
+        .filter(|group| found.mean_variance(&series, group).interval(PLAIN)[0] == 0.0)
         .filter(|group| group.iter().any(above_floor))
         .collect();
     if in_doubt.is_empty() {
@@ -34,13 +34,14 @@ pub fn without_untold_noise(outcome: Outcome, settings: &Settings) -> (Outcome, 
     }
     let (at_none, spread) = information(solved_without(&outcome.adjustment, &in_doubt, settings));
     let Some(spread) = spread else { return (outcome, None) };
-    let is_told =
-        |group: &Group| told.mean_variance(&series, group).variance > TOLD * spread.mean_variance(&series, group).sigma;
-    let (kept, untold): (Vec<Group>, Vec<Group>) = in_doubt.into_iter().partition(is_told);
-    match (kept.is_empty(), untold.is_empty()) {
+    let is_identified = |group: &Group| {
+        found.mean_variance(&series, group).variance > IDENTIFIED * spread.mean_variance(&series, group).sigma
+    };
+    let (kept, unidentified): (Vec<Group>, Vec<Group>) = in_doubt.into_iter().partition(is_identified);
+    match (kept.is_empty(), unidentified.is_empty()) {
         (_, true) => (outcome, None),
-        (true, _) => (at_none, Some(told)),
-        _ => (solved_without(&outcome.adjustment, &untold, settings), Some(told)),
+        (true, _) => (at_none, Some(found)),
+        _ => (solved_without(&outcome.adjustment, &unidentified, settings), Some(found)),
     }
 }
 
@@ -55,8 +56,8 @@ fn information(outcome: Outcome) -> (Outcome, Option<NoiseInformation>) {
     let Outcome { status, iterations, .. } = outcome;
     match outcome.fit() {
         Ok(fit) => {
-            let told = noise_information(&fit);
-            (Outcome { status, iterations, adjustment: fit.adjustment, linearised: Some(fit.linearised) }, told)
+            let found = noise_information(&fit);
+            (Outcome { status, iterations, adjustment: fit.adjustment, linearised: Some(fit.linearised) }, found)
         }
         Err(unsolved) => (Outcome { status, ..unsolved.outcome }, None),
     }
