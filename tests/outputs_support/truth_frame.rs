@@ -9,10 +9,10 @@ use rand_distr::{Distribution, StandardNormal};
 use robotcal::assess::Limits;
 use robotcal::geom::{Pose, project_to_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
-use robotcal::problem::{Adjustment, Mark, Measured, PlateShape, State, Tie};
+use robotcal::problem::{Adjustment, Mark, Measured, PlateShape, State, Tie, hold_scale_bars};
 use robotcal::series::{Plate, PlateKind, ScaleBar};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
-use robotcal::solve::Fit;
+use robotcal::solve::{Fit, Settings, solve};
 use robotcal::study::measured;
 
 use super::{context, robot};
@@ -163,9 +163,12 @@ pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, 
         plates: vec![PlateShape::nominal(&world.plate)],
         ..template.fit.state.clone()
     };
-    let (mut adjustment, free_poses, _) =
-        adjust_free_poses(Adjustment { problem, state: start }, &[None], &Limits::default()).unwrap();
+    let mut start = Adjustment { problem, state: start };
+    // As identify does: the measured distance of this plate, first at its nominal shape, then at the one that was found.
+    hold_scale_bars(&mut start);
+    let (mut adjustment, free_poses, _) = adjust_free_poses(start, &[None], &Limits::default()).unwrap();
     adjustment.hold_poses();
+    let adjustment = solve(adjustment, &Settings::default()).adjustment;
     let linearised = adjustment.linearise().unwrap();
     let covariance = adjustment.linear(&linearised).covariance().unwrap();
     let fit = Fit { adjustment, linearised, covariance };
