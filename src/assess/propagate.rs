@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Matrix6};
 
 use crate::geom::{Pose, adjoint};
 use crate::model::robot::Posture;
-use crate::problem::{Image, Problem, TakenFrom, Tie};
+use crate::problem::{Image, Problem, TakenFrom};
 use crate::solve::Fit;
 
 /// Which camera looks at which plate.
@@ -66,8 +66,7 @@ pub fn predict_pose(fit: &Fit, view: View, readings: &[f64]) -> Option<Predicted
         rejected: None,
     };
     let (posture, exact) = (Posture::at(readings), vec![0.0; readings.len()]);
-    let from = TakenFrom { posture: Some(&posture), joint_errors: &exact, tie: &Tie::Rigid };
-    let chain = fit.state.chained(layout, &image, from)?;
+    let chain = fit.state.chained(layout, &image, TakenFrom::rigid(&posture, &exact))?;
     let theta = layout.theta_len();
     let of_theta = fit.covariance.reduced.view((0, 0), (theta, theta));
     let model = &chain.d_theta * of_theta * chain.d_theta.transpose();

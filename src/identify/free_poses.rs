@@ -11,8 +11,8 @@ use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
 use crate::problem::{Adjustment, ImageRejection, Mark, Problem, State, Tie, Weighting, hold_scale_bars, size_by_bar};
 use crate::solve::{
-    ComponentOptions, Fit, LinearImage, LinearStop, Linearised, PlateScale, Settings, Similarity, Status,
-    estimate_components, frames, in_frame, reject_observations, solve,
+    ComponentOptions, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status, estimate_components,
+    frames, in_frame, reject_observations, solve,
 };
 
 /// RMS of a start, px per point, from which no further focal length is tried.
@@ -306,10 +306,10 @@ fn collect(fit: &Fit) -> Result<FreePoses> {
     let Fit { adjustment: Adjustment { problem, state }, linearised: lin, covariance } = fit;
     let (placed, scales) = placed_cameras(fit)?;
     let mut poses = vec![None; problem.images.len()];
-    let images = fit.linear().stops().flat_map(|stop| stop.images().map(move |image| (stop.clone(), image)));
-    for ((stop, own @ LinearImage { index, terms, chain, .. }), in_frame) in images.zip(placed) {
+    for (own, in_frame) in fit.linear().images().zip(placed) {
+        let LinearImage { index, terms, chain, stop, .. } = own;
         let squares: f64 = terms.residuals.iter().map(|r| r.duv.norm_squared()).sum();
-        let c = own.part_of(&covariance.latents(&stop));
+        let c = own.part_of(&covariance.latents(&fit.linear().stop(stop)));
         poses[index] = Some(FreePose {
             camera_from_plate: chain.pose,
             covariance: Matrix6::from_column_slice(c.as_slice()),
@@ -353,11 +353,8 @@ fn placed_cameras(fit: &Fit) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale
         moved.linearise().ok_or_else(|| undetermined(Code::CameraUndetermined, "a marker lies behind its camera"))?;
     let linear = moved.linear(&lin);
     let covariance = in_frame(linear, &fit.covariance)?;
-    let of_stop = |stop: LinearStop| -> Vec<PlacedCamera> {
-        let placed = |own: LinearImage| PlacedCamera::of(&own.chain.pose, &covariance.pose(&stop, &own));
-        stop.images().map(placed).collect()
-    };
-    Ok((linear.stops().flat_map(of_stop).collect(), scales))
+    let placed = |own: LinearImage| PlacedCamera::of(&own.chain.pose, &covariance.pose(&linear.stop(own.stop), &own));
+    Ok((linear.images().map(placed).collect(), scales))
 }
 
 impl PlacedCamera {

@@ -70,13 +70,12 @@ impl PoseStage {
         let factor = SymmetricFactor::new(&system.information).ok()?;
         let (x, all) = (factor.solve(&system.rhs), factor.inverse());
         let linear = free.linear(&lin);
-        let on_robot = linear.stops().filter(|stop| stop.stop.posture.is_some());
-        let start = |at: usize| system.latent_start[at];
-        let (images, rows): (Vec<LinearImage>, Vec<_>) = on_robot
-            .flat_map(|stop| stop.images().map(move |image| (stop.at, image)))
-            .map(|(at, image)| (image, image.latents().into_iter().flatten().map(move |c| start(at) + c)))
-            .unzip();
-        let rows: Vec<usize> = rows.into_iter().flatten().collect();
+        let images: Vec<LinearImage> = linear.images().filter(|own| free.problem.on_robot(own.index)).collect();
+        let rows_of = |own: &LinearImage| -> Vec<usize> {
+            let start = system.latent_start[own.stop];
+            own.latents().into_iter().flatten().map(|c| start + c).collect()
+        };
+        let rows: Vec<usize> = images.iter().flat_map(rows_of).collect();
         Some(Self {
             images: images.iter().map(|own| own.index).collect(),
             references: images.iter().map(|own| own.chain.pose).collect(),

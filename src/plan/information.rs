@@ -8,7 +8,7 @@ use super::setting::{PlannedStop, Setting};
 use crate::geom::skew;
 use crate::linalg::{product, symmetric_eigen};
 use crate::model::robot::{Posture, Robot};
-use crate::problem::{self, Adjustment, Problem, TakenFrom, Tie, Weighting, by_columns, linearise};
+use crate::problem::{self, Adjustment, Problem, TakenFrom, Weighting, by_columns, linearise};
 
 /// Information of the image of a stop about all columns; `None` where it shows nothing.
 ///
@@ -32,11 +32,10 @@ fn condensed(
 ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let prior: Vec<f64> = problem.noise.joint[image.series].iter().map(|s| s.powi(-2)).collect();
     let exact = vec![0.0; prior.len()];
-    let from = TakenFrom { posture: Some(posture), joint_errors: &exact, tie: &Tie::Rigid };
-    let chain = state.chained(&problem.layout, image, from)?;
+    let chain = state.chained(&problem.layout, image, TakenFrom::rigid(posture, &exact))?;
     let terms = linearise(image, state, &chain.pose, &Weighting::of(problem, image))?;
-    let h = problem::condensed(&[(&terms, chain.d_latent.clone())], &prior)?;
     let t = by_columns(&problem.layout, image, &chain);
+    let h = problem::condensed(&[(&terms, chain.d_latent)], &prior)?;
     Some((h, t))
 }
 

@@ -1,6 +1,6 @@
 //! A problem and where its solution stands.
 
-use super::{Chained, Image, ImageRejection, Problem, State, TakenFrom, Tie};
+use super::{Image, ImageRejection, Problem, State, TakenFrom, Tie};
 use crate::geom::Pose;
 
 /// A problem with a value of every unknown: what a solve starts from and what it leaves.
@@ -37,11 +37,6 @@ impl Adjustment {
     /// Camera pose of an image as the joint readings of another say; `None` where that one was taken off the robot.
     pub fn camera_by_readings_of(&self, image: usize, other: usize) -> Option<Pose> {
         self.state.camera_from_plate(&self.problem.images[image], TakenFrom::exact(self.problem.posture(other)?))
-    }
-
-    /// Camera pose of an image with its derivatives by the columns and by what is latent; `None` off the robot without a free pose.
-    pub fn chained(&self, image: usize) -> Option<Chained> {
-        self.state.chained(&self.problem.layout, &self.problem.images[image], self.taken_from(image))
     }
 
     /// The adjustment without some of its images: they are held out.

@@ -89,7 +89,12 @@ pub struct TakenFrom<'a> {
 impl<'a> TakenFrom<'a> {
     /// A posture that is as it was read.
     pub fn exact(posture: &'a Posture) -> Self {
-        Self { posture: Some(posture), joint_errors: &[], tie: &Tie::Rigid }
+        Self::rigid(posture, &[])
+    }
+
+    /// A posture with these errors, rad or m; with zeros it is as it was read, and its errors are among the unknowns.
+    pub fn rigid(posture: &'a Posture, joint_errors: &'a [f64]) -> Self {
+        Self { posture: Some(posture), joint_errors, tie: &Tie::Rigid }
     }
 
     /// Number of joint errors that the pose depends on.

@@ -161,8 +161,8 @@ fn whitened_coupling(
 ) -> DMatrix<f64> {
     let mut y = DMatrix::zeros(n, 3 * seen.order.len());
     let mut dense = DenseCoupling::new(&linear.adjustment.problem, seen);
-    let of_stops = linear.stops().zip(latent_start);
-    for (own, start) in of_stops.flat_map(|(stop, start)| stop.images().map(move |image| (image, *start))) {
+    for own in linear.images() {
+        let start = latent_start[own.stop];
         let Some(equations) = own.equations() else { continue };
         dense.add(own, seen, &equations);
         let number = &seen.number[own.image.plate];

@@ -91,8 +91,8 @@ fn following(linear: LinearProblem, system: &System, frames: &[Frame]) -> Vec<Fo
     let layout = &problem.layout;
     let mut all = Vec::new();
     let mut placements_done = vec![false; problem.placements.len()];
-    let images = linear.stops().flat_map(|stop| stop.images().map(move |image| (stop.at, image)));
-    for (at, own @ LinearImage { image, tie, .. }) in images {
+    for own in linear.images() {
+        let LinearImage { image, tie, stop: at, .. } = own;
         let Some(frame) = frames.iter().find(|f| f.plates.contains(&image.plate)) else { continue };
         let (pose, by) = if let Some(pose) = tie.free_pose() {
             let [_, Range { start, .. }] = own.latents();

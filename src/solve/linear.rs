@@ -57,6 +57,8 @@ pub struct LinearImage<'a> {
     pub terms: &'a ImageTerms,
     /// Its chain.
     pub chain: &'a Chained,
+    /// Place of its stop among those in use.
+    pub stop: usize,
     /// Number of joint errors of its stop.
     joints: usize,
     /// Place of its tie among what is latent at its stop.
@@ -163,21 +165,17 @@ impl<'a> LinearProblem<'a> {
         LinearStop { linear: self, index, stop, joint_errors, at, images }
     }
 
-    /// The stop of the k-th image in use.
-    pub fn stop_of(self, k: usize) -> LinearStop<'a> {
-        self.stop(self.lin.stops.partition_point(|(_, images)| images.end <= k))
-    }
-
     /// The k-th image in use.
     pub fn image(self, k: usize) -> LinearImage<'a> {
         let Self { adjustment: Adjustment { problem, state }, lin } = self;
         let index = lin.images[k];
         let (image, tie) = (&problem.images[index], &state.ties[index]);
+        let stop = lin.stops.partition_point(|(_, images)| images.end <= k);
         let joints = state.joint_errors[image.stop].len();
-        let before = (0..k).rev().map(|k| lin.images[k]).take_while(|&i| problem.images[i].stop == image.stop);
-        let tie_start = joints + before.map(|i| state.ties[i].len()).sum::<usize>();
+        let before = lin.images[lin.stops[stop].1.start..k].iter();
+        let tie_start = joints + before.map(|&i| state.ties[i].len()).sum::<usize>();
         let (terms, chain) = (&lin.terms[k], &lin.chains[k]);
-        LinearImage { problem, state, index, image, tie, terms, chain, joints, tie_start }
+        LinearImage { problem, state, index, image, tie, terms, chain, stop, joints, tie_start }
     }
 
     /// Right-hand side of the dense columns, without their priors.

@@ -170,7 +170,8 @@ fn reference(request: &StudyRequest, lattice: (u32, u32)) -> Result<Scale> {
     let exact = vec![0.0; request.chain.readings.len()];
     let (mut poses, mut levers) = (Vec::new(), Vec::new());
     for (k, &i) in stage.images.iter().enumerate() {
-        let from = TakenFrom { posture: problem.posture(i), joint_errors: &exact, tie: &Tie::Rigid };
+        let Some(posture) = problem.posture(i) else { continue };
+        let from = TakenFrom::rigid(posture, &exact);
         let Some(chain) = state.chained(&problem.layout, &problem.images[i], from) else { continue };
         let block = stage.covariance.view((6 * k, 6 * k), (6, 6)).into_owned();
         let position = |pose: &Pose, c: nalgebra::DMatrix<f64>| {

@@ -446,7 +446,8 @@ fn predictions_through_the_whole_chain() {
         for (problem, state) in problems(mount, 1e-3, &mut dice) {
             for (i, image) in problem.images.iter().enumerate() {
                 let given = Adjustment { problem: problem.clone(), state: state.clone() };
-                let (from, chain) = (given.taken_from(i), given.chained(i).unwrap());
+                let from = given.taken_from(i);
+                let chain = given.state.chained(&given.problem.layout, &given.problem.images[i], from).unwrap();
                 for o in image.used() {
                     let p = predict(image, &state, &chain.pose, o).unwrap();
                     let through = p.d_pose * &chain.d_theta;

@@ -81,7 +81,7 @@ impl Whole {
                 let mut columns = a.columns_mut(at, 3);
                 columns += row.transpose();
             }
-            for (r, information) in linear.stop_of(k).prior().into_iter().enumerate() {
+            for (r, information) in linear.stop(linear.image(k).stop).prior().into_iter().enumerate() {
                 a[(latent_start[k] + r, latent_start[k] + r)] += information;
             }
         }

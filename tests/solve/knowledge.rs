@@ -33,17 +33,22 @@ fn chain() -> Chain {
     robot().chain(None, None).unwrap()
 }
 
-fn layout(model: RobotModel) -> (Robot, Layout) {
-    let robot = model.robot(chain());
-    let state = State {
-        robot: robot.clone(),
+/// A state of nothing but a robot.
+fn robot_alone(robot: Robot) -> State {
+    State {
+        robot,
         mountings: vec![],
         placements: vec![],
         cameras: vec![],
         plates: vec![],
         joint_errors: vec![],
         ties: vec![],
-    };
+    }
+}
+
+fn layout(model: RobotModel) -> (Robot, Layout) {
+    let robot = model.robot(chain());
+    let state = robot_alone(robot.clone());
     let layout = Layout::new(&state, &[], &[], &[], &[]);
     (robot, layout)
 }
@@ -110,15 +115,7 @@ fn visiting_every_stop_twice_doubles_the_information() {
 #[test]
 fn names_choose_what_is_free_and_wrong_ones_are_answered() {
     let (robot, fresh) = layout(RobotModel::Full);
-    let mut state = State {
-        robot,
-        mountings: vec![],
-        placements: vec![],
-        cameras: vec![],
-        plates: vec![],
-        joint_errors: vec![],
-        ties: vec![],
-    };
+    let mut state = robot_alone(robot);
     let mut apply = |selection: &Selection| {
         let mut layout = fresh.clone();
         selection.apply(&mut layout, &mut state, &Limits::default()).map(|()| layout)
