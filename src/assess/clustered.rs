@@ -88,6 +88,12 @@ impl StopInformation {
         for d in stops.iter().map(|told| &told.by_free) {
             information += product(&d.transpose(), d);
         }
+        for distance in &linear.lin.distances {
+            let modes = layout.shapes[distance.plate].clone();
+            let own = |c: &usize| if modes.contains(c) { distance.by_modes[c - modes.start] } else { 0.0 };
+            let row = DVector::from_iterator(free.len(), free.iter().map(own));
+            information.ger(1.0, &row, &row, 1.0);
+        }
         Self { stops, free, prior, information }
     }
 }

@@ -6,10 +6,7 @@ use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::assess::{Accuracy, refitted};
 use crate::error::Code;
 use crate::fit::Fit;
-use crate::problem::{Adjustment, Problem, SCALE, State, seen_markers};
-
-/// Prior sigma of a scale of which nothing is known.
-const UNKNOWN_SCALE: f64 = 0.1;
+use crate::problem::{Adjustment, Problem, SCALE, State, UNKNOWN_SCALE, seen_markers, size_by_distance};
 
 const ASPECT: usize = 1;
 
@@ -38,13 +35,11 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
     let Adjustment { problem, state } = &fit.adjustment;
     let limits = setting.limits;
     let mut doubts = Vec::new();
-    for (k, columns) in problem.layout.shapes.iter().enumerate() {
-        let plate = &problem.plates[k];
-        let mean = problem.layout.columns[columns.start + SCALE].prior_mean;
-        let free_scale = || with_free_scale(fit, columns.start).plates[k].modes[SCALE] - mean;
-        let contradicted = contradicted(fit, k, limits.plate_size_sigmas);
-        let far = contradicted.map(|sigma| (free_scale(), sigma));
-        if let Some((off, sigma)) = far.filter(|(off, sigma)| off.abs() > limits.plate_size_sigmas * sigma) {
+    for (k, plate) in problem.plates.iter().enumerate() {
+        let far = |(off, sigma): &(f64, f64)| off.abs() > limits.plate_size_sigmas * sigma;
+        let told = if plate.scale.is_some() { against_distance(fit, k) } else { against_file(fit, k) };
+        let confirmed = told.filter(far).map(|(_, sigma)| (with_free_scale(fit, k), sigma));
+        if let Some((off, sigma)) = confirmed.filter(far) {
             doubts.push(DoubtedSize::Contradicted { measured: plate.scale.is_some(), off, sigma });
         }
         if plate.scale.is_none()
@@ -110,20 +105,24 @@ impl Kind for DoubtedSize {
     }
 }
 
-/// Standard deviation of the scale without its prior, where what the data say of it is too far from the prior; `None` where it is not, or where
-/// they say nothing.
-fn contradicted(fit: &Fit, plate: usize, sigmas: f64) -> Option<f64> {
-    let at = fit.problem.layout.shapes[plate].start;
+/// What the data say of the scale, less what the file of the plate says, with its standard deviation; `None` where they say nothing.
+fn against_file(fit: &Fit, plate: usize) -> Option<(f64, f64)> {
+    let at = fit.problem.layout.shapes[plate].start + SCALE;
     let column = &fit.problem.layout.columns[at];
     let (mean, prior) = (column.prior_mean, column.prior_sigma.powi(2));
     let left = fit.covariance.reduced[(at, at)];
     let told = 1.0 / left - 1.0 / prior;
-    if !column.free || told <= 0.0 {
-        return None;
-    }
     let scale = fit.state.plates[plate].modes[SCALE];
-    let (off, sigma) = ((scale - mean) / (left * told), (1.0 / told + prior).sqrt());
-    (off.abs() > sigmas * sigma).then_some(sigma)
+    (column.free && told > 0.0).then(|| ((scale - mean) / (left * told), (1.0 / told + prior).sqrt()))
+}
+
+/// What the data say of the measured distance of a plate, less the distance, with its standard deviation, over the distance; `None` where
+/// they say nothing.
+fn against_distance(fit: &Fit, plate: usize) -> Option<(f64, f64)> {
+    let (k, distance) = fit.linearised.distances.iter().enumerate().find(|(_, d)| d.plate == plate)?;
+    let predicted = 1.0 + fit.covariance.system.predicted_variance(&fit.covariance.reduced, k)?;
+    let unit = distance.sigma_m / distance.length_m;
+    Some((-distance.residual * predicted * unit, predicted.sqrt() * unit))
 }
 
 /// The x/y scale of the markers that were seen, corrections included, and its prior sigma.
@@ -141,9 +140,16 @@ fn x_y_scale(problem: &Problem, state: &State, plate: usize) -> Option<(f64, f64
     (size > 0.0).then(|| (along / size, prior.hypot(loose.sqrt() / size)))
 }
 
-/// The fit with a scale that nothing but images and links tells: where it is far off, the linear answer need not hold.
-fn with_free_scale(fit: &Adjustment, column: usize) -> State {
-    let mut loose = fit.clone();
-    loose.problem.layout.columns[column].prior_sigma = UNKNOWN_SCALE;
-    refitted(loose)
+/// Size of a plate that nothing but images and links tells, less the stated one: where it is far off, the linear answer need not hold.
+fn with_free_scale(fit: &Fit, plate: usize) -> f64 {
+    let mut loose = fit.adjustment.clone();
+    let at = loose.problem.layout.shapes[plate].start + SCALE;
+    let mean = loose.problem.layout.columns[at].prior_mean;
+    loose.problem.layout.columns[at].prior_sigma = UNKNOWN_SCALE;
+    loose.problem.plates[plate].scale = None;
+    let found = &refitted(loose).plates[plate];
+    match size_by_distance(&fit.problem.plates[plate], found) {
+        Some(size) => 1.0 / size - 1.0,
+        None => found.modes[SCALE] - mean,
+    }
 }

@@ -10,9 +10,10 @@ pub fn log_evidence(linear: LinearProblem) -> Option<f64> {
     let reduced = SymmetricFactor::new(&system.information).ok()?.log_determinant();
     let markers = SeenMarkers::of(linear).information(linear);
     let eliminated: f64 = markers.iter().map(|block| block.determinant().ln()).sum();
+    let distances = system.log_determinant_of_distances();
     let priors: f64 = (linear.adjustment.problem.layout.columns.iter())
         .filter(|c| c.free && c.prior_sigma.is_finite())
         .map(|c| c.prior_sigma.ln())
         .sum();
-    Some(-linear.lin.cost - 0.5 * (reduced + eliminated) - priors).filter(|e| e.is_finite())
+    Some(-linear.lin.cost - 0.5 * (reduced + eliminated + distances) - priors).filter(|e| e.is_finite())
 }

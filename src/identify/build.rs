@@ -10,7 +10,7 @@ use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
     Adjustment, Family, Image, ImageRejection, Layout, Mark, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape,
-    Problem, State, Stop, Tie, hold_scale_bars,
+    Problem, State, Stop, Tie, release_measured_scales,
 };
 use crate::series::{Edge, Observation, Plate};
 
@@ -108,7 +108,8 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         ties: vec![Tie::Free(Pose::identity()); images.len()],
         cameras: lenses,
     };
-    let layout = Layout::new(&state, &mountings, &placements, &cameras, &plate_names);
+    let mut layout = Layout::new(&state, &mountings, &placements, &cameras, &plate_names);
+    release_measured_scales(&mut layout, &plates);
     let noise = Noise {
         pixel_factor: vec![1.0; cameras.len()],
         joint: vec![vec![FIRST_JOINT_NOISE; readings]; series.len()],
@@ -119,9 +120,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
     let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
     let problem =
         Problem { layout, plates, placements, mountings, cameras, stops, images, noise, families, huber: HUBER };
-    let mut adjustment = Adjustment { problem, state };
-    hold_scale_bars(&mut adjustment);
-    Ok(adjustment)
+    Ok(Adjustment { problem, state })
 }
 
 /// First guess of the local error of every reading that has columns for it; 0 for the others.

@@ -9,7 +9,7 @@ use crate::fit::{FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
-use crate::problem::{Adjustment, ImageRejection, Mark, Problem, State, Tie, Weighting, hold_scale_bars, size_by_bar};
+use crate::problem::{Adjustment, ImageRejection, Mark, Problem, State, Tie, Weighting, size_by_distance};
 use crate::solve::{
     ComponentOptions, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status, estimate_components,
     frames, in_frame, reject_observations, solve,
@@ -41,7 +41,6 @@ pub fn adjust_free_poses(
     for (column, free) in adjustment.problem.layout.columns.iter_mut().zip(free_before) {
         column.free = free;
     }
-    hold_scale_bars(&mut adjustment);
     Ok((adjustment, free, verdicts))
 }
 
@@ -332,20 +331,19 @@ fn collect(fit: &Fit) -> Result<FreePoses> {
 fn placed_cameras(fit: &Fit) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale>>)> {
     let Adjustment { problem, state } = &fit.adjustment;
     let mut moved = state.clone();
-    let mut scales = vec![None; problem.plates.len()];
+    let mut sizes = vec![1.0; problem.plates.len()];
     for frame in frames(fit)? {
         for &plate in &frame.plates {
             let similarity = Similarity::of(problem, &frame.seen, plate, &state.plates[plate])?;
             let as_made = similarity.shape(&state.plates[plate], 1.0);
-            let (size, sigma) = size_by_bar(&problem.plates[plate], &as_made, &frame.seen, plate)
-                .unwrap_or_else(|| (1.0, frame.scale_sigma_of_priors(problem, plate)));
+            let size = size_by_distance(&problem.plates[plate], &as_made).unwrap_or(1.0);
             moved.plates[plate] = similarity.shape(&state.plates[plate], size);
             for (i, _) in problem.used().filter(|(_, image)| image.plate == plate) {
                 if let Tie::Free(pose) = &mut moved.ties[i] {
                     *pose = similarity.pose(pose, size);
                 }
             }
-            scales[plate] = Some(PlateScale { relative: size - 1.0, sigma });
+            sizes[plate] = size;
         }
     }
     let moved = Adjustment { problem: problem.clone(), state: moved };
@@ -353,6 +351,16 @@ fn placed_cameras(fit: &Fit) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale
         moved.linearise().ok_or_else(|| undetermined(Code::CameraUndetermined, "a marker lies behind its camera"))?;
     let linear = moved.linear(&lin);
     let covariance = in_frame(linear, &fit.covariance)?;
+    let scale = |(plate, size): (usize, f64)| {
+        let frame = covariance.frame(plate)?;
+        let sigma = match problem.plates[plate].scale {
+            Some(_) => covariance.scale_sigma(problem, plate)?,
+            // Images alone see no size: what is known of it was stated.
+            None => frame.scale_sigma_of_priors(problem, plate),
+        };
+        Some(PlateScale { relative: size - 1.0, sigma })
+    };
+    let scales = sizes.into_iter().enumerate().map(scale).collect();
     let placed = |own: LinearImage| PlacedCamera::of(&own.chain.pose, &covariance.pose(&linear.stop(own.stop), &own));
     Ok((linear.images().map(placed).collect(), scales))
 }

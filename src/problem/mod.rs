@@ -14,9 +14,9 @@ mod linearise;
 mod measured;
 mod measured_series;
 mod noise;
+mod plate_distance;
 mod postures;
 mod rejection;
-mod scale_bar;
 mod select;
 mod state;
 mod step;
@@ -33,9 +33,11 @@ pub use linearise::{Chained, ImageTerms, Residual, Weighting, equations, lineari
 pub use measured::{Mark, Measured};
 pub use measured_series::{LensChoice, MeasuredSeries, MeasuredStop};
 pub use noise::Noise;
+pub use plate_distance::{
+    PlateDistance, SCALE, UNKNOWN_SCALE, release_measured_scales, seen_markers, size_by_distance,
+};
 pub use postures::{common_readings, joined, posture_groups};
 pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};
-pub use scale_bar::{SCALE, hold_scale_bars, seen_markers, size_by_bar};
 pub use select::short_name;
 pub use state::{PlateShape, State};
 pub use step::Step;

@@ -52,6 +52,19 @@ impl SeenMarkers {
         information
     }
 
+    /// Derivatives of the measured distances over their sigmas, 3 markers x distances, 1/m.
+    pub fn by_distances(&self, linear: LinearProblem) -> DMatrix<f64> {
+        let distances = &linear.lin.distances;
+        let mut rows = DMatrix::zeros(3 * self.order.len(), distances.len());
+        for (k, distance) in distances.iter().enumerate() {
+            for (marker, direction) in &distance.ends {
+                let at = self.number[distance.plate][*marker];
+                at.iter().for_each(|at| rows.fixed_view_mut::<3, 1>(3 * at, k).copy_from(direction));
+            }
+        }
+        rows
+    }
+
     /// Right-hand side of each, prior included.
     pub fn gradient(&self, linear: LinearProblem) -> DVector<f64> {
         let Adjustment { problem, state } = linear.adjustment;

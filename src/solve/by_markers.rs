@@ -6,6 +6,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, latents_with_markers, times_right};
+use super::distances::Distances;
 use super::linear::Carried;
 use super::linear::LinearProblem;
 use crate::linalg::{mirror_upper, orthonormal, product, subtract_gram};
@@ -104,16 +105,34 @@ impl MarkersEliminated {
         reduced
     }
 
+    /// `F^-1` times the right-hand side of the markers.
+    pub fn whitened_gradient(&self) -> &DVector<f64> {
+        &self.rhs
+    }
+
+    /// `U = F^-1 H_m` of measured distances, less what is held, from whose rows `H_x` by what stays `Y U` is taken.
+    pub fn reduce_rows(&self, linear: LinearProblem, rows: &mut DMatrix<f64>) -> DMatrix<f64> {
+        let mut whitened = self.seen.by_distances(linear);
+        for (at, inverse) in self.inverse_factors.iter().enumerate() {
+            let own = inverse * whitened.rows(3 * at, 3);
+            whitened.rows_mut(3 * at, 3).copy_from(&own);
+        }
+        whitened -= &self.held * self.held.tr_mul(&whitened);
+        *rows -= product(&self.y, &whitened);
+        whitened
+    }
+
     /// `b' V^-1 b` of the right-hand sides of the markers.
     pub fn squares(&self) -> f64 {
         self.rhs.norm_squared()
     }
 
-    /// The whole step from the solution `x` of the reduced system.
-    pub fn step(&self, linear: LinearProblem, x: &DVector<f64>) -> Step {
+    /// The whole step from the solution `x` of the reduced system, with what measured distances add to that of the whitened markers.
+    pub fn step(&self, linear: LinearProblem, x: &DVector<f64>, by_distances: Option<DVector<f64>>) -> Step {
         let dense = x.rows(0, linear.adjustment.problem.layout.len()).into_owned();
         let mut own = self.rhs.clone();
         own.gemv_tr(-1.0, &self.y, x, 1.0);
+        by_distances.iter().for_each(|added| own += added);
         let of = |at: usize| self.inverse_factors[at].transpose() * own.fixed_rows::<3>(3 * at);
         let step = |at: &Option<usize>| at.map_or(Vector3::zeros(), of);
         let markers = self.seen.number.iter().map(|plate| plate.iter().map(step).collect()).collect();
@@ -129,9 +148,11 @@ impl MarkersEliminated {
     pub fn marker_covariances(
         &self,
         reduced: &DMatrix<f64>,
+        distances: &Distances,
         carried: Option<&Carried>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         let mut d = self.y.clone();
+        distances.add_to_coupling(&mut d);
         for (p, plate) in self.seen.number.iter().enumerate() {
             for (m, at) in plate.iter().enumerate().filter_map(|(m, at)| at.map(|at| (m, at))) {
                 times_right(&mut d, 3 * at, &self.inverse_factors[at]);
@@ -145,7 +166,8 @@ impl MarkersEliminated {
         let of = |at: usize| {
             let c = d.columns(3 * at, 3).tr_mul(&cd.columns(3 * at, 3));
             let (f, held) = (self.inverse_factors[at], self.held.rows(3 * at, 3));
-            let left = Matrix3::identity() - Matrix3::from_column_slice((held * held.transpose()).as_slice());
+            let held = Matrix3::from_column_slice((held * held.transpose()).as_slice());
+            let left = Matrix3::identity() - held - distances.of_marker(at);
             f.transpose() * left * f + Matrix3::from_column_slice(c.as_slice())
         };
         self.seen.number.iter().map(|plate| plate.iter().map(|at| at.map(of)).collect()).collect()

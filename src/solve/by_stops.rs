@@ -123,6 +123,21 @@ impl StopsEliminated {
         }
     }
 
+    /// Completes rows of measured distances by those of the markers, less what is held of them; nothing is eliminated of them.
+    pub fn complete_rows(
+        &self,
+        linear: LinearProblem,
+        held: Option<&DMatrix<f64>>,
+        rows: &mut DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let mut markers = self.seen.by_distances(linear);
+        if let Some(held) = held {
+            markers -= held * held.tr_mul(&markers);
+        }
+        rows.rows_range_mut(self.dense..).copy_from(&markers);
+        DMatrix::zeros(0, rows.ncols())
+    }
+
     /// Plate and index of the marker that an unknown behind the dense columns moves.
     pub fn marker(&self, row: usize) -> (usize, usize) {
         self.seen.order[(row - self.dense) / 3]

@@ -15,7 +15,7 @@ pub struct Covariance {
     pub system: System,
     /// Natural logarithm of the determinant of the reduced information.
     pub log_determinant: f64,
-    /// What was added to the dense columns.
+    /// What was added to the first unknowns.
     pub(super) added: Option<DMatrix<f64>>,
     /// Factors by which the sigmas of dense columns were enlarged after that.
     pub(super) enlarged: Vec<(usize, f64)>,
@@ -57,10 +57,10 @@ impl Covariance {
         self.reduced[(column, column)].max(0.0).sqrt()
     }
 
-    /// Adds to the covariance of the dense columns, in their units.
+    /// Adds to the covariance of the first unknowns, dense columns or all, in their units.
     pub fn add(&mut self, added: &DMatrix<f64>) {
-        let mut dense = self.reduced.view_mut((0, 0), added.shape());
-        dense += added;
+        let mut first = self.reduced.view_mut((0, 0), added.shape());
+        first += added;
         match &mut self.added {
             Some(all) => *all += added,
             None => self.added = Some(added.clone()),

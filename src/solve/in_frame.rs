@@ -18,10 +18,7 @@ use super::linear::{LinearImage, LinearProblem, LinearStop};
 use super::system::{Eliminated, Elimination, Singular, System};
 use crate::error::{Code, Error, Result};
 use crate::model::plate_modes::MODES;
-use crate::problem::{Adjustment, Problem};
-
-/// Index of the mode that is scale.
-const SCALE: usize = 0;
+use crate::problem::{Adjustment, Problem, SCALE};
 
 /// Covariance with the plates held in their frames.
 #[derive(Debug, Clone)]
@@ -63,11 +60,12 @@ pub fn in_frame(linear: LinearProblem, stated: &Covariance) -> Result<InFrame> {
 pub fn in_frame_by(which: Elimination, linear: LinearProblem, stated: &Covariance) -> Result<InFrame> {
     let problem = &linear.adjustment.problem;
     let frames = frames(linear.adjustment)?;
-    let mut system = System::with(which, linear, 0.0);
+    let mut system = System::without_distances(which, linear, 0.0);
     let following = following(linear, &system, &frames);
     widen_scales(problem, &frames, &mut system);
     let combinations = combinations(linear, &frames);
     let held = hold(&mut system, combinations, &following);
+    system.add_distances(linear, held.as_ref());
     let singular =
         |e: Singular| Error::new(Code::FitUndetermined, "plate", e.to_string(), "take images of more of the plate");
     let factor = system.factor(linear).map_err(singular)?;
@@ -176,7 +174,7 @@ fn hold(system: &mut System, combinations: DMatrix<f64>, following: &[Following]
     held
 }
 
-/// A covariance of the dense columns after poses have followed.
+/// A covariance of the first unknowns after poses have followed.
 fn followed(mut added: DMatrix<f64>, following: &[Following]) -> DMatrix<f64> {
     for Following { pose, modes, by } in following {
         let Place::Reduced(pose) = *pose else { continue };

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use crate::model::plate_modes::MODES;
 use crate::problem::{
-    Adjustment, Chained, Equations, Image, ImageTerms, Problem, State, Step, Stop, Tie, Weighting, equations, linearise,
+    Adjustment, Chained, Equations, Image, ImageTerms, PlateDistance, Problem, State, Step, Stop, Tie, Weighting,
+    equations, linearise,
 };
 
 /// Blocks of all images, linearised at one state.
@@ -21,7 +22,9 @@ pub struct Linearised {
     pub terms: Vec<ImageTerms>,
     /// Chain of each image in use.
     pub chains: Vec<Chained>,
-    /// Robust cost of the pixels plus half the squares of priors and of what is latent at stops.
+    /// Measured distances of the plates.
+    pub distances: Vec<PlateDistance>,
+    /// Robust cost of the pixels plus half the squares of priors, of what is latent at stops and of measured distances.
     pub cost: f64,
 }
 
@@ -104,8 +107,22 @@ impl Adjustment {
         let (terms, chains): (Vec<_>, Vec<_>) = parts?.into_iter().unzip();
         let pixels: f64 = terms.iter().map(|t| t.cost).sum();
         let stops = self.stops_of(&images);
-        let cost = pixels + self.prior_cost(&images, &stops);
-        cost.is_finite().then_some(Linearised { images, stops, terms, chains, cost })
+        let distances = self.distances(&images, &terms);
+        let measured: f64 = distances.iter().map(|d| 0.5 * d.residual * d.residual).sum();
+        let cost = pixels + self.prior_cost(&images, &stops) + measured;
+        cost.is_finite().then_some(Linearised { images, stops, terms, chains, distances, cost })
+    }
+
+    /// Measured distances of the plates that some images show.
+    fn distances(&self, images: &[usize], terms: &[ImageTerms]) -> Vec<PlateDistance> {
+        let Self { problem, state } = self;
+        let of = |plate: usize| {
+            let shows = |&(&i, _): &(&usize, &ImageTerms)| problem.images[i].plate == plate;
+            let own = || images.iter().zip(terms).filter(shows).flat_map(|(_, t)| &t.markers);
+            own().next()?;
+            PlateDistance::of(problem, plate, &state.plates[plate], |m| own().any(|seen| seen.marker == m))
+        };
+        (0..problem.plates.len()).filter_map(of).collect()
     }
 
     /// Stops of some images, ascending.

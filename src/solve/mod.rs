@@ -5,6 +5,7 @@ mod by_markers;
 mod by_stops;
 mod components;
 mod covariance;
+mod distances;
 mod fit;
 mod frame;
 mod in_frame;

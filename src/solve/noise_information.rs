@@ -1,4 +1,4 @@
-//! How well the data tell the sizes of the joint noise: the information of restricted maximum likelihood on its variances.
+//! How well the data tell the sizes of the joint noise and of the twists: the information of restricted maximum likelihood on its variances.
 //!
 //! With the latents `l ~ N(0, D)`, their posterior covariance `C` over all images and `R = 1 - D^-1/2 C D^-1/2`, the information
 //! on the logarithms of two variances is `F_ab = 1/2 sum_ij p_ia R_ij^2 p_jb`, where `p_ia` is the share of variance `a` in the
@@ -12,7 +12,7 @@ use super::fit::Fit;
 use super::linear::LinearStop;
 use super::system::Elimination;
 use crate::linalg::SymmetricFactor;
-use crate::problem::{Adjustment, Noise, Tie};
+use crate::problem::{Adjustment, Family, Noise, Problem, Tie};
 use crate::urdf::JointKind;
 
 /// Latents up to which those of different stops are taken together; of more, their coupling through the parameters is
@@ -25,7 +25,8 @@ pub struct NoiseInformation {
     readings: usize,
     series: usize,
     locals: usize,
-    /// Of the joint noise per series and reading, of the local errors per reading, of the tilts per series; rad^2 or m^2.
+    /// Of the joint noise per series and reading, of the local errors per reading, of the tilts per series, rad^2 or m^2; then the
+    /// square of the factor on the stated sizes of the twists, where that is estimated.
     pub(super) variances: Vec<f64>,
     /// Covariance of the logarithms of those that the data touch, with their indices.
     covariance: DMatrix<f64>,
@@ -80,7 +81,10 @@ pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
     };
     let cov = coupled.as_ref().unwrap_or(cov);
     let own = problem.noise.joint.iter().flatten();
-    let variances: Vec<f64> = own.chain(&problem.noise.local).chain(&problem.noise.tilt).map(|s| s * s).collect();
+    let of_errors = own.chain(&problem.noise.local).chain(&problem.noise.tilt).copied();
+    let twists = problem.families.iter().find(|f| f.is_of_twists());
+    let variances: Vec<f64> = of_errors.chain(twists.map(|f| f.factor)).map(|s| s * s).collect();
+    let of_twists = variances.len() - usize::from(twists.is_some());
     let mut information = DMatrix::zeros(variances.len(), variances.len());
     let mut add = |a: &Latent, b: &Latent, covariance: f64| {
         let r = f64::from(a.row == b.row) - covariance / (a.sigma * b.sigma);
@@ -89,9 +93,11 @@ pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
         }
     };
     let first = series * readings;
-    let locals = local_latents(&fit.adjustment, |c| cov.system.touched(c), first);
-    for a in &locals {
-        locals.iter().for_each(|b| add(a, b, cov.reduced[(a.row, b.row)]));
+    let touched = |c: usize| problem.layout.columns[c].free && cov.system.touched(c);
+    let mut dense = local_latents(&fit.adjustment, touched, first);
+    dense.extend(twists.into_iter().flat_map(|f| twist_latents(problem, f, touched, of_twists)));
+    for a in &dense {
+        dense.iter().for_each(|b| add(a, b, cov.reduced[(a.row, b.row)]));
     }
     let mut together = Vec::new();
     let of_stops: Vec<Vec<Latent>> = linear.stops().map(|stop| stop_latents(&fit.adjustment, &stop)).collect();
@@ -108,19 +114,29 @@ pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
             .collect();
         for a in &all {
             all.iter().for_each(|b| add(a, b, cov.reduced[(a.row, b.row)]));
-            locals.iter().for_each(|b| {
+            dense.iter().for_each(|b| {
                 add(a, b, cov.reduced[(a.row, b.row)]);
                 add(b, a, cov.reduced[(b.row, a.row)]);
             });
         }
-        together = locals.into_iter().chain(all).collect();
+        together = dense.into_iter().chain(all).collect();
     }
     let touched: Vec<usize> = (0..variances.len()).filter(|&c| information[(c, c)] > 0.0).collect();
+    touched.iter().find(|c| **c < of_twists)?;
     let of_touched =
         |m: &DMatrix<f64>| DMatrix::from_fn(touched.len(), touched.len(), |a, b| m[(touched[a], touched[b])]);
     let from_data = of_touched(&information);
-    draw_together(&problem.noise, &state.robot.chain.reading_kinds, &variances, &touched, &mut information);
-    let factor = SymmetricFactor::new(&of_touched(&information)).ok().filter(|_| !touched.is_empty())?;
+    draw_together(
+        &problem.noise,
+        &state.robot.chain.reading_kinds,
+        &variances[..of_twists],
+        &touched,
+        &mut information,
+    );
+    if let Some(family) = twists {
+        information[(of_twists, of_twists)] += 0.5 * family.drawn;
+    }
+    let factor = SymmetricFactor::new(&of_touched(&information)).ok()?;
     let covariance = factor.inverse();
     let scatter = &covariance * from_data * &covariance;
     let locals = problem.noise.local.len();
@@ -133,12 +149,26 @@ fn local_latents(
     first: usize,
 ) -> Vec<Latent> {
     let terms = problem.layout.terms.start;
-    let used = problem.layout.locals.clone().filter(|&c| touched(c) && problem.layout.columns[c].free);
+    let used = problem.layout.locals.clone().filter(|&c| touched(c));
     let latent = |c: usize| {
         let reading = state.robot.terms[c - terms].reading;
         Latent { row: c, sigma: problem.noise.local[reading], parts: [(first + reading, 1.0), (first + reading, 0.0)] }
     };
     used.map(latent).filter(|l| l.sigma > 0.0).collect()
+}
+
+/// Twists whose common size is estimated: their priors have one variance.
+fn twist_latents(
+    problem: &Problem,
+    family: &Family,
+    touched: impl Fn(usize) -> bool,
+    component: usize,
+) -> impl Iterator<Item = Latent> {
+    let used = family.columns.iter().filter(move |&&c| touched(c));
+    used.map(move |&row| {
+        let sigma = problem.layout.columns[row].prior_sigma;
+        Latent { row, sigma, parts: [(component, 1.0), (component, 0.0)] }
+    })
 }
 
 /// What is latent at a stop and has a variance, numbered within it.

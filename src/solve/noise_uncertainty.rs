@@ -16,7 +16,8 @@ const MOST_SPREAD: f64 = 2.0;
 /// The latents of all stops, and how the estimated variances of each two of them scatter together.
 #[derive(Debug, Clone)]
 pub struct NoiseUncertainty {
-    /// Covariance of dense columns and latents in units of the latents' sigmas, `Y`.
+    /// Covariance of the reduced unknowns (of dense columns alone where other unknowns stay than these latents) and latents in units of
+    /// the latents' sigmas, `Y`.
     columns: DMatrix<f64>,
     /// Scatter of the logarithms of the variances of two latents, `p_i' W p_j`.
     shared: DMatrix<f64>,
@@ -55,12 +56,13 @@ impl NoiseUncertainty {
             let products = parts[i].iter().flat_map(|(a, p)| parts[k].iter().map(move |(b, q)| (*a, *b, p * q)));
             products.map(|(a, b, weight)| weight * bounded(a) * bounded(b) * told.scatter[(a, b)]).sum::<f64>()
         };
-        let columns =
-            DMatrix::from_fn(fit.problem.layout.len(), n, |c, i| cov.reduced[(c, latents[i].row)] / latents[i].sigma);
+        // Markers follow all unknowns that stay, so that these must be enlarged together.
+        let stay = if told.coupled.is_some() { fit.problem.layout.len() } else { cov.reduced.nrows() };
+        let columns = DMatrix::from_fn(stay, n, |c, i| cov.reduced[(c, latents[i].row)] / latents[i].sigma);
         Some(Self { columns, shared: DMatrix::from_fn(n, n, shared), left: scaled(&cov.reduced, -1) + at_known })
     }
 
-    /// What it adds to the covariance of the dense columns, in their units: `Y M Y'`, `M_ij = (p_i' W p_j) (2 - C - T)_ij`.
+    /// What it adds to the covariance of these unknowns, in their units: `Y M Y'`, `M_ij = (p_i' W p_j) (2 - C - T)_ij`.
     pub fn added(&self) -> DMatrix<f64> {
         let middle = DMatrix::from_fn(self.shared.nrows(), self.shared.ncols(), |i, k| {
             self.shared[(i, k)] * (2.0 * f64::from(i == k) - self.left[(i, k)])

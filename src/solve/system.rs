@@ -7,8 +7,10 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use super::blocks::SeenMarkers;
 use super::by_markers::MarkersEliminated;
 use super::by_stops::StopsEliminated;
+use super::distances::Distances;
 use super::linear::{Carried, LinearProblem, LinearStop};
 use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
+use crate::model::plate_modes::MODES;
 use crate::problem::{Adjustment, Problem, Step};
 
 /// Which family of unknowns is eliminated.
@@ -49,6 +51,7 @@ pub struct System {
     pub latent_start: Vec<usize>,
     touched: Vec<bool>,
     pub(super) eliminated: Eliminated,
+    distances: Distances,
 }
 
 /// The normal equations have no unique solution.
@@ -73,6 +76,14 @@ impl System {
 
     /// As [`System::new`] by a given elimination.
     pub fn with(which: Elimination, linear: LinearProblem, lambda: f64) -> Self {
+        let mut system = Self::without_distances(which, linear, lambda);
+        system.add_distances(linear, None);
+        system.take_gradient(linear);
+        system
+    }
+
+    /// The information of images and priors alone, without right-hand sides.
+    pub(super) fn without_distances(which: Elimination, linear: LinearProblem, lambda: f64) -> Self {
         let problem = &linear.adjustment.problem;
         let (information, eliminated) = match which {
             Elimination::Markers => {
@@ -88,14 +99,45 @@ impl System {
         };
         let latent_start = if let Eliminated::Markers(e) = &eliminated { e.latent_start.clone() } else { Vec::new() };
         let rhs = DVector::zeros(information.nrows());
-        let mut system = Self { information, rhs, latent_start, touched: Vec::new(), eliminated };
+        let distances = Distances::none();
+        let mut system = Self { information, rhs, latent_start, touched: Vec::new(), eliminated, distances };
         system.add_priors(problem);
         for i in 0..system.rhs.len() {
             system.information[(i, i)] *= 1.0 + lambda;
         }
         system.hold_fixed(problem);
-        system.take_gradient(linear);
         system
+    }
+
+    /// Adds the information of the measured distances; with the orthonormal combinations of markers that are held where markers stay.
+    pub(super) fn add_distances(&mut self, linear: LinearProblem, held: Option<&DMatrix<f64>>) {
+        if linear.lin.distances.is_empty() {
+            return;
+        }
+        let layout = &linear.adjustment.problem.layout;
+        let mut by_reduced = DMatrix::zeros(self.rhs.len(), linear.lin.distances.len());
+        for (mut row, distance) in by_reduced.column_iter_mut().zip(&linear.lin.distances) {
+            let start = layout.shapes[distance.plate].start;
+            let free = |m: usize| layout.columns[start + m].free && self.touched[start + m];
+            (0..MODES).filter(|m| free(*m)).for_each(|m| row[start + m] = distance.by_modes[m]);
+        }
+        let by_markers = match &self.eliminated {
+            Eliminated::Markers(e) => e.reduce_rows(linear, &mut by_reduced),
+            Eliminated::Stops(e) => e.complete_rows(linear, held, &mut by_reduced),
+        };
+        self.distances = Distances::new(by_reduced, by_markers);
+        self.information += self.distances.information().unwrap_or_else(|| DMatrix::zeros(0, 0));
+    }
+
+    /// Variance of a measured distance as all other data predict it, in units of its own, from the covariance of the reduced unknowns;
+    /// `None` where they do not.
+    pub fn predicted_variance(&self, reduced: &DMatrix<f64>, distance: usize) -> Option<f64> {
+        self.distances.predicted_variance(reduced, distance)
+    }
+
+    /// What eliminating the markers leaves of the determinant of the measured distances, as a natural logarithm.
+    pub fn log_determinant_of_distances(&self) -> f64 {
+        self.distances.log_determinant
     }
 
     /// Factor of the information.
@@ -133,6 +175,8 @@ impl System {
             Eliminated::Markers(e) => e.reduce_gradient(linear),
             Eliminated::Stops(e) => e.reduce_gradient(linear),
         };
+        let markers = if let Eliminated::Markers(e) = &self.eliminated { Some(e.whitened_gradient()) } else { None };
+        self.distances.take_residuals(linear, markers, &mut self.rhs);
         let values = state.values(&problem.layout);
         for (i, c) in problem.layout.columns.iter().enumerate() {
             self.rhs[i] += (c.prior_mean - values[i]) * c.prior_sigma.powi(-2);
@@ -187,7 +231,7 @@ impl System {
     /// The whole step from the solution `x` of the reduced system.
     pub fn step(&self, linear: LinearProblem, x: &DVector<f64>) -> Step {
         match &self.eliminated {
-            Eliminated::Markers(e) => e.step(linear, x),
+            Eliminated::Markers(e) => e.step(linear, x, self.distances.of_markers(x)),
             Eliminated::Stops(e) => e.step(linear, x),
         }
     }
@@ -198,7 +242,7 @@ impl System {
             Eliminated::Markers(e) => e.squares(),
             Eliminated::Stops(e) => e.squares(),
         };
-        (x.dot(&self.rhs) + eliminated).max(0.0).sqrt()
+        (x.dot(&self.rhs) + eliminated + self.distances.squares()).max(0.0).sqrt()
     }
 
     /// Covariance of what is latent at a stop, from the covariance of the reduced unknowns.
@@ -223,7 +267,7 @@ impl System {
         carried: Option<&Carried>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         match &self.eliminated {
-            Eliminated::Markers(e) => e.marker_covariances(reduced, carried),
+            Eliminated::Markers(e) => e.marker_covariances(reduced, &self.distances, carried),
             Eliminated::Stops(e) => e.marker_covariances(reduced, carried),
         }
     }

@@ -18,7 +18,8 @@ use robotcal::output::restore::measured_series;
 use robotcal::output::solution_json;
 use robotcal::problem::{Adjustment, Problem, State};
 use robotcal::series::CameraMount;
-use robotcal::solve::LinearProblem;
+use robotcal::simulate::truth::Truth;
+use robotcal::solve::{Elimination, LinearProblem, in_frame_by};
 
 /// Covariance of all unknowns (dense columns, latents of each stop with its one image, markers) with the priors: nothing is eliminated. It is brought into the
 /// frame of the nominal markers by the formula: `x - G g` with `g = (N' P G)^-1 N' P (x - n)`, poses following.
@@ -84,6 +85,13 @@ impl Whole {
             for (r, information) in linear.stop(linear.image(k).stop).prior().into_iter().enumerate() {
                 a[(latent_start[k] + r, latent_start[k] + r)] += information;
             }
+        }
+        if let Some(bar) = problem.plates[0].scale {
+            let ends = [bar.from, bar.to].map(|m| m as usize);
+            let [from, to] = ends.map(|m| state.plates[0].position(m));
+            let [by_from, by_to] = ends.map(|m| position(problem, state, marker_start, m, n));
+            let row = (from - to).normalize().transpose() * (by_from - by_to) / bar.sigma_m;
+            a += row.transpose() * row;
         }
         for (c, column) in layout.columns.iter().enumerate() {
             a[(c, c)] += column.prior_sigma.powi(-2);
@@ -207,7 +215,23 @@ fn check(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
     let without_frame = relative(&solution.fit.covariance.block(first), &joint.placement(first));
     println!("without the frame {without_frame:e}");
     assert!(plate < TOLERANCE && camera < TOLERANCE && worst < TOLERANCE && scale.abs() < TOLERANCE);
+    check_eliminations(solution);
     check_poses(solution, files);
+}
+
+/// The same with markers eliminated and with stops eliminated.
+fn check_eliminations(solution: &Solution) {
+    let fit = &solution.fit;
+    let [a, b] = [Elimination::Markers, Elimination::Stops]
+        .map(|which| in_frame_by(which, fit.linear(), &fit.covariance).unwrap());
+    let scales = [&a, &b].map(|found| found.scale_sigma(&fit.problem, 0).unwrap());
+    assert!((scales[0] / scales[1] - 1.0).abs() < TOLERANCE, "{scales:?}");
+    for placement in &fit.problem.layout.placements {
+        assert!(relative(&a.placement(placement.start), &b.placement(placement.start)) < TOLERANCE);
+    }
+    for (a, b) in a.positions(fit)[0].iter().zip(&b.positions(fit)[0]) {
+        assert!((a - b).amax() < TOLERANCE * b.diagonal().max(), "{a}{b}");
+    }
 }
 
 fn check_poses(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
@@ -244,6 +268,12 @@ fn check_poses(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
     }
     println!("poses {worst:e} of {tolerance:e}");
     assert!(worst < tolerance);
+    if solution.fit.problem.plates[0].scale.is_some() {
+        let sigma = record["plates"][0]["relative_scale_of_poses"]["sigma"].as_f64().unwrap();
+        let off = sigma / free.scale_sigma() - 1.0;
+        println!("scale of poses {sigma:e}, off by {off:e}");
+        assert!(off.abs() < tolerance);
+    }
 }
 
 #[test]
@@ -268,11 +298,6 @@ fn covariances_of_two_placements_with_a_measured_distance_are_those_in_the_frame
     let solution = identify(chain, &[series_with_bar_in_two_places(&description)], &options).unwrap();
     assert_eq!(solution.fit.problem.placements.len(), 2);
     let files = files(&solution, &context(&description)).unwrap();
-    // The bar tells the scale, ten times better than the tolerances of the markers.
-    let record: serde_json::Value = serde_json::from_slice(&files["solution.json"]).unwrap();
-    let sigma = record["plates"][0]["relative_scale_of_poses"]["sigma"].as_f64().unwrap();
-    let of_bar = 1e-5 / 0.25807;
-    assert!((sigma / of_bar - 1.0).abs() < 0.01, "{sigma} {of_bar}");
     check(&solution, &files);
 }
 
@@ -329,7 +354,7 @@ fn stated_uncertainties_of_poses_and_markers_are_true_with_a_measured_distance_a
 }
 
 #[test]
-fn poses_of_the_shipped_dataset_have_positive_definite_covariances() {
+fn poses_and_markers_of_the_shipped_dataset_are_as_uncertain_as_stated() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let bytes = std::fs::read(root.join("reports/kr6_small/solution.json")).unwrap();
     let measured = measured_series(&solution_json::read(&bytes).unwrap()).unwrap();
@@ -341,6 +366,23 @@ fn poses_of_the_shipped_dataset_have_positive_definite_covariances() {
     let least = rows.iter().map(|row| least_eigenvalue(&pose_row(row).1)).fold(f64::INFINITY, f64::min);
     println!("{} poses, least eigenvalue of a correlation {least:e}", rows.len());
     assert!(rows.len() == 24 && least > 0.0);
+    let truth = Truth::read(&root.join("datasets/kr6_small/truth.toml")).unwrap();
+    let nominal: Vec<Vector3<f64>> = measured[0].plate.markers.iter().map(|m| m.position_m).collect();
+    let actual: Vec<Vector3<f64>> =
+        nominal.iter().zip(&truth.marker_errors_m).map(|(n, e)| n + Vector3::from(*e)).collect();
+    let rows = table(&files, "plate.csv");
+    let columns = |names: [&str; 3]| -> Vec<Vector3<f64>> {
+        rows.iter().map(|row| Vector3::from(names.map(|n| row[n].parse().unwrap()))).collect()
+    };
+    let (found, sigmas) = (columns(["x_m", "y_m", "z_m"]), columns(["sigma_x_m", "sigma_y_m", "sigma_z_m"]));
+    let [found, actual] = [found, actual].map(|all: Vec<_>| Alignment::of(&nominal, &all).shapes(&all));
+    let errors: Vec<Vector3<f64>> =
+        found.iter().zip(&actual).zip(&sigmas).map(|((a, b), s)| (a - b).component_div(s)).collect();
+    for axis in 0..3 {
+        let normalised = errors.iter().map(|e| e[axis].powi(2)).sum::<f64>() / errors.len() as f64;
+        println!("axis {axis}: normalised error squared {normalised}");
+        assert!((0.8..1.25).contains(&normalised), "{axis}: {normalised}");
+    }
 }
 
 /// Table of reports/plate-frame.md: `cargo test --release --test outputs -- --ignored --nocapture plate_frame`.

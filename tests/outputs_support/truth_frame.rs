@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 use robotcal::assess::Limits;
 use robotcal::geom::{Pose, project_to_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
-use robotcal::problem::{Adjustment, Mark, Measured, PlateShape, State, Tie, hold_scale_bars};
+use robotcal::problem::{Adjustment, Mark, Measured, PlateShape, State, Tie, release_measured_scales};
 use robotcal::series::{Plate, PlateKind, ScaleBar};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
 use robotcal::solve::{Fit, Settings, solve};
@@ -59,6 +59,11 @@ impl Alignment {
     pub fn camera(&self, plate_from_camera: &Pose) -> Pose {
         let turned = self.rotation.transpose() * plate_from_camera.rotation;
         Pose::new(turned, self.undo(&plate_from_camera.translation) / self.size)
+    }
+
+    /// Positions in the frame of the nominal markers, at their size.
+    pub fn shapes(&self, others: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        others.iter().map(|x| self.undo(x) / self.size).collect()
     }
 
     fn undo(&self, x: &Vector3<f64>) -> Vector3<f64> {
@@ -163,9 +168,8 @@ pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, 
         plates: vec![PlateShape::nominal(&world.plate)],
         ..template.fit.state.clone()
     };
-    let mut start = Adjustment { problem, state: start };
-    // As identify does: the measured distance of this plate, first at its nominal shape, then at the one that was found.
-    hold_scale_bars(&mut start);
+    release_measured_scales(&mut problem.layout, &problem.plates);
+    let start = Adjustment { problem, state: start };
     let (mut adjustment, free_poses, _) = adjust_free_poses(start, &[None], &Limits::default()).unwrap();
     adjustment.hold_poses();
     let adjustment = solve(adjustment, &Settings::default()).adjustment;

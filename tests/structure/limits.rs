@@ -29,7 +29,6 @@ const NUMERICAL: [(&str, &str); 44] = [
     ("diagnose/joint_noise.rs MOST_IMAGES", "how many are named"),
     ("diagnose/loose.rs MOST_IMAGES", "how many are named"),
     ("diagnose/plate_size.rs ASPECT", "index of a mode"),
-    ("diagnose/plate_size.rs UNKNOWN_SCALE", "prior that says nothing"),
     ("identify/build.rs DEFAULT_SIGMA_PX", "first guess; its size is estimated"),
     ("identify/build.rs FIRST_JOINT_NOISE", "first guess"),
     ("identify/build.rs FIRST_TILT", "first guess"),

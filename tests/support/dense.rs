@@ -1,6 +1,6 @@
 //! The whole adjustment as one dense least-squares problem, from dual numbers: no elimination, no blocks.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 use robotcal::problem::{Adjustment, Problem, State, Tie};
 
 use super::witness::{self, Seed};
@@ -53,7 +53,27 @@ impl Dense {
         let mut dense = Self { unknowns, information: DMatrix::zeros(n, n), rhs: DVector::zeros(n) };
         dense.add_pixels(adjustment);
         dense.add_priors(problem, state);
+        dense.add_distance(problem, state);
         dense
+    }
+
+    /// The measured distance of two markers, whether images show them or not.
+    fn add_distance(&mut self, problem: &Problem, state: &State) {
+        let (Some(bar), shape) = (problem.plates[0].scale, &state.plates[0]) else { return };
+        let ends = [bar.from, bar.to].map(|id| problem.plates[0].index_of(id).unwrap());
+        let between = shape.position(ends[0]) - shape.position(ends[1]);
+        let moved = |u: &Unknown, m: usize| -> Vector3<f64> {
+            let modes = problem.layout.shapes[0].clone();
+            match *u {
+                Unknown::Column(c) if modes.contains(&c) => shape.modes_at(m).column(c - modes.start).into_owned(),
+                Unknown::Marker(own, k) if own == m => Vector3::ith(k, 1.0),
+                _ => Vector3::zeros(),
+            }
+        };
+        let by = |u: &Unknown| (moved(u, ends[0]) - moved(u, ends[1])).dot(&between.normalize()) / bar.sigma_m;
+        let row = DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(by));
+        self.information += &row * row.transpose();
+        self.rhs += &row * ((bar.distance_m - between.norm()) / bar.sigma_m);
     }
 
     fn add_pixels(&mut self, adjustment: &Adjustment) {
