@@ -63,6 +63,9 @@ pub struct Plate {
     /// What is printed in the light squares of a ChArUco board; the detector looks for it where it is not stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aruco: Option<Aruco>,
+    /// Ids of the dots of a grid that are larger than most, or ringed; the detector finds them where none is stated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub large: Vec<u32>,
     /// Measured distance, if any.
     pub scale: Option<ScaleBar>,
     /// All markers, in the order of their ids.
@@ -91,6 +94,6 @@ impl Plate {
                 sigma_m: tolerance_m,
             })
             .collect();
-        Self { kind, columns, rows, pitch_m, tolerance_m, aruco: None, scale: None, markers }
+        Self { kind, columns, rows, pitch_m, tolerance_m, aruco: None, large: Vec::new(), scale: None, markers }
     }
 }

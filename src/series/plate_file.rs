@@ -106,6 +106,7 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
             pitch_m,
             tolerance_m,
             aruco: None,
+            large: Vec::new(),
             scale,
             markers: Vec::new(),
         });

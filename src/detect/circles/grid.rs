@@ -1,53 +1,218 @@
-//! Plain grids of dots: symmetric, asymmetric (every other row shifted by half a step), or with larger dots that tell
-//! the orientation.
+//! Plain grids of dots: symmetric, asymmetric (every other row shifted by half a step), or with dots of another size that
+//! tell the orientation.
 //!
 //! Such a grid carries no code beyond its outline and the sizes of its dots, so all of it must be in view. The markers
 //! lie on a square lattice, along the axes or (asymmetric) along the diagonals; the lattice found in the picture is laid
 //! on them in all four rotations, and the one that leaves the fewest cells unexplained wins.
+//!
+//! Sizes that the plate does not tell are taken from the picture. Where it does not tell which dots are larger either, the plate
+//! is turned so that the first of them has the least id: that is the same corner in every picture. What no dot tells is left as the
+//! more upright of the turns.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
-use super::candidate::Candidate;
 use super::code::MarkerCode;
+use super::grid_dots::{Dot, Dots};
+use super::grid_place::{Classes, Laid, place};
 use super::lattice::{Cell, Lattice};
 use super::neighbour_check::{Board, Placed};
-use super::pipeline::detect_coded;
-use super::types::{Options, Outcome};
+use super::pipeline::{Identified, detect_coded};
+use super::smoothed::{as_before, smoothed};
+use super::types::{CircleDetection, Options, Outcome};
+use super::{candidate::Candidate, types::Reason};
 use crate::detect::{Detection, Picture};
 use crate::error::{Code, Error, Notice, Result};
-use crate::series::Plate;
+use crate::series::{Marker, Plate};
 
 /// How far a marker may be from its place on the lattice, in steps.
 const OFF_LATTICE: f64 = 0.2;
-/// Share of the grid's dots that must be seen.
-const LEAST_SEEN: f64 = 0.7;
+/// Smallest semi-axis of a dot, px: no code is to be read from it, and a whole lattice speaks for it.
+const SMALLEST_PX: f64 = 1.5;
+/// Smoothings that are tried where edges are not blurred steps, px.
+const SMOOTHINGS_PX: [f64; 2] = [0.7, 1.0];
+/// A stated radius and the one seen differ by no more than this, as a logarithm.
+const RADIUS_OFF: f64 = 0.4;
 
 /// Finds the dots of a plain grid in one picture.
 ///
-/// Observations are area centroids with covariance, as for coded circles. Ids are those of the plate's markers.
+/// Observations are area centroids with covariance, as for coded circles. Ids are those of the plate's markers. Radii of the
+/// markers may be zero: then they are those seen.
 ///
 /// # Errors
-/// Markers that do not lie on a square lattice or have no radius. No grid in the picture, not all of it, or a mirrored one where
+/// Markers that do not lie on a square lattice. No grid in the picture, not all of it, or a mirrored one where
 /// the dots show it (a grid without larger dots is mostly its own mirror image): see [`Detection::failure`].
 pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Result<Detection> {
-    let (cells, step_m) = cells(plate).ok_or_else(no_lattice)?;
-    let code = MarkerCode::of_cells(plate, &cells, step_m).ok_or_else(no_lattice)?;
-    let mut symmetric = false;
-    let on_lattice = Plate { pitch_m: step_m, ..plate.clone() };
-    let found = detect_coded(picture, &on_lattice, options, &code, |lattices, candidates| {
-        let Some(lattice) = lattices.first() else {
-            let outcome = if candidates.is_empty() { Outcome::NoCandidates } else { Outcome::NoLattice };
-            return Ok((Board::new(), outcome));
-        };
-        let (board, outcome, turned) = place(&code, &cells, lattice, candidates);
-        symmetric = turned;
-        Ok((board, outcome))
-    })?;
-    let mut detection = Detection::from(found);
-    if symmetric {
+    let grid = Grid::of(plate)?;
+    let options = &Options { smallest_semi_axis_px: options.smallest_semi_axis_px.min(SMALLEST_PX), ..*options };
+    let (mut best, mut facts) = grid.look(picture, options)?;
+    for sigma_px in SMOOTHINGS_PX {
+        if !spoilt(&best) {
+            break;
+        }
+        let (found, other) = grid.look(&smoothed(picture, sigma_px), options)?;
+        if found.found.len() > best.found.len() {
+            (best, facts) = (as_before(found, sigma_px), other);
+        }
+    }
+    let mut detection = Detection::from(best);
+    if facts.symmetric {
         detection.notices.push(symmetric_notice());
     }
     Ok(detection)
+}
+
+/// Dots are missing, or seen but not measured.
+fn spoilt(found: &CircleDetection) -> bool {
+    let of_fit = |r: Reason| matches!(r, Reason::EdgeModel | Reason::Saturated | Reason::NoConvergence);
+    !matches!(found.outcome, Outcome::Identified { .. }) || found.dropped.iter().any(|d| of_fit(d.reason))
+}
+
+/// What is known of a grid beyond its dots.
+#[derive(Debug, Clone, Copy, Default)]
+struct Facts {
+    /// It looks the same after a turn.
+    symmetric: bool,
+}
+
+/// A plate of dots on a square lattice.
+struct Grid<'a> {
+    plate: &'a Plate,
+    /// Of every marker.
+    cells: Vec<Cell>,
+    step_m: f64,
+}
+
+/// What the plate says about the sizes of its dots.
+enum Told {
+    /// All radii, of more than one size.
+    Radii,
+    /// Which of them are not as most are.
+    Places,
+    Nothing,
+}
+
+impl<'a> Grid<'a> {
+    fn of(plate: &'a Plate) -> Result<Self> {
+        let (cells, step_m) = cells(plate).ok_or_else(no_lattice)?;
+        Ok(Self { plate, cells, step_m })
+    }
+
+    fn look(&self, picture: &Picture, options: &Options) -> Result<(CircleDetection, Facts)> {
+        let mut facts = Facts::default();
+        let found = detect_coded(picture, options, |lattices, candidates| {
+            let (identified, symmetric) = self.identify(lattices, candidates)?;
+            facts.symmetric = symmetric;
+            Ok(identified)
+        })?;
+        Ok((found, facts))
+    }
+
+    fn told(&self) -> Told {
+        let radius = |m: &Marker| m.outer_radius_m;
+        let first = self.plate.markers.first().map_or(0.0, radius);
+        if self.plate.markers.iter().any(|m| radius(m) != first || m.inner_radius_m != self.plate.markers[0].inner_radius_m)
+        {
+            Told::Radii
+        } else if self.plate.large.is_empty() {
+            Told::Nothing
+        } else {
+            Told::Places
+        }
+    }
+
+    /// Puts the largest lattice on the grid; true where the grid looks the same after a turn.
+    fn identify(&self, lattices: &[Lattice], candidates: &[Candidate]) -> Result<(Identified, bool)> {
+        let nothing = |outcome| Ok((self.identified(self.plate.clone(), Board::new(), outcome)?, false));
+        let Some(lattice) = lattices.first() else {
+            return nothing(if candidates.is_empty() { Outcome::NoCandidates } else { Outcome::NoLattice });
+        };
+        let told = self.told();
+        let Some(dots) = Dots::of(lattice, candidates) else { return nothing(Outcome::Ambiguous) };
+        let plate = match told {
+            Told::Radii => self.plate.clone(),
+            Told::Places => self.with_large(&dots, |marker| self.plate.large.contains(&self.plate.markers[marker].id)),
+            Told::Nothing => self.with_large(&dots, |_| false),
+        };
+        if !self.agrees(&dots) {
+            return nothing(Outcome::Ambiguous);
+        }
+        let code = self.code(&plate)?;
+        let classes = match told {
+            Told::Radii | Told::Places => code.classes_of(lattice, candidates),
+            Told::Nothing => lattice.cells.keys().map(|cell| (*cell, Some(0))).collect(),
+        };
+        let (mut laid, outcome) = place(&code, &self.cells, &classes);
+        if matches!(told, Told::Nothing) {
+            let first = laid.iter().map(|l| others(l, &dots)).min();
+            laid.retain(|l| first.as_ref() == Some(&others(l, &dots)));
+        }
+        let Some(chosen) = laid.iter().min_by(|a, b| a.lean(lattice).total_cmp(&b.lean(lattice))) else {
+            return nothing(outcome);
+        };
+        let plate = match told {
+            Told::Radii | Told::Places => plate,
+            Told::Nothing => self.with_found(&dots, chosen),
+        };
+        let classes = self.code(&plate)?.classes_of(lattice, candidates);
+        let board = board(chosen, lattice, &classes);
+        Ok((self.identified(plate, board, outcome)?, laid.len() > 1))
+    }
+
+    fn code(&self, plate: &Plate) -> Result<MarkerCode> {
+        MarkerCode::of_cells(plate, &self.cells, self.step_m).ok_or_else(no_lattice)
+    }
+
+    fn identified(&self, mut plate: Plate, board: Board, outcome: Outcome) -> Result<Identified> {
+        // a grid of which nothing is seen has no sizes
+        plate.markers.iter_mut().filter(|m| m.outer_radius_m <= 0.0).for_each(|m| m.outer_radius_m = 0.25 * self.step_m);
+        plate.pitch_m = self.step_m;
+        Ok(Identified { code: self.code(&plate)?, plate, board, outcome })
+    }
+
+    /// The dots are of the size that is stated, where one is.
+    fn agrees(&self, dots: &Dots) -> bool {
+        let mut stated: Vec<f64> = self.plate.markers.iter().map(|m| m.outer_radius_m / self.step_m).collect();
+        stated.sort_by(f64::total_cmp);
+        let usual = stated[stated.len() / 2];
+        usual <= 0.0 || (dots.usual.radius / usual).ln().abs() < RADIUS_OFF
+    }
+
+    /// The plate with the radii seen; the large ones have those of the dots that are not as most are.
+    fn with_large(&self, dots: &Dots, is_large: impl Fn(usize) -> bool) -> Plate {
+        let other: Vec<Dot> = dots.other.values().copied().collect();
+        let large = other.get(other.len() / 2).copied().unwrap_or(dots.usual);
+        self.with_radii(|k| if is_large(k) { large } else { dots.usual })
+    }
+
+    /// The plate with the radii seen, each where it was seen.
+    fn with_found(&self, dots: &Dots, laid: &Laid) -> Plate {
+        let on_plate: Vec<(Cell, Dot)> = dots.other.iter().map(|(c, d)| (laid.apply(*c), *d)).collect();
+        self.with_radii(|k| on_plate.iter().find(|(c, _)| *c == self.cells[k]).map_or(dots.usual, |(_, d)| *d))
+    }
+
+    fn with_radii(&self, dot: impl Fn(usize) -> Dot) -> Plate {
+        let mut plate = self.plate.clone();
+        for (k, marker) in plate.markers.iter_mut().enumerate() {
+            let dot = dot(k);
+            marker.outer_radius_m = dot.radius * self.step_m;
+            marker.inner_radius_m = dot.ratio * marker.outer_radius_m;
+        }
+        plate
+    }
+}
+
+/// Places on the grid of the dots that are not as most are, in the order of their ids.
+fn others(laid: &Laid, dots: &Dots) -> Vec<(i32, i32)> {
+    let mut all: Vec<(i32, i32)> = dots.other.keys().map(|c| laid.apply(*c)).map(|(i, j)| (j, i)).collect();
+    all.sort_unstable();
+    all
+}
+
+fn board(laid: &Laid, lattice: &Lattice, classes: &Classes) -> Board {
+    let placed = |(cell, site): (&Cell, &super::lattice::Site)| {
+        (laid.apply(*cell), Placed { candidate: site.candidate, class: classes.get(cell).copied().flatten() })
+    };
+    lattice.cells.iter().map(placed).collect()
 }
 
 /// Cells of all markers (in their order) on the square lattice of the plate, rows downwards, and its step in m.
@@ -78,137 +243,12 @@ fn cells(plate: &Plate) -> Option<(Vec<Cell>, f64)> {
     None
 }
 
-/// A way to lay the lattice on the grid: quarter turns, then a shift.
-#[derive(Debug, Clone, Copy)]
-struct Laid {
-    turns: u8,
-    mirrored: bool,
-    shift: Cell,
-    /// Dots of the right size on their place.
-    seen: usize,
-    /// Cells of the lattice where the plate has nothing or a dot of another size.
-    wrong: usize,
-}
-
-impl Laid {
-    fn apply(&self, cell: Cell) -> Cell {
-        let (i, j) = turned(cell, self.turns, self.mirrored);
-        (i + self.shift.0, j + self.shift.1)
-    }
-
-    /// Middle of the grid on the lattice, doubled.
-    fn middle(&self, cells: &[Cell]) -> Cell {
-        let size = extent(cells);
-        let doubled = (size.0 - 2 * self.shift.0, size.1 - 2 * self.shift.1);
-        let (i, j) = turned(doubled, (4 - self.turns) % 4, false);
-        if self.mirrored { (j, i) } else { (i, j) }
-    }
-
-    fn score(&self) -> i64 {
-        self.seen as i64 - self.wrong as i64
-    }
-}
-
-fn turned((i, j): Cell, turns: u8, mirrored: bool) -> Cell {
-    let (i, j) = if mirrored { (j, i) } else { (i, j) };
-    match turns {
-        0 => (i, j),
-        1 => (-j, i),
-        2 => (-i, -j),
-        _ => (j, -i),
-    }
-}
-
-/// Puts the lattice on the grid; true where the grid looks the same after a turn.
-fn place(code: &MarkerCode, cells: &[Cell], lattice: &Lattice, candidates: &[Candidate]) -> (Board, Outcome, bool) {
-    let classes = code.classes_of(lattice, candidates);
-    let mut laid = ways(code, cells, &classes);
-    laid.sort_by_key(|l| std::cmp::Reverse(l.score()));
-    let Some(best) = laid.first().copied() else { return (Board::new(), Outcome::Ambiguous, false) };
-    if (best.seen as f64) < LEAST_SEEN * cells.len() as f64 {
-        return (Board::new(), Outcome::Ambiguous, false);
-    }
-    // A shift of the grid loses a line of dots; half of the shortest line must make the difference.
-    let margin = (shortest_line(cells) as i64 + 1) / 2;
-    let middle = best.middle(cells);
-    if laid.iter().take_while(|l| l.score() > best.score() - margin).any(|l| l.middle(cells) != middle) {
-        return (Board::new(), Outcome::Ambiguous, false);
-    }
-    // A dot of another size in the wrong place costs four: twice a cell that is not right and counts as wrong.
-    let equal = laid.iter().take_while(|l| l.score() > best.score() - 2);
-    let direct: Vec<&Laid> = equal.filter(|l| !l.mirrored).collect();
-    let upright = direct.iter().min_by(|a, b| lean(a, lattice).total_cmp(&lean(b, lattice)));
-    let Some(chosen) = upright.map(|l| **l) else {
-        return (Board::new(), Outcome::Mirrored, false);
-    };
-    let board: Board = lattice
-        .cells
-        .iter()
-        .map(|(cell, site)| {
-            let class = classes.get(cell).copied().flatten();
-            (chosen.apply(*cell), Placed { candidate: site.candidate, class })
-        })
-        .collect();
-    let runner_up = laid.iter().find(|l| l.score() < best.score()).map_or(cells.len(), |l| l.wrong);
-    let outcome = Outcome::Identified { agreeing: chosen.seen, disagreeing: chosen.wrong, runner_up };
-    (board, outcome, direct.len() > 1)
-}
-
-/// All ways in which the lattice overlaps the grid.
-fn ways(code: &MarkerCode, cells: &[Cell], classes: &BTreeMap<Cell, Option<u8>>) -> Vec<Laid> {
-    let size = extent(cells);
-    let mut all = Vec::new();
-    for (turns, mirrored) in (0..4).flat_map(|t| [(t, false), (t, true)]) {
-        let found: Vec<(Cell, Option<u8>)> = classes.iter().map(|(&c, &k)| (turned(c, turns, mirrored), k)).collect();
-        let range = |pick: fn(&Cell) -> i32, size: i32| {
-            let low = found.iter().map(|(c, _)| pick(c)).min().unwrap_or(0);
-            let high = found.iter().map(|(c, _)| pick(c)).max().unwrap_or(0);
-            (-low).min(size - high)..=(-low).max(size - high)
-        };
-        for shift_j in range(|c| c.1, size.1) {
-            for shift_i in range(|c| c.0, size.0) {
-                let right = |(c, class): &&(Cell, Option<u8>)| {
-                    class.is_some() && code.class_at((c.0 + shift_i, c.1 + shift_j)) == *class
-                };
-                let seen = found.iter().filter(right).count();
-                let wrong = found.len() - seen;
-                all.push(Laid { turns, mirrored, shift: (shift_i, shift_j), seen, wrong });
-            }
-        }
-    }
-    all
-}
-
-/// Largest column and row.
-fn extent(cells: &[Cell]) -> Cell {
-    let high = |pick: fn(&Cell) -> i32| cells.iter().map(pick).max().unwrap_or(0);
-    (high(|c| c.0), high(|c| c.1))
-}
-
-/// Dots in the shortest outer line of the grid.
-fn shortest_line(cells: &[Cell]) -> usize {
-    let mut lines: BTreeMap<(u8, i32), usize> = BTreeMap::new();
-    for (i, j) in cells {
-        *lines.entry((0, *i)).or_default() += 1;
-        *lines.entry((1, *j)).or_default() += 1;
-    }
-    lines.values().copied().min().unwrap_or(0)
-}
-
-/// How far the plate's x axis points away from the image's right, as the cosine of the angle with its sign changed.
-fn lean(laid: &Laid, lattice: &Lattice) -> f64 {
-    let (origin, right) = (laid.apply((0, 0)), [laid.apply((1, 0)), laid.apply((0, 1))]);
-    let along = right.map(|r| f64::from(r.0 - origin.0));
-    let sum: f64 = lattice.cells.values().map(|s| (0..2).map(|k| along[k] * s.basis[k][0]).sum::<f64>()).sum();
-    -sum
-}
-
 fn no_lattice() -> Error {
     Error::new(
         Code::PlateNotDetectable,
         "plate",
-        "the markers do not lie on a square lattice of circles with a radius",
-        "check positions and radii in the plate file: a symmetric grid, or every other row shifted by half a step",
+        "the markers do not lie on a square lattice",
+        "check the positions in the plate file: a symmetric grid, or every other row shifted by half a step",
     )
 }
 

@@ -20,6 +20,8 @@ mod exact_edge;
 mod flat_zone;
 mod gauss;
 mod grid;
+mod grid_dots;
+mod grid_place;
 mod lattice;
 mod levels;
 mod local_map;
@@ -32,6 +34,7 @@ mod predicted;
 mod predicted_pass;
 mod refine;
 mod rescue;
+mod smoothed;
 mod squares;
 #[cfg(test)]
 pub(crate) mod synth;

@@ -41,16 +41,26 @@ pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<Cir
             "give a plate of kind coded-circles with plate.csv as made by `robotcal plate`",
         )
     })?;
-    detect_coded(picture, plate, options, &code, |lattices, candidates| Ok(identify(&code, lattices, candidates)))
+    detect_coded(picture, options, |lattices, candidates| {
+        let (board, outcome) = identify(&code, lattices, candidates);
+        Ok(Identified { plate: plate.clone(), code, board, outcome })
+    })
+}
+
+/// What was recognised.
+pub(super) struct Identified {
+    /// The plate with the sizes of its markers; its pitch is a step of the lattice.
+    pub plate: Plate,
+    pub code: MarkerCode,
+    pub board: Board,
+    pub outcome: Outcome,
 }
 
 /// The stages around the identification.
 pub(super) fn detect_coded(
     picture: &Picture,
-    plate: &Plate,
     options: &Options,
-    code: &MarkerCode,
-    identify: impl FnOnce(&[Lattice], &[Candidate]) -> Result<(Board, Outcome)>,
+    identify: impl FnOnce(&[Lattice], &[Candidate]) -> Result<Identified>,
 ) -> Result<CircleDetection> {
     if picture.width < 16 || picture.height < 16 || picture.pixels.len() != picture.width * picture.height {
         let what = format!("{} x {} pixels with {} values", picture.width, picture.height, picture.pixels.len());
@@ -59,12 +69,12 @@ pub(super) fn detect_coded(
     let levels = Levels::of(picture, largest_marker(picture, options), THRESHOLD);
     let (candidates, mut dropped) = candidates(picture, &levels, options);
     let lattices = lattices(&candidates, SMALLEST_LATTICE);
-    let (mut board, outcome) = identify(&lattices, &candidates)?;
-    let mut refused = check_neighbours(&mut board, code, &candidates);
-    attach(&mut board, code, &candidates);
-    refused.extend(check_neighbours(&mut board, code, &candidates));
+    let Identified { plate, code, mut board, outcome } = identify(&lattices, &candidates)?;
+    let mut refused = check_neighbours(&mut board, &code, &candidates);
+    attach(&mut board, &code, &candidates);
+    refused.extend(check_neighbours(&mut board, &code, &candidates));
     drop_unused(&board, &refused, &lattices, &candidates, &mut dropped);
-    let mut work = Work { picture, plate, code, candidates: &candidates, pixels: Pixels::default() };
+    let mut work = Work { picture, plate: &plate, code: &code, candidates: &candidates, pixels: Pixels::default() };
     let measured = work.measure(&board, &levels, options, &mut dropped);
     Ok(work.detection(&board, measured, outcome, dropped))
 }
