@@ -15,6 +15,7 @@ mod joint_table;
 mod memory;
 mod plan;
 mod plate;
+mod plate_board;
 mod progress;
 mod recording;
 mod robot;

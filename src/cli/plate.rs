@@ -1,4 +1,4 @@
-//! `robotcal plate`: designs a plate of coded circles and draws it.
+//! `robotcal plate`: designs a plate of coded circles, or a board of another kind, and draws it.
 
 use std::path::{Path, PathBuf};
 
@@ -6,6 +6,7 @@ use clap::Args;
 use sha2::{Digest, Sha256};
 
 use super::Verdict;
+use super::plate_board::{self, BoardArgs, BoardSize, Kind};
 use super::say::say;
 use crate::error::Result;
 use crate::output::Place;
@@ -16,6 +17,8 @@ use crate::series::{plate_csv, plate_toml};
 /// Flags of `plate`.
 #[derive(Debug, Args)]
 pub(super) struct PlateArgs {
+    #[command(flatten)]
+    board: BoardArgs,
     /// Folder for plate.toml, plate.csv, plate.pdf, plate.svg and plate.png
     #[arg(long, value_name = "FOLDER", default_value = "plate")]
     out: PathBuf,
@@ -70,6 +73,17 @@ fn sheet(text: &str) -> std::result::Result<Sheet, String> {
 
 pub(super) fn run(args: &PlateArgs) -> Result<Verdict> {
     let place = Place::among(&args.out)?;
+    if args.board.kind != Kind::CodedCircles {
+        let size = BoardSize {
+            shape: args.shape,
+            pitch_mm: args.pitch_mm,
+            sheet: args.sheet,
+            tolerance_mm: args.tolerance_mm,
+            dpi: args.dpi,
+        };
+        plate_board::draw(&place, &args.out, &args.board, &size)?;
+        return Ok(Verdict::Good);
+    }
     let viewing = args.focal_px.zip(args.distance_m).map(|(focal_px, [near_m, far_m])| Viewing {
         focal_px,
         width_px: args.image[0],

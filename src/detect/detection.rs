@@ -19,6 +19,15 @@ pub struct Detection {
     pub failure: Option<Error>,
 }
 
+/// The sizes of the dots of a grid as an image shows them, where the plate does not state them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Sizes {
+    /// Outer and inner radius of every marker by id, m.
+    pub radii_m: Vec<(u32, [f64; 2])>,
+    /// Ids of those that are not as most are.
+    pub large: Vec<u32>,
+}
+
 /// What an image of circles tells beyond their places.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Circles {
@@ -30,6 +39,8 @@ pub struct Circles {
     pub blur_px: f64,
     /// Noise of a pixel on paper and on ink, counts.
     pub noise: [f64; 2],
+    /// Sizes that the plate does not state.
+    pub sizes: Sizes,
 }
 
 /// A candidate that was left out.
@@ -76,6 +87,7 @@ impl From<circles::CircleDetection> for Detection {
                 outcome: found.outcome,
                 blur_px: found.blur_px,
                 noise: found.noise,
+                sizes: Sizes::default(),
             }),
             notices,
             failure,

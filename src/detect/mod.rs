@@ -8,13 +8,17 @@ pub mod chessboard;
 pub mod circles;
 mod corners;
 mod detection;
+mod edge_line;
 mod flat_field;
 mod load;
 mod picture;
+mod quads;
 mod run;
 mod saddle;
+mod tag_code;
+pub mod tags;
 
-pub use detection::{Circles, Detection, Dropped};
+pub use detection::{Circles, Detection, Dropped, Sizes};
 pub use flat_field::FlatField;
 pub use load::{LUMA_WEIGHTS, load, load_bytes};
 pub use picture::Picture;
@@ -46,6 +50,7 @@ fn by_kind(picture: &Picture, plate: &Plate) -> Result<Detection> {
         PlateKind::CodedCircles => circles::detect(picture, plate, &circles::Options::default()).map(Detection::from),
         PlateKind::CircleGrid => circles::detect_grid(picture, plate, &circles::Options::default()),
         PlateKind::Charuco => charuco::detect(picture, plate),
+        PlateKind::Aprilgrid | PlateKind::ArucoGrid | PlateKind::Tag => tags::detect(picture, plate),
         PlateKind::Points => Err(Error::new(
             Code::PlateNotDetectable,
             "plate",

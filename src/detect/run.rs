@@ -60,7 +60,32 @@ pub fn detect_series(
         found.par_extend(images[batch].par_iter().map(one));
     }
     refuse_odd_sizes(images, &mut found);
+    refuse_odd_dots(images, &mut found);
     found
+}
+
+/// The dots that are larger tell how a grid is turned: images that show others than most have ids that nobody can trust.
+fn refuse_odd_dots(images: &[PathBuf], found: &mut [SeriesImage]) {
+    let large = |i: &SeriesImage| {
+        let sizes = i.detection.circles.as_ref().filter(|_| i.detection.failure.is_none()).map(|c| &c.sizes);
+        sizes.filter(|s| !s.radii_m.is_empty()).map(|s| s.large.clone())
+    };
+    let mut counts: BTreeMap<Vec<u32>, usize> = BTreeMap::new();
+    for seen in found.iter().filter_map(large) {
+        *counts.entry(seen).or_default() += 1;
+    }
+    let Some((usual, count)) = counts.into_iter().max_by_key(|(_, count)| *count) else { return };
+    for (path, image) in images.iter().zip(found) {
+        if large(image).is_some_and(|seen| seen != usual) {
+            image.detection.observations.clear();
+            image.detection.failure = Some(Error::new(
+                Code::PlateIncomplete,
+                path.display(),
+                format!("the larger dots are not those that {count} images show: its ids cannot be told"),
+                "take the image so that all larger dots are seen, or state them in plate.toml: large = [[column, row], ..]",
+            ));
+        }
+    }
 }
 
 /// One camera records one size: images of another than the most frequent one are failures.

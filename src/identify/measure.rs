@@ -9,7 +9,7 @@ use super::stated::{lens_of, measured_series};
 use crate::detect::Detection;
 use crate::error::{Code, Error, Notice, Result};
 use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop};
-use crate::series::{CirclePoint, Observation, Series, Source};
+use crate::series::{CirclePoint, Observation, Plate, Series, Source};
 use crate::urdf::Chain;
 
 /// A seen series with what the user should know of it.
@@ -38,8 +38,9 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     notices.extend(unused_repeatability(series));
     let camera = &series.manifest.camera;
     let lens = lens_of(series)?;
+    let mut plate = series.plate.clone();
     let (mut seen, found_size) = match &series.source {
-        Source::Images { .. } => look_through(series, progress, &mut notices)?,
+        Source::Images { .. } => look_through(series, progress, &mut notices, &mut plate)?,
         Source::Observations(all) => {
             let by_name: BTreeMap<&str, &Vec<Observation>> =
                 all.iter().map(|i| (i.image.as_str(), &i.observations)).collect();
@@ -78,11 +79,31 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     }
     // The detector measures centroids, whatever observations would mean.
     let centroid = found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid;
-    Ok(Measured { series: measured_series(series, lens, (width_px, height_px), centroid, stops), notices })
+    let measured = measured_series(series, lens, (width_px, height_px), centroid, stops);
+    Ok(Measured { series: MeasuredSeries { plate, ..measured }, notices })
 }
 
 /// What all stops show, and the size of the images.
 type SeenStops = (Vec<Seen>, Option<(u32, u32)>);
+
+/// Gives the markers the median of the radii that the images show, where they show any.
+fn set_radii(plate: &mut Plate, images: &[SeenImage]) {
+    let usable = images.iter().filter(|i| i.detection.failure.is_none());
+    let mut seen: BTreeMap<u32, [Vec<f64>; 2]> = BTreeMap::new();
+    for (id, radii) in usable.filter_map(|i| i.detection.circles.as_ref()).flat_map(|c| &c.sizes.radii_m) {
+        let all = seen.entry(*id).or_default();
+        (0..2).for_each(|k| all[k].push(radii[k]));
+    }
+    let middle = |values: &mut Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    for marker in &mut plate.markers {
+        if let Some(radii) = seen.get_mut(&marker.id) {
+            [marker.outer_radius_m, marker.inner_radius_m] = radii.each_mut().map(middle);
+        }
+    }
+}
 
 /// The joint noise is estimated: what a data sheet states says nothing of what the robot model lacks, which is part of it.
 fn unused_repeatability(series: &Series) -> Option<Notice> {
@@ -95,8 +116,15 @@ fn unused_repeatability(series: &Series) -> Option<Notice> {
     ))
 }
 
-fn look_through(series: &Series, progress: impl Fn(&Path) + Sync, notices: &mut Vec<Notice>) -> Result<SeenStops> {
+/// Looks at all images; sizes of dots that the plate does not state are those seen.
+fn look_through(
+    series: &Series,
+    progress: impl Fn(&Path) + Sync,
+    notices: &mut Vec<Notice>,
+    plate: &mut Plate,
+) -> Result<SeenStops> {
     let images = detect_stops(series, progress)?;
+    set_radii(plate, &images);
     notices.extend(images.iter().flat_map(SeenImage::notices));
     // The detector has refused all images of another size.
     let usable = images.iter().filter(|i| i.detection.failure.is_none());

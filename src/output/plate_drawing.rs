@@ -4,7 +4,7 @@
 //! per format. Everything but markers stays outside the quiet field, a pitch away from the outermost markers.
 
 use crate::plan::plate_design::{Sheet, quiet_field_m};
-use crate::series::{Ink, Plate};
+use crate::series::{Ink, Plate, Region, regions};
 
 pub use super::plate_pdf::pdf;
 pub use super::plate_png::png;
@@ -26,6 +26,8 @@ pub(super) enum Figure {
     Ring { centre: [f64; 2], outer: f64, inner: f64 },
     /// A filled polygon.
     Polygon(Vec<[f64; 2]>),
+    /// A dark polygon with light ones within it.
+    Region(Region),
     /// A straight line.
     Line { from: [f64; 2], to: [f64; 2], width: f64 },
     /// A line of text; `at` is the middle of its baseline.
@@ -60,6 +62,11 @@ fn advice(sheet: &Sheet) -> String {
 fn marks(plate: &Plate) -> Vec<Figure> {
     if plate.kind.print().ink == Ink::Squares {
         return squares(plate);
+    }
+    // whoever draws has asked before whether the dictionary has these tags
+    let regions = regions(plate).unwrap_or_default();
+    if !regions.is_empty() {
+        return regions.into_iter().map(Figure::Region).collect();
     }
     let ring = |m: &crate::series::Marker| Figure::Ring {
         centre: [m.position_m.x, m.position_m.y],
@@ -138,7 +145,7 @@ mod tests {
             };
             for figure in figures(&made.plate, &caption) {
                 let corners = match figure {
-                    Figure::Ring { .. } => continue,
+                    Figure::Ring { .. } | Figure::Region(_) => continue,
                     Figure::Polygon(corners) => corners,
                     Figure::Line { from, to, .. } => vec![from, to],
                     // Helvetica is about half as wide as high on average.

@@ -49,15 +49,12 @@ impl Canvas {
                 self.content.fill_even_odd();
             }
             Figure::Polygon(corners) => {
-                for (k, &corner) in corners.iter().enumerate() {
-                    let [x, y] = self.point(corner);
-                    if k == 0 {
-                        self.content.move_to(x, y)
-                    } else {
-                        self.content.line_to(x, y)
-                    };
-                }
-                self.content.close_path().fill_nonzero();
+                self.outline(corners);
+                self.content.fill_nonzero();
+            }
+            Figure::Region(outlines) => {
+                outlines.iter().for_each(|outline| self.outline(outline));
+                self.content.fill_even_odd();
             }
             Figure::Line { from, to, width } => {
                 let ([x0, y0], [x1, y1]) = (self.point(*from), self.point(*to));
@@ -72,6 +69,18 @@ impl Canvas {
                 self.content.show(Str(text.as_bytes())).end_text();
             }
         }
+    }
+
+    fn outline(&mut self, corners: &[[f64; 2]]) {
+        for (k, &corner) in corners.iter().enumerate() {
+            let [x, y] = self.point(corner);
+            if k == 0 {
+                self.content.move_to(x, y)
+            } else {
+                self.content.line_to(x, y)
+            };
+        }
+        self.content.close_path();
     }
 
     fn circle(&mut self, centre: [f64; 2], radius: f64) {

@@ -55,12 +55,10 @@ impl Canvas {
                 };
                 self.fill(box_, ring);
             }
-            Figure::Polygon(corners) => {
-                let fold = |i: usize, f: fn(f64, f64) -> f64, start: f64| corners.iter().map(|c| c[i]).fold(start, f);
-                let (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
-                let box_ =
-                    [fold(0, f64::min, low), fold(1, f64::min, low), fold(0, f64::max, high), fold(1, f64::max, high)];
-                self.fill(box_, |p| contains(corners, p));
+            Figure::Polygon(corners) => self.fill(box_of(corners), |p| contains(corners, p)),
+            Figure::Region(outlines) => {
+                let Some((dark, light)) = outlines.split_first() else { return };
+                self.fill(box_of(dark), |p| contains(dark, p) && !light.iter().any(|hole| contains(hole, p)));
             }
             Figure::Line { from, to, width } => {
                 // At least a pixel wide, so that it is seen at low resolution.
@@ -107,6 +105,13 @@ impl Canvas {
             }
         }
     }
+}
+
+/// Least and largest x and y, m.
+fn box_of(corners: &[[f64; 2]]) -> [f64; 4] {
+    let fold = |i: usize, f: fn(f64, f64) -> f64, start: f64| corners.iter().map(|c| c[i]).fold(start, f);
+    let (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
+    [fold(0, f64::min, low), fold(1, f64::min, low), fold(0, f64::max, high), fold(1, f64::max, high)]
 }
 
 fn contains(corners: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {

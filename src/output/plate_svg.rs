@@ -42,6 +42,16 @@ fn element(figure: &Figure) -> String {
             }
             format!("<polygon points=\"{}\"/>\n", points.trim_end())
         }
+        Figure::Region(outlines) => {
+            let mut path = String::new();
+            for outline in outlines {
+                for (k, [x, y]) in outline.iter().enumerate() {
+                    let _ = write!(path, "{}{},{} ", if k == 0 { "M" } else { "L" }, mm(*x), mm(-*y));
+                }
+                path.push_str("Z ");
+            }
+            format!("<path fill-rule=\"evenodd\" d=\"{}\"/>\n", path.trim_end())
+        }
         Figure::Line { from: [x1, y1], to: [x2, y2], width } => format!(
             "<line x1=\"{}\" y1=\"{}\" x2=\"{}\" y2=\"{}\" stroke=\"black\" stroke-width=\"{}\"/>\n",
             mm(*x1),

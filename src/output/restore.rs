@@ -68,6 +68,7 @@ fn plate(p: &PlateRecord) -> Result<Plate> {
         pitch_m: p.pitch_m,
         tolerance_m: p.tolerance_m,
         aruco: None,
+        tags: p.tags.clone(),
         large: Vec::new(),
         scale: p.scale,
         markers: (0..n).map(marker).collect(),

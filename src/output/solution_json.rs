@@ -14,7 +14,7 @@ use crate::geom::Pose;
 use crate::identify::{Comparison, Estimator, Evidence, LensEvidence, Options, StartVerdict};
 use crate::model::camera::Lens;
 use crate::problem::{ImageRejection, LensChoice, ObservationRejection, short_name};
-use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar};
+use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar, Tags};
 use crate::solve::PlateScale;
 use crate::urdf::{JointKind, Payload};
 
@@ -210,6 +210,9 @@ pub struct PlateRecord {
     pub pitch_m: f64,
     /// Prior sigma of a marker, m.
     pub tolerance_m: f64,
+    /// The tags of a plate of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tags: Option<Tags>,
     /// Measured distance.
     pub scale: Option<ScaleBar>,
     /// Amplitudes of its modes.

@@ -149,6 +149,7 @@ impl Sheet {
 fn widest_radius(plate: &Plate) -> f64 {
     match plate.kind.print().ink {
         Ink::Squares | Ink::SquaresAndTags => plate.pitch_m,
+        Ink::Tags => plate.tags.as_ref().map_or(0.0, |tags| tags.side_m / 2.0 + tags.gap_m),
         Ink::Circles | Ink::Unknown => plate.markers.iter().fold(0.0, |r, m| m.outer_radius_m.max(r)),
     }
 }

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::plate_kind::PlateKind;
+use super::tags::Tags;
 
 /// One marker in the plate frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -63,6 +64,9 @@ pub struct Plate {
     /// What is printed in the light squares of a ChArUco board; the detector looks for it where it is not stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aruco: Option<Aruco>,
+    /// The tags of a plate of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tags: Option<Tags>,
     /// Ids of the dots of a grid that are larger than most, or ringed; the detector finds them where none is stated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub large: Vec<u32>,
@@ -76,6 +80,25 @@ impl Plate {
     /// Index in `markers` of a marker id.
     pub fn index_of(&self, id: u32) -> Option<usize> {
         self.markers.binary_search_by_key(&id, |m| m.id).ok()
+    }
+
+    /// Makes a lattice an asymmetric one as OpenCV has it: rows are a pitch apart, the dots of a row two, and those of every other
+    /// row are a pitch further to the right; the origin stays at the centre.
+    pub(super) fn shift_rows(&mut self) {
+        let middle = f64::from(self.columns) - 0.5;
+        for marker in &mut self.markers {
+            let (column, row) = (marker.id % self.columns, marker.id / self.columns);
+            marker.position_m.x = (f64::from(2 * column + row % 2) - middle) * self.pitch_m;
+        }
+    }
+
+    /// The rows are those of [`Plate::shift_rows`].
+    pub(super) fn has_shifted_rows(&self) -> bool {
+        let x = |index: Option<usize>| index.map(|k| self.markers[k].position_m.x);
+        let first = x(self.index_of(0));
+        let [next, below] = [1, self.columns].map(|id| Some(x(self.index_of(id))? - first?));
+        let near = |seen: Option<f64>, pitches: f64| seen.is_some_and(|d| (d / self.pitch_m - pitches).abs() < 0.25);
+        near(next, 2.0) && near(below, 1.0)
     }
 
     /// A regular lattice of points, ids row-major from the top-left, origin at the centre.
@@ -94,6 +117,17 @@ impl Plate {
                 sigma_m: tolerance_m,
             })
             .collect();
-        Self { kind, columns, rows, pitch_m, tolerance_m, aruco: None, large: Vec::new(), scale: None, markers }
+        Self {
+            kind,
+            columns,
+            rows,
+            pitch_m,
+            tolerance_m,
+            aruco: None,
+            tags: None,
+            large: Vec::new(),
+            scale: None,
+            markers,
+        }
     }
 }

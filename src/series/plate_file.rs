@@ -10,6 +10,7 @@ use super::manifest::{check_format, parse_toml, read_toml, require_positive, to_
 use super::plate::{Aruco, Marker, Plate, ScaleBar};
 use super::plate_kind::{Ink, Places, PlateKind};
 use super::table::{Row, Table, to_csv};
+use super::tags::TagKeys;
 use crate::error::{Code, Error, Result};
 use crate::files::Kind;
 
@@ -33,6 +34,29 @@ struct PlateFile {
     /// Radius of the dots of a circle-grid without a marker file.
     #[serde(skip_serializing_if = "Option::is_none")]
     radius_m: Option<f64>,
+    /// Every other row of a circle-grid is shifted: rows are pitch_m apart, the dots of a row twice that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    asymmetric: Option<bool>,
+    /// Columns and rows of the dots of a circle-grid that are not as most are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    large: Option<Vec<[u32; 2]>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tag_m: Option<f64>,
+    /// Gap between the tags of an aprilgrid over their side.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    spacing: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    family: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    marker_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gap_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dictionary: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    first_id: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     markers: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -63,7 +87,16 @@ pub fn parse_plate(path: &Path, toml: &str, markers: &str) -> Result<Plate> {
 fn parse(path: &Path, toml: &str, marker_text: impl FnOnce(&Path) -> Result<String>) -> Result<Plate> {
     let file: PlateFile = parse_toml(path, toml)?;
     check_format(path, file.format)?;
-    for (key, value) in [("pitch_m", file.pitch_m), ("tolerance_m", file.tolerance_m), ("radius_m", file.radius_m)] {
+    let lengths = [
+        ("pitch_m", file.pitch_m),
+        ("tolerance_m", file.tolerance_m),
+        ("radius_m", file.radius_m),
+        ("tag_m", file.tag_m),
+        ("spacing", file.spacing),
+        ("marker_m", file.marker_m),
+        ("gap_m", file.gap_m),
+    ];
+    for (key, value) in lengths {
         require_positive(path, key, value)?;
     }
     let mut plate = nominal(path, &file)?;
@@ -95,6 +128,10 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
         let what = "radius_m is only for a circle-grid without a marker file";
         return Err(Error::new(Code::SettingConflict, path.display(), what, "remove radius_m"));
     }
+    if print.ink == Ink::Tags {
+        let (tags, [columns, rows]) = tag_keys(file).tags(path, file.kind, [file.columns, file.rows])?;
+        return Ok(Plate { scale: file.scale, ..tags.plate(file.kind, columns, rows, tolerance_m) });
+    }
     if print.places == Places::Anywhere {
         let (columns, rows) = (file.columns.unwrap_or(0), file.rows.unwrap_or(0));
         let pitch_m = file.pitch_m.unwrap_or(0.0);
@@ -106,6 +143,7 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
             pitch_m,
             tolerance_m,
             aruco: None,
+            tags: None,
             large: Vec::new(),
             scale,
             markers: Vec::new(),
@@ -136,7 +174,41 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
     for marker in &mut plate.markers {
         marker.outer_radius_m = file.radius_m.unwrap_or(0.0);
     }
+    if (file.asymmetric.is_some() || file.large.is_some()) && !print.has_radius {
+        let what = "asymmetric and large are only for a circle-grid";
+        return Err(Error::new(Code::SettingConflict, path.display(), what, "remove them or correct `kind`"));
+    }
+    if file.asymmetric == Some(true) {
+        plate.shift_rows();
+    }
+    plate.large = large(path, file, [columns, rows])?;
     Ok(plate)
+}
+
+fn tag_keys(file: &PlateFile) -> TagKeys {
+    TagKeys {
+        tag_m: file.tag_m,
+        marker_m: file.marker_m,
+        spacing: file.spacing,
+        gap_m: file.gap_m,
+        family: file.family.clone(),
+        dictionary: file.dictionary.clone(),
+        first_id: file.first_id,
+        id: file.id,
+    }
+}
+
+/// Ids of the dots that are stated to be of another size.
+fn large(path: &Path, file: &PlateFile, [columns, rows]: [u32; 2]) -> Result<Vec<u32>> {
+    let stated = file.large.as_deref().unwrap_or_default();
+    if let Some([column, row]) = stated.iter().find(|[column, row]| *column >= columns || *row >= rows) {
+        let what = format!("large names column {column}, row {row} of a grid of {columns} x {rows}");
+        return Err(Error::new(Code::SettingRange, path.display(), what, "count both from 0, from the top-left dot"));
+    }
+    let mut ids: Vec<u32> = stated.iter().map(|[column, row]| row * columns + column).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    Ok(ids)
 }
 
 /// The markers of a ChArUco board, where they are stated; no other kind has any.
@@ -321,6 +393,8 @@ fn check_scale(path: &Path, plate: &Plate) -> Result<()> {
 /// None in practice: every field can be written as TOML.
 pub fn plate_toml(plate: &Plate, markers: Option<&str>) -> Result<String> {
     let lattice = plate.kind.print().places != Places::Anywhere || plate.columns > 0;
+    let tags = plate.tags.as_ref().map_or_else(TagKeys::default, |tags| TagKeys::of(plate.kind, tags));
+    let lattice = lattice && plate.kind != PlateKind::Tag;
     let radius = plate.markers.first().map(|m| m.outer_radius_m).filter(|r| *r > 0.0);
     to_toml(
         "plate.toml",
@@ -329,8 +403,19 @@ pub fn plate_toml(plate: &Plate, markers: Option<&str>) -> Result<String> {
             kind: plate.kind,
             columns: lattice.then_some(plate.columns),
             rows: lattice.then_some(plate.rows),
-            pitch_m: Some(plate.pitch_m).filter(|p| *p > 0.0),
+            pitch_m: Some(plate.pitch_m).filter(|p| *p > 0.0 && plate.tags.is_none()),
+            tag_m: tags.tag_m,
+            spacing: tags.spacing,
+            family: tags.family,
+            marker_m: tags.marker_m,
+            gap_m: tags.gap_m,
+            dictionary: tags.dictionary,
+            first_id: tags.first_id,
+            id: tags.id,
             radius_m: radius.filter(|_| plate.kind.print().has_radius && markers.is_none()),
+            asymmetric: plate.has_shifted_rows().then_some(true).filter(|_| plate.kind.print().has_radius),
+            large: Some(plate.large.iter().map(|id| [id % plate.columns, id / plate.columns]).collect())
+                .filter(|large: &Vec<_>| !large.is_empty()),
             markers: markers.map(str::to_string),
             tolerance_m: Some(plate.tolerance_m),
             aruco: plate.aruco.clone(),

@@ -14,6 +14,8 @@ pub enum Ink {
     Squares,
     /// These, with tags in the light ones.
     SquaresAndTags,
+    /// Square tags with a code.
+    Tags,
     /// Nothing that is known.
     Unknown,
 }
@@ -85,6 +87,12 @@ plate_kinds! {
     Chessboard { ink: Ink::Squares }
     /// A chessboard with ArUco markers in its light squares.
     Charuco { ink: Ink::SquaresAndTags, has_tags: true }
+    /// Kalibr's grid of AprilTags; the markers are the corners of the tags.
+    Aprilgrid { ink: Ink::Tags, places: Places::Lattice }
+    /// OpenCV's grid of ArUco markers.
+    ArucoGrid { ink: Ink::Tags, places: Places::Lattice }
+    /// A single AprilTag or ArUco marker.
+    Tag { ink: Ink::Tags, places: Places::Lattice }
     /// Points observed by someone else's detector.
     Points { places: Places::Anywhere, needs_marker_file: true }
 }

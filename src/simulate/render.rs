@@ -15,23 +15,28 @@ use crate::detect::Picture;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
-use crate::series::{Ink, Marker, Plate};
+use crate::series::{Ink, Marker, Plate, Region, regions};
 
 /// Largest distance between a sampled outline and the true one, px.
 const OUTLINE_TOLERANCE_PX: f64 = 0.004;
 /// Samples along each side of a chessboard's square.
 const SIDE_SAMPLES: usize = 16;
+/// The same along a module of a tag.
+const MODULE_SAMPLES: usize = 4;
 
 /// Refuses plates whose print cannot be drawn: a picture without it would be one of another plate.
 ///
 /// # Errors
-/// ChArUco boards, whose markers are not drawn; dots without a radius; points, which no print is described for.
+/// ChArUco boards whose markers are not stated; tags that no dictionary has; dots without a radius; points, which no print is described for.
 pub fn check_drawable(plate: &Plate) -> Result<()> {
     let (what, remedy) = match plate.kind.print().ink {
         Ink::Squares => return Ok(()),
-        Ink::SquaresAndTags => {
-            ("the markers of a ChArUco board cannot be drawn", "give --observations, or a chessboard")
-        }
+        Ink::Tags => return regions(plate).map(|_| ()),
+        Ink::SquaresAndTags if plate.aruco.is_some() => return regions(plate).map(|_| ()),
+        Ink::SquaresAndTags => (
+            "the markers of the ChArUco board are not stated",
+            "give dictionary and side_m under [aruco] in plate.toml, or --observations",
+        ),
         Ink::Circles | Ink::Unknown if plate.markers.iter().all(|m| m.outer_radius_m > 0.0) => return Ok(()),
         Ink::Circles | Ink::Unknown => (
             "dots without a radius cannot be drawn",
@@ -111,7 +116,8 @@ impl View<'_> {
         }
         let mut raster = Rasteriser::default();
         let mut last: Option<(f64, Psf)> = None;
-        let marks = Marks { plate, camera: self.camera, camera_from_plate };
+        let regions = regions(plate).unwrap_or_default();
+        let marks = Marks { plate, camera: self.camera, camera_from_plate, regions };
         for mark in 0..marks.count() {
             let Some((outlines, depth_m)) = marks.outlines(mark) else { continue };
             let Some(bounds) = PixelRect::around(outlines.iter().flatten(), 8) else { continue };
@@ -192,6 +198,8 @@ struct Marks<'a> {
     plate: &'a Plate,
     camera: &'a Camera,
     camera_from_plate: &'a Pose,
+    /// Of tags.
+    regions: Vec<Region>,
 }
 
 impl Marks<'_> {
@@ -200,7 +208,9 @@ impl Marks<'_> {
     }
 
     fn count(&self) -> usize {
-        if self.is_chessboard() {
+        if !self.regions.is_empty() {
+            self.regions.len()
+        } else if self.is_chessboard() {
             ((self.plate.columns + 1) * (self.plate.rows + 1)) as usize
         } else {
             self.plate.markers.len()
@@ -209,7 +219,42 @@ impl Marks<'_> {
 
     /// The imaged outlines of a figure and its depth; `None` when it is light or has no whole image.
     fn outlines(&self, mark: usize) -> Option<(Vec<Vec<Vector2<f64>>>, f64)> {
-        if self.is_chessboard() { self.square(mark) } else { self.circles(&self.plate.markers[mark]) }
+        match self.regions.get(mark) {
+            Some(region) => self.region(region),
+            None if self.is_chessboard() => self.square(mark),
+            None => self.circles(&self.plate.markers[mark]),
+        }
+    }
+
+    /// A dark polygon with the light ones in it.
+    fn region(&self, region: &Region) -> Option<(Vec<Vec<Vector2<f64>>>, f64)> {
+        let (dark, light) = region.split_first()?;
+        let image = |loop_m: &Vec<[f64; 2]>, samples: usize| {
+            let points: Vec<Vector3<f64>> = loop_m.iter().map(|[x, y]| Vector3::new(*x, *y, 0.0)).collect();
+            self.polygon(&points, samples).map(scenery::with_sense)
+        };
+        let mut outlines = vec![image(dark, SIDE_SAMPLES)?];
+        for hole in light {
+            let mut outline = image(hole, MODULE_SAMPLES)?;
+            outline.reverse();
+            outlines.push(outline);
+        }
+        let middle =
+            dark.iter().fold(Vector3::zeros(), |sum, [x, y]| sum + Vector3::new(*x, *y, 0.0)) / dark.len() as f64;
+        Some((outlines, self.camera_from_plate.transform(&middle).z))
+    }
+
+    /// The image of a polygon with so many samples along each side.
+    fn polygon(&self, corners: &[Vector3<f64>], samples: usize) -> Option<Vec<Vector2<f64>>> {
+        let mut outline = Vec::with_capacity(corners.len() * samples);
+        for (k, a) in corners.iter().enumerate() {
+            let b = corners[(k + 1) % corners.len()];
+            for i in 0..samples {
+                let x = a + (b - a) * (i as f64 / samples as f64);
+                outline.push(self.camera.project(&self.camera_from_plate.transform(&x))?);
+            }
+        }
+        Some(outline)
     }
 
     fn circles(&self, marker: &Marker) -> Option<(Vec<Vec<Vector2<f64>>>, f64)> {
@@ -255,14 +300,7 @@ impl Marks<'_> {
         };
         let corners =
             [corner(row, column), corner(row, column + 1), corner(row + 1, column + 1), corner(row + 1, column)];
-        let mut outline = Vec::with_capacity(4 * SIDE_SAMPLES);
-        for k in 0..4 {
-            let (a, b) = (corners[k], corners[(k + 1) % 4]);
-            for i in 0..SIDE_SAMPLES {
-                let x = a + (b - a) * (i as f64 / SIDE_SAMPLES as f64);
-                outline.push(self.camera.project(&self.camera_from_plate.transform(&x))?);
-            }
-        }
+        let outline = self.polygon(&corners, SIDE_SAMPLES)?;
         let middle = self.camera_from_plate.transform(&((corners[0] + corners[2]) / 2.0));
         Some((vec![scenery::with_sense(outline)], middle.z))
     }

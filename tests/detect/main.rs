@@ -13,3 +13,5 @@ mod boards_files;
 mod boards_real;
 mod circles;
 mod command;
+mod grids;
+mod tags;

@@ -143,6 +143,8 @@ fn what_is_written_reads_back_the_same() {
         pitch_m: 0.0,
         tolerance_m: 1e-4,
         aruco: None,
+        tags: None,
+        large: vec![],
         scale: Some(ScaleBar { from: 3, to: 12, distance_m: 0.1 + 0.2, sigma_m: 1e-6 }),
         markers: vec![marker(3, 0.0, 0.01, 0.005, 1e-4), marker(12, 0.3, 0.0, 0.0, 3e-5)],
     };
@@ -152,4 +154,11 @@ fn what_is_written_reads_back_the_same() {
     let mut dots = Plate::lattice(PlateKind::CircleGrid, 5, 4, 0.012, 5e-5);
     dots.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.004);
     assert_eq!(plate(&plate_toml(&dots, None).unwrap(), ""), dots);
+    let shifted = "format = 1\nkind = \"circle-grid\"\ncolumns = 4\nrows = 11\npitch_m = 0.01\nasymmetric = true\n";
+    let marked = plate(&format!("{shifted}large = [[1, 0], [2, 3]]\n"), "");
+    assert_eq!(marked.large, [1, 14]);
+    assert_eq!((marked.markers[1].position_m - marked.markers[0].position_m).x, 0.02);
+    assert_eq!((marked.markers[4].position_m - marked.markers[0].position_m).x, 0.01);
+    assert_eq!(plate(&plate_toml(&marked, None).unwrap(), ""), marked);
+    assert_says(&refusal(&format!("{shifted}large = [[4, 0]]\n"), ""), Code::SettingRange, &["column 4"]);
 }

@@ -15,14 +15,14 @@ const ALL_DARK: u64 = u64::from_le_bytes([DARK; 8]);
 
 /// What a contour encloses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Encloses {
+pub(in crate::detect) enum Encloses {
     Dark,
     Light,
 }
 
 /// A closed contour.
 #[derive(Debug, Clone)]
-pub(super) struct Contour {
+pub(in crate::detect) struct Contour {
     pub encloses: Encloses,
     /// Enclosed area, px^2.
     pub area: f64,
@@ -38,7 +38,7 @@ pub(super) struct Contour {
 }
 
 /// All contours of at least `shortest` cracks; of longer ones than `longest` only the fact is kept.
-pub(super) fn contours(picture: &Picture, levels: &Levels, shortest: usize, longest: usize) -> Vec<Contour> {
+pub(in crate::detect) fn contours(picture: &Picture, levels: &Levels, shortest: usize, longest: usize) -> Vec<Contour> {
     let mut map = DarkMap::of(picture, levels);
     let mut found = Vec::new();
     let mut tracer = Tracer { picture, levels, longest, points: Vec::new() };

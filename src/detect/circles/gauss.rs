@@ -7,7 +7,7 @@ pub(super) const LANES: usize = 8;
 ///
 /// NearbyInk: M. Abramowitz and I. Stegun, Handbook of Mathematical Functions, 26.2.17 (error below 7.5e-8).
 #[inline(always)]
-pub(super) fn normal_tail(u: f32) -> (f32, f32) {
+pub(in crate::detect) fn normal_tail(u: f32) -> (f32, f32) {
     let a = u.abs();
     let phi = 0.398_942_3 * exp_negative(-0.5 * a * a);
     let t = 1.0 / (1.0 + 0.231_641_9 * a);

@@ -11,16 +11,17 @@
 
 use std::collections::BTreeSet;
 
+use super::candidate::Candidate;
 use super::code::MarkerCode;
 use super::grid_dots::{Dot, Dots};
+use super::grid_missing::missing_dots;
 use super::grid_place::{Classes, Laid, place};
 use super::lattice::{Cell, Lattice};
 use super::neighbour_check::{Board, Placed};
-use super::pipeline::{Identified, detect_coded};
+use super::pipeline::{Cut, Identified, detect_coded};
 use super::smoothed::{as_before, smoothed};
-use super::types::{CircleDetection, Options, Outcome};
-use super::{candidate::Candidate, types::Reason};
-use crate::detect::{Detection, Picture};
+use super::types::{CircleDetection, Options, Outcome, Reason};
+use crate::detect::{Detection, Picture, Sizes};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::{Marker, Plate};
 
@@ -55,6 +56,9 @@ pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Resul
         }
     }
     let mut detection = Detection::from(best);
+    if let Some(circles) = &mut detection.circles {
+        circles.sizes = facts.sizes;
+    }
     if facts.symmetric {
         detection.notices.push(symmetric_notice());
     }
@@ -68,10 +72,11 @@ fn spoilt(found: &CircleDetection) -> bool {
 }
 
 /// What is known of a grid beyond its dots.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 struct Facts {
     /// It looks the same after a turn.
     symmetric: bool,
+    sizes: Sizes,
 }
 
 /// A plate of dots on a square lattice.
@@ -100,8 +105,8 @@ impl<'a> Grid<'a> {
     fn look(&self, picture: &Picture, options: &Options) -> Result<(CircleDetection, Facts)> {
         let mut facts = Facts::default();
         let found = detect_coded(picture, options, |lattices, candidates| {
-            let (identified, symmetric) = self.identify(lattices, candidates)?;
-            facts.symmetric = symmetric;
+            let (identified, seen) = self.identify(picture, lattices, candidates)?;
+            facts = seen;
             Ok(identified)
         })?;
         Ok((found, facts))
@@ -110,7 +115,11 @@ impl<'a> Grid<'a> {
     fn told(&self) -> Told {
         let radius = |m: &Marker| m.outer_radius_m;
         let first = self.plate.markers.first().map_or(0.0, radius);
-        if self.plate.markers.iter().any(|m| radius(m) != first || m.inner_radius_m != self.plate.markers[0].inner_radius_m)
+        if self
+            .plate
+            .markers
+            .iter()
+            .any(|m| radius(m) != first || m.inner_radius_m != self.plate.markers[0].inner_radius_m)
         {
             Told::Radii
         } else if self.plate.large.is_empty() {
@@ -120,20 +129,25 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// Puts the largest lattice on the grid; true where the grid looks the same after a turn.
-    fn identify(&self, lattices: &[Lattice], candidates: &[Candidate]) -> Result<(Identified, bool)> {
-        let nothing = |outcome| Ok((self.identified(self.plate.clone(), Board::new(), outcome)?, false));
+    /// Puts the largest lattice on the grid.
+    fn identify(
+        &self,
+        picture: &Picture,
+        lattices: &[Lattice],
+        candidates: &[Candidate],
+    ) -> Result<(Identified, Facts)> {
+        let nothing = |outcome| Ok((self.identified(self.plate.clone(), Board::new(), outcome)?, Facts::default()));
         let Some(lattice) = lattices.first() else {
             return nothing(if candidates.is_empty() { Outcome::NoCandidates } else { Outcome::NoLattice });
         };
         let told = self.told();
-        let Some(dots) = Dots::of(lattice, candidates) else { return nothing(Outcome::Ambiguous) };
+        let Some(mut dots) = Dots::of(lattice, candidates) else { return nothing(Outcome::Ambiguous) };
         let plate = match told {
             Told::Radii => self.plate.clone(),
             Told::Places => self.with_large(&dots, |marker| self.plate.large.contains(&self.plate.markers[marker].id)),
             Told::Nothing => self.with_large(&dots, |_| false),
         };
-        if !self.agrees(&dots) {
+        if !self.agrees(&dots) || (matches!(told, Told::Places) && dots.other.is_empty()) {
             return nothing(Outcome::Ambiguous);
         }
         let code = self.code(&plate)?;
@@ -142,7 +156,8 @@ impl<'a> Grid<'a> {
             Told::Nothing => lattice.cells.keys().map(|cell| (*cell, Some(0))).collect(),
         };
         let (mut laid, outcome) = place(&code, &self.cells, &classes);
-        if matches!(told, Told::Nothing) {
+        if let (Told::Nothing, Some(any)) = (&told, laid.first()) {
+            dots.add(missing_dots(picture, lattice, candidates, (any, &self.cells), &dots.usual));
             let first = laid.iter().map(|l| others(l, &dots)).min();
             laid.retain(|l| first.as_ref() == Some(&others(l, &dots)));
         }
@@ -155,7 +170,11 @@ impl<'a> Grid<'a> {
         };
         let classes = self.code(&plate)?.classes_of(lattice, candidates);
         let board = board(chosen, lattice, &classes);
-        Ok((self.identified(plate, board, outcome)?, laid.len() > 1))
+        let sizes = match told {
+            Told::Radii => Sizes::default(),
+            Told::Places | Told::Nothing => self.sizes(&plate, &dots),
+        };
+        Ok((self.identified(plate, board, outcome)?, Facts { symmetric: laid.len() > 1, sizes }))
     }
 
     fn code(&self, plate: &Plate) -> Result<MarkerCode> {
@@ -164,9 +183,13 @@ impl<'a> Grid<'a> {
 
     fn identified(&self, mut plate: Plate, board: Board, outcome: Outcome) -> Result<Identified> {
         // a grid of which nothing is seen has no sizes
-        plate.markers.iter_mut().filter(|m| m.outer_radius_m <= 0.0).for_each(|m| m.outer_radius_m = 0.25 * self.step_m);
+        plate
+            .markers
+            .iter_mut()
+            .filter(|m| m.outer_radius_m <= 0.0)
+            .for_each(|m| m.outer_radius_m = 0.25 * self.step_m);
         plate.pitch_m = self.step_m;
-        Ok(Identified { code: self.code(&plate)?, plate, board, outcome })
+        Ok(Identified { code: self.code(&plate)?, plate, board, outcome, cut: Cut::Measured })
     }
 
     /// The dots are of the size that is stated, where one is.
@@ -188,6 +211,17 @@ impl<'a> Grid<'a> {
     fn with_found(&self, dots: &Dots, laid: &Laid) -> Plate {
         let on_plate: Vec<(Cell, Dot)> = dots.other.iter().map(|(c, d)| (laid.apply(*c), *d)).collect();
         self.with_radii(|k| on_plate.iter().find(|(c, _)| *c == self.cells[k]).map_or(dots.usual, |(_, d)| *d))
+    }
+
+    /// The sizes of a plate with the radii seen: what blur and threshold do to them is taken off where the plate states what most are.
+    fn sizes(&self, seen: &Plate, dots: &Dots) -> Sizes {
+        let usual_m = dots.usual.radius * self.step_m;
+        let is_usual = |m: &Marker| (m.outer_radius_m / usual_m).ln().abs() < 1e-9;
+        let scale = self.plate.markers.first().map_or(0.0, |m| m.outer_radius_m) / usual_m;
+        let scale = if scale > 0.0 { scale } else { 1.0 };
+        let large = seen.markers.iter().filter(|m| !is_usual(m)).map(|m| m.id).collect();
+        let radii = |m: &Marker| (m.id, [m.outer_radius_m, m.inner_radius_m].map(|r| scale * r));
+        Sizes { radii_m: seen.markers.iter().map(radii).collect(), large }
     }
 
     fn with_radii(&self, dot: impl Fn(usize) -> Dot) -> Plate {

@@ -8,6 +8,8 @@ use super::lattice::{Cell, Lattice};
 /// Least gap between the sizes of two kinds of dots, as a logarithm: printed sizes differ by a half or more, and a fifth is
 /// what threshold and blur may do to a small dot beside a large one.
 const GAP: f64 = 0.2;
+/// The same for a dot of which only a part is seen, roughly.
+const MISSING: f64 = 0.3;
 /// Largest share of dots that are not as most are.
 const FEW: f64 = 0.34;
 
@@ -44,6 +46,12 @@ impl Dots {
         let usual = Dot { radius: median(|d| d.radius)?, ratio: median(|d| d.ratio)? };
         let other: BTreeMap<Cell, Dot> = all.into_iter().filter(|(_, d)| !is_usual(d)).collect();
         ((other.len() as f64) < FEW * lattice.cells.len() as f64).then_some(Self { usual, other })
+    }
+
+    /// Adds dots that are not on the lattice where they are not as most are.
+    pub fn add(&mut self, dots: Vec<(Cell, Dot)>) {
+        let usual = self.usual.radius;
+        self.other.extend(dots.into_iter().filter(|(_, d)| (d.radius / usual).ln().abs() > MISSING));
     }
 }
 

@@ -10,7 +10,7 @@ pub(super) const CELL: usize = 8;
 const BLOCK: usize = 4;
 
 /// Smooth local levels of a picture on a grid of cells of [`CELL`] px.
-pub(super) struct Levels {
+pub(in crate::detect) struct Levels {
     cols: usize,
     rows: usize,
     threshold: Vec<f32>,

@@ -43,7 +43,7 @@ pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<Cir
     })?;
     detect_coded(picture, options, |lattices, candidates| {
         let (board, outcome) = identify(&code, lattices, candidates);
-        Ok(Identified { plate: plate.clone(), code, board, outcome })
+        Ok(Identified { plate: plate.clone(), code, board, outcome, cut: Cut::Left })
     })
 }
 
@@ -54,6 +54,16 @@ pub(super) struct Identified {
     pub code: MarkerCode,
     pub board: Board,
     pub outcome: Outcome,
+    pub cut: Cut,
+}
+
+/// What is done with markers that the border of the picture cuts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Cut {
+    /// They are left to a second pass, when camera and pose tell their shape.
+    Left,
+    /// They are measured with the shape that their neighbours tell.
+    Measured,
 }
 
 /// The stages around the identification.
@@ -69,12 +79,13 @@ pub(super) fn detect_coded(
     let levels = Levels::of(picture, largest_marker(picture, options), THRESHOLD);
     let (candidates, mut dropped) = candidates(picture, &levels, options);
     let lattices = lattices(&candidates, SMALLEST_LATTICE);
-    let Identified { plate, code, mut board, outcome } = identify(&lattices, &candidates)?;
+    let Identified { plate, code, mut board, outcome, cut } = identify(&lattices, &candidates)?;
     let mut refused = check_neighbours(&mut board, &code, &candidates);
     attach(&mut board, &code, &candidates);
     refused.extend(check_neighbours(&mut board, &code, &candidates));
     drop_unused(&board, &refused, &lattices, &candidates, &mut dropped);
-    let mut work = Work { picture, plate: &plate, code: &code, candidates: &candidates, pixels: Pixels::default() };
+    let mut work =
+        Work { picture, plate: &plate, code: &code, cut, candidates: &candidates, pixels: Pixels::default() };
     let measured = work.measure(&board, &levels, options, &mut dropped);
     Ok(work.detection(&board, measured, outcome, dropped))
 }
@@ -217,6 +228,7 @@ struct Work<'a> {
     picture: &'a Picture,
     plate: &'a Plate,
     code: &'a MarkerCode,
+    cut: Cut,
     candidates: &'a [Candidate],
     pixels: Pixels,
 }
@@ -313,12 +325,15 @@ impl Work<'_> {
     /// Looks where the neighbours say that a marker must be.
     fn rescue(&mut self, board: &Board, camera: &Camera, dropped: &mut Vec<DroppedCandidate>) -> Vec<Entry> {
         let mut found = Vec::new();
+        // dots with a sheen are less even than paper
+        let noise = if self.cut == Cut::Measured { [camera.noise[0].max(camera.noise[1]); 2] } else { camera.noise };
+        let camera = &Camera { noise, ..*camera };
         for cell in open_cells(board, self.code, 1) {
             let enough = around(board, cell, 2).count() >= 6;
             let Some((map, _)) = neighbourhood(board, cell, self.candidates).filter(|_| enough) else { continue };
             let Some(marker) = self.marker(cell) else { continue };
             let Some(outer) = map.ellipse(marker.outer_radius_m / self.plate.pitch_m) else { continue };
-            let half = outer.half_extent();
+            let half = if self.cut == Cut::Measured { [0.0; 2] } else { outer.half_extent() };
             let size = [self.picture.width as f64, self.picture.height as f64];
             if (0..2).any(|a| outer.centre[a] < half[a] + 1.0 || outer.centre[a] > size[a] - half[a] - 2.0) {
                 continue;

@@ -17,6 +17,8 @@ use std::f64::consts::PI;
 use super::types::CircleDetection;
 use crate::detect::Picture;
 
+/// What a halo that clipping cuts off leaves beyond noise, px per axis; seen in rendered pictures.
+const SYSTEMATIC_PX: f64 = 0.004;
 /// Of the kernel, in sigmas.
 const REACH: f64 = 4.0;
 
@@ -66,7 +68,9 @@ pub(super) fn as_before(mut found: CircleDetection, sigma_px: f64) -> CircleDete
         let edge = f.measured.blur_px;
         let factor = edge / edge.hypot(sigma_px) / kept;
         for imaged in std::iter::once(&mut f.measured.outer).chain(&mut f.measured.inner) {
-            imaged.covariance = imaged.covariance.map(|c| c * factor);
+            let [uu, uv, vv] = imaged.covariance.map(|c| c * factor);
+            let floor = SYSTEMATIC_PX * SYSTEMATIC_PX;
+            imaged.covariance = [uu + floor, uv, vv + floor];
         }
         f.measured.blur_px = before(edge, sigma_px);
     }

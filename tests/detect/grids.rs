@@ -1,0 +1,232 @@
+//! Grids of dots on rendered pictures: clipped paper, sharpening, noise, JPEG, distortion; without radii and without a table.
+
+#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::path::Path;
+
+use image::codecs::jpeg::JpegEncoder;
+use image::{GrayImage, Luma};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use robotcal::Code;
+use robotcal::detect::{Detection, Picture, detect, detect_series};
+use robotcal::series::{Plate, parse_plate};
+
+use crate::circles_support::{Scene, View, pose, scene};
+
+const PITCH_M: f64 = 0.02;
+
+fn grid(more: &str) -> Plate {
+    let text = format!("format = 1\nkind = \"circle-grid\"\npitch_m = {PITCH_M}\n{more}\n");
+    parse_plate(Path::new("plate.toml"), &text, "").unwrap()
+}
+
+/// The plate with all that is printed: usual dots, larger ones, and rings.
+fn printed(plate: &Plate, large: &[u32], ringed: &[u32]) -> Plate {
+    let mut plate = plate.clone();
+    for m in &mut plate.markers {
+        m.outer_radius_m = if large.contains(&m.id) { 0.4 } else { 0.24 } * PITCH_M;
+        m.inner_radius_m = if ringed.contains(&m.id) { 0.5 * m.outer_radius_m } else { 0.0 };
+    }
+    plate
+}
+
+/// What happens to a picture between sensor and file.
+#[derive(Debug, Clone, Copy)]
+enum Spoiling {
+    None,
+    /// Unsharp mask of this amount and sigma.
+    Sharpened(f64, f64),
+    Jpeg(u8),
+    /// Exposed so that the paper is at this multiple of full scale.
+    Clipped(f64),
+    ClippedAndSharpened,
+    /// Barrel distortion.
+    Distorted,
+}
+
+fn view(rng: &mut ChaCha8Rng, spoiling: Spoiling) -> View {
+    let mut view = View {
+        distance_m: rng.random_range(0.35..0.6),
+        tilt_deg: rng.random_range(0.0..40.0),
+        azimuth_deg: rng.random_range(0.0..360.0),
+        roll_deg: rng.random_range(-40.0..40.0),
+        aim_m: [rng.random_range(-0.01..0.01), rng.random_range(-0.01..0.01)],
+        ..View::default()
+    };
+    match spoiling {
+        Spoiling::Clipped(times) => view.conditions.exposure = times / view.conditions.light_reflectance,
+        Spoiling::ClippedAndSharpened => view.conditions.exposure = 1.1 / view.conditions.light_reflectance,
+        Spoiling::Distorted => view.distortion = [-0.3, 0.1, 0.0, 0.0, 0.0],
+        _ => {}
+    }
+    view
+}
+
+fn spoil(picture: Picture, spoiling: Spoiling) -> Picture {
+    match spoiling {
+        Spoiling::Sharpened(amount, sigma) => sharpen(picture, amount, sigma),
+        Spoiling::ClippedAndSharpened => sharpen(picture, 1.0, 1.0),
+        Spoiling::Jpeg(quality) => jpeg(&picture, quality),
+        _ => picture,
+    }
+}
+
+fn sharpen(picture: Picture, amount: f64, sigma: f64) -> Picture {
+    let to_image = |p: &Picture| {
+        image::ImageBuffer::<Luma<f32>, Vec<f32>>::from_raw(p.width as u32, p.height as u32, p.pixels.clone()).unwrap()
+    };
+    let blurred = image::imageops::blur(&to_image(&picture), sigma as f32);
+    let pairs = picture.pixels.iter().zip(blurred.as_raw());
+    let pixels = pairs.map(|(v, b)| (v + amount as f32 * (v - b)).round().clamp(0.0, 255.0)).collect();
+    Picture { pixels, ..picture }
+}
+
+fn jpeg(picture: &Picture, quality: u8) -> Picture {
+    let bytes = picture.pixels.iter().map(|v| *v as u8).collect();
+    let image = GrayImage::from_raw(picture.width as u32, picture.height as u32, bytes).unwrap();
+    let mut file = Cursor::new(Vec::new());
+    image.write_with_encoder(JpegEncoder::new_with_quality(&mut file, quality)).unwrap();
+    let read = image::load_from_memory(&file.into_inner()).unwrap().into_luma8();
+    Picture { pixels: read.as_raw().iter().map(|v| f32::from(*v)).collect(), ..*picture }
+}
+
+/// What came of many views.
+#[derive(Debug, Default)]
+struct Tally {
+    dots: usize,
+    found: usize,
+    wrong: usize,
+    mean: [f64; 2],
+    square: f64,
+    normalised: f64,
+}
+
+impl Tally {
+    /// Takes up one picture; `turned` is the other id that a dot may have.
+    fn add(&mut self, scene: &Scene, detection: &Detection, turned: &impl Fn(u32) -> u32) {
+        self.dots += scene.plate.markers.len();
+        let off = |id: u32, uv: [f64; 2]| {
+            let truth = scene.centroid(scene.plate.index_of(id).unwrap(), robotcal::series::Edge::Outer).unwrap();
+            [uv[0] - truth.x, uv[1] - truth.y]
+        };
+        let outer: Vec<_> = detection.observations.iter().filter(|o| o.edge == robotcal::series::Edge::Outer).collect();
+        let far = |id: u32, uv: [f64; 2]| {
+            let d = off(id, uv);
+            d[0].hypot(d[1]) > 2.0
+        };
+        let upside_down = outer.first().is_some_and(|o| far(o.marker, o.uv));
+        for o in outer {
+            let id = if upside_down { turned(o.marker) } else { o.marker };
+            if far(id, o.uv) {
+                self.wrong += 1;
+                continue;
+            }
+            let (d, c) = (off(id, o.uv), o.covariance.unwrap());
+            self.found += 1;
+            self.square += d[0] * d[0] + d[1] * d[1];
+            self.normalised += d[0] * d[0] / c[0] + d[1] * d[1] / c[2];
+            (0..2).for_each(|a| self.mean[a] += d[a]);
+        }
+    }
+
+    fn report(&mut self, what: &str) {
+        let n = self.found as f64;
+        self.mean = self.mean.map(|m| m / n);
+        let rms = (self.square / (2.0 * n)).sqrt();
+        let normalised = (self.normalised / (2.0 * n)).sqrt();
+        println!(
+            "{what}: {} of {} dots, {} wrong, bias ({:.4}, {:.4}) px, rms {rms:.4} px, normalised error {normalised:.2}",
+            self.found, self.dots, self.wrong, self.mean[0], self.mean[1]
+        );
+        (self.square, self.normalised) = (rms, normalised);
+    }
+}
+
+fn run(stated: &Plate, print: &Plate, spoiling: Spoiling, views: u64, turned: impl Fn(u32) -> u32) -> Tally {
+    let mut tally = Tally::default();
+    for seed in 0..views {
+        let view = view(&mut ChaCha8Rng::seed_from_u64(seed), spoiling);
+        let scene = Scene { plate: print.clone(), camera_from_plate: pose(&view), ..scene(&view) };
+        let picture = spoil(scene.render(seed), spoiling);
+        match detect(&picture, stated) {
+            Ok(detection) => tally.add(&scene, &detection, &turned),
+            Err(error) => {
+                println!("{spoiling:?} {seed}: {error}");
+                tally.dots += print.markers.len();
+            }
+        }
+    }
+    tally.report(&format!("{spoiling:?}"));
+    tally
+}
+
+/// Views of each kind; `VIEWS` asks for more.
+fn views() -> u64 {
+    std::env::var("VIEWS").ok().and_then(|v| v.parse().ok()).unwrap_or(3)
+}
+
+/// Normalised errors of spoilt pictures are below 1: what the model lacks of sharpened and clipped edges counts as noise.
+#[test]
+fn a_grid_with_one_larger_dot_is_found_however_the_picture_was_spoilt() {
+    let stated = grid("columns = 10\nrows = 10");
+    let print = printed(&stated, &[0], &[]);
+    for (spoiling, normalised) in [
+        (Spoiling::None, 0.85..1.15),
+        (Spoiling::Distorted, 0.85..1.15),
+        (Spoiling::Sharpened(1.0, 1.0), 0.3..1.15),
+        (Spoiling::Jpeg(70), 0.6..1.3),
+        (Spoiling::Clipped(1.2), 0.3..1.15),
+        (Spoiling::ClippedAndSharpened, 0.3..1.15),
+    ] {
+        let tally = run(&stated, &print, spoiling, views(), |id| id);
+        assert_eq!((tally.found, tally.wrong), (tally.dots, 0), "{spoiling:?}");
+        assert!(tally.mean.iter().all(|m| m.abs() < 0.01), "{spoiling:?} {:?}", tally.mean);
+        assert!(normalised.contains(&tally.normalised), "{spoiling:?} {}", tally.normalised);
+    }
+}
+
+#[test]
+fn plain_asymmetric_and_ringed_grids_need_no_radius() {
+    let plain = grid("columns = 9\nrows = 6");
+    let asymmetric = grid("columns = 4\nrows = 11\nasymmetric = true");
+    let ringed = grid("columns = 9\nrows = 7\nlarge = [[4, 3], [5, 3], [4, 2]]");
+    let found = grid("columns = 9\nrows = 7");
+    for (stated, large, rings, turned) in [
+        (&plain, vec![], vec![], 53),
+        (&asymmetric, vec![], vec![], 0),
+        (&ringed, vec![31, 32, 22], vec![22], 0),
+        (&found, vec![0, 8], vec![0, 8], 0),
+    ] {
+        let turned = |id: u32| if turned > 0 { turned - id } else { id };
+        let tally = run(stated, &printed(stated, &large, &rings), Spoiling::None, views(), turned);
+        assert_eq!((tally.found, tally.wrong), (tally.dots, 0), "{large:?}");
+        assert!((0.85..1.15).contains(&tally.normalised), "{large:?} {}", tally.normalised);
+    }
+}
+
+/// The dot that tells the turn is hidden in one image: what is read there may be turned, and is not used.
+#[test]
+fn an_image_without_the_larger_dot_that_the_others_show_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let stated = grid("columns = 8\nrows = 6");
+    let mut paths = Vec::new();
+    let mut pictures = BTreeMap::new();
+    for (seed, large) in [(0, &[5][..]), (1, &[5]), (2, &[]), (3, &[5])] {
+        let view = view(&mut ChaCha8Rng::seed_from_u64(seed), Spoiling::None);
+        let scene = Scene { plate: printed(&stated, large, &[]), camera_from_plate: pose(&view), ..scene(&view) };
+        paths.push(folder.path().join(format!("{seed}.png")));
+        pictures.insert(paths[paths.len() - 1].clone(), scene.render(seed));
+    }
+    let seen = detect_series(&paths, &stated, |path| Ok(pictures[path].clone()), |_| {});
+    let failures: Vec<Option<Code>> = seen.iter().map(|i| i.detection.failure.as_ref().map(|f| f.code)).collect();
+    assert_eq!(failures, [None, None, Some(Code::PlateIncomplete), None]);
+    let sizes = &seen[0].detection.circles.as_ref().unwrap().sizes;
+    assert_eq!(sizes.large.len(), 1);
+    for (id, [outer, _]) in &sizes.radii_m {
+        let printed = if sizes.large.contains(id) { 0.4 } else { 0.24 } * PITCH_M;
+        assert!((outer / printed - 1.0).abs() < 0.06, "{id}: {outer} m for {printed}");
+    }
+}

@@ -1,0 +1,123 @@
+//! AprilGrids, grids of ArUco markers and single tags on rendered pictures.
+
+#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
+use std::path::Path;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use robotcal::Code;
+use robotcal::detect::{Picture, detect};
+use robotcal::series::{Plate, parse_plate};
+
+use crate::circles_support::{Scene, View, pose, scene, standard_plate};
+
+const APRILGRID: &str = "kind = \"aprilgrid\"\ncolumns = 6\nrows = 6\ntag_m = 0.04\nspacing = 0.3";
+const ARUCO: &str =
+    "kind = \"aruco-grid\"\ncolumns = 7\nrows = 5\nmarker_m = 0.04\ngap_m = 0.01\ndictionary = \"DICT_4X4_50\"";
+const APRILTAG: &str = "kind = \"tag\"\ntag_m = 0.15\nfamily = \"36h11\"\nid = 17";
+const MARKER: &str = "kind = \"tag\"\ntag_m = 0.15\ndictionary = \"DICT_5X5_100\"\nid = 3";
+
+fn plate(text: &str) -> Plate {
+    parse_plate(Path::new("plate.toml"), &format!("format = 1\n{text}\n"), "").unwrap()
+}
+
+fn view(rng: &mut ChaCha8Rng) -> View {
+    let mut view = View {
+        distance_m: rng.random_range(0.35..0.9),
+        tilt_deg: rng.random_range(0.0..55.0),
+        azimuth_deg: rng.random_range(0.0..360.0),
+        roll_deg: rng.random_range(0.0..360.0),
+        aim_m: [rng.random_range(-0.1..0.1), rng.random_range(-0.1..0.1)],
+        ..View::default()
+    };
+    view.conditions.psf_sigma_px = rng.random_range(0.5..1.2);
+    view
+}
+
+fn views() -> u64 {
+    std::env::var("VIEWS").ok().and_then(|v| v.parse().ok()).unwrap_or(6)
+}
+
+#[derive(Debug, Default)]
+struct Tally {
+    visible: usize,
+    found: usize,
+    wrong: usize,
+    rms: f64,
+    normalised: f64,
+    bias: [f64; 2],
+}
+
+fn run(text: &str) -> Tally {
+    let plate = plate(text);
+    let mut tally = Tally::default();
+    for seed in 0..views() {
+        let view = view(&mut ChaCha8Rng::seed_from_u64(seed));
+        let scene = Scene { plate: plate.clone(), camera_from_plate: pose(&view), ..scene(&view) };
+        let image = |id: u32| {
+            let m = &plate.markers[plate.index_of(id).unwrap()];
+            scene.camera.project(&scene.camera_from_plate.transform(&m.position_m))
+        };
+        let inside = |id: &u32| image(*id).is_some_and(|p| scene.camera.contains(&p, 8.0));
+        let whole = |tag: &u32| (4 * tag..4 * tag + 4).all(|id| inside(&id));
+        let tags: Vec<u32> = plate.markers.iter().map(|m| m.id / 4).collect();
+        let visible = 4 * tags.iter().step_by(4).filter(|t| whole(t)).count();
+        tally.visible += visible;
+        let Ok(detection) = detect(&scene.render(seed), &plate) else {
+            println!("seed {seed}: none of {visible}");
+            continue;
+        };
+        for o in &detection.observations {
+            let d = nalgebra::Vector2::from(o.uv) - image(o.marker).unwrap();
+            if d.norm() > 2.0 {
+                tally.wrong += 1;
+                continue;
+            }
+            let c = o.covariance.unwrap();
+            tally.found += 1;
+            tally.rms += d.norm_squared();
+            tally.normalised += d.x * d.x / c[0] + d.y * d.y / c[2];
+            tally.bias[0] += d.x;
+            tally.bias[1] += d.y;
+        }
+    }
+    let n = tally.found.max(1) as f64;
+    tally.rms = (tally.rms / (2.0 * n)).sqrt();
+    tally.normalised = (tally.normalised / (2.0 * n)).sqrt();
+    tally.bias = tally.bias.map(|b| b / n);
+    println!("{} {tally:?}", text.lines().next().unwrap());
+    tally
+}
+
+/// 0.015 px for print and lens are in the covariance and not in the picture: the normalised error is below 1.
+#[test]
+fn every_kind_of_tags_is_found_and_measured() {
+    for text in [APRILGRID, ARUCO, APRILTAG, MARKER] {
+        let tally = run(text);
+        assert_eq!(tally.wrong, 0, "{text}");
+        assert!(tally.found as f64 >= 0.97 * tally.visible as f64, "{text}: {tally:?}");
+        assert!(tally.bias.iter().all(|b| b.abs() < 0.02) && tally.normalised < 1.2, "{text}: {tally:?}");
+    }
+}
+
+fn mirror(picture: &Picture) -> Picture {
+    let mut pixels = picture.pixels.clone();
+    pixels.chunks_exact_mut(picture.width).for_each(<[f32]>::reverse);
+    Picture { pixels, ..*picture }
+}
+
+#[test]
+fn other_plates_and_mirrors_are_no_tags() {
+    let look = View { distance_m: 0.7, tilt_deg: 20.0, ..View::default() };
+    let shown = |plate: Plate| Scene { plate, camera_from_plate: pose(&look), ..scene(&look) }.render(1);
+    let other = ARUCO.replace("4X4_50", "6X6_50");
+    for picture in [shown(standard_plate()), shown(plate(&other))] {
+        for text in [APRILGRID, ARUCO, APRILTAG, MARKER] {
+            let error = detect(&picture, &plate(text)).expect_err(text);
+            assert_eq!(error.code, Code::PlateNotFound, "{error}");
+        }
+    }
+    let error = detect(&mirror(&shown(plate(APRILGRID))), &plate(APRILGRID)).expect_err("mirrored");
+    assert_eq!(error.code, Code::PlateMirrored, "{error}");
+}
