@@ -24,6 +24,9 @@ const NEAREST: usize = 6;
 /// How far a tag may be from where the others say, in sides of it: one neighbour extrapolates roughly.
 const OFF: f64 = 0.5;
 
+/// A measured corner with its covariance (uu, uv, vv), px and px^2.
+type Corner = ([f64; 2], [f64; 3]);
+
 /// Corners of tags by their place on the plate, counter-clockwise from the bottom-left.
 type Found = BTreeMap<usize, Quad>;
 
@@ -176,7 +179,7 @@ impl Board<'_> {
     }
 
     /// The four corners from the sides between them.
-    fn corners(&self, corners: &Quad) -> std::result::Result<[([f64; 2], [f64; 3]); 4], &'static str> {
+    fn corners(&self, corners: &Quad) -> std::result::Result<[Corner; 4], &'static str> {
         let side = |k: usize| {
             let (from, to) = (corners[k], corners[(k + 1) % 4]);
             let module = (from[0] - to[0]).hypot(from[1] - to[1]) / self.reader.side() as f64;

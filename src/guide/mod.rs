@@ -1,4 +1,4 @@
-//! The manual: formulation, conventions, glossary, a tour of the program, how to take a series, how to read the result, codes, decisions.
+//! The manual: formulation, conventions, glossary, a tour of the program, how to take a series, how to read the result, codes, circles and boards, decisions.
 
 #[doc = include_str!("formulation.md")]
 pub mod formulation {}
@@ -23,6 +23,9 @@ pub mod codes {}
 
 #[doc = include_str!("circles.md")]
 pub mod circles {}
+
+#[doc = include_str!("boards.md")]
+pub mod boards {}
 
 #[doc = include_str!("planning.md")]
 pub mod planning {}
