@@ -7,8 +7,8 @@ use clap::Args;
 use nalgebra::Vector3;
 
 use super::Verdict;
+use super::arguments::pair;
 use super::choices::Model;
-use super::plate::pair;
 use super::robot::{noted_chain, read_chain};
 use super::say::say;
 use super::show::read_solution;

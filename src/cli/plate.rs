@@ -6,6 +6,7 @@ use clap::Args;
 use sha2::{Digest, Sha256};
 
 use super::Verdict;
+use super::arguments::pair;
 use super::plate_board::{self, BoardArgs, BoardSize, Kind};
 use super::say::say;
 use crate::error::Result;
@@ -55,12 +56,6 @@ pub(super) struct PlateArgs {
     /// Resolution of plate.png
     #[arg(long, default_value_t = 100.0)]
     dpi: f64,
-}
-
-/// Two numbers with an x between them.
-pub(super) fn pair<T: std::str::FromStr + Copy>(text: &str) -> std::result::Result<[T; 2], String> {
-    let parts: Vec<T> = text.split(['x', 'X']).filter_map(|p| p.trim().parse().ok()).collect();
-    <[T; 2]>::try_from(parts).map_err(|_| "give two numbers with an x between them".to_owned())
 }
 
 fn sheet(text: &str) -> std::result::Result<Sheet, String> {

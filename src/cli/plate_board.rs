@@ -5,7 +5,7 @@ use std::path::Path;
 
 use clap::{Args, ValueEnum};
 
-use super::plate::pair;
+use super::arguments::pair;
 use super::say::say;
 use crate::error::{Code, Error, Result};
 use crate::output::Place;

@@ -14,6 +14,7 @@ mod plate_kind;
 mod read;
 mod recorded;
 mod table;
+mod tag_plates;
 mod tags;
 mod units;
 
@@ -33,4 +34,5 @@ pub use plate_file::{DEFAULT_TOLERANCE_M, parse_plate, plate_csv, plate_toml, re
 pub use plate_kind::{Ink, Places, PlateKind, Print};
 pub use read::{Series, Source, read, read_images};
 pub use recorded::convert_recording;
-pub use tags::{Region, TagPrint, Tags, regions};
+pub use tag_plates::regions;
+pub use tags::{Region, TagPrint, Tags};

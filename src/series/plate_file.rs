@@ -10,7 +10,7 @@ use super::manifest::{check_format, parse_toml, read_toml, require_positive, to_
 use super::plate::{Aruco, Marker, Plate, ScaleBar};
 use super::plate_kind::{Ink, Places, PlateKind};
 use super::table::{Row, Table, to_csv};
-use super::tags::TagKeys;
+use super::tag_plates::{TagKeys, plate_of};
 use crate::error::{Code, Error, Result};
 use crate::files::Kind;
 
@@ -129,8 +129,8 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
         return Err(Error::new(Code::SettingConflict, path.display(), what, "remove radius_m"));
     }
     if print.ink == Ink::Tags {
-        let (tags, [columns, rows]) = tag_keys(file).tags(path, file.kind, [file.columns, file.rows])?;
-        return Ok(Plate { scale: file.scale, ..tags.plate(file.kind, columns, rows, tolerance_m) });
+        let (tags, size) = tag_keys(file).tags(path, file.kind, [file.columns, file.rows])?;
+        return Ok(Plate { scale: file.scale, ..plate_of(tags, file.kind, size, tolerance_m) });
     }
     if print.places == Places::Anywhere {
         let (columns, rows) = (file.columns.unwrap_or(0), file.rows.unwrap_or(0));

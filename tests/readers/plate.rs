@@ -157,8 +157,18 @@ fn what_is_written_reads_back_the_same() {
     let shifted = "format = 1\nkind = \"circle-grid\"\ncolumns = 4\nrows = 11\npitch_m = 0.01\nasymmetric = true\n";
     let marked = plate(&format!("{shifted}large = [[1, 0], [2, 3]]\n"), "");
     assert_eq!(marked.large, [1, 14]);
-    assert_eq!((marked.markers[1].position_m - marked.markers[0].position_m).x, 0.02);
-    assert_eq!((marked.markers[4].position_m - marked.markers[0].position_m).x, 0.01);
+    let right_of_first = |id: usize| (marked.markers[id].position_m - marked.markers[0].position_m).x;
+    assert!((right_of_first(1) - 0.02).abs() < 1e-15 && (right_of_first(4) - 0.01).abs() < 1e-15);
     assert_eq!(plate(&plate_toml(&marked, None).unwrap(), ""), marked);
+    for tags in [
+        "kind = \"aprilgrid\"\ncolumns = 3\nrows = 2\ntag_m = 0.05\nspacing = 0.25\nfamily = \"t36h11\"\n",
+        "kind = \"aruco-grid\"\ncolumns = 3\nrows = 2\nmarker_m = 0.05\ngap_m = 0.01\ndictionary = \"DICT_4X4_50\"\nfirst_id = 7\n",
+        "kind = \"tag\"\ntag_m = 0.05\nid = 7\nfamily = \"25h9\"\n",
+        "kind = \"tag\"\ntag_m = 0.05\nid = 7\ndictionary = \"DICT_6X6_50\"\n",
+    ] {
+        let tags = plate(&format!("format = 1\n{tags}"), "");
+        assert_eq!(plate(&plate_toml(&tags, None).unwrap(), ""), tags);
+        assert_eq!(plate(&plate_toml(&tags, Some("plate.csv")).unwrap(), &plate_csv(&tags)), tags);
+    }
     assert_says(&refusal(&format!("{shifted}large = [[4, 0]]\n"), ""), Code::SettingRange, &["column 4"]);
 }
