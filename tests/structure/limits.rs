@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 /// Constants that decide no verdict, with what they are instead.
-const NUMERICAL: [(&str, &str); 44] = [
+const NUMERICAL: [(&str, &str); 43] = [
     ("assess/advice.rs BASES", "stops that are varied"),
     ("assess/advice.rs MOST_NEXT", "how many proposals are kept"),
     ("assess/advice.rs VALUES", "grid of the search"),
