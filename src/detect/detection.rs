@@ -24,7 +24,7 @@ pub struct Detection {
 pub struct Sizes {
     /// Outer and inner radius of every marker by id, m.
     pub radii_m: Vec<(u32, [f64; 2])>,
-    /// Ids of those that are not as most are.
+    /// Ids of those that are not as most are, where they tell how the grid is turned.
     pub large: Vec<u32>,
 }
 

@@ -28,9 +28,14 @@ const USUAL_BLUR_PX: f64 = 0.9;
 const BLUR_SIGMA: f64 = 0.6;
 /// Of the blur, px; others are no edges of a usable picture.
 const BLUR_RANGE_PX: (f64, f64) = (0.2, 8.0);
-const MOST_STEPS: usize = 20;
-/// A step below this moves no corner visibly, px.
+const MOST_STEPS: usize = 24;
+/// A step below this moves no corner visibly, px; and what is good enough where pixels pass in and out of saturation.
 const AT_REST_PX: f64 = 1e-4;
+const NEARLY_AT_REST_PX: f64 = 5e-3;
+/// Prior sigma of a level, as a share of the contrast at the start: paper that is clipped does not tell its own.
+const LEVEL: f64 = 0.3;
+/// Prior sigma of a slope of the light along the side, as a share of the contrast per px.
+const SLOPE_PER_PX: f64 = 0.01;
 /// A side that moves further than this part of its length, or by more than this many px, is another edge.
 const FARTHEST: f64 = 0.1;
 const FARTHEST_PX: f64 = 3.0;
@@ -101,7 +106,7 @@ impl EdgeLine {
 
     /// The pixels of the band: without the ends, and as far to both sides as nothing disturbs.
     fn band(&self, picture: &Picture, side: &Side, length: f64, blur_px: f64) -> Result<Vec<Pixel>, &'static str> {
-        let half = length / 2.0 - (2.5 * blur_px + 0.5).min(length / 4.0);
+        let half = length / 2.0 - (2.5 * blur_px + 1.0).min(length / 4.0);
         let reach = 3.0 * blur_px + 1.0;
         let room = |px: f64| reach.min((px - 1.5 * blur_px).max(0.5 * px).max(1.0));
         let (inner, outer) = (room(side.ink_px), room(side.paper_px));
@@ -131,6 +136,18 @@ impl EdgeLine {
 
     fn offset(&self, x: f64) -> f64 {
         self.shape[0] + x * (self.shape[1] + x * self.shape[2])
+    }
+
+    /// How far a side that goes on in the line of this one, with its ink on the other side, lies to the light of it, px.
+    pub fn step_to(&self, other: &Self) -> f64 {
+        let d = other.middle + other.across * other.shape[0] - self.middle;
+        d.dot(&self.across) - self.offset(d.dot(&self.along))
+    }
+
+    /// The side when its ink ends so many px earlier.
+    pub fn shrunk(mut self, by_px: f64) -> Self {
+        self.shape[0] -= by_px;
+        self
     }
 
     /// Where two sides cross near `start`, with the covariance (uu, uv, vv), px^2.
@@ -180,7 +197,17 @@ fn iterate(
     let mut noise = 0.03 * (state[4] - state[6]);
     let bend = BEND / picture.width.max(picture.height) as f64;
     let farthest = (FARTHEST * length).max(FARTHEST_PX);
-    for _ in 0..MOST_STEPS {
+    let first = *state;
+    let (level, slope) = (LEVEL * (first[4] - first[6]), SLOPE_PER_PX * (first[4] - first[6]));
+    let priors = [
+        (2, 0.0, bend),
+        (3, USUAL_BLUR_PX.ln(), BLUR_SIGMA),
+        (4, first[4], level),
+        (5, 0.0, slope),
+        (6, first[6], level),
+        (7, 0.0, slope),
+    ];
+    for round in 1..=MOST_STEPS {
         let Sums { mut normal, mut gradient, square, used } = sums(pixels, state, picture.full_scale);
         if used < 2 * PARAMETERS {
             return Err("saturated");
@@ -189,23 +216,24 @@ fn iterate(
         let information = 1.0 / (noise * noise);
         normal *= information;
         gradient *= information;
-        for (k, prior, sigma) in [(2, 0.0, bend), (3, USUAL_BLUR_PX.ln(), BLUR_SIGMA)] {
+        for (k, prior, sigma) in priors {
             normal[(k, k)] += 1.0 / (sigma * sigma);
             gradient[k] -= (state[k] - prior) / (sigma * sigma);
         }
         let factor = normal.cholesky().ok_or("no edge")?;
         let mut step = factor.solve(&gradient);
         let largest = (step[0].abs() / 1.0).max(step[1].abs() * length / 2.0).max(step[3].abs() / 0.5);
-        if largest > 1.0 {
-            step /= largest;
-        }
+        // pixels that pass in and out of saturation would have it swing for ever
+        let damping = if round > MOST_STEPS / 2 { 2.0 } else { 1.0 };
+        step /= largest.max(1.0) * damping;
         *state += step;
         let blur = state[3].exp();
         let far = state[0].abs() + state[1].abs() * length / 2.0 > farthest;
         if far || !(BLUR_RANGE_PX.0..BLUR_RANGE_PX.1).contains(&blur) || !step.iter().all(|v| v.is_finite()) {
             return Err("no edge");
         }
-        if step[0].abs() + step[1].abs() * length / 2.0 < AT_REST_PX {
+        let rest = if round < MOST_STEPS { AT_REST_PX } else { NEARLY_AT_REST_PX };
+        if step[0].abs() + step[1].abs() * length / 2.0 < rest {
             let contrast = state[4] - state[6];
             let covariance = factor.inverse().fixed_view::<3, 3>(0, 0).into_owned();
             return if noise < WORST * contrast { Ok(covariance) } else { Err("disturbed surroundings") };

@@ -6,8 +6,6 @@
 use super::Picture;
 use super::circles::{Contour, Encloses, Levels, contours};
 
-/// Threshold in the negative, between its envelopes: above the middle, where the crossing of two dark squares is light.
-const THRESHOLD: f32 = 0.6;
 /// Shortest side, px.
 const SHORTEST_PX: f64 = 7.0;
 /// Rms distance of the contour from the four lines, as a part of the shorter side and px on top.
@@ -19,10 +17,10 @@ const ENDS: f64 = 0.12;
 /// Corners of a quadrilateral, clockwise on the screen.
 pub(super) type Quad = [[f64; 2]; 4];
 
-/// The dark quadrilaterals of a picture that are at most `largest_px` across.
-pub(super) fn quads(picture: &Picture, largest_px: f64) -> Vec<Quad> {
+/// The dark quadrilaterals of a picture that are at most `largest_px` across. `threshold` lies between paper (0) and ink (1).
+pub(super) fn quads(picture: &Picture, largest_px: f64, threshold: f32) -> Vec<Quad> {
     let negative = Picture { pixels: picture.pixels.iter().map(|v| -v).collect(), ..*picture };
-    let levels = Levels::of(&negative, largest_px, THRESHOLD);
+    let levels = Levels::of(&negative, largest_px, threshold);
     let found = contours(&negative, &levels, (4.0 * SHORTEST_PX) as usize, (6.0 * largest_px) as usize);
     found.iter().filter(|c| c.encloses == Encloses::Light && !c.clipped && !c.too_long).filter_map(quad).collect()
 }

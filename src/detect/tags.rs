@@ -14,18 +14,18 @@ use super::tag_code::{Reader, Reading};
 use super::{Detection, Dropped, Picture};
 use crate::error::{Code, Error, Result};
 use crate::geom::PlaneMap;
-use crate::series::{Edge, Observation, Plate, Tags};
+use crate::series::{Edge, Observation, Plate, TagPrint, Tags};
 
-/// Largest tags, as shares of the picture's longer side, that are looked for one after the other: the threshold follows the light
-/// over this length.
-const LARGEST: [f64; 3] = [0.1, 0.3, 0.9];
+/// Largest tags, as shares of the picture's longer side, that are looked for one after the other (the threshold follows the light
+/// over this length), and thresholds between paper and ink: above the middle, where the crossing of two dark squares is light, and
+/// further up for squares that blur joins.
+const PASSES: [(f64, f32); 5] = [(0.1, 0.6), (0.3, 0.6), (0.9, 0.6), (0.1, 0.75), (0.3, 0.75)];
+/// Sides that must say by how much ink has grown before they are believed.
+const LEAST_GROWN: usize = 8;
 /// Tags that say where another one stands.
 const NEAREST: usize = 6;
 /// How far a tag may be from where the others say, in sides of it: one neighbour extrapolates roughly.
 const OFF: f64 = 0.5;
-
-/// A measured corner with its covariance (uu, uv, vv), px and px^2.
-type Corner = ([f64; 2], [f64; 3]);
 
 /// Corners of tags by their place on the plate, counter-clockwise from the bottom-left.
 type Found = BTreeMap<usize, Quad>;
@@ -40,8 +40,8 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let tags = plate.tags.as_ref().ok_or_else(no_tags)?;
     let board = Board { picture, plate, tags, reader: Reader::of(plate, tags)? };
     let (mut found, mut detection) = (Found::new(), Detection::default());
-    for share in LARGEST {
-        board.read(share, &mut found);
+    for pass in PASSES {
+        board.read(pass, &mut found);
         if found.len() == board.count() {
             break;
         }
@@ -70,14 +70,14 @@ impl Board<'_> {
         (self.plate.columns * self.plate.rows) as usize
     }
 
-    fn quads(&self, share: f64) -> Vec<Quad> {
-        quads(self.picture, share * self.picture.width.max(self.picture.height) as f64)
+    fn quads(&self, (share, threshold): (f64, f32)) -> Vec<Quad> {
+        quads(self.picture, share * self.picture.width.max(self.picture.height) as f64, threshold)
     }
 
     /// Reads all quadrilaterals; of two that say the same none is known to be right.
-    fn read(&self, share: f64, found: &mut Found) {
+    fn read(&self, pass: (f64, f32), found: &mut Found) {
         let mut seen: BTreeMap<usize, Vec<Reading>> = BTreeMap::new();
-        for reading in self.quads(share).iter().filter_map(|quad| self.reader.read(self.picture, quad, false)) {
+        for reading in self.quads(pass).iter().filter_map(|quad| self.reader.read(self.picture, quad, false)) {
             let alone = self.count() == 1 || self.reader.is_sure(reading.wrong);
             if alone || self.count() > 1 {
                 seen.entry(reading.place).or_default().push(reading);
@@ -114,8 +114,8 @@ impl Board<'_> {
     fn off(&self, found: &Found, place: usize) -> Option<f64> {
         let predicted = self.predict(found, place)?;
         let seen = found.get(&place)?;
-        let off = (0..4).map(|k| (seen[k][0] - predicted[k][0]).hypot(seen[k][1] - predicted[k][1]));
-        let side = (0..4).map(|k| (seen[k][0] - seen[(k + 1) % 4][0]).hypot(seen[k][1] - seen[(k + 1) % 4][1]));
+        let off = (0..4).map(|k| distance(seen[k], predicted[k]));
+        let side = (0..4).map(|k| distance(seen[k], seen[(k + 1) % 4]));
         Some(off.fold(0.0, f64::max) / (side.sum::<f64>() / 4.0))
     }
 
@@ -162,50 +162,86 @@ impl Board<'_> {
     }
 
     fn measure(&self, found: &Found, detection: &mut Detection) {
+        let mut sides = BTreeMap::new();
         for (place, corners) in found {
-            let id = self.number(*place);
-            match self.corners(corners) {
-                Ok(measured) => {
-                    for (k, (uv, covariance)) in (0..).zip(measured) {
-                        let marker = 4 * id + k;
-                        let covariance = Some(covariance);
+            match self.sides(corners) {
+                Ok(four) => drop(sides.insert(*place, four)),
+                Err(reason) => detection.dropped.push(Dropped::point(middle(corners), reason)),
+            }
+        }
+        let grown_px = self.grown(found, &sides);
+        for (place, four) in sides {
+            let id = self.number(place);
+            let [bottom, right, top, left] = four.map(|side| side.shrunk(grown_px));
+            let crossings = [(&left, &bottom), (&bottom, &right), (&right, &top), (&top, &left)];
+            for ((k, (a, b)), start) in (0..).zip(crossings).zip(found[&place]) {
+                match a.crossing(b, start) {
+                    Some((uv, covariance)) => {
+                        let (marker, covariance) = (4 * id + k, Some(covariance));
                         detection.observations.push(Observation { marker, edge: Edge::Outer, uv, covariance });
                     }
+                    None => detection.dropped.push(Dropped::point(start, "no crossing of two sides")),
                 }
-                Err(reason) => detection.dropped.push(Dropped::point(middle(corners), reason)),
             }
         }
         detection.observations.sort_by_key(|o| o.marker);
     }
 
-    /// The four corners from the sides between them.
-    fn corners(&self, corners: &Quad) -> std::result::Result<[Corner; 4], &'static str> {
+    /// The sides of a tag: bottom, right, top, left as printed.
+    fn sides(&self, corners: &Quad) -> std::result::Result<[EdgeLine; 4], &'static str> {
         let side = |k: usize| {
             let (from, to) = (corners[k], corners[(k + 1) % 4]);
-            let module = (from[0] - to[0]).hypot(from[1] - to[1]) / self.reader.side() as f64;
-            let gap = if self.tags.gap_m > 0.0 {
-                self.tags.gap_m / self.tags.side_m * self.reader.side() as f64
-            } else {
-                1.0
-            };
-            let (ink_px, paper_px) = (module * self.reader.border() as f64, module * gap.min(2.0));
+            let module = distance(from, to) / self.reader.side() as f64;
+            let (ink_px, paper_px) = (module * self.reader.border() as f64, module * self.gap().min(2.0));
             EdgeLine::fit(self.picture, &Side { from: to, to: from, ink_px, paper_px })
         };
-        let [bottom, right, top, left] = [side(0)?, side(1)?, side(2)?, side(3)?];
-        let cross = |a: &EdgeLine, b: &EdgeLine, k: usize| a.crossing(b, corners[k]).ok_or("no crossing of two sides");
-        Ok([cross(&left, &bottom, 0)?, cross(&bottom, &right, 1)?, cross(&right, &top, 2)?, cross(&top, &left, 3)?])
+        Ok([side(0)?, side(1)?, side(2)?, side(3)?])
+    }
+
+    /// Paper beside a tag, modules.
+    fn gap(&self) -> f64 {
+        if self.tags.gap_m > 0.0 { self.tags.gap_m / self.tags.side_m * self.reader.side() as f64 } else { 1.0 }
+    }
+
+    /// How far ink reaches beyond its place, px: where a side of a tag of an AprilGrid ends, the side of a dark square goes on with its
+    /// ink on the other side, so that printing and clipping move the two apart by twice that.
+    fn grown(&self, found: &Found, sides: &BTreeMap<usize, [EdgeLine; 4]>) -> f64 {
+        if self.tags.print != TagPrint::Kalibr {
+            return 0.0;
+        }
+        let share = self.tags.gap_m / self.tags.side_m;
+        let mut grown: Vec<f64> = Vec::new();
+        for (place, four) in sides {
+            let corners = found[place];
+            for (k, side) in four.iter().enumerate() {
+                for (near, far) in [(corners[k], corners[(k + 1) % 4]), (corners[(k + 1) % 4], corners[k])] {
+                    let end = [0, 1].map(|a| near[a] + share * (near[a] - far[a]));
+                    let px = 0.5 * share * distance(near, far);
+                    // its light is where the ink of the tag is
+                    let (from, to) = if near == corners[k] { (end, near) } else { (near, end) };
+                    let square = EdgeLine::fit(self.picture, &Side { from, to, ink_px: px, paper_px: px });
+                    grown.extend(square.map(|square| -0.5 * side.step_to(&square)));
+                }
+            }
+        }
+        grown.sort_by(f64::total_cmp);
+        if grown.len() < LEAST_GROWN { 0.0 } else { grown[grown.len() / 2] }
     }
 
     fn is_mirrored(&self) -> bool {
         let reads =
             |quad: &Quad| self.reader.read(self.picture, quad, true).is_some_and(|r| self.reader.is_sure(r.wrong));
-        LARGEST.iter().any(|share| self.quads(*share).iter().any(reads))
+        PASSES.iter().any(|pass| self.quads(*pass).iter().any(reads))
     }
 }
 
 /// From the order as printed to clockwise on the screen.
 fn clockwise([a, b, c, d]: &Quad) -> Quad {
     [*d, *c, *b, *a]
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
 fn middle(q: &Quad) -> [f64; 2] {

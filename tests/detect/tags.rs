@@ -7,7 +7,9 @@ use std::path::Path;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use robotcal::Code;
-use robotcal::detect::{Picture, detect};
+use robotcal::detect::{Picture, detect, load_bytes};
+use robotcal::output::plate_drawing::{Caption, png};
+use robotcal::plan::plate_design::Sheet;
 use robotcal::series::{Plate, parse_plate};
 
 use crate::circles_support::{Scene, View, pose, scene, standard_plate};
@@ -49,11 +51,13 @@ struct Tally {
     bias: [f64; 2],
 }
 
-fn run(text: &str) -> Tally {
+/// As a camera that is exposed so that the paper is at this multiple of full scale sees a plate.
+fn run(text: &str, paper: f64) -> Tally {
     let plate = plate(text);
     let mut tally = Tally::default();
     for seed in 0..views() {
-        let view = view(&mut ChaCha8Rng::seed_from_u64(seed));
+        let mut view = view(&mut ChaCha8Rng::seed_from_u64(seed));
+        view.conditions.exposure = paper / view.conditions.light_reflectance;
         let scene = Scene { plate: plate.clone(), camera_from_plate: pose(&view), ..scene(&view) };
         let image = |id: u32| {
             let m = &plate.markers[plate.index_of(id).unwrap()];
@@ -94,10 +98,39 @@ fn run(text: &str) -> Tally {
 #[test]
 fn every_kind_of_tags_is_found_and_measured() {
     for text in [APRILGRID, ARUCO, APRILTAG, MARKER] {
-        let tally = run(text);
+        let tally = run(text, 0.72);
         assert_eq!(tally.wrong, 0, "{text}");
         assert!(tally.found as f64 >= 0.97 * tally.visible as f64, "{text}: {tally:?}");
         assert!(tally.bias.iter().all(|b| b.abs() < 0.02) && tally.normalised < 1.2, "{text}: {tally:?}");
+    }
+}
+
+/// Paper that is clipped makes the tags smaller and the squares between them, too: where they meet, nothing moves.
+#[test]
+fn clipped_paper_moves_no_corner_of_an_aprilgrid() {
+    let tally = run(APRILGRID, 1.3);
+    assert_eq!(tally.wrong, 0);
+    assert!(tally.found as f64 >= 0.95 * tally.visible as f64 && tally.rms < 0.03, "{tally:?}");
+}
+
+/// The drawing has no blur but that of its pixels, and no noise.
+#[test]
+fn a_drawing_is_read_back_in_its_place() {
+    const DPI: f64 = 120.0;
+    for text in [APRILGRID, ARUCO, APRILTAG, MARKER] {
+        let plate = plate(text);
+        let sheet = Sheet::fitting(&plate);
+        let drawn = png(&plate, &Caption { name: "read back".to_owned(), sheet }, DPI).unwrap();
+        let picture = load_bytes(Path::new("plate.png"), &drawn, None).unwrap();
+        let detection = detect(&picture, &plate).unwrap();
+        assert_eq!(detection.observations.len(), plate.markers.len(), "{text}");
+        for o in &detection.observations {
+            let m = plate.markers[plate.index_of(o.marker).unwrap()].position_m;
+            let size = [picture.width, picture.height].map(|n| n as f64);
+            let at = [m.x, -m.y].map(|v| v / 0.0254 * DPI);
+            let off = [0, 1].map(|a| o.uv[a] + 0.5 - size[a] / 2.0 - at[a]);
+            assert!(off[0].hypot(off[1]) < 0.1, "{text} {} {off:?}", o.marker);
+        }
     }
 }
 

@@ -156,6 +156,7 @@ impl<'a> Grid<'a> {
             Told::Nothing => lattice.cells.keys().map(|cell| (*cell, Some(0))).collect(),
         };
         let (mut laid, outcome) = place(&code, &self.cells, &classes);
+        let outline_tells = laid.len() == 1;
         if let (Told::Nothing, Some(any)) = (&told, laid.first()) {
             dots.add(missing_dots(picture, lattice, candidates, (any, &self.cells), &dots.usual));
             let first = laid.iter().map(|l| others(l, &dots)).min();
@@ -174,6 +175,7 @@ impl<'a> Grid<'a> {
             Told::Radii => Sizes::default(),
             Told::Places | Told::Nothing => self.sizes(&plate, &dots),
         };
+        let sizes = if outline_tells { Sizes { large: Vec::new(), ..sizes } } else { sizes };
         Ok((self.identified(plate, board, outcome)?, Facts { symmetric: laid.len() > 1, sizes }))
     }
 
