@@ -7,9 +7,7 @@ use std::path::Path;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use robotcal::Code;
-use robotcal::detect::{Picture, detect, load_bytes};
-use robotcal::output::plate_drawing::{Caption, png};
-use robotcal::plan::plate_design::Sheet;
+use robotcal::detect::{Picture, detect};
 use robotcal::series::{Plate, parse_plate};
 
 use crate::circles_support::{Scene, View, pose, scene, standard_plate};
@@ -111,27 +109,6 @@ fn clipped_paper_moves_no_corner_of_an_aprilgrid() {
     let tally = run(APRILGRID, 1.3);
     assert_eq!(tally.wrong, 0);
     assert!(tally.found as f64 >= 0.95 * tally.visible as f64 && tally.rms < 0.03, "{tally:?}");
-}
-
-/// The drawing has no blur but that of its pixels, and no noise.
-#[test]
-fn a_drawing_is_read_back_in_its_place() {
-    const DPI: f64 = 120.0;
-    for text in [APRILGRID, ARUCO, APRILTAG, MARKER] {
-        let plate = plate(text);
-        let sheet = Sheet::fitting(&plate);
-        let drawn = png(&plate, &Caption { name: "read back".to_owned(), sheet }, DPI).unwrap();
-        let picture = load_bytes(Path::new("plate.png"), &drawn, None).unwrap();
-        let detection = detect(&picture, &plate).unwrap();
-        assert_eq!(detection.observations.len(), plate.markers.len(), "{text}");
-        for o in &detection.observations {
-            let m = plate.markers[plate.index_of(o.marker).unwrap()].position_m;
-            let size = [picture.width, picture.height].map(|n| n as f64);
-            let at = [m.x, -m.y].map(|v| v / 0.0254 * DPI);
-            let off = [0, 1].map(|a| o.uv[a] + 0.5 - size[a] / 2.0 - at[a]);
-            assert!(off[0].hypot(off[1]) < 0.1, "{text} {} {off:?}", o.marker);
-        }
-    }
 }
 
 fn mirror(picture: &Picture) -> Picture {
