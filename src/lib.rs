@@ -4,7 +4,8 @@
 //!
 //! | room | from -> to |
 //! |---|---|
-//! | [`error`], [`geom`], [`linalg`] | rotations, rigid motions, factorisations |
+//! | [`error`], [`stage`] | what went wrong; what is being done |
+//! | [`geom`], [`linalg`] | rotations, rigid motions, factorisations |
 //! | [`files`] | a user's files -> bytes, text, pixels within limits |
 //! | [`series`], [`urdf`] | files -> readings, images, plate, kinematic chain |
 //! | [`detect`] | pixels -> identified observations with covariance |
@@ -46,6 +47,7 @@ pub mod programs;
 pub mod series;
 pub mod simulate;
 pub mod solve;
+pub mod stage;
 #[cfg(feature = "report")]
 pub mod study;
 pub mod urdf;

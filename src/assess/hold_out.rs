@@ -12,6 +12,7 @@ use crate::linalg::symmetric_eigen;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Image, Problem, State, TakenFrom, Weighting, posture_groups, predict};
 use crate::solve::{Settings, solve};
+use crate::stage::stage;
 
 /// Errors of predicted images.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -50,6 +51,7 @@ const NOMINAL_JOINT_ERROR: f64 = 3e-3;
 /// Predicts every image on the robot by models that have not seen it: of what is calibrated by `fitted`, from the images that are left, which is
 /// [`refitted`] for the joint fit.
 pub fn hold_out(fit: &Adjustment, fitted: &Refit, limits: &Limits) -> Option<Accuracy> {
+    let _stage = stage("hold-out");
     let folds = folds(&fit.problem, limits)?;
     let nominal = predictions(&nominal(fit), &folds, &joint)?;
     let calibrated = predictions(fit, &folds, fitted)?;

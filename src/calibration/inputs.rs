@@ -8,6 +8,7 @@ use crate::identify::measure;
 use crate::output::{recover, restore, solution_json::SolutionRecord};
 use crate::problem::MeasuredSeries;
 use crate::series::{self, InputFile, RecordingOptions, Series};
+use crate::stage::stage;
 use crate::urdf::{self, Chain, RobotDescription};
 
 /// Links between which the robot is identified; those that are not given are as series.toml and the URDF say.
@@ -92,6 +93,7 @@ impl Inputs {
         }
         let mut series = Vec::with_capacity(all.len());
         for s in &all {
+            let _stage = stage("images");
             let measured = measure(s, &chain, all.len() > 1, |_| watch(&s.name, s.stops.stops.len()))?;
             notices.extend(measured.notices);
             series.push(measured.series);

@@ -25,6 +25,7 @@ use crate::identify::{Options, Solution, beside_two_stages, identify};
 use crate::model::robot::Robot;
 use crate::output::{self, Context, Offsets, Place, Poses};
 use crate::series::{InputFile, RecordingOptions};
+use crate::stage::stage;
 use crate::urdf::RobotDescription;
 
 /// Identifies the robot of a URDF from series folders or recordings.
@@ -110,6 +111,7 @@ impl Calibration {
     /// # Errors
     /// As of [`output::files`].
     pub fn files(&self, export: &Export) -> Result<BTreeMap<String, Vec<u8>>> {
+        let _stage = stage("files");
         output::files(&self.solution, &self.context(export))
     }
 

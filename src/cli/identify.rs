@@ -9,7 +9,7 @@ use super::choices::ChoiceArgs;
 use super::recording::RecordingArgs;
 use super::say::{say, say_line};
 use super::show::read_solution;
-use super::{Verdict, progress, summary};
+use super::{Verdict, progress, stages, summary};
 use crate::calibration::{Calibration, Ends, Export, Inputs, Observed};
 use crate::error::{Code, Error, Result};
 use crate::identify::{Estimator, Options, dry_run};
@@ -159,7 +159,10 @@ fn choose_lens(series: &mut [MeasuredSeries], name: Option<&str>) -> Result<()> 
 fn write(args: &IdentifyArgs, calibration: &Calibration, place: Place) -> Result<Verdict> {
     let poses = if args.poses { Poses::Written } else { Poses::LeftOut };
     let command = super::command_line().join(" ");
-    let files = calibration.files(&Export { offsets: args.offsets.into(), poses, command })?;
+    let mut files = calibration.files(&Export { offsets: args.offsets.into(), poses, command })?;
+    if stages::are_told() {
+        files.insert(stages::FILE_NAME.to_owned(), stages::timings());
+    }
     let folder = place.path().to_path_buf();
     place.write_all(&files)?;
     // What is printed is what `show` prints: it comes from the file.

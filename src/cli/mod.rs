@@ -22,6 +22,7 @@ mod robot;
 mod say;
 mod show;
 mod simulate;
+mod stages;
 mod summary;
 mod verdict;
 mod verify;
@@ -50,9 +51,12 @@ use verdict::Verdict;
     arg_required_else_help = true
 )]
 struct Cli {
-    /// Say more on stderr (twice: everything)
+    /// Say more on stderr (twice: everything), and write the time of every stage beside the results (timings.json)
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
+    /// Show no progress
+    #[arg(short, long, global = true)]
+    quiet: bool,
     /// Threads for images (default: all cores); the result does not depend on it
     #[arg(long, global = true, value_name = "N")]
     threads: Option<usize>,
@@ -112,6 +116,12 @@ pub fn main() -> ExitCode {
     if let Some(code) = memory::in_a_child() {
         return code;
     }
+    if cli.quiet {
+        progress::silence();
+    }
+    if cli.verbose > 0 {
+        stages::tell();
+    }
     start_log(cli.verbose);
     memory::set_threads(cli.threads);
     let ended = cli.command.run().and_then(|verdict| match say::failure() {
@@ -138,11 +148,12 @@ fn start_log(verbose: u8) {
     let level = match verbose {
         0 => tracing::Level::WARN,
         1 => tracing::Level::INFO,
-        _ => tracing::Level::DEBUG,
+        2 => tracing::Level::DEBUG,
+        _ => tracing::Level::TRACE,
     };
     let from = move |m: &tracing::Metadata| m.level() <= &level && (verbose > 1 || is_own(m.target()));
     let words = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_target(verbose > 1).without_time();
-    tracing_subscriber::registry().with(words.with_filter(filter_fn(from))).init();
+    tracing_subscriber::registry().with(words.with_filter(filter_fn(from))).with(stages::layer()).init();
 }
 
 /// What libraries say among themselves is no word to the user: they decide nothing here.

@@ -14,6 +14,7 @@ use crate::geom::Pose;
 use crate::problem::{Adjustment, Problem, State};
 use crate::series::CameraMount;
 use crate::simulate::truth::Truth;
+use crate::stage::stage;
 
 /// Compares on the observations of a solution: its outliers and rejected images are left out for all estimators.
 ///
@@ -54,6 +55,7 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
 /// The two-stage estimators beside the joint fit, held out by image: what the report of every solution says, and the same as [`compare`] says of them.
 /// `None` for too few images.
 pub fn beside_two_stages(solution: &Solution) -> Option<Comparison> {
+    let _stage = stage("comparison with two stages");
     let joint = solution.joint_fit();
     let (problem, limits) = (&joint.problem, &solution.options.limits);
     let images = on_robot(problem);

@@ -13,6 +13,7 @@ use crate::fit::log_evidence;
 use crate::model::joint_terms::RobotModel;
 use crate::problem::{Adjustment, MeasuredSeries};
 use crate::solve::{Settings, solve};
+use crate::stage::stage;
 use crate::urdf::Chain;
 
 /// Identifies robot, cameras, mountings and plates from identified series. The automatic model is the largest that no smaller one
@@ -44,7 +45,10 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
 
 /// The solution with the smallest robot model that the evidence supports, from that with the full one.
 fn best_model(chain: Chain, series: &[MeasuredSeries], options: &Options, full: Solution) -> Result<Solution> {
-    let evidences = compare_models(&full);
+    let evidences = {
+        let _stage = stage("evidence of robot models");
+        compare_models(&full)
+    };
     let supported = evidences.iter().filter(|e| e.log_evidence > -options.limits.decisive_log_odds);
     let largest = supported.max_by_key(|e| e.parameters).map_or(RobotModel::Full, |e| e.model);
     let lenses = full.lenses.clone();

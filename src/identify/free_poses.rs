@@ -14,6 +14,7 @@ use crate::solve::{
     ComponentOptions, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status, estimate_components,
     frames, in_frame, reject_observations, solve,
 };
+use crate::stage::stage;
 
 /// RMS of a start, px per point, from which no further focal length is tried.
 const GOOD_START_PX: f64 = 2.0;
@@ -30,6 +31,7 @@ pub fn adjust_free_poses(
     stated_focal_px: &[Option<f64>],
     limits: &Limits,
 ) -> Result<(Adjustment, FreePoses, Vec<StartVerdict>)> {
+    let _stage = stage("free poses");
     let free_before: Vec<bool> = adjustment.problem.layout.columns.iter().map(|c| c.free).collect();
     adjustment.hold_poses();
     let homographies = fit_homographies(&mut adjustment)?;

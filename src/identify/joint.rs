@@ -16,6 +16,7 @@ use crate::solve::{
     ComponentOptions, NoiseInformation, Outcome, Status, estimate_components, reject_images, reject_observations,
     without_unidentified_noise,
 };
+use crate::stage::stage;
 use crate::urdf::Chain;
 
 /// Most rounds of rejection.
@@ -23,6 +24,7 @@ const ROUNDS: usize = 12;
 
 /// As [`super::identify`] with one robot model.
 pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
+    let _stage = stage(options.model.title());
     let robot = options.model.robot_with(chain, options.harmonics);
     let mut start = build(&robot, series, options.joint_noise == JointNoise::Estimated, &options.limits)?;
     let Adjustment { problem, state } = &mut start;
@@ -39,7 +41,10 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let on_robot = start.problem.used_on_robot().count();
     check_on_robot(&start.problem, on_robot)?;
     let aside = start_robot(&mut start, &free, &mut starts, &options.limits)?;
-    let (mut outcome, before) = fit(start, &free, &aside, options);
+    let (mut outcome, before) = {
+        let _stage = stage("joint fit");
+        fit(start, &free, &aside, options)
+    };
     let (status, iterations) = (outcome.status, outcome.iterations);
     name_wrong_pairs(&mut outcome.adjustment, &free, options.limits.other_readings_explain);
     let mut diagnosis = Diagnosis::new(CheckContext { series, free: &free, on_robot, limits: &options.limits });
@@ -64,13 +69,19 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let accuracy = hold_out(&fit, &fitted, &options.limits).ok_or_else(|| {
         Error::new(Code::NothingHeldOut, "hold-out", "too few images to hold any out", "take more images")
     })?;
-    diagnosis.after_fit(&fit, &accuracy);
+    {
+        let _stage = stage("diagnoses");
+        diagnosis.after_fit(&fit, &accuracy);
+    }
     let (mut fit, joint) = match estimator.is_two_stage() {
         true => (staged(&fit, estimator, noise)?, Some(Box::new(fit.adjustment))),
         false => (fit, None),
     };
     let estimated = noise == JointNoise::Estimated && joint.is_none();
-    let uncertainty = judge(&mut fit, estimated, before, &options.limits);
+    let uncertainty = {
+        let _stage = stage("uncertainty");
+        judge(&mut fit, estimated, before, &options.limits)
+    };
     diagnosis.after_uncertainty(&uncertainty, &accuracy);
     let findings = diagnosis.findings();
     Ok(Solution {

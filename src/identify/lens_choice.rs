@@ -15,6 +15,7 @@ use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, LensChoice, MeasuredSeries, predict};
 use crate::solve::{ComponentOptions, LinearProblem, Status, estimate_components};
+use crate::stage::stage;
 use crate::urdf::Chain;
 
 /// One observation of so many is kept aside, in every image and of every marker in other images.
@@ -84,6 +85,7 @@ fn by_hold_out(
 
 /// Evidence of every lens formula for a camera, from the fit with its present one.
 fn compare_lenses(solution: &Solution, camera: &str, choice: LensChoice) -> Vec<LensEvidence> {
+    let _stage = stage("evidence of lenses");
     let Some(k) = solution.fit.problem.cameras.iter().position(|c| c == camera) else { return Vec::new() };
     let is_wide = solution.fit.state.cameras[k].corner() > solution.options.limits.fisheye_tangent;
     let formulas = Lens::ALL.into_iter().filter(|l| choice.has(*l) && (*l != Lens::Fisheye || is_wide));

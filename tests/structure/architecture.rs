@@ -9,7 +9,7 @@ use crate::imports::{files_below, rooms};
 
 /// Rooms from the bottom up; rooms on one level are peers and do not import each other, but for the pairs in `PEERS`.
 const LEVELS: [&[&str]; 16] = [
-    &["error"],
+    &["error", "stage"],
     &["files", "geom", "linalg"],
     &["series", "urdf"],
     &["detect"],

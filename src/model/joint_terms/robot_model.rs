@@ -13,3 +13,15 @@ pub enum RobotModel {
     /// The largest of these that no smaller one beats by evidence.
     Auto,
 }
+
+impl RobotModel {
+    /// What it is, for people.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Rigid => "rigid robot model",
+            Self::Gear => "robot model with gears",
+            Self::Full => "full robot model",
+            Self::Auto => "robot model by evidence",
+        }
+    }
+}
