@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::limits::Limits;
@@ -41,7 +42,7 @@ pub struct Accuracy {
 }
 
 /// A fit of the images that are left, from where the adjustment stands.
-pub type Refit<'a> = dyn Fn(Adjustment) -> Option<State> + 'a;
+pub type Refit<'a> = dyn Fn(Adjustment) -> Option<State> + Sync + 'a;
 
 const FOLDS: usize = 6;
 
@@ -49,17 +50,19 @@ const FOLDS: usize = 6;
 const NOMINAL_JOINT_ERROR: f64 = 3e-3;
 
 /// Predicts every image on the robot by models that have not seen it: of what is calibrated by `fitted`, from the images that are left, which is
-/// [`refitted`] for the joint fit.
-pub fn hold_out(fit: &Adjustment, fitted: &Refit, limits: &Limits) -> Option<Accuracy> {
+/// [`refitted`] for the joint fit. Also returns what was fitted, fold by fold.
+pub fn hold_out(fit: &Adjustment, fitted: &Refit, limits: &Limits) -> Option<(Accuracy, Vec<State>)> {
     let _stage = stage("hold-out");
     let folds = folds(&fit.problem, limits)?;
-    let nominal = predictions(&nominal(fit), &folds, &joint)?;
-    let calibrated = predictions(fit, &folds, fitted)?;
+    let nominal = nominal(fit);
+    let (nominal, _) = predictions(&nominal, &folds, &joint)?;
+    let (calibrated, states) = predictions(fit, &folds, fitted)?;
     let mut per_image_mm = vec![None; fit.problem.images.len()];
     for ((i, a), (_, b)) in nominal.iter().zip(&calibrated) {
         per_image_mm[*i] = Some([a.mm(), b.mm()]);
     }
-    Some(Accuracy { nominal: summary(&nominal), calibrated: summary(&calibrated), per_image_mm, folds: folds.len() })
+    let [nominal, calibrated] = [summary(&nominal), summary(&calibrated)];
+    Some((Accuracy { nominal, calibrated, per_image_mm, folds: folds.len() }, states))
 }
 
 /// With the nominal robot, which stays as it is.
@@ -77,7 +80,7 @@ fn nominal(fit: &Adjustment) -> Adjustment {
 
 /// Error of every image on the robot, predicted by fits of the free columns to the images of the other folds; `None` for too few.
 pub fn hold_out_images(fit: &Adjustment, limits: &Limits) -> Option<Vec<(usize, ImageError)>> {
-    predictions(fit, &folds(&fit.problem, limits)?, &joint)
+    predictions(fit, &folds(&fit.problem, limits)?, &joint).map(|(errors, _)| errors)
 }
 
 fn joint(adjustment: Adjustment) -> Option<State> {
@@ -186,16 +189,30 @@ fn along_the_workspace(Adjustment { problem, state }: &Adjustment, postures: Vec
     placed.into_iter().map(|(_, posture)| posture).collect()
 }
 
-fn predictions(fit: &Adjustment, folds: &[Vec<usize>], fitted: &Refit) -> Option<Vec<(usize, ImageError)>> {
+/// Error of every held-out image with its index, and the state of every fold.
+type Predictions = (Vec<(usize, ImageError)>, Vec<State>);
+
+/// What `work` makes of the folds with their numbers, as many at a time as there are threads: each needs the memory of a solve.
+pub fn side_by_side<T: Send>(folds: &[Vec<usize>], work: impl Fn(usize, &Vec<usize>) -> T + Sync) -> Vec<T> {
+    let at_a_time = rayon::current_num_threads().max(1);
+    let numbered: Vec<(usize, &Vec<usize>)> = folds.iter().enumerate().collect();
+    numbered
+        .chunks(at_a_time)
+        .flat_map(|some| some.par_iter().map(|(k, fold)| work(*k, fold)).collect::<Vec<T>>())
+        .collect()
+}
+
+fn predictions(fit: &Adjustment, folds: &[Vec<usize>], fitted: &Refit) -> Option<Predictions> {
+    let of_fold = |held: &Vec<usize>| fitted(fit.without_images(held));
+    let states: Vec<State> = side_by_side(folds, |_, held| of_fold(held)).into_iter().collect::<Option<_>>()?;
     let mut errors = Vec::new();
-    for held in folds {
-        let fitted = fitted(fit.without_images(held))?;
+    for (held, fitted) in folds.iter().zip(&states) {
         for &i in held {
-            errors.push((i, predict_image(&fit.problem, &fitted, i)?));
+            errors.push((i, predict_image(&fit.problem, fitted, i)?));
         }
     }
     errors.sort_by_key(|(i, _)| *i);
-    Some(errors)
+    Some((errors, states))
 }
 
 /// The free columns fitted to the images in use, from where the adjustment stands, at its noise.

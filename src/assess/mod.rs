@@ -21,7 +21,7 @@ pub use clustered::{Clustered, RootInformation, StopInformation, clustered_covar
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
 pub use hold_out::{
     Accuracy, Errors, ImageError, Refit, cluster_of_images, folds, hold_out, hold_out_images, predict_image, refitted,
-    regions,
+    regions, side_by_side,
 };
 pub use identifiability::{
     Cause, Correlation, Identifiability, Observability, UnknownDirection, frame_parameters, identifiability,

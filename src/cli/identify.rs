@@ -13,7 +13,7 @@ use super::{Verdict, progress, stages, summary};
 use crate::calibration::{Calibration, Ends, Export, Inputs, Observed};
 use crate::error::{Code, Error, Result};
 use crate::identify::{Estimator, Options, dry_run};
-use crate::output::solution_json::{self, FILE_NAME};
+use crate::output::solution_json::{self, FILE_NAME, TIMINGS};
 use crate::output::{Offsets, Place, Poses, folder_name, restore};
 use crate::problem::{LensChoice, MeasuredSeries};
 
@@ -161,7 +161,7 @@ fn write(args: &IdentifyArgs, calibration: &Calibration, place: Place) -> Result
     let command = super::command_line().join(" ");
     let mut files = calibration.files(&Export { offsets: args.offsets.into(), poses, command })?;
     if stages::are_told() {
-        files.insert(stages::FILE_NAME.to_owned(), stages::timings());
+        files.insert(TIMINGS.to_owned(), stages::timings());
     }
     let folder = place.path().to_path_buf();
     place.write_all(&files)?;

@@ -51,7 +51,7 @@ use verdict::Verdict;
     arg_required_else_help = true
 )]
 struct Cli {
-    /// Say more on stderr (twice: everything), and write the time of every stage beside the results (timings.json)
+    /// Say more on stderr (twice: everything); `identify` also writes the time of every stage (timings.json)
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
     /// Show no progress

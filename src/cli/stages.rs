@@ -17,9 +17,6 @@ use tracing_subscriber::registry::LookupSpan;
 use super::progress;
 use crate::stage;
 
-/// Name of the file with the time of every stage.
-pub(super) const FILE_NAME: &str = "timings.json";
-
 /// How long a stage took.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Timing {

@@ -27,6 +27,9 @@ pub mod circles {}
 #[doc = include_str!("boards.md")]
 pub mod boards {}
 
+#[doc = include_str!("costs.md")]
+pub mod costs {}
+
 #[doc = include_str!("planning.md")]
 pub mod planning {}
 

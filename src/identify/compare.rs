@@ -1,5 +1,7 @@
 //! All estimators side by side: against truth where it is known, on held-out images where it is not.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use super::comparison::{Comparison, ComparisonRow, HeldOut, TruthError};
 use super::estimator::Estimator;
 use super::options::JointNoise;
@@ -7,7 +9,7 @@ use super::solution::Solution;
 use super::two_stage::{PoseStage, fit_joint, fit_poses};
 use crate::assess::{
     ImageError, bootstrap_ratio, by_cluster, camera_errors_m, cluster_of_images, flange_error_m, folds, predict_image,
-    refitted, regions, root_mean_square,
+    refitted, regions, root_mean_square, side_by_side,
 };
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
@@ -22,7 +24,11 @@ use crate::stage::stage;
 ///
 /// # Errors
 /// Too few images on the robot.
-pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usize, usize)) -> Result<Comparison> {
+pub fn compare(
+    solution: &Solution,
+    truth: Option<&Truth>,
+    progress: impl Fn(usize, usize) + Sync,
+) -> Result<Comparison> {
     let joint = solution.joint_fit();
     let (problem, limits) = (&joint.problem, &solution.options.limits);
     let images = on_robot(problem);
@@ -37,15 +43,12 @@ pub fn compare(solution: &Solution, truth: Option<&Truth>, progress: impl Fn(usi
     let by_region = regions(joint, limits).unwrap_or_default();
     let all = Estimator::ALL;
     let total = by_image.len() + by_region.len() + 1;
-    let mut done = 0;
-    let mut tick = || {
-        done += 1;
-        progress(done, total);
-    };
+    let done = AtomicUsize::new(0);
+    let tick = || progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
     let against_truth = truth.map(|t| truth_errors(joint, t)).transpose()?;
     tick();
-    let image_errors = held_out(joint, &by_image, &all, &mut tick);
-    let region_errors = held_out(joint, &by_region, &all, &mut tick);
+    let image_errors = held_out(joint, &by_image, (&all, &solution.held_out), &tick);
+    let region_errors = held_out(joint, &by_region, (&all, &[]), &tick);
     let of_truth = |k: usize| against_truth.as_ref().and_then(|t| t[k]);
     let held = [Some(&image_errors), Some(&region_errors).filter(|e| !e.is_empty())];
     let rows = rows(&cluster_of_images(problem, limits), &all, held, of_truth);
@@ -61,7 +64,7 @@ pub fn beside_two_stages(solution: &Solution) -> Option<Comparison> {
     let images = on_robot(problem);
     let folds = folds(problem, limits).filter(|_| images >= limits.compared_images)?;
     let taking_part: Vec<Estimator> = Estimator::ALL.into_iter().filter(|e| *e != Estimator::HardJoint).collect();
-    let errors = held_out(joint, &folds, &taking_part, &mut || ());
+    let errors = held_out(joint, &folds, (&taking_part, &solution.held_out), &|| ());
     let rows = rows(&cluster_of_images(problem, limits), &taking_part, [Some(&errors), None], |_| None);
     Some(Comparison { rows, images, folds: [folds.len(), 0] })
 }
@@ -87,12 +90,12 @@ fn rows(
     estimators.iter().enumerate().map(row).collect()
 }
 
-/// What every estimator makes of the observations in use; `None` for one that has no solution.
-fn fitted(start: &Adjustment, estimators: &[Estimator]) -> Vec<Option<State>> {
+/// What every estimator makes of the observations in use; `None` for one that has no solution. That of the joint fit may be `known`.
+fn fitted(start: &Adjustment, estimators: &[Estimator], known: Option<&State>) -> Vec<Option<State>> {
     let stage = PoseStage::adjusted(start);
     let noise = JointNoise::Estimated;
     let found = |estimator: &Estimator| match estimator {
-        Estimator::Joint => Some(refitted(start.clone())),
+        Estimator::Joint => Some(known.cloned().unwrap_or_else(|| refitted(start.clone()))),
         Estimator::HardJoint => fit_joint(start, *estimator, noise).map(|(_, found)| found.state),
         _ => Some(fit_poses(start, stage.as_ref()?, *estimator, noise)?.state),
     };
@@ -102,16 +105,21 @@ fn fitted(start: &Adjustment, estimators: &[Estimator]) -> Vec<Option<State>> {
 /// Error of every held-out image, with its index, by every estimator; `None` where an estimator has no solution for a fold.
 type Errors = Vec<(usize, Vec<Option<ImageError>>)>;
 
-fn held_out(joint: &Adjustment, folds: &[Vec<usize>], estimators: &[Estimator], tick: &mut dyn FnMut()) -> Errors {
-    let mut errors = Vec::new();
-    for fold in folds {
-        let found = fitted(&joint.without_images(fold), estimators);
-        for &i in fold {
-            errors.push((i, found.iter().map(|state| predict_image(&joint.problem, state.as_ref()?, i)).collect()));
-        }
+/// Errors by some estimators; of the joint fit, the states of the folds may be `known`.
+fn held_out(
+    joint: &Adjustment,
+    folds: &[Vec<usize>],
+    (estimators, known): (&[Estimator], &[State]),
+    tick: &(dyn Fn() + Sync),
+) -> Errors {
+    let of_fold = |k: usize, fold: &Vec<usize>| -> Errors {
+        let found = fitted(&joint.without_images(fold), estimators, known.get(k));
+        let by_all = |&i: &usize| found.iter().map(|state| predict_image(&joint.problem, state.as_ref()?, i)).collect();
+        let errors = fold.iter().map(|i| (*i, by_all(i))).collect();
         tick();
-    }
-    errors
+        errors
+    };
+    side_by_side(folds, of_fold).concat()
 }
 
 fn summary(errors: &Errors, clusters: &[usize], k: usize, joint: Option<usize>) -> Option<HeldOut> {
@@ -130,7 +138,7 @@ fn summary(errors: &Errors, clusters: &[usize], k: usize, joint: Option<usize>) 
 }
 
 fn truth_errors(joint: &Adjustment, truth: &Truth) -> Result<Vec<Option<TruthError>>> {
-    let found = fitted(joint, &Estimator::ALL);
+    let found = fitted(joint, &Estimator::ALL, None);
     found.iter().map(|s| s.as_ref().map(|s| truth_error(s, truth)).transpose().map(Option::flatten)).collect()
 }
 

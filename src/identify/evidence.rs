@@ -3,9 +3,11 @@
 //! `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what the models share, with the whole information `N` (dense columns,
 //! latents and markers) at the optimum of each (D. MacKay, *Bayesian interpolation*, 1992).
 
+use rayon::prelude::*;
+
 use super::estimator::Estimator;
-use super::joint::identify_model;
-use super::lens_choice::{self, with_lenses};
+use super::joint::{JointFit, fit_model};
+use super::lens_choice::{self, Lensed, with_lenses};
 use super::options::Options;
 use super::solution::{Evidence, Solution};
 use crate::error::Result;
@@ -15,6 +17,9 @@ use crate::problem::{Adjustment, MeasuredSeries};
 use crate::solve::{Settings, solve};
 use crate::stage::stage;
 use crate::urdf::Chain;
+
+/// Newton decrement of a fit that is judged by its evidence, whose logarithm is then known to a tenth or so.
+const DECREMENT: f64 = 0.01;
 
 /// Identifies robot, cameras, mountings and plates from identified series. The automatic model is the largest that no smaller one
 /// beats decisively; whoever names a joint term wants all of them.
@@ -29,47 +34,49 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
         other => other,
     };
     let by_joint_fit = Options { model, estimator: Estimator::Joint, ..options.clone() };
-    let (full, series) = with_lenses(&chain, series, &by_joint_fit)?;
-    let mut solution = match options.model == RobotModel::Auto && !options.selection.names_terms() {
+    let Lensed { fit: full, series, lenses, notices } = with_lenses(&chain, series, &by_joint_fit)?;
+    let (chosen, evidences) = match options.model == RobotModel::Auto && !options.selection.names_terms() {
         true => best_model(chain, &series, options, full)?,
-        false if options.estimator == Estimator::Joint => full,
-        false => {
-            let lenses = full.lenses;
-            Solution { lenses, ..identify_model(chain, &series, &Options { model, ..options.clone() })? }
-        }
+        false => (full, Vec::new()),
     };
+    let mut solution = Solution { evidences, lenses, ..chosen.judged(&series, options.estimator)? };
+    solution.findings.extend(notices.into_iter().map(Into::into));
     let losses = lens_choice::losses(&solution);
     solution.findings.extend(losses.into_iter().map(Into::into));
     Ok(Solution { options: options.clone(), ..solution })
 }
 
-/// The solution with the smallest robot model that the evidence supports, from that with the full one.
-fn best_model(chain: Chain, series: &[MeasuredSeries], options: &Options, full: Solution) -> Result<Solution> {
+/// The fit of the smallest robot model that the evidence supports, from that of the full one.
+fn best_model(
+    chain: Chain,
+    series: &[MeasuredSeries],
+    options: &Options,
+    full: JointFit,
+) -> Result<(JointFit, Vec<Evidence>)> {
     let evidences = {
         let _stage = stage("evidence of robot models");
-        compare_models(&full)
+        compare_models(&full.fit)
     };
     let supported = evidences.iter().filter(|e| e.log_evidence > -options.limits.decisive_log_odds);
     let largest = supported.max_by_key(|e| e.parameters).map_or(RobotModel::Full, |e| e.model);
-    let lenses = full.lenses.clone();
     let chosen = match largest {
-        RobotModel::Full if options.estimator == Estimator::Joint => full,
-        model => identify_model(chain, series, &Options { model, ..options.clone() })?,
+        RobotModel::Full => full,
+        model => fit_model(chain, series, &Options { model, ..options.clone() }, Some(full.start))?,
     };
-    Ok(Solution { evidences, lenses, ..chosen })
+    Ok((chosen, evidences))
 }
 
-/// Evidence of every model that a solution with the full one holds, at its noise components.
-fn compare_models(full: &Solution) -> Vec<Evidence> {
-    let mut all: Vec<Evidence> =
-        [RobotModel::Rigid, RobotModel::Gear, RobotModel::Full].into_iter().filter_map(|m| evidence(full, m)).collect();
+/// Evidence of every model that a fit of the full one holds, at its noise components.
+fn compare_models(full: &Adjustment) -> Vec<Evidence> {
+    let models = [RobotModel::Rigid, RobotModel::Gear, RobotModel::Full];
+    let mut all: Vec<Evidence> = models.into_par_iter().filter_map(|m| evidence(full, m)).collect();
     let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     all.iter_mut().for_each(|e| e.log_evidence -= best);
     all
 }
 
-fn evidence(full: &Solution, model: RobotModel) -> Option<Evidence> {
-    let mut smaller = full.fit.adjustment.clone();
+fn evidence(full: &Adjustment, model: RobotModel) -> Option<Evidence> {
+    let mut smaller = full.clone();
     let Adjustment { problem, state } = &mut smaller;
     let first = problem.layout.terms.start;
     for (k, t) in state.robot.terms.iter_mut().enumerate().filter(|(_, t)| !model.has(t.term)) {
@@ -78,7 +85,7 @@ fn evidence(full: &Solution, model: RobotModel) -> Option<Evidence> {
         t.value = column.prior_mean;
         column.free = false;
     }
-    let outcome = solve(smaller, &Settings::default());
+    let outcome = solve(smaller, &Settings { decrement: DECREMENT, ..Settings::default() });
     let linear = outcome.linear()?;
     let layout = &outcome.adjustment.problem.layout;
     let parameters = layout.columns[layout.robot()].iter().filter(|c| c.free).count();

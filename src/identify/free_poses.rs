@@ -9,7 +9,9 @@ use crate::fit::{FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
-use crate::problem::{Adjustment, ImageRejection, Mark, Problem, State, Tie, Weighting, size_by_distance};
+use crate::problem::{
+    Adjustment, Image, ImageRejection, Mark, ObservationRejection, Problem, State, Tie, Weighting, size_by_distance,
+};
 use crate::solve::{
     ComponentOptions, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status, estimate_components,
     frames, in_frame, reject_observations, solve,
@@ -19,8 +21,65 @@ use crate::stage::stage;
 /// RMS of a start, px per point, from which no further focal length is tried.
 const GOOD_START_PX: f64 = 2.0;
 
+/// Newton decrement at which a start is left to the adjustment, in roots of the cost that it began with.
+const START_DECREMENT: f64 = 0.01;
+
 /// Most rounds of rejection.
 const ROUNDS: usize = 6;
+
+/// What a free-pose adjustment leaves to a joint fit, whatever the robot model.
+#[derive(Debug, Clone)]
+pub(super) struct FreeStart {
+    /// The poses.
+    pub free: FreePoses,
+    /// Starting values of the cameras.
+    pub verdicts: Vec<StartVerdict>,
+    /// Poses of the images.
+    ties: Vec<Tie>,
+    images: Vec<LeftOut>,
+    marker_factor: Vec<f64>,
+    family_factor: Vec<f64>,
+}
+
+/// What was left out of an image.
+#[derive(Debug, Clone)]
+struct LeftOut {
+    image: Option<ImageRejection>,
+    observations: Vec<Option<ObservationRejection>>,
+}
+
+impl FreeStart {
+    /// Of an adjustment as [`adjust_free_poses`] leaves it.
+    pub fn of(Adjustment { problem, state }: &Adjustment, free: FreePoses, verdicts: Vec<StartVerdict>) -> Self {
+        let left_out = |image: &Image| LeftOut {
+            image: image.rejected.clone(),
+            observations: image.observations.iter().map(|o| o.rejected).collect(),
+        };
+        Self {
+            free,
+            verdicts,
+            ties: state.ties.clone(),
+            images: problem.images.iter().map(left_out).collect(),
+            marker_factor: problem.noise.marker.clone(),
+            family_factor: problem.families.iter().map(|f| f.factor).collect(),
+        }
+    }
+
+    /// Brings an adjustment of the same series with another robot model to where its own free-pose adjustment would.
+    pub fn carry_to(&self, Adjustment { problem, state }: &mut Adjustment) {
+        state.cameras.clone_from(&self.free.state.cameras);
+        state.plates.clone_from(&self.free.state.plates);
+        state.ties.clone_from(&self.ties);
+        for (image, left) in problem.images.iter_mut().zip(&self.images) {
+            image.rejected.clone_from(&left.image);
+            image.observations.iter_mut().zip(&left.observations).for_each(|(o, rejected)| o.rejected = *rejected);
+        }
+        problem.noise.pixel_factor.clone_from(&self.free.pixel_factor);
+        problem.noise.marker.clone_from(&self.marker_factor);
+        problem.families.iter_mut().zip(&self.family_factor).for_each(|(f, factor)| f.factor = *factor);
+        problem.families.iter().for_each(|f| f.hold(&mut problem.layout));
+    }
+}
 
 /// Adjusts from nothing. The adjustment that is left holds rejections and pixel factors, cameras, plates and poses.
 ///
@@ -194,7 +253,8 @@ fn try_focal(
             let wanted = early.contains(&k) || (stage == 1 && k < lens.parametric());
             quick.problem.layout.columns[c].free = problem.layout.columns[c].free && wanted;
         }
-        let settings = Settings { iterations: 40, decrement: 0.1 };
+        let cost = quick.linearise().map_or(0.0, |lin| lin.cost);
+        let settings = Settings { iterations: 40, decrement: (START_DECREMENT * cost.sqrt()).max(0.1) };
         let outcome = solve(quick, &settings);
         quick = outcome.adjustment;
         let Some(lin) = outcome.linearised else { break };
@@ -325,7 +385,7 @@ fn collect(fit: &Fit) -> Result<FreePoses> {
         state: state.clone(),
         scales,
         pixel_factor: problem.noise.pixel_factor.clone(),
-        linearised: lin.clone(),
+        linearised: lin.clone().without_equations(),
     })
 }
 

@@ -1,15 +1,17 @@
 //! The joint fit: robot, cameras, hand-camera offsets and plates directly against the pixels, with joint noise.
 
 use super::build::build;
-use super::free_poses::adjust_free_poses;
+use super::estimator::Estimator;
+use super::free_poses::{FreeStart, adjust_free_poses};
 use super::options::{JointNoise, MarkerTolerance, Options};
 use super::solution::Solution;
 use super::staged::{refit, staged};
 use super::start::{start_robot, take_back};
+use super::start_verdict::StartVerdict;
 use crate::assess::{hold_out, judge, refitted};
 use crate::diagnose::{CheckContext, Diagnosis};
 use crate::error::{Code, Error, Result};
-use crate::fit::FreePoses;
+use crate::fit::{Fit, FreePoses};
 use crate::problem::MeasuredSeries;
 use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem};
 use crate::solve::{
@@ -22,8 +24,33 @@ use crate::urdf::Chain;
 /// Most rounds of rejection.
 const ROUNDS: usize = 12;
 
-/// As [`super::identify`] with one robot model.
-pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
+/// A joint fit with one robot model, not judged yet.
+pub(super) struct JointFit {
+    /// How it was made.
+    options: Options,
+    /// The fit.
+    pub fit: Fit,
+    /// What the free-pose adjustment left.
+    pub start: FreeStart,
+    starts: Vec<StartVerdict>,
+    /// Images on the robot at the start.
+    on_robot: usize,
+    /// What was known of the joint noise before some of it was set to none.
+    before: Option<NoiseInformation>,
+    status: Status,
+    iterations: usize,
+}
+
+/// Fits one robot model jointly. What the free-pose adjustment of the same series left may be `known`: the robot takes no part in it.
+///
+/// # Errors
+/// As of [`super::identify`].
+pub(super) fn fit_model(
+    chain: Chain,
+    series: &[MeasuredSeries],
+    options: &Options,
+    known: Option<FreeStart>,
+) -> Result<JointFit> {
     let _stage = stage(options.model.title());
     let robot = options.model.robot_with(chain, options.harmonics);
     let mut start = build(&robot, series, options.joint_noise == JointNoise::Estimated, &options.limits)?;
@@ -34,20 +61,32 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     if options.marker_tolerance == MarkerTolerance::Estimated {
         problem.noise.marker = vec![1.0; problem.plates.len()];
     }
-    let stated: Vec<Option<f64>> = (problem.cameras.iter())
-        .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
-        .collect();
-    let (mut start, free, mut starts) = adjust_free_poses(start, &stated, &options.limits)?;
+    let left = match known {
+        Some(known) => {
+            known.carry_to(&mut start);
+            known
+        }
+        None => {
+            let stated: Vec<Option<f64>> = (problem.cameras.iter())
+                .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
+                .collect();
+            let (adjusted, free, verdicts) = adjust_free_poses(start, &stated, &options.limits)?;
+            start = adjusted;
+            FreeStart::of(&start, free, verdicts)
+        }
+    };
+    let free = &left.free;
+    let mut starts = left.verdicts.clone();
     let on_robot = start.problem.used_on_robot().count();
     check_on_robot(&start.problem, on_robot)?;
-    let aside = start_robot(&mut start, &free, &mut starts, &options.limits)?;
+    let aside = start_robot(&mut start, free, &mut starts, &options.limits)?;
     let (mut outcome, before) = {
         let _stage = stage("joint fit");
-        fit(start, &free, &aside, options)
+        fit(start, free, &aside, options)
     };
     let (status, iterations) = (outcome.status, outcome.iterations);
-    name_wrong_pairs(&mut outcome.adjustment, &free, options.limits.other_readings_explain);
-    let mut diagnosis = Diagnosis::new(CheckContext { series, free: &free, on_robot, limits: &options.limits });
+    name_wrong_pairs(&mut outcome.adjustment, free, options.limits.other_readings_explain);
+    let mut diagnosis = Diagnosis::new(CheckContext { series, free, on_robot, limits: &options.limits });
     diagnosis.after_free_poses(&outcome.adjustment.problem);
     diagnosis.after_left_out(&outcome.adjustment)?;
     if status != Status::Converged {
@@ -61,46 +100,64 @@ pub(super) fn identify_model(chain: Chain, series: &[MeasuredSeries], options: &
     let fit = outcome.fit().map_err(|e| {
         Error::new(Code::FitUndetermined, "joint fit", e.to_string(), "take stops that move every joint")
     })?;
-    let (estimator, noise) = (options.estimator, options.joint_noise);
-    let fitted = |left: Adjustment| match estimator.is_two_stage() {
-        true => refit(&left, estimator, noise),
-        false => Some(refitted(left)),
-    };
-    let accuracy = hold_out(&fit, &fitted, &options.limits).ok_or_else(|| {
-        Error::new(Code::NothingHeldOut, "hold-out", "too few images to hold any out", "take more images")
-    })?;
-    {
-        let _stage = stage("diagnoses");
-        diagnosis.after_fit(&fit, &accuracy);
+    let options = options.clone();
+    Ok(JointFit { options, fit, start: left, starts, on_robot, before, status, iterations })
+}
+
+impl JointFit {
+    /// The result by an estimator, with everything that is known of it.
+    ///
+    /// # Errors
+    /// Too few images to hold any out; an estimator that has no solution.
+    pub fn judged(self, series: &[MeasuredSeries], estimator: Estimator) -> Result<Solution> {
+        let _stage = stage(self.options.model.title());
+        let Self { options, fit, start, starts, on_robot, before, status, iterations } = self;
+        let options = Options { estimator, ..options };
+        let (free, limits, noise) = (start.free, &options.limits, options.joint_noise);
+        let mut diagnosis = Diagnosis::new(CheckContext { series, free: &free, on_robot, limits });
+        diagnosis.after_free_poses(&fit.problem);
+        diagnosis.after_left_out(&fit)?;
+        let fitted = |left: Adjustment| match estimator.is_two_stage() {
+            true => refit(&left, estimator, noise),
+            false => Some(refitted(left)),
+        };
+        let (accuracy, held_out) = hold_out(&fit, &fitted, limits).ok_or_else(|| {
+            Error::new(Code::NothingHeldOut, "hold-out", "too few images to hold any out", "take more images")
+        })?;
+        {
+            let _stage = stage("diagnoses");
+            diagnosis.after_fit(&fit, &accuracy);
+        }
+        let (mut fit, joint, held_out) = match estimator.is_two_stage() {
+            true => (staged(&fit, estimator, noise)?, Some(Box::new(fit.adjustment)), Vec::new()),
+            false => (fit, None, held_out),
+        };
+        let estimated = noise == JointNoise::Estimated && joint.is_none();
+        let uncertainty = {
+            let _stage = stage("uncertainty");
+            judge(&mut fit, estimated, before, limits)
+        };
+        diagnosis.after_uncertainty(&uncertainty, &accuracy);
+        let findings = diagnosis.findings();
+        Ok(Solution {
+            options,
+            estimator,
+            joint,
+            series: series.to_vec(),
+            uncertainty,
+            evidences: Vec::new(),
+            lenses: Vec::new(),
+            fit,
+            free_poses: free,
+            two_stage: None,
+            accuracy,
+            held_out,
+            starts,
+            findings,
+            status,
+            iterations,
+        })
     }
-    let (mut fit, joint) = match estimator.is_two_stage() {
-        true => (staged(&fit, estimator, noise)?, Some(Box::new(fit.adjustment))),
-        false => (fit, None),
-    };
-    let estimated = noise == JointNoise::Estimated && joint.is_none();
-    let uncertainty = {
-        let _stage = stage("uncertainty");
-        judge(&mut fit, estimated, before, &options.limits)
-    };
-    diagnosis.after_uncertainty(&uncertainty, &accuracy);
-    let findings = diagnosis.findings();
-    Ok(Solution {
-        options: options.clone(),
-        estimator,
-        joint,
-        series: series.to_vec(),
-        uncertainty,
-        evidences: Vec::new(),
-        lenses: Vec::new(),
-        fit,
-        free_poses: free,
-        two_stage: None,
-        accuracy,
-        starts,
-        findings,
-        status,
-        iterations,
-    })
 }
 
 /// The fit, and what was known of the joint noise before some of it was set to none.

@@ -2,19 +2,21 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use super::build::build;
 use super::free_poses::adjust_free_poses;
-use super::joint::identify_model;
+use super::joint::{JointFit, fit_model};
 use super::options::Options;
 use super::solution::{LensEvidence, Solution};
 use crate::assess::Limits;
 use crate::diagnose::LensNotInRos;
 use crate::error::{Code, Error, Notice, Result};
-use crate::fit::log_evidence;
+use crate::fit::{FreePoses, log_evidence};
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, LensChoice, MeasuredSeries, predict};
-use crate::solve::{ComponentOptions, LinearProblem, Status, estimate_components};
+use crate::solve::{ComponentOptions, LinearProblem, Settings, Status, estimate_components};
 use crate::stage::stage;
 use crate::urdf::Chain;
 
@@ -22,38 +24,46 @@ use crate::urdf::Chain;
 const KEPT_ASIDE: usize = 4;
 /// Share of the largest errors that does not count: what is wrongly identified says nothing of the lens.
 const OUTLIERS: f64 = 0.02;
+/// Newton decrement of a fit that is judged by its evidence, whose logarithm is then known to a tenth or so.
+const DECREMENT: f64 = 0.01;
 /// Rounds in which image noise and fit follow the lens.
 const ROUNDS: usize = 3;
 
-/// The solution with one robot model and, for cameras whose lens is open, the lens that its evidence supports; and the series with these
-/// lenses.
+/// The fit of one robot model with the lenses that its evidence supports.
+pub(super) struct Lensed {
+    /// The fit.
+    pub fit: JointFit,
+    /// The series with these lenses.
+    pub series: Vec<MeasuredSeries>,
+    /// Evidence of the lenses of cameras whose lens was open.
+    pub lenses: Vec<LensEvidence>,
+    /// What is to be said of it.
+    pub notices: Vec<Notice>,
+}
+
+/// Fits one robot model and, for cameras whose lens is open, the lens that its evidence supports.
 ///
 /// # Errors
-/// As of [`identify_model`]; where no fit with the first lens exists, a lens by hold-out of free poses stands in for it.
-pub(super) fn with_lenses(
-    chain: &Chain,
-    series: &[MeasuredSeries],
-    options: &Options,
-) -> Result<(Solution, Vec<MeasuredSeries>)> {
+/// As of [`fit_model`]; where no fit with the first lens exists, a lens by hold-out of free poses stands in for it.
+pub(super) fn with_lenses(chain: &Chain, series: &[MeasuredSeries], options: &Options) -> Result<Lensed> {
     let mut series = series.to_vec();
     let open = if options.selection.names_cameras() { BTreeMap::new() } else { open_cameras(&series) };
     series.iter_mut().filter(|s| open.contains_key(&s.camera)).for_each(|s| s.lens = Lens::ALL[0]);
-    let (mut solution, notices) = match identify_model(chain.clone(), &series, options) {
-        Ok(solution) => (solution, Vec::new()),
+    let (mut fit, notices) = match fit_model(chain.clone(), &series, options, None) {
+        Ok(fit) => (fit, Vec::new()),
         Err(error) => by_hold_out(chain, &mut series, &open, options).ok_or(error)?,
     };
     let lenses: Vec<LensEvidence> =
-        open.iter().flat_map(|(camera, choice)| compare_lenses(&solution, camera, *choice)).collect();
+        open.iter().flat_map(|(camera, choice)| compare_lenses(&fit, camera, *choice, &options.limits)).collect();
     let mut better = series.clone();
     for chosen in lenses.iter().filter(|l| l.taken) {
         better.iter_mut().filter(|s| s.camera == chosen.camera).for_each(|s| s.lens = chosen.lens);
     }
     if better.iter().zip(&series).any(|(a, b)| a.lens != b.lens) {
-        solution = identify_model(chain.clone(), &better, options)?;
+        fit = fit_model(chain.clone(), &better, options, None)?;
         series = better;
     }
-    solution.findings.extend(notices.into_iter().map(Into::into));
-    Ok((Solution { lenses, ..solution }, series))
+    Ok(Lensed { fit, series, lenses, notices })
 }
 
 /// Cameras none of whose series settles the lens.
@@ -67,43 +77,48 @@ fn open_cameras(series: &[MeasuredSeries]) -> BTreeMap<String, LensChoice> {
     open
 }
 
-/// The solution with other lenses for the open cameras, where free poses speak for others.
+/// The fit with other lenses for the open cameras, where free poses speak for others.
 fn by_hold_out(
     chain: &Chain,
     series: &mut [MeasuredSeries],
     open: &BTreeMap<String, LensChoice>,
     options: &Options,
-) -> Option<(Solution, Vec<Notice>)> {
+) -> Option<(JointFit, Vec<Notice>)> {
     let first: Vec<Lens> = series.iter().map(|s| s.lens).collect();
     let names: Vec<String> = open.keys().cloned().collect();
     let notices =
         if open.is_empty() { return None } else { choose_lens(chain, series, &names, &options.limits).ok()? };
     let is_another = series.iter().zip(first).any(|(s, first)| s.lens != first);
-    let solution = if is_another { identify_model(chain.clone(), series, options).ok()? } else { return None };
-    Some((solution, notices))
+    let fit = if is_another { fit_model(chain.clone(), series, options, None).ok()? } else { return None };
+    Some((fit, notices))
 }
 
 /// Evidence of every lens formula for a camera, from the fit with its present one.
-fn compare_lenses(solution: &Solution, camera: &str, choice: LensChoice) -> Vec<LensEvidence> {
+fn compare_lenses(joint: &JointFit, camera: &str, choice: LensChoice, limits: &Limits) -> Vec<LensEvidence> {
     let _stage = stage("evidence of lenses");
-    let Some(k) = solution.fit.problem.cameras.iter().position(|c| c == camera) else { return Vec::new() };
-    let is_wide = solution.fit.state.cameras[k].corner() > solution.options.limits.fisheye_tangent;
+    let fit = &joint.fit;
+    let Some(k) = fit.problem.cameras.iter().position(|c| c == camera) else { return Vec::new() };
+    let is_wide = fit.state.cameras[k].corner() > limits.fisheye_tangent;
+    let depths_m = depths_of(fit, &joint.start.free)[k];
     let formulas = Lens::ALL.into_iter().filter(|l| choice.has(*l) && (*l != Lens::Fisheye || is_wide));
-    let mut all: Vec<LensEvidence> = formulas.filter_map(|lens| evidence(solution, k, lens)).collect();
+    let formulas: Vec<Lens> = formulas.collect();
+    let mut all: Vec<LensEvidence> =
+        formulas.into_par_iter().filter_map(|lens| evidence(fit, (k, &depths_m), lens)).collect();
     let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     all.iter_mut().for_each(|e| e.log_evidence -= best);
-    let decisive = solution.options.limits.decisive_log_odds;
+    let decisive = limits.decisive_log_odds;
     if let Some(simplest) = all.iter_mut().find(|e| e.log_evidence > -decisive) {
         simplest.taken = true;
     }
     all
 }
 
-fn evidence(solution: &Solution, camera: usize, lens: Lens) -> Option<LensEvidence> {
-    let mut other = with_lens(solution, camera, lens)?;
+fn evidence(fit: &Adjustment, (camera, depths_m): (usize, &[f64; 2]), lens: Lens) -> Option<LensEvidence> {
+    let mut other = with_lens(fit, (camera, depths_m), lens)?;
     // Image noise follows the lens; joint noise, tilt and the sizes of families stay.
     other.problem.families.retain(|f| f.held.ncols() > 0);
-    let options = ComponentOptions { joint: false, tilt: false, rounds: ROUNDS, ..ComponentOptions::default() };
+    let settings = Settings { decrement: DECREMENT, ..Settings::default() };
+    let options = ComponentOptions { joint: false, tilt: false, rounds: ROUNDS, settings };
     let outcome = estimate_components(other, &options);
     let linear = outcome.linear().filter(|_| outcome.status == Status::Converged)?;
     let Adjustment { problem, state } = &outcome.adjustment;
@@ -114,13 +129,13 @@ fn evidence(solution: &Solution, camera: usize, lens: Lens) -> Option<LensEviden
 }
 
 /// The adjustment with another lens for one camera, which images as the present one does.
-fn with_lens(solution: &Solution, camera: usize, lens: Lens) -> Option<Adjustment> {
-    let mut other = solution.fit.adjustment.clone();
+fn with_lens(fit: &Adjustment, (camera, depths_m): (usize, &[f64; 2]), lens: Lens) -> Option<Adjustment> {
+    let mut other = fit.clone();
     let Adjustment { problem, state } = &mut other;
     let present = &state.cameras[camera];
     let next = match present.extended(lens) {
         Some(extended) => extended,
-        None => fit_lens(present, lens, &depths_m(solution)[camera])?.camera,
+        None => fit_lens(present, lens, depths_m)?.camera,
     };
     let (layout, from, moved) = problem.layout.with_camera(camera, &problem.cameras[camera], &next);
     problem.layout = layout;
@@ -149,9 +164,13 @@ fn of_formula(camera: &Camera) -> f64 {
 
 /// Nearest and farthest plate centre that each camera saw, m.
 pub fn depths_m(solution: &Solution) -> Vec<[f64; 2]> {
-    let mut all = vec![[f64::INFINITY, 0.0f64]; solution.fit.problem.cameras.len()];
-    for (i, image) in solution.fit.problem.used() {
-        let Some(pose) = &solution.free_poses.poses[i] else { continue };
+    depths_of(&solution.fit, &solution.free_poses)
+}
+
+fn depths_of(Adjustment { problem, .. }: &Adjustment, free: &FreePoses) -> Vec<[f64; 2]> {
+    let mut all = vec![[f64::INFINITY, 0.0f64]; problem.cameras.len()];
+    for (i, image) in problem.used() {
+        let Some(pose) = &free.poses[i] else { continue };
         let z = pose.camera_from_plate.translation.z;
         let range = &mut all[image.camera];
         *range = [range[0].min(z), range[1].max(z)];

@@ -1,5 +1,6 @@
 //! Series -> solution: `series -> observations -> free poses -> starting values -> joint fit -> assessment`.
 
+mod block_diagonal;
 mod build;
 mod compare;
 mod comparison;

@@ -15,7 +15,7 @@ use crate::model::camera::Lens;
 use crate::model::joint_terms::RobotModel;
 use crate::model::robot::Robot;
 use crate::problem::Adjustment;
-use crate::problem::MeasuredSeries;
+use crate::problem::{MeasuredSeries, State};
 use crate::solve::Status;
 
 /// Evidence of a robot model.
@@ -69,6 +69,8 @@ pub struct Solution {
     pub lenses: Vec<LensEvidence>,
     /// Before and after, held out.
     pub accuracy: Accuracy,
+    /// States of the joint fit without the images of each fold; none for a result in two stages.
+    pub held_out: Vec<State>,
     /// Two-stage fits beside the joint one, where asked for ([`super::beside_two_stages`]).
     pub two_stage: Option<Comparison>,
     /// Starting values with their verdicts.

@@ -14,9 +14,11 @@ use crate::geom::{Pose, right_jacobian_se3};
 use crate::linalg::{SymmetricFactor, product};
 use crate::problem::{Adjustment, Chained, Problem, State, Step, TakenFrom, Tie};
 use crate::solve::{
-    ComponentOptions, Elimination, LinearImage, Settings, Status, System, Tally, estimate_components, share_out,
+    Acceleration, ComponentOptions, Elimination, JOINT_NOISE_FLOOR, LinearImage, Settings, Status, Tally,
+    estimate_components, share_out,
 };
 
+use super::block_diagonal::BlockDiagonal;
 use super::estimator::Estimator;
 use super::options::JointNoise;
 
@@ -43,8 +45,10 @@ pub struct PoseStage {
     pub references: Vec<Pose>,
     /// Measured `x`, six a pose, body twists of `camera_from_plate` (m, rad).
     pub offset: DVector<f64>,
-    /// Covariance of all poses together.
-    pub covariance: DMatrix<f64>,
+    /// Covariance of every pose.
+    pub blocks: Vec<Matrix6<f64>>,
+    /// Covariance of all poses together; none for so many that it would cost more than all the rest.
+    pub covariance: Option<DMatrix<f64>>,
     /// Cameras and plates of this stage.
     pub state: State,
     /// Pixel factors of this stage.
@@ -66,28 +70,34 @@ impl PoseStage {
     pub fn linearised(at: &Adjustment) -> Option<Self> {
         let free = with_free_poses(at)?;
         let lin = free.linearise()?;
-        let system = System::with(Elimination::Markers, free.linear(&lin), 0.0);
-        let factor = SymmetricFactor::new(&system.information).ok()?;
-        let (x, all) = (factor.solve(&system.rhs), factor.inverse());
         let linear = free.linear(&lin);
         let images: Vec<LinearImage> = linear.images().filter(|own| free.problem.on_robot(own.index)).collect();
+        let are_together = images.len() <= MOST_TOGETHER;
+        let which = if are_together { Elimination::Markers } else { Elimination::cheaper(linear) };
+        let cov = linear.covariance_by(which).ok()?;
+        let step = cov.system.step(linear, &(&cov.reduced * &cov.system.rhs));
+        let offset = images.iter().flat_map(|own| step.ties[own.index].iter().copied());
+        let block = |own: &LinearImage| {
+            let of_stop = cov.latents(&linear.stop(own.stop));
+            Matrix6::from_column_slice(own.part_of(&of_stop).as_slice())
+        };
         let rows_of = |own: &LinearImage| -> Vec<usize> {
-            let start = system.latent_start[own.stop];
+            let start = cov.system.latent_start[own.stop];
             own.latents().into_iter().flatten().map(|c| start + c).collect()
         };
-        let rows: Vec<usize> = images.iter().flat_map(rows_of).collect();
+        let together = || {
+            let rows: Vec<usize> = images.iter().flat_map(rows_of).collect();
+            cov.reduced.select_rows(&rows).select_columns(&rows)
+        };
         Some(Self {
             images: images.iter().map(|own| own.index).collect(),
             references: images.iter().map(|own| own.chain.pose).collect(),
-            offset: DVector::from_iterator(rows.len(), rows.iter().map(|&r| x[r])),
-            covariance: DMatrix::from_fn(rows.len(), rows.len(), |i, j| all[(rows[i], rows[j])]),
-            state: free.state,
-            pixel_factor: free.problem.noise.pixel_factor,
+            offset: DVector::from_vec(offset.collect()),
+            blocks: images.iter().map(block).collect(),
+            covariance: are_together.then(together),
+            pixel_factor: free.problem.noise.pixel_factor.clone(),
+            state: free.state.clone(),
         })
-    }
-
-    fn blocks(&self) -> Vec<Matrix6<f64>> {
-        (0..self.images.len()).map(|k| self.covariance.fixed_view::<6, 6>(6 * k, 6 * k).into_owned()).collect()
     }
 }
 
@@ -115,7 +125,8 @@ struct Latent {
 /// Error model of the second stage: what is known, and sizes to be found.
 struct ErrorModel {
     estimator: Estimator,
-    known: DMatrix<f64>,
+    /// Covariance of all poses together, where it is taken.
+    together: Option<DMatrix<f64>>,
     blocks: Vec<Matrix6<f64>>,
     /// Sizes, in the unit of the latents.
     sizes: Vec<f64>,
@@ -128,6 +139,9 @@ const FIRST_ISOTROPIC: f64 = 1e-2;
 const FIRST_FACTOR: f64 = 30.0;
 const FIRST_JOINT_NOISE: f64 = 3e-3;
 
+/// Images up to which the covariance of all poses is taken together: its cost grows with their cube.
+const MOST_TOGETHER: usize = 100;
+
 /// Rounds of variance components, and relative change that ends them.
 const ROUNDS: usize = 60;
 const STANDING: f64 = 1e-3;
@@ -135,31 +149,24 @@ const STANDING: f64 = 1e-3;
 /// Gauss-Newton steps at given weights, and the decrement (in sigma) that ends them.
 const STEPS: usize = 30;
 const DECREMENT: f64 = 1e-9;
+/// The same between rounds of variance components.
+const ROUGH_DECREMENT: f64 = 1e-4;
 
 impl ErrorModel {
     fn new(problem: &Problem, stage: &PoseStage, estimator: Estimator, noise: JointNoise) -> Option<Self> {
-        let n = stage.offset.len();
-        let blocks = stage.blocks();
-        let block_diagonal = || {
-            let mut v = DMatrix::zeros(n, n);
-            for (k, b) in blocks.iter().enumerate() {
-                v.fixed_view_mut::<6, 6>(6 * k, 6 * k).copy_from(b);
-            }
-            v
-        };
         let sizes = problem.noise.joint.len() * sizes_per_series(problem);
         let (first, estimated) = match noise {
             JointNoise::Estimated => (FIRST_JOINT_NOISE, true),
             JointNoise::Known(sigma) => (sigma, false),
         };
-        let (known, sizes, estimated) = match estimator {
-            Estimator::Isotropic => (DMatrix::zeros(n, n), vec![FIRST_ISOTROPIC; 2], true),
-            Estimator::Blocks => (DMatrix::zeros(n, n), vec![FIRST_FACTOR], true),
-            Estimator::BlocksAndRepeatability => (block_diagonal(), vec![first; sizes], estimated),
-            Estimator::FullAndRepeatability => (stage.covariance.clone(), vec![first; sizes], estimated),
+        let (together, sizes, estimated) = match estimator {
+            Estimator::Isotropic => (None, vec![FIRST_ISOTROPIC; 2], true),
+            Estimator::Blocks => (None, vec![FIRST_FACTOR], true),
+            Estimator::BlocksAndRepeatability => (None, vec![first; sizes], estimated),
+            Estimator::FullAndRepeatability => (Some(stage.covariance.clone()?), vec![first; sizes], estimated),
             Estimator::HardJoint | Estimator::Joint => return None,
         };
-        Some(Self { estimator, known, blocks, sizes, estimated })
+        Some(Self { estimator, together, blocks: stage.blocks.clone(), sizes, estimated })
     }
 
     /// Of a pose by itself.
@@ -207,35 +214,49 @@ impl ErrorModel {
         stage.images.chunk_by(|a, b| stop_of(a) == stop_of(b)).map(of_stop).collect()
     }
 
-    /// `V`.
-    fn covariance(&self, latents: &[Latent]) -> DMatrix<f64> {
-        let mut v = self.known.clone();
+    /// What is known of `V` about the poses of a latent.
+    fn known(&self, latent: &Latent) -> DMatrix<f64> {
+        let rows = latent.enters_by.nrows();
+        let mut known = DMatrix::zeros(rows, rows);
+        if self.estimator.has_joint_noise() {
+            for (k, block) in self.blocks[latent.first..latent.first + rows / 6].iter().enumerate() {
+                known.fixed_view_mut::<6, 6>(6 * k, 6 * k).copy_from(block);
+            }
+        }
+        known
+    }
+
+    /// `V`, in blocks as large as what is known of it.
+    fn covariance(&self, latents: &[Latent]) -> BlockDiagonal {
+        let mut v = match &self.together {
+            Some(whole) => BlockDiagonal::of([whole.clone()]),
+            None => BlockDiagonal::of(latents.iter().map(|l| self.known(l))),
+        };
         for l in latents {
             let variances = l.component.iter().zip(&l.beside).map(|(&c, beside)| self.sizes[c].powi(2) + beside);
             let sizes = DVector::from_iterator(l.component.len(), variances);
-            let (start, rows) = (6 * l.first, l.enters_by.nrows());
-            let mut block = v.view_mut((start, start), (rows, rows));
-            block += &l.enters_by * DMatrix::from_diagonal(&sizes) * l.enters_by.transpose();
+            v.add(6 * l.first, &(&l.enters_by * DMatrix::from_diagonal(&sizes) * l.enters_by.transpose()));
         }
         v
     }
 
     /// New sizes from the latents that the residuals ask for; returns the largest relative change.
     ///
-    /// `weighted` is `V^-1 (residual)`, `projected` is `V^-1` less what the parameters take.
+    /// `weighted` is `V^-1 (residual)`; `V^-1` less `taken` times its transpose is what the parameters leave of it.
     fn update(
         &mut self,
         problem: &Problem,
         kinds: &[crate::urdf::JointKind],
         latents: &[Latent],
         weighted: &DVector<f64>,
-        projected: &DMatrix<f64>,
+        (weight, taken): (&BlockDiagonal, &DMatrix<f64>),
     ) -> f64 {
         let mut tally = Tally::new(self.sizes.len());
         for l in latents {
             let (start, rows) = (6 * l.first, l.enters_by.nrows());
             let pull = l.enters_by.transpose() * weighted.rows(start, rows);
-            let share = l.enters_by.transpose() * projected.view((start, start), (rows, rows)) * &l.enters_by;
+            let of_taken = taken.rows(start, rows).tr_mul(&l.enters_by);
+            let share = l.enters_by.transpose() * weight.view(start, rows) * &l.enters_by - of_taken.tr_mul(&of_taken);
             for (a, &c) in l.component.iter().enumerate() {
                 let variance = self.sizes[c].powi(2);
                 tally.squares[c] += (variance * pull[a]).powi(2);
@@ -266,6 +287,19 @@ impl ErrorModel {
             }
         }
         change
+    }
+}
+
+impl ErrorModel {
+    /// Goes on from the sizes after a round to those where the rounds lead.
+    fn accelerate(&mut self, acceleration: &mut Acceleration, before: &[f64], change: f64) {
+        if change < STANDING {
+            return;
+        }
+        let smallest = if self.estimator.has_joint_noise() { JOINT_NOISE_FLOOR } else { f64::MIN_POSITIVE };
+        let logarithms = |sizes: &[f64]| DVector::from_iterator(sizes.len(), sizes.iter().map(|s| s.ln()));
+        let next = acceleration.next_after(change, &logarithms(before), logarithms(&self.sizes));
+        self.sizes.iter_mut().zip(next.iter()).for_each(|(size, next)| *size = next.exp().max(smallest));
     }
 }
 
@@ -317,8 +351,8 @@ struct Normal {
     weighted_jacobian: DMatrix<f64>,
 }
 
-fn normal(Adjustment { problem, state }: &Adjustment, p: &Predicted, weight: &DMatrix<f64>) -> Normal {
-    let weighted_jacobian = product(weight, &p.jacobian);
+fn normal(Adjustment { problem, state }: &Adjustment, p: &Predicted, weight: &BlockDiagonal) -> Normal {
+    let weighted_jacobian = weight.times(&p.jacobian);
     let mut information = product(&p.jacobian.transpose(), &weighted_jacobian);
     let mut rhs = weighted_jacobian.transpose() * &p.residual;
     let values = state.values(&problem.layout);
@@ -359,11 +393,12 @@ pub fn fit_poses(start: &Adjustment, stage: &PoseStage, estimator: Estimator, no
     let mut model = ErrorModel::new(&at.problem, stage, estimator, noise)?;
     let kinds = at.state.robot.chain.reading_kinds.clone();
     let mut standing = !model.estimated;
+    let mut acceleration = Acceleration::default();
     for round in 1.. {
         let p = predict(&at, stage)?;
         let latents = model.latents(&at.problem, stage, &p)?;
-        let weight = SymmetricFactor::new(&model.covariance(&latents)).ok()?.inverse();
-        gauss_newton(&mut at, stage, &weight)?;
+        let weight = model.covariance(&latents).inverse()?;
+        gauss_newton(&mut at, stage, &weight, if standing { DECREMENT } else { ROUGH_DECREMENT })?;
         let p = predict(&at, stage)?;
         let normal = normal(&at, &p, &weight);
         let covariance = SymmetricFactor::new(&normal.information).ok()?.inverse();
@@ -375,8 +410,12 @@ pub fn fit_poses(start: &Adjustment, stage: &PoseStage, estimator: Estimator, no
             };
             return Some(Estimate { estimator, state, covariance, components: model.sizes });
         }
-        let taken = product(&product(&normal.weighted_jacobian, &covariance), &normal.weighted_jacobian.transpose());
-        let change = model.update(&at.problem, &kinds, &latents, &(&weight * &p.residual), &(&weight - taken));
+        let root = covariance.cholesky()?.l();
+        let taken = product(&normal.weighted_jacobian, &root);
+        let weighted = weight.times_vector(&p.residual);
+        let before = model.sizes.clone();
+        let change = model.update(&at.problem, &kinds, &latents, &weighted, (&weight, &taken));
+        model.accelerate(&mut acceleration, &before, change);
         // Sizes that go to nothing never stand, but matter no more.
         standing = change < STANDING || round >= ROUNDS;
     }
@@ -417,13 +456,13 @@ fn zero_fixed(problem: &Problem, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Solves at given weights; `None` where the normal equations are singular.
-fn gauss_newton(at: &mut Adjustment, stage: &PoseStage, weight: &DMatrix<f64>) -> Option<()> {
+fn gauss_newton(at: &mut Adjustment, stage: &PoseStage, weight: &BlockDiagonal, decrement: f64) -> Option<()> {
     for _ in 0..STEPS {
         let p = predict(at, stage)?;
         let n = normal(at, &p, weight);
         let step = SymmetricFactor::new(&n.information).ok()?.solve(&n.rhs);
         at.state = moved(at, &step);
-        if step.dot(&n.rhs).max(0.0).sqrt() < DECREMENT {
+        if step.dot(&n.rhs).max(0.0).sqrt() < decrement {
             break;
         }
     }
@@ -438,7 +477,7 @@ pub fn linear_step(start: &Adjustment, stage: &PoseStage, sigma: f64) -> Option<
     let model = ErrorModel::new(problem, stage, Estimator::FullAndRepeatability, JointNoise::Known(sigma))?;
     let p = predict(start, stage)?;
     let latents = model.latents(problem, stage, &p)?;
-    let weight = SymmetricFactor::new(&model.covariance(&latents)).ok()?.inverse();
+    let weight = model.covariance(&latents).inverse()?;
     let n = normal(start, &p, &weight);
     let factor = SymmetricFactor::new(&n.information).ok()?;
     Some((factor.solve(&n.rhs), zero_fixed(problem, factor.inverse())))

@@ -23,6 +23,9 @@ pub use super::solution_bytes::{read, to_bytes};
 /// Name of the file.
 pub const FILE_NAME: &str = "solution.json";
 
+/// Name of the file with the time of every stage, which goes with a result and is no part of it.
+pub const TIMINGS: &str = "timings.json";
+
 /// Version of the format.
 pub const FORMAT: u32 = 2;
 

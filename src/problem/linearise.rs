@@ -88,6 +88,16 @@ pub fn predict(image: &Image, state: &State, pose: &Pose, observation: &Measured
 
 /// Normal-equation blocks of one image at a camera pose; `None` where an observed marker is behind the camera.
 pub fn linearise(image: &Image, state: &State, pose: &Pose, weighting: &Weighting) -> Option<ImageTerms> {
+    linearise_with_equations(image, state, pose, weighting).map(|(terms, _)| terms)
+}
+
+/// As [`linearise`], with the equations that the blocks are sums of.
+pub fn linearise_with_equations(
+    image: &Image,
+    state: &State,
+    pose: &Pose,
+    weighting: &Weighting,
+) -> Option<(ImageTerms, Equations)> {
     let mut cost = 0.0;
     let mut residuals = Vec::with_capacity(image.observations.len());
     let tell = |share, residual| {
@@ -100,7 +110,7 @@ pub fn linearise(image: &Image, state: &State, pose: &Pose, weighting: &Weightin
     )?;
     let camera = &state.cameras[image.camera];
     let field = camera.parameters.len() - camera.parametric();
-    Some(ImageTerms::new(cost, &equations, field, residuals))
+    Some((ImageTerms::new(cost, &equations, field, residuals), equations))
 }
 
 /// The equations that [`linearise`] sums up.

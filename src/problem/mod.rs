@@ -29,7 +29,9 @@ pub use family::Family;
 pub use given::Problem;
 pub use image::Image;
 pub use layout::{Column, Layout, OriginPrior};
-pub use linearise::{Chained, ImageTerms, Residual, Weighting, equations, linearise, predict};
+pub use linearise::{
+    Chained, ImageTerms, Residual, Weighting, equations, linearise, linearise_with_equations, predict,
+};
 pub use measured::{Mark, Measured};
 pub use measured_series::{LensChoice, MeasuredSeries, MeasuredStop};
 pub use noise::Noise;

@@ -61,7 +61,7 @@ impl StopsEliminated {
             for (k, image) in stop.places().zip(stop.images()) {
                 let equations = if seen.order.is_empty() { None } else { image.equations() };
                 equations.iter().for_each(|e| coupling.add(image, &seen, e));
-                own.push(Coupled::new(image, poses.coupling.rows(6 * k, 6), (dense, &seen, equations.as_ref())));
+                own.push(Coupled::new(image, poses.coupling.rows(6 * k, 6), (dense, &seen, equations.as_deref())));
             }
             blocks.push(Block::new(&stop, &own, lambda));
         }

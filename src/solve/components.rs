@@ -3,12 +3,13 @@
 //! `s^2 = sum r^2 / (redundancy)`: every group of residuals is divided by the number of them that the parameters did not use up.
 //! For joint noise the redundancy of one latent is `1 - C / sigma^2` with its posterior variance C. Started from above.
 
-use nalgebra::Matrix3;
+use nalgebra::{DVector, Matrix3};
 
+use super::acceleration::Acceleration;
 use super::fit::Fit;
 use super::levenberg::{Outcome, Settings, Status, solve};
 use super::linear::{LinearImage, LinearStop};
-use crate::problem::{Adjustment, Noise, Tie};
+use crate::problem::{Adjustment, Noise, Problem, Tie};
 use crate::urdf::JointKind;
 
 /// What is estimated and how long.
@@ -56,6 +57,7 @@ pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Out
     let rough = Settings { decrement: ROUGH_DECREMENT.max(options.settings.decrement), ..options.settings };
     let mut outcome = solve(start, &rough);
     let mut iterations = outcome.iterations;
+    let mut acceleration = Acceleration::default();
     for round in 0..options.rounds {
         let mut fit = match outcome.fit() {
             Ok(fit) => fit,
@@ -64,7 +66,13 @@ pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Out
                 break;
             }
         };
+        let before = sizes(&mut fit.problem);
         let change = fit.update_components(options);
+        if change >= CONVERGED {
+            let next = acceleration.next_after(change, &before, sizes(&mut fit.problem));
+            set_sizes(&mut fit.problem, &next);
+            fit.hold_component_priors();
+        }
         let noise = &fit.problem.noise;
         tracing::debug!(round, change, pixel = ?noise.pixel_factor, joint = ?noise.joint, "variance components");
         outcome = solve(fit.adjustment, &rough);
@@ -82,6 +90,29 @@ pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Out
         }
     }
     Outcome { iterations, ..outcome }
+}
+
+/// Every component that is not zero, with its smallest value.
+fn components(problem: &mut Problem) -> impl Iterator<Item = (&mut f64, f64)> {
+    let Noise { pixel_factor, joint, local, tilt, marker } = &mut problem.noise;
+    let factors = pixel_factor.iter_mut().chain(marker).map(|s| (s, f64::MIN_POSITIVE));
+    let sizes = joint.iter_mut().flatten().chain(local).chain(tilt).map(|s| (s, JOINT_NOISE_FLOOR));
+    let families = problem.families.iter_mut().map(|f| (&mut f.factor, SMALLEST_FACTOR));
+    factors.chain(sizes).chain(families).filter(|(s, _)| **s > 0.0)
+}
+
+/// Logarithms of all components.
+fn sizes(problem: &mut Problem) -> DVector<f64> {
+    DVector::from_vec(components(problem).map(|(s, _)| s.ln()).collect())
+}
+
+/// Takes over components from their logarithms, none below its smallest value; those that were given stay as they are.
+fn set_sizes(problem: &mut Problem, logarithms: &DVector<f64>) {
+    for ((size, smallest), logarithm) in components(problem).zip(logarithms.iter()) {
+        if *logarithm != size.ln() {
+            *size = logarithm.exp().max(smallest);
+        }
+    }
 }
 
 impl Fit {

@@ -92,6 +92,7 @@ impl fmt::Display for NoFit {
     }
 }
 
+/// Damping of the first step of the approach.
 const FIRST_LAMBDA: f64 = 1e-6;
 /// Relative rounding of a cost summed over thousands of residuals.
 const ROUNDING: f64 = 1e-12;
@@ -105,6 +106,10 @@ const ENOUGH: usize = 32;
 const WORTH_A_STEP: f64 = 0.1;
 /// A model serves for the next step, too, while steps shrink at least this much from one to the next.
 const CONTRACTION: f64 = 0.1;
+
+/// Damping after a step that raised the cost, at least. Priors alone tell of some directions, a billionth of what images tell of others: more
+/// damping than that holds them up, and the short steps look like the end.
+const LAMBDA_IF_REFUSED: f64 = 1e-9;
 
 /// Damping where the information was not positive definite, at least.
 const LAMBDA_IF_SINGULAR: f64 = 1e-3;
@@ -156,7 +161,10 @@ impl Proposer {
                 return Some(Proposal { kept: true, ..proposal });
             }
         }
-        let model = Model::new(Elimination::cheaper(linear), linear, lambda)?;
+        let plates = &linear.adjustment.problem.plates;
+        let are_held = plates.iter().flat_map(|p| &p.markers).all(|m| m.sigma_m == 0.0);
+        let which = if are_held { Elimination::StopsMarkersHeld } else { Elimination::cheaper(linear) };
+        let model = Model::new(which, linear, lambda)?;
         let proposal = model.proposal(linear);
         self.model = Some(model);
         Some(proposal)
@@ -248,7 +256,7 @@ pub fn solve(mut adjustment: Adjustment, settings: &Settings) -> Outcome {
     let Some(mut lin) = linearised else {
         return Outcome { status: Status::BadStart, adjustment, linearised: None, iterations };
     };
-    let mut lambda = FIRST_LAMBDA;
+    let mut lambda = SMALLEST_LAMBDA;
     let mut status = Status::OutOfIterations;
     let mut proposer = Proposer::default();
     while iterations < settings.iterations && lambda <= LARGEST_LAMBDA {
@@ -278,7 +286,7 @@ pub fn solve(mut adjustment: Adjustment, settings: &Settings) -> Outcome {
             }
             proposer.refused();
             if !kept {
-                lambda = raised(lambda, FIRST_LAMBDA);
+                lambda = raised(lambda, LAMBDA_IF_REFUSED);
             }
         }
     }

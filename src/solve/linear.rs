@@ -1,6 +1,8 @@
 //! An adjustment linearised at its state.
 
+use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, SMatrix, Vector3};
 use rayon::prelude::*;
@@ -8,7 +10,7 @@ use rayon::prelude::*;
 use crate::model::plate_modes::MODES;
 use crate::problem::{
     Adjustment, Chained, Equations, Image, ImageTerms, PlateDistance, Problem, State, Step, Stop, Tie, Weighting,
-    equations, linearise,
+    equations, linearise_with_equations,
 };
 
 /// Blocks of all images, linearised at one state.
@@ -26,9 +28,22 @@ pub struct Linearised {
     pub distances: Vec<PlateDistance>,
     /// Robust cost of the pixels plus half the squares of priors, of what is latent at stops and of measured distances.
     pub cost: f64,
+    /// Equations of each image in use, which the system is built from; empty where they are too many to keep.
+    equations: Arc<[Equations]>,
 }
 
+/// One image as it is linearised, with its equations where they are kept.
+type Part = ((ImageTerms, Chained), Option<Equations>);
+
+/// Observations up to which their equations are kept, which takes about 60 MB.
+const MOST_KEPT: usize = 120_000;
+
 impl Linearised {
+    /// Without what only the solver needs.
+    pub fn without_equations(self) -> Self {
+        Self { equations: Arc::default(), ..self }
+    }
+
     /// Pixel blocks and chain of an image by its index; `None` for one that takes no part.
     pub fn of(&self, image: usize) -> Option<(&ImageTerms, &Chained)> {
         let k = self.images.binary_search(&image).ok()?;
@@ -66,6 +81,8 @@ pub struct LinearImage<'a> {
     joints: usize,
     /// Place of its tie among what is latent at its stop.
     tie_start: usize,
+    /// Its equations, where they are kept.
+    equations: Option<&'a Equations>,
 }
 
 /// One stop of a linear problem. Latent at it are the errors of its readings, then the ties of its images.
@@ -94,23 +111,34 @@ impl Adjustment {
         let Self { problem, state } = self;
         let images: Vec<usize> = problem.used().map(|(i, _)| i).collect();
         let origins = state.robot.linear_origins();
-        let parts: Option<Vec<(ImageTerms, Chained)>> = images
+        let observations = images.iter().map(|&i| problem.images[i].observations.len()).sum::<usize>();
+        let are_kept = enough == usize::MAX && observations <= MOST_KEPT;
+        let parts: Option<Vec<Part>> = images
             .par_iter()
             .map(|&i| {
                 let image = &problem.images[i];
                 let chain = state.chained_from(&origins, &problem.layout, image, self.taken_from(i))?;
                 let weighting = Weighting::of(problem, image).thinned(image, enough);
-                let terms = linearise(image, state, &chain.pose, &weighting)?;
-                Some((terms, chain))
+                let (terms, equations) = linearise_with_equations(image, state, &chain.pose, &weighting)?;
+                Some(((terms, chain), are_kept.then_some(equations)))
             })
             .collect();
-        let (terms, chains): (Vec<_>, Vec<_>) = parts?.into_iter().unzip();
+        let (parts, equations): (Vec<_>, Vec<_>) = parts?.into_iter().unzip();
+        let (terms, chains): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
         let pixels: f64 = terms.iter().map(|t| t.cost).sum();
         let stops = self.stops_of(&images);
         let distances = self.distances(&images, &terms);
         let measured: f64 = distances.iter().map(|d| 0.5 * d.residual * d.residual).sum();
         let cost = pixels + self.prior_cost(&images, &stops) + measured;
-        cost.is_finite().then_some(Linearised { images, stops, terms, chains, distances, cost })
+        cost.is_finite().then_some(Linearised {
+            images,
+            stops,
+            terms,
+            chains,
+            distances,
+            cost,
+            equations: equations.into_iter().flatten().collect(),
+        })
     }
 
     /// Measured distances of the plates that some images show.
@@ -192,7 +220,8 @@ impl<'a> LinearProblem<'a> {
         let before = lin.images[lin.stops[stop].1.start..k].iter();
         let tie_start = joints + before.map(|&i| state.ties[i].len()).sum::<usize>();
         let (terms, chain) = (&lin.terms[k], &lin.chains[k]);
-        LinearImage { problem, state, index, image, tie, terms, chain, stop, joints, tie_start }
+        let equations = lin.equations.get(k);
+        LinearImage { problem, state, index, image, tie, terms, chain, stop, joints, tie_start, equations }
     }
 
     /// Right-hand side of the dense columns, without their priors.
@@ -210,15 +239,19 @@ impl<'a> LinearProblem<'a> {
     }
 }
 
-impl LinearImage<'_> {
+impl<'a> LinearImage<'a> {
     /// Columns that act on it directly and not through its pose, in the order of its blocks; `None` for padding.
     pub fn columns(&self) -> Vec<Option<usize>> {
         self.problem.layout.intrinsics(self.image)
     }
 
     /// The equations that its blocks are sums of.
-    pub fn equations(&self) -> Option<Equations> {
-        equations(self.image, self.state, &self.chain.pose, &Weighting::of(self.problem, self.image))
+    pub fn equations(&self) -> Option<Cow<'a, Equations>> {
+        if let Some(kept) = self.equations {
+            return Some(Cow::Borrowed(kept));
+        }
+        let own = equations(self.image, self.state, &self.chain.pose, &Weighting::of(self.problem, self.image));
+        own.map(Cow::Owned)
     }
 
     /// Places, among what is latent at its stop, of the unknowns that move its pose, in the order of the columns of

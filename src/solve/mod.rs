@@ -1,5 +1,6 @@
 //! The solver: block elimination, Levenberg-Marquardt, variance components, rejection.
 
+mod acceleration;
 mod blocks;
 mod by_markers;
 mod by_stops;
@@ -17,6 +18,7 @@ mod snoop;
 mod system;
 mod unidentified_noise;
 
+pub use acceleration::Acceleration;
 pub use blocks::SeenMarkers;
 pub use components::{ComponentOptions, JOINT_NOISE_FLOOR, Tally, estimate_components, share_out};
 pub use covariance::Covariance;

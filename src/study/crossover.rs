@@ -173,14 +173,15 @@ fn reference(request: &StudyRequest, lattice: (u32, u32)) -> Result<Scale> {
         let Some(posture) = problem.posture(i) else { continue };
         let from = TakenFrom::rigid(posture, &exact);
         let Some(chain) = state.chained(&problem.layout, &problem.images[i], from) else { continue };
-        let block = stage.covariance.view((6 * k, 6 * k), (6, 6)).into_owned();
-        let position = |pose: &Pose, c: nalgebra::DMatrix<f64>| {
+        let position = |pose: &Pose, c: &nalgebra::Matrix6<f64>| {
             let ad = adjoint(pose);
-            let turned = ad * nalgebra::Matrix6::from_column_slice(c.as_slice()) * ad.transpose();
+            let turned = ad * c * ad.transpose();
             ((0..3).map(|a| turned[(a, a)]).sum::<f64>() / 3.0).sqrt()
         };
-        poses.push(position(&stage.references[k], block));
-        levers.push(position(&chain.pose, &chain.d_latent * chain.d_latent.transpose()));
+        poses.push(position(&stage.references[k], &stage.blocks[k]));
+        let by_latents = &chain.d_latent * chain.d_latent.transpose();
+        let by_latents = nalgebra::Matrix6::from_column_slice(by_latents.as_slice());
+        levers.push(position(&chain.pose, &by_latents));
     }
     Ok(Scale { pose_m: median(&poses).ok_or_else(unsolved)?, lever_m: median(&levers).ok_or_else(unsolved)? })
 }

@@ -14,6 +14,7 @@ mod moved_in_time;
 mod normal_equations;
 mod plate_size;
 mod real_tracker;
+mod refits;
 mod second_pass;
 mod solver_laws;
 mod two_stage;

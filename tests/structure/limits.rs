@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 /// Constants that decide no verdict, with what they are instead.
-const NUMERICAL: [(&str, &str); 43] = [
+const NUMERICAL: [(&str, &str); 48] = [
     ("assess/advice.rs BASES", "stops that are varied"),
     ("assess/advice.rs MOST_NEXT", "how many proposals are kept"),
     ("assess/advice.rs VALUES", "grid of the search"),
@@ -33,9 +33,12 @@ const NUMERICAL: [(&str, &str); 43] = [
     ("identify/build.rs FIRST_JOINT_NOISE", "first guess"),
     ("identify/build.rs FIRST_TILT", "first guess"),
     ("identify/build.rs HUBER", "loss function of the solver"),
+    ("identify/evidence.rs DECREMENT", "convergence"),
     ("identify/free_poses.rs GOOD_START_PX", "saves starts; the best one counts"),
     ("identify/free_poses.rs ROUNDS", "most iterations"),
+    ("identify/free_poses.rs START_DECREMENT", "convergence"),
     ("identify/joint.rs ROUNDS", "most iterations"),
+    ("identify/lens_choice.rs DECREMENT", "convergence"),
     ("identify/lens_choice.rs KEPT_ASIDE", "how the hold-out is divided"),
     ("identify/lens_choice.rs OUTLIERS", "trimming of an estimator"),
     ("identify/lens_choice.rs ROUNDS", "most iterations"),
@@ -46,7 +49,9 @@ const NUMERICAL: [(&str, &str); 43] = [
     ("identify/two_stage.rs FIRST_FACTOR", "first guess"),
     ("identify/two_stage.rs FIRST_ISOTROPIC", "first guess"),
     ("identify/two_stage.rs FIRST_JOINT_NOISE", "first guess"),
+    ("identify/two_stage.rs MOST_TOGETHER", "bounds the work; what it leaves out is none of the result"),
     ("identify/two_stage.rs ROUNDS", "most iterations"),
+    ("identify/two_stage.rs ROUGH_DECREMENT", "convergence"),
     ("identify/two_stage.rs STANDING", "convergence"),
     ("identify/two_stage.rs STEPS", "most iterations"),
 ];

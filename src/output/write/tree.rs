@@ -62,6 +62,7 @@ pub(super) fn earlier_files(target: &Path) -> Option<BTreeSet<String>> {
         let path = target.join(name);
         let bytes = path.symlink_metadata().is_ok_and(|m| !m.is_dir()).then(|| fs::read(&path).ok())??;
         let mut files = serde_json::from_slice::<Listed>(&bytes).ok()?.files;
+        files.insert(solution_json::TIMINGS.to_owned());
         if files.remove(OVERLAY_FOLDER) {
             files.extend(pictures(&bytes));
         }
