@@ -138,4 +138,5 @@ def main():
         row(binary, folder)
 
 
-main()
+if __name__ == "__main__":
+    main()

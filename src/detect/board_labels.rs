@@ -22,6 +22,18 @@ pub(super) struct BoardSize {
     pub rows: i32,
 }
 
+impl BoardSize {
+    /// Quarter turns and colours of the first square (whether light) under which the board may be seen.
+    ///
+    /// With an odd and an even number of columns and rows the first square is dark, which settles the turn; else half a turn keeps the
+    /// colours, and boards of both colours are printed. A square board with odd numbers has dark and light corners.
+    fn looks(self) -> impl Iterator<Item = (u8, bool)> {
+        let odd = |n: i32| n % 2 == 1;
+        let fixed = odd(self.columns) != odd(self.rows) || (odd(self.rows) && self.columns == self.rows);
+        (0..4).flat_map(move |turns| [false, true].into_iter().take(if fixed { 1 } else { 2 }).map(move |light| (turns, light)))
+    }
+}
+
 /// Corners in pixels by lattice coordinates (u to the right, v down).
 pub(super) type Lattice = BTreeMap<(i32, i32), [f64; 2]>;
 
@@ -31,8 +43,8 @@ pub(super) struct Placement {
     board: BoardSize,
     /// Quarter turns of the board in the image.
     turns: u8,
-    /// Whether the image shows the board mirrored.
-    mirrored: bool,
+    /// Whether the board's first square is light.
+    light_first: bool,
     /// Least lattice coordinates of the board's corners.
     origin: (i32, i32),
 }
@@ -54,8 +66,6 @@ pub(super) enum Labelling {
     Symmetric(Placement),
     /// Different parts of the board agree equally well: too little of its outline is seen.
     Ambiguous,
-    /// The mirrored board agrees better with the colours.
-    Mirrored,
     /// No placement agrees with the colours, or the lattice is larger than the board.
     Contradiction,
 }
@@ -63,7 +73,7 @@ pub(super) enum Labelling {
 impl Placement {
     /// Lattice coordinates that are board coordinates already.
     pub fn identity(board: BoardSize) -> Self {
-        Self { board, turns: 0, mirrored: false, origin: (0, 0) }
+        Self { board, turns: 0, light_first: false, origin: (0, 0) }
     }
 
     /// Extent of the board along u and v.
@@ -74,12 +84,8 @@ impl Placement {
 
     /// Board coordinates (column, row) of a lattice corner, also off the board.
     fn board_from_lattice(self, (u, v): (i32, i32)) -> (i32, i32) {
-        let (width, _) = self.extent();
         let BoardSize { columns, rows } = self.board;
-        let (mut a, b) = (u - self.origin.0, v - self.origin.1);
-        if self.mirrored {
-            a = width - 1 - a;
-        }
+        let (a, b) = (u - self.origin.0, v - self.origin.1);
         match self.turns % 4 {
             0 => (a, b),
             1 => (b, rows - 1 - a),
@@ -104,7 +110,7 @@ impl Placement {
     /// Whether the square whose corners of least u and v is `cell` is dark.
     pub fn is_dark(self, (u, v): (i32, i32)) -> bool {
         let (a, b) = (self.board_from_lattice((u, v)), self.board_from_lattice((u + 1, v + 1)));
-        (a.0.min(b.0) + a.1.min(b.1)).rem_euclid(2) == 0
+        ((a.0.min(b.0) + a.1.min(b.1)).rem_euclid(2) == 0) != self.light_first
     }
 
     /// Lattice cells of all squares of the board.
@@ -149,16 +155,12 @@ fn has_blank_line(shades: &Shades, placement: Placement) -> bool {
 }
 
 fn choose(lattice: &Lattice, shades: &Shades, board: BoardSize) -> Labelling {
-    let scored = candidates(lattice, shades, board, false);
+    let scored = candidates(lattice, shades, board);
     let Some(best) = scored.first().filter(|s| s.agreement >= LEAST_AGREEMENT) else {
         return Labelling::Contradiction;
     };
     // A shift past the edge of the board costs at least half a row of squares in the wrong colour; half of that is asked for.
     let margin = 0.25 * (WRONG_COLOUR - 1.0) * f64::from(board.columns.min(board.rows) + 1);
-    let reflected = candidates(lattice, shades, board, true);
-    if reflected.first().is_some_and(|s| s.score > best.score + margin) {
-        return Labelling::Mirrored;
-    }
     if goes_on(lattice, best.placement) {
         return Labelling::Contradiction;
     }
@@ -184,14 +186,14 @@ fn goes_on(lattice: &Lattice, placement: Placement) -> bool {
 }
 
 /// Placements that cover at least half of the lattice, best first.
-fn candidates(lattice: &Lattice, shades: &Shades, board: BoardSize, mirrored: bool) -> Vec<Scored> {
+fn candidates(lattice: &Lattice, shades: &Shades, board: BoardSize) -> Vec<Scored> {
     let Some((low, high)) = bounds(lattice) else { return Vec::new() };
     let mut all = Vec::new();
-    for turns in 0..4 {
-        let (width, height) = Placement { board, turns, mirrored, origin: (0, 0) }.extent();
+    for (turns, light_first) in board.looks() {
+        let (width, height) = Placement { board, turns, light_first, origin: (0, 0) }.extent();
         for v in low.1 - height + 1..=high.1 {
             for u in low.0 - width + 1..=high.0 {
-                let placement = Placement { board, turns, mirrored, origin: (u, v) };
+                let placement = Placement { board, turns, light_first, origin: (u, v) };
                 let corners = lattice.keys().filter(|&&k| placement.id(k).is_some()).count();
                 if 2 * corners >= lattice.len() {
                     all.push(score(placement, corners, shades));

@@ -10,8 +10,7 @@ use calib_targets_core::GrayImageView;
 
 use super::board_labels::{BoardSize, Lattice, Placement};
 use super::chessboard::{WINDOW, board_size, corner_config, to_8_bit};
-use super::corners::measure;
-use super::saddle::Window;
+use super::corners::{Window, measure};
 use super::{Detection, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::Plate;

@@ -7,8 +7,7 @@ use calib_targets_chessboard::{ChessboardDetector, ChessboardParams, detect_corn
 use calib_targets_core::{DetectorConfig, GrayImageView, ImageRefiner, default_chess_config};
 
 use super::board_labels::{BoardSize, Label, Labelling, Lattice, label};
-use super::corners::measure;
-use super::saddle::Window;
+use super::corners::{Window, measure};
 use super::{Detection, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::Plate;
@@ -38,7 +37,6 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
             placement
         }
         Labelling::Ambiguous => return Err(ambiguous()),
-        Labelling::Mirrored => return Err(mirrored()),
         Labelling::Contradiction => return Err(contradiction(board)),
     };
     if blank_line {
@@ -127,15 +125,6 @@ fn ambiguous() -> Error {
         "image",
         "too little of the chessboard's outline is in view to tell which part of the board it is",
         "take the image so that at least two neighbouring sides of the board are in view",
-    )
-}
-
-fn mirrored() -> Error {
-    Error::new(
-        Code::PlateMirrored,
-        "image",
-        "the chessboard is mirrored, or its top-left square is light",
-        "turn off mirroring in the camera or in the image export; the plate's first square must be dark",
     )
 }
 

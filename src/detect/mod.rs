@@ -14,7 +14,6 @@ mod load;
 mod picture;
 mod quads;
 mod run;
-mod saddle;
 mod tag_code;
 pub mod tags;
 

@@ -1,9 +1,19 @@
 //! From a labelled lattice of corners to observations.
 
-use std::collections::BTreeMap;
+mod fit;
+mod look;
+mod model;
+mod noise;
+mod smooth;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+pub(super) use fit::Window;
+use fit::{Refusal, Saddle, Seed};
+use look::{Sight, quantile};
+use noise::Correlation;
 
 use super::board_labels::{Lattice, Placement};
-use super::saddle::{Saddle, Seed, Window, refine};
 use super::{Detection, Dropped, Picture};
 use crate::geom::PlaneMap;
 use crate::series::{Edge, Observation};
@@ -21,42 +31,50 @@ const LEAST_DISTURBED: f64 = 0.06;
 
 /// Sub-pixel positions of all corners of the board, also of those that the lattice finder left out.
 pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement, window: Window) -> Detection {
+    let view = Sight::of(picture, lattice, window);
     let mut detection = Detection::default();
     let mut fitted = BTreeMap::new();
+    let mut retry = BTreeMap::new();
     for (&key, &uv) in lattice {
-        let seed = seed(lattice, key, REACH).ok_or("no neighbours");
-        match seed.and_then(|seed| refine(picture, &seed, window)) {
-            _ if placement.id(key).is_none() => detection.dropped.push(Dropped::point(uv, "off the board")),
+        if placement.id(key).is_none() {
+            detection.dropped.push(Dropped::point(uv, "off the board"));
+            continue;
+        }
+        match seed(lattice, key, REACH).ok_or(Refusal::NoNeighbours).and_then(|seed| view.fit(&seed)) {
             Ok(saddle) => drop(fitted.insert(key, saddle)),
-            Err(reason) => detection.dropped.push(Dropped::point(uv, reason)),
+            Err(refusal) if refusal.may_pass() => drop(retry.insert(key, Dropped::point(uv, refusal.reason()))),
+            Err(refusal) => detection.dropped.push(Dropped::point(uv, refusal.reason())),
         }
     }
     let usual = Usual::of(&fitted);
     let mut kept = BTreeMap::new();
+    let mut closed: BTreeSet<(i32, i32)> = lattice.keys().copied().filter(|key| !retry.contains_key(key)).collect();
     for (key, saddle) in fitted {
         match usual.fault(key, &saddle, placement) {
             None => drop(kept.insert(key, saddle)),
             Some(reason) => detection.dropped.push(Dropped::point(saddle.uv, reason)),
         }
     }
-    let missing = Missing { picture, lattice, placement, window, usual: &usual };
-    missing.find(&mut kept);
+    closed.extend(kept.keys());
+    Missing { view: &view, closed, placement, usual: &usual }.find(&mut kept);
+    detection.dropped.extend(retry.into_iter().filter(|(key, _)| !kept.contains_key(key)).map(|(_, dropped)| dropped));
+    let correlation = Correlation::of(kept.values());
     for (key, saddle) in kept {
         if let Some(marker) = placement.id(key) {
-            let (uv, covariance) = (saddle.uv, Some(saddle.covariance));
-            detection.observations.push(Observation { marker, edge: Edge::Outer, uv, covariance });
+            let covariance = Some(correlation.covariance(&saddle));
+            detection.observations.push(Observation { marker, edge: Edge::Outer, uv: saddle.uv, covariance });
         }
     }
     detection.observations.sort_by_key(|o| o.marker);
     detection
 }
 
-/// The search for corners that the lattice lacks.
+/// The search for corners that the lattice lacks, or whose first start led nowhere.
 struct Missing<'a> {
-    picture: &'a Picture,
-    lattice: &'a Lattice,
+    view: &'a Sight<'a>,
+    /// Corners that are found, or are none.
+    closed: BTreeSet<(i32, i32)>,
     placement: Placement,
-    window: Window,
     usual: &'a Usual,
 }
 
@@ -69,7 +87,7 @@ impl Missing<'_> {
             let found: Vec<_> = self
                 .placement
                 .corners()
-                .filter(|key| !known.contains_key(key) && !self.lattice.contains_key(key))
+                .filter(|key| !known.contains_key(key) && !self.closed.contains(key))
                 .filter_map(|key| Some((key, self.fit(&known, key, reach)?)))
                 .collect();
             if found.is_empty() && reach == FAR_REACH {
@@ -82,7 +100,7 @@ impl Missing<'_> {
     }
 
     fn fit(&self, known: &Lattice, key: (i32, i32), reach: i32) -> Option<Saddle> {
-        let saddle = refine(self.picture, &seed(known, key, reach)?, self.window).ok()?;
+        let saddle = self.view.fit(&seed(known, key, reach)?).ok()?;
         self.usual.fault(key, &saddle, self.placement).is_none().then_some(saddle)
     }
 }
@@ -117,9 +135,7 @@ impl Usual {
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+    quantile(values, 0.5).unwrap_or(0.0)
 }
 
 /// A corner with the directions and lengths of the edges there, from the map of its neighbourhood.
