@@ -15,6 +15,11 @@ const WRONG_COLOUR: f64 = 3.0;
 /// Least mean agreement (-1 to 1) of the visible squares.
 const LEAST_AGREEMENT: f64 = 0.65;
 
+/// Corners further from the map of all than this share of a square show that the lens bends the board.
+const BENT: f64 = 0.1;
+/// Corners that a map of a neighbourhood needs.
+const LEAST_LOCAL: usize = 6;
+
 /// Number of inner corners of the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct BoardSize {
@@ -30,7 +35,9 @@ impl BoardSize {
     fn looks(self) -> impl Iterator<Item = (u8, bool)> {
         let odd = |n: i32| n % 2 == 1;
         let fixed = odd(self.columns) != odd(self.rows) || (odd(self.rows) && self.columns == self.rows);
-        (0..4).flat_map(move |turns| [false, true].into_iter().take(if fixed { 1 } else { 2 }).map(move |light| (turns, light)))
+        (0..4).flat_map(move |turns| {
+            [false, true].into_iter().take(if fixed { 1 } else { 2 }).map(move |light| (turns, light))
+        })
     }
 }
 
@@ -47,14 +54,6 @@ pub(super) struct Placement {
     light_first: bool,
     /// Least lattice coordinates of the board's corners.
     origin: (i32, i32),
-}
-
-/// Where the lattice lies on the board.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Label {
-    pub labelling: Labelling,
-    /// Whether a whole line of squares is in view but not of the board's colours.
-    pub blank_line: bool,
 }
 
 /// What the colours say about where the lattice lies on the board.
@@ -107,6 +106,19 @@ impl Placement {
         (v0..v0 + height).flat_map(move |v| (u0..u0 + width).map(move |u| (u, v)))
     }
 
+    /// Lattice coordinates of the lines of corners, from each of the four sides inwards.
+    pub fn lines_inwards(self) -> [Vec<Vec<(i32, i32)>>; 4] {
+        let ((u0, v0), (width, height)) = (self.origin, self.extent());
+        let row = |v: i32| (u0..u0 + width).map(|u| (u, v)).collect();
+        let column = |u: i32| (v0..v0 + height).map(|v| (u, v)).collect();
+        [
+            (v0..v0 + height).map(row).collect(),
+            (v0..v0 + height).rev().map(row).collect(),
+            (u0..u0 + width).map(column).collect(),
+            (u0..u0 + width).rev().map(column).collect(),
+        ]
+    }
+
     /// Whether the square whose corners of least u and v is `cell` is dark.
     pub fn is_dark(self, (u, v): (i32, i32)) -> bool {
         let (a, b) = (self.board_from_lattice((u, v)), self.board_from_lattice((u + 1, v + 1)));
@@ -131,27 +143,11 @@ struct Scored {
 }
 
 /// Finds where the lattice lies on the board from the colours of the squares.
-pub(super) fn label(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Label {
+pub(super) fn label(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Labelling {
     let Some(shades) = Shades::read(picture, lattice, board.columns.max(board.rows) + 1) else {
-        return Label { labelling: Labelling::Contradiction, blank_line: false };
+        return Labelling::Contradiction;
     };
-    let labelling = choose(lattice, &shades, board);
-    let blank_line = match labelling {
-        Labelling::Unique(placement) | Labelling::Symmetric(placement) => has_blank_line(&shades, placement),
-        _ => false,
-    };
-    Label { labelling, blank_line }
-}
-
-/// Whether the dark squares of a whole line of the board, as far as they are in view, are not dark.
-fn has_blank_line(shades: &Shades, placement: Placement) -> bool {
-    let ((u0, v0), (width, height)) = (placement.origin, placement.extent());
-    let blank = |line: &mut dyn Iterator<Item = (i32, i32)>| {
-        let dark: Vec<f64> = line.filter(|&cell| placement.is_dark(cell)).filter_map(|cell| shades.at(cell)).collect();
-        dark.len() >= 2 && dark.iter().all(|&shade| shade > 0.0)
-    };
-    (u0 - 1..u0 + width).any(|u| blank(&mut (v0 - 1..v0 + height).map(|v| (u, v))))
-        || (v0 - 1..v0 + height).any(|v| blank(&mut (u0 - 1..u0 + width).map(|u| (u, v))))
+    choose(lattice, &shades, board)
 }
 
 fn choose(lattice: &Lattice, shades: &Shades, board: BoardSize) -> Labelling {
@@ -234,15 +230,14 @@ impl Shades {
     /// Reads the cells up to `reach` beyond the lattice.
     fn read(picture: &Picture, lattice: &Lattice, reach: i32) -> Option<Self> {
         let (low, high) = bounds(lattice)?;
-        let pairs: Vec<_> = lattice.iter().map(|(&(u, v), &uv)| ([f64::from(u), f64::from(v)], uv)).collect();
-        let map = PlaneMap::fit(&pairs)?;
+        let maps = Maps::of(lattice)?;
         let inner = inner_cells(picture, lattice);
         let origin = (low.0 - reach, low.1 - reach);
         let (width, height) = (high.0 - low.0 + 2 * reach + 1, high.1 - low.1 + 2 * reach + 1);
         let cells = (0..height).flat_map(|j| (0..width).map(move |i| (origin.0 + i, origin.1 + j)));
         let values = cells
             .map(|cell| {
-                let centre = map.apply([f64::from(cell.0) + 0.5, f64::from(cell.1) + 0.5])?;
+                let centre = maps.centre(cell)?;
                 relative_shade(brightness(picture, centre)?, cell, &inner)
             })
             .collect();
@@ -255,6 +250,48 @@ impl Shades {
             return None;
         }
         self.values.get(usize::try_from(j * self.width + i).ok()?).copied().flatten()
+    }
+}
+
+/// From the lattice to the picture: one map where it holds everywhere, else the map of the neighbourhood.
+struct Maps<'a> {
+    lattice: &'a Lattice,
+    whole: PlaneMap,
+    bent: bool,
+}
+
+impl<'a> Maps<'a> {
+    fn of(lattice: &'a Lattice) -> Option<Self> {
+        let pairs: Vec<_> = lattice.iter().map(|(&(u, v), &uv)| ([f64::from(u), f64::from(v)], uv)).collect();
+        let whole = PlaneMap::fit(&pairs)?;
+        let off = |(at, uv): &([f64; 2], [f64; 2])| {
+            let (Some(p), Some([x, y])) = (whole.apply(*at), whole.jacobian(*at)) else { return f64::INFINITY };
+            let side = x[0].hypot(y[0]).min(x[1].hypot(y[1]));
+            (p[0] - uv[0]).hypot(p[1] - uv[1]) / side
+        };
+        let bent = pairs.iter().map(off).fold(0.0, f64::max) > BENT;
+        Some(Self { lattice, whole, bent })
+    }
+
+    /// Where the middle of a cell lies, px.
+    fn centre(&self, (u, v): (i32, i32)) -> Option<[f64; 2]> {
+        let at = [f64::from(u) + 0.5, f64::from(v) + 0.5];
+        if self.bent
+            && let Some(near) = self.around((u, v))
+        {
+            return near.apply(at);
+        }
+        self.whole.apply(at)
+    }
+
+    /// The map of the corners nearest to a cell, where there are enough of them.
+    fn around(&self, (u, v): (i32, i32)) -> Option<PlaneMap> {
+        (2..=4).find_map(|reach| {
+            let near = (v + 1 - reach..=v + reach).flat_map(|j| (u + 1 - reach..=u + reach).map(move |i| (i, j)));
+            let pairs: Vec<_> =
+                near.filter_map(|key| Some(([f64::from(key.0), f64::from(key.1)], *self.lattice.get(&key)?))).collect();
+            if pairs.len() < LEAST_LOCAL { None } else { PlaneMap::fit(&pairs) }
+        })
     }
 }
 

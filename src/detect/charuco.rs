@@ -9,7 +9,7 @@ use calib_targets_chessboard::{ChessCorner, detect_corners};
 use calib_targets_core::GrayImageView;
 
 use super::board_labels::{BoardSize, Lattice, Placement};
-use super::chessboard::{WINDOW, board_size, corner_config, to_8_bit};
+use super::chessboard::{Bytes, WINDOW, board_size, corner_config};
 use super::corners::{Window, measure};
 use super::{Detection, Picture};
 use crate::error::{Code, Error, Notice, Result};
@@ -40,20 +40,13 @@ struct Print {
 /// An unknown dictionary or one with too few markers; no board in the picture; a mirrored picture.
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
-    let mut view = View::of(picture);
+    let mut bytes = Bytes::of(picture);
     let prints = prints(plate)?;
-    let (print, found) = match view.decode(&prints, board)? {
-        Some(found) => found,
-        None => {
-            let mirrored = view.mirrored().decode(&prints, board)?.is_some();
-            return Err(if mirrored { mirrored_board() } else { no_board(plate) });
-        }
+    let Some(Found { print, lattice, .. }) = find(&bytes, &prints, board)? else {
+        bytes.mirror();
+        let mirrored = at_scale(&bytes, 1.0, &prints, board)?.is_some();
+        return Err(if mirrored { mirrored_board() } else { no_board(plate) });
     };
-    let lattice: Lattice = found
-        .corners
-        .iter()
-        .map(|c| (position_on_board(c.id, board), [f64::from(c.position.x), f64::from(c.position.y)]))
-        .collect();
     let window = Window { arm: 0.5 * (1.0 - print.ratio), keep_off_px: KEEP_OFF_PX, ..WINDOW };
     let mut detection = measure(picture, &lattice, Placement::identity(board), window);
     if plate.aruco.is_none() {
@@ -67,38 +60,59 @@ fn position_on_board(id: u32, board: BoardSize) -> (i32, i32) {
     (id % board.columns, id / board.columns)
 }
 
-/// A picture in 8 bits, for decoding only.
-struct View {
-    width: usize,
-    height: usize,
-    bytes: Vec<u8>,
+/// Sizes of the picture, over its own, at which markers are sought, until one shows most of the board; large pictures begin with half.
+const SCALES: [f64; 3] = [1.0, 0.5, 1.5];
+const SCALES_LARGE: [f64; 3] = [0.5, 1.0, 0.25];
+/// Pixels of a large picture.
+const LARGE_PX: usize = 2_000_000;
+/// Share of the board's corners from which no other size is tried.
+const MOST: f64 = 0.75;
+
+/// What was found at one of the sizes.
+struct Found {
+    print: Print,
+    markers: usize,
+    /// Corners of the board in px of the picture.
+    lattice: Lattice,
 }
 
-impl View {
-    fn of(picture: &Picture) -> Self {
-        Self { width: picture.width, height: picture.height, bytes: to_8_bit(picture) }
-    }
-
-    fn mirrored(&mut self) -> &mut Self {
-        self.bytes.chunks_exact_mut(self.width).for_each(<[u8]>::reverse);
-        self
-    }
-
-    /// The print that explains most markers, with what was found; `None` where there is no board.
-    fn decode(&self, prints: &[Print], board: BoardSize) -> Result<Option<(Print, CharucoDetection)>> {
-        let view = GrayImageView { width: self.width, height: self.height, data: &self.bytes };
-        let corners = detect_corners(&view, &corner_config());
-        let least = if prints.len() > 1 { LEAST_MARKERS } else { 1 };
-        let mut best: Option<(Print, CharucoDetection)> = None;
-        for print in prints {
-            let Some(found) = decode(&view, &corners, print, board)? else { continue };
-            let more = best.as_ref().is_none_or(|(_, other)| found.markers.len() > other.markers.len());
-            if found.markers.len() >= least && more {
-                best = Some((*print, found));
-            }
+/// The best of all sizes; `None` where there is no board.
+fn find(bytes: &Bytes, prints: &[Print], board: BoardSize) -> Result<Option<Found>> {
+    let large = bytes.width * bytes.height > LARGE_PX;
+    let mut best: Option<Found> = None;
+    for scale in if large { SCALES_LARGE } else { SCALES } {
+        let Some(found) = at_scale(bytes, scale, prints, board)? else { continue };
+        if best.as_ref().is_none_or(|other| found.lattice.len() > other.lattice.len()) {
+            best = Some(found);
         }
-        Ok(best)
+        let corners = best.as_ref().map_or(0, |b| b.lattice.len());
+        if corners as f64 >= MOST * f64::from(board.columns * board.rows) {
+            break;
+        }
     }
+    Ok(best)
+}
+
+/// The print that explains most markers in the picture at another size, with what was found.
+fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize) -> Result<Option<Found>> {
+    let scaled = bytes.scaled(scale);
+    let corners = detect_corners(&scaled.view(), &corner_config());
+    let least = if prints.len() > 1 { LEAST_MARKERS } else { 1 };
+    let mut best: Option<Found> = None;
+    for print in prints {
+        let Some(found) = decode(&scaled.view(), &corners, print, board)? else { continue };
+        let markers = found.markers.len();
+        if markers < least || best.as_ref().is_some_and(|other| other.markers >= markers) {
+            continue;
+        }
+        // Pixels are counted from their centres.
+        let on_picture = |c: f32| (f64::from(c) + 0.5) / scale - 0.5;
+        let place = |x: f32, y: f32| [on_picture(x), on_picture(y)];
+        let lattice =
+            found.corners.iter().map(|c| (position_on_board(c.id, board), place(c.position.x, c.position.y))).collect();
+        best = Some(Found { print: *print, markers, lattice });
+    }
+    Ok(best)
 }
 
 fn decode(

@@ -3,12 +3,15 @@
 //! The lattice of corners comes from the `calib-targets` library; which corner is which, the sub-pixel position in the
 //! full depth of the picture and its covariance are found here.
 
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
 use calib_targets_chessboard::{ChessboardDetector, ChessboardParams, detect_corners};
 use calib_targets_core::{DetectorConfig, GrayImageView, ImageRefiner, default_chess_config};
 
-use super::board_labels::{BoardSize, Label, Labelling, Lattice, label};
+use super::board_labels::{BoardSize, Labelling, Lattice, label};
 use super::corners::{Window, measure};
-use super::{Detection, Picture};
+use super::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::Plate;
 
@@ -16,21 +19,24 @@ use crate::series::Plate;
 /// does not bend the edges.
 pub(super) const WINDOW: Window = Window { reach: 0.4, radius_px: 16.0, arm: 1.0, keep_off_px: 0.0 };
 
+/// Pictures with more pixels are looked at in half their size first.
+const LARGE_PX: usize = 500_000;
+
 /// Finds the inner corners of a chessboard; parts of the board may be out of view or covered.
 ///
-/// Ids are row-major from the top-left of the printed face, whose first square is dark. Positions are in px with (0, 0)
+/// Ids are row-major from the top-left of the printed face. With an odd and an even number of columns and rows the first square is
+/// dark; other boards look the same after half a turn (a quarter, where square and even), may have a first square of either colour,
+/// and take the turn in which they are most upright, with a notice. Positions are in px with (0, 0)
 /// at the centre of the top-left pixel.
 ///
 /// # Errors
-/// No board in the picture; colours that contradict the plate; a mirrored picture, where the colours show it (numbers
-/// of squares both even: every other chessboard is its own mirror image); so little of the outline that the part seen
-/// could lie in several places.
+/// No board in the picture; colours that contradict the plate; so little of the outline that the part seen could lie in several
+/// places.
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
-    let lattice = find_lattice(picture).ok_or_else(no_board)?;
+    let lattice = find_lattice(picture, board).ok_or_else(no_board)?;
     let mut notices = Vec::new();
-    let Label { labelling, blank_line } = label(picture, &lattice, board);
-    let placement = match labelling {
+    let placement = match label(picture, &lattice, board) {
         Labelling::Unique(placement) => placement,
         Labelling::Symmetric(placement) => {
             notices.push(symmetric_notice(board));
@@ -39,10 +45,10 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
         Labelling::Ambiguous => return Err(ambiguous()),
         Labelling::Contradiction => return Err(contradiction(board)),
     };
-    if blank_line {
-        notices.push(blank_line_notice(board));
-    }
     let mut detection = measure(picture, &lattice, placement, WINDOW);
+    if detection.outline == Outline::LineMissing {
+        notices.push(hidden_line(board));
+    }
     detection.notices = notices;
     Ok(detection)
 }
@@ -60,19 +66,90 @@ pub(super) fn board_size(plate: &Plate) -> Result<BoardSize> {
     }
 }
 
-/// The largest regular lattice of saddle points.
-fn find_lattice(picture: &Picture) -> Option<Lattice> {
-    let bytes = to_8_bit(picture);
-    let view = GrayImageView { width: picture.width, height: picture.height, data: &bytes };
-    let corners = detect_corners(&view, &corner_config());
-    let detector = ChessboardDetector::new(ChessboardParams::default()).ok()?;
-    let found = detector.detect(&corners)?;
-    let lattice = found
-        .corners
-        .iter()
-        .map(|c| ((c.grid.u, c.grid.v), [f64::from(c.position.x), f64::from(c.position.y)]))
-        .collect();
-    Some(lattice)
+/// The largest regular lattice of saddle points: sought in the picture at half its size first, where there are fewer pixels and a
+/// sharpened edge is one step, and at full size unless that shows as many corners as the board has.
+fn find_lattice(picture: &Picture, board: BoardSize) -> Option<Lattice> {
+    let full = Bytes::of(picture);
+    let enough = (board.columns * board.rows) as usize;
+    let coarse = (picture.width * picture.height > LARGE_PX).then(|| full.halved()).and_then(|half| {
+        let on_full = |c: f64| 2.0 * c + 0.5;
+        Some(half.lattice()?.into_iter().map(|(key, uv)| (key, uv.map(on_full))).collect::<Lattice>())
+    });
+    let count = |lattice: &Option<Lattice>| lattice.as_ref().map_or(0, BTreeMap::len);
+    if count(&coarse) >= enough {
+        return coarse;
+    }
+    let fine = full.lattice();
+    if count(&fine) >= count(&coarse) { fine } else { coarse }
+}
+
+/// A picture in 8 bits, for finding corners only.
+#[derive(Debug, Clone)]
+pub(super) struct Bytes {
+    pub width: usize,
+    pub height: usize,
+    pub data: Vec<u8>,
+}
+
+impl Bytes {
+    /// Bright 8-bit pictures stay as they are, others are stretched so that all but the brightest thousandth of their pixels fit.
+    pub fn of(picture: &Picture) -> Self {
+        let bright = bright_level(picture);
+        let scale = if (128.0..=255.0).contains(&bright) && picture.full_scale <= 255.0 { 1.0 } else { 255.0 / bright };
+        let data = picture.pixels.iter().map(|&p| (p * scale + 0.5) as u8).collect();
+        Self { width: picture.width, height: picture.height, data }
+    }
+
+    /// Means of two by two pixels.
+    pub fn halved(&self) -> Self {
+        let (width, height) = (self.width / 2, self.height / 2);
+        let mut data = Vec::with_capacity(width * height);
+        for pair in self.data.chunks_exact(2 * self.width) {
+            let (top, bottom) = pair.split_at(self.width);
+            let sum = |(t, b): (&[u8], &[u8])| t.iter().chain(b).map(|&v| u16::from(v)).sum::<u16>();
+            data.extend(top.chunks_exact(2).zip(bottom.chunks_exact(2)).map(|p| ((sum(p) + 2) / 4) as u8));
+        }
+        Self { width, height, data }
+    }
+
+    /// At another size: halved as often as that goes, the rest by bilinear interpolation.
+    pub fn scaled(&self, scale: f64) -> Cow<'_, Self> {
+        if scale == 1.0 {
+            return Cow::Borrowed(self);
+        }
+        if scale <= 0.5 {
+            return Cow::Owned(self.halved().scaled(2.0 * scale).into_owned());
+        }
+        let side = |n: usize| ((n as f64 * scale).floor() as usize).max(1);
+        let (width, height) = (side(self.width), side(self.height));
+        let source = |k: usize, last: usize| ((k as f64 + 0.5) / scale - 0.5).clamp(0.0, last as f64);
+        let at = |x: usize, y: usize| f64::from(self.data[y * self.width + x]);
+        let value = |k: usize| {
+            let (x, y) = (source(k % width, self.width - 1), source(k / width, self.height - 1));
+            let (x0, y0) = (x as usize, y as usize);
+            let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(self.height - 1));
+            let (p, q) = (x - x0 as f64, y - y0 as f64);
+            let row = |y: usize| at(x0, y) * (1.0 - p) + at(x1, y) * p;
+            (row(y0) * (1.0 - q) + row(y1) * q + 0.5) as u8
+        };
+        Cow::Owned(Self { width, height, data: (0..width * height).map(value).collect() })
+    }
+
+    /// Left to right.
+    pub fn mirror(&mut self) {
+        self.data.chunks_exact_mut(self.width).for_each(<[u8]>::reverse);
+    }
+
+    pub fn view(&self) -> GrayImageView<'_> {
+        GrayImageView { width: self.width, height: self.height, data: &self.data }
+    }
+
+    fn lattice(&self) -> Option<Lattice> {
+        let corners = detect_corners(&self.view(), &corner_config());
+        let found = ChessboardDetector::new(ChessboardParams::default()).ok()?.detect(&corners)?;
+        let at = |x: f32, y: f32| [f64::from(x), f64::from(y)];
+        Some(found.corners.iter().map(|c| ((c.grid.u, c.grid.v), at(c.position.x, c.position.y))).collect())
+    }
 }
 
 /// Saddle fit over 9 x 9 px: half the scatter of the library's default on real images.
@@ -83,14 +160,6 @@ pub(super) fn corner_config() -> DetectorConfig {
         config.max_offset = 3.0;
     }
     default_chess_config().with_refiner(refiner)
-}
-
-/// Grey values scaled to 8 bits, for finding corners only: bright 8-bit pictures stay as they are, others are stretched
-/// so that all but the brightest thousandth of their pixels fit.
-pub(super) fn to_8_bit(picture: &Picture) -> Vec<u8> {
-    let bright = bright_level(picture);
-    let scale = if (128.0..=255.0).contains(&bright) && picture.full_scale <= 255.0 { 1.0 } else { 255.0 / bright };
-    picture.pixels.iter().map(|&p| (p * scale + 0.5) as u8).collect()
 }
 
 /// Count below which all but a thousandth of the pixels lie.
@@ -142,18 +211,31 @@ fn symmetric_notice(board: BoardSize) -> Notice {
         Code::PlateSymmetric,
         "plate",
         format!(
-            "a board of {} x {} inner corners looks the same after a turn; ids assume that its top is up in the image",
+            "a board of {} x {} inner corners looks the same after a turn; in single images its top is taken to be up",
             board.columns, board.rows
         ),
-        "keep the camera within 90 degrees of upright, or use a board with an odd and an even number of squares",
+        "with joint readings `identify` settles the turn; without, use a board with an odd and an even number of squares",
     )
 }
 
-fn blank_line_notice(board: BoardSize) -> Notice {
+/// The refusal where an outer line is not there.
+pub(super) fn line_missing(plate: &Plate) -> Error {
+    Error::new(
+        Code::PlateLineHidden,
+        "image",
+        format!(
+            "an outer line of the {} x {} inner corners is not where it should be in view",
+            plate.columns, plate.rows
+        ),
+        "check `columns` and `rows` of the plate file (inner corners); a covered line is accepted beside images that show the whole board",
+    )
+}
+
+fn hidden_line(board: BoardSize) -> Notice {
     Notice::new(
         Code::PlateLineHidden,
         "image",
-        "a whole line of the chessboard's squares is not seen where it should be",
+        "a whole outer line of the chessboard is not seen where it should be",
         format!("if nothing covers it, the board has fewer than {} x {} inner corners", board.columns, board.rows),
     )
 }

@@ -15,6 +15,8 @@ pub struct Detection {
     pub circles: Option<Circles>,
     /// What the user should know though the work went on.
     pub notices: Vec<Notice>,
+    /// Whether the outer lines of a chessboard were there.
+    pub outline: Outline,
     /// Why the image cannot be used, with no observations then; `None` where it can.
     pub failure: Option<Error>,
 }
@@ -26,6 +28,18 @@ pub struct Sizes {
     pub radii_m: Vec<(u32, [f64; 2])>,
     /// Ids of those that are not as most are, where they tell how the grid is turned.
     pub large: Vec<u32>,
+}
+
+/// What an image tells about the size of a chessboard.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Outline {
+    /// Some outer line of corners is out of view, or the plate has none.
+    #[default]
+    Open,
+    /// All four outer lines of corners were found.
+    Whole,
+    /// An outer line of corners is not where it should be in view: it is covered, or the board is smaller than the plate says.
+    LineMissing,
 }
 
 /// What an image of circles tells beyond their places.
@@ -91,6 +105,7 @@ impl From<circles::CircleDetection> for Detection {
             }),
             notices,
             failure,
+            ..Self::default()
         }
     }
 }

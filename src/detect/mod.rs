@@ -17,7 +17,7 @@ mod run;
 mod tag_code;
 pub mod tags;
 
-pub use detection::{Circles, Detection, Dropped, Sizes};
+pub use detection::{Circles, Detection, Dropped, Outline, Sizes};
 pub use flat_field::FlatField;
 pub use load::{LUMA_WEIGHTS, load, load_bytes};
 pub use picture::Picture;
@@ -29,9 +29,13 @@ use crate::series::{Plate, PlateKind};
 /// Finds and identifies the markers of a plate in a picture.
 ///
 /// # Errors
-/// What the detector of the plate's kind says; the place is then `image`, for the caller to fill in the name.
+/// What the detector of the plate's kind says; a chessboard of which an outer line is not where it should be in view. The place is
+/// then `image`, for the caller to fill in the name.
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let detection = examine(picture, plate);
+    if detection.outline == Outline::LineMissing {
+        return Err(chessboard::line_missing(plate));
+    }
     match detection.failure {
         None => Ok(detection),
         Some(error) => Err(error),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::{Detection, Picture, examine};
+use super::{Detection, Outline, Picture, chessboard, examine};
 use crate::error::{Code, Error, Result};
 use crate::files::{batches, picture_size};
 use crate::series::Plate;
@@ -34,7 +34,8 @@ impl SeriesImage {
 /// Detects the plate in all images of a series.
 ///
 /// Results stand in the order of `images`, whatever the number of threads; an image that cannot be read or shows no
-/// plate is a failure in its own place only, and so is one whose size differs from that of most. Each thread holds one image at a
+/// plate is a failure in its own place only, and so is one whose size differs from that of most; where outer lines of a chessboard are
+/// missing in view and no image shows all of them, all are failures. Each thread holds one image at a
 /// time, which `picture` reads, and all of them together a gigabyte or one image; `progress` is called after every image, from any thread.
 pub fn detect_series(
     images: &[PathBuf],
@@ -59,6 +60,7 @@ pub fn detect_series(
     for batch in batches(&sizes, MOST_IN_FLIGHT) {
         found.par_extend(images[batch].par_iter().map(one));
     }
+    refuse_unproven_boards(images, plate, &mut found);
     refuse_odd_sizes(images, &mut found);
     refuse_odd_dots(images, &mut found);
     found
@@ -85,6 +87,19 @@ fn refuse_odd_dots(images: &[PathBuf], found: &mut [SeriesImage]) {
                 "take the image so that all larger dots are seen, or state them in plate.toml: large = [[column, row], ..]",
             ));
         }
+    }
+}
+
+/// A line of a board that is missing in view may be covered only where another image shows the whole board: else the board is smaller
+/// than the plate says, and every id is in doubt.
+fn refuse_unproven_boards(images: &[PathBuf], plate: &Plate, found: &mut [SeriesImage]) {
+    let any = |outline: Outline| found.iter().any(|i| i.detection.outline == outline);
+    if any(Outline::Whole) || !any(Outline::LineMissing) {
+        return;
+    }
+    for (path, image) in images.iter().zip(found).filter(|(_, image)| image.detection.failure.is_none()) {
+        image.detection.observations.clear();
+        image.detection.failure = Some(Error { place: path.display().to_string(), ..chessboard::line_missing(plate) });
     }
 }
 

@@ -10,6 +10,7 @@ use super::joint::{JointFit, fit_model};
 use super::lens_choice::{self, Lensed, with_lenses};
 use super::options::Options;
 use super::solution::{Evidence, Solution};
+use super::turns;
 use crate::error::Result;
 use crate::fit::log_evidence;
 use crate::model::joint_terms::RobotModel;
@@ -34,6 +35,8 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
         other => other,
     };
     let by_joint_fit = Options { model, estimator: Estimator::Joint, ..options.clone() };
+    let robot = model.robot_with(chain.clone(), options.harmonics);
+    let series = &turns::settled(&robot, series, &options.limits);
     let Lensed { fit: full, series, lenses, notices } = with_lenses(&chain, series, &by_joint_fit)?;
     let (chosen, evidences) = match options.model == RobotModel::Auto && !options.selection.names_terms() {
         true => best_model(chain, &series, options, full)?,

@@ -24,6 +24,7 @@ mod start;
 mod start_verdict;
 mod stated;
 mod suspects;
+mod turns;
 mod two_stage;
 mod verify;
 

@@ -3,6 +3,7 @@
 use super::build::build;
 use super::free_poses::adjust_free_poses;
 use super::start::start_robot;
+use super::turns;
 use crate::assess::Limits;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
 use crate::error::{Code, Error, Result};
@@ -31,6 +32,7 @@ pub struct JudgedImage {
 /// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset.
 pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<JudgedImage>> {
     let limits = &Limits::default();
+    let series = &turns::settled(robot, series, limits);
     let mut adjustment = build(robot, series, false, limits)?;
     let layout = &mut adjustment.problem.layout;
     let columns = layout.robot();

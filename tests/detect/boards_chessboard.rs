@@ -147,7 +147,8 @@ fn boards_that_look_the_same_after_half_a_turn_may_begin_with_either_colour() {
         let picture = scene.render(0);
         let turned = if columns == 9 { mirror(&picture) } else { inverse(&picture) };
         let board = plate(columns, rows);
-        let (dark, light) = (detect(&picture, &board).expect("dark first"), detect(&turned, &board).expect("light first"));
+        let (dark, light) =
+            (detect(&picture, &board).expect("dark first"), detect(&turned, &board).expect("light first"));
         let count = (columns * rows) as usize;
         assert_eq!([dark.observations.len(), light.observations.len()], [count, count], "{columns} x {rows}");
     }
@@ -175,18 +176,25 @@ fn a_board_that_is_its_own_half_turn_is_upright_with_a_notice() {
 }
 
 #[test]
-fn another_board_than_the_plate_file_says_is_refused_or_noted() {
+fn another_board_than_the_plate_file_says_is_refused() {
     let picture = tilted(9, 6, 0.1).render(0);
-    for (columns, rows) in [(6, 5), (8, 6), (9, 5)] {
+    for (columns, rows) in [(6, 5), (8, 6), (9, 5), (10, 6), (9, 7), (12, 9), (11, 6), (9, 8)] {
         let found = detect(&picture, &plate(columns, rows));
         assert!(found.is_err(), "{columns} x {rows}");
-    }
-    // Lines more than printed differ from covered lines by nothing in the picture.
-    for (columns, rows) in [(10, 6), (9, 7), (12, 9)] {
-        let larger = detect(&picture, &plate(columns, rows)).expect("a part of the larger board");
-        assert!(larger.notices.iter().any(|n| n.code == Code::PlateLineHidden), "{:?}", larger.notices);
     }
     let empty = Picture { pixels: vec![80.0; picture.pixels.len()], ..picture };
     let error = detect(&empty, &plate(9, 6)).expect_err("nothing there");
     assert_eq!(error.code, Code::PlateNotFound, "{error}");
+}
+
+#[test]
+fn a_line_more_than_printed_is_missing_from_large_boards() {
+    let scene =
+        Scene { size: (900, 600), ..Scene::new(28, 17, View::new(28, 17, [450.0, 300.0], 27.0, 0.05, [0.003, 0.0])) };
+    let picture = scene.render(0);
+    assert_eq!(detect(&picture, &plate(28, 17)).expect("the board itself").observations.len(), 28 * 17);
+    for (columns, rows) in [(29, 17), (28, 18)] {
+        let error = detect(&picture, &plate(columns, rows)).expect_err("another size");
+        assert!([Code::PlateLineHidden, Code::PlateIncomplete].contains(&error.code), "{columns} x {rows}: {error}");
+    }
 }

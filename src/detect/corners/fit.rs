@@ -1,7 +1,8 @@
 //! Sub-pixel position of the crossing of four squares: least squares over the pixels around it.
 
 use super::model::{
-    Edges, GROWTH, HALO, HALO_BLUR, LEVEL, LEVEL_SLOPE, LN_BLUR, Matrix, PARAMETERS, Pixel, STEP, STEP_SLOPE, THETA, Vector,
+    Block, Edges, GROWTH, HALO, HALO_BLUR, LANES, LEVEL, LEVEL_SLOPE, LN_BLUR, Matrix, PARAMETERS, Prediction, STEP,
+    STEP_SLOPE, THETA, Vector,
 };
 use crate::detect::Picture;
 
@@ -25,7 +26,7 @@ const BLUR_RANGE_PX: (f64, f64) = (0.2, 12.0);
 /// A corner further from its seed than this share of the square's side is another structure.
 const OFF_LATTICE: f64 = 0.2;
 /// A corner nearer to the edge of the picture is not fitted, px.
-const LEAST_MARGIN_PX: f64 = 4.0;
+pub(super) const LEAST_MARGIN_PX: f64 = 4.0;
 /// Least sine of the angle between the two edges.
 const LEAST_CROSSING: f64 = 0.1;
 
@@ -131,25 +132,55 @@ pub(super) struct Term {
     pub residual: f64,
     /// Derivative of the corner by the value of the pixel, px per count.
     pub influence: [f64; 2],
+    /// Its product with that of another pixel is the derivative of the fitted value there by the value here.
+    pub leverage: [f64; PARAMETERS],
 }
 
 /// Fits the model around a seed.
 pub(super) fn refine(picture: &Picture, seed: &Seed, window: Window, look: Look) -> Result<Saddle, Refusal> {
-    let pixels = pixels(picture, seed, window)?;
+    let pixels = Pixels::within(picture, seed, window)?;
     let full_scale = f64::from(picture.full_scale);
-    let mut problem = Problem { pixels: &pixels, look, noise: 0.0, contrast: 0.0, full_scale };
     let guess = start(seed, &pixels, look);
-    problem.noise = START_NOISE * guess[STEP].abs();
-    problem.contrast = guess[STEP];
-    let rough = problem.minimise(&guess, ROUGH_TOLERANCE_PX)?;
-    problem.noise = rough.variance(pixels.len()).sqrt();
+    let contrast = guess[STEP];
+    let mut problem = Problem { pixels: &pixels, look, noise: START_NOISE * contrast.abs(), contrast, full_scale };
+    let rough = problem.minimise(problem.at(&guess), ROUGH_TOLERANCE_PX)?;
+    problem.noise = (rough.sum.squares / pixels.degrees_of_freedom()).sqrt();
     problem.contrast = rough.state[STEP];
-    problem.finish(seed, &problem.minimise(&rough.state, STEP_TOLERANCE_PX)?)
+    problem.finish(seed, &problem.minimise(rough, STEP_TOLERANCE_PX)?)
+}
+
+/// The pixels of a window.
+struct Pixels {
+    blocks: Vec<Block>,
+    count: usize,
+}
+
+impl Pixels {
+    fn of(list: &[[f64; 3]]) -> Self {
+        let block = |chunk: &[[f64; 3]]| {
+            let mut block = Block::EMPTY;
+            for (lane, [x, y, value]) in chunk.iter().enumerate() {
+                (block.x[lane], block.y[lane], block.value[lane], block.weight[lane]) = (*x, *y, *value, 1.0);
+            }
+            block
+        };
+        Self { blocks: list.chunks(LANES).map(block).collect(), count: list.len() }
+    }
+
+    fn degrees_of_freedom(&self) -> f64 {
+        (self.count - PARAMETERS) as f64
+    }
+
+    /// Offsets and values.
+    fn iter(&self) -> impl Iterator<Item = [f64; 3]> {
+        let all = self.blocks.iter().flat_map(|b| (0..LANES).map(|lane| [b.x[lane], b.y[lane], b.value[lane]]));
+        all.take(self.count)
+    }
 }
 
 /// Least squares over the pixels of one corner.
 struct Problem<'a> {
-    pixels: &'a [Pixel],
+    pixels: &'a Pixels,
     look: Look,
     /// Of a pixel, and half the step between the squares, counts: they weigh the priors.
     noise: f64,
@@ -157,43 +188,43 @@ struct Problem<'a> {
     full_scale: f64,
 }
 
-/// The minimum, with the normal matrix there.
-struct Minimum {
-    state: Vector,
-    normal: Matrix,
-    cost: f64,
+/// Sums over the pixels at a state: normal matrix (lower triangle), right side, squares of the residuals.
+#[derive(Clone, Copy)]
+struct Sum {
+    normal: [[f64; PARAMETERS]; PARAMETERS],
+    right: [f64; PARAMETERS],
+    squares: f64,
 }
 
-impl Minimum {
-    /// Of the residuals, counts^2.
-    fn variance(&self, pixels: usize) -> f64 {
-        self.cost / (pixels - PARAMETERS) as f64
-    }
+/// A state with the sums there.
+#[derive(Clone, Copy)]
+struct Point {
+    state: Vector,
+    sum: Sum,
 }
 
 impl Problem<'_> {
     /// Levenberg-Marquardt; the end is reached where the next step would be below the tolerance, as far as the last two tell.
-    fn minimise(&self, start: &Vector, tolerance_px: f64) -> Result<Minimum, Refusal> {
-        let mut state = *start;
-        let (mut normal, mut right, mut cost) = self.accumulate(&state);
+    fn minimise(&self, start: Point, tolerance_px: f64) -> Result<Point, Refusal> {
+        let mut point = start;
         let mut damping = 1e-3;
         // Length of the step before.
         let mut last = 0.0;
         for _ in 0..MAX_STEPS {
+            let (normal, right, cost) = self.with_priors(&point);
             let step = solve(&normal, &right, damping).ok_or(Refusal::NoCrossing)?;
-            let trial = state + step;
-            let (trial_normal, trial_right, trial_cost) = self.accumulate(&trial);
+            let trial = self.at(&(point.state + step));
             let length = step[0].hypot(step[1]);
-            let accepted = trial_cost <= cost;
+            let accepted = self.cost(&trial) <= cost;
             if accepted {
-                (state, normal, right, cost) = (trial, trial_normal, trial_right, trial_cost);
+                point = trial;
                 damping = f64::max(damping * 0.1, 1e-9);
             } else {
                 damping *= 10.0;
             }
             let next = if last > 0.0 { length * f64::min(length / last, 1.0) } else { length };
             if length < tolerance_px || (accepted && next < tolerance_px) || damping > 1e9 {
-                return Ok(Minimum { state, normal, cost });
+                return Ok(point);
             }
             last = length;
         }
@@ -217,38 +248,35 @@ impl Problem<'_> {
         ]
     }
 
-    fn accumulate(&self, state: &Vector) -> (Matrix, Vector, f64) {
-        let mut normal = Matrix::zeros();
-        let mut right = Vector::zeros();
-        let mut cost = 0.0;
-        let edges = Edges::new(state, self.look.halo);
-        for pixel in self.pixels {
-            let predicted = edges.predict(pixel);
-            let residual = pixel.value - predicted.value.min(self.full_scale);
-            cost += residual * residual;
-            if predicted.value >= self.full_scale {
-                continue;
-            }
-            let g = &predicted.gradient;
-            for j in 0..PARAMETERS {
-                right[j] += g[j] * residual;
-                for i in j..PARAMETERS {
-                    normal[(i, j)] += g[i] * g[j];
-                }
-            }
-        }
-        for (i, weight, centre) in self.priors() {
-            let off = state[i] - centre;
-            normal[(i, i)] += weight;
-            right[i] -= weight * off;
-            cost += weight * off * off;
-        }
-        normal.fill_upper_triangle_with_lower_triangle();
-        (normal, right, cost)
+    fn cost(&self, point: &Point) -> f64 {
+        let off = |(i, weight, centre): (usize, f64, f64)| weight * (point.state[i] - centre).powi(2);
+        point.sum.squares + self.priors().into_iter().map(off).sum::<f64>()
     }
 
-    fn finish(&self, seed: &Seed, minimum: &Minimum) -> Result<Saddle, Refusal> {
-        let Minimum { state, normal, .. } = minimum;
+    /// Normal matrix, right side and cost of pixels and priors.
+    fn with_priors(&self, point: &Point) -> (Matrix, Vector, f64) {
+        let mut normal = Matrix::from_fn(|i, j| point.sum.normal[i.max(j)][i.min(j)]);
+        let mut right = Vector::from(point.sum.right);
+        for (i, weight, centre) in self.priors() {
+            normal[(i, i)] += weight;
+            right[i] -= weight * (point.state[i] - centre);
+        }
+        (normal, right, self.cost(point))
+    }
+
+    fn at(&self, state: &Vector) -> Point {
+        let mut sum = Sum { normal: [[0.0; PARAMETERS]; PARAMETERS], right: [0.0; PARAMETERS], squares: 0.0 };
+        let edges = Edges::new(state, self.look.halo);
+        let mut predicted = Prediction::NONE;
+        for block in &self.pixels.blocks {
+            edges.predict(block, &mut predicted);
+            sum.add(block, &predicted, self.full_scale);
+        }
+        Point { state: *state, sum }
+    }
+
+    fn finish(&self, seed: &Seed, point: &Point) -> Result<Saddle, Refusal> {
+        let state = &point.state;
         let blurs = LN_BLUR.map(|i| state[i].exp());
         let crossing = (state[THETA[0]] - state[THETA[1]]).sin().abs();
         let in_range = |s: &f64| (BLUR_RANGE_PX.0..=BLUR_RANGE_PX.1).contains(s);
@@ -261,80 +289,125 @@ impl Problem<'_> {
         Ok(Saddle {
             uv: [seed.uv[0] + state[0], seed.uv[1] + state[1]],
             contrast: state[STEP],
-            noise: minimum.variance(self.pixels.len()).sqrt(),
+            noise: (self.cost(point) / self.pixels.degrees_of_freedom()).sqrt(),
             blur_px: 0.5 * (blurs[0] + blurs[1]),
             halo: state[HALO],
-            terms: self.terms(seed, state, normal).ok_or(Refusal::NoCrossing)?,
+            terms: self.terms(seed, point).ok_or(Refusal::NoCrossing)?,
         })
     }
 
     /// What each pixel adds to the corner, after the other parameters have been eliminated.
-    fn terms(&self, seed: &Seed, state: &Vector, normal: &Matrix) -> Option<Vec<Term>> {
-        let inverse = normal.cholesky()?.inverse();
-        let edges = Edges::new(state, self.look.halo);
-        let place = |pixel: &Pixel| [(seed.uv[0] + pixel.x).round() as i32, (seed.uv[1] + pixel.y).round() as i32];
-        let term = |pixel: &Pixel| {
-            let predicted = edges.predict(pixel);
-            let clipped = predicted.value >= self.full_scale;
-            let influence = [0, 1].map(|i| if clipped { 0.0 } else { inverse.column(i).dot(&predicted.gradient) });
-            Term { at: place(pixel), residual: pixel.value - predicted.value.min(self.full_scale), influence }
-        };
-        Some(self.pixels.iter().map(term).collect())
+    fn terms(&self, seed: &Seed, point: &Point) -> Option<Vec<Term>> {
+        let factor = self.with_priors(point).0.cholesky()?;
+        let (inverse, lower) = (factor.inverse(), factor.l());
+        let edges = Edges::new(&point.state, self.look.halo);
+        let mut predicted = Prediction::NONE;
+        let mut terms = Vec::with_capacity(self.pixels.count);
+        for block in &self.pixels.blocks {
+            edges.predict(block, &mut predicted);
+            for lane in (0..LANES).filter(|&lane| block.weight[lane] > 0.0) {
+                let clipped = predicted.value[lane] >= self.full_scale;
+                let gradient = if clipped { Vector::zeros() } else { predicted.gradient_at(lane) };
+                terms.push(Term {
+                    at: [seed.uv[0] + block.x[lane], seed.uv[1] + block.y[lane]].map(|c| c.round() as i32),
+                    residual: block.value[lane] - predicted.value[lane].min(self.full_scale),
+                    influence: [0, 1].map(|i| inverse.column(i).dot(&gradient)),
+                    leverage: lower.solve_lower_triangular(&gradient)?.into(),
+                });
+            }
+        }
+        Some(terms)
     }
 }
 
-fn pixels(picture: &Picture, seed: &Seed, window: Window) -> Result<Vec<Pixel>, Refusal> {
-    let [[ax, ay], [bx, by]] = seed.sides;
-    let area = ax * by - ay * bx;
-    if area.abs() < LEAST_CROSSING * ax.hypot(ay) * bx.hypot(by) {
-        return Err(Refusal::Oblique);
-    }
-    let [cx, cy] = seed.uv;
-    let (last_x, last_y) = (picture.width as f64 - 1.0, picture.height as f64 - 1.0);
-    if cx.min(cy).min(last_x - cx).min(last_y - cy) < LEAST_MARGIN_PX {
-        return Err(Refusal::AtTheEdge);
-    }
-    let low = |c: f64| (c - window.radius_px).ceil().max(0.0);
-    let high = |c: f64, last: f64| (c + window.radius_px).floor().min(last);
-    let (x1, y1) = (high(cx, last_x), high(cy, last_y));
-    // Distance from the edges per unit of the coordinates p and q.
-    let (from_b, from_a) = (area.abs() / bx.hypot(by), area.abs() / ax.hypot(ay));
-    let mut found = Vec::new();
-    let mut y = low(cy);
-    while y <= y1 {
-        let mut x = low(cx);
-        while x <= x1 {
-            let (dx, dy) = (x - cx, y - cy);
-            let (p, q) = ((dx * by - dy * bx) / area, (dy * ax - dx * ay) / area);
-            let near = dx * dx + dy * dy <= window.radius_px * window.radius_px;
-            let on_arm = (p.abs() - window.arm) * from_b <= -window.keep_off_px
-                || (q.abs() - window.arm) * from_a <= -window.keep_off_px;
-            if near && on_arm && p.abs() <= window.reach && q.abs() <= window.reach {
-                found.push(Pixel { x: dx, y: dy, value: f64::from(picture.at(x as usize, y as usize)) });
-            }
-            x += 1.0;
+impl Sum {
+    fn add(&mut self, block: &Block, predicted: &Prediction, full_scale: f64) {
+        let (mut residual, mut open) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            let value = predicted.value[lane];
+            let clipped = value >= full_scale;
+            residual[lane] = block.weight[lane] * (block.value[lane] - if clipped { full_scale } else { value });
+            open[lane] = if clipped { 0.0 } else { block.weight[lane] };
         }
-        y += 1.0;
+        self.squares += dot(&residual, &residual);
+        for i in 0..PARAMETERS {
+            let mut row = predicted.gradient[i];
+            row.iter_mut().zip(&open).for_each(|(g, open)| *g *= open);
+            self.right[i] += dot(&row, &residual);
+            for j in 0..=i {
+                self.normal[i][j] += dot(&row, &predicted.gradient[j]);
+            }
+        }
     }
-    if found.len() < 2 * PARAMETERS { Err(Refusal::TooFewPixels) } else { Ok(found) }
+}
+
+/// With sums in a fixed order, two lanes beside each other.
+#[inline(always)]
+fn dot(a: &[f64; LANES], b: &[f64; LANES]) -> f64 {
+    let mut sums = [0.0; 4];
+    for k in 0..LANES / 4 {
+        for lane in 0..4 {
+            sums[lane] += a[4 * k + lane] * b[4 * k + lane];
+        }
+    }
+    (sums[0] + sums[2]) + (sums[1] + sums[3])
+}
+
+impl Pixels {
+    fn within(picture: &Picture, seed: &Seed, window: Window) -> Result<Self, Refusal> {
+        let [[ax, ay], [bx, by]] = seed.sides;
+        let area = ax * by - ay * bx;
+        if area.abs() < LEAST_CROSSING * ax.hypot(ay) * bx.hypot(by) {
+            return Err(Refusal::Oblique);
+        }
+        let [cx, cy] = seed.uv;
+        let (last_x, last_y) = (picture.width as f64 - 1.0, picture.height as f64 - 1.0);
+        if cx.min(cy).min(last_x - cx).min(last_y - cy) < LEAST_MARGIN_PX {
+            return Err(Refusal::AtTheEdge);
+        }
+        let low = |c: f64| (c - window.radius_px).ceil().max(0.0);
+        let high = |c: f64, last: f64| (c + window.radius_px).floor().min(last);
+        let (x1, y1) = (high(cx, last_x), high(cy, last_y));
+        // Distance from the edges per unit of the coordinates p and q.
+        let (from_b, from_a) = (area.abs() / bx.hypot(by), area.abs() / ax.hypot(ay));
+        let mut found = Vec::new();
+        let mut y = low(cy);
+        while y <= y1 {
+            let mut x = low(cx);
+            while x <= x1 {
+                let (dx, dy) = (x - cx, y - cy);
+                let (p, q) = ((dx * by - dy * bx) / area, (dy * ax - dx * ay) / area);
+                let near = dx * dx + dy * dy <= window.radius_px * window.radius_px;
+                let on_arm = (p.abs() - window.arm) * from_b <= -window.keep_off_px
+                    || (q.abs() - window.arm) * from_a <= -window.keep_off_px;
+                if near && on_arm && p.abs() <= window.reach && q.abs() <= window.reach {
+                    found.push([dx, dy, f64::from(picture.at(x as usize, y as usize))]);
+                }
+                x += 1.0;
+            }
+            y += 1.0;
+        }
+        if found.len() < 2 * PARAMETERS { Err(Refusal::TooFewPixels) } else { Ok(Self::of(&found)) }
+    }
 }
 
 /// Starting values from the seed; the sign of the contrast from the pixels.
-fn start(seed: &Seed, pixels: &[Pixel], look: Look) -> Vector {
+fn start(seed: &Seed, pixels: &Pixels, look: Look) -> Vector {
     let [s1, s2] = seed.sides;
     let mut state = Vector::zeros();
     state[THETA[0]] = s1[1].atan2(s1[0]);
     state[THETA[1]] = s2[1].atan2(s2[0]);
     LN_BLUR.iter().for_each(|&i| state[i] = look.blur_px.ln());
-    state[LEVEL] = pixels.iter().map(|p| p.value).sum::<f64>() / pixels.len() as f64;
+    state[LEVEL] = pixels.iter().map(|[_, _, value]| value).sum::<f64>() / pixels.count as f64;
+    let tangents = THETA.map(|i| [state[i].cos(), state[i].sin()]);
     let signed: f64 = pixels
         .iter()
-        .map(|pixel| {
-            let side = |theta: f64| pixel.y * theta.cos() - pixel.x * theta.sin();
-            (side(state[THETA[0]]) * side(state[THETA[1]])).signum() * (pixel.value - state[LEVEL])
+        .map(|[x, y, value]| {
+            let [side1, side2] = tangents.map(|[c, s]| y * c - x * s);
+            (side1 * side2).signum() * (value - state[LEVEL])
         })
         .sum();
-    state[STEP] = signed / pixels.len() as f64;
+    state[STEP] = signed / pixels.count as f64;
     state
 }
 

@@ -30,13 +30,15 @@ pub(super) struct Sight<'a> {
     picture: Cow<'a, Picture>,
     window: Window,
     look: Look,
+    /// Sigma of the smoothing, if any, px.
+    pub smoothing_px: Option<f64>,
 }
 
 impl<'a> Sight<'a> {
     /// Looks at some corners of a lattice.
     pub fn of(picture: &'a Picture, lattice: &Lattice, window: Window) -> Self {
         let start = Look { blur_px: START_BLUR_PX, halo: true };
-        let raw = Self { picture: Cow::Borrowed(picture), window, look: start };
+        let raw = Self { picture: Cow::Borrowed(picture), window, look: start, smoothing_px: None };
         let step = lattice.len().div_ceil(SAMPLES).max(1);
         let seeds: Vec<Seed> = lattice.keys().step_by(step).filter_map(|&key| seed(lattice, key, REACH)).collect();
         let fits: Vec<Saddle> = seeds.iter().filter_map(|seed| raw.fit(seed).ok()).collect();
@@ -49,7 +51,8 @@ impl<'a> Sight<'a> {
             return Self { look: Look { blur_px, halo }, ..raw };
         }
         let picture = smoothed(picture, SMOOTHING_PX);
-        Self { picture: Cow::Owned(picture), window, look: Look { blur_px: blur_px.hypot(SMOOTHING_PX), halo } }
+        let look = Look { blur_px: blur_px.hypot(SMOOTHING_PX), halo };
+        Self { picture: Cow::Owned(picture), window, look, smoothing_px: Some(SMOOTHING_PX) }
     }
 
     /// Fits a corner.

@@ -4,6 +4,7 @@ mod fit;
 mod look;
 mod model;
 mod noise;
+mod outline;
 mod smooth;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,6 +13,7 @@ pub(super) use fit::Window;
 use fit::{Refusal, Saddle, Seed};
 use look::{Sight, quantile};
 use noise::Correlation;
+use outline::outline;
 
 use super::board_labels::{Lattice, Placement};
 use super::{Detection, Dropped, Picture};
@@ -28,6 +30,9 @@ const WEAK: f64 = 0.3;
 const DISTURBED: f64 = 3.0;
 /// ... if its residuals exceed this share of the contrast.
 const LEAST_DISTURBED: f64 = 0.06;
+
+/// Corners whose residuals tell how the noise of neighbouring pixels is correlated, at most.
+const NOISE_CORNERS: usize = 16;
 
 /// Sub-pixel positions of all corners of the board, also of those that the lattice finder left out.
 pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement, window: Window) -> Detection {
@@ -58,7 +63,9 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
     closed.extend(kept.keys());
     Missing { view: &view, closed, placement, usual: &usual }.find(&mut kept);
     detection.dropped.extend(retry.into_iter().filter(|(key, _)| !kept.contains_key(key)).map(|(_, dropped)| dropped));
-    let correlation = Correlation::of(kept.values());
+    detection.outline = outline(picture, &kept, placement);
+    let some = kept.values().step_by(kept.len().div_ceil(NOISE_CORNERS).max(1));
+    let correlation = Correlation::of(some, view.smoothing_px);
     for (key, saddle) in kept {
         if let Some(marker) = placement.id(key) {
             let covariance = Some(correlation.covariance(&saddle));

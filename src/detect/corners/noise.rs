@@ -7,7 +7,13 @@
 //! C = sigma^2 sum_p sum_l psi_p psi_(p + l)' rho(l)
 //! ```
 //!
-//! rho is measured on the residuals of all corners of the picture together.
+//! rho is measured on the residuals of some corners of the picture together. A fit follows the noise, the more so where it is
+//! correlated: with the derivatives h of fitted values by pixel values, whose mean at lag l is h(l), residuals have the covariance
+//! c(l) = sigma^2 (rho(l) - L h(l)) for noise of a short range, L = sum_l rho(l), from which
+//!
+//! ```text
+//! sigma^2 L = sum_l c(l) / (1 - sum_l h(l))
+//! ```
 
 use super::fit::{Saddle, Term};
 
@@ -20,9 +26,19 @@ const LAGS: usize = (REACH as usize + 1) * SIDE;
 /// printing errors are taken out.
 const SYSTEMATIC_PX: f64 = 0.015;
 
-/// Correlation of the noise of two pixels by their lag; rows 0 to `REACH`, columns from -`REACH`.
+/// Where a fit follows more than this share of noise that reaches over all lags, its residuals say nothing about it.
+const MOST_FOLLOWED: f64 = 0.6;
+/// Least variance of a corner over that with noise of the same size that is not correlated.
+const LEAST_SHARE: f64 = 0.25;
+
+/// Noise of two pixels by their lag (rows 0 to `REACH`, columns from -`REACH`), over the mean square of the residuals of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Correlation([f64; LAGS]);
+pub(super) struct Correlation {
+    /// Variance of a pixel.
+    variance: f64,
+    /// Covariance by lag.
+    lags: [f64; LAGS],
+}
 
 /// A window's pixels on their raster.
 struct Raster<'a> {
@@ -63,41 +79,76 @@ impl<'a> Raster<'a> {
 }
 
 impl Correlation {
-    /// Of the residuals of fitted corners.
-    pub fn of<'a>(corners: impl Iterator<Item = &'a Saddle>) -> Self {
-        let (mut sums, mut counts) = ([0.0; LAGS], [0.0; LAGS]);
-        let (mut squares, mut pixels) = (0.0, 0.0);
+    /// Of noise that is not correlated.
+    const WHITE: Self = Self { variance: 1.0, lags: [0.0; LAGS] };
+
+    /// Of noise that was not correlated before a Gaussian smoothing.
+    fn smoothed(sigma_px: f64) -> Self {
+        let lag = |l: usize| {
+            let (down, right) = ((l / SIDE) as f64, (l % SIDE) as f64 - f64::from(REACH));
+            if l > REACH as usize { (-(down * down + right * right) / (4.0 * sigma_px * sigma_px)).exp() } else { 0.0 }
+        };
+        Self { variance: 1.0, lags: std::array::from_fn(lag) }
+    }
+
+    /// Of the residuals of fitted corners in a picture that was smoothed; as the smoothing alone leaves it where they are too few.
+    pub fn of<'a>(corners: impl Iterator<Item = &'a Saddle>, smoothing_px: Option<f64>) -> Self {
+        let (mut covariance, mut followed, mut counts) = ([0.0; LAGS], [0.0; LAGS], [0.0; LAGS]);
+        let (mut square, mut own, mut pixels) = (0.0, 0.0, 0.0);
         for corner in corners {
             let scale = 1.0 / (corner.noise * corner.noise).max(f64::MIN_POSITIVE);
-            squares += scale * corner.terms.iter().map(|t| t.residual * t.residual).sum::<f64>();
-            pixels += corner.terms.len() as f64;
+            for term in &corner.terms {
+                square += scale * term.residual * term.residual;
+                own += product(term, term);
+                pixels += 1.0;
+            }
             Raster::new(&corner.terms).for_pairs(|lag, a, b| {
-                sums[lag] += scale * a.residual * b.residual;
+                covariance[lag] += scale * a.residual * b.residual;
+                followed[lag] += product(a, b);
                 counts[lag] += 1.0;
             });
         }
-        let mut correlation = [0.0; LAGS];
-        for lag in REACH as usize + 1..LAGS {
-            if counts[lag] > 0.0 && squares > 0.0 {
-                correlation[lag] = sums[lag] / counts[lag] / (squares / pixels);
-            }
+        let mean = |sums: &[f64; LAGS], lag: usize| if counts[lag] > 0.0 { sums[lag] / counts[lag] } else { 0.0 };
+        let all =
+            |at_zero: f64, sums: &[f64; LAGS]| at_zero / pixels + 2.0 * (0..LAGS).map(|l| mean(sums, l)).sum::<f64>();
+        let all_followed = all(own, &followed);
+        if pixels == 0.0 || !(all_followed < MOST_FOLLOWED) {
+            return smoothing_px.map_or(Self::WHITE, Self::smoothed);
         }
-        Self(correlation)
+        let reach = (all(square, &covariance) / (1.0 - all_followed)).max(0.0);
+        let lag = |l: usize| mean(&covariance, l) + reach * mean(&followed, l);
+        Self { variance: (square + reach * own) / pixels, lags: std::array::from_fn(lag) }
     }
 
     /// Covariance uu, uv, vv of a corner in px^2, with what the noise does not explain.
     pub fn covariance(&self, corner: &Saddle) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        let mut add = |weight: f64, a: &Term, b: &Term| {
-            let ([p, q], [r, s]) = (a.influence, b.influence);
-            sum[0] += weight * p * r;
-            sum[1] += weight * 0.5 * (p * s + q * r);
-            sum[2] += weight * q * s;
-        };
-        corner.terms.iter().for_each(|t| add(1.0, t, t));
-        Raster::new(&corner.terms).for_pairs(|lag, a, b| add(2.0 * self.0[lag], a, b));
+        let white = sum(corner, &Self::WHITE);
+        let found = sum(corner, self);
+        // Never far below noise without correlation: what a few corners say about large lags is uncertain.
+        let [white_trace, trace] = [white, found].map(|c| c[0] + c[2]);
+        let chosen = if trace < LEAST_SHARE * white_trace { white.map(|c| LEAST_SHARE * c) } else { found };
         let variance = corner.noise * corner.noise;
         let floor = SYSTEMATIC_PX * SYSTEMATIC_PX;
-        [variance * sum[0] + floor, variance * sum[1], variance * sum[2] + floor]
+        [variance * chosen[0] + floor, variance * chosen[1], variance * chosen[2] + floor]
     }
+}
+
+fn product(a: &Term, b: &Term) -> f64 {
+    a.leverage.iter().zip(&b.leverage).map(|(a, b)| a * b).sum()
+}
+
+/// uu, uv and vv of a corner at a noise of 1.
+fn sum(corner: &Saddle, noise: &Correlation) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    let mut add = |weight: f64, a: &Term, b: &Term| {
+        let ([p, q], [r, s]) = (a.influence, b.influence);
+        sum[0] += weight * p * r;
+        sum[1] += weight * 0.5 * (p * s + q * r);
+        sum[2] += weight * q * s;
+    };
+    corner.terms.iter().for_each(|t| add(noise.variance, t, t));
+    if noise.lags != Correlation::WHITE.lags {
+        Raster::new(&corner.terms).for_pairs(|lag, a, b| add(2.0 * noise.lags[lag], a, b));
+    }
+    sum
 }
