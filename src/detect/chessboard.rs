@@ -4,7 +4,6 @@
 //! full depth of the picture and its covariance are found here.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 
 use calib_targets_chessboard::{ChessboardDetector, ChessboardParams, detect_corners};
 use calib_targets_core::{DetectorConfig, GrayImageView, ImageRefiner, default_chess_config};
@@ -66,21 +65,25 @@ pub(super) fn board_size(plate: &Plate) -> Result<BoardSize> {
     }
 }
 
-/// The largest regular lattice of saddle points: sought in the picture at half its size first, where there are fewer pixels and a
-/// sharpened edge is one step, and at full size unless that shows as many corners as the board has.
+/// The largest regular lattice of saddle points: sought in the picture at one size, and at the next unless that shows as many corners
+/// as the board has. Large pictures begin with half their size, where there are fewer pixels and a sharpened edge is one step; in small ones
+/// squares may be too small for the finder.
 fn find_lattice(picture: &Picture, board: BoardSize) -> Option<Lattice> {
-    let full = Bytes::of(picture);
-    let enough = (board.columns * board.rows) as usize;
-    let coarse = (picture.width * picture.height > LARGE_PX).then(|| full.halved()).and_then(|half| {
-        let on_full = |c: f64| 2.0 * c + 0.5;
-        Some(half.lattice()?.into_iter().map(|(key, uv)| (key, uv.map(on_full))).collect::<Lattice>())
-    });
-    let count = |lattice: &Option<Lattice>| lattice.as_ref().map_or(0, BTreeMap::len);
-    if count(&coarse) >= enough {
-        return coarse;
+    let bytes = Bytes::of(picture);
+    let scales = if picture.width * picture.height > LARGE_PX { [0.5, 1.0] } else { [1.0, 2.0] };
+    let mut best: Option<Lattice> = None;
+    for scale in scales {
+        // Pixels are counted from their centres.
+        let on_picture = |c: f64| (c + 0.5) / scale - 0.5;
+        let Some(lattice) = bytes.scaled(scale).lattice() else { continue };
+        if best.as_ref().is_none_or(|other| lattice.len() >= other.len()) {
+            best = Some(lattice.into_iter().map(|(key, uv)| (key, uv.map(on_picture))).collect());
+        }
+        if best.as_ref().is_some_and(|found| found.len() >= (board.columns * board.rows) as usize) {
+            break;
+        }
     }
-    let fine = full.lattice();
-    if count(&fine) >= count(&coarse) { fine } else { coarse }
+    best
 }
 
 /// A picture in 8 bits, for finding corners only.

@@ -27,6 +27,9 @@ pub mod circles {}
 #[doc = include_str!("boards.md")]
 pub mod boards {}
 
+#[doc = include_str!("corners.md")]
+pub mod corners {}
+
 #[doc = include_str!("costs.md")]
 pub mod costs {}
 

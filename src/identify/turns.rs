@@ -111,3 +111,33 @@ fn agreeing(views: &[View]) -> Vec<u8> {
     let usual = (0..4).max_by_key(|&q| (count(q), std::cmp::Reverse(q))).unwrap_or(0);
     quarters.iter().map(|q| (q + 4 - usual) % 4).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Images of a camera in the hand at eight postures, seen with ids that are off by these quarter turns.
+    fn views(off: &[u8], allowed: &[u8]) -> Vec<View> {
+        let rotation = |k: usize| {
+            let angles = [0.9, 0.7, 1.3].map(|f: f64| (f * (k as f64 + 1.0) * 2.3).sin() * 1.4);
+            exp_so3(&Vector3::from(angles))
+        };
+        let (x, z) = (rotation(40), rotation(50));
+        let about = |quarters: u8| exp_so3(&Vector3::new(0.0, 0.0, -f64::from(quarters) * std::f64::consts::FRAC_PI_2));
+        let view = |(k, &off): (usize, &u8)| {
+            let seen = x.transpose() * rotation(k) * z * about(4 - off);
+            let tried = std::iter::once(&0).chain(allowed);
+            let camera_from_plate = tried.map(|&q| (q, seen * about(q))).collect();
+            View { series: 0, stop: k, camera_from_plate, chain: rotation(k) }
+        };
+        off.iter().enumerate().map(view).collect()
+    }
+
+    #[test]
+    fn turned_images_are_turned_back() {
+        let half = [0, 0, 2, 0, 2, 0, 0, 2];
+        assert_eq!(agreeing(&views(&half, &[2])), half);
+        let quarter = [0, 1, 0, 3, 0, 2, 0, 0];
+        assert_eq!(agreeing(&views(&quarter, &[1, 2, 3])), quarter);
+    }
+}

@@ -67,12 +67,12 @@ mod tests {
 
     #[test]
     fn colours_decide_on_chessboards() {
-        assert_eq!(quarters(PlateKind::Chessboard, 9, 6), []);
+        assert!(quarters(PlateKind::Chessboard, 9, 6).is_empty());
         assert_eq!(quarters(PlateKind::Chessboard, 9, 7), [2]);
         assert_eq!(quarters(PlateKind::Chessboard, 8, 6), [2]);
         assert_eq!(quarters(PlateKind::Chessboard, 8, 8), [1, 2, 3]);
         assert_eq!(quarters(PlateKind::Chessboard, 7, 7), [2]);
-        assert_eq!(quarters(PlateKind::Charuco, 9, 7), []);
+        assert!(quarters(PlateKind::Charuco, 9, 7).is_empty());
     }
 
     #[test]

@@ -13,5 +13,6 @@ mod boards_files;
 mod boards_real;
 mod circles;
 mod command;
+mod corners_rendered;
 mod grids;
 mod tags;

@@ -7,10 +7,11 @@ use super::model::{
 use crate::detect::Picture;
 
 const MAX_STEPS: usize = 30;
-/// A step below this moves no corner visibly, px.
-const STEP_TOLERANCE_PX: f64 = 1e-4;
-/// The same before the noise is known, px.
-const ROUGH_TOLERANCE_PX: f64 = 1e-2;
+/// Before the noise is known.
+const ROUGH: Descent = Descent { tolerance_px: 1e-2, damping: 1e-3 };
+/// A step below the tolerance moves no corner visibly. Slopes of the light and place of the corner are alike in a small window: damping would
+/// slow both down.
+const FINE: Descent = Descent { tolerance_px: 1e-4, damping: 1e-8 };
 /// Noise of the pixels over half the step of an edge, as long as it is not known.
 const START_NOISE: f64 = 0.03;
 /// Prior sigma of the slope of the light, share of the contrast per px.
@@ -27,8 +28,20 @@ const BLUR_RANGE_PX: (f64, f64) = (0.2, 12.0);
 const OFF_LATTICE: f64 = 0.2;
 /// A corner nearer to the edge of the picture is not fitted, px.
 pub(super) const LEAST_MARGIN_PX: f64 = 4.0;
+/// Least reach along the edges of small squares, px, as long as it is below this share of their side.
+const LEAST_REACH_PX: f64 = 3.3;
+const MOST_REACH: f64 = 0.55;
 /// Least sine of the angle between the two edges.
 const LEAST_CROSSING: f64 = 0.1;
+
+/// How a minimum is sought.
+#[derive(Debug, Clone, Copy)]
+struct Descent {
+    /// Length of a step of the corner, px.
+    tolerance_px: f64,
+    /// Damping to begin with.
+    damping: f64,
+}
 
 /// Why no corner came out of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,7 +114,6 @@ pub(super) struct Look {
 }
 
 /// A fitted corner.
-#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Saddle {
     pub uv: [f64; 2],
     /// Half the step between the squares, counts; positive where the square towards -side 1 and +side 2 is the lighter.
@@ -112,15 +124,10 @@ pub(super) struct Saddle {
     pub blur_px: f64,
     /// Share of the step that the halo adds and takes.
     pub halo: f64,
-    /// What each pixel of the window says.
-    pub terms: Vec<Term>,
-}
-
-impl Saddle {
-    /// Blur of a Gaussian edge as steep in its middle, px.
-    pub fn steepness_px(&self) -> f64 {
-        self.blur_px / (1.0 + self.halo * (1.0 - 1.0 / HALO_BLUR)).max(0.1)
-    }
+    /// The fit, for what its pixels say.
+    problem: Problem,
+    end: Point,
+    seed_uv: [f64; 2],
 }
 
 /// One pixel's share in a corner.
@@ -132,31 +139,40 @@ pub(super) struct Term {
     pub residual: f64,
     /// Derivative of the corner by the value of the pixel, px per count.
     pub influence: [f64; 2],
-    /// Its product with that of another pixel is the derivative of the fitted value there by the value here.
-    pub leverage: [f64; PARAMETERS],
 }
 
-/// Fits the model around a seed.
+/// Fits the model around a seed: roughly to the nearer pixels, then to all.
 pub(super) fn refine(picture: &Picture, seed: &Seed, window: Window, look: Look) -> Result<Saddle, Refusal> {
     let pixels = Pixels::within(picture, seed, window)?;
-    let full_scale = f64::from(picture.full_scale);
     let guess = start(seed, &pixels, look);
     let contrast = guess[STEP];
-    let mut problem = Problem { pixels: &pixels, look, noise: START_NOISE * contrast.abs(), contrast, full_scale };
-    let rough = problem.minimise(problem.at(&guess), ROUGH_TOLERANCE_PX)?;
-    problem.noise = (rough.sum.squares / pixels.degrees_of_freedom()).sqrt();
+    let full_scale = f64::from(picture.full_scale);
+    let mut problem = Problem { pixels, look, noise: START_NOISE * contrast.abs(), contrast, full_scale };
+    let near = problem.pixels.near;
+    let rough = problem.minimise(problem.at(&guess, near), near, ROUGH)?;
+    problem.noise = (rough.sum.squares / near.degrees_of_freedom()).sqrt();
     problem.contrast = rough.state[STEP];
-    problem.finish(seed, &problem.minimise(rough, STEP_TOLERANCE_PX)?)
+    let all = problem.pixels.all;
+    let end = problem.minimise(problem.at(&rough.state, all), all, FINE)?;
+    problem.finish(seed, end)
 }
 
-/// The pixels of a window.
+/// The pixels of a window, the nearer ones first.
 struct Pixels {
     blocks: Vec<Block>,
-    count: usize,
+    near: Part,
+    all: Part,
+}
+
+/// The first blocks.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    blocks: usize,
+    pixels: usize,
 }
 
 impl Pixels {
-    fn of(list: &[[f64; 3]]) -> Self {
+    fn of(near: &[[f64; 3]], far: &[[f64; 3]]) -> Self {
         let block = |chunk: &[[f64; 3]]| {
             let mut block = Block::EMPTY;
             for (lane, [x, y, value]) in chunk.iter().enumerate() {
@@ -164,23 +180,32 @@ impl Pixels {
             }
             block
         };
-        Self { blocks: list.chunks(LANES).map(block).collect(), count: list.len() }
-    }
-
-    fn degrees_of_freedom(&self) -> f64 {
-        (self.count - PARAMETERS) as f64
+        let mut blocks: Vec<Block> = near.chunks(LANES).map(block).collect();
+        let first = Part { blocks: blocks.len(), pixels: near.len() };
+        blocks.extend(far.chunks(LANES).map(block));
+        let all = Part { blocks: blocks.len(), pixels: near.len() + far.len() };
+        Self { blocks, near: if first.pixels < 4 * PARAMETERS { all } else { first }, all }
     }
 
     /// Offsets and values.
     fn iter(&self) -> impl Iterator<Item = [f64; 3]> {
-        let all = self.blocks.iter().flat_map(|b| (0..LANES).map(|lane| [b.x[lane], b.y[lane], b.value[lane]]));
-        all.take(self.count)
+        let pixels = |b: &Block| {
+            let Block { x, y, value, weight } = *b;
+            (0..LANES).filter(move |&lane| weight[lane] > 0.0).map(move |lane| [x[lane], y[lane], value[lane]])
+        };
+        self.blocks.iter().flat_map(pixels)
+    }
+}
+
+impl Part {
+    fn degrees_of_freedom(&self) -> f64 {
+        (self.pixels - PARAMETERS) as f64
     }
 }
 
 /// Least squares over the pixels of one corner.
-struct Problem<'a> {
-    pixels: &'a Pixels,
+struct Problem {
+    pixels: Pixels,
     look: Look,
     /// Of a pixel, and half the step between the squares, counts: they weigh the priors.
     noise: f64,
@@ -203,17 +228,17 @@ struct Point {
     sum: Sum,
 }
 
-impl Problem<'_> {
+impl Problem {
     /// Levenberg-Marquardt; the end is reached where the next step would be below the tolerance, as far as the last two tell.
-    fn minimise(&self, start: Point, tolerance_px: f64) -> Result<Point, Refusal> {
+    fn minimise(&self, start: Point, part: Part, descent: Descent) -> Result<Point, Refusal> {
         let mut point = start;
-        let mut damping = 1e-3;
+        let mut damping = descent.damping;
         // Length of the step before.
         let mut last = 0.0;
         for _ in 0..MAX_STEPS {
             let (normal, right, cost) = self.with_priors(&point);
             let step = solve(&normal, &right, damping).ok_or(Refusal::NoCrossing)?;
-            let trial = self.at(&(point.state + step));
+            let trial = self.at(&(point.state + step), part);
             let length = step[0].hypot(step[1]);
             let accepted = self.cost(&trial) <= cost;
             if accepted {
@@ -223,7 +248,8 @@ impl Problem<'_> {
                 damping *= 10.0;
             }
             let next = if last > 0.0 { length * f64::min(length / last, 1.0) } else { length };
-            if length < tolerance_px || (accepted && next < tolerance_px) || damping > 1e9 {
+            let close = length < descent.tolerance_px || (accepted && next < descent.tolerance_px);
+            if close || damping > 1e9 {
                 return Ok(point);
             }
             last = length;
@@ -264,19 +290,19 @@ impl Problem<'_> {
         (normal, right, self.cost(point))
     }
 
-    fn at(&self, state: &Vector) -> Point {
+    fn at(&self, state: &Vector, part: Part) -> Point {
         let mut sum = Sum { normal: [[0.0; PARAMETERS]; PARAMETERS], right: [0.0; PARAMETERS], squares: 0.0 };
         let edges = Edges::new(state, self.look.halo);
         let mut predicted = Prediction::NONE;
-        for block in &self.pixels.blocks {
+        for block in &self.pixels.blocks[..part.blocks] {
             edges.predict(block, &mut predicted);
             sum.add(block, &predicted, self.full_scale);
         }
         Point { state: *state, sum }
     }
 
-    fn finish(&self, seed: &Seed, point: &Point) -> Result<Saddle, Refusal> {
-        let state = &point.state;
+    fn finish(self, seed: &Seed, end: Point) -> Result<Saddle, Refusal> {
+        let state = &end.state;
         let blurs = LN_BLUR.map(|i| state[i].exp());
         let crossing = (state[THETA[0]] - state[THETA[1]]).sin().abs();
         let in_range = |s: &f64| (BLUR_RANGE_PX.0..=BLUR_RANGE_PX.1).contains(s);
@@ -289,34 +315,65 @@ impl Problem<'_> {
         Ok(Saddle {
             uv: [seed.uv[0] + state[0], seed.uv[1] + state[1]],
             contrast: state[STEP],
-            noise: (self.cost(point) / self.pixels.degrees_of_freedom()).sqrt(),
+            noise: (self.cost(&end) / self.pixels.all.degrees_of_freedom()).sqrt(),
             blur_px: 0.5 * (blurs[0] + blurs[1]),
             halo: state[HALO],
-            terms: self.terms(seed, point).ok_or(Refusal::NoCrossing)?,
+            problem: self,
+            end,
+            seed_uv: seed.uv,
         })
     }
 
-    /// What each pixel adds to the corner, after the other parameters have been eliminated.
-    fn terms(&self, seed: &Seed, point: &Point) -> Option<Vec<Term>> {
-        let factor = self.with_priors(point).0.cholesky()?;
-        let (inverse, lower) = (factor.inverse(), factor.l());
-        let edges = Edges::new(&point.state, self.look.halo);
+    /// Calls `pixel` for every pixel with its block and lane and the prediction of the block.
+    fn for_pixels(&self, state: &Vector, mut pixel: impl FnMut(&Block, usize, &Prediction)) {
+        let edges = Edges::new(state, self.look.halo);
         let mut predicted = Prediction::NONE;
-        let mut terms = Vec::with_capacity(self.pixels.count);
         for block in &self.pixels.blocks {
             edges.predict(block, &mut predicted);
             for lane in (0..LANES).filter(|&lane| block.weight[lane] > 0.0) {
-                let clipped = predicted.value[lane] >= self.full_scale;
-                let gradient = if clipped { Vector::zeros() } else { predicted.gradient_at(lane) };
-                terms.push(Term {
-                    at: [seed.uv[0] + block.x[lane], seed.uv[1] + block.y[lane]].map(|c| c.round() as i32),
-                    residual: block.value[lane] - predicted.value[lane].min(self.full_scale),
-                    influence: [0, 1].map(|i| inverse.column(i).dot(&gradient)),
-                    leverage: lower.solve_lower_triangular(&gradient)?.into(),
-                });
+                // A clipped pixel depends on nothing.
+                if predicted.value[lane] >= self.full_scale {
+                    predicted.value[lane] = self.full_scale;
+                    predicted.gradient.iter_mut().for_each(|g| g[lane] = 0.0);
+                }
+                pixel(block, lane, &predicted);
             }
         }
-        Some(terms)
+    }
+}
+
+impl Saddle {
+    /// Blur of a Gaussian edge as steep in its middle, px.
+    pub fn steepness_px(&self) -> f64 {
+        self.blur_px / (1.0 + self.halo * (1.0 - 1.0 / HALO_BLUR)).max(0.1)
+    }
+
+    /// What each pixel adds to the corner, after the other parameters have been eliminated; none for a normal matrix without inverse.
+    pub fn terms(&self) -> Vec<Term> {
+        let Some(factor) = self.problem.with_priors(&self.end).0.cholesky() else { return Vec::new() };
+        let inverse = factor.inverse();
+        let mut terms = Vec::with_capacity(self.problem.pixels.all.pixels);
+        self.problem.for_pixels(&self.end.state, |block, lane, predicted| {
+            let influence =
+                |i: usize| predicted.gradient.iter().zip(inverse.column(i).iter()).map(|(g, c)| g[lane] * c).sum();
+            terms.push(Term {
+                at: [self.seed_uv[0] + block.x[lane], self.seed_uv[1] + block.y[lane]].map(|c| c.round() as i32),
+                residual: block.value[lane] - predicted.value[lane],
+                influence: [influence(0), influence(1)],
+            });
+        });
+        terms
+    }
+
+    /// A vector for each of the terms: the product of two is the derivative of the fitted value at one pixel by the value at the other.
+    pub fn leverages(&self) -> Vec<Vector> {
+        let Some(factor) = self.problem.with_priors(&self.end).0.cholesky() else { return Vec::new() };
+        let lower = factor.l();
+        let mut leverages = Vec::with_capacity(self.problem.pixels.all.pixels);
+        self.problem.for_pixels(&self.end.state, |_, lane, predicted| {
+            leverages.push(lower.solve_lower_triangular(&predicted.gradient_at(lane)).unwrap_or_else(Vector::zeros));
+        });
+        leverages
     }
 }
 
@@ -370,7 +427,9 @@ impl Pixels {
         let (x1, y1) = (high(cx, last_x), high(cy, last_y));
         // Distance from the edges per unit of the coordinates p and q.
         let (from_b, from_a) = (area.abs() / bx.hypot(by), area.abs() / ax.hypot(ay));
-        let mut found = Vec::new();
+        let near_px = (0.5 * window.radius_px).powi(2);
+        let reach = window.reach.max((LEAST_REACH_PX / seed.side_px()).min(MOST_REACH));
+        let (mut nearer, mut farther) = (Vec::new(), Vec::new());
         let mut y = low(cy);
         while y <= y1 {
             let mut x = low(cx);
@@ -380,14 +439,16 @@ impl Pixels {
                 let near = dx * dx + dy * dy <= window.radius_px * window.radius_px;
                 let on_arm = (p.abs() - window.arm) * from_b <= -window.keep_off_px
                     || (q.abs() - window.arm) * from_a <= -window.keep_off_px;
-                if near && on_arm && p.abs() <= window.reach && q.abs() <= window.reach {
-                    found.push([dx, dy, f64::from(picture.at(x as usize, y as usize))]);
+                if near && on_arm && p.abs() <= reach && q.abs() <= reach {
+                    let pixel = [dx, dy, f64::from(picture.at(x as usize, y as usize))];
+                    if dx * dx + dy * dy <= near_px { nearer.push(pixel) } else { farther.push(pixel) }
                 }
                 x += 1.0;
             }
             y += 1.0;
         }
-        if found.len() < 2 * PARAMETERS { Err(Refusal::TooFewPixels) } else { Ok(Self::of(&found)) }
+        let count = nearer.len() + farther.len();
+        if count < 2 * PARAMETERS { Err(Refusal::TooFewPixels) } else { Ok(Self::of(&nearer, &farther)) }
     }
 }
 
@@ -398,7 +459,7 @@ fn start(seed: &Seed, pixels: &Pixels, look: Look) -> Vector {
     state[THETA[0]] = s1[1].atan2(s1[0]);
     state[THETA[1]] = s2[1].atan2(s2[0]);
     LN_BLUR.iter().for_each(|&i| state[i] = look.blur_px.ln());
-    state[LEVEL] = pixels.iter().map(|[_, _, value]| value).sum::<f64>() / pixels.count as f64;
+    state[LEVEL] = pixels.iter().map(|[_, _, value]| value).sum::<f64>() / pixels.all.pixels as f64;
     let tangents = THETA.map(|i| [state[i].cos(), state[i].sin()]);
     let signed: f64 = pixels
         .iter()
@@ -407,7 +468,7 @@ fn start(seed: &Seed, pixels: &Pixels, look: Look) -> Vector {
             (side1 * side2).signum() * (value - state[LEVEL])
         })
         .sum();
-    state[STEP] = signed / pixels.count as f64;
+    state[STEP] = signed / pixels.all.pixels as f64;
     state
 }
 

@@ -93,6 +93,7 @@ impl<'a> Edges<'a> {
         if self.halo { self.fill::<true>(block, out) } else { self.fill::<false>(block, out) }
     }
 
+    #[allow(clippy::needless_range_loop, reason = "lanes of many arrays beside each other")]
     fn fill<const HALOED: bool>(&self, block: &Block, out: &mut Prediction) {
         let state = self.state;
         let [[t1x, t1y], [t2x, t2y]] = self.tangents;

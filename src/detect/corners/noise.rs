@@ -7,7 +7,7 @@
 //! C = sigma^2 sum_p sum_l psi_p psi_(p + l)' rho(l)
 //! ```
 //!
-//! rho is measured on the residuals of some corners of the picture together. A fit follows the noise, the more so where it is
+//! rho is measured on the odd part of the residuals of some corners of the picture together. A fit follows the noise, the more so where it is
 //! correlated: with the derivatives h of fitted values by pixel values, whose mean at lag l is h(l), residuals have the covariance
 //! c(l) = sigma^2 (rho(l) - L h(l)) for noise of a short range, L = sum_l rho(l), from which
 //!
@@ -16,6 +16,7 @@
 //! ```
 
 use super::fit::{Saddle, Term};
+use super::model::Vector;
 
 /// Lags looked at, px.
 const REACH: i32 = 3;
@@ -28,6 +29,8 @@ const SYSTEMATIC_PX: f64 = 0.015;
 
 /// Where a fit follows more than this share of noise that reaches over all lags, its residuals say nothing about it.
 const MOST_FOLLOWED: f64 = 0.6;
+/// Least pixels of a window, on average: the lags must be small beside it.
+const LEAST_PIXELS: f64 = 100.0;
 /// Least variance of a corner over that with noise of the same size that is not correlated.
 const LEAST_SHARE: f64 = 0.25;
 
@@ -63,15 +66,23 @@ impl<'a> Raster<'a> {
         Self { terms, low, width, cells }
     }
 
-    /// Calls `pair` with every two terms at a lag that is not zero, and its index.
-    fn for_pairs(&self, mut pair: impl FnMut(usize, &Term, &Term)) {
-        for term in self.terms {
+    /// Index of the term of a pixel.
+    fn find(&self, [x, y]: [i32; 2]) -> Option<usize> {
+        let (i, j) = (x - self.low[0], y - self.low[1]);
+        let inside = (0..self.width).contains(&i) && j >= 0;
+        let cell = inside.then(|| self.cells.get((j * self.width + i) as usize)).flatten()?;
+        (*cell as usize).checked_sub(1)
+    }
+
+    /// Calls `pair` with the index of a lag that is not zero and those of every two terms at it.
+    fn for_pairs(&self, mut pair: impl FnMut(usize, usize, usize)) {
+        for (k, term) in self.terms.iter().enumerate() {
             let cell = (term.at[1] - self.low[1]) * self.width + term.at[0] - self.low[0];
             for lag in REACH as usize + 1..LAGS {
                 let (down, right) = ((lag / SIDE) as i32, (lag % SIDE) as i32 - REACH);
                 let other = self.cells[(cell + down * self.width + right) as usize] as usize;
                 if other > 0 {
-                    pair(lag, term, &self.terms[other - 1]);
+                    pair(lag, k, other - 1);
                 }
             }
         }
@@ -94,16 +105,19 @@ impl Correlation {
     /// Of the residuals of fitted corners in a picture that was smoothed; as the smoothing alone leaves it where they are too few.
     pub fn of<'a>(corners: impl Iterator<Item = &'a Saddle>, smoothing_px: Option<f64>) -> Self {
         let (mut covariance, mut followed, mut counts) = ([0.0; LAGS], [0.0; LAGS], [0.0; LAGS]);
-        let (mut square, mut own, mut pixels) = (0.0, 0.0, 0.0);
+        let (mut square, mut own, mut pixels, mut number) = (0.0, 0.0, 0.0, 1.0);
         for corner in corners {
             let scale = 1.0 / (corner.noise * corner.noise).max(f64::MIN_POSITIVE);
-            for term in &corner.terms {
+            let (terms, leverages) = odd_part(corner);
+            number += 1.0;
+            let product = |a: usize, b: usize| leverages[a].dot(&leverages[b]);
+            for (k, term) in terms.iter().enumerate() {
                 square += scale * term.residual * term.residual;
-                own += product(term, term);
+                own += product(k, k);
                 pixels += 1.0;
             }
-            Raster::new(&corner.terms).for_pairs(|lag, a, b| {
-                covariance[lag] += scale * a.residual * b.residual;
+            Raster::new(&terms).for_pairs(|lag, a, b| {
+                covariance[lag] += scale * terms[a].residual * terms[b].residual;
                 followed[lag] += product(a, b);
                 counts[lag] += 1.0;
             });
@@ -112,7 +126,7 @@ impl Correlation {
         let all =
             |at_zero: f64, sums: &[f64; LAGS]| at_zero / pixels + 2.0 * (0..LAGS).map(|l| mean(sums, l)).sum::<f64>();
         let all_followed = all(own, &followed);
-        if pixels == 0.0 || !(all_followed < MOST_FOLLOWED) {
+        if pixels < LEAST_PIXELS * number || all_followed >= MOST_FOLLOWED {
             return smoothing_px.map_or(Self::WHITE, Self::smoothed);
         }
         let reach = (all(square, &covariance) / (1.0 - all_followed)).max(0.0);
@@ -122,8 +136,9 @@ impl Correlation {
 
     /// Covariance uu, uv, vv of a corner in px^2, with what the noise does not explain.
     pub fn covariance(&self, corner: &Saddle) -> [f64; 3] {
-        let white = sum(corner, &Self::WHITE);
-        let found = sum(corner, self);
+        let terms = corner.terms();
+        let white = sum(&terms, &Self::WHITE);
+        let found = sum(&terms, self);
         // Never far below noise without correlation: what a few corners say about large lags is uncertain.
         let [white_trace, trace] = [white, found].map(|c| c[0] + c[2]);
         let chosen = if trace < LEAST_SHARE * white_trace { white.map(|c| LEAST_SHARE * c) } else { found };
@@ -133,12 +148,23 @@ impl Correlation {
     }
 }
 
-fn product(a: &Term, b: &Term) -> f64 {
-    a.leverage.iter().zip(&b.leverage).map(|(a, b)| a * b).sum()
+/// What is left of the residuals of a corner, and of their leverages, where those of the pixels opposite are taken off: another
+/// shape of the edges than that of the model is the same on both sides and does not move the corner; noise is not.
+fn odd_part(corner: &Saddle) -> (Vec<Term>, Vec<Vector>) {
+    let (terms, leverages) = (corner.terms(), corner.leverages());
+    let raster = Raster::new(&terms);
+    let [sum_x, sum_y] = corner.uv.map(|c| (2.0 * c).round() as i32);
+    let odd = terms.iter().zip(&leverages).filter_map(|(term, leverage)| {
+        let other = raster.find([sum_x - term.at[0], sum_y - term.at[1]])?;
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let residual = half * (term.residual - terms[other].residual);
+        Some((Term { residual, ..*term }, half * (leverage - leverages.get(other)?)))
+    });
+    odd.unzip()
 }
 
-/// uu, uv and vv of a corner at a noise of 1.
-fn sum(corner: &Saddle, noise: &Correlation) -> [f64; 3] {
+/// uu, uv and vv of a corner's terms at a noise of 1.
+fn sum(terms: &[Term], noise: &Correlation) -> [f64; 3] {
     let mut sum = [0.0; 3];
     let mut add = |weight: f64, a: &Term, b: &Term| {
         let ([p, q], [r, s]) = (a.influence, b.influence);
@@ -146,9 +172,9 @@ fn sum(corner: &Saddle, noise: &Correlation) -> [f64; 3] {
         sum[1] += weight * 0.5 * (p * s + q * r);
         sum[2] += weight * q * s;
     };
-    corner.terms.iter().for_each(|t| add(noise.variance, t, t));
+    terms.iter().for_each(|t| add(noise.variance, t, t));
     if noise.lags != Correlation::WHITE.lags {
-        Raster::new(&corner.terms).for_pairs(|lag, a, b| add(2.0 * noise.lags[lag], a, b));
+        Raster::new(terms).for_pairs(|lag, a, b| add(2.0 * noise.lags[lag], &terms[a], &terms[b]));
     }
     sum
 }
