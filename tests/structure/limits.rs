@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 /// Constants that decide no verdict, with what they are instead.
-const NUMERICAL: [(&str, &str); 48] = [
+const NUMERICAL: &[(&str, &str)] = &[
     ("assess/advice.rs BASES", "stops that are varied"),
     ("assess/advice.rs MOST_NEXT", "how many proposals are kept"),
     ("assess/advice.rs VALUES", "grid of the search"),
@@ -45,6 +45,8 @@ const NUMERICAL: [(&str, &str); 48] = [
     ("identify/second_pass.rs FEWEST_IMAGES", "first guess of a detector"),
     ("identify/second_pass.rs REACH", "reach of a detector"),
     ("identify/start.rs COMPARED", "how many starts are compared"),
+    ("identify/turns.rs MOST_MISFIT", "robust loss of a choice"),
+    ("identify/turns.rs ROUNDS", "most iterations"),
     ("identify/two_stage.rs DECREMENT", "convergence"),
     ("identify/two_stage.rs FIRST_FACTOR", "first guess"),
     ("identify/two_stage.rs FIRST_ISOTROPIC", "first guess"),

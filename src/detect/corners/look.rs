@@ -7,9 +7,10 @@
 use std::borrow::Cow;
 
 use super::fit::{Look, Refusal, Saddle, Seed, Window, refine};
+use super::neighbours::{REACH, seed};
 use super::smooth::smoothed;
-use super::{Lattice, REACH, seed};
 use crate::detect::Picture;
+use crate::detect::board_labels::Lattice;
 
 /// Corners that say how the edges look, at most.
 const SAMPLES: usize = 12;

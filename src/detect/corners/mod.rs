@@ -3,6 +3,7 @@
 mod fit;
 mod look;
 mod model;
+mod neighbours;
 mod noise;
 mod outline;
 mod smooth;
@@ -10,20 +11,16 @@ mod smooth;
 use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) use fit::Window;
-use fit::{Refusal, Saddle, Seed};
+use fit::{Refusal, Saddle};
 use look::{Sight, quantile};
+use neighbours::{FAR_REACH, REACH, seed};
 use noise::Correlation;
 use outline::outline;
 
 use super::board_labels::{Lattice, Placement};
 use super::{Detection, Dropped, Picture};
-use crate::geom::PlaneMap;
 use crate::series::{Edge, Observation};
 
-/// Neighbours up to this many squares away say where a corner is and how the edges run ...
-const REACH: i32 = 2;
-/// ... and up to this many where a gap in the lattice has to be bridged.
-const FAR_REACH: i32 = 5;
 /// A corner with less than this share of the usual contrast is none.
 const WEAK: f64 = 0.3;
 /// A fit this many times worse than usual is disturbed by something else in the window ...
@@ -143,20 +140,4 @@ impl Usual {
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {
     quantile(values, 0.5).unwrap_or(0.0)
-}
-
-/// A corner with the directions and lengths of the edges there, from the map of its neighbourhood.
-fn seed(lattice: &Lattice, (u, v): (i32, i32), reach: i32) -> Option<Seed> {
-    let pairs: Vec<_> = (v - reach..=v + reach)
-        .flat_map(|j| (u - reach..=u + reach).map(move |i| (i, j)))
-        .filter(|&key| key != (u, v))
-        .filter_map(|key| Some(([f64::from(key.0 - u), f64::from(key.1 - v)], *lattice.get(&key)?)))
-        .collect();
-    let map = PlaneMap::fit(&pairs)?;
-    let [[xu, xv], [yu, yv]] = map.jacobian([0.0, 0.0])?;
-    let predicted = map.apply([0.0, 0.0])?;
-    let near =
-        |uv: &&[f64; 2]| (uv[0] - predicted[0]).hypot(uv[1] - predicted[1]) < 0.2 * xu.hypot(yu).min(xv.hypot(yv));
-    let uv = lattice.get(&(u, v)).filter(near).copied().unwrap_or(predicted);
-    Some(Seed { uv, sides: [[xu, yu], [xv, yv]] })
 }

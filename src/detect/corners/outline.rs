@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::fit::{LEAST_MARGIN_PX, Saddle};
-use super::{FAR_REACH, Lattice, seed};
-use crate::detect::board_labels::Placement;
+use super::neighbours::{FAR_REACH, seed};
+use crate::detect::board_labels::{Lattice, Placement};
 use crate::detect::{Outline, Picture};
 
 /// A line of which a smaller share of the corners in view is found is missing ...

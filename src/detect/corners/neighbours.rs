@@ -1,0 +1,25 @@
+//! Where a corner should be, by the corners around it.
+
+use super::fit::Seed;
+use crate::detect::board_labels::Lattice;
+use crate::geom::PlaneMap;
+
+/// Neighbours up to this many squares away say where a corner is and how the edges run ...
+pub(super) const REACH: i32 = 2;
+/// ... and up to this many where a gap in the lattice has to be bridged.
+pub(super) const FAR_REACH: i32 = 5;
+/// A corner with the directions and lengths of the edges there, from the map of its neighbourhood.
+pub(super) fn seed(lattice: &Lattice, (u, v): (i32, i32), reach: i32) -> Option<Seed> {
+    let pairs: Vec<_> = (v - reach..=v + reach)
+        .flat_map(|j| (u - reach..=u + reach).map(move |i| (i, j)))
+        .filter(|&key| key != (u, v))
+        .filter_map(|key| Some(([f64::from(key.0 - u), f64::from(key.1 - v)], *lattice.get(&key)?)))
+        .collect();
+    let map = PlaneMap::fit(&pairs)?;
+    let [[xu, xv], [yu, yv]] = map.jacobian([0.0, 0.0])?;
+    let predicted = map.apply([0.0, 0.0])?;
+    let near =
+        |uv: &&[f64; 2]| (uv[0] - predicted[0]).hypot(uv[1] - predicted[1]) < 0.2 * xu.hypot(yu).min(xv.hypot(yv));
+    let uv = lattice.get(&(u, v)).filter(near).copied().unwrap_or(predicted);
+    Some(Seed { uv, sides: [[xu, yu], [xv, yv]] })
+}
