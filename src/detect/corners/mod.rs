@@ -62,7 +62,7 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
     detection.dropped.extend(retry.into_iter().filter(|(key, _)| !kept.contains_key(key)).map(|(_, dropped)| dropped));
     detection.outline = outline(picture, &kept, placement);
     let some = kept.values().step_by(kept.len().div_ceil(NOISE_CORNERS).max(1));
-    let correlation = Correlation::of(some, view.smoothing_px);
+    let correlation = view.smoothing_px.map_or(Correlation::WHITE, |sigma| Correlation::of(some, sigma));
     for (key, saddle) in kept {
         if let Some(marker) = placement.id(key) {
             let covariance = Some(correlation.covariance(&saddle));

@@ -91,7 +91,7 @@ impl<'a> Raster<'a> {
 
 impl Correlation {
     /// Of noise that is not correlated.
-    const WHITE: Self = Self { variance: 1.0, lags: [0.0; LAGS] };
+    pub const WHITE: Self = Self { variance: 1.0, lags: [0.0; LAGS] };
 
     /// Of noise that was not correlated before a Gaussian smoothing.
     fn smoothed(sigma_px: f64) -> Self {
@@ -103,7 +103,7 @@ impl Correlation {
     }
 
     /// Of the residuals of fitted corners in a picture that was smoothed; as the smoothing alone leaves it where they are too few.
-    pub fn of<'a>(corners: impl Iterator<Item = &'a Saddle>, smoothing_px: Option<f64>) -> Self {
+    pub fn of<'a>(corners: impl Iterator<Item = &'a Saddle>, smoothing_px: f64) -> Self {
         let (mut covariance, mut followed, mut counts) = ([0.0; LAGS], [0.0; LAGS], [0.0; LAGS]);
         let (mut square, mut own, mut pixels, mut number) = (0.0, 0.0, 0.0, 1.0);
         for corner in corners {
@@ -127,7 +127,7 @@ impl Correlation {
             |at_zero: f64, sums: &[f64; LAGS]| at_zero / pixels + 2.0 * (0..LAGS).map(|l| mean(sums, l)).sum::<f64>();
         let all_followed = all(own, &followed);
         if pixels < LEAST_PIXELS * number || all_followed >= MOST_FOLLOWED {
-            return smoothing_px.map_or(Self::WHITE, Self::smoothed);
+            return Self::smoothed(smoothing_px);
         }
         let reach = (all(square, &covariance) / (1.0 - all_followed)).max(0.0);
         let lag = |l: usize| mean(&covariance, l) + reach * mean(&followed, l);
