@@ -144,7 +144,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
 }
 
 /// The lens that `--camera` names, or all of them for `auto`.
-fn choose_lens(series: &mut [MeasuredSeries], name: Option<&str>) -> Result<()> {
+pub(super) fn choose_lens(series: &mut [MeasuredSeries], name: Option<&str>) -> Result<()> {
     match name {
         Some("auto") => series.iter_mut().for_each(|s| s.lens_choice = LensChoice::All),
         Some(name) => {

@@ -16,6 +16,7 @@ mod memory;
 mod plan;
 mod plate;
 mod plate_board;
+mod poses;
 mod progress;
 mod recording;
 mod robot;
@@ -80,6 +81,8 @@ enum Command {
     Plan(Box<plan::PlanArgs>),
     /// Design a plate of coded circles and draw it for printing
     Plate(plate::PlateArgs),
+    /// Camera, plate and camera poses from images alone; needs no robot and no joint values
+    Poses(poses::PosesArgs),
     /// Print a solution again, or compare two over the workspace
     Show(show::ShowArgs),
     /// Make a series of a robot with known errors, with images or observations
@@ -98,6 +101,7 @@ impl Command {
             Self::Identify(args) => identify::run(args),
             Self::Plan(args) => plan::run(args),
             Self::Plate(args) => plate::run(args),
+            Self::Poses(args) => poses::run(args),
             Self::Show(args) => show::run(args),
             Self::Simulate(args) => simulate::run(args),
             Self::Verify(args) => verify::run(args),

@@ -15,7 +15,7 @@ use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{FreePoses, log_evidence};
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
-use crate::problem::{Adjustment, LensChoice, MeasuredSeries, predict};
+use crate::problem::{Adjustment, LensChoice, MeasuredSeries, Problem, predict};
 use crate::solve::{ComponentOptions, LinearProblem, Settings, Status, estimate_components};
 use crate::stage::stage;
 use crate::urdf::Chain;
@@ -67,7 +67,7 @@ pub(super) fn with_lenses(chain: &Chain, series: &[MeasuredSeries], options: &Op
 }
 
 /// Cameras none of whose series settles the lens.
-fn open_cameras(series: &[MeasuredSeries]) -> BTreeMap<String, LensChoice> {
+pub(super) fn open_cameras(series: &[MeasuredSeries]) -> BTreeMap<String, LensChoice> {
     let mut open = BTreeMap::new();
     for s in series {
         let choice = open.entry(s.camera.clone()).or_insert(s.lens_choice);
@@ -99,11 +99,11 @@ fn compare_lenses(joint: &JointFit, camera: &str, choice: LensChoice, limits: &L
     let fit = &joint.fit;
     let Some(k) = fit.problem.cameras.iter().position(|c| c == camera) else { return Vec::new() };
     let is_wide = fit.state.cameras[k].corner() > limits.fisheye_tangent;
-    let depths_m = depths_of(fit, &joint.start.free)[k];
+    let depths = depths_m(&fit.problem, &joint.start.free)[k];
     let formulas = Lens::ALL.into_iter().filter(|l| choice.has(*l) && (*l != Lens::Fisheye || is_wide));
     let formulas: Vec<Lens> = formulas.collect();
     let mut all: Vec<LensEvidence> =
-        formulas.into_par_iter().filter_map(|lens| evidence(fit, (k, &depths_m), lens)).collect();
+        formulas.into_par_iter().filter_map(|lens| evidence(fit, (k, &depths), lens)).collect();
     let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     all.iter_mut().for_each(|e| e.log_evidence -= best);
     let decisive = limits.decisive_log_odds;
@@ -163,11 +163,7 @@ fn of_formula(camera: &Camera) -> f64 {
 }
 
 /// Nearest and farthest plate centre that each camera saw, m.
-pub fn depths_m(solution: &Solution) -> Vec<[f64; 2]> {
-    depths_of(&solution.fit, &solution.free_poses)
-}
-
-fn depths_of(Adjustment { problem, .. }: &Adjustment, free: &FreePoses) -> Vec<[f64; 2]> {
+pub fn depths_m(problem: &Problem, free: &FreePoses) -> Vec<[f64; 2]> {
     let mut all = vec![[f64::INFINITY, 0.0f64]; problem.cameras.len()];
     for (i, image) in problem.used() {
         let Some(pose) = &free.poses[i] else { continue };
@@ -180,7 +176,13 @@ fn depths_of(Adjustment { problem, .. }: &Adjustment, free: &FreePoses) -> Vec<[
 
 /// What the cameras of ROS cannot say of the lenses that were identified.
 pub(super) fn losses(solution: &Solution) -> Vec<LensNotInRos> {
-    let named = solution.fit.problem.cameras.iter().zip(&solution.fit.state.cameras).zip(depths_m(solution));
+    let named = solution
+        .fit
+        .problem
+        .cameras
+        .iter()
+        .zip(&solution.fit.state.cameras)
+        .zip(depths_m(&solution.fit.problem, &solution.free_poses));
     let loss = |((name, camera), depths): ((&String, &Camera), [f64; 2])| {
         let fit = camera.in_ros(&depths)?;
         let (camera, lens) = (name.clone(), camera.lens.name());
@@ -202,7 +204,10 @@ pub fn choose_lens(
 ) -> Result<Vec<Notice>> {
     let mut trials: Vec<(Lens, Vec<(String, f64)>)> = Vec::new();
     let mut last_error = None;
-    for lens in Lens::ALL.into_iter().filter(|l| !l.has_field()) {
+    let among = |s: &MeasuredSeries, lens: Lens| s.lens_choice == LensChoice::Settled || s.lens_choice.has(lens);
+    let is_open = |lens: &Lens| series.iter().any(|s| open.contains(&s.camera) && among(s, *lens));
+    let lenses: Vec<Lens> = Lens::ALL.into_iter().filter(|l| !l.has_field() && is_open(l)).collect();
+    for lens in lenses {
         match held_out_errors(chain, series, lens, limits) {
             Ok(errors) => trials.push((lens, errors)),
             Err(error) => last_error = Some(error),

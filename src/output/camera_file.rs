@@ -3,19 +3,16 @@
 use super::names::file_names;
 use super::text::{list, quoted};
 use crate::error::{Code, Error, Result};
-use crate::identify::{Solution, depths_m};
 use crate::model::camera::{Camera, Lens};
 #[cfg(feature = "mcap")]
 use crate::series::CameraInfo;
 
-/// One file for each camera, as (file name, text).
+/// One file for each camera that sees between two depths (m), as (file name, text).
 ///
 /// # Errors
 /// A lens that camera_info cannot express.
-pub(super) fn cameras(solution: &Solution) -> Result<Vec<(String, String)>> {
-    let names = &solution.fit.problem.cameras;
-    let depths = depths_m(solution);
-    let cameras = names.iter().zip(&solution.fit.state.cameras).zip(&depths);
+pub(super) fn cameras(names: &[String], cameras: &[Camera], depths_m: &[[f64; 2]]) -> Result<Vec<(String, String)>> {
+    let cameras = names.iter().zip(cameras).zip(depths_m);
     let texts = cameras.map(|((name, camera), depths)| camera_yaml(name, camera, depths));
     file_names("camera", "yaml", names).into_iter().zip(texts).map(|(file, text)| Ok((file, text?))).collect()
 }

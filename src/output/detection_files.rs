@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::names::file_parts;
-use super::text::csv;
-use crate::error::{Code, Error, Result};
+use super::text::{csv, json};
+use crate::error::{Code, Result};
 use crate::identify::SeenImage;
 use crate::series::{
     CirclePoint, Edge, ImageObservations, InputFile, Plate, Series, observations_csv, plate_csv, plate_toml,
@@ -84,10 +84,7 @@ pub fn detection_files(images: &[SeenImage], context: &DetectionContext) -> Resu
         inputs: &context.inputs,
         images: images.iter().map(ImageRecord::of).collect(),
     };
-    let mut json = serde_json::to_vec_pretty(&record)
-        .map_err(|e| Error::new(Code::RecordNotWritten, FILE_NAME, e, "report this"))?;
-    json.push(b'\n');
-    files.insert(FILE_NAME.to_owned(), json);
+    files.insert(FILE_NAME.to_owned(), json(&record, FILE_NAME)?);
     Ok(files)
 }
 

@@ -27,7 +27,7 @@ pub(super) fn estimates(solution: &Solution, context: &Context) -> Result<Vec<Es
     let layout = &solution.fit.problem.layout;
     let values = solution.fit.state.values(layout);
     let poses = || layout.mountings.iter().chain(&layout.placements);
-    let names = column_names(&solution.fit.problem, context);
+    let names = column_names(&solution.fit.problem, &context.series);
     let mut all = Vec::with_capacity(layout.len());
     for (k, (column, name)) in layout.columns.iter().zip(names).enumerate() {
         let sigma = sigma(solution, k);

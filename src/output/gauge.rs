@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Matrix6};
 
 use crate::error::Result;
-use crate::identify::Solution;
-use crate::problem::Adjustment;
+use crate::fit::Fit;
+use crate::problem::{Adjustment, Problem};
 use crate::solve::{InFrame, PlateScale, Similarity, in_frame};
 
 /// Covariances of placements and markers in the frames of the plates.
@@ -17,12 +17,11 @@ pub(super) struct Gauge {
 }
 
 impl Gauge {
-    /// Of a solution.
+    /// Of a fit.
     ///
     /// # Errors
     /// Markers that lie on a line.
-    pub fn of(solution: &Solution) -> Result<Self> {
-        let fit = &solution.fit;
+    pub fn of(fit: &Fit) -> Result<Self> {
         let Adjustment { problem, state } = &fit.adjustment;
         let in_frame = in_frame(fit.linear(), &fit.covariance)?;
         let scale = |plate: usize| -> Result<Option<PlateScale>> {
@@ -37,7 +36,7 @@ impl Gauge {
     }
 
     /// Covariance of the pose of a plate.
-    pub fn placement(&self, solution: &Solution, placement: usize) -> Matrix6<f64> {
-        self.in_frame.placement(solution.fit.problem.layout.placements[placement].start)
+    pub fn placement(&self, problem: &Problem, placement: usize) -> Matrix6<f64> {
+        self.in_frame.placement(problem.layout.placements[placement].start)
     }
 }

@@ -49,6 +49,7 @@ mod solution_bytes;
 mod solution_check;
 pub mod solution_json;
 mod solution_record;
+pub mod stand_alone_files;
 mod text;
 mod write;
 
@@ -64,14 +65,17 @@ pub use write::{NewFolder, NewResult, Place, recover, write_all, write_beside};
 use std::collections::BTreeMap;
 
 use crate::error::Result;
-use crate::identify::Solution;
+use crate::identify::{Solution, depths_m};
+use crate::problem::Adjustment;
 
 /// Every file of the result: name -> bytes.
 ///
 /// # Errors
 /// A camera that a ROS camera_info cannot express, a URDF that cannot be patched, estimates that are not finite.
 pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, Vec<u8>>> {
-    let gauge = gauge::Gauge::of(solution)?;
+    let gauge = gauge::Gauge::of(&solution.fit)?;
+    let Adjustment { problem, state } = &solution.fit.adjustment;
+    let depths = depths_m(problem, &solution.free_poses);
     let mut files = BTreeMap::new();
     let mut add = |name: String, text: String| files.insert(name, text.into_bytes());
     add(robot_files::urdf_name(context), robot_files::urdf(solution, context)?);
@@ -80,17 +84,18 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
     add("mdh.csv".into(), controller_files::mdh_csv(solution, context));
     add("mastering.csv".into(), controller_files::mastering_csv(solution, context));
     add("compensation.toml".into(), compensation::compensation_toml(solution, context));
-    for (name, text) in camera_file::cameras(solution)? {
+    for (name, text) in camera_file::cameras(&problem.cameras, &state.cameras, &depths)? {
         add(name, text);
     }
     for (name, text) in pose_files::mountings(solution).into_iter().chain(pose_files::placements(solution, &gauge)) {
         add(name, text);
     }
-    for (name, text) in plate_files::plates(solution, context, &gauge)? {
+    for (name, text) in plate_files::plates(&solution.fit, &context.series, &gauge)? {
         add(name, text);
     }
     if context.poses == Poses::Written {
-        add("poses.csv".into(), pose_files::poses_csv(solution, context));
+        let names = names::ImageNames::new(problem, &context.series);
+        add("poses.csv".into(), pose_files::poses_csv(&names, &solution.free_poses));
     }
     add("observations.csv".into(), observation_table::observations_csv(solution, context));
     let mut names: Vec<String> = files.keys().cloned().collect();

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::Context;
 use crate::problem::{Image, Problem};
 
 /// Names of images: that of the file; with its series in front where two series have an image of the same name.
@@ -11,12 +10,12 @@ pub(super) struct ImageNames {
 }
 
 impl ImageNames {
-    pub fn new(problem: &Problem, context: &Context) -> Self {
+    pub fn new(problem: &Problem, series: &[String]) -> Self {
         let mut count: BTreeMap<&str, usize> = BTreeMap::new();
         problem.images.iter().for_each(|i| *count.entry(&i.name).or_default() += 1);
         let name = |image: &Image| match count[image.name.as_str()] {
             1 => image.name.clone(),
-            _ => format!("{}/{}", series_name(context, image.series), image.name),
+            _ => format!("{}/{}", series_name(series, image.series), image.name),
         };
         Self { names: problem.images.iter().map(name).collect() }
     }
@@ -27,25 +26,25 @@ impl ImageNames {
 }
 
 /// Name of a series, or its number where it has none.
-pub(super) fn series_name(context: &Context, series: usize) -> String {
-    context.series.get(series).cloned().unwrap_or_else(|| format!("series {}", series + 1))
+pub(super) fn series_name(all: &[String], series: usize) -> String {
+    all.get(series).cloned().unwrap_or_else(|| format!("series {}", series + 1))
 }
 
 /// Name of a plate: that of the first series that shows it.
-pub(super) fn plate_name(problem: &Problem, context: &Context, plate: usize) -> String {
+pub(super) fn plate_name(problem: &Problem, series: &[String], plate: usize) -> String {
     let first = problem.images.iter().find(|i| i.plate == plate);
-    first.map_or_else(|| format!("plate {}", plate + 1), |i| series_name(context, i.series))
+    first.map_or_else(|| format!("plate {}", plate + 1), |i| series_name(series, i.series))
 }
 
 /// Names of all columns; those of several plates by series instead of by path.
-pub(super) fn column_names(problem: &Problem, context: &Context) -> Vec<String> {
+pub(super) fn column_names(problem: &Problem, series: &[String]) -> Vec<String> {
     let layout = &problem.layout;
     let mut names: Vec<String> = layout.columns.iter().map(|c| c.name.clone()).collect();
     if layout.shapes.len() > 1 {
         for (plate, range) in layout.shapes.iter().enumerate() {
             for name in &mut names[range.clone()] {
                 let mode = name.rsplit_once('.').map_or("", |(_, mode)| mode).to_owned();
-                *name = format!("plate_shape/{}.{mode}", plate_name(problem, context, plate));
+                *name = format!("plate_shape/{}.{mode}", plate_name(problem, series, plate));
             }
         }
     }

@@ -12,7 +12,7 @@ const HEADER: [&str; 11] = ["image", "marker", "u", "v", "edge", "cov_uu", "cov_
 /// Text of observations.csv; covariances as the detector states them, du and dv measured minus predicted (px). For an image
 /// that is left out the prediction is that of its joint readings.
 pub(super) fn observations_csv(solution: &Solution, context: &Context) -> String {
-    let names = ImageNames::new(&solution.fit.problem, context);
+    let names = ImageNames::new(&solution.fit.problem, &context.series);
     let poses = poses(solution);
     let mut rows = vec![HEADER.map(String::from).to_vec()];
     for (k, image) in solution.fit.problem.images.iter().enumerate() {

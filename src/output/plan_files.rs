@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::error::{Code, Error, Result};
+use super::text::json;
+use crate::error::Result;
 use crate::plan::{Forecast, Plan, PlanRequest, image_name};
 use crate::series::{AngleUnit, CameraSection, DEFAULT_PLACEMENT, Manifest, Stop, Stops, plate_csv, plate_toml};
 use crate::urdf::JointKind;
@@ -125,10 +126,7 @@ pub fn plan_files(
     let mut names: Vec<String> = files.keys().cloned().collect();
     names.push(FILE_NAME.to_owned());
     let record = record(request, plan, forecast, command, names);
-    let mut bytes = serde_json::to_vec_pretty(&record)
-        .map_err(|e| Error::new(Code::RecordNotWritten, FILE_NAME, e, "report this"))?;
-    bytes.push(b'\n');
-    files.insert(FILE_NAME.to_owned(), bytes);
+    files.insert(FILE_NAME.to_owned(), json(&record, FILE_NAME)?);
     Ok(files)
 }
 

@@ -1,11 +1,10 @@
 //! plate.toml and plate.csv with corrected positions, in the formats that a series reads.
 
-use super::Context;
 use super::gauge::Gauge;
 use super::names::{file_names, plate_name};
 use super::text::csv;
 use crate::error::Result;
-use crate::identify::Solution;
+use crate::problem::Adjustment;
 use crate::series::plate_toml;
 
 const HEADER: [&str; 9] =
@@ -15,23 +14,23 @@ const HEADER: [&str; 9] =
 ///
 /// # Errors
 /// A plate that cannot be written.
-pub(super) fn plates(solution: &Solution, context: &Context, gauge: &Gauge) -> Result<Vec<(String, String)>> {
-    let problem = &solution.fit.problem;
-    let names: Vec<String> = (0..problem.plates.len()).map(|p| plate_name(problem, context, p)).collect();
+pub(super) fn plates(adjustment: &Adjustment, series: &[String], gauge: &Gauge) -> Result<Vec<(String, String)>> {
+    let problem = &adjustment.problem;
+    let names: Vec<String> = (0..problem.plates.len()).map(|p| plate_name(problem, series, p)).collect();
     let (tomls, tables) = (file_names("plate", "toml", &names), file_names("plate", "csv", &names));
     let mut out = Vec::new();
     for (k, (toml, table)) in tomls.into_iter().zip(tables).enumerate() {
         out.push((toml, plate_toml(&problem.plates[k], Some(&table))?));
-        out.push((table, plate_csv(solution, k, gauge)));
+        out.push((table, plate_csv(adjustment, k, gauge)));
     }
     Ok(out)
 }
 
-fn plate_csv(solution: &Solution, plate: usize, gauge: &Gauge) -> String {
-    let shape = &solution.fit.state.plates[plate];
+fn plate_csv(Adjustment { problem, state }: &Adjustment, plate: usize, gauge: &Gauge) -> String {
+    let shape = &state.plates[plate];
     let covariances = &gauge.positions[plate];
     let mut rows = vec![HEADER.map(String::from).to_vec()];
-    for (k, m) in solution.fit.problem.plates[plate].markers.iter().enumerate() {
+    for (k, m) in problem.plates[plate].markers.iter().enumerate() {
         let x = shape.position(k);
         let sigma = covariances[k].diagonal().map(|v| v.max(0.0).sqrt());
         let numbers = [x.x, x.y, x.z, m.outer_radius_m, m.inner_radius_m, sigma.x, sigma.y, sigma.z];

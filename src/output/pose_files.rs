@@ -2,11 +2,10 @@
 
 use nalgebra::Matrix6;
 
-use super::Context;
 use super::gauge::Gauge;
 use super::names::{ImageNames, file_names};
 use super::text::{csv, list, quoted};
-use crate::fit::PlacedCamera;
+use crate::fit::{FreePoses, PlacedCamera};
 use crate::geom::Pose;
 use crate::identify::Solution;
 use crate::problem::Image;
@@ -104,7 +103,7 @@ pub(super) fn placements(solution: &Solution, gauge: &Gauge) -> Vec<(String, Str
             parent,
             child: if problem.placements.len() == 1 { "plate" } else { &problem.placements[k] },
             pose: &solution.fit.state.placements[k],
-            covariance: gauge.placement(solution, k),
+            covariance: gauge.placement(problem, k),
             remark: INNER,
         };
         out.push((file, text.text()));
@@ -113,13 +112,12 @@ pub(super) fn placements(solution: &Solution, gauge: &Gauge) -> Vec<(String, Str
 }
 
 /// Text of poses.csv.
-pub(super) fn poses_csv(solution: &Solution, context: &Context) -> String {
-    let names = ImageNames::new(&solution.fit.problem, context);
+pub(super) fn poses_csv(names: &ImageNames, free_poses: &FreePoses) -> String {
     let upper = || (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
     let mut header: Vec<String> = ["image", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"].map(String::from).to_vec();
     header.extend(upper().map(|(i, j)| format!("c{}{}", i + 1, j + 1)));
     let mut rows = vec![header];
-    for (k, free) in solution.free_poses.poses.iter().enumerate() {
+    for (k, free) in free_poses.poses.iter().enumerate() {
         let Some(PlacedCamera { plate_from_camera: pose, covariance }) = free.as_ref().map(|f| &f.in_frame) else {
             continue;
         };

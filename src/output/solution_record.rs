@@ -142,7 +142,7 @@ fn robot(state: &State, twist_factor: f64) -> RobotRecord {
 fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
     let plate = |k: usize| solution.fit.problem.images.iter().find(|i| i.series == k).map_or(0, |i| i.plate);
     let record = |(k, s): (usize, &crate::problem::MeasuredSeries)| SeriesRecord {
-        name: series_name(context, k),
+        name: series_name(&context.series, k),
         camera: s.camera.clone(),
         mounting: s.mounting.clone(),
         camera_mount: s.mount,
@@ -161,7 +161,7 @@ fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
 
 fn cameras(solution: &Solution) -> Vec<CameraRecord> {
     let problem = &solution.fit.problem;
-    let depths = depths_m(solution);
+    let depths = depths_m(&solution.fit.problem, &solution.free_poses);
     let camera = |(k, name): (usize, &String)| {
         let c = &solution.fit.state.cameras[k];
         let noise = stop_noise(solution, &series_with(problem, k));
@@ -237,7 +237,7 @@ fn placements(solution: &Solution, gauge: &Gauge) -> Vec<PlacedRecord> {
     let problem = &solution.fit.problem;
     let placed = |(k, name): (usize, &String)| {
         let determined = determined(solution, problem.layout.placements[k].start);
-        let covariance = determined.then(|| flat(&gauge.placement(solution, k)));
+        let covariance = determined.then(|| flat(&gauge.placement(problem, k)));
         PlacedRecord { name: name.clone(), pose: (&solution.fit.state.placements[k]).into(), covariance }
     };
     problem.placements.iter().enumerate().map(placed).collect()
@@ -249,7 +249,7 @@ fn plates(solution: &Solution, context: &Context, gauge: &Gauge) -> Vec<PlateRec
         let shape = &solution.fit.state.plates[k];
         let sigmas = &gauge.positions[k];
         PlateRecord {
-            name: plate_name(problem, context, k),
+            name: plate_name(problem, &context.series, k),
             kind: p.kind,
             columns: p.columns,
             rows: p.rows,
@@ -275,7 +275,7 @@ fn plates(solution: &Solution, context: &Context, gauge: &Gauge) -> Vec<PlateRec
 
 fn images(solution: &Solution, context: &Context) -> Vec<ImageRecord> {
     let problem = &solution.fit.problem;
-    let names = ImageNames::new(problem, context);
+    let names = ImageNames::new(problem, &context.series);
     let poses = poses(solution);
     let image = |(k, i): (usize, &Image)| {
         let from = solution.fit.taken_from(k);
@@ -283,7 +283,7 @@ fn images(solution: &Solution, context: &Context) -> Vec<ImageRecord> {
         let observations = observations(solution, k, poses[k].as_ref());
         ImageRecord {
             name: names.of(k).to_owned(),
-            series: series_name(context, i.series),
+            series: series_name(&context.series, i.series),
             camera: i.camera,
             mounting: i.mounting,
             placement: i.placement,

@@ -1,4 +1,19 @@
-//! Numbers and names as YAML, TOML and CSV want them.
+//! Numbers, names and records as YAML, TOML, CSV and JSON want them.
+
+use serde::Serialize;
+
+use crate::error::{Code, Error, Result};
+
+/// A record as the bytes of a JSON file; `file` is its name, for messages.
+///
+/// # Errors
+/// None in practice: every field can be written as JSON.
+pub(super) fn json(record: &impl Serialize, file: &str) -> Result<Vec<u8>> {
+    let written = serde_json::to_vec_pretty(record);
+    let mut bytes = written.map_err(|e| Error::new(Code::RecordNotWritten, file, e, "report this"))?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
 
 /// A number that every YAML and TOML reader takes for a float and reads back exactly.
 ///

@@ -18,6 +18,7 @@ mod table;
 mod tag_plates;
 mod tags;
 mod units;
+mod without_robot;
 
 pub use inputs::InputFile;
 pub use joints::{DEFAULT_PLACEMENT, Stop, Stops};
@@ -38,3 +39,4 @@ pub use read::{Series, Source, read, read_images};
 pub use recorded::convert_recording;
 pub use tag_plates::regions;
 pub use tags::{Region, TagPrint, Tags};
+pub use without_robot::{read_without_robot, series_of_images};

@@ -121,7 +121,7 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     Ok(Series { name, folder, manifest, plate, stops, source, notices, inputs })
 }
 
-fn folder_name(folder: &Path) -> Result<String> {
+pub(super) fn folder_name(folder: &Path) -> Result<String> {
     let full = folder.canonicalize().map_err(|e| Error::io(folder, &e))?;
     if !full.is_dir() {
         let remedy = "give the folder that holds series.toml";
@@ -220,7 +220,7 @@ pub(super) fn optional_images(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBu
 }
 
 /// Image files of a folder in the order of their names.
-fn image_files(folder: &Path) -> Result<Vec<PathBuf>> {
+pub(super) fn image_files(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::io(folder, &e))?;
     let mut files = Vec::new();
     for entry in entries {

@@ -105,7 +105,7 @@ fn the_joint_fit_tells_lenses_apart_and_states_what_ros_cannot_express() {
         let taken: Vec<Lens> = s.lenses.iter().filter(|l| l.taken).map(|l| l.lens).collect();
         println!("{lens:?}: {:?}", s.lenses);
         assert_eq!((taken, s.fit.state.cameras[0].lens), (vec![lens], lens));
-        let loss = s.fit.state.cameras[0].in_ros(&depths_m(&s)[0]);
+        let loss = s.fit.state.cameras[0].in_ros(&depths_m(&s.fit.problem, &s.free_poses)[0]);
         assert_eq!(loss.is_some(), lens == Lens::Parallax);
         let said = s.findings.iter().filter(|f| f.code() == robotcal::Code::LensNotInRos).count();
         assert_eq!(said, usize::from(loss.is_some()));

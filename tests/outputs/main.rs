@@ -5,6 +5,7 @@ mod outputs_support;
 
 mod controller;
 mod gauge;
+mod poses;
 mod report;
 mod verify_points;
 mod whole;

@@ -1,0 +1,176 @@
+//! `robotcal poses`: camera, plate and stand-alone camera poses from images alone.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::recording::RecordingArgs;
+use super::say::{say, say_line};
+use super::{Verdict, identify, progress};
+use crate::assess::{Limits, median};
+use crate::calibration::{Pictures, require_unchanged};
+use crate::error::{Code, Error, Notice, Result};
+use crate::identify::{PoseSigma, StandAlone, measure, stand_alone};
+use crate::output::stand_alone_files::{StandAloneContext, stand_alone_files};
+use crate::output::{Place, folder_name};
+use crate::problem::{Adjustment, MeasuredSeries};
+use crate::series::{InputFile, Series, read_without_robot, series_of_images};
+use crate::urdf::Chain;
+
+/// Images of which the table has a row each; of more, the worst.
+const MOST_ROWS: usize = 40;
+
+/// Flags of `poses`.
+#[derive(Debug, Args)]
+pub(super) struct PosesArgs {
+    /// Series folder, or a folder with images/ and plate.toml; give it several times to adjust several series together
+    #[arg(long, value_name = "FOLDER", required_unless_present = "images")]
+    series: Vec<PathBuf>,
+    /// Single images instead of a series; they need --plate
+    #[arg(value_name = "IMAGE", conflicts_with = "series", requires = "plate")]
+    images: Vec<PathBuf>,
+    /// The plate in single images (plate.toml)
+    #[arg(long, value_name = "FILE", conflicts_with = "series")]
+    plate: Option<PathBuf>,
+    /// Lens: auto (the simplest of all that predicts best what the adjustment had not seen), brown, fisheye, parallax, rational, thin_prism, brown+field or fisheye+field [default: as in series.toml, else among those that camera.yaml can express]
+    #[arg(long, value_name = "LENS")]
+    camera: Option<String>,
+    /// Folder for the results [default: reports/<series name>-poses]
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    recording: RecordingArgs,
+}
+
+pub(super) fn run(args: &PosesArgs) -> Result<Verdict> {
+    // Pictures of a recording are needed until they have been looked at.
+    let pictures = Pictures::new();
+    let claimed = args.out.as_deref().map(Place::claim).transpose()?;
+    let series = match &args.plate {
+        Some(plate) => vec![series_of_images(&args.images, plate)?],
+        None => args.series.iter().map(|folder| read_without_robot(folder)).collect::<Result<Vec<Series>>>()?,
+    };
+    let names: Vec<String> = series.iter().map(|s| s.name.clone()).collect();
+    let place = match claimed {
+        Some(place) => place,
+        None => Place::claim(&Path::new("reports").join(format!("{}-poses", folder_name(&names))))?,
+    };
+    let mut series = pictures.of_recordings(series, &args.recording.options(&[])?)?;
+    series.iter_mut().for_each(forget_joints);
+    let mut inputs: Vec<InputFile> = Vec::new();
+    for s in &series {
+        inputs.extend(s.inputs.iter().cloned());
+        inputs.extend(s.image_hashes()?);
+    }
+    let (mut measured, mut notices) = observe(&series)?;
+    series.iter().try_for_each(|s| require_unchanged(&inputs, &s.image_hashes()?))?;
+    identify::choose_lens(&mut measured, args.camera.as_deref())?;
+    let found = stand_alone(&measured, &Limits::default())?;
+    notices.extend(found.notices.iter().cloned());
+    let command = super::command_line().join(" ");
+    let context = StandAloneContext { series: names, inputs, command, notices: Notice::said_once(&notices) };
+    let files = stand_alone_files(&found, &context)?;
+    let folder = place.path().to_path_buf();
+    place.write_all(&files)?;
+    say!("{}", text(&found)?);
+    context.notices.iter().for_each(|n| say_line!("note      {}", n.coded()));
+    say_line!("results   {} ({} files)", folder.display(), files.len());
+    Ok(Verdict::Good)
+}
+
+/// No robot takes part.
+fn forget_joints(series: &mut Series) {
+    series.stops.joints.clear();
+    series.stops.stops.iter_mut().for_each(|stop| stop.raw_readings = None);
+}
+
+fn observe(series: &[Series]) -> Result<(Vec<MeasuredSeries>, Vec<Notice>)> {
+    let (mut all, mut notices) = (Vec::new(), Vec::new());
+    let watch = progress::of_series();
+    for s in series {
+        let found = measure(s, &Chain::empty(), series.len() > 1, |_| watch(&s.name, s.stops.stops.len()))?;
+        notices.extend(found.notices);
+        all.push(found.series);
+    }
+    Ok((all, notices))
+}
+
+/// Position in mm and direction in arcmin.
+fn in_words(sigma: &PoseSigma) -> String {
+    format!("{:.4} mm   {:.3} arcmin", 1e3 * sigma.position_m, 60.0 * sigma.rotation_rad.to_degrees())
+}
+
+/// What is printed: the poses as a whole, cameras, scale, and the images.
+fn text(found: &StandAlone) -> Result<String> {
+    let Adjustment { problem, state } = &found.fit.adjustment;
+    let sigmas = found.sigmas();
+    let middle = |of: fn(&PoseSigma) -> f64| median(&sigmas.iter().map(of).collect::<Vec<_>>()).unwrap_or(f64::NAN);
+    let worst = sigmas.iter().max_by(|a, b| a.position_m.total_cmp(&b.position_m)).ok_or_else(|| {
+        Error::new(Code::PlateNowhere, "poses", "no image has a pose", "look at one of the images: is the plate in it?")
+    })?;
+    let name = |image: usize| &problem.images[image].name;
+    let usual = PoseSigma { position_m: middle(|s| s.position_m), rotation_rad: middle(|s| s.rotation_rad), ..*worst };
+    let mut text = format!(
+        "poses     {} of {} images, known to {} per axis (median; one sigma, in the frame of the plate)\n          worst: {} ({})\n",
+        sigmas.len(),
+        problem.images.len(),
+        in_words(&usual),
+        in_words(worst),
+        name(worst.image)
+    );
+    for (k, camera) in problem.cameras.iter().zip(&state.cameras).enumerate().map(|(k, (n, c))| ((k, n), c)) {
+        let (parameters, columns) = (&camera.parameters, &problem.layout.cameras[k.0]);
+        let sigma = |c: usize| found.fit.covariance.sigma(columns.start + c);
+        text += &format!(
+            "camera    {}: {}, fx {:.3} +- {:.3}, fy {:.3} +- {:.3}, centre ({:.3} +- {:.3}, {:.3} +- {:.3}) px\n",
+            k.1,
+            camera.lens.name(),
+            parameters[0],
+            sigma(0),
+            parameters[1],
+            sigma(1),
+            parameters[2],
+            sigma(2),
+            parameters[3],
+            sigma(3),
+        );
+    }
+    text += &format!(
+        "residuals {:.4} px RMS per point over {} observations\n",
+        found.free_poses.rms_px, found.free_poses.observations
+    );
+    for scale in found.scales() {
+        text += &format!(
+            "scale     of all poses together, and not in their sigmas: known to {:.4} %; 0.1 % is 1 mm a metre\n",
+            100.0 * scale.sigma
+        );
+    }
+    for image in &problem.images {
+        if let Some(why) = &image.rejected {
+            text += &format!("left out  {}: {why}\n", image.name);
+        }
+    }
+    Ok(text + &table(&sigmas, name))
+}
+
+/// A row for every image; of many images the worst.
+fn table<'a>(sigmas: &[PoseSigma], name: impl Fn(usize) -> &'a String) -> String {
+    let mut rows: Vec<&PoseSigma> = sigmas.iter().collect();
+    if rows.len() > MOST_ROWS {
+        rows.sort_by(|a, b| b.position_m.total_cmp(&a.position_m));
+        rows.truncate(MOST_ROWS);
+    }
+    let widest = rows.iter().map(|s| name(s.image).chars().count()).fold(5, usize::max);
+    let mut text = format!("{:widest$}  points  px RMS  position mm  direction arcmin\n", "image");
+    for s in rows {
+        text += &format!(
+            "{:widest$}  {:6}  {:6.4}  {:11.4}  {:16.3}\n",
+            name(s.image),
+            s.observations,
+            s.rms_px,
+            1e3 * s.position_m,
+            60.0 * s.rotation_rad.to_degrees()
+        );
+    }
+    text
+}

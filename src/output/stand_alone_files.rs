@@ -1,0 +1,148 @@
+//! Files of cameras, plates and stand-alone poses that were adjusted without a robot.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::gauge::Gauge;
+use super::names::{ImageNames, plate_name};
+use super::text::json;
+use super::{camera_file, plate_files, pose_files};
+use crate::error::{Notice, Result};
+use crate::identify::{StandAlone, depths_m};
+use crate::model::camera::Lens;
+use crate::problem::Adjustment;
+use crate::series::InputFile;
+
+/// Name of the record that a program reads.
+pub const FILE_NAME: &str = "poses.json";
+
+/// What the files need beside the adjustment.
+#[derive(Debug, Clone)]
+pub struct StandAloneContext {
+    /// Names of the series.
+    pub series: Vec<String>,
+    /// All files that were read, with their hashes.
+    pub inputs: Vec<InputFile>,
+    /// The command line.
+    pub command: String,
+    /// What the user should know.
+    pub notices: Vec<Notice>,
+}
+
+#[derive(Serialize)]
+struct Record<'a> {
+    format: u32,
+    program: &'static str,
+    command: &'a str,
+    inputs: &'a [InputFile],
+    cameras: Vec<CameraOf<'a>>,
+    plates: Vec<PlateOf>,
+    images: Vec<ImageOf<'a>>,
+    notices: Vec<String>,
+}
+
+/// A number with its standard deviation; none where it was held.
+#[derive(Serialize)]
+struct Value {
+    value: f64,
+    sigma: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct CameraOf<'a> {
+    name: &'a str,
+    lens: Lens,
+    width_px: u32,
+    height_px: u32,
+    parameters: BTreeMap<String, Value>,
+    /// Factor on the stated standard deviations of its observations.
+    pixel_factor: f64,
+}
+
+#[derive(Serialize)]
+struct PlateOf {
+    name: String,
+    /// Size over the nominal one, less one: common to all poses and markers before the plate, and not in their covariances.
+    relative_scale: Option<Value>,
+}
+
+#[derive(Serialize)]
+struct ImageOf<'a> {
+    image: &'a str,
+    /// Why it is left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    left_out: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    observations: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rms_px: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    position_sigma_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rotation_sigma_rad: Option<f64>,
+}
+
+/// Every file of the result: name -> bytes.
+///
+/// # Errors
+/// A camera that a ROS camera_info cannot express; markers that lie on a line.
+pub fn stand_alone_files(found: &StandAlone, context: &StandAloneContext) -> Result<BTreeMap<String, Vec<u8>>> {
+    let Adjustment { problem, state } = &found.fit.adjustment;
+    let (series, depths) = (&context.series, depths_m(problem, &found.free_poses));
+    let names = ImageNames::new(problem, series);
+    let cameras = camera_file::cameras(&problem.cameras, &state.cameras, &depths)?;
+    let plates = plate_files::plates(&found.fit, series, &Gauge::of(&found.fit)?)?;
+    let poses = [("poses.csv".to_owned(), pose_files::poses_csv(&names, &found.free_poses))];
+    let texts = cameras.into_iter().chain(plates).chain(poses);
+    let mut files: BTreeMap<String, Vec<u8>> = texts.map(|(name, text)| (name, text.into_bytes())).collect();
+    files.insert(FILE_NAME.to_owned(), json(&record(found, context, &names), FILE_NAME)?);
+    Ok(files)
+}
+
+fn record<'a>(found: &'a StandAlone, context: &'a StandAloneContext, names: &'a ImageNames) -> Record<'a> {
+    let Adjustment { problem, state } = &found.fit.adjustment;
+    let covariance = &found.fit.covariance;
+    let camera = |(k, name): (usize, &'a String)| {
+        let camera = &state.cameras[k];
+        let value = |(column, value): (usize, &f64)| {
+            let is_free = problem.layout.columns[column].free;
+            Value { value: *value, sigma: is_free.then(|| covariance.sigma(column)) }
+        };
+        let values = problem.layout.cameras[k].clone().zip(&camera.parameters).map(value);
+        CameraOf {
+            name,
+            lens: camera.lens,
+            width_px: camera.width_px,
+            height_px: camera.height_px,
+            parameters: camera.parameter_names().map(Into::into).zip(values).collect(),
+            pixel_factor: problem.noise.pixel_factor[k],
+        }
+    };
+    let plate = |k: usize| PlateOf {
+        name: plate_name(problem, &context.series, k),
+        relative_scale: found.free_poses.scales[k].map(|s| Value { value: s.relative, sigma: Some(s.sigma) }),
+    };
+    let sigmas: BTreeMap<usize, _> = found.sigmas().into_iter().map(|s| (s.image, s)).collect();
+    let image = |k: usize| {
+        let known = sigmas.get(&k);
+        ImageOf {
+            image: names.of(k),
+            left_out: problem.images[k].rejected.as_ref().map(ToString::to_string),
+            observations: known.map(|s| s.observations),
+            rms_px: known.map(|s| s.rms_px),
+            position_sigma_m: known.map(|s| s.position_m),
+            rotation_sigma_rad: known.map(|s| s.rotation_rad),
+        }
+    };
+    Record {
+        format: 1,
+        program: concat!("robotcal ", env!("CARGO_PKG_VERSION")),
+        command: &context.command,
+        inputs: &context.inputs,
+        cameras: problem.cameras.iter().enumerate().map(camera).collect(),
+        plates: (0..problem.plates.len()).map(plate).collect(),
+        images: (0..problem.images.len()).map(image).collect(),
+        notices: context.notices.iter().map(Notice::coded).collect(),
+    }
+}

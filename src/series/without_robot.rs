@@ -1,0 +1,87 @@
+//! A series read for its camera and plate alone: joint readings and their unit need not be there.
+
+use std::path::{Path, PathBuf};
+
+use super::joints::{DEFAULT_PLACEMENT, Stop, Stops};
+use super::manifest::{CameraMount, Manifest};
+use super::observation_file;
+use super::plate_file::read_plate;
+use super::read::{Series, Source, file_name, folder_name, image_files, optional_images, read};
+use crate::error::{Code, Error, Result};
+
+/// Reads a series folder, or a folder of images/ (or observations.csv) with plate.toml and nothing else. What joints.csv says is taken where it
+/// is there.
+///
+/// # Errors
+/// By file and line: whatever does not follow the format.
+pub fn read_without_robot(folder: &Path) -> Result<Series> {
+    let manifest_path = folder.join("series.toml");
+    if !folder.is_dir() || folder.join("joints.csv").is_file() || folder.join("metadata.yaml").is_file() {
+        return read(folder);
+    }
+    let name = folder_name(folder)?;
+    let mut inputs = Vec::new();
+    let manifest = match manifest_path.is_file() {
+        true => Manifest::read(&manifest_path, &mut inputs)?,
+        false => Manifest::plain(CameraMount::Hand, "plate.toml"),
+    };
+    if manifest.mcap.is_some() {
+        return read(folder);
+    }
+    let plate = read_plate(&folder.join(&manifest.plate), &mut inputs)?;
+    let observed = folder.join("observations.csv");
+    let (stops, source) = if observed.is_file() {
+        let size = manifest.camera.width_px.zip(manifest.camera.height_px);
+        let images = observation_file::read(&observed, &plate, size, &mut inputs)?;
+        (
+            images.keys().map(|image| stop(image.clone(), None)).collect(),
+            Source::Observations(images.into_values().collect()),
+        )
+    } else {
+        let images = folder.join("images");
+        let paths = image_files(&images)?;
+        if paths.is_empty() {
+            let remedy = "copy the images into it, or give them one by one with --plate";
+            return Err(Error::new(Code::ImagesMissing, images.display(), "holds no image", remedy));
+        }
+        let (dark, white) = optional_images(folder)?;
+        (paths.into_iter().map(of_file).collect(), Source::Images { folder: images, dark, white })
+    };
+    let (folder, notices) = (folder.to_path_buf(), Vec::new());
+    Ok(Series { name, folder, manifest, plate, stops: Stops { joints: Vec::new(), stops }, source, notices, inputs })
+}
+
+/// A series of single images of a plate.
+///
+/// # Errors
+/// A plate that cannot be read; two images of one name.
+pub fn series_of_images(images: &[PathBuf], plate: &Path) -> Result<Series> {
+    let mut inputs = Vec::new();
+    let read = read_plate(plate, &mut inputs)?;
+    if let Some((k, twin)) =
+        images.iter().enumerate().find(|(k, i)| images[..*k].iter().any(|j| file_name(i) == file_name(j)))
+    {
+        let what = format!("has the name of image {k} as well");
+        let remedy = "images are told apart by their names: rename one";
+        return Err(Error::new(Code::ImageTwice, twin.display(), what, remedy));
+    }
+    let folder = plate.parent().map_or_else(PathBuf::new, Path::to_path_buf);
+    Ok(Series {
+        name: "images".to_owned(),
+        manifest: Manifest::plain(CameraMount::Hand, &file_name(plate)),
+        plate: read,
+        stops: Stops { joints: Vec::new(), stops: images.iter().cloned().map(of_file).collect() },
+        source: Source::Images { folder: folder.clone(), dark: Vec::new(), white: Vec::new() },
+        folder,
+        notices: Vec::new(),
+        inputs,
+    })
+}
+
+fn of_file(path: PathBuf) -> Stop {
+    stop(file_name(&path), Some(path))
+}
+
+fn stop(image: String, path: Option<PathBuf>) -> Stop {
+    Stop { image, path, raw_readings: None, placement: DEFAULT_PLACEMENT.to_owned(), time_s: None, line: 0 }
+}
