@@ -40,6 +40,7 @@ struct Record<'a> {
     plates: Vec<PlateOf>,
     images: Vec<ImageOf<'a>>,
     notices: Vec<String>,
+    files: Vec<String>,
 }
 
 /// A number with its standard deviation; none where it was held.
@@ -96,7 +97,10 @@ pub fn stand_alone_files(found: &StandAlone, context: &StandAloneContext) -> Res
     let poses = [("poses.csv".to_owned(), pose_files::poses_csv(&names, &found.free_poses))];
     let texts = cameras.into_iter().chain(plates).chain(poses);
     let mut files: BTreeMap<String, Vec<u8>> = texts.map(|(name, text)| (name, text.into_bytes())).collect();
-    files.insert(FILE_NAME.to_owned(), json(&record(found, context, &names), FILE_NAME)?);
+    let mut listed: Vec<String> = files.keys().cloned().chain([FILE_NAME.to_owned()]).collect();
+    listed.sort();
+    let record = Record { files: listed, ..record(found, context, &names) };
+    files.insert(FILE_NAME.to_owned(), json(&record, FILE_NAME)?);
     Ok(files)
 }
 
@@ -144,5 +148,6 @@ fn record<'a>(found: &'a StandAlone, context: &'a StandAloneContext, names: &'a 
         plates: (0..problem.plates.len()).map(plate).collect(),
         images: (0..problem.images.len()).map(image).collect(),
         notices: context.notices.iter().map(Notice::coded).collect(),
+        files: Vec::new(),
     }
 }

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -250,4 +251,33 @@ fn a_recording_that_cannot_be_written_is_refused_before_the_work() {
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
     assert_eq!(std::fs::read(at("old.mcap")).unwrap(), b"mine");
+}
+
+#[test]
+fn poses_need_no_robot_and_no_joint_values() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = folder.path().join("run1");
+    std::fs::create_dir(&run).unwrap();
+    for file in ["observations.csv", "plate.toml", "plate.csv"] {
+        std::fs::copy(root(&format!("datasets/ur10e_observations/{file}")), run.join(file)).unwrap();
+    }
+    let manifest = std::fs::read_to_string(root("datasets/ur10e_observations/series.toml")).unwrap();
+    let without: Vec<&str> = manifest.lines().filter(|l| !l.starts_with("joint_unit")).collect();
+    std::fs::write(run.join("series.toml"), without.join("\n")).unwrap();
+    let out = folder.path().join("poses");
+    let [series, out] = [&run, &out].map(|path| path.to_str().unwrap());
+    let output = robotcal(&["poses", "--series", series, "--out", out]);
+    assert!(output.status.success(), "{}", text(&output));
+    assert!(text(&output).starts_with("poses     "), "{}", text(&output));
+    let poses = std::fs::read_to_string(Path::new(out).join("poses.csv")).unwrap();
+    let images: BTreeSet<&str> = poses.lines().skip(1).filter_map(|l| l.split(',').next()).collect();
+    let observed = std::fs::read_to_string(run.join("observations.csv")).unwrap();
+    let expected: BTreeSet<&str> = observed.lines().skip(1).filter_map(|l| l.split(',').next()).collect();
+    assert_eq!(images, expected);
+    // An earlier result stays where there is nothing to look at.
+    std::fs::remove_file(run.join("plate.toml")).unwrap();
+    let output = robotcal(&["poses", "--series", series, "--out", out]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output).starts_with("error[file_missing]: "), "{}", text(&output));
+    assert_eq!(std::fs::read_to_string(Path::new(out).join("poses.csv")).unwrap(), poses);
 }

@@ -8,10 +8,11 @@ use std::path::{Component, Path, PathBuf};
 use serde::Deserialize;
 
 use crate::output::detection_files::OVERLAY_FOLDER;
-use crate::output::{detection_files, plan_files, solution_json};
+use crate::output::{detection_files, plan_files, solution_json, stand_alone_files};
 
 /// Files that list all others of their result; the last to come and the last to go.
-pub(super) const RECORDS: [&str; 3] = [solution_json::FILE_NAME, plan_files::FILE_NAME, detection_files::FILE_NAME];
+pub(super) const RECORDS: [&str; 4] =
+    [solution_json::FILE_NAME, plan_files::FILE_NAME, detection_files::FILE_NAME, stand_alone_files::FILE_NAME];
 
 /// The folder of a run at work within its target.
 pub(super) const UNFINISHED: &str = ".robotcal-unfinished";
