@@ -16,7 +16,7 @@ use crate::identify::SeenImage;
 use crate::output::detection_files::{DetectionContext, detection_files, dropped_counts, marker_counts, picture_names};
 use crate::output::overlay::{Palette, overlay_png};
 use crate::output::{NewResult, Place, folder_name};
-use crate::series::{self, InputFile, Plate, Series, read_plate};
+use crate::series::{self, InputFile, Plate, Series, series_of_images};
 
 /// Flags of `detect`.
 #[derive(Debug, Args)]
@@ -103,18 +103,7 @@ fn of_series(args: &DetectArgs, series: Series, pictures: &Pictures) -> Result<L
 }
 
 fn of_images(images: &[PathBuf], plate: &Path) -> Result<Looked> {
-    let mut inputs = Vec::new();
-    let plate = read_plate(plate, &mut inputs)?;
-    let name = |path: &PathBuf| path.file_name().map(|n| n.to_owned());
-    if let Some((k, twin)) = images.iter().enumerate().find(|(k, i)| images[..*k].iter().any(|j| name(i) == name(j))) {
-        let what = format!("has the name of image {} as well", k);
-        return Err(Error::new(
-            Code::ImageTwice,
-            twin.display(),
-            what,
-            "images are told apart by their names: rename one",
-        ));
-    }
+    let Series { plate, mut inputs, .. } = series_of_images(images, plate)?;
     let hashes = || images.iter().filter(|i| i.is_file()).map(|i| InputFile::of_file(i)).collect::<Result<Vec<_>>>();
     inputs.extend(hashes()?);
     let bar = progress::bar(images.len(), "images");

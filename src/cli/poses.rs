@@ -118,12 +118,13 @@ fn text(found: &StandAlone) -> Result<String> {
         in_words(worst),
         name(worst.image)
     );
-    for (k, camera) in problem.cameras.iter().zip(&state.cameras).enumerate().map(|(k, (n, c))| ((k, n), c)) {
-        let (parameters, columns) = (&camera.parameters, &problem.layout.cameras[k.0]);
+    let cameras = problem.cameras.iter().zip(&state.cameras).zip(&problem.layout.cameras);
+    for ((name, camera), columns) in cameras {
+        let parameters = &camera.parameters;
         let sigma = |c: usize| found.fit.covariance.sigma(columns.start + c);
         text += &format!(
             "camera    {}: {}, fx {:.3} +- {:.3}, fy {:.3} +- {:.3}, centre ({:.3} +- {:.3}, {:.3} +- {:.3}) px\n",
-            k.1,
+            name,
             camera.lens.name(),
             parameters[0],
             sigma(0),

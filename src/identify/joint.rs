@@ -8,6 +8,7 @@ use super::solution::Solution;
 use super::staged::{refit, staged};
 use super::start::{start_robot, take_back};
 use super::start_verdict::StartVerdict;
+use super::stated::focals_px;
 use crate::assess::{hold_out, judge, refitted};
 use crate::diagnose::{CheckContext, Diagnosis};
 use crate::error::{Code, Error, Result};
@@ -67,9 +68,7 @@ pub(super) fn fit_model(
             known
         }
         None => {
-            let stated: Vec<Option<f64>> = (problem.cameras.iter())
-                .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
-                .collect();
+            let stated = focals_px(&problem.cameras, series);
             let (adjusted, free, verdicts) = adjust_free_poses(start, &stated, &options.limits)?;
             start = adjusted;
             FreeStart::of(&start, free, verdicts)

@@ -9,6 +9,7 @@ use super::free_poses::adjust_free_poses;
 use super::joint::{JointFit, fit_model};
 use super::options::Options;
 use super::solution::{LensEvidence, Solution};
+use super::stated::focals_px;
 use crate::assess::Limits;
 use crate::diagnose::LensNotInRos;
 use crate::error::{Code, Error, Notice, Result};
@@ -255,9 +256,7 @@ fn held_out_errors(
     for (i, image) in thinned.problem.images.iter_mut().enumerate() {
         image.observations.retain(|o| !aside(i, o.marker));
     }
-    let stated: Vec<Option<f64>> = (full.cameras.iter())
-        .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
-        .collect();
+    let stated = focals_px(&full.cameras, series);
     let (_, free, _) = adjust_free_poses(thinned, &stated, limits)?;
     let mut squares: Vec<Vec<f64>> = vec![Vec::new(); full.cameras.len()];
     for (i, image) in full.images.iter().enumerate() {

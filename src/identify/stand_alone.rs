@@ -4,9 +4,10 @@ use super::build::build;
 use super::free_poses::adjust_free_poses;
 use super::lens_choice::{choose_lens, open_cameras};
 use super::start_verdict::StartVerdict;
+use super::stated::focals_px;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Notice, Result};
-use crate::fit::{Fit, FreePoses};
+use crate::fit::{Fit, FreePose, FreePoses};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, MeasuredSeries};
 use crate::solve::PlateScale;
@@ -52,8 +53,7 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     let open: Vec<String> = open_cameras(&series).into_keys().collect();
     let notices = if open.is_empty() { Vec::new() } else { choose_lens(&chain, &mut series, &open, limits)? };
     let start = build(&Robot::nominal(chain), &series, false, limits)?;
-    let stated = |name: &String| series.iter().filter(|s| &s.camera == name).find_map(|s| s.focal_px);
-    let stated: Vec<Option<f64>> = start.problem.cameras.iter().map(stated).collect();
+    let stated = focals_px(&start.problem.cameras, &series);
     let (mut adjustment, free_poses, starts) = adjust_free_poses(start, &stated, limits)?;
     adjustment.hold_poses();
     Ok(StandAlone { fit: at_solution(adjustment)?, free_poses, starts, notices })
@@ -72,8 +72,8 @@ fn at_solution(adjustment: Adjustment) -> Result<Fit> {
 impl StandAlone {
     /// How well every pose is known, in the order of the images.
     pub fn sigmas(&self) -> Vec<PoseSigma> {
-        let of = |(image, pose): (usize, &Option<_>)| {
-            let pose: &crate::fit::FreePose = pose.as_ref()?;
+        let of = |(image, pose): (usize, &Option<FreePose>)| {
+            let pose = pose.as_ref()?;
             let c = &pose.in_frame.covariance;
             let mean = |first: usize| ((first..first + 3).map(|k| c[(k, k)]).sum::<f64>() / 3.0).max(0.0).sqrt();
             Some(PoseSigma {

@@ -47,3 +47,9 @@ pub(super) fn lens_of(series: &Series) -> Result<Lens> {
         )
     })
 }
+
+/// Focal length of every camera as the first series that states one has it, px.
+pub(super) fn focals_px(cameras: &[String], series: &[MeasuredSeries]) -> Vec<Option<f64>> {
+    let of = |name: &String| series.iter().filter(|s| &s.camera == name).find_map(|s| s.focal_px);
+    cameras.iter().map(of).collect()
+}

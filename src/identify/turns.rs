@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::build::build;
 use super::free_poses::adjust_free_poses;
+use super::stated::focals_px;
 use crate::assess::Limits;
 use crate::geom::{exp_so3, log_so3};
 use crate::init::PosePair;
@@ -57,9 +58,7 @@ pub(super) fn settled<'a>(robot: &Robot, series: &'a [MeasuredSeries], limits: &
 /// Images that share a camera mounting and a placement, with the poses that the images alone give.
 fn groups(robot: &Robot, series: &[MeasuredSeries], turns: &[Vec<PlateTurn>], limits: &Limits) -> Vec<Vec<View>> {
     let Ok(start) = build(robot, series, false, limits) else { return Vec::new() };
-    let stated: Vec<Option<f64>> = (start.problem.cameras.iter())
-        .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
-        .collect();
+    let stated = focals_px(&start.problem.cameras, series);
     let Ok((adjustment, free, _)) = adjust_free_poses(start, &stated, limits) else { return Vec::new() };
     let mut groups: BTreeMap<(usize, usize), Vec<View>> = BTreeMap::new();
     let mut first = vec![0; series.len() + 1];

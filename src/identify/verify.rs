@@ -3,6 +3,7 @@
 use super::build::build;
 use super::free_poses::adjust_free_poses;
 use super::start::start_robot;
+use super::stated::focals_px;
 use super::turns;
 use crate::assess::Limits;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
@@ -37,9 +38,7 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
     let layout = &mut adjustment.problem.layout;
     let columns = layout.robot();
     layout.columns[columns].iter_mut().for_each(|c| c.free = false);
-    let stated: Vec<Option<f64>> = (adjustment.problem.cameras.iter())
-        .map(|name| series.iter().find(|s| &s.camera == name && s.focal_px.is_some()).and_then(|s| s.focal_px))
-        .collect();
+    let stated = focals_px(&adjustment.problem.cameras, series);
     let (mut adjustment, free, mut starts) = adjust_free_poses(adjustment, &stated, limits)?;
     start_robot(&mut adjustment, &free, &mut starts, limits)?;
     adjustment.tie_to_readings(false);
