@@ -103,7 +103,7 @@ type Given = (Option<CameraInfo>, Vec<FramePoses>, Vec<ImageMarks>);
 
 /// What is known without a solution: the stated focal length, the nominal tip, the observations where there are any.
 fn as_given(args: &ConvertArgs, series: &Series, chain: &Chain, readings: &[Option<Vec<f64>>]) -> Result<Given> {
-    let stated = &series.manifest.camera;
+    let stated = series.manifest.camera();
     let size = series.stops.stops.iter().find_map(|s| picture_size(s.path.as_ref()?).ok());
     let camera = size.zip(stated.focal_px).map(|((width_px, height_px), focal)| CameraInfo {
         width_px,

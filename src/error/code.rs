@@ -98,6 +98,7 @@ codes! {
         SettingRange "setting_range" "the value of a key is out of its range",
         SettingConflict "setting_conflict" "keys exclude each other, or one of a pair is missing",
         LensChosen "lens_chosen" "of several lenses the simplest that explains the markers was chosen",
+        SettingUnsupported "setting_unsupported" "a key is part of the format, and this program does not use it yet",
         RepeatabilityUnused "repeatability_unused" "a stated repeatability is not used: the joint noise is estimated",
     }
     Input "Tables" {
@@ -111,6 +112,7 @@ codes! {
         CsvNumber "csv_number" "a cell is not a number",
         CsvRange "csv_range" "the value of a cell is out of its range",
         CsvName "csv_name" "a cell does not name what its column wants",
+        StopUnknown "stop_unknown" "a table names a stop that joints.csv does not have",
         CsvRowTwice "csv_row_twice" "two rows say the same thing",
     }
     Input "Robot description" {
@@ -145,6 +147,7 @@ codes! {
         MillimetresAsMetres "millimetres_as_metres" "readings of a prismatic joint are millimetres",
         JointMissing "joint_missing" "a joint of the chain has no readings",
         JointUnused "joint_unused" "readings are of no joint of the chain",
+        CovariatesUnused "covariates_unused" "measured torques or temperatures are not used",
         JointBeyondLimits "joint_beyond_limits" "readings are beyond the limits of the joint",
         ReadingsMissing "readings_missing" "no row has joint readings",
     }

@@ -41,15 +41,12 @@ pub fn pictures(series: &Series) -> Result<impl Fn(&Path) -> Result<Picture> + S
         Source::Recording(path) => return Err(recording(path)),
         Source::Observations(_) => {
             let what = "has observations and no images";
-            return Err(Error::new(
-                Code::ImagesMissing,
-                series.folder.display(),
-                what,
-                "add the images, or use the observations",
-            ));
+            let remedy = "add the images, or use the observations";
+            return Err(Error::new(Code::ImagesMissing, series.folder.display(), what, remedy));
         }
+        Source::NoImages => return Err(no_images(series)),
     };
-    let bits = series.manifest.camera.bits;
+    let bits = series.manifest.camera().bits;
     let flat_field = FlatField::from_images(dark, white, bits)?;
     Ok(move |path: &Path| {
         let picture = load(path, bits)?;
@@ -75,6 +72,12 @@ pub(super) fn recording(path: &Path) -> Error {
         "is a recording, not a series folder",
         "convert it first: robotcal convert run1.mcap run1/",
     )
+}
+
+/// A series of a tracker or of contacts alone.
+pub(super) fn no_images(series: &Series) -> Error {
+    let remedy = "add images/, or observations.csv";
+    Error::new(Code::ImagesMissing, series.folder.display(), "no images: there is nothing to look at", remedy)
 }
 
 /// When none of the images can be used: what is wrong with the first ones.

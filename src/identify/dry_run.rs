@@ -31,7 +31,7 @@ fn layout(options: &Options, chain: Chain, series: &[Series]) -> Result<(Layout,
     let mut placements: Vec<String> = series.iter().flat_map(|s| &s.stops.stops).map(|s| s.placement.clone()).collect();
     placements.sort();
     placements.dedup();
-    let lens = |s: &Series| s.manifest.camera.model.as_deref().and_then(Lens::from_name).unwrap_or(Lens::Brown);
+    let lens = |s: &Series| s.manifest.camera().model.as_deref().and_then(Lens::from_name).unwrap_or(Lens::Brown);
     let mut state = State {
         robot: options.model.robot_with(chain, options.harmonics),
         mountings: vec![Pose::identity(); mountings.len()],

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::detections::{detect_stops, recording, require_some};
+use super::detections::{detect_stops, no_images, recording, require_some};
 use super::seen_image::SeenImage;
 use super::stated::{lens_of, measured_series};
 use crate::detect::Detection;
@@ -32,11 +32,12 @@ struct Seen {
 /// # Errors
 /// Of the readings (unit, missing joints), of a series none of whose images can be used, and of differently sized images.
 pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(&Path) + Sync) -> Result<Measured> {
+    refuse_several(series)?;
     let readings = series.readings_for(chain)?;
     let mut notices = series.notices.clone();
     notices.extend(series.reading_notices(chain));
     notices.extend(unused_repeatability(series));
-    let camera = &series.manifest.camera;
+    let camera = series.manifest.camera();
     let lens = lens_of(series)?;
     let mut plate = series.plate.clone();
     let (mut seen, found_size) = match &series.source {
@@ -51,6 +52,7 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
             (series.stops.stops.iter().map(|s| given(&s.image)).collect(), None)
         }
         Source::Recording(path) => return Err(recording(path)),
+        Source::NoImages => return Err(no_images(series)),
     };
     let failures: Vec<Option<String>> = seen.iter().map(|s| s.left_out.as_ref().map(ToString::to_string)).collect();
     let stops = series.stops.stops.iter().zip(&seen).zip(&failures);
@@ -58,8 +60,7 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
         &format!("series {}", series.name),
         stops.map(|((stop, s), failure)| (stop.image.as_str(), s.observations.len(), failure.as_deref())),
     )?;
-    let stated = camera.width_px.zip(camera.height_px);
-    let (width_px, height_px) = found_size.or(stated).ok_or_else(|| {
+    let (width_px, height_px) = found_size.or(camera.size_px()).ok_or_else(|| {
         Error::new(
             Code::SettingMissing,
             series.folder.join("series.toml").display(),
@@ -81,6 +82,15 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     let centroid = found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid;
     let measured = measured_series(series, lens, (width_px, height_px), centroid, stops);
     Ok(Measured { series: MeasuredSeries { plate, ..measured }, notices })
+}
+
+fn refuse_several(series: &Series) -> Result<()> {
+    if series.manifest.cameras.len() < 2 {
+        return Ok(());
+    }
+    let what = "several [[camera]] in one series are not supported yet";
+    let remedy = "make a series folder for each camera, and give both with --series";
+    Err(Error::new(Code::SettingUnsupported, series.folder.join("series.toml").display(), what, remedy))
 }
 
 /// What all stops show, and the size of the images.

@@ -67,7 +67,7 @@ fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Opti
     let limits = Limits::default();
     let nobody = Robot::nominal(Chain::empty());
     let nothing = build(&nobody, &[measured], false, &limits).ok()?;
-    let (_, free, _) = adjust_free_poses(nothing, &[series.manifest.camera.focal_px], &limits).ok()?;
+    let (_, free, _) = adjust_free_poses(nothing, &[series.manifest.camera().focal_px], &limits).ok()?;
     let pose = |k: usize| free.poses[k].as_ref().map(|p| p.camera_from_plate);
     // The adjustment takes one of two images that show the same; they stay the same when both have its pose.
     let original =

@@ -13,17 +13,18 @@ pub(super) fn measured_series(
     centroid: bool,
     stops: Vec<MeasuredStop>,
 ) -> MeasuredSeries {
-    let plate_file = series.folder.join(&series.manifest.plate);
+    let camera = series.manifest.camera();
+    let plate_file = series.manifest.plate_in(&series.folder).unwrap_or_default();
     MeasuredSeries {
         name: series.name.clone(),
         camera: series.camera_name().to_owned(),
         mounting: series.mounting().to_owned(),
-        mount: series.manifest.camera_mount,
+        mount: series.manifest.mount(),
         width_px,
         height_px,
-        focal_px: series.manifest.camera.focal_px,
+        focal_px: camera.focal_px,
         lens,
-        lens_choice: match series.manifest.camera.model {
+        lens_choice: match camera.model {
             Some(_) => LensChoice::Settled,
             None => LensChoice::Exported,
         },
@@ -37,7 +38,7 @@ pub(super) fn measured_series(
 
 /// The lens model that a series states, or with which the choice begins.
 pub(super) fn lens_of(series: &Series) -> Result<Lens> {
-    let Some(name) = series.manifest.camera.model.as_deref() else { return Ok(Lens::Brown) };
+    let Some(name) = series.manifest.camera().model.as_deref() else { return Ok(Lens::Brown) };
     Lens::from_name(name).ok_or_else(|| {
         Error::new(
             Code::LensUnknown,

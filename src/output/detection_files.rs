@@ -92,10 +92,10 @@ pub fn detection_files(images: &[SeenImage], context: &DetectionContext) -> Resu
 fn manifest(series: &Series, images: &[SeenImage]) -> Result<String> {
     let mut manifest = series.manifest.clone();
     manifest.mcap = None;
-    manifest.plate = "plate.toml".to_owned();
+    manifest.plate = Some("plate.toml".to_owned());
     manifest.joint_unit = Some(series.joint_unit());
     manifest.observations.point = CirclePoint::Centroid;
-    let camera = &mut manifest.camera;
+    let camera = manifest.cameras.first_mut();
     camera.name = Some(series.camera_name().to_owned());
     camera.mounting = Some(series.mounting().to_owned());
     let size = images.iter().filter(|i| i.detection.failure.is_none()).find_map(|i| i.size);

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::text::json;
 use crate::error::Result;
 use crate::plan::{Forecast, Plan, PlanRequest, image_name};
-use crate::series::{AngleUnit, CameraSection, DEFAULT_PLACEMENT, Manifest, Stop, Stops, plate_csv, plate_toml};
+use crate::series::{AngleUnit, DEFAULT_PLACEMENT, Manifest, Stop, Stops, plate_csv, plate_toml};
 use crate::urdf::JointKind;
 
 /// Name of the file that lists the others.
@@ -96,24 +96,20 @@ pub fn plan_files(
     let chain = &setting.robot.chain;
     let stop = |(k, leg): (usize, &crate::plan::order::Leg)| Stop {
         image: image_name(k),
-        path: None,
         raw_readings: Some(written(&plan.pool[leg.stop].readings, &chain.reading_kinds)),
         placement: placement_name(request, plan.pool[leg.stop].placement),
-        time_s: None,
-        line: 0,
+        ..Stop::default()
     };
-    let stops = Stops { joints: chain.readings.clone(), stops: plan.legs.iter().enumerate().map(stop).collect() };
+    let stops = Stops {
+        joints: chain.readings.clone(),
+        stops: plan.legs.iter().enumerate().map(stop).collect(),
+        ..Stops::default()
+    };
     let manifest = Manifest {
-        format: 1,
         joint_unit: Some(AngleUnit::Deg),
         base: Some(chain.base.clone()),
         tip: Some(chain.tip.clone()),
-        camera_mount: setting.mount,
-        plate: "plate.toml".to_owned(),
-        mcap: None,
-        camera: CameraSection::default(),
-        observations: Default::default(),
-        robot: Default::default(),
+        ..Manifest::plain(setting.mount, "plate.toml")
     };
     let circles = setting.plate.markers.iter().any(|m| m.outer_radius_m > 0.0);
     let mut files = more;

@@ -11,12 +11,46 @@ use crate::error::{Code, Error, Result};
 pub const DEFAULT_PLACEMENT: &str = "placement_0";
 
 /// Columns that are no joints.
-const RESERVED: [&str; 3] = ["image", "placement", "time_s"];
+const RESERVED: [&str; 5] = ["image", "stop", "placement", "time_s", TEMPERATURE];
 
-/// One stop: one image, and the joint readings while it was taken.
-#[derive(Debug, Clone, PartialEq)]
+const TEMPERATURE: &str = "temperature_c";
+
+/// Before the name of a joint: its measured torque.
+const TORQUE: &str = "tau_nm:";
+
+/// What the first column of joints.csv names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum StopKey {
+    /// The image of the stop, the only one.
+    #[default]
+    Image,
+    /// The stop; whatever was measured at it refers to it by this name.
+    Stop,
+}
+
+impl StopKey {
+    /// Name of the column.
+    pub fn column(self) -> &'static str {
+        match self {
+            Self::Image => "image",
+            Self::Stop => "stop",
+        }
+    }
+}
+
+/// What was measured of the state of the robot beside its readings.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Covariates {
+    /// Temperature, degrees Celsius.
+    pub temperature_c: Option<f64>,
+    /// Torque of each joint in `Stops::torque_joints`, Nm.
+    pub torques_nm: Vec<Option<f64>>,
+}
+
+/// One standstill of the robot, with its joint readings.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stop {
-    /// File name of the image, the key of the stop.
+    /// Name of the stop: with [`StopKey::Image`] the file name of its image.
     pub image: String,
     /// The image file; `None` when it is not there, or when observations are given instead.
     pub path: Option<PathBuf>,
@@ -26,8 +60,17 @@ pub struct Stop {
     pub placement: String,
     /// Time of the image, s, on any clock.
     pub time_s: Option<f64>,
+    /// What else was measured of the robot.
+    pub covariates: Covariates,
     /// Line in joints.csv; 0 when it does not come from one.
     pub line: u64,
+}
+
+impl Stop {
+    /// Name of the stop.
+    pub fn name(&self) -> &str {
+        &self.image
+    }
 }
 
 /// All stops, with the names of the joint columns.
@@ -35,6 +78,10 @@ pub struct Stop {
 pub struct Stops {
     /// Joint names in the order of `Stop::raw_readings`.
     pub joints: Vec<String>,
+    /// What the first column names.
+    pub key: StopKey,
+    /// Joints whose torques were measured, in the order of `Covariates::torques_nm`.
+    pub torque_joints: Vec<String>,
     /// The stops in visiting order.
     pub stops: Vec<Stop>,
 }
@@ -57,58 +104,37 @@ impl Stops {
     }
 
     fn from_table(table: &Table) -> Result<Self> {
-        let image = table.require("image")?;
-        let (placement, time) = (table.column("placement"), table.column("time_s"));
-        let columns: Vec<usize> =
-            (0..table.headers.len()).filter(|&c| !RESERVED.contains(&table.headers[c].as_str())).collect();
-        let joints: Vec<String> = columns.iter().map(|&c| table.headers[c].clone()).collect();
-        let placements_named = placement.is_some_and(|c| table.rows().any(|r| !r.cell(c).is_empty()));
+        let columns = Columns::of(table)?;
         let mut seen: BTreeMap<String, u64> = BTreeMap::new();
         let mut stops = Vec::new();
         for row in table.rows() {
-            let name = image_name(table, row, image)?;
-            if let Some(first) = seen.insert(name.clone(), row.line) {
-                let what = format!("is the image of line {first} already");
-                return Err(table.refuse(Code::CsvRowTwice, row, image, &what, "give every image one row"));
+            let stop = columns.stop(table, row)?;
+            if let Some(first) = seen.insert(stop.image.clone(), row.line) {
+                let what = format!("is the {} of line {first} already", columns.key.column());
+                let remedy = format!("give every {} one row", columns.key.column());
+                return Err(table.refuse(Code::CsvRowTwice, row, columns.name, &what, &remedy));
             }
-            let placement = match placement.filter(|_| placements_named) {
-                None => DEFAULT_PLACEMENT.to_string(),
-                Some(c) if row.cell(c).is_empty() => {
-                    return Err(table.refuse(
-                        Code::CsvCellEmpty,
-                        row,
-                        c,
-                        "names no placement",
-                        "name it as in the other rows",
-                    ));
-                }
-                Some(c) => row.cell(c).to_string(),
-            };
-            stops.push(Stop {
-                image: name,
-                path: None,
-                raw_readings: readings(table, row, &columns)?,
-                placement,
-                time_s: table.optional_number(row, time)?,
-                line: row.line,
-            });
+            stops.push(stop);
         }
         if stops.is_empty() {
-            return Err(Error::new(
-                Code::FileEmpty,
-                table.place_of_header(),
-                "has no rows",
-                "give one row for every image",
-            ));
+            let remedy = format!("give one row for every {}", columns.key.column());
+            return Err(Error::new(Code::FileEmpty, table.place_of_header(), "has no rows", remedy));
         }
-        Ok(Self { joints, stops })
+        let named = |columns: &[usize]| columns.iter().map(|&c| table.headers[c].clone()).collect::<Vec<_>>();
+        let torque_joints = named(&columns.torques).iter().map(|c| c[TORQUE.len()..].to_owned()).collect();
+        Ok(Self { joints: named(&columns.joints), key: columns.key, torque_joints, stops })
+    }
+
+    /// Index of the stop of that name.
+    pub fn index_of(&self, name: &str) -> Option<usize> {
+        self.stops.iter().position(|s| s.image == name)
     }
 
     /// Text of joints.csv; columns `placement` and `time_s` only where they say something.
     pub fn to_csv(&self) -> String {
         let placed = self.stops.iter().any(|s| s.placement != DEFAULT_PLACEMENT);
         let timed = self.stops.iter().any(|s| s.time_s.is_some());
-        let mut names = vec!["image".to_string()];
+        let mut names = vec![self.key.column().to_string()];
         names.extend(self.joints.iter().cloned());
         names.extend(placed.then(|| "placement".into()));
         names.extend(timed.then(|| "time_s".into()));
@@ -127,19 +153,82 @@ impl Stops {
     }
 }
 
-fn image_name(table: &Table, row: Row<'_>, column: usize) -> Result<String> {
+/// Where everything stands in a joints.csv.
+struct Columns {
+    key: StopKey,
+    name: usize,
+    placement: Option<usize>,
+    time: Option<usize>,
+    temperature: Option<usize>,
+    torques: Vec<usize>,
+    joints: Vec<usize>,
+}
+
+impl Columns {
+    fn of(table: &Table) -> Result<Self> {
+        let (key, name) = key_column(table)?;
+        let placement = table.column("placement").filter(|&c| table.rows().any(|r| !r.cell(c).is_empty()));
+        let (torques, others): (Vec<usize>, Vec<usize>) =
+            (0..table.headers.len()).partition(|&c| table.headers[c].starts_with(TORQUE));
+        let joints = others.into_iter().filter(|&c| !RESERVED.contains(&table.headers[c].as_str())).collect();
+        let (time, temperature) = (table.column("time_s"), table.column(TEMPERATURE));
+        Ok(Self { key, name, placement, time, temperature, torques, joints })
+    }
+
+    fn stop(&self, table: &Table, row: Row<'_>) -> Result<Stop> {
+        let torques = self.torques.iter().map(|&c| table.optional_number(row, Some(c)));
+        let covariates = Covariates {
+            temperature_c: table.optional_number(row, self.temperature)?,
+            torques_nm: torques.collect::<Result<_>>()?,
+        };
+        Ok(Stop {
+            image: stop_name(table, row, self.name, self.key)?,
+            path: None,
+            raw_readings: readings(table, row, &self.joints)?,
+            placement: placement(table, row, self.placement)?,
+            time_s: table.optional_number(row, self.time)?,
+            covariates,
+            line: row.line,
+        })
+    }
+}
+
+/// The column that names the stops, and what it names.
+pub(super) fn key_column(table: &Table) -> Result<(StopKey, usize)> {
+    match (table.column("stop"), table.column("image")) {
+        (Some(_), Some(_)) => {
+            let remedy = "name the stop here, and its images in images.csv";
+            Err(Error::new(Code::CsvColumnTwice, table.place_of_header(), "has both \"stop\" and \"image\"", remedy))
+        }
+        (Some(column), None) => Ok((StopKey::Stop, column)),
+        (None, _) => table.require("image").map(|column| (StopKey::Image, column)),
+    }
+}
+
+fn placement(table: &Table, row: Row<'_>, column: Option<usize>) -> Result<String> {
+    match column {
+        None => Ok(DEFAULT_PLACEMENT.to_string()),
+        Some(c) if row.cell(c).is_empty() => {
+            let remedy = "name it as in the other rows";
+            Err(table.refuse(Code::CsvCellEmpty, row, c, "names no placement", remedy))
+        }
+        Some(c) => Ok(row.cell(c).to_string()),
+    }
+}
+
+/// Name of a stop; that of an image is a file name, of which nothing else is taken.
+pub(super) fn stop_name(table: &Table, row: Row<'_>, column: usize, key: StopKey) -> Result<String> {
     let name = row.cell(column);
     if name.is_empty() {
-        return Err(table.refuse(Code::CsvCellEmpty, row, column, "names no image", "name the image of the stop"));
+        let (what, remedy) = match key {
+            StopKey::Image => ("names no image", "name the image of the stop"),
+            StopKey::Stop => ("names no stop", "give every stop a name of its own"),
+        };
+        return Err(table.refuse(Code::CsvCellEmpty, row, column, what, remedy));
     }
-    if name.contains(['/', '\\']) {
-        return Err(table.refuse(
-            Code::CsvName,
-            row,
-            column,
-            "is a path",
-            "write the file name alone; images lie in images/",
-        ));
+    if key == StopKey::Image && name.contains(['/', '\\']) {
+        let remedy = "write the file name alone; images lie in images/";
+        return Err(table.refuse(Code::CsvName, row, column, "is a path", remedy));
     }
     Ok(name.to_string())
 }

@@ -1,12 +1,16 @@
-//! `series.toml`: how a series was taken. `plate.toml` shares the reader for TOML.
+//! `series.toml`: how a series was taken.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use super::camera_section::{CameraMount, CameraSection, Cameras};
 use super::inputs::{InputFile, read_text};
-use crate::error::{Code, Error, Result, closest_name, plain_name};
+use super::sections::{
+    ContactSection, ControllerSection, DistanceSection, PlateMountSection, SecondRobotSection, TrackerSection,
+};
+use super::toml_file::{check_format, parse_toml, require_positive, to_toml};
+use crate::error::{Code, Error, Result};
 use crate::files::Kind;
 
 /// Unit of the revolute columns of joints.csv.
@@ -37,16 +41,6 @@ impl AngleUnit {
     }
 }
 
-/// Where the camera is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum CameraMount {
-    /// Camera on the tip, plate fixed in the base.
-    Hand,
-    /// Plate on the tip, camera fixed in the base.
-    Fixed,
-}
-
 /// What u, v of an observed circle mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "lowercase")]
@@ -67,33 +61,6 @@ pub enum StopOrder {
     Visited,
     /// Nothing is known of the order.
     Unknown,
-}
-
-/// `[camera]`: everything optional, every starting value can be found from the data.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CameraSection {
-    /// Series with the same name share intrinsics; default the name of the series folder.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-    /// Series with the same mounting share the hand-camera offset; default the name of the series folder.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mounting: Option<String>,
-    /// Lens model by name; default chosen from the data.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub model: Option<String>,
-    /// Starting value of the focal length, px.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub focal_px: Option<f64>,
-    /// Image width, px; needed only when there are no images.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub width_px: Option<u32>,
-    /// Image height, px.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub height_px: Option<u32>,
-    /// Valid bits when they sit in the low end of 16.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bits: Option<u32>,
 }
 
 /// `[observations]`.
@@ -132,22 +99,42 @@ pub struct Manifest {
     /// Tip link; default the only leaf of the URDF.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip: Option<String>,
-    /// Camera in the hand or fixed.
-    pub camera_mount: CameraMount,
-    /// Plate file, relative to the manifest.
-    pub plate: String,
+    /// Camera in the hand or fixed; needed where there are images, and `mount` of the camera does not say it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera_mount: Option<CameraMount>,
+    /// Plate file, relative to the manifest; needed where there are images.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plate: Option<String>,
     /// Recording that replaces images and joints.csv, relative to the manifest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mcap: Option<String>,
-    /// Camera.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub camera: CameraSection,
+    /// Cameras: a table for one, a list for several.
+    #[serde(default, rename = "camera", skip_serializing_if = "is_default")]
+    pub cameras: Cameras,
     /// Observations.
     #[serde(default, skip_serializing_if = "is_default")]
     pub observations: ObservationsSection,
     /// Robot.
     #[serde(default, skip_serializing_if = "is_default")]
     pub robot: RobotSection,
+    /// Tracker of points.csv and poses.csv.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracker: Option<TrackerSection>,
+    /// What contacts.csv means.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact: Option<ContactSection>,
+    /// Measured distances.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub distance: Vec<DistanceSection>,
+    /// What controller.csv means.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub controller: Option<ControllerSection>,
+    /// Link that carries the plate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plate_mount: Option<PlateMountSection>,
+    /// Second arm, which carries the plate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robot_2: Option<SecondRobotSection>,
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
@@ -162,13 +149,39 @@ impl Manifest {
             joint_unit: Some(AngleUnit::Rad),
             base: None,
             tip: None,
-            camera_mount,
-            plate: plate.to_string(),
+            camera_mount: Some(camera_mount),
+            plate: Some(plate.to_string()),
             mcap: None,
-            camera: CameraSection::default(),
+            cameras: Cameras::default(),
             observations: ObservationsSection::default(),
             robot: RobotSection::default(),
+            tracker: None,
+            contact: None,
+            distance: Vec::new(),
+            controller: None,
+            plate_mount: None,
+            robot_2: None,
         }
+    }
+
+    /// The camera, where there is one; of several the first.
+    pub fn camera(&self) -> &CameraSection {
+        self.cameras.first()
+    }
+
+    /// Where the plate file is; the manifest lies in `folder`.
+    pub fn plate_in(&self, folder: &Path) -> Option<PathBuf> {
+        self.plate.as_ref().map(|plate| folder.join(plate))
+    }
+
+    /// Where a camera is, as it states itself or as `camera_mount` says for all.
+    pub fn mount_of(&self, camera: &CameraSection) -> Option<CameraMount> {
+        camera.mount.or(self.camera_mount)
+    }
+
+    /// Where the first camera is; in the hand where nothing says it (a series without images).
+    pub fn mount(&self) -> CameraMount {
+        self.mount_of(self.camera()).unwrap_or(CameraMount::Hand)
     }
 
     /// Text of `series.toml`.
@@ -191,30 +204,54 @@ impl Manifest {
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
         let manifest: Self = parse_toml(path, text)?;
         check_format(path, manifest.format)?;
-        let camera = &manifest.camera;
-        let positive = [
-            ("camera.focal_px", camera.focal_px),
-            ("camera.width_px", camera.width_px.map(f64::from)),
-            ("camera.height_px", camera.height_px.map(f64::from)),
-            ("robot.repeatability_m", manifest.robot.repeatability_m),
-        ];
-        for (key, value) in positive {
-            require_positive(path, key, value)?;
-        }
-        if let Some(bits) = camera.bits.filter(|b| !(8..=16).contains(b)) {
-            let what = format!("camera.bits = {bits}");
-            return Err(Error::new(
-                Code::SettingRange,
-                path.display(),
-                what,
-                "give 8 to 16, the bits that the sensor delivers",
-            ));
-        }
-        if camera.width_px.is_some() != camera.height_px.is_some() {
-            let what = "one of camera.width_px and camera.height_px is missing";
-            return Err(Error::new(Code::SettingConflict, path.display(), what, "give both or none"));
-        }
+        require_positive(path, "robot.repeatability_m", manifest.robot.repeatability_m)?;
+        manifest.cameras.check(path)?;
+        manifest.check_measured(path)?;
+        manifest.refuse_unsupported(path)?;
         Ok(manifest)
+    }
+
+    /// Sizes of errors and distances are positive.
+    fn check_measured(&self, path: &Path) -> Result<()> {
+        let tracker = self.tracker.as_ref();
+        require_positive(path, "tracker.sigma_m", tracker.and_then(|t| t.sigma_m))?;
+        require_positive(path, "tracker.sigma_rad", tracker.and_then(|t| t.sigma_rad))?;
+        require_positive(path, "contact.sigma_m", self.contact.as_ref().and_then(|c| c.sigma_m))?;
+        self.distance.iter().try_for_each(|d| d.check(path))
+    }
+
+    /// What the format knows and this program does not use yet must not be passed over in silence.
+    fn refuse_unsupported(&self, path: &Path) -> Result<()> {
+        let carried = self.cameras.iter().any(|c| c.link.is_some());
+        let refused = [
+            ("[[camera]] link", carried),
+            ("[plate_mount]", self.plate_mount.is_some()),
+            ("[robot_2]", self.robot_2.is_some()),
+        ];
+        match refused.iter().find(|(_, stated)| *stated) {
+            None => Ok(()),
+            Some((key, _)) => {
+                let remedy = "remove it: camera or plate sit on the tip, or stand in the base";
+                Err(Error::new(Code::SettingUnsupported, path.display(), format!("{key} is not supported yet"), remedy))
+            }
+        }
+    }
+
+    /// Images need a plate, and it must be known where their cameras are.
+    pub(super) fn require_camera_and_plate(&self, path: &Path) -> Result<()> {
+        let missing = |key: &str, remedy: &str| {
+            Err(Error::new(Code::SettingMissing, path.display(), format!("missing field `{key}`"), remedy))
+        };
+        let unplaced = self.cameras.iter().any(|c| self.mount_of(c).is_none());
+        if unplaced || (self.cameras.is_empty() && self.camera_mount.is_none()) {
+            let remedy =
+                "write camera_mount = \"hand\" (camera on the tip) or camera_mount = \"fixed\" (plate on the tip)";
+            return missing("camera_mount", remedy);
+        }
+        if self.plate.is_none() {
+            return missing("plate", "add plate = \"plate.toml\", the file that describes the plate in the images");
+        }
+        Ok(())
     }
 
     /// Readings of joints.csv need their unit; those of a recording are in rad.
@@ -225,83 +262,4 @@ impl Manifest {
         let remedy = "write joint_unit = \"deg\" or joint_unit = \"rad\"; there is no default on purpose";
         Err(Error::new(Code::JointUnitMissing, path.display(), "does not say the unit of the joint readings", remedy))
     }
-}
-
-/// A value that must be positive and finite where it is given.
-pub(super) fn require_positive(path: &Path, key: &str, value: Option<f64>) -> Result<()> {
-    match value {
-        Some(v) if !(v > 0.0 && v.is_finite()) => {
-            Err(Error::new(Code::SettingRange, path.display(), format!("{key} = {v}"), "give a positive number"))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Refuses other versions of a format.
-pub(super) fn check_format(path: &Path, format: u32) -> Result<()> {
-    if format == 1 {
-        return Ok(());
-    }
-    let remedy = "this program reads format = 1; a newer one may be needed";
-    Err(Error::new(Code::SettingVersion, path.display(), format!("format = {format}"), remedy))
-}
-
-/// Text of a TOML file.
-pub(super) fn to_toml(file: &str, value: &impl Serialize) -> Result<String> {
-    toml::to_string(value)
-        .map_err(|e| Error::new(Code::OutputFailed, file, format!("cannot be written: {e}"), "report this"))
-}
-
-/// Reads a TOML file; unknown keys and wrong values are named with their line.
-pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path, inputs: &mut Vec<InputFile>) -> Result<T> {
-    parse_toml(path, &read_text(path, Kind::Settings, inputs)?)
-}
-
-/// A value from the text of a TOML file; `path` is for messages only.
-pub(super) fn parse_toml<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
-    let value = toml::from_str(text).map_err(|error| {
-        let line = error.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count());
-        let place = line.map_or_else(|| path.display().to_string(), |l| format!("{}:{l}", path.display()));
-        let message = error.message().trim().replace('\n', "; ");
-        let remedy = toml_remedy(&message);
-        Error::new(Code::SettingSyntax, place, message, remedy)
-    })?;
-    plain_toml(path, text)?;
-    Ok(value)
-}
-
-/// Keys and strings of a TOML file without control characters; the line is that of the innermost key.
-fn plain_toml(path: &Path, text: &str) -> Result<()> {
-    fn walk(value: &toml::Value, key: &str, place: &dyn Fn(&str) -> String) -> Result<()> {
-        match value {
-            toml::Value::String(text) => plain_name(key, text, place(key)).map(|_| ()),
-            toml::Value::Array(all) => all.iter().try_for_each(|v| walk(v, key, place)),
-            toml::Value::Table(all) => all.iter().try_for_each(|(k, v)| {
-                plain_name("key", k, place(key))?;
-                walk(v, k, place)
-            }),
-            _ => Ok(()),
-        }
-    }
-    let place = |key: &str| {
-        let line = text.lines().position(|l| l.trim_start().starts_with(key) && l.contains('\\'));
-        line.map_or_else(|| path.display().to_string(), |l| format!("{}:{}", path.display(), l + 1))
-    };
-    toml::from_str::<toml::Value>(text).map_or(Ok(()), |value| walk(&value, "", &place))
-}
-
-/// What to try after a message of the TOML reader, which quotes names in backticks: the offender, then what it knows.
-fn toml_remedy(message: &str) -> String {
-    let mut quoted = message.split('`').skip(1).step_by(2);
-    let first = quoted.next().unwrap_or_default();
-    if message.starts_with("unknown") {
-        return match closest_name(first, quoted) {
-            Some(meant) => format!("is \"{meant}\" meant?"),
-            None => "remove it or correct its name".into(),
-        };
-    }
-    if message.starts_with("missing field") {
-        return format!("add {first} = ...");
-    }
-    "correct the line (text stands in quotes, numbers have a decimal point)".into()
 }

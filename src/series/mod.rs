@@ -2,6 +2,8 @@
 //!
 //! A new source of recordings is one file here that returns a [`Series`], and one row in `read`.
 
+mod camera_section;
+mod contact_file;
 mod inputs;
 mod joints;
 mod manifest;
@@ -12,20 +14,27 @@ mod plate;
 mod plate_file;
 mod plate_kind;
 mod plate_turns;
+mod point_file;
+mod pose_file;
+mod quaternion;
 mod read;
 mod recorded;
+mod rotation_kind;
+mod sections;
+mod spatial;
+mod stop_index;
 mod table;
 mod tag_plates;
 mod tags;
+mod toml_file;
 mod units;
 mod without_robot;
 
+pub use camera_section::{CameraMount, CameraSection, Cameras};
+pub use contact_file::ContactRow;
 pub use inputs::InputFile;
-pub use joints::{DEFAULT_PLACEMENT, Stop, Stops};
-pub(crate) use manifest::read_toml;
-pub use manifest::{
-    AngleUnit, CameraMount, CameraSection, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder,
-};
+pub use joints::{Covariates, DEFAULT_PLACEMENT, Stop, StopKey, Stops};
+pub use manifest::{AngleUnit, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder};
 pub use mcap::{CameraInfo, Clock, Delay, Extracted, Motion, Picking, RecordingOptions, StopReport, extract};
 #[cfg(feature = "mcap")]
 pub use mcap::{FramePoses, ImageMarks, MarkKind, MarkLayer, Shown, require_new, write_recording};
@@ -35,8 +44,16 @@ pub use plate::{Aruco, Marker, Plate, ScaleBar};
 pub use plate_file::{DEFAULT_TOLERANCE_M, parse_plate, plate_csv, plate_toml, read_plate};
 pub use plate_kind::{Ink, Places, PlateKind, Print};
 pub use plate_turns::PlateTurn;
+pub use point_file::PointRow;
+pub use pose_file::PoseRow;
 pub use read::{Series, Source, read, read_images};
 pub use recorded::convert_recording;
+pub use rotation_kind::RotationKind;
+pub use sections::{
+    ContactSection, ControllerSection, DistanceSection, PlateMountSection, SecondRobotSection, TrackerSection,
+};
+pub use spatial::SpatialFiles;
 pub use tag_plates::regions;
 pub use tags::{Region, TagPrint, Tags};
+pub(crate) use toml_file::read_toml;
 pub use without_robot::{read_without_robot, series_of_images};

@@ -101,6 +101,11 @@ impl Plate {
         near(next, 2.0) && near(below, 1.0)
     }
 
+    /// No plate: nothing is seen of it.
+    pub fn none() -> Self {
+        Self::lattice(PlateKind::Points, 0, 0, 0.0, 0.0)
+    }
+
     /// A regular lattice of points, ids row-major from the top-left, origin at the centre.
     pub fn lattice(kind: PlateKind, columns: u32, rows: u32, pitch_m: f64, tolerance_m: f64) -> Self {
         let centre = |n: u32| (f64::from(n) - 1.0) / 2.0;

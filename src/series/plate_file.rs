@@ -6,11 +6,11 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::inputs::{InputFile, read_text};
-use super::manifest::{check_format, parse_toml, read_toml, require_positive, to_toml};
 use super::plate::{Aruco, Marker, Plate, ScaleBar};
 use super::plate_kind::{Ink, Places, PlateKind};
 use super::table::{Row, Table, to_csv};
 use super::tag_plates::{TagKeys, plate_of};
+use super::toml_file::{check_format, parse_toml, read_toml, require_positive, to_toml};
 use crate::error::{Code, Error, Result};
 use crate::files::Kind;
 

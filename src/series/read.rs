@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::inputs::InputFile;
-use super::joints::Stops;
+use super::joints::{Stop, StopKey, Stops};
 use super::manifest::{AngleUnit, Manifest};
 use super::mcap::require_recording;
 use super::observation::ImageObservations;
 use super::observation_file;
 use super::plate::Plate;
 use super::plate_file::read_plate;
+use super::spatial::SpatialFiles;
 use super::units;
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::urdf::Chain;
@@ -35,6 +36,8 @@ pub enum Source {
     Observations(Vec<ImageObservations>),
     /// A recording, which has the readings as well.
     Recording(PathBuf),
+    /// Neither: what was measured stands in [`Series::spatial`].
+    NoImages,
 }
 
 /// A measurement series as read: nothing is judged yet but the files themselves.
@@ -46,12 +49,14 @@ pub struct Series {
     pub folder: PathBuf,
     /// The manifest as written; see [`Series::camera_name`] and [`Series::mounting`] for its defaults.
     pub manifest: Manifest,
-    /// The plate.
+    /// The plate; without markers where there are no images.
     pub plate: Plate,
     /// Stops and raw readings (empty for a recording that has not been read yet).
     pub stops: Stops,
-    /// Images, observations or a recording.
+    /// Images, observations, a recording, or none of them.
     pub source: Source,
+    /// What was measured of the tip in space.
+    pub spatial: SpatialFiles,
     /// What was seen while reading that the user should know.
     pub notices: Vec<Notice>,
     /// Text files that were read, with their hashes; see [`Series::image_hashes`] for the images.
@@ -90,11 +95,13 @@ fn read_recording(path: &Path) -> Result<Series> {
     let mut inputs = Vec::new();
     let mut manifest = Manifest::read(&manifest_path, &mut inputs)?;
     manifest.mcap = Some(file_name(path));
-    let plate = read_plate(&folder.join(&manifest.plate), &mut inputs)?;
+    manifest.require_camera_and_plate(&manifest_path)?;
+    let plate = plate_of(&manifest, &folder, &mut inputs)?;
     let name = path.file_stem().map_or_else(|| "series".into(), |n| n.to_string_lossy().into_owned());
     plain_name("series", &name, path.display())?;
     let source = Source::Recording(path.to_path_buf());
-    Ok(Series { name, folder, manifest, plate, stops: Stops::default(), source, notices: Vec::new(), inputs })
+    let (stops, spatial, notices) = (Stops::default(), SpatialFiles::default(), Vec::new());
+    Ok(Series { name, folder, manifest, plate, stops, source, spatial, notices, inputs })
 }
 
 fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
@@ -102,23 +109,39 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     let manifest_path = folder.join("series.toml");
     let mut inputs = Vec::new();
     let manifest = Manifest::read(&manifest_path, &mut inputs)?;
-    let plate = read_plate(&folder.join(&manifest.plate), &mut inputs)?;
+    let is_seen = manifest.mcap.is_some() || use_observations || !is_measured_in_space_alone(folder);
+    if is_seen {
+        manifest.require_camera_and_plate(&manifest_path)?;
+    }
+    let plate = plate_of(&manifest, folder, &mut inputs)?;
     let mut notices = Vec::new();
-    let mut stops = Stops::default();
+    let (mut stops, mut spatial) = (Stops::default(), SpatialFiles::default());
     let source = if let Some(recording) = &manifest.mcap {
         Source::Recording(folder.join(recording))
     } else {
         manifest.require_joint_unit(&manifest_path)?;
         stops = Stops::read(&folder.join("joints.csv"), &mut inputs)?;
+        spatial = SpatialFiles::read(folder, &stops, &mut inputs)?;
         if use_observations {
             let path = folder.join("observations.csv");
             observed(&path, &manifest, &plate, &stops, &mut inputs, &mut notices)?
-        } else {
+        } else if is_seen {
             pictured(folder, &mut stops, &mut notices)?
+        } else {
+            Source::NoImages
         }
     };
     let folder = folder.to_path_buf();
-    Ok(Series { name, folder, manifest, plate, stops, source, notices, inputs })
+    Ok(Series { name, folder, manifest, plate, stops, source, spatial, notices, inputs })
+}
+
+fn is_measured_in_space_alone(folder: &Path) -> bool {
+    !folder.join("images").is_dir() && SpatialFiles::NAMES.iter().any(|name| folder.join(name).is_file())
+}
+
+/// The plate that a manifest names; none where it names none.
+pub(super) fn plate_of(manifest: &Manifest, folder: &Path, inputs: &mut Vec<InputFile>) -> Result<Plate> {
+    manifest.plate_in(folder).map_or_else(|| Ok(Plate::none()), |path| read_plate(&path, inputs))
 }
 
 pub(super) fn folder_name(folder: &Path) -> Result<String> {
@@ -140,7 +163,7 @@ fn observed(
     inputs: &mut Vec<InputFile>,
     notices: &mut Vec<Notice>,
 ) -> Result<Source> {
-    let size = manifest.camera.width_px.zip(manifest.camera.height_px);
+    let size = manifest.camera().size_px();
     let images = observation_file::read(path, plate, size, inputs)?;
     let (ordered, strange) = observation_file::in_order(images, stops.stops.iter().map(|s| s.image.as_str()));
     observation_file::require_some(path, &ordered)?;
@@ -169,6 +192,9 @@ fn pictured(folder: &Path, stops: &mut Stops, notices: &mut Vec<Notice>) -> Resu
     let names: BTreeSet<String> = on_disk.iter().map(|p| file_name(p)).collect();
     let csv = folder.join("joints.csv");
     let mut missing = Vec::new();
+    if stops.key == StopKey::Stop {
+        stops.stops.iter_mut().for_each(|stop| name_image(stop, &names));
+    }
     for stop in &mut stops.stops {
         if names.contains(&stop.image) {
             stop.path = Some(images.join(&stop.image));
@@ -208,6 +234,14 @@ fn pictured(folder: &Path, stops: &mut Stops, notices: &mut Vec<Notice>) -> Resu
     }
     let (dark, white) = optional_images(folder)?;
     Ok(Source::Images { folder: images, dark, white })
+}
+
+/// The image of a stop that joints.csv names without the ending of its file.
+fn name_image(stop: &mut Stop, names: &BTreeSet<String>) {
+    let is_its_own = |file: &&String| file.rsplit_once('.').is_some_and(|(stem, _)| stem == stop.image);
+    if let Some(file) = names.iter().find(is_its_own).filter(|_| !names.contains(&stop.image)) {
+        stop.image.clone_from(file);
+    }
 }
 
 /// Images in dark/ and white/, where there are any.
@@ -263,12 +297,12 @@ fn some(names: &[String]) -> String {
 impl Series {
     /// Series with this camera share intrinsics.
     pub fn camera_name(&self) -> &str {
-        self.manifest.camera.name.as_deref().unwrap_or(&self.name)
+        self.manifest.camera().name.as_deref().unwrap_or(&self.name)
     }
 
     /// Series with this mounting share the hand-camera offset.
     pub fn mounting(&self) -> &str {
-        self.manifest.camera.mounting.as_deref().unwrap_or(&self.name)
+        self.manifest.camera().mounting.as_deref().unwrap_or(&self.name)
     }
 
     /// Unit of the revolute columns; recordings are in rad.

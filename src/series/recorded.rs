@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::manifest::{AngleUnit, CameraMount, Manifest};
+use super::camera_section::CameraMount;
+use super::manifest::{AngleUnit, Manifest};
 use super::mcap::{CameraInfo, Extracted, RecordingOptions, extract};
 use super::read::{Series, Source, file_name, manifest_beside, optional_images};
 use crate::error::{Code, Error, Notice, Result};
@@ -29,12 +30,13 @@ impl Series {
 /// What a camera info knows and the manifest does not.
 fn fill_camera(manifest: &mut Manifest, info: Option<&CameraInfo>) {
     let Some(info) = info else { return };
+    let camera = manifest.cameras.first_mut();
     if let Some([fx, fy, ..]) = info.intrinsics {
-        manifest.camera.focal_px.get_or_insert(0.5 * (fx + fy));
+        camera.focal_px.get_or_insert(0.5 * (fx + fy));
     }
-    if manifest.camera.width_px.is_none() && info.width_px > 0 && info.height_px > 0 {
-        manifest.camera.width_px = Some(info.width_px);
-        manifest.camera.height_px = Some(info.height_px);
+    if camera.width_px.is_none() && info.width_px > 0 && info.height_px > 0 {
+        camera.width_px = Some(info.width_px);
+        camera.height_px = Some(info.height_px);
     }
 }
 
@@ -91,7 +93,9 @@ fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extract
     let mut manifest = match manifest_beside(recording) {
         Ok(path) => {
             let mut manifest = Manifest::read(&path, &mut extracted.inputs)?;
-            manifest.plate = copy_plate(&path.with_file_name(&manifest.plate), unfinished)?;
+            if let Some(plate) = &manifest.plate {
+                manifest.plate = Some(copy_plate(&path.with_file_name(plate), unfinished)?);
+            }
             manifest
         }
         Err(_) => {

@@ -180,11 +180,24 @@ pub(super) fn notices(file: &Path, stops: &Stops, unit: AngleUnit, chain: &Chain
             "they are not used; check the spelling if they should be",
         ));
     }
+    notices.extend(unused_covariates(file, stops));
     let Ok(columns) = columns_of(file, stops, chain) else { return notices };
     for (reading, column) in columns.into_iter().enumerate() {
         notices.extend(beyond_limits(file, stops, unit, chain, reading, column));
     }
     notices
+}
+
+/// Columns that are read, and of which no joint term makes use.
+fn unused_covariates(file: &Path, stops: &Stops) -> Option<Notice> {
+    let is_warm = stops.stops.iter().any(|s| s.covariates.temperature_c.is_some());
+    let columns: Vec<&str> = [(is_warm, "temperature_c"), (!stops.torque_joints.is_empty(), "tau_nm:<joint>")]
+        .into_iter()
+        .filter_map(|(is_there, name)| is_there.then_some(name))
+        .collect();
+    let what = format!("columns that no joint term makes use of: {}", columns.join(", "));
+    let remedy = "they may stay; the result is the same without them";
+    (!columns.is_empty()).then(|| Notice::new(Code::CovariatesUnused, file.display(), what, remedy))
 }
 
 /// The worst offender of one joint, and how many there are.

@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use super::camera_section::CameraMount;
 use super::joints::{DEFAULT_PLACEMENT, Stop, Stops};
-use super::manifest::{CameraMount, Manifest};
+use super::manifest::Manifest;
 use super::observation_file;
 use super::plate_file::read_plate;
-use super::read::{Series, Source, file_name, folder_name, image_files, optional_images, read};
+use super::read::{Series, Source, file_name, folder_name, image_files, optional_images, plate_of, read};
+use super::spatial::SpatialFiles;
 use crate::error::{Code, Error, Result};
 
 /// Reads a series folder, or a folder of images/ (or observations.csv) with plate.toml and nothing else. What joints.csv says is taken where it
@@ -28,10 +30,11 @@ pub fn read_without_robot(folder: &Path) -> Result<Series> {
     if manifest.mcap.is_some() {
         return read(folder);
     }
-    let plate = read_plate(&folder.join(&manifest.plate), &mut inputs)?;
+    manifest.require_camera_and_plate(&manifest_path)?;
+    let plate = plate_of(&manifest, folder, &mut inputs)?;
     let observed = folder.join("observations.csv");
     let (stops, source) = if observed.is_file() {
-        let size = manifest.camera.width_px.zip(manifest.camera.height_px);
+        let size = manifest.camera().size_px();
         let images = observation_file::read(&observed, &plate, size, &mut inputs)?;
         (
             images.keys().map(|image| stop(image.clone(), None)).collect(),
@@ -48,7 +51,8 @@ pub fn read_without_robot(folder: &Path) -> Result<Series> {
         (paths.into_iter().map(of_file).collect(), Source::Images { folder: images, dark, white })
     };
     let (folder, notices) = (folder.to_path_buf(), Vec::new());
-    Ok(Series { name, folder, manifest, plate, stops: Stops { joints: Vec::new(), stops }, source, notices, inputs })
+    let (stops, spatial) = (Stops { stops, ..Stops::default() }, SpatialFiles::default());
+    Ok(Series { name, folder, manifest, plate, stops, source, spatial, notices, inputs })
 }
 
 /// A series of single images of a plate.
@@ -70,7 +74,8 @@ pub fn series_of_images(images: &[PathBuf], plate: &Path) -> Result<Series> {
         name: "images".to_owned(),
         manifest: Manifest::plain(CameraMount::Hand, &file_name(plate)),
         plate: read,
-        stops: Stops { joints: Vec::new(), stops: images.iter().cloned().map(of_file).collect() },
+        stops: Stops { stops: images.iter().cloned().map(of_file).collect(), ..Stops::default() },
+        spatial: SpatialFiles::default(),
         source: Source::Images { folder: folder.clone(), dark: Vec::new(), white: Vec::new() },
         folder,
         notices: Vec::new(),
@@ -83,5 +88,5 @@ fn of_file(path: PathBuf) -> Stop {
 }
 
 fn stop(image: String, path: Option<PathBuf>) -> Stop {
-    Stop { image, path, raw_readings: None, placement: DEFAULT_PLACEMENT.to_owned(), time_s: None, line: 0 }
+    Stop { image, path, placement: DEFAULT_PLACEMENT.to_owned(), ..Stop::default() }
 }

@@ -52,9 +52,9 @@ pub fn write(folder: &Path, series: &SimulatedSeries, content: Content<'_>) -> R
         Content::Observations => put(&folder.join("observations.csv"), observations_csv(&series.observations))?,
         Content::Images { conditions, progress } => {
             truth.pixel_sigma_px = None;
-            manifest.camera.width_px = None;
-            manifest.camera.height_px = None;
-            manifest.camera.bits = (9..16).contains(&conditions.bits).then_some(u32::from(conditions.bits));
+            let camera = manifest.cameras.first_mut();
+            (camera.width_px, camera.height_px) = (None, None);
+            camera.bits = (9..16).contains(&conditions.bits).then_some(u32::from(conditions.bits));
             write_images(&folder.join("images"), series, conditions, progress)?;
         }
     }

@@ -214,16 +214,14 @@ impl World<'_> {
         };
         let stop = |s: &Seen| Stop {
             image: s.observations.image.clone(),
-            path: None,
             raw_readings: Some(s.raw.clone()),
             placement: names(s.placement),
-            time_s: None,
-            line: 0,
+            ..Stop::default()
         };
         SimulatedSeries {
             manifest: manifest(request),
             plate: request.plate.clone(),
-            stops: Stops { joints: chain.readings.clone(), stops: seen.iter().map(stop).collect() },
+            stops: Stops { joints: chain.readings.clone(), stops: seen.iter().map(stop).collect(), ..Stops::default() },
             observations: seen.into_iter().map(|s| s.observations).collect(),
             true_plate: self.true_plate,
             truth,
@@ -272,20 +270,16 @@ fn marker_errors(nominal: &Plate, actual: &Plate) -> Vec<[f64; 3]> {
 }
 
 fn manifest(request: &WorldRequest) -> Manifest {
+    let size = CameraSection {
+        width_px: Some(request.camera.width_px),
+        height_px: Some(request.camera.height_px),
+        ..CameraSection::default()
+    };
     Manifest {
-        format: 1,
         joint_unit: Some(request.joint_unit),
         base: Some(request.chain.base.clone()),
         tip: Some(request.chain.tip.clone()),
-        camera_mount: request.mount,
-        plate: "plate.toml".to_owned(),
-        mcap: None,
-        camera: CameraSection {
-            width_px: Some(request.camera.width_px),
-            height_px: Some(request.camera.height_px),
-            ..CameraSection::default()
-        },
-        observations: Default::default(),
-        robot: Default::default(),
+        cameras: size.into(),
+        ..Manifest::plain(request.mount, "plate.toml")
     }
 }

@@ -26,7 +26,7 @@ pub fn measured(series: &SimulatedSeries, chain: &Chain) -> MeasuredSeries {
         name: "simulated".into(),
         camera: "camera".into(),
         mounting: "mounting".into(),
-        mount: series.manifest.camera_mount,
+        mount: series.manifest.mount(),
         width_px: camera.width_px,
         height_px: camera.height_px,
         focal_px: None,

@@ -70,7 +70,7 @@ fn the_result_is_a_series_with_the_observations_of_the_detector() {
     assert_eq!(raw(&given), raw(&made));
     assert_eq!(given.plate.markers, made.plate.markers);
     assert_eq!((made.camera_name(), made.mounting()), ("run1", "run1"));
-    assert_eq!(made.manifest.camera.width_px, Some(1280));
+    assert_eq!(made.manifest.camera().width_px, Some(1280));
     // The table and the list of what was dropped say the same.
     let dropped = std::fs::read_to_string(out.join("dropped.csv")).unwrap();
     let reasons: BTreeSet<&str> = dropped.lines().skip(1).filter_map(|l| l.split(',').nth(3)).collect();

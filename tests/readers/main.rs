@@ -15,5 +15,6 @@ mod recorded;
 mod recording_overlay;
 mod series;
 mod simulated;
+mod spatial;
 mod urdf;
 mod urdf_patch;

@@ -71,8 +71,8 @@ fn a_recording_and_the_folder_made_of_it_are_the_same_series() {
     for (q, wanted) in readings[3].as_ref().unwrap().iter().zip([-0.25, 0.3, -0.1]) {
         assert!((q - wanted).abs() < 1e-12, "{readings:?}");
     }
-    assert_eq!(direct.manifest.camera.focal_px, Some(40.5), "from the camera info");
-    assert_eq!(direct.manifest.camera.width_px, Some(32));
+    assert_eq!(direct.manifest.camera().focal_px, Some(40.5), "from the camera info");
+    assert_eq!(direct.manifest.camera().width_px, Some(32));
     assert_eq!(direct.image_hashes().unwrap().len(), 5);
     assert!(direct.inputs.iter().any(|i| i.path == path));
     assert!(direct.reading_notices(&chain()).is_empty());
@@ -88,7 +88,7 @@ fn a_recording_and_the_folder_made_of_it_are_the_same_series() {
         assert_eq!((&a.image, a.time_s), (&b.image, b.time_s));
         assert_eq!(fs::read(a.path.as_ref().unwrap()).unwrap(), fs::read(b.path.as_ref().unwrap()).unwrap());
     }
-    assert_eq!(series.manifest.camera, direct.manifest.camera);
+    assert_eq!(series.manifest.cameras, direct.manifest.cameras);
 
     let error = convert_recording(&path, &converted, &RecordingOptions::default()).unwrap_err();
     assert_eq!(error.code, Code::OutputExists, "{error}");
@@ -118,7 +118,7 @@ fn a_recording_without_a_manifest_says_what_to_write() {
     assert!(!manifest.contains("camera_mount"), "{manifest}");
     fs::write(converted.join("plate.toml"), BOARD).unwrap();
     let error = read(&converted).unwrap_err();
-    assert_says(&error, Code::SettingSyntax, &["camera_mount"]);
+    assert_says(&error, Code::SettingMissing, &["camera_mount"]);
     assert_says(&read(&recording("old.bag")).unwrap_err(), Code::RecordingFormat, &["rosbags-convert"]);
 }
 

@@ -64,7 +64,7 @@ fn a_folder_is_read_with_its_defaults() {
     let series = read(folder.path()).unwrap();
     let name = folder.path().file_name().unwrap().to_str().unwrap();
     assert_eq!([series.name.as_str(), series.camera_name(), series.mounting()], [name; 3]);
-    assert_eq!(series.manifest.camera_mount, CameraMount::Hand);
+    assert_eq!(series.manifest.mount(), CameraMount::Hand);
     assert_eq!(series.manifest.robot.order, StopOrder::Visited);
     assert_eq!(series.stops.joints, ["j1", "j2", "x"]);
     assert_eq!(series.stops.stops[1].raw_readings, Some(vec![-0.7, 1.5, 0.25]));
@@ -109,7 +109,8 @@ fn a_bad_manifest_names_line_and_key() {
     );
     assert_says(&replaced("\"rad\"", "\"degree\""), Code::SettingSyntax, &["series.toml:2", "`degree`", "`deg`"]);
     assert_says(&replaced("format = 1", "format = 2"), Code::SettingVersion, &["format = 2", "format = 1"]);
-    assert_says(&replaced("camera_mount = \"hand\"\n", ""), Code::SettingSyntax, &["camera_mount"]);
+    assert_says(&replaced("camera_mount = \"hand\"\n", ""), Code::SettingMissing, &["series.toml", "camera_mount"]);
+    assert_says(&replaced("plate = \"plate.toml\"\n", ""), Code::SettingMissing, &["series.toml", "plate.toml"]);
     assert_says(&replaced("plate.toml", "plat.toml"), Code::FileMissing, &["plat.toml"]);
     assert_says(&read(Path::new("no/such/folder")).unwrap_err(), Code::FileMissing, &["no/such/folder"]);
 }
@@ -299,6 +300,7 @@ fn what_is_written_reads_back_the_same() {
         placement: placement.into(),
         time_s,
         line,
+        ..Stop::default()
     };
     let stops = Stops {
         joints: vec!["j 1".into(), "arm,2".into()],
@@ -306,6 +308,7 @@ fn what_is_written_reads_back_the_same() {
             stop("a \"1\".png", 2, Some(vec![0.1 + 0.2, -1e-17]), "left", Some(1732.000000001)),
             stop("b.png", 3, None, "right side, far", None),
         ],
+        ..Stops::default()
     };
     let observations = vec![ImageObservations {
         image: "a \"1\".png".into(),

@@ -176,7 +176,7 @@ fn written_images_keep_their_depth() {
         write(&place, &made, Content::Images { conditions: &conditions, progress: &|_| {} }).unwrap();
         let read = robotcal::series::read(&place).unwrap();
         let picture =
-            robotcal::detect::load(read.stops.stops[1].path.as_ref().unwrap(), read.manifest.camera.bits).unwrap();
+            robotcal::detect::load(read.stops.stops[1].path.as_ref().unwrap(), read.manifest.camera().bits).unwrap();
         assert_eq!(picture, made.render(1, &conditions), "{bits} bits");
     }
 }

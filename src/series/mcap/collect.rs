@@ -176,7 +176,7 @@ impl<'a> Collector<'a> {
             raw_readings: Some(joints.positions),
             placement: DEFAULT_PLACEMENT.to_string(),
             time_s: Some(time as f64 * 1e-9),
-            line: 0,
+            ..Stop::default()
         };
         let report = StopReport {
             image,

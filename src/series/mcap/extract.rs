@@ -100,7 +100,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     }
     let (stops, reports) = taken.rows.into_values().unzip();
     Ok(Extracted {
-        stops: Stops { joints, stops },
+        stops: Stops { joints, stops, ..Stops::default() },
         reports,
         image_delay_s,
         late,

@@ -1,0 +1,89 @@
+//! TOML files of a series: read with the line of every complaint, and written.
+
+use std::path::Path;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::inputs::{InputFile, read_text};
+use crate::error::{Code, Error, Result, closest_name, plain_name};
+use crate::files::Kind;
+
+/// A value that must be positive and finite where it is given.
+pub(super) fn require_positive(path: &Path, key: &str, value: Option<f64>) -> Result<()> {
+    match value {
+        Some(v) if !(v > 0.0 && v.is_finite()) => {
+            Err(Error::new(Code::SettingRange, path.display(), format!("{key} = {v}"), "give a positive number"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses other versions of a format.
+pub(super) fn check_format(path: &Path, format: u32) -> Result<()> {
+    if format == 1 {
+        return Ok(());
+    }
+    let remedy = "this program reads format = 1; a newer one may be needed";
+    Err(Error::new(Code::SettingVersion, path.display(), format!("format = {format}"), remedy))
+}
+
+/// Text of a TOML file.
+pub(super) fn to_toml(file: &str, value: &impl Serialize) -> Result<String> {
+    toml::to_string(value)
+        .map_err(|e| Error::new(Code::OutputFailed, file, format!("cannot be written: {e}"), "report this"))
+}
+
+/// Reads a TOML file; unknown keys and wrong values are named with their line.
+pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path, inputs: &mut Vec<InputFile>) -> Result<T> {
+    parse_toml(path, &read_text(path, Kind::Settings, inputs)?)
+}
+
+/// A value from the text of a TOML file; `path` is for messages only.
+pub(super) fn parse_toml<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
+    let value = toml::from_str(text).map_err(|error| {
+        let line = error.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count());
+        let place = line.map_or_else(|| path.display().to_string(), |l| format!("{}:{l}", path.display()));
+        let message = error.message().trim().replace('\n', "; ");
+        let remedy = toml_remedy(&message);
+        Error::new(Code::SettingSyntax, place, message, remedy)
+    })?;
+    plain_toml(path, text)?;
+    Ok(value)
+}
+
+/// Keys and strings of a TOML file without control characters; the line is that of the innermost key.
+fn plain_toml(path: &Path, text: &str) -> Result<()> {
+    fn walk(value: &toml::Value, key: &str, place: &dyn Fn(&str) -> String) -> Result<()> {
+        match value {
+            toml::Value::String(text) => plain_name(key, text, place(key)).map(|_| ()),
+            toml::Value::Array(all) => all.iter().try_for_each(|v| walk(v, key, place)),
+            toml::Value::Table(all) => all.iter().try_for_each(|(k, v)| {
+                plain_name("key", k, place(key))?;
+                walk(v, k, place)
+            }),
+            _ => Ok(()),
+        }
+    }
+    let place = |key: &str| {
+        let line = text.lines().position(|l| l.trim_start().starts_with(key) && l.contains('\\'));
+        line.map_or_else(|| path.display().to_string(), |l| format!("{}:{}", path.display(), l + 1))
+    };
+    toml::from_str::<toml::Value>(text).map_or(Ok(()), |value| walk(&value, "", &place))
+}
+
+/// What to try after a message of the TOML reader, which quotes names in backticks: the offender, then what it knows.
+fn toml_remedy(message: &str) -> String {
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let first = quoted.next().unwrap_or_default();
+    if message.starts_with("unknown") {
+        return match closest_name(first, quoted) {
+            Some(meant) => format!("is \"{meant}\" meant?"),
+            None => "remove it or correct its name".into(),
+        };
+    }
+    if message.starts_with("missing field") {
+        return format!("add {first} = ...");
+    }
+    "correct the line (text stands in quotes, numbers have a decimal point)".into()
+}

@@ -1,0 +1,142 @@
+//! Points and poses of a tracker, contacts, and stops that have more than an image.
+
+use std::fs;
+
+use robotcal::series::{RotationKind, Series, Source, StopKey, read};
+use robotcal::{Code, Error};
+use tempfile::TempDir;
+
+use crate::said::assert_says;
+
+const MANIFEST: &str = "format = 1\njoint_unit = \"rad\"\n";
+const JOINTS: &str = "stop,j1,temperature_c,tau_nm:j1,time_s\nleft/0,0.1,21.5,3.25,1\nleft/1,-0.7,,,2\n";
+const POINTS: &str = "stop,target,x_m,y_m,z_m,sigma_m\nleft/0,ball,1,2,3,\nleft/1,ball,1.5,2,3,0.0001\n";
+const POSES: &str = "stop,target,x_m,y_m,z_m,qx,qy,qz,qw\nleft/1,body,1,2,3,0,0,0.7071068,0.7071068\n";
+const CONTACTS: &str = "stop,contact,x_m,y_m,z_m\nleft/0,front,,,\nleft/1,cad,0.5,0,0.25\n";
+
+fn folder(files: &[(&str, &str)]) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let good = [
+        ("series.toml", MANIFEST),
+        ("joints.csv", JOINTS),
+        ("points.csv", POINTS),
+        ("poses.csv", POSES),
+        ("contacts.csv", CONTACTS),
+    ];
+    for (name, text) in good.iter().chain(files) {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+fn series(files: &[(&str, &str)]) -> Series {
+    read(folder(files).path()).unwrap()
+}
+
+fn refusal(name: &str, text: &str) -> Error {
+    let error = read(folder(&[(name, text)]).path()).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    error
+}
+
+#[test]
+fn a_series_without_images_is_read() {
+    let series = series(&[]);
+    assert_eq!(series.source, Source::NoImages);
+    assert_eq!(series.stops.key, StopKey::Stop);
+    assert!(series.plate.markers.is_empty());
+    let points = &series.spatial.points;
+    assert_eq!(
+        points.iter().map(|p| (p.stop, p.sigma_m, p.line)).collect::<Vec<_>>(),
+        [(0, None, 2), (1, Some(1e-4), 3)]
+    );
+    assert_eq!(points[1].tracker_from_point_m.as_slice(), [1.5, 2.0, 3.0]);
+    let pose = &series.spatial.poses[0];
+    assert_eq!((pose.stop, pose.target.as_str(), pose.sigma_rad), (1, "body", None));
+    // A quarter turn about z takes x to y.
+    assert!((pose.tracker_from_target.rotation[(1, 0)] - 1.0).abs() < 1e-7);
+    let contacts = &series.spatial.contacts;
+    assert_eq!(contacts[0].position_m, None);
+    assert_eq!(contacts[1].position_m.unwrap().as_slice(), [0.5, 0.0, 0.25]);
+}
+
+#[test]
+fn temperatures_and_torques_are_no_joints() {
+    let stops = series(&[]).stops;
+    assert_eq!((stops.joints, stops.torque_joints), (vec!["j1".to_owned()], vec!["j1".to_owned()]));
+    assert_eq!(stops.stops[0].covariates.temperature_c, Some(21.5));
+    assert_eq!(stops.stops[0].covariates.torques_nm, [Some(3.25)]);
+    assert_eq!(stops.stops[1].covariates.torques_nm, [None]);
+    assert_says(&refusal("joints.csv", &JOINTS.replace("21.5", "warm")), Code::CsvNumber, &["joints.csv:2", "warm"]);
+}
+
+#[test]
+fn sections_beside_the_camera_are_read() {
+    let sections = "[tracker]\nname = \"leica\"\nsigma_m = 5e-5\n[contact]\nsigma_m = 1e-4\nframe = \"cad\"\n\
+                    [[distance]]\nbetween = [\"a\", \"b\"]\ndistance_m = 0.05\nsigma_m = 1e-4\n[controller]\nrotation = \"abc_deg\"\n\
+                    [[camera]]\nname = \"left\"\nmount = \"hand\"\n[[camera]]\nname = \"right\"\nmount = \"fixed\"\n";
+    let manifest = series(&[("series.toml", &format!("{MANIFEST}{sections}"))]).manifest;
+    assert_eq!(manifest.tracker.as_ref().unwrap().sigma_m, Some(5e-5));
+    assert_eq!(manifest.contact.as_ref().unwrap().frame.as_deref(), Some("cad"));
+    assert_eq!(manifest.distance[0].between, ["a", "b"]);
+    assert_eq!(manifest.controller.unwrap().rotation, RotationKind::Abc);
+    let names: Vec<_> = manifest.cameras.iter().map(|c| c.name.as_deref().unwrap()).collect();
+    assert_eq!(names, ["left", "right"]);
+    let again = manifest.to_toml().unwrap();
+    assert_eq!(series(&[("series.toml", &again)]).manifest, manifest);
+}
+
+#[test]
+fn bad_sections_name_their_key() {
+    let with = |lines: &str| refusal("series.toml", &format!("{MANIFEST}{lines}\n"));
+    assert_says(&with("[tracker]\nsigma_m = 0"), Code::SettingRange, &["tracker.sigma_m"]);
+    assert_says(&with("[contact]\nsigma = 1"), Code::SettingSyntax, &["series.toml:4", "`sigma`"]);
+    assert_says(
+        &with("[controller]\nrotation = \"abc\""),
+        Code::SettingSyntax,
+        &["series.toml:4", "`abc`", "`abc_deg`"],
+    );
+    assert_says(&with("[[camera]]\nname = \"a\"\n[[camera]]"), Code::SettingMissing, &["2 of 2"]);
+    assert_says(&with("[[camera]]\nname = \"a\"\nfocal = 1"), Code::SettingSyntax, &["series.toml:5", "`focal`"]);
+    assert_says(&with("[plate_mount]\nlink = \"table\""), Code::SettingUnsupported, &["plate_mount"]);
+    assert_says(&with("[robot_2]"), Code::SettingUnsupported, &["robot_2"]);
+    assert_says(&with("[camera]\nlink = \"wrist\""), Code::SettingUnsupported, &["link"]);
+}
+
+#[test]
+fn a_bad_row_names_file_line_and_stop() {
+    for (file, text) in [("points.csv", POINTS), ("poses.csv", POSES), ("contacts.csv", CONTACTS)] {
+        let error = refusal(file, &text.replace("left/1", "left/9"));
+        assert_says(&error, Code::StopUnknown, &[file, "left/9", "left/0"]);
+        assert_says(&refusal(file, &text.replace("left/1", "")), Code::CsvCellEmpty, &[file, "stop"]);
+        let column = text.split(',').nth(1).unwrap();
+        assert_says(&refusal(file, &text.replace(column, "body_name")), Code::CsvColumnUnknown, &[file, "body_name"]);
+    }
+    let twice = POINTS.replace("left/1", "left/0");
+    assert_says(&refusal("points.csv", &twice), Code::CsvRowTwice, &["points.csv:3", "ball", "line 2"]);
+    assert_says(&refusal("points.csv", &POINTS.replace("0.0001", "-1")), Code::CsvRange, &["points.csv:3", "-1"]);
+    assert_says(&refusal("points.csv", &POINTS.replace("1.5", "")), Code::CsvNumber, &["points.csv:3", "x_m"]);
+    assert_says(
+        &refusal("contacts.csv", &CONTACTS.replace("0.25", "")),
+        Code::CsvCellEmpty,
+        &["contacts.csv:3", "z_m"],
+    );
+    let long = POSES.replace("0.7071068", "0.8");
+    assert_says(&refusal("poses.csv", &long), Code::CsvRange, &["poses.csv:2", "left/1", "1.1314"]);
+    assert_says(&refusal("joints.csv", &JOINTS.replace("left/1", "left/0")), Code::CsvRowTwice, &["joints.csv:3"]);
+    assert_says(
+        &refusal("joints.csv", &JOINTS.replace("j1,temp", "image,temp")),
+        Code::CsvColumnTwice,
+        &["joints.csv:1"],
+    );
+}
+
+#[test]
+fn nothing_measured_is_no_series() {
+    let folder = folder(&[]);
+    for name in ["points.csv", "poses.csv", "contacts.csv"] {
+        fs::remove_file(folder.path().join(name)).unwrap();
+    }
+    let error = read(folder.path()).unwrap_err();
+    assert_says(&error, Code::SettingMissing, &["camera_mount"]);
+}
