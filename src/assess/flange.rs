@@ -1,15 +1,16 @@
 //! Uncertainty of the flange, anywhere in the workspace.
 //!
 //! The pose of the flange is given relative to what stands still: the plate, or a fixed camera. No series can tell a constant
-//! displacement of the flange (the last origin and the last offset against the hand-camera offset), so the flange is the one that
+//! displacement of the flange (the last origin and the last offset against the hand-eye transform), so the flange is the one that
 //! is right on average over the stops: with `J(q)` the derivative of its body twist, `J(q) - mean_j J(q_j)` counts.
 //!
 //! The robot is that of the exported files, corrected URDF and compensation.toml: local errors are left out.
 
-use nalgebra::{DMatrix, Matrix6};
+use nalgebra::{DMatrix, Matrix6, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::limits::Limits;
+use super::mean_square::MeanSquare;
 use super::root_mean_square;
 use super::stops::{halton_stops, range_of};
 use crate::geom::{Pose, adjoint};
@@ -156,6 +157,18 @@ impl<'a> FlangeModel<'a> {
             (0..3).map(|k| c[(k, k)]).sum::<f64>().max(0.0)
         };
         root_mean_square(&samples.iter().map(|s| (square(s), 1.0)).collect::<Vec<_>>())
+    }
+
+    /// 95 % interval of the root mean square of an error that is known up to the errors of the model: `known` gives, in the frame of
+    /// the flange, what of it is known, m.
+    pub(super) fn interval_m(&self, samples: &[Posture], known: impl Fn(usize) -> Vector3<f64>) -> [f64; 2] {
+        let n = self.layout.theta_len();
+        let mut sums = MeanSquare::new(n);
+        for (k, sample) in samples.iter().enumerate() {
+            let j = self.derivative(sample).1 - &self.mean;
+            sums.add(&j.fixed_rows::<3>(0).into_owned(), &known(k));
+        }
+        sums.interval_m(&self.covariance.view((0, 0), (n, n)).into_owned())
     }
 
     /// Samples of the region of the stops, then of everything within the joint limits.

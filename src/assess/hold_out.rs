@@ -31,7 +31,7 @@ pub struct Errors {
 /// Before and after.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Accuracy {
-    /// Nominal robot, with camera, hand-camera offset and plate fitted to the other images.
+    /// Nominal robot, with camera, hand-eye transform and plate fitted to the other images.
     pub nominal: Errors,
     /// Calibrated robot, fitted to the other images.
     pub calibrated: Errors,

@@ -45,6 +45,12 @@ limits! {
     share_of_observations_left_out: f64 = 0.05;
     /// Images of the robot below which the prior decides much of the result: a 6R arm has some 30 parameters, six rows an image.
     few_images: usize = 20;
+    /// Share of the robot's images left out from which a result asks for a look.
+    doubtful_share_left_out: f64 = 0.1;
+    /// Gain on held-out images, nominal over calibrated, below which a new model is hardly worth installing.
+    doubtful_gain: f64 = 1.3;
+    /// Times the RMS held-out error from which a single image asks for a look.
+    doubtful_odd_image: f64 = 3.0;
     /// Times the median held-out error from which an image stands out.
     times_usual_error: f64 = 2.5;
     /// Times the median sigma of a marker from which an image is badly seen.

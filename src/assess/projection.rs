@@ -1,6 +1,6 @@
 //! How well the camera is known over its image: the uncertainty of where a direction is imaged.
 //!
-//! A turn of the camera is not part of it: hand-camera offset and camera poses take it up (as in mrcal's projection uncertainty, D. Kogan). With
+//! A turn of the camera is not part of it: hand-eye transform and camera poses take it up (as in mrcal's projection uncertainty, D. Kogan). With
 //! `J` the derivative of the images of directions by the parameters of the camera, `R` that by a turn, and weights `W`
 //! (inverse variances, so that the turn follows where the camera is known), the covariance is `P J C J' P'`, `P = 1 - R (R' W R)^-1 R' W`.
 

@@ -5,7 +5,7 @@
 //! joint noise and local errors. A description that holds less of the model is displaced against it besides, by so much RMS over
 //! the region; both parts add as squares. The nominal robot is given the base and the tool that fit it best.
 
-use nalgebra::Vector6;
+use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use super::flange::FlangeModel;
@@ -25,6 +25,20 @@ pub struct FlangeErrors {
     pub model_m: f64,
     /// The part of each of them that no model removes: joint noise and local errors of a stop.
     pub scatter_m: f64,
+    /// How far each of them may be off; absent in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intervals: Option<FlangeIntervals>,
+}
+
+/// 95 % intervals of the expected errors, by the covariance of the model, m: how large the error is that this one arm has in truth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FlangeIntervals {
+    /// Of the nominal robot.
+    pub nominal_m: [f64; 2],
+    /// Of the corrected URDF alone.
+    pub urdf_m: [f64; 2],
+    /// Of the whole model.
+    pub model_m: [f64; 2],
 }
 
 impl FlangeErrors {
@@ -37,11 +51,25 @@ impl FlangeErrors {
             .iter()
             .map(|s| MeasuredPoint { position_m: exact(&whole, s).translation, readings: s.readings.clone() })
             .collect();
-        let misfit = fit_points(&Robot::nominal(robot.chain.clone()), &points)?.rms_m;
-        let lacking = displacement(&whole, &with(robot, |t| t == Term::Offset), &samples, stops);
+        let nominal = fit_points(&Robot::nominal(robot.chain.clone()), &points)?;
+        let lacking = displacements(&whole, &with(robot, |t| t == Term::Offset), &samples, stops);
         let scatter_m = scatter_m(&whole, joint_sigma, &samples);
         let model_m = model.sigma_m(&samples).hypot(scatter_m);
-        Some(Self { nominal_m: model_m.hypot(misfit), urdf_m: model_m.hypot(lacking), model_m, scatter_m })
+        let in_flange = |k: usize| exact(&whole, &samples[k]).rotation.transpose() * nominal.residuals_m[k];
+        let interval = |known: &dyn Fn(usize) -> Vector3<f64>| {
+            model.interval_m(&samples, known).map(|rms_m| rms_m.hypot(scatter_m))
+        };
+        Some(Self {
+            nominal_m: model_m.hypot(nominal.rms_m),
+            urdf_m: model_m.hypot(rms(&lacking)),
+            model_m,
+            scatter_m,
+            intervals: Some(FlangeIntervals {
+                nominal_m: interval(&in_flange),
+                urdf_m: interval(&|k| -lacking[k]),
+                model_m: interval(&|_| Vector3::zeros()),
+            }),
+        })
     }
 }
 
@@ -56,13 +84,15 @@ fn exact(robot: &Robot, stop: &Posture) -> crate::geom::Pose {
     robot.pose_at(stop, &vec![0.0; stop.readings.len()])
 }
 
-/// Distance of the flange between two robots, RMS over samples, right on average over the stops, m.
-fn displacement(a: &Robot, b: &Robot, samples: &[Posture], stops: &[Posture]) -> f64 {
+/// How the flange of a second robot stands to that of a first, in the frame of the flange, right on average over the stops, m.
+fn displacements(a: &Robot, b: &Robot, samples: &[Posture], stops: &[Posture]) -> Vec<Vector3<f64>> {
     let twist = |s: &Posture| (exact(a, s).inverse() * exact(b, s)).log();
     let mean = stops.iter().map(twist).sum::<Vector6<f64>>() / stops.len().max(1) as f64;
-    let squares: Vec<(f64, f64)> =
-        samples.iter().map(|s| ((twist(s) - mean).fixed_rows::<3>(0).norm_squared(), 1.0)).collect();
-    root_mean_square(&squares)
+    samples.iter().map(|s| (twist(s) - mean).fixed_rows::<3>(0).into_owned()).collect()
+}
+
+fn rms(displacements: &[Vector3<f64>]) -> f64 {
+    root_mean_square(&displacements.iter().map(|d| (d.norm_squared(), 1.0)).collect::<Vec<_>>())
 }
 
 /// What the noise of a stop does to the position of the flange, RMS over samples, m.

@@ -29,7 +29,7 @@ pub(super) struct CompareArgs {
     /// Series folder; give it several times to fit several series of the same robot together
     #[arg(long, value_name = "FOLDER", required_unless_present_any = ["study", "monte_carlo"])]
     series: Vec<PathBuf>,
-    /// Simulate where the joint fit beats two stages, over repeatability and number of markers, instead of reading a series
+    /// Simulate where the joint fit beats two-step calibration, over repeatability and number of markers, instead of reading a series
     #[arg(long, conflicts_with = "series")]
     study: bool,
     /// Simulate series with errors drawn from the priors, and judge the stated uncertainties by the known truth
@@ -88,7 +88,7 @@ fn series(args: &CompareArgs) -> Result<Verdict> {
     if let Some(place) = place {
         let series: Vec<String> = args.series.iter().map(|s| format!(" --series {}", s.display())).collect();
         let command = format!("robotcal compare --urdf {}{}", args.urdf.display(), series.concat());
-        let report = format!("# Two stages against one, on a series\n\n    {command}\n\n{text}");
+        let report = format!("# Two-step calibration against the joint fit, on a series\n\n    {command}\n\n{text}");
         write(&place, [("comparison.md", report)])?;
     }
     Ok(Verdict::Good)

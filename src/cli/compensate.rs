@@ -354,7 +354,7 @@ fn text(program: &Program, outcomes: &[Outcome], left: &[Left], chain: &Chain) -
         1e3 * (done.iter().map(|(_, c)| of(c).powi(2)).sum::<f64>() / done.len().max(1) as f64).sqrt()
     };
     let worst = |of: fn(&Correction) -> f64| done.iter().map(|(_, c)| of(c)).fold(0.0, f64::max);
-    let mut out = format!("targets   {} corrected, {} left as they are\n", done.len(), left.len());
+    let mut out = format!("targets   {} corrected, {} unchanged\n", done.len(), left.len());
     if !done.is_empty() {
         let _ = writeln!(
             out,

@@ -9,7 +9,7 @@ use super::choices::ChoiceArgs;
 use super::recording::RecordingArgs;
 use super::say::{say, say_line};
 use super::show::read_solution;
-use super::{Verdict, progress, stages, summary};
+use super::{Verdict, long_table, progress, stages, summary};
 use crate::calibration::{Calibration, Ends, Export, Inputs, Observed};
 use crate::error::{Code, Error, Result};
 use crate::identify::{Estimator, Options, dry_run};
@@ -47,12 +47,15 @@ pub(super) struct IdentifyArgs {
     /// Where joint offsets go
     #[arg(long, value_enum, default_value_t = OffsetsName::Folded)]
     offsets: OffsetsName,
-    /// Fit in two stages (camera poses first, the robot from the poses) instead of jointly; `compare` says what each would reach
+    /// Two-step calibration (camera poses first, the robot from the poses) instead of the joint fit; `compare` says what each would reach
     #[arg(long, value_enum, value_name = "ESTIMATOR", ignore_case = true, conflicts_with = "dry_run")]
     two_stage: Option<TwoStage>,
     /// Also write the stand-alone camera poses (poses.csv)
     #[arg(long)]
     poses: bool,
+    /// Print solution.json and nothing else
+    #[arg(long, conflicts_with_all = ["dry_run", "at"])]
+    json: bool,
     #[command(flatten)]
     choices: ChoiceArgs,
     #[command(flatten)]
@@ -120,7 +123,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
             let inputs = inputs.with_recordings(&args.recording.options(&[])?)?;
             if args.dry_run {
                 inputs.tip_notice.iter().for_each(|notice| say_line!("note      {}", notice.coded()));
-                say!("{}", summary::of_stops(&dry_run(inputs.chain, &inputs.series, &options)?));
+                say!("{}", long_table::of_stops(&dry_run(inputs.chain, &inputs.series, &options)?));
                 return Ok(Verdict::Good);
             }
             inputs.observe(&progress::of_series())?
@@ -166,10 +169,15 @@ fn write(args: &IdentifyArgs, calibration: &Calibration, place: Place) -> Result
     let folder = place.path().to_path_buf();
     place.write_all(&files)?;
     // What is printed is what `show` prints: it comes from the file.
-    let record = files.get(FILE_NAME).map_or(&[][..], Vec::as_slice);
-    let record = solution_json::read(record)?;
-    say!("{}", summary::text(&record));
-    say!("{}", args.at.run(&record, &folder)?);
-    say_line!("results   {} ({} files)", folder.display(), files.len());
+    let bytes = files.get(FILE_NAME).map_or(&[][..], Vec::as_slice);
+    let record = solution_json::read(bytes)?;
+    match (args.json, stages::are_told()) {
+        (true, _) => say!("{}", String::from_utf8_lossy(bytes)),
+        (_, true) => {
+            say!("{}{}", long_table::text(&record), args.at.run(&record, &folder)?);
+            say_line!("results   {} ({} files)", folder.display(), files.len());
+        }
+        _ => say!("{}{}", summary::text(&record, &folder), args.at.run(&record, &folder)?),
+    }
     Ok(if record.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed })
 }

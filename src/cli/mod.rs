@@ -12,7 +12,9 @@ mod detect;
 mod identify;
 mod image_study;
 mod joint_table;
+mod long_table;
 mod memory;
+mod paragraph;
 mod plan;
 mod plate;
 mod plate_board;
@@ -52,7 +54,7 @@ use verdict::Verdict;
     arg_required_else_help = true
 )]
 struct Cli {
-    /// Say more on stderr (twice: everything); `identify` also writes the time of every stage (timings.json)
+    /// Say more: the long table of a result, and on stderr what is done (twice: everything); `identify` also writes the time of every stage (timings.json)
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
     /// Show no progress
@@ -75,7 +77,7 @@ enum Command {
     Convert(convert::ConvertArgs),
     /// Find the plate in images and say what was found, what was dropped and why; needs no robot
     Detect(Box<detect::DetectArgs>),
-    /// Identify robot, camera, hand-camera offset and plate from one or more series
+    /// Identify robot, camera, hand-eye transform and plate from one or more series
     Identify(identify::IdentifyArgs),
     /// Plan where to take images, and say what they will be worth
     Plan(Box<plan::PlanArgs>),
@@ -109,9 +111,9 @@ impl Command {
     }
 }
 
-/// What `show --parameters` prints of a solution.
+/// What `show`, `show --all` and `show --parameters` print of a solution.
 pub fn summary_of(record: &crate::output::solution_json::SolutionRecord) -> String {
-    summary::text(record) + &summary::parameters(record)
+    summary::text(record, std::path::Path::new("")) + &long_table::text(record) + &long_table::parameters(record)
 }
 
 /// Runs the program with the arguments of the process.

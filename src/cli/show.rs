@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::at::AtArgs;
 use super::say::{say, say_line};
-use super::{Verdict, summary};
+use super::{Verdict, long_table, stages, summary};
 use crate::error::{Error, Result};
 use crate::files::{self, Kind};
 use crate::output::difference::{Difference, compare_solutions};
@@ -20,9 +20,15 @@ pub(super) struct ShowArgs {
     /// solution.json; a second one is compared with it over the workspace
     #[arg(value_name = "SOLUTION", required = true, num_args = 1..=2)]
     solutions: Vec<PathBuf>,
+    /// Print the long table: everything that was found, and what was left out
+    #[arg(long)]
+    all: bool,
     /// Print every parameter with sigma, prior and share of data
     #[arg(long)]
     parameters: bool,
+    /// Print the solution as JSON and nothing else
+    #[arg(long, conflicts_with_all = ["all", "parameters", "at"])]
+    json: bool,
     /// Folder for at.csv
     #[arg(long, value_name = "FOLDER", default_value = ".")]
     out: PathBuf,
@@ -43,12 +49,24 @@ pub(super) fn run(args: &ShowArgs) -> Result<Verdict> {
     if let Some(second) = args.solutions.get(1) {
         return compare(args, &first, &read_solution(second)?);
     }
-    say!("{}", summary::text(&first));
+    if args.json {
+        say!("{}", String::from_utf8_lossy(&solution_json::to_bytes(&first)?));
+        return Ok(verdict_of(&first));
+    }
+    let folder = args.solutions[0].parent().unwrap_or(Path::new(""));
+    match args.all || stages::are_told() {
+        true => say!("{}", long_table::text(&first)),
+        false => say!("{}", summary::text(&first, folder)),
+    }
     if args.parameters {
-        say!("{}", summary::parameters(&first));
+        say!("{}", long_table::parameters(&first));
     }
     say!("{}", args.at.run(&first, &args.out)?);
-    Ok(if first.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed })
+    Ok(verdict_of(&first))
+}
+
+fn verdict_of(r: &SolutionRecord) -> Verdict {
+    if r.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed }
 }
 
 fn compare(args: &ShowArgs, a: &SolutionRecord, b: &SolutionRecord) -> Result<Verdict> {

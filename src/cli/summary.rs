@@ -1,428 +1,168 @@
-//! What `identify` and `show` say on stdout: all of it stands in solution.json.
+//! The answer of `identify` and `show` in at most [`MOST_LINES`] lines: verdict, accuracy, what was left out, what to do, where it stands.
+//! All else is in the long table (`-v`, `show --all`) and in the report.
 
-use std::fmt::Write;
+use std::collections::BTreeMap;
+use std::path::Path;
 
-use crate::assess::{Cause, Errors, Identifiability, UnknownDirection, median};
-use crate::error::Notice;
-use crate::identify::{Comparison, Estimator, LensEvidence};
+use super::paragraph::{WIDTH, indented, paragraph};
+use crate::assess::Advice;
+use crate::error::Code;
 use crate::output::solution_json::SolutionRecord;
-use crate::problem::{OriginPrior, short_name};
+use crate::output::verdict::{Reason, Trust, Verdict};
 use crate::urdf::JointKind;
 
-/// Most lines of one kind before the rest is counted.
+/// Most lines in all.
 const MOST_LINES: usize = 12;
 
-/// Most lines of advice of one kind: the table stays short, the report has them all.
-const MOST_ADVICE: usize = 3;
+/// Most lines of what to do next.
+const MOST_NEXT: usize = 3;
 
-/// Most parameters of a direction that are named.
-const MOST_NAMED: usize = 4;
+/// Most lines of why the result asks for a look.
+const MOST_DOUBTS: usize = 4;
 
-/// The short table: what was read, what was left out and why, joint noise, accuracy, what could not be determined, verdict.
-pub(super) fn text(record: &SolutionRecord) -> String {
-    let mut out = String::new();
-    // Writing to a String cannot fail.
-    let _ = write_all(&mut out, record);
-    out
+/// The answer; `folder` is that of the result.
+pub(super) fn text(record: &SolutionRecord, folder: &Path) -> String {
+    let verdict = Verdict::of(record);
+    let failed = verdict.trust == Trust::Failed;
+    let mut figures = if failed { flange_in_brief(record) } else { flange(record) };
+    figures.extend(held_out(record));
+    figures.extend(left_out(record));
+    let free = MOST_LINES.saturating_sub(figures.len() + 2);
+    let least = verdict.reasons.len().min(if failed { free / 2 } else { MOST_DOUBTS });
+    let next = next(record, &verdict, free.saturating_sub(least).min(MOST_NEXT));
+    let reasons = reasons(&verdict, free.saturating_sub(next.len()));
+    let mut lines = vec![headline(&verdict)];
+    [reasons, figures, next].into_iter().for_each(|more| lines.extend(more));
+    lines.push(results(record, folder));
+    if lines.len() < MOST_LINES {
+        let file = folder.join(crate::output::solution_json::FILE_NAME);
+        lines.push(indented("more", &format!("robotcal show --all {}", file.display())));
+    }
+    lines.into_iter().map(|line| line + "\n").collect()
 }
 
-/// What stops can tell, before the solve.
-pub(super) fn of_stops(found: &Identifiability) -> String {
-    let mut out = String::new();
-    // No report holds the rest.
-    let _ = identifiability(&mut out, found, "the stops can tell", usize::MAX);
-    let gauge = found.unknown.iter().filter(|d| d.cause != Cause::Stops).map(direction);
-    let _ = at_most(usize::MAX, &mut out, "gauge", gauge);
-    out
-}
-
-/// Every parameter with sigma, prior and share of data.
-pub(super) fn parameters(r: &SolutionRecord) -> String {
-    let shown = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.4e}"));
-    let mut out =
-        String::from("parameter, unit: value, sigma, sigma by the scatter of images, prior sigma, share of data\n");
-    for e in &r.estimates {
-        let share = e.share_of_data.map_or("-".to_owned(), |s| format!("{:.0} %", 100.0 * s));
-        let sigma = if e.free { shown(e.sigma) } else { "fixed".to_owned() };
-        let (value, clustered, prior) = (shown(e.value), shown(e.sigma_clustered), shown(e.prior_sigma));
-        out += &format!("{}, {}: {value}, {sigma}, {clustered}, {prior}, {share}\n", short_name(&e.name), e.unit);
-    }
-    out
-}
-
-fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    verdict(out, r)?;
-    flange(out, r)?;
-    accuracy(out, r)?;
-    let robot = &r.robot;
-    writeln!(
-        out,
-        "robot     {} ({} -> {}, {} moving joints)",
-        robot.name,
-        robot.base,
-        robot.tip,
-        robot.readings.len()
-    )?;
-    if r.estimator != Estimator::Joint {
-        writeln!(out, "estimator {}; by default the fit is joint", r.estimator.title())?;
-    }
-    for one in &r.series {
-        let images = || r.images.iter().filter(|i| i.series == one.name);
-        let used = || images().filter(|i| i.reason.is_none());
-        let observations: usize = used().map(|i| i.observations.reason.iter().filter(|o| o.is_none()).count()).sum();
-        writeln!(
-            out,
-            "series    {}: {} of {} images used, {observations} markers observed, {}x{} px",
-            one.name,
-            used().count(),
-            images().count(),
-            one.width_px,
-            one.height_px
-        )?;
-    }
-    limited(
-        out,
-        "left out",
-        r.images.iter().filter_map(|i| i.reason.as_ref().map(|why| format!("{}: {why}", i.name))),
-    )?;
-    if r.statistics.observations_left_out > 0 {
-        writeln!(out, "left out  {} single observations with large residuals", r.statistics.observations_left_out)?;
-    }
-    limited(
-        out,
-        "start",
-        r.starts.iter().filter(|v| v.won).map(|v| format!("{}: {} ({})", v.of, v.origin, v.reached)),
-    )?;
-    cameras(out, r)?;
-    writeln!(
-        out,
-        "free pose {:.3} px RMS per point over {} observations",
-        r.statistics.free_pose_rms_px, r.statistics.free_pose_observations
-    )?;
-    marker_tolerance(out, r)?;
-    joint_noise(out, r)?;
-    twists(out, r)?;
-    evidences(out, r)?;
-    lenses(out, r)?;
-    two_stage(out, r)?;
-    map(out, r)?;
-    scales(out, r)?;
-    undetermined(out, r)?;
-    if let Some(found) = &r.identifiability {
-        identifiability(out, found, "the data tell", MOST_ADVICE)?;
-    }
-    limited(out, "note", Notice::said_once(&r.notices).iter().map(Notice::coded))
-}
-
-fn verdict(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    if r.failed_gates.is_empty() {
-        writeln!(out, "verdict   good")
-    } else {
-        writeln!(out, "verdict   NOT TO BE TRUSTED:")?;
-        r.failed_gates.iter().try_for_each(|g| writeln!(out, "          - {g}"))
+fn headline(verdict: &Verdict) -> String {
+    let count = verdict.reasons.len();
+    match verdict.trust {
+        Trust::Good => "verdict   good".into(),
+        Trust::Doubts if count == 1 => "verdict   good, with one doubt".into(),
+        Trust::Doubts => format!("verdict   good, with {count} doubts"),
+        Trust::Failed if count == 1 => "verdict   NOT TO BE TRUSTED: a check failed".into(),
+        Trust::Failed => format!("verdict   NOT TO BE TRUSTED: {count} checks failed"),
     }
 }
 
-/// What may be promised of the corrected robot: by model and covariance.
-fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    let Some(e) = &r.flange else { return Ok(()) };
-    let mm = |m: f64| format!("{:>8.3} mm", 1e3 * m);
-    writeln!(
-        out,
-        "flange    expected error of its position relative to the plate in the region of the stops, by model and covariance, RMS:"
-    )?;
-    writeln!(out, "          nominal    {}   base and tool that fit it best", mm(e.nominal_m))?;
-    writeln!(out, "          calibrated {}   corrected URDF alone", mm(e.urdf_m))?;
+/// What was found; of a failed result the remedies stand under "next".
+fn reasons(verdict: &Verdict, most: usize) -> Vec<String> {
+    let words = |r: &Reason| match verdict.trust == Trust::Failed || r.remedy.is_empty() {
+        true => r.what.clone(),
+        false => format!("{} ({})", r.what, r.remedy),
+    };
+    shared("          - ", &verdict.reasons.iter().map(words).collect::<Vec<_>>(), most)
+}
+
+/// Several things in `most` lines, at least one for each, the first ones in full; those that find no room are counted.
+fn shared(first: &str, all: &[String], most: usize) -> Vec<String> {
+    let shown = if all.len() > most { most.saturating_sub(1) } else { all.len() };
+    let mut lines: Vec<String> = Vec::new();
+    for (k, words) in all.iter().take(shown).enumerate() {
+        let others = all.len().min(shown + 1) - k - 1;
+        lines.extend(paragraph(first, words, most - lines.len() - others));
+    }
+    let more = (all.len() > shown && most > 0).then(|| format!("{first}{} more: see the report", all.len() - shown));
+    lines.into_iter().chain(more).collect()
+}
+
+/// Expected error of the flange, before and after.
+fn flange(r: &SolutionRecord) -> Vec<String> {
+    let Some(e) = &r.flange else { return Vec::new() };
+    let row = |what: &str, m: f64, interval: Option<[f64; 2]>| {
+        let told = interval.map_or(String::new(), |[low, high]| format!("  ({:.3} to {:.3})", 1e3 * low, 1e3 * high));
+        format!("          {what:<24} {:>7.3} mm{told}", 1e3 * m)
+    };
+    let told = if e.intervals.is_some() { " (95 % interval)" } else { "" };
+    let i = e.intervals.as_ref();
+    let mut lines = vec![
+        format!("accuracy  expected flange error where the stops were, RMS{told}:"),
+        row("nominal robot", e.nominal_m, i.map(|i| i.nominal_m)),
+        row("corrected URDF alone", e.urdf_m, i.map(|i| i.urdf_m)),
+    ];
     if r.beyond_urdf() {
-        writeln!(out, "          calibrated {}   with compensation.toml", mm(e.model_m))?;
+        lines.push(row("with compensation.toml", e.model_m, i.map(|i| i.model_m)));
     }
-    writeln!(out, "          {:.3} mm of each is noise from stop to stop, which no model takes away", 1e3 * e.scatter_m)
+    lines
 }
 
-fn limited(out: &mut String, label: &str, lines: impl Iterator<Item = String>) -> std::fmt::Result {
-    at_most(MOST_LINES, out, label, lines)
+/// The same in a line, for a result that is not to be trusted.
+fn flange_in_brief(r: &SolutionRecord) -> Vec<String> {
+    let Some(e) = &r.flange else { return Vec::new() };
+    let whole =
+        if r.beyond_urdf() { format!(", {:.3} with compensation.toml", 1e3 * e.model_m) } else { String::new() };
+    let words = format!("not valid: flange {:.3} mm nominal, {:.3} URDF{whole}", 1e3 * e.nominal_m, 1e3 * e.urdf_m);
+    vec![indented("accuracy", &words)]
 }
 
-fn at_most(most: usize, out: &mut String, label: &str, lines: impl Iterator<Item = String>) -> std::fmt::Result {
-    let lines: Vec<String> = lines.collect();
-    for line in lines.iter().take(most) {
-        writeln!(out, "{label:<9} {line}")?;
+/// How well unseen images are predicted.
+fn held_out(r: &SolutionRecord) -> Vec<String> {
+    let [before, after] = [&r.accuracy.nominal, &r.accuracy.calibrated].map(|e| e.rms_mm);
+    let words = format!("{before:.3} -> {after:.3} mm on the plate, in images that the fit had not seen");
+    vec![indented("held out", &words)]
+}
+
+/// Images and observations that took no part, counted by reason.
+fn left_out(r: &SolutionRecord) -> Vec<String> {
+    let mut reasons: BTreeMap<Code, usize> = BTreeMap::new();
+    for rejection in r.images.iter().filter_map(|i| i.rejection()) {
+        *reasons.entry(rejection.code()).or_default() += 1;
     }
-    if lines.len() > most {
-        writeln!(out, "{label:<9} ... and {} more (all in the report)", lines.len() - most)?;
-    }
-    Ok(())
+    let out: usize = reasons.values().sum();
+    let named: Vec<String> = reasons.iter().map(|(code, n)| format!("{n} {}", spoken(*code))).collect();
+    let why = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
+    let s = &r.statistics;
+    let words = format!(
+        "{out} of {} images{why}, {} of {} observations",
+        r.images.len(),
+        s.observations_left_out,
+        s.observations_left_out + s.observations_used
+    );
+    paragraph("left out  ", &words, 2)
 }
 
-fn cameras(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    for (k, camera) in r.cameras.iter().enumerate() {
-        let value = |k: usize| camera.parameters.get(k).map_or(0.0, |(_, v)| *v);
-        let first = format!("camera/{}/", camera.name);
-        let sigma = r.estimates.iter().find(|e| e.name.starts_with(&first)).and_then(|e| e.sigma);
-        let sigma = sigma.map_or("fixed".to_owned(), |s| format!("+- {s:.2}"));
-        let known = camera.projection_known(r.seen_by(k).map(|(uv, _)| uv));
-        let known = known.map_or(String::new(), |[seen, largest]| {
-            format!("; projection known to {seen:.3} px where markers were seen, at worst {largest:.3} px")
-        });
-        let loss = camera.ros_loss_px.map_or(String::new(), |[rms, most]| {
-            format!("; {} lens, which camera.yaml misses by {rms:.3} px RMS, at most {most:.3} px", camera.lens.name())
-        });
-        writeln!(
-            out,
-            "camera    {}: fx {:.2} {sigma}, fy {:.2}, centre ({:.2}, {:.2}) px; image noise {:.3} px per axis{known}{loss}",
-            camera.name,
-            value(0),
-            value(1),
-            value(2),
-            value(3),
-            image_noise_px(r, k)
-        )?;
-    }
-    Ok(())
-}
-
-/// Typical standard deviation of an observation per axis, px: stated sigma times the estimated factor.
-fn image_noise_px(r: &SolutionRecord, camera: usize) -> f64 {
-    let determinants = r.seen_by(camera).map(|(_, c)| c[0] * c[2] - c[1] * c[1]).filter(|d| *d > 0.0);
-    let (sum, count) = determinants.fold((0.0, 0.0), |(s, n), d| (s + d.sqrt(), n + 1.0));
-    (sum / f64::max(count, 1.0)).sqrt() * r.cameras[camera].pixel_factor
-}
-
-fn marker_tolerance(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    for plate in r.plates.iter().filter(|p| p.tolerance_factor != 1.0) {
-        let stated = 1e3 * median(&plate.prior_sigma_m).unwrap_or(plate.tolerance_m);
-        let found = plate.tolerance_factor * stated;
-        writeln!(out, "plate     {}: markers are off by {found:.3} mm per axis, {stated:.3} mm stated", plate.name)?;
-    }
-    Ok(())
-}
-
-fn joint_noise(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    let all = r.stop_noise();
-    for (name, noise) in &all {
-        let readings = r.robot.readings.iter().zip(&r.robot.reading_kinds).zip(&noise.joint);
-        let parts: Vec<String> = readings
-            .enumerate()
-            .map(|(k, ((name, kind), s))| {
-                let unit = if *kind == JointKind::Prismatic { " mm" } else { "" };
-                let told = match noise.joint_interval.get(k) {
-                    Some([Some(low), Some(high)]) if *low == 0.0 => format!(" (below {:.3})", 1e3 * high),
-                    Some([Some(low), Some(high)]) => format!(" ({:.3} to {:.3})", 1e3 * low, 1e3 * high),
-                    _ => String::new(),
-                };
-                format!("{name} {:.3}{unit}{told}", 1e3 * s)
-            })
-            .collect();
-        let of = if all.len() > 1 { format!(" ({name})") } else { String::new() };
-        let tilt = Some(noise.apparent_tilt_rad).filter(|t| *t > 0.0);
-        let tilt = tilt.map(|t| format!("; apparent tilt of the plate {:.3}", 1e3 * t));
-        writeln!(out, "joints    noise in mrad (95 %){of}: {}{}", parts.join(", "), tilt.unwrap_or_default())?;
-    }
-    Ok(())
-}
-
-/// How far the origins of this robot are from nominal, beside what is assumed of robots.
-fn twists(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    let (factor, usual) = (r.robot.twist_factor, OriginPrior::default());
-    if factor == 1.0 {
-        return Ok(());
-    }
-    let [mm, mrad] = [usual.translation_m, usual.rotation_rad].map(|size| 1e3 * size);
-    writeln!(
-        out,
-        "origins   of the joints are off by {:.2} mm and {:.2} mrad per axis ({factor:.2} times {mm} mm and {mrad} mrad)",
-        factor * mm,
-        factor * mrad
-    )
-}
-
-fn evidences(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    if r.evidences.is_empty() {
-        return Ok(());
-    }
-    let all: Vec<String> = (r.evidences.iter())
-        .map(|e| format!("{:?} {:.1} ({} parameters)", e.model, e.log_evidence, e.parameters).to_lowercase())
-        .collect();
-    writeln!(out, "evidence  logarithm, relative to the best model: {}", all.join(", "))
-}
-
-fn lenses(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    for camera in &r.cameras {
-        let all: Vec<&LensEvidence> = r.lenses.iter().filter(|l| l.camera == camera.name).collect();
-        let Some(taken) = all.iter().find(|l| l.taken) else { continue };
-        let each: Vec<String> = all.iter().map(|l| format!("{} {:.1}", l.lens.name(), l.log_evidence)).collect();
-        let (lens, each) = (taken.lens.name(), each.join(", "));
-        writeln!(out, "lens      of {}: {lens}; evidence, logarithm, relative to the best: {each}", camera.name)?;
-    }
-    Ok(())
-}
-
-fn accuracy(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    let row = |e: &Errors| format!("{:>8.3} mm {:>8.3} px   worst image {:.3} mm", e.rms_mm, e.rms_px, e.worst_mm);
-    writeln!(
-        out,
-        "held out  images that the fit had not seen ({} folds), where the plate stood, repeatability included, RMS over the markers:",
-        r.accuracy.folds
-    )?;
-    writeln!(out, "          nominal    {}", row(&r.accuracy.nominal))?;
-    writeln!(out, "          calibrated {}", row(&r.accuracy.calibrated))
-}
-
-/// Two-stage fits beside the joint one.
-fn two_stage(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    let comparison = r.two_stage.as_ref();
-    let Some((row, ratio)) = comparison.and_then(Comparison::best_two_stage) else { return Ok(()) };
-    writeln!(
-        out,
-        "stages    the best two-stage fit of the same images ({}) has {ratio} times the error of the joint fit",
-        row.estimator.title()
-    )
-}
-
-/// What the lengths of the robot hang on.
-fn scales(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    let scales = r.estimates.iter().filter(|e| e.name.starts_with("plate_shape") && e.name.ends_with(".scale"));
-    for (e, plate) in scales.zip(&r.plates).filter(|(e, _)| e.free) {
-        let (Some(prior), Some(sigma)) = (e.prior_sigma, e.sigma) else { continue };
-        let known =
-            format!("scale     the robot's lengths follow the plate, whose size is known to {:.3} %", 100.0 * sigma);
-        let all_else = e.share_of_data.filter(|s| *s > 0.0).map(|s| 100.0 * prior / s.sqrt());
-        match (plate.scale, all_else) {
-            (None, Some(all_else)) => writeln!(
-                out,
-                "{known} if its file is right (nobody measured it, and all else tells {all_else:.2} %); 0.1 % is 1 mm a metre: give [scale]"
-            )?,
-            _ => writeln!(out, "{known}")?,
-        }
-    }
-    Ok(())
-}
-
-/// Uncertainty of the flange over the workspace.
-fn map(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    let sorted = |covered: bool| {
-        let mut all: Vec<f64> = r.workspace.iter().filter(|w| w.covered || !covered).map(|w| 1e3 * w.sigma_m).collect();
-        all.sort_by(f64::total_cmp);
-        all
-    };
-    let (inside, all) = (sorted(true), sorted(false));
-    let at = |v: &[f64], share: f64| v.get(((v.len() as f64 - 1.0) * share).max(0.0) as usize).copied();
-    if let (Some(median), Some(most)) = (at(&inside, 0.5), at(&inside, 0.95)) {
-        writeln!(
-            out,
-            "map       sigma of the flange relative to the plate, by the model: {median:.3} mm (95 % below {most:.3} mm) in the region of the stops{}",
-            at(&all, 1.0).map_or(String::new(), |w| format!(", up to {w:.2} mm elsewhere"))
-        )?;
-    }
-    let Some((scatter, ratio)) = r.scatter.as_ref().and_then(|s| s.flange_ratio.map(|ratio| (s, ratio))) else {
-        return Ok(());
-    };
-    let larger = if scatter.larger_stated { "; the larger ones are stated" } else { "" };
-    writeln!(out, "scatter   the images scatter {ratio:.2} times as much as the noise model says (flange){larger}")
-}
-
-fn undetermined(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    let Some(found) = &r.identifiability else { return Ok(()) };
-    writeln!(out, "gauge     {}", gauge(found))?;
-    let weak: Vec<String> = r.undetermined().iter().map(|e| short_name(&e.name)).collect();
-    if weak.is_empty() {
-        return writeln!(out, "unknown   nothing else: the data determine every robot parameter");
-    }
-    writeln!(
-        out,
-        "unknown   {} of {} robot parameters stay near nominal, the data say little of them: {}",
-        weak.len(),
-        r.robot_parameters().count(),
-        grouped(&weak)
-    )
-}
-
-/// Which parameters no series can tell from the pose of plate and camera.
-fn gauge(found: &Identifiability) -> String {
-    let of = |cause: Cause| {
-        let names = found.unknown.iter().filter(|d| d.cause == cause).flat_map(|d| d.parameters.iter());
-        let mut blocks: Vec<&str> = Vec::new();
-        for (name, _) in names {
-            let block = match name.rsplit_once('.') {
-                Some((block, _)) if block.ends_with(".origin") => block,
-                _ => name.as_str(),
-            };
-            if !blocks.contains(&block) {
-                blocks.push(block);
-            }
-        }
-        blocks.join(", ")
-    };
-    match (of(Cause::Base), of(Cause::Tip)) {
-        (base, tip) if base.is_empty() && tip.is_empty() => "no freedom is left between robot, plate and camera".into(),
-        (base, tip) => format!(
-            "{} cannot be separated from the pose of the plate, {} not from that of the camera: they need not be",
-            if base.is_empty() { "nothing" } else { &base },
-            if tip.is_empty() { "nothing" } else { &tip }
-        ),
+/// A code as it is spoken of images.
+fn spoken(code: Code) -> String {
+    match code {
+        Code::WronglyPaired => "wrongly paired".into(),
+        Code::ImageDuplicate => "duplicates".into(),
+        Code::MarkersTooFew => "with too few markers".into(),
+        other => other.name().replace('_', " "),
     }
 }
 
-fn identifiability(out: &mut String, found: &Identifiability, who: &str, most: usize) -> std::fmt::Result {
-    writeln!(
-        out,
-        "rank      {who} {} of the {} directions that any series could ({} free parameters of the robot)",
-        found.rank, found.tellable, found.parameters
-    )?;
-    if let Some(o) = found.observability {
-        writeln!(
-            out,
-            "observe   O1 {:.3}, O2 {:.2e}, O3 {:.3}, O4 {:.2e}, O5 {:.3} (over these directions, in units of the priors)",
-            o.o1, o.o2, o.o3, o.o4, o.o5
-        )?;
+/// Remedies of a failed result, else the stops that would help most; the most useful first.
+fn next(r: &SolutionRecord, verdict: &Verdict, most: usize) -> Vec<String> {
+    let remedies = verdict.reasons.iter().filter(|_| verdict.trust == Trust::Failed).map(|r| r.remedy.clone());
+    let remedies: Vec<String> = remedies.filter(|r| !r.is_empty()).collect();
+    if !remedies.is_empty() {
+        return shared("next      ", &remedies, most);
     }
-    let by_stops = found.unknown.iter().filter(|d| d.cause == Cause::Stops);
-    at_most(
-        most,
-        out,
-        "unknown",
-        by_stops.map(|d| format!("{}: {}", direction(d), d.remedy.as_deref().unwrap_or("more stops"))),
-    )?;
-    at_most(
-        most,
-        out,
-        "alike",
-        (found.correlations.iter())
-            .map(|c| format!("{} and {} (correlation {:.3}): {}", c.first, c.second, c.correlation, c.remedy)),
-    )?;
-    at_most(
-        most,
-        out,
-        "next",
-        found.next.iter().map(|a| format!("{} (takes {:.0} % off what is left)", a.words, 100.0 * a.gain)),
-    )
+    let stops = r.identifiability.iter().flat_map(|found| &found.next);
+    stops.map(|a| indented("next", &advice(r, a))).take(most).collect()
 }
 
-/// Parameters of a direction in words.
-fn direction(d: &UnknownDirection) -> String {
-    let names: Vec<&str> = d.parameters.iter().take(MOST_NAMED).map(|(name, _)| name.as_str()).collect();
-    let rest = d.parameters.len().saturating_sub(MOST_NAMED);
-    let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
-    let what = match d.cause {
-        Cause::Base => " (against the pose of the plate)",
-        Cause::Tip => " (against that of the camera)",
-        Cause::Redundant => " (do the same to this robot)",
-        Cause::Idle => " (does nothing to this robot)",
-        Cause::Stops => "",
-    };
-    format!("{}{more}{what}", names.join(" with "))
+/// A stop to add, in a line.
+fn advice(r: &SolutionRecord, a: &Advice) -> String {
+    let reading = r.robot.readings.iter().position(|name| *name == a.joint);
+    let slides = reading.is_some_and(|k| r.robot.reading_kinds[k] == JointKind::Prismatic);
+    let (factor, unit) = if slides { (1e3, "mm") } else { (1f64.to_degrees(), "deg") };
+    let [near, low, high] = [a.near, a.covered.0, a.covered.1].map(|q| factor * q);
+    let gain = 100.0 * a.gain;
+    format!("stops with {} near {near:.0} {unit} (so far {low:.0} to {high:.0}): {gain:.0} % less unknown", a.joint)
 }
 
-/// `joint_1.origin.x`, `joint_1.origin.y` -> `joint_1.origin (x y)`.
-fn grouped(names: &[String]) -> String {
-    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
-    for name in names {
-        let (block, component) = name.rsplit_once('.').unwrap_or((name, ""));
-        match groups.last_mut().filter(|(b, _)| *b == block) {
-            Some((_, components)) => components.push(component),
-            None => groups.push((block, vec![component])),
-        }
-    }
-    let parts: Vec<String> = groups.iter().map(|(b, c)| format!("{b} ({})", c.join(" "))).collect();
-    parts.join(", ")
+/// Where all of it stands.
+fn results(r: &SolutionRecord, folder: &Path) -> String {
+    let urdf = r.files.iter().find(|f| f.ends_with(".calibrated.urdf")).map_or("", |f| f.as_str());
+    let report = indented("report", &folder.join(crate::output::REPORT).display().to_string());
+    let beside = format!("{report}; robot: {urdf}");
+    if beside.len() <= WIDTH && !urdf.is_empty() { beside } else { report }
 }

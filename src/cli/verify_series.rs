@@ -25,7 +25,7 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
         model.iter().filter_map(|m| nominal.iter().find(|n| same(m, n)).map(|n| (m, n))).collect();
     let (model, nominal): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
     say_line!(
-        "images    {} that both models predict; camera, hand-camera offset and plate fitted to the others",
+        "images    {} that both models predict; camera, hand-eye transform and plate fitted to the others",
         model.len()
     );
     say_line!("{}", line("model", &args.urdf, &model));

@@ -22,7 +22,7 @@ impl fmt::Display for CameraModelMisfit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "camera: free poses leave {:.2} px per point; the camera model or the plate does not describe these images",
+            "camera: stand-alone camera poses leave {:.2} px per point; the camera model or the plate does not describe these images",
             self.rms_px
         )
     }

@@ -35,7 +35,10 @@ pub(super) fn start_robot(
     for ((mounting, placement), pairs) in &order {
         let poses: Vec<PosePair> = pairs.iter().map(|(_, p)| *p).collect();
         let problem = &adjustment.problem;
-        let of = format!("hand-camera {} and plate {}", problem.mountings[*mounting], problem.placements[*placement]);
+        let of = format!(
+            "hand-eye transform {} and target pose {}",
+            problem.mountings[*mounting], problem.placements[*placement]
+        );
         let known = (cameras.get(mounting).copied(), plates.get(placement).copied());
         let solution = match known {
             (Some(camera), Some(plate)) => HandEye { camera, plate },
@@ -127,7 +130,10 @@ fn closed_form(
     if best.median_error > limits.hand_eye_spread {
         return Err(no_fit(
             of,
-            &format!("even the best start leaves a median misfit of {:.0} (mm + mrad)", 1e3 * best.median_error),
+            &format!(
+                "even the best start leaves a median hand-eye residual of {:.0} (mm plus mrad)",
+                1e3 * best.median_error
+            ),
         ));
     }
     Ok(best.solution)

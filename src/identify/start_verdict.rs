@@ -52,7 +52,7 @@ impl fmt::Display for StartReached {
             }
             Self::HandEye { median_px, misfit } => {
                 let pixels = median_px.map(|px| format!("median {px:.1} px, ")).unwrap_or_default();
-                write!(f, "{pixels}median spread {:.2} mrad + mm", 1e3 * misfit)
+                write!(f, "{pixels}median hand-eye residual {:.2} (mm plus mrad)", 1e3 * misfit)
             }
             Self::InWords { what } => write!(f, "{what}"),
         }

@@ -18,7 +18,7 @@ pub fn comparison_markdown(comparison: &Comparison) -> String {
     };
     let mut out = format!(
         "{} images of the robot; each held out once, in {} folds{regions} (images that share joint readings stay together).\n\
-         The same observations, outliers, priors and gauge for all estimators.\n\
+         The same observations, outliers, priors and frames for all estimators.\n\
          mm: RMS distance at the plate between where an unseen image shows the markers and where the joint readings put them.\n\
          to F: its ratio to the joint fit, with the 95 % bootstrap interval over images (those that share joint readings count once). The joint fit keeps the noise \
          that the whole series showed, as in the accuracy that `identify` prints; the others find theirs anew.\n\n",
@@ -49,7 +49,7 @@ pub fn comparison_markdown(comparison: &Comparison) -> String {
     }
     if with_truth {
         out.push_str(
-            "\nflange: RMS error of the flange relative to the plate at readings that took no part, gauge aligned; \
+            "\nflange: RMS error of the flange relative to the plate at readings that took no part, plate and tool frames aligned; \
              camera: that of the camera in the plate frame, nothing aligned; both fitted to all images.\n",
         );
     }

@@ -51,6 +51,7 @@ pub mod solution_json;
 mod solution_record;
 pub mod stand_alone_files;
 mod text;
+pub mod verdict;
 mod write;
 
 pub use compensation_read::{compensated, parse_compensation, read_compensation};

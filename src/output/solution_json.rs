@@ -373,7 +373,7 @@ pub struct SeriesRecord {
     pub name: String,
     /// Series with the same camera share intrinsics.
     pub camera: String,
-    /// Series with the same mounting share the hand-camera offset.
+    /// Series with the same mounting share the hand-eye transform.
     pub mounting: String,
     /// Where the camera is.
     pub camera_mount: CameraMount,

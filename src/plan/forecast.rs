@@ -103,12 +103,12 @@ const NAMED_FROM: f64 = 0.25;
 /// from nothing.
 ///
 /// # Errors
-/// Where the images do not determine camera, plate or hand-camera offset.
+/// Where the images do not determine camera, plate or hand-eye transform.
 pub fn exact_covariance(planned: &Adjustment, setting: &Setting, stops: Vec<PlannedStop>) -> Result<DMatrix<f64>> {
     let (n, count) = (planned.problem.layout.len(), stops.len());
     let planned = setting.with_stops(planned, stops);
     let singular = || {
-        let what = format!("{count} images do not determine camera, plate and hand-camera offset");
+        let what = format!("{count} images do not determine camera, plate and hand-eye transform");
         Error::new(
             Code::PlanUndetermined,
             "plan: forecast",
@@ -145,7 +145,7 @@ pub fn image_name(index: usize) -> String {
 /// Forecast of a plan: exact at the points of the curve, with every marker's correction eliminated.
 ///
 /// # Errors
-/// Where the planned images do not determine camera, plate and hand-camera offset.
+/// Where the planned images do not determine camera, plate and hand-eye transform.
 pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
     let setting = &request.setting;
     let n = plan.legs.len();

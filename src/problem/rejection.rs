@@ -141,7 +141,7 @@ impl fmt::Display for Mismatch {
             Self::Fit { misfit, fits } => {
                 write!(f, "{misfit}")?;
                 fits.as_ref().map_or(Ok(()), |other| {
-                    write!(f, "; it fits the readings of {} to {:.1} (mm + mrad)", other.of, 1e3 * other.misfit)
+                    write!(f, "; it fits the readings of {} to {:.1} (mm plus mrad)", other.of, 1e3 * other.misfit)
                 })
             }
         }

@@ -78,8 +78,8 @@ fn study_setup(study: &Study) -> String {
     let noise = 1e3 * r.pixel_sigma_px;
     format!(
         "Robot {}, {} images a series, {} worlds a cell, robot errors of 0.3 mm, 1 mrad and offsets of 3 mrad, observations with \
-         {noise:.0} thousandths of a pixel of noise, marker positions known to 0.05 mm; all estimators share data, priors and gauge. Error: RMS over \
-         the worlds of the flange position relative to the plate at 60 joint vectors that took no part, gauge aligned. Ratio: \
+         {noise:.0} thousandths of a pixel of noise, marker positions known to 0.05 mm; all estimators share data, priors and frames. Error: RMS over \
+         the worlds of the flange position relative to the plate at 60 joint vectors that took no part, plate and tool frames aligned. Ratio: \
          repeatability (joint noise seen at the camera) over the error of the position of a free camera pose.",
         r.chain.robot, r.images, r.seeds
     )
@@ -87,7 +87,7 @@ fn study_setup(study: &Study) -> String {
 
 /// The study as Markdown.
 pub fn study_markdown(study: &Study, command: &str) -> String {
-    let mut out = format!("# Two stages against one\n\n`{command}`\n\n{}\n\n", study_setup(study));
+    let mut out = format!("# Two-step calibration against the joint fit\n\n`{command}`\n\n{}\n\n", study_setup(study));
     for line in study_verdict(study) {
         let _ = writeln!(out, "- {line}");
     }
@@ -190,7 +190,7 @@ pub fn study_html(study: &Study, command: &str) -> String {
         })
         .collect();
     let body = html! {
-        h1 { "Two stages against one" }
+        h1 { "Two-step calibration against the joint fit" }
         p { code { (command) } }
         p { (study_setup(study)) }
         ul { @for line in study_verdict(study) { li { (line) } } }
@@ -198,7 +198,7 @@ pub fn study_html(study: &Study, command: &str) -> String {
         div { @for p in &panels { (PreEscaped(p)) } }
         (table(study))
     };
-    page("Two stages against one", STYLE, &body)
+    page("Two-step calibration against the joint fit", STYLE, &body)
 }
 
 fn table(study: &Study) -> Markup {

@@ -34,7 +34,7 @@ use crate::urdf::{Chain, JointKind};
 /// What is tried.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MonteCarloRequest {
-    /// The nominal robot; without fixed joints, whose errors belong to the hand-camera offset.
+    /// The nominal robot; without fixed joints, whose errors belong to the hand-eye transform.
     pub chain: Chain,
     /// Worlds for each joint noise.
     pub seeds: u64,

@@ -118,7 +118,7 @@ fn plate() -> Plate {
 /// Runs the study.
 ///
 /// The robot's errors are drawn from the priors of the fit (origins 1 mm and 2 mrad, offsets 10 mrad), the scale of the plate
-/// from its prior: so a prediction that is right agrees with the errors found, over many worlds. Camera, hand-camera offset and
+/// from its prior: so a prediction that is right agrees with the errors found, over many worlds. Camera, hand-eye transform and
 /// plate pose are known to the planner only roughly (5 mm, 10 mrad, no distortion).
 ///
 /// # Errors

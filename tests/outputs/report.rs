@@ -45,7 +45,7 @@ fn the_page_is_complete_and_self_contained() {
         "Accuracy before and after",
         "What was read, and what was left out",
         "How well the flange is known where",
-        "Two stages against one",
+        "Two-step calibration",
         "Joint noise",
         "Residuals",
         "What was corrected on the robot",

@@ -114,6 +114,17 @@ fn the_verdict_stands_first_and_the_flange_after_it() {
 }
 
 #[test]
+fn as_json_the_solution_and_nothing_else_is_printed() {
+    let solution = root("reports/kr6_small/solution.json");
+    let output = robotcal(&["show", "--json", &solution]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    let [printed, file] = [output.stdout, std::fs::read(&solution).unwrap()]
+        .map(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).unwrap());
+    assert_eq!(printed["images"], file["images"]);
+    assert_eq!(printed["flange"]["model_m"], file["flange"]["model_m"]);
+}
+
+#[test]
 fn the_folder_of_predicted_flanges_is_made() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path().join("points.csv");
@@ -133,7 +144,7 @@ fn a_dry_run_says_all_that_it_counts() {
     assert_eq!(output.status.code(), Some(0), "{}", text(&output));
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     let numbers: Vec<usize> =
-        said.lines().find(|l| l.starts_with("rank")).unwrap().split(' ').filter_map(|w| w.parse().ok()).collect();
+        said.lines().find(|l| l.starts_with("known")).unwrap().split(' ').filter_map(|w| w.parse().ok()).collect();
     let unknown = said.lines().filter(|l| l.starts_with("unknown")).count();
     assert!(unknown > 12, "{said}");
     assert_eq!(unknown, numbers[1] - numbers[0], "{said}");

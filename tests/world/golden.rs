@@ -22,6 +22,9 @@ const NOTHING: f64 = 1e-9;
 /// Numbers of one kind beyond which two sums stand for them.
 const MANY: usize = 24;
 
+/// What stands before the long table.
+const ALL: &str = "--- show --all\n";
+
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -41,7 +44,13 @@ fn identify(urdf: &Path, series: &[PathBuf]) -> Answer {
         command.arg("--series").arg(s);
     }
     let output = command.arg("--out").arg(out.path().join("out")).output().unwrap();
-    let text = String::from_utf8(output.stdout).unwrap() + "--- stderr\n" + &String::from_utf8(output.stderr).unwrap();
+    let mut text = String::from_utf8(output.stdout).unwrap();
+    let solution = out.path().join("out/solution.json");
+    if solution.exists() {
+        let all = Command::new(env!("CARGO_BIN_EXE_robotcal")).args(["show", "--all"]).arg(&solution).output().unwrap();
+        text += &format!("{ALL}{}", String::from_utf8(all.stdout).unwrap());
+    }
+    text += &format!("--- stderr\n{}", String::from_utf8(output.stderr).unwrap());
     let terminal =
         text.replace(&out.path().display().to_string(), "TMP").replace(&root().display().to_string(), "ROOT");
     let record = std::fs::read(out.path().join("out/solution.json")).ok().map(|b| serde_json::from_slice(&b).unwrap());
@@ -141,6 +150,17 @@ fn reads_alike(a: &str, b: &str) -> bool {
 
 fn kr6() -> PathBuf {
     PathBuf::from("robots/kuka_kr6_r900/kuka_kr6_r900.urdf")
+}
+
+#[test]
+fn the_answer_is_short_and_begins_with_the_verdict() {
+    for file in std::fs::read_dir(root().join("tests/golden")).unwrap().map(|f| f.unwrap().path()) {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let Some((answer, _)) = text.split_once(ALL) else { continue };
+        let lines: Vec<&str> = answer.lines().skip(1).collect();
+        assert!(lines.len() <= 12 && lines[0].starts_with("verdict "), "{}:\n{answer}", file.display());
+        assert!(lines.iter().all(|l| l.chars().count() <= 100 && !l.contains('\u{1b}')), "{answer}");
+    }
 }
 
 #[test]

@@ -14,7 +14,6 @@ mod plots;
 mod sections;
 pub(crate) mod svg;
 mod two_stage;
-mod verdict;
 mod words;
 
 pub use plan_page::{plan_html, sigma_text};

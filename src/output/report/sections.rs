@@ -3,16 +3,21 @@
 use maud::{Markup, PreEscaped, html};
 
 use super::figure::figure;
-use super::verdict::verdict;
 use super::words::{count, fixed, plus_minus, significant, unit};
 use super::{maps, plots};
 use crate::error::Notice;
 use crate::identify::StartReached;
 use crate::output::solution_json::SolutionRecord;
+use crate::output::verdict::{Trust, Verdict};
 
 /// Title, verdict and the numbers that matter most.
 pub(super) fn head(r: &SolutionRecord) -> Markup {
-    let v = verdict(r);
+    let v = Verdict::of(r);
+    let (class, headline) = match v.trust {
+        Trust::Good => ("good", "Good: the corrected model can be used"),
+        Trust::Doubts => ("care", "Good, with doubts: look at the points below first"),
+        Trust::Failed => ("failed", "Not to be trusted: do not use this model before the cause is found"),
+    };
     let (before, after) = (&r.accuracy.nominal, &r.accuracy.calibrated);
     html! {
         h1 { "Calibration of " (r.robot.name) }
@@ -21,9 +26,9 @@ pub(super) fn head(r: &SolutionRecord) -> Markup {
             (count(r.statistics.images_used, "image")) " of " (r.statistics.images) " used. "
             (r.program.name) " " (r.program.version) "."
         }
-        div class={ "verdict " (v.class) } {
-            strong { (v.headline) }
-            @if !v.reasons.is_empty() { ul { @for reason in &v.reasons { li { (reason) } } } }
+        div class={ "verdict " (class) } {
+            strong { (headline) }
+            @if !v.reasons.is_empty() { ul { @for reason in &v.reasons { li { (reason.what) @if !reason.remedy.is_empty() { span.note { " (" (reason.remedy) ")" } } } } } }
         }
         p { (next_step(r)) }
         (promise(r))

@@ -1,4 +1,4 @@
-//! Two stages against one, on images that neither fit had seen.
+//! Two-step calibration against the joint fit, on images that neither fit had seen.
 
 use maud::{Markup, html};
 
@@ -12,7 +12,7 @@ use crate::output::solution_json::SolutionRecord;
 pub(super) fn section(r: &SolutionRecord) -> Markup {
     let Some(comparison) = &r.two_stage else { return html! {} };
     html! {
-        h2 { "Two stages against one" }
+        h2 { "Two-step calibration" }
         p {
             "Would it have done to find every camera pose by itself and to fit the robot to these poses? "
             "Both ways were fitted to the same " (count(comparison.images, "image")) ", less those put aside in "

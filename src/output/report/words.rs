@@ -26,9 +26,9 @@ pub(super) fn parameter(name: &str) -> String {
             Some(joint) => format!("{joint} origin, {part}"),
             None => format!("{rest} {part}"),
         },
-        ("hand_camera", None) => format!("hand-camera offset, {part}"),
-        ("hand_camera", Some(mounting)) => format!("hand-camera offset ({mounting}), {part}"),
-        ("plate", Some(placement)) => format!("plate pose ({placement}), {part}"),
+        ("hand_camera", None) => format!("hand-eye transform, {part}"),
+        ("hand_camera", Some(mounting)) => format!("hand-eye transform ({mounting}), {part}"),
+        ("plate", Some(placement)) => format!("target pose ({placement}), {part}"),
         ("camera", Some(rest)) => {
             let camera = rest.rsplit_once('/').map_or(rest, |(camera, _)| camera);
             format!("{component} of camera {camera}")
@@ -178,8 +178,8 @@ mod tests {
             ("robot/a/b.offset", "a/b offset"),
             ("robot/joint_3.cos_2", "joint_3 gear harmonic 2 (cosine)"),
             ("robot/joint_3.local_-0.3298", "joint_3 local error near the reading -0.3298"),
-            ("hand_camera.rz", "hand-camera offset, rotation about z"),
-            ("plate/placement_0.z", "plate pose (placement_0), shift along z"),
+            ("hand_camera.rz", "hand-eye transform, rotation about z"),
+            ("plate/placement_0.z", "target pose (placement_0), shift along z"),
             ("camera/front/lens.k1", "k1 of camera front"),
             ("plate_shape.scale", "plate scale"),
         ] {

@@ -1,0 +1,105 @@
+//! The verdict: may this result be used? Terminal and report say the same.
+
+use crate::error::{Code, Notice};
+use crate::output::solution_json::SolutionRecord;
+
+/// How far a result may be trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trust {
+    /// Nothing speaks against it.
+    Good,
+    /// It stands, and something asks for a look.
+    Doubts,
+    /// A quality gate failed.
+    Failed,
+}
+
+/// What asks for a look, and the first thing to do about it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reason {
+    /// What was found.
+    pub what: String,
+    /// What to do; empty where nothing is known.
+    pub remedy: String,
+}
+
+/// The verdict on a result with its reasons, the weightiest first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Verdict {
+    /// May it be used?
+    pub trust: Trust,
+    /// Failed gates, or doubts; none of a good result.
+    pub reasons: Vec<Reason>,
+}
+
+impl Verdict {
+    /// Failed gates first, then what asks for care.
+    pub fn of(record: &SolutionRecord) -> Self {
+        if !record.failed_gates.is_empty() {
+            return Self { trust: Trust::Failed, reasons: record.failed_gates.iter().map(|g| of_gate(g)).collect() };
+        }
+        let reasons = doubts(record);
+        Self { trust: if reasons.is_empty() { Trust::Good } else { Trust::Doubts }, reasons }
+    }
+}
+
+/// Sentences of gates say what was found, and after the first semicolon what to do.
+fn of_gate(sentence: &str) -> Reason {
+    let (what, remedy) = sentence.split_once("; ").unwrap_or((sentence, ""));
+    Reason { what: what.to_owned(), remedy: remedy.to_owned() }
+}
+
+fn doubts(r: &SolutionRecord) -> Vec<Reason> {
+    let noted: Vec<Notice> = r.notices.iter().filter(|n| !is_information(n.code)).cloned().collect();
+    let noted = Notice::said_once(&noted).into_iter();
+    let noted = noted.map(|n| Reason { what: format!("{}: {}", n.place, n.what), remedy: n.remedy });
+    noted.chain(left_out(r)).chain(small_gain(r)).chain(odd_image(r)).collect()
+}
+
+/// Notices that tell of a choice, or of what is counted among the images left out, and cast no doubt on the result.
+fn is_information(code: Code) -> bool {
+    matches!(
+        code,
+        Code::DictionaryGuessed
+            | Code::ImageDelayFound
+            | Code::ImageNotThere
+            | Code::ImageUnlisted
+            | Code::JointUnused
+            | Code::LensChosen
+            | Code::ObservationsMissing
+            | Code::RepeatabilityUnused
+            | Code::TipChosen
+    )
+}
+
+fn left_out(r: &SolutionRecord) -> Option<Reason> {
+    let on_robot = || r.images.iter().filter(|i| i.readings.is_some());
+    let (all, out) = (on_robot().count(), on_robot().filter(|i| i.reason.is_some()).count());
+    let many = out as f64 > r.limits().doubtful_share_left_out * all as f64;
+    many.then(|| Reason {
+        what: format!("{out} of {all} images of the robot were left out"),
+        remedy: "look at their reasons (report, or show --all)".into(),
+    })
+}
+
+fn small_gain(r: &SolutionRecord) -> Option<Reason> {
+    let (before, after) = (r.accuracy.nominal.rms_mm, r.accuracy.calibrated.rms_mm);
+    let small = after * r.limits().doubtful_gain > before;
+    small.then(|| Reason {
+        what: format!("the gain is small: {before:.3} mm before, {after:.3} mm after, on held-out images"),
+        remedy:
+            "the robot repeats no better, or the stops move its joints too little: take more, and more different ones"
+                .into(),
+    })
+}
+
+fn odd_image(r: &SolutionRecord) -> Option<Reason> {
+    let after = &r.accuracy.calibrated;
+    let odd = after.worst_mm > r.limits().doubtful_odd_image * after.rms_mm;
+    let error = |i: &&crate::output::solution_json::ImageRecord| i.held_out_mm.map_or(0.0, |e| e[1]);
+    let worst = r.images.iter().max_by(|a, b| error(a).total_cmp(&error(b)))?;
+    odd.then(|| Reason {
+        what: format!("image {} is off by {:.3} mm, far more than the others", worst.name, after.worst_mm),
+        remedy: "look at it in the report; did the arm stand still?".into(),
+    })
+}
