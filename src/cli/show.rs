@@ -10,8 +10,8 @@ use super::{Verdict, long_table, stages, summary};
 use crate::error::{Error, Result};
 use crate::files::{self, Kind};
 use crate::output::difference::{Difference, compare_solutions};
-use crate::output::recover;
 use crate::output::solution_json::{self, SolutionRecord};
+use crate::output::{Thumbnails, recover, report_html, write_beside};
 use crate::urdf::JointKind;
 
 /// Flags of `show`.
@@ -29,6 +29,9 @@ pub(super) struct ShowArgs {
     /// Print the solution as JSON and nothing else
     #[arg(long, conflicts_with_all = ["all", "parameters", "at"])]
     json: bool,
+    /// Write report.html again to this file, with pictures of the images that are still there
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
     /// Folder for at.csv
     #[arg(long, value_name = "FOLDER", default_value = ".")]
     out: PathBuf,
@@ -48,6 +51,12 @@ pub(super) fn run(args: &ShowArgs) -> Result<Verdict> {
     let first = read_solution(&args.solutions[0])?;
     if let Some(second) = args.solutions.get(1) {
         return compare(args, &first, &read_solution(second)?);
+    }
+    if let Some(file) = &args.report {
+        let page = report_html(&first, &Thumbnails::of_files(&first));
+        let name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let folder = file.parent().unwrap_or(Path::new("."));
+        write_beside(folder, &[(name, page.as_bytes())], &args.solutions)?;
     }
     if args.json {
         say!("{}", String::from_utf8_lossy(&solution_json::to_bytes(&first)?));

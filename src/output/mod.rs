@@ -1,6 +1,7 @@
 //! Solution -> bytes.
 //!
-//! Exporters are pure: [`files`] makes every file of a result in memory, [`write_all`] alone touches the disk.
+//! Exporters are pure: [`files`] makes every file of a result in memory (for small pictures in the report it looks at images of the series),
+//! [`write_all`] alone writes.
 //! A new exporter is one file here and one row in [`files`].
 
 mod camera_file;
@@ -60,7 +61,7 @@ pub use controller_files::kinematics_xacro;
 pub use kinematics_file::kinematics_yaml;
 pub use names::folder_name;
 #[cfg(feature = "report")]
-pub use report::{plan_html, report_html, sigma_text};
+pub use report::{Shown, Thumbnail, Thumbnails, plan_html, report_html, sigma_text};
 pub use write::{NewFolder, NewResult, Place, recover, write_all, write_beside};
 
 use std::collections::BTreeMap;
@@ -106,7 +107,7 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
     names.sort();
     let record = solution_record::record(solution, context, &gauge, names)?;
     #[cfg(feature = "report")]
-    files.insert(REPORT.into(), report::report_html(&record).into_bytes());
+    files.insert(REPORT.into(), report::report_html(&record, &Thumbnails::of_files(&record)).into_bytes());
     files.insert(solution_json::FILE_NAME.into(), solution_json::to_bytes(&record)?);
     Ok(files)
 }

@@ -2,8 +2,8 @@
 
 use crate::outputs_support::{context, robot, solved};
 use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
-use robotcal::output::{files, report_html, solution_json};
-use robotcal::series::CameraMount;
+use robotcal::output::{Thumbnails, files, report_html, solution_json};
+use robotcal::series::{CameraMount, InputFile};
 
 fn record() -> solution_json::SolutionRecord {
     let description = robot();
@@ -12,7 +12,7 @@ fn record() -> solution_json::SolutionRecord {
     let files = files(&solution, &context(&description)).unwrap();
     let record = solution_json::read(&files["solution.json"]).unwrap();
     // The page is made from the record alone: what it says is in solution.json.
-    assert_eq!(report_html(&record).as_bytes(), files["report.html"]);
+    assert_eq!(report_html(&record, &Thumbnails::default()).as_bytes(), files["report.html"]);
     record
 }
 
@@ -40,7 +40,7 @@ fn drawings(page: &str) -> Vec<&str> {
 #[test]
 fn the_page_is_complete_and_self_contained() {
     let record = record();
-    let page = report_html(&record);
+    let page = report_html(&record, &Thumbnails::default());
     for text in [
         "Accuracy before and after",
         "What was read, and what was left out",
@@ -54,22 +54,29 @@ fn the_page_is_complete_and_self_contained() {
         "Starting values",
         "For the record",
     ] {
-        assert!(page.contains(&format!("<h2>{text}</h2>")), "no section \"{text}\"");
+        assert!(page.contains(&format!(">{text}</h2>")), "no section \"{text}\"");
     }
     for image in &record.images {
         assert!(page.contains(&image.name), "{} is missing", image.name);
     }
     assert!(page.contains(&record.inputs[0].sha256));
-    for foreign in ["<script", "<link", "<img", "@import", "url(", "href="] {
+    for foreign in ["<link", "<img", "src=", "@import", "url("] {
         assert!(!page.contains(foreign), "the page contains {foreign}");
     }
+    let links: Vec<&str> = page.split("href=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+    for link in &links {
+        let id = link.strip_prefix('#').unwrap_or_else(|| panic!("{link} leads out of the page"));
+        assert!(page.contains(&format!("id=\"{id}\"")), "{link} leads nowhere");
+    }
+    assert!(links.len() > 15);
+    assert_eq!(page.matches("<script").count(), 1, "the page has one script of its own");
     for broken in ["NaN", ">inf", "-inf", "Infinity"] {
         assert!(!page.contains(broken), "the page says {broken}");
     }
     // Histogram, workspace from above and from the side, two stages against one, joint noise, residuals over image and plate, distortion and uncertainty of the
-    // camera, plate corrections.
+    // camera, plate corrections; residuals by image, joints and image that were covered, the scene.
     let drawings = drawings(&page);
-    assert_eq!(drawings.len(), 10);
+    assert_eq!(drawings.len(), 14);
     for drawing in drawings {
         let document = roxmltree::Document::parse(drawing).unwrap();
         assert!(document.descendants().filter(|n| n.is_element()).count() > 5);
@@ -80,7 +87,7 @@ fn the_page_is_complete_and_self_contained() {
 fn what_may_be_promised_stands_first() {
     let record = record();
     let e = record.flange.unwrap();
-    let page = report_html(&record);
+    let page = report_html(&record, &Thumbnails::default());
     let at = |mm: f64| {
         let decimals = (2.0 - mm.log10().floor()) as usize;
         let shown = format!("{mm:.decimals$} mm");
@@ -116,17 +123,17 @@ fn the_fits_in_two_stages_stand_beside_the_joint_one() {
 #[test]
 fn the_verdict_follows_the_gates_and_then_the_doubts() {
     let mut record = record();
-    assert!(report_html(&record).contains("class=\"verdict good\""));
+    assert!(report_html(&record, &Thumbnails::default()).contains("class=\"verdict good\""));
     let good = record.clone();
     record.accuracy.calibrated.worst_mm = 10.0 * record.accuracy.calibrated.rms_mm;
-    let page = report_html(&record);
+    let page = report_html(&record, &Thumbnails::default());
     assert!(page.contains("class=\"verdict care\""));
     let mut without_gain = good;
     without_gain.accuracy.nominal.rms_mm = without_gain.accuracy.calibrated.rms_mm;
-    assert!(report_html(&without_gain).contains("class=\"verdict care\""));
+    assert!(report_html(&without_gain, &Thumbnails::default()).contains("class=\"verdict care\""));
     let gate = "joint noise: 12.0 mrad";
     record.failed_gates.push(gate.into());
-    let page = report_html(&record);
+    let page = report_html(&record, &Thumbnails::default());
     assert!(page.contains("class=\"verdict failed\"") && page.contains(gate));
 }
 
@@ -142,11 +149,33 @@ fn names_and_reasons_cannot_break_the_page() {
     record.cameras[0].name = hostile.into();
     record.plates[0].name = hostile.into();
     record.program.command = hostile.into();
-    let page = report_html(&record);
-    assert!(!page.contains("<script"), "a name reached the page as markup");
+    let page = report_html(&record, &Thumbnails::default());
+    assert!(!page.contains("<script>alert"), "a name reached the page as markup");
     for drawing in drawings(&page) {
         roxmltree::Document::parse(drawing).unwrap();
     }
+}
+
+#[test]
+fn pictures_are_shown_of_images_whose_files_are_those_that_were_looked_at() {
+    let mut record = record();
+    let folder = tempfile::tempdir().unwrap();
+    let image = |grey: u8| image::GrayImage::from_fn(640, 480, |x, _| image::Luma([grey.wrapping_add(x as u8)]));
+    for k in 0..record.images.len() {
+        let path = folder.path().join(&record.images[k].name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        image(k as u8).save_with_format(&path, image::ImageFormat::Png).unwrap();
+        record.inputs.push(InputFile::of_file(&path).unwrap());
+    }
+    record.images[0].reason = Some("in motion".into());
+    record.images[0].rms_px = None;
+    let pictures = Thumbnails::of_files(&record);
+    let page = report_html(&record, &pictures);
+    // Two with the smallest residuals, three with the largest, one left out.
+    assert_eq!(page.matches("data:image/jpeg;base64,").count(), 6);
+    assert!(page.len() < 2_000_000);
+    record.inputs.iter_mut().for_each(|f| f.sha256 = "0".into());
+    assert_eq!(Thumbnails::of_files(&record), Thumbnails::default(), "another image is not shown for it");
 }
 
 #[test]
@@ -175,7 +204,7 @@ fn a_result_without_robot_terms_plots_or_covariances_still_has_a_page() {
         image.held_out_mm = None;
         image.observations = solution_json::ObservationColumns::default();
     }
-    let page = report_html(&record);
+    let page = report_html(&record, &Thumbnails::default());
     // words: the page is for people, and no number stands where nothing was estimated.
     assert!(page.contains("The readings were taken as exact."));
     assert!(!page.contains("NaN"));
@@ -185,7 +214,7 @@ fn a_result_without_robot_terms_plots_or_covariances_still_has_a_page() {
 fn local_errors_are_summed_up_and_make_no_columns() {
     let mut record = record();
     let heads = |page: &str| page.matches("<th class=\"n\">").count();
-    let before = heads(&report_html(&record));
+    let before = heads(&report_html(&record, &Thumbnails::default()));
     let joint = record.robot.readings[0].clone();
     let known = record.estimates.len();
     record.covariance_lower.resize((known + 3) * (known + 4) / 2, 0.0);
@@ -201,7 +230,7 @@ fn local_errors_are_summed_up_and_make_no_columns() {
             unit: "rad".into(),
         });
     }
-    let page = report_html(&record);
+    let page = report_html(&record, &Thumbnails::default());
     assert_eq!(heads(&page), before + 3, "one small table: readings, RMS, largest");
     assert!(!page.contains("local_"));
     assert!(page.contains(">0.400<"), "largest, mrad");
@@ -215,6 +244,6 @@ fn the_page_names_the_files_that_are_there() {
     assert!(record.files.iter().any(|f| f == "plate.csv"));
     record.files.retain(|f| f != "plate.csv");
     record.files.extend(["plate.run1.csv".into(), "plate.run2.csv".into()]);
-    let page = report_html(&record);
+    let page = report_html(&record, &Thumbnails::default());
     assert!(!page.contains("plate.csv") && page.contains("plate.run1.csv") && page.contains("plate.run2.csv"));
 }

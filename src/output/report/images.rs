@@ -2,6 +2,8 @@
 
 use maud::{Markup, html};
 
+use super::figure::pointed;
+use super::plots;
 use super::words::fixed;
 use crate::output::solution_json::{ImageRecord, SolutionRecord};
 
@@ -9,7 +11,7 @@ use crate::output::solution_json::{ImageRecord, SolutionRecord};
 pub(super) fn table(r: &SolutionRecord) -> Markup {
     let several = r.images.iter().any(|i| i.series != r.images[0].series);
     html! {
-        h2 { "Images" }
+        @if let Some(svg) = plots::by_image(r) { (pointed(&svg, "Point at a bar, or touch it: image, pose, joints, residual.")) }
         p.note {
             "Markers: used of those found. Residual: RMS per point in the joint fit. Held out: how far the robot model misses the "
             "plate in an image that it had not seen, nominal and calibrated."

@@ -20,7 +20,6 @@ pub(super) fn identifiable(r: &SolutionRecord) -> Markup {
     let Some(found) = &r.identifiability else { return html! {} };
     let of = |causes: &'static [Cause]| found.unknown.iter().filter(move |d| causes.contains(&d.cause));
     html! {
-        h2 { "What the data tell, and what to measure next" }
         p {
             "The robot model has " (count(found.parameters, "free parameter")) ". Stops over the whole range of all joints could tell "
             (found.tellable) " independent directions of them; these images tell " b { (found.rank) } ". "
@@ -98,7 +97,6 @@ pub(super) fn workspace(r: &SolutionRecord) -> Markup {
     inside.sort_by(f64::total_cmp);
     let bounds = bounds(r);
     html! {
-        h2 { "How well the flange is known where" }
         p {
             "Uncertainty of the position of the flange relative to the plate, one sigma over all three axes, by the calibrated model. "
             "Joint noise of a single move comes on top. "

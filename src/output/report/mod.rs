@@ -1,8 +1,13 @@
-//! report.html: one self-contained page, made from the record in solution.json and nothing else.
+//! report.html: one self-contained page, made from the record in solution.json, with small pictures of images whose files are there.
 //!
-//! A new section is one function in `sections`, `parameters` or `images` and one row in [`report_html`].
+//! A new chapter is one function and one row in [`chapters`].
 
+mod coverage;
+mod describe;
 mod figure;
+mod findings;
+mod first_page;
+mod gallery;
 mod images;
 mod knowledge;
 mod maps;
@@ -11,38 +16,52 @@ mod parameters;
 mod plan_page;
 mod plan_pictures;
 mod plots;
+mod scene;
 mod sections;
 pub(crate) mod svg;
+mod thumbnails;
 mod two_stage;
 mod words;
 
 pub use plan_page::{plan_html, sigma_text};
+pub use thumbnails::{Shown, Thumbnail, Thumbnails};
 
-use maud::html;
+use maud::Markup;
 
 use crate::output::solution_json::SolutionRecord;
+use page::{Chapter, page_of_chapters};
 
 const STYLE: &str = include_str!("style.css");
+const SCRIPT: &str = include_str!("report.js");
 
 /// The page.
-pub fn report_html(record: &SolutionRecord) -> String {
-    let body = html! {
-        (sections::head(record))
-        (sections::accuracy(record))
-        (knowledge::workspace(record))
-        (two_stage::section(record))
-        (sections::left_out(record))
-        (sections::joint_noise(record))
-        (sections::residuals(record))
-        (parameters::robot(record))
-        (parameters::undetermined(record))
-        (knowledge::identifiable(record))
-        (parameters::placed(record))
-        (parameters::cameras(record))
-        (sections::plates(record))
-        (images::table(record))
-        (sections::starts(record))
-        (sections::record(record))
-    };
-    page::page(&format!("Calibration of {}", record.robot.name), STYLE, &body)
+pub fn report_html(record: &SolutionRecord, pictures: &Thumbnails) -> String {
+    let title = format!("Calibration of {}", record.robot.name);
+    page_of_chapters(&title, STYLE, SCRIPT, &first_page::first_page(record), &chapters(record, pictures))
+}
+
+/// All chapters; those without content are left out.
+fn chapters(r: &SolutionRecord, pictures: &Thumbnails) -> Vec<Chapter> {
+    let chapter = |id: &'static str, title: &str, body: Markup| Chapter { id, title: title.to_owned(), body };
+    vec![
+        chapter("accuracy", "Accuracy before and after", sections::accuracy(r)),
+        chapter("findings", "Findings, and what to do", findings::section(r)),
+        chapter("left-out", "What was read, and what was left out", sections::left_out(r)),
+        chapter("pictures", "Pictures: best, worst and left out", gallery::gallery(r, pictures)),
+        chapter("scene", "Arm, camera poses and plate", scene::section(r)),
+        chapter("coverage", "What the stops covered", coverage::section(r)),
+        chapter("images", "Residuals by image", images::table(r)),
+        chapter("residuals", "Residuals", sections::residuals(r)),
+        chapter("workspace", "How well the flange is known where", knowledge::workspace(r)),
+        chapter("corrections", "What was corrected on the robot", parameters::robot(r)),
+        chapter("undetermined", "What the data could not determine", parameters::undetermined(r)),
+        chapter("known", "What the data tell, and what to measure next", knowledge::identifiable(r)),
+        chapter("two-step", "Two-step calibration", two_stage::section(r)),
+        chapter("joint-noise", "Joint noise", sections::joint_noise(r)),
+        chapter("poses", "Hand-eye transform and target pose", parameters::placed(r)),
+        chapter("cameras", "Camera", parameters::cameras(r)),
+        chapter("plate", "Plate", sections::plates(r)),
+        chapter("starts", "Starting values", sections::starts(r)),
+        chapter("record", "For the record", sections::record(r)),
+    ]
 }

@@ -18,7 +18,6 @@ const MOST_CORRECTIONS: usize = 12;
 pub(super) fn robot(r: &SolutionRecord) -> Markup {
     let strongest = strongest(r);
     html! {
-        h2 { "What was corrected on the robot" }
         h3 { "The corrections that are surest to be real" }
         @if strongest.is_empty() {
             p { "No correction is larger than three times its sigma." }
@@ -149,7 +148,6 @@ pub(super) fn undetermined(r: &SolutionRecord) -> Markup {
     let others = || r.estimates.iter().filter(|e| e.free && !e.name.starts_with("robot/"));
     let silent: Vec<&str> = others().filter(|e| r.hardly_determines(e)).map(|e| e.name.as_str()).collect();
     html! {
-        h2 { "What the data could not determine" }
         @if weak.is_empty() {
             p { "Nothing: the data say something about every parameter of the robot." }
         } @else {
@@ -176,7 +174,6 @@ pub(super) fn placed(r: &SolutionRecord) -> Markup {
     let cameras = r.mountings.iter().map(|m| (format!("camera in {camera}"), m, r.mountings.len()));
     let plates = r.placements.iter().map(|p| (format!("plate in {plate}"), p, r.placements.len()));
     html! {
-        h2 { "Camera and plate poses" }
         p.note { "Sigmas are per axis of the camera (of the plate). Roll, pitch, yaw as in URDF." }
         div.wide { table {
             thead { tr {
@@ -213,7 +210,6 @@ fn is_of_formula(e: &EstimateRecord, camera: &str) -> bool {
 /// Cameras: parameters, distortion and uncertainty.
 pub(super) fn cameras(r: &SolutionRecord) -> Markup {
     html! {
-        h2 { @if r.cameras.len() == 1 { "Camera" } @else { "Cameras" } }
         @for (k, camera) in r.cameras.iter().enumerate() {
             h3 { (camera.name) ", " (camera.lens.name()) " lens, " (camera.width_px) " × " (camera.height_px) " px" }
             div.pair {

@@ -1,5 +1,6 @@
 //! Plots of numbers: histogram of held-out errors, joint noise.
 
+use super::describe::describe;
 use super::svg::{Anchor, Svg, ticks};
 use super::words::plain;
 use crate::output::solution_json::SolutionRecord;
@@ -94,6 +95,35 @@ pub(super) fn histogram(record: &SolutionRecord) -> Option<String> {
     let scale = if axis.logarithmic { " (logarithmic)" } else { "" };
     svg.text([LEFT + w / 2.0, HEIGHT - 8.0], Anchor::Middle, &format!("error of an image, mm{scale}"));
     svg.text_upwards([13.0, TOP + h / 2.0], "images");
+    Some(svg.finish())
+}
+
+/// Residuals of every image in use, a bar each in the order of the series; left-out images are marked at the foot.
+pub(super) fn by_image(record: &SolutionRecord) -> Option<String> {
+    let most = record.images.iter().filter_map(|i| i.rms_px).fold(0.0, f64::max);
+    if most <= 0.0 {
+        return None;
+    }
+    let width = 720.0;
+    let mut svg = Svg::new(width, HEIGHT, "Residuals of every image, px RMS");
+    let (w, h) = (width - LEFT - RIGHT, HEIGHT - TOP - BOTTOM);
+    let y = |px: f64| TOP + h * (1.0 - px / (1.05 * most));
+    for t in ticks(most) {
+        svg.line([LEFT, y(t)], [LEFT + w, y(t)], "grid");
+        svg.text([LEFT - 6.0, y(t) + 4.0], Anchor::End, &plain(t));
+    }
+    let step = w / record.images.len() as f64;
+    let bar = (0.8 * step).min(24.0);
+    for (k, image) in record.images.iter().enumerate() {
+        let x = LEFT + step * (k as f64 + 0.5) - bar / 2.0;
+        svg.titled(&describe(record, image), |svg| match (image.rms_px, &image.reason) {
+            (Some(px), None) => svg.rect([x, y(px)], [bar, TOP + h - y(px)], "after"),
+            _ => svg.rect([x, TOP + h - 8.0], [bar, 8.0], "gone"),
+        });
+    }
+    svg.line([LEFT, TOP + h], [LEFT + w, TOP + h], "axis");
+    svg.text([LEFT + w / 2.0, HEIGHT - 22.0], Anchor::Middle, "images in the order of the series; red: left out");
+    svg.text_upwards([13.0, TOP + h / 2.0], "px RMS");
     Some(svg.finish())
 }
 

@@ -3,77 +3,15 @@
 use maud::{Markup, PreEscaped, html};
 
 use super::figure::figure;
-use super::words::{count, fixed, plus_minus, significant, unit};
+use super::words::{count, plus_minus, significant, unit};
 use super::{maps, plots};
-use crate::error::Notice;
 use crate::identify::StartReached;
 use crate::output::solution_json::SolutionRecord;
-use crate::output::verdict::{Trust, Verdict};
-
-/// Title, verdict and the numbers that matter most.
-pub(super) fn head(r: &SolutionRecord) -> Markup {
-    let v = Verdict::of(r);
-    let (class, headline) = match v.trust {
-        Trust::Good => ("good", "Good: the corrected model can be used"),
-        Trust::Doubts => ("care", "Good, with doubts: look at the points below first"),
-        Trust::Failed => ("failed", "Not to be trusted: do not use this model before the cause is found"),
-    };
-    let (before, after) = (&r.accuracy.nominal, &r.accuracy.calibrated);
-    html! {
-        h1 { "Calibration of " (r.robot.name) }
-        p.sub {
-            (r.robot.base) " to " (r.robot.tip) ", " (count(r.robot.readings.len(), "moving joint")) "; "
-            (count(r.statistics.images_used, "image")) " of " (r.statistics.images) " used. "
-            (r.program.name) " " (r.program.version) "."
-        }
-        div class={ "verdict " (class) } {
-            strong { (headline) }
-            @if !v.reasons.is_empty() { ul { @for reason in &v.reasons { li { (reason.what) @if !reason.remedy.is_empty() { span.note { " (" (reason.remedy) ")" } } } } } }
-        }
-        p { (next_step(r)) }
-        (promise(r))
-        div.big {
-            div { b { (significant(before.rms_mm)) " → " (significant(after.rms_mm)) " mm" } span { "images the fit had not seen, where the plate stood, before → after" } }
-            div { b { (fixed(before.rms_mm / after.rms_mm, 1)) " times" } span { "better on these images" } }
-            div { b { (significant(after.worst_mm)) " mm" } span { "worst single image after" } }
-            div { b { (significant(r.statistics.rms_px)) " px" } span { "what is left in the images (RMS per point)" } }
-        }
-    }
-}
-
-/// The expected error of the flange: what may be promised.
-fn promise(r: &SolutionRecord) -> Markup {
-    let Some(e) = &r.flange else { return html! {} };
-    let mm = |m: f64| significant(1e3 * m);
-    html! {
-        div.big {
-            div { b { (mm(e.nominal_m)) " → " (mm(e.urdf_m)) " mm" } span { "expected error of the flange, corrected URDF alone" } }
-            @if r.beyond_urdf() {
-                div { b { (mm(e.nominal_m)) " → " (mm(e.model_m)) " mm" } span { "the same with compensation.toml" } }
-            }
-            div { b { (mm(e.scatter_m)) " mm" } span { "of each is noise from stop to stop" } }
-        }
-        p.note {
-            "Position relative to the plate, by model and covariance, RMS in the region of the stops; the nominal robot with the base and the tool that fit it best. "
-            "The second row is measured on images of the same series; it says less, because the stops all look at one plate."
-        }
-    }
-}
-
-/// What to do with the files.
-fn next_step(r: &SolutionRecord) -> Markup {
-    let urdf = r.files.iter().find(|f| f.ends_with(".calibrated.urdf"));
-    html! {
-        @if let Some(urdf) = urdf { "The corrected robot is " code { (urdf) } ", joint offsets included. " }
-        @if r.beyond_urdf() { "What a URDF cannot say (gear, sag, backlash) is in " code { "compensation.toml" } ". " }
-    }
-}
 
 /// Before and after on held-out images.
 pub(super) fn accuracy(r: &SolutionRecord) -> Markup {
     let rows = [("Nominal robot", &r.accuracy.nominal), ("Calibrated robot", &r.accuracy.calibrated)];
     html! {
-        h2 { "Accuracy before and after" }
         p {
             "How well do the joint readings alone say where the plate appears? The images were put aside in "
             (r.accuracy.folds) " groups in turn; a model fitted to the other groups had to predict them. "
@@ -108,7 +46,6 @@ pub(super) fn left_out(r: &SolutionRecord) -> Markup {
     });
     let rejected: Vec<_> = r.images.iter().filter_map(|i| i.reason.as_ref().map(|reason| (&i.name, reason))).collect();
     html! {
-        h2 { "What was read, and what was left out" }
         div.wide { table {
             thead { tr { th { "Series" } th { "camera" } th.n { "images" } th.n { "used" } th.n { "on the robot" } th.n { "markers observed" } } }
             tbody { @for name in &series { (series_row(r, name)) } }
@@ -125,23 +62,6 @@ pub(super) fn left_out(r: &SolutionRecord) -> Markup {
                 (r.statistics.observations_left_out + r.statistics.observations_used)
                 " left out because of a large residual (all are in observations.csv)."
             }
-        }
-        @if !r.notices.is_empty() {
-            h3 { "Notes" }
-            ul { @for group in Notice::alike(&r.notices) { (notes(&group)) } }
-        }
-    }
-}
-
-/// Notices that say the same: all places, then once what; each by itself where their numbers differ.
-fn notes(group: &[&Notice]) -> Markup {
-    let remedy = |n: &Notice| html! { @if !n.remedy.is_empty() { span.note { " (" (n.remedy) ")" } } };
-    let first = group[0];
-    html! {
-        @if group.iter().all(|n| n.what == first.what) {
-            li { @for n in group { code { (n.place) } " " } (first.what) (remedy(first)) }
-        } @else {
-            @for n in group { li { code { (n.place) } " " (n.what) (remedy(n)) } }
         }
     }
 }
@@ -160,7 +80,6 @@ fn series_row(r: &SolutionRecord, name: &str) -> Markup {
 /// How well each joint repeats its reading.
 pub(super) fn joint_noise(r: &SolutionRecord) -> Markup {
     html! {
-        h2 { "Joint noise" }
         p {
             "How far a joint typically stands from where its reading and the model say (one sigma), as the images show it. "
             "No model can remove this part: it bounds the accuracy of a single move."
@@ -175,7 +94,6 @@ pub(super) fn joint_noise(r: &SolutionRecord) -> Markup {
 /// Residual maps.
 pub(super) fn residuals(r: &SolutionRecord) -> Markup {
     html! {
-        h2 { "Residuals" }
         p {
             "What the model leaves unexplained in the images (measured minus predicted). A healthy map looks like noise: "
             "short lines in all directions. A pattern means that the lens model or the plate does not describe what was seen."
@@ -205,7 +123,6 @@ pub(super) fn plates(r: &SolutionRecord) -> Markup {
     let modes: Vec<_> = r.estimates.iter().filter(|e| e.name.starts_with("plate_shape")).collect();
     let tables = || r.files.iter().filter(|f| f.starts_with("plate") && f.ends_with(".csv"));
     html! {
-        h2 { "Plate" }
         p {
             "The plate is part of what is estimated: corrected positions with sigmas are in "
             @for (k, f) in tables().enumerate() { @if k > 0 { ", " } code { (f) } } "."
@@ -237,7 +154,6 @@ pub(super) fn starts(r: &SolutionRecord) -> Markup {
     let tried = || r.starts.iter().filter(|s| s.reached != StartReached::NotNeeded);
     let spared = r.starts.len() - tried().count();
     html! {
-        h2 { "Starting values" }
         p {
             "No guess was needed. These starts were tried; the ones in bold won."
             @if spared > 0 { " " (count(spared, "further start")) " not needed." }
@@ -255,7 +171,6 @@ pub(super) fn starts(r: &SolutionRecord) -> Markup {
 /// What is needed to repeat the result.
 pub(super) fn record(r: &SolutionRecord) -> Markup {
     html! {
-        h2 { "For the record" }
         p { code { (r.program.command) } }
         p { (r.program.name) " " (r.program.version) "; the last solve " (r.status) " after " (count(r.iterations, "step")) " in all." }
         @if !r.program.options.is_empty() {

@@ -77,6 +77,14 @@ impl Svg {
         ));
     }
 
+    /// What is drawn says what it is when one points at it.
+    pub fn titled(&mut self, title: &str, draw: impl FnOnce(&mut Self)) {
+        let title = escaped(title);
+        self.add(format_args!("<g><title>{title}</title>"));
+        draw(self);
+        self.add(format_args!("</g>"));
+    }
+
     /// Vectors as one path, cut off at a rectangle (corner, size).
     pub fn vectors_inside(
         &mut self,

@@ -12,7 +12,6 @@ use crate::output::solution_json::SolutionRecord;
 pub(super) fn section(r: &SolutionRecord) -> Markup {
     let Some(comparison) = &r.two_stage else { return html! {} };
     html! {
-        h2 { "Two-step calibration" }
         p {
             "Would it have done to find every camera pose by itself and to fit the robot to these poses? "
             "Both ways were fitted to the same " (count(comparison.images, "image")) ", less those put aside in "

@@ -1,0 +1,106 @@
+//! What a technician decides by: verdict, accuracy, what to do.
+
+use maud::{Markup, html};
+
+use super::words::{count, significant};
+use crate::output::solution_json::SolutionRecord;
+use crate::output::verdict::{Trust, Verdict};
+
+/// Most stops that are proposed.
+const MOST_NEXT: usize = 3;
+
+/// The first page.
+pub(super) fn first_page(r: &SolutionRecord) -> Markup {
+    let v = Verdict::of(r);
+    let (class, headline) = match v.trust {
+        Trust::Good => ("good", "Good: the corrected model can be used"),
+        Trust::Doubts => ("care", "Good, with doubts: look at the points below first"),
+        Trust::Failed => ("failed", "Not to be trusted: do not use this model before the cause is found"),
+    };
+    html! {
+        h1 { "Calibration of " (r.robot.name) }
+        p.sub {
+            (r.robot.base) " to " (r.robot.tip) ", " (count(r.robot.readings.len(), "moving joint")) "; "
+            (count(r.statistics.images_used, "image")) " of " (r.statistics.images) " used"
+            @if r.statistics.images > r.statistics.images_used { " (" a href="#left-out" { "why not all" } ")" }
+            ", " (r.statistics.observations_left_out) " of " (r.statistics.observations_left_out + r.statistics.observations_used)
+            " observations left out. " (r.program.name) " " (r.program.version) "."
+        }
+        div class={ "verdict " (class) } {
+            strong { (headline) }
+            @if !v.reasons.is_empty() { ul { @for reason in &v.reasons {
+                li { (reason.what) @if !reason.remedy.is_empty() { br; span.note { "→ " (reason.remedy) } } }
+            } } }
+        }
+        (promise(r, v.trust))
+        (held_out(r))
+        h2 { "What to do" }
+        ol.steps { @for step in steps(r, &v) { li { (step) } } }
+    }
+}
+
+/// The expected error of the flange: what may be promised.
+fn promise(r: &SolutionRecord, trust: Trust) -> Markup {
+    let Some(e) = &r.flange else { return html! {} };
+    let i = e.intervals.as_ref();
+    let mut rows = vec![
+        ("Nominal robot", e.nominal_m, i.map(|i| i.nominal_m), "before"),
+        ("Corrected URDF alone", e.urdf_m, i.map(|i| i.urdf_m), "after"),
+    ];
+    if r.beyond_urdf() {
+        rows.push(("Corrected URDF with compensation.toml", e.model_m, i.map(|i| i.model_m), "after"));
+    }
+    let most = rows.iter().map(|row| row.1).fold(f64::MIN_POSITIVE, f64::max);
+    html! {
+        h2 { "Accuracy of the flange" }
+        @if trust == Trust::Failed { p { b { "These figures hold only if the checks above are wrong." } } }
+        div.wide { table {
+            thead { tr { th { "Robot model" } th.n { "expected error, RMS" } @if i.is_some() { th.n { "95 % interval" } } td.meter {} } }
+            tbody { @for (name, m, interval, class) in rows { tr {
+                th scope="row" { (name) }
+                td.n { b { (significant(1e3 * m)) " mm" } }
+                @if let Some([low, high]) = interval { td.n { (significant(1e3 * low)) " to " (significant(1e3 * high)) " mm" } }
+                td.meter { span.bar { i.(class) style={ "width:" (format!("{:.0}", 100.0 * m / most)) "%" } {} } }
+            } } }
+        } }
+        p.note {
+            "Position of the flange relative to the plate in the region of the stops, by model and covariance; the nominal robot with the base and "
+            "the tool that fit it best. " (significant(1e3 * e.scatter_m)) " mm of each is noise from stop to stop, which no model takes away. "
+            "This is the figure to quote; " a href="#workspace" { "elsewhere in the workspace" } " it is larger."
+        }
+    }
+}
+
+/// What was measured on images of the same series.
+fn held_out(r: &SolutionRecord) -> Markup {
+    let (before, after) = (&r.accuracy.nominal, &r.accuracy.calibrated);
+    html! { p {
+        "Measured on images that the fit had not seen: " b { (significant(before.rms_mm)) " → " (significant(after.rms_mm)) " mm" }
+        " on the plate, worst image " (significant(after.worst_mm)) " mm. They all look at one plate: this is no figure for the workspace ("
+        a href="#accuracy" { "more" } ")."
+    } }
+}
+
+/// Remedies of a failed result; else what to install, and what would help most.
+fn steps(r: &SolutionRecord, v: &Verdict) -> Vec<Markup> {
+    if v.trust == Trust::Failed {
+        let remedies = v.reasons.iter().filter(|r| !r.remedy.is_empty()).map(|r| html! { (r.remedy) "." });
+        return remedies.chain([html! { "Identify again; keep the earlier robot model until then." }]).collect();
+    }
+    let mut all = Vec::new();
+    if let Some(urdf) = r.files.iter().find(|f| f.ends_with(".calibrated.urdf")) {
+        all.push(html! { "Use " code { (urdf) } ": joint offsets are in it, controller angles stay as they are." });
+    }
+    if r.beyond_urdf() {
+        all.push(html! {
+            "Correct programs with " code { "robotcal compensate" } " and " code { "compensation.toml" }
+            ": it holds what a URDF cannot (gears, sag, backlash)."
+        });
+    }
+    let next = r.identifiability.iter().flat_map(|found| &found.next).take(MOST_NEXT);
+    let next: Vec<&str> = next.map(|a| a.words.as_str()).collect();
+    if !next.is_empty() {
+        all.push(html! { "To be more accurate, " (next.join("; ")) " (" a href="#known" { "why" } ")." });
+    }
+    all
+}
