@@ -35,16 +35,16 @@ pub(super) fn identifiable(r: &SolutionRecord) -> Markup {
             h3 { "What other stops could tell" }
             ul { @for d in of(&[Cause::Stops]) { li { (names(d)) @if let Some(remedy) = &d.remedy { ": " (remedy) } } } }
         }
-        h3 { "What no series can tell, and need not" }
+        h3 { "What is unobservable, and does no harm" }
         p.note { "These directions change nothing that a camera sees, or only what the poses of plate and camera take up as well." }
         ul {
-            (group("Against the pose of the plate (base frame)", of(&[Cause::Base])))
-            (group("Against the pose of the camera (tip frame)", of(&[Cause::Tip])))
+            (group("Unobservable beside the target pose (base frame)", of(&[Cause::Base])))
+            (group("Unobservable beside the hand-eye transform (tip frame)", of(&[Cause::Tip])))
             (group("Parameters that do the same to this robot", of(&[Cause::Redundant])))
             (group("Parameters that do nothing to this robot", of(&[Cause::Idle])))
         }
         @if !found.correlations.is_empty() {
-            h3 { "Parameters that are hard to tell apart" }
+            h3 { "Correlated parameters" }
             p.note {
                 "The images fix a combination of the two well, and each alone badly (correlation beyond 0.9). "
                 "This does not harm the accuracy as long as both are used together."

@@ -1,5 +1,6 @@
 //! Arm, camera views, plate and the region of the stops in three dimensions: a drawing that a small script turns.
 
+use std::f64::consts::FRAC_PI_4;
 use std::fmt::Write as _;
 
 use maud::{Markup, PreEscaped, html};
@@ -153,7 +154,7 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
     let mut d = Drawing { centre, size, body: String::new() };
     let o = Vector3::zeros();
     for k in 0..8 {
-        let turn = |k: f64| 0.35 * size * Vector3::new((k * 0.785_398).cos(), (k * 0.785_398).sin(), 0.0);
+        let turn = |k: f64| 0.35 * size * Vector3::new((k * FRAC_PI_4).cos(), (k * FRAC_PI_4).sin(), 0.0);
         d.line("ground", &[turn(f64::from(k)), turn(f64::from(k) + 1.0)], "");
     }
     for (k, class) in ["x", "y", "z"].into_iter().enumerate() {

@@ -146,6 +146,9 @@ pub(super) fn significant(value: f64) -> String {
 
 /// A scale as few characters: 0.5, 20.
 pub(super) fn plain(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
     let d = (-value.abs().log10().floor()).clamp(0.0, 6.0) as usize;
     format!("{value:.d$}")
 }
