@@ -34,7 +34,8 @@ pub struct Inputs {
     pub series: Vec<Series>,
     /// What to say where the tip was chosen among several leaves.
     pub tip_notice: Option<Notice>,
-    urdf: PathBuf,
+    /// Where the robot comes from; none where poses of the controller are all that is known of it.
+    urdf: Option<PathBuf>,
     pictures: Pictures,
 }
 
@@ -59,13 +60,42 @@ impl Inputs {
     /// # Errors
     /// Files that cannot be read or do not go together; links that the URDF does not have.
     pub fn read(urdf: &Path, folders: &[PathBuf], ends: Ends) -> Result<Self> {
-        let description = urdf::read(urdf)?;
+        Self::of(urdf::read(urdf)?, Some(urdf), read_all(folders)?, ends)
+    }
+
+    /// Reads series folders whose controllers say where the flange was: nothing is known, or identified, of the robot itself.
+    ///
+    /// # Errors
+    /// Files that cannot be read; series with joint readings.
+    pub fn without_robot(folders: &[PathBuf]) -> Result<Self> {
         let series = read_all(folders)?;
-        let base = agreed("base", ends.base, &series, |s| s.manifest.base.as_deref())?;
-        let tip = agreed("tip", ends.tip, &series, |s| s.manifest.tip.as_deref())?;
+        let mut poses = Vec::new();
+        for s in &series {
+            let Some(controller) = &s.controller else {
+                let what = "no robot is given, and the series has joint readings";
+                let remedy = "give --urdf; only a series with controller.csv (poses of the flange) needs none";
+                return Err(Error::new(Code::OptionMissing, s.folder.display(), what, remedy));
+            };
+            poses.extend(controller.base_from_flange.iter().flatten());
+        }
+        Self::of(urdf::pose_robot(&poses)?, None, series, Ends::default())
+    }
+
+    fn of(description: RobotDescription, urdf: Option<&Path>, series: Vec<Series>, ends: Ends) -> Result<Self> {
+        // Links that the series name are those of a robot that is not given.
+        let own: &[Series] = if urdf.is_some() { &series } else { &[] };
+        let base = agreed("base", ends.base, own, |s| s.manifest.base.as_deref())?;
+        let tip = agreed("tip", ends.tip, own, |s| s.manifest.tip.as_deref())?;
         let chain = description.chain(base, tip)?;
         let tip_notice = description.tip_notice(base, tip);
-        Ok(Self { chain, tip_notice, urdf: urdf.to_path_buf(), pictures: Pictures::new(), series, description })
+        Ok(Self {
+            chain,
+            tip_notice,
+            urdf: urdf.map(Path::to_path_buf),
+            pictures: Pictures::new(),
+            series,
+            description,
+        })
     }
 
     /// Takes the stops out of the recordings among the series.
@@ -86,7 +116,8 @@ impl Inputs {
         let Self { description, chain, series: all, tip_notice, urdf, pictures: _until_the_end } = self;
         let mut notices = description.notices.clone();
         notices.extend(tip_notice);
-        let mut files = vec![InputFile::of_bytes(&urdf, description.text.as_bytes())];
+        let of_robot = urdf.iter().map(|path| InputFile::of_bytes(path, description.text.as_bytes()));
+        let mut files: Vec<InputFile> = of_robot.collect();
         for s in &all {
             files.extend(s.inputs.iter().cloned());
             files.extend(s.image_hashes()?);

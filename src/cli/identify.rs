@@ -20,8 +20,8 @@ use crate::problem::{LensChoice, MeasuredSeries};
 /// Flags of `identify`.
 #[derive(Debug, Args)]
 pub(super) struct IdentifyArgs {
-    /// Robot description (URDF)
-    #[arg(long, value_name = "FILE", required_unless_present = "from")]
+    /// Robot description (URDF); without it a series of controller poses (controller.csv) calibrates camera, hand-eye transform and plate alone
+    #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
     /// Series folder or recording (.mcap, rosbag2 folder); give it several times to fit several series of the same robot together
     #[arg(long, value_name = "FOLDER", required_unless_present = "from")]
@@ -114,8 +114,11 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
     let mut observed = match (earlier.as_ref().zip(args.from.as_deref()), &args.urdf) {
         (Some((record, path)), _) => Observed::of_record(record, path, ends)?,
-        (None, Some(urdf)) => {
-            let inputs = Inputs::read(urdf, &args.series, ends)?;
+        (None, urdf) => {
+            let inputs = match urdf {
+                Some(urdf) => Inputs::read(urdf, &args.series, ends)?,
+                None => Inputs::without_robot(&args.series)?,
+            };
             if place.is_none() && !args.dry_run {
                 let names: Vec<String> = inputs.series.iter().map(|s| s.name.clone()).collect();
                 place = Some(Place::claim(&Path::new("reports").join(folder_name(&names)))?);
@@ -127,14 +130,6 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
                 return Ok(Verdict::Good);
             }
             inputs.observe(&progress::of_series())?
-        }
-        (None, None) => {
-            return Err(Error::new(
-                Code::OptionMissing,
-                "identify",
-                "no robot is given",
-                "give --urdf and --series, or --from",
-            ));
         }
     };
     let place = place.ok_or_else(|| {

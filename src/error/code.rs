@@ -149,6 +149,7 @@ codes! {
         JointUnused "joint_unused" "readings are of no joint of the chain",
         CovariatesUnused "covariates_unused" "measured torques or temperatures are not used",
         JointBeyondLimits "joint_beyond_limits" "readings are beyond the limits of the joint",
+        PosturesFromPoses "postures_from_poses" "joint readings were computed from poses of the controller by inverse kinematics",
         ReadingsMissing "readings_missing" "no row has joint readings",
     }
     Input "Series" {
@@ -247,6 +248,9 @@ codes! {
         JointSignWrong "joint_sign_wrong" "with joints negated the images fit",
         JointOrderWrong "joint_order_wrong" "with joints exchanged the images fit",
         JointUnitWrong "joint_unit_wrong" "with the unit of single joints changed the images fit",
+        RotationConvention "rotation_convention" "poses of the controller follow another convention of rotation than is stated",
+        PosesInverted "poses_inverted" "with the poses of the controller inverted the images fit",
+        PoseOutOfReach "pose_out_of_reach" "the nominal robot reaches no such pose",
         RowsShifted "rows_shifted" "with the rows of joints.csv shifted by one the images fit",
         CameraMountWrong "camera_mount_wrong" "with the camera mounted the other way the images fit",
         LinkLengthsWrong "link_lengths_wrong" "directions fit and distances do not: another size of robot",

@@ -1,5 +1,6 @@
 //! Before any image is looked at: what the stops of a series can tell of the robot.
 
+use super::controller_readings::readings_of;
 use super::options::Options;
 use crate::assess::{Identifiability, identifiability_of_stops};
 use crate::error::{Code, Error, Result};
@@ -16,7 +17,7 @@ fn stops(series: &[Series], chain: &Chain) -> Result<Vec<Posture>> {
     for s in series {
         let known = s.manifest.robot.order == StopOrder::Visited;
         let mut previous: Option<Vec<f64>> = None;
-        for readings in s.readings_for(chain)?.into_iter().flatten() {
+        for readings in readings_of(s, chain)?.into_iter().flatten() {
             let step = |before: &Vec<f64>| readings.iter().zip(before).map(|(b, a)| b - a).collect();
             stops.push(Posture { approach: previous.as_ref().filter(|_| known).map(step), readings: readings.clone() });
             previous = Some(readings);

@@ -30,6 +30,8 @@ const DECREMENT: f64 = 0.01;
 /// not belong together.
 pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Solution> {
     let chain = chain.carrying(options.payload.as_ref())?;
+    let of_poses = chain.pose_coordinates().map(|_| options.without_robot()).transpose()?;
+    let options = of_poses.as_ref().unwrap_or(options);
     let model = match options.model {
         RobotModel::Auto => RobotModel::Full,
         other => other,

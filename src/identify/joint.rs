@@ -6,7 +6,7 @@ use super::free_poses::{FreeStart, adjust_free_poses};
 use super::options::{JointNoise, MarkerTolerance, Options};
 use super::solution::Solution;
 use super::staged::{refit, staged};
-use super::start::{start_robot, take_back};
+use super::start::{StartGiven, start_robot, take_back};
 use super::start_verdict::StartVerdict;
 use super::stated::focals_px;
 use crate::assess::{hold_out, judge, refitted};
@@ -78,7 +78,7 @@ pub(super) fn fit_model(
     let mut starts = left.verdicts.clone();
     let on_robot = start.problem.used_on_robot().count();
     check_on_robot(&start.problem, on_robot)?;
-    let aside = start_robot(&mut start, free, &mut starts, &options.limits)?;
+    let aside = start_robot(&mut start, free, StartGiven { series, limits: &options.limits }, &mut starts)?;
     let (mut outcome, before) = {
         let _stage = stage("joint fit");
         fit(start, free, &aside, options)

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::controller_readings::{self, readings_of};
 use super::detections::{detect_stops, no_images, recording, require_some};
 use super::seen_image::SeenImage;
 use super::stated::{lens_of, measured_series};
@@ -33,8 +34,9 @@ struct Seen {
 /// Of the readings (unit, missing joints), of a series none of whose images can be used, and of differently sized images.
 pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(&Path) + Sync) -> Result<Measured> {
     refuse_several(series)?;
-    let readings = series.readings_for(chain)?;
+    let readings = readings_of(series, chain)?;
     let mut notices = series.notices.clone();
+    notices.extend(controller_readings::notice(series, chain));
     notices.extend(series.reading_notices(chain));
     notices.extend(unused_repeatability(series));
     let camera = series.manifest.camera();

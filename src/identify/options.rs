@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::estimator::Estimator;
 use super::selection::Selection;
 use crate::assess::Limits;
+use crate::error::{Code, Error, Result};
 use crate::model::joint_terms::{RobotModel, USUAL_HARMONICS};
 use crate::urdf::Payload;
 
@@ -48,6 +49,28 @@ pub struct Options {
     pub payload: Option<Payload>,
     /// Numbers that decide verdicts.
     pub limits: Limits,
+}
+
+/// Name of all parameters of the robot.
+const ROBOT: &str = "robot";
+
+impl Options {
+    /// The same for poses of a controller, whose robot is not known: nothing of it is estimated.
+    ///
+    /// # Errors
+    /// Options that want something of the robot.
+    pub(super) fn without_robot(&self) -> Result<Self> {
+        let is_asked = !matches!(self.model, RobotModel::Auto | RobotModel::Rigid) || self.payload.is_some();
+        if is_asked {
+            let what = "a robot model or a payload is given, and no robot";
+            return Err(Error::new(Code::OptionConflict, "--robot-model", what, "give --urdf, or leave it out"));
+        }
+        let mut without = Self { model: RobotModel::Rigid, ..self.clone() };
+        if !without.selection.fix.iter().any(|name| name == ROBOT) {
+            without.selection.fix.push(ROBOT.to_owned());
+        }
+        Ok(without)
+    }
 }
 
 impl Default for Options {

@@ -10,17 +10,28 @@ use crate::fit::FreePoses;
 use crate::geom::log_so3;
 use crate::init::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
 use crate::linalg::symmetric_eigen;
-use crate::problem::{Adjustment, ImageRejection, Misfit, Mismatch, Problem, State, TakenFrom, predict};
+use crate::problem::{
+    Adjustment, ImageRejection, MeasuredSeries, Misfit, Mismatch, Problem, State, TakenFrom, predict,
+};
 
 /// Closed forms whose pixel cost is compared.
 const COMPARED: usize = 4;
+
+/// What a start is judged by.
+#[derive(Clone, Copy)]
+pub(super) struct StartGiven<'a> {
+    /// The series of the images.
+    pub series: &'a [MeasuredSeries],
+    /// Limits.
+    pub limits: &'a Limits,
+}
 
 /// Fills in mountings and placements; sets images aside that do not fit their readings, and returns which.
 pub(super) fn start_robot(
     adjustment: &mut Adjustment,
     free: &FreePoses,
+    given: StartGiven<'_>,
     verdicts: &mut Vec<StartVerdict>,
-    limits: &Limits,
 ) -> Result<Vec<usize>> {
     let mut aside = Vec::new();
     let mut groups: BTreeMap<(usize, usize), Vec<(usize, PosePair)>> = BTreeMap::new();
@@ -48,11 +59,11 @@ pub(super) fn start_robot(
             (None, Some(plate)) => {
                 closest(&poses, |p| HandEye { camera: (p.chain * plate) * p.camera_from_plate.inverse(), plate })
             }
-            (None, None) => closed_form(adjustment, pairs, &poses, (*mounting, *placement), &of, verdicts, limits)?,
+            (None, None) => closed_form(adjustment, pairs, &poses, (*mounting, *placement), &of, given, verdicts)?,
         };
         cameras.insert(*mounting, solution.camera);
         plates.insert(*placement, solution.plate);
-        aside.extend(set_aside(&mut adjustment.problem, pairs, &solution, limits));
+        aside.extend(set_aside(&mut adjustment.problem, pairs, &solution, given.limits));
     }
     for (k, pose) in adjustment.state.mountings.iter_mut().enumerate() {
         *pose = cameras.get(&k).copied().unwrap_or(*pose);
@@ -83,8 +94,8 @@ fn closed_form(
     poses: &[PosePair],
     (mounting, placement): (usize, usize),
     of: &str,
+    StartGiven { series, limits }: StartGiven<'_>,
     verdicts: &mut Vec<StartVerdict>,
-    limits: &Limits,
 ) -> Result<HandEye> {
     let fewest = limits.hand_eye_images;
     if pairs.len() < fewest {
@@ -122,7 +133,7 @@ fn closed_form(
             won: s.origin == winner,
         });
     }
-    let suspects = Suspects { problem, robot: &state.robot, pairs, limits };
+    let suspects = Suspects { problem, robot: &state.robot, series, pairs, limits };
     if let Some(cause) = suspects.better_than(best.median_error) {
         let place = if cause.joints.is_empty() { of.to_owned() } else { cause.joints.join(", ") };
         return Err(Error::new(cause.code, place, cause.what, cause.remedy));

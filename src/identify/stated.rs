@@ -32,6 +32,7 @@ pub(super) fn measured_series(
         plate: series.plate.clone(),
         plate_name: plate_file.canonicalize().unwrap_or(plate_file).display().to_string(),
         order_known: series.manifest.robot.order == StopOrder::Visited,
+        otherwise: series.controller.as_ref().map(|c| c.otherwise.clone()).unwrap_or_default(),
         stops,
     }
 }

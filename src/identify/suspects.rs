@@ -4,7 +4,7 @@ use crate::assess::Limits;
 use crate::error::Code;
 use crate::init::{PosePair, plate_scale, solve_hand_eye};
 use crate::model::robot::Robot;
-use crate::problem::Problem;
+use crate::problem::{MeasuredSeries, Problem};
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
 
@@ -25,6 +25,7 @@ pub(super) struct Cause {
 pub(super) struct Suspects<'a> {
     pub problem: &'a Problem,
     pub robot: &'a Robot,
+    pub series: &'a [MeasuredSeries],
     pub pairs: &'a [(usize, PosePair)],
     pub limits: &'a Limits,
 }
@@ -32,14 +33,25 @@ pub(super) struct Suspects<'a> {
 impl Suspects<'_> {
     /// The mistake that, undone, fits far better than `misfit`, if there is one.
     pub fn better_than(&self, misfit: f64) -> Option<Cause> {
-        if let Some((_, cause)) = self.wrong_scale().filter(|(error, _)| *error < self.limits.scale_explains * misfit) {
+        let of_poses = self.robot.chain.pose_coordinates().is_some();
+        if misfit >= self.limits.suspicious_misfit
+            && let Some((error, cause)) = self.read_otherwise()
+            && error < self.limits.mistake_explains * misfit
+        {
+            return Some(cause);
+        }
+        // Poses without a robot may be as coarse as they are; the links of a URDF are right to a percent.
+        let is_told = !of_poses || misfit >= self.limits.suspicious_misfit;
+        let scale = self.wrong_scale().filter(|(error, _)| is_told && *error < self.limits.scale_explains * misfit);
+        if let Some((_, cause)) = scale {
             return Some(cause);
         }
         if misfit < self.limits.suspicious_misfit {
             return None;
         }
         let mut best: Option<(f64, Cause)> = None;
-        for (readings, cause) in self.hypotheses() {
+        let hypotheses = if of_poses { self.shifted_rows() } else { self.hypotheses() };
+        for (readings, cause) in hypotheses {
             let error = self.misfit(&readings);
             if error < self.limits.mistake_explains * misfit && best.as_ref().is_none_or(|(e, _)| error < *e) {
                 best = Some((error, cause));
@@ -49,7 +61,29 @@ impl Suspects<'_> {
         if error < self.limits.mistake_explains * misfit && best.as_ref().is_none_or(|(e, _)| error < *e) {
             return Some(mount);
         }
-        best.map(|(_, cause)| cause).or_else(|| self.other_lengths())
+        best.map(|(_, cause)| cause).or_else(|| self.other_lengths().filter(|_| !of_poses))
+    }
+
+    /// Poses of a controller with a mistake undone, the best of them.
+    fn read_otherwise(&self) -> Option<(f64, Cause)> {
+        let all = self.series.first()?.otherwise.len();
+        let tried = (0..all).filter_map(|k| {
+            let pairs: Vec<PosePair> =
+                self.pairs.iter().map(|(i, pair)| self.pair_otherwise(*i, pair, k)).collect::<Option<_>>()?;
+            Some((solve_hand_eye(&pairs).first()?.median_error, k))
+        });
+        let (error, k) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let other = &self.series.first()?.otherwise[k];
+        let (what, remedy) = (other.what.clone(), other.remedy.clone());
+        Some((error, Cause { code: other.code, joints: Vec::new(), what, remedy }))
+    }
+
+    fn pair_otherwise(&self, image: usize, pair: &PosePair, otherwise: usize) -> Option<PosePair> {
+        let image = &self.problem.images[image];
+        let before: usize = self.series[..image.series].iter().map(|s| s.stops.len()).sum();
+        let poses = &self.series[image.series].otherwise.get(otherwise)?.poses;
+        let tip = (*poses.get(image.stop - before)?)?;
+        Some(PosePair::of_flange(image.mount, tip, pair.camera_from_plate))
     }
 
     fn readings(&self) -> Vec<Vec<f64>> {
@@ -212,22 +246,21 @@ impl Suspects<'_> {
             "the joints stand in reverse order: reversed, the images fit".into(),
             "reverse the column names in joints.csv".into(),
         );
-        for (shift, words) in [(1, "the row below"), (given.len() - 1, "the row above")] {
+        all.extend(self.shifted_rows());
+        all
+    }
+
+    fn shifted_rows(&self) -> Vec<(Vec<Vec<f64>>, Cause)> {
+        let given = self.readings();
+        let shifted = |(shift, words): (usize, &str)| {
             let mut shifted = given.clone();
             shifted.rotate_left(shift);
-            all.push((
-                shifted,
-                Cause {
-                    code: Code::RowsShifted,
-                    joints: Vec::new(),
-                    what: format!(
-                        "images and joint readings are shifted by one row: every image fits the readings of {words}"
-                    ),
-                    remedy: "shift the image names in joints.csv by one row".into(),
-                },
-            ));
-        }
-        all
+            let what =
+                format!("images and joint readings are shifted by one row: every image fits the readings of {words}");
+            let remedy = "shift the image names in joints.csv by one row".into();
+            (shifted, Cause { code: Code::RowsShifted, joints: Vec::new(), what, remedy })
+        };
+        [(1, "the row below"), (given.len().saturating_sub(1), "the row above")].map(shifted).into()
     }
 
     fn wrong_scale(&self) -> Option<(f64, Cause)> {

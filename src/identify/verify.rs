@@ -2,7 +2,7 @@
 
 use super::build::build;
 use super::free_poses::adjust_free_poses;
-use super::start::start_robot;
+use super::start::{StartGiven, start_robot};
 use super::stated::focals_px;
 use super::turns;
 use crate::assess::Limits;
@@ -40,7 +40,7 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
     layout.columns[columns].iter_mut().for_each(|c| c.free = false);
     let stated = focals_px(&adjustment.problem.cameras, series);
     let (mut adjustment, free, mut starts) = adjust_free_poses(adjustment, &stated, limits)?;
-    start_robot(&mut adjustment, &free, &mut starts, limits)?;
+    start_robot(&mut adjustment, &free, StartGiven { series, limits }, &mut starts)?;
     adjustment.tie_to_readings(false);
     let outcome = estimate_components(adjustment, &ComponentOptions::default());
     if outcome.status != Status::Converged {

@@ -27,7 +27,11 @@ pub struct PosePair {
 impl PosePair {
     /// That of a stop with these readings, in which the camera saw the plate.
     pub fn of_stop(robot: &Robot, mount: CameraMount, readings: &[f64], camera_from_plate: Pose) -> Self {
-        let tip = robot.base_from_tip(readings);
+        Self::of_flange(mount, robot.base_from_tip(readings), camera_from_plate)
+    }
+
+    /// That of a stop with the tip there, in which the camera saw the plate.
+    pub fn of_flange(mount: CameraMount, tip: Pose, camera_from_plate: Pose) -> Self {
         Self { camera_from_plate, chain: if mount == CameraMount::Hand { tip.inverse() } else { tip } }
     }
 }

@@ -152,6 +152,9 @@ pub fn symmetric_eigen(m: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)>
         return None;
     }
     let n = m.nrows();
+    if n == 0 {
+        return Some((DVector::zeros(0), DMatrix::zeros(0, 0)));
+    }
     let wanted = evd::ComputeEigenvectors::Yes;
     let needed = evd::self_adjoint_evd_scratch::<f64>(n, wanted, Par::Seq, Default::default());
     let (mut values, mut vectors) = (Diag::zeros(n), DMatrix::zeros(n, n));

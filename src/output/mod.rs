@@ -80,12 +80,12 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
     let depths = depths_m(problem, &solution.free_poses);
     let mut files = BTreeMap::new();
     let mut add = |name: String, text: String| files.insert(name, text.into_bytes());
-    add(robot_files::urdf_name(context), robot_files::urdf(solution, context)?);
-    add("kinematics.yaml".into(), kinematics_file::of_solution(solution, context));
-    add("kinematics.xacro".into(), controller_files::xacro(solution, context));
-    add("mdh.csv".into(), controller_files::mdh_csv(solution, context));
-    add("mastering.csv".into(), controller_files::mastering_csv(solution, context));
-    add("compensation.toml".into(), compensation::compensation_toml(solution, context));
+    // Poses of a controller tell nothing of its robot.
+    if state.robot.chain.pose_coordinates().is_none() {
+        for (name, text) in robot_files::all(solution, context)? {
+            add(name, text);
+        }
+    }
     for (name, text) in camera_file::cameras(&problem.cameras, &state.cameras, &depths)? {
         add(name, text);
     }

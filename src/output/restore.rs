@@ -118,6 +118,7 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
             plate: plates.get(s.plate).ok_or_else(of_plate)?.clone(),
             plate_name: format!("{} {}", record.plates[s.plate].name, s.plate),
             order_known: s.order_known,
+            otherwise: Vec::new(),
             stops: stops.map(|i| stop(i, &s.name, &placements)).collect::<Result<_>>()?,
         })
     });

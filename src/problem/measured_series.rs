@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::rejection::ImageRejection;
 use crate::model::camera::Lens;
-use crate::series::{CameraMount, Observation, Plate};
+use crate::series::{CameraMount, Observation, Plate, ReadOtherwise};
 
 /// Which lenses the evidence chooses among.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -59,6 +59,8 @@ pub struct MeasuredSeries {
     pub plate_name: String,
     /// True where the rows stand in the order of visiting.
     pub order_known: bool,
+    /// Poses of a controller with a mistake undone, for each mistake that is usual; one a stop.
+    pub otherwise: Vec<ReadOtherwise>,
     /// Stops in the order of the rows.
     pub stops: Vec<MeasuredStop>,
 }

@@ -205,7 +205,7 @@ pub(super) fn key_column(table: &Table) -> Result<(StopKey, usize)> {
     }
 }
 
-fn placement(table: &Table, row: Row<'_>, column: Option<usize>) -> Result<String> {
+pub(super) fn placement(table: &Table, row: Row<'_>, column: Option<usize>) -> Result<String> {
     match column {
         None => Ok(DEFAULT_PLACEMENT.to_string()),
         Some(c) if row.cell(c).is_empty() => {

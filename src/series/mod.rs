@@ -4,6 +4,8 @@
 
 mod camera_section;
 mod contact_file;
+mod controller_file;
+mod controller_poses;
 mod inputs;
 mod joints;
 mod manifest;
@@ -32,6 +34,8 @@ mod without_robot;
 
 pub use camera_section::{CameraMount, CameraSection, Cameras};
 pub use contact_file::ContactRow;
+pub use controller_file::parse_controller;
+pub use controller_poses::{ControllerPoses, ReadOtherwise};
 pub use inputs::InputFile;
 pub use joints::{Covariates, DEFAULT_PLACEMENT, Stop, StopKey, Stops};
 pub use manifest::{AngleUnit, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder};

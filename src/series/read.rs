@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
+use super::controller_file;
+use super::controller_poses::ControllerPoses;
 use super::inputs::InputFile;
 use super::joints::{Stop, StopKey, Stops};
 use super::manifest::{AngleUnit, Manifest};
@@ -13,6 +15,7 @@ use super::observation::ImageObservations;
 use super::observation_file;
 use super::plate::Plate;
 use super::plate_file::read_plate;
+use super::rotation_kind::RotationKind;
 use super::spatial::SpatialFiles;
 use super::units;
 use crate::error::{Code, Error, Notice, Result, plain_name};
@@ -55,6 +58,8 @@ pub struct Series {
     pub stops: Stops,
     /// Images, observations, a recording, or none of them.
     pub source: Source,
+    /// Poses of the controller in the place of joint readings, in the order of the stops.
+    pub controller: Option<ControllerPoses>,
     /// What was measured of the tip in space.
     pub spatial: SpatialFiles,
     /// What was seen while reading that the user should know.
@@ -101,7 +106,7 @@ fn read_recording(path: &Path) -> Result<Series> {
     plain_name("series", &name, path.display())?;
     let source = Source::Recording(path.to_path_buf());
     let (stops, spatial, notices) = (Stops::default(), SpatialFiles::default(), Vec::new());
-    Ok(Series { name, folder, manifest, plate, stops, source, spatial, notices, inputs })
+    Ok(Series { name, folder, manifest, plate, stops, source, controller: None, spatial, notices, inputs })
 }
 
 fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
@@ -115,12 +120,11 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     }
     let plate = plate_of(&manifest, folder, &mut inputs)?;
     let mut notices = Vec::new();
-    let (mut stops, mut spatial) = (Stops::default(), SpatialFiles::default());
+    let (mut stops, mut controller, mut spatial) = (Stops::default(), None, SpatialFiles::default());
     let source = if let Some(recording) = &manifest.mcap {
         Source::Recording(folder.join(recording))
     } else {
-        manifest.require_joint_unit(&manifest_path)?;
-        stops = Stops::read(&folder.join("joints.csv"), &mut inputs)?;
+        (stops, controller) = stops_of(folder, &manifest, &manifest_path, &mut inputs)?;
         spatial = SpatialFiles::read(folder, &stops, &mut inputs)?;
         if use_observations {
             let path = folder.join("observations.csv");
@@ -132,7 +136,34 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
         }
     };
     let folder = folder.to_path_buf();
-    Ok(Series { name, folder, manifest, plate, stops, source, spatial, notices, inputs })
+    Ok(Series { name, folder, manifest, plate, stops, source, controller, spatial, notices, inputs })
+}
+
+/// The stops of joints.csv, or of controller.csv with their poses.
+fn stops_of(
+    folder: &Path,
+    manifest: &Manifest,
+    manifest_path: &Path,
+    inputs: &mut Vec<InputFile>,
+) -> Result<(Stops, Option<ControllerPoses>)> {
+    let (joints, poses) = (folder.join("joints.csv"), folder.join(controller_file::NAME));
+    if !poses.is_file() {
+        manifest.require_joint_unit(manifest_path)?;
+        return Ok((Stops::read(&joints, inputs)?, None));
+    }
+    if joints.is_file() {
+        let what = "stands beside joints.csv: either of them tells where the robot stood";
+        let remedy = "remove controller.csv; joint readings tell more";
+        return Err(Error::new(Code::SettingConflict, poses.display(), what, remedy));
+    }
+    let Some(section) = manifest.controller else {
+        let names = RotationKind::ALL.map(RotationKind::name).join(", ");
+        let what = "does not say how controller.csv writes rotations";
+        let remedy = format!("add [controller] with rotation = one of {names}; there is no default on purpose");
+        return Err(Error::new(Code::SettingMissing, manifest_path.display(), what, remedy));
+    };
+    let (stops, poses) = controller_file::read(&poses, section.rotation, inputs)?;
+    Ok((stops, Some(poses)))
 }
 
 fn is_measured_in_space_alone(folder: &Path) -> bool {
@@ -190,7 +221,8 @@ fn pictured(folder: &Path, stops: &mut Stops, notices: &mut Vec<Notice>) -> Resu
     let images = folder.join("images");
     let on_disk = image_files(&images)?;
     let names: BTreeSet<String> = on_disk.iter().map(|p| file_name(p)).collect();
-    let csv = folder.join("joints.csv");
+    let csv = [controller_file::NAME, "joints.csv"].map(|name| folder.join(name));
+    let csv = if csv[0].is_file() { &csv[0] } else { &csv[1] };
     let mut missing = Vec::new();
     if stops.key == StopKey::Stop {
         stops.stops.iter_mut().for_each(|stop| name_image(stop, &names));
@@ -325,17 +357,26 @@ impl Series {
                 "convert it first: robotcal convert run1.mcap run1/",
             ));
         }
+        if self.controller.is_some() {
+            let what = "has poses and no joint readings";
+            let remedy = "give a series with joints.csv";
+            return Err(Error::new(Code::ReadingsMissing, self.readings_file().display(), what, remedy));
+        }
         units::readings_for(&self.readings_file(), &self.stops, self.joint_unit(), chain)
     }
 
     /// What the readings of a chain give reason to say: columns that are not used, values beyond the URDF's limits.
     pub fn reading_notices(&self, chain: &Chain) -> Vec<Notice> {
+        if self.controller.is_some() {
+            return Vec::new();
+        }
         units::notices(&self.readings_file(), &self.stops, self.joint_unit(), chain)
     }
 
-    /// The file that the readings come from, for messages.
-    fn readings_file(&self) -> PathBuf {
-        self.folder.join(self.manifest.mcap.as_deref().unwrap_or("joints.csv"))
+    /// The file that says where the robot stood, for messages.
+    pub fn readings_file(&self) -> PathBuf {
+        let written = if self.controller.is_some() { controller_file::NAME } else { "joints.csv" };
+        self.folder.join(self.manifest.mcap.as_deref().unwrap_or(written))
     }
 
     /// Hashes of all image files (stops in order, then dark and white).

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::camera_section::CameraMount;
+use super::controller_file;
 use super::joints::{DEFAULT_PLACEMENT, Stop, Stops};
 use super::manifest::Manifest;
 use super::observation_file;
@@ -18,7 +19,8 @@ use crate::error::{Code, Error, Result};
 /// By file and line: whatever does not follow the format.
 pub fn read_without_robot(folder: &Path) -> Result<Series> {
     let manifest_path = folder.join("series.toml");
-    if !folder.is_dir() || folder.join("joints.csv").is_file() || folder.join("metadata.yaml").is_file() {
+    let is_series = ["joints.csv", controller_file::NAME].iter().any(|name| folder.join(name).is_file());
+    if !folder.is_dir() || is_series || folder.join("metadata.yaml").is_file() {
         return read(folder);
     }
     let name = folder_name(folder)?;
@@ -52,7 +54,7 @@ pub fn read_without_robot(folder: &Path) -> Result<Series> {
     };
     let (folder, notices) = (folder.to_path_buf(), Vec::new());
     let (stops, spatial) = (Stops { stops, ..Stops::default() }, SpatialFiles::default());
-    Ok(Series { name, folder, manifest, plate, stops, source, spatial, notices, inputs })
+    Ok(Series { name, folder, manifest, plate, stops, source, controller: None, spatial, notices, inputs })
 }
 
 /// A series of single images of a plate.
@@ -75,6 +77,7 @@ pub fn series_of_images(images: &[PathBuf], plate: &Path) -> Result<Series> {
         manifest: Manifest::plain(CameraMount::Hand, &file_name(plate)),
         plate: read,
         stops: Stops { stops: images.iter().cloned().map(of_file).collect(), ..Stops::default() },
+        controller: None,
         spatial: SpatialFiles::default(),
         source: Source::Images { folder: folder.clone(), dark: Vec::new(), white: Vec::new() },
         folder,

@@ -36,6 +36,7 @@ pub fn measured(series: &SimulatedSeries, chain: &Chain) -> MeasuredSeries {
         plate: series.plate.clone(),
         plate_name: "plate".into(),
         order_known: series.manifest.robot.order == StopOrder::Visited,
+        otherwise: Vec::new(),
         stops,
     }
 }

@@ -179,6 +179,7 @@ fn series_where(
         plate,
         plate_name: "/somewhere/run1/plate.toml".into(),
         order_known: true,
+        otherwise: Vec::new(),
         stops,
     }
 }

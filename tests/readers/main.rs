@@ -7,6 +7,7 @@ mod recording_support;
 #[path = "../said/mod.rs"]
 mod said;
 
+mod controller;
 mod hostile;
 mod mcap;
 mod plate;

@@ -5,6 +5,7 @@ mod outputs_support;
 #[path = "../support/mod.rs"]
 mod support;
 
+mod controller_poses;
 mod coverage;
 mod diagnosis;
 mod knowledge;

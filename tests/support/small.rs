@@ -340,6 +340,7 @@ pub fn series(problem: &Problem) -> MeasuredSeries {
         centroid: true,
         plate_name: "plate".into(),
         order_known: false,
+        otherwise: Vec::new(),
         stops: problem.images.iter().map(stop).collect(),
         plate,
     }

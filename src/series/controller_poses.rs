@@ -1,0 +1,46 @@
+//! Poses of the flange as a controller says them, and the mistakes that are usual in them.
+
+use crate::error::Code;
+use crate::geom::Pose;
+
+/// Poses of the flange at the stops of a series.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ControllerPoses {
+    /// Of every stop; `None` for an image that was taken off the robot.
+    pub base_from_flange: Vec<Option<Pose>>,
+    /// The same table with a mistake undone, for each mistake that is usual.
+    pub otherwise: Vec<ReadOtherwise>,
+}
+
+/// Poses as they would be if a mistake had been made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadOtherwise {
+    /// Which mistake.
+    pub code: Code,
+    /// How the table would be to be read.
+    pub what: String,
+    /// What to do then.
+    pub remedy: String,
+    /// `base_from_flange` of every stop.
+    pub poses: Vec<Option<Pose>>,
+}
+
+impl ReadOtherwise {
+    pub(super) fn of_convention(poses: Vec<Option<Pose>>, name: &str, remedy: String) -> Self {
+        let what = format!("the rotations in controller.csv follow another convention: read as {name} the images fit");
+        Self { code: Code::RotationConvention, what, remedy, poses }
+    }
+
+    /// Poses of the base in the flange, where those of the flange in the base are wanted.
+    pub(super) fn inverted(poses: &[Option<Pose>], convention: Option<&str>) -> Self {
+        let read = convention.map_or_else(String::new, |name| format!(" and their rotations as {name}"));
+        let what =
+            format!("the poses in controller.csv are those of the base in the flange: inverted{read} the images fit");
+        let remedy =
+            "invert every pose, or export the pose of the flange in the base; if they are right, the camera is \
+                      mounted the other way (camera_mount in series.toml)"
+                .to_owned();
+        let poses = poses.iter().map(|p| p.map(|p| p.inverse())).collect();
+        Self { code: Code::PosesInverted, what, remedy, poses }
+    }
+}

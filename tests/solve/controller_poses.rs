@@ -1,0 +1,193 @@
+//! Poses of a controller in the place of joint readings: what is found without a robot, and the mistakes that are named.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Matrix6, Vector6};
+use robotcal::calibration::{Calibration, Ends, Export, Inputs};
+use robotcal::geom::{Pose, log_so3};
+use robotcal::identify::Options;
+use robotcal::model::robot::Robot;
+use robotcal::simulate::truth::Truth;
+use robotcal::{Code, Error};
+use tempfile::TempDir;
+
+use crate::support::small::Dice;
+
+const SIGMA_M: f64 = 2e-4;
+const SIGMA_RAD: f64 = 3e-4;
+
+fn dataset() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/ur10e_observations")
+}
+
+fn truth() -> Truth {
+    Truth::read(&dataset().join("truth.toml")).unwrap()
+}
+
+/// Poses of the flange in the base at the stops, as a controller with noise says them.
+fn poses(truth: &Truth, seed: u64) -> Vec<(String, Pose)> {
+    println!("seed {seed}");
+    let mut dice = Dice::new(seed);
+    let (camera, plate) = (truth.camera_pose.pose(), truth.plate_poses["placement_0"].pose());
+    let mut noisy = |pose: Pose| {
+        let noise = Vector6::from_fn(|k, _| dice.normal(if k < 3 { SIGMA_M } else { SIGMA_RAD }));
+        pose.perturbed(&noise)
+    };
+    let of = |s: &robotcal::simulate::truth::StopRecord| plate * (camera * s.camera_from_plate.pose()).inverse();
+    truth.stops.iter().map(|s| (s.image.clone(), noisy(of(s)))).collect()
+}
+
+/// A rotation as numbers of a table.
+type Written = fn(&Pose) -> Vec<f64>;
+
+fn quaternion(pose: &Pose) -> Vec<f64> {
+    pose.quaternion_xyzw().to_vec()
+}
+
+fn rotation_vector(pose: &Pose) -> Vec<f64> {
+    log_so3(&pose.rotation).as_slice().to_vec()
+}
+
+fn abc_deg(pose: &Pose) -> Vec<f64> {
+    let [roll, pitch, yaw] = pose.rpy();
+    [yaw, pitch, roll].map(f64::to_degrees).to_vec()
+}
+
+fn roll_pitch_yaw(pose: &Pose) -> Vec<f64> {
+    pose.rpy().to_vec()
+}
+
+/// Angles about z, y', z'': from the direction of the third axis, then what is left about it.
+fn zyz_deg(pose: &Pose) -> Vec<f64> {
+    let r = &pose.rotation;
+    let o = r[(1, 2)].atan2(r[(0, 2)]);
+    let a = r[(0, 2)].hypot(r[(1, 2)]).atan2(r[(2, 2)]);
+    let t = r[(2, 1)].atan2(-r[(2, 0)]);
+    [o, a, t].map(f64::to_degrees).to_vec()
+}
+
+/// The series with these poses instead of joint readings.
+fn series(rotation: &str, columns: &str, poses: &[(String, Pose)], written: Written) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for file in ["plate.toml", "plate.csv", "observations.csv"] {
+        fs::copy(dataset().join(file), folder.path().join(file)).unwrap();
+    }
+    let manifest = fs::read_to_string(dataset().join("series.toml")).unwrap();
+    let manifest = format!("{manifest}\n[controller]\nrotation = \"{rotation}\"\n");
+    fs::write(folder.path().join("series.toml"), manifest).unwrap();
+    let mut text = format!("image,x_m,y_m,z_m,{columns}\n");
+    for (image, pose) in poses {
+        let numbers = pose.xyz().into_iter().chain(written(pose)).map(|v| format!("{v:.10}")).collect::<Vec<_>>();
+        writeln!(text, "{image},{}", numbers.join(",")).unwrap();
+    }
+    fs::write(folder.path().join("controller.csv"), text).unwrap();
+    folder
+}
+
+fn calibrated(folder: &TempDir) -> Result<Calibration, Error> {
+    let inputs = Inputs::without_robot(&[folder.path().to_path_buf()])?;
+    Calibration::of(inputs.observe(&|_, _| ())?, &Options::default())
+}
+
+/// A squared normalised error with six degrees of freedom stays below this in 999 of 1000 cases.
+const CHI2_6: f64 = 22.5;
+
+#[test]
+fn hand_eye_transform_and_noise_are_found_without_a_robot() {
+    let truth = truth();
+    let folder = series("rotvec_rad", "rx,ry,rz", &poses(&truth, 5), rotation_vector);
+    let calibration = calibrated(&folder).unwrap();
+    let fit = &calibration.solution().fit;
+    let error = (truth.camera_pose.pose().inverse() * fit.state.mountings[0]).log();
+    let at = fit.problem.layout.mountings[0].clone();
+    let covariance = fit.covariance.reduced.view((at.start, at.start), (6, 6)).into_owned();
+    let covariance = Matrix6::from_column_slice(covariance.as_slice());
+    let normalised = error.dot(&(covariance.try_inverse().unwrap() * error));
+    assert!(normalised < CHI2_6, "{normalised}, {error:?}");
+    // Of 50 poses: the standard deviation of an estimated standard deviation is a tenth.
+    for (k, sigma) in fit.problem.joint_sigma(0).into_iter().enumerate() {
+        let stated = if k < 3 { SIGMA_M } else { SIGMA_RAD };
+        assert!((0.6..1.5).contains(&(sigma / stated)), "coordinate {k}: {sigma} for {stated}");
+    }
+    let files = calibration.files(&Export::default()).unwrap();
+    for name in ["camera.yaml", "hand_camera.yaml", "plate_pose.yaml", "solution.json"] {
+        assert!(files.contains_key(name), "{name} is missing");
+    }
+    for part in ["urdf", "kinematics", "mdh", "mastering", "compensation"] {
+        assert!(files.keys().all(|name| !name.contains(part)), "{part} of no robot");
+    }
+}
+
+#[test]
+fn every_convention_of_rotation_says_the_same() {
+    let poses = poses(&truth(), 6);
+    let all: [(&str, &str, Written); 6] = [
+        ("quaternion", "qx,qy,qz,qw", quaternion),
+        ("rotvec_rad", "rx,ry,rz", rotation_vector),
+        ("abc_deg", "a,b,c", abc_deg),
+        ("rpy_rad", "roll,pitch,yaw", roll_pitch_yaw),
+        ("wpr_deg", "w,p,r", |p| p.rpy().map(f64::to_degrees).to_vec()),
+        ("zyz_deg", "o,a,t", zyz_deg),
+    ];
+    for (rotation, columns, written) in all {
+        let folder = series(rotation, columns, &poses, written);
+        let read = robotcal::series::read(folder.path()).unwrap().controller.unwrap();
+        for (read, (image, pose)) in read.base_from_flange.iter().zip(&poses) {
+            let (angle, distance) = read.unwrap().distance(pose);
+            assert!(angle < 1e-8 && distance < 1e-9, "{rotation}, {image}: {angle} rad, {distance} m");
+        }
+    }
+}
+
+#[test]
+fn mistakes_in_poses_are_named() {
+    // A few stops are enough to tell, and every hypothesis costs time.
+    let poses: Vec<_> = poses(&truth(), 7).into_iter().take(14).collect();
+    let inverted: Vec<_> = poses.iter().map(|(i, p)| (i.clone(), p.inverse())).collect();
+    let far: Vec<_> = poses.iter().map(|(i, p)| (i.clone(), Pose::new(p.rotation, p.translation * 1e3))).collect();
+    let first = |p: &Pose| {
+        let [x, y, z, w] = p.quaternion_xyzw();
+        vec![w, x, y, z]
+    };
+    let cases: [(TempDir, Code, &str); 6] = [
+        (series("quaternion", "qx,qy,qz,qw", &poses, first), Code::RotationConvention, "qw"),
+        (series("rpy_rad", "roll,pitch,yaw", &poses, rotation_vector), Code::RotationConvention, "rotvec_rad"),
+        (series("wpr_deg", "w,p,r", &poses, abc_deg), Code::RotationConvention, "abc_deg"),
+        (series("abc_deg", "a,b,c", &poses, zyz_deg), Code::RotationConvention, "zyz_deg"),
+        (series("quaternion", "qx,qy,qz,qw", &inverted, quaternion), Code::PosesInverted, "inverted"),
+        (series("quaternion", "qx,qy,qz,qw", &far, quaternion), Code::MillimetresAsMetres, "1000"),
+    ];
+    for (folder, code, part) in cases {
+        let error = calibrated(&folder).unwrap_err();
+        assert_eq!(error.code, code, "{error}");
+        assert!(error.to_string().contains(part), "{part} is not in {error}");
+    }
+}
+
+#[test]
+fn postures_of_poses_identify_the_robot_of_a_urdf() {
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf");
+    let joints = robotcal::series::read(&dataset()).unwrap();
+    let chain = Inputs::read(&urdf, &[dataset()], Ends::default()).unwrap().chain;
+    let robot = Robot::nominal(chain.clone());
+    let readings = joints.readings_for(&chain).unwrap();
+    let poses: Vec<(String, Pose)> = (joints.stops.stops.iter().zip(&readings))
+        .map(|(s, q)| (s.image.clone(), robot.base_from_tip(q.as_ref().unwrap())))
+        .collect();
+    let folder = series("quaternion", "qx,qy,qz,qw", &poses, quaternion);
+    let read = robotcal::series::read(folder.path()).unwrap();
+    let found = robotcal::identify::readings_of(&read, &chain).unwrap();
+    for (q, (image, pose)) in found.iter().zip(&poses) {
+        let (angle, distance) = robot.base_from_tip(q.as_ref().unwrap()).distance(pose);
+        assert!(angle < 1e-8 && distance < 1e-8, "{image}: {angle} rad, {distance} m");
+    }
+    let beyond = [(poses[0].0.clone(), Pose::new(poses[0].1.rotation, poses[0].1.translation * 9.0))];
+    let folder = series("quaternion", "qx,qy,qz,qw", &[&beyond[..], &poses[1..]].concat(), quaternion);
+    let error = robotcal::identify::readings_of(&robotcal::series::read(folder.path()).unwrap(), &chain).unwrap_err();
+    assert_eq!(error.code, Code::PoseOutOfReach);
+    assert!(error.place.contains("controller.csv:2") && error.place.contains("img_000.png"), "{error}");
+}
