@@ -51,8 +51,8 @@ fn from_table(table: &Table, kind: RotationKind) -> Result<(Stops, ControllerPos
     let (key, name) = key_column(table)?;
     refuse_other_convention(table, kind)?;
     let known = [&["stop", "image", "x_m", "y_m", "z_m", "placement", "time_s"], kind.columns()].concat();
-    table.refuse_unknown(&known)?;
     let xyz = position_columns(table)?;
+    table.refuse_unknown(&known)?;
     let rotation: Vec<usize> = kind.columns().iter().map(|c| table.require(c)).collect::<Result<_>>()?;
     let (placed, time) = (table.column("placement"), table.column("time_s"));
     let placed = placed.filter(|&c| table.rows().any(|r| !r.cell(c).is_empty()));
@@ -95,7 +95,7 @@ fn refuse_other_convention(table: &Table, kind: RotationKind) -> Result<()> {
                 kind.columns().join(", ")
             );
             let remedy = format!("write rotation = \"{}\" under [controller] of series.toml", other.name());
-            Err(Error::new(Code::RotationConvention, table.place_of_header(), what, remedy))
+            Err(Error::new(Code::CsvColumnMissing, table.place_of_header(), what, remedy))
         }
         _ => Ok(()),
     }
@@ -145,8 +145,8 @@ fn refuse_units(table: &Table, kind: RotationKind, poses: &[&Written]) -> Result
         return Err(Error::new(Code::MillimetresAsMetres, place, what, remedy));
     }
     let is_rad = matches!(kind, RotationKind::RotationVector | RotationKind::Rpy);
-    let turned = |p: &&&Written| p.numbers.iter().any(|v| v.abs() > LARGEST_RAD);
-    if is_rad && poses.iter().any(|p| turned(&p)) {
+    let turned = |p: &&Written| p.numbers.iter().any(|v| v.abs() > LARGEST_RAD);
+    if is_rad && poses.iter().any(turned) {
         let largest = poses.iter().flat_map(|p| &p.numbers).fold(0.0_f64, |m, v| m.max(v.abs()));
         let what = format!("rotations are said to be \"{}\", and go up to {largest}", kind.name());
         let remedy = "convert them to radians; roll, pitch, yaw in degrees are w, p, r of rotation = \"wpr_deg\"";

@@ -54,7 +54,7 @@ fn what_the_manifest_must_say_is_asked_for() {
     for kind in RotationKind::ALL.iter().filter(|k| **k != RotationKind::Quaternion) {
         let manifest = MANIFEST.replace("quaternion", kind.name());
         let error = refusal(&[("series.toml", &manifest)]);
-        assert_says(&error, Code::RotationConvention, &["controller.csv:1", kind.name(), "\"quaternion\""]);
+        assert_says(&error, Code::CsvColumnMissing, &["controller.csv:1", kind.name(), "\"quaternion\""]);
     }
 }
 
@@ -70,7 +70,7 @@ fn a_bad_pose_names_line_and_stop() {
     assert_says(&with("0.125", "far"), Code::CsvNumber, &["controller.csv:3", "y_m", "far"]);
     assert_says(&with("b,", "a,"), Code::CsvRowTwice, &["controller.csv:3", "line 2"]);
     assert_says(&with("time_s", "when"), Code::CsvColumnUnknown, &["controller.csv:1", "when"]);
-    assert_says(&with("x_m", "x"), Code::CsvColumnUnknown, &["controller.csv:1", "\"x_m\""]);
+    assert_says(&with("x_m", "x"), Code::CsvColumnMissing, &["controller.csv:1", "\"x_m\""]);
     let far = POSES.replace("0.5,", "500,");
     assert_says(&refusal(&[("controller.csv", &far)]), Code::MillimetresAsMetres, &["controller.csv", "1000"]);
     let turned = "stop,x_m,y_m,z_m,rx,ry,rz\na,0.5,0.25,1,180,0,0\n";

@@ -164,6 +164,7 @@ fn mistakes_in_poses_are_named() {
     for (folder, code, part) in cases {
         let error = calibrated(&folder).unwrap_err();
         assert_eq!(error.code, code, "{error}");
+        // words: the convention stands in the sentence and nowhere else.
         assert!(error.to_string().contains(part), "{part} is not in {error}");
     }
 }

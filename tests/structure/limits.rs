@@ -34,6 +34,8 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/build.rs FIRST_JOINT_NOISE", "first guess"),
     ("identify/build.rs FIRST_TILT", "first guess"),
     ("identify/build.rs HUBER", "loss function of the solver"),
+    ("identify/controller_readings.rs STARTS", "starts of a search"),
+    ("identify/controller_readings.rs TRIED", "samples of a share"),
     ("identify/evidence.rs DECREMENT", "convergence"),
     ("identify/free_poses.rs GOOD_START_PX", "saves starts; the best one counts"),
     ("identify/free_poses.rs ROUNDS", "most iterations"),
