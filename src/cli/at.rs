@@ -14,6 +14,7 @@ use crate::output::write_beside;
 
 /// Flags of `--at`.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "The flange at given readings")]
 pub(super) struct AtArgs {
     /// Joint vectors (CSV, columns named as the joints): pose and uncertainty of the flange relative to the plate, by the corrected URDF with compensation.toml, go to at.csv
     #[arg(long, value_name = "FILE", requires = "at_unit")]

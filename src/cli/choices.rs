@@ -9,6 +9,7 @@ use crate::identify::{Config, JointNoise, MarkerTolerance, Options, Parameters, 
 
 /// Flags that `identify` shares with whatever solves.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "What is estimated")]
 pub(super) struct ChoiceArgs {
     /// Joint noise in rad (m for a prismatic joint) instead of the estimate; 0 takes the readings as exact
     #[arg(long, value_name = "SIGMA")]

@@ -42,10 +42,10 @@ pub(super) struct CompensateArgs {
     #[arg(long, visible_alias = "to-compensation", value_name = "FILE")]
     compensation: Option<PathBuf>,
     /// Retarget: robot description of the robot on which the program was taught [default: the nominal one]
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Retargeting")]
     from: Option<PathBuf>,
     /// compensation.toml of the robot on which the program was taught
-    #[arg(long, value_name = "FILE", requires = "from")]
+    #[arg(long, value_name = "FILE", requires = "from", help_heading = "Retargeting")]
     from_compensation: Option<PathBuf>,
     /// solution.json from which the description came: says how far the tool is expected from where the program meant it [default: the one beside it]
     #[arg(long, value_name = "FILE")]
@@ -54,37 +54,55 @@ pub(super) struct CompensateArgs {
     #[arg(long, value_name = "FOLDER", default_value = "compensated")]
     out: PathBuf,
     /// Language [default: by the extension of the files]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "How the program is read")]
     language: Option<Language>,
     /// Base link: the frame in which the controller computes poses
-    #[arg(long, value_name = "LINK")]
+    #[arg(long, value_name = "LINK", help_heading = "How the program is read")]
     base: Option<String>,
     /// Tip link: the controller's flange
-    #[arg(long, value_name = "LINK")]
+    #[arg(long, value_name = "LINK", help_heading = "How the program is read")]
     tip: Option<String>,
     /// Unit of the revolute joints in tables
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "How the program is read")]
     joint_unit: Option<Unit>,
     /// Joints in the order of the program's axes, separated by commas [default: as in the URDF, prismatic ones last]
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', help_heading = "How the program is read")]
     axes: Vec<String>,
     /// Joints that keep their programmed value, separated by commas
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', help_heading = "How the program is read")]
     hold: Vec<String>,
     /// Joint values near which a pose is reached where the text does not tell from where the robot comes (the first pose), in deg (mm) and in the order of the axes, separated by commas
-    #[arg(long, value_name = "VALUES", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "VALUES",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        help_heading = "How the program is read"
+    )]
     start: Vec<f64>,
     /// Tool where the program sets none, in the notation of the language
-    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "NUMBERS",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        help_heading = "How the program is read"
+    )]
     tool: Vec<f64>,
     /// Work frame where the program sets none, in the notation of the language
-    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "NUMBERS",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        help_heading = "How the program is read"
+    )]
     work: Vec<f64>,
     /// The robot does not visit the targets in the order of the text: backlash stays out of account
-    #[arg(long)]
+    #[arg(long, help_heading = "How the program is read")]
     unordered: bool,
     /// Ignore status and turn, or confdata: a pose means the posture next to the target before it
-    #[arg(long)]
+    #[arg(long, help_heading = "How the program is read")]
     nearest_posture: bool,
 }
 

@@ -33,28 +33,35 @@ pub(super) struct IdentifyArgs {
     #[arg(long)]
     dry_run: bool,
     /// Folder for the results [default: reports/<series name>]
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long, value_name = "FOLDER", help_heading = "What is written")]
     out: Option<PathBuf>,
     /// Base link (overrides series.toml)
-    #[arg(long, value_name = "LINK")]
+    #[arg(long, value_name = "LINK", help_heading = "Robot")]
     base: Option<String>,
     /// Tip link that carries camera or plate (overrides series.toml)
-    #[arg(long, value_name = "LINK")]
+    #[arg(long, value_name = "LINK", help_heading = "Robot")]
     tip: Option<String>,
     /// Lens: auto (the simplest of all that none beats decisively by the evidence of the joint fit), brown, fisheye, parallax, rational, thin_prism, brown+field or fisheye+field [default: as in series.toml, else by evidence among those that camera.yaml can express]
-    #[arg(long, value_name = "LENS")]
+    #[arg(long, value_name = "LENS", help_heading = "What is estimated")]
     camera: Option<String>,
     /// Where joint offsets go
-    #[arg(long, value_enum, default_value_t = OffsetsName::Folded)]
+    #[arg(long, value_enum, default_value_t = OffsetsName::Folded, help_heading = "What is written")]
     offsets: OffsetsName,
     /// Two-step calibration (camera poses first, the robot from the poses) instead of the joint fit; `compare` says what each would reach
-    #[arg(long, value_enum, value_name = "ESTIMATOR", ignore_case = true, conflicts_with = "dry_run")]
+    #[arg(
+        long,
+        value_enum,
+        value_name = "ESTIMATOR",
+        ignore_case = true,
+        conflicts_with = "dry_run",
+        help_heading = "What is estimated"
+    )]
     two_stage: Option<TwoStage>,
     /// Also write the stand-alone camera poses (poses.csv)
-    #[arg(long)]
+    #[arg(long, help_heading = "What is written")]
     poses: bool,
     /// Print solution.json and nothing else
-    #[arg(long, conflicts_with_all = ["dry_run", "at"])]
+    #[arg(long, conflicts_with_all = ["dry_run", "at"], help_heading = "What is written")]
     json: bool,
     #[command(flatten)]
     choices: ChoiceArgs,

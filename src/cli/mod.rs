@@ -9,6 +9,8 @@ mod compare;
 mod compensate;
 mod convert;
 mod detect;
+mod doctor;
+mod examples;
 mod identify;
 mod image_study;
 mod joint_table;
@@ -50,46 +52,59 @@ use verdict::Verdict;
     version,
     about,
     propagate_version = true,
-    subcommand_required = true,
-    arg_required_else_help = true
+    after_help = examples::START
 )]
 struct Cli {
     /// Say more: the long table of a result, and on stderr what is done (twice: everything); `identify` also writes the time of every stage (timings.json)
-    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
+    #[arg(short, long, action = clap::ArgAction::Count, global = true, help_heading = "Everywhere")]
     verbose: u8,
     /// Show no progress
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, help_heading = "Everywhere")]
     quiet: bool,
     /// Threads for images (default: all cores); the result does not depend on it
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", help_heading = "Everywhere")]
     threads: Option<usize>,
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
 
 #[derive(Subcommand)]
 enum Command {
     /// Compare two-stage estimators with the joint fit, on a series or in simulation
+    #[command(after_help = examples::COMPARE)]
     Compare(compare::CompareArgs),
     /// Correct the targets of a robot program for the real robot, or move it to another robot
+    #[command(after_help = examples::COMPENSATE)]
     Compensate(Box<compensate::CompensateArgs>),
     /// Turn a recording (MCAP, rosbag2) into a series folder, or a series folder into a recording
+    #[command(after_help = examples::CONVERT)]
     Convert(convert::ConvertArgs),
     /// Find the plate in images and say what was found, what was dropped and why; needs no robot
+    #[command(after_help = examples::DETECT)]
     Detect(Box<detect::DetectArgs>),
+    /// Say what is missing in a series folder, before the long work
+    #[command(after_help = examples::DOCTOR)]
+    Doctor(doctor::DoctorArgs),
     /// Identify robot, camera, hand-eye transform and plate from one or more series
+    #[command(after_help = examples::IDENTIFY)]
     Identify(identify::IdentifyArgs),
     /// Plan where to take images, and say what they will be worth
+    #[command(after_help = examples::PLAN)]
     Plan(Box<plan::PlanArgs>),
     /// Design a plate of coded circles and draw it for printing
+    #[command(after_help = examples::PLATE)]
     Plate(plate::PlateArgs),
     /// Camera, plate and camera poses from images alone; needs no robot and no joint values
+    #[command(after_help = examples::POSES)]
     Poses(poses::PosesArgs),
     /// Print a solution again, or compare two over the workspace
+    #[command(after_help = examples::SHOW)]
     Show(show::ShowArgs),
     /// Make a series of a robot with known errors, with images or observations
+    #[command(after_help = examples::SIMULATE)]
     Simulate(Box<simulate::SimulateArgs>),
     /// Judge a corrected model by points that another device measured
+    #[command(after_help = examples::VERIFY)]
     Verify(verify_args::VerifyArgs),
 }
 
@@ -100,6 +115,7 @@ impl Command {
             Self::Compensate(args) => compensate::run(args),
             Self::Convert(args) => convert::run(args),
             Self::Detect(args) => detect::run(args),
+            Self::Doctor(args) => doctor::run(args),
             Self::Identify(args) => identify::run(args),
             Self::Plan(args) => plan::run(args),
             Self::Plate(args) => plate::run(args),
@@ -130,7 +146,11 @@ pub fn main() -> ExitCode {
     }
     start_log(cli.verbose);
     memory::set_threads(cli.threads);
-    let ended = cli.command.run().and_then(|verdict| match say::failure() {
+    let Some(command) = cli.command else {
+        say::say_line!("{}", examples::START);
+        return ExitCode::SUCCESS;
+    };
+    let ended = command.run().and_then(|verdict| match say::failure() {
         Some(error) => Err(Error::new(
             Code::OutputFailed,
             "stdout",
@@ -165,4 +185,28 @@ fn start_log(verbose: u8) {
 /// What libraries say among themselves is no word to the user: they decide nothing here.
 fn is_own(target: &str) -> bool {
     target.split("::").next() == Some(env!("CARGO_CRATE_NAME"))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{CommandFactory, Parser};
+
+    use super::{Cli, examples};
+
+    #[test]
+    fn every_example_is_understood_and_every_command_has_some() {
+        let lines = examples::ALL.iter().flat_map(|text| text.lines()).filter_map(|l| l.strip_prefix("  "));
+        let start = examples::START
+            .lines()
+            .map(str::trim)
+            .filter(|l| l.starts_with("robotcal p") || l.starts_with("robotcal i"));
+        for example in lines.chain(start) {
+            let parsed = Cli::try_parse_from(example.split_whitespace());
+            assert!(parsed.is_ok_and(|cli| cli.command.is_some()), "{example}");
+        }
+        let command = Cli::command();
+        let commands: Vec<_> = command.get_subcommands().filter(|c| c.get_name() != "help").collect();
+        assert_eq!(commands.len(), examples::ALL.len());
+        assert!(commands.iter().all(|c| c.get_after_help().is_some()));
+    }
 }

@@ -53,96 +53,102 @@ pub(super) struct PlanArgs {
         "plate", "camera", "camera_fov_deg", "image", "mount", "hand_camera", "pixel_noise_px", "joint_noise_mrad"])]
     from: Option<PathBuf>,
     /// Base link
-    #[arg(long, value_name = "LINK")]
+    #[arg(long, value_name = "LINK", help_heading = "Robot")]
     base: Option<String>,
     /// Tip link
-    #[arg(long, value_name = "LINK")]
+    #[arg(long, value_name = "LINK", help_heading = "Robot")]
     tip: Option<String>,
     /// Camera (ROS camera_info)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Camera and plate")]
     camera: Option<PathBuf>,
     /// Horizontal field of view, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 60.0, conflicts_with = "camera")]
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 60.0,
+        conflicts_with = "camera",
+        help_heading = "Camera and plate"
+    )]
     camera_fov_deg: f64,
     /// Columns and rows of the images
-    #[arg(long, value_name = "WxH", default_value = "1280x1024", value_parser = pair::<u32>, conflicts_with = "camera")]
+    #[arg(long, value_name = "WxH", default_value = "1280x1024", value_parser = pair::<u32>, conflicts_with = "camera", help_heading = "Camera and plate")]
     image: [u32; 2],
     /// Where the camera is
-    #[arg(long, value_enum, default_value_t = Mount::Hand)]
+    #[arg(long, value_enum, default_value_t = Mount::Hand, help_heading = "Camera and plate")]
     mount: Mount,
     /// Camera on the flange (for a fixed camera: in the base frame), roughly: x,y,z,roll,pitch,yaw in m and degrees, or a file
     /// like hand_camera.yaml [default: 80 mm before the flange, looking along its z]
-    #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true)]
+    #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true, help_heading = "Camera and plate")]
     hand_camera: Option<String>,
     /// Plate in the base frame (for a fixed camera: on the flange), roughly: x,y,z,roll,pitch,yaw in m and degrees, or a file;
     /// several times for several places [default: on the table before the robot]
-    #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true)]
+    #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true, help_heading = "Camera and plate")]
     plate_pose: Vec<String>,
     /// Joint terms that shall be found
-    #[arg(long, value_enum, default_value_t = Model::Rigid)]
+    #[arg(long, value_enum, default_value_t = Model::Rigid, help_heading = "Robot")]
     robot_model: Model,
     /// Accuracy is meant at these joint vectors (ten or more; columns as in joints.csv, degrees), not over the workspace
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["d_optimal", "parameters"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["d_optimal", "parameters"], help_heading = "What is to be accurate")]
     targets: Option<PathBuf>,
     /// All parameters of the robot alike, not the flange
-    #[arg(long, conflicts_with = "parameters")]
+    #[arg(long, conflicts_with = "parameters", help_heading = "What is to be accurate")]
     d_optimal: bool,
     /// These parameters only, for example joint_1 or joint_2.gear
-    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', help_heading = "What is to be accurate")]
     parameters: Vec<String>,
     /// Noise of an observation (sigma per axis), px
-    #[arg(long, value_name = "PX", default_value_t = 0.05)]
+    #[arg(long, value_name = "PX", default_value_t = 0.05, help_heading = "Camera and plate")]
     pixel_noise_px: f64,
     /// Joint noise (sigma), mrad
-    #[arg(long, value_name = "MRAD", default_value_t = 0.03)]
+    #[arg(long, value_name = "MRAD", default_value_t = 0.03, help_heading = "Camera and plate")]
     joint_noise_mrad: f64,
     /// Nearest and farthest distance from camera to plate, m
-    #[arg(long, value_name = "NEARxFAR", default_value = "0.15x0.6", value_parser = pair::<f64>)]
+    #[arg(long, value_name = "NEARxFAR", default_value = "0.15x0.6", value_parser = pair::<f64>, help_heading = "Camera and plate")]
     distance_m: [f64; 2],
     /// Largest tilt of the view, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 55.0)]
+    #[arg(long, value_name = "DEG", default_value_t = 55.0, help_heading = "Camera and plate")]
     tilt_deg: f64,
     /// Depths between which the image is sharp, m
-    #[arg(long, value_name = "NEARxFAR", value_parser = pair::<f64>)]
+    #[arg(long, value_name = "NEARxFAR", value_parser = pair::<f64>, help_heading = "Camera and plate")]
     focus_m: Option<[f64; 2]>,
     /// Markers that every view shows at least
-    #[arg(long, value_name = "N", default_value_t = 20)]
+    #[arg(long, value_name = "N", default_value_t = 20, help_heading = "Camera and plate")]
     markers: usize,
     /// Candidates to choose from
-    #[arg(long, value_name = "N", default_value_t = 1000)]
+    #[arg(long, value_name = "N", default_value_t = 1000, help_heading = "Search")]
     candidates: usize,
     /// Rounds of search for further candidates near the best, at most (fewer when they gain little)
-    #[arg(long, value_name = "N", default_value_t = USUAL_ROUNDS)]
+    #[arg(long, value_name = "N", default_value_t = USUAL_ROUNDS, help_heading = "Search")]
     rounds: usize,
     /// Images at most with the plate at one place
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Search")]
     per_placement: Option<usize>,
     /// Images at most in one posture of the arm (elbow, wrist)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Search")]
     per_posture: Option<usize>,
     /// Travel at most: greatest joint motion from the middle posture, summed over the images, rad
-    #[arg(long, value_name = "RAD")]
+    #[arg(long, value_name = "RAD", help_heading = "Search")]
     travel_rad: Option<f64>,
     /// Box that is in the way, in the base frame: middle and edges x,y,z,a,b,c, m
-    #[arg(long, value_name = "BOX", allow_hyphen_values = true)]
+    #[arg(long, value_name = "BOX", allow_hyphen_values = true, help_heading = "What is in the way")]
     r#box: Vec<String>,
     /// Height of the table in the base frame, m [default: below plate and robot]
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    #[arg(long, value_name = "M", allow_hyphen_values = true, help_heading = "What is in the way")]
     table_z_m: Option<f64>,
     /// Least distance between what must not touch, mm
-    #[arg(long, value_name = "MM", default_value_t = 10.0)]
+    #[arg(long, value_name = "MM", default_value_t = 10.0, help_heading = "What is in the way")]
     clearance_mm: f64,
     /// Radius of links without collision geometry, mm [default: by the length of the arm]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", help_heading = "What is in the way")]
     link_radius_mm: Option<f64>,
     /// Radius of the camera's body, mm
-    #[arg(long, value_name = "MM", default_value_t = 30.0)]
+    #[arg(long, value_name = "MM", default_value_t = 30.0, help_heading = "What is in the way")]
     camera_radius_mm: f64,
     /// Seed of the candidates; of the first world of a study
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, help_heading = "Search")]
     seed: u64,
     /// Study instead of a plan: 30 planned against 60 random poses in as many simulated worlds; writes study.md
-    #[arg(long, value_name = "WORLDS")]
+    #[arg(long, value_name = "WORLDS", help_heading = "Search")]
     study: Option<u64>,
 }
 

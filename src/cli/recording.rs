@@ -7,6 +7,7 @@ use crate::series::{Clock, Motion, Picking, RecordingOptions};
 
 /// Flags that say how a recording is read.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Recordings")]
 pub(super) struct RecordingArgs {
     /// Recordings: topic of the joint states, when there are several
     #[arg(long, value_name = "TOPIC")]

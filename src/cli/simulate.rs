@@ -28,19 +28,19 @@ pub(super) struct SimulateArgs {
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// Base link
-    #[arg(long, value_name = "LINK")]
+    #[arg(long, value_name = "LINK", help_heading = "Robot")]
     base: Option<String>,
     /// Tip link
-    #[arg(long, value_name = "LINK")]
+    #[arg(long, value_name = "LINK", help_heading = "Robot")]
     tip: Option<String>,
     /// Plate [default: the 504-marker plate of `robotcal plate`]
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Camera and plate")]
     plate: Option<PathBuf>,
     /// Where the camera is
-    #[arg(long, value_enum, default_value_t = Mount::Hand)]
+    #[arg(long, value_enum, default_value_t = Mount::Hand, help_heading = "Camera and plate")]
     mount: Mount,
     /// Lens: brown, fisheye, parallax, rational, thin_prism, brown+field or fisheye+field
-    #[arg(long, default_value = "brown")]
+    #[arg(long, default_value = "brown", help_heading = "Camera and plate")]
     lens: String,
     /// Number of stops
     #[arg(long, default_value_t = 50)]
@@ -58,37 +58,37 @@ pub(super) struct SimulateArgs {
     #[arg(long, value_enum, default_value_t = Unit::Deg)]
     joint_unit: Unit,
     /// Errors of the robot (sigma): origins by 0.3 mm and 1 mrad, offsets of 3 mrad; full: gear, sag, backlash, too
-    #[arg(long, value_enum, default_value_t = Errors::Rigid)]
+    #[arg(long, value_enum, default_value_t = Errors::Rigid, help_heading = "Robot")]
     errors: Errors,
     /// Joint noise (sigma), mrad
-    #[arg(long, value_name = "MRAD", default_value_t = 0.02)]
+    #[arg(long, value_name = "MRAD", default_value_t = 0.02, help_heading = "Robot")]
     joint_noise_mrad: f64,
     /// Noise of the observations (sigma per axis), px; images have that of their sensor
-    #[arg(long, value_name = "PX", default_value_t = 0.02)]
+    #[arg(long, value_name = "PX", default_value_t = 0.02, help_heading = "Camera and plate")]
     pixel_noise_px: f64,
     /// Errors of the markers (sigma per axis), mm
-    #[arg(long, value_name = "MM", default_value_t = 0.03)]
+    #[arg(long, value_name = "MM", default_value_t = 0.03, help_heading = "Camera and plate")]
     marker_noise_mm: f64,
     /// Columns of the images
-    #[arg(long, default_value_t = 1280)]
+    #[arg(long, default_value_t = 1280, help_heading = "Camera and plate")]
     width_px: u32,
     /// Rows of the images
-    #[arg(long, default_value_t = 1024)]
+    #[arg(long, default_value_t = 1024, help_heading = "Camera and plate")]
     height_px: u32,
     /// Horizontal field of view, degrees
-    #[arg(long, default_value_t = 60.0)]
+    #[arg(long, default_value_t = 60.0, help_heading = "Camera and plate")]
     field_deg: f64,
     /// Nearest view, m
-    #[arg(long, default_value_t = 0.12)]
+    #[arg(long, default_value_t = 0.12, help_heading = "Camera and plate")]
     near_m: f64,
     /// Farthest view, m
-    #[arg(long, default_value_t = 0.6)]
+    #[arg(long, default_value_t = 0.6, help_heading = "Camera and plate")]
     far_m: f64,
     /// Largest tilt, degrees
-    #[arg(long, default_value_t = 50.0)]
+    #[arg(long, default_value_t = 50.0, help_heading = "Camera and plate")]
     tilt_deg: f64,
     /// Markers that every view shows at least
-    #[arg(long, default_value_t = 20)]
+    #[arg(long, default_value_t = 20, help_heading = "Camera and plate")]
     least_markers: usize,
     /// Joint vectors kept aside in truth.toml
     #[arg(long, default_value_t = 100)]

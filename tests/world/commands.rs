@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use crate::said::assert_says;
 use robotcal::Code;
 use robotcal::series::{Plate, read_plate};
 
@@ -122,6 +123,29 @@ fn as_json_the_solution_and_nothing_else_is_printed() {
         .map(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).unwrap());
     assert_eq!(printed["images"], file["images"]);
     assert_eq!(printed["flange"]["model_m"], file["flange"]["model_m"]);
+}
+
+#[test]
+fn doctor_names_all_that_is_missing_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = folder.path().join("run1");
+    std::fs::create_dir(&run).unwrap();
+    let output = robotcal(&["doctor", run.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(2));
+    assert_says(&text(&output), Code::FileMissing, &["series.toml", "plate.toml", "joints.csv", "images"]);
+    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let complete = robotcal(&["doctor", &root("datasets/kr6_small"), "--urdf", &urdf]);
+    assert_eq!(complete.status.code(), Some(0), "{}", text(&complete));
+    let unknown = robotcal(&["doctor", &root("datasets/bad/unknown-joint"), "--urdf", &urdf]);
+    assert_says(&text(&unknown), Code::JointMissing, &["joint_a3", "joint_x"]);
+}
+
+#[test]
+fn alone_the_program_says_how_to_start() {
+    let output = robotcal(&[]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    let commands = text(&output).lines().filter(|l| l.starts_with("  robotcal ")).count();
+    assert_eq!(commands, 3, "{}", text(&output));
 }
 
 #[test]

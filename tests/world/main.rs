@@ -5,4 +5,6 @@ mod bad;
 mod commands;
 mod golden;
 mod render;
+#[path = "../said/mod.rs"]
+mod said;
 mod series;
