@@ -34,8 +34,8 @@ examples! {
     ];
     /// Of `compensate`.
     COMPENSATE = [
-        "robotcal compensate weld.src weld.dat --nominal robot.urdf --robot reports/run1/robot.calibrated.urdf --compensation reports/run1/compensation.toml",
-        "robotcal compensate targets.csv --nominal robot.urdf --robot robot.calibrated.urdf --joint-unit deg --out corrected",
+        "robotcal compensate weld.src weld.dat --nominal robot.urdf --urdf reports/run1/robot.calibrated.urdf --compensation reports/run1/compensation.toml",
+        "robotcal compensate targets.csv --nominal robot.urdf --urdf robot.calibrated.urdf --joint-unit deg --out corrected",
     ];
     /// Of `convert`.
     CONVERT = [

@@ -32,6 +32,22 @@ async function widths(context, report, name) {
   }
 }
 
+// Paper: 14 mm of margin on either side, 96 px an inch.
+async function prints(context, report, name) {
+  for (const [format, millimetres] of [["A4", 210], ["Letter", 215.9]]) {
+    const page = await context.newPage();
+    const width = Math.floor(((millimetres - 28) / 25.4) * 96);
+    await page.setViewportSize({ width, height: 1000 });
+    await page.emulateMedia({ media: "print" });
+    await page.goto("file://" + resolve(report));
+    const beyond = await page.$$eval("table, svg:not(svg svg), figure, p, li", (all) => all.filter((part) => part.getBoundingClientRect().right > innerWidth + 1).map((part) => part.outerHTML.slice(0, 80)));
+    check(report, beyond.length === 0, `on ${format} runs out of the page: ${beyond.slice(0, 2).join(" | ")}`);
+    await page.screenshot({ path: `${folder}/${name}-${format}.png`, fullPage: true });
+    await page.pdf({ path: `${folder}/${name}-${format}.pdf`, format });
+    await page.close();
+  }
+}
+
 async function clicks(page, report) {
   for (const link of await page.$$eval("nav.contents a", (all) => all.map((a) => a.getAttribute("href")))) {
     await page.click(`nav.contents a[href="${link}"]`);
@@ -109,7 +125,7 @@ for (const report of reports) {
   await page.goto("file://" + resolve(report));
   await clicks(page, report);
   await scene(page, report);
-  for (const format of ["A4", "Letter"]) await page.pdf({ path: `${folder}/${name}-${format}.pdf`, format, preferCSSPageSize: false });
+  await prints(context, report, name);
   await widths(context, report, name);
   await accessible(context, report, "light");
   await accessible(context, report, "dark");

@@ -55,11 +55,11 @@ fn promise(r: &SolutionRecord, trust: Trust) -> Markup {
         h2 { "Accuracy of the flange" }
         @if trust == Trust::Failed { p { b { "These figures hold only if the checks above are wrong." } } }
         div.wide { table {
-            thead { tr { th { "Robot model" } th.n { "expected error, RMS" } @if i.is_some() { th.n { "95 % interval" } } td.meter {} } }
+            thead { tr { th { "Robot model" } th.n { "expected error, RMS" } @if i.is_some() { th.n { "95 % interval, mm" } } td.meter {} } }
             tbody { @for (name, m, interval, class) in rows { tr {
                 th scope="row" { (name) }
                 td.n { b { (significant(1e3 * m)) " mm" } }
-                @if let Some([low, high]) = interval { td.n { (significant(1e3 * low)) " to " (significant(1e3 * high)) " mm" } }
+                @if let Some([low, high]) = interval { td.n { (significant(1e3 * low)) " to " (significant(1e3 * high)) } }
                 td.meter { span.bar { i.(class) style={ "width:" (format!("{:.0}", 100.0 * m / most)) "%" } {} } }
             } } }
         } }
