@@ -114,6 +114,9 @@ pub struct RootInformation {
 impl RootInformation {
     fn of(stop: &LinearStop, layout: &Layout, free: &[usize]) -> Option<Self> {
         let (n, size) = (stop.unknowns(), 6 + E);
+        if stop.places().is_empty() {
+            return None;
+        }
         let images: Vec<SeenAtStop> = stop.images().map(|own| (own.terms, own.by_latents(n))).collect();
         let (root, inverse) = roots(&condensed(&images, &stop.prior())?)?;
         let mut score = DVector::zeros(size * images.len());

@@ -14,11 +14,15 @@ use super::mean_square::MeanSquare;
 use super::root_mean_square;
 use super::stops::{halton_stops, range_of};
 use crate::geom::{Pose, adjoint};
+use crate::linalg::SymmetricFactor;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::Layout;
 
 /// Samples of the workspace: so many in the region of the stops, as many within all joint limits.
 const SAMPLES: usize = 250;
+
+/// Share of the information of base and tool that holds what the stops do not tell of them.
+const HELD: f64 = 1e-9;
 
 /// A flange pose with its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,7 +69,9 @@ pub struct FlangeModel<'a> {
     still_column: usize,
     /// Of the dense columns.
     covariance: &'a DMatrix<f64>,
-    mean: DMatrix<f64>,
+    /// What the tool (mean of `J` over the stops), and where asked for the base, take up: 6 x columns each, of body twists of flange and of base.
+    fitted: [DMatrix<f64>; 2],
+    base_is_fitted: bool,
     covered: Vec<(f64, f64)>,
     margin: f64,
 }
@@ -81,7 +87,8 @@ impl<'a> FlangeModel<'a> {
         stops: &[Posture],
         limits: &Limits,
     ) -> Option<Self> {
-        let known = (still_column..still_column + 6).all(|c| layout.columns[c].free && covariance[(c, c)] > 0.0);
+        // The frame of a socket is parallel to the base.
+        let known = (still_column..still_column + 3).all(|c| layout.columns[c].free && covariance[(c, c)] > 0.0);
         if stops.is_empty() || !known {
             return None;
         }
@@ -98,13 +105,35 @@ impl<'a> FlangeModel<'a> {
             still,
             still_column,
             covariance,
-            mean: DMatrix::zeros(6, layout.theta_len()),
+            fitted: [DMatrix::zeros(6, layout.theta_len()), DMatrix::zeros(6, layout.theta_len())],
+            base_is_fitted: false,
             covered: (0..readings).map(range).collect(),
             margin: limits.covered_margin,
         };
-        let sum = stops.iter().fold(model.mean.clone(), |sum, s| sum + model.derivative(s).1);
-        model.mean = sum / stops.len() as f64;
-        Some(model)
+        let sum = stops.iter().fold(model.fitted[0].clone(), |sum, s| sum + model.derivative(s).1);
+        model.fitted[0] = sum / stops.len() as f64;
+        // A place without axes of its own, as that of a socket is, tells nothing of how the base stands to it.
+        let has_axes = (still_column + 3..still_column + 6).all(|c| layout.columns[c].free);
+        if has_axes { Some(model) } else { model.with_fitted_base(stops) }
+    }
+
+    /// The same relative to the base that fits the stops best, where nothing that stands still has axes of its own: least squares over
+    /// tool and base, `J(q) = tool + Ad(pose(q)^-1) base`.
+    fn with_fitted_base(mut self, stops: &[Posture]) -> Option<Self> {
+        let columns = self.layout.theta_len();
+        let (mut n, mut rhs) = (DMatrix::zeros(12, 12), DMatrix::zeros(12, columns));
+        for (pose, j) in stops.iter().map(|s| self.derivative(s)) {
+            let mut a = DMatrix::identity(6, 12);
+            a.fixed_view_mut::<6, 6>(0, 6).copy_from(&adjoint(&pose.inverse()));
+            n += a.tr_mul(&a);
+            rhs += a.tr_mul(&j);
+        }
+        let scale = n.diagonal().mean();
+        (0..12).for_each(|k| n[(k, k)] += HELD * scale);
+        let x = SymmetricFactor::new(&n).ok()?.solve_many(&rhs);
+        self.base_is_fitted = true;
+        self.fitted = [x.rows(0, 6).into_owned(), x.rows(6, 6).into_owned()];
+        Some(self)
     }
 
     /// Pose relative to what stands still, and `J`, 6 x columns that act through the camera poses.
@@ -126,7 +155,7 @@ impl<'a> FlangeModel<'a> {
     /// Flange at joint readings (rad or m), approach unknown.
     pub fn at(&self, readings: &[f64]) -> PredictedFlange {
         let (pose, j) = self.derivative(&Posture::at(readings));
-        let covariance = self.propagated(&j, self.covariance);
+        let covariance = self.propagated(&pose, &j, self.covariance);
         let outside = (self.covered.iter().zip(readings).zip(&self.robot.chain.readings))
             .filter(|(((low, high), q), _)| {
                 let margin = self.margin * (high - low);
@@ -137,8 +166,18 @@ impl<'a> FlangeModel<'a> {
         PredictedFlange { pose, covariance, outside }
     }
 
-    fn propagated(&self, j: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Matrix6<f64> {
-        let j = j - &self.mean;
+    /// `J` without what tool and base take up.
+    fn fitted_out(&self, pose: &Pose, j: DMatrix<f64>) -> DMatrix<f64> {
+        let [tool, base] = &self.fitted;
+        let mut left = j - tool;
+        if self.base_is_fitted {
+            left -= DMatrix::from_column_slice(6, 6, adjoint(&pose.inverse()).as_slice()) * base;
+        }
+        left
+    }
+
+    fn propagated(&self, pose: &Pose, j: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Matrix6<f64> {
+        let j = self.fitted_out(pose, j.clone());
         let n = j.ncols();
         let c = &j * covariance.view((0, 0), (n, n)) * j.transpose();
         let c = Matrix6::from_column_slice(c.as_slice());
@@ -153,7 +192,8 @@ impl<'a> FlangeModel<'a> {
     /// Sigma of the position over samples, RMS of the length, m.
     pub(super) fn sigma_m(&self, samples: &[Posture]) -> f64 {
         let square = |s: &Posture| {
-            let c = self.propagated(&self.derivative(s).1, self.covariance);
+            let (pose, j) = self.derivative(s);
+            let c = self.propagated(&pose, &j, self.covariance);
             (0..3).map(|k| c[(k, k)]).sum::<f64>().max(0.0)
         };
         root_mean_square(&samples.iter().map(|s| (square(s), 1.0)).collect::<Vec<_>>())
@@ -165,7 +205,8 @@ impl<'a> FlangeModel<'a> {
         let n = self.layout.theta_len();
         let mut sums = MeanSquare::new(n);
         for (k, sample) in samples.iter().enumerate() {
-            let j = self.derivative(sample).1 - &self.mean;
+            let (pose, j) = self.derivative(sample);
+            let j = self.fitted_out(&pose, j);
             sums.add(&j.fixed_rows::<3>(0).into_owned(), &known(k));
         }
         sums.interval_m(&self.covariance.view((0, 0), (n, n)).into_owned())
@@ -194,10 +235,10 @@ impl<'a> FlangeModel<'a> {
     pub fn ratio_of(&self, other: &DMatrix<f64>) -> f64 {
         let (mut own_sum, mut other_sum) = (0.0, 0.0);
         for stop in halton_stops(&self.covered, SAMPLES) {
-            let (_, j) = self.derivative(&stop);
+            let (pose, j) = self.derivative(&stop);
             let trace = |c: &Matrix6<f64>| (0..3).map(|k| c[(k, k)]).sum::<f64>();
-            own_sum += trace(&self.propagated(&j, self.covariance));
-            other_sum += trace(&self.propagated(&j, other));
+            own_sum += trace(&self.propagated(&pose, &j, self.covariance));
+            other_sum += trace(&self.propagated(&pose, &j, other));
         }
         (other_sum / f64::max(own_sum, f64::MIN_POSITIVE)).max(0.0).sqrt()
     }

@@ -37,6 +37,8 @@ pub struct Accuracy {
     pub calibrated: Errors,
     /// Error of each held-out image, nominal and calibrated, mm; in the order of the problem's images.
     pub per_image_mm: Vec<Option<[f64; 2]>>,
+    /// The same of each measurement of a body that was held out.
+    pub per_body_mm: Vec<Option<[f64; 2]>>,
     /// Number of folds.
     pub folds: usize,
 }
@@ -44,7 +46,7 @@ pub struct Accuracy {
 /// A fit of the images that are left, from where the adjustment stands.
 pub type Refit<'a> = dyn Fn(Adjustment) -> Option<State> + Sync + 'a;
 
-const FOLDS: usize = 6;
+pub(super) const FOLDS: usize = 6;
 
 /// Joint error that a nominal robot is allowed per stop, rad or m, so that its geometric errors do not bend camera and plate.
 const NOMINAL_JOINT_ERROR: f64 = 3e-3;
@@ -62,11 +64,12 @@ pub fn hold_out(fit: &Adjustment, fitted: &Refit, limits: &Limits) -> Option<(Ac
         per_image_mm[*i] = Some([a.mm(), b.mm()]);
     }
     let [nominal, calibrated] = [summary(&nominal), summary(&calibrated)];
-    Some((Accuracy { nominal, calibrated, per_image_mm, folds: folds.len() }, states))
+    let per_body_mm = Vec::new();
+    Some((Accuracy { nominal, calibrated, per_image_mm, per_body_mm, folds: folds.len() }, states))
 }
 
 /// With the nominal robot, which stays as it is.
-fn nominal(fit: &Adjustment) -> Adjustment {
+pub(super) fn nominal(fit: &Adjustment) -> Adjustment {
     let mut nominal = fit.clone();
     let Adjustment { problem, state } = &mut nominal;
     state.robot = Robot { terms: fit.state.robot.terms.clone(), ..Robot::nominal(fit.state.robot.chain.clone()) };

@@ -4,6 +4,7 @@ mod advice;
 mod clustered;
 mod flange;
 mod hold_out;
+mod hold_out_bodies;
 mod identifiability;
 mod in_base;
 mod limits;
@@ -24,6 +25,7 @@ pub use hold_out::{
     Accuracy, Errors, ImageError, Refit, cluster_of_images, folds, hold_out, hold_out_images, predict_image, refitted,
     regions, side_by_side,
 };
+pub use hold_out_bodies::hold_out_bodies;
 pub use identifiability::{
     Cause, Correlation, Identifiability, Observability, UnknownDirection, frame_parameters, identifiability,
     identifiability_of_stops,

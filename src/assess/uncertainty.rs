@@ -40,15 +40,17 @@ pub struct Uncertainty {
 
 /// Stops of the images in use.
 pub fn stops(problem: &Problem) -> Vec<Posture> {
-    let mut stops: Vec<usize> = problem.used().map(|(_, image)| image.stop).collect();
-    stops.dedup();
-    stops.into_iter().filter_map(|s| problem.stops[s].posture.clone()).collect()
+    problem.used_stops().into_iter().filter_map(|s| problem.stops[s].posture.clone()).collect()
 }
 
-/// What stands still in the base frame for the first image on the robot, with its first column: the plate, or a fixed camera.
+/// What stands still in the base frame for the first image on the robot, with its first column: the plate, or a fixed camera; without images
+/// an instrument.
 pub fn still(Adjustment { problem, state }: &Adjustment) -> Option<(Pose, usize)> {
     let layout = &problem.layout;
-    let image = &problem.images[problem.used_on_robot().next()?];
+    let Some(image) = problem.used_on_robot().next().map(|i| &problem.images[i]) else {
+        let (_, measured) = problem.used_bodies().next()?;
+        return Some((state.instruments[measured.instrument], layout.instruments[measured.instrument].start));
+    };
     Some(match image.mount {
         CameraMount::Hand => (state.placements[image.placement], layout.placements[image.placement].start),
         CameraMount::Fixed => (state.mountings[image.mounting], layout.mountings[image.mounting].start),
@@ -93,7 +95,8 @@ pub fn judge(
         found.clustered_sigma = Some(by_clusters);
     }
     let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops, limits));
-    let noise: Vec<Vec<f64>> = problem.used_on_robot().map(|i| problem.joint_sigma(problem.images[i].series)).collect();
+    let on_robot = problem.used_stops().into_iter().map(|s| &problem.stops[s]).filter(|s| s.posture.is_some());
+    let noise: Vec<Vec<f64>> = on_robot.map(|s| problem.joint_sigma(s.series)).collect();
     let promise = |m: &FlangeModel| FlangeErrors::new(m, &state.robot, &usual_joint_sigma(&noise), &stops);
     found.flange = model.as_ref().and_then(promise);
     found.workspace = model.map(|m| m.workspace()).unwrap_or_default();
@@ -130,7 +133,7 @@ fn enlarge(covariance: &mut Covariance, model: &[f64], clusters: &[f64], theta: 
     }
 }
 
-/// False where every image has a pose of its own that does not know of the robot.
+/// False where every image has a pose of its own that does not know of the robot, and where not only images tell of it.
 fn images_know_the_robot(fit: &Adjustment) -> bool {
-    fit.used().any(|(i, _, tie)| fit.problem.on_robot(i) && !tie.is_free())
+    fit.problem.body_measurements.is_empty() && fit.used().any(|(i, _, tie)| fit.problem.on_robot(i) && !tie.is_free())
 }

@@ -3,8 +3,8 @@
 use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
 use super::{
-    camera_model, few_images, focus, joint_noise, left_out_images, left_out_observations, loose, marker_off, moved,
-    no_gain, parameter_off, plate_size, pose_step, scatter, undetermined,
+    camera_model, few_images, focus, joint_noise, left_out_bodies, left_out_images, left_out_observations, loose,
+    marker_off, moved, no_gain, parameter_off, plate_size, pose_step, scatter, undetermined,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -63,6 +63,7 @@ pub const CHECKS: &[Check] = &[
     check("joint_noise", Stage::Fit(|a, b, s| found(joint_noise::check(a, b, s)))),
     check("loose", Stage::Fit(|a, b, s| found(loose::check(a, b, s)))),
     check("left_out_images", Stage::LeftOut(|a, s| found(left_out_images::check(a, s)))),
+    check("left_out_bodies", Stage::LeftOut(|a, s| found(left_out_bodies::check(a, s)))),
     check("left_out_observations", Stage::LeftOut(|a, s| found(left_out_observations::check(a, s)))),
     check("no_gain", Stage::Fit(|a, b, s| found(no_gain::check(a, b, s)))),
     check("plate_size", Stage::Fit(|a, b, s| found(plate_size::check(a, b, s)))),

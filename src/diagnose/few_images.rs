@@ -12,11 +12,14 @@ use crate::fit::Fit;
 pub struct FewImages {
     /// Images of the robot.
     pub images: usize,
+    /// True where nothing but trackers and contacts measured: stops of the robot are counted.
+    pub are_stops: bool,
 }
 
-pub(super) fn check(_: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<FewImages> {
-    let images = setting.on_robot;
-    (images < setting.limits.few_images).then_some(FewImages { images })
+pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<FewImages> {
+    let are_stops = setting.on_robot == 0;
+    let images = if are_stops { fit.problem.used_stops().len() } else { setting.on_robot };
+    (images < setting.limits.few_images).then_some(FewImages { images, are_stops })
 }
 
 impl fmt::Display for FewImages {
@@ -47,8 +50,9 @@ impl Kind for FewImages {
             self.code(),
             "series",
             format!(
-                "{} images of the robot are few: expect the prior (nominal model) to decide much of the result",
-                self.images
+                "{} {} of the robot are few: expect the prior (nominal model) to decide much of the result",
+                self.images,
+                if self.are_stops { "stops" } else { "images" }
             ),
             "take 30 to 50 stops that move every joint through its range",
         )

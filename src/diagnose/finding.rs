@@ -8,6 +8,7 @@ use super::few_images::FewImages;
 use super::focus::FocusChange;
 use super::joint_noise::JointNoiseLarge;
 use super::kind::{Kind, Quantity, Subject, Weight};
+use super::left_out_bodies::MeasurementsLeftOut;
 use super::left_out_images::ImagesLeftOut;
 use super::left_out_observations::ObservationsLeftOut;
 use super::lens_not_in_ros::LensNotInRos;
@@ -60,6 +61,7 @@ findings! {
     LensNotInRos,
     LooseMounting,
     MarkerOff,
+    MeasurementsLeftOut,
     Moved,
     NoGain,
     Noticed,

@@ -42,6 +42,8 @@ pub enum Subject {
     Place(String),
     /// A series.
     Series(String),
+    /// A stop (a row of joints.csv).
+    Stop(String),
     /// An image (a row of joints.csv).
     Image(String),
     /// A camera.

@@ -167,6 +167,7 @@ codes! {
         ImageTwice "image_twice" "two images have one name",
         ImagesMissing "images_missing" "images are needed, and there are none",
         ObservationsMissing "observations_missing" "images of joints.csv have no observations",
+        MeasurementsTooFew "measurements_too_few" "a body on the tip was measured at too few stops",
         MarkerUnknown "marker_unknown" "the plate has no such marker",
     }
     Input "Plate" {
@@ -282,6 +283,7 @@ codes! {
         CameraLoose "camera_loose" "the camera tilts with gravity",
         PlateSizeContradicted "plate_size_contradicted" "robot and plate file disagree on the size of the plate",
         PlateUneven "plate_uneven" "the plate is stretched more one way than the other",
+        MeasurementsLeftOut "measurements_left_out" "measurements of trackers or contacts do not fit the others, and are left out",
         ImagesLeftOut "images_left_out" "many images were left out",
         ObservationsLeftOut "observations_left_out" "many observations were left out",
         LensNotInRos "lens_not_in_ros" "camera.yaml cannot express the lens",

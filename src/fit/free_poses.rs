@@ -29,6 +29,21 @@ pub struct PlacedCamera {
     pub covariance: Matrix6<f64>,
 }
 
+impl FreePoses {
+    /// Of no image.
+    pub fn none(state: State) -> Self {
+        Self {
+            poses: Vec::new(),
+            rms_px: 0.0,
+            observations: 0,
+            state,
+            scales: Vec::new(),
+            pixel_factor: Vec::new(),
+            linearised: Linearised::default(),
+        }
+    }
+}
+
 /// The adjusted free poses.
 #[derive(Debug, Clone)]
 pub struct FreePoses {

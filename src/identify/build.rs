@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use super::bodies::{Bodies, intern};
 use super::local_errors::{local_share, local_terms};
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
@@ -9,8 +10,8 @@ use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
-    Adjustment, Family, Image, ImageRejection, Layout, Mark, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape,
-    Problem, State, Stop, Tie, release_measured_scales,
+    Adjustment, Family, Image, ImageRejection, Layout, Mark, Measured, MeasuredSeries, MeasuredStop, Names, Noise,
+    PlateShape, Problem, State, Stop, Tie, release_measured_scales,
 };
 use crate::series::{Edge, Observation, Plate};
 
@@ -26,21 +27,15 @@ const FIRST_TILT: f64 = 1e-3;
 /// Huber bound: the 95 % point of the length of a 2-D standard normal vector.
 const HUBER: f64 = 2.45;
 
-fn intern(names: &mut Vec<String>, name: &str) -> usize {
-    names.iter().position(|n| n == name).unwrap_or_else(|| {
-        names.push(name.to_owned());
-        names.len() - 1
-    })
-}
-
 /// The problem at a state whose poses and focal lengths are still unknown (identities; pinhole of one image width).
 ///
 /// With `local_errors` the errors of readings that stops have in common become columns.
 pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limits: &Limits) -> Result<Adjustment> {
     let (mut cameras, mut mountings, mut placements, mut plate_names) = (vec![], vec![], vec![], vec![]);
     let (mut lenses, mut plates): (Vec<Camera>, Vec<Plate>) = (vec![], vec![]);
-    let (mut stops, mut images): (Vec<Stop>, Vec<Image>) = (vec![], vec![]);
-    for (index, s) in series.iter().enumerate() {
+    let (mut stops, first_stop) = stops_of(series);
+    let mut images: Vec<Image> = vec![];
+    for (index, s) in series.iter().enumerate().filter(|(_, s)| s.has_images) {
         let camera = intern(&mut cameras, &s.camera);
         if camera == lenses.len() {
             lenses.push(Camera::pinhole(s.lens, s.width_px, s.height_px, f64::from(s.width_px)));
@@ -61,11 +56,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
             plates.push(s.plate.clone());
         }
         let mounting = intern(&mut mountings, &s.mounting);
-        let mut previous: Option<&Vec<f64>> = None;
         for (row, stop) in s.stops.iter().enumerate() {
-            let approach = previous.zip(stop.readings.as_ref()).filter(|_| s.order_known);
-            let approach = approach.map(|(a, b)| b.iter().zip(a).map(|(b, a)| b - a).collect());
-            previous = stop.readings.as_ref().or(previous);
             let observations = measured(stop, s)?;
             let twin =
                 s.stops[..row].iter().find(|t| !t.observations.is_empty() && t.observations == stop.observations);
@@ -78,7 +69,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
             images.push(Image {
                 name: stop.image.clone(),
                 series: index,
-                stop: stops.len(),
+                stop: first_stop[index] + row,
                 camera,
                 mounting,
                 placement: intern(&mut placements, &stop.placement),
@@ -87,10 +78,9 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
                 observations,
                 rejected,
             });
-            let posture = stop.readings.clone().map(|readings| Posture { readings, approach });
-            stops.push(Stop { series: index, posture, local_share: Vec::new() });
         }
     }
+    let bodies = Bodies::of(series, &first_stop);
     let mut robot = robot.clone();
     if local_errors {
         robot.terms.extend(local_terms(&stops, robot.chain.readings.len(), limits.stops_in_common));
@@ -103,24 +93,67 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         robot,
         mountings: vec![Pose::identity(); mountings.len()],
         placements: vec![Pose::identity(); placements.len()],
+        instruments: vec![Pose::identity(); bodies.instruments.len()],
+        bodies: vec![Pose::identity(); bodies.names.len()],
         plates: plates.iter().map(PlateShape::nominal).collect(),
         joint_errors: vec![Vec::new(); stops.len()],
         ties: vec![Tie::Free(Pose::identity()); images.len()],
         cameras: lenses,
     };
-    let mut layout = Layout::new(&state, &mountings, &placements, &cameras, &plate_names);
+    let names = Names {
+        mountings: &mountings,
+        placements: &placements,
+        cameras: &cameras,
+        plates: &plate_names,
+        instruments: &bodies.instruments,
+        bodies: &bodies.names,
+    };
+    let mut layout = Layout::new(&state, &names);
     release_measured_scales(&mut layout, &plates);
+    bodies.hold_unseen_turns(&mut layout);
     let noise = Noise {
         pixel_factor: vec![1.0; cameras.len()],
         joint: vec![vec![FIRST_JOINT_NOISE; readings]; series.len()],
         local: first_local(&state, &layout),
         tilt: vec![FIRST_TILT; series.len()],
         marker: Vec::new(),
+        body: vec![[1.0; 2]; bodies.components],
     };
     let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
-    let problem =
-        Problem { layout, plates, placements, mountings, cameras, stops, images, noise, families, huber: HUBER };
+    let problem = Problem {
+        layout,
+        plates,
+        placements,
+        mountings,
+        cameras,
+        stops,
+        images,
+        instruments: bodies.instruments,
+        bodies: bodies.names,
+        body_measurements: bodies.measurements,
+        lengths: bodies.lengths,
+        noise,
+        families,
+        huber: HUBER,
+    };
     Ok(Adjustment { problem, state })
+}
+
+/// Stops of all series, and the first of each.
+fn stops_of(series: &[MeasuredSeries]) -> (Vec<Stop>, Vec<usize>) {
+    let (mut stops, mut first) = (Vec::new(), Vec::with_capacity(series.len()));
+    for (index, s) in series.iter().enumerate() {
+        first.push(stops.len());
+        let mut previous: Option<&Vec<f64>> = None;
+        for stop in &s.stops {
+            let approach = previous.zip(stop.readings.as_ref()).filter(|_| s.order_known);
+            let approach = approach.map(|(a, b)| b.iter().zip(a).map(|(b, a)| b - a).collect());
+            previous = stop.readings.as_ref().or(previous);
+            let posture = stop.readings.clone().map(|readings| Posture { readings, approach });
+            stops.push(Stop { series: index, posture, local_share: Vec::new() });
+        }
+    }
+    (stops, first)
 }
 
 /// First guess of the local error of every reading that has columns for it; 0 for the others.

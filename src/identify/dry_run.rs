@@ -7,7 +7,7 @@ use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::{Camera, Lens};
 use crate::model::robot::Posture;
-use crate::problem::{Layout, PlateShape, State};
+use crate::problem::{Layout, Names, PlateShape, State};
 use crate::series::{Series, StopOrder};
 use crate::urdf::Chain;
 
@@ -37,13 +37,24 @@ fn layout(options: &Options, chain: Chain, series: &[Series]) -> Result<(Layout,
         robot: options.model.robot_with(chain, options.harmonics),
         mountings: vec![Pose::identity(); mountings.len()],
         placements: vec![Pose::identity(); placements.len()],
+        instruments: Vec::new(),
+        bodies: Vec::new(),
         cameras: series.iter().map(|s| Camera::pinhole(lens(s), 1, 1, 1.0)).collect(),
         plates: series.iter().map(|s| PlateShape::nominal(&s.plate)).collect(),
         joint_errors: Vec::new(),
         ties: Vec::new(),
     };
     let names: Vec<String> = series.iter().map(|s| s.name.clone()).collect();
-    let mut layout = Layout::new(&state, &mountings, &placements, &cameras, &names);
+    let mut layout = Layout::new(
+        &state,
+        &Names {
+            mountings: &mountings,
+            placements: &placements,
+            cameras: &cameras,
+            plates: &names,
+            ..Names::default()
+        },
+    );
     options.selection.apply(&mut layout, &mut state, &options.limits)?;
     Ok((layout, state))
 }

@@ -91,6 +91,7 @@ pub fn adjust_free_poses(
     limits: &Limits,
 ) -> Result<(Adjustment, FreePoses, Vec<StartVerdict>)> {
     let _stage = stage("free poses");
+    let bodies = adjustment.problem.take_bodies();
     let free_before: Vec<bool> = adjustment.problem.layout.columns.iter().map(|c| c.free).collect();
     adjustment.hold_poses();
     let homographies = fit_homographies(&mut adjustment)?;
@@ -102,6 +103,7 @@ pub fn adjust_free_poses(
     for (column, free) in adjustment.problem.layout.columns.iter_mut().zip(free_before) {
         column.free = free;
     }
+    adjustment.problem.put_bodies(bodies);
     Ok((adjustment, free, verdicts))
 }
 

@@ -1,5 +1,6 @@
 //! The joint fit: robot, cameras, hand-camera offsets and plates directly against the pixels, with joint noise.
 
+use super::bodies_start::start_bodies;
 use super::build::build;
 use super::estimator::Estimator;
 use super::free_poses::{FreeStart, adjust_free_poses};
@@ -9,15 +10,15 @@ use super::staged::{refit, staged};
 use super::start::{StartGiven, start_robot, take_back};
 use super::start_verdict::StartVerdict;
 use super::stated::focals_px;
-use crate::assess::{hold_out, judge, refitted};
+use crate::assess::{hold_out, hold_out_bodies, judge, refitted};
 use crate::diagnose::{CheckContext, Diagnosis};
 use crate::error::{Code, Error, Result};
 use crate::fit::{Fit, FreePoses};
 use crate::problem::MeasuredSeries;
 use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem};
 use crate::solve::{
-    ComponentOptions, NoiseInformation, Outcome, Status, estimate_components, reject_images, reject_observations,
-    without_unidentified_noise,
+    ComponentOptions, NoiseInformation, Outcome, Status, estimate_components, reject_bodies, reject_observations,
+    reject_stops, without_unidentified_noise,
 };
 use crate::stage::stage;
 use crate::urdf::Chain;
@@ -67,6 +68,7 @@ pub(super) fn fit_model(
             known.carry_to(&mut start);
             known
         }
+        None if problem.images.is_empty() => FreeStart::of(&start, FreePoses::none(start.state.clone()), Vec::new()),
         None => {
             let stated = focals_px(&problem.cameras, series);
             let (adjusted, free, verdicts) = adjust_free_poses(start, &stated, &options.limits)?;
@@ -79,6 +81,7 @@ pub(super) fn fit_model(
     let on_robot = start.problem.used_on_robot().count();
     check_on_robot(&start.problem, on_robot)?;
     let aside = start_robot(&mut start, free, StartGiven { series, limits: &options.limits }, &mut starts)?;
+    start_bodies(&mut start)?;
     let (mut outcome, before) = {
         let _stage = stage("joint fit");
         fit(start, free, &aside, options)
@@ -120,9 +123,10 @@ impl JointFit {
             true => refit(&left, estimator, noise),
             false => Some(refitted(left)),
         };
-        let (accuracy, held_out) = hold_out(&fit, &fitted, limits).ok_or_else(|| {
-            Error::new(Code::NothingHeldOut, "hold-out", "too few images to hold any out", "take more images")
-        })?;
+        let (accuracy, held_out) =
+            hold_out(&fit, &fitted, limits).or_else(|| hold_out_bodies(&fit, limits)).ok_or_else(|| {
+                Error::new(Code::NothingHeldOut, "hold-out", "too few images to hold any out", "take more images")
+            })?;
         {
             let _stage = stage("diagnoses");
             diagnosis.after_fit(&fit, &accuracy);
@@ -183,8 +187,9 @@ fn fit(
         outcome = estimate_components(outcome.adjustment, &components);
     }
     for _ in 0..ROUNDS {
-        let images = reject_images(&mut outcome.adjustment);
-        if images.is_none() && reject_observations(&mut outcome.adjustment) == 0 {
+        let stops = reject_stops(&mut outcome.adjustment);
+        let of_images = if stops { 0 } else { reject_observations(&mut outcome.adjustment) };
+        if !stops && of_images + reject_bodies(&mut outcome.adjustment) == 0 {
             break;
         }
         outcome = estimate_components(outcome.adjustment, &components);
@@ -221,7 +226,7 @@ fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f6
 fn check_on_robot(problem: &Problem, on_robot: usize) -> Result<()> {
     let all = problem.images.len();
     match (0..all).filter(|&i| problem.on_robot(i)).count() {
-        _ if on_robot > 0 => Ok(()),
+        _ if on_robot > 0 || problem.used_bodies().next().is_some() => Ok(()),
         0 => Err(Error::new(
             Code::ReadingsMissing,
             "joints.csv",

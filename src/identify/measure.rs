@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::bodies_measured::{seen_bodies, seen_lengths};
 use super::controller_readings::{self, readings_of};
 use super::detections::{detect_stops, no_images, recording, require_some};
 use super::seen_image::SeenImage;
@@ -10,7 +11,7 @@ use super::stated::{lens_of, measured_series};
 use crate::detect::Detection;
 use crate::error::{Code, Error, Notice, Result};
 use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop};
-use crate::series::{CirclePoint, Observation, Plate, Series, Source};
+use crate::series::{CirclePoint, Observation, Plate, Series, Source, StopOrder};
 use crate::urdf::Chain;
 
 /// A seen series with what the user should know of it.
@@ -35,10 +36,15 @@ struct Seen {
 pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(&Path) + Sync) -> Result<Measured> {
     refuse_several(series)?;
     let readings = readings_of(series, chain)?;
-    let mut notices = series.notices.clone();
-    notices.extend(controller_readings::notice(series, chain));
-    notices.extend(series.reading_notices(chain));
-    notices.extend(unused_repeatability(series));
+    let bodies = seen_bodies(series, several);
+    let lengths = seen_lengths(series, several, &bodies)?;
+    if series.source == Source::NoImages {
+        return Ok(Measured {
+            series: MeasuredSeries { bodies, lengths, ..without_images(series, readings) },
+            notices: notices_of(series, chain),
+        });
+    }
+    let mut notices = notices_of(series, chain);
     let camera = series.manifest.camera();
     let lens = lens_of(series)?;
     let mut plate = series.plate.clone();
@@ -83,7 +89,29 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     // The detector measures centroids, whatever observations would mean.
     let centroid = found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid;
     let measured = measured_series(series, lens, (width_px, height_px), centroid, stops);
-    Ok(Measured { series: MeasuredSeries { plate, ..measured }, notices })
+    Ok(Measured { series: MeasuredSeries { plate, bodies, lengths, ..measured }, notices })
+}
+
+/// What reading a series gives reason to say.
+fn notices_of(series: &Series, chain: &Chain) -> Vec<Notice> {
+    let mut notices = series.notices.clone();
+    notices.extend(controller_readings::notice(series, chain));
+    notices.extend(series.reading_notices(chain));
+    notices.extend(unused_repeatability(series));
+    notices
+}
+
+/// A series of stops at which no image was taken.
+fn without_images(series: &Series, readings: Vec<Option<Vec<f64>>>) -> MeasuredSeries {
+    let of = |(stop, readings): (&crate::series::Stop, Option<Vec<f64>>)| MeasuredStop {
+        image: stop.image.clone(),
+        readings,
+        placement: stop.placement.clone(),
+        observations: Vec::new(),
+        left_out: None,
+    };
+    let stops = series.stops.stops.iter().zip(readings).map(of).collect();
+    MeasuredSeries::without_images(&series.name, series.manifest.robot.order == StopOrder::Visited, stops)
 }
 
 fn refuse_several(series: &Series) -> Result<()> {

@@ -1,6 +1,9 @@
 //! Series -> solution: `series -> observations -> free poses -> starting values -> joint fit -> assessment`.
 
 mod block_diagonal;
+mod bodies;
+mod bodies_measured;
+mod bodies_start;
 mod build;
 mod compare;
 mod comparison;

@@ -104,6 +104,7 @@ impl PoseStage {
 /// Every image in use with a free pose, and nothing of the robot.
 fn with_free_poses(start: &Adjustment) -> Option<Adjustment> {
     let mut free = start.clone();
+    free.problem.take_bodies();
     free.hold_poses();
     free.state.joint_errors.fill(Vec::new());
     for (i, ..) in start.used() {

@@ -4,6 +4,7 @@
 //! [`write_all`] alone writes.
 //! A new exporter is one file here and one row in [`files`].
 
+mod bodies_record;
 mod camera_file;
 #[cfg(feature = "draw")]
 mod canvas;
@@ -46,6 +47,7 @@ pub(crate) mod report;
 mod residuals;
 pub mod restore;
 mod robot_files;
+mod series_record;
 mod solution_bytes;
 mod solution_check;
 pub mod solution_json;

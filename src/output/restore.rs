@@ -4,6 +4,7 @@ use std::path::Path;
 
 use nalgebra::{DMatrix, Vector3, Vector6};
 
+use super::bodies_record::first_instrument;
 use super::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
 use crate::assess::{FlangeModel, Limits};
 use crate::error::{Code, Error, Result};
@@ -13,7 +14,7 @@ use crate::model::camera::Camera;
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes::MODES;
 use crate::model::robot::{Posture, Robot};
-use crate::problem::{Layout, PlateShape, State};
+use crate::problem::{Layout, Names, PlateShape, State};
 use crate::problem::{MeasuredSeries, MeasuredStop};
 use crate::series::{CameraMount, Marker, Observation, Plate};
 use crate::urdf::{Chain, RobotDescription};
@@ -102,6 +103,11 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
     let placements: Vec<String> = record.placements.iter().map(|p| p.name.clone()).collect();
     let plates: Vec<Plate> = record.plates.iter().map(plate).collect::<Result<_>>()?;
     let series = record.series.iter().map(|s| {
+        let (bodies, lengths) = (record.bodies.seen(&s.name), record.bodies.seen_lengths(&s.name));
+        if !s.has_images {
+            let own = MeasuredSeries::without_images(&s.name, s.order_known, record.bodies.stops_of(&s.name));
+            return Ok(MeasuredSeries { bodies, lengths, ..own });
+        }
         let of_plate = || damaged(format!("series {} has no plate", s.name));
         let stops = record.images.iter().filter(|i| i.series == s.name);
         Ok(MeasuredSeries {
@@ -117,6 +123,9 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
             centroid: s.centroid,
             plate: plates.get(s.plate).ok_or_else(of_plate)?.clone(),
             plate_name: format!("{} {}", record.plates[s.plate].name, s.plate),
+            has_images: true,
+            bodies,
+            lengths,
             order_known: s.order_known,
             otherwise: Vec::new(),
             stops: stops.map(|i| stop(i, &s.name, &placements)).collect::<Result<_>>()?,
@@ -171,6 +180,8 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
         robot: robot.clone(),
         mountings: record.mountings.iter().map(|m| (&m.pose).into()).collect(),
         placements: record.placements.iter().map(|p| (&p.pose).into()).collect(),
+        instruments: record.bodies.instruments.iter().map(|i| (&i.pose).into()).collect(),
+        bodies: record.bodies.bodies.iter().map(|b| (&b.pose).into()).collect(),
         cameras: record.cameras.iter().map(camera).collect(),
         plates: record.plates.iter().map(|p| plate(p).map(|p| PlateShape::nominal(&p))).collect::<Result<_>>()?,
         joint_errors: Vec::new(),
@@ -179,7 +190,17 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
     let names = |all: &[super::solution_json::PlacedRecord]| all.iter().map(|p| p.name.clone()).collect::<Vec<_>>();
     let cameras: Vec<String> = record.cameras.iter().map(|c| c.name.clone()).collect();
     let plates: Vec<String> = record.plates.iter().map(|p| p.name.clone()).collect();
-    let mut layout = Layout::new(&state, &names(&record.mountings), &names(&record.placements), &cameras, &plates);
+    let mut layout = Layout::new(
+        &state,
+        &Names {
+            mountings: &names(&record.mountings),
+            placements: &names(&record.placements),
+            cameras: &cameras,
+            plates: &plates,
+            instruments: &record.bodies.named_instruments(),
+            bodies: &names(&record.bodies.bodies),
+        },
+    );
     let n = layout.len();
     if record.estimates.len() != n || record.covariance_lower.len() != n * (n + 1) / 2 {
         return Err(damaged(format!("there are {} estimates for {n} parameters", record.estimates.len())));
@@ -197,10 +218,12 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
         CameraMount::Hand => (state.placements[i.placement], layout.placements[i.placement].start),
         CameraMount::Fixed => (state.mountings[i.mounting], layout.mountings[i.mounting].start),
     });
+    let of_instrument = || first_instrument(&record.bodies).map(|(pose, k)| (pose, layout.instruments[k].start));
+    let still = still.or_else(of_instrument);
     Ok(FoundModel {
         limits: record.limits(),
         covariance: DMatrix::from_fn(n, n, at),
-        stops: used().filter_map(stop).collect(),
+        stops: used().filter_map(stop).chain(record.bodies.postures()).collect(),
         robot: robot.without_local_errors(),
         layout,
         still,

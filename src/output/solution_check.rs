@@ -25,6 +25,7 @@ pub(super) fn check(r: &SolutionRecord) -> Result<()> {
     r.cameras.iter().enumerate().try_for_each(|(k, c)| camera(&format!("cameras[{k}]"), c, r.robot.readings.len()))?;
     placed("mountings", &r.mountings)?;
     placed("placements", &r.placements)?;
+    bodies(r)?;
     r.plates.iter().enumerate().try_for_each(|(k, p)| plate(&format!("plates[{k}]"), p))?;
     series(r)?;
     r.images.iter().enumerate().try_for_each(|(k, i)| image(&format!("images[{k}]"), i, r))?;
@@ -110,6 +111,27 @@ fn camera(field: &str, c: &CameraRecord, readings: usize) -> Result<()> {
     length(&format!("{field}.projection.sigma_px"), map.sigma_px.len(), places)
 }
 
+fn bodies(r: &SolutionRecord) -> Result<()> {
+    placed("bodies.bodies", &r.bodies.bodies)?;
+    for (k, i) in r.bodies.instruments.iter().enumerate() {
+        pose(&format!("bodies.instruments[{k}].pose"), &i.pose)?;
+        length(&format!("bodies.instruments[{k}].covariance"), i.covariance.len(), POSE_COVARIANCE)?;
+    }
+    for (k, m) in r.bodies.measurements.iter().enumerate() {
+        let field = format!("bodies.measurements[{k}]");
+        let stops = r.bodies.stops.iter().filter(|s| s.series == m.series).count();
+        let images = r.images.iter().filter(|i| i.series == m.series).count();
+        index(&format!("{field}.stop"), m.stop, stops.max(images))?;
+        require(m.sigma.iter().all(|s| *s > 0.0), &format!("{field}.sigma"), "is not positive")?;
+        require(r.bodies.bodies.iter().any(|b| b.name == m.body), &format!("{field}.body"), "names no body")?;
+    }
+    for (k, s) in r.bodies.stops.iter().enumerate() {
+        let readings = s.readings.as_ref().map_or(r.robot.readings.len(), Vec::len);
+        length(&format!("bodies.stops[{k}].readings"), readings, r.robot.readings.len())?;
+    }
+    Ok(())
+}
+
 fn placed(field: &str, all: &[PlacedRecord]) -> Result<()> {
     for (k, p) in all.iter().enumerate() {
         pose(&format!("{field}[{k}].pose"), &p.pose)?;
@@ -148,6 +170,9 @@ fn series(r: &SolutionRecord) -> Result<()> {
     for (k, s) in r.series.iter().enumerate() {
         let field = |name: &str| format!("series[{k}].{name}");
         require(names.insert(&s.name), &field("name"), format!("is \"{}\" a second time", s.name))?;
+        if !s.has_images {
+            continue;
+        }
         index(&field("plate"), s.plate, r.plates.len())?;
         for (name, side) in [("width_px", s.width_px), ("height_px", s.height_px)] {
             require((2..=MOST_SIDE_PX).contains(&side), &field(name), format!("is {side}"))?;

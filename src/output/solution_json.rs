@@ -7,17 +7,19 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
+use super::bodies_record::BodiesRecord;
 use super::finding_record::FindingRecord;
 use crate::assess::{Cause, Errors, FlangeErrors, Identifiability, Limits, ProjectionMap, WorkspacePoint};
 use crate::error::{Notice, Result, plain_name};
 use crate::geom::Pose;
 use crate::identify::{Comparison, Estimator, Evidence, LensEvidence, Options, StartVerdict};
 use crate::model::camera::Lens;
-use crate::problem::{ImageRejection, LensChoice, ObservationRejection, short_name};
+use crate::problem::{ImageRejection, ObservationRejection, short_name};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar, Tags};
 use crate::solve::PlateScale;
 use crate::urdf::{JointKind, Payload};
 
+pub use super::series_record::{SeriesRecord, StopNoise};
 pub use super::solution_bytes::{read, to_bytes};
 
 /// Name of the file.
@@ -366,50 +368,6 @@ pub struct UrdfRecord {
     pub text: String,
 }
 
-/// A series, apart from its images.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SeriesRecord {
-    /// Name.
-    pub name: String,
-    /// Series with the same camera share intrinsics.
-    pub camera: String,
-    /// Series with the same mounting share the hand-eye transform.
-    pub mounting: String,
-    /// Where the camera is.
-    pub camera_mount: CameraMount,
-    /// Columns of the images.
-    pub width_px: u32,
-    /// Rows.
-    pub height_px: u32,
-    /// Focal length as stated, px.
-    pub focal_px: Option<f64>,
-    /// Lens model.
-    pub lens: Lens,
-    /// Whether the evidence decided on it.
-    #[serde(default)]
-    pub lens_choice: LensChoice,
-    /// True where an observation of a circle is the centroid of its image, false for its imaged centre.
-    pub centroid: bool,
-    /// Index of its plate.
-    pub plate: usize,
-    /// True where the images stand in the order of visiting.
-    pub order_known: bool,
-    /// What scatters from stop to stop in it; absent in files that know it per camera only.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub noise: Option<StopNoise>,
-}
-
-/// What scatters from stop to stop in a series.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StopNoise {
-    /// Joint noise of each reading, rad or m.
-    pub joint: Vec<f64>,
-    /// 95 % interval of each of them; empty where the data do not tell it. The upper end is absent where it is not told.
-    pub joint_interval: Vec<[Option<f64>; 2]>,
-    /// Apparent tilt of the plate in each image, rad; 0 where it is not part of the model.
-    pub apparent_tilt_rad: f64,
-}
-
 /// Sigmas by the noise model against those by the scatter between images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScatterRecord {
@@ -501,6 +459,9 @@ pub struct SolutionRecord {
     pub covariance_lower: Vec<f64>,
     /// Images with their observations.
     pub images: Vec<ImageRecord>,
+    /// What trackers and contacts measured of bodies on the tip.
+    #[serde(default, skip_serializing_if = "BodiesRecord::is_empty")]
+    pub bodies: BodiesRecord,
 }
 
 impl SolutionRecord {

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::Matrix6;
 
 use super::Context;
+use super::bodies_record::BodiesRecord;
 use super::estimates::{estimates, lower_triangle};
 use super::gauge::Gauge;
 use super::names::{ImageNames, plate_name, series_name};
@@ -78,6 +79,7 @@ pub(super) fn record(
         estimates: estimates(solution, context)?,
         covariance_lower: lower_triangle(solution),
         images: images(solution, context),
+        bodies: BodiesRecord::of(solution),
     })
 }
 
@@ -153,6 +155,7 @@ fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
         lens_choice: s.lens_choice,
         centroid: s.centroid,
         plate: plate(k),
+        has_images: s.has_images,
         order_known: s.order_known,
         noise: Some(stop_noise(solution, &[k])),
     };

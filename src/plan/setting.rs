@@ -7,7 +7,7 @@ use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
-    Adjustment, Image, Layout, Mark, Measured, Noise, PlateShape, Problem, State, Stop, Tie, predict,
+    Adjustment, Image, Layout, Mark, Measured, Names, Noise, PlateShape, Problem, State, Stop, Tie, predict,
 };
 use crate::series::{CameraMount, Edge, Plate};
 
@@ -56,12 +56,23 @@ impl Setting {
             robot: self.robot.clone(),
             mountings: vec![self.mounting],
             placements: self.placements.iter().map(|p| p.1).collect(),
+            instruments: Vec::new(),
+            bodies: Vec::new(),
             cameras: vec![self.camera.clone()],
             plates: vec![PlateShape::nominal(&self.plate)],
             joint_errors: Vec::new(),
             ties: Vec::new(),
         };
-        let mut layout = Layout::new(&state, &one("hand_camera"), &names, &one("camera"), &one("plate"));
+        let mut layout = Layout::new(
+            &state,
+            &Names {
+                mountings: &one("hand_camera"),
+                placements: &names,
+                cameras: &one("camera"),
+                plates: &one("plate"),
+                ..Names::default()
+            },
+        );
         if let Some(sigma) = scale_sigma(&self.plate) {
             layout.columns[layout.shapes[0].start].prior_sigma = sigma;
         }
@@ -74,6 +85,10 @@ impl Setting {
             cameras: one("camera"),
             stops: Vec::new(),
             images: Vec::new(),
+            instruments: Vec::new(),
+            bodies: Vec::new(),
+            body_measurements: Vec::new(),
+            lengths: Vec::new(),
             noise: Noise { pixel_factor: vec![1.0], joint: vec![joint], ..Noise::default() },
             families: Vec::new(),
             huber: HUBER,

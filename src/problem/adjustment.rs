@@ -1,6 +1,6 @@
 //! A problem and where its solution stands.
 
-use super::{Image, ImageRejection, Problem, State, TakenFrom, Tie};
+use super::{BodyRejection, Image, ImageRejection, Problem, State, TakenFrom, Tie};
 use crate::geom::Pose;
 
 /// A problem with a value of every unknown: what a solve starts from and what it leaves.
@@ -24,6 +24,13 @@ impl Adjustment {
         TakenFrom { posture: self.problem.posture(image), joint_errors, tie: &self.state.ties[image] }
     }
 
+    /// Where a body was measured from, as the unknowns stand: it has no tie of its own.
+    pub fn body_taken_from(&self, measured: usize) -> TakenFrom<'_> {
+        let stop = self.problem.body_measurements[measured].stop;
+        let joint_errors = &self.state.joint_errors[stop];
+        TakenFrom { posture: self.problem.stops[stop].posture.as_ref(), joint_errors, tie: &Tie::Rigid }
+    }
+
     /// Camera pose of an image as the unknowns say; `None` off the robot without a free pose.
     pub fn camera_from_plate(&self, image: usize) -> Option<Pose> {
         self.state.camera_from_plate(&self.problem.images[image], self.taken_from(image))
@@ -39,10 +46,19 @@ impl Adjustment {
         self.state.camera_from_plate(&self.problem.images[image], TakenFrom::exact(self.problem.posture(other)?))
     }
 
-    /// The adjustment without some of its images: they are held out.
+    /// The adjustment without some of its images: they are held out, and with them what was measured of bodies at their stops.
     pub fn without_images(&self, held: &[usize]) -> Self {
-        let mut rest = self.clone();
+        let stops: Vec<usize> = held.iter().map(|&i| self.problem.images[i].stop).collect();
+        let mut rest = self.without_bodies_at(&stops);
         held.iter().for_each(|&i| rest.problem.images[i].rejected = Some(ImageRejection::Excluded));
+        rest
+    }
+
+    /// The adjustment without what was measured of bodies at some stops.
+    pub fn without_bodies_at(&self, stops: &[usize]) -> Self {
+        let mut rest = self.clone();
+        let held = rest.problem.body_measurements.iter_mut().filter(|m| stops.contains(&m.stop));
+        held.for_each(|m| m.rejected = Some(BodyRejection::Excluded));
         rest
     }
 

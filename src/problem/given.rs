@@ -1,8 +1,10 @@
 //! What is given: data, columns, and what is known beforehand.
 
+use super::body::{BodyMeasurement, Instrument};
 use super::family::Family;
 use super::image::Image;
 use super::layout::Layout;
+use super::length::MeasuredLength;
 use super::noise::Noise;
 use super::stop::{Stop, Tie};
 use crate::model::robot::Posture;
@@ -28,6 +30,14 @@ pub struct Problem {
     pub stops: Vec<Stop>,
     /// Images, in the order of their stops.
     pub images: Vec<Image>,
+    /// Frames in which bodies are measured.
+    pub instruments: Vec<Instrument>,
+    /// Names of the bodies that the tip carries.
+    pub bodies: Vec<String>,
+    /// What was measured of them, in the order of their stops.
+    pub body_measurements: Vec<BodyMeasurement>,
+    /// Distances that were measured between places and bodies.
+    pub lengths: Vec<MeasuredLength>,
     /// Variance components.
     pub noise: Noise,
     /// Families of parameters whose size is a variance component, too.
@@ -35,6 +45,10 @@ pub struct Problem {
     /// Huber bound on the normalised length of a residual.
     pub huber: f64,
 }
+
+/// What was measured of bodies, out of its problem.
+#[derive(Debug)]
+pub struct TakenBodies(Vec<BodyMeasurement>, Vec<MeasuredLength>);
 
 impl Problem {
     /// Joint readings of an image; `None` where it was taken off the robot.
@@ -115,6 +129,35 @@ impl Problem {
     pub fn marker_information(&self, plate: usize, marker: usize) -> f64 {
         let factor = self.noise.marker.get(plate).copied().unwrap_or(1.0);
         (factor * self.plates[plate].markers[marker].sigma_m).max(FIXED_MARKER_SIGMA_M).powi(-2)
+    }
+
+    /// Takes out what was measured of bodies: poses of images alone are asked for.
+    pub fn take_bodies(&mut self) -> TakenBodies {
+        TakenBodies(std::mem::take(&mut self.body_measurements), std::mem::take(&mut self.lengths))
+    }
+
+    /// Puts back what [`Problem::take_bodies`] took out.
+    pub fn put_bodies(&mut self, TakenBodies(measurements, lengths): TakenBodies) {
+        (self.body_measurements, self.lengths) = (measurements, lengths);
+    }
+
+    /// Measurements of bodies that take part, with their indices.
+    pub fn used_bodies(&self) -> impl Iterator<Item = (usize, &BodyMeasurement)> {
+        self.body_measurements.iter().enumerate().filter(|(_, measured)| measured.rejected.is_none())
+    }
+
+    /// Stops at which something in use was measured, ascending.
+    pub fn used_stops(&self) -> Vec<usize> {
+        let of_bodies = self.used_bodies().map(|(_, measured)| measured.stop);
+        let mut stops: Vec<usize> = self.used().map(|(_, image)| image.stop).chain(of_bodies).collect();
+        stops.sort_unstable();
+        stops.dedup();
+        stops
+    }
+
+    /// Factors on the stated sigmas of a measurement of a body: position, rotation.
+    pub fn body_factors(&self, measured: &BodyMeasurement) -> [f64; 2] {
+        self.noise.body[self.instruments[measured.instrument].component]
     }
 
     /// Images that take part.

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::body::Instrument;
 use super::{Image, State};
 use crate::model::camera::{Camera, MAX_PARAMETERS};
 use crate::model::joint_terms::Term;
@@ -22,7 +23,7 @@ pub struct Column {
     pub free: bool,
 }
 
-/// Columns of the dense part: robot, mountings and placements (which act through the camera poses), then cameras and plate
+/// Columns of the dense part: robot, mountings, placements, instruments and bodies (which act through poses), then cameras and plate
 /// shapes (which act on the pixels directly). Markers and what is latent at stops have no columns of their own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
@@ -38,12 +39,33 @@ pub struct Layout {
     pub mountings: Vec<Range<usize>>,
     /// Six columns a placement.
     pub placements: Vec<Range<usize>>,
+    /// Six columns an instrument (`base_from_instrument`).
+    pub instruments: Vec<Range<usize>>,
+    /// Six columns a body that the tip carries (`tip_from_body`).
+    pub bodies: Vec<Range<usize>>,
     /// Columns of each camera.
     pub cameras: Vec<Range<usize>>,
     /// Those of them that are its displacement field, at their end; empty for a lens without one.
     pub fields: Vec<Range<usize>>,
     /// Columns of each plate's modes.
     pub shapes: Vec<Range<usize>>,
+}
+
+/// Names of everything that has columns of its own beside the robot.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Names<'a> {
+    /// Mountings.
+    pub mountings: &'a [String],
+    /// Placements.
+    pub placements: &'a [String],
+    /// Instruments.
+    pub instruments: &'a [Instrument],
+    /// Bodies that the tip carries.
+    pub bodies: &'a [String],
+    /// Cameras.
+    pub cameras: &'a [String],
+    /// Plates.
+    pub plates: &'a [String],
 }
 
 const TWIST: [(&str, &str); 6] = [("x", "m"), ("y", "m"), ("z", "m"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad")];
@@ -100,13 +122,8 @@ fn named(block: &str, name: &str, count: usize) -> String {
 
 impl Layout {
     /// Columns for the unknowns in `state`, with default priors.
-    pub fn new(
-        state: &State,
-        mountings: &[String],
-        placements: &[String],
-        cameras: &[String],
-        plates: &[String],
-    ) -> Self {
+    pub fn new(state: &State, names: &Names) -> Self {
+        let Names { mountings, placements, instruments, bodies, cameras, plates } = *names;
         let mut b = Builder::default();
         let chain = &state.robot.chain;
         let origin = OriginPrior::default();
@@ -129,6 +146,8 @@ impl Layout {
         let locals = terms.end - local_count..terms.end;
         let mountings = mountings.iter().map(|m| b.pose(&named("hand_camera", m, mountings.len()))).collect();
         let placements = placements.iter().map(|p| b.pose(&format!("plate/{p}"))).collect();
+        let instruments = instruments.iter().map(|i| b.pose(&format!("{}/{}", i.kind.block(), i.name))).collect();
+        let bodies = bodies.iter().map(|body| b.pose(&format!("target/{body}"))).collect();
         let cameras: Vec<Range<usize>> =
             (cameras.iter().zip(&state.cameras)).map(|(name, camera)| b.camera(name, camera)).collect();
         let fields = (cameras.iter().zip(&state.cameras))
@@ -145,7 +164,19 @@ impl Layout {
                 })
             })
             .collect();
-        Self { columns: b.columns, twists, terms, locals, mountings, placements, cameras, fields, shapes }
+        Self {
+            columns: b.columns,
+            twists,
+            terms,
+            locals,
+            mountings,
+            placements,
+            instruments,
+            bodies,
+            cameras,
+            fields,
+            shapes,
+        }
     }
 
     /// The columns with those of camera `index` for another lens, and where and by how many columns those behind it moved. Parameters that
@@ -185,7 +216,7 @@ impl Layout {
         self.columns.is_empty()
     }
 
-    /// Number of leading columns that act through the camera poses (robot, mountings, placements).
+    /// Number of leading columns that act through poses (robot, mountings, placements, instruments, bodies).
     pub fn theta_len(&self) -> usize {
         self.cameras.first().map_or(self.len(), |c| c.start)
     }

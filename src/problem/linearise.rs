@@ -12,7 +12,7 @@ use super::{Image, Layout, Measured, Problem, State, TakenFrom, Tie};
 use crate::geom::{Pose, adjoint, right_jacobian_se3};
 use crate::linalg::wide;
 use crate::model::circle::Prediction;
-use crate::model::robot::LinearOrigins;
+use crate::model::robot::{Kinematics, LinearOrigins};
 
 /// One residual with what the robust weighting made of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -202,6 +202,25 @@ impl ImageTerms {
     }
 }
 
+impl Kinematics {
+    /// Puts the derivatives of a pose by twists and joint terms into their columns, given that by the body twist of `base_from_tip`.
+    pub(super) fn put(&self, d_tip: &Matrix6<f64>, layout: &Layout, into: &mut DMatrix<f64>) {
+        for (k, d) in self.d_twists.iter().enumerate() {
+            into.fixed_view_mut::<6, 6>(0, layout.twists.start + 6 * k).copy_from(&(d_tip * d));
+        }
+        for (k, d) in self.d_terms.iter().enumerate() {
+            into.fixed_view_mut::<6, 1>(0, layout.terms.start + k).copy_from(&(d_tip * d));
+        }
+    }
+
+    /// Derivatives of a pose by the first `joints` readings, 6 x joints.
+    pub(super) fn by_readings(&self, d_tip: &Matrix6<f64>, joints: usize) -> DMatrix<f64> {
+        let mut by = DMatrix::zeros(6, joints);
+        by.column_iter_mut().zip(&self.d_readings).for_each(|(mut column, d)| column.copy_from(&(d_tip * d)));
+        by
+    }
+}
+
 /// How the camera pose of one image depends on the dense columns that act through it, and on what is latent.
 #[derive(Debug, Clone)]
 pub struct Chained {
@@ -238,19 +257,11 @@ impl State {
             &self.placements[image.placement],
         );
         let mut g = DMatrix::zeros(6, theta);
-        for (k, d) in kinematics.d_twists.iter().enumerate() {
-            g.fixed_view_mut::<6, 6>(0, layout.twists.start + 6 * k).copy_from(&(mounted.d_robot * d));
-        }
-        for (k, d) in kinematics.d_terms.iter().enumerate() {
-            g.fixed_view_mut::<6, 1>(0, layout.terms.start + k).copy_from(&(mounted.d_robot * d));
-        }
+        kinematics.put(&mounted.d_robot, layout, &mut g);
         g.fixed_view_mut::<6, 6>(0, layout.mountings[image.mounting].start).copy_from(&mounted.d_camera);
         g.fixed_view_mut::<6, 6>(0, layout.placements[image.placement].start).copy_from(&Matrix6::identity());
         let joints = from.joints();
-        let mut l = DMatrix::zeros(6, from.unknowns());
-        for (k, d) in kinematics.d_readings.iter().enumerate().take(joints) {
-            l.fixed_view_mut::<6, 1>(0, k).copy_from(&(mounted.d_robot * d));
-        }
+        let l = kinematics.by_readings(&mounted.d_robot, joints).resize_horizontally(from.unknowns(), 0.0);
         let pose = mounted.camera_from_plate;
         let Tie::Tilted([x, y]) = *from.tie else {
             return Some(Chained { pose, d_theta: g, d_latent: l });

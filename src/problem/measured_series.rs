@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::body::{BodySeen, InstrumentKind};
 use super::rejection::ImageRejection;
 use crate::model::camera::Lens;
-use crate::series::{CameraMount, Observation, Plate, ReadOtherwise};
+use crate::series::{CameraMount, Observation, Plate, PlateKind, ReadOtherwise};
 
 /// Which lenses the evidence chooses among.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -61,8 +62,70 @@ pub struct MeasuredSeries {
     pub order_known: bool,
     /// Poses of a controller with a mistake undone, for each mistake that is usual; one a stop.
     pub otherwise: Vec<ReadOtherwise>,
+    /// False for a series without images: what it says of camera and plate is not used.
+    pub has_images: bool,
     /// Stops in the order of the rows.
     pub stops: Vec<MeasuredStop>,
+    /// What was measured of bodies that the tip carries.
+    pub bodies: Vec<SeenBody>,
+    /// Distances that were measured between places or bodies.
+    pub lengths: Vec<SeenLength>,
+}
+
+impl MeasuredSeries {
+    /// A series without images: stops, and nothing measured yet.
+    pub fn without_images(name: &str, order_known: bool, stops: Vec<MeasuredStop>) -> Self {
+        Self {
+            name: name.to_owned(),
+            camera: String::new(),
+            mounting: String::new(),
+            mount: CameraMount::Hand,
+            width_px: 0,
+            height_px: 0,
+            focal_px: None,
+            lens: Lens::Brown,
+            lens_choice: LensChoice::Settled,
+            centroid: true,
+            plate: Plate::lattice(PlateKind::Points, 0, 0, 0.0, 0.0),
+            plate_name: String::new(),
+            order_known,
+            otherwise: Vec::new(),
+            has_images: false,
+            stops,
+            bodies: Vec::new(),
+            lengths: Vec::new(),
+        }
+    }
+}
+
+/// What an instrument measured of a body at a stop.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeenBody {
+    /// Index of the stop in its series.
+    pub stop: usize,
+    /// Name of the instrument.
+    pub instrument: String,
+    /// What it is.
+    pub kind: InstrumentKind,
+    /// Name of the body.
+    pub body: String,
+    /// What it saw, m.
+    pub seen: BodySeen,
+    /// Stated sigma of a coordinate, m.
+    pub sigma_m: f64,
+    /// Stated sigma of the rotation about an axis, rad.
+    pub sigma_rad: f64,
+}
+
+/// A measured distance between two instruments (sockets) or bodies, by name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeenLength {
+    /// Names.
+    pub between: [String; 2],
+    /// Measured, m.
+    pub distance_m: f64,
+    /// Its sigma, m.
+    pub sigma_m: f64,
 }
 
 /// One stop with what its image shows.

@@ -4,12 +4,14 @@
 //! that turns a name into a column. The unit of residual evaluation is one image ([`linearise`]).
 
 mod adjustment;
+mod body;
 mod condensed;
 mod equations;
 mod family;
 mod given;
 mod image;
 mod layout;
+mod length;
 mod linearise;
 mod measured;
 mod measured_series;
@@ -23,17 +25,19 @@ mod step;
 mod stop;
 
 pub use adjustment::Adjustment;
+pub use body::{BodyMeasurement, BodyRejection, BodySeen, BodyTerms, Instrument, InstrumentKind};
 pub use condensed::{SeenAtStop, by_columns, condensed};
 pub use equations::{E, Equations, MarkerCoupling, MarkerTerms, Sight};
 pub use family::Family;
-pub use given::Problem;
+pub use given::{Problem, TakenBodies};
 pub use image::Image;
-pub use layout::{Column, Layout, OriginPrior};
+pub use layout::{Column, Layout, Names, OriginPrior};
+pub use length::{Length, LengthEnds, MeasuredLength};
 pub use linearise::{
     Chained, ImageTerms, Residual, Weighting, equations, linearise, linearise_with_equations, predict,
 };
 pub use measured::{Mark, Measured};
-pub use measured_series::{LensChoice, MeasuredSeries, MeasuredStop};
+pub use measured_series::{LensChoice, MeasuredSeries, MeasuredStop, SeenBody, SeenLength};
 pub use noise::Noise;
 pub use plate_distance::{
     PlateDistance, SCALE, UNKNOWN_SCALE, release_measured_scales, seen_markers, size_by_distance,

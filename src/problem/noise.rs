@@ -13,6 +13,8 @@ pub struct Noise {
     pub local: Vec<f64>,
     /// Apparent tilt of the plate in every image, rad: per series. Empty where there is none.
     pub tilt: Vec<f64>,
+    /// Factors on the stated sigmas of measured bodies, position and rotation, per component of the instruments.
+    pub body: Vec<[f64; 2]>,
     /// Factor on the stated tolerances of the markers, per plate. Empty where they are taken as stated.
     pub marker: Vec<f64>,
 }

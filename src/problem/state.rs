@@ -62,6 +62,10 @@ pub struct State {
     pub mountings: Vec<Pose>,
     /// Plate poses: `base_from_plate`, or `flange_from_plate` for a fixed camera.
     pub placements: Vec<Pose>,
+    /// Frames in which bodies are measured: `base_from_instrument`.
+    pub instruments: Vec<Pose>,
+    /// Bodies that the tip carries: `tip_from_body`.
+    pub bodies: Vec<Pose>,
     /// Cameras.
     pub cameras: Vec<Camera>,
     /// Plates.

@@ -41,10 +41,10 @@ impl State {
         for (k, term) in next.robot.terms.iter_mut().enumerate() {
             term.value += x[layout.terms.start + k];
         }
-        for (pose, range) in next.mountings.iter_mut().zip(&layout.mountings) {
-            *pose = pose.perturbed(&twist(x, range.start));
-        }
-        for (pose, range) in next.placements.iter_mut().zip(&layout.placements) {
+        let Self { mountings, placements, instruments, bodies, .. } = &mut next;
+        let poses = mountings.iter_mut().chain(placements).chain(instruments).chain(bodies);
+        let ranges = [&layout.mountings, &layout.placements, &layout.instruments, &layout.bodies];
+        for (pose, range) in poses.zip(ranges.into_iter().flatten()) {
             *pose = pose.perturbed(&twist(x, range.start));
         }
         for (camera, range) in next.cameras.iter_mut().zip(&layout.cameras) {

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 
-use super::linear::{LinearImage, LinearProblem};
+use super::linear::{BodyPart, LinearImage, LinearProblem};
 use crate::linalg::product;
 use crate::problem::{Adjustment, E, Equations, Problem};
 
@@ -205,7 +205,7 @@ pub(super) fn latents_with_markers(l: &DMatrix<f64>, equations: &Equations) -> (
     (markers, coupling)
 }
 
-/// The pixel equations of all images in the space of their camera poses, six rows an image.
+/// The equations of all images and measured bodies in the space of their poses, six rows each, images first.
 pub(super) struct PoseRows {
     /// `G`, 6J x theta.
     chain: DMatrix<f64>,
@@ -217,7 +217,7 @@ impl PoseRows {
     pub fn new(linear: LinearProblem) -> Self {
         let layout = &linear.adjustment.problem.layout;
         let (theta, dense) = (layout.theta_len(), layout.len());
-        let rows = 6 * linear.images().len();
+        let rows = 6 * (linear.images().len() + linear.lin.bodies.len());
         let (mut chain, mut coupling) = (DMatrix::zeros(rows, theta), DMatrix::zeros(rows, dense));
         for (k, own) in linear.images().enumerate() {
             let LinearImage { terms, chain: by_theta, .. } = own;
@@ -228,6 +228,10 @@ impl PoseRows {
                     coupling.fixed_view_mut::<6, 1>(6 * k, c).copy_from(&terms.pe.column(e));
                 }
             }
+        }
+        for (k, BodyPart { terms, chain: by_theta, .. }) in (linear.images().len()..).zip(&linear.lin.bodies) {
+            chain.rows_mut(6 * k, 6).copy_from(&by_theta.d_theta);
+            coupling.view_mut((6 * k, 0), (6, theta)).copy_from(&(terms.pp * &by_theta.d_theta));
         }
         Self { chain, coupling }
     }

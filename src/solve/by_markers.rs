@@ -44,9 +44,9 @@ impl MarkersEliminated {
         let poses = PoseRows::new(linear);
         poses.add_to(linear, &mut a);
         for (stop, &start) in linear.stops().zip(&latent_start) {
-            for (k, image) in stop.places().zip(stop.images()) {
-                let with_dense = poses.coupling.rows(6 * k, 6).tr_mul(&image.chain.d_latent);
-                for (row, own) in image.latents().into_iter().flatten().zip(with_dense.column_iter()) {
+            for pose in stop.poses() {
+                let with_dense = poses.coupling.rows(6 * pose.place, 6).tr_mul(&pose.chain.d_latent);
+                for (row, own) in pose.latents.into_iter().zip(with_dense.column_iter()) {
                     let mut column = a.view_mut((0, start + row), (with_dense.nrows(), 1));
                     column += own;
                 }

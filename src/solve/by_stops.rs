@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, SMatrix, Vector3};
 
 use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, latents_with_markers};
 use super::linear::Carried;
-use super::linear::{LinearImage, LinearProblem, LinearStop};
+use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
 use crate::linalg::{gram, mirror_upper, orthonormal, product, subtract_gram};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Equations, Step};
@@ -63,6 +63,8 @@ impl StopsEliminated {
                 equations.iter().for_each(|e| coupling.add(image, &seen, e));
                 own.push(Coupled::new(image, poses.coupling.rows(6 * k, 6), (dense, &seen, equations.as_deref())));
             }
+            let bodies = stop.poses().skip(stop.places().len());
+            own.extend(bodies.map(|body| Coupled::of_body(&body, linear, poses.coupling.rows(6 * body.place, 6))));
             blocks.push(Block::new(&stop, &own, lambda));
         }
         coupling.copy_to(&mut a, dense);
@@ -171,6 +173,20 @@ impl StopsEliminated {
         block.inverse_factor.tr_mul(&block.inverse_factor) + d.tr_mul(&product(&own, &d))
     }
 
+    /// Covariance of a pose that something shows at a stop, as its body twist: that of the unknowns that stay through `G - L D'`, and what is
+    /// left of the latents through `L`.
+    pub fn pose_covariance(&self, reduced: &DMatrix<f64>, at: usize, pose: &LinearPose) -> DMatrix<f64> {
+        let Block { inverse_factor, rows, y, .. } = &self.blocks[at];
+        let theta = pose.chain.d_theta.ncols();
+        let column =
+            |&row: &usize| if row < theta { pose.chain.d_theta.column(row).into_owned() } else { DVector::zeros(6) };
+        let mut by_rows = DMatrix::from_columns(&rows.iter().map(column).collect::<Vec<_>>());
+        let by_latents = pose.by_latents(inverse_factor.ncols()) * inverse_factor.transpose();
+        by_rows -= &by_latents * y.transpose();
+        let own = DMatrix::from_fn(rows.len(), rows.len(), |i, j| reduced[(rows[i], rows[j])]);
+        &by_rows * own * by_rows.transpose() + &by_latents * by_latents.transpose()
+    }
+
     /// Covariance of every marker that was seen; with what moves it with the dense columns for a position.
     pub fn marker_covariances(
         &self,
@@ -194,27 +210,42 @@ impl StopsEliminated {
     }
 }
 
-/// One image with its coupling.
-struct Coupled<'a> {
-    image: LinearImage<'a>,
+/// One image or measured body with its coupling.
+struct Coupled {
+    /// Places of its latents at the stop.
+    latents: Vec<usize>,
     /// Unknowns that stay and that it touches, ascending.
     rows: Vec<usize>,
-    /// Columns of its [`crate::problem::Chained::d_latent`] x `rows`.
+    /// `latents` x `rows`.
     coupling: DMatrix<f64>,
 }
 
-impl<'a> Coupled<'a> {
+/// `L' [H G]` of some columns, from the rows `H G` of a pose.
+fn with_latents(l: &DMatrix<f64>, of_pose: DMatrixView<f64>, rows: &[usize]) -> DMatrix<f64> {
+    let columns = rows.iter().map(|&c| l.tr_mul(&of_pose.fixed_view::<6, 1>(0, c)));
+    DMatrix::from_iterator(l.ncols(), rows.len(), columns.flat_map(|c| c.as_slice().to_vec()))
+}
+
+impl Coupled {
+    /// Of a measured body.
+    fn of_body(body: &LinearPose, linear: LinearProblem, of_pose: DMatrixView<f64>) -> Self {
+        let layout = &linear.adjustment.problem.layout;
+        let touched = |c: &usize| layout.columns[*c].free && body.chain.d_theta.column(*c).iter().any(|d| *d != 0.0);
+        let rows: Vec<usize> = (0..layout.theta_len()).filter(touched).collect();
+        let coupling = with_latents(&body.chain.d_latent, of_pose, &rows);
+        Self { latents: body.latents.clone(), rows, coupling }
+    }
+
     /// With the coupling of its pose with the `dense` columns, and of the markers that were seen where they stay.
     fn new(
-        image: LinearImage<'a>,
+        image: LinearImage,
         of_pose: DMatrixView<f64>,
         (dense, seen, equations): (usize, &SeenMarkers, Option<&Equations>),
     ) -> Self {
         let l = &image.chain.d_latent;
         // Columns that stay at their value take no part, nor in the back-substitution.
         let mut rows = image.free_columns();
-        let columns = rows.iter().map(|&c| l.tr_mul(&of_pose.fixed_view::<6, 1>(0, c)));
-        let mut coupling = DMatrix::from_iterator(l.ncols(), rows.len(), columns.flat_map(|c| c.as_slice().to_vec()));
+        let mut coupling = with_latents(l, of_pose, &rows);
         if let Some(equations) = equations {
             let number = &seen.number[image.image.plate];
             let (markers, with_markers) = latents_with_markers(l, equations);
@@ -224,7 +255,7 @@ impl<'a> Coupled<'a> {
             coupling = coupling.resize_horizontally(rows.len(), 0.0);
             coupling.columns_range_mut(first..).copy_from(&with_markers);
         }
-        Self { image, rows, coupling }
+        Self { latents: image.latents().into_iter().flatten().collect(), rows, coupling }
     }
 }
 
@@ -238,12 +269,11 @@ impl Block {
         let rows: BTreeSet<usize> = images.iter().flat_map(|own| own.rows.iter().copied()).collect();
         let rows: Vec<usize> = rows.into_iter().collect();
         let mut coupling = DMatrix::zeros(rows.len(), n);
-        for Coupled { image, rows: touched, coupling: own } in images {
+        for Coupled { latents, rows: touched, coupling: own } in images {
             let mut at = 0;
             for (row, own) in touched.iter().zip(own.column_iter()) {
                 at += rows[at..].partition_point(|r| r < row);
-                let latents = image.latents().into_iter().flatten();
-                latents.zip(own.iter()).for_each(|(latent, value)| coupling[(at, latent)] += value);
+                latents.iter().zip(own.iter()).for_each(|(&latent, value)| coupling[(at, latent)] += value);
             }
         }
         let y = product(&coupling, &inverse_factor.transpose());

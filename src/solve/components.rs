@@ -6,6 +6,7 @@
 use nalgebra::{DVector, Matrix3};
 
 use super::acceleration::Acceleration;
+use super::body_components::{BodyTally, update_bodies};
 use super::fit::Fit;
 use super::levenberg::{Outcome, Settings, Status, solve};
 use super::linear::{LinearImage, LinearStop};
@@ -94,8 +95,9 @@ pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Out
 
 /// Every component that is not zero, with its smallest value.
 fn components(problem: &mut Problem) -> impl Iterator<Item = (&mut f64, f64)> {
-    let Noise { pixel_factor, joint, local, tilt, marker } = &mut problem.noise;
-    let factors = pixel_factor.iter_mut().chain(marker).map(|s| (s, f64::MIN_POSITIVE));
+    let Noise { pixel_factor, joint, local, tilt, marker, body } = &mut problem.noise;
+    let factors =
+        pixel_factor.iter_mut().chain(marker).chain(body.iter_mut().flatten()).map(|s| (s, f64::MIN_POSITIVE));
     let sizes = joint.iter_mut().flatten().chain(local).chain(tilt).map(|s| (s, JOINT_NOISE_FLOOR));
     let families = problem.families.iter_mut().map(|f| (&mut f.factor, SMALLEST_FACTOR));
     factors.chain(sizes).chain(families).filter(|(s, _)| **s > 0.0)
@@ -121,8 +123,10 @@ impl Fit {
         let problem = &self.problem;
         let mut noise = problem.noise.clone();
         let markers = self.marker_tallies();
-        let taken = self.effective_parameters(markers.iter().map(|[_, told]| told).sum());
-        let mut change = update_markers(&markers, &mut noise);
+        let bodies = self.body_tallies();
+        let by_bodies: f64 = bodies.iter().flatten().map(BodyTally::taken).sum();
+        let taken = self.effective_parameters(markers.iter().map(|[_, told]| told).sum()) - by_bodies;
+        let mut change = update_markers(&markers, &mut noise).max(update_bodies(&bodies, &mut noise));
         let counts = self.linearised.terms.iter().map(|t| 2.0 * t.residuals.len() as f64);
         let total: f64 = counts.clone().sum();
         for (camera, factor) in noise.pixel_factor.iter_mut().enumerate() {

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
-use super::linear::{LinearProblem, LinearStop};
+use super::linear::{LinearPose, LinearProblem, LinearStop};
 use super::system::{Elimination, Singular, System};
 use crate::problem::Problem;
 
@@ -91,6 +91,11 @@ impl Covariance {
     /// Covariance of what is latent at a stop: errors of its readings, then the ties of its images.
     pub fn latents(&self, stop: &LinearStop) -> DMatrix<f64> {
         self.system.latent_covariance(&self.reduced, stop)
+    }
+
+    /// Covariance of a pose that something shows at a stop, as its body twist, m and rad.
+    pub(super) fn pose(&self, stop: &LinearStop, pose: &LinearPose) -> DMatrix<f64> {
+        self.system.pose_covariance(&self.reduced, stop, pose)
     }
 
     /// Covariance of the correction of every marker that was seen, m^2, per plate and marker, in the frame of the priors (the

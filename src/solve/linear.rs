@@ -4,32 +4,59 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, SMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
 
 use crate::model::plate_modes::MODES;
+use crate::model::robot::LinearOrigins;
 use crate::problem::{
-    Adjustment, Chained, Equations, Image, ImageTerms, PlateDistance, Problem, State, Step, Stop, Tie, Weighting,
-    equations, linearise_with_equations,
+    Adjustment, BodyMeasurement, BodyTerms, Chained, Equations, Image, ImageTerms, Length, PlateDistance, Problem,
+    State, Step, Stop, Tie, Weighting, equations, linearise_with_equations,
 };
 
 /// Blocks of all images, linearised at one state.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Linearised {
     /// Indices of the images in use, ascending.
     pub images: Vec<usize>,
-    /// Stops of the images in use: index, and which of those images were taken at it.
-    pub stops: Vec<(usize, Range<usize>)>,
+    /// Stops at which something in use was measured.
+    pub stops: Vec<StopParts>,
     /// Pixel blocks of each image in use.
     pub terms: Vec<ImageTerms>,
     /// Chain of each image in use.
     pub chains: Vec<Chained>,
+    /// Measurements of bodies in use, in the order of their stops.
+    pub bodies: Vec<BodyPart>,
     /// Measured distances of the plates.
     pub distances: Vec<PlateDistance>,
+    /// Measured distances between places and bodies.
+    pub lengths: Vec<Length>,
     /// Robust cost of the pixels plus half the squares of priors, of what is latent at stops and of measured distances.
     pub cost: f64,
     /// Equations of each image in use, which the system is built from; empty where they are too many to keep.
     equations: Arc<[Equations]>,
+}
+
+/// What was measured at one stop.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StopParts {
+    /// Index of the stop.
+    pub stop: usize,
+    /// Its images, among those in use.
+    pub images: Range<usize>,
+    /// Its measurements of bodies, among those in use.
+    pub bodies: Range<usize>,
+}
+
+/// One measurement of a body, linearised.
+#[derive(Debug, Clone)]
+pub struct BodyPart {
+    /// Index among all measurements of bodies.
+    pub index: usize,
+    /// Its blocks.
+    pub terms: BodyTerms,
+    /// Its chain.
+    pub chain: Chained,
 }
 
 /// One image as it is linearised, with its equations where they are kept.
@@ -98,6 +125,31 @@ pub struct LinearStop<'a> {
     /// Its place among the stops in use.
     pub at: usize,
     images: Range<usize>,
+    bodies: Range<usize>,
+}
+
+/// A pose of the linear problem that something shows, whatever shows it.
+pub(super) struct LinearPose<'a> {
+    /// Its place among all of them: images, then bodies.
+    pub place: usize,
+    /// Information.
+    pub pp: &'a Matrix6<f64>,
+    /// Right-hand side.
+    pub bp: &'a Vector6<f64>,
+    /// Its chain.
+    pub chain: &'a Chained,
+    /// Places, among what is latent at its stop, of the columns of [`Chained::d_latent`].
+    pub latents: Vec<usize>,
+}
+
+impl LinearPose<'_> {
+    /// `L` by everything that is latent at its stop, 6 x latent.
+    pub fn by_latents(&self, latent: usize) -> DMatrix<f64> {
+        let mut by = DMatrix::zeros(6, latent);
+        let columns = self.latents.iter().zip(self.chain.d_latent.column_iter());
+        columns.for_each(|(latent, column)| by.column_mut(*latent).copy_from(&column));
+        by
+    }
 }
 
 impl Adjustment {
@@ -126,16 +178,22 @@ impl Adjustment {
         let (parts, equations): (Vec<_>, Vec<_>) = parts?.into_iter().unzip();
         let (terms, chains): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
         let pixels: f64 = terms.iter().map(|t| t.cost).sum();
-        let stops = self.stops_of(&images);
+        let bodies = self.linearised_bodies(&origins)?;
+        let of_bodies: f64 = bodies.iter().map(|b| b.terms.cost).sum();
+        let stops = self.stops_of(&images, &bodies);
         let distances = self.distances(&images, &terms);
-        let measured: f64 = distances.iter().map(|d| 0.5 * d.residual * d.residual).sum();
-        let cost = pixels + self.prior_cost(&images, &stops) + measured;
+        let lengths: Vec<Length> = problem.lengths.iter().filter_map(|l| l.linearise(&problem.layout, state)).collect();
+        let residuals = distances.iter().map(|d| d.residual).chain(lengths.iter().map(|l| l.residual));
+        let measured: f64 = residuals.map(|r| 0.5 * r * r).sum();
+        let cost = pixels + of_bodies + self.prior_cost(&images, &stops) + measured;
         cost.is_finite().then_some(Linearised {
             images,
             stops,
             terms,
             chains,
+            bodies,
             distances,
+            lengths,
             cost,
             equations: equations.into_iter().flatten().collect(),
         })
@@ -153,19 +211,37 @@ impl Adjustment {
         (0..problem.plates.len()).filter_map(of).collect()
     }
 
-    /// Stops of some images, ascending.
-    fn stops_of(&self, images: &[usize]) -> Vec<(usize, Range<usize>)> {
-        let stop_of = |i: &usize| self.problem.images[*i].stop;
-        let mut first = 0;
-        let stops = images.chunk_by(|a, b| stop_of(a) == stop_of(b)).map(|own| {
-            first += own.len();
-            (stop_of(&own[0]), first - own.len()..first)
-        });
-        stops.collect()
+    /// Linearises every measurement of a body in use; `None` for one off the robot.
+    fn linearised_bodies(&self, origins: &LinearOrigins) -> Option<Vec<BodyPart>> {
+        let Self { problem, state } = self;
+        let used: Vec<(usize, &BodyMeasurement)> = problem.used_bodies().collect();
+        let part = |&(index, measured): &(usize, &BodyMeasurement)| {
+            let chain = state.body_chained(origins, &problem.layout, measured, self.body_taken_from(index))?;
+            let terms = measured.linearise(&chain.pose, problem.body_factors(measured));
+            Some(BodyPart { index, terms, chain })
+        };
+        used.par_iter().map(part).collect()
+    }
+
+    /// Stops of some images and measurements of bodies, ascending.
+    fn stops_of(&self, images: &[usize], bodies: &[BodyPart]) -> Vec<StopParts> {
+        let of_image = |i: &usize| self.problem.images[*i].stop;
+        let of_body = |b: &BodyPart| self.problem.body_measurements[b.index].stop;
+        let (mut image, mut body) = (0, 0);
+        let parts = |stop: usize| {
+            let first = (image, body);
+            image += images[image..].iter().take_while(|i| of_image(i) == stop).count();
+            body += bodies[body..].iter().take_while(|b| of_body(b) == stop).count();
+            StopParts { stop, images: first.0..image, bodies: first.1..body }
+        };
+        let mut stops: Vec<usize> = images.iter().map(of_image).chain(bodies.iter().map(of_body)).collect();
+        stops.sort_unstable();
+        stops.dedup();
+        stops.into_iter().map(parts).collect()
     }
 
     /// Half the squares of priors and of what is latent at some stops and their images.
-    fn prior_cost(&self, images: &[usize], stops: &[(usize, Range<usize>)]) -> f64 {
+    fn prior_cost(&self, images: &[usize], stops: &[StopParts]) -> f64 {
         let Self { problem, state } = self;
         let values = state.values(&problem.layout);
         let dense: f64 = (problem.layout.columns.iter().zip(values.iter()))
@@ -177,7 +253,7 @@ impl Adjustment {
             shape.corrections.iter().enumerate().map(of)
         });
         let markers: f64 = corrections.sum();
-        let latent = |(stop, own): &(usize, Range<usize>)| -> f64 {
+        let latent = |StopParts { stop, images: own, .. }: &StopParts| -> f64 {
             let ties =
                 images[own.clone()].iter().flat_map(|&i| problem.tie_squares(&problem.images[i], &state.ties[i]));
             problem.joint_error_squares(*stop, &state.joint_errors[*stop]).chain(ties).sum()
@@ -205,9 +281,9 @@ impl<'a> LinearProblem<'a> {
     /// A stop by its place among those in use.
     pub fn stop(self, at: usize) -> LinearStop<'a> {
         let Adjustment { problem, state } = self.adjustment;
-        let (index, images) = self.lin.stops[at].clone();
+        let StopParts { stop: index, images, bodies } = self.lin.stops[at].clone();
         let (stop, joint_errors) = (&problem.stops[index], state.joint_errors[index].as_slice());
-        LinearStop { linear: self, index, stop, joint_errors, at, images }
+        LinearStop { linear: self, index, stop, joint_errors, at, images, bodies }
     }
 
     /// The k-th image in use.
@@ -215,9 +291,9 @@ impl<'a> LinearProblem<'a> {
         let Self { adjustment: Adjustment { problem, state }, lin } = self;
         let index = lin.images[k];
         let (image, tie) = (&problem.images[index], &state.ties[index]);
-        let stop = lin.stops.partition_point(|(_, images)| images.end <= k);
+        let stop = lin.stops.partition_point(|stop| stop.images.end <= k);
         let joints = state.joint_errors[image.stop].len();
-        let before = lin.images[lin.stops[stop].1.start..k].iter();
+        let before = lin.images[lin.stops[stop].images.start..k].iter();
         let tie_start = joints + before.map(|&i| state.ties[i].len()).sum::<usize>();
         let (terms, chain) = (&lin.terms[k], &lin.chains[k]);
         let equations = lin.equations.get(k);
@@ -234,6 +310,9 @@ impl<'a> LinearProblem<'a> {
             for (e, c) in own.columns().iter().enumerate() {
                 c.iter().for_each(|&c| gradient[c] += terms.be[e]);
             }
+        }
+        for BodyPart { terms, chain, .. } in &self.lin.bodies {
+            gradient.rows_mut(0, layout.theta_len()).gemv_tr(1.0, &chain.d_theta, &terms.bp, 1.0);
         }
         gradient
     }
@@ -290,6 +369,32 @@ impl<'a> LinearStop<'a> {
         self.images.clone().map(move |k| linear.image(k))
     }
 
+    /// Its measurements of bodies in use.
+    pub fn bodies(&self) -> &'a [BodyPart] {
+        &self.linear.lin.bodies[self.bodies.clone()]
+    }
+
+    /// Blocks of its images and measurements of bodies in the pose that each shows, with its place among all of them (images first) and the
+    /// places, among what is latent here, of the columns of its [`Chained::d_latent`].
+    pub(super) fn poses(&self) -> impl Iterator<Item = LinearPose<'a>> {
+        let images = self.places().zip(self.images()).map(|(place, own)| LinearPose {
+            place,
+            pp: &own.terms.pp,
+            bp: &own.terms.bp,
+            chain: own.chain,
+            latents: own.latents().into_iter().flatten().collect(),
+        });
+        let before = self.linear.lin.images.len();
+        let bodies = self.bodies.clone().zip(self.bodies()).map(move |(place, own)| LinearPose {
+            place: before + place,
+            pp: &own.terms.pp,
+            bp: &own.terms.bp,
+            chain: &own.chain,
+            latents: (0..own.chain.d_latent.ncols()).collect(),
+        });
+        images.chain(bodies)
+    }
+
     /// Places of its images among those in use.
     pub fn places(&self) -> Range<usize> {
         self.images.clone()
@@ -315,10 +420,9 @@ impl<'a> LinearStop<'a> {
     /// Information of what is latent at it, prior included.
     pub(super) fn information(&self) -> DMatrix<f64> {
         let mut information = DMatrix::from_diagonal(&DVector::from_vec(self.prior()));
-        for image in self.images() {
-            let l = &image.chain.d_latent;
-            let own = l.tr_mul(&(image.terms.pp * l));
-            let places: Vec<usize> = image.latents().into_iter().flatten().collect();
+        for LinearPose { pp, chain, latents: places, .. } in self.poses() {
+            let l = &chain.d_latent;
+            let own = l.tr_mul(&(pp * l));
             for (b, &column) in places.iter().enumerate() {
                 places.iter().enumerate().for_each(|(a, &row)| information[(row, column)] += own[(a, b)]);
             }
@@ -333,9 +437,11 @@ impl<'a> LinearStop<'a> {
         for (r, q) in self.joint_errors.iter().enumerate() {
             gradient[r] = -q * problem.joint_error_information(self.stop, r);
         }
+        for LinearPose { bp, chain, latents, .. } in self.poses() {
+            let own = chain.d_latent.tr_mul(bp);
+            latents.into_iter().zip(own.iter()).for_each(|(row, g)| gradient[row] += g);
+        }
         for image in self.images() {
-            let own = image.chain.d_latent.tr_mul(&image.terms.bp);
-            image.latents().into_iter().flatten().zip(own.iter()).for_each(|(row, g)| gradient[row] += g);
             if let Tie::Tilted(tilt) = image.tie {
                 let [_, places] = image.latents();
                 places.zip(tilt).for_each(|(k, t)| gradient[k] -= t * problem.tilt_information(image.image));

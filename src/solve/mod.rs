@@ -2,6 +2,7 @@
 
 mod acceleration;
 mod blocks;
+mod body_components;
 mod by_markers;
 mod by_stops;
 mod components;
@@ -26,9 +27,9 @@ pub use fit::Fit;
 pub use frame::{Frame, PlateScale, Similarity, frames};
 pub use in_frame::{InFrame, in_frame, in_frame_by};
 pub use levenberg::{NoFit, Outcome, Settings, Status, solve};
-pub use linear::{LinearImage, LinearProblem, LinearStop, Linearised};
+pub use linear::{BodyPart, LinearImage, LinearProblem, LinearStop, Linearised};
 pub use noise_information::{NoiseInformation, Spread, noise_information};
 pub use noise_uncertainty::NoiseUncertainty;
-pub use snoop::{reject_images, reject_observations};
+pub use snoop::{reject_bodies, reject_observations, reject_stops};
 pub use system::{Elimination, Singular, System};
 pub use unidentified_noise::without_unidentified_noise;

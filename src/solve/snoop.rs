@@ -1,6 +1,9 @@
 //! Rejection with reasons: single observations by their residual, whole images by the joint error that they would need.
 
-use crate::problem::{Adjustment, ImageRejection, Mismatch, ObservationRejection, Weighting, predict};
+use crate::problem::{
+    Adjustment, BodyMeasurement, BodyRejection, ImageRejection, Mismatch, ObservationRejection, TakenFrom, Weighting,
+    predict,
+};
 
 /// Normalised residual length beyond which an observation is left out (a clean one is so with probability 4e-5).
 const OBSERVATION_BOUND: f64 = 4.5;
@@ -40,20 +43,35 @@ pub fn reject_observations(adjustment: &mut Adjustment) -> usize {
     verdicts.len()
 }
 
-/// Latent and local error of every reading at the stop of an image, rad or m; `None` for one that its readings do not hold.
-fn whole_error(adjustment: &Adjustment, image: usize) -> Option<Vec<f64>> {
-    let from = adjustment.taken_from(image);
+/// Latent and local error of every reading where something was taken from, rad or m; `None` for what its readings do not hold.
+fn whole_error(adjustment: &Adjustment, from: &TakenFrom) -> Option<Vec<f64>> {
     let local = adjustment.state.robot.local_errors(from.posture.filter(|_| from.joints() > 0)?);
     Some(from.joint_errors.iter().zip(local).map(|(n, l)| n + l).collect())
 }
 
-/// Leaves out the image whose readings fit it worst, where they do not fit at all; returns its index.
-pub fn reject_images(adjustment: &mut Adjustment) -> Option<usize> {
+/// An image or a measurement of a body, by its index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Taken {
+    Image(usize),
+    Body(usize),
+}
+
+/// Leaves out the image or measurement of a body whose readings fit it worst, where they do not fit at all; true where there is one.
+pub fn reject_stops(adjustment: &mut Adjustment) -> bool {
+    reject_worst(adjustment).is_some()
+}
+
+fn reject_worst(adjustment: &mut Adjustment) -> Option<Taken> {
     let robot = &adjustment.state.robot;
-    let used = adjustment.used().filter_map(|(i, ..)| Some((i, whole_error(adjustment, i)?)));
-    let noise: Vec<(usize, Vec<f64>)> = used.collect();
+    let images = adjustment
+        .used()
+        .filter_map(|(i, ..)| Some((Taken::Image(i), whole_error(adjustment, &adjustment.taken_from(i))?)));
+    let bodies = adjustment.problem.used_bodies();
+    let bodies =
+        bodies.filter_map(|(k, _)| Some((Taken::Body(k), whole_error(adjustment, &adjustment.body_taken_from(k))?)));
+    let noise: Vec<(Taken, Vec<f64>)> = images.chain(bodies).collect();
     let joints = noise.first()?.1.len();
-    let noise: Vec<(usize, &[f64])> = noise.iter().map(|(i, dq)| (*i, dq.as_slice())).collect();
+    let noise: Vec<(Taken, &[f64])> = noise.iter().map(|(i, dq)| (*i, dq.as_slice())).collect();
     let sigma: Vec<f64> = (0..joints)
         .map(|r| {
             let mut sizes: Vec<f64> = noise.iter().map(|(_, dq)| dq[r].abs()).collect();
@@ -68,8 +86,36 @@ pub fn reject_images(adjustment: &mut Adjustment) -> Option<usize> {
     }
     let (joint, error) =
         dq.iter().enumerate().max_by(|a, b| (a.1 / sigma[a.0]).abs().total_cmp(&(b.1 / sigma[b.0]).abs()))?;
-    let rejection =
-        Mismatch::JointError { usual_errors: score(dq), joint: robot.chain.readings[joint].clone(), error: *error };
-    adjustment.problem.images[*worst].rejected = Some(ImageRejection::WronglyPaired(rejection));
-    Some(*worst)
+    let (usual_errors, joint, error, worst) = (score(dq), robot.chain.readings[joint].clone(), *error, *worst);
+    match worst {
+        Taken::Image(i) => {
+            let rejection = Mismatch::JointError { usual_errors, joint, error };
+            adjustment.problem.images[i].rejected = Some(ImageRejection::WronglyPaired(rejection));
+        }
+        Taken::Body(k) => {
+            let rejected = Some(BodyRejection::JointError { usual_errors });
+            adjustment.problem.body_measurements[k].rejected = rejected;
+        }
+    }
+    Some(worst)
+}
+
+/// Re-judges every measurement of a body by its residual; returns how many verdicts changed.
+pub fn reject_bodies(adjustment: &mut Adjustment) -> usize {
+    let Adjustment { problem, state } = &*adjustment;
+    let verdict = |(k, measured): (usize, &BodyMeasurement)| {
+        let was_out = matches!(measured.rejected, Some(BodyRejection::Residual { .. }));
+        if measured.rejected.is_some() && !was_out {
+            return None;
+        }
+        let predicted = state.instrument_from_body(measured, adjustment.body_taken_from(k))?;
+        let [sigmas, bound] = measured.length(&predicted, problem.body_factors(measured));
+        let is_out = sigmas > if was_out { bound * OBSERVATION_RETURN / OBSERVATION_BOUND } else { bound };
+        (is_out != was_out).then_some((k, is_out.then_some(BodyRejection::Residual { sigmas })))
+    };
+    let verdicts: Vec<_> = problem.body_measurements.iter().enumerate().filter_map(verdict).collect();
+    for &(k, rejected) in &verdicts {
+        adjustment.problem.body_measurements[k].rejected = rejected;
+    }
+    verdicts.len()
 }

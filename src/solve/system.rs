@@ -8,10 +8,10 @@ use super::blocks::SeenMarkers;
 use super::by_markers::MarkersEliminated;
 use super::by_stops::StopsEliminated;
 use super::distances::Distances;
-use super::linear::{Carried, LinearProblem, LinearStop};
+use super::linear::{Carried, LinearPose, LinearProblem, LinearStop};
 use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
 use crate::model::plate_modes::MODES;
-use crate::problem::{Adjustment, Problem, Step};
+use crate::problem::{Adjustment, Length, Problem, Step};
 
 /// Which family of unknowns is eliminated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,6 +102,9 @@ impl System {
         let distances = Distances::none();
         let mut system = Self { information, rhs, latent_start, touched: Vec::new(), eliminated, distances };
         system.add_priors(problem);
+        for (a, b) in linear.lin.lengths.iter().flat_map(Length::pairs) {
+            system.information[(a.0, b.0)] += a.1 * b.1;
+        }
         for i in 0..system.rhs.len() {
             system.information[(i, i)] *= 1.0 + lambda;
         }
@@ -178,6 +181,9 @@ impl System {
         let markers = if let Eliminated::Markers(e) = &self.eliminated { Some(e.whitened_gradient()) } else { None };
         self.distances.take_residuals(linear, markers, &mut self.rhs);
         let values = state.values(&problem.layout);
+        for length in &linear.lin.lengths {
+            length.by_columns.iter().for_each(|(c, d)| self.rhs[*c] += d * length.residual);
+        }
         for (i, c) in problem.layout.columns.iter().enumerate() {
             self.rhs[i] += (c.prior_mean - values[i]) * c.prior_sigma.powi(-2);
         }
@@ -253,6 +259,21 @@ impl System {
                 reduced.view((start, start), (n, n)).into_owned()
             }
             Eliminated::Stops(e) => e.latent_covariance(reduced, stop.at),
+        }
+    }
+
+    /// Covariance of a pose that something shows at a stop, as its body twist, m and rad.
+    pub(super) fn pose_covariance(&self, reduced: &DMatrix<f64>, stop: &LinearStop, pose: &LinearPose) -> DMatrix<f64> {
+        match &self.eliminated {
+            Eliminated::Markers(e) => {
+                let (start, n) = (e.latent_start[stop.at], stop.unknowns());
+                let theta = pose.chain.d_theta.ncols();
+                let rows: Vec<usize> = (0..theta).chain(start..start + n).collect();
+                let mut by = pose.chain.d_theta.clone().resize_horizontally(theta + n, 0.0);
+                by.columns_mut(theta, n).copy_from(&pose.by_latents(n));
+                &by * reduced.select_rows(&rows).select_columns(&rows) * by.transpose()
+            }
+            Eliminated::Stops(e) => e.pose_covariance(reduced, stop.at, pose),
         }
     }
 

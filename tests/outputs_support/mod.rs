@@ -166,6 +166,9 @@ fn series_where(
         });
     }
     MeasuredSeries {
+        has_images: true,
+        bodies: Vec::new(),
+        lengths: Vec::new(),
         name: "run1".into(),
         camera: "front".into(),
         mounting: "run1".into(),

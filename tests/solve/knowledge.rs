@@ -22,7 +22,7 @@ use robotcal::model::robot::{Posture, Robot};
 use robotcal::output::difference::compare_solutions;
 use robotcal::output::restore::{found_model, measured_series, robot_description};
 use robotcal::output::{files, solution_json};
-use robotcal::problem::{Layout, State, short_name};
+use robotcal::problem::{Layout, Names, State, short_name};
 use robotcal::series::{CameraMount, Marker, Observation, Plate, PlateKind};
 use robotcal::simulate::truth::{TrueTerm, Truth};
 use robotcal::simulate::{RobotErrors, WorldRequest, series};
@@ -36,6 +36,8 @@ fn chain() -> Chain {
 /// A state of nothing but a robot.
 fn robot_alone(robot: Robot) -> State {
     State {
+        instruments: Vec::new(),
+        bodies: Vec::new(),
         robot,
         mountings: vec![],
         placements: vec![],
@@ -49,7 +51,7 @@ fn robot_alone(robot: Robot) -> State {
 fn layout(model: RobotModel) -> (Robot, Layout) {
     let robot = model.robot(chain());
     let state = robot_alone(robot.clone());
-    let layout = Layout::new(&state, &[], &[], &[], &[]);
+    let layout = Layout::new(&state, &Names::default());
     (robot, layout)
 }
 

@@ -5,6 +5,7 @@ mod outputs_support;
 #[path = "../support/mod.rs"]
 mod support;
 
+mod bodies;
 mod controller_poses;
 mod coverage;
 mod diagnosis;

@@ -162,7 +162,7 @@ fn check_covariance(which: Elimination, adjustment: &Adjustment, dense: &Dense, 
     let index = |u: &Unknown| match *u {
         Unknown::Column(c) => Some(c),
         Unknown::Latent(stop, k) => {
-            let position = lin.stops.iter().position(|(used, _)| *used == stop).unwrap();
+            let position = lin.stops.iter().position(|used| used.stop == stop).unwrap();
             library.system.latent_start.get(position).map(|start| start + k)
         }
         Unknown::Marker(..) => None,

@@ -12,7 +12,7 @@ use robotcal::identify::{
     identify, linear_step,
 };
 use robotcal::model::joint_terms::{JointTerm, Term};
-use robotcal::problem::{Adjustment, Layout, Problem, State};
+use robotcal::problem::{Adjustment, Layout, Names, Problem, State};
 use robotcal::series::CameraMount;
 use robotcal::solve::{Covariance, Settings, Status, solve};
 
@@ -127,7 +127,9 @@ fn every_estimator_has_a_solution_where_joints_came_back_to_readings() {
         state.robot.terms.push(JointTerm { reading: 0, term: Term::local(reading), value: 0.0 });
     }
     let (mountings, placements, cameras) = (&problem.mountings, &problem.placements, &problem.cameras);
-    problem.layout = Layout::new(&state, mountings, placements, cameras, &["plate".to_owned()]);
+    let plates = ["plate".to_owned()];
+    problem.layout =
+        Layout::new(&state, &Names { mountings, placements, cameras, plates: &plates, ..Names::default() });
     assert_eq!(problem.layout.locals.len(), 12);
     problem.noise.local = vec![1e-3, 0.0, 0.0, 0.0, 0.0, 0.0];
     for (estimator, found) in estimate_all(&Adjustment { problem, state }) {

@@ -9,7 +9,9 @@ use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::problem::{Adjustment, State, Stop, TakenFrom, Tie, predict};
-use robotcal::problem::{Image, Layout, Mark, Measured, MeasuredSeries, MeasuredStop, Noise, PlateShape, Problem};
+use robotcal::problem::{
+    Image, Layout, Mark, Measured, MeasuredSeries, MeasuredStop, Names, Noise, PlateShape, Problem,
+};
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 use robotcal::urdf::{CarriedMass, Chain, Drive, Joint, JointKind};
 
@@ -186,6 +188,8 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
         robot,
         mountings: vec![mounting],
         placements: Vec::new(),
+        instruments: Vec::new(),
+        bodies: Vec::new(),
         cameras: vec![camera; request.images_a_stop],
         plates: vec![shape],
         joint_errors,
@@ -243,13 +247,22 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
     let count = request.images_a_stop;
     let (mountings, placements) = (names(count, "mounting"), names(state.placements.len(), "placement"));
     let cameras = if count == 1 { vec!["front".to_owned()] } else { names(count, "camera") };
-    let layout = Layout::new(&state, &mountings, &placements, &cameras, &["plate".to_owned()]);
+    let plates = ["plate".to_owned()];
+    let named = Names {
+        mountings: &mountings,
+        placements: &placements,
+        cameras: &cameras,
+        plates: &plates,
+        ..Names::default()
+    };
+    let layout = Layout::new(&state, &named);
     let noise = Noise {
         pixel_factor: vec![request.pixel_factor; count],
         joint: vec![vec![request.joint_noise.max(1e-6); readings]],
         local: Vec::new(),
         tilt: Vec::new(),
         marker: Vec::new(),
+        body: Vec::new(),
     };
     (
         Problem {
@@ -260,6 +273,10 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
             cameras,
             stops,
             images,
+            instruments: Vec::new(),
+            bodies: Vec::new(),
+            body_measurements: Vec::new(),
+            lengths: Vec::new(),
             noise,
             families: Vec::new(),
             huber: 2.45,
@@ -341,6 +358,9 @@ pub fn series(problem: &Problem) -> MeasuredSeries {
         plate_name: "plate".into(),
         order_known: false,
         otherwise: Vec::new(),
+        has_images: true,
+        bodies: Vec::new(),
+        lengths: Vec::new(),
         stops: problem.images.iter().map(stop).collect(),
         plate,
     }

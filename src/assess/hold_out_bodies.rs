@@ -1,0 +1,58 @@
+//! Hold-out of measured bodies by stop: where no image tells of the robot, they are what a model is judged by.
+
+use super::hold_out::{Accuracy, Errors, FOLDS, nominal, refitted, side_by_side};
+use super::limits::Limits;
+use crate::problem::{Adjustment, State, TakenFrom};
+use crate::stage::stage;
+
+/// Predicts what was measured of bodies by models that have not seen the stop. Also returns the states, fold by fold; `None` for too few stops.
+pub fn hold_out_bodies(fit: &Adjustment, limits: &Limits) -> Option<(Accuracy, Vec<State>)> {
+    let _stage = stage("hold-out");
+    let stops: Vec<usize> = {
+        let mut all: Vec<usize> = fit.problem.used_bodies().map(|(_, m)| m.stop).collect();
+        all.dedup();
+        all
+    };
+    if stops.len() < limits.hand_eye_images {
+        return None;
+    }
+    let mut folds = vec![Vec::new(); FOLDS.min(stops.len())];
+    let count = folds.len();
+    stops.into_iter().enumerate().for_each(|(k, stop)| folds[k % count].push(stop));
+    let (before, _) = predictions(&nominal(fit), &folds)?;
+    let (after, states) = predictions(fit, &folds)?;
+    let mut per_body_mm = vec![None; fit.problem.body_measurements.len()];
+    for ((k, a), (_, b)) in before.iter().zip(&after) {
+        per_body_mm[*k] = Some([*a, *b]);
+    }
+    let [nominal, calibrated] = [summary(&before), summary(&after)];
+    let accuracy = Accuracy { nominal, calibrated, per_image_mm: Vec::new(), per_body_mm, folds: folds.len() };
+    Some((accuracy, states))
+}
+
+/// Distance of what was measured from what is predicted, mm, with the index of the measurement; ascending.
+type Predictions = (Vec<(usize, f64)>, Vec<State>);
+
+fn predictions(fit: &Adjustment, folds: &[Vec<usize>]) -> Option<Predictions> {
+    let states = side_by_side(folds, |_, held| refitted(fit.without_bodies_at(held)));
+    let mut errors = Vec::new();
+    for (held, state) in folds.iter().zip(&states) {
+        for (k, measured) in fit.problem.used_bodies().filter(|(_, m)| held.contains(&m.stop)) {
+            let posture = fit.problem.stops[measured.stop].posture.as_ref()?;
+            let predicted = state.instrument_from_body(measured, TakenFrom::exact(posture))?;
+            errors.push((k, 1e3 * (measured.seen.position() - predicted.translation).norm()));
+        }
+    }
+    errors.sort_by_key(|(k, _)| *k);
+    Some((errors, states))
+}
+
+fn summary(errors: &[(usize, f64)]) -> Errors {
+    let squares: f64 = errors.iter().map(|(_, mm)| mm * mm).sum();
+    Errors {
+        rms_px: 0.0,
+        rms_mm: (squares / errors.len().max(1) as f64).sqrt(),
+        worst_mm: errors.iter().map(|(_, mm)| *mm).fold(0.0, f64::max),
+        images: errors.len(),
+    }
+}

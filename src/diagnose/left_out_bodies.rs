@@ -1,0 +1,76 @@
+//! Do measurements of trackers and contacts belong to their stops?
+
+use std::fmt;
+
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
+use crate::error::Code;
+use crate::problem::Adjustment;
+
+/// Most that are named.
+const MOST_NAMED: usize = 5;
+
+/// Measurements of bodies that do not fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasurementsLeftOut {
+    /// Stop, instrument and reason of each.
+    pub named: Vec<[String; 3]>,
+    /// How many there were.
+    pub all: usize,
+    /// Note, gate, or refusal where most are left out.
+    pub weight: Weight,
+}
+
+pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<MeasurementsLeftOut> {
+    let problem = &adjustment.problem;
+    let mut named = Vec::new();
+    for measured in &problem.body_measurements {
+        let Some(why) = &measured.rejected else { continue };
+        let stop = &problem.stops[measured.stop];
+        let first = problem.stops.iter().position(|s| s.series == stop.series).unwrap_or(0);
+        let name = setting.series[stop.series].stops[measured.stop - first].image.clone();
+        named.push([name, problem.instruments[measured.instrument].name.clone(), why.to_string()]);
+    }
+    let (out, all) = (named.len(), problem.body_measurements.len());
+    let share = |limit: f64| out as f64 > limit * all as f64;
+    let weight = match () {
+        () if out == 0 => return None,
+        () if share(setting.limits.hopeless_share_of_images_left_out) => Weight::Refusal,
+        () if share(setting.limits.share_of_images_left_out) => Weight::Gate,
+        () => Weight::Note,
+    };
+    Some(MeasurementsLeftOut { named, all, weight })
+}
+
+impl fmt::Display for MeasurementsLeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let named: Vec<String> =
+            self.named.iter().map(|[stop, instrument, why]| format!("stop {stop} ({instrument}): {why}")).collect();
+        let (out, all) = (self.named.len(), self.all);
+        write!(
+            f,
+            "measurements: {out} of {all} do not fit the others and are left out: {}",
+            some_of(&named, MOST_NAMED)
+        )
+    }
+}
+
+impl Kind for MeasurementsLeftOut {
+    fn code(&self) -> Code {
+        Code::MeasurementsLeftOut
+    }
+
+    fn weight(&self) -> Weight {
+        self.weight
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        self.named.iter().map(|[stop, ..]| Subject::Stop(stop.clone())).collect()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![
+            Quantity::new("measurements_left_out", self.named.len() as f64, "1"),
+            Quantity::new("measurements", self.all as f64, "1"),
+        ]
+    }
+}

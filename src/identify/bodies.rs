@@ -1,0 +1,91 @@
+//! What was measured of bodies on the tip, in all series: who shares what, by name.
+
+use crate::problem::{
+    BodyMeasurement, BodySeen, Instrument, InstrumentKind, Layout, LengthEnds, MeasuredLength, MeasuredSeries,
+    SeenLength,
+};
+
+/// Index of a name among `names`, to which it is added where it is new.
+pub(super) fn intern(names: &mut Vec<String>, name: &str) -> usize {
+    names.iter().position(|n| n == name).unwrap_or_else(|| {
+        names.push(name.to_owned());
+        names.len() - 1
+    })
+}
+
+/// Instruments, bodies and what was measured, by index.
+#[derive(Debug, Default)]
+pub(super) struct Bodies {
+    /// The instruments.
+    pub instruments: Vec<Instrument>,
+    /// Names of the bodies.
+    pub names: Vec<String>,
+    /// Measurements, in the order of their stops.
+    pub measurements: Vec<BodyMeasurement>,
+    /// Measured distances.
+    pub lengths: Vec<MeasuredLength>,
+    /// Number of variance components: one for every kind of instrument in a series.
+    pub components: usize,
+}
+
+impl Bodies {
+    /// Of all series, whose first stops are given.
+    pub fn of(series: &[MeasuredSeries], first_stop: &[usize]) -> Self {
+        let mut all = Self::default();
+        for (s, &first) in series.iter().zip(first_stop) {
+            let mut components: Vec<(InstrumentKind, usize)> = Vec::new();
+            for seen in &s.bodies {
+                let component = match components.iter().find(|(kind, _)| *kind == seen.kind) {
+                    Some((_, component)) => *component,
+                    None => {
+                        components.push((seen.kind, all.components));
+                        all.components += 1;
+                        all.components - 1
+                    }
+                };
+                let instrument = all.instrument(&seen.instrument, seen.kind, component);
+                let body = intern(&mut all.names, &seen.body);
+                all.measurements.push(BodyMeasurement {
+                    stop: first + seen.stop,
+                    instrument,
+                    body,
+                    seen: seen.seen,
+                    sigma_m: seen.sigma_m,
+                    sigma_rad: seen.sigma_rad,
+                    rejected: None,
+                });
+            }
+            all.lengths.extend(s.lengths.iter().filter_map(|l| all.length(l)).collect::<Vec<_>>());
+        }
+        all.measurements.sort_by_key(|m| m.stop);
+        all
+    }
+
+    fn instrument(&mut self, name: &str, kind: InstrumentKind, component: usize) -> usize {
+        let found = self.instruments.iter().position(|i| i.name == name && i.kind == kind);
+        found.unwrap_or_else(|| {
+            self.instruments.push(Instrument { name: name.to_owned(), kind, component });
+            self.instruments.len() - 1
+        })
+    }
+
+    /// By names of instruments, else of bodies.
+    fn length(&self, length: &SeenLength) -> Option<MeasuredLength> {
+        let pair = |of: &dyn Fn(&String) -> Option<usize>| Some([of(&length.between[0])?, of(&length.between[1])?]);
+        let instruments = pair(&|name| self.instruments.iter().position(|i| &i.name == name));
+        let bodies = || pair(&|name| self.names.iter().position(|n| n == name));
+        let ends = instruments.map(LengthEnds::Instruments).or_else(|| bodies().map(LengthEnds::Bodies))?;
+        Some(MeasuredLength { ends, distance_m: length.distance_m, sigma_m: length.sigma_m })
+    }
+
+    /// Holds turns that nothing sees: of bodies that are seen as points only, and of frames that are parallel to the base.
+    pub fn hold_unseen_turns(&self, layout: &mut Layout) {
+        let is_seen_as_pose =
+            |body: usize| self.measurements.iter().any(|m| m.body == body && matches!(m.seen, BodySeen::Pose(_)));
+        let bodies =
+            layout.bodies.iter().enumerate().filter(|(body, _)| !is_seen_as_pose(*body)).map(|(_, r)| r.clone());
+        let frames = layout.instruments.iter().zip(&self.instruments).filter(|(_, i)| i.kind.is_parallel_to_base());
+        let held: Vec<usize> = bodies.chain(frames.map(|(r, _)| r.clone())).flat_map(|r| r.skip(3)).collect();
+        held.into_iter().for_each(|c| layout.columns[c].free = false);
+    }
+}

@@ -1,0 +1,226 @@
+//! A body that the tip carries, measured at a stop: a reflector or a ball as a point, a 6-DoF target as a pose.
+//!
+//! `instrument_from_body = instrument_from_base * base_from_tip(q) * tip_from_body`, in the frame of the instrument that measured it: that of
+//! a tracker, of a socket that a ball sits in (parallel to the base, its origin is the place), or of given places. To the robot it is what
+//! a fixed camera and its plate are, so it enters through the same six degrees of freedom.
+
+use std::fmt;
+
+use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
+
+use super::linearise::Chained;
+use super::{Layout, State, TakenFrom};
+use crate::geom::{Pose, right_jacobian_se3};
+use crate::model::robot::LinearOrigins;
+use crate::series::CameraMount;
+
+/// Huber bounds on the normalised length of a residual: the 95 % points of the length of a standard normal vector of 3 and of 6 components.
+const HUBER: [f64; 2] = [2.795, 3.548];
+
+/// Lengths that a standard normal vector of 3 and of 6 components exceeds with a probability of 4e-5, as those do that are left out of an image.
+const BOUND: [f64; 2] = [4.79, 5.52];
+
+/// What measures bodies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InstrumentKind {
+    /// A tracker, in a frame of its own.
+    Tracker,
+    /// A socket: the body is always at the same place of the base.
+    Socket,
+    /// Given places, in a frame of their own.
+    Places,
+}
+
+impl InstrumentKind {
+    /// Name of the block of its columns.
+    pub fn block(self) -> &'static str {
+        match self {
+            Self::Tracker => "tracker",
+            Self::Socket => "contact",
+            Self::Places => "places",
+        }
+    }
+
+    /// True where the axes of its frame are those of the base.
+    pub fn is_parallel_to_base(self) -> bool {
+        self == Self::Socket
+    }
+}
+
+/// One frame in which bodies are measured.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Instrument {
+    /// Name.
+    pub name: String,
+    /// What it is.
+    pub kind: InstrumentKind,
+    /// Index of its variance components in [`super::Noise::body`]: sockets of one series have them in common.
+    pub component: usize,
+}
+
+/// What an instrument saw of a body, in its frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BodySeen {
+    /// Its origin, m.
+    Point(Vector3<f64>),
+    /// Its pose, `instrument_from_body`.
+    Pose(Pose),
+}
+
+impl BodySeen {
+    /// Number of coordinates.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Point(_) => 3,
+            Self::Pose(_) => 6,
+        }
+    }
+
+    /// Where it was seen, m.
+    pub fn position(&self) -> Vector3<f64> {
+        match self {
+            Self::Point(position) => *position,
+            Self::Pose(pose) => pose.translation,
+        }
+    }
+}
+
+/// Why a measurement of a body is left out.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(tag = "code", rename_all = "snake_case")]
+pub enum BodyRejection {
+    /// It disagrees with all others at its stop.
+    Residual {
+        /// Length of its residual in sigmas.
+        sigmas: f64,
+    },
+    /// It and the joint readings of its stop do not belong together.
+    JointError {
+        /// In usual joint errors, RMS over the joints.
+        usual_errors: f64,
+    },
+    /// The caller does not want it: held out.
+    Excluded,
+}
+
+impl fmt::Display for BodyRejection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Residual { sigmas } => write!(f, "its residual is {sigmas:.1} sigma"),
+            Self::JointError { usual_errors } => {
+                write!(f, "its joint readings would have to be wrong by {usual_errors:.1} of the usual noise")
+            }
+            Self::Excluded => f.write_str("not asked for"),
+        }
+    }
+}
+
+/// One measurement of a body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodyMeasurement {
+    /// Index of its stop.
+    pub stop: usize,
+    /// Index of the instrument.
+    pub instrument: usize,
+    /// Index of the body.
+    pub body: usize,
+    /// What was seen.
+    pub seen: BodySeen,
+    /// Stated sigma of a coordinate, m.
+    pub sigma_m: f64,
+    /// Stated sigma of the rotation about an axis, rad.
+    pub sigma_rad: f64,
+    /// Why it is left out; `None` while it is used.
+    pub rejected: Option<BodyRejection>,
+}
+
+/// Normal-equation blocks of one measurement in the six degrees of freedom of `instrument_from_body`.
+#[derive(Debug, Clone)]
+pub struct BodyTerms {
+    /// Robust cost.
+    pub cost: f64,
+    /// Information.
+    pub pp: Matrix6<f64>,
+    /// Right-hand side.
+    pub bp: Vector6<f64>,
+    /// Measured minus predicted: position (m), then rotation (rad, zero for a point); as a body twist for a pose.
+    pub residual: Vector6<f64>,
+    /// Sums of squares in units of the stated sigmas: position, rotation.
+    pub squares: [f64; 2],
+    /// Huber weight.
+    pub weight: f64,
+}
+
+impl BodyMeasurement {
+    /// Length of the residual at a predicted pose in sigmas, and that which a normal one exceeds with a probability of 4e-5.
+    pub fn length(&self, predicted: &Pose, factors: [f64; 2]) -> [f64; 2] {
+        let BodyTerms { squares, .. } = self.linearise(predicted, factors);
+        let length = (squares[0] / factors[0].powi(2) + squares[1] / factors[1].powi(2)).sqrt();
+        [length, BOUND[usize::from(self.seen.len() == 6)]]
+    }
+
+    /// Blocks at a predicted pose, with factors on the stated sigmas of position and rotation.
+    pub fn linearise(&self, predicted: &Pose, factors: [f64; 2]) -> BodyTerms {
+        let (residual, jacobian) = self.residual(predicted);
+        let sigma = [self.sigma_m, self.sigma_rad];
+        let square = |k: usize| residual.fixed_rows::<3>(3 * k).norm_squared() / sigma[k].powi(2);
+        let squares = [square(0), if self.seen.len() == 6 { square(1) } else { 0.0 }];
+        let length = (squares[0] / factors[0].powi(2) + squares[1] / factors[1].powi(2)).sqrt();
+        let bound = HUBER[usize::from(self.seen.len() == 6)];
+        let weight = if length <= bound { 1.0 } else { bound / length };
+        let cost = if length <= bound { 0.5 * length * length } else { bound * (length - 0.5 * bound) };
+        let information = |k: usize| weight / (sigma[k / 3] * factors[k / 3]).powi(2);
+        let w =
+            Matrix6::from_diagonal(&Vector6::from_fn(|k, _| if k < self.seen.len() { information(k) } else { 0.0 }));
+        let jw = jacobian.transpose() * w;
+        BodyTerms { cost, pp: jw * jacobian, bp: jw * residual, residual, squares, weight }
+    }
+
+    /// Measured minus predicted, and the derivative of the prediction by its body twist.
+    fn residual(&self, predicted: &Pose) -> (Vector6<f64>, Matrix6<f64>) {
+        match &self.seen {
+            BodySeen::Point(position) => {
+                let d = position - predicted.translation;
+                let mut jacobian = Matrix6::zeros();
+                jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&predicted.rotation);
+                (Vector6::new(d.x, d.y, d.z, 0.0, 0.0, 0.0), jacobian)
+            }
+            BodySeen::Pose(pose) => {
+                let residual = (predicted.inverse() * *pose).log();
+                // log(Exp(-x) Exp(r)) = r - J_l(r)^-1 x, and J_l(r) = J_r(-r).
+                let jacobian = right_jacobian_se3(&-residual).try_inverse().unwrap_or_else(Matrix6::identity);
+                (residual, jacobian)
+            }
+        }
+    }
+}
+
+impl State {
+    /// `instrument_from_body` as the unknowns say; `None` off the robot.
+    pub fn instrument_from_body(&self, measured: &BodyMeasurement, from: TakenFrom) -> Option<Pose> {
+        let tip = self.robot.pose_at(from.posture?, &from.errors());
+        let [instrument, body] = [&self.instruments[measured.instrument], &self.bodies[measured.body]];
+        Some(CameraMount::Fixed.camera_from_plate(instrument, &tip, body))
+    }
+
+    /// The same with its derivatives.
+    pub fn body_chained(
+        &self,
+        origins: &LinearOrigins,
+        layout: &Layout,
+        measured: &BodyMeasurement,
+        from: TakenFrom,
+    ) -> Option<Chained> {
+        let kinematics = self.robot.kinematics_from(origins, from.posture?, &from.errors());
+        let [instrument, body] = [&self.instruments[measured.instrument], &self.bodies[measured.body]];
+        let mounted = CameraMount::Fixed.linearised(instrument, &kinematics.base_from_tip, body);
+        let mut d_theta = DMatrix::zeros(6, layout.theta_len());
+        kinematics.put(&mounted.d_robot, layout, &mut d_theta);
+        let starts = [layout.instruments[measured.instrument].start, layout.bodies[measured.body].start];
+        d_theta.fixed_view_mut::<6, 6>(0, starts[0]).copy_from(&mounted.d_camera);
+        d_theta.fixed_view_mut::<6, 6>(0, starts[1]).copy_from(&Matrix6::identity());
+        let d_latent = kinematics.by_readings(&mounted.d_robot, from.joints());
+        Some(Chained { pose: mounted.camera_from_plate, d_theta, d_latent })
+    }
+}

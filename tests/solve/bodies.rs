@@ -1,0 +1,291 @@
+//! Trackers and sockets in the place of a camera: simulated robots with known truth.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use nalgebra::{DVector, Vector3};
+use robotcal::assess::{MeasuredPoint, fit_points};
+use robotcal::geom::Pose;
+use robotcal::identify::{Options, RobotModel, Solution, identify};
+use robotcal::model::robot::{Posture, Robot};
+use robotcal::problem::{
+    Adjustment, BodySeen, InstrumentKind, MeasuredSeries, MeasuredStop, SeenBody, SeenLength, Step,
+};
+use robotcal::solve::{Elimination, System};
+use robotcal::urdf::{self, Chain};
+
+use crate::support::small::Dice;
+
+/// What measures, and how well.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Points,
+    Poses,
+}
+
+struct World {
+    truth: Robot,
+    chain: Chain,
+    series: MeasuredSeries,
+    sigma_m: f64,
+    noise_rad: f64,
+}
+
+fn chain() -> Chain {
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    urdf::read(&urdf).unwrap().chain(None, None).unwrap()
+}
+
+fn stop(k: usize, readings: Vec<f64>) -> MeasuredStop {
+    let (image, placement) = (format!("{k:03}"), "placement_0".to_owned());
+    MeasuredStop { image, readings: Some(readings), placement, observations: Vec::new(), left_out: None }
+}
+
+/// Robot with errors of 0.5 mm and 1 mrad an axis.
+fn truth(dice: &mut Dice, chain: &Chain) -> Robot {
+    let mut robot = Robot::nominal(chain.clone());
+    for twist in &mut robot.twists {
+        for k in 0..6 {
+            twist[k] = dice.normal(if k < 3 { 5e-4 } else { 1e-3 });
+        }
+    }
+    robot
+}
+
+/// Readings of the middle of the workspace.
+fn readings(dice: &mut Dice) -> Vec<f64> {
+    let middle = [0.0, -1.2, 1.4, 0.0, 0.6, 0.0];
+    let reach = [1.2, 0.5, 0.6, 1.8, 0.9, 2.5];
+    middle.iter().zip(reach).map(|(m, r)| m + dice.between(-r, r)).collect()
+}
+
+impl World {
+    fn new(seed: u64, kind: Kind, stops: usize, (sigma_m, sigma_rad): (f64, f64), noise_rad: f64) -> Self {
+        let mut dice = Dice::new(seed);
+        let chain = chain();
+        let truth = truth(&mut dice, &chain);
+        let tip_from_body = dice.pose(0.15, 1.0);
+        let base_from_tracker = dice.pose(2.5, 2.0);
+        let mut all = Vec::new();
+        let mut seen = Vec::new();
+        for k in 0..stops {
+            let q = readings(&mut dice);
+            let errors: Vec<f64> = (0..q.len()).map(|_| dice.normal(noise_rad)).collect();
+            let body = truth.pose_at(&Posture::at(&q), &errors) * tip_from_body;
+            let tracker_from_body = base_from_tracker.inverse() * body;
+            let jitter = Vector3::from_fn(|_, _| dice.normal(sigma_m));
+            let turn = Vector3::from_fn(|_, _| dice.normal(sigma_rad));
+            let noise = nalgebra::Vector6::new(jitter.x, jitter.y, jitter.z, turn.x, turn.y, turn.z);
+            let measured = tracker_from_body.perturbed(&noise);
+            let what = match kind {
+                Kind::Points => BodySeen::Point(measured.translation),
+                _ => BodySeen::Pose(measured),
+            };
+            seen.push(SeenBody {
+                stop: k,
+                instrument: "tracker".into(),
+                kind: InstrumentKind::Tracker,
+                body: "reflector".into(),
+                seen: what,
+                sigma_m,
+                sigma_rad: sigma_rad.max(1e-6),
+            });
+            all.push(stop(k, q));
+        }
+        let mut series = MeasuredSeries::without_images("run", true, all);
+        series.bodies = seen;
+        Self { truth, chain, series, sigma_m, noise_rad }
+    }
+
+    /// A ball on the tip, put into sockets with the tip turned to many directions.
+    fn sockets(seed: u64, places: usize, stops_each: usize, sigma_m: f64, noise_rad: f64) -> Self {
+        let mut dice = Dice::new(seed);
+        let chain = chain();
+        let truth = truth(&mut dice, &chain);
+        let ball = Pose::new(nalgebra::Matrix3::identity(), Vector3::new(0.02, -0.03, 0.11));
+        let mut world =
+            Self { series: MeasuredSeries::without_images("run", true, Vec::new()), truth, chain, sigma_m, noise_rad };
+        let mut centres = Vec::new();
+        for place in 0..places {
+            let centre = (world.truth.pose_at(&Posture::at(&readings(&mut dice)), &[0.0; 6]) * ball).translation;
+            for _ in 0..stops_each {
+                let q = loop {
+                    if let Some(q) = world.reached(&mut dice, &ball, &centre) {
+                        break q;
+                    }
+                };
+                let k = world.series.stops.len();
+                world.series.bodies.push(SeenBody {
+                    stop: k,
+                    instrument: format!("socket {place}"),
+                    kind: InstrumentKind::Socket,
+                    body: "ball".into(),
+                    seen: BodySeen::Point(Vector3::zeros()),
+                    sigma_m,
+                    sigma_rad: 1.0,
+                });
+                world.series.stops.push(stop(k, q));
+            }
+            centres.push(centre);
+        }
+        for (k, pair) in centres.windows(2).enumerate() {
+            world.series.lengths.push(SeenLength {
+                between: [format!("socket {k}"), format!("socket {}", k + 1)],
+                distance_m: (pair[1] - pair[0]).norm() + dice.normal(5e-5),
+                sigma_m: 5e-5,
+            });
+        }
+        world
+    }
+
+    /// Readings with which the true robot, its joint errors included, has the ball in the socket up to its noise.
+    fn reached(&self, dice: &mut Dice, ball: &Pose, centre: &Vector3<f64>) -> Option<Vec<f64>> {
+        let mut q = readings(dice);
+        let errors: Vec<f64> = (0..q.len()).map(|_| dice.normal(self.noise_rad)).collect();
+        let wanted = centre + Vector3::from_fn(|_, _| dice.normal(self.sigma_m));
+        for _ in 0..30 {
+            let kinematics = self.truth.kinematics(&Posture::at(&q), &errors);
+            let body = kinematics.base_from_tip * *ball;
+            let missing = wanted - body.translation;
+            if missing.norm() < 1e-12 {
+                return (q.iter().all(|q| q.abs() < 3.0)).then_some(q);
+            }
+            let j = nalgebra::Matrix3xX::from_columns(
+                &kinematics
+                    .d_readings
+                    .iter()
+                    .map(|d| {
+                        let (rho, phi) = (d.fixed_rows::<3>(0).into_owned(), d.fixed_rows::<3>(3).into_owned());
+                        kinematics.base_from_tip.rotation * (rho + phi.cross(&ball.translation))
+                    })
+                    .collect::<Vec<_>>(),
+            );
+            let step = j.clone().svd(true, true).pseudo_inverse(1e-9).unwrap() * missing;
+            let longest = step.amax();
+            let share = if longest > 0.3 { 0.3 / longest } else { 1.0 };
+            q.iter_mut().zip(step.iter()).for_each(|(q, s)| *q += share * s);
+        }
+        None
+    }
+
+    fn solve(&self, model: RobotModel) -> Solution {
+        identify(self.chain.clone(), std::slice::from_ref(&self.series), &Options { model, ..Options::default() })
+            .unwrap()
+    }
+
+    /// RMS error of points on the tip, mm, over joint vectors that were not measured, the base frame and the point fitted.
+    fn error_mm(&self, robot: &Robot) -> f64 {
+        let mut dice = Dice::new(999);
+        let points: Vec<MeasuredPoint> = (0..120)
+            .map(|_| {
+                let readings = readings(&mut dice);
+                let at = self.truth.base_from_tip(&readings).transform(&Vector3::new(0.05, 0.02, 0.1));
+                MeasuredPoint { position_m: at, readings }
+            })
+            .collect();
+        1e3 * fit_points(robot, &points).unwrap().rms_m
+    }
+}
+
+fn check(world: &World, most_mm: f64) {
+    let solution = world.solve(RobotModel::Rigid);
+    let nominal = world.error_mm(&Robot::nominal(world.chain.clone()));
+    let found = world.error_mm(&solution.exported_robot());
+    let factors = &solution.fit.problem.noise.body;
+    println!("{nominal:.3} -> {found:.3} mm, factors {factors:?}, joint noise {:?}", solution.fit.problem.noise.joint);
+    println!("held out {:?}", solution.accuracy.calibrated);
+    assert!(nominal > 1.0 && found < most_mm, "{nominal} {found}");
+}
+
+#[test]
+fn a_robot_is_identified_from_tracker_points_alone() {
+    check(&World::new(1, Kind::Points, 80, (3e-5, 0.0), 2e-5), 0.15);
+}
+
+#[test]
+fn a_robot_is_identified_from_tracker_poses_alone() {
+    check(&World::new(2, Kind::Poses, 40, (3e-5, 5e-5), 2e-5), 0.1);
+}
+
+#[test]
+fn a_robot_is_identified_from_a_ball_in_sockets() {
+    check(&World::sockets(3, 4, 25, 5e-5, 2e-5), 0.3);
+}
+
+/// Away from the optimum, so that the gradient is not nearly zero.
+fn shaken(solution: &Solution) -> Adjustment {
+    let mut dice = Dice::new(5);
+    let mut adjustment = solution.fit.adjustment.clone();
+    let layout = adjustment.problem.layout.clone();
+    let dense: Vec<f64> = layout.columns.iter().map(|c| if c.free { dice.normal(3e-5) } else { 0.0 }).collect();
+    let joint_errors = adjustment.state.joint_errors.iter().map(|s| s.iter().map(|_| dice.normal(3e-5)).collect());
+    let step = Step {
+        dense: DVector::from_vec(dense),
+        joint_errors: joint_errors.collect(),
+        ties: Vec::new(),
+        markers: Vec::new(),
+    };
+    adjustment.state = adjustment.state.moved(&layout, &step);
+    adjustment
+}
+
+#[test]
+fn the_gradient_of_measured_bodies_is_that_of_the_cost() {
+    for world in [
+        World::new(4, Kind::Points, 12, (3e-5, 0.0), 2e-5),
+        World::new(5, Kind::Poses, 12, (3e-5, 5e-5), 2e-5),
+        World::sockets(6, 3, 8, 5e-5, 2e-5),
+    ] {
+        let adjustment = shaken(&world.solve(RobotModel::Gear));
+        let (problem, state) = (&adjustment.problem, &adjustment.state);
+        let lin = adjustment.linearise().unwrap();
+        let system = System::with(Elimination::Markers, adjustment.linear(&lin), 0.0);
+        let starts = &system.latent_start;
+        let mut dice = Dice::new(8);
+        for _ in 0..20 {
+            let draw = |dice: &mut Dice, free: bool| if free { dice.normal(1.0) } else { 0.0 };
+            let dense: Vec<f64> = problem.layout.columns.iter().map(|c| draw(&mut dice, c.free)).collect();
+            let errors: Vec<Vec<f64>> =
+                state.joint_errors.iter().map(|s| s.iter().map(|_| draw(&mut dice, true)).collect()).collect();
+            let along: f64 = dense.iter().zip(system.rhs.iter()).map(|(d, g)| d * g).sum::<f64>()
+                + (errors.iter().zip(starts))
+                    .map(|(e, &s)| e.iter().enumerate().map(|(k, e)| e * system.rhs[s + k]).sum::<f64>())
+                    .sum::<f64>();
+            let cost = |h: f64| {
+                let step = Step {
+                    dense: DVector::from_vec(dense.clone()) * h,
+                    joint_errors: errors.iter().map(|e| e.iter().map(|e| e * h).collect()).collect(),
+                    ties: Vec::new(),
+                    markers: Vec::new(),
+                };
+                let state = state.moved(&problem.layout, &step);
+                Adjustment { problem: problem.clone(), state }.linearise().unwrap().cost
+            };
+            let h = 1e-7;
+            let numeric = -(cost(h) - cost(-h)) / (2.0 * h);
+            assert!((along - numeric).abs() < 1e-4 * along.abs().max(1e6), "{along} {numeric}");
+        }
+    }
+}
+
+#[test]
+fn both_eliminations_of_measured_bodies_take_the_same_step() {
+    let adjustment = shaken(&World::new(5, Kind::Poses, 12, (3e-5, 5e-5), 2e-5).solve(RobotModel::Rigid));
+    let lin = adjustment.linearise().unwrap();
+    let linear = adjustment.linear(&lin);
+    let [a, b] = [Elimination::Markers, Elimination::Stops].map(|which| {
+        let system = System::with(which, linear, 0.0);
+        let x = system.factor(linear).unwrap().solve(&system.rhs);
+        (system.step(linear, &x), system.decrement(&x), linear.covariance_by(which).unwrap())
+    });
+    let size = a.0.dense.amax();
+    assert!((&a.0.dense - &b.0.dense).amax() < 1e-8 * size, "{}", (&a.0.dense - &b.0.dense).amax() / size);
+    assert!((a.1 - b.1).abs() < 1e-8 * a.1);
+    for (own, other) in a.0.joint_errors.iter().zip(&b.0.joint_errors) {
+        assert!(own.iter().zip(other).all(|(a, b)| (a - b).abs() < 1e-11));
+    }
+    let sigma = |k: usize, of: &(Step, f64, robotcal::solve::Covariance)| of.2.sigma(k);
+    let columns = adjustment.problem.layout.len();
+    assert!((0..columns).all(|k| (sigma(k, &a) - sigma(k, &b)).abs() <= 1e-6 * sigma(k, &a)));
+}
