@@ -112,12 +112,12 @@ impl<'a> FlangeModel<'a> {
         };
         let sum = stops.iter().fold(model.fitted[0].clone(), |sum, s| sum + model.derivative(s).1);
         model.fitted[0] = sum / stops.len() as f64;
-        // A place without axes of its own, as that of a socket is, tells nothing of how the base stands to it.
-        let has_axes = (still_column + 3..still_column + 6).all(|c| layout.columns[c].free);
-        if has_axes { Some(model) } else { model.with_fitted_base(stops) }
+        // A tracker or a socket is gone after the calibration: right is what is right relative to the base that fits.
+        let is_gone = layout.instruments.iter().any(|r| r.start == still_column);
+        if is_gone { model.with_fitted_base(stops) } else { Some(model) }
     }
 
-    /// The same relative to the base that fits the stops best, where nothing that stands still has axes of its own: least squares over
+    /// The same relative to the base that fits the stops best, where nothing that stands still remains: least squares over
     /// tool and base, `J(q) = tool + Ad(pose(q)^-1) base`.
     fn with_fitted_base(mut self, stops: &[Posture]) -> Option<Self> {
         let columns = self.layout.theta_len();

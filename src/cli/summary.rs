@@ -105,7 +105,8 @@ fn flange_in_brief(r: &SolutionRecord) -> Vec<String> {
 /// How well unseen images are predicted.
 fn held_out(r: &SolutionRecord) -> Vec<String> {
     let [before, after] = [&r.accuracy.nominal, &r.accuracy.calibrated].map(|e| e.rms_mm);
-    let words = format!("{before:.3} -> {after:.3} mm on the plate, in images that the fit had not seen");
+    let what = if r.images.is_empty() { "at stops" } else { "on the plate, in images" };
+    let words = format!("{before:.3} -> {after:.3} mm {what} that the fit had not seen");
     vec![indented("held out", &words)]
 }
 
@@ -119,8 +120,14 @@ fn left_out(r: &SolutionRecord) -> Vec<String> {
     let named: Vec<String> = reasons.iter().map(|(code, n)| format!("{n} {}", spoken(*code))).collect();
     let why = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
     let s = &r.statistics;
+    let b = &r.bodies.measurements;
+    let of_bodies = format!("{} of {} measurements", b.iter().filter(|m| m.rejection.is_some()).count(), b.len());
+    if r.images.is_empty() {
+        return vec![indented("left out", &of_bodies)];
+    }
+    let bodies = if b.is_empty() { String::new() } else { format!(", {of_bodies}") };
     let words = format!(
-        "{out} of {} images{why}, {} of {} observations",
+        "{out} of {} images{why}, {} of {} observations{bodies}",
         r.images.len(),
         s.observations_left_out,
         s.observations_left_out + s.observations_used

@@ -3,8 +3,9 @@
 use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
 use super::{
-    camera_model, few_images, focus, joint_noise, left_out_bodies, left_out_images, left_out_observations, loose,
-    marker_off, moved, no_gain, parameter_off, plate_size, pose_step, scatter, undetermined,
+    camera_model, extrapolates, few_images, focus, joint_noise, left_out_bodies, left_out_images,
+    left_out_observations, loose, marker_off, moved, no_gain, parameter_off, plate_size, pose_step, scatter,
+    undetermined,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -71,6 +72,7 @@ pub const CHECKS: &[Check] = &[
     check("marker_off", Stage::Fit(|a, b, s| found(marker_off::check(a, b, s)))),
     check("parameter_off", Stage::Fit(|a, b, s| found(parameter_off::check(a, b, s)))),
     check("scatter", Stage::Uncertainty(|a, b, s| found(scatter::check(a, b, s)))),
+    check("extrapolates", Stage::Uncertainty(|a, b, s| found(extrapolates::check(a, b, s)))),
     check("undetermined", Stage::Uncertainty(|a, b, s| found(undetermined::check(a, b, s)))),
 ];
 

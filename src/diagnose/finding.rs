@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::camera_model::CameraModelMisfit;
 use super::displaced::Displaced;
+use super::extrapolates::Extrapolates;
 use super::few_images::FewImages;
 use super::focus::FocusChange;
 use super::joint_noise::JointNoiseLarge;
@@ -52,6 +53,7 @@ findings! {
     CameraModelMisfit,
     Displaced,
     DoubtedSize,
+    Extrapolates,
     FewImages,
     FlangeUndetermined,
     FocusChange,

@@ -6,6 +6,7 @@
 mod camera_model;
 mod checks;
 mod displaced;
+mod extrapolates;
 mod few_images;
 mod finding;
 mod focus;
@@ -30,6 +31,7 @@ mod undetermined;
 pub use camera_model::CameraModelMisfit;
 pub use checks::{CHECKS, Check, Diagnosis, Stage};
 pub use displaced::{Carried, Displaced, Displacement};
+pub use extrapolates::Extrapolates;
 pub use few_images::FewImages;
 pub use finding::Finding;
 pub use focus::FocusChange;

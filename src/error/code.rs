@@ -272,6 +272,7 @@ codes! {
     Unsolved "Findings" {
         Noticed "noticed" "a notice of an earlier version of the program, which gave it no code of its own",
         CameraModelMisfit "camera_model_misfit" "the camera model does not explain the markers",
+        Extrapolates "extrapolates" "outside the region of the stops the flange is known badly",
         FewImages "few_images" "few images: the nominal model decides much of the result",
         FocusChanged "focus_changed" "focus or zoom changed during the series",
         JointNoiseLarge "joint_noise_large" "the joint noise is larger than robots have",

@@ -1,15 +1,14 @@
 //! Laplace's approximation of the evidence of a model (D. MacKay, *Bayesian interpolation*, 1992).
 
 use crate::linalg::SymmetricFactor;
-use crate::solve::{Elimination, LinearProblem, SeenMarkers, System};
+use crate::solve::{Elimination, LinearProblem, System};
 
 /// `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what models of the same data share, with the whole information `N`
 /// (dense columns, latents and markers) at the optimum; `None` where it is not finite.
 pub fn log_evidence(linear: LinearProblem) -> Option<f64> {
-    let system = System::with(Elimination::Markers, linear, 0.0);
+    let system = System::with(Elimination::cheaper(linear), linear, 0.0);
     let reduced = SymmetricFactor::new(&system.information).ok()?.log_determinant();
-    let markers = SeenMarkers::of(linear).information(linear);
-    let eliminated: f64 = markers.iter().map(|block| block.determinant().ln()).sum();
+    let eliminated = system.log_determinant_of_eliminated(linear);
     let distances = system.log_determinant_of_distances();
     let priors: f64 = (linear.adjustment.problem.layout.columns.iter())
         .filter(|c| c.free && c.prior_sigma.is_finite())

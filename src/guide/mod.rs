@@ -15,6 +15,9 @@ pub mod tour {}
 #[doc = include_str!("capture.md")]
 pub mod capture {}
 
+#[doc = include_str!("trackers_and_contacts.md")]
+pub mod trackers_and_contacts {}
+
 #[doc = include_str!("reading_the_result.md")]
 pub mod reading_the_result {}
 

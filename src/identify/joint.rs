@@ -119,6 +119,9 @@ impl JointFit {
         let mut diagnosis = Diagnosis::new(CheckContext { series, free: &free, on_robot, limits });
         diagnosis.after_free_poses(&fit.problem);
         diagnosis.after_left_out(&fit)?;
+        if estimator.is_two_stage() && !fit.problem.body_measurements.is_empty() {
+            return Err(of_images_alone());
+        }
         let fitted = |left: Adjustment| match estimator.is_two_stage() {
             true => refit(&left, estimator, noise),
             false => Some(refitted(left)),
@@ -220,6 +223,13 @@ fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f6
     for (i, mismatch) in remarks {
         adjustment.problem.images[i].rejected = Some(ImageRejection::WronglyPaired(mismatch));
     }
+}
+
+/// A two-step calibration goes by camera poses.
+fn of_images_alone() -> Error {
+    let what =
+        "a two-step calibration is made of camera poses, and these series have measurements of trackers or contacts";
+    Error::new(Code::OptionConflict, "--two-stage", what, "leave it out, or give series of images alone")
 }
 
 /// Without images of the robot there is no robot to fit.

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::solution_json::{PlacedRecord, PoseRecord};
+use super::pose_record::{PlacedRecord, PoseRecord};
 use crate::geom::Pose;
 use crate::identify::Solution;
 use crate::model::robot::Posture;

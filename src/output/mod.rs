@@ -40,6 +40,7 @@ mod plate_png;
 #[cfg(feature = "draw")]
 mod plate_svg;
 mod pose_files;
+mod pose_record;
 #[cfg(feature = "mcap")]
 pub mod recording;
 #[cfg(feature = "report")]

@@ -11,7 +11,6 @@ use super::bodies_record::BodiesRecord;
 use super::finding_record::FindingRecord;
 use crate::assess::{Cause, Errors, FlangeErrors, Identifiability, Limits, ProjectionMap, WorkspacePoint};
 use crate::error::{Notice, Result, plain_name};
-use crate::geom::Pose;
 use crate::identify::{Comparison, Estimator, Evidence, LensEvidence, Options, StartVerdict};
 use crate::model::camera::Lens;
 use crate::problem::{ImageRejection, ObservationRejection, short_name};
@@ -19,6 +18,7 @@ use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar, Tags};
 use crate::solve::PlateScale;
 use crate::urdf::{JointKind, Payload};
 
+pub use super::pose_record::{PlacedRecord, PoseRecord};
 pub use super::series_record::{SeriesRecord, StopNoise};
 pub use super::solution_bytes::{read, to_bytes};
 
@@ -30,27 +30,6 @@ pub const TIMINGS: &str = "timings.json";
 
 /// Version of the format.
 pub const FORMAT: u32 = 2;
-
-/// A pose `parent_from_child`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct PoseRecord {
-    /// Translation, m.
-    pub xyz_m: [f64; 3],
-    /// Rotation, qx qy qz qw.
-    pub quat_xyzw: [f64; 4],
-}
-
-impl From<&Pose> for PoseRecord {
-    fn from(pose: &Pose) -> Self {
-        Self { xyz_m: pose.xyz(), quat_xyzw: pose.quaternion_xyzw() }
-    }
-}
-
-impl From<&PoseRecord> for Pose {
-    fn from(record: &PoseRecord) -> Self {
-        Self::from_xyz_quaternion(record.xyz_m, record.quat_xyzw)
-    }
-}
 
 /// The program that wrote the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -187,17 +166,6 @@ pub struct CameraRecord {
     /// What camera.yaml loses of a lens that ROS has no model for: RMS over the image and the most, px.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ros_loss_px: Option<[f64; 2]>,
-}
-
-/// A mounting or placement.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PlacedRecord {
-    /// Name.
-    pub name: String,
-    /// Pose.
-    pub pose: PoseRecord,
-    /// Covariance of its body twist, 36 numbers; none where no image of the robot determines it.
-    pub covariance: Option<Vec<f64>>,
 }
 
 /// A plate: as given, and corrected.

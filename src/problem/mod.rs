@@ -5,6 +5,7 @@
 
 mod adjustment;
 mod body;
+mod body_chain;
 mod condensed;
 mod equations;
 mod family;

@@ -145,6 +145,12 @@ impl StopsEliminated {
         self.seen.order[(row - self.dense) / 3]
     }
 
+    /// Natural logarithm of the determinant of the information of what is latent at all stops.
+    pub fn log_determinant(&self) -> f64 {
+        let of = |block: &Block| -2.0 * block.inverse_factor.diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        self.blocks.iter().map(of).sum()
+    }
+
     /// `b' H^-1 b` of the right-hand sides of the latents.
     pub fn squares(&self) -> f64 {
         self.blocks.iter().map(|b| b.rhs.norm_squared()).sum()

@@ -143,6 +143,16 @@ impl System {
         self.distances.log_determinant
     }
 
+    /// Natural logarithm of the determinant of the information of the family that was eliminated.
+    pub fn log_determinant_of_eliminated(&self, linear: LinearProblem) -> f64 {
+        match &self.eliminated {
+            Eliminated::Markers(_) => {
+                SeenMarkers::of(linear).information(linear).iter().map(|block| block.determinant().ln()).sum()
+            }
+            Eliminated::Stops(e) => e.log_determinant(),
+        }
+    }
+
     /// Factor of the information.
     ///
     /// # Errors

@@ -2,6 +2,7 @@
 //!
 //! A new chapter is one function and one row in [`chapters`].
 
+mod bodies;
 mod coverage;
 mod describe;
 mod figure;
@@ -50,6 +51,7 @@ fn chapters(r: &SolutionRecord, pictures: &Thumbnails) -> Vec<Chapter> {
         chapter("pictures", "Pictures: best, worst and left out", gallery::gallery(r, pictures)),
         chapter("scene", "Arm, camera poses and plate", scene::section(r)),
         chapter("coverage", "What the stops covered", coverage::section(r)),
+        chapter("bodies", "Trackers and contacts", bodies::section(r)),
         chapter("images", "Residuals by image", images::table(r)),
         chapter("residuals", "Residuals", sections::residuals(r)),
         chapter("workspace", "How well the flange is known where", knowledge::workspace(r)),

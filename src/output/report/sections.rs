@@ -12,14 +12,19 @@ use crate::output::solution_json::SolutionRecord;
 pub(super) fn accuracy(r: &SolutionRecord) -> Markup {
     let rows = [("Nominal robot", &r.accuracy.nominal), ("Calibrated robot", &r.accuracy.calibrated)];
     html! {
-        p {
+        @if r.images.is_empty() {
+            p {
+                "How well do the joint readings alone say where the body on the tip was measured? The stops were put aside in " (r.accuracy.folds)
+                " groups in turn; a model fitted to the other groups had to predict them. The error includes how well the robot repeats."
+            }
+        } @else { p {
             "How well do the joint readings alone say where the plate appears? The images were put aside in "
             (r.accuracy.folds) " groups in turn; a model fitted to the other groups had to predict them. "
             "The images look at one plate: this is no figure for the whole workspace, and smaller than what the robot is off elsewhere. "
             "In millimetres it is the distance between where the image shows the markers and where the robot model puts them; "
             "it includes how well the robot repeats. "
             @if r.beyond_urdf() { "The calibrated robot is the whole model, corrected URDF and compensation.toml together." }
-        }
+        } }
         div.wide { table {
             thead { tr { th { "Model" } th.n { "error, mm RMS" } th.n { "in the image, px RMS" } th.n { "worst image, mm" } th.n { "images" } } }
             tbody { @for (name, e) in rows { tr {

@@ -1,0 +1,63 @@
+//! Is the corrected robot any good where no stop was?
+
+use std::fmt;
+
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use crate::assess::{Accuracy, Uncertainty, median};
+use crate::error::{Code, Notice};
+
+/// Outside the region of the stops the corrected robot is known worse than the nominal one misses inside.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extrapolates {
+    /// Sigma of the flange outside the region of the stops, m.
+    pub outside_m: f64,
+    /// Error of the nominal robot in the region of the stops, m.
+    pub nominal_m: f64,
+}
+
+pub(super) fn check(uncertainty: &Uncertainty, _: &Accuracy, _: &CheckContext) -> Option<Extrapolates> {
+    let outside = uncertainty.workspace.iter().filter(|w| !w.covered).map(|w| w.sigma_m);
+    let outside_m = median(&outside.collect::<Vec<f64>>())?;
+    let nominal_m = uncertainty.flange?.nominal_m;
+    (outside_m > nominal_m).then_some(Extrapolates { outside_m, nominal_m })
+}
+
+impl fmt::Display for Extrapolates {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.notice().fmt(f)
+    }
+}
+
+impl Kind for Extrapolates {
+    fn code(&self) -> Code {
+        Code::Extrapolates
+    }
+
+    fn weight(&self) -> Weight {
+        Weight::Note
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        Vec::new()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![
+            Quantity::new("flange_sigma_outside", self.outside_m, "m"),
+            Quantity::new("nominal_error", self.nominal_m, "m"),
+        ]
+    }
+
+    fn notice(&self) -> Notice {
+        Notice::new(
+            self.code(),
+            "workspace",
+            format!(
+                "outside the region of the stops the flange is known to {:.1} mm only, where the nominal robot is off by {:.1} mm inside",
+                1e3 * self.outside_m,
+                1e3 * self.nominal_m
+            ),
+            "keep programs within the region, or add stops where they go; elsewhere the nominal robot may be better",
+        )
+    }
+}
