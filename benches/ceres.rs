@@ -14,7 +14,9 @@ use robotcal::identify::adjust_free_poses;
 use robotcal::init::{PosePair, solve_hand_eye};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::{Posture, Robot};
-use robotcal::problem::{Adjustment, Image, Layout, Mark, Measured, Noise, PlateShape, Problem, State, Stop, Tie};
+use robotcal::problem::{
+    Adjustment, Image, Layout, Mark, Measured, Names, Noise, PlateShape, Problem, State, Stop, Tie,
+};
 use robotcal::series::{CameraMount, Edge, Marker, Plate, PlateKind};
 use robotcal::solve::{Outcome, Settings, solve};
 
@@ -102,13 +104,18 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
         robot: Robot::nominal(chain),
         mountings: vec![pose(&guess["T_flange_cam"])?],
         placements: vec![pose(&guess["T_base_plate"])?],
+        instruments: Vec::new(),
+        bodies: Vec::new(),
         cameras: vec![camera],
         plates: vec![PlateShape::nominal(&plate)],
         joint_errors,
         ties,
     };
     let names = |name: &str| vec![name.to_owned()];
-    let mut layout = Layout::new(&state, &names("hand"), &names("plate"), &names("camera"), &names("plate"));
+    let (hand, plate_name, front) = (names("hand"), names("plate"), names("camera"));
+    let named =
+        Names { mountings: &hand, placements: &plate_name, cameras: &front, plates: &plate_name, ..Names::default() };
+    let mut layout = Layout::new(&state, &named);
     let joints = &state.robot.chain.joints;
     for (i, column) in layout.columns.iter_mut().enumerate() {
         column.prior_sigma = f64::INFINITY;
@@ -131,6 +138,10 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
         cameras: names("camera"),
         stops,
         images,
+        instruments: Vec::new(),
+        bodies: Vec::new(),
+        body_measurements: Vec::new(),
+        lengths: Vec::new(),
         noise,
         families: Vec::new(),
         huber: f64::INFINITY,
