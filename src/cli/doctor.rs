@@ -100,7 +100,7 @@ fn files_of(folder: &Path, seen: &mut Examination) {
     }
     let text = std::fs::read_to_string(folder.join("series.toml")).unwrap_or_default();
     let is_recording = text.lines().any(|line| line.trim_start().starts_with("mcap"));
-    if is_recording {
+    if is_recording || has("controller.csv") {
         return;
     }
     need(

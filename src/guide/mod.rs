@@ -1,4 +1,6 @@
-//! The manual: formulation, conventions, glossary, a tour of the program, how to take a series, how to read the result, codes, circles and boards, decisions.
+//! The manual. For those who calibrate: how to take a series, recordings, dark and white frames, warm-up, how accurate can I get, how to read the result,
+//! controllers, programs, questions, codes, glossary. For those who want to know how it works: formulation, conventions, circles and boards, costs, planning,
+//! a tour of the code, decisions.
 
 #[doc = include_str!("formulation.md")]
 pub mod formulation {}
@@ -17,6 +19,24 @@ pub mod capture {}
 
 #[doc = include_str!("trackers_and_contacts.md")]
 pub mod trackers_and_contacts {}
+
+#[doc = include_str!("recordings.md")]
+pub mod recordings {}
+
+#[doc = include_str!("flat_field.md")]
+pub mod flat_field {}
+
+#[doc = include_str!("warm_up.md")]
+pub mod warm_up {}
+
+#[doc = include_str!("accuracy.md")]
+pub mod accuracy {}
+
+#[doc = include_str!("controllers.md")]
+pub mod controllers {}
+
+#[doc = include_str!("faq.md")]
+pub mod faq {}
 
 #[doc = include_str!("reading_the_result.md")]
 pub mod reading_the_result {}
