@@ -6,9 +6,13 @@ use std::path::Path;
 
 use nalgebra::{DVector, Vector3};
 use robotcal::assess::{MeasuredPoint, fit_points};
+use robotcal::calibration::Export;
+use robotcal::diagnose::Subject;
+use robotcal::error::Code;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::model::robot::{Posture, Robot};
+use robotcal::output::{restore, solution_json};
 use robotcal::problem::{
     Adjustment, BodySeen, InstrumentKind, MeasuredSeries, MeasuredStop, SeenBody, SeenLength, Step,
 };
@@ -288,4 +292,62 @@ fn both_eliminations_of_measured_bodies_take_the_same_step() {
     let sigma = |k: usize, of: &(Step, f64, robotcal::solve::Covariance)| of.2.sigma(k);
     let columns = adjustment.problem.layout.len();
     assert!((0..columns).all(|k| (sigma(k, &a) - sigma(k, &b)).abs() <= 1e-6 * sigma(k, &a)));
+}
+
+/// The series of a world as the files of a folder.
+fn written(world: &World, folder: &Path) {
+    let joints = &world.chain.readings;
+    let mut rows = format!("stop,{}\n", joints.join(","));
+    let mut contacts = String::from("stop,contact\n");
+    for stop in &world.series.stops {
+        let cells: Vec<String> = stop.readings.as_ref().unwrap().iter().map(|q| format!("{q:?}")).collect();
+        rows += &format!("{},{}\n", stop.image, cells.join(","));
+    }
+    for seen in &world.series.bodies {
+        contacts += &format!("{},{}\n", world.series.stops[seen.stop].image, seen.instrument);
+    }
+    let mut settings = format!("format = 1\njoint_unit = \"rad\"\n[contact]\nsigma_m = {}\n", world.sigma_m);
+    for l in &world.series.lengths {
+        let [a, b] = &l.between;
+        settings += &format!(
+            "[[distance]]\nbetween = [\"{a}\", \"{b}\"]\ndistance_m = {:?}\nsigma_m = {}\n",
+            l.distance_m, l.sigma_m
+        );
+    }
+    for (name, text) in [("joints.csv", rows), ("contacts.csv", contacts), ("series.toml", settings)] {
+        std::fs::write(folder.join(name), text).unwrap();
+    }
+}
+
+#[test]
+fn a_folder_of_contacts_gives_a_robot_and_its_record_gives_it_again() {
+    let world = World::sockets(7, 3, 14, 5e-5, 2e-5);
+    let folder = tempfile::tempdir().unwrap();
+    written(&world, folder.path());
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let calibration = robotcal::calibrate(&urdf, [folder.path()], &options).unwrap();
+    let files = calibration.files(&Export::default()).unwrap();
+    assert!(files.keys().any(|name| name.ends_with(".urdf")) && files.contains_key("report.html"));
+    assert!(!files.keys().any(|name| name.starts_with("camera") || name.starts_with("plate")), "{:?}", files.keys());
+    let record = solution_json::read(&files["solution.json"]).unwrap();
+    assert_eq!((record.bodies.measurements.len(), record.bodies.lengths.len()), (42, 2));
+    let again = identify(world.chain.clone(), &restore::measured_series(&record).unwrap(), &options).unwrap();
+    let first = &calibration.solution().fit.state.robot.twists;
+    let same = again.fit.state.robot.twists.iter().zip(first).all(|(a, b)| (a - b).amax() < 1e-9);
+    assert!(same, "solved again from the record, the robot is another one");
+}
+
+#[test]
+fn a_ball_that_sat_in_another_socket_is_left_out_by_name() {
+    let mut world = World::sockets(7, 3, 14, 5e-5, 2e-5);
+    world.series.bodies[5].instrument = "socket 2".into();
+    let solution = world.solve(RobotModel::Rigid);
+    let out: Vec<usize> = (solution.fit.problem.body_measurements.iter().enumerate())
+        .filter(|(_, m)| m.rejected.is_some())
+        .map(|(k, _)| k)
+        .collect();
+    assert_eq!(out, [5]);
+    let found = solution.findings.iter().find(|f| f.code() == Code::MeasurementsLeftOut).unwrap();
+    assert_eq!(found.subjects(), [Subject::Stop("005".into())]);
 }
