@@ -121,7 +121,7 @@ fn left_out(r: &SolutionRecord) -> Vec<String> {
     let why = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
     let s = &r.statistics;
     let b = &r.bodies.measurements;
-    let of_bodies = format!("{} of {} measurements", b.iter().filter(|m| m.rejection.is_some()).count(), b.len());
+    let of_bodies = format!("{} of {} measurements", r.bodies.left_out(), b.len());
     if r.images.is_empty() {
         return vec![indented("left out", &of_bodies)];
     }

@@ -143,6 +143,11 @@ impl BodiesRecord {
         self.measurements.is_empty()
     }
 
+    /// Number of measurements that are left out.
+    pub fn left_out(&self) -> usize {
+        self.measurements.iter().filter(|m| m.rejection.is_some()).count()
+    }
+
     /// Measurements of a series, ready to be solved again.
     pub fn seen(&self, series: &str) -> Vec<SeenBody> {
         let of = |m: &MeasurementRecord| SeenBody {

@@ -6,7 +6,7 @@ use super::describe::name;
 use super::figure::pointed;
 use super::svg::{Anchor, Svg};
 use super::words::fixed;
-use crate::output::solution_json::SolutionRecord;
+use crate::output::solution_json::{ImageRecord, SolutionRecord};
 use crate::urdf::JointKind;
 
 const WIDTH: f64 = 640.0;
@@ -18,7 +18,7 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
     html! {
         p {
             "Each dot is the reading of a joint at a stop, within the limits of the joint. What no stop covered is extrapolated. "
-            "Markers should have been seen everywhere in the image, the corners too."
+            @if !r.images.is_empty() { "Markers should have been seen everywhere in the image, the corners too." }
         }
         @if let Some(svg) = joints(r) { (pointed(&svg, "Readings of every joint; the bar is its range by the URDF.")) }
         div.pair { @for k in 0..r.cameras.len() { @if let Some(svg) = field(r, k) {
@@ -27,18 +27,33 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
     }
 }
 
+/// A stop of the robot, as it is drawn.
+struct Stop<'a> {
+    name: String,
+    readings: &'a [f64],
+    is_gone: bool,
+}
+
+/// Those of images, then those of series without images.
+fn stops(r: &SolutionRecord) -> impl Iterator<Item = Stop<'_>> {
+    let of_image = |i: &'_ ImageRecord| (name(r, i), i.reason.is_some());
+    let images = r.images.iter().filter_map(move |i| Some((of_image(i), i.readings.as_deref()?)));
+    let bodies = r.bodies.stops.iter().filter_map(|s| Some(((s.name.clone(), false), s.readings.as_deref()?)));
+    images.chain(bodies).map(|((name, is_gone), readings)| Stop { name, readings, is_gone })
+}
+
 /// Range that is drawn of a reading: its limits, widened to what was read.
 fn range(r: &SolutionRecord, reading: usize) -> (f64, f64) {
     let name = &r.robot.readings[reading];
     let joint = r.robot.joints.iter().find(|j| j.drive.as_ref().is_some_and(|(of, ..)| of == name));
     let (low, high) = joint.and_then(|j| j.limits).unwrap_or((-std::f64::consts::PI, std::f64::consts::PI));
-    let read = || r.images.iter().filter_map(|i| i.readings.as_ref()).map(|q| q[reading]);
+    let read = || stops(r).map(|stop| stop.readings[reading]);
     (read().fold(low, f64::min), read().fold(high, f64::max))
 }
 
 fn joints(r: &SolutionRecord) -> Option<String> {
     let names = &r.robot.readings;
-    if names.is_empty() || r.images.iter().all(|i| i.readings.is_none()) {
+    if names.is_empty() || stops(r).next().is_none() {
         return None;
     }
     let (left, row) = (130.0, 34.0);
@@ -54,9 +69,9 @@ fn joints(r: &SolutionRecord) -> Option<String> {
         };
         svg.text([left - 8.0, top + 12.0], Anchor::End, &joint.chars().take(18).collect::<String>());
         svg.rect([left, top], [reach, 16.0], "span");
-        for (image, q) in r.images.iter().filter_map(|i| Some((i, i.readings.as_ref()?[k]))) {
-            let class = if image.reason.is_some() { "gone" } else { "stop" };
-            svg.titled(&format!("{}: {joint} {}", name(r, image), shown(q)), |svg| {
+        for stop in stops(r) {
+            let (q, class) = (stop.readings[k], if stop.is_gone { "gone" } else { "stop" });
+            svg.titled(&format!("{}: {joint} {}", stop.name, shown(q)), |svg| {
                 svg.circle([x(q), top + 8.0], 4.0, class);
             });
         }

@@ -21,10 +21,16 @@ pub(super) fn first_page(r: &SolutionRecord) -> Markup {
         h1 { "Calibration of " (r.robot.name) }
         p.sub {
             (r.robot.base) " to " (r.robot.tip) ", " (count(r.robot.readings.len(), "moving joint")) "; "
-            (count(r.statistics.images_used, "image")) " of " (r.statistics.images) " used"
-            @if r.statistics.images > r.statistics.images_used { " (" a href="#left-out" { "why not all" } ")" }
-            ", " (r.statistics.observations_left_out) " of " (r.statistics.observations_left_out + r.statistics.observations_used)
-            " observations left out. " (r.program.name) " " (r.program.version) "."
+            @if !r.images.is_empty() {
+                (count(r.statistics.images_used, "image")) " of " (r.statistics.images) " used"
+                @if r.statistics.images > r.statistics.images_used { " (" a href="#left-out" { "why not all" } ")" }
+                ", " (r.statistics.observations_left_out) " of " (r.statistics.observations_left_out + r.statistics.observations_used)
+                " observations left out. "
+            }
+            @if !r.bodies.is_empty() {
+                (r.bodies.left_out()) " of " (count(r.bodies.measurements.len(), "measurement")) " by trackers and contacts left out. "
+            }
+            (r.program.name) " " (r.program.version) "."
         }
         div class={ "verdict " (class) } {
             strong { (headline) }
@@ -64,7 +70,7 @@ fn promise(r: &SolutionRecord, trust: Trust) -> Markup {
             } } }
         } }
         p.note {
-            "Position of the flange relative to the plate in the region of the stops, by model and covariance; the nominal robot with the base and "
+            "Position of the flange relative to " (if r.images.is_empty() { "the base and tool that fit the stops" } else { "the plate" }) " in the region of the stops, by model and covariance; the nominal robot with the base and "
             "the tool that fit it best. " (significant(1e3 * e.scatter_m)) " mm of each is noise from stop to stop, which no model takes away. "
             "This is the figure to quote; " a href="#workspace" { "elsewhere in the workspace" } " it is larger."
         }
@@ -74,6 +80,12 @@ fn promise(r: &SolutionRecord, trust: Trust) -> Markup {
 /// What was measured on images of the same series.
 fn held_out(r: &SolutionRecord) -> Markup {
     let (before, after) = (&r.accuracy.nominal, &r.accuracy.calibrated);
+    if r.images.is_empty() {
+        return html! { p {
+            "Measured at stops that the fit had not seen: " b { (significant(before.rms_mm)) " → " (significant(after.rms_mm)) " mm" }
+            ", worst " (significant(after.worst_mm)) " mm (" a href="#accuracy" { "more" } ")."
+        } };
+    }
     html! { p {
         "Measured on images that the fit had not seen: " b { (significant(before.rms_mm)) " → " (significant(after.rms_mm)) " mm" }
         " on the plate, worst image " (significant(after.worst_mm)) " mm. They all look at one plate: this is no figure for the workspace ("

@@ -10,9 +10,10 @@ use crate::output::solution_json::SolutionRecord;
 
 /// Before and after on held-out images.
 pub(super) fn accuracy(r: &SolutionRecord) -> Markup {
+    let are_images = !r.images.is_empty();
     let rows = [("Nominal robot", &r.accuracy.nominal), ("Calibrated robot", &r.accuracy.calibrated)];
     html! {
-        @if r.images.is_empty() {
+        @if !are_images {
             p {
                 "How well do the joint readings alone say where the body on the tip was measured? The stops were put aside in " (r.accuracy.folds)
                 " groups in turn; a model fitted to the other groups had to predict them. The error includes how well the robot repeats."
@@ -26,9 +27,10 @@ pub(super) fn accuracy(r: &SolutionRecord) -> Markup {
             @if r.beyond_urdf() { "The calibrated robot is the whole model, corrected URDF and compensation.toml together." }
         } }
         div.wide { table {
-            thead { tr { th { "Model" } th.n { "error, mm RMS" } th.n { "in the image, px RMS" } th.n { "worst image, mm" } th.n { "images" } } }
+            thead { tr { th { "Model" } th.n { "error, mm RMS" } @if are_images { th.n { "in the image, px RMS" } }
+                th.n { "worst, mm" } th.n { (if are_images { "images" } else { "measurements" }) } } }
             tbody { @for (name, e) in rows { tr {
-                td { (name) } td.n { (significant(e.rms_mm)) } td.n { (significant(e.rms_px)) }
+                td { (name) } td.n { (significant(e.rms_mm)) } @if are_images { td.n { (significant(e.rms_px)) } }
                 td.n { (significant(e.worst_mm)) } td.n { (e.images) }
             } } }
         } }
@@ -50,6 +52,9 @@ pub(super) fn left_out(r: &SolutionRecord) -> Markup {
         }
     });
     let rejected: Vec<_> = r.images.iter().filter_map(|i| i.reason.as_ref().map(|reason| (&i.name, reason))).collect();
+    if r.images.is_empty() {
+        return html! { p { (r.bodies.left_out()) " of " (count(r.bodies.measurements.len(), "measurement")) " left out." } };
+    }
     html! {
         div.wide { table {
             thead { tr { th { "Series" } th { "camera" } th.n { "images" } th.n { "used" } th.n { "on the robot" } th.n { "markers observed" } } }
