@@ -117,6 +117,9 @@ limits! {
     /// Logarithm of the odds at which a smaller model takes the place of a larger one: "decisive" (H. Jeffreys, *Theory of
     /// probability*, 1961). Gears have errors and arms sag; that there is nothing of it must be plain.
     decisive_log_odds: f64 = 4.605;
+    /// Sigma of the flange outside the region of the stops over the error of the nominal robot, beyond which it is said: twice, so that a
+    /// series that covers most of what matters is not doubted for the corners that it does not.
+    extrapolation_ratio: f64 = 2.0;
     /// Ratio of the sigma of the flange by clusters of images to that by the model from which the larger one is reported.
     scatter_ratio: f64 = 1.5;
     /// Fewest images whose scatter says anything: of ten, the standard deviation is known to a quarter.

@@ -15,11 +15,11 @@ pub struct Extrapolates {
     pub nominal_m: f64,
 }
 
-pub(super) fn check(uncertainty: &Uncertainty, _: &Accuracy, _: &CheckContext) -> Option<Extrapolates> {
+pub(super) fn check(uncertainty: &Uncertainty, _: &Accuracy, setting: &CheckContext) -> Option<Extrapolates> {
     let outside = uncertainty.workspace.iter().filter(|w| !w.covered).map(|w| w.sigma_m);
     let outside_m = median(&outside.collect::<Vec<f64>>())?;
     let nominal_m = uncertainty.flange?.nominal_m;
-    (outside_m > nominal_m).then_some(Extrapolates { outside_m, nominal_m })
+    (outside_m > setting.limits.extrapolation_ratio * nominal_m).then_some(Extrapolates { outside_m, nominal_m })
 }
 
 impl fmt::Display for Extrapolates {
