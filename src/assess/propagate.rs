@@ -70,7 +70,7 @@ pub fn predict_pose(fit: &Fit, view: View, readings: &[f64]) -> Option<Predicted
     let theta = layout.theta_len();
     let of_theta = fit.covariance.reduced.view((0, 0), (theta, theta));
     let model = &chain.d_theta * of_theta * chain.d_theta.transpose();
-    let noise = nalgebra::DVector::from_vec(fit.problem.joint_sigma(view.series)).map(|s| s * s);
+    let noise = nalgebra::DVector::from_vec(fit.problem.joint_sigma(fit.problem.noise_of(view.series))).map(|s| s * s);
     let noise = &chain.d_latent * DMatrix::from_diagonal(&noise) * chain.d_latent.transpose();
     // A body twist d of camera_from_plate is the body twist -Ad d of its inverse.
     let turned = |c: DMatrix<f64>| {

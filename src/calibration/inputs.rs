@@ -7,7 +7,7 @@ use crate::error::{Code, Error, Notice, Result};
 use crate::identify::measure;
 use crate::output::{recover, restore, solution_json::SolutionRecord};
 use crate::problem::MeasuredSeries;
-use crate::series::{self, InputFile, RecordingOptions, Series};
+use crate::series::{self, InputFile, RecordingOptions, Series, Source};
 use crate::stage::stage;
 use crate::urdf::{self, Chain, RobotDescription};
 
@@ -123,11 +123,19 @@ impl Inputs {
             files.extend(s.image_hashes()?);
         }
         let mut series = Vec::with_capacity(all.len());
+        let several = all.len() > 1;
         for s in &all {
             let _stage = stage("images");
-            let measured = measure(s, &chain, all.len() > 1, |_| watch(&s.name, s.stops.stops.len()))?;
-            notices.extend(measured.notices);
-            series.push(measured.series);
+            if let Source::Cameras(_) = &s.source {
+                notices.extend(s.notices.iter().cloned());
+            }
+            for view in s.views() {
+                let measured = measure(view, &chain, several, |_| watch(&view.name, view.stops.stops.len()))?;
+                // What the readings give reason to say is the same for every camera.
+                let known: Vec<Notice> = measured.notices.into_iter().filter(|n| !notices.contains(n)).collect();
+                notices.extend(known);
+                series.push(measured.series);
+            }
         }
         all.iter().try_for_each(|s| require_unchanged(&files, &s.image_hashes()?))?;
         Ok(Observed { description, chain, series, notices, files })

@@ -61,12 +61,14 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
             weight,
         })
     };
-    setting.series.iter().enumerate().filter_map(of_series).collect()
+    // Cameras at the same stops have one noise: it is said once.
+    let is_first = |k: usize| (0..k).all(|before| fit.problem.noise_of(before) != fit.problem.noise_of(k));
+    setting.series.iter().enumerate().filter(|(k, _)| is_first(*k)).filter_map(of_series).collect()
 }
 
 /// The reading with the largest joint noise in a series, and its size, rad or m.
 fn noisiest_joint(fit: &Fit, series: usize) -> Option<(&str, f64)> {
-    let sigmas = fit.problem.joint_sigma(series).into_iter();
+    let sigmas = fit.problem.joint_sigma(fit.problem.noise_of(series)).into_iter();
     let named = fit.state.robot.chain.readings.iter().map(String::as_str).zip(sigmas);
     named.max_by(|a, b| a.1.total_cmp(&b.1))
 }

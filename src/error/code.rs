@@ -112,6 +112,7 @@ codes! {
         CsvNumber "csv_number" "a cell is not a number",
         CsvRange "csv_range" "the value of a cell is out of its range",
         CsvName "csv_name" "a cell does not name what its column wants",
+        CameraUnknown "camera_unknown" "a table names a camera that series.toml does not have",
         StopUnknown "stop_unknown" "a table names a stop that joints.csv does not have",
         CsvRowTwice "csv_row_twice" "two rows say the same thing",
     }

@@ -29,10 +29,10 @@ pub(super) struct Bodies {
 }
 
 impl Bodies {
-    /// Of all series, whose first stops are given.
-    pub fn of(series: &[MeasuredSeries], first_stop: &[usize]) -> Self {
+    /// Of all series; `places` has the stop of every row of each.
+    pub fn of(series: &[MeasuredSeries], places: &[Vec<usize>]) -> Self {
         let mut all = Self::default();
-        for (s, &first) in series.iter().zip(first_stop) {
+        for (s, stops) in series.iter().zip(places) {
             let mut components: Vec<(InstrumentKind, usize)> = Vec::new();
             for seen in &s.bodies {
                 let component = match components.iter().find(|(kind, _)| *kind == seen.kind) {
@@ -46,7 +46,7 @@ impl Bodies {
                 let instrument = all.instrument(&seen.instrument, seen.kind, component);
                 let body = intern(&mut all.names, &seen.body);
                 all.measurements.push(BodyMeasurement {
-                    stop: first + seen.stop,
+                    stop: stops[seen.stop],
                     instrument,
                     body,
                     seen: seen.seen,

@@ -1,5 +1,7 @@
 //! Identified series to a problem: who shares what, by name.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix2, Vector2};
 
 use super::bodies::{Bodies, intern};
@@ -33,7 +35,7 @@ const HUBER: f64 = 2.45;
 pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limits: &Limits) -> Result<Adjustment> {
     let (mut cameras, mut mountings, mut placements, mut plate_names) = (vec![], vec![], vec![], vec![]);
     let (mut lenses, mut plates): (Vec<Camera>, Vec<Plate>) = (vec![], vec![]);
-    let (mut stops, first_stop) = stops_of(series);
+    let (mut stops, places) = stops_of(series);
     let mut images: Vec<Image> = vec![];
     for (index, s) in series.iter().enumerate().filter(|(_, s)| s.has_images) {
         let camera = intern(&mut cameras, &s.camera);
@@ -69,7 +71,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
             images.push(Image {
                 name: stop.image.clone(),
                 series: index,
-                stop: first_stop[index] + row,
+                stop: places[index][row],
                 camera,
                 mounting,
                 placement: intern(&mut placements, &stop.placement),
@@ -80,7 +82,10 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
             });
         }
     }
-    let bodies = Bodies::of(series, &first_stop);
+    // Images of one stop follow each other.
+    images.sort_by_key(|image| image.stop);
+    let bodies = Bodies::of(series, &places);
+    let runs = stops.last().map_or(0, |s| s.series + 1);
     let mut robot = robot.clone();
     if local_errors {
         robot.terms.extend(local_terms(&stops, robot.chain.readings.len(), limits.stops_in_common));
@@ -113,9 +118,9 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
     bodies.hold_unseen_turns(&mut layout);
     let noise = Noise {
         pixel_factor: vec![1.0; cameras.len()],
-        joint: vec![vec![FIRST_JOINT_NOISE; readings]; series.len()],
+        joint: vec![vec![FIRST_JOINT_NOISE; readings]; runs],
         local: first_local(&state, &layout),
-        tilt: vec![FIRST_TILT; series.len()],
+        tilt: vec![FIRST_TILT; runs],
         marker: Vec::new(),
         body: vec![[1.0; 2]; bodies.components],
     };
@@ -139,21 +144,33 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
     Ok(Adjustment { problem, state })
 }
 
-/// Stops of all series, and the first of each.
-fn stops_of(series: &[MeasuredSeries]) -> (Vec<Stop>, Vec<usize>) {
-    let (mut stops, mut first) = (Vec::new(), Vec::with_capacity(series.len()));
-    for (index, s) in series.iter().enumerate() {
-        first.push(stops.len());
+/// Stops of all series, and those of the rows of each: rows of one place in a run are one stop.
+fn stops_of(series: &[MeasuredSeries]) -> (Vec<Stop>, Vec<Vec<usize>>) {
+    let (mut stops, mut places) = (Vec::new(), Vec::with_capacity(series.len()));
+    for (run, views) in series.chunk_by(|a, b| a.run.is_some() && a.run == b.run).enumerate() {
+        let rows = rows(views);
         let mut previous: Option<&Vec<f64>> = None;
-        for stop in &s.stops {
-            let approach = previous.zip(stop.readings.as_ref()).filter(|_| s.order_known);
+        let first = stops.len();
+        for at in rows.values() {
+            let approach = previous.zip(at.readings.as_ref()).filter(|_| views[0].order_known);
             let approach = approach.map(|(a, b)| b.iter().zip(a).map(|(b, a)| b - a).collect());
-            previous = stop.readings.as_ref().or(previous);
-            let posture = stop.readings.clone().map(|readings| Posture { readings, approach });
-            stops.push(Stop { series: index, posture, local_share: Vec::new() });
+            previous = at.readings.as_ref().or(previous);
+            let posture = at.readings.clone().map(|readings| Posture { readings, approach });
+            stops.push(Stop { series: run, posture, local_share: Vec::new() });
         }
+        let place: BTreeMap<usize, usize> = rows.keys().enumerate().map(|(k, row)| (*row, first + k)).collect();
+        places.extend(views.iter().map(|s| s.stops.iter().map(|stop| place[&stop.row]).collect::<Vec<_>>()));
     }
-    (stops, first)
+    (stops, places)
+}
+
+/// A stop of every place in a run.
+fn rows(views: &[MeasuredSeries]) -> BTreeMap<usize, &MeasuredStop> {
+    let mut all = BTreeMap::new();
+    for stop in views.iter().flat_map(|s| &s.stops) {
+        all.entry(stop.row).or_insert(stop);
+    }
+    all
 }
 
 /// First guess of the local error of every reading that has columns for it; 0 for the others.

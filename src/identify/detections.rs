@@ -45,6 +45,7 @@ pub fn pictures(series: &Series) -> Result<impl Fn(&Path) -> Result<Picture> + S
             return Err(Error::new(Code::ImagesMissing, series.folder.display(), what, remedy));
         }
         Source::NoImages => return Err(no_images(series)),
+        Source::Cameras(_) => return Err(several_cameras(series)),
     };
     let bits = series.manifest.camera().bits;
     let flat_field = FlatField::from_images(dark, white, bits)?;
@@ -78,6 +79,13 @@ pub(super) fn recording(path: &Path) -> Error {
 pub(super) fn no_images(series: &Series) -> Error {
     let remedy = "add images/, or observations.csv";
     Error::new(Code::ImagesMissing, series.folder.display(), "no images: there is nothing to look at", remedy)
+}
+
+/// A series of several cameras, where one is wanted.
+pub(super) fn several_cameras(series: &Series) -> Error {
+    let what = "has several cameras, and one is looked at at a time";
+    let remedy = "give the images of one camera with --plate";
+    Error::new(Code::SettingUnsupported, series.folder.join("series.toml").display(), what, remedy)
 }
 
 /// When none of the images can be used: what is wrong with the first ones.

@@ -27,8 +27,9 @@ fn stops(series: &[Series], chain: &Chain) -> Result<Vec<Posture>> {
 }
 
 fn layout(options: &Options, chain: Chain, series: &[Series]) -> Result<(Layout, State)> {
-    let cameras: Vec<String> = series.iter().map(|s| s.camera_name().to_owned()).collect();
-    let mountings: Vec<String> = series.iter().map(|s| s.mounting().to_owned()).collect();
+    let views: Vec<&Series> = series.iter().flat_map(Series::views).collect();
+    let cameras: Vec<String> = views.iter().map(|s| s.camera_name().to_owned()).collect();
+    let mountings: Vec<String> = views.iter().map(|s| s.mounting().to_owned()).collect();
     let mut placements: Vec<String> = series.iter().flat_map(|s| &s.stops.stops).map(|s| s.placement.clone()).collect();
     placements.sort();
     placements.dedup();
@@ -39,7 +40,7 @@ fn layout(options: &Options, chain: Chain, series: &[Series]) -> Result<(Layout,
         placements: vec![Pose::identity(); placements.len()],
         instruments: Vec::new(),
         bodies: Vec::new(),
-        cameras: series.iter().map(|s| Camera::pinhole(lens(s), 1, 1, 1.0)).collect(),
+        cameras: views.iter().map(|s| Camera::pinhole(lens(s), 1, 1, 1.0)).collect(),
         plates: series.iter().map(|s| PlateShape::nominal(&s.plate)).collect(),
         joint_errors: Vec::new(),
         ties: Vec::new(),

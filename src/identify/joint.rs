@@ -17,8 +17,8 @@ use crate::fit::{Fit, FreePoses};
 use crate::problem::MeasuredSeries;
 use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem};
 use crate::solve::{
-    ComponentOptions, NoiseInformation, Outcome, Status, estimate_components, reject_bodies, reject_observations,
-    reject_stops, without_unidentified_noise,
+    ComponentOptions, NoiseInformation, Outcome, Status, estimate_components, reject_bodies, reject_contradicting,
+    reject_observations, reject_stops, without_unidentified_noise,
 };
 use crate::stage::stage;
 use crate::urdf::Chain;
@@ -190,7 +190,7 @@ fn fit(
         outcome = estimate_components(outcome.adjustment, &components);
     }
     for _ in 0..ROUNDS {
-        let stops = reject_stops(&mut outcome.adjustment);
+        let stops = reject_stops(&mut outcome.adjustment) || reject_contradicting(&mut outcome.adjustment).is_some();
         let of_images = if stops { 0 } else { reject_observations(&mut outcome.adjustment) };
         if !stops && of_images + reject_bodies(&mut outcome.adjustment) == 0 {
             break;

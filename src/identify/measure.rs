@@ -5,9 +5,9 @@ use std::path::Path;
 
 use super::bodies_measured::{seen_bodies, seen_lengths};
 use super::controller_readings::{self, readings_of};
-use super::detections::{detect_stops, no_images, recording, require_some};
+use super::detections::{detect_stops, no_images, recording, require_some, several_cameras};
 use super::seen_image::SeenImage;
-use super::stated::{lens_of, measured_series};
+use super::stated::{lens_of, measured_series, on_the_tip_beside_others};
 use crate::detect::Detection;
 use crate::error::{Code, Error, Notice, Result};
 use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop};
@@ -28,13 +28,12 @@ struct Seen {
     left_out: Option<ImageRejection>,
 }
 
-/// Reads joint values in the order of the chain and finds the plate in every image. `several` series qualify the names
+/// Reads joint values in the order of the chain and finds the plate in every image; `series` is what one camera saw. `several` series qualify the names
 /// that a single one leaves to its defaults. `progress` is called after every image, from any thread.
 ///
 /// # Errors
 /// Of the readings (unit, missing joints), of a series none of whose images can be used, and of differently sized images.
 pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(&Path) + Sync) -> Result<Measured> {
-    refuse_several(series)?;
     let readings = readings_of(series, chain)?;
     let bodies = seen_bodies(series, several);
     let lengths = seen_lengths(series, several, &bodies)?;
@@ -61,6 +60,7 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
         }
         Source::Recording(path) => return Err(recording(path)),
         Source::NoImages => return Err(no_images(series)),
+        Source::Cameras(_) => return Err(several_cameras(series)),
     };
     let failures: Vec<Option<String>> = seen.iter().map(|s| s.left_out.as_ref().map(ToString::to_string)).collect();
     let stops = series.stops.stops.iter().zip(&seen).zip(&failures);
@@ -77,14 +77,11 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
         )
     })?;
     let mut stops = Vec::with_capacity(readings.len());
-    for ((stop, readings), seen) in series.stops.stops.iter().zip(readings).zip(seen.drain(..)) {
-        let placement = if several && stop.placement == crate::series::DEFAULT_PLACEMENT {
-            format!("{} of {}", stop.placement, series.name)
-        } else {
-            stop.placement.clone()
-        };
+    for (k, ((stop, readings), seen)) in series.stops.stops.iter().zip(readings).zip(seen.drain(..)).enumerate() {
+        let placement = placement_of(series, &stop.placement, several);
         let Seen { observations, left_out } = seen;
-        stops.push(MeasuredStop { image: stop.image.clone(), readings, placement, observations, left_out });
+        let (image, row) = (stop.image.clone(), series.row(k));
+        stops.push(MeasuredStop { row, image, readings, placement, observations, left_out });
     }
     // The detector measures centroids, whatever observations would mean.
     let centroid = found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid;
@@ -103,24 +100,25 @@ fn notices_of(series: &Series, chain: &Chain) -> Vec<Notice> {
 
 /// A series of stops at which no image was taken.
 fn without_images(series: &Series, readings: Vec<Option<Vec<f64>>>) -> MeasuredSeries {
-    let of = |(stop, readings): (&crate::series::Stop, Option<Vec<f64>>)| MeasuredStop {
+    let of = |(row, (stop, readings)): (usize, (&crate::series::Stop, Option<Vec<f64>>))| MeasuredStop {
+        row,
         image: stop.image.clone(),
         readings,
         placement: stop.placement.clone(),
         observations: Vec::new(),
         left_out: None,
     };
-    let stops = series.stops.stops.iter().zip(readings).map(of).collect();
+    let stops = series.stops.stops.iter().zip(readings).enumerate().map(of).collect();
     MeasuredSeries::without_images(&series.name, series.manifest.robot.order == StopOrder::Visited, stops)
 }
 
-fn refuse_several(series: &Series) -> Result<()> {
-    if series.manifest.cameras.len() < 2 {
-        return Ok(());
-    }
-    let what = "several [[camera]] in one series are not supported yet";
-    let remedy = "make a series folder for each camera, and give both with --series";
-    Err(Error::new(Code::SettingUnsupported, series.folder.join("series.toml").display(), what, remedy))
+/// Name of a placement: the default one is that of its series alone, and a plate on the tip is not one in the cell.
+fn placement_of(series: &Series, placement: &str, several: bool) -> String {
+    let own = match several && placement == crate::series::DEFAULT_PLACEMENT {
+        true => format!("{placement} of {}", series.run_name()),
+        false => placement.to_owned(),
+    };
+    if on_the_tip_beside_others(series) { format!("{own} on the tip") } else { own }
 }
 
 /// What all stops show, and the size of the images.

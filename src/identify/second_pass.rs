@@ -50,7 +50,8 @@ fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Opti
     let seen = images.iter().filter(|i| i.detection.failure.is_none() && i.detection.circles.is_some());
     let sizes: Vec<(usize, usize)> = seen.filter_map(|i| i.size).collect();
     let (width, height) = *sizes.first().filter(|_| sizes.len() >= FEWEST_IMAGES)?;
-    let stop = |image: &SeenImage| MeasuredStop {
+    let stop = |(row, image): (usize, &SeenImage)| MeasuredStop {
+        row,
         image: image.name.clone(),
         readings: None,
         placement: DEFAULT_PLACEMENT.to_owned(),
@@ -61,7 +62,7 @@ fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Opti
             .as_ref()
             .map(|e| ImageRejection::Unusable { why: e.code, what: e.what.clone() }),
     };
-    let stops = images.iter().map(stop).collect();
+    let stops = images.iter().enumerate().map(stop).collect();
     let measured = measured_series(series, lens_of(series).ok()?, (width as u32, height as u32), true, stops);
     // What is seen does not hang on what is decided of it later.
     let limits = Limits::default();

@@ -3,7 +3,7 @@
 use crate::error::{Code, Error, Result};
 use crate::model::camera::Lens;
 use crate::problem::{LensChoice, MeasuredSeries, MeasuredStop};
-use crate::series::{Series, StopOrder};
+use crate::series::{CameraMount, Series, StopOrder};
 
 /// A series with what its stops show.
 pub(super) fn measured_series(
@@ -15,7 +15,9 @@ pub(super) fn measured_series(
 ) -> MeasuredSeries {
     let camera = series.manifest.camera();
     let plate_file = series.manifest.plate_in(&series.folder).unwrap_or_default();
+    let plate_name = plate_file.canonicalize().unwrap_or(plate_file).display().to_string();
     MeasuredSeries {
+        run: series.run.as_ref().map(|run| run.name.clone()),
         name: series.name.clone(),
         camera: series.camera_name().to_owned(),
         mounting: series.mounting().to_owned(),
@@ -30,7 +32,7 @@ pub(super) fn measured_series(
         },
         centroid,
         plate: series.plate.clone(),
-        plate_name: plate_file.canonicalize().unwrap_or(plate_file).display().to_string(),
+        plate_name: if on_the_tip_beside_others(series) { format!("{plate_name} on the tip") } else { plate_name },
         has_images: true,
         bodies: Vec::new(),
         lengths: Vec::new(),
@@ -38,6 +40,12 @@ pub(super) fn measured_series(
         otherwise: series.controller.as_ref().map(|c| c.otherwise.clone()).unwrap_or_default(),
         stops,
     }
+}
+
+/// True for a plate on the tip where other cameras of the series are in the hand, and see one in the cell.
+pub(super) fn on_the_tip_beside_others(series: &Series) -> bool {
+    let is_mixed = series.run.as_ref().is_some_and(|run| run.has_mixed_mounts);
+    is_mixed && series.manifest.mount() == CameraMount::Fixed
 }
 
 /// The lens model that a series states, or with which the choice begins.

@@ -79,11 +79,11 @@ impl Suspects<'_> {
     }
 
     fn pair_otherwise(&self, image: usize, pair: &PosePair, otherwise: usize) -> Option<PosePair> {
-        let image = &self.problem.images[image];
-        let before: usize = self.series[..image.series].iter().map(|s| s.stops.len()).sum();
-        let poses = &self.series[image.series].otherwise.get(otherwise)?.poses;
-        let tip = (*poses.get(image.stop - before)?)?;
-        Some(PosePair::of_flange(image.mount, tip, pair.camera_from_plate))
+        let images = &self.problem.images;
+        let own = &images[image];
+        let place = images[..image].iter().filter(|i| i.series == own.series).count();
+        let tip = (*self.series[own.series].otherwise.get(otherwise)?.poses.get(place)?)?;
+        Some(PosePair::of_flange(own.mount, tip, pair.camera_from_plate))
     }
 
     fn readings(&self) -> Vec<Vec<f64>> {

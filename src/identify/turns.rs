@@ -14,7 +14,7 @@ use super::free_poses::adjust_free_poses;
 use super::stated::focals_px;
 use crate::assess::Limits;
 use crate::geom::{exp_so3, log_so3};
-use crate::init::PosePair;
+use crate::init::{PosePair, solve_hand_eye};
 use crate::model::robot::Robot;
 use crate::problem::MeasuredSeries;
 use crate::series::PlateTurn;
@@ -30,8 +30,8 @@ struct View {
     stop: usize,
     /// `camera_from_plate` for every turn that the plate allows, by quarter turns.
     camera_from_plate: Vec<(u8, Matrix3<f64>)>,
-    /// A.
-    chain: Matrix3<f64>,
+    /// M as the ids are, and A.
+    pair: PosePair,
 }
 
 /// The series with ids as the readings demand them; unchanged where the plates have no symmetry or no camera poses are found.
@@ -42,8 +42,15 @@ pub(super) fn settled<'a>(robot: &Robot, series: &'a [MeasuredSeries], limits: &
     }
     let mut turned = series.to_vec();
     let mut changed = false;
-    for views in groups(robot, series, &turns, limits) {
-        for (view, quarters) in views.iter().zip(agreeing(&views)) {
+    let mut found: BTreeMap<usize, Matrix3<f64>> = BTreeMap::new();
+    for (placement, views) in groups(robot, series, &turns, limits) {
+        let own = agreeing(&views);
+        let common = common_turn(&views, &own, &turns[views[0].series], found.get(&placement));
+        if let Some(plate) = plate_of(&views, &own, common) {
+            found.entry(placement).or_insert(plate);
+        }
+        for (view, own) in views.iter().zip(own) {
+            let quarters = (own + common) % 4;
             let turn = turns[view.series].iter().find(|t| t.quarters == quarters);
             let Some(turn) = turn else { continue };
             let observations = &mut turned[view.series].stops[view.stop].observations;
@@ -55,31 +62,63 @@ pub(super) fn settled<'a>(robot: &Robot, series: &'a [MeasuredSeries], limits: &
     if changed { Cow::Owned(turned) } else { Cow::Borrowed(series) }
 }
 
-/// Images that share a camera mounting and a placement, with the poses that the images alone give.
-fn groups(robot: &Robot, series: &[MeasuredSeries], turns: &[Vec<PlateTurn>], limits: &Limits) -> Vec<Vec<View>> {
+/// Images that share a camera mounting and a placement, with the index of this and the poses that the images alone give; the largest first.
+fn groups(
+    robot: &Robot,
+    series: &[MeasuredSeries],
+    turns: &[Vec<PlateTurn>],
+    limits: &Limits,
+) -> Vec<(usize, Vec<View>)> {
     let Ok(start) = build(robot, series, false, limits) else { return Vec::new() };
     let stated = focals_px(&start.problem.cameras, series);
     let Ok((adjustment, free, _)) = adjust_free_poses(start, &stated, limits) else { return Vec::new() };
     let mut groups: BTreeMap<(usize, usize), Vec<View>> = BTreeMap::new();
-    let mut first = vec![0; series.len() + 1];
-    series.iter().enumerate().for_each(|(k, s)| first[k + 1] = first[k] + s.stops.len());
+    let place = |i: usize| {
+        let images = &adjustment.problem.images;
+        images[..i].iter().filter(|other| other.series == images[i].series).count()
+    };
     for (i, image, _) in adjustment.used() {
         let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
         let pair = PosePair::of_stop(robot, image.mount, &stop.readings, pose.camera_from_plate);
         let seen = pair.camera_from_plate.rotation;
-        let about = |quarters: u8| {
-            let angle = -f64::from(quarters) * std::f64::consts::FRAC_PI_2;
-            (quarters, seen * exp_so3(&Vector3::new(0.0, 0.0, angle)))
-        };
-        let camera_from_plate = std::iter::once(0).chain(turns[image.series].iter().map(|t| t.quarters)).map(about);
+        let tried = std::iter::once(0).chain(turns[image.series].iter().map(|t| t.quarters));
+        let camera_from_plate = tried.map(|quarters| (quarters, seen * about(quarters)));
         groups.entry((image.mounting, image.placement)).or_default().push(View {
             series: image.series,
-            stop: i - first[image.series],
+            stop: place(i),
             camera_from_plate: camera_from_plate.collect(),
-            chain: pair.chain.rotation,
+            pair,
         });
     }
-    groups.into_values().filter(|views| views.iter().any(|v| v.camera_from_plate.len() > 1)).collect()
+    let of_placement = |((_, placement), views)| (placement, views);
+    let mut all: Vec<(usize, Vec<View>)> = groups.into_iter().map(of_placement).collect();
+    all.retain(|(_, views)| views.iter().any(|v| v.camera_from_plate.len() > 1));
+    all.sort_by_key(|(_, views)| std::cmp::Reverse(views.len()));
+    all
+}
+
+/// Rotation of the plate in what holds it, from images that are turned by their `own` quarters and a common one.
+fn plate_of(views: &[View], own: &[u8], common: u8) -> Option<Matrix3<f64>> {
+    let turned = |(view, own): (&View, &u8)| {
+        let mut pair = view.pair;
+        pair.camera_from_plate.rotation *= about(own + common);
+        pair
+    };
+    let pairs: Vec<PosePair> = views.iter().zip(own).map(turned).collect();
+    solve_hand_eye(&pairs).first().map(|s| s.solution.plate.rotation)
+}
+
+/// The turn of all images with which another camera sees the plate the way round that the first one does.
+fn common_turn(views: &[View], own: &[u8], turns: &[PlateTurn], known: Option<&Matrix3<f64>>) -> u8 {
+    let (Some(known), Some(plate)) = (known, plate_of(views, own, 0)) else { return 0 };
+    let off = |quarters: &u8| log_so3(&(known.transpose() * plate * about(*quarters))).norm();
+    let allowed = std::iter::once(0).chain(turns.iter().map(|t| t.quarters));
+    allowed.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
+}
+
+/// The rotation of the plate frame that quarter turns of its ids are.
+fn about(quarters: u8) -> Matrix3<f64> {
+    exp_so3(&Vector3::new(0.0, 0.0, -f64::from(quarters) * std::f64::consts::FRAC_PI_2))
 }
 
 /// The turns, by quarters, with which the images agree best; that of most images is none.
@@ -94,7 +133,9 @@ fn agreeing(views: &[View]) -> Vec<u8> {
                 pairs
                     .map(|(j, c)| {
                         let seen = angle(&views[i].camera_from_plate[k].1, &views[j].camera_from_plate[c].1);
-                        (seen - angle(&views[i].chain, &views[j].chain)).abs().min(MOST_MISFIT)
+                        (seen - angle(&views[i].pair.chain.rotation, &views[j].pair.chain.rotation))
+                            .abs()
+                            .min(MOST_MISFIT)
                     })
                     .sum()
             };
@@ -114,6 +155,7 @@ fn agreeing(views: &[View]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geom::Pose;
 
     /// Images of a camera in the hand at eight postures, seen with ids that are off by these quarter turns.
     fn views(off: &[u8], allowed: &[u8]) -> Vec<View> {
@@ -122,12 +164,12 @@ mod tests {
             exp_so3(&Vector3::from(angles))
         };
         let (x, z) = (rotation(40), rotation(50));
-        let about = |quarters: u8| exp_so3(&Vector3::new(0.0, 0.0, -f64::from(quarters) * std::f64::consts::FRAC_PI_2));
         let view = |(k, &off): (usize, &u8)| {
             let seen = x.transpose() * rotation(k) * z * about(4 - off);
             let tried = std::iter::once(&0).chain(allowed);
             let camera_from_plate = tried.map(|&q| (q, seen * about(q))).collect();
-            View { series: 0, stop: k, camera_from_plate, chain: rotation(k) }
+            let [chain, seen] = [rotation(k), seen].map(|r| Pose::new(r, Vector3::zeros()));
+            View { series: 0, stop: k, camera_from_plate, pair: PosePair { camera_from_plate: seen, chain } }
         };
         off.iter().enumerate().map(view).collect()
     }

@@ -174,14 +174,15 @@ impl BodiesRecord {
 
     /// Stops of a series without images.
     pub fn stops_of(&self, series: &str) -> Vec<MeasuredStop> {
-        let of = |s: &StopRecord| MeasuredStop {
+        let of = |(row, s): (usize, &StopRecord)| MeasuredStop {
+            row,
             image: s.name.clone(),
             readings: s.readings.clone(),
             placement: String::new(),
             observations: Vec::new(),
             left_out: None,
         };
-        self.stops.iter().filter(|s| s.series == series).map(of).collect()
+        self.stops.iter().filter(|s| s.series == series).enumerate().map(of).collect()
     }
 
     /// Postures of the stops of series without images.

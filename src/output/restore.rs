@@ -76,7 +76,7 @@ fn plate(p: &PlateRecord) -> Result<Plate> {
     })
 }
 
-fn stop(image: &ImageRecord, series: &str, placements: &[String]) -> Result<MeasuredStop> {
+fn stop(row: usize, image: &ImageRecord, series: &str, placements: &[String]) -> Result<MeasuredStop> {
     let o = &image.observations;
     if [o.edge.len(), o.uv.len(), o.covariance.len()].iter().any(|len| *len != o.marker.len()) {
         return Err(damaged(format!("image {} has columns of different lengths", image.name)));
@@ -87,6 +87,7 @@ fn stop(image: &ImageRecord, series: &str, placements: &[String]) -> Result<Meas
     let placement = placements.get(image.placement);
     let prefix = format!("{series}/");
     Ok(MeasuredStop {
+        row: image.row.unwrap_or(row),
         image: image.name.strip_prefix(&prefix).unwrap_or(&image.name).to_owned(),
         readings: image.readings.clone(),
         placement: placement.ok_or_else(|| damaged(format!("image {} has no placement", image.name)))?.clone(),
@@ -109,9 +110,10 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
             return Ok(MeasuredSeries { bodies, lengths, ..own });
         }
         let of_plate = || damaged(format!("series {} has no plate", s.name));
-        let stops = record.images.iter().filter(|i| i.series == s.name);
+        let stops = record.images.iter().filter(|i| i.series == s.name).enumerate();
         Ok(MeasuredSeries {
             name: s.name.clone(),
+            run: s.run.clone(),
             camera: s.camera.clone(),
             mounting: s.mounting.clone(),
             mount: s.camera_mount,
@@ -128,7 +130,7 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
             lengths,
             order_known: s.order_known,
             otherwise: Vec::new(),
-            stops: stops.map(|i| stop(i, &s.name, &placements)).collect::<Result<_>>()?,
+            stops: stops.map(|(row, i)| stop(row, i, &s.name, &placements)).collect::<Result<_>>()?,
         })
     });
     series.collect()

@@ -41,6 +41,9 @@ pub struct SeriesRecord {
     pub has_images: bool,
     /// True where the images stand in the order of visiting.
     pub order_known: bool,
+    /// Name of its stops, where other cameras saw them, too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub run: Option<String>,
     /// What scatters from stop to stop in it; absent in files that know it per camera only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<StopNoise>,

@@ -298,6 +298,9 @@ pub struct ImageRecord {
     /// The same with its code and sizes; absent in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rejection: Option<ImageRejection>,
+    /// Place of its stop among those of the run, where several cameras saw them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub row: Option<usize>,
     /// Observations.
     pub observations: ObservationColumns,
 }

@@ -22,7 +22,7 @@ use crate::geom::Pose;
 use crate::identify::{Solution, depths_m, stated_covariance};
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes;
-use crate::problem::{Image, Problem, State};
+use crate::problem::{Image, MeasuredStop, Problem, State};
 use crate::series::Observation;
 
 /// The record of a solution.
@@ -157,7 +157,8 @@ fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
         plate: plate(k),
         has_images: s.has_images,
         order_known: s.order_known,
-        noise: Some(stop_noise(solution, &[k])),
+        noise: Some(stop_noise(solution, &[solution.fit.problem.noise_of(k)])),
+        run: s.run.clone(),
     };
     solution.series.iter().enumerate().map(record).collect()
 }
@@ -186,9 +187,10 @@ fn cameras(solution: &Solution) -> Vec<CameraRecord> {
     problem.cameras.iter().enumerate().map(camera).collect()
 }
 
-/// Series that a camera took.
+/// Series that a camera took, by the index of their noise.
 fn series_with(problem: &Problem, camera: usize) -> Vec<usize> {
-    let taken: BTreeSet<usize> = problem.images.iter().filter(|i| i.camera == camera).map(|i| i.series).collect();
+    let taken: BTreeSet<usize> =
+        problem.images.iter().filter(|i| i.camera == camera).map(|i| problem.stops[i.stop].series).collect();
     taken.into_iter().collect()
 }
 
@@ -305,6 +307,7 @@ fn images(solution: &Solution, context: &Context) -> Vec<ImageRecord> {
             held_out_mm: solution.accuracy.per_image_mm.get(k).copied().flatten(),
             reason: i.rejected.as_ref().map(ToString::to_string),
             rejection: i.rejected.clone(),
+            row: row_of(solution, k),
             observations,
         }
     };
@@ -319,13 +322,25 @@ pub(super) fn rms_px(solution: &Solution, image: usize) -> Option<f64> {
     Some((squares / residuals.len().max(1) as f64).sqrt())
 }
 
-/// Covariances as they were stated, in the order of the observations of the image: inverted twice they would be others in the last bit.
-fn stated(solution: &Solution, image: usize) -> Vec<[f64; 3]> {
+/// The stop of an image in its series.
+fn measured_stop(solution: &Solution, image: usize) -> &MeasuredStop {
     let images = &solution.fit.problem.images;
     let series = images[image].series;
     let before = images[..image].iter().filter(|i| i.series == series).count();
-    let series = &solution.series[series];
-    let mut all: Vec<&Observation> = series.stops[before].observations.iter().collect();
+    &solution.series[series].stops[before]
+}
+
+/// Place of its stop, where several cameras saw it.
+fn row_of(solution: &Solution, image: usize) -> Option<usize> {
+    let series = &solution.series[solution.fit.problem.images[image].series];
+    series.run.as_ref().map(|_| measured_stop(solution, image).row)
+}
+
+/// Covariances as they were stated, in the order of the observations of the image: inverted twice they would be others in the last bit.
+fn stated(solution: &Solution, image: usize) -> Vec<[f64; 3]> {
+    let images = &solution.fit.problem.images;
+    let series = &solution.series[images[image].series];
+    let mut all: Vec<&Observation> = measured_stop(solution, image).observations.iter().collect();
     all.sort_by_key(|o| (series.plate.index_of(o.marker), o.edge));
     all.into_iter().map(stated_covariance).collect()
 }

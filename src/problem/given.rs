@@ -89,7 +89,7 @@ impl Problem {
 
     /// Variance of a component of the apparent tilt of an image, rad^2.
     pub fn tilt_variance(&self, image: &Image) -> f64 {
-        self.noise.tilt[image.series].powi(2)
+        self.noise.tilt[self.stops[image.stop].series].powi(2)
     }
 
     /// Information (inverse of the variance) of a component of the apparent tilt of an image.
@@ -119,7 +119,13 @@ impl Problem {
         self.families.iter().find_map(of).unwrap_or(self.layout.columns[column].prior_sigma)
     }
 
-    /// Standard deviation of the whole joint noise of the stops of a series, per reading, rad or m.
+    /// Index of the noise of the images of a series: series that several cameras took at the same stops have it in common.
+    pub fn noise_of(&self, series: usize) -> usize {
+        let first = self.images.iter().find(|image| image.series == series);
+        first.map_or(series, |image| self.stops[image.stop].series)
+    }
+
+    /// Standard deviation of the whole joint noise of stops, by the index of their noise, per reading, rad or m.
     pub fn joint_sigma(&self, series: usize) -> Vec<f64> {
         let local = self.noise.local.iter().chain(std::iter::repeat(&0.0));
         self.noise.joint[series].iter().zip(local).map(|(own, local)| own.hypot(*local)).collect()

@@ -36,6 +36,8 @@ impl LensChoice {
 pub struct MeasuredSeries {
     /// Name of the series, for messages.
     pub name: String,
+    /// Name of its stops, where other cameras saw them, too: series of one run follow each other.
+    pub run: Option<String>,
     /// Series with the same camera share intrinsics.
     pub camera: String,
     /// Series with the same mounting share the hand-camera offset.
@@ -77,6 +79,7 @@ impl MeasuredSeries {
     pub fn without_images(name: &str, order_known: bool, stops: Vec<MeasuredStop>) -> Self {
         Self {
             name: name.to_owned(),
+            run: None,
             camera: String::new(),
             mounting: String::new(),
             mount: CameraMount::Hand,
@@ -131,6 +134,8 @@ pub struct SeenLength {
 /// One stop with what its image shows.
 #[derive(Debug, Clone)]
 pub struct MeasuredStop {
+    /// Place among the stops of the run; rows of one place are images of one stop.
+    pub row: usize,
     /// File name of the image.
     pub image: String,
     /// Readings, rad or m; `None` off the robot.

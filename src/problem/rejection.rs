@@ -60,6 +60,13 @@ pub enum Mismatch {
         /// Its error, rad or m.
         error: f64,
     },
+    /// By the other images of its stop, of which it would have to share the joint errors.
+    OtherImages {
+        /// Observations that contradict them.
+        contradict: usize,
+        /// All of its observations.
+        of: usize,
+    },
     /// By the finished fit.
     Fit {
         /// Stand-alone camera pose against that of the readings.
@@ -138,6 +145,9 @@ impl fmt::Display for Mismatch {
                 "its joint readings would have to be wrong by {usual_errors:.1} of the usual noise ({joint} alone by {:.2} mrad)",
                 1e3 * error.abs()
             ),
+            Self::OtherImages { contradict, of } => {
+                write!(f, "{contradict} of its {of} markers contradict the other images of its stop")
+            }
             Self::Fit { misfit, fits } => {
                 write!(f, "{misfit}")?;
                 fits.as_ref().map_or(Ok(()), |other| {

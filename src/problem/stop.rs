@@ -11,7 +11,7 @@ const TILT: usize = 2;
 /// One standstill of the robot: what was read there, with one latent error of every reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stop {
-    /// Index of its series.
+    /// Index of its series, where those that several cameras took at the same stops count as one: that of its noise.
     pub series: usize,
     /// Joint readings; `None` off the robot.
     pub posture: Option<Posture>,

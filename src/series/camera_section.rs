@@ -116,6 +116,11 @@ impl Cameras {
         self.0.iter()
     }
 
+    /// The cameras as stated.
+    pub fn as_slice(&self) -> &[CameraSection] {
+        &self.0
+    }
+
     /// Number of cameras that are stated.
     pub fn len(&self) -> usize {
         self.0.len()

@@ -25,6 +25,15 @@ pub struct ReadOtherwise {
     pub poses: Vec<Option<Pose>>,
 }
 
+impl ControllerPoses {
+    /// Those of some stops.
+    pub(super) fn of_rows(&self, rows: impl Iterator<Item = usize> + Clone) -> Self {
+        let of = |poses: &[Option<Pose>]| rows.clone().map(|k| poses[k]).collect::<Vec<_>>();
+        let otherwise = self.otherwise.iter().map(|o| ReadOtherwise { poses: of(&o.poses), ..o.clone() });
+        Self { base_from_flange: of(&self.base_from_flange), otherwise: otherwise.collect() }
+    }
+}
+
 impl ReadOtherwise {
     pub(super) fn of_convention(poses: Vec<Option<Pose>>, name: &str, remedy: String) -> Self {
         let what = format!("the rotations in controller.csv follow another convention: read as {name} the images fit");

@@ -6,6 +6,7 @@ mod camera_section;
 mod contact_file;
 mod controller_file;
 mod controller_poses;
+mod image_file;
 mod inputs;
 mod joints;
 mod manifest;
@@ -22,6 +23,7 @@ mod quaternion;
 mod read;
 mod recorded;
 mod rotation_kind;
+mod run;
 mod sections;
 mod spatial;
 mod stop_index;
@@ -30,6 +32,7 @@ mod tag_plates;
 mod tags;
 mod toml_file;
 mod units;
+mod views;
 mod without_robot;
 
 pub use camera_section::{CameraMount, CameraSection, Cameras};
@@ -53,6 +56,7 @@ pub use pose_file::PoseRow;
 pub use read::{Series, Source, read, read_images};
 pub use recorded::convert_recording;
 pub use rotation_kind::RotationKind;
+pub use run::Run;
 pub use sections::{
     ContactSection, ControllerSection, DistanceSection, PlateMountSection, SecondRobotSection, TrackerSection,
 };

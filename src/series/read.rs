@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::controller_file;
 use super::controller_poses::ControllerPoses;
+use super::image_file;
 use super::inputs::InputFile;
 use super::joints::{Stop, StopKey, Stops};
 use super::manifest::{AngleUnit, Manifest};
@@ -16,8 +17,12 @@ use super::observation_file;
 use super::plate::Plate;
 use super::plate_file::read_plate;
 use super::rotation_kind::RotationKind;
+use super::run::Run;
 use super::spatial::SpatialFiles;
+use super::stop_index::StopIndex;
+use super::table::Table;
 use super::units;
+use super::views::{CameraView, Seen, has_mixed_mounts};
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::urdf::Chain;
 
@@ -41,6 +46,8 @@ pub enum Source {
     Recording(PathBuf),
     /// Neither: what was measured stands in [`Series::spatial`].
     NoImages,
+    /// Several cameras, or several images a stop: a view for each camera, see [`Series::views`].
+    Cameras(Vec<Series>),
 }
 
 /// A measurement series as read: nothing is judged yet but the files themselves.
@@ -62,6 +69,8 @@ pub struct Series {
     pub controller: Option<ControllerPoses>,
     /// What was measured of the tip in space.
     pub spatial: SpatialFiles,
+    /// What the view of one camera has in common with those of others; none for a series of its own.
+    pub run: Option<Run>,
     /// What was seen while reading that the user should know.
     pub notices: Vec<Notice>,
     /// Text files that were read, with their hashes; see [`Series::image_hashes`] for the images.
@@ -106,7 +115,7 @@ fn read_recording(path: &Path) -> Result<Series> {
     plain_name("series", &name, path.display())?;
     let source = Source::Recording(path.to_path_buf());
     let (stops, spatial, notices) = (Stops::default(), SpatialFiles::default(), Vec::new());
-    Ok(Series { name, folder, manifest, plate, stops, source, controller: None, spatial, notices, inputs })
+    Ok(Series { name, folder, manifest, plate, stops, source, controller: None, spatial, run: None, notices, inputs })
 }
 
 fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
@@ -114,7 +123,8 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     let manifest_path = folder.join("series.toml");
     let mut inputs = Vec::new();
     let manifest = Manifest::read(&manifest_path, &mut inputs)?;
-    let is_seen = manifest.mcap.is_some() || use_observations || !is_measured_in_space_alone(folder);
+    let by_cameras = manifest.mcap.is_none() && (manifest.cameras.len() > 1 || folder.join(image_file::NAME).is_file());
+    let is_seen = by_cameras || manifest.mcap.is_some() || use_observations || !is_measured_in_space_alone(folder);
     if is_seen {
         manifest.require_camera_and_plate(&manifest_path)?;
     }
@@ -126,17 +136,73 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     } else {
         (stops, controller) = stops_of(folder, &manifest, &manifest_path, &mut inputs)?;
         spatial = SpatialFiles::read(folder, &stops, &mut inputs)?;
-        if use_observations {
+        if by_cameras {
+            Source::NoImages
+        } else if use_observations {
             let path = folder.join("observations.csv");
             observed(&path, &manifest, &plate, &stops, &mut inputs, &mut notices)?
         } else if is_seen {
-            pictured(folder, &mut stops, &mut notices)?
+            let tables = [controller_file::NAME, "joints.csv"].map(|name| folder.join(name));
+            let table = if controller.is_some() { &tables[0] } else { &tables[1] };
+            pictured(&folder.join("images"), table, &mut stops, &mut notices)?
         } else {
             Source::NoImages
         }
     };
     let folder = folder.to_path_buf();
-    Ok(Series { name, folder, manifest, plate, stops, source, controller, spatial, notices, inputs })
+    let mut series =
+        Series { name, folder, manifest, plate, stops, source, controller, spatial, run: None, notices, inputs };
+    if by_cameras {
+        series.source = Source::Cameras(views_of(&mut series, use_observations)?);
+    }
+    Ok(series)
+}
+
+/// The views of the cameras of a series, by its images.csv.
+fn views_of(series: &mut Series, use_observations: bool) -> Result<Vec<Series>> {
+    let path = series.folder.join(image_file::NAME);
+    if !path.is_file() {
+        let what = "is missing: there are several [[camera]], and nothing says which took which image";
+        let remedy = "write it with the columns stop, camera, image";
+        return Err(Error::new(Code::FileMissing, path.display(), what, remedy));
+    }
+    let table = Table::read(&path, &mut series.inputs)?;
+    let rows = image_file::rows(&table, &StopIndex::of(&series.stops), &series.manifest.cameras)?;
+    let Series { name, folder, manifest, stops, controller, .. } = &*series;
+    let all = Seen { series: name, folder, manifest, stops, controller: controller.as_ref() };
+    let mut inputs = Vec::new();
+    let views = all.views(&rows).into_iter().map(|view| one_view(series, &path, view, use_observations, &mut inputs));
+    let views = views.collect::<Result<Vec<_>>>()?;
+    series.inputs.extend(inputs);
+    series.inputs.dedup();
+    Ok(views)
+}
+
+fn one_view(
+    series: &Series,
+    table: &Path,
+    view: CameraView,
+    use_observations: bool,
+    inputs: &mut Vec<InputFile>,
+) -> Result<Series> {
+    let CameraView { name, manifest, images, mut stops, rows, controller } = view;
+    if stops.stops.is_empty() {
+        let what = format!("has no image of camera \"{}\"", manifest.camera().name.as_deref().unwrap_or(&name));
+        let remedy = "add its images, or remove the [[camera]] from series.toml";
+        return Err(Error::new(Code::ImagesMissing, table.display(), what, remedy));
+    }
+    let mut notices = Vec::new();
+    let source = if use_observations {
+        // Images of the other cameras stand in the same file: that they are none of this one is no news.
+        let path = series.folder.join("observations.csv");
+        observed(&path, &manifest, &series.plate, &stops, inputs, &mut Vec::new())?
+    } else {
+        pictured(&images, table, &mut stops, &mut notices)?
+    };
+    let has_mixed_mounts = has_mixed_mounts(&series.manifest);
+    let run = Some(Run { name: series.name.clone(), has_mixed_mounts, rows });
+    let (folder, plate, spatial) = (series.folder.clone(), series.plate.clone(), SpatialFiles::default());
+    Ok(Series { name, folder, manifest, plate, stops, source, controller, spatial, run, notices, inputs: Vec::new() })
 }
 
 /// The stops of joints.csv, or of controller.csv with their poses.
@@ -217,12 +283,9 @@ fn observed(
 }
 
 /// Finds the image of every stop, and tells of images without one.
-fn pictured(folder: &Path, stops: &mut Stops, notices: &mut Vec<Notice>) -> Result<Source> {
-    let images = folder.join("images");
-    let on_disk = image_files(&images)?;
+fn pictured(images: &Path, csv: &Path, stops: &mut Stops, notices: &mut Vec<Notice>) -> Result<Source> {
+    let on_disk = image_files(images)?;
     let names: BTreeSet<String> = on_disk.iter().map(|p| file_name(p)).collect();
-    let csv = [controller_file::NAME, "joints.csv"].map(|name| folder.join(name));
-    let csv = if csv[0].is_file() { &csv[0] } else { &csv[1] };
     let mut missing = Vec::new();
     if stops.key == StopKey::Stop {
         stops.stops.iter_mut().for_each(|stop| name_image(stop, &names));
@@ -264,8 +327,8 @@ fn pictured(folder: &Path, stops: &mut Stops, notices: &mut Vec<Notice>) -> Resu
             "they are not used; add a row with empty joint cells to use one",
         ));
     }
-    let (dark, white) = optional_images(folder)?;
-    Ok(Source::Images { folder: images, dark, white })
+    let (dark, white) = optional_images(images.parent().unwrap_or(images))?;
+    Ok(Source::Images { folder: images.to_path_buf(), dark, white })
 }
 
 /// The image of a stop that joints.csv names without the ending of its file.
@@ -327,6 +390,24 @@ fn some(names: &[String]) -> String {
 }
 
 impl Series {
+    /// What each camera saw, a series each: the series itself where it has one camera.
+    pub fn views(&self) -> &[Self] {
+        match &self.source {
+            Source::Cameras(views) => views,
+            _ => std::slice::from_ref(self),
+        }
+    }
+
+    /// Name of the series folder whose stops these are.
+    pub fn run_name(&self) -> &str {
+        self.run.as_ref().map_or(&self.name, |run| &run.name)
+    }
+
+    /// Place of a stop among those of the folder.
+    pub fn row(&self, stop: usize) -> usize {
+        self.run.as_ref().map_or(stop, |run| run.rows[stop])
+    }
+
     /// Series with this camera share intrinsics.
     pub fn camera_name(&self) -> &str {
         self.manifest.camera().name.as_deref().unwrap_or(&self.name)
@@ -384,6 +465,10 @@ impl Series {
     /// # Errors
     /// A file that cannot be read.
     pub fn image_hashes(&self) -> Result<Vec<InputFile>> {
+        if let Source::Cameras(views) = &self.source {
+            let of_views = views.iter().map(Self::image_hashes).collect::<Result<Vec<_>>>()?;
+            return Ok(of_views.concat());
+        }
         let mut files: Vec<&Path> = self.stops.stops.iter().filter_map(|s| s.path.as_deref()).collect();
         if let Source::Images { dark, white, .. } = &self.source {
             files.extend(dark.iter().chain(white).map(PathBuf::as_path));

@@ -54,7 +54,7 @@ pub fn read_without_robot(folder: &Path) -> Result<Series> {
     };
     let (folder, notices) = (folder.to_path_buf(), Vec::new());
     let (stops, spatial) = (Stops { stops, ..Stops::default() }, SpatialFiles::default());
-    Ok(Series { name, folder, manifest, plate, stops, source, controller: None, spatial, notices, inputs })
+    Ok(Series { name, folder, manifest, plate, stops, source, controller: None, spatial, run: None, notices, inputs })
 }
 
 /// A series of single images of a plate.
@@ -78,6 +78,7 @@ pub fn series_of_images(images: &[PathBuf], plate: &Path) -> Result<Series> {
         plate: read,
         stops: Stops { stops: images.iter().cloned().map(of_file).collect(), ..Stops::default() },
         controller: None,
+        run: None,
         spatial: SpatialFiles::default(),
         source: Source::Images { folder: folder.clone(), dark: Vec::new(), white: Vec::new() },
         folder,

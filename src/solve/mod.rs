@@ -30,6 +30,6 @@ pub use levenberg::{NoFit, Outcome, Settings, Status, solve};
 pub use linear::{BodyPart, LinearImage, LinearProblem, LinearStop, Linearised};
 pub use noise_information::{NoiseInformation, Spread, noise_information};
 pub use noise_uncertainty::NoiseUncertainty;
-pub use snoop::{reject_bodies, reject_observations, reject_stops};
+pub use snoop::{reject_bodies, reject_contradicting, reject_observations, reject_stops};
 pub use system::{Elimination, Singular, System};
 pub use unidentified_noise::without_unidentified_noise;

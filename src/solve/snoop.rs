@@ -43,6 +43,23 @@ pub fn reject_observations(adjustment: &mut Adjustment) -> usize {
     verdicts.len()
 }
 
+/// Leaves out the image most of whose observations are left out, where others were taken at its stop: they cannot all have its joint
+/// errors. Returns its index.
+pub fn reject_contradicting(adjustment: &mut Adjustment) -> Option<usize> {
+    let problem = &adjustment.problem;
+    let at_stop = |stop: usize| problem.used().filter(|(_, other)| other.stop == stop).count();
+    let counted = problem.used().map(|(i, image)| (i, image.observations.len() - image.used().count()));
+    let (worst, contradict) = counted
+        .filter(|&(i, out)| 2 * out > problem.images[i].observations.len() && at_stop(problem.images[i].stop) > 1)
+        .max_by_key(|&(i, out)| (out, std::cmp::Reverse(i)))?;
+    let image = &mut adjustment.problem.images[worst];
+    let of = image.observations.len();
+    image.rejected = Some(ImageRejection::WronglyPaired(Mismatch::OtherImages { contradict, of }));
+    let by_residual = image.observations.iter_mut().filter(|o| o.rejected == Some(ObservationRejection::Residual));
+    by_residual.for_each(|o| o.rejected = None);
+    Some(worst)
+}
+
 /// Latent and local error of every reading where something was taken from, rad or m; `None` for what its readings do not hold.
 fn whole_error(adjustment: &Adjustment, from: &TakenFrom) -> Option<Vec<f64>> {
     let local = adjustment.state.robot.local_errors(from.posture.filter(|_| from.joints() > 0)?);

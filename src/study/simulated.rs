@@ -13,7 +13,9 @@ pub fn measured(series: &SimulatedSeries, chain: &Chain) -> MeasuredSeries {
         raw.iter().zip(&chain.reading_kinds).map(|(q, kind)| q * factor(kind)).collect()
     };
     let stops = (series.stops.stops.iter().zip(&series.observations))
-        .map(|(stop, seen)| MeasuredStop {
+        .enumerate()
+        .map(|(row, (stop, seen))| MeasuredStop {
+            row,
             image: stop.image.clone(),
             readings: stop.raw_readings.as_ref().map(in_si),
             placement: stop.placement.clone(),
@@ -24,6 +26,7 @@ pub fn measured(series: &SimulatedSeries, chain: &Chain) -> MeasuredSeries {
     let camera = &series.truth.camera;
     MeasuredSeries {
         name: "simulated".into(),
+        run: None,
         camera: "camera".into(),
         mounting: "mounting".into(),
         mount: series.manifest.mount(),

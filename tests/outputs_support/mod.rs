@@ -48,13 +48,13 @@ pub fn context(robot: &RobotDescription) -> Context<'_> {
 }
 
 /// Poses that show the plate: the camera in the hand over a plate on the table, or the plate in the hand before a camera.
-struct Scene {
-    camera: Pose,
-    plate: Pose,
-    middle: [f64; 6],
+pub struct Scene {
+    pub camera: Pose,
+    pub plate: Pose,
+    pub middle: [f64; 6],
 }
 
-fn scene(mount: CameraMount, nominal: &Robot) -> Scene {
+pub fn scene(mount: CameraMount, nominal: &Robot) -> Scene {
     let middle = [0.1, -1.6, 1.9, 0.2, 1.2, 0.3];
     let facing = Pose::new(exp_so3(&Vector3::new(std::f64::consts::PI, 0.0, 0.0)), Vector3::new(0.0, 0.0, 0.35));
     let held = Pose::from_xyz_rpy([0.04, -0.05, 0.06], [0.05, -0.2, 0.4]);
@@ -158,6 +158,7 @@ fn series_where(
             covariance: Some([0.0025, 0.0, 0.0025]),
         };
         stops.push(MeasuredStop {
+            row: stops.len(),
             image: format!("im{:03}.png", stops.len()),
             readings: Some(q),
             placement: "placement_0".into(),
@@ -170,6 +171,7 @@ fn series_where(
         bodies: Vec::new(),
         lengths: Vec::new(),
         name: "run1".into(),
+        run: None,
         camera: "front".into(),
         mounting: "run1".into(),
         mount,

@@ -9,6 +9,7 @@ mod said;
 
 mod controller;
 mod hostile;
+mod images;
 mod mcap;
 mod plate;
 mod real;

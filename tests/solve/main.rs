@@ -6,6 +6,7 @@ mod outputs_support;
 mod support;
 
 mod bodies;
+mod cameras;
 mod controller_poses;
 mod coverage;
 mod diagnosis;

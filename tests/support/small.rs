@@ -331,7 +331,8 @@ fn observed(
 /// The same data as a series for `identify`.
 pub fn series(problem: &Problem) -> MeasuredSeries {
     let plate = problem.plates[0].clone();
-    let stop = |image: &Image| MeasuredStop {
+    let stop = |(row, image): (usize, &Image)| MeasuredStop {
+        row,
         image: image.name.clone(),
         readings: problem.stops[image.stop].posture.as_ref().map(|p| p.readings.clone()),
         placement: problem.placements[image.placement].clone(),
@@ -346,6 +347,7 @@ pub fn series(problem: &Problem) -> MeasuredSeries {
     };
     MeasuredSeries {
         name: "small".into(),
+        run: None,
         camera: problem.cameras[0].clone(),
         mounting: problem.mountings[0].clone(),
         mount: problem.images[0].mount,
@@ -361,7 +363,7 @@ pub fn series(problem: &Problem) -> MeasuredSeries {
         has_images: true,
         bodies: Vec::new(),
         lengths: Vec::new(),
-        stops: problem.images.iter().map(stop).collect(),
+        stops: problem.images.iter().enumerate().map(stop).collect(),
         plate,
     }
 }

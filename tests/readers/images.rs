@@ -1,0 +1,75 @@
+//! images.csv: several cameras at the same stops.
+
+use std::fs;
+
+use robotcal::series::{CameraMount, Series, Source, read};
+use robotcal::{Code, Error};
+use tempfile::TempDir;
+
+use crate::said::assert_says;
+
+const MANIFEST: &str = "format = 1\njoint_unit = \"rad\"\nplate = \"plate.toml\"\n\
+    [[camera]]\nname = \"left\"\nmount = \"fixed\"\n[[camera]]\nname = \"wrist\"\nmount = \"hand\"\nimages = \"pictures\"\n";
+const PLATE: &str = "format = 1\nkind = \"chessboard\"\ncolumns = 3\nrows = 2\npitch_m = 0.02\ntolerance_m = 0.0001\n";
+const JOINTS: &str = "stop,j1\none,0.1\ntwo,0.2\nthree,0.3\n";
+const IMAGES: &str =
+    "stop,camera,image\nthree,left,c.png\none,left,a.png\none,wrist,a.png\ntwo,wrist,b1.png\ntwo,wrist,b2.png\n";
+
+fn folder(files: &[(&str, &str)]) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let good = [("series.toml", MANIFEST), ("plate.toml", PLATE), ("joints.csv", JOINTS), ("images.csv", IMAGES)];
+    let images = ["images/left/a.png", "images/left/c.png", "pictures/a.png", "pictures/b1.png", "pictures/b2.png"];
+    for (name, text) in good.iter().copied().chain(images.map(|i| (i, ""))).chain(files.iter().copied()) {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+    folder
+}
+
+fn refusal(name: &str, text: &str) -> Error {
+    let error = read(folder(&[(name, text)]).path()).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    error
+}
+
+fn seen(view: &Series) -> Vec<(usize, &str)> {
+    view.stops.stops.iter().enumerate().map(|(k, s)| (view.row(k), s.image.as_str())).collect()
+}
+
+#[test]
+fn every_camera_is_a_view_of_the_same_stops() {
+    let folder = folder(&[]);
+    let series = read(folder.path()).unwrap();
+    assert!(matches!(series.source, Source::Cameras(_)));
+    let views = series.views();
+    assert_eq!(views.iter().map(|v| v.camera_name()).collect::<Vec<_>>(), ["left", "wrist"]);
+    assert_eq!(views.iter().map(|v| v.manifest.mount()).collect::<Vec<_>>(), [CameraMount::Fixed, CameraMount::Hand]);
+    assert_eq!(seen(&views[0]), [(0, "a.png"), (2, "c.png")]);
+    assert_eq!(seen(&views[1]), [(0, "a.png"), (1, "b1.png"), (1, "b2.png")]);
+    assert_eq!(views[1].stops.stops[2].raw_readings, Some(vec![0.2]));
+    assert!(views[1].stops.stops[0].path.as_ref().unwrap().ends_with("pictures/a.png"));
+    assert!(views.iter().all(|v| v.run_name() == series.name && v.run.as_ref().unwrap().has_mixed_mounts));
+    assert_ne!(views[0].mounting(), views[1].mounting());
+    assert_eq!(series.image_hashes().unwrap().len(), 5);
+}
+
+#[test]
+fn a_bad_row_names_line_and_column() {
+    let with = |from: &str, to: &str| refusal("images.csv", &IMAGES.replace(from, to));
+    assert_says(&with("two,wrist,b1", "to,wrist,b1"), Code::StopUnknown, &["images.csv:5", "\"to\"", "\"two\""]);
+    assert_says(&with("three,left", "three,lift"), Code::CameraUnknown, &["images.csv:2", "\"lift\"", "\"left\""]);
+    assert_says(&with("b2.png", "b1.png"), Code::CsvRowTwice, &["images.csv:6", "b1.png", "line 5"]);
+    assert_says(&with("b2.png", ""), Code::CsvCellEmpty, &["images.csv:6", "image"]);
+    assert_says(&with("camera", "cam"), Code::CsvColumnUnknown, &["images.csv:1", "cam"]);
+    assert_says(
+        &refusal("images.csv", "stop,camera,image\none,left,a.png\n"),
+        Code::ImagesMissing,
+        &["images.csv", "wrist"],
+    );
+    let unmounted = MANIFEST.replace("mount = \"hand\"\n", "");
+    assert_says(&refusal("series.toml", &unmounted), Code::SettingMissing, &["series.toml", "camera_mount"]);
+    let folder = folder(&[]);
+    fs::remove_file(folder.path().join("images.csv")).unwrap();
+    assert_says(&read(folder.path()).unwrap_err(), Code::FileMissing, &["images.csv"]);
+}
