@@ -11,6 +11,7 @@ use super::say::say_line;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::picture_size;
+use crate::identify::readings_of;
 use crate::series::{self, Series, Source};
 use crate::urdf;
 
@@ -103,11 +104,16 @@ fn files_of(folder: &Path, seen: &mut Examination) {
     if is_recording || has("controller.csv") {
         return;
     }
-    need(
-        "joints.csv",
-        "a row each image: its name, then the reading of every joint; the columns are named as in the URDF",
-    );
-    if !["images", "observations.csv", "points.csv", "poses.csv", "contacts.csv"].iter().any(|name| has(name)) {
+    if !has("controller.csv") {
+        need(
+            "joints.csv",
+            "a row each image: its name, then the reading of every joint; the columns are named as in the URDF",
+        );
+    }
+    if !["images", "images.csv", "observations.csv", "points.csv", "poses.csv", "contacts.csv"]
+        .iter()
+        .any(|name| has(name))
+    {
         need("images", "put the images of the series there, named as in joints.csv");
     }
 }
@@ -119,6 +125,10 @@ fn examine(series: &Series, args: &DoctorArgs, seen: &mut Examination) {
             seen.good("recording", &format!("{}; stops are taken out by identify", path.display()))
         }
         Source::Observations(all) => seen.good("observations.csv", &format!("{} images", all.len())),
+        Source::Cameras(views) => {
+            seen.good("images.csv", &format!("{} cameras at the same stops", views.len()));
+            views.iter().for_each(|view| images(view, seen));
+        }
         Source::NoImages => seen.good("measurements", "of the tip in space, without images"),
         Source::Images { dark, white, .. } => {
             images(series, seen);
@@ -171,6 +181,7 @@ fn images(series: &Series, seen: &mut Examination) {
 fn stops(series: &Series, seen: &mut Examination) {
     let (all, few) = (series.stops.stops.len(), Limits::default().few_images);
     match all < few {
+        false if series.controller.is_some() => seen.good("controller.csv", &format!("{all} stops with their poses")),
         false => seen.good("joints.csv", &format!("{all} stops, joints {}", series.stops.joints.join(", "))),
         true => {
             let remedy = "take 30 to 50 stops that move every joint through its range";
@@ -190,7 +201,7 @@ fn robot(series: &Series, file: &Path, seen: &Examination) -> Result<()> {
     if matches!(series.source, Source::Recording(_)) {
         return Ok(());
     }
-    let readings = series.readings_for(&chain)?;
+    let readings = readings_of(series, &chain)?;
     series.reading_notices(&chain).iter().for_each(|n| seen.note(n));
     seen.good("readings", &format!("{} stops with a value for every joint", readings.iter().flatten().count()));
     Ok(())
