@@ -43,7 +43,7 @@ fn chain() -> Chain {
 
 fn stop(k: usize, readings: Vec<f64>) -> MeasuredStop {
     let (image, placement) = (format!("{k:03}"), "placement_0".to_owned());
-    MeasuredStop { image, readings: Some(readings), placement, observations: Vec::new(), left_out: None }
+    MeasuredStop { row: k, image, readings: Some(readings), placement, observations: Vec::new(), left_out: None }
 }
 
 /// Robot with errors of 0.5 mm and 1 mrad an axis.

@@ -108,6 +108,9 @@ fn seen(mounts: &[CameraMount], wanted: usize, seed: u64) -> Seen {
         plate_name: format!("plate {:?}", mounts[k]),
         order_known: true,
         otherwise: Vec::new(),
+        has_images: true,
+        bodies: Vec::new(),
+        lengths: Vec::new(),
         stops,
     };
     Seen { series: stops.into_iter().enumerate().map(series).collect(), joint_errors }
