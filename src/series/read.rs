@@ -153,9 +153,21 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     let mut series =
         Series { name, folder, manifest, plate, stops, source, controller, spatial, run: None, notices, inputs };
     if by_cameras {
+        refuse_spatial(&series)?;
         series.source = Source::Cameras(views_of(&mut series, use_observations)?);
     }
     Ok(series)
+}
+
+/// Measurements of trackers and contacts have no place among the views of several cameras yet.
+fn refuse_spatial(series: &Series) -> Result<()> {
+    if series.spatial.is_empty() {
+        return Ok(());
+    }
+    let what = "points.csv, poses.csv and contacts.csv are not read yet beside images.csv";
+    let remedy =
+        "put them with their rows of joints.csv into a series folder of their own, and give both with --series";
+    Err(Error::new(Code::SettingUnsupported, series.folder.display(), what, remedy))
 }
 
 /// The views of the cameras of a series, by its images.csv.
