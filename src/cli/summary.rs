@@ -112,12 +112,12 @@ fn held_out(r: &SolutionRecord) -> Vec<String> {
 
 /// Images and observations that took no part, counted by reason.
 fn left_out(r: &SolutionRecord) -> Vec<String> {
-    let mut reasons: BTreeMap<Code, usize> = BTreeMap::new();
-    for rejection in r.images.iter().filter_map(|i| i.rejection()) {
-        *reasons.entry(rejection.code()).or_default() += 1;
+    let mut reasons: BTreeMap<Code, Vec<&str>> = BTreeMap::new();
+    for (name, rejection) in r.images.iter().filter_map(|i| Some((&i.name, i.rejection()?))) {
+        reasons.entry(rejection.code()).or_default().push(name);
     }
-    let out: usize = reasons.values().sum();
-    let named: Vec<String> = reasons.iter().map(|(code, n)| format!("{n} {}", spoken(*code))).collect();
+    let out: usize = reasons.values().map(Vec::len).sum();
+    let named: Vec<String> = reasons.iter().map(|(code, names)| reason(*code, names)).collect();
     let why = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
     let s = &r.statistics;
     let b = &r.bodies.measurements;
@@ -134,6 +134,17 @@ fn left_out(r: &SolutionRecord) -> Vec<String> {
     );
     paragraph("left out  ", &words, 2)
 }
+
+/// Images of one reason: their names, where they are few.
+fn reason(code: Code, names: &[&str]) -> String {
+    match names.len() {
+        ..=MOST_NAMED => format!("{}: {}", names.join(", "), spoken(code)),
+        many => format!("{many} {}", spoken(code)),
+    }
+}
+
+/// Images left out for one reason that are named.
+const MOST_NAMED: usize = 2;
 
 /// A code as it is spoken of images.
 fn spoken(code: Code) -> String {

@@ -227,17 +227,17 @@ impl Adjustment {
     fn stops_of(&self, images: &[usize], bodies: &[BodyPart]) -> Vec<StopParts> {
         let of_image = |i: &usize| self.problem.images[*i].stop;
         let of_body = |b: &BodyPart| self.problem.body_measurements[b.index].stop;
+        let mut parts = Vec::new();
         let (mut image, mut body) = (0, 0);
-        let parts = |stop: usize| {
+        while image < images.len() || body < bodies.len() {
+            let next = [images.get(image).map(of_image), bodies.get(body).map(of_body)];
+            let Some(stop) = next.into_iter().flatten().min() else { break };
             let first = (image, body);
             image += images[image..].iter().take_while(|i| of_image(i) == stop).count();
             body += bodies[body..].iter().take_while(|b| of_body(b) == stop).count();
-            StopParts { stop, images: first.0..image, bodies: first.1..body }
-        };
-        let mut stops: Vec<usize> = images.iter().map(of_image).chain(bodies.iter().map(of_body)).collect();
-        stops.sort_unstable();
-        stops.dedup();
-        stops.into_iter().map(parts).collect()
+            parts.push(StopParts { stop, images: first.0..image, bodies: first.1..body });
+        }
+        parts
     }
 
     /// Half the squares of priors and of what is latent at some stops and their images.

@@ -1,8 +1,9 @@
 //! Points and poses of a tracker, contacts, and stops that have more than an image.
 
 use std::fs;
+use std::path::Path;
 
-use robotcal::series::{RotationKind, Series, Source, StopKey, read};
+use robotcal::series::{Manifest, RotationKind, Series, Source, StopKey, read};
 use robotcal::{Code, Error};
 use tempfile::TempDir;
 
@@ -75,7 +76,7 @@ fn sections_beside_the_camera_are_read() {
     let sections = "[tracker]\nname = \"leica\"\nsigma_m = 5e-5\n[contact]\nsigma_m = 1e-4\nframe = \"cad\"\n\
                     [[distance]]\nbetween = [\"a\", \"b\"]\ndistance_m = 0.05\nsigma_m = 1e-4\n[controller]\nrotation = \"abc_deg\"\n\
                     [[camera]]\nname = \"left\"\nmount = \"hand\"\n[[camera]]\nname = \"right\"\nmount = \"fixed\"\n";
-    let manifest = series(&[("series.toml", &format!("{MANIFEST}{sections}"))]).manifest;
+    let manifest = Manifest::parse(Path::new("series.toml"), &format!("{MANIFEST}{sections}")).unwrap();
     assert_eq!(manifest.tracker.as_ref().unwrap().sigma_m, Some(5e-5));
     assert_eq!(manifest.contact.as_ref().unwrap().frame.as_deref(), Some("cad"));
     assert_eq!(manifest.distance[0].between, ["a", "b"]);
@@ -83,7 +84,7 @@ fn sections_beside_the_camera_are_read() {
     let names: Vec<_> = manifest.cameras.iter().map(|c| c.name.as_deref().unwrap()).collect();
     assert_eq!(names, ["left", "right"]);
     let again = manifest.to_toml().unwrap();
-    assert_eq!(series(&[("series.toml", &again)]).manifest, manifest);
+    assert_eq!(Manifest::parse(Path::new("series.toml"), &again).unwrap(), manifest);
 }
 
 #[test]
