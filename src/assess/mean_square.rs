@@ -1,8 +1,9 @@
 //! How far the mean square of an error may be from what is expected of it.
 //!
 //! The error of the flange at a place is `d + J x` with a known `d` and `x ~ N(0, C)`: its mean square over places is a quadratic form
-//! `x' A x + 2 g' x + d2` of mean `tr(A C) + d2` and variance `2 tr(A C A C) + 4 g' C g`. It is taken as a multiple of chi square of
-//! the same mean and variance (Satterthwaite), whose quantiles are those of Wilson and Hilferty.
+//! `x' A x + 2 g' x + d2` with the cumulants `k_s = 2^(s-1) (s-1)! (tr((A C)^s) + s g' C (A C)^(s-2) g)`, `d2` on the first. It is taken as a
+//! shifted multiple of a chi square of the same three (P. Hall 1983, M. Buckley and G. Eagleson 1988), whose quantiles are those of Wilson
+//! and Hilferty.
 
 use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 
@@ -36,12 +37,29 @@ impl MeanSquare {
         let n = self.places.max(1.0);
         let ac = &self.a * covariance / n;
         let g = &self.g / n;
+        let twice = &ac * &ac;
+        let cg = covariance * &g;
         let mean = ac.trace() + self.d2 / n;
-        let variance = 2.0 * ac.component_mul(&ac.transpose()).sum() + 4.0 * g.dot(&(covariance * &g));
-        let spread = 2.0 / 9.0 * variance.max(0.0) / (2.0 * mean * mean).max(f64::MIN_POSITIVE);
-        [-NORMAL_95, NORMAL_95].map(|z| (mean * (1.0 - spread + z * spread.sqrt()).max(0.0).powi(3)).max(0.0).sqrt())
+        let variance = (2.0 * twice.trace() + 4.0 * g.dot(&cg)).max(0.0);
+        let third = 8.0 * twice.component_mul(&ac.transpose()).sum() + 24.0 / n * cg.dot(&(&self.a * &cg));
+        let freedom = 8.0 * variance.powi(3) / (third * third).max(f64::MIN_POSITIVE);
+        [-NORMAL_95, NORMAL_95].map(|z| (mean + variance.sqrt() * standard_chi_square(freedom, z)).max(0.0).sqrt())
     }
 }
+
+/// Quantile at `z` normal sigmas of a chi square of mean 0 and variance 1 with so many degrees of freedom; that of a normal one where they are
+/// without bound.
+fn standard_chi_square(freedom: f64, z: f64) -> f64 {
+    if freedom > NEARLY_NORMAL {
+        return z;
+    }
+    let spread = 2.0 / (9.0 * freedom);
+    let quantile = freedom * (1.0 - spread + z * spread.sqrt()).max(0.0).powi(3);
+    (quantile - freedom) / (2.0 * freedom).sqrt()
+}
+
+/// Degrees of freedom from which a chi square counts as normal.
+const NEARLY_NORMAL: f64 = 1e8;
 
 #[cfg(test)]
 mod tests {

@@ -16,6 +16,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("assess/hold_out.rs NOMINAL_JOINT_ERROR", "prior of the nominal fit"),
     ("assess/identifiability.rs AS_LONG", "rounding of a length"),
     ("assess/identifiability.rs MOST_PAIRS", "how many pairs are kept"),
+    ("assess/mean_square.rs NEARLY_NORMAL", "limit of a distribution"),
     ("assess/mean_square.rs NORMAL_95", "quantile of the normal distribution"),
     ("assess/projection.rs ACROSS", "grid of a map"),
     ("assess/statistics.rs RESAMPLINGS", "samples of a bootstrap"),
