@@ -66,7 +66,7 @@ pub enum BodySeen {
 
 impl BodySeen {
     /// Number of coordinates.
-    pub fn len(&self) -> usize {
+    pub fn coordinates(&self) -> usize {
         match self {
             Self::Point(_) => 3,
             Self::Pose(_) => 6,
@@ -153,7 +153,7 @@ impl BodyMeasurement {
     pub fn length(&self, predicted: &Pose, factors: [f64; 2]) -> [f64; 2] {
         let BodyTerms { squares, .. } = self.linearise(predicted, factors);
         let length = (squares[0] / factors[0].powi(2) + squares[1] / factors[1].powi(2)).sqrt();
-        [length, BOUND[usize::from(self.seen.len() == 6)]]
+        [length, BOUND[usize::from(self.seen.coordinates() == 6)]]
     }
 
     /// Blocks at a predicted pose, with factors on the stated sigmas of position and rotation.
@@ -161,14 +161,16 @@ impl BodyMeasurement {
         let (residual, jacobian) = self.residual(predicted);
         let sigma = [self.sigma_m, self.sigma_rad];
         let square = |k: usize| residual.fixed_rows::<3>(3 * k).norm_squared() / sigma[k].powi(2);
-        let squares = [square(0), if self.seen.len() == 6 { square(1) } else { 0.0 }];
+        let squares = [square(0), if self.seen.coordinates() == 6 { square(1) } else { 0.0 }];
         let length = (squares[0] / factors[0].powi(2) + squares[1] / factors[1].powi(2)).sqrt();
-        let bound = HUBER[usize::from(self.seen.len() == 6)];
+        let bound = HUBER[usize::from(self.seen.coordinates() == 6)];
         let weight = if length <= bound { 1.0 } else { bound / length };
         let cost = if length <= bound { 0.5 * length * length } else { bound * (length - 0.5 * bound) };
         let information = |k: usize| weight / (sigma[k / 3] * factors[k / 3]).powi(2);
         let w =
-            Matrix6::from_diagonal(&Vector6::from_fn(|k, _| if k < self.seen.len() { information(k) } else { 0.0 }));
+            Matrix6::from_diagonal(&Vector6::from_fn(
+                |k, _| if k < self.seen.coordinates() { information(k) } else { 0.0 },
+            ));
         let jw = jacobian.transpose() * w;
         BodyTerms { cost, pp: jw * jacobian, bp: jw * residual, residual, squares, weight }
     }

@@ -43,10 +43,10 @@ impl Fit {
                 let used_up: Matrix6<f64> = Matrix6::from_column_slice(covariance.as_slice()) * part.terms.pp;
                 let tally = &mut tallies[problem.instruments[measured.instrument].component];
                 // The rotation of a pose moves no position: the trace falls apart as its blocks do.
-                for (k, tally) in tally.iter_mut().enumerate().take(measured.seen.len() / 3) {
+                for (k, tally) in tally.iter_mut().enumerate().take(measured.seen.coordinates() / 3) {
                     tally.squares += part.terms.weight * part.terms.squares[k];
                     tally.count += 3.0;
-                    tally.taken += match measured.seen.len() {
+                    tally.taken += match measured.seen.coordinates() {
                         3 => used_up.trace(),
                         _ => used_up.fixed_view::<3, 3>(3 * k, 3 * k).trace(),
                     };
