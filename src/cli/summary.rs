@@ -135,16 +135,14 @@ fn left_out(r: &SolutionRecord) -> Vec<String> {
     paragraph("left out  ", &words, 2)
 }
 
-/// Images of one reason: their names, where they are few.
+/// Images of one reason, the first few by name.
 fn reason(code: Code, names: &[&str]) -> String {
-    match names.len() {
-        ..=MOST_NAMED => format!("{}: {}", names.join(", "), spoken(code)),
-        many => format!("{many} {}", spoken(code)),
-    }
+    let more = if names.len() > MOST_NAMED { ", .." } else { "" };
+    format!("{} {}: {}{more}", names.len(), spoken(code), names[..names.len().min(MOST_NAMED)].join(", "))
 }
 
 /// Images left out for one reason that are named.
-const MOST_NAMED: usize = 2;
+const MOST_NAMED: usize = 3;
 
 /// A code as it is spoken of images.
 fn spoken(code: Code) -> String {
