@@ -25,9 +25,8 @@ pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<M
     let mut named = Vec::new();
     for measured in &problem.body_measurements {
         let Some(why) = &measured.rejected else { continue };
-        let stop = &problem.stops[measured.stop];
-        let first = problem.stops.iter().position(|s| s.series == stop.series).unwrap_or(0);
-        let name = setting.series[stop.series].stops[measured.stop - first].image.clone();
+        let (series, stop) = measured.read;
+        let name = setting.series[series].stops[stop].image.clone();
         named.push([name, problem.instruments[measured.instrument].name.clone(), why.to_string()]);
     }
     let (out, all) = (named.len(), problem.body_measurements.len());

@@ -32,7 +32,7 @@ impl Bodies {
     /// Of all series; `places` has the stop of every row of each.
     pub fn of(series: &[MeasuredSeries], places: &[Vec<usize>]) -> Self {
         let mut all = Self::default();
-        for (s, stops) in series.iter().zip(places) {
+        for (index, (s, stops)) in series.iter().zip(places).enumerate() {
             let mut components: Vec<(InstrumentKind, usize)> = Vec::new();
             for seen in &s.bodies {
                 let component = match components.iter().find(|(kind, _)| *kind == seen.kind) {
@@ -47,6 +47,7 @@ impl Bodies {
                 let body = intern(&mut all.names, &seen.body);
                 all.measurements.push(BodyMeasurement {
                     stop: stops[seen.stop],
+                    read: (index, seen.stop),
                     instrument,
                     body,
                     seen: seen.seen,

@@ -200,18 +200,16 @@ impl BodiesRecord {
 
 fn measurement(solution: &Solution, k: usize, m: &BodyMeasurement) -> MeasurementRecord {
     let problem = &solution.fit.problem;
-    let stop = &problem.stops[m.stop];
-    let first = problem.stops.iter().position(|s| s.series == stop.series).unwrap_or(0);
-    let series = &solution.series[stop.series];
-    let part = solution.fit.linearised.bodies.iter().find(|part| part.index == k);
+    let (series, stop) = (&solution.series[m.read.0], m.read.1);
+    let part = solution.fit.linearised.body(k);
     let (xyz_m, quat_xyzw) = match &m.seen {
         BodySeen::Point(position) => ((*position).into(), None),
         BodySeen::Pose(pose) => (pose.xyz(), Some(pose.quaternion_xyzw())),
     };
     MeasurementRecord {
         series: series.name.clone(),
-        stop: m.stop - first,
-        name: series.stops[m.stop - first].image.clone(),
+        stop,
+        name: series.stops[stop].image.clone(),
         instrument: problem.instruments[m.instrument].name.clone(),
         kind: problem.instruments[m.instrument].kind,
         body: problem.bodies[m.body].clone(),

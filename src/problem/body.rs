@@ -117,6 +117,8 @@ impl fmt::Display for BodyRejection {
 pub struct BodyMeasurement {
     /// Index of its stop.
     pub stop: usize,
+    /// Series that it was read from, and place of its stop there.
+    pub read: (usize, usize),
     /// Index of the instrument.
     pub instrument: usize,
     /// Index of the body.

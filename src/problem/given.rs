@@ -119,10 +119,13 @@ impl Problem {
         self.families.iter().find_map(of).unwrap_or(self.layout.columns[column].prior_sigma)
     }
 
-    /// Index of the noise of the images of a series: series that several cameras took at the same stops have it in common.
+    /// Index of the noise of the stops of a series: series that several cameras took at the same stops have it in common.
     pub fn noise_of(&self, series: usize) -> usize {
-        let first = self.images.iter().find(|image| image.series == series);
-        first.map_or(series, |image| self.stops[image.stop].series)
+        let image = self.images.iter().find(|image| image.series == series).map(|image| image.stop);
+        let body =
+            || self.body_measurements.iter().find(|measured| measured.read.0 == series).map(|measured| measured.stop);
+        let last = self.noise.joint.len().saturating_sub(1);
+        image.or_else(body).map_or(series.min(last), |stop| self.stops[stop].series)
     }
 
     /// Standard deviation of the whole joint noise of stops, by the index of their noise, per reading, rad or m.

@@ -40,7 +40,9 @@ impl Seen<'_> {
         let stated = self.manifest.cameras.as_slice();
         let cameras = if stated.is_empty() { &unstated[..] } else { stated };
         let view = |(k, camera): (usize, &CameraSection)| {
-            let own: Vec<&ImageRow> = rows.iter().filter(|r| r.camera == k).collect();
+            // In the order of the stops, whatever that of the table is: images of a problem stand in it.
+            let mut own: Vec<&ImageRow> = rows.iter().filter(|r| r.camera == k).collect();
+            own.sort_by_key(|r| r.stop);
             self.view(camera, cameras.len() > 1, &own)
         };
         cameras.iter().enumerate().map(view).collect()

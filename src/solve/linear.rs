@@ -71,6 +71,11 @@ impl Linearised {
         Self { equations: Arc::default(), ..self }
     }
 
+    /// A measurement of a body by its index; `None` for one that takes no part.
+    pub fn body(&self, index: usize) -> Option<&BodyPart> {
+        Some(&self.bodies[self.bodies.binary_search_by_key(&index, |part| part.index).ok()?])
+    }
+
     /// Pixel blocks and chain of an image by its index; `None` for one that takes no part.
     pub fn of(&self, image: usize) -> Option<(&ImageTerms, &Chained)> {
         let k = self.images.binary_search(&image).ok()?;

@@ -351,3 +351,20 @@ fn a_ball_that_sat_in_another_socket_is_left_out_by_name() {
     let found = solution.findings.iter().find(|f| f.code() == Code::MeasurementsLeftOut).unwrap();
     assert_eq!(found.subjects(), [Subject::Stop("005".into())]);
 }
+
+#[test]
+fn a_left_out_measurement_is_named_by_its_own_series_behind_several_cameras() {
+    let mut world = World::sockets(7, 3, 14, 5e-5, 2e-5);
+    world.series.bodies[5].instrument = "socket 2".into();
+    // Two views of one run have their stops in common: there are fewer runs than series.
+    let view = |name: &str| {
+        let stops = world.series.stops[..3].iter().cloned().enumerate().map(|(row, s)| MeasuredStop { row, ..s });
+        let own = MeasuredSeries::without_images(name, true, stops.collect());
+        MeasuredSeries { run: Some("cell".into()), ..own }
+    };
+    let series = [view("cell left"), view("cell right"), world.series.clone()];
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let solution = identify(world.chain.clone(), &series, &options).unwrap();
+    let found = solution.findings.iter().find(|f| f.code() == Code::MeasurementsLeftOut).unwrap();
+    assert_eq!(found.subjects(), [Subject::Stop("005".into())]);
+}
