@@ -46,7 +46,7 @@ pub struct Accuracy {
 /// A fit of the images that are left, from where the adjustment stands.
 pub type Refit<'a> = dyn Fn(Adjustment) -> Option<State> + Sync + 'a;
 
-pub(super) const FOLDS: usize = 6;
+const FOLDS: usize = 6;
 
 /// Joint error that a nominal robot is allowed per stop, rad or m, so that its geometric errors do not bend camera and plate.
 const NOMINAL_JOINT_ERROR: f64 = 3e-3;
@@ -137,13 +137,15 @@ pub fn cluster_of_images(problem: &Problem, limits: &Limits) -> Vec<usize> {
 /// Images that are held out together, fold by fold; those that share joint readings stay together. `None` for too few images on the robot.
 pub fn folds(problem: &Problem, limits: &Limits) -> Option<Vec<Vec<usize>>> {
     let groups = clusters(problem, limits);
-    if groups.len() < 2 {
-        return None;
-    }
+    (groups.len() >= 2).then(|| dealt(groups))
+}
+
+/// Groups that stay together, dealt to the folds one after the other.
+pub(super) fn dealt(groups: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
     let mut folds = vec![Vec::new(); FOLDS.min(groups.len())];
     let count = folds.len();
     groups.into_iter().enumerate().for_each(|(k, group)| folds[k % count].extend(group));
-    Some(folds)
+    folds
 }
 
 /// Regions of the workspace that are held out one after the other: postures (images that share joint readings) next to each other along the direction

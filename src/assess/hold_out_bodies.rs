@@ -1,6 +1,8 @@
 //! Hold-out of measured bodies by stop: where no image tells of the robot, they are what a model is judged by.
 
-use super::hold_out::{Accuracy, Errors, FOLDS, nominal, refitted, side_by_side};
+use std::collections::HashSet;
+
+use super::hold_out::{Accuracy, Errors, dealt, nominal, refitted, side_by_side};
 use super::limits::Limits;
 use crate::problem::{Adjustment, State, TakenFrom};
 use crate::stage::stage;
@@ -16,9 +18,7 @@ pub fn hold_out_bodies(fit: &Adjustment, limits: &Limits) -> Option<(Accuracy, V
     if stops.len() < limits.hand_eye_images {
         return None;
     }
-    let mut folds = vec![Vec::new(); FOLDS.min(stops.len())];
-    let count = folds.len();
-    stops.into_iter().enumerate().for_each(|(k, stop)| folds[k % count].push(stop));
+    let folds = dealt(stops.into_iter().map(|stop| vec![stop]).collect());
     let (before, _) = predictions(&nominal(fit), &folds)?;
     let (after, states) = predictions(fit, &folds)?;
     let mut per_body_mm = vec![None; fit.problem.body_measurements.len()];
@@ -37,6 +37,7 @@ fn predictions(fit: &Adjustment, folds: &[Vec<usize>]) -> Option<Predictions> {
     let states = side_by_side(folds, |_, held| refitted(fit.without_bodies_at(held)));
     let mut errors = Vec::new();
     for (held, state) in folds.iter().zip(&states) {
+        let held: HashSet<usize> = held.iter().copied().collect();
         for (k, measured) in fit.problem.used_bodies().filter(|(_, m)| held.contains(&m.stop)) {
             let posture = fit.problem.stops[measured.stop].posture.as_ref()?;
             let predicted = state.instrument_from_body(measured, TakenFrom::exact(posture))?;

@@ -84,8 +84,9 @@ impl Inputs {
     fn of(description: RobotDescription, urdf: Option<&Path>, series: Vec<Series>, ends: Ends) -> Result<Self> {
         // Links that the series name are those of a robot that is not given.
         let own: &[Series] = if urdf.is_some() { &series } else { &[] };
-        let base = agreed("base", ends.base, own, |s| s.manifest.base.as_deref())?;
-        let tip = agreed("tip", ends.tip, own, |s| s.manifest.tip.as_deref())?;
+        let [by_base, by_tip] = carriers(own)?;
+        let base = by_base.or(agreed("base", ends.base, own, |s| s.manifest.base.as_deref())?);
+        let tip = by_tip.or(agreed("tip", ends.tip, own, |s| s.manifest.tip.as_deref())?);
         let chain = description.chain(base, tip)?;
         let tip_notice = description.tip_notice(base, tip);
         Ok(Self {
@@ -196,6 +197,21 @@ fn read_all(folders: &[PathBuf]) -> Result<Vec<Series>> {
         all.push(s);
     }
     Ok(all)
+}
+
+/// Links that carry what neither base nor tip does, the same in all series.
+fn carriers(all: &[Series]) -> Result<[Option<&str>; 2]> {
+    let Some(first) = all.first() else { return Ok([None, None]) };
+    let links = first.manifest.carriers();
+    match all.iter().find(|s| s.manifest.carriers() != links) {
+        None => Ok(links),
+        Some(other) => Err(Error::new(
+            Code::SeriesDisagree,
+            other.folder.join("series.toml").display(),
+            format!("its camera and plate hang on other links than those of {}", first.name),
+            "identify series with different links ([plate_mount] or link of the camera) one by one",
+        )),
+    }
 }
 
 /// A link that the flag or the manifests name; they must agree.

@@ -193,7 +193,7 @@ fn stops(series: &Series, seen: &mut Examination) {
 /// Names, units and limits of the readings against the robot.
 fn robot(series: &Series, file: &Path, seen: &Examination) -> Result<()> {
     let description = urdf::read(file)?;
-    let (base, tip) = (series.manifest.base.as_deref(), series.manifest.tip.as_deref());
+    let [base, tip] = series.manifest.ends();
     let chain = description.chain(base, tip)?;
     let moving = chain.readings.join(", ");
     seen.good("urdf", &format!("{} ({} to {}; {moving})", description.name, chain.base, chain.tip));

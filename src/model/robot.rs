@@ -143,15 +143,23 @@ impl Robot {
         errors
     }
 
-    /// `origin_i Exp(xi_i) Motion_i(offset_i)` for every joint: the corrected URDF, in which controller angles stay as they are.
+    /// `origin_i Exp(xi_i) Motion_i(offset_i)` for every joint: the corrected URDF, in which controller angles stay as they are. The offset
+    /// of a joint that is passed upwards stands before the origin behind its motion.
     pub fn corrected_origins(&self) -> Vec<Pose> {
         let mut offsets = vec![0.0; self.chain.readings.len()];
         for t in self.terms.iter().filter(|t| t.term == Term::Offset) {
             offsets[t.reading] += t.value;
         }
+        let mut before = Pose::identity();
         let corrected = |(joint, twist): (&Joint, &Vector6<f64>)| {
-            let offset = joint.drive.map_or(0.0, |d| d.multiplier * offsets[d.reading]);
-            joint.origin.perturbed(twist) * motion(joint, offset)
+            let zero = motion(joint, joint.drive.map_or(0.0, |d| d.multiplier * offsets[d.reading]));
+            let moved = std::mem::replace(&mut before, Pose::identity()) * joint.origin.perturbed(twist);
+            if joint.states_origin() {
+                moved * zero
+            } else {
+                before = zero;
+                moved
+            }
         };
         self.chain.joints.iter().zip(&self.twists).map(corrected).collect()
     }
@@ -159,7 +167,8 @@ impl Robot {
     /// Names of the joints of the chain, each with the corrected `<origin>` that the URDF states for it.
     pub fn urdf_origins(&self) -> Vec<(&str, Pose)> {
         let stated = |j: &Joint, origin: Pose| if j.upwards { origin.inverse() } else { origin };
-        self.chain.joints.iter().zip(self.corrected_origins()).map(|(j, o)| (j.name.as_str(), stated(j, o))).collect()
+        let all = self.chain.joints.iter().zip(self.corrected_origins()).filter(|(j, _)| j.states_origin());
+        all.map(|(j, o)| (j.name.as_str(), stated(j, o))).collect()
     }
 
     /// The robot that a result states: without the local errors, which are noise near readings of one series, not properties of
@@ -234,7 +243,8 @@ impl Robot {
         (self.chain.joints.iter().map(position).collect(), contexts)
     }
 
-    /// Gravity moments in the nominal posture, gravity along -z of the base; a sagging joint turns the way its moment pulls.
+    /// Gravity moments in the nominal posture, gravity along -z of the base (of the link above both ends, where the base is carried); a
+    /// sagging joint turns the way its moment pulls.
     fn fill_gravity(&self, contexts: &mut [TermContext]) {
         let joints = &self.chain.joints;
         // Pose behind every joint, base frame; the driven ones with their readings.
@@ -245,20 +255,30 @@ impl Robot {
             driven.extend(joint.drive.map(|d| (index, d.reading)));
             poses.push(pose);
         }
-        let weight = Vector3::new(0.0, 0.0, -1.0);
+        let down = Vector3::new(0.0, 0.0, -1.0);
+        let above = self.chain.climbed().checked_sub(1).filter(|_| self.chain.base_moves());
+        let weight = above.map_or(down, |above| poses[above].rotation * down);
         let levers = |index: usize| levers(&joints[index].axis).map(|l| poses[index].rotation * l);
+        let centre_of = |m: &CarriedMass| match joints[m.joint].upwards {
+            // In the child link, which lies before the motion.
+            true => m.joint.checked_sub(1).map_or(m.centre_m, |before| poses[before].transform(&m.centre_m)),
+            false => poses[m.joint].transform(&m.centre_m),
+        };
         for (k, &(index, reading)) in driven.iter().enumerate() {
             let axis = poses[index].rotation * joints[index].axis;
             let moment = |lever: Vector3<f64>| match joints[index].kind {
                 JointKind::Prismatic => axis.dot(&weight),
                 _ => axis.dot(&lever.cross(&weight)),
             };
-            let of_mass =
-                |m: &CarriedMass| m.mass_kg * moment(poses[m.joint].transform(&m.centre_m) - poses[index].translation);
+            let of_mass = |m: &CarriedMass| m.mass_kg * moment(centre_of(m) - poses[index].translation);
             let largest = self.chain.largest_moment(index);
             if largest > 0.0 {
-                let carried = self.chain.masses.iter().filter(|m| m.joint >= index);
-                contexts[reading].moment = carried.map(of_mass).sum::<f64>() / largest;
+                let carried = self.chain.masses_on(index).map(of_mass).sum::<f64>() / largest;
+                contexts[reading].moment = if joints[index].upwards { -carried } else { carried };
+            }
+            // Levers lie in the links behind a joint, which are not those that one passed upwards carries.
+            if joints[index].upwards {
+                continue;
             }
             let own = levers(index).map(moment);
             let next = driven.get(k + 1).map_or([0.0; 2], |&(next, _)| levers(next).map(moment));

@@ -129,8 +129,8 @@ pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -
 /// The robot with the twists and terms of the solution; terms of the model that it has not stand at zero.
 fn calibrated(record: &SolutionRecord, chain: Chain, model: RobotModel) -> Robot {
     let mut robot = model.robot(chain);
-    for (joint, twist) in robot.chain.joints.iter().zip(&mut robot.twists) {
-        if let Some(found) = record.robot.joints.iter().find(|j| j.name == joint.name) {
+    for (joint, twist) in robot.chain.joints.iter().zip(&mut robot.twists).filter(|(j, _)| j.states_origin()) {
+        if let Some(found) = record.robot.joints.iter().rfind(|j| j.name == joint.name) {
             *twist = Vector6::from(found.twist);
         }
     }

@@ -146,35 +146,32 @@ pub struct BodyTerms {
     pub residual: Vector6<f64>,
     /// Sums of squares in units of the stated sigmas: position, rotation.
     pub squares: [f64; 2],
+    /// Length of the residual in sigmas, and that which a normal one exceeds with a probability of 4e-5.
+    pub length: [f64; 2],
     /// Huber weight.
     pub weight: f64,
 }
 
 impl BodyMeasurement {
-    /// Length of the residual at a predicted pose in sigmas, and that which a normal one exceeds with a probability of 4e-5.
-    pub fn length(&self, predicted: &Pose, factors: [f64; 2]) -> [f64; 2] {
-        let BodyTerms { squares, .. } = self.linearise(predicted, factors);
-        let length = (squares[0] / factors[0].powi(2) + squares[1] / factors[1].powi(2)).sqrt();
-        [length, BOUND[usize::from(self.seen.coordinates() == 6)]]
-    }
-
     /// Blocks at a predicted pose, with factors on the stated sigmas of position and rotation.
     pub fn linearise(&self, predicted: &Pose, factors: [f64; 2]) -> BodyTerms {
         let (residual, jacobian) = self.residual(predicted);
         let sigma = [self.sigma_m, self.sigma_rad];
         let square = |k: usize| residual.fixed_rows::<3>(3 * k).norm_squared() / sigma[k].powi(2);
-        let squares = [square(0), if self.seen.coordinates() == 6 { square(1) } else { 0.0 }];
+        let (coordinates, turned, kind) = match self.seen {
+            BodySeen::Point(_) => (3, 0.0, 0),
+            BodySeen::Pose(_) => (6, square(1), 1),
+        };
+        let squares = [square(0), turned];
         let length = (squares[0] / factors[0].powi(2) + squares[1] / factors[1].powi(2)).sqrt();
-        let bound = HUBER[usize::from(self.seen.coordinates() == 6)];
+        let bound = HUBER[kind];
         let weight = if length <= bound { 1.0 } else { bound / length };
         let cost = if length <= bound { 0.5 * length * length } else { bound * (length - 0.5 * bound) };
         let information = |k: usize| weight / (sigma[k / 3] * factors[k / 3]).powi(2);
         let w =
-            Matrix6::from_diagonal(&Vector6::from_fn(
-                |k, _| if k < self.seen.coordinates() { information(k) } else { 0.0 },
-            ));
+            Matrix6::from_diagonal(&Vector6::from_fn(|k, _| if k < coordinates { information(k) } else { 0.0 }));
         let jw = jacobian.transpose() * w;
-        BodyTerms { cost, pp: jw * jacobian, bp: jw * residual, residual, squares, weight }
+        BodyTerms { cost, pp: jw * jacobian, bp: jw * residual, residual, squares, length: [length, BOUND[kind]], weight }
     }
 
     /// Measured minus predicted, and the derivative of the prediction by its body twist.

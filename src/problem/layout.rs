@@ -129,10 +129,13 @@ impl Layout {
         let origin = OriginPrior::default();
         let twists = b.block(|b| {
             for joint in &chain.joints {
+                let first = b.columns.len();
+                let part = if joint.states_origin() { "origin" } else { "motion" };
                 for (c, unit) in TWIST {
                     let sigma = if unit == "m" { origin.translation_m } else { origin.rotation_rad };
-                    b.add(format!("robot/{}/origin.{c}", joint.name), unit, sigma);
+                    b.add(format!("robot/{}/{part}.{c}", joint.name), unit, sigma);
                 }
+                b.columns[first..].iter_mut().for_each(|c| c.free = joint.states_origin());
             }
         });
         let terms = b.block(|b| {

@@ -207,6 +207,7 @@ impl Manifest {
         require_positive(path, "robot.repeatability_m", manifest.robot.repeatability_m)?;
         manifest.cameras.check(path)?;
         manifest.check_measured(path)?;
+        manifest.require_same_links(path)?;
         manifest.refuse_unsupported(path)?;
         Ok(manifest)
     }
@@ -222,19 +223,37 @@ impl Manifest {
 
     /// What the format knows and this program does not use yet must not be passed over in silence.
     fn refuse_unsupported(&self, path: &Path) -> Result<()> {
-        let carried = self.cameras.iter().any(|c| c.link.is_some());
-        let refused = [
-            ("[[camera]] link", carried),
-            ("[plate_mount]", self.plate_mount.is_some()),
-            ("[robot_2]", self.robot_2.is_some()),
-        ];
-        match refused.iter().find(|(_, stated)| *stated) {
-            None => Ok(()),
-            Some((key, _)) => {
-                let remedy = "remove it: camera or plate sit on the tip, or stand in the base";
-                Err(Error::new(Code::SettingUnsupported, path.display(), format!("{key} is not supported yet"), remedy))
-            }
+        if self.robot_2.is_none() {
+            return Ok(());
         }
+        let remedy = "give one URDF with both arms, and the link that carries the plate as link of [plate_mount]";
+        Err(Error::new(Code::SettingUnsupported, path.display(), "[robot_2] is not supported yet", remedy))
+    }
+
+    /// Links that are named as those that carry camera and plate: in place of the base, and in place of the tip. A camera in the hand and
+    /// the plate of a fixed one sit on the tip where no link is named.
+    pub fn carriers(&self) -> [Option<&str>; 2] {
+        let camera = self.camera().link.as_deref();
+        let plate = self.plate_mount.as_ref().map(|p| p.link.as_str());
+        match self.mount() {
+            CameraMount::Hand => [plate, camera],
+            CameraMount::Fixed => [camera, plate],
+        }
+    }
+
+    /// Links between which the chain runs, as far as the manifest states them.
+    pub fn ends(&self) -> [Option<&str>; 2] {
+        let [base, tip] = self.carriers();
+        [base.or(self.base.as_deref()), tip.or(self.tip.as_deref())]
+    }
+
+    /// All cameras of a series hang on the same links.
+    fn require_same_links(&self, path: &Path) -> Result<()> {
+        let Some(other) = self.cameras.iter().find(|c| c.link != self.camera().link) else { return Ok(()) };
+        let name = other.name.as_deref().unwrap_or("another");
+        let what = format!("camera \"{name}\" names another link than the first camera");
+        let remedy = "give cameras on different links as series of their own, each with its own base and tip";
+        Err(Error::new(Code::SettingConflict, path.display(), what, remedy))
     }
 
     /// Images need a plate, and it must be known where their cameras are.

@@ -162,7 +162,7 @@ impl Truth {
             )
         };
         for (name, twist) in &self.twists {
-            let index = chain.joints.iter().position(|j| j.name == *name).ok_or_else(|| unknown(name))?;
+            let index = chain.origin_of(name).ok_or_else(|| unknown(name))?;
             robot.twists[index] = Vector6::from(*twist);
         }
         for t in &self.terms {

@@ -80,11 +80,11 @@ fn normal(sigma: f64, rng: &mut impl Rng) -> f64 {
 fn true_robot(request: &WorldRequest, rng: &mut impl Rng) -> Robot {
     let e = &request.errors;
     let mut robot = Robot::nominal(request.chain.clone());
-    for (joint, twist) in request.chain.joints.iter().zip(&mut robot.twists) {
+    for (index, twist) in robot.twists.iter_mut().enumerate() {
         for k in 0..6 {
             let sigma = if k < 3 { e.translation_m } else { e.rotation_rad };
             let value = normal(sigma, rng);
-            twist[k] = if joint.kind == JointKind::Fixed { 0.0 } else { value };
+            twist[k] = if request.chain.is_origin_of_moving(index) { value } else { 0.0 };
         }
     }
     for (reading, &kind) in request.chain.reading_kinds.iter().enumerate() {
@@ -255,8 +255,8 @@ fn as_written(readings: &[f64], kinds: &[JointKind], unit: AngleUnit) -> (Vec<f6
 }
 
 fn twists_by_name(robot: &Robot) -> BTreeMap<String, [f64; 6]> {
-    let moving = robot.chain.joints.iter().zip(&robot.twists).filter(|(j, _)| j.kind != JointKind::Fixed);
-    moving.map(|(j, t)| (j.name.clone(), (*t).into())).collect()
+    let moving = (0..robot.twists.len()).filter(|&k| robot.chain.is_origin_of_moving(k));
+    moving.map(|k| (robot.chain.joints[k].name.clone(), robot.twists[k].into())).collect()
 }
 
 fn terms_by_name(robot: &Robot) -> Vec<TrueTerm> {

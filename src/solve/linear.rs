@@ -147,13 +147,17 @@ pub(super) struct LinearPose<'a> {
     pub latents: Vec<usize>,
 }
 
+/// Columns of `L` of a chain at their places among all that is latent at its stop, 6 x latent.
+fn by_latents(chain: &Chained, places: impl Iterator<Item = usize>, latent: usize) -> DMatrix<f64> {
+    let mut by = DMatrix::zeros(6, latent);
+    places.zip(chain.d_latent.column_iter()).for_each(|(place, column)| by.column_mut(place).copy_from(&column));
+    by
+}
+
 impl LinearPose<'_> {
     /// `L` by everything that is latent at its stop, 6 x latent.
     pub fn by_latents(&self, latent: usize) -> DMatrix<f64> {
-        let mut by = DMatrix::zeros(6, latent);
-        let columns = self.latents.iter().zip(self.chain.d_latent.column_iter());
-        columns.for_each(|(latent, column)| by.column_mut(*latent).copy_from(&column));
-        by
+        by_latents(self.chain, self.latents.iter().copied(), latent)
     }
 }
 
@@ -353,10 +357,7 @@ impl<'a> LinearImage<'a> {
 
     /// `L` by everything that is latent at its stop, 6 x latent.
     pub fn by_latents(&self, latent: usize) -> DMatrix<f64> {
-        let mut by = DMatrix::zeros(6, latent);
-        let columns = self.latents().into_iter().flatten().zip(self.chain.d_latent.column_iter());
-        columns.for_each(|(latent, column)| by.column_mut(latent).copy_from(&column));
-        by
+        by_latents(self.chain, self.latents().into_iter().flatten(), latent)
     }
 
     /// Dense columns that it depends on and that are free.

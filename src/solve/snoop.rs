@@ -126,7 +126,7 @@ pub fn reject_bodies(adjustment: &mut Adjustment) -> usize {
             return None;
         }
         let predicted = state.instrument_from_body(measured, adjustment.body_taken_from(k))?;
-        let [sigmas, bound] = measured.length(&predicted, problem.body_factors(measured));
+        let [sigmas, bound] = measured.linearise(&predicted, problem.body_factors(measured)).length;
         let is_out = sigmas > if was_out { bound * OBSERVATION_RETURN / OBSERVATION_BOUND } else { bound };
         (is_out != was_out).then_some((k, is_out.then_some(BodyRejection::Residual { sigmas })))
     };

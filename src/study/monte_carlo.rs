@@ -29,7 +29,7 @@ use crate::problem::{Adjustment, Problem, State, TakenFrom};
 use crate::series::{Plate, PlateKind};
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
 use crate::solve::{JOINT_NOISE_FLOOR, NoiseUncertainty, Settings, noise_information, solve};
-use crate::urdf::{Chain, JointKind};
+use crate::urdf::Chain;
 
 /// What is tried.
 #[derive(Debug, Clone, PartialEq)]
@@ -233,8 +233,8 @@ fn single((error, covariance): &ErrorWithCovariance) -> Normalised {
 /// Columns of the robot with their true values.
 fn robot_columns(s: &Solution, truth: &Robot) -> Vec<(usize, f64)> {
     let layout = &s.fit.problem.layout;
-    let moving = truth.chain.joints.iter().enumerate().filter(|(_, j)| j.kind != JointKind::Fixed);
-    let twists = moving.flat_map(|(k, _)| (0..6).map(move |a| (k, a)));
+    let moving = (0..truth.twists.len()).filter(|&k| truth.chain.is_origin_of_moving(k));
+    let twists = moving.flat_map(|k| (0..6).map(move |a| (k, a)));
     let twists = twists.map(|(k, a)| (layout.twists.start + 6 * k + a, truth.twists[k][a]));
     let terms = s.fit.state.robot.terms.iter().take(layout.locals.start - layout.terms.start).enumerate();
     let terms = terms.map(|(k, t)| {

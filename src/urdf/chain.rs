@@ -44,8 +44,16 @@ pub struct Joint {
     pub limits: Option<(f64, f64)>,
     /// What drives it; `None` for a fixed joint.
     pub drive: Option<Drive>,
-    /// True where the chain passes it from child to parent: a fixed joint between the base and the first link above the tip.
+    /// True where the chain passes it from child to parent: it lies between the base and the first link that is above both base and tip.
+    /// One that moves stands twice then: its motion about the opposite axis, at an identity, and behind it its origin as a fixed joint.
     pub upwards: bool,
+}
+
+impl Joint {
+    /// False for the motion of a joint that is passed upwards: the URDF states its origin with the entry behind it.
+    pub fn states_origin(&self) -> bool {
+        !(self.upwards && self.drive.is_some())
+    }
 }
 
 /// A mass that a joint of the chain carries rigidly with its child link.
@@ -53,7 +61,7 @@ pub struct Joint {
 pub struct CarriedMass {
     /// Link whose mass it is.
     pub link: String,
-    /// Index in [`Chain::joints`] of the last joint before it; all joints up to there bear it.
+    /// Index in [`Chain::joints`] of the last joint above it; all joints up to there bear it.
     pub joint: usize,
     /// Mass, kg.
     pub mass_kg: f64,
@@ -82,6 +90,27 @@ pub struct Chain {
 }
 
 impl Chain {
+    /// Number of entries that are passed upwards: they come first, and behind them lies the link above both base and tip.
+    pub fn climbed(&self) -> usize {
+        self.joints.iter().take_while(|j| j.upwards).count()
+    }
+
+    /// True where camera and plate are both carried: the base moves, too.
+    pub fn base_moves(&self) -> bool {
+        self.joints.iter().any(|j| !j.states_origin())
+    }
+
+    /// True for the entry with the origin of a joint that moves.
+    pub fn is_origin_of_moving(&self, index: usize) -> bool {
+        let joint = &self.joints[index];
+        joint.states_origin() && self.joints.iter().any(|j| j.name == joint.name && j.drive.is_some())
+    }
+
+    /// Index of the entry with the origin that the URDF states for a joint.
+    pub fn origin_of(&self, name: &str) -> Option<usize> {
+        self.joints.iter().position(|j| j.name == name && j.states_origin())
+    }
+
     /// No robot at all: base and tip are one.
     pub fn empty() -> Self {
         let [robot, base, tip] = [const { String::new() }; 3];

@@ -83,15 +83,25 @@ impl Chain {
         Some(Payload { mass_kg: stated.mass_kg, centre_m: stated.centre_m.into() })
     }
 
+    /// The masses that joint `index` of the chain carries.
+    pub fn masses_on(&self, index: usize) -> impl Iterator<Item = &CarriedMass> {
+        let upwards = self.joints[index].upwards;
+        let carries = move |m: &&CarriedMass| match upwards {
+            true => m.joint <= index,
+            false => m.joint >= index,
+        };
+        self.masses.iter().filter(carries)
+    }
+
     /// Largest moment of gravity about joint `index` of the chain, whatever the posture, as a mass on a lever (kg m; kg for a
-    /// prismatic joint): the masses behind it, each as far away as the links between allow.
+    /// prismatic joint): the masses that it carries, each as far away as the links between allow.
     pub fn largest_moment(&self, index: usize) -> f64 {
-        let behind = self.masses.iter().filter(|m| m.joint >= index);
         let lever = |m: &CarriedMass| {
-            let links: f64 = self.joints[index + 1..=m.joint].iter().map(|j| j.origin.translation.norm()).sum();
+            let between = if m.joint < index { m.joint + 1..=index } else { index + 1..=m.joint };
+            let links: f64 = self.joints[between].iter().map(|j| j.origin.translation.norm()).sum();
             if self.joints[index].kind == JointKind::Prismatic { 1.0 } else { links + m.centre_m.norm() }
         };
-        behind.map(|m| m.mass_kg * lever(m)).sum()
+        self.masses_on(index).map(|m| m.mass_kg * lever(m)).sum()
     }
 }
 

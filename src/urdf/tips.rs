@@ -84,7 +84,7 @@ impl RobotDescription {
     }
 
     /// Joints above a link, nearest first.
-    fn joints_above<'a>(&'a self, link: &'a str) -> impl Iterator<Item = &'a JointElement> {
+    pub(super) fn joints_above<'a>(&'a self, link: &'a str) -> impl Iterator<Item = &'a JointElement> {
         std::iter::successors(self.joint_to(link), |j| self.joint_to(&j.parent))
     }
 

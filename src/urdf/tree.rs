@@ -28,7 +28,7 @@ impl RobotDescription {
     /// moving joints lie before, `tool0` before `flange` before others, see [`RobotDescription::tip_notice`]).
     ///
     /// The base need not be above the tip: a link that hangs on one by fixed joints, as `base` of ur_description does on
-    /// `base_link`, will do ([`Joint::upwards`]).
+    /// `base_link`, will do, and so will one that joints carry beside the arm, as a positioner or another arm does ([`Joint::upwards`]).
     ///
     /// A mimic joint is driven by the joint that it follows, inside the chain or not: `Chain::readings` has the
     /// name of that joint.
@@ -64,7 +64,10 @@ impl RobotDescription {
                 "choose a base and a tip of the arm alone",
             ));
         }
-        chain.joints.extend(up.into_iter().map(upwards));
+        for element in up {
+            let motion = self.chain_joint(element, &mut chain)?;
+            chain.joints.extend(upwards(motion));
+        }
         for element in down {
             let joint = self.chain_joint(element, &mut chain)?;
             chain.joints.push(joint);
@@ -235,13 +238,18 @@ impl RobotDescription {
         std::iter::successors(up(&link), up).collect()
     }
 
-    /// Fixed joints from `base` up to the first link that is above the tip, then joints down to `tip`.
+    /// Joints from `base` up to the first link that is above the tip, then joints down to `tip`. A tip that no joint moves on
+    /// its own way, as where base and tip are exchanged, is refused.
     fn path<'a>(&'a self, base: &'a str, tip: &'a str) -> Result<(Vec<&'a JointElement>, Vec<&'a JointElement>)> {
         let above = self.ancestors(tip);
         let reaches = |link: &str| link == tip || above.contains(&link);
-        let fixed: Vec<&JointElement> = self.fixed_ancestors(base).collect();
-        let links: Vec<&str> = std::iter::once(base).chain(fixed.iter().map(|j| j.parent.as_str())).collect();
-        let Some(climbed) = links.iter().position(|l| reaches(l)) else {
+        let climb: Vec<&JointElement> = self.joints_above(base).collect();
+        let links: Vec<&str> = std::iter::once(base).chain(climb.iter().map(|j| j.parent.as_str())).collect();
+        let moves = |joint: &JointElement| joint.joint_type != JointType::Fixed;
+        let is_carried = |climbed: usize| climb[..climbed].iter().any(|j| moves(j));
+        let tip_moves = |from: &str| self.joints_above(tip).take_while(|j| j.child != from).any(moves);
+        let met = links.iter().position(|l| reaches(l));
+        let Some(climbed) = met.filter(|&k| !is_carried(k) || tip_moves(links[k])) else {
             let what = format!("tip \"{tip}\" does not hang below base \"{base}\"");
             let remedy = match above[..] {
                 [] => format!("\"{tip}\" is the root itself; are base and tip exchanged?"),
@@ -256,7 +264,7 @@ impl RobotDescription {
             current = &joint.parent;
         }
         down.reverse();
-        Ok((fixed[..climbed].to_vec(), down))
+        Ok((climb[..climbed].to_vec(), down))
     }
 
     fn chain_joint(&self, element: &JointElement, chain: &mut Chain) -> Result<Joint> {
@@ -313,17 +321,20 @@ impl RobotDescription {
     }
 }
 
-/// A fixed joint of the way up from the base.
-fn upwards(element: &JointElement) -> Joint {
-    Joint {
-        name: element.name.clone(),
+/// The entries of a joint of the way up from the base: its motion where it moves, then its origin.
+fn upwards(joint: Joint) -> impl Iterator<Item = Joint> {
+    let origin = Joint {
+        name: joint.name.clone(),
         kind: JointKind::Fixed,
-        origin: element.origin.inverse(),
+        origin: joint.origin.inverse(),
         axis: Vector3::zeros(),
         limits: None,
         drive: None,
         upwards: true,
-    }
+    };
+    let moves = joint.drive.is_some();
+    let motion = Joint { origin: Pose::identity(), axis: -joint.axis, upwards: true, ..joint };
+    moves.then_some(motion).into_iter().chain([origin])
 }
 
 fn kind(element: &JointElement) -> Result<JointKind> {
