@@ -75,7 +75,8 @@ pub(super) fn nominal(fit: &Adjustment) -> Adjustment {
     state.robot = Robot { terms: fit.state.robot.terms.clone(), ..Robot::nominal(fit.state.robot.chain.clone()) };
     state.robot.terms.iter_mut().for_each(|t| t.value = 0.0);
     let robot = problem.layout.twists.start..problem.layout.terms.end;
-    problem.layout.columns[robot].iter_mut().for_each(|c| c.free = false);
+    let known: Vec<usize> = robot.filter(|c| !problem.layout.is_between_bases(*c)).collect();
+    known.into_iter().for_each(|c| problem.layout.columns[c].free = false);
     problem.noise.local.fill(0.0);
     problem.noise.joint.iter_mut().flatten().for_each(|s| *s = s.max(NOMINAL_JOINT_ERROR));
     nominal

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::cell::{CellFiles, Ends};
 use super::pictures::Pictures;
 use crate::error::{Code, Error, Notice, Result};
 use crate::identify::measure;
@@ -10,15 +11,6 @@ use crate::problem::MeasuredSeries;
 use crate::series::{self, InputFile, RecordingOptions, Series, Source};
 use crate::stage::stage;
 use crate::urdf::{self, Chain, RobotDescription};
-
-/// Links between which the robot is identified; those that are not given are as series.toml and the URDF say.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Ends<'a> {
-    /// Base link.
-    pub base: Option<&'a str>,
-    /// Tip link.
-    pub tip: Option<&'a str>,
-}
 
 /// Who wants to know of every image that was looked at: name of the series, number of its stops.
 pub type Watch<'a> = &'a (dyn Fn(&str, usize) + Sync);
@@ -35,7 +27,7 @@ pub struct Inputs {
     /// What to say where the tip was chosen among several leaves.
     pub tip_notice: Option<Notice>,
     /// Where the robot comes from; none where poses of the controller are all that is known of it.
-    urdf: Option<PathBuf>,
+    files: Vec<InputFile>,
     pictures: Pictures,
 }
 
@@ -60,7 +52,9 @@ impl Inputs {
     /// # Errors
     /// Files that cannot be read or do not go together; links that the URDF does not have.
     pub fn read(urdf: &Path, folders: &[PathBuf], ends: Ends) -> Result<Self> {
-        Self::of(urdf::read(urdf)?, Some(urdf), read_all(folders)?, ends)
+        let series = read_all(folders)?;
+        let robot = CellFiles::read(urdf, &series, ends)?;
+        Self::of(robot, Some(urdf), series, ends)
     }
 
     /// Reads series folders whose controllers say where the flange was: nothing is known, or identified, of the robot itself.
@@ -78,25 +72,21 @@ impl Inputs {
             };
             poses.extend(controller.base_from_flange.iter().flatten());
         }
-        Self::of(urdf::pose_robot(&poses)?, None, series, Ends::default())
+        let robot = CellFiles { description: urdf::pose_robot(&poses)?, files: Vec::new(), second_tip: None };
+        Self::of(robot, None, series, Ends::default())
     }
 
-    fn of(description: RobotDescription, urdf: Option<&Path>, series: Vec<Series>, ends: Ends) -> Result<Self> {
+    fn of(robot: CellFiles, urdf: Option<&Path>, series: Vec<Series>, ends: Ends) -> Result<Self> {
+        let CellFiles { description, files, second_tip } = robot;
         // Links that the series name are those of a robot that is not given.
         let own: &[Series] = if urdf.is_some() { &series } else { &[] };
         let [by_base, by_tip] = carriers(own)?;
-        let base = by_base.or(agreed("base", ends.base, own, |s| s.manifest.base.as_deref())?);
+        let base =
+            second_tip.as_deref().or(by_base).or(agreed("base", ends.base, own, |s| s.manifest.base.as_deref())?);
         let tip = by_tip.or(agreed("tip", ends.tip, own, |s| s.manifest.tip.as_deref())?);
         let chain = description.chain(base, tip)?;
         let tip_notice = description.tip_notice(base, tip);
-        Ok(Self {
-            chain,
-            tip_notice,
-            urdf: urdf.map(Path::to_path_buf),
-            pictures: Pictures::new(),
-            series,
-            description,
-        })
+        Ok(Self { chain, tip_notice, files, pictures: Pictures::new(), series, description })
     }
 
     /// Takes the stops out of the recordings among the series.
@@ -114,11 +104,9 @@ impl Inputs {
     /// # Errors
     /// Series whose images show no plate; files that change meanwhile.
     pub fn observe(self, watch: Watch) -> Result<Observed> {
-        let Self { description, chain, series: all, tip_notice, urdf, pictures: _until_the_end } = self;
+        let Self { description, chain, series: all, tip_notice, mut files, pictures: _until_the_end } = self;
         let mut notices = description.notices.clone();
         notices.extend(tip_notice);
-        let of_robot = urdf.iter().map(|path| InputFile::of_bytes(path, description.text.as_bytes()));
-        let mut files: Vec<InputFile> = of_robot.collect();
         for s in &all {
             files.extend(s.inputs.iter().cloned());
             files.extend(s.image_hashes()?);

@@ -9,10 +9,12 @@
 //! # Ok::<(), robotcal::Error>(())
 //! ```
 
+mod cell;
 mod inputs;
 mod pictures;
 
-pub use inputs::{Ends, Inputs, Observed, Watch, require_unchanged};
+pub use cell::Ends;
+pub use inputs::{Inputs, Observed, Watch, require_unchanged};
 pub use pictures::Pictures;
 
 use std::collections::BTreeMap;

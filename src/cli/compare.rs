@@ -148,8 +148,9 @@ fn monte_carlo(args: &CompareArgs) -> Result<Verdict> {
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
-    let tip = args.tip.as_deref().map(|t| format!(" --tip {t}")).unwrap_or_default();
-    let command = format!("robotcal compare --monte-carlo --urdf {}{tip} --seeds {}", args.urdf.display(), args.seeds);
+    let end = |flag: &str, link: Option<&str>| link.map(|l| format!(" {flag} {l}")).unwrap_or_default();
+    let ends = end("--base", args.base.as_deref()) + &end("--tip", args.tip.as_deref());
+    let command = format!("robotcal compare --monte-carlo --urdf {}{ends} --seeds {}", args.urdf.display(), args.seeds);
     let text = monte_carlo_markdown(&cells, &command);
     say!("{text}");
     write(&place, [("monte-carlo.md", text)])?;

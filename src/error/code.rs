@@ -135,6 +135,7 @@ codes! {
         TreeBroken "tree_broken" "links and joints form no tree",
         RootAmbiguous "root_ambiguous" "there are several root links, and none was named as base",
         TipAmbiguous "tip_ambiguous" "there are several leaf links, and none was named as tip",
+        SecondArmRenamed "second_arm_renamed" "the second arm has names of the first, and got a prefix",
         TipChosen "tip_chosen" "of several leaf links one was chosen as tip",
         ChainImpossible "chain_impossible" "between base and tip no joint moves, or there is no way, or a joint without a single reading",
         MimicBroken "mimic_broken" "a mimic joint follows nothing that moves",

@@ -7,12 +7,14 @@ use super::suspects::Suspects;
 use crate::assess::{Limits, median};
 use crate::error::{Code, Error, Result};
 use crate::fit::FreePoses;
-use crate::geom::log_so3;
-use crate::init::{HandEye, HandEyeStart, PosePair, solve_hand_eye};
+use crate::geom::{Pose, log_so3};
+use crate::init::{HandEye, HandEyeStart, PosePair, PoseTriple, solve_between, solve_hand_eye};
 use crate::linalg::symmetric_eigen;
 use crate::problem::{
     Adjustment, ImageRejection, MeasuredSeries, Misfit, Mismatch, Problem, State, TakenFrom, predict,
 };
+use crate::series::CameraMount;
+use crate::urdf::{BASE_FROM_BASE, Joint};
 
 /// Closed forms whose pixel cost is compared.
 const COMPARED: usize = 4;
@@ -33,6 +35,7 @@ pub(super) fn start_robot(
     given: StartGiven<'_>,
     verdicts: &mut Vec<StartVerdict>,
 ) -> Result<Vec<usize>> {
+    place_bases(adjustment, free)?;
     let mut aside = Vec::new();
     let mut groups: BTreeMap<(usize, usize), Vec<(usize, PosePair)>> = BTreeMap::new();
     for (i, image, _) in adjustment.used() {
@@ -72,6 +75,36 @@ pub(super) fn start_robot(
         *pose = plates.get(&k).copied().unwrap_or(*pose);
     }
     Ok(aside)
+}
+
+/// Gives the joint between the bases of two arms an origin, where it has none yet.
+fn place_bases(adjustment: &mut Adjustment, free: &FreePoses) -> Result<()> {
+    let chain = &adjustment.state.robot.chain;
+    let unplaced = |j: &Joint| j.is_between_bases() && j.origin == Pose::identity();
+    let Some(k) = chain.joints.iter().position(unplaced) else { return Ok(()) };
+    let mut groups: BTreeMap<(usize, usize), Vec<PoseTriple>> = BTreeMap::new();
+    for (i, image, _) in adjustment.used() {
+        let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
+        let behind = adjustment.state.robot.link_poses(&stop.readings);
+        let tip = behind.last().copied().unwrap_or_else(Pose::identity);
+        let second = k.checked_sub(1).map_or_else(Pose::identity, |before| behind[before]);
+        let first = behind[k].inverse() * tip;
+        let camera_from_plate = pose.camera_from_plate;
+        groups.entry((image.mounting, image.placement)).or_default().push(match image.mount {
+            CameraMount::Hand => PoseTriple { camera_from_plate, before: first.inverse(), after: second.inverse() },
+            CameraMount::Fixed => PoseTriple { camera_from_plate, before: second, after: first },
+        });
+    }
+    let Some(largest) = groups.into_iter().max_by_key(|(_, triples)| triples.len()) else { return Ok(()) };
+    let found = solve_between(&largest.1).map(|(pose, _)| pose);
+    let is_inverse = adjustment.used().any(|(_, image, _)| image.mount == CameraMount::Hand);
+    let Some(pose) = found else {
+        let what = "how the bases of the two arms stand to each other does not come out of these stops";
+        let remedy = "take more stops at which both arms move all their joints";
+        return Err(Error::new(Code::StopsAlike, BASE_FROM_BASE, what, remedy));
+    };
+    adjustment.state.robot.chain.joints[k].origin = if is_inverse { pose.inverse() } else { pose };
+    Ok(())
 }
 
 /// Of the solutions that single images give, the one that all images like best.

@@ -205,7 +205,7 @@ pub fn plate_scale(pairs: &[PosePair], solution: &HandEye) -> Option<f64> {
     (scale.is_finite() && scale > 0.0).then_some(scale)
 }
 
-fn shah(pairs: &[PosePair]) -> Option<HandEye> {
+pub(super) fn shah(pairs: &[PosePair]) -> Option<HandEye> {
     // R_X = sum R_A R_Z R_C' in the least-squares sense: K = sum kron(R_C, R_A) maps vec(R_Z) to vec(R_X).
     let mut k = DMatrix::<f64>::zeros(9, 9);
     for p in pairs {

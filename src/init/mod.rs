@@ -1,10 +1,12 @@
 //! Starting values from nothing: homographies, focal length, poses, hand-camera and plate pose.
 
+mod between;
 mod focal;
 mod hand_eye;
 mod homography;
 mod resection;
 
+pub use between::{PoseTriple, solve_between};
 pub use focal::{FocalCandidate, focal_candidates};
 pub use hand_eye::{HandEye, HandEyeStart, PosePair, plate_scale, solve_hand_eye};
 pub use homography::{Homography, PlanarPose};

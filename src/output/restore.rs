@@ -47,7 +47,13 @@ pub fn options(record: &SolutionRecord) -> Options {
 /// # Errors
 /// Links that the URDF does not have.
 pub fn chain(record: &SolutionRecord, description: &RobotDescription, base: &str, tip: &str) -> Result<Chain> {
-    description.chain(Some(base), Some(tip))?.carrying(record.robot.payload.as_ref())
+    let mut chain = description.chain(Some(base), Some(tip))?.carrying(record.robot.payload.as_ref())?;
+    // The URDF does not know it: the start was found.
+    for joint in chain.joints.iter_mut().filter(|j| j.is_between_bases()) {
+        let found = record.robot.joints.iter().find(|j| j.name == joint.name);
+        joint.origin = found.map_or(joint.origin, |j| (&j.nominal_origin).into());
+    }
+    Ok(chain)
 }
 
 fn plate(p: &PlateRecord) -> Result<Plate> {

@@ -68,6 +68,7 @@ fn is_information(code: Code) -> bool {
             | Code::LensChosen
             | Code::ObservationsMissing
             | Code::RepeatabilityUnused
+            | Code::SecondArmRenamed
             | Code::TipChosen
     )
 }

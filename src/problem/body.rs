@@ -168,10 +168,17 @@ impl BodyMeasurement {
         let weight = if length <= bound { 1.0 } else { bound / length };
         let cost = if length <= bound { 0.5 * length * length } else { bound * (length - 0.5 * bound) };
         let information = |k: usize| weight / (sigma[k / 3] * factors[k / 3]).powi(2);
-        let w =
-            Matrix6::from_diagonal(&Vector6::from_fn(|k, _| if k < coordinates { information(k) } else { 0.0 }));
+        let w = Matrix6::from_diagonal(&Vector6::from_fn(|k, _| if k < coordinates { information(k) } else { 0.0 }));
         let jw = jacobian.transpose() * w;
-        BodyTerms { cost, pp: jw * jacobian, bp: jw * residual, residual, squares, length: [length, BOUND[kind]], weight }
+        BodyTerms {
+            cost,
+            pp: jw * jacobian,
+            bp: jw * residual,
+            residual,
+            squares,
+            length: [length, BOUND[kind]],
+            weight,
+        }
     }
 
     /// Measured minus predicted, and the derivative of the prediction by its body twist.

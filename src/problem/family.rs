@@ -40,7 +40,8 @@ impl Family {
 
     /// The twists of the joints whose priors nobody has stated: how far robots are from nominal is known to a factor of two.
     pub fn of_twists(layout: &Layout, is_stated: impl Fn(usize) -> bool) -> Option<Self> {
-        let columns: Vec<usize> = layout.twists.clone().filter(|c| !is_stated(*c)).collect();
+        let columns: Vec<usize> =
+            layout.twists.clone().filter(|c| !is_stated(*c) && !layout.is_between_bases(*c)).collect();
         (!columns.is_empty()).then(|| Self { drawn: TWISTS_DRAWN, ..Self::new(TWISTS, layout, columns) })
     }
 

@@ -7,6 +7,7 @@ use super::{Image, State};
 use crate::model::camera::{Camera, MAX_PARAMETERS};
 use crate::model::joint_terms::Term;
 use crate::model::plate_modes;
+use crate::urdf::BASE_FROM_BASE;
 
 /// One scalar unknown of the dense part of the problem.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +80,11 @@ pub struct OriginPrior {
     pub rotation_rad: f64,
 }
 
+impl OriginPrior {
+    /// Of the base of another arm somewhere in the same hall.
+    const UNKNOWN: Self = Self { translation_m: 10.0, rotation_rad: 3.0 };
+}
+
 impl Default for OriginPrior {
     fn default() -> Self {
         Self { translation_m: 1e-3, rotation_rad: 2e-3 }
@@ -131,8 +137,9 @@ impl Layout {
             for joint in &chain.joints {
                 let first = b.columns.len();
                 let part = if joint.states_origin() { "origin" } else { "motion" };
+                let prior = if joint.is_between_bases() { OriginPrior::UNKNOWN } else { origin };
                 for (c, unit) in TWIST {
-                    let sigma = if unit == "m" { origin.translation_m } else { origin.rotation_rad };
+                    let sigma = if unit == "m" { prior.translation_m } else { prior.rotation_rad };
                     b.add(format!("robot/{}/{part}.{c}", joint.name), unit, sigma);
                 }
                 b.columns[first..].iter_mut().for_each(|c| c.free = joint.states_origin());
@@ -207,6 +214,11 @@ impl Layout {
     /// Columns of what belongs to the robot: twists and joint terms, without the local errors.
     pub fn robot(&self) -> Range<usize> {
         self.twists.start..self.locals.start
+    }
+
+    /// True for a column of the pose between the bases of two arms, which is no property of either.
+    pub fn is_between_bases(&self, column: usize) -> bool {
+        self.columns[column].name.strip_prefix("robot/").is_some_and(|n| n.split('/').next() == Some(BASE_FROM_BASE))
     }
 
     /// Number of columns.

@@ -208,7 +208,7 @@ impl Manifest {
         manifest.cameras.check(path)?;
         manifest.check_measured(path)?;
         manifest.require_same_links(path)?;
-        manifest.refuse_unsupported(path)?;
+        manifest.require_one_carrier(path)?;
         Ok(manifest)
     }
 
@@ -221,13 +221,19 @@ impl Manifest {
         self.distance.iter().try_for_each(|d| d.check(path))
     }
 
-    /// What the format knows and this program does not use yet must not be passed over in silence.
-    fn refuse_unsupported(&self, path: &Path) -> Result<()> {
-        if self.robot_2.is_none() {
-            return Ok(());
+    /// The plate hangs on one link.
+    fn require_one_carrier(&self, path: &Path) -> Result<()> {
+        let place = |key: &str| format!("{}, {key}", path.display());
+        if self.robot_2.is_some() && self.plate_mount.is_some() {
+            let remedy = "name the link that carries the plate as tip of [robot_2], and leave [plate_mount] out";
+            return Err(Error::new(Code::SettingConflict, place("[plate_mount]"), "stands beside [robot_2]", remedy));
         }
-        let remedy = "give one URDF with both arms, and the link that carries the plate as link of [plate_mount]";
-        Err(Error::new(Code::SettingUnsupported, path.display(), "[robot_2] is not supported yet", remedy))
+        if self.robot_2.is_some() && self.mount() == CameraMount::Fixed {
+            let what = "its arm carries the plate, so the first one carries the camera";
+            let remedy = "write camera_mount = \"hand\"; exchange the arms where the second one carries the camera";
+            return Err(Error::new(Code::SettingConflict, place("[robot_2]"), what, remedy));
+        }
+        Ok(())
     }
 
     /// Links that are named as those that carry camera and plate: in place of the base, and in place of the tip. A camera in the hand and

@@ -50,7 +50,10 @@ pub(super) fn set_up(request: &WorldRequest, robot: &Robot, rng: &mut impl Rng) 
         return Ok(setup);
     }
     for k in 0..request.placements.max(1) {
-        let candidates = plates_on_tables(reach, k, rng);
+        let candidates = match request.chain.base_moves() {
+            true => plates_on_the_link(k, rng),
+            false => plates_on_tables(reach, k, rng),
+        };
         let plate = best(&candidates, request, robot, rng, |c| setup.clone_with(&[*c]))?;
         setup.plates.push(plate);
     }
@@ -95,6 +98,12 @@ fn plates_on_tables(reach: f64, placement: usize, rng: &mut impl Rng) -> Vec<Pos
         }
     }
     all
+}
+
+/// Plates on the link that carries them, a positioner's table or a second arm's tip.
+fn plates_on_the_link(placement: usize, rng: &mut impl Rng) -> Vec<Pose> {
+    let aside = 0.05 * placement as f64;
+    [0.02, 0.1].map(|above| near([aside, -aside, above], [0.02, -0.03, 0.3], rng)).to_vec()
 }
 
 /// Cameras on a stand before the robot that look back at it.
@@ -167,6 +176,10 @@ impl Setup {
             CameraMount::Hand => plate.translation.z.min(0.0),
             CameraMount::Fixed => 0.0,
         };
+        // No table stands still beside a base that moves.
+        if request.chain.base_moves() {
+            return Some(readings);
+        }
         let above = |stump: &Robot| stump.base_from_tip(&readings).translation.z > table - BELOW_TABLE_M;
         self.stumps.iter().all(above).then_some(readings)
     }

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::second_arm::BASE_FROM_BASE;
 use crate::geom::Pose;
 
 /// How a joint moves.
@@ -53,6 +54,11 @@ impl Joint {
     /// False for the motion of a joint that is passed upwards: the URDF states its origin with the entry behind it.
     pub fn states_origin(&self) -> bool {
         !(self.upwards && self.drive.is_some())
+    }
+
+    /// True for the joint between the bases of two arms, of whose origin nothing is known.
+    pub fn is_between_bases(&self) -> bool {
+        self.kind == JointKind::Fixed && self.name == BASE_FROM_BASE
     }
 }
 

@@ -8,6 +8,7 @@ mod masses;
 mod patch;
 mod pose_robot;
 mod read;
+mod second_arm;
 mod tips;
 mod tree;
 
@@ -18,3 +19,4 @@ pub use masses::Payload;
 pub use patch::patch_origins;
 pub use pose_robot::{PoseCoordinates, pose_robot};
 pub use read::{RobotDescription, read};
+pub use second_arm::{BASE_FROM_BASE, SECOND_ARM_PREFIX};

@@ -207,14 +207,14 @@ impl RobotDescription {
         found
     }
 
-    fn known_link(&self, name: &str, role: &str) -> Result<&str> {
+    pub(super) fn known_link(&self, name: &str, role: &str) -> Result<&str> {
         self.links().find(|l| *l == name).ok_or_else(|| {
             let what = format!("has no link \"{name}\" (wanted as {role})");
             Error::new(Code::LinkUnknown, self.path.display(), what, suggest(name, self.links()))
         })
     }
 
-    fn only_root(&self) -> Result<&str> {
+    pub(super) fn only_root(&self) -> Result<&str> {
         let roots = self.roots();
         if let [one] = roots[..] {
             return Ok(one);

@@ -7,6 +7,7 @@ mod support;
 
 mod bodies;
 mod cameras;
+mod carried;
 mod controller_poses;
 mod coverage;
 mod diagnosis;
