@@ -144,6 +144,13 @@ limits! {
     /// needed gain more.
     lens_as_good: f64 = 0.01;
 
+    /// Images that must show the plate before zeros of the joints are looked for elsewhere than in the URDF.
+    zeros_images: usize = 15;
+    /// Offset of a zero, rad (m), from which on it is no matter of the fit: 3 degrees.
+    zeros_off_rad: f64 = 0.05;
+    /// Median misfit, rad + m, that other zeros leave at most where they are the cause.
+    zeros_explain: f64 = 0.05;
+
     /// Misfit of readings and images, rad + m, below which no mistake is looked for: nominal robots miss by as much.
     suspicious_misfit: f64 = 0.025;
     /// Median misfit of distances, with directions that fit, from which the links are those of another robot, m.

@@ -5,7 +5,7 @@ use super::kind::{CheckContext, Weight};
 use super::{
     camera_model, extrapolates, few_images, focus, joint_noise, left_out_bodies, left_out_images,
     left_out_observations, loose, marker_off, moved, no_gain, parameter_off, plate_size, pose_step, scatter,
-    undetermined,
+    undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -67,6 +67,7 @@ pub const CHECKS: &[Check] = &[
     check("left_out_bodies", Stage::LeftOut(|a, s| found(left_out_bodies::check(a, s)))),
     check("left_out_observations", Stage::LeftOut(|a, s| found(left_out_observations::check(a, s)))),
     check("no_gain", Stage::Fit(|a, b, s| found(no_gain::check(a, b, s)))),
+    check("zeros_off", Stage::LeftOut(|a, s| found(zeros_off::check(a, s)))),
     check("plate_size", Stage::Fit(|a, b, s| found(plate_size::check(a, b, s)))),
     check("moved", Stage::LeftOut(|a, s| found(moved::check(a, s)))),
     check("marker_off", Stage::Fit(|a, b, s| found(marker_off::check(a, b, s)))),

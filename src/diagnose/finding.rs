@@ -22,6 +22,7 @@ use super::parameter_off::ParameterOff;
 use super::plate_size::DoubtedSize;
 use super::scatter::LargeScatter;
 use super::undetermined::FlangeUndetermined;
+use super::zeros_off::ZeroOff;
 use crate::error::{Code, Notice};
 
 macro_rules! findings {
@@ -69,6 +70,7 @@ findings! {
     Noticed,
     ObservationsLeftOut,
     ParameterOff,
+    ZeroOff,
 }
 
 impl Finding {

@@ -25,8 +25,8 @@ mod parameter_off;
 mod plate_size;
 mod pose_step;
 mod scatter;
-
 mod undetermined;
+mod zeros_off;
 
 pub use camera_model::CameraModelMisfit;
 pub use checks::{CHECKS, Check, Diagnosis, Stage};
@@ -50,3 +50,4 @@ pub use parameter_off::ParameterOff;
 pub use plate_size::DoubtedSize;
 pub use scatter::LargeScatter;
 pub use undetermined::FlangeUndetermined;
+pub use zeros_off::ZeroOff;

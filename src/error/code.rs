@@ -295,6 +295,7 @@ codes! {
         NoGain "no_gain" "the calibrated robot is no better than the nominal one",
         ParameterOff "parameter_off" "a parameter is far from what robots usually have",
         LargeScatter "large_scatter" "images scatter more than the noise model says",
+        ZeroOff "zero_off" "the zero of a joint is far from that of the URDF, or it counts the other way",
         FlangeUndetermined "flange_undetermined" "the data do not determine the flange",
     }
     Unsolved "Planning and simulation" {

@@ -20,6 +20,9 @@ pub mod capture {}
 #[doc = include_str!("trackers_and_contacts.md")]
 pub mod trackers_and_contacts {}
 
+#[doc = include_str!("cells.md")]
+pub mod cells {}
+
 #[doc = include_str!("recordings.md")]
 pub mod recordings {}
 

@@ -2,21 +2,29 @@
 
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::robot::Posture;
-use crate::problem::{Stop, common_readings, joined};
+use crate::problem::{Stop, common_readings, joined, nearly_common_readings};
+
+/// Readings in common, over those that just fail to be, from which on they are no chance.
+const BEYOND_CHANCE: usize = 3;
 
 /// Terms for the readings that at least this share of the stops has in common with others, in the order of the readings.
 pub(super) fn local_terms(stops: &[Stop], readings: usize, least_share: f64) -> Vec<JointTerm> {
     let on_robot: Vec<&Posture> = stops.iter().filter_map(|s| s.posture.as_ref()).collect();
     let mut pairs: Vec<Vec<(usize, usize)>> = vec![Vec::new(); readings];
+    let mut missed = vec![0_usize; readings];
     for (b, later) in on_robot.iter().enumerate() {
         for (a, earlier) in on_robot[..b].iter().enumerate() {
             for r in common_readings(earlier, later) {
                 pairs[r].push((a, b));
             }
+            nearly_common_readings(earlier, later).into_iter().for_each(|r| missed[r] += 1);
         }
     }
     let mut terms = Vec::new();
     for (reading, pairs) in pairs.into_iter().enumerate() {
+        if pairs.len() < BEYOND_CHANCE * missed[reading] {
+            continue;
+        }
         let mut sets = joined(on_robot.len(), pairs.into_iter());
         sets.retain(|set| set.len() > 1);
         let tied: usize = sets.iter().map(Vec::len).sum();
@@ -38,4 +46,28 @@ pub(super) fn local_share(terms: &[JointTerm], posture: &Posture) -> Vec<f64> {
         share[t.reading] += t.local_basis(posture.readings[t.reading]).map_or(0.0, |basis| basis * basis);
     }
     share
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::model::robot::Posture;
+
+    fn stops(count: usize, step: Option<f64>) -> Vec<Stop> {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut readings = || (0..3).map(|_| rng.random_range(0.0..0.5)).collect::<Vec<f64>>();
+        let on_grid =
+            |q: Vec<f64>| q.into_iter().map(|q| step.map_or(q, |s| (q / s).round() * s)).collect::<Vec<f64>>();
+        (0..count)
+            .map(|_| Stop { posture: Some(Posture::at(&on_grid(readings()))), series: 0, local_share: Vec::new() })
+            .collect()
+    }
+
+    #[test]
+    fn readings_that_agree_by_chance_are_no_places_of_their_own() {
+        assert!(local_terms(&stops(1500, None), 3, 0.5).is_empty());
+        assert_eq!(local_terms(&stops(1500, Some(0.1)), 3, 0.5).len(), 3 * 6);
+    }
 }

@@ -8,13 +8,13 @@ use crate::assess::{Limits, median};
 use crate::error::{Code, Error, Result};
 use crate::fit::FreePoses;
 use crate::geom::{Pose, log_so3};
-use crate::init::{HandEye, HandEyeStart, PosePair, PoseTriple, solve_between, solve_hand_eye};
+use crate::init::{HandEye, HandEyeStart, PosePair, PoseTriple, SeenStop, solve_between, solve_hand_eye, solve_zeros};
 use crate::linalg::symmetric_eigen;
 use crate::problem::{
     Adjustment, ImageRejection, MeasuredSeries, Misfit, Mismatch, Problem, State, TakenFrom, predict,
 };
 use crate::series::CameraMount;
-use crate::urdf::{BASE_FROM_BASE, Joint};
+use crate::urdf::{BASE_FROM_BASE, FoundOrigin, Joint};
 
 /// Closed forms whose pixel cost is compared.
 const COMPARED: usize = 4;
@@ -36,6 +36,7 @@ pub(super) fn start_robot(
     verdicts: &mut Vec<StartVerdict>,
 ) -> Result<Vec<usize>> {
     place_bases(adjustment, free)?;
+    place_zeros(adjustment, free, given.limits);
     let mut aside = Vec::new();
     let mut groups: BTreeMap<(usize, usize), Vec<(usize, PosePair)>> = BTreeMap::new();
     for (i, image, _) in adjustment.used() {
@@ -103,8 +104,50 @@ fn place_bases(adjustment: &mut Adjustment, free: &FreePoses) -> Result<()> {
         let remedy = "take more stops at which both arms move all their joints";
         return Err(Error::new(Code::StopsAlike, BASE_FROM_BASE, what, remedy));
     };
-    adjustment.state.robot.chain.joints[k].origin = if is_inverse { pose.inverse() } else { pose };
+    let joint = &mut adjustment.state.robot.chain.joints[k];
+    joint.origin = if is_inverse { pose.inverse() } else { pose };
+    joint.found = Some(FoundOrigin::Pose);
     Ok(())
+}
+
+/// Gives joints other zeros, and one of them the other direction, where readings and images fit then and only then. A single mistake without other
+/// zeros is left to be named.
+fn place_zeros(adjustment: &mut Adjustment, free: &FreePoses, limits: &Limits) {
+    let robot = &adjustment.state.robot;
+    let is_found = robot.chain.joints.iter().any(|j| j.found.is_some());
+    if is_found || robot.chain.base_moves() || robot.chain.pose_coordinates().is_some() {
+        return;
+    }
+    let mut groups: BTreeMap<(usize, usize), Vec<SeenStop>> = BTreeMap::new();
+    for (i, image, _) in adjustment.used() {
+        let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
+        let (readings, camera_from_plate) = (stop.readings.clone(), pose.camera_from_plate);
+        let seen = SeenStop { readings, mount: image.mount, camera_from_plate };
+        groups.entry((image.mounting, image.placement)).or_default().push(seen);
+    }
+    let Some(stops) = groups.into_values().max_by_key(Vec::len).filter(|s| s.len() >= limits.zeros_images) else {
+        return;
+    };
+    let pairs: Vec<PosePair> =
+        stops.iter().map(|s| PosePair::of_stop(robot, s.mount, &s.readings, s.camera_from_plate)).collect();
+    let as_described = solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error);
+    if as_described < limits.suspicious_misfit {
+        return;
+    }
+    let tried = solve_zeros(robot, &stops);
+    let [best, next, ..] = &tried[..] else { return };
+    let is_far = best.offsets.iter().any(|o| o.abs() > limits.zeros_off_rad);
+    let is_plain = best.left < limits.mistake_explains * next.left.min(as_described) || best.reversed.is_none();
+    let explains = best.left < limits.zeros_explain && best.left < limits.mistake_explains * as_described;
+    if !(is_far && is_plain && explains) {
+        return;
+    }
+    let mut chain = robot.chain.clone();
+    for (reading, &offset) in best.offsets.iter().enumerate() {
+        let Some(moved) = chain.with_zero(reading, offset, best.reversed == Some(reading)) else { return };
+        chain = moved;
+    }
+    adjustment.state.robot.chain = chain;
 }
 
 /// Of the solutions that single images give, the one that all images like best.

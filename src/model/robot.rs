@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::joint_terms::{GRAVITY_TERMS, JointTerm, RobotModel, Term, TermContext, USUAL_HARMONICS, levers};
-use crate::geom::{Pose, adjoint, exp_so3, right_jacobian_se3};
+use crate::geom::{Pose, adjoint, right_jacobian_se3};
 use crate::urdf::{CarriedMass, Chain, Joint, JointKind};
 
 /// Where the robot stood: readings in the order of [`Chain::readings`], rad or m.
@@ -50,14 +50,6 @@ pub struct Kinematics {
 #[derive(Debug, Clone)]
 pub struct LinearOrigins(Vec<(Pose, Matrix6<f64>)>);
 
-fn motion(joint: &Joint, position: f64) -> Pose {
-    match joint.kind {
-        JointKind::Fixed => Pose::identity(),
-        JointKind::Revolute => Pose::new(exp_so3(&(joint.axis * position)), Vector3::zeros()),
-        JointKind::Prismatic => Pose::new(nalgebra::Matrix3::identity(), joint.axis * position),
-    }
-}
-
 fn motion_twist(joint: &Joint) -> Vector6<f64> {
     let (rho, phi) = match joint.kind {
         JointKind::Fixed => (Vector3::zeros(), Vector3::zeros()),
@@ -84,7 +76,7 @@ impl Robot {
         let positions = self.positions(stop, noise).0;
         let mut pose = Pose::identity();
         for (i, joint) in self.chain.joints.iter().enumerate() {
-            pose = pose * joint.origin * Pose::exp(&self.twists[i]) * motion(joint, positions[i]);
+            pose = pose * joint.origin * Pose::exp(&self.twists[i]) * joint.motion(positions[i]);
         }
         pose
     }
@@ -94,7 +86,7 @@ impl Robot {
         let positions = self.positions(&Posture::at(readings), &vec![0.0; readings.len()]).0;
         let mut pose = Pose::identity();
         let behind = |(i, joint): (usize, &Joint)| {
-            pose = pose * joint.origin * Pose::exp(&self.twists[i]) * motion(joint, positions[i]);
+            pose = pose * joint.origin * Pose::exp(&self.twists[i]) * joint.motion(positions[i]);
             pose
         };
         self.chain.joints.iter().enumerate().map(behind).collect()
@@ -125,7 +117,7 @@ impl Robot {
                 let column = adjoint(&rest_from_tip.inverse()) * motion_twist(joint);
                 d_readings[drive.reading] += column * drive.multiplier;
             }
-            rest_from_tip = motion(joint, positions[i]) * rest_from_tip;
+            rest_from_tip = joint.motion(positions[i]) * rest_from_tip;
             let (origin, d_twist) = &origins.0[i];
             d_twists[i] = adjoint(&rest_from_tip.inverse()) * d_twist;
             rest_from_tip = origin * &rest_from_tip;
@@ -152,7 +144,7 @@ impl Robot {
         }
         let mut before = Pose::identity();
         let corrected = |(joint, twist): (&Joint, &Vector6<f64>)| {
-            let zero = motion(joint, joint.drive.map_or(0.0, |d| d.multiplier * offsets[d.reading]));
+            let zero = joint.motion(joint.drive.map_or(0.0, |d| d.multiplier * offsets[d.reading]));
             let moved = std::mem::replace(&mut before, Pose::identity()) * joint.origin.perturbed(twist);
             if joint.states_origin() {
                 moved * zero
@@ -251,7 +243,7 @@ impl Robot {
         let (mut pose, mut poses, mut driven) = (Pose::identity(), Vec::with_capacity(joints.len()), Vec::new());
         for (index, joint) in joints.iter().enumerate() {
             let position = joint.drive.map_or(0.0, |d| d.multiplier * contexts[d.reading].reading + d.offset);
-            pose = pose * joint.origin * motion(joint, position);
+            pose = pose * joint.origin * joint.motion(position);
             driven.extend(joint.drive.map(|d| (index, d.reading)));
             poses.push(pose);
         }

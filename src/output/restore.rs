@@ -48,10 +48,12 @@ pub fn options(record: &SolutionRecord) -> Options {
 /// Links that the URDF does not have.
 pub fn chain(record: &SolutionRecord, description: &RobotDescription, base: &str, tip: &str) -> Result<Chain> {
     let mut chain = description.chain(Some(base), Some(tip))?.carrying(record.robot.payload.as_ref())?;
-    // The URDF does not know it: the start was found.
-    for joint in chain.joints.iter_mut().filter(|j| j.is_between_bases()) {
-        let found = record.robot.joints.iter().find(|j| j.name == joint.name);
-        joint.origin = found.map_or(joint.origin, |j| (&j.nominal_origin).into());
+    // What was found before the fit does not stand in the URDF.
+    for joint in &mut chain.joints {
+        let found = record.robot.joints.iter().find(|j| j.found.is_some() && j.name == joint.name);
+        if let Some(record) = found {
+            (joint.origin, joint.found) = ((&record.nominal_origin).into(), record.found);
+        }
     }
     Ok(chain)
 }

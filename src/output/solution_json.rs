@@ -16,7 +16,7 @@ use crate::model::camera::Lens;
 use crate::problem::{ImageRejection, ObservationRejection, short_name};
 use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar, Tags};
 use crate::solve::PlateScale;
-use crate::urdf::{JointKind, Payload};
+use crate::urdf::{FoundOrigin, JointKind, Payload};
 
 pub use super::pose_record::{PlacedRecord, PoseRecord};
 pub use super::series_record::{SeriesRecord, StopNoise};
@@ -66,6 +66,9 @@ pub struct JointRecord {
     /// True where the chain passes it from child to parent: its origins are `joint_from_parent` then.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub upwards: bool,
+    /// What was found of the nominal origin before the fit, where the URDF states another.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub found: Option<FoundOrigin>,
 }
 
 /// One joint term.

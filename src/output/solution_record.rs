@@ -118,6 +118,7 @@ fn robot(state: &State, twist_factor: f64) -> RobotRecord {
         limits: j.limits,
         drive: j.drive.map(|d| (chain.readings[d.reading].clone(), d.multiplier, d.offset)),
         upwards: j.upwards,
+        found: j.found,
     });
     let record = |t: &JointTerm| TermRecord {
         reading: chain.readings[t.reading].clone(),

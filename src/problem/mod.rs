@@ -43,7 +43,7 @@ pub use noise::Noise;
 pub use plate_distance::{
     PlateDistance, SCALE, UNKNOWN_SCALE, release_measured_scales, seen_markers, size_by_distance,
 };
-pub use postures::{common_readings, joined, posture_groups};
+pub use postures::{common_readings, joined, nearly_common_readings, posture_groups};
 pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};
 pub use select::short_name;
 pub use state::{PlateShape, State};

@@ -11,11 +11,27 @@ const FEWEST_IN_COMMON: usize = 2;
 
 /// Readings that two stops have in common; empty where it may be chance.
 pub fn common_readings(a: &Posture, b: &Posture) -> Vec<usize> {
-    let same: Vec<usize> = (a.readings.iter().zip(&b.readings).enumerate())
-        .filter(|(_, (a, b))| (*a - *b).abs() < SAME_READING)
-        .map(|(r, _)| r)
-        .collect();
-    if same.len() < FEWEST_IN_COMMON { Vec::new() } else { same }
+    let is_same = |r: &usize| apart(a, b, *r) < SAME_READING;
+    let readings = 0..a.readings.len();
+    if readings.clone().filter(is_same).count() < FEWEST_IN_COMMON {
+        Vec::new()
+    } else {
+        readings.filter(is_same).collect()
+    }
+}
+
+/// Readings that two stops just fail to have in common beside others: among stops that are dense enough to agree by chance there are as
+/// many of them as of those in common.
+pub fn nearly_common_readings(a: &Posture, b: &Posture) -> Vec<usize> {
+    let readings = 0..a.readings.len();
+    if readings.clone().filter(|r| apart(a, b, *r) < SAME_READING).count() + 1 < FEWEST_IN_COMMON {
+        return Vec::new();
+    }
+    readings.filter(|r| (SAME_READING..2.0 * SAME_READING).contains(&apart(a, b, *r))).collect()
+}
+
+fn apart(a: &Posture, b: &Posture, reading: usize) -> f64 {
+    (a.readings[reading] - b.readings[reading]).abs()
 }
 
 /// Sets of indices below `count`, joined by the pairs; each set ascending, in the order of their first members.

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::second_arm::BASE_FROM_BASE;
-use crate::geom::Pose;
+use crate::geom::{Pose, exp_so3};
 
 /// How a joint moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -30,6 +30,21 @@ pub struct Drive {
     pub offset: f64,
 }
 
+/// An origin of which the URDF was found to say nothing, or something else, before the fit.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FoundOrigin {
+    /// Of the joint between two bases, or of one behind a joint that counts the other way.
+    Pose,
+    /// Of a joint whose zero is elsewhere.
+    Zero {
+        /// What the readings lack after their sign, rad or m.
+        offset: f64,
+        /// True where the joint counts the other way.
+        is_reversed: bool,
+    },
+}
+
 /// One joint of the chain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
@@ -48,6 +63,8 @@ pub struct Joint {
     /// True where the chain passes it from child to parent: it lies between the base and the first link that is above both base and tip.
     /// One that moves stands twice then: its motion about the opposite axis, at an identity, and behind it its origin as a fixed joint.
     pub upwards: bool,
+    /// What was found of the origin before the fit, where it is not as in the URDF.
+    pub found: Option<FoundOrigin>,
 }
 
 impl Joint {
@@ -56,10 +73,25 @@ impl Joint {
         !(self.upwards && self.drive.is_some())
     }
 
+    /// How its child stands to its origin at a position, rad or m.
+    pub fn motion(&self, position: f64) -> Pose {
+        match self.kind {
+            JointKind::Fixed => Pose::identity(),
+            JointKind::Revolute => Pose::new(exp_so3(&(self.axis * position)), Vector3::zeros()),
+            JointKind::Prismatic => Pose::new(nalgebra::Matrix3::identity(), self.axis * position),
+        }
+    }
+
     /// True for the joint between the bases of two arms, of whose origin nothing is known.
     pub fn is_between_bases(&self) -> bool {
         self.kind == JointKind::Fixed && self.name == BASE_FROM_BASE
     }
+}
+
+/// Half a turn about an axis across the given one.
+fn half_turn_across(axis: &Vector3<f64>) -> Pose {
+    let across = axis.cross(&if axis.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() }).normalize();
+    Pose::new(2.0 * across * across.transpose() - nalgebra::Matrix3::identity(), Vector3::zeros())
 }
 
 /// A mass that a joint of the chain carries rigidly with its child link.
@@ -104,6 +136,33 @@ impl Chain {
     /// True where camera and plate are both carried: the base moves, too.
     pub fn base_moves(&self) -> bool {
         self.joints.iter().any(|j| !j.states_origin())
+    }
+
+    /// The chain with another zero of a reading, which may count the other way: `m (s q + o) + c` in the place of `m q + c`. A reversed joint is turned
+    /// about and back, `P Motion(q) P^-1` with half a turn `P` about an axis across; behind the last joint that is a matter of the hand. `None` where the base moves.
+    pub fn with_zero(mut self, reading: usize, offset: f64, is_reversed: bool) -> Option<Self> {
+        if self.base_moves() {
+            return None;
+        }
+        let driven = |j: &Joint| j.drive.filter(|d| d.reading == reading);
+        for k in 0..self.joints.len() {
+            let Some(drive) = driven(&self.joints[k]) else { continue };
+            let joint = &mut self.joints[k];
+            let shift = drive.multiplier * offset + if is_reversed { 2.0 * drive.offset } else { 0.0 };
+            joint.found = Some(FoundOrigin::Zero { offset, is_reversed });
+            if !is_reversed {
+                joint.origin = joint.origin * joint.motion(shift);
+                continue;
+            }
+            let about = half_turn_across(&joint.axis);
+            joint.origin = joint.origin * about;
+            let behind = about.inverse() * joint.motion(shift);
+            if let Some(next) = self.joints.get_mut(k + 1) {
+                next.origin = behind * next.origin;
+                next.found = next.found.or(Some(FoundOrigin::Pose));
+            }
+        }
+        Some(self)
     }
 
     /// True for the entry with the origin of a joint that moves.

@@ -12,7 +12,7 @@ mod second_arm;
 mod tips;
 mod tree;
 
-pub use chain::{CarriedMass, Chain, Drive, Joint, JointKind};
+pub use chain::{CarriedMass, Chain, Drive, FoundOrigin, Joint, JointKind};
 pub use collisions::CarriedCapsule;
 pub use inertial::Inertial;
 pub use masses::Payload;

@@ -278,6 +278,7 @@ impl RobotDescription {
             limits: element.limits,
             drive,
             upwards: false,
+            found: None,
         })
     }
 
@@ -331,6 +332,7 @@ fn upwards(joint: Joint) -> impl Iterator<Item = Joint> {
         limits: None,
         drive: None,
         upwards: true,
+        found: None,
     };
     let moves = joint.drive.is_some();
     let motion = Joint { origin: Pose::identity(), axis: -joint.axis, upwards: true, ..joint };

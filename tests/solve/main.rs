@@ -22,3 +22,4 @@ mod refits;
 mod second_pass;
 mod solver_laws;
 mod two_stage;
+mod zeros;

@@ -87,6 +87,7 @@ pub fn chain(dice: &mut Dice, parts: &[Part]) -> Chain {
                 limits: None,
                 drive,
                 upwards: false,
+                found: None,
             }
         })
         .collect();
