@@ -148,8 +148,12 @@ limits! {
     zeros_images: usize = 15;
     /// Offset of a zero, rad (m), from which on it is no matter of the fit: 3 degrees.
     zeros_off_rad: f64 = 0.05;
+    /// Offset of a zero, rad (m), beyond which it is none: 40 degrees.
+    zeros_most_rad: f64 = 0.7;
     /// Median misfit, rad + m, that other zeros leave at most where they are the cause.
     zeros_explain: f64 = 0.05;
+    /// They are the cause where they leave less than this share of the misfit that is there without them, or with another axis reversed.
+    zeros_explain_share: f64 = 0.5;
 
     /// Misfit of readings and images, rad + m, below which no mistake is looked for: nominal robots miss by as much.
     suspicious_misfit: f64 = 0.025;

@@ -7,7 +7,10 @@ use crate::problem::{Stop, common_readings, joined, nearly_common_readings};
 /// Readings in common, over those that just fail to be, from which on they are no chance.
 const BEYOND_CHANCE: usize = 3;
 
-/// Terms for the readings that at least this share of the stops has in common with others, in the order of the readings.
+/// Terms of all readings: they are columns of a dense matrix, and where so many stops repeat readings no single place decides anything any more.
+const MOST_TERMS: usize = 300;
+
+/// Terms for the readings, those with the fewest first, that at least this share of the stops has in common with others, in the order of the readings.
 pub(super) fn local_terms(stops: &[Stop], readings: usize, least_share: f64) -> Vec<JointTerm> {
     let on_robot: Vec<&Posture> = stops.iter().filter_map(|s| s.posture.as_ref()).collect();
     let mut pairs: Vec<Vec<(usize, usize)>> = vec![Vec::new(); readings];
@@ -20,7 +23,7 @@ pub(super) fn local_terms(stops: &[Stop], readings: usize, least_share: f64) -> 
             nearly_common_readings(earlier, later).into_iter().for_each(|r| missed[r] += 1);
         }
     }
-    let mut terms = Vec::new();
+    let mut of_readings: Vec<Vec<JointTerm>> = Vec::new();
     for (reading, pairs) in pairs.into_iter().enumerate() {
         if pairs.len() < BEYOND_CHANCE * missed[reading] {
             continue;
@@ -31,11 +34,20 @@ pub(super) fn local_terms(stops: &[Stop], readings: usize, least_share: f64) -> 
         if (tied as f64) < least_share * on_robot.len() as f64 {
             continue;
         }
-        for set in sets {
+        let term = |set: &Vec<usize>| {
             let mean = set.iter().map(|&k| on_robot[k].readings[reading]).sum::<f64>() / set.len() as f64;
-            terms.push(JointTerm { reading, term: Term::local(mean), value: 0.0 });
-        }
+            JointTerm { reading, term: Term::local(mean), value: 0.0 }
+        };
+        of_readings.push(sets.iter().map(term).collect());
     }
+    of_readings.sort_by_key(Vec::len);
+    let mut count = 0;
+    let is_paid = |terms: &Vec<JointTerm>| {
+        count += terms.len();
+        count <= MOST_TERMS
+    };
+    let mut terms: Vec<JointTerm> = of_readings.into_iter().take_while(is_paid).flatten().collect();
+    terms.sort_by_key(|t| t.reading);
     terms
 }
 

@@ -8,7 +8,9 @@ use crate::assess::{Limits, median};
 use crate::error::{Code, Error, Result};
 use crate::fit::FreePoses;
 use crate::geom::{Pose, log_so3};
-use crate::init::{HandEye, HandEyeStart, PosePair, PoseTriple, SeenStop, solve_between, solve_hand_eye, solve_zeros};
+use crate::init::{
+    HandEye, HandEyeStart, PosePair, PoseTriple, SeenStop, Zeros, solve_between, solve_hand_eye, solve_zeros,
+};
 use crate::linalg::symmetric_eigen;
 use crate::problem::{
     Adjustment, ImageRejection, MeasuredSeries, Misfit, Mismatch, Problem, State, TakenFrom, predict,
@@ -134,12 +136,14 @@ fn place_zeros(adjustment: &mut Adjustment, free: &FreePoses, limits: &Limits) {
     if as_described < limits.suspicious_misfit {
         return;
     }
-    let tried = solve_zeros(robot, &stops);
-    let [best, next, ..] = &tried[..] else { return };
+    // A joint that stands upside down with all behind it is the same arm with zeros half a turn off.
+    let is_plausible = |z: &Zeros| z.offsets.iter().all(|o| o.abs() < limits.zeros_most_rad);
+    let mut tried = solve_zeros(robot, &stops).into_iter().filter(is_plausible);
+    let Some(best) = tried.next() else { return };
+    let otherwise = tried.next().map_or(f64::INFINITY, |next| next.left).min(as_described);
     let is_far = best.offsets.iter().any(|o| o.abs() > limits.zeros_off_rad);
-    let is_plain = best.left < limits.mistake_explains * next.left.min(as_described) || best.reversed.is_none();
-    let explains = best.left < limits.zeros_explain && best.left < limits.mistake_explains * as_described;
-    if !(is_far && is_plain && explains) {
+    let explains = best.left < limits.zeros_explain && best.left < limits.zeros_explain_share * otherwise;
+    if !(is_far && explains) {
         return;
     }
     let mut chain = robot.chain.clone();
