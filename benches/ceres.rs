@@ -152,7 +152,11 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
 /// Starting values from the images alone: free camera poses, then hand-camera and plate pose in closed form.
 fn start_from_images(mut guess: Adjustment) -> Fallible<Adjustment> {
     let focal_px = guess.state.cameras[0].parameters[0];
-    let (_, free, _) = adjust_free_poses(guess.clone(), &[Some(focal_px)], &robotcal::assess::Limits::default())?;
+    let (_, free, _) = adjust_free_poses(
+        guess.clone(),
+        &[robotcal::identify::CameraStart::Focal(focal_px)],
+        &robotcal::assess::Limits::default(),
+    )?;
     let pair = |(i, free): (usize, &Option<FreePose>)| {
         let chain = guess.state.robot.base_from_tip(&guess.problem.posture(i)?.readings).inverse();
         Some(PosePair { camera_from_plate: free.as_ref()?.camera_from_plate, chain })

@@ -6,7 +6,7 @@
 //!
 //! The robot is that of the exported files, corrected URDF and compensation.toml: local errors are left out.
 
-use nalgebra::{DMatrix, Matrix6, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::limits::Limits;
@@ -197,6 +197,17 @@ impl<'a> FlangeModel<'a> {
             (0..3).map(|k| c[(k, k)]).sum::<f64>().max(0.0)
         };
         root_mean_square(&samples.iter().map(|s| (square(s), 1.0)).collect::<Vec<_>>())
+    }
+
+    /// How far a step of the columns that act through the camera poses moves the flange, and the stated sigma: lengths, RMS over the region of the stops, m.
+    pub fn moved_m(&self, step: &DVector<f64>) -> [f64; 2] {
+        let samples = self.region();
+        let square = |s: &Posture| {
+            let (pose, j) = self.derivative(s);
+            (self.fitted_out(&pose, j) * step).rows(0, 3).norm_squared()
+        };
+        let moved = root_mean_square(&samples.iter().map(|s| (square(s), 1.0)).collect::<Vec<_>>());
+        [moved, self.sigma_m(&samples)]
     }
 
     /// 95 % interval of the root mean square of an error that is known up to the errors of the model: `known` gives, in the frame of

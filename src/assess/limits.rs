@@ -58,6 +58,16 @@ limits! {
     /// Prior sigmas beyond which a deviation is no longer within tolerance.
     sigmas_beyond_tolerance: f64 = 5.0;
 
+    /// Change of dark images over full scale, in common or from place to place, that is said: a fifth of a percent tilts edges of 100 counts
+    /// by half a percent of their contrast.
+    dark_drift: f64 = 2e-3;
+    /// Relative change of the light from the first white images to the last that is said.
+    light_drift: f64 = 0.05;
+    /// The same from place to place in the image: the gradients that bias a marker by a hundredth of a pixel change by more over its size.
+    white_drift: f64 = 0.01;
+    /// What the scatter of single frames leaves of a change from place to place, times which it is no chance.
+    drift_sigmas: f64 = 3.0;
+
     /// Fewest images on either side of a change of focus: a scatter needs three.
     focus_images: usize = 3;
     /// Change of focus in standard errors from which it is no chance, all divisions of a series considered.
@@ -96,6 +106,15 @@ limits! {
     displaced_rad: f64 = 0.1e-3;
     /// Most displacements in all: more are no displacements but noise.
     displacements: usize = 3;
+
+    /// Normal deviate from which a pattern in the residuals is no chance: one in thirty thousand for each that is looked for.
+    pattern_sigmas: f64 = 4.0;
+    /// Stated sigmas by which a pattern must move flange or poses for the gate to fail.
+    pattern_moves: f64 = 1.0;
+    /// Share of what the best pattern removes from which a simpler one names the cause: the rest is of second order.
+    pattern_share: f64 = 0.8;
+    /// Fewest coordinates of markers that the data must tell before they are compared with their tolerance: its size is then known to a tenth.
+    tolerance_coordinates: f64 = 50.0;
 
     /// Standard deviations from which on plate and links contradict each other.
     plate_size_sigmas: f64 = 3.0;

@@ -9,6 +9,7 @@ mod identifiability;
 mod in_base;
 mod limits;
 mod mean_square;
+mod patterns;
 mod points;
 mod projection;
 mod promise;
@@ -32,6 +33,7 @@ pub use identifiability::{
 };
 pub use in_base::sigma_in_base;
 pub use limits::Limits;
+pub use patterns::{Bearer, Moved, Pattern, PatternTest, cause, patterns};
 pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
 pub use projection::ProjectionMap;
 pub use promise::{FlangeErrors, FlangeIntervals, usual_joint_sigma};

@@ -1,10 +1,11 @@
-//! `robotcal convert`: a recording becomes a series folder, a series folder becomes a recording.
+//! `robotcal convert`: a recording becomes a series folder, a series folder becomes a recording, a camera goes to another program.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::Verdict;
+use super::convert_camera::{self, Wanted};
 use super::recording::RecordingArgs;
 use super::robot::read_chain;
 use super::say::{say, say_line};
@@ -20,10 +21,10 @@ use crate::urdf::Chain;
 /// Flags of `convert`.
 #[derive(Debug, Args)]
 pub(super) struct ConvertArgs {
-    /// Recording (an .mcap file or a rosbag2 folder), or series folder
+    /// Recording (an .mcap file or a rosbag2 folder), series folder, or what holds a camera
     #[arg(value_name = "FROM")]
     from: PathBuf,
-    /// New series folder, or new .mcap file for a series folder
+    /// New series folder, new .mcap file for a series folder, or new camera file
     #[arg(value_name = "TO")]
     to: PathBuf,
     /// Robot description: its joints are taken [default: all that are recorded]; a series folder needs it
@@ -38,11 +39,33 @@ pub(super) struct ConvertArgs {
     /// Solution of the series (solution.json): its camera, frames and residuals go into the recording, too
     #[arg(long, value_name = "SOLUTION", requires = "urdf")]
     solution: Option<PathBuf>,
+    /// Write a camera for another program: opencv, kalibr, mrcal or ros; FROM is then a solution.json, poses.json or camera file
+    #[arg(long = "as", value_name = "FORMAT", conflicts_with_all = ["urdf", "solution"], help_heading = "Cameras")]
+    camera_format: Option<String>,
+    /// Which camera, where there are several
+    #[arg(long, value_name = "CAMERA", help_heading = "Cameras")]
+    name: Option<String>,
+    /// Write the nearest model of the format where it does not have the lens
+    #[arg(long, help_heading = "Cameras")]
+    nearest: bool,
     #[command(flatten)]
     recording: RecordingArgs,
 }
 
 pub(super) fn run(args: &ConvertArgs) -> Result<Verdict> {
+    let camera = Wanted {
+        from: &args.from,
+        to: &args.to,
+        format: args.camera_format.as_deref(),
+        name: args.name.as_deref(),
+        nearest: args.nearest,
+    };
+    if let Some(format) = convert_camera::format(&camera)? {
+        series::require_new(&args.to)?;
+        convert_camera::run(&camera, format)?;
+        say_line!("written   {}", args.to.display());
+        return Ok(Verdict::Good);
+    }
     let is_recording = args.to.extension().is_some_and(|e| e == "mcap");
     let new = (!is_recording).then(|| NewFolder::begin(&args.to)).transpose()?;
     let chain = match &args.urdf {

@@ -9,8 +9,9 @@ use super::image_study::{self, StudyArgs};
 use super::recording::RecordingArgs;
 use super::say::{say, say_line};
 use super::{Verdict, progress};
+use crate::assess::Limits;
 use crate::calibration::{Pictures, require_unchanged};
-use crate::detect::load;
+use crate::detect::{FlatFieldFacts, load};
 use crate::error::{Code, Error, Notice, Result};
 use crate::identify::SeenImage;
 use crate::output::detection_files::{DetectionContext, detection_files, dropped_counts, marker_counts, picture_names};
@@ -49,6 +50,8 @@ struct Looked {
     images: Vec<SeenImage>,
     notices: Vec<Notice>,
     inputs: Vec<InputFile>,
+    /// Dark and white images.
+    flat_field: Option<FlatFieldFacts>,
 }
 
 pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
@@ -77,6 +80,7 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
     let out = place.path().to_path_buf();
     let written = write(args, &looked, place)?;
     say!("{}", text(&looked.images));
+    looked.flat_field.iter().for_each(|facts| say!("{}", of_flat_field(facts)));
     let notices: Vec<Notice> =
         looked.notices.iter().cloned().chain(looked.images.iter().flat_map(SeenImage::notices)).collect();
     Notice::said_once(&notices).iter().for_each(|n| say_line!("note      {}", n.coded()));
@@ -99,7 +103,12 @@ fn of_series(args: &DetectArgs, series: Series, pictures: &Pictures) -> Result<L
     let images = crate::identify::detect_stops(&series, |_| bar.inc(1))?;
     bar.finish_and_clear();
     require_unchanged(&inputs, &series.image_hashes()?)?;
-    Ok(Looked { plate: series.plate.clone(), images, notices: series.notices.clone(), inputs, series: Some(series) })
+    let mut notices = series.notices.clone();
+    let flat_field = crate::identify::flat_field_facts(&series, &Limits::default())?.map(|(facts, said)| {
+        notices.extend(said);
+        facts
+    });
+    Ok(Looked { plate: series.plate.clone(), images, notices, inputs, flat_field, series: Some(series) })
 }
 
 fn of_images(images: &[PathBuf], plate: &Path) -> Result<Looked> {
@@ -110,7 +119,7 @@ fn of_images(images: &[PathBuf], plate: &Path) -> Result<Looked> {
     let seen = crate::identify::detect_images(images, &plate, |_| bar.inc(1));
     bar.finish_and_clear();
     require_unchanged(&inputs, &hashes()?)?;
-    Ok(Looked { series: None, plate, images: seen, notices: Vec::new(), inputs })
+    Ok(Looked { series: None, plate, images: seen, notices: Vec::new(), inputs, flat_field: None })
 }
 
 /// Writes the results; returns the number of files.
@@ -174,6 +183,35 @@ fn text(images: &[SeenImage]) -> String {
     text += &format!("{label:widest$}  {found:5}  {rescued:7}  {:>7}  {:9}  {}\n", "", "", counts(images.iter()));
     text += &format!("images    {used} of {} used\n", images.len());
     text
+}
+
+/// What dark and white images did.
+fn of_flat_field(facts: &FlatFieldFacts) -> String {
+    let mut text = format!("dark      {} images", facts.dark_images);
+    if facts.dark_images > 0 {
+        text += &format!(" averaged and taken off: {:.2} % of full scale", 100.0 * facts.dark_level);
+    }
+    text += &format!("\nwhite     {} images", facts.white_images);
+    if facts.white_images > 0 {
+        text += &format!(
+            " averaged and divided by: the darkest part of the image has {:.0} % of the light of the brightest, {} pixels without signal",
+            100.0 * facts.darkest,
+            facts.dead
+        );
+    }
+    for (name, drift) in [("dark", &facts.dark_drift), ("white", &facts.white_drift)] {
+        if let Some(d) = drift {
+            let noise = d
+                .noise
+                .map_or_else(String::new, |n| format!(", {:.3} % of it by the scatter of single frames", 100.0 * n));
+            text += &format!(
+                "\nchange    {name}, begin to end: {:+.2} %, from place to place {:.3} % RMS{noise}",
+                100.0 * d.level,
+                100.0 * d.pattern
+            );
+        }
+    }
+    text + "\n"
 }
 
 /// Reasons with their counts, the most frequent first.

@@ -41,6 +41,8 @@ examples! {
     CONVERT = [
         "robotcal convert run1.mcap run1",
         "robotcal convert run1 run1.mcap --urdf robot.urdf",
+        "robotcal convert reports/run1/solution.json front.cameramodel",
+        "robotcal convert reports/run1/solution.json camchain.yaml --as kalibr --nearest",
     ];
     /// Of `detect`.
     DETECT = [

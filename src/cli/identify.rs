@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 
 use super::at::AtArgs;
+use super::camera_args::CameraArgs;
 use super::choices::ChoiceArgs;
 use super::recording::RecordingArgs;
 use super::say::{say, say_line};
@@ -15,7 +16,6 @@ use crate::error::{Code, Error, Result};
 use crate::identify::{Estimator, Options, dry_run};
 use crate::output::solution_json::{self, FILE_NAME, TIMINGS};
 use crate::output::{Offsets, Place, Poses, folder_name, restore};
-use crate::problem::{LensChoice, MeasuredSeries};
 
 /// Flags of `identify`.
 #[derive(Debug, Args)]
@@ -41,9 +41,6 @@ pub(super) struct IdentifyArgs {
     /// Tip link that carries camera or plate (overrides series.toml)
     #[arg(long, value_name = "LINK", help_heading = "Robot")]
     tip: Option<String>,
-    /// Lens: auto (the simplest of all that none beats decisively by the evidence of the joint fit), brown, fisheye, parallax, rational, thin_prism, brown+field or fisheye+field [default: as in series.toml, else by evidence among those that camera.yaml can express]
-    #[arg(long, value_name = "LENS", help_heading = "What is estimated")]
-    camera: Option<String>,
     /// Where joint offsets go
     #[arg(long, value_enum, default_value_t = OffsetsName::Folded, help_heading = "What is written")]
     offsets: OffsetsName,
@@ -63,6 +60,8 @@ pub(super) struct IdentifyArgs {
     /// Print solution.json and nothing else
     #[arg(long, conflicts_with_all = ["dry_run", "at"], help_heading = "What is written")]
     json: bool,
+    #[command(flatten)]
+    cameras: CameraArgs,
     #[command(flatten)]
     choices: ChoiceArgs,
     #[command(flatten)]
@@ -143,22 +142,10 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
         Error::new(Code::OptionMissing, "identify", "no folder for the results is given", "give --out")
     })?;
     let estimator = args.two_stage.map_or(options.estimator, Into::into);
-    choose_lens(&mut observed.series, args.camera.as_deref())?;
+    let of_cameras = args.cameras.apply(&mut observed.series)?;
+    observed.notices.extend(of_cameras);
     let calibration = Calibration::of(observed, &Options { estimator, ..options })?;
     write(args, &calibration, place)
-}
-
-/// The lens that `--camera` names, or all of them for `auto`.
-pub(super) fn choose_lens(series: &mut [MeasuredSeries], name: Option<&str>) -> Result<()> {
-    match name {
-        Some("auto") => series.iter_mut().for_each(|s| s.lens_choice = LensChoice::All),
-        Some(name) => {
-            let lens = super::simulate::lens(name)?;
-            series.iter_mut().for_each(|s| (s.lens, s.lens_choice) = (lens, LensChoice::Settled));
-        }
-        None => {}
-    }
-    Ok(())
 }
 
 fn write(args: &IdentifyArgs, calibration: &Calibration, place: Place) -> Result<Verdict> {

@@ -2,12 +2,15 @@
 //!
 //! To add a subcommand: a file with its `Args` and `run`, a variant of `Command` and a row in `Command::run`.
 
+mod against;
 mod arguments;
 mod at;
+mod camera_args;
 mod choices;
 mod compare;
 mod compensate;
 mod convert;
+mod convert_camera;
 mod detect;
 mod doctor;
 mod examples;

@@ -17,6 +17,7 @@ use crate::error::{Code, Error, Result};
 use crate::geom::{OrientedBox, Pose};
 use crate::identify::RobotModel;
 use crate::model::camera::Camera;
+use crate::output::camera_formats::read_camera_file;
 use crate::output::{Place, plan_files, plan_html, plan_programs, plan_start, sigma_text};
 use crate::plan::candidates::CandidateOptions;
 use crate::plan::refine::USUAL_ROUNDS;
@@ -475,7 +476,7 @@ fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)>
 
 fn camera(args: &PlanArgs) -> Result<Camera> {
     match &args.camera {
-        Some(path) => plan_start::read_camera(path),
+        Some(path) => read_camera_file(path, None).map(|read| read.camera),
         None => Ok(typical_camera(args.image[0], args.image[1], args.camera_fov_deg.to_radians())),
     }
 }

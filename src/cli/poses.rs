@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::camera_args::CameraArgs;
 use super::recording::RecordingArgs;
 use super::say::{say, say_line};
-use super::{Verdict, identify, progress};
+use super::{Verdict, against, progress};
 use crate::assess::{Limits, median};
 use crate::calibration::{Pictures, require_unchanged};
+use crate::diagnose::Finding;
 use crate::error::{Code, Error, Notice, Result};
 use crate::identify::{PoseSigma, StandAlone, measure, stand_alone};
 use crate::output::stand_alone_files::{StandAloneContext, stand_alone_files};
@@ -32,12 +34,14 @@ pub(super) struct PosesArgs {
     /// The plate in single images (plate.toml)
     #[arg(long, value_name = "FILE", conflicts_with = "series")]
     plate: Option<PathBuf>,
-    /// Lens: auto (the simplest of all that predicts best what the adjustment had not seen), brown, fisheye, parallax, rational, thin_prism, brown+field or fisheye+field [default: as in series.toml, else among those that camera.yaml can express]
-    #[arg(long, value_name = "LENS")]
-    camera: Option<String>,
+    /// Compare with other poses: truth.toml of a simulation, a tracker's poses.csv (stop, target, ..), or poses.csv of another program (image, .., plate_from_camera)
+    #[arg(long, value_name = "FILE")]
+    against: Option<PathBuf>,
     /// Folder for the results [default: reports/<series name>-poses]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    cameras: CameraArgs,
     #[command(flatten)]
     recording: RecordingArgs,
 }
@@ -64,18 +68,27 @@ pub(super) fn run(args: &PosesArgs) -> Result<Verdict> {
     }
     let (mut measured, mut notices) = observe(&series)?;
     series.iter().try_for_each(|s| require_unchanged(&inputs, &s.image_hashes()?))?;
-    identify::choose_lens(&mut measured, args.camera.as_deref())?;
+    notices.extend(args.cameras.apply(&mut measured)?);
     let found = stand_alone(&measured, &Limits::default())?;
     notices.extend(found.notices.iter().cloned());
     let command = super::command_line().join(" ");
-    let context = StandAloneContext { series: names, inputs, command, notices: Notice::said_once(&notices) };
+    let against = args.against.as_deref().map(|path| Ok((path.display().to_string(), against::compare(&found, path)?)));
+    let against = against.transpose()?;
+    let context = StandAloneContext { series: names, inputs, command, notices: Notice::said_once(&notices), against };
     let files = stand_alone_files(&found, &context)?;
     let folder = place.path().to_path_buf();
     place.write_all(&files)?;
     say!("{}", text(&found)?);
+    if let Some((path, (_, compared))) = args.against.as_deref().zip(context.against.as_ref()) {
+        say!("{}", against::text(path, compared));
+    }
+    for finding in &found.findings {
+        let word = if finding.fails() { "GATE" } else { "note" };
+        say_line!("{word:9} {finding}");
+    }
     context.notices.iter().for_each(|n| say_line!("note      {}", n.coded()));
     say_line!("results   {} ({} files)", folder.display(), files.len());
-    Ok(Verdict::Good)
+    Ok(if found.findings.iter().any(Finding::fails) { Verdict::GateFailed } else { Verdict::Good })
 }
 
 /// No robot takes part.
@@ -162,16 +175,27 @@ fn table<'a>(sigmas: &[PoseSigma], name: impl Fn(usize) -> &'a String) -> String
         rows.truncate(MOST_ROWS);
     }
     let widest = rows.iter().map(|s| name(s.image).chars().count()).fold(5, usize::max);
-    let mut text = format!("{:widest$}  points  px RMS  position mm  direction arcmin\n", "image");
+    let mut text = format!(
+        "{:widest$}  points  px RMS  position mm  direction arcmin  axes mm: of the camera, of the plate's centre  correlation\n",
+        "image"
+    );
     for s in rows {
         text += &format!(
-            "{:widest$}  {:6}  {:6.4}  {:11.4}  {:16.3}\n",
+            "{:widest$}  {:6}  {:6.4}  {:11.4}  {:16.3}  {}  {}  {:11.3}\n",
             name(s.image),
             s.observations,
             s.rms_px,
             1e3 * s.position_m,
-            60.0 * s.rotation_rad.to_degrees()
+            60.0 * s.rotation_rad.to_degrees(),
+            axes(&s.camera_axes_m),
+            axes(&s.centre_axes_m),
+            s.correlation
         );
     }
     text
+}
+
+/// Semi-axes of an ellipsoid, mm.
+fn axes(all: &[f64; 3]) -> String {
+    all.map(|a| format!("{:.4}", 1e3 * a)).join(" ")
 }

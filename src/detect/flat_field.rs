@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::flat_field_facts::{FlatFieldFacts, Light, block_means, drift};
 use super::{Picture, load};
 use crate::error::{Code, Error, Result};
 
@@ -19,6 +20,8 @@ pub struct FlatField {
     dark: Vec<f32>,
     /// Sensitivity of every pixel over that of the most sensitive; 0 for a pixel without signal.
     gain: Vec<f32>,
+    /// The images in numbers.
+    pub facts: FlatFieldFacts,
 }
 
 impl FlatField {
@@ -26,8 +29,8 @@ impl FlatField {
     ///
     /// # Errors
     /// An unreadable image, sizes or depths that differ, white images that are saturated or not brighter than the dark.
-    pub fn from_images(dark: &[PathBuf], white: &[PathBuf], bits: Option<u32>) -> Result<Option<Self>> {
-        let (dark_mean, white_mean) = (average(dark, bits)?, average(white, bits)?);
+    pub fn from_images(dark_paths: &[PathBuf], white_paths: &[PathBuf], bits: Option<u32>) -> Result<Option<Self>> {
+        let (dark_mean, white_mean) = (average(dark_paths, bits)?, average(white_paths, bits)?);
         if let (Some((_, d)), Some((place, w))) = (&dark_mean, &white_mean)
             && !same_kind(d, w)
         {
@@ -45,7 +48,19 @@ impl FlatField {
             Some((place, mean)) => gains(&mean, &dark, place)?,
             None => vec![1.0; width * height],
         };
-        Ok(Some(Self { width, height, full_scale, dark, gain }))
+        let blocks = block_means(&gain, width, height, 1.0);
+        let (low, high) = blocks.iter().fold((f64::INFINITY, 0.0f64), |(l, h), b| (l.min(*b), h.max(*b)));
+        let mean = dark.iter().map(|d| f64::from(*d)).sum::<f64>() / dark.len().max(1) as f64;
+        let facts = FlatFieldFacts {
+            dark_images: dark_paths.len(),
+            white_images: white_paths.len(),
+            dark_level: mean / f64::from(full_scale),
+            darkest: if high > 0.0 { low / high } else { 1.0 },
+            dead: gain.iter().filter(|g| **g <= 0.0).count(),
+            dark_drift: drift(dark_paths, bits, Light::Dark)?,
+            white_drift: drift(white_paths, bits, Light::White)?,
+        };
+        Ok(Some(Self { width, height, full_scale, dark, gain, facts }))
     }
 
     /// Corrects a picture: counts as an evenly sensitive sensor in even light would give.

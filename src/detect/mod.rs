@@ -10,6 +10,7 @@ mod corners;
 mod detection;
 mod edge_line;
 mod flat_field;
+mod flat_field_facts;
 mod load;
 mod picture;
 mod quads;
@@ -19,6 +20,7 @@ pub mod tags;
 
 pub use detection::{Circles, Detection, Dropped, Outline, Sizes};
 pub use flat_field::FlatField;
+pub use flat_field_facts::{Drift, FlatFieldFacts};
 pub use load::{LUMA_WEIGHTS, load, load_bytes};
 pub use picture::Picture;
 pub use run::{SeriesImage, detect_series};

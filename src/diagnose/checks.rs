@@ -3,7 +3,7 @@
 use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
 use super::{
-    camera_model, extrapolates, few_images, focus, joint_noise, left_out_bodies, left_out_images,
+    camera_model, camera_pattern, extrapolates, few_images, focus, joint_noise, left_out_bodies, left_out_images,
     left_out_observations, loose, marker_off, moved, no_gain, parameter_off, plate_size, pose_step, scatter,
     undetermined, zeros_off,
 };
@@ -60,6 +60,7 @@ pub const CHECKS: &[Check] = &[
         ..check("focus", Stage::FreePoses(|p, s| found(focus::check(p, s))))
     },
     check("camera_model", Stage::FreePoses(|p, s| found(camera_model::check(p, s)))),
+    check("camera_pattern", Stage::Fit(|a, b, s| found(camera_pattern::check(a, b, s)))),
     check("few_images", Stage::Fit(|a, b, s| found(few_images::check(a, b, s)))),
     check("joint_noise", Stage::Fit(|a, b, s| found(joint_noise::check(a, b, s)))),
     check("loose", Stage::Fit(|a, b, s| found(loose::check(a, b, s)))),

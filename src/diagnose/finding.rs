@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::camera_model::CameraModelMisfit;
+use super::camera_pattern::ResidualPattern;
 use super::displaced::Displaced;
 use super::extrapolates::Extrapolates;
 use super::few_images::FewImages;
@@ -70,6 +71,7 @@ findings! {
     Noticed,
     ObservationsLeftOut,
     ParameterOff,
+    ResidualPattern,
     ZeroOff,
 }
 

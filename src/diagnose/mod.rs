@@ -4,6 +4,7 @@
 //! [`Finding`]; the function as a row of [`CHECKS`]. Numbers that decide stand in [`crate::assess::Limits`].
 
 mod camera_model;
+mod camera_pattern;
 mod checks;
 mod displaced;
 mod extrapolates;
@@ -29,6 +30,7 @@ mod undetermined;
 mod zeros_off;
 
 pub use camera_model::CameraModelMisfit;
+pub use camera_pattern::{ResidualPattern, residual_pattern};
 pub use checks::{CHECKS, Check, Diagnosis, Stage};
 pub use displaced::{Carried, Displaced, Displacement};
 pub use extrapolates::Extrapolates;

@@ -189,6 +189,7 @@ codes! {
         ImageSizeImpossible "image_size_impossible" "an image is too small to show anything, or larger than is read or drawn",
         ImageSizeDiffers "image_size_differs" "an image has another size or depth than the others",
         ImageDepth "image_depth" "pixels do not fit the stated number of bits",
+        FlatFieldDrift "flat_field_drift" "dark or white images of the end differ from those of the begin",
         FlatFieldUseless "flat_field_useless" "white images are saturated, or not brighter than dark ones",
     }
     Input "Detection" {
@@ -267,13 +268,14 @@ codes! {
         NothingHeldOut "nothing_held_out" "too few images to hold any out",
         PointsUndetermined "points_undetermined" "measured points do not determine the frame of the device",
         PointsContradict "points_contradict" "measured points and readings do not belong together",
-        CameraFileImpossible "camera_file_impossible" "no camera model of ROS comes near to a lens",
+        CameraFileImpossible "camera_file_impossible" "no camera model of a format expresses a lens, or comes near to it",
         OriginNotWritten "origin_not_written" "an origin cannot be written into the robot description",
         RecordNotWritten "record_not_written" "a record cannot be encoded",
     }
     Unsolved "Findings" {
         Noticed "noticed" "a notice of an earlier version of the program, which gave it no code of its own",
         CameraModelMisfit "camera_model_misfit" "the camera model does not explain the markers",
+        ResidualPattern "residual_pattern" "the residuals show a pattern that noise does not leave",
         Extrapolates "extrapolates" "outside the region of the stops the flange is known badly",
         FewImages "few_images" "few images: the nominal model decides much of the result",
         FocusChanged "focus_changed" "focus or zoom changed during the series",

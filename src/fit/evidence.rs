@@ -1,10 +1,12 @@
 //! Laplace's approximation of the evidence of a model (D. MacKay, *Bayesian interpolation*, 1992).
 
 use crate::linalg::SymmetricFactor;
+use crate::problem::Family;
 use crate::solve::{Elimination, LinearProblem, System};
 
 /// `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what models of the same data share, with the whole information `N`
-/// (dense columns, latents and markers) at the optimum; `None` where it is not finite.
+/// (dense columns, latents and markers) at the optimum, and what holding directions of a family adds to the density of its prior; `None` where it
+/// is not finite.
 pub fn log_evidence(linear: LinearProblem) -> Option<f64> {
     let system = System::with(Elimination::cheaper(linear), linear, 0.0);
     let reduced = SymmetricFactor::new(&system.information).ok()?.log_determinant();
@@ -14,5 +16,7 @@ pub fn log_evidence(linear: LinearProblem) -> Option<f64> {
         .filter(|c| c.free && c.prior_sigma.is_finite())
         .map(|c| c.prior_sigma.ln())
         .sum();
-    Some(-linear.lin.cost - 0.5 * (reduced + eliminated + distances) - priors).filter(|e| e.is_finite())
+    let families = linear.adjustment.problem.families.iter();
+    let held: f64 = families.map(Family::log_density_of_held).sum();
+    Some(-linear.lin.cost - 0.5 * (reduced + eliminated + distances) - priors + held).filter(|e| e.is_finite())
 }

@@ -50,6 +50,12 @@ pub mod codes {}
 #[doc = include_str!("circles.md")]
 pub mod circles {}
 
+#[doc = include_str!("camera_misfit.md")]
+pub mod camera_misfit {}
+
+#[doc = include_str!("photogrammetry.md")]
+pub mod photogrammetry {}
+
 #[doc = include_str!("boards.md")]
 pub mod boards {}
 

@@ -40,7 +40,9 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
     for (index, s) in series.iter().enumerate().filter(|(_, s)| s.has_images) {
         let camera = intern(&mut cameras, &s.camera);
         if camera == lenses.len() {
-            lenses.push(Camera::pinhole(s.lens, s.width_px, s.height_px, f64::from(s.width_px)));
+            let known = s.known_camera.as_ref().map(|k| k.camera.clone());
+            let unknown = || Camera::pinhole(s.lens, s.width_px, s.height_px, f64::from(s.width_px));
+            lenses.push(known.unwrap_or_else(unknown));
         }
         if (lenses[camera].width_px, lenses[camera].height_px) != (s.width_px, s.height_px) {
             return Err(Error::new(
@@ -115,6 +117,10 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
     };
     let mut layout = Layout::new(&state, &names);
     release_measured_scales(&mut layout, &plates);
+    for s in series.iter().filter(|s| s.known_camera.as_ref().is_some_and(|k| k.held)) {
+        let own = cameras.iter().position(|c| *c == s.camera).map(|k| layout.cameras[k].clone());
+        own.into_iter().flatten().for_each(|c| layout.columns[c].free = false);
+    }
     bodies.hold_unseen_turns(&mut layout);
     let noise = Noise {
         pixel_factor: vec![1.0; cameras.len()],

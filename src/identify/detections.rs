@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::second_pass::second_pass;
 use super::seen_image::SeenImage;
-use crate::detect::{FlatField, Picture, SeriesImage, detect_series, load};
-use crate::error::{Code, Error, Result};
+use crate::assess::Limits;
+use crate::detect::{Drift, FlatField, FlatFieldFacts, Picture, SeriesImage, detect_series, load};
+use crate::error::{Code, Error, Notice, Result};
 use crate::series::{Plate, Series, Source};
 
 /// Looks for the plate in the images of all stops, dark and white images taken into account, then again where a first
@@ -36,6 +37,19 @@ pub fn detect_stops(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<
 /// # Errors
 /// A series without images; dark and white images that are of no use.
 pub fn pictures(series: &Series) -> Result<impl Fn(&Path) -> Result<Picture> + Sync> {
+    let flat_field = flat_field(series)?;
+    let bits = series.manifest.camera().bits;
+    Ok(move |path: &Path| {
+        let picture = load(path, bits)?;
+        match &flat_field {
+            Some(flat_field) => flat_field.apply(picture),
+            None => Ok(picture),
+        }
+    })
+}
+
+/// Dark and white images of a series; none where it has none.
+fn flat_field(series: &Series) -> Result<Option<FlatField>> {
     let (dark, white) = match &series.source {
         Source::Images { dark, white, .. } => (dark, white),
         Source::Recording(path) => return Err(recording(path)),
@@ -47,15 +61,42 @@ pub fn pictures(series: &Series) -> Result<impl Fn(&Path) -> Result<Picture> + S
         Source::NoImages => return Err(no_images(series)),
         Source::Cameras(_) => return Err(several_cameras(series)),
     };
-    let bits = series.manifest.camera().bits;
-    let flat_field = FlatField::from_images(dark, white, bits)?;
-    Ok(move |path: &Path| {
-        let picture = load(path, bits)?;
-        match &flat_field {
-            Some(flat_field) => flat_field.apply(picture),
-            None => Ok(picture),
-        }
-    })
+    FlatField::from_images(dark, white, series.manifest.camera().bits)
+}
+
+/// What the dark and white images of a series did, and whether sensor or light changed from their frames `begin*` to their frames `end*`.
+///
+/// # Errors
+/// A series without images; dark and white images that are of no use.
+pub fn flat_field_facts(series: &Series, limits: &Limits) -> Result<Option<(FlatFieldFacts, Vec<Notice>)>> {
+    let Some(FlatField { facts, .. }) = flat_field(series)? else { return Ok(None) };
+    let place = |folder: &str| series.folder.join(folder).display().to_string();
+    let mut notices = Vec::new();
+    if let Some(d) = facts.dark_drift.filter(|d| changed(d, [limits.dark_drift, limits.dark_drift], limits)) {
+        let what = format!(
+            "from the frames begin* to end* the dark images change by {:.2} % of full scale, and by {:.2} % from place to place",
+            100.0 * d.level,
+            100.0 * d.pattern
+        );
+        let remedy = "let the sensor warm up before the series, and take dark images at its temperature";
+        notices.push(Notice::new(Code::FlatFieldDrift, place("dark"), what, remedy));
+    }
+    if let Some(d) = facts.white_drift.filter(|d| changed(d, [limits.light_drift, limits.white_drift], limits)) {
+        let what = format!(
+            "from the frames begin* to end* the light changes by {:.1} %, and by {:.2} % from place to place in the image",
+            100.0 * d.level,
+            100.0 * d.pattern
+        );
+        let remedy = "did aperture, focus, dust or the light change? take the white images again, evenly lit";
+        notices.push(Notice::new(Code::FlatFieldDrift, place("white"), what, remedy));
+    }
+    Ok(Some((facts, notices)))
+}
+
+/// Beyond what matters, in common or from place to place, and there beyond what single frames scatter.
+fn changed(drift: &Drift, [level, pattern]: [f64; 2], limits: &Limits) -> bool {
+    let chance = limits.drift_sigmas * drift.noise.unwrap_or(0.0);
+    drift.level.abs() > level || drift.pattern > pattern.max(chance)
 }
 
 /// Looks for a plate in single images.

@@ -1,8 +1,9 @@
 //! Free-pose adjustment: cameras, plate and one free camera pose an image; the robot takes no part.
 
-use nalgebra::{Matrix6, Vector2};
+use nalgebra::{DMatrix, Matrix6, Vector2};
 
 use super::start_verdict::{StartReached, StartVerdict};
+use super::stated::CameraStart;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::fit::{FreePose, FreePoses, PlacedCamera};
@@ -13,8 +14,8 @@ use crate::problem::{
     Adjustment, Image, ImageRejection, Mark, ObservationRejection, Problem, State, Tie, Weighting, size_by_distance,
 };
 use crate::solve::{
-    ComponentOptions, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status, estimate_components,
-    frames, in_frame, reject_observations, solve,
+    ComponentOptions, Elimination, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status,
+    estimate_components, frames, in_frame, in_frame_by, reject_observations, solve,
 };
 use crate::stage::stage;
 
@@ -87,7 +88,7 @@ impl FreeStart {
 /// When no image shows enough markers, when the plate is mirrored, when no start converges or the focal length is not determined.
 pub fn adjust_free_poses(
     mut adjustment: Adjustment,
-    stated_focal_px: &[Option<f64>],
+    starts: &[CameraStart],
     limits: &Limits,
 ) -> Result<(Adjustment, FreePoses, Vec<StartVerdict>)> {
     let _stage = stage("free poses");
@@ -96,8 +97,8 @@ pub fn adjust_free_poses(
     adjustment.hold_poses();
     let homographies = fit_homographies(&mut adjustment)?;
     let mut verdicts = Vec::new();
-    for (camera, stated) in stated_focal_px.iter().enumerate() {
-        adjustment.state = start_camera(&adjustment, camera, &homographies, *stated, &mut verdicts)?;
+    for (camera, start) in starts.iter().enumerate() {
+        adjustment.state = start_camera(&adjustment, camera, &homographies, start, &mut verdicts)?;
     }
     let (mut adjustment, free) = finish(adjustment, limits)?;
     for (column, free) in adjustment.problem.layout.columns.iter_mut().zip(free_before) {
@@ -180,7 +181,7 @@ fn start_camera(
     adjustment: &Adjustment,
     camera: usize,
     homographies: &[Option<Homography>],
-    stated: Option<f64>,
+    start: &CameraStart,
     verdicts: &mut Vec<StartVerdict>,
 ) -> Result<State> {
     let Adjustment { problem, state } = adjustment;
@@ -198,14 +199,24 @@ fn start_camera(
     let (width, height) = (state.cameras[camera].width_px, state.cameras[camera].height_px);
     let mut best: Option<(f64, State, usize)> = None;
     let before = verdicts.len();
-    for FocalCandidate { focal_px, origin } in focal_candidates(&own, width, height, stated) {
+    let pinhole = |FocalCandidate { focal_px, origin }: FocalCandidate| {
+        let lens = state.cameras[camera].lens;
+        (Camera::pinhole(lens, width, height, focal_px), format!("{origin}: {focal_px:.0} px"))
+    };
+    let (known, stated) = match start {
+        CameraStart::Known(known) => (Some(known), None),
+        CameraStart::Focal(focal_px) => (None, Some(*focal_px)),
+        CameraStart::Unknown => (None, None),
+    };
+    let given = known.map(|k| (k.camera.clone(), format!("camera file: {:.0} px", k.camera.parameters[0])));
+    let others = if known.is_some_and(|k| k.held) { Vec::new() } else { focal_candidates(&own, width, height, stated) };
+    for (first, origin) in given.into_iter().chain(others.into_iter().map(pinhole)) {
         let of = format!("focal length of camera {name}");
-        let origin = format!("{origin}: {focal_px:.0} px");
         if best.as_ref().is_some_and(|b| b.0 < GOOD_START_PX) {
             verdicts.push(StartVerdict { of, origin, reached: StartReached::NotNeeded, won: false });
             continue;
         }
-        let (rms, candidate, behind) = try_focal(adjustment, camera, homographies, focal_px);
+        let (rms, candidate, behind) = try_camera(adjustment, camera, homographies, first);
         let reached = StartReached::CameraPoses { rms_px: Some(rms).filter(|rms| rms.is_finite()) };
         verdicts.push(StartVerdict { of, origin, reached, won: false });
         if best.as_ref().is_none_or(|b| rms < b.0) {
@@ -233,16 +244,16 @@ fn start_camera(
     }
 }
 
-/// RMS that a focal length reaches, px, with the state and the number of views from behind.
-fn try_focal(
+/// RMS that a first camera reaches, px, with the state and the number of views from behind.
+fn try_camera(
     Adjustment { problem, state }: &Adjustment,
     camera: usize,
     homographies: &[Option<Homography>],
-    focal_px: f64,
+    first: Camera,
 ) -> (f64, State, usize) {
     let mut quick = Adjustment { problem: quick_problem(problem, camera), state: state.clone() };
-    let lens = &state.cameras[camera];
-    quick.state.cameras[camera] = Camera::pinhole(lens.lens, lens.width_px, lens.height_px, focal_px);
+    let parametric = first.parametric();
+    quick.state.cameras[camera] = first;
     let [behind, failed] = start_poses(&mut quick, camera, homographies);
     if failed > 0 {
         return (f64::INFINITY, quick.state, behind);
@@ -252,7 +263,7 @@ fn try_focal(
     let early = [0, 1, 4];
     for stage in 0..2 {
         for (k, c) in columns.clone().enumerate() {
-            let wanted = early.contains(&k) || (stage == 1 && k < lens.parametric());
+            let wanted = early.contains(&k) || (stage == 1 && k < parametric);
             quick.problem.layout.columns[c].free = problem.layout.columns[c].free && wanted;
         }
         let cost = quick.linearise().map_or(0.0, |lin| lin.cost);
@@ -391,8 +402,8 @@ fn collect(fit: &Fit) -> Result<FreePoses> {
     })
 }
 
-/// The cameras of the images in use in the frames of their plates, and the scales of the plates.
-fn placed_cameras(fit: &Fit) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale>>)> {
+/// The adjustment with every plate in its frame, and the sizes of the plates.
+fn in_own_frames(fit: &Fit) -> Result<(Adjustment, Vec<f64>)> {
     let Adjustment { problem, state } = &fit.adjustment;
     let mut moved = state.clone();
     let mut sizes = vec![1.0; problem.plates.len()];
@@ -410,9 +421,39 @@ fn placed_cameras(fit: &Fit) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale
             sizes[plate] = size;
         }
     }
-    let moved = Adjustment { problem: problem.clone(), state: moved };
-    let lin =
-        moved.linearise().ok_or_else(|| undetermined(Code::CameraUndetermined, "a marker lies behind its camera"))?;
+    Ok((Adjustment { problem: problem.clone(), state: moved }, sizes))
+}
+
+fn linearised(moved: &Adjustment) -> Result<Linearised> {
+    moved.linearise().ok_or_else(|| undetermined(Code::CameraUndetermined, "a marker lies behind its camera"))
+}
+
+/// Covariance of all poses `plate_from_camera` together, in the frames of their plates: images in use, six rows each, m and rad.
+///
+/// # Errors
+/// Markers that define no frame.
+pub(super) fn covariance_together(fit: &Fit) -> Result<DMatrix<f64>> {
+    let (moved, _) = in_own_frames(fit)?;
+    let lin = linearised(&moved)?;
+    let linear = moved.linear(&lin);
+    let together = in_frame_by(Elimination::Markers, linear, &fit.covariance)?.poses_together(linear);
+    let mut all = together.unwrap_or_else(|| DMatrix::zeros(0, 0));
+    let turns: Vec<Matrix6<f64>> = linear.images().map(|own| adjoint(&own.chain.pose)).collect();
+    let images = all.nrows() / 6;
+    for (i, turn) in turns.iter().enumerate().take(images) {
+        let rows = turn * all.rows(6 * i, 6);
+        all.rows_mut(6 * i, 6).copy_from(&rows);
+        let columns = all.columns(6 * i, 6) * turn.transpose();
+        all.columns_mut(6 * i, 6).copy_from(&columns);
+    }
+    Ok((&all + all.transpose()) * 0.5)
+}
+
+/// The cameras of the images in use in the frames of their plates, and the scales of the plates.
+fn placed_cameras(fit: &Fit) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale>>)> {
+    let problem = &fit.problem;
+    let (moved, sizes) = in_own_frames(fit)?;
+    let lin = linearised(&moved)?;
     let linear = moved.linear(&lin);
     let covariance = in_frame(linear, &fit.covariance)?;
     let scale = |(plate, size): (usize, f64)| {

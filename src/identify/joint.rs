@@ -9,7 +9,7 @@ use super::solution::Solution;
 use super::staged::{refit, staged};
 use super::start::{StartGiven, start_robot, take_back};
 use super::start_verdict::StartVerdict;
-use super::stated::focals_px;
+use super::stated::camera_starts;
 use crate::assess::{hold_out, hold_out_bodies, judge, refitted};
 use crate::diagnose::{CheckContext, Diagnosis};
 use crate::error::{Code, Error, Result};
@@ -70,7 +70,7 @@ pub(super) fn fit_model(
         }
         None if problem.images.is_empty() => FreeStart::of(&start, FreePoses::none(start.state.clone()), Vec::new()),
         None => {
-            let stated = focals_px(&problem.cameras, series);
+            let stated = camera_starts(&problem.cameras, series);
             let (adjusted, free, verdicts) = adjust_free_poses(start, &stated, &options.limits)?;
             start = adjusted;
             FreeStart::of(&start, free, verdicts)

@@ -9,14 +9,14 @@ use super::free_poses::adjust_free_poses;
 use super::joint::{JointFit, fit_model};
 use super::options::Options;
 use super::solution::{LensEvidence, Solution};
-use super::stated::focals_px;
+use super::stated::camera_starts;
 use crate::assess::Limits;
 use crate::diagnose::LensNotInRos;
 use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{FreePoses, log_evidence};
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
-use crate::problem::{Adjustment, LensChoice, MeasuredSeries, Problem, predict};
+use crate::problem::{Adjustment, Family, LensChoice, MeasuredSeries, Problem, predict};
 use crate::solve::{ComponentOptions, LinearProblem, Settings, Status, estimate_components};
 use crate::stage::stage;
 use crate::urdf::Chain;
@@ -29,6 +29,8 @@ const OUTLIERS: f64 = 0.02;
 const DECREMENT: f64 = 0.01;
 /// Rounds in which image noise and fit follow the lens.
 const ROUNDS: usize = 3;
+/// The same for a lens with a displacement field.
+const FIELD_ROUNDS: usize = 8;
 
 /// The fit of one robot model with the lenses that its evidence supports.
 pub(super) struct Lensed {
@@ -101,7 +103,7 @@ fn compare_lenses(joint: &JointFit, camera: &str, choice: LensChoice, limits: &L
     let Some(k) = fit.problem.cameras.iter().position(|c| c == camera) else { return Vec::new() };
     let is_wide = fit.state.cameras[k].corner() > limits.fisheye_tangent;
     let depths = depths_m(&fit.problem, &joint.start.free)[k];
-    let formulas = Lens::ALL.into_iter().filter(|l| choice.has(*l) && (*l != Lens::Fisheye || is_wide));
+    let formulas = Lens::ALL.into_iter().filter(|l| choice.has(*l) && (l.formula() != Lens::Fisheye || is_wide));
     let formulas: Vec<Lens> = formulas.collect();
     let mut all: Vec<LensEvidence> =
         formulas.into_par_iter().filter_map(|lens| evidence(fit, (k, &depths), lens)).collect();
@@ -119,7 +121,9 @@ fn evidence(fit: &Adjustment, (camera, depths_m): (usize, &[f64; 2]), lens: Lens
     // Image noise follows the lens; joint noise, tilt and the sizes of families stay.
     other.problem.families.retain(|f| f.held.ncols() > 0);
     let settings = Settings { decrement: DECREMENT, ..Settings::default() };
-    let options = ComponentOptions { joint: false, tilt: false, rounds: ROUNDS, settings };
+    // The size of a displacement field is found from above.
+    let rounds = if lens.has_field() { FIELD_ROUNDS } else { ROUNDS };
+    let options = ComponentOptions { joint: false, tilt: false, rounds, settings };
     let outcome = estimate_components(other, &options);
     let linear = outcome.linear().filter(|_| outcome.status == Status::Converged)?;
     let Adjustment { problem, state } = &outcome.adjustment;
@@ -143,6 +147,7 @@ fn with_lens(fit: &Adjustment, (camera, depths_m): (usize, &[f64; 2]), lens: Len
     let columns = problem.families.iter_mut().flat_map(|f| &mut f.columns);
     columns.filter(|c| **c >= from).for_each(|c| *c = c.saturating_add_signed(moved));
     state.cameras[camera] = next;
+    problem.families.extend(Family::of_field(&problem.layout, state, camera));
     Some(other)
 }
 
@@ -192,8 +197,7 @@ pub(super) fn losses(solution: &Solution) -> Vec<LensNotInRos> {
     named.filter_map(loss).collect()
 }
 
-/// Sets the lens of `open` cameras by hold-out of free poses, and says why. Lenses with a displacement field are not among them: they cost three
-/// to five times as much, and are asked for by name.
+/// Sets the lens of `open` cameras by hold-out of free poses, and says why.
 ///
 /// # Errors
 /// Those of the adjustment, when no lens explains the images at all.
@@ -207,7 +211,7 @@ pub fn choose_lens(
     let mut last_error = None;
     let among = |s: &MeasuredSeries, lens: Lens| s.lens_choice == LensChoice::Settled || s.lens_choice.has(lens);
     let is_open = |lens: &Lens| series.iter().any(|s| open.contains(&s.camera) && among(s, *lens));
-    let lenses: Vec<Lens> = Lens::ALL.into_iter().filter(|l| !l.has_field() && is_open(l)).collect();
+    let lenses: Vec<Lens> = Lens::ALL.into_iter().filter(is_open).collect();
     for lens in lenses {
         match held_out_errors(chain, series, lens, limits) {
             Ok(errors) => trials.push((lens, errors)),
@@ -256,7 +260,7 @@ fn held_out_errors(
     for (i, image) in thinned.problem.images.iter_mut().enumerate() {
         image.observations.retain(|o| !aside(i, o.marker));
     }
-    let stated = focals_px(&full.cameras, series);
+    let stated = camera_starts(&full.cameras, series);
     let (_, free, _) = adjust_free_poses(thinned, &stated, limits)?;
     let mut squares: Vec<Vec<f64>> = vec![Vec::new(); full.cameras.len()];
     for (i, image) in full.images.iter().enumerate() {

@@ -5,9 +5,10 @@ use std::path::Path;
 
 use super::bodies_measured::{seen_bodies, seen_lengths};
 use super::controller_readings::{self, readings_of};
-use super::detections::{detect_stops, no_images, recording, require_some, several_cameras};
+use super::detections::{detect_stops, flat_field_facts, no_images, recording, require_some, several_cameras};
 use super::seen_image::SeenImage;
 use super::stated::{lens_of, measured_series, on_the_tip_beside_others};
+use crate::assess::Limits;
 use crate::detect::Detection;
 use crate::error::{Code, Error, Notice, Result};
 use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop};
@@ -48,7 +49,11 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     let lens = lens_of(series)?;
     let mut plate = series.plate.clone();
     let (mut seen, found_size) = match &series.source {
-        Source::Images { .. } => look_through(series, progress, &mut notices, &mut plate)?,
+        Source::Images { .. } => {
+            let seen = look_through(series, progress, &mut notices, &mut plate)?;
+            notices.extend(flat_field_facts(series, &Limits::default())?.into_iter().flat_map(|(_, said)| said));
+            seen
+        }
         Source::Observations(all) => {
             let by_name: BTreeMap<&str, &Vec<Observation>> =
                 all.iter().map(|i| (i.image.as_str(), &i.observations)).collect();

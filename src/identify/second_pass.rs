@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::build::build;
 use super::free_poses::adjust_free_poses;
 use super::seen_image::SeenImage;
-use super::stated::{lens_of, measured_series};
+use super::stated::{CameraStart, lens_of, measured_series};
 use crate::assess::Limits;
 use crate::detect::Picture;
 use crate::detect::circles::{Predicted, detect_predicted};
@@ -68,7 +68,12 @@ fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Opti
     let limits = Limits::default();
     let nobody = Robot::nominal(Chain::empty());
     let nothing = build(&nobody, &[measured], false, &limits).ok()?;
-    let (_, free, _) = adjust_free_poses(nothing, &[series.manifest.camera().focal_px], &limits).ok()?;
+    let (_, free, _) = adjust_free_poses(
+        nothing,
+        &[series.manifest.camera().focal_px.map_or(CameraStart::Unknown, CameraStart::Focal)],
+        &limits,
+    )
+    .ok()?;
     let pose = |k: usize| free.poses[k].as_ref().map(|p| p.camera_from_plate);
     // The adjustment takes one of two images that show the same; they stay the same when both have its pose.
     let original =

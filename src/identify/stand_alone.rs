@@ -1,13 +1,17 @@
 //! Cameras, plates and stand-alone camera poses from images alone: the photogrammetric part by itself, no robot takes part.
 
+use nalgebra::{DMatrix, Matrix3, Matrix3x6, Matrix6};
+
 use super::build::build;
-use super::free_poses::adjust_free_poses;
+use super::free_poses::{adjust_free_poses, covariance_together};
 use super::lens_choice::{choose_lens, open_cameras};
 use super::start_verdict::StartVerdict;
-use super::stated::focals_px;
+use super::stated::camera_starts;
 use crate::assess::Limits;
+use crate::diagnose::{CheckContext, Diagnosis, Finding, residual_pattern};
 use crate::error::{Code, Error, Notice, Result};
-use crate::fit::{Fit, FreePose, FreePoses};
+use crate::fit::{Fit, FreePose, FreePoses, PlacedCamera};
+use crate::geom::skew;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, MeasuredSeries};
 use crate::solve::PlateScale;
@@ -24,6 +28,8 @@ pub struct StandAlone {
     pub starts: Vec<StartVerdict>,
     /// Why which lens was taken.
     pub notices: Vec<Notice>,
+    /// What the images contradict.
+    pub findings: Vec<Finding>,
 }
 
 /// How well the pose of one camera is known, in the frame of the plate that its nominal markers define; the scale is apart.
@@ -39,7 +45,32 @@ pub struct PoseSigma {
     pub position_m: f64,
     /// Standard deviation of the direction, rad: root of the mean variance about an axis.
     pub rotation_rad: f64,
+    /// Semi-axes of the ellipsoid of one sigma of the camera in the frame of the plate, m, the largest first.
+    pub camera_axes_m: [f64; 3],
+    /// The same of the plate's centre as the camera sees it: errors of position and direction of a pose go together, so that the
+    /// centre is known better than the camera.
+    pub centre_axes_m: [f64; 3],
+    /// Largest correlation of a direction of the position with one of the rotation (canonical correlation).
+    pub correlation: f64,
 }
+
+/// Semi-axes of the ellipsoid of one sigma, the largest first.
+fn semi_axes(covariance: &Matrix3<f64>) -> [f64; 3] {
+    let mut axes: [f64; 3] = covariance.symmetric_eigenvalues().map(|v| v.max(0.0).sqrt()).into();
+    axes.sort_by(|a, b| b.total_cmp(a));
+    axes
+}
+
+/// Largest canonical correlation of position and rotation.
+fn canonical_correlation(c: &Matrix6<f64>) -> f64 {
+    let part = |i: usize, k: usize| c.fixed_view::<3, 3>(3 * i, 3 * k).into_owned();
+    let whitening = |m: Matrix3<f64>| m.cholesky().and_then(|f| f.l().try_inverse());
+    let both = whitening(part(0, 0)).zip(whitening(part(1, 1)));
+    both.map_or(f64::NAN, |(a, b)| (a * part(0, 1) * b.transpose()).singular_values().max())
+}
+
+/// Most images of which the covariance between poses is stated: the square of their number counts.
+const MOST_TOGETHER: usize = 400;
 
 /// Adjusts cameras, plates and free camera poses; readings are not looked at. The lens of a camera that its series leaves open is that
 /// which predicts best what the adjustment had not seen.
@@ -53,10 +84,15 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     let open: Vec<String> = open_cameras(&series).into_keys().collect();
     let notices = if open.is_empty() { Vec::new() } else { choose_lens(&chain, &mut series, &open, limits)? };
     let start = build(&Robot::nominal(chain), &series, false, limits)?;
-    let stated = focals_px(&start.problem.cameras, &series);
+    let stated = camera_starts(&start.problem.cameras, &series);
     let (mut adjustment, free_poses, starts) = adjust_free_poses(start, &stated, limits)?;
     adjustment.hold_poses();
-    Ok(StandAlone { fit: at_solution(adjustment)?, free_poses, starts, notices })
+    let mut diagnosis = Diagnosis::new(CheckContext { series: &series, free: &free_poses, on_robot: 0, limits });
+    diagnosis.after_free_poses(&adjustment.problem);
+    let mut findings = diagnosis.findings();
+    let fit = at_solution(adjustment)?;
+    findings.extend(residual_pattern(&fit, limits).map(Finding::from));
+    Ok(StandAlone { fit, free_poses, starts, notices, findings })
 }
 
 /// The fit where the adjustment stands.
@@ -69,7 +105,28 @@ fn at_solution(adjustment: Adjustment) -> Result<Fit> {
     Ok(Fit { adjustment, linearised, covariance })
 }
 
+/// Covariance of the plate's centre in the frame of the camera: with `p` that centre, `dp = -rho - phi x p`.
+fn centre_covariance(placed: &PlacedCamera) -> Matrix3<f64> {
+    let p = placed.plate_from_camera.inverse().translation;
+    let mut j = Matrix3x6::zeros();
+    j.fixed_view_mut::<3, 3>(0, 0).copy_from(&-Matrix3::identity());
+    j.fixed_view_mut::<3, 3>(0, 3).copy_from(&skew(&p));
+    j * placed.covariance * j.transpose()
+}
+
 impl StandAlone {
+    /// Covariance of all poses together, in the frames of their plates, six rows an image, with the indices of the images; none of very many.
+    ///
+    /// # Errors
+    /// Markers that define no frame.
+    pub fn covariance_together(&self) -> Result<Option<(Vec<usize>, DMatrix<f64>)>> {
+        let images = self.fit.linearised.images.clone();
+        if images.len() > MOST_TOGETHER {
+            return Ok(None);
+        }
+        Ok(Some((images, covariance_together(&self.fit)?)))
+    }
+
     /// How well every pose is known, in the order of the images.
     pub fn sigmas(&self) -> Vec<PoseSigma> {
         let of = |(image, pose): (usize, &Option<FreePose>)| {
@@ -82,6 +139,9 @@ impl StandAlone {
                 observations: self.fit.problem.images[image].used().count(),
                 position_m: mean(0),
                 rotation_rad: mean(3),
+                camera_axes_m: semi_axes(&c.fixed_view::<3, 3>(0, 0).into_owned()),
+                centre_axes_m: semi_axes(&centre_covariance(&pose.in_frame)),
+                correlation: canonical_correlation(c),
             })
         };
         self.free_poses.poses.iter().enumerate().filter_map(of).collect()

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::build::build;
 use super::free_poses::adjust_free_poses;
-use super::stated::focals_px;
+use super::stated::camera_starts;
 use crate::assess::Limits;
 use crate::geom::{exp_so3, log_so3};
 use crate::init::{PosePair, solve_hand_eye};
@@ -70,7 +70,7 @@ fn groups(
     limits: &Limits,
 ) -> Vec<(usize, Vec<View>)> {
     let Ok(start) = build(robot, series, false, limits) else { return Vec::new() };
-    let stated = focals_px(&start.problem.cameras, series);
+    let stated = camera_starts(&start.problem.cameras, series);
     let Ok((adjustment, free, _)) = adjust_free_poses(start, &stated, limits) else { return Vec::new() };
     let mut groups: BTreeMap<(usize, usize), Vec<View>> = BTreeMap::new();
     let place = |i: usize| {

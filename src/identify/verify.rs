@@ -3,7 +3,7 @@
 use super::build::build;
 use super::free_poses::adjust_free_poses;
 use super::start::{StartGiven, start_robot};
-use super::stated::focals_px;
+use super::stated::camera_starts;
 use super::turns;
 use crate::assess::Limits;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
@@ -38,7 +38,7 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
     let layout = &mut adjustment.problem.layout;
     let columns = layout.robot();
     layout.columns[columns].iter_mut().for_each(|c| c.free = false);
-    let stated = focals_px(&adjustment.problem.cameras, series);
+    let stated = camera_starts(&adjustment.problem.cameras, series);
     let (mut adjustment, free, mut starts) = adjust_free_poses(adjustment, &stated, limits)?;
     start_robot(&mut adjustment, &free, StartGiven { series, limits }, &mut starts)?;
     adjustment.tie_to_readings(false);

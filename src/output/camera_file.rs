@@ -1,7 +1,8 @@
 //! camera.yaml: ROS camera_info, for image_pipeline, camera_calibration_parsers and OpenCV.
 
+use super::camera_formats::ros;
 use super::names::file_names;
-use super::text::{list, quoted};
+use super::text::list;
 use crate::error::{Code, Error, Result};
 use crate::model::camera::{Camera, Lens};
 #[cfg(feature = "mcap")]
@@ -30,24 +31,7 @@ fn ros_name(camera: &Camera) -> &'static str {
 /// A lens that no model of ROS comes near to.
 pub(super) fn camera_yaml(name: &str, camera: &Camera, depths_m: &[f64; 2]) -> Result<String> {
     let (camera, remark) = in_ros(name, camera, depths_m)?;
-    let [fx, fy, cx, cy] = [0, 1, 2, 3].map(|k| camera.parameters[k]);
-    // The coefficients of these lenses stand in the order of OpenCV.
-    let model = ros_name(&camera);
-    let coefficients = camera.parameters[4..].to_vec();
-    let matrix = |rows: usize, columns: usize, data: &[f64]| {
-        format!("\n  rows: {rows}\n  cols: {columns}\n  data: {}\n", list(data.iter().copied()))
-    };
-    Ok(format!(
-        "{remark}image_width: {}\nimage_height: {}\ncamera_name: {}\ncamera_matrix:{}distortion_model: {model}\n\
-         distortion_coefficients:{}rectification_matrix:{}projection_matrix:{}",
-        camera.width_px,
-        camera.height_px,
-        quoted(name),
-        matrix(3, 3, &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]),
-        matrix(1, coefficients.len(), &coefficients),
-        matrix(3, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
-        matrix(3, 4, &[fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]),
-    ))
+    Ok(remark + &ros::text(name, &camera))
 }
 
 /// The camera as ROS can say it, and what that loses, in words.

@@ -6,6 +6,7 @@
 
 mod bodies_record;
 mod camera_file;
+pub mod camera_formats;
 #[cfg(feature = "draw")]
 mod canvas;
 pub mod comparison;
@@ -24,6 +25,7 @@ pub mod flange_table;
 mod gauge;
 mod kinematics_file;
 mod names;
+mod npy;
 mod observation_table;
 #[cfg(feature = "draw")]
 pub mod overlay;

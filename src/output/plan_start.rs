@@ -10,27 +10,13 @@ use crate::error::{Code, Error, Result};
 use crate::files::{self, Kind};
 use crate::geom::Pose;
 use crate::identify::RobotModel;
-use crate::model::camera::{Camera, Lens};
+use crate::model::camera::Camera;
 use crate::model::joint_terms::JointTerm;
 use crate::model::robot::{Posture, Robot};
 use crate::plan::setting::{PlannedStop, Setting};
 use crate::problem::{Image, Mark, Measured};
 use crate::series::{Marker, Plate};
 use crate::urdf::Chain;
-
-#[derive(Deserialize)]
-struct Numbers {
-    data: Vec<f64>,
-}
-
-#[derive(Deserialize)]
-struct CameraInfo {
-    image_width: u32,
-    image_height: u32,
-    distortion_model: String,
-    camera_matrix: Numbers,
-    distortion_coefficients: Numbers,
-}
 
 #[derive(Deserialize)]
 struct PoseFile {
@@ -41,34 +27,6 @@ struct PoseFile {
 
 fn text(path: &Path) -> Result<String> {
     files::read_text(path, Kind::Settings)
-}
-
-/// The camera of a ROS camera_info file.
-///
-/// # Errors
-/// Unreadable files, distortion models other than plumb_bob.
-pub fn read_camera(path: &Path) -> Result<Camera> {
-    let info: CameraInfo = serde_saphyr::from_str(&text(path)?).map_err(|e| {
-        Error::new(Code::SettingSyntax, path.display(), e, "give a ROS camera_info file, or --camera-fov-deg")
-    })?;
-    let refuse = |what: String| {
-        Error::new(Code::SettingRange, path.display(), what, "give a plumb_bob camera with five coefficients")
-    };
-    if info.distortion_model != "plumb_bob" {
-        return Err(refuse(format!("distortion model \"{}\"", info.distortion_model)));
-    }
-    let k = &info.camera_matrix.data;
-    if k.len() != 9 || !(k[0] > 0.0 && k[4] > 0.0) {
-        return Err(refuse("camera_matrix is not a 3x3 matrix with positive focal lengths".into()));
-    }
-    let mut camera = Camera::pinhole(Lens::Brown, info.image_width, info.image_height, k[0]);
-    camera.parameters[..4].copy_from_slice(&[k[0], k[4], k[2], k[5]]);
-    let d = &info.distortion_coefficients.data;
-    if d.len() > camera.parameters.len() - 4 {
-        return Err(refuse(format!("{} distortion coefficients", d.len())));
-    }
-    camera.parameters[4..4 + d.len()].copy_from_slice(d);
-    Ok(camera)
 }
 
 /// The pose of a file like hand_camera.yaml or plate_pose.yaml.

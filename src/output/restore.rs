@@ -128,6 +128,7 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
             width_px: s.width_px,
             height_px: s.height_px,
             focal_px: s.focal_px,
+            known_camera: s.known_camera.clone(),
             lens: s.lens,
             lens_choice: s.lens_choice,
             centroid: s.centroid,
@@ -145,9 +146,22 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
 }
 
 /// A camera as it was found.
-pub(super) fn camera(c: &CameraRecord) -> Camera {
+pub fn camera(c: &CameraRecord) -> Camera {
     let parameters = c.parameters.iter().map(|(_, v)| *v).collect();
     Camera { lens: c.lens, width_px: c.width_px, height_px: c.height_px, parameters }
+}
+
+/// Nearest and farthest plate centre that each camera saw, m.
+pub fn depths_of_record(record: &SolutionRecord) -> Vec<[f64; 2]> {
+    let seen = |camera: usize| {
+        let poses = record.images.iter().filter(move |i| i.camera == camera && i.reason.is_none());
+        poses.filter_map(|i| i.free_pose.as_ref()).map(|f| Pose::from(&f.plate_from_camera).inverse().translation.z)
+    };
+    let range = |k: usize| match (seen(k).reduce(f64::min), seen(k).reduce(f64::max)) {
+        (Some(near), Some(far)) if near > 0.0 => [near, far],
+        _ => [1.0, 1.0],
+    };
+    (0..record.cameras.len()).map(range).collect()
 }
 
 /// The model that a solution found, with its covariance.

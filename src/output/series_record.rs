@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::model::camera::Lens;
-use crate::problem::LensChoice;
+use crate::problem::{KnownCamera, LensChoice};
 use crate::series::CameraMount;
 
 fn yes() -> bool {
@@ -27,6 +27,9 @@ pub struct SeriesRecord {
     pub height_px: u32,
     /// Focal length as stated, px.
     pub focal_px: Option<f64>,
+    /// The camera, where a file of it was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub known_camera: Option<KnownCamera>,
     /// Lens model.
     pub lens: Lens,
     /// Whether the evidence decided on it.

@@ -9,6 +9,7 @@ use super::solution_json::{
 use crate::error::{Code, Error, Result};
 use crate::files::MOST_SIDE_PX;
 use crate::model::camera::Camera;
+use crate::problem::KnownCamera;
 
 /// Numbers of a covariance of a pose.
 const POSE_COVARIANCE: usize = 36;
@@ -178,6 +179,16 @@ fn series(r: &SolutionRecord) -> Result<()> {
             require((2..=MOST_SIDE_PX).contains(&side), &field(name), format!("is {side}"))?;
         }
         require(s.focal_px.is_none_or(|f| f > 0.0), &field("focal_px"), "is not positive")?;
+        let fits = |known: &KnownCamera| {
+            let Camera { lens, width_px, height_px, .. } = known.camera;
+            let like = |of: &Camera| of.parameters.len() == known.camera.parameters.len();
+            [width_px, height_px] == [s.width_px, s.height_px] && like(&Camera::pinhole(lens, width_px, height_px, 1.0))
+        };
+        require(
+            s.known_camera.as_ref().is_none_or(fits),
+            &field("known_camera"),
+            "is of other images or another lens",
+        )?;
     }
     match r.images.iter().position(|i| !names.contains(&i.series)) {
         None => Ok(()),

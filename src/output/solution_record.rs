@@ -152,6 +152,7 @@ fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
         width_px: s.width_px,
         height_px: s.height_px,
         focal_px: s.focal_px,
+        known_camera: s.known_camera.clone(),
         lens: s.lens,
         lens_choice: s.lens_choice,
         centroid: s.centroid,

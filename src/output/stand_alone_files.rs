@@ -4,18 +4,21 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::finding_record::FindingRecord;
 use super::gauge::Gauge;
 use super::names::{ImageNames, plate_name};
 use super::text::json;
-use super::{camera_file, plate_files, pose_files};
+use super::{camera_file, npy, plate_files, pose_files};
 use crate::error::{Notice, Result};
-use crate::identify::{StandAlone, depths_m};
+use crate::identify::{PoseComparison, StandAlone, depths_m};
 use crate::model::camera::Lens;
 use crate::problem::Adjustment;
 use crate::series::InputFile;
 
 /// Name of the record that a program reads.
 pub const FILE_NAME: &str = "poses.json";
+/// Name of the covariance of all poses together.
+const TOGETHER: &str = "poses_covariance.npy";
 
 /// What the files need beside the adjustment.
 #[derive(Debug, Clone)]
@@ -28,6 +31,8 @@ pub struct StandAloneContext {
     pub command: String,
     /// What the user should know.
     pub notices: Vec<Notice>,
+    /// The poses of another source, by the name of their file.
+    pub against: Option<(String, PoseComparison)>,
 }
 
 #[derive(Serialize)]
@@ -39,6 +44,13 @@ struct Record<'a> {
     cameras: Vec<CameraOf<'a>>,
     plates: Vec<PlateOf>,
     images: Vec<ImageOf<'a>>,
+    /// Images in the order of poses_covariance.npy, six rows each (body twist of `plate_from_camera`, m and rad).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    covariance_together: Option<Vec<&'a str>>,
+    /// The poses of another source, after the common frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    against: Option<AgainstOf<'a>>,
+    findings: Vec<FindingRecord>,
     notices: Vec<String>,
     files: Vec<String>,
 }
@@ -57,6 +69,8 @@ struct CameraOf<'a> {
     width_px: u32,
     height_px: u32,
     parameters: BTreeMap<String, Value>,
+    /// Nearest and farthest plate centre that it saw, m.
+    depths_m: [f64; 2],
     /// Factor on the stated standard deviations of its observations.
     pixel_factor: f64,
 }
@@ -66,6 +80,18 @@ struct PlateOf {
     name: String,
     /// Size over the nominal one, less one: common to all poses and markers before the plate, and not in their covariances.
     relative_scale: Option<Value>,
+}
+
+#[derive(Serialize)]
+struct AgainstOf<'a> {
+    file: &'a str,
+    poses: usize,
+    rms_m: f64,
+    rms_rad: f64,
+    relative_scale: f64,
+    normalised_error_squared: f64,
+    /// Body twist from the pose of the other source to that found, m and rad.
+    twists: BTreeMap<&'a str, [f64; 6]>,
 }
 
 #[derive(Serialize)]
@@ -82,6 +108,14 @@ struct ImageOf<'a> {
     position_sigma_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rotation_sigma_rad: Option<f64>,
+    /// Semi-axes of the ellipsoids of one sigma: of the camera, and of the plate's centre as the camera sees it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    camera_axes_m: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    centre_axes_m: Option<[f64; 3]>,
+    /// Largest correlation of position and rotation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    correlation: Option<f64>,
 }
 
 /// Every file of the result: name -> bytes.
@@ -97,9 +131,14 @@ pub fn stand_alone_files(found: &StandAlone, context: &StandAloneContext) -> Res
     let poses = [("poses.csv".to_owned(), pose_files::poses_csv(&names, &found.free_poses))];
     let texts = cameras.into_iter().chain(plates).chain(poses);
     let mut files: BTreeMap<String, Vec<u8>> = texts.map(|(name, text)| (name, text.into_bytes())).collect();
+    let together = found.covariance_together()?;
+    if let Some((_, covariance)) = &together {
+        files.insert(TOGETHER.to_owned(), npy::matrix(covariance));
+    }
     let mut listed: Vec<String> = files.keys().cloned().chain([FILE_NAME.to_owned()]).collect();
     listed.sort();
-    let record = Record { files: listed, ..record(found, context, &names) };
+    let order = together.map(|(images, _)| images.into_iter().map(|i| names.of(i)).collect());
+    let record = Record { files: listed, covariance_together: order, ..record(found, context, &names) };
     files.insert(FILE_NAME.to_owned(), json(&record, FILE_NAME)?);
     Ok(files)
 }
@@ -107,6 +146,7 @@ pub fn stand_alone_files(found: &StandAlone, context: &StandAloneContext) -> Res
 fn record<'a>(found: &'a StandAlone, context: &'a StandAloneContext, names: &'a ImageNames) -> Record<'a> {
     let Adjustment { problem, state } = &found.fit.adjustment;
     let covariance = &found.fit.covariance;
+    let depths = depths_m(problem, &found.free_poses);
     let camera = |(k, name): (usize, &'a String)| {
         let camera = &state.cameras[k];
         let value = |(column, value): (usize, &f64)| {
@@ -120,6 +160,7 @@ fn record<'a>(found: &'a StandAlone, context: &'a StandAloneContext, names: &'a 
             width_px: camera.width_px,
             height_px: camera.height_px,
             parameters: camera.parameter_names().map(Into::into).zip(values).collect(),
+            depths_m: depths[k],
             pixel_factor: problem.noise.pixel_factor[k],
         }
     };
@@ -137,6 +178,9 @@ fn record<'a>(found: &'a StandAlone, context: &'a StandAloneContext, names: &'a 
             rms_px: known.map(|s| s.rms_px),
             position_sigma_m: known.map(|s| s.position_m),
             rotation_sigma_rad: known.map(|s| s.rotation_rad),
+            camera_axes_m: known.map(|s| s.camera_axes_m),
+            centre_axes_m: known.map(|s| s.centre_axes_m),
+            correlation: known.map(|s| s.correlation),
         }
     };
     Record {
@@ -147,6 +191,17 @@ fn record<'a>(found: &'a StandAlone, context: &'a StandAloneContext, names: &'a 
         cameras: problem.cameras.iter().enumerate().map(camera).collect(),
         plates: (0..problem.plates.len()).map(plate).collect(),
         images: (0..problem.images.len()).map(image).collect(),
+        covariance_together: None,
+        against: context.against.as_ref().map(|(file, c)| AgainstOf {
+            file,
+            poses: c.differences.len(),
+            rms_m: c.rms[0],
+            rms_rad: c.rms[1],
+            relative_scale: c.relative_scale,
+            normalised_error_squared: c.normalised,
+            twists: c.differences.iter().map(|d| (d.image.as_str(), d.twist.into())).collect(),
+        }),
+        findings: found.findings.iter().map(FindingRecord::from).collect(),
         notices: context.notices.iter().map(Notice::coded).collect(),
         files: Vec::new(),
     }

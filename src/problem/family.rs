@@ -74,6 +74,11 @@ impl Family {
         (self.held.ncols() > 0).then(|| &self.held * self.held.transpose() / (sigma * sigma))
     }
 
+    /// What holding the directions adds to the logarithm of the density of the prior at zero: half of `ln(1 + (sigma / sigma_held)^2)` each.
+    pub fn log_density_of_held(&self) -> f64 {
+        0.5 * self.held.ncols() as f64 * (1.0 + (self.factor / HELD).powi(2)).ln()
+    }
+
     /// Sum of squares of what is held, in units of its sigma, at values of all columns.
     pub fn squares(&self, values: &DVector<f64>) -> f64 {
         let Some(base) = self.base.first().filter(|_| self.held.ncols() > 0) else { return 0.0 };

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::body::{BodySeen, InstrumentKind};
 use super::rejection::ImageRejection;
-use crate::model::camera::Lens;
+use crate::model::camera::{Camera, Lens};
 use crate::series::{CameraMount, Observation, Plate, PlateKind, ReadOtherwise};
 
 /// Which lenses the evidence chooses among.
@@ -16,7 +16,7 @@ pub enum LensChoice {
     Settled,
     /// Those that camera.yaml can express.
     Exported,
-    /// All formulas.
+    /// All, with and without a displacement field.
     All,
 }
 
@@ -26,9 +26,18 @@ impl LensChoice {
         match self {
             Self::Settled => false,
             Self::Exported => lens.is_in_ros(),
-            Self::All => !lens.has_field(),
+            Self::All => true,
         }
     }
+}
+
+/// A camera that is known beforehand.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KnownCamera {
+    /// It.
+    pub camera: Camera,
+    /// True where it is held, false where it is what the adjustment starts from.
+    pub held: bool,
 }
 
 /// One series after detection, joint readings in SI and in the order of the chain.
@@ -50,6 +59,8 @@ pub struct MeasuredSeries {
     pub height_px: u32,
     /// Focal length as stated, px.
     pub focal_px: Option<f64>,
+    /// The camera, where a file of it was given.
+    pub known_camera: Option<KnownCamera>,
     /// Lens model.
     pub lens: Lens,
     /// Whether the evidence decides on the lens; the fit then begins with the simplest.
@@ -86,6 +97,7 @@ impl MeasuredSeries {
             width_px: 0,
             height_px: 0,
             focal_px: None,
+            known_camera: None,
             lens: Lens::Brown,
             lens_choice: LensChoice::Settled,
             centroid: true,

@@ -11,6 +11,7 @@ mod inputs;
 mod joints;
 mod manifest;
 mod mcap;
+mod named_poses;
 mod observation;
 mod observation_file;
 mod plate;
@@ -45,6 +46,7 @@ pub use manifest::{AngleUnit, CirclePoint, Manifest, ObservationsSection, RobotS
 pub use mcap::{CameraInfo, Clock, Delay, Extracted, Motion, Picking, RecordingOptions, StopReport, extract};
 #[cfg(feature = "mcap")]
 pub use mcap::{FramePoses, ImageMarks, MarkKind, MarkLayer, Shown, require_new, write_recording};
+pub use named_poses::{NamedPoses, read_named_poses};
 pub use observation::{Edge, ImageObservations, Observation};
 pub use observation_file::{observations_csv, parse_observations};
 pub use plate::{Aruco, Marker, Plate, ScaleBar};

@@ -184,7 +184,7 @@ impl Fit {
     }
 
     /// Of every plate: sum of squares of the corrections of its markers in units of their prior, and how many coordinates the data tell.
-    pub(super) fn marker_tallies(&self) -> Vec<[f64; 2]> {
+    pub fn marker_tallies(&self) -> Vec<[f64; 2]> {
         let Adjustment { problem, state } = &self.adjustment;
         let of_plate = |(p, covariances): (usize, &Vec<Option<Matrix3<f64>>>)| {
             let seen = covariances.iter().enumerate().filter_map(|(m, c)| c.map(|c| (m, c)));

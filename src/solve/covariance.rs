@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
-use super::linear::{LinearPose, LinearProblem, LinearStop};
+use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
 use super::system::{Elimination, Singular, System};
 use crate::problem::Problem;
 
@@ -96,6 +96,12 @@ impl Covariance {
     /// Covariance of a pose that something shows at a stop, as its body twist, m and rad.
     pub(super) fn pose(&self, stop: &LinearStop, pose: &LinearPose) -> DMatrix<f64> {
         self.system.pose_covariance(&self.reduced, stop, pose)
+    }
+
+    /// Covariance of the camera pose of an image, as its body twist, m and rad.
+    pub fn pose_of(&self, stop: &LinearStop, image: &LinearImage) -> Matrix6<f64> {
+        let own = stop.poses().zip(stop.places()).find(|(_, place)| stop.image_index(*place) == image.index);
+        own.map_or_else(Matrix6::zeros, |(pose, _)| Matrix6::from_column_slice(self.pose(stop, &pose).as_slice()))
     }
 
     /// Covariance of the correction of every marker that was seen, m^2, per plate and marker, in the frame of the priors (the

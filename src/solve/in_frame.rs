@@ -208,6 +208,19 @@ impl InFrame {
         0.5 * (c + c.transpose())
     }
 
+    /// Covariance of the free camera poses of all images in use together, six rows each, in their order; none where what is latent at the
+    /// stops was eliminated.
+    pub fn poses_together(&self, linear: LinearProblem) -> Option<DMatrix<f64>> {
+        let first = |own: LinearImage| {
+            let [_, Range { start, .. }] = own.latents();
+            own.tie.free_pose()?;
+            Some(self.covariance.system.latent_start.get(own.stop)? + start)
+        };
+        let starts: Vec<usize> = linear.images().map(first).collect::<Option<_>>()?;
+        let rows: Vec<usize> = starts.into_iter().flat_map(|s| s..s + 6).collect();
+        Some(self.covariance.reduced.select_rows(&rows).select_columns(&rows))
+    }
+
     /// Sigma of the scale of a plate.
     pub fn scale_sigma(&self, problem: &Problem, plate: usize) -> Option<f64> {
         self.frame(plate).map(|f| f.scale_sigma(problem, &self.covariance.reduced, plate))

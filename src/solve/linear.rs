@@ -406,6 +406,11 @@ impl<'a> LinearStop<'a> {
         self.images.clone()
     }
 
+    /// Index among all images of that at a place among those in use.
+    pub(super) fn image_index(&self, place: usize) -> usize {
+        self.linear.lin.images[place]
+    }
+
     /// Number of unknowns that are latent at it.
     pub fn unknowns(&self) -> usize {
         self.joint_errors.len() + self.images().map(|image| image.tie.len()).sum::<usize>()

@@ -33,6 +33,7 @@ pub fn measured(series: &SimulatedSeries, chain: &Chain) -> MeasuredSeries {
         width_px: camera.width_px,
         height_px: camera.height_px,
         focal_px: None,
+        known_camera: None,
         lens: camera.lens,
         lens_choice: LensChoice::Settled,
         centroid: true,

@@ -170,7 +170,8 @@ pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, 
     };
     release_measured_scales(&mut problem.layout, &problem.plates);
     let start = Adjustment { problem, state: start };
-    let (mut adjustment, free_poses, _) = adjust_free_poses(start, &[None], &Limits::default()).unwrap();
+    let (mut adjustment, free_poses, _) =
+        adjust_free_poses(start, &[robotcal::identify::CameraStart::Unknown], &Limits::default()).unwrap();
     adjustment.hold_poses();
     let adjustment = solve(adjustment, &Settings::default()).adjustment;
     let linearised = adjustment.linearise().unwrap();

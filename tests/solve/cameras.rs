@@ -101,6 +101,7 @@ fn seen(mounts: &[CameraMount], wanted: usize, seed: u64) -> Seen {
         width_px: 1280,
         height_px: 1024,
         focal_px: None,
+        known_camera: None,
         lens: Lens::Brown,
         lens_choice: LensChoice::Settled,
         centroid: true,

@@ -16,6 +16,7 @@ mod lens_study;
 mod marker_tolerance;
 mod moved_in_time;
 mod normal_equations;
+mod patterns;
 mod plate_size;
 mod real_tracker;
 mod refits;

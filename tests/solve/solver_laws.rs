@@ -156,7 +156,8 @@ fn poses_mode_is_the_free_pose_adjustment() {
     nothing.plates[0].modes = [0.0; 6];
     nothing.plates[0].corrections.iter_mut().for_each(|c| *c = Vector3::zeros());
     let nothing = Adjustment { problem: problem.clone(), state: nothing };
-    let (Adjustment { problem, .. }, found, _) = adjust_free_poses(nothing, &[None], &Limits::default()).unwrap();
+    let (Adjustment { problem, .. }, found, _) =
+        adjust_free_poses(nothing, &[robotcal::identify::CameraStart::Unknown], &Limits::default()).unwrap();
     // ... and with the same weights from the truth, robot present but tied to nothing.
     let mode = converged(&problem, free_poses(&problem, &state, |_| true), &TIGHT);
     let cov = covariance(&mode);

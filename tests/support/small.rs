@@ -355,6 +355,7 @@ pub fn series(problem: &Problem) -> MeasuredSeries {
         width_px: 1280,
         height_px: 1024,
         focal_px: None,
+        known_camera: None,
         lens: Lens::Brown,
         lens_choice: robotcal::problem::LensChoice::Settled,
         centroid: true,

@@ -39,19 +39,33 @@ impl Camera {
 ///
 /// `None` where too little of the image has a direction, or where the fit does not settle.
 pub fn fit_lens(camera: &Camera, lens: Lens, depths_m: &[f64; 2]) -> Option<LensFit> {
-    let points = points(camera, depths_m);
+    fit_lens_holding(camera, lens, &[], depths_m)
+}
+
+/// As [`fit_lens`], with some parameters of the fitted camera held at zero.
+pub fn fit_lens_holding(camera: &Camera, lens: Lens, zeros: &[usize], depths_m: &[f64; 2]) -> Option<LensFit> {
+    fit_lens_to(camera, lens, zeros, &points(camera, depths_m))
+}
+
+/// As [`fit_lens_holding`], to points in space (m) with their images (px), from the pinhole of `camera`.
+pub fn fit_lens_to(
+    camera: &Camera,
+    lens: Lens,
+    zeros: &[usize],
+    points: &[(Vector3<f64>, Vector2<f64>)],
+) -> Option<LensFit> {
     if points.len() < ACROSS * ACROSS / 2 {
         return None;
     }
     let mut fitted = Camera::pinhole(lens, camera.width_px, camera.height_px, camera.parameters[0]);
     fitted.parameters[..4].copy_from_slice(&camera.parameters[..4]);
     let mut damping = 1e-6;
-    let mut cost = squares(&fitted, &points)?;
+    let mut cost = squares(&fitted, points)?;
     for _ in 0..STEPS {
         let mut next = fitted.clone();
-        let step = step(&fitted, &points, damping);
+        let step = step(&fitted, points, damping, zeros);
         next.parameters.iter_mut().zip(step.iter().flatten()).for_each(|(p, s)| *p += s);
-        match squares(&next, &points).filter(|c| step.is_some() && *c <= cost) {
+        match squares(&next, points).filter(|c| step.is_some() && *c <= cost) {
             Some(lower) => {
                 let settled = cost - lower < 1e-12 * (cost + 1e-12);
                 (fitted, cost, damping) = (next, lower, (0.1 * damping).max(1e-9));
@@ -88,7 +102,7 @@ fn squares(camera: &Camera, points: &[(Vector3<f64>, Vector2<f64>)]) -> Option<f
     points.iter().map(square).sum::<Option<f64>>().filter(|s| s.is_finite())
 }
 
-fn step(camera: &Camera, points: &[(Vector3<f64>, Vector2<f64>)], damping: f64) -> Option<Vec<f64>> {
+fn step(camera: &Camera, points: &[(Vector3<f64>, Vector2<f64>)], damping: f64, zeros: &[usize]) -> Option<Vec<f64>> {
     let mut normal = SMatrix::<f64, MAX_PARAMETERS, MAX_PARAMETERS>::zeros();
     let mut right = SVector::<f64, MAX_PARAMETERS>::zeros();
     for (x, uv) in points {
@@ -98,6 +112,12 @@ fn step(camera: &Camera, points: &[(Vector3<f64>, Vector2<f64>)], damping: f64) 
     }
     for k in 0..MAX_PARAMETERS {
         normal[(k, k)] += if k < camera.parameters.len() { damping * normal[(k, k)] + 1e-9 } else { 1.0 };
+    }
+    for &k in zeros {
+        normal.row_mut(k).fill(0.0);
+        normal.column_mut(k).fill(0.0);
+        normal[(k, k)] = 1.0;
+        right[k] = 0.0;
     }
     let step = normal.cholesky()?.solve(&right);
     Some(step.iter().take(camera.parameters.len()).copied().collect())

@@ -17,7 +17,7 @@ mod rational;
 mod thin_prism;
 
 pub use field::{Lattice, Touched};
-pub use fit::{LensFit, fit_lens};
+pub use fit::{LensFit, fit_lens, fit_lens_holding, fit_lens_to};
 pub use formula::MAX_PARAMETERS;
 pub use lens::Lens;
 pub use projection::{Camera, Projection};

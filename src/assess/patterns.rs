@@ -1,0 +1,424 @@
+//! Patterns that noise does not leave in the residuals: over the image, over the depth, over the plate.
+//!
+//! Score tests ([`crate::solve::Response`]) of columns that the model lacks, one group for each cause that has a remedy of its own. With `n`
+//! equations and `R` the squares of the whitened residuals, whose size the fit itself has estimated, a group of `m` columns removes
+//! `D = s' M^-1 s` of `R`, and `F = D (n' - m) / (R - D)`, `n' = R`, is chi-squared with `m` degrees of freedom where there is no pattern. Of
+//! groups beyond chance the one with the largest `F - m ln n` (G. Schwarz 1978) names the cause.
+
+use nalgebra::{DMatrix, DVector, Matrix3x2, Matrix6, SMatrix, Vector2, Vector3, Vector6};
+
+use super::flange::FlangeModel;
+use super::{Limits, still, stops};
+use crate::fit::Fit;
+use crate::geom::adjoint;
+use crate::linalg::{SymmetricFactor, symmetric_eigen};
+use crate::problem::{Adjustment, Equations, Step};
+use crate::solve::{LinearImage, Response, Singular};
+
+/// Share of the information of a scaled direction below which the fit absorbs it.
+const ABSORBED: f64 = 1e-8;
+/// Columns that everything else absorbs are left out below this share of what they say.
+const LEAST_SHARE: f64 = 1e-9;
+/// One-sided normal deviate of a power of 95 %.
+const POWER_95: f64 = 1.645;
+/// Share of what the poses tell of the common frames that holds what they do not.
+const HELD: f64 = 1e-9;
+/// Degrees of the displacement field, of the bow and of the print of the plate.
+const FIELD_DEGREES: [usize; 2] = [2, 5];
+const BOW_DEGREES: [usize; 2] = [2, 4];
+const PRINT_DEGREES: [usize; 2] = [2, 3];
+/// Unit of the columns of a plate, m.
+const PLATE_UNIT_M: f64 = 1e-4;
+/// Columns of the camera parameters cx and cy: the image moves with them.
+const CENTRE: [usize; 2] = [2, 3];
+
+/// What can leave a pattern.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pattern {
+    /// Displacements with the square of the distance from the axis in one direction: a lens element that is tilted.
+    ThinPrism,
+    /// Radial displacements of a higher order than the lens has.
+    Radial,
+    /// Radial displacements that go with one over the depth: the entrance pupil moves.
+    Parallax,
+    /// Smooth displacements over the image that no formula has.
+    Field,
+    /// Heights over the plate.
+    PlateBow,
+    /// Smooth shifts of the markers in the plate.
+    PlatePrint,
+    /// Markers that are off by more than the stated tolerance.
+    Tolerance,
+}
+
+impl Pattern {
+    /// Those of a camera.
+    const OF_CAMERA: [Self; 4] = [Self::ThinPrism, Self::Radial, Self::Parallax, Self::Field];
+    /// Those of a plate that are columns.
+    const OF_PLATE: [Self; 2] = [Self::PlateBow, Self::PlatePrint];
+
+    fn columns(self) -> usize {
+        let powers = |[low, high]: [usize; 2]| (low..=high).map(|d| d + 1).sum::<usize>();
+        match self {
+            Self::ThinPrism => 4,
+            Self::Radial | Self::Parallax => 2,
+            Self::Field => 2 * powers(FIELD_DEGREES),
+            Self::PlateBow => powers(BOW_DEGREES),
+            Self::PlatePrint => 2 * powers(PRINT_DEGREES),
+            Self::Tolerance => 0,
+        }
+    }
+}
+
+/// A camera or plate, by its index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bearer {
+    /// Camera.
+    Camera(usize),
+    /// Plate.
+    Plate(usize),
+}
+
+/// What one group of columns says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PatternTest {
+    /// The cause.
+    pub pattern: Pattern,
+    /// Whose.
+    pub bearer: Bearer,
+    /// Chi-squared where noise alone is.
+    pub statistic: f64,
+    /// Its degrees of freedom.
+    pub degrees: usize,
+    /// Normal deviate of the statistic.
+    pub deviate: f64,
+    /// RMS of the pattern in the residuals, px.
+    pub rms_px: f64,
+    /// What would be found with a probability of 95 %, px RMS in the residuals.
+    pub least_px: f64,
+    /// What it gains beyond its number of columns.
+    pub gain: f64,
+    /// By how much the step to the fit with these columns moves what counts, and what is stated of it.
+    pub moved: Option<Moved>,
+}
+
+/// How far something is moved, RMS, beside its sigma.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moved {
+    /// The flange relative to the plate, m, and the stated sigma; none without a robot.
+    pub flange_m: Option<[f64; 2]>,
+    /// The camera relative to the plate over the images, m, and the stated sigma.
+    pub pose_m: [f64; 2],
+    /// The same of its direction, rad.
+    pub pose_rad: [f64; 2],
+}
+
+impl Moved {
+    /// The largest displacement in stated sigmas: of the flange where there is one, else of the poses.
+    pub fn sigmas(&self) -> f64 {
+        let ratio = |[moved, sigma]: [f64; 2]| if sigma > 0.0 { moved / sigma } else { 0.0 };
+        self.flange_m.map_or_else(|| ratio(self.pose_m).max(ratio(self.pose_rad)), ratio)
+    }
+}
+
+impl PatternTest {
+    /// True where chance does not leave it.
+    pub fn is_found(&self, limits: &Limits) -> bool {
+        self.deviate > limits.pattern_sigmas
+    }
+}
+
+/// A group of columns with its place among all of them.
+struct Group {
+    pattern: Pattern,
+    bearer: Bearer,
+    first: usize,
+}
+
+/// Tests every pattern; `None` without images.
+///
+/// # Errors
+/// Normal equations that are singular.
+pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular> {
+    let linear = fit.linear();
+    if linear.images().len() == 0 {
+        return Ok(Vec::new());
+    }
+    let groups = groups(fit);
+    let count = groups.iter().map(|g| g.pattern.columns()).sum();
+    let response = linear.response(count, |image, equations| columns(fit, &groups, image, equations, count))?;
+    let flange_model = {
+        let postures = stops(&fit.problem);
+        still(fit).map(|s| (s, postures))
+    };
+    let model = flange_model.as_ref().and_then(|(s, postures)| {
+        FlangeModel::new(&fit.state.robot, &fit.problem.layout, *s, &fit.covariance.reduced, postures, limits)
+    });
+    let (n, squares) = (response.equations as f64, response.squares);
+    let points: usize = linear.images().map(|i| i.terms.residuals.len()).sum();
+    let sum: f64 = linear.images().flat_map(|i| i.terms.residuals.iter()).map(|r| r.duv.norm_squared()).sum();
+    let rms_px = (sum / points.max(1) as f64).sqrt();
+    let of_group = |g: &Group| {
+        let (y, statistic, degrees) = solved(&response, g.first, g.pattern.columns());
+        let left = (squares - statistic).max(f64::MIN_POSITIVE);
+        let statistic = statistic * (squares - degrees as f64).max(1.0) / left;
+        let step = combined(&response.steps[g.first..g.first + y.len()], &y)?;
+        Some(PatternTest {
+            pattern: g.pattern,
+            bearer: g.bearer,
+            statistic,
+            degrees,
+            deviate: deviate(statistic, degrees),
+            rms_px: rms_px * (statistic / (statistic + squares)).sqrt(),
+            least_px: rms_px * (least(degrees, limits.pattern_sigmas) / squares).sqrt(),
+            gain: statistic - degrees as f64 * n.ln(),
+            moved: Some(moved(fit, model.as_ref(), &step)),
+        })
+    };
+    let mut tests: Vec<PatternTest> = groups.iter().filter_map(of_group).collect();
+    tests.extend(tolerances(fit, rms_px, squares, limits));
+    Ok(tests)
+}
+
+/// The pattern that names the cause: of those beyond chance that which gains most, or the simplest that removes nearly as much (what is of
+/// second order in a large fault belongs to no first-order column, and many columns take more of it).
+pub fn cause<'a>(tests: &'a [PatternTest], limits: &Limits) -> Option<&'a PatternTest> {
+    let found = || tests.iter().filter(|t| t.is_found(limits));
+    let best = found().max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+    if best.pattern == Pattern::Tolerance {
+        return Some(best);
+    }
+    let alike = |t: &&PatternTest| {
+        t.pattern != Pattern::Tolerance
+            && t.statistic >= limits.pattern_share * best.statistic
+            && t.degrees < best.degrees
+    };
+    found().filter(alike).min_by_key(|t| t.degrees).or(Some(best))
+}
+
+fn groups(fit: &Adjustment) -> Vec<Group> {
+    let mut all: Vec<Group> = Vec::new();
+    let mut first = 0;
+    let mut add = |pattern: Pattern, bearer: Bearer| {
+        all.push(Group { pattern, bearer, first });
+        first += pattern.columns();
+    };
+    for k in 0..fit.problem.cameras.len() {
+        Pattern::OF_CAMERA.into_iter().for_each(|p| add(p, Bearer::Camera(k)));
+    }
+    for k in 0..fit.problem.plates.len() {
+        Pattern::OF_PLATE.into_iter().for_each(|p| add(p, Bearer::Plate(k)));
+    }
+    all
+}
+
+/// Columns of an image, whitened, equations x columns.
+fn columns(fit: &Adjustment, groups: &[Group], own: &LinearImage, equations: &Equations, count: usize) -> DMatrix<f64> {
+    let image = own.image;
+    let (camera, plate) = (&fit.state.cameras[image.camera], &fit.state.plates[image.plate]);
+    let mut all = DMatrix::zeros(2 * equations.markers.len(), count);
+    let corner = camera.corner();
+    let size = plate.nominal.iter().map(|n| n.norm()).fold(f64::MIN_POSITIVE, f64::max);
+    for (o, (sight, &marker)) in equations.sights().zip(&equations.markers).enumerate() {
+        let at = own.chain.pose.transform(&plate.position(marker));
+        let Some(seen) = camera.project_with_jacobian(&at) else { continue };
+        let intrinsics = sight.by_intrinsics();
+        let by_pixel: SMatrix<f64, 2, 2> = SMatrix::from_columns(&CENTRE.map(|e| intrinsics.row(e).transpose()));
+        let by_marker: Matrix3x2<f64> = sight.by_marker();
+        let p = &camera.parameters;
+        let y = Vector2::new((seen.uv.x - p[2]) / p[0], (seen.uv.y - p[3]) / p[1]) / corner;
+        let middle = |n: u32| 0.5 * (f64::from(n) - 1.0);
+        let (mu, mv) = (middle(camera.width_px), middle(camera.height_px));
+        let across = Vector2::new((seen.uv.x - mu) / mu, (seen.uv.y - mv) / mv);
+        let on_plate = plate.nominal[marker].xy() / size;
+        for g in groups {
+            let mut put = |k: usize, column: Vector2<f64>| {
+                all.fixed_view_mut::<2, 1>(2 * o, g.first + k).copy_from(&column);
+            };
+            match g.bearer {
+                Bearer::Camera(k) if k == image.camera => {
+                    let shifts = image_shifts(g.pattern, &y, &across, at.z);
+                    shifts.into_iter().enumerate().for_each(|(k, px)| put(k, by_pixel * px));
+                }
+                Bearer::Plate(k) if k == image.plate => {
+                    let shifts = plate_shifts(g.pattern, &on_plate);
+                    shifts.into_iter().enumerate().for_each(|(k, m)| put(k, by_marker.tr_mul(&m)));
+                }
+                _ => {}
+            }
+        }
+    }
+    all
+}
+
+/// Displacements in the image, px, at `y` (1 at the corner) from the axis, at `across` (-1 to 1) of the image.
+fn image_shifts(pattern: Pattern, y: &Vector2<f64>, across: &Vector2<f64>, depth_m: f64) -> Vec<Vector2<f64>> {
+    let t2 = y.norm_squared();
+    match pattern {
+        Pattern::ThinPrism => {
+            [(t2, 0.0), (t2 * t2, 0.0), (0.0, t2), (0.0, t2 * t2)].map(|(u, v)| Vector2::new(u, v)).to_vec()
+        }
+        Pattern::Radial => vec![y * t2.powi(4), y * t2.powi(5)],
+        Pattern::Parallax => vec![y * (t2 / depth_m), y * (t2 * t2 / depth_m)],
+        Pattern::Field => polynomials(across, FIELD_DEGREES)
+            .into_iter()
+            .flat_map(|b| [Vector2::new(b, 0.0), Vector2::new(0.0, b)])
+            .collect(),
+        Pattern::PlateBow | Pattern::PlatePrint | Pattern::Tolerance => Vec::new(),
+    }
+}
+
+/// Displacements of a marker, m.
+fn plate_shifts(pattern: Pattern, at: &Vector2<f64>) -> Vec<Vector3<f64>> {
+    match pattern {
+        Pattern::PlateBow => {
+            polynomials(at, BOW_DEGREES).into_iter().map(|b| Vector3::new(0.0, 0.0, b * PLATE_UNIT_M)).collect()
+        }
+        Pattern::PlatePrint => polynomials(at, PRINT_DEGREES)
+            .into_iter()
+            .flat_map(|b| [Vector3::new(b * PLATE_UNIT_M, 0.0, 0.0), Vector3::new(0.0, b * PLATE_UNIT_M, 0.0)])
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Products of Legendre polynomials of a range of degrees.
+fn polynomials(at: &Vector2<f64>, [low, high]: [usize; 2]) -> Vec<f64> {
+    let legendre = |x: f64| {
+        let mut p = vec![1.0, x];
+        for k in 1..high {
+            let n = k as f64;
+            p.push(((2.0 * n + 1.0) * x * p[k] - n * p[k - 1]) / (n + 1.0));
+        }
+        p
+    };
+    let (x, y) = (legendre(at.x), legendre(at.y));
+    (low..=high).flat_map(|d| (0..=d).map(move |i| (i, d - i))).map(|(i, k)| x[i] * y[k]).collect()
+}
+
+/// `y = M^-1 s`, `s' M^-1 s` and the number of directions that the rest of the fit does not absorb.
+fn solved(response: &Response, first: usize, count: usize) -> (DVector<f64>, f64, usize) {
+    let scale = response.by_itself.rows(first, count).map(|d| if d > 0.0 { d.sqrt().recip() } else { 0.0 });
+    let m = response.information.view((first, first), (count, count));
+    let scaled = DMatrix::from_fn(count, count, |i, k| m[(i, k)] * scale[i] * scale[k]);
+    let score = response.score.rows(first, count).component_mul(&scale);
+    let Some((values, vectors)) = symmetric_eigen(&scaled) else { return (DVector::zeros(count), 0.0, 0) };
+    let least = (ABSORBED * values.max()).max(LEAST_SHARE);
+    let mut y = DVector::zeros(count);
+    let (mut statistic, mut degrees) = (0.0, 0);
+    for (value, vector) in values.iter().zip(vectors.column_iter()).filter(|(value, _)| **value > least) {
+        let along = vector.dot(&score);
+        y += vector * (along / value);
+        statistic += along * along / value;
+        degrees += 1;
+    }
+    (y.component_mul(&scale), statistic, degrees)
+}
+
+/// `-X y`.
+fn combined(steps: &[Step], y: &DVector<f64>) -> Option<Step> {
+    let mut all = steps.first()?.clone();
+    let first = -y[0];
+    all.dense *= first;
+    all.joint_errors.iter_mut().chain(&mut all.ties).flatten().for_each(|v| *v *= first);
+    all.markers.iter_mut().flatten().for_each(|v| *v *= first);
+    for (step, y) in steps.iter().zip(y.iter()).skip(1) {
+        all.dense.axpy(-y, &step.dense, 1.0);
+        let pairs = all.joint_errors.iter_mut().chain(&mut all.ties).zip(step.joint_errors.iter().chain(&step.ties));
+        pairs.for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a -= y * b));
+        all.markers.iter_mut().flatten().zip(step.markers.iter().flatten()).for_each(|(a, b)| *a -= b * *y);
+    }
+    Some(all)
+}
+
+/// What a step moves. Of the camera poses counts what no common displacement of the camera frame or the plate frame takes up: with the body
+/// twist `w_i` of the camera, `w_i - a - Ad(T_i) b`, least squares over `a` and `b` in units of the stated sigmas.
+fn moved(fit: &Fit, model: Option<&FlangeModel>, step: &Step) -> Moved {
+    let linear = fit.linear();
+    let count = linear.images().len().max(1) as f64;
+    let mut variances = [0.0f64; 2];
+    let mut twists: Vec<(Matrix6<f64>, Vector6<f64>)> = Vec::new();
+    for own in linear.images() {
+        let ad = adjoint(&own.chain.pose);
+        let covariance = ad * fit.covariance.pose_of(&linear.stop(own.stop), &own) * ad.transpose();
+        for (part, sum) in variances.iter_mut().enumerate() {
+            *sum += (0..3).map(|k| covariance[(3 * part + k, 3 * part + k)]).sum::<f64>().max(0.0) / count;
+        }
+        twists.push((ad, ad * own.pose_step(step)));
+    }
+    let sigmas = variances.map(f64::sqrt);
+    let left = without_frames(&twists, sigmas);
+    let rms =
+        |part: usize| (left.iter().map(|w| w.fixed_rows::<3>(3 * part).norm_squared()).sum::<f64>() / count).sqrt();
+    let theta = fit.problem.layout.theta_len();
+    Moved {
+        flange_m: model.map(|m| m.moved_m(&step.dense.rows(0, theta).into_owned())),
+        pose_m: [rms(0), sigmas[0]],
+        pose_rad: [rms(1), sigmas[1]],
+    }
+}
+
+fn without_frames(twists: &[(Matrix6<f64>, Vector6<f64>)], sigmas: [f64; 2]) -> Vec<Vector6<f64>> {
+    let weight = Vector6::from_fn(|k, _| if sigmas[k / 3] > 0.0 { sigmas[k / 3].powi(-2) } else { 0.0 });
+    let (mut n, mut rhs) = (DMatrix::<f64>::zeros(12, 12), DVector::<f64>::zeros(12));
+    let rows = |ad: &Matrix6<f64>| {
+        let mut a = DMatrix::identity(6, 12);
+        a.fixed_view_mut::<6, 6>(0, 6).copy_from(ad);
+        a
+    };
+    for (ad, twist) in twists {
+        let a = rows(ad);
+        let weighted = DMatrix::from_diagonal(&DVector::from_column_slice(weight.as_slice())) * &a;
+        n += a.tr_mul(&weighted);
+        rhs += weighted.tr_mul(twist);
+    }
+    let size = n.diagonal();
+    (0..12).for_each(|k| n[(k, k)] += HELD * size[k]);
+    let Ok(factor) = SymmetricFactor::new(&n) else { return twists.iter().map(|t| t.1).collect() };
+    let x = factor.solve(&rhs);
+    twists.iter().map(|(ad, twist)| twist - Vector6::from_column_slice((rows(ad) * &x).as_slice())).collect()
+}
+
+/// Normal deviate of a chi-squared statistic (E. Wilson and M. Hilferty 1931).
+fn deviate(statistic: f64, degrees: usize) -> f64 {
+    let spread = 2.0 / (9.0 * degrees.max(1) as f64);
+    ((statistic / degrees.max(1) as f64).cbrt() - (1.0 - spread)) / spread.sqrt()
+}
+
+/// Noncentrality at which a statistic is beyond `sigmas` with a probability of 95 %.
+fn least(degrees: usize, sigmas: f64) -> f64 {
+    let m = degrees.max(1) as f64;
+    let spread = 2.0 / (9.0 * m);
+    let beyond = m * (1.0 - spread + sigmas * spread.sqrt()).powi(3);
+    // Mean m + l, variance 2 (m + 2 l).
+    let mut l = beyond;
+    for _ in 0..50 {
+        l = (beyond - m + POWER_95 * (2.0 * (m + 2.0 * l)).sqrt()).max(0.0);
+    }
+    l
+}
+
+/// Do the corrections of the markers fit their stated tolerance? Their squares over the coordinates that the data tell.
+fn tolerances(fit: &Fit, rms_px: f64, squares: f64, limits: &Limits) -> Vec<PatternTest> {
+    if !fit.problem.noise.marker.is_empty() {
+        return Vec::new();
+    }
+    let tallies = fit.marker_tallies().into_iter().enumerate();
+    let told = tallies.filter(|(_, [_, told])| *told >= limits.tolerance_coordinates);
+    told.map(|(plate, [sum, told])| {
+        let ratio = sum / told;
+        PatternTest {
+            pattern: Pattern::Tolerance,
+            bearer: Bearer::Plate(plate),
+            statistic: sum,
+            degrees: told.round() as usize,
+            deviate: deviate(sum, told.round() as usize),
+            rms_px: f64::NAN,
+            least_px: rms_px * (least(told.round() as usize, limits.pattern_sigmas) / squares).sqrt(),
+            // Twice the gain in the logarithm of the density, less the price of one parameter.
+            gain: told * (ratio - 1.0 - ratio.max(f64::MIN_POSITIVE).ln()) - told.ln(),
+            moved: None,
+        }
+    })
+    .collect()
+}

@@ -1,0 +1,143 @@
+//! Is there a pattern in the residuals that noise does not explain, what would remove it, and does it matter?
+
+use std::fmt;
+
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use crate::assess::{Accuracy, Bearer, Limits, Moved, Pattern, PatternTest, cause, patterns};
+use crate::error::{Code, Notice};
+use crate::fit::Fit;
+
+/// The residuals show a pattern.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResidualPattern {
+    /// What it is, and what it does.
+    pub found: PatternTest,
+    /// Whose pattern it is.
+    pub bearer: String,
+    /// True where it moves flange or poses by more than is stated of them.
+    pub matters: bool,
+}
+
+pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<ResidualPattern> {
+    residual_pattern(fit, setting.limits)
+}
+
+/// The pattern that names the cause, where there is one.
+pub fn residual_pattern(fit: &Fit, limits: &Limits) -> Option<ResidualPattern> {
+    let tests = patterns(fit, limits).ok()?;
+    let found = cause(&tests, limits)?.clone();
+    let bearer = match found.bearer {
+        Bearer::Camera(k) => fit.problem.cameras.get(k)?.clone(),
+        Bearer::Plate(k) => match fit.problem.plates.len() {
+            1 => "plate".to_owned(),
+            _ => format!("plate {}", k + 1),
+        },
+    };
+    let matters = found.moved.is_some_and(|m| m.sigmas() > limits.pattern_moves);
+    Some(ResidualPattern { found, bearer, matters })
+}
+
+/// What it looks like, and what removes it.
+fn words(pattern: Pattern) -> [&'static str; 2] {
+    match pattern {
+        Pattern::ThinPrism => [
+            "grow with the square of the distance from the axis, to one side",
+            "try --camera thin_prism: an element of the lens is tilted",
+        ],
+        Pattern::Radial => {
+            ["are radial, of a higher order than the lens has", "try --camera rational, or fisheye for a wide lens"]
+        }
+        Pattern::Parallax => {
+            ["are radial and go with the distance", "try --camera parallax: the entrance pupil of the lens moves"]
+        }
+        Pattern::Field => ["are smooth over the image, and no formula has them", "try --camera brown+field"],
+        Pattern::PlateBow => {
+            ["are those of heights of the plate", "flatten the plate, or state a larger tolerance_m of its markers"]
+        }
+        Pattern::PlatePrint => {
+            ["are those of markers shifted smoothly in the plate", "measure the markers, or state a larger tolerance_m"]
+        }
+        Pattern::Tolerance => ["", "state a larger tolerance_m, or give --marker-tolerance estimated"],
+    }
+}
+
+impl ResidualPattern {
+    fn moves(&self) -> String {
+        let Some(Moved { flange_m, pose_m, pose_rad }) = self.found.moved else { return String::new() };
+        match flange_m {
+            Some([by, sigma]) => {
+                format!("; without it the flange moves by {:.3} mm (stated sigma {:.3} mm)", 1e3 * by, 1e3 * sigma)
+            }
+            None => format!(
+                "; without it the camera poses move by {:.4} mm and {:.3} arcmin (stated sigmas {:.4} mm, {:.3} arcmin)",
+                1e3 * pose_m[0],
+                60.0 * pose_rad[0].to_degrees(),
+                1e3 * pose_m[1],
+                60.0 * pose_rad[1].to_degrees()
+            ),
+        }
+    }
+}
+
+impl fmt::Display for ResidualPattern {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.notice().fmt(f)
+    }
+}
+
+impl Kind for ResidualPattern {
+    fn code(&self) -> Code {
+        Code::ResidualPattern
+    }
+
+    fn weight(&self) -> Weight {
+        if self.matters { Weight::Gate } else { Weight::Note }
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        match self.found.bearer {
+            Bearer::Camera(_) => vec![Subject::Camera(self.bearer.clone())],
+            Bearer::Plate(_) => vec![Subject::Body(self.bearer.clone())],
+        }
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        let test = &self.found;
+        let mut all = vec![
+            Quantity::new("chi_squared", test.statistic, "1"),
+            Quantity::new("degrees_of_freedom", test.degrees as f64, "1"),
+            Quantity::new("found_from", test.least_px, "px"),
+        ];
+        if test.rms_px.is_finite() {
+            all.push(Quantity::new("pattern_rms", test.rms_px, "px"));
+        }
+        if let Some(Moved { flange_m, pose_m, pose_rad }) = test.moved {
+            let moved = |name: &str, [by, sigma]: [f64; 2], unit: &str| Quantity::new(name, by, unit).with_sigma(sigma);
+            all.extend(flange_m.map(|m| moved("flange_moved", m, "m")));
+            all.extend([moved("pose_moved", pose_m, "m"), moved("pose_turned", pose_rad, "rad")]);
+        }
+        all
+    }
+
+    fn notice(&self) -> Notice {
+        let test = &self.found;
+        let [shape, remedy] = words(test.pattern);
+        let what = match test.pattern {
+            Pattern::Tolerance => format!(
+                "the markers are off by {:.1} times the stated tolerance",
+                (test.statistic / test.degrees.max(1) as f64).sqrt()
+            ),
+            _ => format!(
+                "the residuals show a pattern of {:.4} px RMS that noise does not leave: they {shape}{} (patterns from {:.4} px on are found)",
+                test.rms_px,
+                self.moves(),
+                test.least_px
+            ),
+        };
+        let place = match test.bearer {
+            Bearer::Camera(_) => format!("camera {}", self.bearer),
+            Bearer::Plate(_) => self.bearer.clone(),
+        };
+        Notice::new(self.code(), place, what, remedy)
+    }
+}

@@ -1,0 +1,58 @@
+//! YAML of other programs.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+use crate::error::{Code, Error, Result};
+
+/// A matrix as OpenCV and ROS write it.
+#[derive(Deserialize)]
+pub(super) struct Numbers {
+    pub data: Vec<f64>,
+}
+
+/// Pinhole matrix, distortion and size: OpenCV and ROS have the same keys.
+#[derive(Deserialize)]
+pub(super) struct Calibration {
+    pub image_width: u32,
+    pub image_height: u32,
+    pub camera_name: Option<String>,
+    pub distortion_model: Option<String>,
+    /// The calibration sample of OpenCV says so of a Kannala-Brandt lens.
+    #[serde(default)]
+    pub fisheye_model: u8,
+    #[serde(alias = "cameraMatrix")]
+    pub camera_matrix: Numbers,
+    #[serde(alias = "distCoeffs", alias = "distortionCoefficients")]
+    pub distortion_coefficients: Numbers,
+}
+
+impl Calibration {
+    /// fx, fy, cx, cy.
+    pub fn pinhole(&self, path: &Path) -> Result<[f64; 4]> {
+        match self.camera_matrix.data[..] {
+            [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0] => Ok([fx, fy, cx, cy]),
+            _ => {
+                let what = "camera_matrix is not [fx, 0, cx, 0, fy, cy, 0, 0, 1]";
+                Err(Error::new(
+                    Code::SettingRange,
+                    path.display(),
+                    what,
+                    "a skew is not part of the models of this program",
+                ))
+            }
+        }
+    }
+}
+
+/// A value from YAML, with what only OpenCV writes taken out: directive, tags of matrices.
+pub(super) fn parse<T: DeserializeOwned>(path: &Path, text: &str, remedy: &str) -> Result<T> {
+    let plain: String = text
+        .lines()
+        .map(|l| if l.starts_with('%') || l == "---" { "" } else { l })
+        .map(|l| l.replace("!!opencv-matrix", "") + "\n")
+        .collect();
+    serde_saphyr::from_str(&plain).map_err(|e| Error::new(Code::SettingSyntax, path.display(), e, remedy))
+}
