@@ -108,6 +108,7 @@ fn world(seed: u64, images: usize) -> World {
         width_px: 1280,
         height_px: 720,
         focal_px: None,
+        known_camera: None,
         lens: Lens::Brown,
         lens_choice: LensChoice::Settled,
         centroid: false,
