@@ -9,11 +9,11 @@ use super::Verdict;
 use super::paragraph::paragraph;
 use super::say::say_line;
 use crate::assess::Limits;
+use crate::calibration::{Ends, Inputs};
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::picture_size;
 use crate::identify::readings_of;
 use crate::series::{self, Series, Source};
-use crate::urdf;
 
 /// Most lines of a notice.
 const MOST_LINES: usize = 6;
@@ -144,7 +144,7 @@ fn examine(series: &Series, args: &DoctorArgs, seen: &mut Examination) {
         stops(series, seen);
     }
     if let Some(urdf) = &args.urdf
-        && let Err(error) = robot(series, urdf, seen)
+        && let Err(error) = robot(series, urdf, &args.series, seen)
     {
         seen.missing(error);
     }
@@ -191,13 +191,11 @@ fn stops(series: &Series, seen: &mut Examination) {
 }
 
 /// Names, units and limits of the readings against the robot.
-fn robot(series: &Series, file: &Path, seen: &Examination) -> Result<()> {
-    let description = urdf::read(file)?;
-    let [base, tip] = series.manifest.ends();
-    let chain = description.chain(base, tip)?;
+fn robot(series: &Series, file: &Path, folder: &Path, seen: &Examination) -> Result<()> {
+    let Inputs { description, chain, tip_notice, .. } = Inputs::read(file, &[folder.to_path_buf()], Ends::default())?;
     let moving = chain.readings.join(", ");
     seen.good("urdf", &format!("{} ({} to {}; {moving})", description.name, chain.base, chain.tip));
-    description.tip_notice(base, tip).iter().chain(&description.notices).for_each(|n| seen.note(n));
+    tip_notice.iter().chain(&description.notices).for_each(|n| seen.note(n));
     if matches!(series.source, Source::Recording(_)) {
         return Ok(());
     }

@@ -255,9 +255,13 @@ impl Manifest {
 
     /// All cameras of a series hang on the same links.
     fn require_same_links(&self, path: &Path) -> Result<()> {
-        let Some(other) = self.cameras.iter().find(|c| c.link != self.camera().link) else { return Ok(()) };
+        let is_carried = self.plate_mount.is_some() || self.robot_2.is_some() || self.camera().link.is_some();
+        let differs = |c: &&CameraSection| {
+            c.link != self.camera().link || (is_carried && self.mount_of(c) != self.mount_of(self.camera()))
+        };
+        let Some(other) = self.cameras.iter().find(differs) else { return Ok(()) };
         let name = other.name.as_deref().unwrap_or("another");
-        let what = format!("camera \"{name}\" names another link than the first camera");
+        let what = format!("camera \"{name}\" hangs on another link than the first camera");
         let remedy = "give cameras on different links as series of their own, each with its own base and tip";
         Err(Error::new(Code::SettingConflict, path.display(), what, remedy))
     }

@@ -99,9 +99,23 @@ fn bad_sections_name_their_key() {
     );
     assert_says(&with("[[camera]]\nname = \"a\"\n[[camera]]"), Code::SettingMissing, &["2 of 2"]);
     assert_says(&with("[[camera]]\nname = \"a\"\nfocal = 1"), Code::SettingSyntax, &["series.toml:5", "`focal`"]);
-    assert_says(&with("[plate_mount]\nlink = \"table\""), Code::SettingUnsupported, &["plate_mount"]);
-    assert_says(&with("[robot_2]"), Code::SettingUnsupported, &["robot_2"]);
-    assert_says(&with("[camera]\nlink = \"wrist\""), Code::SettingUnsupported, &["link"]);
+}
+
+#[test]
+fn links_that_carry_camera_and_plate_contradict_nobody() {
+    let parse = |lines: &str| Manifest::parse(Path::new("series.toml"), &format!("{MANIFEST}{lines}\n"));
+    let table = "[plate_mount]\nlink = \"table\"\n";
+    let wrist = "[camera]\nlink = \"wrist\"\n";
+    assert_eq!(parse(table).unwrap().carriers(), [Some("table"), None]);
+    assert_eq!(parse(&format!("camera_mount = \"fixed\"\n{table}")).unwrap().carriers(), [None, Some("table")]);
+    assert_eq!(parse(&format!("tip = \"hand\"\n{wrist}{table}")).unwrap().ends(), [Some("table"), Some("wrist")]);
+    let refused = |lines: &str| parse(lines).unwrap_err();
+    assert_says(&refused(&format!("{table}[robot_2]")), Code::SettingConflict, &["plate_mount", "robot_2"]);
+    assert_says(&refused("camera_mount = \"fixed\"\n[robot_2]"), Code::SettingConflict, &["robot_2"]);
+    let two = "[[camera]]\nname = \"a\"\nlink = \"wrist\"\n[[camera]]\nname = \"b\"\n";
+    assert_says(&refused(two), Code::SettingConflict, &["\"b\""]);
+    let mixed = "[[camera]]\nname = \"a\"\nmount = \"hand\"\n[[camera]]\nname = \"b\"\nmount = \"fixed\"\n";
+    assert_says(&refused(&format!("{mixed}{table}")), Code::SettingConflict, &["\"b\""]);
 }
 
 #[test]
