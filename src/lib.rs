@@ -34,6 +34,7 @@ pub mod diagnose;
 pub mod error;
 pub mod files;
 pub mod fit;
+pub mod frames;
 pub mod geom;
 pub mod guide;
 pub mod identify;

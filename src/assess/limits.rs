@@ -147,6 +147,33 @@ limits! {
     /// image decide.
     scatter_taken: f64 = 0.8;
 
+    /// Fewest touches that give a tool: three leave nothing to judge them by.
+    fewest_touches: usize = 4;
+    /// Fewest places, apart from each other, that give a work object: its six unknowns.
+    fewest_places: usize = 3;
+    /// Touches for each one that may be left out: of fewer nobody can say which one is wrong.
+    touches_for_one_left_out: usize = 5;
+    /// Extent of touched places, m RMS about their middle, beyond which they are not in metres.
+    touches_apart_m: f64 = 20.0;
+    /// Sigma of a touch, m, from which it is not in metres.
+    touch_sigma_m: f64 = 0.01;
+    /// Extent of places across their line over that along it, below which they lie on a line: with touches of 0.1 mm the angle about it
+    /// is worse than that of any gauge.
+    touches_on_a_line: f64 = 0.01;
+    /// RMS turn of the tip about the axis that it was turned least about, rad, below which touches do not tell the tool: a sigma of
+    /// fifty touches' sigmas.
+    touches_turned_rad: f64 = 0.02;
+    /// Sigma of a direction of tool or work object, mm, from which it counts as not told.
+    frame_sigma_mm: f64 = 1.0;
+    /// Factor on the stated sigma of touches from which they contradict it.
+    touch_factor: f64 = 3.0;
+    /// Distance (m) and angle (rad) between the work object of a program and the measured one beyond which they are not the same.
+    same_work_m: f64 = 0.1;
+    /// The angle.
+    same_work_rad: f64 = 0.1;
+    /// Distance between the tool of a program and the measured one beyond which they are not the same, m.
+    same_tool_m: f64 = 0.05;
+
     /// Fewest observations of an image that takes part: four give its pose, two more a margin.
     image_observations: usize = 6;
     /// Largest angle between two views of a camera below which all its images are alike, rad (5 degrees).

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3x6, Vector3, Vector6};
 
-use crate::geom::{Pose, skew};
+use crate::geom::{Pose, rigid_fit, skew};
 use crate::linalg::{SymmetricFactor, product};
 use crate::model::joint_terms::LOCAL_RANGE;
 use crate::model::robot::{Posture, Robot};
@@ -47,7 +47,8 @@ pub fn fit_points(robot: &Robot, points: &[MeasuredPoint]) -> Option<PointFit> {
 
 fn from_start(tips: &[Pose], points: &[MeasuredPoint], start: Vector3<f64>) -> Option<PointFit> {
     let mut tip_point = start;
-    let mut frame = rigid_fit(tips, points, &tip_point)?;
+    let pairs = tips.iter().zip(points).map(|(tip, p)| (tip.transform(&start), p.position_m));
+    let mut frame = rigid_fit(&pairs.collect::<Vec<_>>())?;
     for _ in 0..100 {
         let mut n = DMatrix::<f64>::zeros(9, 9);
         let mut b = DVector::<f64>::zeros(9);
@@ -72,17 +73,6 @@ fn from_start(tips: &[Pose], points: &[MeasuredPoint], start: Vector3<f64>) -> O
         tips.iter().zip(points).map(|(tip, p)| p.position_m - frame.transform(&tip.transform(&tip_point))).collect();
     let rms_m = (residuals_m.iter().map(Vector3::norm_squared).sum::<f64>() / points.len() as f64).sqrt();
     rms_m.is_finite().then_some(PointFit { device_from_base: frame, tip_point_m: tip_point, residuals_m, rms_m })
-}
-
-/// Rotation and translation that bring the reflector positions onto the measured points (Kabsch).
-fn rigid_fit(tips: &[Pose], points: &[MeasuredPoint], tip_point: &Vector3<f64>) -> Option<Pose> {
-    let n = points.len() as f64;
-    let ys: Vec<Vector3<f64>> = tips.iter().map(|t| t.transform(tip_point)).collect();
-    let mean_y = ys.iter().sum::<Vector3<f64>>() / n;
-    let mean_p = points.iter().map(|p| p.position_m).sum::<Vector3<f64>>() / n;
-    let m = ys.iter().zip(points).map(|(y, p)| (p.position_m - mean_p) * (y - mean_y).transpose()).sum();
-    let rotation = crate::geom::project_to_so3(&m)?;
-    Some(Pose::new(rotation, mean_p - rotation * mean_y))
 }
 
 /// What a fit of points should leave, by the covariance of the model.

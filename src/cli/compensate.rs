@@ -8,18 +8,16 @@ use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
 use super::Verdict;
+use super::compensate_frames::{Choice, Side, Sides};
 use super::robot::noted_chain;
 use super::say::{say, say_line};
-use super::show::read_solution;
 use crate::error::{Code, Error, Result};
 use crate::files;
 use crate::geom::Pose;
 use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
 use crate::output::corrections::{self, TABLE, Weight};
-use crate::output::restore::found_model;
-use crate::output::{Place, compensated, solution_json};
-use crate::programs::compensate::Compensated;
+use crate::output::{Place, compensated};
 use crate::programs::program::Posture;
 use crate::programs::{
     self, Correction, Kind, Language, Left, Models, Outcome, Postures, Program, Setting, Target, TextFile,
@@ -47,6 +45,15 @@ pub(super) struct CompensateArgs {
     /// compensation.toml of the robot on which the program was taught
     #[arg(long, value_name = "FILE", requires = "from", help_heading = "Retargeting")]
     from_compensation: Option<PathBuf>,
+    /// frames.json of this robot (`robotcal frames`): where its tool and work object really are; or `nominal`, to take them as the program has them
+    #[arg(long, visible_alias = "to-frames", value_name = "FILE|nominal")]
+    frames: Option<PathBuf>,
+    /// frames.json of the robot on which the program was taught, with the same work object
+    #[arg(long, value_name = "FILE", requires = "from", help_heading = "Retargeting")]
+    from_frames: Option<PathBuf>,
+    /// solution.json of the robot on which the program was taught [default: the one beside its description]
+    #[arg(long, value_name = "FILE", requires = "from", help_heading = "Retargeting")]
+    from_solution: Option<PathBuf>,
     /// solution.json from which the description came: says how far the tool is expected from where the program meant it [default: the one beside it]
     #[arg(long, value_name = "FILE")]
     solution: Option<PathBuf>,
@@ -158,14 +165,35 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
             }
         }
     }
-    let models = Models { controller: &controller, from: from.as_ref().unwrap_or(&controller), to: &to };
+    let sides = Sides {
+        to: Side { robot: &to, urdf: &args.urdf, solution: args.solution.as_deref() },
+        from: from.as_ref().zip(args.from.as_ref()).map(|(robot, urdf)| Side {
+            robot,
+            urdf,
+            solution: args.from_solution.as_deref(),
+        }),
+    };
+    let choice = Choice::read(args.frames.as_deref(), args.from_frames.as_deref(), &sides)?;
+    let frames = choice.measured((setting.tool, setting.work));
+    let models = Models {
+        controller: &controller,
+        from: from.as_ref().unwrap_or(&controller),
+        to: &to,
+        frames: frames.as_ref(),
+    };
     let done = programs::compensate(&program, models, &postures(args, &controller.chain, &axes)?);
     let left = done.left(&program);
-    let expected = expected(args, &to, &program, &done)?;
+    let expected = choice.expected(&sides, &program, &done)?;
     let mut findings = corrections::nominal_findings(&program, &done);
     findings.extend(corrections::displaced_finding(&program, &done));
     let subject = args.urdf.display().to_string();
-    findings.push(corrections::expected_finding(expected.as_deref().map_err(|why| why.as_str()), &subject));
+    let meant = choice.meant();
+    findings.extend(corrections::expected_findings(
+        expected.as_deref().map_err(|why| why.as_str()),
+        &done,
+        &meant,
+        &subject,
+    ));
     findings.extend(corrections::left_finding(&left, &subject));
     let report = corrections::table(&program, &done, expected.as_deref().ok(), &controller.chain);
     let said = corrections::findings_json(&findings)?;
@@ -182,62 +210,19 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     for f in findings.iter().filter(|f| f.code != Code::TargetsLeft) {
         say_line!("{}{} [{}]", if f.weight == Weight::Gate { "GATE      " } else { "note      " }, f.text, f.code);
     }
-    say_line!("results   {} ({} files)", args.out.display(), written.len());
     let good = left.is_empty() && findings.iter().all(|f| f.weight == Weight::Note);
+    let gates: Vec<&str> = findings.iter().filter(|f| f.weight == Weight::Gate).map(|f| f.code.name()).collect();
+    match good {
+        true => say_line!("verdict   corrected{}", meant.in_words()),
+        false => say_line!("verdict   NOT CORRECTED AS A WHOLE: {}", gates.join(", ")),
+    }
+    say_line!("results   {} ({} files)", args.out.display(), written.len());
     Ok(if good { Verdict::Good } else { Verdict::GateFailed })
 }
 
 /// The link of the chain on which `--base` is fixed, where it does not lie in the chain itself.
 fn stands_on<'d>(args: &CompensateArgs, description: &'d RobotDescription) -> Option<(&'d str, Pose)> {
     description.fixed_base(args.base.as_deref()?, args.tip.as_deref()?)
-}
-
-/// Distance (m and rad) within which the origins of two descriptions are those of one robot.
-const SAME_ORIGIN: f64 = 1e-6;
-
-/// Expected error of every target by the solution from which the description came, m; else why it is not known.
-fn expected(
-    args: &CompensateArgs,
-    to: &Robot,
-    program: &Program,
-    done: &Compensated,
-) -> Result<std::result::Result<Vec<Option<f64>>, String>> {
-    if args.from.is_some() {
-        return Ok(Err("base and tool of both robots count".into()));
-    }
-    let beside = args.urdf.with_file_name(solution_json::FILE_NAME);
-    let path = args.solution.as_ref().unwrap_or(&beside);
-    if args.solution.is_none() && !path.is_file() {
-        return Ok(Err("no solution.json beside the description, and no --solution".into()));
-    }
-    let record = match read_solution(path) {
-        Ok(record) => record,
-        Err(error) if args.solution.is_some() => return Err(error),
-        Err(_) => return Ok(Err(format!("{} cannot be read", path.display()))),
-    };
-    let origin =
-        |name: &str| record.robot.joints.iter().find(|j| j.name == name).map(|j| Pose::from(&j.corrected_origin));
-    let same = to.chain.readings == record.robot.readings
-        && to.chain.tip == record.robot.tip
-        && to.chain.joints.iter().filter(|j| j.drive.is_some()).all(|j| {
-            origin(&j.name).is_some_and(|o| {
-                let (rad, m) = o.distance(&j.origin);
-                rad < SAME_ORIGIN && m < SAME_ORIGIN
-            })
-        });
-    if !same {
-        let what = format!("is not the solution from which {} came", args.urdf.display());
-        return match args.solution {
-            Some(_) => Err(Error::new(
-                Code::SolutionDiffers,
-                path.display(),
-                what,
-                "give the solution.json that was written beside it",
-            )),
-            None => Ok(Err(format!("{} {what}", path.display()))),
-        };
-    }
-    Ok(Ok(corrections::expected_errors(program, done, &found_model(&record)?)))
 }
 
 /// Languages as values of a flag.
@@ -372,7 +357,7 @@ fn text(program: &Program, outcomes: &[Outcome], left: &[Left], chain: &Chain) -
         1e3 * (done.iter().map(|(_, c)| of(c).powi(2)).sum::<f64>() / done.len().max(1) as f64).sqrt()
     };
     let worst = |of: fn(&Correction) -> f64| done.iter().map(|(_, c)| of(c)).fold(0.0, f64::max);
-    let mut out = format!("targets   {} corrected, {} unchanged\n", done.len(), left.len());
+    let mut out = format!("targets   {} rewritten, {} unchanged\n", done.len(), left.len());
     if !done.is_empty() {
         let _ = writeln!(
             out,
@@ -384,7 +369,7 @@ fn text(program: &Program, outcomes: &[Outcome], left: &[Left], chain: &Chain) -
         );
         let _ = writeln!(
             out,
-            "residual  at most {:.1e} m and {:.1e} rad, with the numbers as written",
+            "rounding  the numbers as written give these joints to {:.1e} m and {:.1e} rad; how accurate the robot is with them is said below",
             worst(|c| c.residual_m),
             worst(|c| c.residual_rad)
         );

@@ -35,6 +35,8 @@ examples! {
     /// Of `compensate`.
     COMPENSATE = [
         "robotcal compensate weld.src weld.dat --nominal robot.urdf --urdf reports/run1/robot.calibrated.urdf --compensation reports/run1/compensation.toml",
+        "robotcal compensate weld.src --nominal robot.urdf --urdf reports/run1/robot.calibrated.urdf --compensation reports/run1/compensation.toml --frames frames/frames.json",
+        "robotcal compensate taught.csv --from a.calibrated.urdf --to b.calibrated.urdf --from-frames a/frames.json --frames b/frames.json --joint-unit deg",
         "robotcal compensate targets.csv --nominal robot.urdf --urdf robot.calibrated.urdf --joint-unit deg --out corrected",
     ];
     /// Of `convert`.
@@ -51,6 +53,12 @@ examples! {
     ];
     /// Of `doctor`.
     DOCTOR = ["robotcal doctor run1 --urdf robot.urdf", "robotcal doctor run1.mcap"];
+    /// Of `frames`.
+    FRAMES = [
+        "robotcal frames --from reports/run1/solution.json --touches touches",
+        "robotcal frames --from reports/run1/solution.json --touches tcp --touches fixture --out frames",
+        "robotcal frames --from reports/run1/solution.json --plate",
+    ];
     /// Of `identify`.
     IDENTIFY = [
         "robotcal identify --urdf robot.urdf --series run1",
@@ -60,6 +68,7 @@ examples! {
     ];
     /// Of `plan`.
     PLAN = [
+        "robotcal plan --from reports/run1/solution.json --touch fixture.csv --touch-work 0.5,0.1,0.1 --count 12 --out touches",
         "robotcal plan --urdf robot.urdf --plate plate/plate.toml --count 30 --out run1",
         "robotcal plan --urdf robot.urdf --from reports/run1/solution.json --count 10 --out run2",
     ];

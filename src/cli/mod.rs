@@ -9,11 +9,13 @@ mod camera_args;
 mod choices;
 mod compare;
 mod compensate;
+mod compensate_frames;
 mod convert;
 mod convert_camera;
 mod detect;
 mod doctor;
 mod examples;
+mod frames;
 mod identify;
 mod image_study;
 mod joint_table;
@@ -21,6 +23,8 @@ mod long_table;
 mod memory;
 mod paragraph;
 mod plan;
+mod plan_targets;
+mod plan_touches;
 mod plate;
 mod plate_board;
 mod poses;
@@ -88,6 +92,9 @@ enum Command {
     /// Say what is missing in a series folder, before the long work
     #[command(after_help = examples::DOCTOR)]
     Doctor(doctor::DoctorArgs),
+    /// Tool (TCP) and base or work object of an identified robot, from touches or tracker points
+    #[command(after_help = examples::FRAMES)]
+    Frames(Box<frames::FramesArgs>),
     /// Identify robot, camera, hand-eye transform and plate from one or more series
     #[command(after_help = examples::IDENTIFY)]
     Identify(identify::IdentifyArgs),
@@ -119,6 +126,7 @@ impl Command {
             Self::Convert(args) => convert::run(args),
             Self::Detect(args) => detect::run(args),
             Self::Doctor(args) => doctor::run(args),
+            Self::Frames(args) => frames::run(args),
             Self::Identify(args) => identify::run(args),
             Self::Plan(args) => plan::run(args),
             Self::Plate(args) => plate::run(args),

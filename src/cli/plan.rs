@@ -4,11 +4,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use clap::builder::ArgPredicate;
 use nalgebra::Vector3;
 
 use super::Verdict;
 use super::arguments::pair;
 use super::choices::Model;
+use super::plan_targets::targets;
+use super::plan_touches::{self, TouchArgs};
 use super::robot::{noted_chain, read_chain};
 use super::say::say;
 use super::show::read_solution;
@@ -29,7 +32,7 @@ use crate::plan::{
     Budget, Demand, Forecast, PlaceForecast, Plan, PlanRequest, check_demand, choose, compare_places, forecast,
     image_name, place_words, plan,
 };
-use crate::series::{CameraMount, Stops, read_plate};
+use crate::series::{CameraMount, read_plate};
 use crate::simulate::typical_camera;
 use crate::study::{PlanStudyRequest, plan_study};
 use crate::urdf::{self, Chain, JointKind};
@@ -38,16 +41,21 @@ use crate::urdf::{self, Chain, JointKind};
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
     /// Robot description (URDF)
-    #[arg(long, value_name = "FILE")]
-    urdf: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "touch")]
+    urdf: Option<PathBuf>,
     /// New folder for joints.csv, programs and plan.html, or one of an earlier plan
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// Plate (plate.toml)
     #[arg(long, value_name = "FILE", required_unless_present_any = ["from", "study"])]
     plate: Option<PathBuf>,
-    /// Number of images
-    #[arg(long, default_value_t = 50)]
+    /// Number of images, or of touches [default: 50 images, 12 touches]
+    #[arg(
+        long,
+        default_value_t = 50,
+        default_value_if("touch", ArgPredicate::IsPresent, "12"),
+        hide_default_value = true
+    )]
     count: usize,
     /// Plan further images for this result: camera, poses and noise are taken from it
     #[arg(long, value_name = "solution.json", conflicts_with_all = [
@@ -151,6 +159,15 @@ pub(super) struct PlanArgs {
     /// Study instead of a plan: 30 planned against 60 random poses in as many simulated worlds; writes study.md
     #[arg(long, value_name = "WORLDS", help_heading = "Search")]
     study: Option<u64>,
+    #[command(flatten)]
+    touches: TouchArgs,
+}
+
+impl PlanArgs {
+    /// The URDF, which is required unless touches are planned.
+    fn urdf(&self) -> &Path {
+        self.urdf.as_deref().unwrap_or(Path::new(""))
+    }
 }
 
 /// Numbers between commas.
@@ -177,12 +194,15 @@ fn pose(flag: &str, text: &str) -> Result<Pose> {
 }
 
 pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
+    if let (Some(points), Some(from)) = (&args.touches.touch, &args.from) {
+        return plan_touches::run(&args.touches, points, from, args.targets.as_deref(), args.count, &args.out);
+    }
     check(args)?;
     if let Some(worlds) = args.study {
         return study(args, worlds);
     }
     let place = Place::claim(&args.out)?;
-    let description = urdf::read(&args.urdf)?;
+    let description = urdf::read(args.urdf())?;
     let chain = noted_chain(&description, args.base.as_deref(), args.tip.as_deref())?;
     let (capsules, meshes) = description.carried_capsules(&chain);
     let described = scene::described(&capsules, &chain);
@@ -266,7 +286,7 @@ const STUDIED: [usize; 2] = [30, 60];
 
 fn study(args: &PlanArgs, seeds: u64) -> Result<Verdict> {
     let place = Place::among(&args.out)?;
-    let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
+    let chain = read_chain(args.urdf(), args.base.as_deref(), args.tip.as_deref())?;
     let robot = chain.robot.clone();
     let [planned, random] = STUDIED;
     let request = PlanStudyRequest {
@@ -281,7 +301,7 @@ fn study(args: &PlanArgs, seeds: u64) -> Result<Verdict> {
     };
     let study = plan_study(&request, |seed| tracing::info!("world {seed} done"))?;
     let text = crate::study::study_table(&robot, &request, &study);
-    place.write_beside(&[("study.md".to_owned(), text.as_bytes())], std::slice::from_ref(&args.urdf))?;
+    place.write_beside(&[("study.md".to_owned(), text.as_bytes())], &[args.urdf().to_path_buf()])?;
     say!("{text}");
     Ok(Verdict::Good)
 }
@@ -375,46 +395,6 @@ fn demand(args: &PlanArgs, chain: &Chain) -> Result<Demand> {
         (_, false) => Demand::Named(args.parameters.clone()),
         _ => Demand::Workspace,
     })
-}
-
-/// Fewest targets whose error says something: the nine numbers of the frames take up less than a third of theirs.
-const LEAST_TARGETS: usize = 10;
-
-/// Joint vectors of a file, in degrees (m for prismatic joints), as rad and m in the order of the chain.
-fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
-    let stops = Stops::read(path, &mut Vec::new())?;
-    let column = |name: &String| {
-        let at = stops.joints.iter().position(|j| j == name);
-        at.ok_or_else(|| {
-            Error::new(
-                Code::JointMissing,
-                path.display(),
-                format!("has no column \"{name}\""),
-                "name every joint of the chain",
-            )
-        })
-    };
-    let columns: Vec<usize> = chain.readings.iter().map(column).collect::<Result<_>>()?;
-    let in_si = |raw: &Vec<f64>| {
-        let one = |(c, kind): (&usize, &JointKind)| {
-            if *kind == JointKind::Revolute { raw[*c].to_radians() } else { raw[*c] }
-        };
-        columns.iter().zip(&chain.reading_kinds).map(one).collect()
-    };
-    let targets: Vec<Vec<f64>> = stops.stops.iter().filter_map(|s| s.raw_readings.as_ref()).map(in_si).collect();
-    if targets.len() < LEAST_TARGETS {
-        let what = format!(
-            "{} targets are too few: base frame and a point of the flange are brought together there, which three fit exactly",
-            targets.len()
-        );
-        return Err(Error::new(
-            Code::TargetsTooFew,
-            path.display(),
-            what,
-            format!("give at least {LEAST_TARGETS}, spread over where the robot works"),
-        ));
-    }
-    Ok(targets)
 }
 
 fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)> {

@@ -300,6 +300,20 @@ codes! {
         ZeroOff "zero_off" "the zero of a joint is far from that of the URDF, or it counts the other way",
         FlangeUndetermined "flange_undetermined" "the data do not determine the flange",
     }
+    Input "Touches" {
+        TouchUnit "touch_unit" "touched places or their sigma are not in metres",
+        TouchesFew "touches_few" "too few touches for tool or work object",
+        TouchesOnLine "touches_on_line" "the touched places lie on a line",
+        TouchesNotTurned "touches_not_turned" "the tip was not turned between touches",
+    }
+    Unsolved "Tool and work object" {
+        FramesUndetermined "frames_undetermined" "touches do not determine tool and work object together",
+        FrameWeak "frame_weak" "a direction of tool or work object is hardly told",
+        TouchesLeftOut "touches_left_out" "touches disagree with the others, and are left out",
+        TouchesScatter "touches_scatter" "touches scatter more than their stated sigma says",
+        FramesUnknown "frames_unknown" "base and tool of the real robot are known worse than the correction is large",
+        FramesNominal "frames_nominal" "base and tool were taken as nominal, as asked for",
+    }
     Unsolved "Planning and simulation" {
         PlanTooFewPoses "plan_too_few_poses" "too few workable poses were found",
         PlanUndetermined "plan_undetermined" "planned images do not determine what they shall",

@@ -1,5 +1,5 @@
 //! The manual. For those who calibrate: how to take a series, recordings, dark and white frames, warm-up, how accurate can I get, how to read the result,
-//! controllers, programs, questions, codes, glossary. For those who want to know how it works: formulation, conventions, circles and boards, costs, planning,
+//! controllers, programs, tool and work object, questions, codes, glossary. For those who want to know how it works: formulation, conventions, circles and boards, costs, planning,
 //! a tour of the code, decisions.
 
 #[doc = include_str!("formulation.md")]
@@ -70,6 +70,9 @@ pub mod planning {}
 
 #[doc = include_str!("programs.md")]
 pub mod programs {}
+
+#[doc = include_str!("frames.md")]
+pub mod frames {}
 
 #[doc = include_str!("decisions.md")]
 pub mod decisions {

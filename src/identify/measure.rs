@@ -35,15 +35,12 @@ struct Seen {
 /// # Errors
 /// Of the readings (unit, missing joints), of a series none of whose images can be used, and of differently sized images.
 pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(&Path) + Sync) -> Result<Measured> {
+    if series.source == Source::NoImages {
+        return measure_bodies(series, chain, several);
+    }
     let readings = readings_of(series, chain)?;
     let bodies = seen_bodies(series, several);
     let lengths = seen_lengths(series, several, &bodies)?;
-    if series.source == Source::NoImages {
-        return Ok(Measured {
-            series: MeasuredSeries { bodies, lengths, ..without_images(series, readings) },
-            notices: notices_of(series, chain),
-        });
-    }
     let mut notices = notices_of(series, chain);
     let camera = series.manifest.camera();
     let lens = lens_of(series)?;
@@ -92,6 +89,20 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     let centroid = found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid;
     let measured = measured_series(series, lens, (width_px, height_px), centroid, stops);
     Ok(Measured { series: MeasuredSeries { plate, bodies, lengths, ..measured }, notices })
+}
+
+/// What was measured in space alone: touches, and what a tracker saw. Images are not looked at.
+///
+/// # Errors
+/// Of the readings (unit, missing joints); distances between what was not measured.
+pub fn measure_bodies(series: &Series, chain: &Chain, several: bool) -> Result<Measured> {
+    let readings = readings_of(series, chain)?;
+    let bodies = seen_bodies(series, several);
+    let lengths = seen_lengths(series, several, &bodies)?;
+    Ok(Measured {
+        series: MeasuredSeries { bodies, lengths, ..without_images(series, readings) },
+        notices: notices_of(series, chain),
+    })
 }
 
 /// What reading a series gives reason to say.

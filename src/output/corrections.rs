@@ -3,12 +3,15 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::restore::FoundModel;
 use crate::assess::sigma_in_base;
 use crate::error::{Code, Result};
+use crate::frames::knowledge::scatter_m;
+use crate::frames::{Knowledge, KnownRobot};
 use crate::geom::Pose;
+use crate::model::robot::Posture;
 use crate::programs::compensate::{Compensated, RESIDUAL};
 use crate::programs::{Kind, Left, Outcome, Program};
 use crate::urdf::Chain;
@@ -23,7 +26,7 @@ const SAME_MODEL: f64 = 5e-5;
 const SAME_FRAMES: f64 = 0.02;
 
 /// Whether a finding asks for something.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Weight {
     /// To know.
@@ -33,7 +36,7 @@ pub enum Weight {
 }
 
 /// What was found about a program or the models it was corrected with.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// Code that stays the same in every version.
     pub code: Code,
@@ -42,9 +45,14 @@ pub struct Finding {
     /// File that it is about.
     pub subject: String,
     /// Numbers by name, the unit at the end of the name.
-    pub quantities: BTreeMap<&'static str, f64>,
+    pub quantities: BTreeMap<String, f64>,
     /// In words.
     pub text: String,
+}
+
+/// Numbers by name.
+pub fn numbers<const N: usize>(all: [(&str, f64); N]) -> BTreeMap<String, f64> {
+    all.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
 }
 
 fn rms(values: &[f64]) -> f64 {
@@ -64,7 +72,7 @@ pub fn nominal_findings(program: &Program, done: &Compensated) -> Vec<Finding> {
         let (same, other): (Vec<f64>, Vec<f64>) = apart.iter().partition(|m| **m < SAME_FRAMES);
         let mut add = |code, weight, values: &[f64], words: &str| {
             let (rms_mm, max_mm) = (1e3 * rms(values), 1e3 * largest(values));
-            let quantities = BTreeMap::from([("pairs", values.len() as f64), ("rms_mm", rms_mm), ("max_mm", max_mm)]);
+            let quantities = numbers([("pairs", values.len() as f64), ("rms_mm", rms_mm), ("max_mm", max_mm)]);
             let text = format!(
                 "{} taught poses lie {rms_mm:.3} mm RMS ({max_mm:.3} mm at most) from where the nominal model puts the joints beside them: {words}",
                 values.len()
@@ -100,15 +108,15 @@ pub fn displaced_finding(program: &Program, done: &Compensated) -> Option<Findin
         code: Code::DisplacedOrientation,
         weight: Weight::Note,
         subject: program.files.first().map_or_else(String::new, |f| f.name.clone()),
-        quantities: BTreeMap::from([("targets", mrad.len() as f64), ("max_mrad", max_mrad)]),
+        quantities: numbers([("targets", mrad.len() as f64), ("max_mrad", max_mrad)]),
         text: format!("{} displaced targets are exact in place and turned as the points that they start from: {max_mrad:.4} mrad at most are left (RelTool can turn, Offs cannot)", mrad.len()),
     })
 }
 
 /// Targets that stay as they are: how many, and how many for each reason.
 pub fn left_finding(left: &[Left], subject: &str) -> Option<Finding> {
-    let mut quantities = BTreeMap::from([("targets", left.len() as f64)]);
-    left.iter().for_each(|l| *quantities.entry(l.why.reason.name()).or_default() += 1.0);
+    let mut quantities = numbers([("targets", left.len() as f64)]);
+    left.iter().for_each(|l| *quantities.entry(l.why.reason.name().to_owned()).or_default() += 1.0);
     let text = format!("{} targets stay as they are, each with its reason in {TABLE}", left.len());
     let (code, weight, subject) = (Code::TargetsLeft, Weight::Gate, subject.to_owned());
     (!left.is_empty()).then_some(Finding { code, weight, subject, quantities, text })
@@ -127,28 +135,125 @@ pub fn expected_errors(program: &Program, done: &Compensated, model: &FoundModel
     program.targets.iter().zip(&done.outcomes).map(expected).collect()
 }
 
-/// What the numbers promise, until base and tool frame are measured; `Err` says why it is not known.
-pub fn expected_finding(expected: std::result::Result<&[Option<f64>], &str>, subject: &str) -> Finding {
-    let remedy = "measure tool and base on the robot";
+/// Expected error of every corrected target by measured frames, m: that of the tool in the work object, joint noise of one arrival included.
+pub fn expected_with_frames(program: &Program, done: &Compensated, sides: &[FramedRobot]) -> Vec<Option<f64>> {
+    let expected = |(target, outcome): (&crate::programs::Target, &Outcome)| {
+        let Outcome::Done(c) = outcome else { return None };
+        let own = match &target.kind {
+            Kind::Pose(pose) => pose.flange_from_tool,
+            Kind::Joints(_) => Pose::identity(),
+        };
+        let square = |side: &FramedRobot| {
+            let tool = side.tool.unwrap_or(own);
+            let posture = Posture::at(if side.is_taught { &c.programmed } else { &c.corrected });
+            let sigma_m = side.knowledge.sigma_m(&side.robot, &posture, &tool, &side.work);
+            let scatter = if side.is_taught { 0.0 } else { scatter_m(&side.robot, &posture, &tool) };
+            sigma_m.powi(2) + scatter.powi(2)
+        };
+        Some(sides.iter().map(square).sum::<f64>().sqrt())
+    };
+    program.targets.iter().zip(&done.outcomes).map(expected).collect()
+}
+
+/// A robot with its measured frames.
+#[derive(Debug, Clone)]
+pub struct FramedRobot {
+    /// The robot.
+    pub robot: KnownRobot,
+    /// What is known of tool and work object.
+    pub knowledge: Knowledge,
+    /// `tip_from_tool`, where it was measured.
+    pub tool: Option<Pose>,
+    /// `base_from_work`.
+    pub work: Pose,
+    /// True for the robot on which the program was taught.
+    pub is_taught: bool,
+}
+
+/// Which tool and base a program was corrected with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Meant {
+    /// Nothing was said: they stand where the description has them, which nobody measured.
+    Untold,
+    /// They are taken as nominal, as the user asks.
+    Nominal,
+    /// They were measured: what of them, in words.
+    Measured(String),
+}
+
+impl Meant {
+    /// Behind "corrected".
+    pub fn in_words(&self) -> String {
+        match self {
+            Self::Untold => String::new(),
+            Self::Nominal => " for a robot whose base and tool are exactly where the program has them".into(),
+            Self::Measured(what) => format!(", with {what}"),
+        }
+    }
+}
+
+/// What the numbers promise, by what is known of base and tool; `Err` says why it is not known. Where nobody said what to take them for, and they
+/// are known worse than the correction is large, the program is not corrected.
+pub fn expected_findings(
+    expected: std::result::Result<&[Option<f64>], &str>,
+    done: &Compensated,
+    meant: &Meant,
+    subject: &str,
+) -> Vec<Finding> {
+    let remedy =
+        "measure them with a few touches (robotcal frames) and give --frames frames.json, or say --frames nominal";
     let finding =
-        |code, quantities, text| Finding { code, weight: Weight::Note, subject: subject.to_owned(), quantities, text };
-    match expected {
-        Ok(all) => {
-            let mm: Vec<f64> = all.iter().flatten().map(|m| 1e3 * m).collect();
+        |code, weight, quantities, text| Finding { code, weight, subject: subject.to_owned(), quantities, text };
+    let shifts: Vec<f64> = (done.outcomes.iter())
+        .filter_map(|o| if let Outcome::Done(c) = o { Some(1e3 * c.shift_m) } else { None })
+        .collect();
+    if shifts.is_empty() {
+        return Vec::new();
+    }
+    let correction_mm = rms(&shifts);
+    let mut all = Vec::new();
+    let unknown = match expected {
+        Ok(each) => {
+            let mm: Vec<f64> = each.iter().flatten().map(|m| 1e3 * m).collect();
             let (rms_mm, max_mm) = (rms(&mm), largest(&mm));
-            let quantities = BTreeMap::from([("targets", mm.len() as f64), ("rms_mm", rms_mm), ("max_mm", max_mm)]);
-            let text = format!(
-                "in the base frame the tool is expected {rms_mm:.2} mm RMS ({max_mm:.2} mm at most) from where the program meant it: images do not tell where base and tool stand; {remedy}"
-            );
-            finding(Code::ExpectedError, quantities, text)
+            let quantities = numbers([("targets", mm.len() as f64), ("rms_mm", rms_mm), ("max_mm", max_mm)]);
+            let text = match meant {
+                Meant::Measured(what) => format!(
+                    "the tool is expected {rms_mm:.3} mm RMS ({max_mm:.3} mm at most) from where the program meant it, joint noise included, with {what}"
+                ),
+                _ => format!(
+                    "in the base frame the tool is expected {rms_mm:.2} mm RMS ({max_mm:.2} mm at most) from where the program meant it: images do not tell where base and tool stand"
+                ),
+            };
+            all.push(finding(Code::ExpectedError, Weight::Note, quantities, text));
+            Some(rms_mm)
         }
         Err(why) => {
             let text = format!(
-                "how far in the base frame the tool will be from where the program meant it is not known ({why}); base and tool stand where the description says, usually wrong by millimetres; {remedy}"
+                "how far the tool will be from where the program meant it is not known ({why}); base and tool are usually wrong by millimetres"
             );
-            finding(Code::ExpectedErrorUnknown, BTreeMap::new(), text)
+            all.push(finding(Code::ExpectedErrorUnknown, Weight::Note, BTreeMap::new(), text));
+            None
         }
+    };
+    match meant {
+        Meant::Untold if unknown.is_none_or(|mm| mm > correction_mm) => {
+            let size = unknown
+                .map_or_else(|| "by an unknown amount".to_owned(), |mm| format!("by {mm:.2} mm RMS at the targets"));
+            let text = format!(
+                "base and tool of the real robot are unknown {size}, and the correction itself is {correction_mm:.2} mm RMS: the program repeats the shape of what was meant, and is not corrected; {remedy}"
+            );
+            let known = unknown.map(|mm| ("unknown_mm", mm)).into_iter();
+            let quantities = known.chain([("correction_mm", correction_mm)]).map(|(n, v)| (n.to_owned(), v)).collect();
+            all.push(finding(Code::FramesUnknown, Weight::Gate, quantities, text));
+        }
+        Meant::Nominal => {
+            let text = "base and tool are taken as nominal, as asked for: right where the real ones are".to_owned();
+            all.push(finding(Code::FramesNominal, Weight::Note, BTreeMap::new(), text));
+        }
+        _ => {}
     }
+    all
 }
 
 /// All findings as JSON, one a line.
@@ -167,7 +272,7 @@ pub fn findings_json(findings: &[Finding]) -> Result<String> {
 /// One row for every target: what the correction is, or why there is none.
 pub fn table(program: &Program, done: &Compensated, expected: Option<&[Option<f64>]>, chain: &Chain) -> String {
     let mut out = String::from(
-        "file,line,target,correction_mm,correction_mrad,largest_joint_change,joint,residual_m,residual_rad,left_because,posture,expected_mm,taught_mm,reason\n",
+        "file,line,target,correction_mm,correction_mrad,largest_joint_change,joint,rounding_m,rounding_rad,left_because,posture,expected_mm,taught_mm,reason\n",
     );
     let cell = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
     let millimetres = |m: Option<f64>| m.map_or_else(String::new, |m| format!("{:.4}", 1e3 * m));

@@ -6,8 +6,9 @@ use nalgebra::{DMatrix, Vector3, Vector6};
 
 use super::bodies_record::first_instrument;
 use super::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
-use crate::assess::{FlangeModel, Limits};
+use crate::assess::{FlangeModel, Limits, usual_joint_sigma};
 use crate::error::{Code, Error, Result};
+use crate::frames::KnownRobot;
 use crate::geom::Pose;
 use crate::identify::Options;
 use crate::model::camera::Camera;
@@ -177,6 +178,8 @@ pub struct FoundModel {
     pub covariance: DMatrix<f64>,
     /// Stops of the images in use.
     pub stops: Vec<Posture>,
+    /// Joint noise of a stop, root mean square over the series, rad or m.
+    pub joint_sigma: Vec<f64>,
     /// Numbers that decide.
     pub limits: Limits,
 }
@@ -246,6 +249,7 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
     let still = still.or_else(of_instrument);
     Ok(FoundModel {
         limits: record.limits(),
+        joint_sigma: joint_sigma(record),
         covariance: DMatrix::from_fn(n, n, at),
         stops: used().filter_map(stop).chain(record.bodies.postures()).collect(),
         robot: robot.without_local_errors(),
@@ -254,7 +258,29 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
     })
 }
 
+/// Joint noise of the series, of the cameras in files that know it of them only.
+fn joint_sigma(record: &SolutionRecord) -> Vec<f64> {
+    let of_series: Vec<Vec<f64>> =
+        record.series.iter().filter_map(|s| s.noise.as_ref()).map(|n| n.joint.clone()).collect();
+    let of_cameras = || record.cameras.iter().map(|c| c.joint_noise.clone()).collect::<Vec<_>>();
+    let all = if of_series.is_empty() { of_cameras() } else { of_series };
+    let readings = record.robot.readings.len();
+    let found = usual_joint_sigma(&all);
+    if found.len() == readings { found } else { vec![0.0; readings] }
+}
+
 impl FoundModel {
+    /// The robot as measured frames go with it; with the plate of a placement, whose pose is known as the robot is.
+    ///
+    /// # Errors
+    /// A covariance that is not finite.
+    pub fn known_robot(&self, placement: Option<usize>) -> Result<KnownRobot> {
+        let plate = placement.map(|p| self.layout.placements[p].start);
+        let (stops, joint) = (self.stops.clone(), self.joint_sigma.clone());
+        KnownRobot::new(&self.robot, &self.layout, &self.covariance, plate, joint, stops)
+            .ok_or_else(|| damaged("the covariance is not finite"))
+    }
+
     /// The flange anywhere; `None` where robot and plate (or fixed camera) are not tied.
     pub fn flange(&self) -> Option<FlangeModel<'_>> {
         FlangeModel::new(&self.robot, &self.layout, self.still?, &self.covariance, &self.stops, &self.limits)

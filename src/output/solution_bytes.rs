@@ -13,9 +13,17 @@ use crate::model::joint_terms::Term;
 /// # Errors
 /// None in practice: every field can be written as JSON.
 pub fn to_bytes(record: &SolutionRecord) -> Result<Vec<u8>> {
+    field_per_line(record, FILE_NAME)
+}
+
+/// A record as JSON with a line for each field; `file` is its name, for messages.
+///
+/// # Errors
+/// None in practice: every field can be written as JSON.
+pub(super) fn field_per_line(record: &impl Serialize, file: &str) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut serializer = serde_json::Serializer::with_formatter(&mut bytes, FieldPerLine::default());
-    record.serialize(&mut serializer).map_err(|e| Error::new(Code::RecordNotWritten, FILE_NAME, e, "report this"))?;
+    record.serialize(&mut serializer).map_err(|e| Error::new(Code::RecordNotWritten, file, e, "report this"))?;
     bytes.push(b'\n');
     Ok(bytes)
 }

@@ -16,6 +16,11 @@ const HUBER: [f64; 2] = [2.795, 3.548];
 /// Lengths that a standard normal vector of 3 and of 6 components exceeds with a probability of 4e-5, as those do that are left out of an image.
 const BOUND: [f64; 2] = [4.79, 5.52];
 
+/// Length of the residual of a point or a pose, in sigmas, beyond which it is left out.
+pub fn body_bound(is_pose: bool) -> f64 {
+    BOUND[usize::from(is_pose)]
+}
+
 /// What measures bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -26,7 +26,7 @@ mod step;
 mod stop;
 
 pub use adjustment::Adjustment;
-pub use body::{BodyMeasurement, BodyRejection, BodySeen, BodyTerms, Instrument, InstrumentKind};
+pub use body::{BodyMeasurement, BodyRejection, BodySeen, BodyTerms, Instrument, InstrumentKind, body_bound};
 pub use condensed::{SeenAtStop, by_columns, condensed};
 pub use equations::{E, Equations, MarkerCoupling, MarkerTerms, Sight};
 pub use family::Family;

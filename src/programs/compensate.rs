@@ -3,6 +3,8 @@
 //! With the controller's model `N`, the robot `A` for which the program was made and the robot `B` that runs it, a target with the joints `q`
 //! (those of a pose are `N^-1(pose)`) becomes the joints `q'` with `B(q') = A(q)`, and a pose becomes `N(q')`: the controller turns it back into
 //! `q'` by its own model.
+//!
+//! With measured tools `T` and work objects `W` of both robots, `W_B^-1 B(q') T_B = W_A^-1 A(q) T_A`: the tool comes to the same place of the work object.
 
 use std::collections::BTreeMap;
 
@@ -10,6 +12,7 @@ use nalgebra::Vector6;
 
 use super::codes::Branch;
 use super::field::{Edit, Place, splice};
+use super::measured_frames::{MeasuredFrames, Moved};
 use super::posture::{Before, Finder, Known};
 use super::program::{Approach, Displaced, Kind, Left, PoseTarget, Posture, Program, Target, Understood, write_joints};
 use super::reason::{Reason, Why};
@@ -34,6 +37,8 @@ pub struct Models<'a> {
     pub from: &'a Robot,
     /// The robot that runs it.
     pub to: &'a Robot,
+    /// Where tool and work object really are; without them the program's own count.
+    pub frames: Option<&'a MeasuredFrames>,
 }
 
 /// What is known of the postures.
@@ -63,7 +68,7 @@ pub struct Correction {
     pub corrected: Vec<f64>,
     /// How the posture became known.
     pub posture: Known,
-    /// How far the real robot would have missed, m.
+    /// How far the real robot would have missed, m; at the tool where that was measured, else at the flange.
     pub shift_m: f64,
     /// The same, rad.
     pub turn_rad: f64,
@@ -219,7 +224,8 @@ impl<'a> Work<'a> {
         let kind = &self.completed(target, programmed_before.as_deref())?;
         let (programmed, held, known) = self.meant(kind, programmed_before.is_some())?;
         let meant = reach(self.models.from, &self.limits, &held, programmed_before.as_deref()).stop(&programmed);
-        let wanted = self.models.from.pose_at(&meant, &vec![0.0; programmed.len()]);
+        let moved = self.models.frames.map_or_else(|| Ok(Moved::none()), |f| f.moved(kind))?;
+        let wanted = moved.applied(&self.models.from.pose_at(&meant, &vec![0.0; programmed.len()]));
         let to = reach(self.models.to, &self.limits, &held, corrected_before.as_deref());
         let corrected = self.reached(&to, &wanted, &programmed);
         // The next target is approached from here also when this one stays as it is.
@@ -229,7 +235,8 @@ impl<'a> Work<'a> {
         }
         let corrected = corrected?;
         let pose_at = |q: &[f64]| self.models.to.pose_at(&to.stop(q), &vec![0.0; q.len()]);
-        let (turn_rad, shift_m) = pose_at(&programmed).distance(&wanted);
+        let at_tool = |flange: Pose| flange * moved.flange_from_tool;
+        let (turn_rad, shift_m) = at_tool(pose_at(&programmed)).distance(&at_tool(wanted));
         let (edits, read, later) = match kind {
             Kind::Joints(joints) => {
                 let (edits, read) = joints.edits(&corrected, &program.files);

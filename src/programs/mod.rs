@@ -6,6 +6,7 @@
 //! | [`program`] | targets: joints or a pose, made of fields |
 //! | [`codes`] | status and turn, confdata: which posture a pose means |
 //! | [`posture`] | which joints a pose means |
+//! | [`measured_frames`] | tool and work object of the real robot instead of those of the program |
 //! | [`mod@compensate`] | targets of one robot to targets of another |
 //! | `scan` | tokens that all languages share |
 //! | `language` | the table of languages |
@@ -19,6 +20,7 @@ pub mod field;
 mod itinerary;
 mod krl;
 mod language;
+pub mod measured_frames;
 pub mod posture;
 pub mod program;
 mod rapid;
@@ -31,6 +33,7 @@ mod urscript;
 
 pub use compensate::{Correction, Models, Outcome, Postures, compensate};
 pub use language::{Language, read};
+pub use measured_frames::{MeasuredFrames, MeasuredTool, RobotFrames};
 pub use posture::Known;
 pub use program::{Kind, Left, Program, Target};
 pub use reason::{Reason, Why};

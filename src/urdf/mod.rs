@@ -1,5 +1,6 @@
 //! Robot descriptions: read by `urdf-rs`, patched as text so that every other byte stays.
 
+mod added_links;
 mod chain;
 mod collisions;
 mod elements;
@@ -12,6 +13,7 @@ mod second_arm;
 mod tips;
 mod tree;
 
+pub use added_links::{AddedLink, add_links};
 pub use chain::{CarriedMass, Chain, Drive, FoundOrigin, Joint, JointKind};
 pub use collisions::CarriedCapsule;
 pub use inertial::Inertial;

@@ -174,7 +174,7 @@ fn name_and_attributes_end(element: Node<'_, '_>) -> usize {
 }
 
 /// Shortest numbers that read back as the same `f64`, separated by blanks.
-fn join(values: &[f64]) -> String {
+pub(super) fn join(values: &[f64]) -> String {
     let number = |v: f64| if v != 0.0 && v.abs() < 1e-4 { format!("{v:e}") } else { format!("{}", v + 0.0) };
     values.iter().map(|v| number(*v)).collect::<Vec<_>>().join(" ")
 }

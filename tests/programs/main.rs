@@ -5,6 +5,8 @@ mod programs_support;
 #[path = "../said/mod.rs"]
 mod said;
 
+mod frames;
+mod frames_study;
 mod krl;
 mod plan_choice;
 mod plan_poses;

@@ -7,6 +7,7 @@
 
 use std::time::Instant;
 
+use crate::programs_support::findings;
 use crate::programs_support::{Cell, assert_meets, numbers, shape};
 use crate::said::assert_says;
 use robotcal::Code;
@@ -307,7 +308,7 @@ fn ten_thousand_targets_take_less_than_a_second() {
     let begin = Instant::now();
     let file = TextFile { name: "t.csv".into(), bytes: text.into_bytes() };
     let program = programs::read(Language::Csv, vec![file], &setting).unwrap();
-    let models = Models { controller: &cell.nominal, from: &cell.nominal, to: real };
+    let models = Models { controller: &cell.nominal, from: &cell.nominal, to: real, frames: None };
     let done = programs::compensate(&program, models, &postures);
     let seconds = begin.elapsed().as_secs_f64();
     let count = done.outcomes.iter().filter(|o| matches!(o, Outcome::Done(_))).count();
@@ -341,15 +342,6 @@ fn left_over(cell: &Cell, tool: &Pose, old: &[f64], new: &[f64], q: &[f64]) -> f
     let change = commanded.iter().zip(q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(change < 0.1, "another posture: {change}");
     (cell.real_at(&commanded, None) * *tool).distance(&(flange(old) * *tool)).1
-}
-
-/// The findings of a call: code -> (weight, quantities).
-fn findings(run: &crate::programs_support::Run) -> std::collections::BTreeMap<String, (String, serde_json::Value)> {
-    let all: Vec<serde_json::Value> = serde_json::from_str(&run.text("findings.json")).unwrap();
-    let one = |f: serde_json::Value| {
-        (f["code"].as_str().unwrap().into(), (f["weight"].as_str().unwrap().into(), f["quantities"].clone()))
-    };
-    all.into_iter().map(one).collect()
 }
 
 fn column(run: &crate::programs_support::Run, name: &str) -> Vec<String> {
@@ -567,7 +559,15 @@ fn the_controller_may_compute_in_a_frame_that_is_fixed_beside_the_arm() {
             .arg(&nominal)
             .arg("--urdf")
             .arg(&real);
-        command.arg("--compensation").arg(&cell.compensation).args(["--unordered", "--base", base, "--tip", "tool0"]);
+        command.arg("--compensation").arg(&cell.compensation).args([
+            "--unordered",
+            "--frames",
+            "nominal",
+            "--base",
+            base,
+            "--tip",
+            "tool0",
+        ]);
         crate::programs_support::Run { output: command.output().unwrap(), out }
     };
     let run = call("base").expect(0);

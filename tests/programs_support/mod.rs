@@ -2,6 +2,8 @@
 
 #![allow(dead_code, clippy::unwrap_used)]
 
+pub mod touching;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -131,7 +133,7 @@ impl Cell {
         command.arg("compensate").args(files).arg("--out").arg(&out);
         command.arg("--nominal").arg(&self.nominal_urdf).arg("--urdf").arg(&self.real_urdf);
         command.arg("--compensation").arg(&self.compensation);
-        command.args(["--base", &self.nominal.chain.base, "--tip", &self.nominal.chain.tip]);
+        command.args(["--frames", "nominal", "--base", &self.nominal.chain.base, "--tip", &self.nominal.chain.tip]);
         let output = command.args(flags).output().unwrap();
         Run { output, out }
     }
@@ -241,3 +243,12 @@ pub fn status_turn(q: &[f64]) -> (u32, u32) {
 
 /// Side of the 35 mm: the wrist lies above axis 3 when the forearm is level.
 const SIDE: f64 = -1.0;
+
+/// Findings of a call by their codes: weight and quantities.
+pub fn findings(run: &Run) -> BTreeMap<String, (String, serde_json::Value)> {
+    let all: Vec<serde_json::Value> = serde_json::from_str(&run.text("findings.json")).unwrap();
+    let one = |f: serde_json::Value| {
+        (f["code"].as_str().unwrap().into(), (f["weight"].as_str().unwrap().into(), f["quantities"].clone()))
+    };
+    all.into_iter().map(one).collect()
+}

@@ -19,7 +19,7 @@ const LEVELS: [&[&str]; 16] = [
     &["fit"],
     &["assess"],
     &["plan", "programs"],
-    &["simulate", "diagnose"],
+    &["simulate", "diagnose", "frames"],
     &["identify"],
     &["output"],
     &["calibration"],

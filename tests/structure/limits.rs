@@ -39,6 +39,18 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("diagnose/left_out_bodies.rs MOST_NAMED", "words"),
     ("diagnose/loose.rs MOST_IMAGES", "how many are named"),
     ("diagnose/plate_size.rs ASPECT", "index of a mode"),
+    ("frames/absorbed.rs HELD", "rounding"),
+    ("frames/absorbed.rs MOST", "samples of an average"),
+    ("frames/fit.rs ROUNDS", "most iterations"),
+    ("frames/fit.rs SIZE", "convergence"),
+    ("frames/fit.rs STATED", "prior of a variance component"),
+    ("frames/fit.rs STEP", "convergence"),
+    ("frames/fit.rs UNCONTROLLED", "rounding"),
+    ("frames/plan.rs BEFORE", "prior that says nothing"),
+    ("frames/plan.rs EXCHANGES", "most iterations"),
+    ("frames/plan.rs GAIN", "convergence"),
+    ("frames/plan.rs SEED", "start of random numbers"),
+    ("frames/robot.rs ROUNDING", "rounding of an eigenvalue"),
     ("identify/bodies_measured.rs DEFAULT_SIGMA", "start of a variance component"),
     ("identify/bodies_start.rs FEWEST_POINTS", "unknowns of a start"),
     ("identify/bodies_start.rs FEWEST_POSES", "unknowns of a start"),
@@ -91,7 +103,7 @@ const COMPARED: [(&str, &str, &str); 2] = [
 /// Numbers that a comparison may hold: signs, halves and majorities, probabilities of certainty.
 const PLAIN: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
 
-const ROOMS: [&str; 3] = ["diagnose", "identify", "assess"];
+const ROOMS: [&str; 4] = ["diagnose", "identify", "assess", "frames"];
 
 /// Name in its room and text of every file of the rooms.
 fn files() -> Vec<(String, String)> {

@@ -1,0 +1,231 @@
+//! `--frames` of `compensate`: where tool and work object of the robots are, and what is known of them.
+
+use std::path::Path;
+
+use super::show::read_solution;
+use crate::assess::Limits;
+use crate::error::{Code, Error, Result};
+use crate::files::{self, Kind};
+use crate::geom::Pose;
+use crate::model::robot::Robot;
+use crate::output::corrections::{self, FramedRobot, Meant};
+use crate::output::frames_record::{self, FramesRecord, ToolKind};
+use crate::output::restore::found_model;
+use crate::output::solution_json::{self, SolutionRecord};
+use crate::programs::compensate::Compensated;
+use crate::programs::{MeasuredFrames, MeasuredTool, Program, RobotFrames};
+
+/// One of the calibrated robots.
+pub(super) struct Side<'a> {
+    pub robot: &'a Robot,
+    pub urdf: &'a Path,
+    /// Its solution.json as given; else the one beside the description.
+    pub solution: Option<&'a Path>,
+}
+
+/// The robot that runs the program, and the one on which it was taught.
+pub(super) struct Sides<'a> {
+    pub to: Side<'a>,
+    pub from: Option<Side<'a>>,
+}
+
+/// What was said of tool and base.
+pub(super) enum Choice {
+    Untold,
+    Nominal,
+    Measured { to: Box<FramesRecord>, from: Option<Box<FramesRecord>> },
+}
+
+/// Value of `--frames` that takes tool and base as they are in the program.
+const NOMINAL: &str = "nominal";
+
+/// Distance (m and rad) within which the origins of two descriptions are those of one robot.
+const SAME_ORIGIN: f64 = 1e-6;
+
+/// Why a value is not known.
+type Known<T> = std::result::Result<T, String>;
+
+fn read_frames(path: &Path, side: &Side) -> Result<FramesRecord> {
+    let named =
+        |e: Error| Error { place: e.place.replacen(frames_record::FILE_NAME, &path.display().to_string(), 1), ..e };
+    let record = frames_record::read(&files::read(path, Kind::Solution)?).map_err(named)?;
+    record.check_robot(side.robot, &side.urdf.display().to_string())?;
+    Ok(record)
+}
+
+impl Choice {
+    /// Reads the frames and refuses those of other robots.
+    pub fn read(frames: Option<&Path>, from_frames: Option<&Path>, sides: &Sides) -> Result<Self> {
+        let Some(frames) = frames.filter(|f| *f != Path::new(NOMINAL)) else {
+            if let Some(other) = from_frames {
+                let what = "gives the frames of the robot on which the program was taught alone";
+                return Err(Error::new(
+                    Code::OptionMissing,
+                    other.display(),
+                    what,
+                    "give those of the other robot with --frames",
+                ));
+            }
+            return Ok(if frames.is_none() { Self::Untold } else { Self::Nominal });
+        };
+        let to = Box::new(read_frames(frames, &sides.to)?);
+        let from = match (&sides.from, from_frames) {
+            (Some(side), Some(path)) => Some(Box::new(read_frames(path, side)?)),
+            (Some(side), None) => {
+                let what = "taught the program, and where its tool and work object are is not given";
+                let remedy = "give its frames.json with --from-frames: of the same work object, touched with the tool of that robot";
+                return Err(Error::new(Code::OptionMissing, side.urdf.display(), what, remedy));
+            }
+            (None, _) => None,
+        };
+        let choice = Self::Measured { to, from };
+        choice.common(frames, from_frames)?;
+        Ok(choice)
+    }
+
+    /// Frames of two robots are of one work object.
+    fn common(&self, frames: &Path, from_frames: Option<&Path>) -> Result<()> {
+        let Self::Measured { to, from: Some(from) } = self else { return Ok(()) };
+        let refuse = |what: String, remedy: &str| Err(Error::new(Code::FramesDiffer, frames.display(), what, remedy));
+        let other = from_frames.map_or_else(String::new, |p| p.display().to_string());
+        match (&to.work, &from.work) {
+            (Some(a), Some(b)) if a.name == b.name => {}
+            (Some(a), Some(b)) => {
+                let what = format!("is of the work object '{}', and {other} of '{}'", a.name, b.name);
+                return refuse(
+                    what,
+                    "two robots need a common frame: touch the same points of one work object, and name it in [contact] frame",
+                );
+            }
+            _ => {
+                let what = format!("and {other} do not both have a work object: nothing is common to the robots");
+                return refuse(what, "touch three or more points of the common work object with each robot");
+            }
+        }
+        if to.tool.is_some() != from.tool.is_some() {
+            let what = format!("and {other} do not both have a tool");
+            return refuse(what, "touch with the tools of both robots");
+        }
+        Ok(())
+    }
+
+    /// What takes the place of the program's own frames; `own` are tool and work object of joint targets, where they are known.
+    pub fn measured(&self, own: (Option<Pose>, Option<Pose>)) -> Option<MeasuredFrames> {
+        let Self::Measured { to, from } = self else { return None };
+        let limits = Limits::default();
+        Some(MeasuredFrames {
+            to: frames_of(to),
+            from: from.as_ref().map(|f| frames_of(f)),
+            work_is_base: to.work_is_base(),
+            tool: own.0,
+            work: own.1,
+            same_work: (limits.same_work_m, limits.same_work_rad),
+            same_tool_m: limits.same_tool_m,
+        })
+    }
+
+    /// What the program is corrected with, in words.
+    pub fn meant(&self) -> Meant {
+        match self {
+            Self::Untold => Meant::Untold,
+            Self::Nominal => Meant::Nominal,
+            Self::Measured { to, from } => {
+                let work = to.work.as_ref().map(|w| match from {
+                    Some(_) => format!("the common work object '{}'", w.name),
+                    None => format!("the work object '{}'", w.name),
+                });
+                let tool = to.tool.as_ref().map(|t| match from {
+                    Some(_) => "the tools of both robots".to_owned(),
+                    None => format!("the tool '{}'", t.name),
+                });
+                let measured: Vec<String> = work.into_iter().chain(tool).collect();
+                let nominal = match (&to.work, &to.tool) {
+                    (None, _) => "; the base is nominal",
+                    (_, None) => "; the tool is nominal",
+                    _ => "",
+                };
+                Meant::Measured(format!("{} as measured{nominal}", measured.join(" and ")))
+            }
+        }
+    }
+
+    /// Expected error of every target, m; else why it is not known.
+    pub fn expected(&self, sides: &Sides, program: &Program, done: &Compensated) -> Result<Known<Vec<Option<f64>>>> {
+        match (self, &sides.from) {
+            (Self::Measured { to, from }, other) => {
+                let mut all = Vec::new();
+                let both = [(Some(&sides.to), Some(to), false), (other.as_ref(), from.as_ref(), true)];
+                for (side, record, is_taught) in both {
+                    let (Some(side), Some(record)) = (side, record) else { continue };
+                    match framed(side, record, is_taught)? {
+                        Ok(robot) => all.push(robot),
+                        Err(why) => return Ok(Err(why)),
+                    }
+                }
+                Ok(Ok(corrections::expected_with_frames(program, done, &all)))
+            }
+            (_, Some(_)) => Ok(Err("base and tool of both robots count, and no common frame is given".into())),
+            (_, None) => Ok(match solution(&sides.to, None)? {
+                Ok(record) => Ok(corrections::expected_errors(program, done, &found_model(&record)?)),
+                Err(why) => Err(why),
+            }),
+        }
+    }
+}
+
+fn frames_of(record: &FramesRecord) -> RobotFrames {
+    let tool = record.tool.as_ref().map(|t| {
+        let pose = Pose::from(&t.pose);
+        match t.measured {
+            ToolKind::Point => MeasuredTool::Point(pose.translation),
+            ToolKind::Pose | ToolKind::Given => MeasuredTool::Pose(pose),
+        }
+    });
+    RobotFrames { tool, work: record.work.as_ref().map(|w| (&w.pose).into()) }
+}
+
+fn framed(side: &Side, record: &FramesRecord, is_taught: bool) -> Result<Known<FramedRobot>> {
+    let found = match solution(side, Some(&record.robot.solution.path))? {
+        Ok(solution) => found_model(&solution)?,
+        Err(why) => return Ok(Err(why)),
+    };
+    let (robot, knowledge) = record.known(&found)?;
+    let tool = record.tool.as_ref().map(|t| Pose::from(&t.pose));
+    Ok(Ok(FramedRobot { robot, knowledge, tool, work: record.base_from_work(), is_taught }))
+}
+
+/// The solution from which a description came.
+fn solution(side: &Side, recorded: Option<&Path>) -> Result<Known<SolutionRecord>> {
+    let beside = side.urdf.with_file_name(solution_json::FILE_NAME);
+    let there = [Some(beside.as_path()), recorded].into_iter().flatten().find(|p| p.is_file());
+    let Some(path) = side.solution.or(there) else {
+        return Ok(Err(format!("no solution.json beside {}, and no --solution", side.urdf.display())));
+    };
+    let record = match read_solution(path) {
+        Ok(record) => record,
+        Err(error) if side.solution.is_some() => return Err(error),
+        Err(_) => return Ok(Err(format!("{} cannot be read", path.display()))),
+    };
+    let origin =
+        |name: &str| record.robot.joints.iter().find(|j| j.name == name).map(|j| Pose::from(&j.corrected_origin));
+    let chain = &side.robot.chain;
+    let same = chain.readings == record.robot.readings
+        && chain.tip == record.robot.tip
+        && chain.joints.iter().filter(|j| j.drive.is_some()).all(|j| {
+            origin(&j.name).is_some_and(|o| {
+                let (rad, m) = o.distance(&j.origin);
+                rad < SAME_ORIGIN && m < SAME_ORIGIN
+            })
+        });
+    if same {
+        return Ok(Ok(record));
+    }
+    let what = format!("is not the solution from which {} came", side.urdf.display());
+    match side.solution {
+        Some(_) => {
+            let remedy = "give the solution.json that was written beside it";
+            Err(Error::new(Code::SolutionDiffers, path.display(), what, remedy))
+        }
+        None => Ok(Err(format!("{} {what}", path.display()))),
+    }
+}

@@ -1,0 +1,235 @@
+//! `robotcal plan --touch`: which points to touch, and with which joint values, to find tool and work object.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nalgebra::Vector3;
+
+use super::Verdict;
+use super::plan_targets::targets;
+use super::say::{say, say_line};
+use super::show::read_solution;
+use crate::error::{Code, Error, Result, plain_name};
+use crate::files::{self, Kind};
+use crate::frames::{KnownRobot, PlannedTouch, TouchPlan, TouchRequest, plan_touches};
+use crate::geom::Pose;
+use crate::model::robot::Posture;
+use crate::output::Place;
+use crate::output::restore::found_model;
+use crate::urdf::{Chain, JointKind};
+
+/// Flags of `plan` for touches.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Touches (with --from)")]
+pub(super) struct TouchArgs {
+    /// Plan touches instead of images: points of the work object (CSV: name,x_m,y_m,z_m), for `robotcal frames`
+    #[arg(long, value_name = "FILE", requires_all = ["from", "touch_work"])]
+    pub touch: Option<PathBuf>,
+    /// Work object in the base, roughly: x,y,z[,roll,pitch,yaw] in m and degrees
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true, requires = "touch")]
+    touch_work: Vec<f64>,
+    /// Tool on the tip, roughly: x,y,z[,roll,pitch,yaw] in m and degrees [default: the tip]
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true, requires = "touch")]
+    touch_tool: Vec<f64>,
+    /// Name of the work object
+    #[arg(long, value_name = "NAME", default_value = "work")]
+    touch_frame: String,
+    /// Sigma of a touch per axis, mm
+    #[arg(long, value_name = "MM", default_value_t = 0.05)]
+    touch_sigma_mm: f64,
+    /// Largest tilt of the tool's z axis from straight down on the work object, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 45.0)]
+    touch_tilt_deg: f64,
+}
+
+/// Postures that are tried at each point.
+const TRIES: usize = 60;
+
+/// Plans the touches.
+pub(super) fn run(
+    args: &TouchArgs,
+    points: &Path,
+    from: &Path,
+    target_file: Option<&Path>,
+    count: usize,
+    out: &Path,
+) -> Result<Verdict> {
+    let place = Place::among(out)?;
+    let record = read_solution(from)?;
+    let found = found_model(&record)?;
+    let robot = found.known_robot(None)?;
+    let positive = |flag: &str, value: f64, most: f64| match value > 0.0 && value <= most {
+        true => Ok(value),
+        false => {
+            Err(Error::new(Code::OptionRange, flag, format!("{value}"), format!("give a number between 0 and {most}")))
+        }
+    };
+    let chain = &robot.exported().chain;
+    let wanted = target_file.map(|path| targets(path, chain)).transpose()?.unwrap_or_default();
+    let request = TouchRequest {
+        points: read_points(points)?,
+        tool: pose("--touch-tool", &args.touch_tool)?,
+        work: pose("--touch-work", &args.touch_work)?,
+        count,
+        sigma_m: 1e-3 * positive("--touch-sigma-mm", args.touch_sigma_mm, 10.0)?,
+        tilt_rad: positive("--touch-tilt-deg", args.touch_tilt_deg, 90.0)?.to_radians(),
+        targets: wanted.iter().map(|q| Posture::at(q)).collect(),
+        tries: TRIES,
+    };
+    plain_name("frame", &args.touch_frame, "--touch-frame")?;
+    if count < robot_needs() {
+        let what = format!("{count} touches");
+        return Err(Error::new(Code::OptionRange, "--count", what, format!("plan {} or more", robot_needs())));
+    }
+    let TouchPlan { touches: planned, unreached } = plan_touches(&robot, &request, &found.limits)?;
+    let files = [
+        ("series.toml".to_owned(), manifest(args, chain)),
+        ("joints.csv".to_owned(), joints(&planned, chain)),
+        ("contacts.csv".to_owned(), contacts(&planned, &request)),
+    ];
+    let listed: Vec<(String, &[u8])> = files.iter().map(|(name, text)| (name.clone(), text.as_bytes())).collect();
+    place.write_beside(&listed, &[from.to_path_buf(), points.to_path_buf()])?;
+    say!("{}", text(&planned, &request, &robot, out));
+    if !unreached.is_empty() {
+        let names: Vec<&str> = unreached.iter().map(|k| request.points[*k].0.as_str()).collect();
+        say_line!(
+            "note      no posture touches {}: out of reach, or further tilted than --touch-tilt-deg",
+            names.join(", ")
+        );
+    }
+    Ok(Verdict::Good)
+}
+
+fn robot_needs() -> usize {
+    crate::assess::Limits::default().fewest_touches
+}
+
+fn pose(flag: &str, numbers: &[f64]) -> Result<Pose> {
+    match *numbers {
+        [] => Ok(Pose::identity()),
+        [x, y, z] => Ok(Pose::from_xyz_rpy([x, y, z], [0.0; 3])),
+        [x, y, z, r, p, w] => Ok(Pose::from_xyz_rpy([x, y, z], [r, p, w].map(f64::to_radians))),
+        _ => {
+            let what = format!("{} numbers", numbers.len());
+            Err(Error::new(Code::OptionRange, flag, what, "give x,y,z or x,y,z,roll,pitch,yaw in m and degrees"))
+        }
+    }
+}
+
+/// Points of a work object.
+fn read_points(path: &Path) -> Result<Vec<(String, Vector3<f64>)>> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(files::open(path, Kind::Table)?.0);
+    let refuse = |code, line: u64, what: String, remedy: &str| {
+        Err(Error::new(code, format!("{}:{line}", path.display()), what, remedy))
+    };
+    let bad =
+        |e: csv::Error| Error::new(Code::CsvSyntax, path.display(), e, "every row has the columns of the first line");
+    let header = reader.headers().map_err(bad)?.clone();
+    let column = |name: &str| header.iter().position(|h| h == name);
+    let (Some(name), Some(x), Some(y), Some(z)) = (column("name"), column("x_m"), column("y_m"), column("z_m")) else {
+        let what = format!("columns are {}", header.iter().collect::<Vec<_>>().join(", "));
+        return refuse(Code::CsvColumnMissing, 1, what, "name them name,x_m,y_m,z_m");
+    };
+    let mut points = Vec::new();
+    for row in reader.records() {
+        let row = row.map_err(bad)?;
+        let line = row.position().map_or(0, csv::Position::line);
+        let number = |c: usize| row.get(c).and_then(|cell| cell.parse::<f64>().ok()).filter(|v| v.is_finite());
+        let (Some(x), Some(y), Some(z)) = (number(x), number(y), number(z)) else {
+            return refuse(Code::CsvNumber, line, "a coordinate is no number".into(), "give x_m, y_m, z_m in metres");
+        };
+        if [x, y, z].iter().any(|v| v.abs() > crate::assess::Limits::default().touches_apart_m) {
+            return refuse(Code::TouchUnit, line, format!("a point at ({x}, {y}, {z}) m"), "write metres, not mm");
+        }
+        let name = row.get(name).unwrap_or_default();
+        points
+            .push((plain_name("point", name, format!("{}:{line}", path.display()))?.to_owned(), Vector3::new(x, y, z)));
+    }
+    match points.len() {
+        0 => refuse(Code::FileEmpty, 1, "has no points".into(), "write one row a point"),
+        1 | 2 => refuse(
+            Code::TouchesFew,
+            1,
+            format!("has {} points", points.len()),
+            "a work object takes three or more that are not on a line",
+        ),
+        _ => Ok(points),
+    }
+}
+
+fn manifest(args: &TouchArgs, chain: &Chain) -> String {
+    format!(
+        "# Planned touches: replace the joint values by those at which the tool touches the point.\nformat = 1\njoint_unit = \"deg\"\nbase = {:?}\ntip = {:?}\n\
+         [contact]\nsigma_m = {}\nframe = {:?}\n",
+        chain.base,
+        chain.tip,
+        1e-3 * args.touch_sigma_mm,
+        args.touch_frame
+    )
+}
+
+fn stop(k: usize) -> String {
+    format!("touch_{:02}", k + 1)
+}
+
+/// Readings as joints.csv has them.
+fn shown(readings: &[f64], chain: &Chain) -> Vec<String> {
+    let one = |(q, kind): (&f64, &JointKind)| match kind {
+        JointKind::Prismatic => format!("{q:.6}"),
+        _ => format!("{:.4}", q.to_degrees()),
+    };
+    readings.iter().zip(&chain.reading_kinds).map(one).collect()
+}
+
+fn joints(planned: &[PlannedTouch], chain: &Chain) -> String {
+    let rows =
+        planned.iter().enumerate().map(|(k, t)| format!("{},{}\n", stop(k), shown(&t.readings, chain).join(",")));
+    format!("stop,{}\n", chain.readings.join(",")) + &rows.collect::<String>()
+}
+
+fn contacts(planned: &[PlannedTouch], request: &TouchRequest) -> String {
+    let row = |(k, t): (usize, &PlannedTouch)| {
+        let (name, p) = &request.points[t.point];
+        format!("{},{name},{},{},{}\n", stop(k), p.x, p.y, p.z)
+    };
+    "stop,contact,x_m,y_m,z_m\n".to_owned() + &planned.iter().enumerate().map(row).collect::<String>()
+}
+
+fn text(planned: &[PlannedTouch], request: &TouchRequest, robot: &KnownRobot, out: &Path) -> String {
+    let chain = &robot.exported().chain;
+    let mut text = String::new();
+    let of = if request.targets.is_empty() {
+        "over the stops of the solution".to_owned()
+    } else {
+        format!("at {} targets", request.targets.len())
+    };
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        text,
+        "touches   {} of {} points, in the order in which they tell most",
+        planned.len(),
+        request.points.len()
+    );
+    let _ = writeln!(text, "{:>10}  {:<12} {:>12}  joints, deg (m)", "stop", "point", "expected mm");
+    for (k, t) in planned.iter().enumerate() {
+        // Fewer do not determine tool and work object.
+        let expected = if k + 1 < robot_needs() { "-".to_owned() } else { format!("{:.3}", 1e3 * t.expected_m) };
+        let joints = shown(&t.readings, chain).join(", ");
+        let _ = writeln!(text, "{:>10}  {:<12} {expected:>12}  {joints}", stop(k), request.points[t.point].0);
+    }
+    if let Some(last) = planned.last() {
+        let _ = writeln!(
+            text,
+            "expected  tool in the work object {:.3} mm RMS {of} with all of them; joint noise of an arrival comes on top",
+            1e3 * last.expected_m
+        );
+    }
+    let _ = writeln!(text, "note      collisions are not looked at: approach by hand");
+    let _ = writeln!(
+        text,
+        "results   {} (series.toml, joints.csv, contacts.csv): write the joint values of each touch into joints.csv, then robotcal frames --touches",
+        out.display()
+    );
+    text
+}

@@ -1,0 +1,131 @@
+//! What was measured of the tip: touches of places, known or not, and what a tracker saw.
+
+use nalgebra::Vector3;
+
+use crate::error::{Code, Error, Result};
+use crate::geom::Pose;
+use crate::model::robot::Posture;
+use crate::problem::{BodySeen, InstrumentKind, MeasuredSeries};
+
+/// Where a touch says that the body was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Seen {
+    /// Its origin in the work object, m.
+    Point(Vector3<f64>),
+    /// Its pose in the work object.
+    Pose(Pose),
+    /// At a place that is not known: index of the contact.
+    Unknown(usize),
+}
+
+/// One measurement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Touch {
+    /// Name of its stop.
+    pub stop: String,
+    /// Index of its posture: measurements of one stop share their joint noise.
+    pub posture: usize,
+    /// Index of the body.
+    pub body: usize,
+    /// Where it was.
+    pub seen: Seen,
+    /// Stated sigma of a coordinate, m.
+    pub sigma_m: f64,
+    /// Stated sigma of the rotation about an axis, rad; of poses.
+    pub sigma_rad: f64,
+}
+
+/// Everything that was measured with one tool.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Touches {
+    /// Postures of the stops.
+    pub postures: Vec<Posture>,
+    /// Names of the bodies that the tip carries: the tool, or the targets of a tracker.
+    pub bodies: Vec<String>,
+    /// Names of contacts at unknown places.
+    pub contacts: Vec<String>,
+    /// Name of the frame of the known places; `None` where none is known.
+    pub frame: Option<String>,
+    /// Measurements.
+    pub all: Vec<Touch>,
+}
+
+/// Index of a name in a list that it joins if it is new.
+fn index_of(all: &mut Vec<String>, name: &str) -> usize {
+    all.iter().position(|known| known == name).unwrap_or_else(|| {
+        all.push(name.to_owned());
+        all.len() - 1
+    })
+}
+
+impl Touches {
+    /// What series hold of it. Series are of one tool: bodies and contacts of one name are one thing in all of them.
+    ///
+    /// # Errors
+    /// Places in more than one frame; measurements at stops without readings; no measurements at all.
+    pub fn of(series: &[MeasuredSeries]) -> Result<Self> {
+        let mut touches = Self::default();
+        for s in series {
+            let mut postures = vec![None; s.stops.len()];
+            for b in &s.bodies {
+                let stop = &s.stops[b.stop];
+                let place = || format!("series {}, stop {}", s.name, stop.image);
+                let Some(readings) = &stop.readings else {
+                    let what = "was measured, but its joint readings are not given";
+                    return Err(Error::new(
+                        Code::ReadingsMissing,
+                        place(),
+                        what,
+                        "fill the row of joints.csv, or remove the measurement",
+                    ));
+                };
+                let seen = match (b.kind, b.seen) {
+                    (InstrumentKind::Socket, _) => Seen::Unknown(index_of(&mut touches.contacts, &b.instrument)),
+                    (_, seen) => {
+                        let frame = touches.frame.get_or_insert_with(|| b.instrument.clone());
+                        if *frame != b.instrument {
+                            let what = format!("is in the frame '{}', others are in '{frame}'", b.instrument);
+                            let remedy = "give the places of one work object at a time: run `frames` once for each";
+                            return Err(Error::new(Code::SeriesDisagree, place(), what, remedy));
+                        }
+                        match seen {
+                            BodySeen::Point(point) => Seen::Point(point),
+                            BodySeen::Pose(pose) => Seen::Pose(pose),
+                        }
+                    }
+                };
+                let posture = *postures[b.stop].get_or_insert_with(|| {
+                    let before = b.stop.checked_sub(1).and_then(|k| s.stops[k].readings.as_ref());
+                    let step = |before: &Vec<f64>| readings.iter().zip(before).map(|(q, b)| q - b).collect();
+                    let approach = before.filter(|_| s.order_known).map(step);
+                    touches.postures.push(Posture { readings: readings.clone(), approach });
+                    touches.postures.len() - 1
+                });
+                let body = index_of(&mut touches.bodies, &b.body);
+                let (sigma_m, sigma_rad) = (b.sigma_m, b.sigma_rad);
+                touches.all.push(Touch { stop: stop.image.clone(), posture, body, seen, sigma_m, sigma_rad });
+            }
+        }
+        if touches.all.is_empty() {
+            let names: Vec<&str> = series.iter().map(|s| s.name.as_str()).collect();
+            let what = "holds no touches: there is no contacts.csv, points.csv or poses.csv with rows";
+            let remedy = "write contacts.csv with the columns stop,contact,x_m,y_m,z_m (without x_m,y_m,z_m where the place is not known)";
+            return Err(Error::new(Code::FileEmpty, format!("series {}", names.join(", ")), what, remedy));
+        }
+        Ok(touches)
+    }
+
+    /// True where the orientation of a body was seen, too.
+    pub fn is_pose(&self, body: usize) -> bool {
+        self.all.iter().any(|t| t.body == body && matches!(t.seen, Seen::Pose(_)))
+    }
+
+    /// Measurements at known places.
+    pub fn placed(&self) -> impl Iterator<Item = (&Touch, Vector3<f64>)> {
+        self.all.iter().filter_map(|t| match t.seen {
+            Seen::Point(place) => Some((t, place)),
+            Seen::Pose(pose) => Some((t, pose.translation)),
+            Seen::Unknown(_) => None,
+        })
+    }
+}

@@ -1,0 +1,493 @@
+//! Tool and work object from touches: closed form, covariance, outliers, what cannot be told, and programs that use them.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use robotcal::assess::Limits;
+use robotcal::error::Code;
+use robotcal::frames::{Given, KnownRobot, Seen, Touches, fit};
+use robotcal::geom::Pose;
+use robotcal::model::robot::Robot;
+use robotcal::output::restore::found_model;
+use robotcal::output::solution_json;
+use robotcal::simulate::truth::Truth;
+
+use crate::programs_support::touching::{Toucher, ranges, spread, write};
+use crate::programs_support::{Run, findings, repo};
+use crate::said::assert_says;
+
+const TOOL: [f64; 3] = [0.012, -0.02, 0.11];
+
+/// The robot of reports/kr6_small, as found and as it is.
+struct World {
+    robot: KnownRobot,
+    truth: Robot,
+}
+
+fn world() -> World {
+    let record = solution_json::read(&std::fs::read(repo("reports/kr6_small/solution.json")).unwrap()).unwrap();
+    let found = found_model(&record).unwrap();
+    let truth = Truth::read(&repo("datasets/kr6_small/truth.toml")).unwrap();
+    World { truth: truth.robot(&found.robot.chain).unwrap(), robot: found.known_robot(None).unwrap() }
+}
+
+fn work() -> Pose {
+    Pose::from_xyz_rpy([0.45, -0.1, 0.2], [0.02, -0.03, 0.7])
+}
+
+fn rng(seed: u64) -> ChaCha8Rng {
+    println!("seed {seed}");
+    ChaCha8Rng::seed_from_u64(seed)
+}
+
+/// A robot that is as it was found, and touches without any noise.
+fn exact<'a>(robot: &'a Robot) -> Toucher<'a> {
+    Toucher { truth: robot, work: work(), tool: TOOL.into(), sigma_m: 0.0, joint_sigma: 0.0 }
+}
+
+/// Touches of one unknown point: postures that bring the tool there, the tip turned every way.
+fn one_point(robot: &Robot, start: &[f64], count: usize, rng: &mut ChaCha8Rng) -> Touches {
+    use robotcal::model::inverse::{reading_limits, solve_from};
+    let limits = reading_limits(&robot.chain);
+    let tool = Pose::new(Matrix3::identity(), TOOL.into());
+    let first = robot.base_from_tip(start) * tool;
+    let mut found: Vec<Vec<f64>> = Vec::new();
+    while found.len() < count {
+        let turn = spread(&[(-0.6, 0.6); 3], 1, rng).remove(0);
+        let wanted = first * Pose::from_xyz_rpy([0.0; 3], [turn[0], turn[1], turn[2]]) * tool.inverse();
+        found.extend(solve_from(robot, &limits, &wanted, start));
+    }
+    let toucher = exact(robot);
+    let mut touches = toucher.places(&found, "unused", rng);
+    touches.frame = None;
+    touches.contacts = vec!["pin".into()];
+    touches.all.iter_mut().for_each(|t| t.seen = Seen::Unknown(0));
+    touches
+}
+
+const START: [f64; 6] = [0.2, -1.2, 1.5, 0.3, 0.8, 0.1];
+
+#[test]
+fn a_tool_without_noise_is_that_of_the_closed_form() {
+    let World { robot, .. } = world();
+    let mut rng = rng(1);
+    let touches = one_point(robot.exported(), &START, 6, &mut rng);
+    let found = fit(&robot, &touches, &Given::default(), &Limits::default()).unwrap();
+    // R_j t - w = -p_j, by a solver of its own.
+    let (mut a, mut b) = (DMatrix::zeros(18, 6), DVector::zeros(18));
+    for (k, p) in touches.postures.iter().enumerate() {
+        let tip = robot.exported().base_from_tip(&p.readings);
+        a.view_mut((3 * k, 0), (3, 3)).copy_from(&tip.rotation);
+        a.view_mut((3 * k, 3), (3, 3)).copy_from(&-Matrix3::identity());
+        b.rows_mut(3 * k, 3).copy_from(&-tip.translation);
+    }
+    let closed = a.svd(true, true).solve(&b, 1e-14).unwrap();
+    let tool = found.tools[0].translation;
+    let apart = (tool - Vector3::new(closed[0], closed[1], closed[2])).norm();
+    assert!(apart < 1e-9, "{apart:.1e} m from the closed form");
+    assert!((tool - Vector3::from(TOOL)).norm() < 1e-9);
+    assert!(found.work.is_none() && found.rms_m < 1e-9);
+}
+
+#[test]
+fn tool_and_work_object_without_noise_are_exact() {
+    let World { robot, .. } = world();
+    let mut rng = rng(2);
+    let q = spread(&ranges(&robot.stops), 12, &mut rng);
+    let touches = exact(robot.exported()).places(&q, "fixture", &mut rng);
+    let found = fit(&robot, &touches, &Given::default(), &Limits::default()).unwrap();
+    let (rad, m) = found.work.unwrap().distance(&work());
+    let tool = (found.tools[0].translation - Vector3::from(TOOL)).norm();
+    assert!(rad < 1e-9 && m < 1e-9 && tool < 1e-9, "{rad:.1e} rad, {m:.1e} m, {tool:.1e} m");
+}
+
+#[test]
+fn a_wrong_touch_is_left_out_by_name_and_moves_nothing() {
+    let World { robot, truth } = world();
+    let mut rng = rng(3);
+    let toucher = Toucher { truth: &truth, work: work(), tool: TOOL.into(), sigma_m: 5e-5, joint_sigma: 2e-5 };
+    let q = spread(&ranges(&robot.stops), 12, &mut rng);
+    let mut touches = toucher.places(&q, "fixture", &mut rng);
+    let clean = fit(&robot, &touches, &Given::default(), &Limits::default()).unwrap();
+    assert!(clean.judged.iter().all(|j| !j.left_out));
+    let Seen::Point(place) = touches.all[7].seen else { unreachable!() };
+    touches.all[7].seen = Seen::Point(place + Vector3::new(0.0, 2e-3, 0.0));
+    let found = fit(&robot, &touches, &Given::default(), &Limits::default()).unwrap();
+    let left: Vec<usize> = (0..12).filter(|&k| found.judged[k].left_out).collect();
+    assert_eq!(left, [7]);
+    let moved = (found.tools[0].translation - clean.tools[0].translation).norm();
+    assert!(moved < 1e-4, "{moved} m");
+}
+
+/// What touches cannot tell is refused with its reason.
+#[test]
+fn touches_that_tell_nothing_are_refused_by_their_reason() {
+    let World { robot, .. } = world();
+    let mut rng = rng(4);
+    let q = spread(&ranges(&robot.stops), 12, &mut rng);
+    let good = exact(robot.exported()).places(&q, "fixture", &mut rng);
+    let code = |touches: &Touches| fit(&robot, touches, &Given::default(), &Limits::default()).unwrap_err().code;
+    let with = |change: &dyn Fn(usize, Vector3<f64>) -> Vector3<f64>| {
+        let mut touches = good.clone();
+        for (k, t) in touches.all.iter_mut().enumerate() {
+            if let Seen::Point(p) = &mut t.seen {
+                *p = change(k, *p);
+            }
+        }
+        touches
+    };
+    assert_eq!(code(&with(&|_, p| 1e3 * p)), Code::TouchUnit);
+    assert_eq!(code(&with(&|k, _| Vector3::new(0.1 * k as f64, 0.0, 0.0))), Code::TouchesOnLine);
+    let mut few = good.clone();
+    few.all.truncate(3);
+    assert_eq!(code(&few), Code::TouchesFew);
+    let mut coarse = good.clone();
+    coarse.all[2].sigma_m = 0.05;
+    assert_eq!(code(&coarse), Code::TouchUnit);
+    // Joint 1 alone turns: the tip has one axis in all touches.
+    let mut one_axis = one_point(robot.exported(), &START, 5, &mut rng);
+    for (k, p) in one_axis.postures.iter_mut().enumerate() {
+        p.readings = START.to_vec();
+        p.readings[5] += 0.5 * k as f64;
+    }
+    assert_eq!(code(&one_axis), Code::TouchesNotTurned);
+    one_axis.postures.iter_mut().for_each(|p| p.readings = START.to_vec());
+    assert_eq!(code(&one_axis), Code::TouchesNotTurned);
+}
+
+fn robotcal(args: &[&str], out: &Path) -> Run {
+    let output = Command::new(env!("CARGO_BIN_EXE_robotcal")).args(args).arg("--out").arg(out).output().unwrap();
+    Run { output, out: out.to_path_buf() }
+}
+
+struct Files {
+    folder: tempfile::TempDir,
+    touches: PathBuf,
+    world: World,
+}
+
+/// Touches of the true robot in a folder of their own.
+fn files(frame: &str, work: Pose, seed: u64) -> Files {
+    let world = world();
+    let mut rng = rng(seed);
+    let toucher = Toucher { truth: &world.truth, work, tool: TOOL.into(), sigma_m: 5e-5, joint_sigma: 2e-5 };
+    let q = spread(&ranges(&world.robot.stops), 20, &mut rng);
+    let touches = toucher.places(&q, frame, &mut rng);
+    let folder = tempfile::tempdir().unwrap();
+    let head = format!("base = \"base_link\"\ntip = \"tool0\"\n[contact]\nsigma_m = 0.00005\nframe = \"{frame}\"\n");
+    let joints = world.truth.chain.readings.clone();
+    let touches = write(&folder.path().join("touches"), &joints, &touches, &head);
+    Files { folder, touches, world }
+}
+
+const SOLUTION: &str = "reports/kr6_small/solution.json";
+
+#[test]
+fn a_program_with_measured_frames_brings_the_tool_where_it_was_meant() {
+    let Files { folder, touches, world } = files("base_link", Pose::identity(), 5);
+    let solution = repo(SOLUTION);
+    let [solution, touches] = [&solution, &touches].map(|p| p.to_str().unwrap().to_owned());
+    let frames = folder.path().join("frames");
+    let run = robotcal(&["frames", "--from", &solution, "--touches", &touches], &frames).expect(0);
+    println!("{}", run.said());
+    let nominal = Robot::nominal(world.truth.chain.clone());
+    let q = spread(&ranges(&world.robot.stops), 40, &mut rng(6));
+    let mut table = world.truth.chain.readings.join(",") + "\n";
+    q.iter().for_each(|q| table += &(q.iter().map(|v| format!("{v:.12}")).collect::<Vec<_>>().join(",") + "\n"));
+    let program = folder.path().join("t.csv");
+    std::fs::write(&program, table).unwrap();
+    let path = |p: &str| repo(p).to_str().unwrap().to_owned();
+    let (urdf, kr6) =
+        (path("reports/kr6_small/kuka_kr6_r900.calibrated.urdf"), path("robots/kuka_kr6_r900/kuka_kr6_r900.urdf"));
+    let compensation = path("reports/kr6_small/compensation.toml");
+    let tool = format!("--tool={},{},{},0,0,0,1", TOOL[0], TOOL[1], TOOL[2]);
+    let frames = frames.join("frames.json");
+    let call = |more: &[&str]| {
+        let mut args = vec!["compensate", program.to_str().unwrap(), "--nominal", &kr6, "--urdf", &urdf];
+        args.extend(["--compensation", &compensation, "--joint-unit", "rad", "--unordered"]);
+        args.extend(["--base", "base_link", "--tip", "tool0"]);
+        args.extend(more);
+        robotcal(&args, &folder.path().join("out"))
+    };
+    let error = |run: &Run| {
+        let text = run.text("t.csv");
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let rows: Vec<Vec<f64>> =
+            reader.records().map(|r| r.unwrap().iter().map(|c| c.parse().unwrap()).collect()).collect();
+        let told = run.told();
+        let is_left = |k: usize| told.left.iter().any(|(line, _, _)| *line == k + 2);
+        let of = |(_, (meant, row)): (usize, (&Vec<f64>, &Vec<f64>))| {
+            let at = |robot: &Robot, q: &[f64]| robot.base_from_tip(q).transform(&Vector3::from(TOOL));
+            (at(&world.truth, row) - at(&nominal, meant)).norm_squared()
+        };
+        assert!(told.left.len() <= 10, "{:?}", told.left);
+        let done: Vec<f64> = q.iter().zip(&rows).enumerate().filter(|(k, _)| !is_left(*k)).map(of).collect();
+        (done.iter().sum::<f64>() / done.len() as f64).sqrt()
+    };
+    // Nobody said where base and tool are: it is stated, and the program is not called corrected.
+    let untold = call(&[]).expect(1);
+    assert_eq!(findings(&untold)["frames_unknown"].0, "gate");
+    let nominal_frames = call(&["--frames", "nominal"]);
+    // The next call writes to the same folder.
+    let with_nominal = error(&nominal_frames);
+    let measured = call(&["--frames", frames.to_str().unwrap(), &tool]);
+    println!("{}", measured.said());
+    let with_measured = error(&measured);
+    println!("nominal frames: {:.3} mm, measured frames: {:.3} mm", 1e3 * with_nominal, 1e3 * with_measured);
+    assert!(with_measured < 1e-4 && with_nominal > 1e-3);
+    // Without the compensation it is another robot than that of the frames.
+    let mut args = vec!["compensate", program.to_str().unwrap(), "--nominal", &kr6, "--urdf", &kr6];
+    args.extend(["--joint-unit", "rad", "--base", "base_link", "--tip", "tool0", "--frames", frames.to_str().unwrap()]);
+    let other = robotcal(&args, &folder.path().join("other")).expect(2);
+    assert_says(&other.said(), Code::SolutionDiffers, &["kuka_kr6_r900.urdf"]);
+}
+
+/// Each bad input is refused with its file and place.
+#[test]
+fn bad_touches_are_refused_by_file_and_place() {
+    let solution = repo(SOLUTION);
+    let call = |change: &dyn Fn(&Path)| {
+        let Files { folder, touches, .. } = files("fixture", work(), 8);
+        change(&touches);
+        let args = ["frames", "--from", solution.to_str().unwrap(), "--touches", touches.to_str().unwrap()];
+        robotcal(&args, &folder.path().join("frames"))
+    };
+    let edit = |file: &'static str, from: &'static str, to: &'static str| {
+        move |folder: &Path| {
+            let path = folder.join(file);
+            let text = std::fs::read_to_string(&path).unwrap();
+            let changed = text.replacen(from, to, 1);
+            assert_ne!(changed, text);
+            std::fs::write(path, changed).unwrap();
+        }
+    };
+    let refused = |run: Run, exit: i32, code: Code, names: &[&str]| assert_says(&run.expect(exit).said(), code, names);
+    refused(call(&edit("contacts.csv", "t03,", "t33,")), 2, Code::StopUnknown, &["contacts.csv:5", "t33"]);
+    refused(
+        call(&edit("series.toml", "tip = \"tool0\"", "tip = \"link_5\"")),
+        2,
+        Code::SolutionDiffers,
+        &["series.toml", "link_5", "tool0"],
+    );
+    refused(call(&edit("series.toml", "sigma_m = 0.00005", "sigma_m = 0.05")), 2, Code::TouchUnit, &["t00"]);
+    refused(
+        call(&edit("contacts.csv", "x_m,y_m,z_m", "x_mm,y_mm,z_mm")),
+        2,
+        Code::CsvColumnUnknown,
+        &["contacts.csv", "x_mm"],
+    );
+    let millimetres = |folder: &Path| {
+        let path = folder.join("contacts.csv");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let scaled = |line: &str| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let mm: Vec<String> = cells[2..].iter().map(|c| (1e3 * c.parse::<f64>().unwrap()).to_string()).collect();
+            format!("{},{},{}\n", cells[0], cells[1], mm.join(","))
+        };
+        let rows: String = text.lines().skip(1).map(scaled).collect();
+        std::fs::write(path, format!("stop,contact,x_m,y_m,z_m\n{rows}")).unwrap();
+    };
+    refused(call(&millimetres), 2, Code::TouchUnit, &["touches"]);
+    let few = |folder: &Path| {
+        let path = folder.join("contacts.csv");
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(path, text.lines().take(4).map(|l| format!("{l}\n")).collect::<String>()).unwrap();
+    };
+    refused(call(&few), 2, Code::TouchesFew, &["touches"]);
+    refused(
+        call(&|folder| std::fs::remove_file(folder.join("contacts.csv")).unwrap()),
+        2,
+        Code::FileMissing,
+        &["touches", "contacts.csv"],
+    );
+}
+
+/// What is written for controllers is read back by the readers of their programs, the URDF by that of robots.
+#[test]
+fn frames_are_written_as_controllers_read_them() {
+    use robotcal::programs::{self, Kind, Language, Setting, TextFile};
+    let Files { folder, touches, world } = files("fixture", work(), 9);
+    let out = folder.path().join("frames");
+    let solution = repo(SOLUTION);
+    let args = [
+        "frames",
+        "--from",
+        solution.to_str().unwrap(),
+        "--touches",
+        touches.to_str().unwrap(),
+        "--tool-rpy-deg",
+        "10,-20,30",
+    ];
+    let run = robotcal(&args, &out).expect(0);
+    let record = robotcal::output::frames_record::read(&run.file("frames.json")).unwrap();
+    let (tool, work) = (Pose::from(&record.tool.as_ref().unwrap().pose), record.base_from_work());
+    assert!((tool.rpy()[2].to_degrees() - 30.0).abs() < 1e-9);
+    let chain = &world.truth.chain;
+    let setting = Setting {
+        chain,
+        axes: &[0, 1, 2, 3, 4, 5],
+        rad_per_unit: None,
+        base: Pose::identity(),
+        tool: None,
+        work: None,
+    };
+    let moves = [
+        (Language::Krl, "src", "END\n", "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\nEND\n"),
+        (
+            Language::Rapid,
+            "mod",
+            "ENDMODULE",
+            "PROC main()\nMoveL [[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v10,fine,tool_tcp\\WObj:=wobj_fixture;\nENDPROC\nENDMODULE",
+        ),
+        (
+            Language::UrScript,
+            "script",
+            "end\n",
+            "movel(pose_trans(plane_fixture,p[0,0,0,0,0,0]))\nmovel(p[0.1,0.2,0.3,0,0,0])\nend\n",
+        ),
+    ];
+    for (language, kind, end, ending) in moves {
+        let text = run.text(&format!("robotcal_frames.{kind}"));
+        println!("{text}");
+        let at = text.rfind(end).unwrap();
+        let bytes = format!("{}{ending}", &text[..at]).into_bytes();
+        let program = programs::read(language, vec![TextFile { name: format!("t.{kind}"), bytes }], &setting).unwrap();
+        let Kind::Pose(pose) = &program.targets.last().unwrap().kind else { panic!("{language:?}: no pose") };
+        let apart = |a: &Pose, b: &Pose| {
+            let (rad, m) = a.distance(b);
+            assert!(m < 1e-6 && rad < 1e-7, "{language:?}: {m:.1e} m, {rad:.1e} rad");
+        };
+        apart(&pose.flange_from_tool, &tool);
+        if language != Language::UrScript {
+            apart(&pose.base_from_work, &work);
+        }
+    }
+    let file = out.join("kuka_kr6_r900.frames.urdf");
+    let read = robotcal::urdf::read(&file).unwrap();
+    for (link, from, expected) in [("tcp", "tool0", tool), ("fixture", "base_link", work)] {
+        let at = |tip: &str| Robot::nominal(read.chain(Some("base_link"), Some(tip)).unwrap()).base_from_tip(&[0.3; 6]);
+        let pose = match from {
+            "tool0" => at("tool0").inverse() * at(link),
+            _ => read.fixed_base(link, "tool0").unwrap().1,
+        };
+        let (rad, m) = pose.distance(&expected);
+        assert!(rad < 1e-12 && m < 1e-12, "{link}: {rad:.1e} rad, {m:.1e} m");
+    }
+    // Every other byte is that of the corrected URDF.
+    let (urdf, calibrated) = (
+        std::fs::read_to_string(file).unwrap(),
+        std::fs::read_to_string(repo("reports/kr6_small/kuka_kr6_r900.calibrated.urdf")).unwrap(),
+    );
+    let start = urdf.find("  <link name=\"tcp\"/>").unwrap();
+    let end = start + urdf[start..].rfind("</joint>\n").unwrap() + "</joint>\n".len();
+    assert_eq!(format!("{}{}", &urdf[..start], &urdf[end..]), calibrated);
+}
+
+/// A plan is a series: touched as planned it gives back tool and work object that it was made for.
+#[test]
+fn planned_touches_are_a_series_that_frames_reads() {
+    let folder = tempfile::tempdir().unwrap();
+    let points = folder.path().join("fixture.csv");
+    let grid = (0..9).map(|k| {
+        format!("p{k},{},{},{}\n", 0.1 * f64::from(k % 3), 0.1 * f64::from(k / 3), 0.02 * f64::from((k * 5) % 3))
+    });
+    std::fs::write(&points, format!("name,x_m,y_m,z_m\n{}", grid.collect::<String>())).unwrap();
+    let (solution, out) = (repo(SOLUTION), folder.path().join("touches"));
+    let [solution, points] = [&solution, &points].map(|p| p.to_str().unwrap().to_owned());
+    let plan = [
+        "plan",
+        "--from",
+        &solution,
+        "--touch",
+        &points,
+        "--touch-work",
+        "0.4,-0.1,0.1,0,0,20",
+        "--touch-tool",
+        "0.01,0,0.1",
+    ];
+    let run = robotcal(&[&plan[..], &["--touch-frame", "fixture", "--count", "8"]].concat(), &out).expect(0);
+    println!("{}", run.said());
+    let frames = folder.path().join("frames");
+    let run = robotcal(&["frames", "--from", &solution, "--touches", out.to_str().unwrap()], &frames).expect(0);
+    println!("{}", run.said());
+    let record = robotcal::output::frames_record::read(&run.file("frames.json")).unwrap();
+    let (rad, m) =
+        record.base_from_work().distance(&Pose::from_xyz_rpy([0.4, -0.1, 0.1], [0.0, 0.0, 20f64.to_radians()]));
+    // Joint values have four decimals of a degree.
+    assert!(rad < 2e-5 && m < 2e-5, "{rad:.1e} rad, {m:.1e} m");
+    assert!((record.tool.unwrap().pose.xyz_m[2] - 0.1).abs() < 2e-5);
+    // Points in mm, and points that no posture touches.
+    std::fs::write(&points, "name,x_m,y_m,z_m\na,0,0,0\nb,100,0,0\nc,0,100,0\n").unwrap();
+    assert_says(&robotcal(&plan, &out).expect(2).said(), Code::TouchUnit, &["fixture.csv:3"]);
+    std::fs::write(&points, "name,x_m,y_m,z_m\na,0,0,0\nb,5,0,0\nc,0,5,0\n").unwrap();
+    assert_says(&robotcal(&plan, &out).expect(3).said(), Code::PlanOutOfReach, &["b", "c"]);
+}
+
+/// A taught program on another robot: the common work object is named, and the tool comes to the same place of it.
+#[test]
+fn a_taught_program_is_moved_by_a_common_work_object() {
+    // A little beside the place of the first: joint vectors are spread over the whole region.
+    let other_work = work() * Pose::from_xyz_rpy([0.004, -0.003, 0.002], [0.004, -0.003, 0.005]);
+    let (a, b, wrong) =
+        (files("fixture", work(), 11), files("fixture", other_work, 12), files("table", other_work, 13));
+    let solution = repo(SOLUTION);
+    let frames = |files: &Files| {
+        let args = ["frames", "--from", solution.to_str().unwrap(), "--touches", files.touches.to_str().unwrap()];
+        robotcal(&args, &files.folder.path().join("frames"))
+            .expect(0)
+            .out
+            .join("frames.json")
+            .to_str()
+            .unwrap()
+            .to_owned()
+    };
+    let [of_a, of_b, of_wrong] = [&a, &b, &wrong].map(frames);
+    let path = |p: &str| repo(p).to_str().unwrap().to_owned();
+    let (urdf, compensation) =
+        (path("reports/kr6_small/kuka_kr6_r900.calibrated.urdf"), path("reports/kr6_small/compensation.toml"));
+    let q = spread(&ranges(&a.world.robot.stops), 30, &mut rng(14));
+    let mut table = a.world.truth.chain.readings.join(",") + "\n";
+    q.iter().for_each(|q| table += &(q.iter().map(|v| format!("{v:.12}")).collect::<Vec<_>>().join(",") + "\n"));
+    let program = a.folder.path().join("taught.csv");
+    std::fs::write(&program, table).unwrap();
+    let call = |more: &[&str]| {
+        let mut args =
+            vec!["compensate", program.to_str().unwrap(), "--from", &urdf, "--to", &urdf, "--joint-unit", "rad"];
+        args.extend(["--compensation", &compensation, "--from-compensation", &compensation, "--unordered"]);
+        args.extend(["--base", "base_link", "--tip", "tool0"]);
+        args.extend(more);
+        robotcal(&args, &a.folder.path().join("out"))
+    };
+    let run = call(&["--from-frames", &of_a, "--frames", &of_b]);
+    println!("{}", run.said());
+    let text = run.text("taught.csv");
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let rows: Vec<Vec<f64>> =
+        reader.records().map(|r| r.unwrap().iter().map(|c| c.parse().unwrap()).collect()).collect();
+    let place = |work: &Pose, q: &[f64]| {
+        work.inverse().transform(&a.world.truth.base_from_tip(q).transform(&Vector3::from(TOOL)))
+    };
+    let told = run.told();
+    let is_left = |k: usize| told.left.iter().any(|(line, _, _)| *line == k + 2);
+    let moved: Vec<f64> = (q.iter().zip(&rows).enumerate().filter(|(k, _)| !is_left(*k)))
+        .map(|(_, (old, new))| (place(&other_work, new) - place(&work(), old)).norm_squared())
+        .collect();
+    let error = (moved.iter().sum::<f64>() / moved.len() as f64).sqrt();
+    let stated = findings(&run)["expected_error"].1["rms_mm"].as_f64().unwrap();
+    println!("{} of {} targets moved, off by {:.4} mm, stated {stated:.4} mm", moved.len(), q.len(), 1e3 * error);
+    // Twenty touches of 0.05 mm for each robot, whose own errors are common to both.
+    assert!(moved.len() >= 15 && error < 1e-4, "{} targets, {error} m", moved.len());
+    assert_eq!(findings(&call(&[]).expect(1))["frames_unknown"].0, "gate");
+    assert_says(&call(&["--frames", &of_b]).expect(2).said(), Code::OptionMissing, &["--from-frames"]);
+    assert_says(&call(&["--from-frames", &of_a]).expect(2).said(), Code::OptionMissing, &["--frames"]);
+    assert_says(
+        &call(&["--from-frames", &of_a, "--frames", &of_wrong]).expect(2).said(),
+        Code::FramesDiffer,
+        &["fixture", "table"],
+    );
+}
