@@ -8,7 +8,7 @@ use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
 use super::Verdict;
-use super::compensate_frames::{Choice, Side, Sides};
+use super::compensate_frames::{Choice, Side, Sides, known_error};
 use super::robot::noted_chain;
 use super::say::{say, say_line};
 use crate::error::{Code, Error, Result};
@@ -174,16 +174,18 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
         }),
     };
     let choice = Choice::read(args.frames.as_deref(), args.from_frames.as_deref(), &sides)?;
+    let framed = choice.framed(&sides)?;
     let frames = choice.measured((setting.tool, setting.work));
     let models = Models {
         controller: &controller,
         from: from.as_ref().unwrap_or(&controller),
         to: &to,
         frames: frames.as_ref(),
+        beyond: [true, false].map(|taught| framed.as_ref().ok().and_then(|all| known_error(all, taught))),
     };
     let done = programs::compensate(&program, models, &postures(args, &controller.chain, &axes)?);
     let left = done.left(&program);
-    let expected = choice.expected(&sides, &program, &done)?;
+    let expected = choice.expected(&sides, &framed, &program, &done)?;
     let mut findings = corrections::nominal_findings(&program, &done);
     findings.extend(corrections::displaced_finding(&program, &done));
     let subject = args.urdf.display().to_string();

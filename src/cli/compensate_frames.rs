@@ -13,7 +13,7 @@ use crate::output::frames_record::{self, FramesRecord, ToolKind};
 use crate::output::restore::found_model;
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::programs::compensate::Compensated;
-use crate::programs::{MeasuredFrames, MeasuredTool, Program, RobotFrames};
+use crate::programs::{KnownError, MeasuredFrames, MeasuredTool, Program, RobotFrames};
 
 /// One of the calibrated robots.
 pub(super) struct Side<'a> {
@@ -149,21 +149,34 @@ impl Choice {
         }
     }
 
-    /// Expected error of every target, m; else why it is not known.
-    pub fn expected(&self, sides: &Sides, program: &Program, done: &Compensated) -> Result<Known<Vec<Option<f64>>>> {
-        match (self, &sides.from) {
-            (Self::Measured { to, from }, other) => {
-                let mut all = Vec::new();
-                let both = [(Some(&sides.to), Some(to), false), (other.as_ref(), from.as_ref(), true)];
-                for (side, record, is_taught) in both {
-                    let (Some(side), Some(record)) = (side, record) else { continue };
-                    match framed(side, record, is_taught)? {
-                        Ok(robot) => all.push(robot),
-                        Err(why) => return Ok(Err(why)),
-                    }
-                }
-                Ok(Ok(corrections::expected_with_frames(program, done, &all)))
+    /// The robots with their measured frames; else why what is known of them is not at hand.
+    pub fn framed(&self, sides: &Sides) -> Result<Known<Vec<FramedRobot>>> {
+        let Self::Measured { to, from } = self else { return Ok(Ok(Vec::new())) };
+        let mut all = Vec::new();
+        let both = [(Some(&sides.to), Some(to), false), (sides.from.as_ref(), from.as_ref(), true)];
+        for (side, record, is_taught) in both {
+            let (Some(side), Some(record)) = (side, record) else { continue };
+            match framed(side, record, is_taught)? {
+                Ok(robot) => all.push(robot),
+                Err(why) => return Ok(Err(why)),
             }
+        }
+        Ok(Ok(all))
+    }
+
+    /// Expected error of every target, m; else why it is not known.
+    pub fn expected(
+        &self,
+        sides: &Sides,
+        framed: &Known<Vec<FramedRobot>>,
+        program: &Program,
+        done: &Compensated,
+    ) -> Result<Known<Vec<Option<f64>>>> {
+        match (self, &sides.from) {
+            (Self::Measured { .. }, _) => Ok(framed
+                .as_ref()
+                .map(|all| corrections::expected_with_frames(program, done, all))
+                .map_err(Clone::clone)),
             (_, Some(_)) => Ok(Err("base and tool of both robots count, and no common frame is given".into())),
             (_, None) => Ok(match solution(&sides.to, None)? {
                 Ok(record) => Ok(corrections::expected_errors(program, done, &found_model(&record)?)),
@@ -171,6 +184,11 @@ impl Choice {
             }),
         }
     }
+}
+
+/// What is known beyond the model of the robot that taught, or that runs, the program.
+pub(super) fn known_error(all: &[FramedRobot], is_taught: bool) -> Option<&dyn KnownError> {
+    all.iter().find(|robot| robot.is_taught == is_taught).map(|robot| robot as &dyn KnownError)
 }
 
 fn frames_of(record: &FramesRecord) -> RobotFrames {

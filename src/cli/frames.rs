@@ -116,6 +116,8 @@ pub(super) fn run(args: &FramesArgs) -> Result<Verdict> {
             placement,
             frames: rows(&fitted.knowledge.frames),
             cross: rows(&fitted.knowledge.cross),
+            learned: fitted.knowledge.learned.as_slice().to_vec(),
+            taken: fitted.knowledge.taken.as_slice().to_vec(),
         },
     };
     let mut files = frame_files::files(&frames);

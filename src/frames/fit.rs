@@ -319,7 +319,7 @@ impl Work<'_> {
             Some(self.robot.covariance().view((first, first), (6, 6)).into_owned())
         };
         let has_work = self.touches.frame.is_some();
-        let knowledge = Knowledge::new(self.robot, columns, &solved.inverse, &solved.absorbed);
+        let knowledge = Knowledge::new(self.robot, columns, (&solved.inverse, &solved.step), &solved.absorbed);
         let (tool, none) = (&unknowns.tools[0], Knowledge::none(self.robot));
         let rms = |of: &dyn Fn(&Posture) -> f64| {
             root_mean_square(&self.region.iter().map(|p| (of(p).powi(2), 1.0)).collect::<Vec<_>>())

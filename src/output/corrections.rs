@@ -13,7 +13,7 @@ use crate::frames::{Knowledge, KnownRobot};
 use crate::geom::Pose;
 use crate::model::robot::Posture;
 use crate::programs::compensate::{Compensated, RESIDUAL};
-use crate::programs::{Kind, Left, Outcome, Program};
+use crate::programs::{Kind, KnownError, Left, Outcome, Program};
 use crate::urdf::Chain;
 
 /// Name of the table of corrections.
@@ -168,6 +168,13 @@ pub struct FramedRobot {
     pub work: Pose,
     /// True for the robot on which the program was taught.
     pub is_taught: bool,
+}
+
+impl KnownError for FramedRobot {
+    fn error_m(&self, readings: &[f64]) -> nalgebra::Vector3<f64> {
+        let tool = self.tool.unwrap_or_else(Pose::identity);
+        self.knowledge.error_m(&self.robot, &Posture::at(readings), &tool, &self.work)
+    }
 }
 
 /// Which tool and base a program was corrected with.

@@ -3,7 +3,7 @@
 //! Poses are `parent_from_frame`; covariances of points stand along the axes of the parent, those of poses are of body twists, translation
 //! first, row by row; m and rad. A change of meaning raises [`FORMAT`].
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use super::corrections::Finding;
@@ -125,6 +125,10 @@ pub struct KnowledgeRecord {
     pub frames: Vec<Vec<f64>>,
     /// Of `u` with the robot, a list a row.
     pub cross: Vec<Vec<f64>>,
+    /// What the touches say of the robot's parameters beyond the solution.
+    pub learned: Vec<f64>,
+    /// What of it tool and work object have taken up.
+    pub taken: Vec<f64>,
 }
 
 /// The whole file.
@@ -220,6 +224,8 @@ impl FramesRecord {
         let square = known.frames.iter().all(|r| r.len() == n) && (n == 9 || n == 12);
         let whole = known.cross.len() == n && known.cross.iter().all(|r| r.len() == columns);
         let all = || known.frames.iter().chain(&known.cross).flatten();
+        let whole = whole && known.learned.len() == columns && known.taken.len() == n;
+        let all = || all().chain(&known.learned).chain(&known.taken);
         if !square || !whole || !all().all(|v| v.is_finite()) {
             return Err(damaged("its covariance does not hang together"));
         }
@@ -291,7 +297,13 @@ impl FramesRecord {
         let robot = found.known_robot(placement)?;
         let matrix =
             |rows: &[Vec<f64>]| DMatrix::from_fn(rows.len(), rows.first().map_or(0, Vec::len), |i, j| rows[i][j]);
-        let knowledge = Knowledge { frames: matrix(&self.knowledge.frames), cross: matrix(&self.knowledge.cross) };
+        let vector = |values: &[f64]| DVector::from_column_slice(values);
+        let knowledge = Knowledge {
+            frames: matrix(&self.knowledge.frames),
+            cross: matrix(&self.knowledge.cross),
+            learned: vector(&self.knowledge.learned),
+            taken: vector(&self.knowledge.taken),
+        };
         if knowledge.cross.ncols() != robot.columns().len() {
             return Err(damaged("the solution has other parameters than the one that the frames were found with"));
         }

@@ -12,7 +12,7 @@ use nalgebra::Vector6;
 
 use super::codes::Branch;
 use super::field::{Edit, Place, splice};
-use super::measured_frames::{MeasuredFrames, Moved};
+use super::measured_frames::{KnownError, MeasuredFrames, Moved};
 use super::posture::{Before, Finder, Known};
 use super::program::{Approach, Displaced, Kind, Left, PoseTarget, Posture, Program, Target, Understood, write_joints};
 use super::reason::{Reason, Why};
@@ -39,6 +39,16 @@ pub struct Models<'a> {
     pub to: &'a Robot,
     /// Where tool and work object really are; without them the program's own count.
     pub frames: Option<&'a MeasuredFrames>,
+    /// What is known beyond the models of the robots that taught and that runs the program.
+    pub beyond: [Option<&'a dyn KnownError>; 2],
+}
+
+impl Models<'_> {
+    /// A pose of one of the robots moved by what is known beyond its model, forwards or back.
+    fn beyond(&self, robot: usize, readings: &[f64], factor: f64, pose: Pose) -> Pose {
+        let error = self.beyond[robot].map(|known| known.error_m(readings));
+        error.map_or(pose, |e| Pose::new(pose.rotation, pose.translation + e * factor))
+    }
 }
 
 /// What is known of the postures.
@@ -225,7 +235,9 @@ impl<'a> Work<'a> {
         let (programmed, held, known) = self.meant(kind, programmed_before.is_some())?;
         let meant = reach(self.models.from, &self.limits, &held, programmed_before.as_deref()).stop(&programmed);
         let moved = self.models.frames.map_or_else(|| Ok(Moved::none()), |f| f.moved(kind))?;
-        let wanted = moved.applied(&self.models.from.pose_at(&meant, &vec![0.0; programmed.len()]));
+        let taught = self.models.from.pose_at(&meant, &vec![0.0; programmed.len()]);
+        let taught = self.models.beyond(0, &programmed, 1.0, taught);
+        let wanted = self.models.beyond(1, &programmed, -1.0, moved.applied(&taught));
         let to = reach(self.models.to, &self.limits, &held, corrected_before.as_deref());
         let corrected = self.reached(&to, &wanted, &programmed);
         // The next target is approached from here also when this one stays as it is.

@@ -6,6 +6,12 @@ use super::program::{Kind, Understood};
 use super::reason::{Reason, Why};
 use crate::geom::Pose;
 
+/// What is known of a robot beyond the model that it is written as.
+pub trait KnownError: std::fmt::Debug + Sync {
+    /// Where the tool is beside where the model has it, at readings, along the axes of the base, m.
+    fn error_m(&self, readings: &[f64]) -> Vector3<f64>;
+}
+
 /// A tool as it was measured on a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MeasuredTool {

@@ -33,7 +33,7 @@ mod urscript;
 
 pub use compensate::{Correction, Models, Outcome, Postures, compensate};
 pub use language::{Language, read};
-pub use measured_frames::{MeasuredFrames, MeasuredTool, RobotFrames};
+pub use measured_frames::{KnownError, MeasuredFrames, MeasuredTool, RobotFrames};
 pub use posture::Known;
 pub use program::{Kind, Left, Program, Target};
 pub use reason::{Reason, Why};

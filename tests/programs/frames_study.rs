@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use robotcal::assess::Limits;
 use robotcal::calibration::{Ends, Inputs};
-use robotcal::frames::{Given, KnownRobot, Seen, TouchRequest, Touches, fit, plan_touches};
+use robotcal::frames::{Given, Knowledge, KnownRobot, Seen, TouchRequest, Touches, fit, plan_touches};
 use robotcal::geom::{Pose, skew};
 use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::linalg::SymmetricFactor;
@@ -172,10 +172,11 @@ impl Robots {
     }
 
     /// Mean square error of an off-line program with measured frames, m^2.
-    fn program(&self, robot: &Robot, targets: &[Vec<f64>], cell: &Cell, (tool, work): (Vector3<f64>, Pose)) -> f64 {
+    fn program(&self, robot: &Robot, targets: &[Vec<f64>], cell: &Cell, found: &Found) -> f64 {
+        let (tool, work) = (found.tool, found.work);
         let square = |q: &Vec<f64>| {
             let meant = cell.planned_work.inverse() * self.nominal.base_from_tip(q) * point(cell.planned_tool);
-            let wanted = work * meant * point(tool).inverse();
+            let wanted = found.aimed(self, q, work * meant * point(tool).inverse());
             let corrected = self.reached(robot, &wanted, q)?;
             Some((self.really(&corrected, cell) - meant.translation).norm_squared())
         };
@@ -217,19 +218,46 @@ fn kr6(seed: u64, errors: RobotErrors) -> Robots {
     Robots { joint_sigma, region, ..Robots::of(&s, &kuka(), made.truth.robot(&kuka()).unwrap()) }
 }
 
+/// Frames of touches, as `compensate` uses them.
+struct Found {
+    tool: Vector3<f64>,
+    work: Pose,
+    /// What the touches say of the robot beyond the solution.
+    knowledge: Option<Knowledge>,
+    bound_m2: f64,
+    stated_m2: f64,
+}
+
+impl Found {
+    /// Tool and base where the description has them.
+    fn nominal(tool: Vector3<f64>, work: Pose) -> Self {
+        Self { tool, work, knowledge: None, bound_m2: 0.0, stated_m2: 0.0 }
+    }
+
+    /// Where the tool is beside where the written robot has it.
+    fn error(&self, robots: &Robots, q: &[f64]) -> Vector3<f64> {
+        let of = |k: &Knowledge| k.error_m(&robots.known, &Posture::at(q), &point(self.tool), &self.work);
+        self.knowledge.as_ref().map_or_else(Vector3::zeros, of)
+    }
+
+    /// The pose that the written robot aims at to arrive at another.
+    fn aimed(&self, robots: &Robots, q: &[f64], wanted: Pose) -> Pose {
+        Pose::new(wanted.rotation, wanted.translation - self.error(robots, q))
+    }
+}
+
 /// Frames of touches at random joint vectors of the region, and the bound for them.
-fn touched(
-    robots: &Robots,
-    cell: &Cell,
-    count: usize,
-    targets: &[Vec<f64>],
-    rng: &mut ChaCha8Rng,
-) -> ((Vector3<f64>, Pose), f64, f64) {
+fn touched(robots: &Robots, cell: &Cell, count: usize, targets: &[Vec<f64>], rng: &mut ChaCha8Rng) -> Found {
     let q = robots.drawn(count, rng);
     let touches = robots.toucher(cell).places(&q, "fixture", rng);
     let found = fit(&robots.known, &touches, &Given::default(), &Limits::default()).unwrap();
-    let (tool, work) = (found.tools[0].translation, found.work.unwrap());
-    (((tool), work), robots.bound(&touches, targets, &cell.tool, &cell.work), found.expected.with_frames_m.powi(2))
+    Found {
+        tool: found.tools[0].translation,
+        work: found.work.unwrap(),
+        knowledge: Some(found.knowledge),
+        bound_m2: robots.bound(&touches, targets, &cell.tool, &cell.work),
+        stated_m2: found.expected.with_frames_m.powi(2),
+    }
 }
 
 fn worlds(default: u64) -> u64 {
@@ -248,35 +276,39 @@ fn study_of_touches_against_their_bound() {
         let of = |(k, robot): (usize, &Robots)| {
             let mut rng = ChaCha8Rng::seed_from_u64(100 * k as u64 + count as u64);
             let other = &robots[(k + 1) % robots.len()];
-            let mut sums = [0.0; 5];
+            let mut sums = [0.0; 6];
             for _ in 0..3 {
                 let (own, others) = (cell(&mut rng), cell(&mut rng));
                 let targets = robot.drawn(TARGETS, &mut rng);
-                let (a, bound_a, stated_a) = touched(robot, &own, count, &targets, &mut rng);
-                let (b, bound_b, _) = touched(other, &others, count, &targets, &mut rng);
-                let error = robot.program(robot.known.exported(), &targets, &own, a);
+                let a = touched(robot, &own, count, &targets, &mut rng);
+                let b = touched(other, &others, count, &targets, &mut rng);
+                let error = robot.program(robot.known.exported(), &targets, &own, &a);
+                let written = robot.program(robot.known.exported(), &targets, &own, &Found::nominal(a.tool, a.work));
                 // Taught on `robot` with its tool, run by `other`.
                 let square = |q: &Vec<f64>| {
-                    let in_work = a.1.inverse() * robot.known.exported().base_from_tip(q) * point(a.0);
-                    let wanted = b.1 * in_work * point(b.0).inverse();
+                    let taught = robot.known.exported().base_from_tip(q);
+                    let taught = Pose::new(taught.rotation, taught.translation + a.error(robot, q));
+                    let in_work = a.work.inverse() * taught * point(a.tool);
+                    let wanted = b.aimed(other, q, b.work * in_work * point(b.tool).inverse());
                     let corrected = other.reached(other.known.exported(), &wanted, q)?;
                     Some((other.really(&corrected, &others) - robot.really(q, &own)).norm_squared())
                 };
                 let moved: Vec<f64> = targets.iter().filter_map(square).collect();
                 let moved = moved.iter().sum::<f64>() / moved.len() as f64;
-                let all = [error, bound_a, stated_a, moved, bound_a + bound_b];
+                let all = [error, a.bound_m2, a.stated_m2, moved, a.bound_m2 + b.bound_m2, written];
                 sums.iter_mut().zip(all).for_each(|(s, v)| *s += v / 3.0);
             }
             sums
         };
-        let all: Vec<[f64; 5]> = robots.par_iter().enumerate().map(of).collect();
+        let all: Vec<[f64; 6]> = robots.par_iter().enumerate().map(of).collect();
         let rms = |k: usize| 1e3 * (all.iter().map(|s| s[k]).sum::<f64>() / all.len() as f64).sqrt();
         println!(
-            "{count:>3} touches: tool off by {:.4} mm RMS, bound {:.4}, ratio {:.3}, stated {:.4}; retargeted {:.4}, bound {:.4}, ratio {:.3}",
+            "{count:>3} touches: tool off by {:.4} mm RMS, bound {:.4}, ratio {:.3}, stated {:.4}, frames alone {:.4}; retargeted {:.4}, bound {:.4}, ratio {:.3}",
             rms(0),
             rms(1),
             rms(0) / rms(1),
             rms(2),
+            rms(5),
             rms(3),
             rms(4),
             rms(3) / rms(4)
@@ -344,16 +376,16 @@ fn study_of_programs_with_thirty_touches() {
             Cell { planned_work: Pose::identity(), planned_tool: planned, work: Pose::identity(), tool: planned };
         let targets = robots.region[..TARGETS].to_vec();
         let exported = robots.known.exported();
-        let as_written = (planned, Pose::identity());
-        let nominal = robots.program(&robots.nominal, &targets, &cell, as_written);
-        let written = robots.program(exported, &targets, &cell, as_written);
-        let without_terms = robots.program(&urdf_only(exported), &targets, &cell, as_written);
+        let as_written = Found::nominal(planned, Pose::identity());
+        let nominal = robots.program(&robots.nominal, &targets, &cell, &as_written);
+        let written = robots.program(exported, &targets, &cell, &as_written);
+        let without_terms = robots.program(&urdf_only(exported), &targets, &cell, &as_written);
         let mut errors = Vec::new();
         let mut bounds = Vec::new();
         for _ in 0..10 {
-            let (frames, bound, _) = touched(&robots, &cell, 30, &targets, &mut rng);
-            errors.push(robots.program(exported, &targets, &cell, frames));
-            bounds.push(bound);
+            let found = touched(&robots, &cell, 30, &targets, &mut rng);
+            errors.push(robots.program(exported, &targets, &cell, &found));
+            bounds.push(found.bound_m2);
         }
         let rms = |all: &[f64]| 1e3 * (all.iter().sum::<f64>() / all.len() as f64).sqrt();
         let worst = 1e3 * errors.iter().fold(0.0f64, |m, e| m.max(*e)).sqrt();

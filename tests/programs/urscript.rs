@@ -308,7 +308,8 @@ fn ten_thousand_targets_take_less_than_a_second() {
     let begin = Instant::now();
     let file = TextFile { name: "t.csv".into(), bytes: text.into_bytes() };
     let program = programs::read(Language::Csv, vec![file], &setting).unwrap();
-    let models = Models { controller: &cell.nominal, from: &cell.nominal, to: real, frames: None };
+    let models =
+        Models { controller: &cell.nominal, from: &cell.nominal, to: real, frames: None, beyond: [None, None] };
     let done = programs::compensate(&program, models, &postures);
     let seconds = begin.elapsed().as_secs_f64();
     let count = done.outcomes.iter().filter(|o| matches!(o, Outcome::Done(_))).count();
