@@ -77,6 +77,8 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/pose_comparison.rs FIRST_M_PER_RAD", "first guess"),
     ("identify/pose_comparison.rs HELD", "rounding"),
     ("identify/pose_comparison.rs ROUNDS", "iterations"),
+    ("identify/local_errors.rs BEYOND_CHANCE", "which columns are added to the fit"),
+    ("identify/local_errors.rs MOST_TERMS", "size of a matrix"),
     ("identify/second_pass.rs FEWEST_IMAGES", "first guess of a detector"),
     ("identify/second_pass.rs REACH", "reach of a detector"),
     ("identify/stand_alone.rs MOST_TOGETHER", "how many are written"),
