@@ -98,7 +98,7 @@ pub struct PatternTest {
     pub least_px: f64,
     /// What it gains beyond its number of columns.
     pub gain: f64,
-    /// By how much the step to the fit with these columns moves what counts, and what is stated of it.
+    /// By how much the step to the fit with these columns moves what counts, and what is stated of it; none of shifts in the plate.
     pub moved: Option<Moved>,
 }
 
@@ -172,7 +172,8 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
             rms_px: rms_px * (statistic / (statistic + squares)).sqrt(),
             least_px: rms_px * (least(degrees, limits.pattern_sigmas) / squares).sqrt(),
             gain: statistic - degrees as f64 * n.ln(),
-            moved: Some(moved(fit, model.as_ref(), &step)),
+            // Shifts in the plate trade against its size, by which the step moves everything: that is judged by itself.
+            moved: (g.pattern != Pattern::PlatePrint).then(|| moved(fit, model.as_ref(), &step)),
         })
     };
     let mut tests: Vec<PatternTest> = groups.iter().filter_map(of_group).collect();

@@ -133,7 +133,7 @@ fn place_zeros(adjustment: &mut Adjustment, free: &FreePoses, limits: &Limits) {
     let pairs: Vec<PosePair> =
         stops.iter().map(|s| PosePair::of_stop(robot, s.mount, &s.readings, s.camera_from_plate)).collect();
     let as_described = solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error);
-    if as_described < limits.suspicious_misfit {
+    if as_described < limits.hand_eye_spread {
         return;
     }
     // A joint that stands upside down with all behind it is the same arm with zeros half a turn off.
