@@ -133,7 +133,7 @@ fn place_zeros(adjustment: &mut Adjustment, free: &FreePoses, limits: &Limits) {
     let pairs: Vec<PosePair> =
         stops.iter().map(|s| PosePair::of_stop(robot, s.mount, &s.readings, s.camera_from_plate)).collect();
     let as_described = solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error);
-    if as_described < limits.hand_eye_spread {
+    if as_described < limits.suspicious_misfit {
         return;
     }
     // A joint that stands upside down with all behind it is the same arm with zeros half a turn off.
@@ -143,7 +143,9 @@ fn place_zeros(adjustment: &mut Adjustment, free: &FreePoses, limits: &Limits) {
     let otherwise = tried.next().map_or(f64::INFINITY, |next| next.left).min(as_described);
     let is_far = best.offsets.iter().any(|o| o.abs() > limits.zeros_off_rad);
     let explains = best.left < limits.zeros_explain && best.left < limits.zeros_explain_share * otherwise;
-    if !(is_far && explains) {
+    // Zeros alone are a matter of the fit as long as it starts.
+    let is_needed = best.reversed.is_some() || as_described > limits.hand_eye_spread;
+    if !(is_far && explains && is_needed) {
         return;
     }
     let mut chain = robot.chain.clone();

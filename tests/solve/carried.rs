@@ -129,8 +129,9 @@ fn robots_that_carry_both_ends_are_identified_as_well_as_is_stated() {
 #[test]
 #[ignore = "minutes; its figures stand in the guide, Positioners, rails and second arms"]
 fn study_of_cells_against_their_bound() {
+    let worlds = std::env::var("WORLDS").map_or(20, |w| w.parse().unwrap());
     for cell in &cells() {
-        let [actual, stated] = errors_m(cell, 1..=20);
+        let [actual, stated] = errors_m(cell, 1..=worlds);
         println!("| {} | {:.4} | {:.4} | {:.3} |", cell.name, 1e3 * actual, 1e3 * stated, actual / stated);
     }
 }
