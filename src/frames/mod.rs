@@ -8,7 +8,7 @@
 //! | `absorbed` | what tool and work object take up of the robot's errors |
 //! | `determined` | what touches cannot tell: too few, on a line, one orientation, another unit |
 //! | `start` | closed forms that the adjustment starts from |
-//! | [`fit`] | generalised least squares, size of the errors, outliers by name |
+//! | [`mod@fit`] | generalised least squares, size of the errors, outliers by name |
 //! | [`knowledge`] | what frames and covariance say of the tool at a target |
 //! | [`plan`] | which touches tell most |
 //!

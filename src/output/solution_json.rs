@@ -213,7 +213,7 @@ pub struct PlateRecord {
     /// Size of the markers as a whole, as in `position_m`, plate.csv and plate_pose.yaml; none where no image shows the plate.
     #[serde(default)]
     pub relative_scale: Option<ScaleRecord>,
-    /// Size that the stand-alone poses (poses.csv, `free_pose`) are given for: nominal, or as measured ([scale]). The robot takes no part
+    /// Size that the stand-alone poses (poses.csv, `free_pose`) are given for: nominal, or as measured (`[scale]`). The robot takes no part
     /// in them, nor in this scale.
     #[serde(default)]
     pub relative_scale_of_poses: Option<ScaleRecord>,

@@ -96,7 +96,7 @@ pub struct Choice {
     pub drawn: usize,
     /// Criterion of the relaxed weights before the first round of search and after each.
     pub values: Vec<f64>,
-    /// Their information, as [`Choice::told`] has it.
+    /// Their information, in the identified directions ([`Identified`]).
     pub information: Vec<DMatrix<f64>>,
     /// What fell out.
     pub tally: Tally,
@@ -110,7 +110,7 @@ pub struct Choice {
     pub targets: Vec<Vec<f64>>,
     /// Its weight: the mean squared error is `tr(W cov)`.
     pub weight: DMatrix<f64>,
-    /// Information before the first image, as [`Choice::told`] has it.
+    /// Information before the first image, in the identified directions ([`Identified`]).
     pub known: DMatrix<f64>,
     /// What images tell.
     pub identified: Identified,

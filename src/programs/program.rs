@@ -159,7 +159,7 @@ pub enum RotationFields {
 /// A target that is another point, displaced (`Offs`, `RelTool`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Displaced {
-    /// File and first byte of the other point, as of [`Kind::first_byte`].
+    /// File and first byte of the other point, as of `Kind::first_byte`.
     pub base: (usize, usize),
     /// Displacement, m: along the axes of the tool with `turned`, else of the work object.
     pub by: [Field; 3],
