@@ -318,18 +318,8 @@ fn solved(response: &Response, first: usize, count: usize) -> (DVector<f64>, f64
 
 /// `-X y`.
 fn combined(steps: &[Step], y: &DVector<f64>) -> Option<Step> {
-    let mut all = steps.first()?.clone();
-    let first = -y[0];
-    all.dense *= first;
-    all.joint_errors.iter_mut().chain(&mut all.ties).flatten().for_each(|v| *v *= first);
-    all.markers.iter_mut().flatten().for_each(|v| *v *= first);
-    for (step, y) in steps.iter().zip(y.iter()).skip(1) {
-        all.dense.axpy(-y, &step.dense, 1.0);
-        let pairs = all.joint_errors.iter_mut().chain(&mut all.ties).zip(step.joint_errors.iter().chain(&step.ties));
-        pairs.for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a -= y * b));
-        all.markers.iter_mut().flatten().zip(step.markers.iter().flatten()).for_each(|(a, b)| *a -= b * *y);
-    }
-    Some(all)
+    let none = steps.first()?.none();
+    Some(steps.iter().zip(y.iter()).fold(none, |sum, (step, y)| sum.plus(-y, step)))
 }
 
 /// What a step moves. Of the camera poses counts what no common displacement of the camera frame or the plate frame takes up: with the body

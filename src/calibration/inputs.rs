@@ -52,7 +52,14 @@ impl Inputs {
     /// # Errors
     /// Files that cannot be read or do not go together; links that the URDF does not have.
     pub fn read(urdf: &Path, folders: &[PathBuf], ends: Ends) -> Result<Self> {
-        let series = read_all(folders)?;
+        Self::with_series(urdf, read_all(folders)?, ends)
+    }
+
+    /// Reads the URDFs of series that are at hand.
+    ///
+    /// # Errors
+    /// As of [`Inputs::read`].
+    pub fn with_series(urdf: &Path, series: Vec<Series>, ends: Ends) -> Result<Self> {
         let robot = CellFiles::read(urdf, &series, ends)?;
         Self::of(robot, Some(urdf), series, ends)
     }

@@ -11,9 +11,9 @@ use super::say::{say, say_line};
 use super::{Verdict, progress};
 use crate::assess::Limits;
 use crate::calibration::{Pictures, require_unchanged};
-use crate::detect::{FlatFieldFacts, load};
+use crate::detect::{FlatField, FlatFieldFacts, load};
 use crate::error::{Code, Error, Notice, Result};
-use crate::identify::SeenImage;
+use crate::identify::{SeenImage, SeenSeries, detect_stops, flat_field_drift, pictures};
 use crate::output::detection_files::{DetectionContext, detection_files, dropped_counts, marker_counts, picture_names};
 use crate::output::overlay::{Palette, overlay_png};
 use crate::output::{NewResult, Place, folder_name};
@@ -51,7 +51,7 @@ struct Looked {
     notices: Vec<Notice>,
     inputs: Vec<InputFile>,
     /// Dark and white images.
-    flat_field: Option<FlatFieldFacts>,
+    flat_field: Option<FlatField>,
 }
 
 pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
@@ -80,7 +80,7 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
     let out = place.path().to_path_buf();
     let written = write(args, &looked, place)?;
     say!("{}", text(&looked.images));
-    looked.flat_field.iter().for_each(|facts| say!("{}", of_flat_field(facts)));
+    looked.flat_field.iter().for_each(|f| say!("{}", of_flat_field(&f.facts)));
     let notices: Vec<Notice> =
         looked.notices.iter().cloned().chain(looked.images.iter().flat_map(SeenImage::notices)).collect();
     Notice::said_once(&notices).iter().for_each(|n| say_line!("note      {}", n.coded()));
@@ -100,14 +100,11 @@ fn of_series(args: &DetectArgs, series: Series, pictures: &Pictures) -> Result<L
     let mut inputs = series.inputs.clone();
     inputs.extend(series.image_hashes()?);
     let bar = progress::bar(series.stops.stops.len(), &series.name);
-    let images = crate::identify::detect_stops(&series, |_| bar.inc(1))?;
+    let SeenSeries { images, flat_field } = detect_stops(&series, |_| bar.inc(1))?;
     bar.finish_and_clear();
     require_unchanged(&inputs, &series.image_hashes()?)?;
     let mut notices = series.notices.clone();
-    let flat_field = crate::identify::flat_field_facts(&series, &Limits::default())?.map(|(facts, said)| {
-        notices.extend(said);
-        facts
-    });
+    notices.extend(flat_field.iter().flat_map(|f| flat_field_drift(&series, &f.facts, &Limits::default())));
     Ok(Looked { plate: series.plate.clone(), images, notices, inputs, flat_field, series: Some(series) })
 }
 
@@ -149,7 +146,7 @@ fn write(args: &DetectArgs, looked: &Looked, place: Place) -> Result<usize> {
 
 fn draw(looked: &Looked, drawable: &[(&SeenImage, &PathBuf, &String)], result: &NewResult) -> Result<()> {
     let palette = Palette::of(&looked.images);
-    let corrected = looked.series.as_ref().map(crate::identify::pictures).transpose()?;
+    let corrected = looked.series.as_ref().map(|s| pictures(s, looked.flat_field.as_ref()));
     let picture = |path: &Path| corrected.as_ref().map_or_else(|| load(path, None), |read| read(path));
     let bar = progress::bar(drawable.len(), "drawing");
     drawable.par_iter().try_for_each(|(image, path, name)| {

@@ -144,7 +144,7 @@ fn examine(series: &Series, args: &DoctorArgs, seen: &mut Examination) {
         stops(series, seen);
     }
     if let Some(urdf) = &args.urdf
-        && let Err(error) = robot(series, urdf, &args.series, seen)
+        && let Err(error) = robot(series, urdf, seen)
     {
         seen.missing(error);
     }
@@ -191,8 +191,9 @@ fn stops(series: &Series, seen: &mut Examination) {
 }
 
 /// Names, units and limits of the readings against the robot.
-fn robot(series: &Series, file: &Path, folder: &Path, seen: &Examination) -> Result<()> {
-    let Inputs { description, chain, tip_notice, .. } = Inputs::read(file, &[folder.to_path_buf()], Ends::default())?;
+fn robot(series: &Series, file: &Path, seen: &Examination) -> Result<()> {
+    let Inputs { description, chain, tip_notice, .. } =
+        Inputs::with_series(file, vec![series.clone()], Ends::default())?;
     let moving = chain.readings.join(", ");
     seen.good("urdf", &format!("{} ({} to {}; {moving})", description.name, chain.base, chain.tip));
     tip_notice.iter().chain(&description.notices).for_each(|n| seen.note(n));

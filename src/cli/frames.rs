@@ -7,11 +7,12 @@ use clap::Args;
 use nalgebra::DMatrix;
 
 use super::Verdict;
+use super::pose_argument::pose;
 use super::say::{say, say_line};
 use super::show::read_solution;
 use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::frames::{FrameFit, Given, KnownRobot, Seen, Touches, fit};
-use crate::geom::Pose;
+use crate::geom::{Pose, matrix_from_rpy};
 use crate::identify::measure_bodies;
 use crate::output::corrections::Weight;
 use crate::output::frame_files::{self, Frames, Named};
@@ -209,46 +210,28 @@ fn placement_named(record: &SolutionRecord, name: &str) -> Result<usize> {
     }
 }
 
-/// Roll, pitch, yaw in degrees.
-fn rotation(flag: &str, numbers: &[f64]) -> Result<Pose> {
-    match *numbers {
-        [] => Ok(Pose::identity()),
-        [r, p, y] => Ok(Pose::from_xyz_rpy([0.0; 3], [r, p, y].map(f64::to_radians))),
-        _ => Err(Error::new(
-            Code::OptionRange,
-            flag,
-            format!("{} numbers", numbers.len()),
-            "give roll,pitch,yaw in degrees",
-        )),
-    }
-}
-
 fn orientation(args: &FramesArgs) -> Result<nalgebra::Matrix3<f64>> {
-    Ok(rotation("--tool-rpy-deg", &args.tool_rpy_deg)?.rotation)
+    match *args.tool_rpy_deg {
+        [] => Ok(nalgebra::Matrix3::identity()),
+        [roll, pitch, yaw] => Ok(matrix_from_rpy([roll, pitch, yaw].map(f64::to_radians))),
+        _ => {
+            let what = format!("{} numbers", args.tool_rpy_deg.len());
+            Err(Error::new(Code::OptionRange, "--tool-rpy-deg", what, "give roll,pitch,yaw in degrees"))
+        }
+    }
 }
 
 /// A tool that is not further away than any is, m.
 const FARTHEST_TOOL_M: f64 = 10.0;
 
 fn known_tool(args: &FramesArgs) -> Result<Option<Pose>> {
-    let bad = |what: String| {
-        Err(Error::new(
-            Code::OptionRange,
-            "--tool",
-            what,
-            "give x,y,z[,roll,pitch,yaw] on the tip, in metres and degrees",
-        ))
-    };
-    match args.tool.split_at_checked(3) {
-        None if args.tool.is_empty() => Ok(None),
-        Some((xyz, _)) if xyz.iter().any(|v| v.abs() > FARTHEST_TOOL_M || !v.is_finite()) => {
-            bad(format!("a tool {:.0} m from the tip", xyz.iter().fold(0.0, |m: f64, v| m.max(v.abs()))))
-        }
-        Some((&[x, y, z], rest)) => {
-            Ok(Some(Pose::new(rotation("--tool", rest)?.rotation, nalgebra::Vector3::new(x, y, z))))
-        }
-        _ => bad(format!("{} numbers", args.tool.len())),
+    let xyz = args.tool.iter().take(3);
+    if xyz.clone().any(|v| v.abs() > FARTHEST_TOOL_M || !v.is_finite()) {
+        let what = format!("a tool {:.0} m from the tip", xyz.fold(0.0, |m: f64, v| m.max(v.abs())));
+        let remedy = "give x,y,z[,roll,pitch,yaw] on the tip, in metres and degrees";
+        return Err(Error::new(Code::OptionRange, "--tool", what, remedy));
     }
+    pose("--tool", &args.tool)
 }
 
 /// Name of a frame of places that has none.

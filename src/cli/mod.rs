@@ -27,6 +27,7 @@ mod plan_targets;
 mod plan_touches;
 mod plate;
 mod plate_board;
+mod pose_argument;
 mod poses;
 mod progress;
 mod recording;

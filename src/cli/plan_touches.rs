@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 
 use super::Verdict;
 use super::plan_targets::targets;
+use super::pose_argument::pose;
 use super::say::{say, say_line};
 use super::show::read_solution;
 use crate::error::{Code, Error, Result, plain_name};
@@ -17,6 +18,7 @@ use crate::geom::Pose;
 use crate::model::robot::Posture;
 use crate::output::Place;
 use crate::output::restore::found_model;
+use crate::series::{AngleUnit, CameraMount, ContactSection, Manifest};
 use crate::urdf::{Chain, JointKind};
 
 /// Flags of `plan` for touches.
@@ -69,8 +71,8 @@ pub(super) fn run(
     let wanted = target_file.map(|path| targets(path, chain)).transpose()?.unwrap_or_default();
     let request = TouchRequest {
         points: read_points(points)?,
-        tool: pose("--touch-tool", &args.touch_tool)?,
-        work: pose("--touch-work", &args.touch_work)?,
+        tool: pose("--touch-tool", &args.touch_tool)?.unwrap_or_else(Pose::identity),
+        work: pose("--touch-work", &args.touch_work)?.unwrap_or_else(Pose::identity),
         count,
         sigma_m: 1e-3 * positive("--touch-sigma-mm", args.touch_sigma_mm, 10.0)?,
         tilt_rad: positive("--touch-tilt-deg", args.touch_tilt_deg, 90.0)?.to_radians(),
@@ -84,7 +86,7 @@ pub(super) fn run(
     }
     let TouchPlan { touches: planned, unreached } = plan_touches(&robot, &request, &found.limits)?;
     let files = [
-        ("series.toml".to_owned(), manifest(args, chain)),
+        ("series.toml".to_owned(), manifest(args, chain)?),
         ("joints.csv".to_owned(), joints(&planned, chain)),
         ("contacts.csv".to_owned(), contacts(&planned, &request)),
     ];
@@ -103,18 +105,6 @@ pub(super) fn run(
 
 fn robot_needs() -> usize {
     crate::assess::Limits::default().fewest_touches
-}
-
-fn pose(flag: &str, numbers: &[f64]) -> Result<Pose> {
-    match *numbers {
-        [] => Ok(Pose::identity()),
-        [x, y, z] => Ok(Pose::from_xyz_rpy([x, y, z], [0.0; 3])),
-        [x, y, z, r, p, w] => Ok(Pose::from_xyz_rpy([x, y, z], [r, p, w].map(f64::to_radians))),
-        _ => {
-            let what = format!("{} numbers", numbers.len());
-            Err(Error::new(Code::OptionRange, flag, what, "give x,y,z or x,y,z,roll,pitch,yaw in m and degrees"))
-        }
-    }
 }
 
 /// Points of a work object.
@@ -158,15 +148,21 @@ fn read_points(path: &Path) -> Result<Vec<(String, Vector3<f64>)>> {
     }
 }
 
-fn manifest(args: &TouchArgs, chain: &Chain) -> String {
-    format!(
-        "# Planned touches: replace the joint values by those at which the tool touches the point.\nformat = 1\njoint_unit = \"deg\"\nbase = {:?}\ntip = {:?}\n\
-         [contact]\nsigma_m = {}\nframe = {:?}\n",
-        chain.base,
-        chain.tip,
-        1e-3 * args.touch_sigma_mm,
-        args.touch_frame
-    )
+fn manifest(args: &TouchArgs, chain: &Chain) -> Result<String> {
+    let manifest = Manifest {
+        joint_unit: Some(AngleUnit::Deg),
+        base: Some(chain.base.clone()),
+        tip: Some(chain.tip.clone()),
+        camera_mount: None,
+        plate: None,
+        contact: Some(ContactSection {
+            sigma_m: Some(1e-3 * args.touch_sigma_mm),
+            frame: Some(args.touch_frame.clone()),
+        }),
+        ..Manifest::plain(CameraMount::Hand, "")
+    };
+    let head = "# Planned touches: replace the joint values by those at which the tool touches the point.\n";
+    Ok(head.to_owned() + &manifest.to_toml()?)
 }
 
 fn stop(k: usize) -> String {

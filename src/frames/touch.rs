@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::robot::Posture;
-use crate::problem::{BodySeen, InstrumentKind, MeasuredSeries};
+use crate::problem::{BodySeen, InstrumentKind, MeasuredSeries, intern};
 
 /// Where a touch says that the body was.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,14 +50,6 @@ pub struct Touches {
     pub all: Vec<Touch>,
 }
 
-/// Index of a name in a list that it joins if it is new.
-fn index_of(all: &mut Vec<String>, name: &str) -> usize {
-    all.iter().position(|known| known == name).unwrap_or_else(|| {
-        all.push(name.to_owned());
-        all.len() - 1
-    })
-}
-
 impl Touches {
     /// What series hold of it. Series are of one tool: bodies and contacts of one name are one thing in all of them.
     ///
@@ -80,7 +72,7 @@ impl Touches {
                     ));
                 };
                 let seen = match (b.kind, b.seen) {
-                    (InstrumentKind::Socket, _) => Seen::Unknown(index_of(&mut touches.contacts, &b.instrument)),
+                    (InstrumentKind::Socket, _) => Seen::Unknown(intern(&mut touches.contacts, &b.instrument)),
                     (_, seen) => {
                         let frame = touches.frame.get_or_insert_with(|| b.instrument.clone());
                         if *frame != b.instrument {
@@ -101,7 +93,7 @@ impl Touches {
                     touches.postures.push(Posture { readings: readings.clone(), approach });
                     touches.postures.len() - 1
                 });
-                let body = index_of(&mut touches.bodies, &b.body);
+                let body = intern(&mut touches.bodies, &b.body);
                 let (sigma_m, sigma_rad) = (b.sigma_m, b.sigma_rad);
                 touches.all.push(Touch { stop: stop.image.clone(), posture, body, seen, sigma_m, sigma_rad });
             }

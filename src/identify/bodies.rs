@@ -2,16 +2,8 @@
 
 use crate::problem::{
     BodyMeasurement, BodySeen, Instrument, InstrumentKind, Layout, LengthEnds, MeasuredLength, MeasuredSeries,
-    SeenLength,
+    SeenLength, intern,
 };
-
-/// Index of a name among `names`, to which it is added where it is new.
-pub(super) fn intern(names: &mut Vec<String>, name: &str) -> usize {
-    names.iter().position(|n| n == name).unwrap_or_else(|| {
-        names.push(name.to_owned());
-        names.len() - 1
-    })
-}
 
 /// Instruments, bodies and what was measured, by index.
 #[derive(Debug, Default)]

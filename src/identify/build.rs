@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::bodies::{Bodies, intern};
+use super::bodies::Bodies;
 use super::local_errors::{local_share, local_terms};
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
@@ -13,7 +13,7 @@ use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
     Adjustment, Family, Image, ImageRejection, Layout, Mark, Measured, MeasuredSeries, MeasuredStop, Names, Noise,
-    PlateShape, Problem, State, Stop, Tie, release_measured_scales,
+    PlateShape, Problem, State, Stop, Tie, intern, release_measured_scales,
 };
 use crate::series::{Edge, Observation, Plate};
 

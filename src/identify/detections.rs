@@ -9,14 +9,24 @@ use crate::detect::{Drift, FlatField, FlatFieldFacts, Picture, SeriesImage, dete
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::{Plate, Series, Source};
 
+/// What is seen in the images of a series.
+#[derive(Debug)]
+pub struct SeenSeries {
+    /// In the order of the stops.
+    pub images: Vec<SeenImage>,
+    /// What its dark and white images correct; none where it has none.
+    pub flat_field: Option<FlatField>,
+}
+
 /// Looks for the plate in the images of all stops, dark and white images taken into account, then again where a first
 /// solve predicts more markers; in the order of the stops.
 /// `progress` is called after every image, from any thread.
 ///
 /// # Errors
 /// A series without images; dark and white images that are of no use.
-pub fn detect_stops(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<Vec<SeenImage>> {
-    let picture = pictures(series)?;
+pub fn detect_stops(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<SeenSeries> {
+    let flat_field = flat_field(series)?;
+    let picture = pictures(series, flat_field.as_ref());
     let paths: Vec<PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.clone()).collect();
     let mut found = detect_series(&paths, &series.plate, &picture, progress).into_iter();
     let missing = |image: &str| {
@@ -29,23 +39,22 @@ pub fn detect_stops(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<
     });
     let mut seen: Vec<SeenImage> = seen.collect();
     second_pass(series, &mut seen, picture);
-    Ok(seen)
+    Ok(SeenSeries { images: seen, flat_field })
 }
 
 /// Reads the images of a series as the detector sees them: dark and white images taken into account.
-///
-/// # Errors
-/// A series without images; dark and white images that are of no use.
-pub fn pictures(series: &Series) -> Result<impl Fn(&Path) -> Result<Picture> + Sync> {
-    let flat_field = flat_field(series)?;
+pub fn pictures<'a>(
+    series: &Series,
+    flat_field: Option<&'a FlatField>,
+) -> impl Fn(&Path) -> Result<Picture> + Sync + use<'a> {
     let bits = series.manifest.camera().bits;
-    Ok(move |path: &Path| {
+    move |path: &Path| {
         let picture = load(path, bits)?;
-        match &flat_field {
+        match flat_field {
             Some(flat_field) => flat_field.apply(picture),
             None => Ok(picture),
         }
-    })
+    }
 }
 
 /// Dark and white images of a series; none where it has none.
@@ -64,12 +73,8 @@ fn flat_field(series: &Series) -> Result<Option<FlatField>> {
     FlatField::from_images(dark, white, series.manifest.camera().bits)
 }
 
-/// What the dark and white images of a series did, and whether sensor or light changed from their frames `begin*` to their frames `end*`.
-///
-/// # Errors
-/// A series without images; dark and white images that are of no use.
-pub fn flat_field_facts(series: &Series, limits: &Limits) -> Result<Option<(FlatFieldFacts, Vec<Notice>)>> {
-    let Some(FlatField { facts, .. }) = flat_field(series)? else { return Ok(None) };
+/// Whether sensor or light changed from the dark and white frames `begin*` to the frames `end*`.
+pub fn flat_field_drift(series: &Series, facts: &FlatFieldFacts, limits: &Limits) -> Vec<Notice> {
     let place = |folder: &str| series.folder.join(folder).display().to_string();
     let mut notices = Vec::new();
     if let Some(d) = facts.dark_drift.filter(|d| changed(d, [limits.dark_drift, limits.dark_drift], limits)) {
@@ -90,7 +95,7 @@ pub fn flat_field_facts(series: &Series, limits: &Limits) -> Result<Option<(Flat
         let remedy = "did aperture, focus, dust or the light change? take the white images again, evenly lit";
         notices.push(Notice::new(Code::FlatFieldDrift, place("white"), what, remedy));
     }
-    Ok(Some((facts, notices)))
+    notices
 }
 
 /// Beyond what matters, in common or from place to place, and there beyond what single frames scatter.

@@ -5,7 +5,9 @@ use std::path::Path;
 
 use super::bodies_measured::{seen_bodies, seen_lengths};
 use super::controller_readings::{self, readings_of};
-use super::detections::{detect_stops, flat_field_facts, no_images, recording, require_some, several_cameras};
+use super::detections::{
+    SeenSeries, detect_stops, flat_field_drift, no_images, recording, require_some, several_cameras,
+};
 use super::seen_image::SeenImage;
 use super::stated::{lens_of, measured_series, on_the_tip_beside_others};
 use crate::assess::Limits;
@@ -46,11 +48,7 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     let lens = lens_of(series)?;
     let mut plate = series.plate.clone();
     let (mut seen, found_size) = match &series.source {
-        Source::Images { .. } => {
-            let seen = look_through(series, progress, &mut notices, &mut plate)?;
-            notices.extend(flat_field_facts(series, &Limits::default())?.into_iter().flat_map(|(_, said)| said));
-            seen
-        }
+        Source::Images { .. } => look_through(series, progress, &mut notices, &mut plate)?,
         Source::Observations(all) => {
             let by_name: BTreeMap<&str, &Vec<Observation>> =
                 all.iter().map(|i| (i.image.as_str(), &i.observations)).collect();
@@ -177,9 +175,10 @@ fn look_through(
     notices: &mut Vec<Notice>,
     plate: &mut Plate,
 ) -> Result<SeenStops> {
-    let images = detect_stops(series, progress)?;
+    let SeenSeries { images, flat_field } = detect_stops(series, progress)?;
     set_radii(plate, &images);
     notices.extend(images.iter().flat_map(SeenImage::notices));
+    notices.extend(flat_field.iter().flat_map(|f| flat_field_drift(series, &f.facts, &Limits::default())));
     // The detector has refused all images of another size.
     let usable = images.iter().filter(|i| i.detection.failure.is_none());
     let size = usable.filter_map(|i| i.size).next().map(|(w, h)| (w as u32, h as u32));

@@ -9,7 +9,8 @@ use crate::error::{Code, Error, Result};
 use crate::fit::FreePoses;
 use crate::geom::{Pose, log_so3};
 use crate::init::{
-    HandEye, HandEyeStart, PosePair, PoseTriple, SeenStop, Zeros, solve_between, solve_hand_eye, solve_zeros,
+    HandEye, HandEyeStart, PosePair, PoseTriple, SeenStop, Zeros, shah, solve_between, solve_hand_eye, solve_zeros,
+    upper_median,
 };
 use crate::linalg::symmetric_eigen;
 use crate::problem::{
@@ -40,13 +41,10 @@ pub(super) fn start_robot(
     place_bases(adjustment, free)?;
     place_zeros(adjustment, free, given.limits);
     let mut aside = Vec::new();
-    let mut groups: BTreeMap<(usize, usize), Vec<(usize, PosePair)>> = BTreeMap::new();
-    for (i, image, _) in adjustment.used() {
-        let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
-        let pair = PosePair::of_stop(&adjustment.state.robot, image.mount, &stop.readings, pose.camera_from_plate);
-        groups.entry((image.mounting, image.placement)).or_default().push((i, pair));
-    }
-    let mut order: Vec<_> = groups.into_iter().collect();
+    let robot = &adjustment.state.robot;
+    let pairs = |seen: Vec<(usize, SeenStop)>| seen.into_iter().map(|(i, stop)| (i, stop.pair(robot))).collect();
+    let mut order: Vec<(_, Vec<(usize, PosePair)>)> =
+        seen_stops(adjustment, free).into_iter().map(|(of, seen)| (of, pairs(seen))).collect();
     order.sort_by_key(|((m, p), pairs)| (std::cmp::Reverse(pairs.len()), *m, *p));
     let (mut cameras, mut plates) = (BTreeMap::new(), BTreeMap::new());
     for ((mounting, placement), pairs) in &order {
@@ -80,34 +78,50 @@ pub(super) fn start_robot(
     Ok(aside)
 }
 
+/// Images on the robot with what they and their readings say, by index, for every camera mounting and plate placement.
+fn seen_stops(adjustment: &Adjustment, free: &FreePoses) -> BTreeMap<(usize, usize), Vec<(usize, SeenStop)>> {
+    let mut groups: BTreeMap<(usize, usize), Vec<(usize, SeenStop)>> = BTreeMap::new();
+    for (i, image, _) in adjustment.used() {
+        let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
+        let (readings, camera_from_plate) = (stop.readings.clone(), pose.camera_from_plate);
+        let seen = SeenStop { readings, mount: image.mount, camera_from_plate };
+        groups.entry((image.mounting, image.placement)).or_default().push((i, seen));
+    }
+    groups
+}
+
+/// Those of the mounting and placement with most of them.
+fn most_seen_stops(adjustment: &Adjustment, free: &FreePoses) -> Vec<SeenStop> {
+    let largest = seen_stops(adjustment, free).into_values().max_by_key(Vec::len).unwrap_or_default();
+    largest.into_iter().map(|(_, stop)| stop).collect()
+}
+
 /// Gives the joint between the bases of two arms an origin, where it has none yet.
 fn place_bases(adjustment: &mut Adjustment, free: &FreePoses) -> Result<()> {
     let chain = &adjustment.state.robot.chain;
     let unplaced = |j: &Joint| j.is_between_bases() && j.origin == Pose::identity();
     let Some(k) = chain.joints.iter().position(unplaced) else { return Ok(()) };
-    let mut groups: BTreeMap<(usize, usize), Vec<PoseTriple>> = BTreeMap::new();
-    for (i, image, _) in adjustment.used() {
-        let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
+    let stops = most_seen_stops(adjustment, free);
+    let Some(mount) = stops.first().map(|stop| stop.mount) else { return Ok(()) };
+    let triple = |stop: &SeenStop| {
         let behind = adjustment.state.robot.link_poses(&stop.readings);
         let tip = behind.last().copied().unwrap_or_else(Pose::identity);
         let second = k.checked_sub(1).map_or_else(Pose::identity, |before| behind[before]);
         let first = behind[k].inverse() * tip;
-        let camera_from_plate = pose.camera_from_plate;
-        groups.entry((image.mounting, image.placement)).or_default().push(match image.mount {
+        let camera_from_plate = stop.camera_from_plate;
+        match mount {
             CameraMount::Hand => PoseTriple { camera_from_plate, before: first.inverse(), after: second.inverse() },
             CameraMount::Fixed => PoseTriple { camera_from_plate, before: second, after: first },
-        });
-    }
-    let Some(largest) = groups.into_iter().max_by_key(|(_, triples)| triples.len()) else { return Ok(()) };
-    let found = solve_between(&largest.1).map(|(pose, _)| pose);
-    let is_inverse = adjustment.used().any(|(_, image, _)| image.mount == CameraMount::Hand);
+        }
+    };
+    let found = solve_between(&stops.iter().map(triple).collect::<Vec<_>>()).map(|(pose, _)| pose);
     let Some(pose) = found else {
         let what = "how the bases of the two arms stand to each other does not come out of these stops";
         let remedy = "take more stops at which both arms move all their joints";
         return Err(Error::new(Code::StopsAlike, BASE_FROM_BASE, what, remedy));
     };
     let joint = &mut adjustment.state.robot.chain.joints[k];
-    joint.origin = if is_inverse { pose.inverse() } else { pose };
+    joint.origin = if mount == CameraMount::Hand { pose.inverse() } else { pose };
     joint.found = Some(FoundOrigin::Pose);
     Ok(())
 }
@@ -120,18 +134,16 @@ fn place_zeros(adjustment: &mut Adjustment, free: &FreePoses, limits: &Limits) {
     if is_found || robot.chain.base_moves() || robot.chain.pose_coordinates().is_some() {
         return;
     }
-    let mut groups: BTreeMap<(usize, usize), Vec<SeenStop>> = BTreeMap::new();
-    for (i, image, _) in adjustment.used() {
-        let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
-        let (readings, camera_from_plate) = (stop.readings.clone(), pose.camera_from_plate);
-        let seen = SeenStop { readings, mount: image.mount, camera_from_plate };
-        groups.entry((image.mounting, image.placement)).or_default().push(seen);
-    }
-    let Some(stops) = groups.into_values().max_by_key(Vec::len).filter(|s| s.len() >= limits.zeros_images) else {
+    let stops = most_seen_stops(adjustment, free);
+    if stops.len() < limits.zeros_images {
         return;
-    };
-    let pairs: Vec<PosePair> =
-        stops.iter().map(|s| PosePair::of_stop(robot, s.mount, &s.readings, s.camera_from_plate)).collect();
+    }
+    let pairs: Vec<PosePair> = stops.iter().map(|stop| stop.pair(robot)).collect();
+    // The closed form of all images is enough to see that nothing is wrong.
+    let of_all = shah(&pairs).map_or(f64::INFINITY, |s| s.median_error(&pairs));
+    if of_all < limits.suspicious_misfit {
+        return;
+    }
     let as_described = solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error);
     if as_described < limits.suspicious_misfit {
         return;
@@ -251,11 +263,6 @@ fn pixels(problem: &Problem, state: &State, image: usize) -> Option<f64> {
         count += 1.0;
     }
     Some((sum / f64::max(count, 1.0)).sqrt())
-}
-
-fn upper_median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// Hand-camera and plate pose need rotations about at least two axes.

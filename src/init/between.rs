@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
-use super::hand_eye::{PosePair, shah};
+use super::hand_eye::{PosePair, shah, upper_median};
 use crate::geom::{Pose, exp_so3, log_so3, project_to_so3};
 use crate::linalg::SymmetricFactor;
 
@@ -85,13 +85,8 @@ fn angle(t: &PoseTriple, [x, v, z]: &Rotations) -> Vector3<f64> {
     log_so3(&(right.transpose() * x * t.camera_from_plate.rotation))
 }
 
-fn median_of(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
-}
-
 fn median_angle(triples: &[PoseTriple], rotations: &Rotations) -> f64 {
-    median_of(triples.iter().map(|t| angle(t, rotations).norm()).collect())
+    upper_median(triples.iter().map(|t| angle(t, rotations).norm()).collect())
 }
 
 /// Gauss-Newton with weights for images that disagree.
@@ -147,12 +142,12 @@ fn translated(triples: &[PoseTriple], rotations: &Rotations) -> Option<(Pose, f6
         (0..9).for_each(|k| n[(k, k)] += HELD * scale);
         solution = SymmetricFactor::new(&n).ok()?.solve(&b);
         left = equations.iter().map(|(a, y)| (a * &solution - y).norm()).collect::<Vec<f64>>();
-        let bound = 2.0 * median_of(left.clone()) + f64::EPSILON;
+        let bound = 2.0 * upper_median(left.clone()) + f64::EPSILON;
         weights = left.iter().map(|l| (bound / l.max(f64::MIN_POSITIVE)).min(1.0)).collect();
     }
     let sizes = triples.iter().zip(&left).map(|(t, l)| angle(t, rotations).norm() + l).collect();
     let translation = Vector3::new(solution[3], solution[4], solution[5]);
-    Some((Pose::new(*v, translation), median_of(sizes)))
+    Some((Pose::new(*v, translation), upper_median(sizes)))
 }
 
 #[cfg(test)]

@@ -64,16 +64,18 @@ impl HandEye {
 
     /// Median over the images of rotation error (rad) plus translation error (m).
     pub fn median_error(&self, pairs: &[PosePair]) -> f64 {
-        let mut errors: Vec<f64> = pairs
-            .iter()
-            .map(|p| {
-                let (angle, distance) = self.error(p);
-                angle + distance
-            })
-            .collect();
-        errors.sort_by(f64::total_cmp);
-        errors.get(errors.len() / 2).copied().unwrap_or(f64::INFINITY)
+        let size = |p: &PosePair| {
+            let (angle, distance) = self.error(p);
+            angle + distance
+        };
+        upper_median(pairs.iter().map(size).collect())
     }
+}
+
+/// The middle value, of an even number the larger of both; infinite where there is none.
+pub fn upper_median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
 }
 
 type ClosedForm = fn(&[PosePair]) -> Option<HandEye>;
@@ -205,7 +207,8 @@ pub fn plate_scale(pairs: &[PosePair], solution: &HandEye) -> Option<f64> {
     (scale.is_finite() && scale > 0.0).then_some(scale)
 }
 
-pub(super) fn shah(pairs: &[PosePair]) -> Option<HandEye> {
+/// X and Z by the Kronecker product (M. Shah 2013); `None` where there is no solution.
+pub fn shah(pairs: &[PosePair]) -> Option<HandEye> {
     // R_X = sum R_A R_Z R_C' in the least-squares sense: K = sum kron(R_C, R_A) maps vec(R_Z) to vec(R_X).
     let mut k = DMatrix::<f64>::zeros(9, 9);
     for p in pairs {

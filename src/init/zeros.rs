@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
-use super::hand_eye::{PosePair, shah};
+use super::hand_eye::{PosePair, shah, upper_median};
 use crate::geom::{Pose, adjoint, right_jacobian_se3};
 use crate::linalg::SymmetricFactor;
 use crate::model::robot::{Posture, Robot};
@@ -22,6 +22,13 @@ pub struct SeenStop {
     pub mount: CameraMount,
     /// `camera_from_plate` measured in the image.
     pub camera_from_plate: Pose,
+}
+
+impl SeenStop {
+    /// What it says with a robot.
+    pub fn pair(&self, robot: &Robot) -> PosePair {
+        PosePair::of_stop(robot, self.mount, &self.readings, self.camera_from_plate)
+    }
 }
 
 /// Zeros that bring readings and images together.
@@ -106,9 +113,8 @@ impl Trial<'_> {
                 break;
             }
         }
-        let mut sizes: Vec<f64> = self.stops.iter().map(|s| size(&self.misfit(s, &x).0)).collect();
-        sizes.sort_by(f64::total_cmp);
-        Some(Zeros { offsets: x.offsets, reversed: self.reversed, left: *sizes.get(sizes.len() / 2)? })
+        let left = upper_median(self.stops.iter().map(|s| size(&self.misfit(s, &x).0)).collect());
+        Some(Zeros { offsets: x.offsets, reversed: self.reversed, left })
     }
 
     /// `log((X C)^-1 A Z)` and its derivative by the body twists of X and Z and the offsets.

@@ -159,3 +159,11 @@ pub struct MeasuredStop {
     /// Why the image is left out already (unreadable, nothing found).
     pub left_out: Option<ImageRejection>,
 }
+
+/// Index of a name among `names`, to which it is added where it is new.
+pub fn intern(names: &mut Vec<String>, name: &str) -> usize {
+    names.iter().position(|n| n == name).unwrap_or_else(|| {
+        names.push(name.to_owned());
+        names.len() - 1
+    })
+}

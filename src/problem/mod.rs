@@ -38,7 +38,7 @@ pub use linearise::{
     Chained, ImageTerms, Residual, Weighting, equations, linearise, linearise_with_equations, predict,
 };
 pub use measured::{Mark, Measured};
-pub use measured_series::{KnownCamera, LensChoice, MeasuredSeries, MeasuredStop, SeenBody, SeenLength};
+pub use measured_series::{KnownCamera, LensChoice, MeasuredSeries, MeasuredStop, SeenBody, SeenLength, intern};
 pub use noise::Noise;
 pub use plate_distance::{
     PlateDistance, SCALE, UNKNOWN_SCALE, release_measured_scales, seen_markers, size_by_distance,

@@ -24,6 +24,23 @@ impl Step {
         let (stops, images) = (state.joint_errors.len(), state.ties.len());
         Self { dense, joint_errors: vec![Vec::new(); stops], ties: vec![Vec::new(); images], markers }
     }
+
+    /// With `factor` times another step of the same unknowns.
+    #[must_use]
+    pub fn plus(mut self, factor: f64, other: &Self) -> Self {
+        self.dense.axpy(factor, &other.dense, 1.0);
+        let latents = self.joint_errors.iter_mut().chain(&mut self.ties).flatten();
+        let of_other = other.joint_errors.iter().chain(&other.ties).flatten();
+        latents.zip(of_other).for_each(|(a, b)| *a += factor * b);
+        let markers = self.markers.iter_mut().flatten().zip(other.markers.iter().flatten());
+        markers.for_each(|(a, b)| *a += factor * b);
+        self
+    }
+
+    /// No step, of the same unknowns.
+    pub fn none(&self) -> Self {
+        self.clone().plus(-1.0, self)
+    }
 }
 
 fn twist(step: &DVector<f64>, start: usize) -> Vector6<f64> {

@@ -83,7 +83,7 @@ impl<'a> LinearProblem<'a> {
                     }
                 }
             });
-            steps.push(difference(step, &none));
+            steps.push(step.plus(-1.0, &none));
         }
         let parts: Vec<Sums> = places
             .par_iter()
@@ -142,14 +142,6 @@ impl RightHandSide {
             marker.bm = self.bm.get(k).copied().unwrap_or_default();
         }
     }
-}
-
-fn difference(mut step: Step, other: &Step) -> Step {
-    step.dense -= &other.dense;
-    let pairs = step.joint_errors.iter_mut().zip(&other.joint_errors).chain(step.ties.iter_mut().zip(&other.ties));
-    pairs.for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a -= b));
-    step.markers.iter_mut().flatten().zip(other.markers.iter().flatten()).for_each(|(a, b)| *a -= b);
-    step
 }
 
 /// Sums over equations.

@@ -9,10 +9,12 @@ use std::path::Path;
 use robotcal::assess::{View, predict_pose};
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, Solution, identify};
-use robotcal::series::{CameraMount, Plate, PlateKind};
-use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
+use robotcal::series::CameraMount;
+use robotcal::simulate::SimulatedSeries;
 use robotcal::study::measured;
 use robotcal::urdf::{BASE_FROM_BASE, Chain, RobotDescription, patch_origins};
+
+use crate::coverage::world;
 
 const POSITIONER: &str = r#"
   <link name="trunnion"/><link name="table"/>
@@ -60,19 +62,6 @@ fn cells() -> [Cell; 3] {
         same("rail", with(RAIL).chain(None, Some("link_6")).unwrap()),
         Cell { name: "two arms", actual: chain(&placed), known: chain(&two) },
     ]
-}
-
-fn world(chain: &Chain, seed: u64) -> SimulatedSeries {
-    let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.1e-3);
-    plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.01);
-    let request = WorldRequest {
-        pixel_sigma_px: 0.05,
-        least_markers: 12,
-        marker_sigma_m: 0.1e-3,
-        seed,
-        ..WorldRequest::typical(chain.clone(), plate)
-    };
-    series(&request).unwrap()
 }
 
 /// Sums of squared errors of the predicted position of the camera in the plate frame, m^2: actual, stated, and how many.

@@ -22,7 +22,7 @@ fn chain() -> Chain {
 }
 
 /// 50 stops with typical errors: 0.3 mm, 1 mrad, offsets of 3 mrad, 0.02 mrad of joint noise, 0.05 px.
-fn world(chain: &Chain, seed: u64) -> SimulatedSeries {
+pub fn world(chain: &Chain, seed: u64) -> SimulatedSeries {
     let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.1e-3);
     plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.01);
     let request = WorldRequest {
