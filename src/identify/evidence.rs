@@ -66,7 +66,7 @@ fn best_model(
     let largest = supported.max_by_key(|e| e.parameters).map_or(RobotModel::Full, |e| e.model);
     let chosen = match largest {
         RobotModel::Full => full,
-        model => fit_model(chain, series, &Options { model, ..options.clone() }, Some(full.start))?,
+        model => fit_model(chain, series, &Options { model, ..options.clone() }, Some(full))?,
     };
     Ok((chosen, evidences))
 }

@@ -380,10 +380,9 @@ fn collect(fit: &Fit) -> Result<FreePoses> {
     let Fit { adjustment: Adjustment { problem, state }, linearised: lin, covariance } = fit;
     let (placed, scales) = placed_cameras(fit)?;
     let mut poses = vec![None; problem.images.len()];
-    for (own, in_frame) in fit.linear().images().zip(placed) {
-        let LinearImage { index, terms, chain, stop, .. } = own;
+    let covariances = covariance.of_images(fit.linear());
+    for ((LinearImage { index, terms, chain, .. }, c), in_frame) in fit.linear().images().zip(covariances).zip(placed) {
         let squares: f64 = terms.residuals.iter().map(|r| r.duv.norm_squared()).sum();
-        let c = own.part_of(&covariance.latents(&fit.linear().stop(stop)));
         poses[index] = Some(FreePose {
             camera_from_plate: chain.pose,
             covariance: Matrix6::from_column_slice(c.as_slice()),
@@ -466,8 +465,8 @@ fn placed_cameras(fit: &Fit) -> Result<(Vec<PlacedCamera>, Vec<Option<PlateScale
         Some(PlateScale { relative: size - 1.0, sigma })
     };
     let scales = sizes.into_iter().enumerate().map(scale).collect();
-    let placed = |own: LinearImage| PlacedCamera::of(&own.chain.pose, &covariance.pose(&linear.stop(own.stop), &own));
-    Ok((linear.images().map(placed).collect(), scales))
+    let of_images = linear.images().zip(covariance.poses(linear));
+    Ok((of_images.map(|(own, c)| PlacedCamera::of(&own.chain.pose, &c)).collect(), scales))
 }
 
 impl PlacedCamera {

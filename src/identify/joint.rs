@@ -17,8 +17,8 @@ use crate::fit::{Fit, FreePoses};
 use crate::problem::MeasuredSeries;
 use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem};
 use crate::solve::{
-    ComponentOptions, NoiseInformation, Outcome, Status, estimate_components, reject_bodies, reject_contradicting,
-    reject_observations, reject_stops, without_unidentified_noise,
+    ComponentOptions, LEAST_FIRST_GUESS, NoiseInformation, Outcome, Status, estimate_components, reject_bodies,
+    reject_contradicting, reject_observations, reject_stops, without_unidentified_noise,
 };
 use crate::stage::stage;
 use crate::urdf::Chain;
@@ -43,7 +43,8 @@ pub(super) struct JointFit {
     iterations: usize,
 }
 
-/// Fits one robot model jointly. What the free-pose adjustment of the same series left may be `known`: the robot takes no part in it.
+/// Fits one robot model jointly. A fit of the same series with another robot model may be `known`: the robot takes no part in its free-pose
+/// adjustment, and its end is near that of the other.
 ///
 /// # Errors
 /// As of [`super::identify`].
@@ -51,7 +52,7 @@ pub(super) fn fit_model(
     chain: Chain,
     series: &[MeasuredSeries],
     options: &Options,
-    known: Option<FreeStart>,
+    known: Option<JointFit>,
 ) -> Result<JointFit> {
     let _stage = stage(options.model.title());
     let robot = options.model.robot_with(chain, options.harmonics);
@@ -63,6 +64,7 @@ pub(super) fn fit_model(
     if options.marker_tolerance == MarkerTolerance::Estimated {
         problem.noise.marker = vec![1.0; problem.plates.len()];
     }
+    let (known, near) = known.map(|k| (k.start, k.fit.adjustment)).unzip();
     let left = match known {
         Some(known) => {
             known.carry_to(&mut start);
@@ -84,7 +86,7 @@ pub(super) fn fit_model(
     start_bodies(&mut start)?;
     let (mut outcome, before) = {
         let _stage = stage("joint fit");
-        fit(start, free, &aside, options)
+        fit(start, free, (&aside, near.as_ref()), options)
     };
     let (status, iterations) = (outcome.status, outcome.iterations);
     name_wrong_pairs(&mut outcome.adjustment, free, options.limits.other_readings_explain);
@@ -168,11 +170,11 @@ impl JointFit {
 
 /// The fit, and what was known of the joint noise before some of it was set to none.
 ///
-/// Images that were set `aside` before take part where the fit says that they belong.
+/// Images that were set `aside` before take part where the fit says that they belong. A fit with another robot model may be `near`.
 fn fit(
     mut start: Adjustment,
     free: &FreePoses,
-    aside: &[usize],
+    (aside, near): (&[usize], Option<&Adjustment>),
     options: &Options,
 ) -> (Outcome, Option<NoiseInformation>) {
     let exact = options.joint_noise == JointNoise::Known(0.0);
@@ -180,6 +182,9 @@ fn fit(
         start.problem.noise.tilt.clear();
     }
     start.tie_to_readings(exact);
+    if let Some(solved) = near {
+        start.start_near(solved, LEAST_FIRST_GUESS);
+    }
     if let JointNoise::Known(sigma) = options.joint_noise {
         start.problem.noise.joint.iter_mut().flatten().for_each(|s| *s = sigma.max(f64::MIN_POSITIVE));
     }

@@ -14,8 +14,8 @@ use crate::geom::{Pose, right_jacobian_se3};
 use crate::linalg::{SymmetricFactor, product};
 use crate::problem::{Adjustment, Chained, Problem, State, Step, TakenFrom, Tie};
 use crate::solve::{
-    Acceleration, ComponentOptions, Elimination, JOINT_NOISE_FLOOR, LinearImage, Settings, Status, Tally,
-    estimate_components, share_out,
+    Acceleration, ComponentOptions, Elimination, JOINT_NOISE_FLOOR, LEAST_FIRST_GUESS, LinearImage, Settings, Status,
+    Tally, estimate_components, share_out,
 };
 
 use super::block_diagonal::BlockDiagonal;
@@ -71,16 +71,14 @@ impl PoseStage {
         let free = with_free_poses(at)?;
         let lin = free.linearise()?;
         let linear = free.linear(&lin);
-        let images: Vec<LinearImage> = linear.images().filter(|own| free.problem.on_robot(own.index)).collect();
+        let on_robot = |own: &LinearImage| free.problem.on_robot(own.index);
+        let images: Vec<LinearImage> = linear.images().filter(on_robot).collect();
         let are_together = images.len() <= MOST_TOGETHER;
         let which = if are_together { Elimination::Markers } else { Elimination::cheaper(linear) };
         let cov = linear.covariance_by(which).ok()?;
         let step = cov.system.step(linear, &(&cov.reduced * &cov.system.rhs));
         let offset = images.iter().flat_map(|own| step.ties[own.index].iter().copied());
-        let block = |own: &LinearImage| {
-            let of_stop = cov.latents(&linear.stop(own.stop));
-            Matrix6::from_column_slice(own.part_of(&of_stop).as_slice())
-        };
+        let of_images = linear.images().zip(cov.of_images(linear)).filter(|(own, _)| on_robot(own));
         let rows_of = |own: &LinearImage| -> Vec<usize> {
             let start = cov.system.latent_start[own.stop];
             own.latents().into_iter().flatten().map(|c| start + c).collect()
@@ -93,7 +91,7 @@ impl PoseStage {
             images: images.iter().map(|own| own.index).collect(),
             references: images.iter().map(|own| own.chain.pose).collect(),
             offset: DVector::from_vec(offset.collect()),
-            blocks: images.iter().map(block).collect(),
+            blocks: of_images.map(|(_, c)| Matrix6::from_column_slice(c.as_slice())).collect(),
             covariance: are_together.then(together),
             pixel_factor: free.problem.noise.pixel_factor.clone(),
             state: free.state.clone(),
@@ -135,7 +133,8 @@ struct ErrorModel {
     estimated: bool,
 }
 
-/// First guesses, from above: position (m) and rotation (rad) of a pose, factor on its stated sigma, joint noise (rad or m).
+/// First guesses, from above: position (m) and rotation (rad) of a pose, factor on its stated sigma, joint noise (rad or m) where the joint fit
+/// has none.
 const FIRST_ISOTROPIC: f64 = 1e-2;
 const FIRST_FACTOR: f64 = 30.0;
 const FIRST_JOINT_NOISE: f64 = 3e-3;
@@ -145,7 +144,7 @@ const MOST_TOGETHER: usize = 100;
 
 /// Rounds of variance components, and relative change that ends them.
 const ROUNDS: usize = 60;
-const STANDING: f64 = 1e-3;
+const STANDING: f64 = 1e-2;
 
 /// Gauss-Newton steps at given weights, and the decrement (in sigma) that ends them.
 const STEPS: usize = 30;
@@ -155,16 +154,20 @@ const ROUGH_DECREMENT: f64 = 1e-4;
 
 impl ErrorModel {
     fn new(problem: &Problem, stage: &PoseStage, estimator: Estimator, noise: JointNoise) -> Option<Self> {
-        let sizes = problem.noise.joint.len() * sizes_per_series(problem);
-        let (first, estimated) = match noise {
-            JointNoise::Estimated => (FIRST_JOINT_NOISE, true),
-            JointNoise::Known(sigma) => (sigma, false),
+        let estimated = noise == JointNoise::Estimated;
+        let first = |of_joint_fit: f64| match noise {
+            JointNoise::Known(sigma) => sigma,
+            JointNoise::Estimated if of_joint_fit > 0.0 => of_joint_fit.max(LEAST_FIRST_GUESS),
+            JointNoise::Estimated => FIRST_JOINT_NOISE,
         };
+        let tilt = |series: usize| problem.noise.tilt.get(series);
+        let of_series = |(k, own): (usize, &Vec<f64>)| own.iter().chain(tilt(k)).map(|s| first(*s)).collect::<Vec<_>>();
+        let sizes = || problem.noise.joint.iter().enumerate().flat_map(of_series).collect();
         let (together, sizes, estimated) = match estimator {
             Estimator::Isotropic => (None, vec![FIRST_ISOTROPIC; 2], true),
             Estimator::Blocks => (None, vec![FIRST_FACTOR], true),
-            Estimator::BlocksAndRepeatability => (None, vec![first; sizes], estimated),
-            Estimator::FullAndRepeatability => (Some(stage.covariance.clone()?), vec![first; sizes], estimated),
+            Estimator::BlocksAndRepeatability => (None, sizes(), estimated),
+            Estimator::FullAndRepeatability => (Some(stage.covariance.clone()?), sizes(), estimated),
             Estimator::HardJoint | Estimator::Joint => return None,
         };
         Some(Self { estimator, together, blocks: stage.blocks.clone(), sizes, estimated })
@@ -260,8 +263,7 @@ impl ErrorModel {
             let share = l.enters_by.transpose() * weight.view(start, rows) * &l.enters_by - of_taken.tr_mul(&of_taken);
             for (a, &c) in l.component.iter().enumerate() {
                 let variance = self.sizes[c].powi(2);
-                tally.squares[c] += (variance * pull[a]).powi(2);
-                tally.redundancy[c] += (variance * share[(a, a)]).max(0.0);
+                tally.count(c, (variance * pull[a]).powi(2), (variance * share[(a, a)]).max(0.0));
             }
         }
         if matches!(self.estimator, Estimator::Isotropic | Estimator::Blocks) {

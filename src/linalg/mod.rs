@@ -1,7 +1,7 @@
 //! Dense factorisations and quadratic programmes; the only room that imports `faer` and `clarabel`.
 //!
-//! Everything runs on one thread: parallelism lies outside, over images. Every call of `faer` says so itself; its setting for
-//! the whole process belongs to the caller and is neither read nor changed.
+//! Every call of `faer` runs on one thread and says so itself; its setting for the whole process belongs to the caller and is neither read nor
+//! changed. Parallelism lies outside, over images, stops and blocks of columns, whose bounds do not depend on the number of threads.
 
 mod quadratic;
 mod wide;
@@ -13,12 +13,13 @@ use std::ops::Range;
 
 use faer::diag::Diag;
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::{factor, solve};
+use faer::linalg::cholesky::llt::{factor, inverse, solve};
 use faer::linalg::evd;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Conj, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Cholesky factor of a symmetric positive definite matrix, with the diagonal scaled to one first.
 pub struct SymmetricFactor {
@@ -55,8 +56,9 @@ impl SymmetricFactor {
         }
         let scale = m.diagonal().map(|d| 1.0 / d.sqrt());
         let mut scaled = DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * scale[i] * scale[j]);
-        if let Some(row) = scaled.row_iter().position(|r| !r.iter().all(|x| x.is_finite())) {
-            return Err(NotPositiveDefinite { row });
+        if !scaled.iter().all(|x| x.is_finite()) {
+            let row = scaled.row_iter().position(|r| !r.iter().all(|x| x.is_finite()));
+            return Err(NotPositiveDefinite { row: row.unwrap_or_default() });
         }
         let needed = factor::cholesky_in_place_scratch::<f64>(m.nrows(), Par::Seq, Default::default());
         let (mut memory, options) = (MemBuffer::new(needed), Default::default());
@@ -89,8 +91,16 @@ impl SymmetricFactor {
     /// The inverse, symmetric to the last bit.
     pub fn inverse(&self) -> DMatrix<f64> {
         let n = self.scale.len();
-        let x = self.solve_many(&DMatrix::identity(n, n));
-        DMatrix::from_fn(n, n, |i, j| 0.5 * (x[(i, j)] + x[(j, i)]))
+        let mut lower = DMatrix::zeros(n, n);
+        let mut memory = MemBuffer::new(inverse::inverse_scratch::<f64>(n, Par::Seq));
+        inverse::inverse(view_mut(&mut lower), view(&self.factor), Par::Seq, MemStack::new(&mut memory));
+        for j in 0..n {
+            for i in j..n {
+                lower[(i, j)] *= self.scale[i] * self.scale[j];
+            }
+        }
+        lower.fill_upper_triangle_with_lower_triangle();
+        lower
     }
 
     /// Natural logarithm of the determinant.
@@ -131,10 +141,23 @@ pub fn gram(y: &DMatrix<f64>) -> DMatrix<f64> {
     multiply(view(y), view(y).transpose())
 }
 
-/// `a -= y y'` in the upper triangle of `a`; what lies below the diagonal is left as it is.
+/// Columns of a Gram product that are made together.
+const COLUMNS_A_BLOCK: usize = 192;
+
+/// `a -= y y'` in the upper triangle of the square matrix `a`; what lies below the diagonal is left as it is. Blocks of columns side by side.
 pub fn subtract_gram(a: &mut DMatrix<f64>, y: &DMatrix<f64>) {
     let (upper, full) = (BlockStructure::TriangularUpper, BlockStructure::Rectangular);
-    triangular::matmul(view_mut(a), upper, Accum::Add, view(y), full, view(y).transpose(), full, -1.0, Par::Seq);
+    let rows = a.nrows();
+    a.as_mut_slice().par_chunks_mut(COLUMNS_A_BLOCK * rows.max(1)).enumerate().for_each(|(block, columns)| {
+        let (first, y) = (block * COLUMNS_A_BLOCK, view(y));
+        let own = columns.len() / rows;
+        let columns = MatMut::from_column_major_slice_mut(columns, rows, own);
+        let (above, rest) = columns.split_at_row_mut(first);
+        let (diagonal, _) = rest.split_at_row_mut(own);
+        let of_columns = y.get(first..first + own, ..);
+        matmul(above, Accum::Add, y.get(..first, ..), of_columns.transpose(), -1.0, Par::Seq);
+        triangular::matmul(diagonal, upper, Accum::Add, of_columns, full, of_columns.transpose(), full, -1.0, Par::Seq);
+    });
 }
 
 /// Copies the upper triangle to the lower one.

@@ -97,6 +97,23 @@ impl Adjustment {
         }
     }
 
+    /// Starts where an adjustment of the same series with another robot model ended: what both have is taken over, and the noise, joint noise at
+    /// `least`, rad or m, or more.
+    pub fn start_near(&mut self, solved: &Self, least: f64) {
+        let Self { problem, state } = self;
+        let mut robot = state.robot.clone();
+        robot.twists.clone_from(&solved.state.robot.twists);
+        for own in &mut robot.terms {
+            let known = solved.state.robot.terms.iter().find(|t| (t.reading, t.term) == (own.reading, own.term));
+            own.value = known.map_or(own.value, |t| t.value);
+        }
+        *state = State { robot, ..solved.state.clone() };
+        problem.noise.start_near(&solved.problem.noise, least);
+        let factor = |name: &str| solved.problem.families.iter().find(|f| f.name == name).map(|f| f.factor);
+        problem.families.iter_mut().for_each(|f| f.factor = factor(&f.name).unwrap_or(f.factor));
+        self.hold_component_priors();
+    }
+
     /// What acts through the camera poses (robot, mountings, placements) stays as it is.
     pub fn hold_poses(&mut self) {
         let theta = self.problem.layout.theta_len();

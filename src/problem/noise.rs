@@ -27,6 +27,17 @@ impl Noise {
         self.tilt.fill(first);
     }
 
+    /// Takes over what another problem of the same series found; sizes of latent joint errors and tilts at `least`, rad or m, or more.
+    pub fn start_near(&mut self, other: &Self, least: f64) {
+        self.pixel_factor.clone_from(&other.pixel_factor);
+        self.body.clone_from(&other.body);
+        self.marker.clone_from(&other.marker);
+        let own = self.joint.iter_mut().flatten().chain(&mut self.tilt);
+        let of_other = other.joint.iter().flatten().chain(&other.tilt);
+        let local = self.local.iter_mut().zip(&other.local).filter(|(s, _)| **s > 0.0);
+        own.zip(of_other).chain(local).filter(|(_, other)| **other > 0.0).for_each(|(s, other)| *s = other.max(least));
+    }
+
     /// Readings whose noise is alike: of one kind, with local errors told apart or not.
     pub fn groups(&self, kinds: &[JointKind]) -> Vec<Vec<usize>> {
         let apart = |r: usize| self.local.get(r).is_some_and(|s| *s > 0.0);

@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, SMatrix, Vector3};
+use rayon::prelude::*;
 
 use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, latents_with_markers};
 use super::linear::Carried;
@@ -170,13 +171,28 @@ impl StopsEliminated {
         step
     }
 
-    /// `H^-1 + H^-1 B' cov(x) B H^-1`, of a stop by its place among those in use.
-    pub fn latent_covariance(&self, reduced: &DMatrix<f64>, at: usize) -> DMatrix<f64> {
-        let block = &self.blocks[at];
-        let n = block.rows.len();
-        let own = DMatrix::from_fn(n, n, |i, j| reduced[(block.rows[i], block.rows[j])]);
-        let d = &block.y * &block.inverse_factor;
-        block.inverse_factor.tr_mul(&block.inverse_factor) + d.tr_mul(&product(&own, &d))
+    /// `H^-1 + H^-1 B' cov(x) B H^-1` of stops by their places among those in use.
+    pub fn latent_covariances(&self, reduced: &DMatrix<f64>, stops: &[usize]) -> Vec<DMatrix<f64>> {
+        let of_part = |part: &[usize]| {
+            let blocks = || part.iter().map(|&at| &self.blocks[at]);
+            let mut d = DMatrix::zeros(reduced.nrows(), blocks().map(|b| b.y.ncols()).sum());
+            let mut into = d.column_iter_mut();
+            for (block, d) in blocks().map(|b| (b, &b.y * &b.inverse_factor)) {
+                for (own, mut into) in d.column_iter().zip(&mut into) {
+                    block.rows.iter().zip(own.iter()).for_each(|(&row, value)| into[row] = *value);
+                }
+            }
+            let of_reduced = product(reduced, &d);
+            let mut first = 0;
+            let of = |block: &Block| {
+                let (start, own) = (first, block.y.ncols());
+                first += own;
+                let part = d.columns(start, own).tr_mul(&of_reduced.columns(start, own));
+                block.inverse_factor.tr_mul(&block.inverse_factor) + part
+            };
+            blocks().map(of).collect::<Vec<_>>()
+        };
+        stops.par_chunks(STOPS_A_PRODUCT).flat_map_iter(of_part).collect()
     }
 
     /// Covariance of a pose that something shows at a stop, as its body twist: that of the unknowns that stay through `G - L D'`, and what is

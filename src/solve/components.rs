@@ -3,12 +3,12 @@
 //! `s^2 = sum r^2 / (redundancy)`: every group of residuals is divided by the number of them that the parameters did not use up.
 //! For joint noise the redundancy of one latent is `1 - C / sigma^2` with its posterior variance C. Started from above.
 
-use nalgebra::{DVector, Matrix3};
+use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::acceleration::Acceleration;
 use super::body_components::{BodyTally, update_bodies};
 use super::fit::Fit;
-use super::levenberg::{Outcome, Settings, Status, solve};
+use super::levenberg::{Outcome, Settings, Status, minimise, minimise_near};
 use super::linear::{LinearImage, LinearStop};
 use crate::problem::{Adjustment, Noise, Problem, Tie};
 use crate::urdf::JointKind;
@@ -35,6 +35,9 @@ impl Default for ComponentOptions {
 /// Smallest joint noise, rad or m: a tenth of what forty images of a good camera can tell from none.
 pub const JOINT_NOISE_FLOOR: f64 = 1e-7;
 
+/// Smallest joint noise, rad or m, that a neighbouring fit gives as a first guess: sizes grow by two in a round at most.
+pub const LEAST_FIRST_GUESS: f64 = 10.0 * JOINT_NOISE_FLOOR;
+
 /// Weight, in observations, with which the noise of a single joint is drawn to that of all joints of its series, and this to what is usual of all series.
 pub(super) const SHRINKAGE: f64 = 5.0;
 
@@ -56,16 +59,13 @@ const ROUGH_DECREMENT: f64 = 0.05;
 /// Alternates solving and re-estimating until the components stand. The adjustment keeps the final components.
 pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Outcome {
     let rough = Settings { decrement: ROUGH_DECREMENT.max(options.settings.decrement), ..options.settings };
-    let mut outcome = solve(start, &rough);
-    let mut iterations = outcome.iterations;
+    let mut minimised = minimise(start, &rough);
+    let mut iterations = minimised.outcome.iterations;
     let mut acceleration = Acceleration::default();
     for round in 0..options.rounds {
-        let mut fit = match outcome.fit() {
+        let mut fit = match minimised.fit() {
             Ok(fit) => fit,
-            Err(unsolved) => {
-                outcome = unsolved.outcome;
-                break;
-            }
+            Err(unsolved) => return Outcome { iterations, ..unsolved.outcome },
         };
         let before = sizes(&mut fit.problem);
         let change = fit.update_components(options);
@@ -76,21 +76,21 @@ pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Out
         }
         let noise = &fit.problem.noise;
         tracing::debug!(round, change, pixel = ?noise.pixel_factor, joint = ?noise.joint, "variance components");
-        outcome = solve(fit.adjustment, &rough);
-        iterations += outcome.iterations;
-        if change < CONVERGED || outcome.status == Status::BadStart {
+        minimised = minimise_near(fit.adjustment, &rough);
+        iterations += minimised.outcome.iterations;
+        if change < CONVERGED || minimised.outcome.status == Status::BadStart {
             break;
         }
     }
-    if outcome.status == Status::Converged {
-        outcome = solve(outcome.adjustment, &options.settings);
-        iterations += outcome.iterations;
+    if minimised.outcome.status == Status::Converged {
+        minimised = minimised.polished(&options.settings);
+        iterations += minimised.outcome.iterations;
         // The rough solve converged to 0.05 sigma; polishing lowered the cost further, if slowly.
-        if outcome.status == Status::OutOfIterations {
-            outcome.status = Status::Converged;
+        if minimised.outcome.status == Status::OutOfIterations {
+            minimised.outcome.status = Status::Converged;
         }
     }
-    Outcome { iterations, ..outcome }
+    Outcome { iterations, ..minimised.outcome }
 }
 
 /// Every component that is not zero, with its smallest value.
@@ -125,7 +125,9 @@ impl Fit {
         let markers = self.marker_tallies();
         let bodies = self.body_tallies();
         let by_bodies: f64 = bodies.iter().flatten().map(BodyTally::taken).sum();
-        let taken = self.effective_parameters(markers.iter().map(|[_, told]| told).sum()) - by_bodies;
+        let stops = self.stops_with_noise();
+        let latents = self.covariance.latents(&stops);
+        let taken = self.effective_parameters(&stops, &latents, markers.iter().map(|[_, told]| told).sum()) - by_bodies;
         let mut change = update_markers(&markers, &mut noise).max(update_bodies(&bodies, &mut noise));
         let counts = self.linearised.terms.iter().map(|t| 2.0 * t.residuals.len() as f64);
         let total: f64 = counts.clone().sum();
@@ -145,7 +147,7 @@ impl Fit {
             change = change.max((ratio - 1.0).abs());
         }
         if options.joint || options.tilt {
-            let found = self.tallies();
+            let found = self.tallies(stops.iter().zip(&latents));
             if options.tilt {
                 change = change.max(update_tilt(&found.tilt, &mut noise));
             }
@@ -197,33 +199,38 @@ impl Fit {
         self.covariance.markers().iter().enumerate().map(of_plate).collect()
     }
 
-    /// Number of parameters that the pixels (and not the priors) determine, with so many `markers` coordinates among them.
-    pub(super) fn effective_parameters(&self, markers: f64) -> f64 {
+    /// Stops at which something latent has a prior.
+    fn stops_with_noise(&self) -> Vec<LinearStop<'_>> {
+        self.linear().stops().filter(|stop| stop.prior().iter().any(|prior| *prior > 0.0)).collect()
+    }
+
+    /// Number of parameters that the pixels (and not the priors) determine, with so many `markers` coordinates among them; `covariances` of what
+    /// is latent at the stops where something has a prior.
+    fn effective_parameters(&self, stops: &[LinearStop], covariances: &[DMatrix<f64>], markers: f64) -> f64 {
         let (problem, cov) = (&self.problem, &self.covariance);
         let columns = &problem.layout.columns;
         let dense: f64 = (columns.iter().enumerate())
             .filter(|(i, c)| c.free && cov.system.touched(*i))
             .map(|(i, c)| 1.0 - cov.reduced[(i, i)] / (c.prior_sigma * c.prior_sigma))
             .sum();
-        let mut latent = 0.0;
-        for stop in self.linear().stops() {
-            let c = cov.latents(&stop);
-            latent += stop.prior().into_iter().enumerate().map(|(k, prior)| 1.0 - c[(k, k)] * prior).sum::<f64>();
-        }
+        let all: usize = self.linear().stops().map(|stop| stop.unknowns()).sum();
+        let by_priors = |(stop, c): (&LinearStop, &DMatrix<f64>)| {
+            stop.prior().into_iter().enumerate().map(|(k, prior)| c[(k, k)] * prior).sum::<f64>()
+        };
+        let latent = all as f64 - stops.iter().zip(covariances).map(by_priors).sum::<f64>();
         dense + latent + markers
     }
 
-    /// What is latent at the stops tells of the sizes.
-    fn tallies(&self) -> Tallies {
+    /// What is latent at stops, with its covariance, tells of the sizes.
+    fn tallies<'a>(&self, stops: impl Iterator<Item = (&'a LinearStop<'a>, &'a DMatrix<f64>)>) -> Tallies {
         let (Adjustment { problem, state }, cov) = (&self.adjustment, &self.covariance);
         let (robot, noise) = (&state.robot, &problem.noise);
         let n = robot.chain.readings.len();
         let mut own = vec![Tally::new(n); noise.joint.len()];
         let mut local = Tally::new(n);
         let mut tilt = Tally::new(noise.tilt.len());
-        for at in self.linear().stops() {
+        for (at, c) in stops {
             let LinearStop { stop, joint_errors, .. } = at;
-            let c = cov.latents(&at);
             for image in at.images() {
                 let Tie::Tilted(values) = image.tie else { continue };
                 let ([_, places], prior) = (image.latents(), problem.tilt_variance(image.image));
@@ -288,12 +295,21 @@ pub struct Tally {
     pub squares: Vec<f64>,
     /// Redundancies.
     pub redundancy: Vec<f64>,
+    /// Sums of squares of the redundancies of single latents: twice the information on the logarithm of the standard deviation is this, at most.
+    pub information: Vec<f64>,
 }
 
 impl Tally {
     /// Nothing counted yet.
     pub fn new(readings: usize) -> Self {
-        Self { squares: vec![0.0; readings], redundancy: vec![0.0; readings] }
+        Self { squares: vec![0.0; readings], redundancy: vec![0.0; readings], information: vec![0.0; readings] }
+    }
+
+    /// Counts the square of a latent, and how far the data determine it.
+    pub fn count(&mut self, reading: usize, square: f64, redundancy: f64) {
+        self.squares[reading] += square;
+        self.redundancy[reading] += redundancy;
+        self.information[reading] += redundancy * redundancy;
     }
 
     /// Variance of the readings of a group together; `None` where the data say nothing.
@@ -331,6 +347,7 @@ impl Tally {
         for r in (0..self.squares.len()).filter(|&r| which(r)) {
             self.squares[r] += other.squares[r];
             self.redundancy[r] += other.redundancy[r];
+            self.information[r] += other.information[r];
         }
         self
     }
@@ -339,8 +356,7 @@ impl Tally {
     /// `part` is the variance of the one that is counted: its share in the estimate, and in what was learnt of it.
     fn add(&mut self, reading: usize, value: f64, left: f64, prior: f64, part: f64) {
         let share = part / prior;
-        self.squares[reading] += (share * value).powi(2);
-        self.redundancy[reading] += share * (1.0 - left / prior).max(0.0);
+        self.count(reading, (share * value).powi(2), share * (1.0 - left / prior).max(0.0));
     }
 }
 
@@ -383,8 +399,16 @@ fn update_tilt(tilt: &Tally, noise: &mut Noise) -> f64 {
     share_out(&all, tilt, usual, &mut noise.tilt)
 }
 
+/// A change by so many of its own standard deviations is none.
+const STANDING_SIGMAS: f64 = 0.1;
+
+/// A relative change of a size that counts less where the data hardly tell the size: one by [`STANDING_SIGMAS`] counts as [`CONVERGED`], at most.
+fn counted(change: f64, information: f64) -> f64 {
+    change * (CONVERGED * (2.0 * information).sqrt() / STANDING_SIGMAS).min(1.0)
+}
+
 /// New noise from the sum of squares and the redundancy of each reading's latents; every reading is drawn to the common
-/// variance. Returns the largest relative change.
+/// variance. Returns the largest relative change, less of what the data hardly tell.
 pub fn share_out(group: &[usize], tally: &Tally, common: Option<f64>, sigma: &mut [f64]) -> f64 {
     let mut change: f64 = 0.0;
     let Some(common) = common else { return change };
@@ -393,7 +417,7 @@ pub fn share_out(group: &[usize], tally: &Tally, common: Option<f64>, sigma: &mu
         let variance = (squares[r] + SHRINKAGE * common) / (redundancy[r] + SHRINKAGE);
         let next = variance.sqrt().clamp(JOINT_NOISE_FLOOR, 2.0 * sigma[r].max(JOINT_NOISE_FLOOR));
         if next > JOINT_NOISE_FLOOR {
-            change = change.max((next / sigma[r] - 1.0).abs());
+            change = change.max(counted((next / sigma[r] - 1.0).abs(), tally.information[r]));
         }
         sigma[r] = next;
     }

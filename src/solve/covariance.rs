@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
 use super::system::{Elimination, Singular, System};
+use crate::linalg::SymmetricFactor;
 use crate::problem::Problem;
 
 /// Covariance of the reduced unknowns (dense columns, then latents or markers), with what is needed for the eliminated family.
@@ -37,10 +38,7 @@ impl LinearProblem<'_> {
     pub fn covariance_by(self, which: Elimination) -> Result<Covariance, Singular> {
         let system = System::with(which, self, 0.0);
         let factor = system.factor(self)?;
-        let mut reduced = factor.inverse();
-        fixed_are_known(&self.adjustment.problem, &mut reduced);
-        let log_determinant = factor.log_determinant();
-        Ok(Covariance { reduced, log_determinant, system, added: None, enlarged: Vec::new() })
+        Ok(Covariance::of(&self.adjustment.problem, system, &factor))
     }
 }
 
@@ -52,6 +50,14 @@ pub(super) fn fixed_are_known(problem: &Problem, reduced: &mut DMatrix<f64>) {
 }
 
 impl Covariance {
+    /// From the factor of a system.
+    pub(super) fn of(problem: &Problem, system: System, factor: &SymmetricFactor) -> Self {
+        let mut reduced = factor.inverse();
+        fixed_are_known(problem, &mut reduced);
+        let log_determinant = factor.log_determinant();
+        Self { reduced, log_determinant, system, added: None, enlarged: Vec::new() }
+    }
+
     /// Standard deviation of a dense column, in its unit.
     pub fn sigma(&self, column: usize) -> f64 {
         self.reduced[(column, column)].max(0.0).sqrt()
@@ -88,9 +94,15 @@ impl Covariance {
         self.reduced.fixed_view::<6, 6>(start, start).into_owned()
     }
 
-    /// Covariance of what is latent at a stop: errors of its readings, then the ties of its images.
-    pub fn latents(&self, stop: &LinearStop) -> DMatrix<f64> {
-        self.system.latent_covariance(&self.reduced, stop)
+    /// Covariance of what is latent at each of some stops: errors of its readings, then the ties of its images. Cheaper for all than one by one.
+    pub fn latents(&self, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
+        self.system.latent_covariances(&self.reduced, stops)
+    }
+
+    /// Covariance of what moves the camera pose of each image in use: errors of its readings, then its tie.
+    pub fn of_images(&self, linear: LinearProblem) -> Vec<DMatrix<f64>> {
+        let of_stops = self.latents(&linear.stops().collect::<Vec<_>>());
+        linear.images().map(|own| own.part_of(&of_stops[own.stop])).collect()
     }
 
     /// Covariance of a pose that something shows at a stop, as its body twist, m and rad.

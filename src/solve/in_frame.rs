@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 use super::blocks::SeenMarkers;
 use super::covariance::{Covariance, fixed_are_known};
 use super::frame::{Frame, frames};
-use super::linear::{LinearImage, LinearProblem, LinearStop};
+use super::linear::{LinearImage, LinearProblem};
 use super::system::{Eliminated, Elimination, Singular, System};
 use crate::error::{Code, Error, Result};
 use crate::model::plate_modes::MODES;
@@ -202,10 +202,13 @@ impl InFrame {
         self.covariance.block(start)
     }
 
-    /// Covariance of the free camera pose of an image of a stop.
-    pub fn pose(&self, stop: &LinearStop, image: &LinearImage) -> Matrix6<f64> {
-        let c = Matrix6::from_column_slice(image.part_of(&self.covariance.latents(stop)).as_slice());
-        0.5 * (c + c.transpose())
+    /// Covariances of the free camera poses of all images in use.
+    pub fn poses(&self, linear: LinearProblem) -> Vec<Matrix6<f64>> {
+        let of = |c: DMatrix<f64>| {
+            let c = Matrix6::from_column_slice(c.as_slice());
+            0.5 * (c + c.transpose())
+        };
+        self.covariance.of_images(linear).into_iter().map(of).collect()
     }
 
     /// Covariance of the free camera poses of all images in use together, six rows each, in their order; none where what is latent at the

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::covariance::Covariance;
 use super::fit::Fit;
 use super::linear::{LinearProblem, Linearised};
 use super::system::{Elimination, Singular, System};
@@ -115,17 +116,33 @@ const LAMBDA_IF_REFUSED: f64 = 1e-9;
 const LAMBDA_IF_SINGULAR: f64 = 1e-3;
 const SMALLEST_LAMBDA: f64 = 1e-12;
 
+/// Newton decrement of the first step of a model up to which its information is that of the end: no unknown moved by more sigmas.
+const NEAR: f64 = 1.0;
+
 /// Quadratic model of the cost.
 struct Model {
     system: System,
     factor: SymmetricFactor,
+    /// Levenberg-Marquardt damping.
+    lambda: f64,
+    /// Nothing is held that is free.
+    is_whole: bool,
+    /// Newton decrement of its first step.
+    decrement: f64,
 }
 
 impl Model {
     fn new(which: Elimination, linear: LinearProblem, lambda: f64) -> Option<Self> {
         let system = System::with(which, linear, lambda);
         let factor = system.factor(linear).inspect_err(|singular| tracing::debug!(lambda, "{singular}")).ok()?;
-        Some(Self { system, factor })
+        let is_whole = which != Elimination::StopsMarkersHeld;
+        Some(Self { system, factor, lambda, is_whole, decrement: f64::INFINITY })
+    }
+
+    /// The covariance, where the model stands for the end of the iteration.
+    fn covariance(self, adjustment: &Adjustment) -> Option<Covariance> {
+        let is_near = self.is_whole && self.decrement <= NEAR && self.lambda <= LAMBDA_IF_REFUSED;
+        is_near.then(|| Covariance::of(&adjustment.problem, self.system, &self.factor))
     }
 
     fn proposal(&self, linear: LinearProblem) -> Proposal {
@@ -164,8 +181,9 @@ impl Proposer {
         let plates = &linear.adjustment.problem.plates;
         let are_held = plates.iter().flat_map(|p| &p.markers).all(|m| m.sigma_m == 0.0);
         let which = if are_held { Elimination::StopsMarkersHeld } else { Elimination::cheaper(linear) };
-        let model = Model::new(which, linear, lambda)?;
+        let mut model = Model::new(which, linear, lambda)?;
         let proposal = model.proposal(linear);
+        model.decrement = proposal.decrement;
         self.model = Some(model);
         Some(proposal)
     }
@@ -246,19 +264,72 @@ fn approach(adjustment: &mut Adjustment, most: usize) -> usize {
 }
 
 /// Minimises the cost from where the adjustment stands.
-pub fn solve(mut adjustment: Adjustment, settings: &Settings) -> Outcome {
+pub fn solve(adjustment: Adjustment, settings: &Settings) -> Outcome {
+    minimise(adjustment, settings).outcome
+}
+
+/// An outcome with what proposed its steps.
+pub(super) struct Minimised {
+    pub outcome: Outcome,
+    proposer: Proposer,
+}
+
+impl Minimised {
+    /// With its covariance: that of the last model where this is near the end, else a new one.
+    ///
+    /// # Errors
+    /// A bad start; singular normal equations.
+    pub fn fit(self) -> Result<Fit, Box<NoFit>> {
+        let Self { outcome, proposer } = self;
+        let kept = proposer.model.and_then(|model| model.covariance(&outcome.adjustment));
+        match (kept, outcome) {
+            (Some(covariance), Outcome { adjustment, linearised: Some(linearised), .. }) => {
+                Ok(Fit { adjustment, linearised, covariance })
+            }
+            (_, outcome) => outcome.fit(),
+        }
+    }
+
+    /// Goes on to other bounds.
+    pub fn polished(self, settings: &Settings) -> Self {
+        let Self { outcome: Outcome { adjustment, linearised, .. }, proposer } = self;
+        minimise_by(proposer, adjustment, linearised, settings)
+    }
+}
+
+/// As [`solve`], with what proposed its steps.
+pub(super) fn minimise(mut adjustment: Adjustment, settings: &Settings) -> Minimised {
     let start = adjustment.state.clone();
-    let mut iterations = approach(&mut adjustment, settings.iterations);
+    let tried = approach(&mut adjustment, settings.iterations);
     let linearised = adjustment.linearise().or_else(|| {
         adjustment.state = start;
         adjustment.linearise()
     });
+    let left = Settings { iterations: settings.iterations.saturating_sub(tried), ..*settings };
+    let mut minimised = minimise_by(Proposer::default(), adjustment, linearised, &left);
+    minimised.outcome.iterations += tried;
+    minimised
+}
+
+/// As [`minimise`], from near the end.
+pub(super) fn minimise_near(adjustment: Adjustment, settings: &Settings) -> Minimised {
+    let linearised = adjustment.linearise();
+    minimise_by(Proposer::default(), adjustment, linearised, settings)
+}
+
+fn minimise_by(
+    mut proposer: Proposer,
+    mut adjustment: Adjustment,
+    linearised: Option<Linearised>,
+    settings: &Settings,
+) -> Minimised {
+    let mut iterations = 0;
     let Some(mut lin) = linearised else {
-        return Outcome { status: Status::BadStart, adjustment, linearised: None, iterations };
+        let outcome = Outcome { status: Status::BadStart, adjustment, linearised: None, iterations };
+        return Minimised { outcome, proposer };
     };
     let mut lambda = SMALLEST_LAMBDA;
     let mut status = Status::OutOfIterations;
-    let mut proposer = Proposer::default();
     while iterations < settings.iterations && lambda <= LARGEST_LAMBDA {
         iterations += 1;
         let Some(proposal) = proposer.propose(adjustment.linear(&lin), lambda) else {
@@ -294,5 +365,6 @@ pub fn solve(mut adjustment: Adjustment, settings: &Settings) -> Outcome {
         status = Status::Stalled;
     }
     tracing::debug!(iterations, ?status, cost = lin.cost, "levenberg-marquardt");
-    Outcome { status, adjustment, linearised: Some(lin), iterations }
+    let outcome = Outcome { status, adjustment, linearised: Some(lin), iterations };
+    Minimised { outcome, proposer }
 }

@@ -22,7 +22,7 @@ mod unidentified_noise;
 
 pub use acceleration::Acceleration;
 pub use blocks::SeenMarkers;
-pub use components::{ComponentOptions, JOINT_NOISE_FLOOR, Tally, estimate_components, share_out};
+pub use components::{ComponentOptions, JOINT_NOISE_FLOOR, LEAST_FIRST_GUESS, Tally, estimate_components, share_out};
 pub use covariance::Covariance;
 pub use fit::Fit;
 pub use frame::{Frame, PlateScale, Similarity, frames};

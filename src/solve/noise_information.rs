@@ -102,8 +102,8 @@ pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
     let mut together = Vec::new();
     let of_stops: Vec<Vec<Latent>> = linear.stops().map(|stop| stop_latents(&fit.adjustment, &stop)).collect();
     if cov.system.latent_start.is_empty() {
-        for (stop, own) in linear.stops().zip(&of_stops) {
-            let c = cov.latents(&stop);
+        let covariances = cov.latents(&linear.stops().collect::<Vec<_>>());
+        for (c, own) in covariances.iter().zip(&of_stops) {
             own.iter().for_each(|a| own.iter().for_each(|b| add(a, b, c[(a.row, b.row)])));
         }
     } else {

@@ -261,14 +261,19 @@ impl System {
         (x.dot(&self.rhs) + eliminated + self.distances.squares()).max(0.0).sqrt()
     }
 
-    /// Covariance of what is latent at a stop, from the covariance of the reduced unknowns.
-    pub fn latent_covariance(&self, reduced: &DMatrix<f64>, stop: &LinearStop) -> DMatrix<f64> {
+    /// Covariance of what is latent at each of some stops, from the covariance of the reduced unknowns.
+    pub fn latent_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
         match &self.eliminated {
             Eliminated::Markers(e) => {
-                let (start, n) = (e.latent_start[stop.at], stop.unknowns());
-                reduced.view((start, start), (n, n)).into_owned()
+                let of = |stop: &LinearStop| {
+                    let (start, n) = (e.latent_start[stop.at], stop.unknowns());
+                    reduced.view((start, start), (n, n)).into_owned()
+                };
+                stops.iter().map(of).collect()
             }
-            Eliminated::Stops(e) => e.latent_covariance(reduced, stop.at),
+            Eliminated::Stops(e) => {
+                e.latent_covariances(reduced, &stops.iter().map(|stop| stop.at).collect::<Vec<_>>())
+            }
         }
     }
 

@@ -132,7 +132,7 @@ fn normalised(seen: &Seen, solution: &Solution) -> f64 {
         let errors = &fit.state.joint_errors[stop.index];
         let n = errors.len();
         let off = DVector::from_fn(n, |k, _| errors[k] - seen.joint_errors[stop.index][k]);
-        let covariance = fit.covariance.latents(&stop).view((0, 0), (n, n)).into_owned();
+        let covariance = fit.covariance.latents(std::slice::from_ref(&stop))[0].view((0, 0), (n, n)).into_owned();
         sum += off.dot(&(covariance.try_inverse().unwrap() * &off));
         count += n as f64;
     }

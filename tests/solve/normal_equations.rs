@@ -185,7 +185,7 @@ fn check_covariance(which: Elimination, adjustment: &Adjustment, dense: &Dense, 
         let (i, n) = (stop.index, stop.unknowns());
         let at = dense.find(Unknown::Latent(i, 0)).unwrap();
         let expected = truth.view((at, at), (n, n));
-        let got = library.latents(&stop);
+        let got = &library.latents(std::slice::from_ref(&stop))[0];
         for (a, b) in (0..n).flat_map(|a| (0..n).map(move |b| (a, b))) {
             let unit = (expected[(a, a)] * expected[(b, b)]).sqrt();
             assert!((got[(a, b)] - expected[(a, b)]).abs() < bound * unit, "latents of stop {i}\n{got}{expected}");
