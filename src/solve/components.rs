@@ -295,7 +295,7 @@ pub struct Tally {
     pub squares: Vec<f64>,
     /// Redundancies.
     pub redundancy: Vec<f64>,
-    /// Sums of squares of the redundancies of single latents: twice the information on the logarithm of the standard deviation is this, at most.
+    /// Sums of squares of the redundancies of single latents: half of it is the information on the logarithm of the variance.
     pub information: Vec<f64>,
 }
 
@@ -399,16 +399,16 @@ fn update_tilt(tilt: &Tally, noise: &mut Noise) -> f64 {
     share_out(&all, tilt, usual, &mut noise.tilt)
 }
 
-/// A change by so many of its own standard deviations is none.
-const STANDING_SIGMAS: f64 = 0.1;
+/// A variance of less than so many of its own standard deviations may be none: to go on towards it changes nothing.
+const NOT_TOLD_SIGMAS: f64 = 0.3;
 
-/// A relative change of a size that counts less where the data hardly tell the size: one by [`STANDING_SIGMAS`] counts as [`CONVERGED`], at most.
-fn counted(change: f64, information: f64) -> f64 {
-    change * (CONVERGED * (2.0 * information).sqrt() / STANDING_SIGMAS).min(1.0)
+/// True for a variance of which the data say less than [`NOT_TOLD_SIGMAS`]: its standard deviation over itself is `sqrt(2 / information)`.
+fn is_not_told(information: f64) -> bool {
+    (0.5 * information).sqrt() < NOT_TOLD_SIGMAS
 }
 
 /// New noise from the sum of squares and the redundancy of each reading's latents; every reading is drawn to the common
-/// variance. Returns the largest relative change, less of what the data hardly tell.
+/// variance. Returns the largest relative change, but for sizes that go to nothing and matter no more.
 pub fn share_out(group: &[usize], tally: &Tally, common: Option<f64>, sigma: &mut [f64]) -> f64 {
     let mut change: f64 = 0.0;
     let Some(common) = common else { return change };
@@ -416,8 +416,8 @@ pub fn share_out(group: &[usize], tally: &Tally, common: Option<f64>, sigma: &mu
     for &r in group {
         let variance = (squares[r] + SHRINKAGE * common) / (redundancy[r] + SHRINKAGE);
         let next = variance.sqrt().clamp(JOINT_NOISE_FLOOR, 2.0 * sigma[r].max(JOINT_NOISE_FLOOR));
-        if next > JOINT_NOISE_FLOOR {
-            change = change.max(counted((next / sigma[r] - 1.0).abs(), tally.information[r]));
+        if next > sigma[r] || !is_not_told(tally.information[r]) {
+            change = change.max((next / sigma[r] - 1.0).abs());
         }
         sigma[r] = next;
     }
