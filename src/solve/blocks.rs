@@ -1,10 +1,15 @@
 //! Blocks of the normal equations that both eliminations are made of, and their right-hand sides.
 
-use nalgebra::{DMatrix, DVector, Matrix3};
+use std::ops::Range;
 
-use super::linear::{BodyPart, LinearImage, LinearProblem};
+use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3};
+
+use super::linear::{BodyPart, LinearImage, LinearProblem, StopParts};
 use crate::linalg::product;
-use crate::problem::{Adjustment, E, Equations, Problem};
+use crate::problem::{Adjustment, E, Equations, Layout, Problem};
+
+/// Stops whose equations are taken together.
+pub(super) const STOPS_A_PRODUCT: usize = 48;
 
 /// Markers that images in use show.
 #[derive(Debug, Clone)]
@@ -205,21 +210,29 @@ pub(super) fn latents_with_markers(l: &DMatrix<f64>, equations: &Equations) -> (
     (markers, coupling)
 }
 
-/// The equations of all images and measured bodies in the space of their poses, six rows each, images first.
-pub(super) struct PoseRows {
+/// The equations of the images and measured bodies of some stops in the space of their poses, six rows each, images first.
+pub(super) struct PoseRows<'a> {
+    linear: LinearProblem<'a>,
+    images: Range<usize>,
+    bodies: Range<usize>,
     /// `G`, 6J x theta.
     chain: DMatrix<f64>,
     /// `[H_pp G, H_pe]`, 6J x dense.
-    pub coupling: DMatrix<f64>,
+    coupling: DMatrix<f64>,
 }
 
-impl PoseRows {
-    pub fn new(linear: LinearProblem) -> Self {
+impl<'a> PoseRows<'a> {
+    /// Of stops one after the other, by their places among those in use.
+    pub fn new(linear: LinearProblem<'a>, stops: &[StopParts]) -> Self {
         let layout = &linear.adjustment.problem.layout;
         let (theta, dense) = (layout.theta_len(), layout.len());
-        let rows = 6 * (linear.images().len() + linear.lin.bodies.len());
+        let of = |parts: fn(&StopParts) -> &Range<usize>| {
+            stops.first().map_or(0, |s| parts(s).start)..stops.last().map_or(0, |s| parts(s).end)
+        };
+        let (images, bodies) = (of(|s| &s.images), of(|s| &s.bodies));
+        let rows = 6 * (images.len() + bodies.len());
         let (mut chain, mut coupling) = (DMatrix::zeros(rows, theta), DMatrix::zeros(rows, dense));
-        for (k, own) in linear.images().enumerate() {
+        for (k, own) in images.clone().map(|k| linear.image(k)).enumerate() {
             let LinearImage { terms, chain: by_theta, .. } = own;
             chain.rows_mut(6 * k, 6).copy_from(&by_theta.d_theta);
             coupling.view_mut((6 * k, 0), (6, theta)).copy_from(&(terms.pp * &by_theta.d_theta));
@@ -229,20 +242,34 @@ impl PoseRows {
                 }
             }
         }
-        for (k, BodyPart { terms, chain: by_theta, .. }) in (linear.images().len()..).zip(&linear.lin.bodies) {
+        for (k, BodyPart { terms, chain: by_theta, .. }) in (images.len()..).zip(&linear.lin.bodies[bodies.clone()]) {
             chain.rows_mut(6 * k, 6).copy_from(&by_theta.d_theta);
             coupling.view_mut((6 * k, 0), (6, theta)).copy_from(&(terms.pp * &by_theta.d_theta));
         }
-        Self { chain, coupling }
+        Self { linear, images, bodies, chain, coupling }
+    }
+
+    /// The dense columns.
+    pub fn layout(&self) -> &Layout {
+        &self.linear.adjustment.problem.layout
+    }
+
+    /// `[H_pp G, H_pe]` of a pose by its place among all of them, 6 x dense.
+    pub fn of(&self, place: usize) -> DMatrixView<'_, f64> {
+        let all = self.linear.images().len();
+        let own = match place.checked_sub(all) {
+            None => place - self.images.start,
+            Some(body) => self.images.len() + body - self.bodies.start,
+        };
+        self.coupling.rows(6 * own, 6)
     }
 
     /// Adds the information of the dense columns: upper triangle.
-    pub fn add_to(&self, linear: LinearProblem, a: &mut DMatrix<f64>) {
-        let layout = &linear.adjustment.problem.layout;
-        let (theta, dense) = (layout.theta_len(), layout.len());
+    pub fn add_to(&self, a: &mut DMatrix<f64>) {
+        let (theta, dense) = (self.layout().theta_len(), self.layout().len());
         let mut upper = a.view_mut((0, 0), (theta, dense));
         upper += product(&self.chain.transpose(), &self.coupling);
-        for own in linear.images() {
+        for own in self.images.clone().map(|k| self.linear.image(k)) {
             let (columns, terms) = (own.columns(), own.terms);
             let used = || columns.iter().enumerate().filter_map(|(e, c)| c.map(|c| (e, c)));
             for (e, c) in used() {

@@ -5,7 +5,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, latents_with_markers, times_right};
+use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, SeenMarkers, latents_with_markers, times_right};
 use super::distances::Distances;
 use super::linear::Carried;
 use super::linear::LinearProblem;
@@ -41,18 +41,21 @@ impl MarkersEliminated {
             })
             .collect();
         let mut a = DMatrix::zeros(n, n);
-        let poses = PoseRows::new(linear);
-        poses.add_to(linear, &mut a);
-        for (stop, &start) in linear.stops().zip(&latent_start) {
-            for pose in stop.poses() {
-                let with_dense = poses.coupling.rows(6 * pose.place, 6).tr_mul(&pose.chain.d_latent);
-                for (row, own) in pose.latents.into_iter().zip(with_dense.column_iter()) {
-                    let mut column = a.view_mut((0, start + row), (with_dense.nrows(), 1));
-                    column += own;
+        let mut starts = latent_start.iter();
+        for stops in linear.lin.stops.chunks(STOPS_A_PRODUCT) {
+            let rows = PoseRows::new(linear, stops);
+            rows.add_to(&mut a);
+            for (stop, &start) in linear.stops_of(stops).zip(&mut starts) {
+                for pose in stop.poses() {
+                    let with_dense = rows.of(pose.place).tr_mul(&pose.chain.d_latent);
+                    for (row, own) in pose.latents.into_iter().zip(with_dense.column_iter()) {
+                        let mut column = a.view_mut((0, start + row), (with_dense.nrows(), 1));
+                        column += own;
+                    }
                 }
+                let own = stop.information();
+                a.view_mut((start, start), own.shape()).copy_from(&own);
             }
-            let own = stop.information();
-            a.view_mut((start, start), own.shape()).copy_from(&own);
         }
         let seen = SeenMarkers::of(linear);
         let damped = |mut v: Matrix3<f64>| {

@@ -3,12 +3,13 @@
 //! With the information `H = F F'` of what is latent at a stop (pixels of its images through `L`, and the priors) and its coupling `B` with
 //! what stays, `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, SMatrix, Vector3};
 use rayon::prelude::*;
 
-use super::blocks::{DenseCoupling, PoseRows, SeenMarkers, latents_with_markers};
+use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, SeenMarkers, latents_with_markers};
 use super::linear::Carried;
 use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
 use crate::linalg::{gram, mirror_upper, orthonormal, product, subtract_gram};
@@ -17,9 +18,6 @@ use crate::problem::{Equations, Step};
 
 /// What moves a marker with the modes of a plate.
 type Modes = SMatrix<f64, 3, MODES>;
-
-/// Stops whose couplings form one Gram product.
-const STOPS_A_PRODUCT: usize = 48;
 
 /// What is latent at one stop, with its elimination.
 #[derive(Debug, Clone)]
@@ -50,23 +48,20 @@ impl StopsEliminated {
         let dense = linear.adjustment.problem.layout.len();
         let n = dense + 3 * seen.order.len();
         let mut a = DMatrix::zeros(n, n);
-        let poses = PoseRows::new(linear);
-        poses.add_to(linear, &mut a);
         for (at, information) in seen.information(linear).iter().enumerate() {
             a.fixed_view_mut::<3, 3>(dense + 3 * at, dense + 3 * at).copy_from(information);
         }
         let mut coupling = DenseCoupling::new(&linear.adjustment.problem, &seen);
         let mut blocks = Vec::with_capacity(linear.stops().len());
-        for stop in linear.stops() {
-            let mut own = Vec::with_capacity(stop.places().len());
-            for (k, image) in stop.places().zip(stop.images()) {
-                let equations = if seen.order.is_empty() { None } else { image.equations() };
-                equations.iter().for_each(|e| coupling.add(image, &seen, e));
-                own.push(Coupled::new(image, poses.coupling.rows(6 * k, 6), (dense, &seen, equations.as_deref())));
+        for stops in linear.lin.stops.chunks(STOPS_A_PRODUCT) {
+            let rows = PoseRows::new(linear, stops);
+            rows.add_to(&mut a);
+            let stops: Vec<LinearStop> = linear.stops_of(stops).collect();
+            let own: Vec<_> = stops.par_iter().map(|stop| Block::of(stop, &rows, (dense, &seen), lambda)).collect();
+            for (stop, (block, equations)) in stops.iter().zip(own) {
+                stop.images().zip(&equations).for_each(|(image, e)| coupling.add(image, &seen, e));
+                blocks.push(block);
             }
-            let bodies = stop.poses().skip(stop.places().len());
-            own.extend(bodies.map(|body| Coupled::of_body(&body, linear, poses.coupling.rows(6 * body.place, 6))));
-            blocks.push(Block::new(&stop, &own, lambda));
         }
         coupling.copy_to(&mut a, dense);
         for part in blocks.chunks(STOPS_A_PRODUCT) {
@@ -244,17 +239,20 @@ struct Coupled {
 
 /// `L' [H G]` of some columns, from the rows `H G` of a pose.
 fn with_latents(l: &DMatrix<f64>, of_pose: DMatrixView<f64>, rows: &[usize]) -> DMatrix<f64> {
-    let columns = rows.iter().map(|&c| l.tr_mul(&of_pose.fixed_view::<6, 1>(0, c)));
-    DMatrix::from_iterator(l.ncols(), rows.len(), columns.flat_map(|c| c.as_slice().to_vec()))
+    let mut coupling = DMatrix::zeros(l.ncols(), rows.len());
+    for (mut into, &c) in coupling.column_iter_mut().zip(rows) {
+        into.gemv_tr(1.0, l, &of_pose.fixed_view::<6, 1>(0, c), 0.0);
+    }
+    coupling
 }
 
 impl Coupled {
     /// Of a measured body.
-    fn of_body(body: &LinearPose, linear: LinearProblem, of_pose: DMatrixView<f64>) -> Self {
-        let layout = &linear.adjustment.problem.layout;
+    fn of_body(body: &LinearPose, rows_of: &PoseRows) -> Self {
+        let layout = rows_of.layout();
         let touched = |c: &usize| layout.columns[*c].free && body.chain.d_theta.column(*c).iter().any(|d| *d != 0.0);
         let rows: Vec<usize> = (0..layout.theta_len()).filter(touched).collect();
-        let coupling = with_latents(&body.chain.d_latent, of_pose, &rows);
+        let coupling = with_latents(&body.chain.d_latent, rows_of.of(body.place), &rows);
         Self { latents: body.latents.clone(), rows, coupling }
     }
 
@@ -282,6 +280,24 @@ impl Coupled {
 }
 
 impl Block {
+    /// Of a stop with the equations of its images, where markers are among those `seen`; `dense` is the first unknown of the markers.
+    fn of<'a>(
+        stop: &LinearStop<'a>,
+        rows: &PoseRows,
+        (dense, seen): (usize, &SeenMarkers),
+        lambda: f64,
+    ) -> (Self, Vec<Cow<'a, Equations>>) {
+        let mut own = Vec::with_capacity(stop.places().len());
+        let mut all = Vec::new();
+        for (k, image) in stop.places().zip(stop.images()) {
+            let equations = if seen.order.is_empty() { None } else { image.equations() };
+            own.push(Coupled::new(image, rows.of(k), (dense, seen, equations.as_deref())));
+            all.extend(equations);
+        }
+        own.extend(stop.poses().skip(stop.places().len()).map(|body| Coupled::of_body(&body, rows)));
+        (Self::new(stop, &own, lambda), all)
+    }
+
     fn new(stop: &LinearStop, images: &[Coupled], lambda: f64) -> Self {
         let n = stop.unknowns();
         let mut h = stop.information();

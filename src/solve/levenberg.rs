@@ -237,8 +237,12 @@ fn take_step(adjustment: &mut Adjustment, step: &Step) -> State {
     std::mem::replace(&mut adjustment.state, moved)
 }
 
-/// Comes close to the optimum with some of the observations, no marker moved; returns how many steps were tried. A good start stays as it is.
+/// Comes close to the optimum with some of the observations of the images, no marker moved; returns how many steps were tried. A good start stays
+/// as it is.
 fn approach(adjustment: &mut Adjustment, most: usize) -> usize {
+    if adjustment.used().next().is_none() {
+        return 0;
+    }
     let mut lambda = FIRST_LAMBDA;
     let Some(mut lin) = adjustment.linearise_some(ENOUGH) else { return 0 };
     for tried in 0..most {

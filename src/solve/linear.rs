@@ -287,6 +287,12 @@ impl<'a> LinearProblem<'a> {
         (0..self.lin.stops.len()).map(move |at| self.stop(at))
     }
 
+    /// Stops one after the other, some of [`Linearised::stops`].
+    pub(super) fn stops_of(self, parts: &[StopParts]) -> impl Iterator<Item = LinearStop<'a>> + use<'a> {
+        let first = parts.first().map_or(0, |part| self.lin.stops.partition_point(|s| s.stop < part.stop));
+        (first..first + parts.len()).map(move |at| self.stop(at))
+    }
+
     /// A stop by its place among those in use.
     pub fn stop(self, at: usize) -> LinearStop<'a> {
         let Adjustment { problem, state } = self.adjustment;
