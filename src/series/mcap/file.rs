@@ -3,15 +3,12 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::message::Message;
+use super::message::{MCAP, Message};
 #[cfg(feature = "mcap")]
 use super::records;
 use super::sqlite;
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::files::{self, Kind};
-
-/// How an MCAP file begins.
-pub(super) const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
 /// The files of a recording, in the order in which they were written: one file, or a rosbag2 folder.
 ///

@@ -1,5 +1,8 @@
 //! A message of a recording, whatever holds it.
 
+/// How an MCAP file begins.
+pub(super) const MCAP: &[u8] = b"\x89MCAP0\r\n";
+
 /// One message of a recording.
 pub(super) struct Message<'a> {
     pub topic: &'a str,

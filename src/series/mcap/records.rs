@@ -9,8 +9,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use super::file::MCAP;
-use super::message::Message;
+use super::message::{MCAP, Message};
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::{self, Kind};
 
