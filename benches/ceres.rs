@@ -144,6 +144,7 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
         lengths: Vec::new(),
         noise,
         families: Vec::new(),
+        restraint: None,
         huber: f64::INFINITY,
     };
     Ok(Adjustment { problem, state })

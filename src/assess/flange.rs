@@ -57,6 +57,12 @@ pub struct WorkspacePoint {
     pub covered: bool,
 }
 
+/// Samples of everything within the joint limits.
+pub(super) fn everywhere(robot: &Robot) -> Vec<Posture> {
+    let limits: Vec<(f64, f64)> = (0..robot.chain.readings.len()).map(|r| range_of(robot, r)).collect();
+    halton_stops(&limits, SAMPLES)
+}
+
 /// What is needed to predict.
 #[derive(Debug, Clone)]
 pub struct FlangeModel<'a> {
@@ -225,8 +231,7 @@ impl<'a> FlangeModel<'a> {
 
     /// Samples of the region of the stops, then of everything within the joint limits.
     pub fn workspace(&self) -> Vec<WorkspacePoint> {
-        let limits: Vec<(f64, f64)> = (0..self.covered.len()).map(|r| range_of(&self.robot, r)).collect();
-        let stops = halton_stops(&self.covered, SAMPLES).into_iter().chain(halton_stops(&limits, SAMPLES));
+        let stops = halton_stops(&self.covered, SAMPLES).into_iter().chain(everywhere(&self.robot));
         stops
             .map(|stop| {
                 let found = self.at(&stop.readings);

@@ -9,7 +9,7 @@ use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use super::flange::FlangeModel;
-use super::points::{MeasuredPoint, fit_points};
+use super::points::{MeasuredPoint, PointFit, fit_points};
 use super::root_mean_square;
 use crate::model::joint_terms::Term;
 use crate::model::robot::{Posture, Robot};
@@ -47,11 +47,7 @@ impl FlangeErrors {
         let samples = model.region();
         // Local errors belong to single readings of the series: at others they are noise.
         let whole = with(robot, |t| !matches!(t, Term::Local(_)));
-        let points: Vec<MeasuredPoint> = samples
-            .iter()
-            .map(|s| MeasuredPoint { position_m: exact(&whole, s).translation, readings: s.readings.clone() })
-            .collect();
-        let nominal = fit_points(&Robot::nominal(robot.chain.clone()), &points)?;
+        let nominal = nominal_laid_over(&whole, &samples)?;
         let lacking = displacements(&whole, &with(robot, |t| t == Term::Offset), &samples, stops);
         let scatter_m = scatter_m(&whole, joint_sigma, &samples);
         let model_m = model.sigma_m(&samples).hypot(scatter_m);
@@ -71,6 +67,12 @@ impl FlangeErrors {
             }),
         })
     }
+}
+
+/// The nominal robot over a corrected one at samples, with the base and the tool that fit best; `None` where they do not determine these.
+pub(super) fn nominal_laid_over(corrected: &Robot, samples: &[Posture]) -> Option<PointFit> {
+    let point = |s: &Posture| MeasuredPoint { position_m: exact(corrected, s).translation, readings: s.readings.clone() };
+    fit_points(&Robot::nominal(corrected.chain.clone()), &samples.iter().map(point).collect::<Vec<_>>())
 }
 
 /// The robot with some of its terms.

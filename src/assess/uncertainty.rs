@@ -43,6 +43,12 @@ pub fn stops(problem: &Problem) -> Vec<Posture> {
     problem.used_stops().into_iter().filter_map(|s| problem.stops[s].posture.clone()).collect()
 }
 
+/// Joint noise of every stop on the robot that is in use, rad or m.
+pub(super) fn on_robot_sigmas(problem: &Problem) -> Vec<Vec<f64>> {
+    let on_robot = problem.used_stops().into_iter().map(|s| &problem.stops[s]).filter(|s| s.posture.is_some());
+    on_robot.map(|s| problem.joint_sigma(s.series)).collect()
+}
+
 /// What stands still in the base frame for the first image on the robot, with its first column: the plate, or a fixed camera; without images
 /// an instrument.
 pub fn still(Adjustment { problem, state }: &Adjustment) -> Option<(Pose, usize)> {
@@ -95,9 +101,8 @@ pub fn judge(
         found.clustered_sigma = Some(by_clusters);
     }
     let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops, limits));
-    let on_robot = problem.used_stops().into_iter().map(|s| &problem.stops[s]).filter(|s| s.posture.is_some());
-    let noise: Vec<Vec<f64>> = on_robot.map(|s| problem.joint_sigma(s.series)).collect();
-    let promise = |m: &FlangeModel| FlangeErrors::new(m, &state.robot, &usual_joint_sigma(&noise), &stops);
+    let noise = usual_joint_sigma(&on_robot_sigmas(problem));
+    let promise = |m: &FlangeModel| FlangeErrors::new(m, &state.robot, &noise, &stops);
     found.flange = model.as_ref().and_then(promise);
     found.workspace = model.map(|m| m.workspace()).unwrap_or_default();
     found

@@ -3,7 +3,7 @@
 use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
 use super::{
-    camera_model, camera_pattern, extrapolates, few_images, focus, joint_noise, left_out_bodies, left_out_images,
+    camera_model, camera_pattern, extrapolates, few_images, focus, held_near_nominal, joint_noise, left_out_bodies, left_out_images,
     left_out_observations, loose, marker_off, moved, no_gain, parameter_off, plate_size, pose_step, scatter,
     undetermined, zeros_off,
 };
@@ -74,6 +74,7 @@ pub const CHECKS: &[Check] = &[
     check("marker_off", Stage::Fit(|a, b, s| found(marker_off::check(a, b, s)))),
     check("parameter_off", Stage::Fit(|a, b, s| found(parameter_off::check(a, b, s)))),
     check("scatter", Stage::Uncertainty(|a, b, s| found(scatter::check(a, b, s)))),
+    check("held_near_nominal", Stage::Fit(|a, b, s| found(held_near_nominal::check(a, b, s)))),
     check("extrapolates", Stage::Uncertainty(|a, b, s| found(extrapolates::check(a, b, s)))),
     check("undetermined", Stage::Uncertainty(|a, b, s| found(undetermined::check(a, b, s)))),
 ];

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
-use crate::assess::{Accuracy, Uncertainty, median};
+use crate::assess::{Accuracy, Uncertainty, extrapolation_m};
 use crate::error::{Code, Notice};
 
 /// Outside the region of the stops the corrected robot is known worse than the nominal one misses inside.
@@ -16,10 +16,9 @@ pub struct Extrapolates {
 }
 
 pub(super) fn check(uncertainty: &Uncertainty, _: &Accuracy, setting: &CheckContext) -> Option<Extrapolates> {
-    let outside = uncertainty.workspace.iter().filter(|w| !w.covered).map(|w| w.sigma_m);
-    let outside_m = median(&outside.collect::<Vec<f64>>())?;
     let nominal_m = uncertainty.flange?.nominal_m;
-    (outside_m > setting.limits.extrapolation_ratio * nominal_m).then_some(Extrapolates { outside_m, nominal_m })
+    let outside_m = extrapolation_m(&uncertainty.workspace, nominal_m, setting.limits)?;
+    Some(Extrapolates { outside_m, nominal_m })
 }
 
 impl fmt::Display for Extrapolates {

@@ -8,6 +8,7 @@ use super::displaced::Displaced;
 use super::extrapolates::Extrapolates;
 use super::few_images::FewImages;
 use super::focus::FocusChange;
+use super::held_near_nominal::HeldNearNominal;
 use super::joint_noise::JointNoiseLarge;
 use super::kind::{Kind, Quantity, Subject, Weight};
 use super::left_out_bodies::MeasurementsLeftOut;
@@ -58,6 +59,7 @@ findings! {
     Extrapolates,
     FewImages,
     FlangeUndetermined,
+    HeldNearNominal,
     FocusChange,
     ImagesLeftOut,
     JointNoiseLarge,

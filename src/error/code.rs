@@ -277,6 +277,7 @@ codes! {
         CameraModelMisfit "camera_model_misfit" "the camera model does not explain the markers",
         ResidualPattern "residual_pattern" "the residuals show a pattern that noise does not leave",
         Extrapolates "extrapolates" "outside the region of the stops the flange is known badly",
+        HeldNearNominal "held_near_nominal" "outside the region of the stops the robot is held near the nominal one",
         FewImages "few_images" "few images: the nominal model decides much of the result",
         FocusChanged "focus_changed" "focus or zoom changed during the series",
         JointNoiseLarge "joint_noise_large" "the joint noise is larger than robots have",

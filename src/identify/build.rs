@@ -145,6 +145,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         lengths: bodies.lengths,
         noise,
         families,
+        restraint: None,
         huber: HUBER,
     };
     Ok(Adjustment { problem, state })

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::estimator::Estimator;
 use super::joint::{JointFit, fit_model};
 use super::lens_choice::{self, Lensed, with_lenses};
+use super::near_nominal::near_nominal;
 use super::options::Options;
 use super::solution::{Evidence, Solution};
 use super::turns;
@@ -40,10 +41,11 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let robot = model.robot_with(chain.clone(), options.harmonics);
     let series = &turns::settled(&robot, series, &options.limits);
     let Lensed { fit: full, series, lenses, notices } = with_lenses(&chain, series, &by_joint_fit)?;
-    let (chosen, evidences) = match options.model == RobotModel::Auto && !options.selection.names_terms() {
+    let (mut chosen, evidences) = match options.model == RobotModel::Auto && !options.selection.names_terms() {
         true => best_model(chain, &series, options, full)?,
         false => (full, Vec::new()),
     };
+    chosen.fit = near_nominal(chosen.fit, &options.limits);
     let mut solution = Solution { evidences, lenses, ..chosen.judged(&series, options.estimator)? };
     solution.findings.extend(notices.into_iter().map(Into::into));
     let losses = lens_choice::losses(&solution);

@@ -18,6 +18,7 @@ mod joint;
 mod lens_choice;
 mod local_errors;
 mod measure;
+mod near_nominal;
 mod options;
 mod pose_comparison;
 mod second_pass;

@@ -91,6 +91,7 @@ impl Setting {
             lengths: Vec::new(),
             noise: Noise { pixel_factor: vec![1.0], joint: vec![joint], ..Noise::default() },
             families: Vec::new(),
+            restraint: None,
             huber: HUBER,
         };
         Adjustment { problem, state }

@@ -6,6 +6,7 @@ use super::image::Image;
 use super::layout::Layout;
 use super::length::MeasuredLength;
 use super::noise::Noise;
+use super::restraint::{JointPrior, Restraint};
 use super::stop::{Stop, Tie};
 use crate::model::robot::Posture;
 use crate::series::Plate;
@@ -42,6 +43,8 @@ pub struct Problem {
     pub noise: Noise,
     /// Families of parameters whose size is a variance component, too.
     pub families: Vec<Family>,
+    /// What holds the robot near nominal where the data do not say; none where nothing asks for it.
+    pub restraint: Option<Restraint>,
     /// Huber bound on the normalised length of a residual.
     pub huber: f64,
 }
@@ -106,6 +109,13 @@ impl Problem {
     /// Tie of an image to its readings: rigid, or tilted by nothing where tilt has a size.
     pub fn upright_tie(&self) -> Tie {
         if self.noise.tilt.is_empty() { Tie::Rigid } else { Tie::Tilted([0.0; 2]) }
+    }
+
+    /// Priors that say something of several columns together.
+    pub fn joint_priors(&self) -> impl Iterator<Item = JointPrior<'_>> {
+        let of_family = |f| Some(JointPrior { information: Family::information(f)?, columns: &f.columns });
+        let families = self.families.iter().filter_map(of_family);
+        families.chain(self.restraint.iter().map(Restraint::prior))
     }
 
     /// Factor on the stated sizes of the twists; 1 where they are held at what is stated.

@@ -20,6 +20,7 @@ mod noise;
 mod plate_distance;
 mod postures;
 mod rejection;
+mod restraint;
 mod select;
 mod state;
 mod step;
@@ -45,6 +46,7 @@ pub use plate_distance::{
 };
 pub use postures::{common_readings, joined, nearly_common_readings, posture_groups};
 pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};
+pub use restraint::{JointPrior, Restraint};
 pub use select::short_name;
 pub use state::{PlateShape, State};
 pub use step::Step;

@@ -257,6 +257,7 @@ impl Adjustment {
             .map(|(c, v)| ((v - c.prior_mean) / c.prior_sigma).powi(2))
             .sum();
         let held: f64 = problem.families.iter().map(|f| f.squares(&values)).sum();
+        let restraint = problem.restraint.iter().map(|r| r.prior().squares(&values)).sum::<f64>();
         let corrections = state.plates.iter().enumerate().flat_map(|(p, shape)| {
             let of = move |(m, c): (usize, &Vector3<f64>)| c.norm_squared() * problem.marker_information(p, m);
             shape.corrections.iter().enumerate().map(of)
@@ -267,7 +268,7 @@ impl Adjustment {
                 images[own.clone()].iter().flat_map(|&i| problem.tie_squares(&problem.images[i], &state.ties[i]));
             problem.joint_error_squares(*stop, &state.joint_errors[*stop]).chain(ties).sum()
         };
-        0.5 * (dense + held + markers + stops.iter().map(latent).sum::<f64>())
+        0.5 * (dense + held + restraint + markers + stops.iter().map(latent).sum::<f64>())
     }
 
     /// With its linearisation.

@@ -197,10 +197,9 @@ impl System {
         for (i, c) in problem.layout.columns.iter().enumerate() {
             self.rhs[i] += (c.prior_mean - values[i]) * c.prior_sigma.powi(-2);
         }
-        for (family, information) in problem.families.iter().filter_map(|f| Some((f, f.information()?))) {
-            let own = DVector::from_iterator(family.columns.len(), family.columns.iter().map(|&c| values[c]));
-            let pull = &information * own;
-            family.columns.iter().zip(pull.iter()).for_each(|(&row, pull)| self.rhs[row] -= pull);
+        for prior in problem.joint_priors() {
+            let pull = prior.pull(&values);
+            prior.columns.iter().zip(pull.iter()).for_each(|(&row, pull)| self.rhs[row] -= pull);
         }
         for (i, c) in problem.layout.columns.iter().enumerate() {
             if !c.free || !self.touched[i] {
@@ -213,10 +212,10 @@ impl System {
         for (i, c) in problem.layout.columns.iter().enumerate() {
             self.information[(i, i)] += c.prior_sigma.powi(-2);
         }
-        for (family, information) in problem.families.iter().filter_map(|f| Some((f, f.information()?))) {
-            for (i, &row) in family.columns.iter().enumerate() {
-                for (k, &column) in family.columns.iter().enumerate() {
-                    self.information[(row, column)] += information[(i, k)];
+        for prior in problem.joint_priors() {
+            for (i, &row) in prior.columns.iter().enumerate() {
+                for (k, &column) in prior.columns.iter().enumerate() {
+                    self.information[(row, column)] += prior.information[(i, k)];
                 }
             }
         }

@@ -280,6 +280,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
             lengths: Vec::new(),
             noise,
             families: Vec::new(),
+            restraint: None,
             huber: 2.45,
         },
         state,
