@@ -71,7 +71,8 @@ impl FlangeErrors {
 
 /// The nominal robot over a corrected one at samples, with the base and the tool that fit best; `None` where they do not determine these.
 pub(super) fn nominal_laid_over(corrected: &Robot, samples: &[Posture]) -> Option<PointFit> {
-    let point = |s: &Posture| MeasuredPoint { position_m: exact(corrected, s).translation, readings: s.readings.clone() };
+    let point =
+        |s: &Posture| MeasuredPoint { position_m: exact(corrected, s).translation, readings: s.readings.clone() };
     fit_points(&Robot::nominal(corrected.chain.clone()), &samples.iter().map(point).collect::<Vec<_>>())
 }
 

@@ -3,9 +3,9 @@
 use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
 use super::{
-    camera_model, camera_pattern, extrapolates, few_images, focus, held_near_nominal, joint_noise, left_out_bodies, left_out_images,
-    left_out_observations, loose, marker_off, moved, no_gain, parameter_off, plate_size, pose_step, scatter,
-    undetermined, zeros_off,
+    camera_model, camera_pattern, extrapolates, few_images, focus, held_near_nominal, joint_noise, left_out_bodies,
+    left_out_images, left_out_observations, loose, marker_off, moved, no_gain, parameter_off, plate_size, pose_step,
+    scatter, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};

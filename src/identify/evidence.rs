@@ -41,11 +41,11 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let robot = model.robot_with(chain.clone(), options.harmonics);
     let series = &turns::settled(&robot, series, &options.limits);
     let Lensed { fit: full, series, lenses, notices } = with_lenses(&chain, series, &by_joint_fit)?;
-    let (mut chosen, evidences) = match options.model == RobotModel::Auto && !options.selection.names_terms() {
-        true => best_model(chain, &series, options, full)?,
+    let (chosen, evidences) = match options.model_is_open() {
+        true => best_model(chain.clone(), &series, options, full)?,
         false => (full, Vec::new()),
     };
-    chosen.fit = near_nominal(chosen.fit, &options.limits);
+    let chosen = near_nominal(chain, &series, options, chosen)?;
     let mut solution = Solution { evidences, lenses, ..chosen.judged(&series, options.estimator)? };
     solution.findings.extend(notices.into_iter().map(Into::into));
     let losses = lens_choice::losses(&solution);

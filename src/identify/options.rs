@@ -55,6 +55,11 @@ pub struct Options {
 const ROBOT: &str = "robot";
 
 impl Options {
+    /// True where the data choose the robot model: whoever names a joint term wants all of them.
+    pub(super) fn model_is_open(&self) -> bool {
+        self.model == RobotModel::Auto && !self.selection.names_terms()
+    }
+
     /// The same for poses of a controller, whose robot is not known: nothing of it is estimated.
     ///
     /// # Errors
