@@ -24,7 +24,7 @@ pub(super) fn near_nominal(
     let Some(own) = restraint(&chosen.fit, &options.limits) else { return Ok(chosen) };
     let model = RobotModel::Rigid;
     let rigid = match options.model_is_open() {
-        true => Some(fit_model(chain, series, &Options { model, ..options.clone() }, Some(chosen.start.clone()))?),
+        true => Some(fit_model(chain, series, &Options { model, ..options.clone() }, None)?),
         false => None,
     };
     let of_rigid = rigid.and_then(|rigid| Some((restraint(&rigid.fit, &options.limits)?, rigid)));
