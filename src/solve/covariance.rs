@@ -43,7 +43,7 @@ impl LinearProblem<'_> {
 }
 
 /// Fixed columns have no variance.
-pub(super) fn fixed_are_known(problem: &Problem, reduced: &mut DMatrix<f64>) {
+fn fixed_are_known(problem: &Problem, reduced: &mut DMatrix<f64>) {
     for (i, _) in problem.layout.columns.iter().enumerate().filter(|(_, c)| !c.free) {
         reduced[(i, i)] = 0.0;
     }

@@ -12,7 +12,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 use super::blocks::SeenMarkers;
-use super::covariance::{Covariance, fixed_are_known};
+use super::covariance::Covariance;
 use super::frame::{Frame, frames};
 use super::linear::{LinearImage, LinearProblem};
 use super::system::{Eliminated, Elimination, Singular, System};
@@ -69,13 +69,10 @@ pub fn in_frame_by(which: Elimination, linear: LinearProblem, stated: &Covarianc
     let singular =
         |e: Singular| Error::new(Code::FitUndetermined, "plate", e.to_string(), "take images of more of the plate");
     let factor = system.factor(linear).map_err(singular)?;
-    let mut reduced = factor.inverse();
-    if let (Eliminated::Stops(e), Some(held)) = (&system.eliminated, &held) {
-        e.project(held, &mut reduced);
+    let mut covariance = Covariance::of(problem, system, &factor);
+    if let (Eliminated::Stops(e), Some(held)) = (&covariance.system.eliminated, &held) {
+        e.project(held, &mut covariance.reduced);
     }
-    fixed_are_known(problem, &mut reduced);
-    let log_determinant = factor.log_determinant();
-    let mut covariance = Covariance { reduced, system, log_determinant, added: None, enlarged: Vec::new() };
     if let Some(added) = &stated.added {
         covariance.add(&followed(added.clone(), &following));
     }
