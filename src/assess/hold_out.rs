@@ -221,9 +221,12 @@ fn predictions(fit: &Adjustment, folds: &[Vec<usize>], fitted: &Refit) -> Option
     Some((errors, states))
 }
 
+/// Newton decrement at which the fit of a fold ends: no unknown is off by more than this share of its sigma.
+const DECREMENT: f64 = 0.1;
+
 /// The free columns fitted to the images in use, from where the adjustment stands, at its noise.
 pub fn refitted(adjustment: Adjustment) -> State {
-    solve(adjustment, &Settings { iterations: 30, decrement: 1e-2 }).adjustment.state
+    solve(adjustment, &Settings { iterations: 30, decrement: DECREMENT }).adjustment.state
 }
 
 /// Error of an image that `state` was not fitted to, predicted from its joint readings alone; `None` off the robot, or where

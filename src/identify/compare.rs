@@ -20,7 +20,8 @@ use crate::stage::stage;
 
 /// Compares on the observations of a solution: its outliers and rejected images are left out for all estimators.
 ///
-/// The joint fit keeps the noise components of the solution, as in its accuracy; those of the others are from the images that are left.
+/// The joint fit keeps the noise components of the solution, as in its accuracy; the others find them in the images that are left, but for the
+/// pixel noise.
 ///
 /// # Errors
 /// Too few images on the robot.
@@ -94,7 +95,7 @@ fn rows(
 
 /// What every estimator makes of the observations in use; `None` for one that has no solution. That of the joint fit may be `known`.
 fn fitted(start: &Adjustment, estimators: &[Estimator], known: Option<&State>) -> Vec<Option<State>> {
-    let stage = PoseStage::adjusted(start);
+    let stage = PoseStage::at_noise_of(start);
     let noise = JointNoise::Estimated;
     let found = |estimator: &Estimator| match estimator {
         Estimator::Joint => Some(known.cloned().unwrap_or_else(|| refitted(start.clone()))),

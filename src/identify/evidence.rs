@@ -21,7 +21,7 @@ use crate::stage::stage;
 use crate::urdf::Chain;
 
 /// Newton decrement of a fit that is judged by its evidence, whose logarithm is then known to a tenth or so.
-const DECREMENT: f64 = 0.01;
+const DECREMENT: f64 = 0.1;
 
 /// Identifies robot, cameras, mountings and plates from identified series. The automatic model is the largest that no smaller one
 /// beats decisively; whoever names a joint term wants all of them.
@@ -60,29 +60,32 @@ fn best_model(
     options: &Options,
     full: JointFit,
 ) -> Result<(JointFit, Vec<Evidence>)> {
-    let evidences = {
+    let (evidences, mut reduced): (Vec<_>, Vec<_>) = {
         let _stage = stage("evidence of robot models");
-        compare_models(&full.fit)
+        compare_models(&full.fit).into_iter().unzip()
     };
-    let supported = evidences.iter().filter(|e| e.log_evidence > -options.limits.decisive_log_odds);
-    let largest = supported.max_by_key(|e| e.parameters).map_or(RobotModel::Full, |e| e.model);
+    let supported = evidences.iter().enumerate().filter(|(_, e)| e.log_evidence > -options.limits.decisive_log_odds);
+    let largest = supported.max_by_key(|(_, e)| e.parameters).map(|(k, e)| (e.model, reduced.swap_remove(k)));
     let chosen = match largest {
-        RobotModel::Full => full,
-        model => fit_model(chain, series, &Options { model, ..options.clone() }, Some(full))?,
+        None | Some((RobotModel::Full, _)) => full,
+        Some((model, near)) => {
+            let options = Options { model, ..options.clone() };
+            fit_model(chain, series, &options, Some((full.start, near)))?
+        }
     };
     Ok((chosen, evidences))
 }
 
-/// Evidence of every model that a fit of the full one holds, at its noise components.
-fn compare_models(full: &Adjustment) -> Vec<Evidence> {
+/// Evidence of every model that a fit of the full one holds, at its noise components, and its optimum there.
+fn compare_models(full: &Adjustment) -> Vec<(Evidence, Adjustment)> {
     let models = [RobotModel::Rigid, RobotModel::Gear, RobotModel::Full];
-    let mut all: Vec<Evidence> = models.into_par_iter().filter_map(|m| evidence(full, m)).collect();
-    let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-    all.iter_mut().for_each(|e| e.log_evidence -= best);
+    let mut all: Vec<_> = models.into_par_iter().filter_map(|m| evidence(full, m)).collect();
+    let best = all.iter().map(|(e, _)| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    all.iter_mut().for_each(|(e, _)| e.log_evidence -= best);
     all
 }
 
-fn evidence(full: &Adjustment, model: RobotModel) -> Option<Evidence> {
+fn evidence(full: &Adjustment, model: RobotModel) -> Option<(Evidence, Adjustment)> {
     let mut smaller = full.clone();
     let Adjustment { problem, state } = &mut smaller;
     let first = problem.layout.terms.start;
@@ -97,5 +100,6 @@ fn evidence(full: &Adjustment, model: RobotModel) -> Option<Evidence> {
     let layout = &outcome.adjustment.problem.layout;
     let parameters = layout.columns[layout.robot()].iter().filter(|c| c.free).count();
     let log_evidence = log_evidence(linear)?;
-    Some(Evidence { model, log_evidence, cost: linear.lin.cost, parameters })
+    let evidence = Evidence { model, log_evidence, cost: linear.lin.cost, parameters };
+    Some((evidence, outcome.adjustment))
 }

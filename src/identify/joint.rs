@@ -43,8 +43,8 @@ pub(super) struct JointFit {
     iterations: usize,
 }
 
-/// Fits one robot model jointly. A fit of the same series with another robot model may be `known`: the robot takes no part in its free-pose
-/// adjustment, and its end is near that of the other.
+/// Fits one robot model jointly. Of the same series with another robot model, the free-pose adjustment, in which the robot takes no part, and an
+/// adjustment near the end may be `known`.
 ///
 /// # Errors
 /// As of [`super::identify`].
@@ -52,7 +52,7 @@ pub(super) fn fit_model(
     chain: Chain,
     series: &[MeasuredSeries],
     options: &Options,
-    known: Option<JointFit>,
+    known: Option<(FreeStart, Adjustment)>,
 ) -> Result<JointFit> {
     let _stage = stage(options.model.title());
     let robot = options.model.robot_with(chain, options.harmonics);
@@ -64,7 +64,7 @@ pub(super) fn fit_model(
     if options.marker_tolerance == MarkerTolerance::Estimated {
         problem.noise.marker = vec![1.0; problem.plates.len()];
     }
-    let (known, near) = known.map(|k| (k.start, k.fit.adjustment)).unzip();
+    let (known, near) = known.unzip();
     let left = match known {
         Some(known) => {
             known.carry_to(&mut start);

@@ -52,8 +52,8 @@ pub(super) fn staged(joint: &Fit, estimator: Estimator, noise: JointNoise) -> Re
     Ok(Fit { adjustment: own, linearised, covariance })
 }
 
-/// As the hold-out needs it: from the images that are left.
+/// As the hold-out needs it: from the images that are left, with the pixel noise of all.
 pub(super) fn refit(start: &Adjustment, estimator: Estimator, noise: JointNoise) -> Option<State> {
-    let stage = PoseStage::adjusted(start)?;
+    let stage = PoseStage::at_noise_of(start)?;
     Some(fit_poses(start, &stage, estimator, noise)?.state)
 }

@@ -15,7 +15,7 @@ use crate::linalg::{SymmetricFactor, product};
 use crate::problem::{Adjustment, Chained, Problem, State, Step, TakenFrom, Tie};
 use crate::solve::{
     Acceleration, ComponentOptions, Elimination, JOINT_NOISE_FLOOR, LEAST_FIRST_GUESS, LinearImage, Settings, Status,
-    Tally, estimate_components, share_out,
+    Tally, converged, estimate_components, share_out,
 };
 
 use super::block_diagonal::BlockDiagonal;
@@ -58,24 +58,35 @@ pub struct PoseStage {
 impl PoseStage {
     /// The free-pose adjustment of the observations in use, from the poses that `start` predicts.
     pub fn adjusted(start: &Adjustment) -> Option<Self> {
-        let options = ComponentOptions { joint: false, ..ComponentOptions::default() };
+        let options = ComponentOptions { joint: false, settings: AT_POSES, ..ComponentOptions::default() };
         let outcome = estimate_components(with_free_poses(start)?, &options);
-        if outcome.status != Status::Converged {
-            return None;
-        }
-        Self::linearised(&outcome.adjustment)
+        (outcome.status == Status::Converged).then(|| Self::linearised(&outcome.adjustment)).flatten()
+    }
+
+    /// As [`PoseStage::adjusted`], with the pixel noise that `start` has.
+    pub fn at_noise_of(start: &Adjustment) -> Option<Self> {
+        Self::of(converged(with_free_poses(start)?, &AT_POSES)?)
     }
 
     /// The adjustment linearised at its poses, cameras and plates: one step from there, not iterated.
     pub fn linearised(at: &Adjustment) -> Option<Self> {
-        let free = with_free_poses(at)?;
-        let lin = free.linearise()?;
-        let linear = free.linear(&lin);
+        let adjustment = with_free_poses(at)?;
+        let linearised = adjustment.linearise()?;
+        let covariance = adjustment.linear(&linearised).covariance().ok()?;
+        Self::of(Fit { adjustment, linearised, covariance })
+    }
+
+    /// One step from where the fit ends.
+    fn of(fit: Fit) -> Option<Self> {
+        let Fit { adjustment: free, linearised, covariance: mut cov } = fit;
+        let linear = free.linear(&linearised);
         let on_robot = |own: &LinearImage| free.problem.on_robot(own.index);
         let images: Vec<LinearImage> = linear.images().filter(on_robot).collect();
         let are_together = images.len() <= MOST_TOGETHER;
-        let which = if are_together { Elimination::Markers } else { Elimination::cheaper(linear) };
-        let cov = linear.covariance_by(which).ok()?;
+        if are_together && cov.system.latent_start.is_empty() {
+            cov = linear.covariance_by(Elimination::Markers).ok()?;
+        }
+        cov.system.take_gradient(linear);
         let step = cov.system.step(linear, &(&cov.reduced * &cov.system.rhs));
         let offset = images.iter().flat_map(|own| step.ties[own.index].iter().copied());
         let of_images = linear.images().zip(cov.of_images(linear)).filter(|(own, _)| on_robot(own));
@@ -145,6 +156,9 @@ const MOST_TOGETHER: usize = 100;
 /// Rounds of variance components, and relative change that ends them.
 const ROUNDS: usize = 60;
 const STANDING: f64 = 1e-2;
+
+/// Bounds of the adjustment of free poses.
+const AT_POSES: Settings = Settings { iterations: 100, decrement: 0.1 };
 
 /// Gauss-Newton steps at given weights, and the decrement (in sigma) that ends them.
 const STEPS: usize = 30;

@@ -272,6 +272,12 @@ pub fn solve(adjustment: Adjustment, settings: &Settings) -> Outcome {
     minimise(adjustment, settings).outcome
 }
 
+/// As [`solve`], with the covariance; `None` where it did not converge, or has none.
+pub fn converged(adjustment: Adjustment, settings: &Settings) -> Option<Fit> {
+    let minimised = minimise(adjustment, settings);
+    (minimised.outcome.status == Status::Converged).then(|| minimised.fit().ok()).flatten()
+}
+
 /// An outcome with what proposed its steps.
 pub(super) struct Minimised {
     pub outcome: Outcome,

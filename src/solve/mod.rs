@@ -27,7 +27,7 @@ pub use covariance::Covariance;
 pub use fit::Fit;
 pub use frame::{Frame, PlateScale, Similarity, frames};
 pub use in_frame::{InFrame, in_frame, in_frame_by};
-pub use levenberg::{NoFit, Outcome, Settings, Status, solve};
+pub use levenberg::{NoFit, Outcome, Settings, Status, converged, solve};
 pub use linear::{BodyPart, LinearImage, LinearProblem, LinearStop, Linearised};
 pub use noise_information::{NoiseInformation, Spread, noise_information};
 pub use noise_uncertainty::NoiseUncertainty;

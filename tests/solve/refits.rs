@@ -24,7 +24,7 @@ fn held_out_errors_are_those_of_fits_to_the_last_digit() {
         [(solution.accuracy.calibrated, honest.calibrated), (solution.accuracy.nominal, honest.nominal)]
     {
         for (stated, honest) in [(stated.rms_mm, honest.rms_mm), (stated.rms_px, honest.rms_px)] {
-            // The last steps were below a hundredth of a standard deviation, of which a prediction has a few in all.
+            // The last steps were below a tenth of a standard deviation, of which a prediction has a few in all.
             assert!((stated / honest - 1.0).abs() < 0.02, "{stated} {honest}");
         }
     }
