@@ -187,6 +187,10 @@ fn translations(pairs: &[PosePair], rx: Matrix3<f64>, rz: Matrix3<f64>) -> Optio
     })
 }
 
+/// Share of the squares of the distances to the plate, at least, that the rotations of the stops leave to tell its scale: a hundredth of the
+/// distance, which is more than the error of a camera pose.
+const LEAST_TOLD: f64 = 1e-4;
+
 /// Scale of the plate against the robot's link lengths that fits the pairs best, for the rotations of `solution`; about 1
 /// where the pitch of the plate is right. `None` where the stops do not determine it.
 pub fn plate_scale(pairs: &[PosePair], solution: &HandEye) -> Option<f64> {
@@ -203,8 +207,10 @@ pub fn plate_scale(pairs: &[PosePair], solution: &HandEye) -> Option<f64> {
         normal += rows.transpose() * rows;
     }
     let factor = SymmetricFactor::new(&normal).ok()?;
+    // A camera that turns about one point: the translations of its poses are told by their rotations, whatever the scale.
+    let told = 1.0 / (factor.inverse()[(6, 6)] * normal[(6, 6)]);
     let scale = factor.solve(&rhs)[6];
-    (scale.is_finite() && scale > 0.0).then_some(scale)
+    (scale.is_finite() && scale > 0.0 && told > LEAST_TOLD).then_some(scale)
 }
 
 /// X and Z by the Kronecker product (M. Shah 2013); `None` where there is no solution.
@@ -320,5 +326,19 @@ mod tests {
         let starts = solve_hand_eye(&pairs);
         assert_close(&starts[0].solution, &truth, 1e-6);
         assert!(starts[0].median_error < 1e-6);
+    }
+    #[test]
+    fn the_scale_of_the_plate_is_told_by_stops_that_go_somewhere() {
+        let (truth, mut pairs) = world(12);
+        pairs.iter_mut().for_each(|p| p.camera_from_plate.translation /= 1.25);
+        assert!((plate_scale(&pairs, &truth).unwrap() - 1.25).abs() < 1e-9);
+        // A wrist that turns about its centre, seen with an error: no scale fits better than another, and nought does exactly.
+        for (k, p) in pairs.iter_mut().enumerate() {
+            p.chain.translation = Vector3::new(0.3, 0.1, 0.9) + p.chain.rotation * Vector3::new(0.0, 0.0, 0.08);
+            let seen = truth.camera.inverse() * p.chain * truth.plate;
+            p.camera_from_plate =
+                Pose { translation: seen.translation + Vector3::new(1e-4, 0.0, -1e-4) * (k % 3) as f64, ..seen };
+        }
+        assert_eq!(plate_scale(&pairs, &truth), None);
     }
 }
