@@ -85,7 +85,7 @@ impl Lines {
         let formula = camera.parametric();
         let mut by_parameters = DMatrix::zeros(2, camera.parameters.len());
         by_parameters.columns_mut(0, formula).copy_from(&p.d_parameters.columns(0, formula.min(MAX_PARAMETERS)));
-        for (k, b) in p.field.iter().flat_map(|t| t.points()) {
+        for (k, b) in camera.touched(&p.by_formula).iter().flat_map(|t| t.points()) {
             by_parameters[(0, formula + 2 * k)] = b;
             by_parameters[(1, formula + 2 * k + 1)] = b;
         }

@@ -5,17 +5,19 @@
 //! contour fall off geometrically with (radius / distance), so N = 12 is exact to 1e-7 px for every plate that can be imaged, and
 //! N = 8 where the distance is at least fifty radii.
 
-use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
-use super::camera::{Camera, MAX_PARAMETERS, Projection};
+use super::camera::{Camera, MAX_PARAMETERS, Projections, weighted_sum};
 use crate::geom::{Pose, skew};
 
 /// Where the contour is sampled.
 struct Samples<const N: usize> {
     /// On the circle of radius one in the plane of the plate.
     unit: [Vector3<f64>; N],
+    /// The same by components in that plane.
+    places: [[f64; N]; 2],
     /// Spectral derivative with respect to the angle; antisymmetric.
     derivative: [[f64; N]; N],
 }
@@ -29,9 +31,10 @@ static FAR_SAMPLES: LazyLock<Samples<8>> = LazyLock::new(Samples::new);
 impl<const N: usize> Samples<N> {
     fn new() -> Self {
         let angle = |k: usize| TAU * k as f64 / N as f64;
-        let mut s = Self { unit: [Vector3::zeros(); N], derivative: [[0.0; N]; N] };
+        let unit = std::array::from_fn(|k| Vector3::new(angle(k).cos(), angle(k).sin(), 0.0));
+        let places = [0, 1].map(|axis| unit.map(|u: Vector3<f64>| u[axis]));
+        let mut s = Self { unit, places, derivative: [[0.0; N]; N] };
         for i in 0..N {
-            s.unit[i] = Vector3::new(angle(i).cos(), angle(i).sin(), 0.0);
             for j in 0..N {
                 if i != j {
                     let sign = if (i + j) % 2 == 0 { 0.5 } else { -0.5 };
@@ -40,6 +43,18 @@ impl<const N: usize> Samples<N> {
             }
         }
         s
+    }
+
+    /// Derivative with respect to the angle of what has these values at the samples.
+    #[inline(always)]
+    fn differentiated(&self, f: &[f64; N]) -> [f64; N] {
+        let mut out = [0.0; N];
+        for (column, f) in self.derivative.iter().zip(f) {
+            for (o, c) in out.iter_mut().zip(column) {
+                *o -= c * f;
+            }
+        }
+        out
     }
 }
 
@@ -72,9 +87,9 @@ pub fn point(camera: &Camera, camera_from_plate: &Pose, x: &Vector3<f64>) -> Opt
     let mut d_pose = SMatrix::<f64, 2, 6>::zeros();
     d_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&d_marker);
     d_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-d_marker * skew(x)));
-    let d_field = match p.field {
-        Some(_) => field_columns(std::slice::from_ref(&p), &[Matrix2::identity()]),
-        None => Vec::new(),
+    let d_field = match camera.lens.has_field() {
+        true => field_columns(camera, std::iter::once((p.by_formula, Matrix2::identity()))),
+        false => Vec::new(),
     };
     Some(Prediction { uv: p.uv, d_pose, d_marker, d_camera: p.d_parameters, d_field })
 }
@@ -100,33 +115,136 @@ fn centroid_of_contour<const N: usize>(
     centre: &Vector3<f64>,
     radius_m: f64,
 ) -> Option<Prediction> {
-    let mut samples = [Projection::default(); N];
-    let mut uv = [Vector2::zeros(); N];
-    for (k, unit) in at.unit.iter().enumerate() {
-        let x = centre + unit * radius_m;
-        samples[k] = camera.project_with_jacobian(&camera_from_plate.transform(&x))?;
-        uv[k] = samples[k].uv;
+    let around = Around::of(camera_from_plate, centre, radius_m);
+    let mut points = [[0.0; N]; 3];
+    for (axis, points) in points.iter_mut().enumerate() {
+        let (centre, [across, along]) = (around.centre[axis], [around.radii[0][axis], around.radii[1][axis]]);
+        for (point, (u, v)) in points.iter_mut().zip(at.places[0].iter().zip(&at.places[1])) {
+            *point = centre + across * u + along * v;
+        }
     }
-    let (mean, weights) = centroid_weights(at, &uv);
-    // With K_k = g_k d_point_k R: d_marker = sum K_k and d_phi = -sum K_k [centre + offset_k]x.
-    let (mut d_marker, mut d_turn) = (Matrix2x3::zeros(), Matrix2x3::zeros());
-    let mut d_camera = SMatrix::<f64, 2, MAX_PARAMETERS>::zeros();
-    for ((p, g), unit) in samples.iter().zip(&weights).zip(&at.unit) {
-        let k = g * p.d_point * camera_from_plate.rotation;
-        d_marker += k;
-        d_turn += k * skew(&(unit * radius_m));
-        d_camera += g * p.d_parameters;
+    let formula: Projections<N> = camera.project_together(&points)?;
+    if !camera.lens.has_field() {
+        let (uv, weights) = centroid_weights(at, &formula.uv);
+        let sums = Sums::of(at, camera, &formula, &weights);
+        return Some(sums.prediction(uv, camera_from_plate, centre, radius_m));
     }
-    let mut d_pose = SMatrix::<f64, 2, 6>::zeros();
-    d_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&d_marker);
-    d_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-d_turn - d_marker * skew(centre)));
-    Some(Prediction { uv: mean, d_pose, d_marker, d_camera, d_field: field_columns(&samples, &weights) })
+    let by_formula: [Vector2<f64>; N] = std::array::from_fn(|n| Vector2::new(formula.uv[0][n], formula.uv[1][n]));
+    let displaced = by_formula.map(|h| camera.displacement(&h));
+    let uv = [0, 1].map(|i| std::array::from_fn(|n| by_formula[n][i] + displaced[n].0[i]));
+    let (uv, weights) = centroid_weights(at, &uv);
+    let at_sample = |n: usize| Matrix2::from_fn(|i, c| weights[i][c][n]);
+    // A sample is moved by the field as well, where the formula moves it.
+    let through_field: [Matrix2<f64>; N] =
+        std::array::from_fn(|n| at_sample(n) * (Matrix2::identity() + displaced[n].1));
+    let by_component = |i, c| std::array::from_fn(|n| through_field[n][(i, c)]);
+    let sums = Sums::of(at, camera, &formula, &[0, 1].map(|i| [0, 1].map(|c| by_component(i, c))));
+    let d_field = field_columns(camera, (0..N).map(|n| (by_formula[n], at_sample(n))));
+    Some(Prediction { d_field, ..sums.prediction(uv, camera_from_plate, centre, radius_m) })
 }
 
-/// Derivative by the displacement field of the sum of samples, each with its weight; nothing for a lens without a field.
-fn field_columns(samples: &[Projection], weights: &[Matrix2<f64>]) -> Vec<(usize, Matrix2<f64>)> {
+/// Derivatives of the centroid with respect to the samples: of component i by component c of sample n.
+type Weights<const N: usize> = [[[f64; N]; 2]; 2];
+
+/// Derivatives of samples, summed with the weights `g` that they have in the centroid.
+struct Sums {
+    /// `sum g d_point`.
+    whole: Matrix2x3<f64>,
+    /// `sum g d_point u` for both components of the places `u` of the samples on the unit circle.
+    moments: [Matrix2x3<f64>; 2],
+    /// `sum g d_parameters`.
+    d_camera: SMatrix<f64, 2, MAX_PARAMETERS>,
+}
+
+impl Sums {
+    #[inline(always)]
+    fn of<const N: usize>(at: &Samples<N>, camera: &Camera, formula: &Projections<N>, weights: &Weights<N>) -> Self {
+        let mut sums = Self { whole: Matrix2x3::zeros(), moments: [Matrix2x3::zeros(); 2], d_camera: SMatrix::zeros() };
+        let parameters = camera.parametric();
+        for i in 0..2 {
+            for j in 0..3 {
+                let (mut by, of) = ([0.0; N], [&formula.d_point[0][j], &formula.d_point[1][j]]);
+                for n in 0..N {
+                    by[n] = weights[i][0][n] * of[0][n] + weights[i][1][n] * of[1][n];
+                }
+                sums.whole[(i, j)] = weighted_sum(&by, &[1.0; N]);
+                for (axis, moment) in sums.moments.iter_mut().enumerate() {
+                    moment[(i, j)] = weighted_sum(&by, &at.places[axis]);
+                }
+            }
+            for (c, weights) in weights[i].iter().enumerate() {
+                let by = formula.by_parameters(c, weights, parameters);
+                for (k, by) in by.iter().enumerate() {
+                    sums.d_camera[(i, k)] += by;
+                }
+            }
+        }
+        sums
+    }
+
+    /// `d_marker = sum g d_point R`, and `d_phi = -sum g d_point R [centre + radius u]x`.
+    #[inline(always)]
+    fn prediction(
+        &self,
+        uv: Vector2<f64>,
+        camera_from_plate: &Pose,
+        centre: &Vector3<f64>,
+        radius_m: f64,
+    ) -> Prediction {
+        let rotated = |d: &Matrix2x3<f64>| times(d, &camera_from_plate.rotation);
+        let d_marker = rotated(&self.whole);
+        let [across, along] = [rotated(&self.moments[0]) * radius_m, rotated(&self.moments[1]) * radius_m];
+        // Columns of [x]x and [y]x are unit vectors.
+        let d_turn = Matrix2x3::from_columns(&[
+            -along.column(2),
+            across.column(2).into_owned(),
+            along.column(0) - across.column(1),
+        ]);
+        let mut d_pose = SMatrix::<f64, 2, 6>::zeros();
+        d_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&d_marker);
+        d_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-d_turn - d_marker * skew(centre)));
+        Prediction { uv, d_pose, d_marker, d_camera: self.d_camera, d_field: Vec::new() }
+    }
+}
+
+/// The product, compiled where it stands.
+#[inline(always)]
+fn times(a: &Matrix2x3<f64>, b: &Matrix3<f64>) -> Matrix2x3<f64> {
+    let mut c = Matrix2x3::zeros();
+    for (j, b) in b.column_iter().enumerate() {
+        (0..2).for_each(|i| c[(i, j)] = a[(i, 0)] * b[0] + a[(i, 1)] * b[1] + a[(i, 2)] * b[2]);
+    }
+    c
+}
+
+/// A circle in the camera frame.
+struct Around {
+    centre: Vector3<f64>,
+    /// From the centre to the samples at 0 and at 90 degrees.
+    radii: [Vector3<f64>; 2],
+}
+
+impl Around {
+    #[inline(always)]
+    fn of(camera_from_plate: &Pose, centre: &Vector3<f64>, radius_m: f64) -> Self {
+        let rotation = camera_from_plate.rotation * radius_m;
+        let radii = [rotation.column(0).into_owned(), rotation.column(1).into_owned()];
+        Self { centre: camera_from_plate.transform(centre), radii }
+    }
+
+    #[inline(always)]
+    fn sample(&self, unit: &Vector3<f64>) -> Vector3<f64> {
+        self.centre + self.radii[0] * unit.x + self.radii[1] * unit.y
+    }
+}
+
+/// Derivative by the displacement field of the sum of samples, each given by where the formula images it, with its weight.
+fn field_columns(
+    camera: &Camera,
+    samples: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>,
+) -> Vec<(usize, Matrix2<f64>)> {
     let mut columns: Vec<(usize, Matrix2<f64>)> = Vec::new();
-    for (touched, g) in samples.iter().zip(weights).filter_map(|(p, g)| p.field.as_ref().map(|t| (t, g))) {
+    for (touched, g) in samples.filter_map(|(h, g)| Some((camera.touched(&h)?, g))) {
         for (k, b) in touched.points() {
             match columns.binary_search_by_key(&k, |c| c.0) {
                 Ok(at) => columns[at].1 += g * b,
@@ -160,43 +278,42 @@ fn centroid_of_samples<const N: usize>(
     centre: &Vector3<f64>,
     radius_m: f64,
 ) -> Option<Vector2<f64>> {
-    let mut uv = [Vector2::zeros(); N];
+    let around = Around::of(camera_from_plate, centre, radius_m);
+    let mut uv = [[0.0; N]; 2];
     for (k, unit) in at.unit.iter().enumerate() {
-        let x = centre + unit * radius_m;
-        uv[k] = camera.project(&camera_from_plate.transform(&x))?;
+        let sample = camera.project(&around.sample(unit))?;
+        (0..2).for_each(|i| uv[i][k] = sample[i]);
     }
     Some(centroid_weights(at, &uv).0)
 }
 
 /// Area centroid of a closed contour of samples, and its derivative with respect to each sample.
 #[inline(always)]
-fn centroid_weights<const N: usize>(at: &Samples<N>, uv: &[Vector2<f64>; N]) -> (Vector2<f64>, [Matrix2<f64>; N]) {
-    let origin = uv.iter().sum::<Vector2<f64>>() / N as f64;
-    let x: [f64; N] = std::array::from_fn(|k| uv[k].x - origin.x);
-    let y: [f64; N] = std::array::from_fn(|k| uv[k].y - origin.y);
-    let d = |f: &[f64; N]| -> [f64; N] {
-        let mut out = [0.0; N];
-        for (column, f) in at.derivative.iter().zip(f) {
-            for (o, c) in out.iter_mut().zip(column) {
-                *o -= c * f;
-            }
-        }
-        out
-    };
-    let (dx, dy) = (d(&x), d(&y));
-    let (dxx, dyy) = (d(&x.map(|a| a * a)), d(&y.map(|a| a * a)));
+fn centroid_weights<const N: usize>(at: &Samples<N>, uv: &[[f64; N]; 2]) -> (Vector2<f64>, Weights<N>) {
+    let ones = [1.0; N];
+    let origin = [weighted_sum(&uv[0], &ones) / N as f64, weighted_sum(&uv[1], &ones) / N as f64];
+    let (mut x, mut y, mut xx, mut yy) = ([0.0; N], [0.0; N], [0.0; N], [0.0; N]);
+    for k in 0..N {
+        (x[k], y[k]) = (uv[0][k] - origin[0], uv[1][k] - origin[1]);
+        (xx[k], yy[k]) = (x[k] * x[k], y[k] * y[k]);
+    }
+    let (dx, dy, dxx, dyy) =
+        (at.differentiated(&x), at.differentiated(&y), at.differentiated(&xx), at.differentiated(&yy));
+    let (mut x_dy, mut y_dx) = ([0.0; N], [0.0; N]);
+    for k in 0..N {
+        (x_dy[k], y_dx[k]) = (x[k] * dy[k], y[k] * dx[k]);
+    }
     // Green: area = sum x y', moments = sum x^2 y' / 2 and -sum y^2 x' / 2 (the common factor 2 pi / N cancels).
-    let area: f64 = (0..N).map(|k| x[k] * dy[k]).sum();
-    let mx: f64 = (0..N).map(|k| x[k] * x[k] * dy[k]).sum::<f64>() / 2.0;
-    let my: f64 = (0..N).map(|k| -y[k] * y[k] * dx[k]).sum::<f64>() / 2.0;
-    let c = Vector2::new(mx / area, my / area);
-    let weights = std::array::from_fn(|k| {
-        let (ax, ay) = (dy[k], -dx[k]);
-        let (mxx, mxy) = (x[k] * dy[k], -dxx[k] / 2.0);
-        let (myx, myy) = (dyy[k] / 2.0, -y[k] * dx[k]);
-        Matrix2::new(mxx - c.x * ax, mxy - c.x * ay, myx - c.y * ax, myy - c.y * ay) / area
-    });
-    (origin + c, weights)
+    let area = weighted_sum(&x, &dy);
+    let c = [weighted_sum(&x, &x_dy) / 2.0 / area, -weighted_sum(&y, &y_dx) / 2.0 / area];
+    let mut weights = [[[0.0; N]; 2]; 2];
+    for k in 0..N {
+        weights[0][0][k] = (x_dy[k] - c[0] * dy[k]) / area;
+        weights[0][1][k] = (-dxx[k] / 2.0 + c[0] * dx[k]) / area;
+        weights[1][0][k] = (dyy[k] / 2.0 - c[1] * dy[k]) / area;
+        weights[1][1][k] = (-y_dx[k] + c[1] * dx[k]) / area;
+    }
+    (Vector2::new(origin[0] + c[0], origin[1] + c[1]), weights)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3};
 
 use super::linear::{BodyPart, LinearImage, LinearProblem, StopParts};
-use crate::linalg::product;
+use crate::linalg::{product, wide};
 use crate::problem::{Adjustment, E, Equations, Layout, Problem};
 
 /// Stops whose equations are taken together.
@@ -118,21 +118,29 @@ impl DenseCoupling {
         let intrinsics: Vec<_> =
             own.columns().into_iter().map(|c| c.and_then(|c| self.free.binary_search(&c).ok())).collect();
         let runs = runs((0..E).filter_map(|e| Some((equations.intrinsic_row(e)?, intrinsics[e]?))));
-        for (o, (&marker, sight)) in equations.markers.iter().zip(equations.sights()).enumerate() {
-            let Some(at) = seen.number[image.plate][marker] else { continue };
-            let by_marker = sight.by_marker();
-            let (t0, t1) = (by_theta.column(2 * o), by_theta.column(2 * o + 1));
-            for (d, w) in by_marker.row_iter().enumerate() {
-                let mut column = self.values.column_mut(3 * at + d);
-                let into = column.as_mut_slice();
-                add_combination(&mut into[..theta], [t0.as_slice(), t1.as_slice()], [w[0], w[1]]);
-                for run in &runs {
-                    let of = sight.row_range(run.from..run.from + run.length);
-                    add_combination(&mut into[run.into..run.into + run.length], of, [w[0], w[1]]);
+        let values = &mut self.values;
+        wide(
+            #[inline(always)]
+            || {
+                for (o, (&marker, sight)) in equations.markers.iter().zip(equations.sights()).enumerate() {
+                    let Some(at) = seen.number[image.plate][marker] else { continue };
+                    let (t0, t1) = (by_theta.column(2 * o), by_theta.column(2 * o + 1));
+                    for (d, w) in sight.by_marker().row_iter().enumerate() {
+                        let mut column = values.column_mut(3 * at + d);
+                        let into = column.as_mut_slice();
+                        add_combination(&mut into[..theta], [t0.as_slice(), t1.as_slice()], [w[0], w[1]]);
+                        for run in &runs {
+                            let of = sight.row_range(run.from..run.from + run.length);
+                            add_combination(&mut into[run.into..run.into + run.length], of, [w[0], w[1]]);
+                        }
+                    }
                 }
-            }
+            },
+        );
+        for (&marker, sight) in equations.markers.iter().zip(equations.sights()) {
+            let Some(at) = seen.number[image.plate][marker] else { continue };
             for (point, d) in sight.by_field() {
-                let own = by_marker * d;
+                let own = sight.by_marker() * d;
                 for (component, column) in own.column_iter().enumerate() {
                     if let Some(row) = intrinsics[E + 2 * point + component] {
                         (0..3).for_each(|d| self.values[(row, 3 * at + d)] += column[d]);
@@ -144,7 +152,10 @@ impl DenseCoupling {
 
     /// Multiplies the columns of every marker from the right by a matrix of its own.
     pub fn times_right(&mut self, matrices: impl Iterator<Item = Matrix3<f64>>) {
-        matrices.enumerate().for_each(|(at, m)| times_right(&mut self.values, 3 * at, &m));
+        wide(
+            #[inline(always)]
+            || matrices.enumerate().for_each(|(at, m)| times_right(&mut self.values, 3 * at, &m)),
+        );
     }
 
     /// Copies the columns to those of `into` from `first` on.
@@ -156,6 +167,7 @@ impl DenseCoupling {
 }
 
 /// Multiplies three columns from `first` on by `m` from the right.
+#[inline(always)]
 pub(super) fn times_right(y: &mut DMatrix<f64>, first: usize, m: &Matrix3<f64>) {
     let rows = y.nrows();
     let (x, rest) = y.as_mut_slice()[first * rows..(first + 3) * rows].split_at_mut(rows);
@@ -186,6 +198,7 @@ fn runs(places: impl Iterator<Item = (usize, usize)>) -> Vec<Run> {
 }
 
 /// `into += a s + b t`.
+#[inline(always)]
 fn add_combination(into: &mut [f64], [a, b]: [&[f64]; 2], [s, t]: [f64; 2]) {
     for ((x, a), b) in into.iter_mut().zip(a).zip(b) {
         *x += a * s + b * t;

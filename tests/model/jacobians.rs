@@ -195,7 +195,7 @@ fn projection_through_a_displacement_field() {
         (seen, beyond) = (seen + usize::from(inside), beyond + usize::from(!inside));
         let by_point = columns::<3>(|s| evaluate(s.iter().position(|s| *s).map(|c| usize::MAX - c)));
         assert_same(&format!("{lens:?}, point"), &library.d_point, &by_point, 1e-11);
-        let touched = library.field.unwrap();
+        let touched = camera.touched(&library.by_formula).unwrap();
         for c in 0..camera.parameters.len() {
             let w = evaluate(Some(c)).map(|d| d.eps);
             let own = match c.checked_sub(formula) {

@@ -5,8 +5,11 @@ use nalgebra::{Matrix2, SMatrix, Vector2};
 /// Most parameters that the formula of any camera has (pinhole and lens; a displacement field comes on top).
 pub const MAX_PARAMETERS: usize = 13;
 
+/// Most coefficients of a lens.
+const MOST: usize = MAX_PARAMETERS - 4;
+
 /// Derivatives of a distorted point by the coefficients of a lens, one column each.
-pub(super) type Coefficients = SMatrix<f64, 2, { MAX_PARAMETERS - 4 }>;
+pub(super) type Coefficients = SMatrix<f64, 2, MOST>;
 
 /// A distorted point of the plane z = 1 with its derivatives.
 pub(super) struct Distorted {
@@ -53,4 +56,41 @@ pub(super) trait Formula {
 
     /// True while the image still moves outwards from the axis to `r2 = r^2`.
     fn is_monotonic_to(c: &[f64], r2: f64, inverse_depth: f64) -> bool;
+}
+
+/// N distorted points of the plane z = 1 with their derivatives: place n of every array is of point n.
+pub(super) struct DistortedPoints<const N: usize> {
+    /// Two components.
+    pub point: [[f64; N]; 2],
+    /// Of each component by each.
+    pub d_point: [[[f64; N]; 2]; 2],
+    /// Of each component by each coefficient.
+    pub d_coefficients: [[[f64; N]; MOST]; 2],
+    /// With respect to 1 / depth (1/m).
+    pub d_inverse_depth: [[f64; N]; 2],
+}
+
+/// Distorts N points of the plane z = 1 by a formula with the coefficients `c`.
+#[inline(always)]
+pub(super) fn distorted<F: Formula, const N: usize>(
+    c: &[f64],
+    x: &[[f64; N]; 2],
+    inverse_depth: &[f64; N],
+) -> DistortedPoints<N> {
+    let mut all = DistortedPoints {
+        point: [[0.0; N]; 2],
+        d_point: [[[0.0; N]; 2]; 2],
+        d_coefficients: [[[0.0; N]; MOST]; 2],
+        d_inverse_depth: [[0.0; N]; 2],
+    };
+    for n in 0..N {
+        let d = F::distort(c, &Vector2::new(x[0][n], x[1][n]), inverse_depth[n]);
+        for i in 0..2 {
+            all.point[i][n] = d.point[i];
+            all.d_inverse_depth[i][n] = d.d_inverse_depth[i];
+            (0..2).for_each(|j| all.d_point[i][j][n] = d.d_point[(i, j)]);
+            (0..F::COEFFICIENTS.len()).for_each(|k| all.d_coefficients[i][k][n] = d.d_coefficients[(i, k)]);
+        }
+    }
+    all
 }

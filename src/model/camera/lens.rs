@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::brown::Brown;
 use super::fisheye::Fisheye;
-use super::formula::{Distorted, Formula, MAX_PARAMETERS};
+use super::formula::{Distorted, DistortedPoints, Formula, MAX_PARAMETERS, distorted};
 use super::parallax::Parallax;
 use super::rational::Rational;
 use super::thin_prism::ThinPrism;
@@ -61,6 +61,17 @@ macro_rules! lenses {
             #[inline(always)]
             pub(super) fn distort(self, c: &[f64], x: &Vector2<f64>, inverse_depth: f64) -> Distorted {
                 match self { $(Self::$lens => <$formula>::distort(c, x, inverse_depth),)+ }
+            }
+
+            /// As `distort`, of N points.
+            #[inline(always)]
+            pub(super) fn distorted<const N: usize>(
+                self,
+                c: &[f64],
+                x: &[[f64; N]; 2],
+                inverse_depth: &[f64; N],
+            ) -> DistortedPoints<N> {
+                match self { $(Self::$lens => distorted::<$formula, N>(c, x, inverse_depth),)+ }
             }
 
             pub(super) fn is_monotonic_to(self, c: &[f64], r2: f64, inverse_depth: f64) -> bool {

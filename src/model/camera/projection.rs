@@ -38,8 +38,8 @@ pub struct Projection {
     pub d_point: Matrix2x3<f64>,
     /// With respect to the parameters of the formula; columns beyond their number are zero.
     pub d_parameters: SMatrix<f64, 2, MAX_PARAMETERS>,
-    /// Basis functions of the displacement field: derivatives of u by its u components, and of v by its v components.
-    pub field: Option<Touched>,
+    /// Column and row that the formula gives, px: there the displacement field moves the point.
+    pub by_formula: Vector2<f64>,
 }
 
 impl Camera {
@@ -149,21 +149,22 @@ impl Camera {
             d_point[(c, 2)] = -by_x * x.x - by_y * x.y - focal * iz * iz * d.d_inverse_depth[c];
         }
         let h = self.to_pixels(&d.point);
-        let Some(lattice) = self.lattice() else {
-            return Some(Projection { uv: h, d_point, d_parameters, field: None });
-        };
+        if !self.lens.has_field() {
+            return Some(Projection { uv: h, d_point, d_parameters, by_formula: h });
+        }
         let (shift, bend) = self.displacement(&h);
         let by_h = Matrix2::identity() + bend;
-        Some(Projection {
-            uv: h + shift,
-            d_point: by_h * d_point,
-            d_parameters: by_h * d_parameters,
-            field: Some(lattice.touched(&h)),
-        })
+        Some(Projection { uv: h + shift, d_point: by_h * d_point, d_parameters: by_h * d_parameters, by_formula: h })
+    }
+
+    /// Basis functions of the displacement field where the formula images a point at `h` px: derivatives of u by its u components, and of v by its
+    /// v components. `None` for a lens without a field.
+    pub fn touched(&self, h: &Vector2<f64>) -> Option<Touched> {
+        self.lattice().map(|lattice| lattice.touched(h))
     }
 
     /// Displacement (px) on top of the formula where that images a point at `h`, and its derivative.
-    fn displacement(&self, h: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+    pub fn displacement(&self, h: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let lattice = self.lattice();
         lattice.map_or_else(Default::default, |l| l.displacement(&self.parameters[self.parametric()..], h))
     }
@@ -201,6 +202,12 @@ impl Camera {
         inside(uv.x, self.width_px) && inside(uv.y, self.height_px)
     }
 
+    /// True for a depth (m) that is imaged.
+    #[inline(always)]
+    pub(super) fn is_before(depth: f64) -> bool {
+        depth > 1e-6
+    }
+
     #[inline(always)]
     fn to_pixels(&self, x: &Vector2<f64>) -> Vector2<f64> {
         let p = &self.parameters;
@@ -210,7 +217,7 @@ impl Camera {
 
 #[inline(always)]
 fn normalised(x: &Vector3<f64>) -> Option<Vector2<f64>> {
-    (x.z > 1e-6).then(|| Vector2::new(x.x / x.z, x.y / x.z))
+    Camera::is_before(x.z).then(|| Vector2::new(x.x / x.z, x.y / x.z))
 }
 
 #[cfg(test)]
