@@ -2,6 +2,7 @@
 
 use crate::outputs_support::{context, robot, solved};
 use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
+use robotcal::output::verdict::Verdict;
 use robotcal::output::{Thumbnails, files, report_html, solution_json};
 use robotcal::series::{CameraMount, InputFile};
 
@@ -128,6 +129,9 @@ fn the_verdict_follows_the_gates_and_then_the_doubts() {
     record.accuracy.calibrated.worst_mm = 10.0 * record.accuracy.calibrated.rms_mm;
     let page = report_html(&record, &Thumbnails::default());
     assert!(page.contains("class=\"verdict care\""));
+    // The first page and the chapter on findings both say why.
+    let doubts = Verdict::of(&record).reasons;
+    assert!(!doubts.is_empty() && doubts.iter().all(|doubt| page.matches(&doubt.what).count() >= 2), "{doubts:?}");
     let mut without_gain = good;
     without_gain.accuracy.nominal.rms_mm = without_gain.accuracy.calibrated.rms_mm;
     assert!(report_html(&without_gain, &Thumbnails::default()).contains("class=\"verdict care\""));

@@ -4,20 +4,36 @@ use maud::{Markup, html};
 
 use crate::error::Notice;
 use crate::output::solution_json::SolutionRecord;
-use crate::output::verdict::{Trust, Verdict};
+use crate::output::verdict::{Reason, Trust, Verdict};
 
-/// Failed gates, then notes.
+/// Failed gates or doubts, then notes.
 pub(super) fn section(r: &SolutionRecord) -> Markup {
     let v = Verdict::of(r);
+    // Most doubts are notes, and stand there.
+    let is_noted = |reason: &&Reason| r.notices.iter().any(|n| reason.what.ends_with(&n.what));
+    let others: Vec<&Reason> = v.reasons.iter().filter(|reason| !is_noted(reason)).collect();
     html! {
-        @if v.trust == Trust::Failed {
-            h3 { "Checks that failed" }
-            ul { @for reason in &v.reasons { li { b { (reason.what) } @if !reason.remedy.is_empty() { br; "→ " (reason.remedy) } } } }
-        } @else { p { "Every check passed." } }
+        @match v.trust {
+            Trust::Good => p { "Every check passed." },
+            Trust::Doubts => {
+                @if others.is_empty() { p { "No check failed; some of the notes ask for a look." } }
+                @else { p { "No check failed. What asks for a look:" } (list(others)) }
+            },
+            Trust::Failed => {
+                h3 { "Checks that failed" }
+                (list(v.reasons.iter()))
+            },
+        }
         @if !r.notices.is_empty() {
             h3 { "Notes" }
             ul { @for group in Notice::alike(&r.notices) { (notes(&group)) } }
         }
+    }
+}
+
+fn list<'a>(reasons: impl IntoIterator<Item = &'a Reason>) -> Markup {
+    html! {
+        ul { @for reason in reasons { li { b { (reason.what) } @if !reason.remedy.is_empty() { br; "→ " (reason.remedy) } } } }
     }
 }
 
