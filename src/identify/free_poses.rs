@@ -169,7 +169,7 @@ fn quick_problem(problem: &Problem, camera: usize) -> Problem {
         if image.camera != camera && image.rejected.is_none() {
             image.rejected = Some(ImageRejection::Excluded);
         }
-        let every = (image.observations.len() / ENOUGH).max(1);
+        let every = Weighting::of(problem, image).thinned(image, ENOUGH).every;
         image.observations = image.observations.iter().step_by(every).cloned().collect();
         image.observations.iter_mut().for_each(|o| o.mark = Mark::Corner);
     }

@@ -14,9 +14,7 @@ use crate::geom::{Pose, skew};
 
 /// Where the contour is sampled.
 struct Samples<const N: usize> {
-    /// On the circle of radius one in the plane of the plate.
-    unit: [Vector3<f64>; N],
-    /// The same by components in that plane.
+    /// On the circle of radius one, by components in the plane of the plate.
     places: [[f64; N]; 2],
     /// Spectral derivative with respect to the angle; antisymmetric.
     derivative: [[f64; N]; N],
@@ -31,9 +29,8 @@ static FAR_SAMPLES: LazyLock<Samples<8>> = LazyLock::new(Samples::new);
 impl<const N: usize> Samples<N> {
     fn new() -> Self {
         let angle = |k: usize| TAU * k as f64 / N as f64;
-        let unit = std::array::from_fn(|k| Vector3::new(angle(k).cos(), angle(k).sin(), 0.0));
-        let places = [0, 1].map(|axis| unit.map(|u: Vector3<f64>| u[axis]));
-        let mut s = Self { unit, places, derivative: [[0.0; N]; N] };
+        let places = [f64::cos, f64::sin].map(|component| std::array::from_fn(|k| component(angle(k))));
+        let mut s = Self { places, derivative: [[0.0; N]; N] };
         for i in 0..N {
             for j in 0..N {
                 if i != j {
@@ -43,6 +40,19 @@ impl<const N: usize> Samples<N> {
             }
         }
         s
+    }
+
+    /// Those of a circle of `radius_m` about `centre` (plate frame, m), in the camera frame, m.
+    #[inline(always)]
+    fn of_circle(&self, camera_from_plate: &Pose, centre: &Vector3<f64>, radius_m: f64) -> [[f64; N]; 3] {
+        let (centre, radii) = (camera_from_plate.transform(centre), camera_from_plate.rotation * radius_m);
+        let mut points = [[0.0; N]; 3];
+        for (axis, points) in points.iter_mut().enumerate() {
+            for (point, (u, v)) in points.iter_mut().zip(self.places[0].iter().zip(&self.places[1])) {
+                *point = centre[axis] + radii[(axis, 0)] * u + radii[(axis, 1)] * v;
+            }
+        }
+        points
     }
 
     /// Derivative with respect to the angle of what has these values at the samples.
@@ -115,15 +125,7 @@ fn centroid_of_contour<const N: usize>(
     centre: &Vector3<f64>,
     radius_m: f64,
 ) -> Option<Prediction> {
-    let around = Around::of(camera_from_plate, centre, radius_m);
-    let mut points = [[0.0; N]; 3];
-    for (axis, points) in points.iter_mut().enumerate() {
-        let (centre, [across, along]) = (around.centre[axis], [around.radii[0][axis], around.radii[1][axis]]);
-        for (point, (u, v)) in points.iter_mut().zip(at.places[0].iter().zip(&at.places[1])) {
-            *point = centre + across * u + along * v;
-        }
-    }
-    let formula: Projections<N> = camera.project_together(&points)?;
+    let formula: Projections<N> = camera.project_together(&at.of_circle(camera_from_plate, centre, radius_m))?;
     if !camera.lens.has_field() {
         let (uv, weights) = centroid_weights(at, &formula.uv);
         let sums = Sums::of(at, camera, &formula, &weights);
@@ -217,27 +219,6 @@ fn times(a: &Matrix2x3<f64>, b: &Matrix3<f64>) -> Matrix2x3<f64> {
     c
 }
 
-/// A circle in the camera frame.
-struct Around {
-    centre: Vector3<f64>,
-    /// From the centre to the samples at 0 and at 90 degrees.
-    radii: [Vector3<f64>; 2],
-}
-
-impl Around {
-    #[inline(always)]
-    fn of(camera_from_plate: &Pose, centre: &Vector3<f64>, radius_m: f64) -> Self {
-        let rotation = camera_from_plate.rotation * radius_m;
-        let radii = [rotation.column(0).into_owned(), rotation.column(1).into_owned()];
-        Self { centre: camera_from_plate.transform(centre), radii }
-    }
-
-    #[inline(always)]
-    fn sample(&self, unit: &Vector3<f64>) -> Vector3<f64> {
-        self.centre + self.radii[0] * unit.x + self.radii[1] * unit.y
-    }
-}
-
 /// Derivative by the displacement field of the sum of samples, each given by where the formula images it, with its weight.
 fn field_columns(
     camera: &Camera,
@@ -278,10 +259,10 @@ fn centroid_of_samples<const N: usize>(
     centre: &Vector3<f64>,
     radius_m: f64,
 ) -> Option<Vector2<f64>> {
-    let around = Around::of(camera_from_plate, centre, radius_m);
+    let [x, y, z] = at.of_circle(camera_from_plate, centre, radius_m);
     let mut uv = [[0.0; N]; 2];
-    for (k, unit) in at.unit.iter().enumerate() {
-        let sample = camera.project(&around.sample(unit))?;
+    for k in 0..N {
+        let sample = camera.project(&Vector3::new(x[k], y[k], z[k]))?;
         (0..2).for_each(|i| uv[i][k] = sample[i]);
     }
     Some(centroid_weights(at, &uv).0)

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::field::{Lattice, Touched};
 use super::formula::MAX_PARAMETERS;
 use super::lens::Lens;
+use super::projections::Projections;
 
 /// First guess of the displacements that a field has to make, px; the data decide.
 const FIELD_SIGMA_PX: f64 = 1.0;
@@ -131,30 +132,52 @@ impl Camera {
     /// As [`Camera::project`], with derivatives; `None` only behind the camera, so that an adjustment can pass through a poor state.
     #[inline(always)]
     pub fn project_with_jacobian(&self, x_camera: &Vector3<f64>) -> Option<Projection> {
-        let x = normalised(x_camera)?;
-        let iz = 1.0 / x_camera.z;
-        let d = self.lens.distort(&self.parameters[4..], &x, iz);
-        let scale = [self.parameters[0], self.parameters[1]];
-        let mut d_parameters = SMatrix::<f64, 2, MAX_PARAMETERS>::zeros();
-        let mut d_point = Matrix2x3::zeros();
-        for (c, focal) in scale.into_iter().enumerate() {
-            d_parameters[(c, c)] = d.point[c];
-            d_parameters[(c, 2 + c)] = 1.0;
-            for k in 0..MAX_PARAMETERS - 4 {
-                d_parameters[(c, 4 + k)] = focal * d.d_coefficients[(c, k)];
-            }
-            let [by_x, by_y] = [focal * iz * d.d_point[(c, 0)], focal * iz * d.d_point[(c, 1)]];
-            d_point[(c, 0)] = by_x;
-            d_point[(c, 1)] = by_y;
-            d_point[(c, 2)] = -by_x * x.x - by_y * x.y - focal * iz * iz * d.d_inverse_depth[c];
+        let formula = self.project_together(&[[x_camera.x], [x_camera.y], [x_camera.z]])?;
+        let h = Vector2::new(formula.uv[0][0], formula.uv[1][0]);
+        let (mut d_point, mut d_parameters) = (Matrix2x3::zeros(), SMatrix::<f64, 2, MAX_PARAMETERS>::zeros());
+        for (i, by_point) in formula.d_point.iter().enumerate() {
+            (0..3).for_each(|j| d_point[(i, j)] = by_point[j][0]);
+            let by = formula.by_parameters(i, &[1.0], self.parametric());
+            by.iter().enumerate().for_each(|(k, by)| d_parameters[(i, k)] = *by);
         }
-        let h = self.to_pixels(&d.point);
         if !self.lens.has_field() {
             return Some(Projection { uv: h, d_point, d_parameters, by_formula: h });
         }
         let (shift, bend) = self.displacement(&h);
         let by_h = Matrix2::identity() + bend;
         Some(Projection { uv: h + shift, d_point: by_h * d_point, d_parameters: by_h * d_parameters, by_formula: h })
+    }
+
+    /// Projects N points in the camera frame (m) by the formula alone; `None` where one is behind the camera.
+    #[inline(always)]
+    pub fn project_together<const N: usize>(&self, points: &[[f64; N]; 3]) -> Option<Projections<N>> {
+        let [x, y, z] = points;
+        if z.iter().any(|z| !Self::is_before(*z)) {
+            return None;
+        }
+        let mut inverse_depth = [0.0; N];
+        let mut normalised = [[0.0; N]; 2];
+        for n in 0..N {
+            inverse_depth[n] = 1.0 / z[n];
+            normalised[0][n] = x[n] / z[n];
+            normalised[1][n] = y[n] / z[n];
+        }
+        let distorted = self.lens.distorted(&self.parameters[4..], &normalised, &inverse_depth);
+        let focal = [self.parameters[0], self.parameters[1]];
+        let (mut uv, mut d_point) = ([[0.0; N]; 2], [[[0.0; N]; 3]; 2]);
+        for (i, focal) in focal.into_iter().enumerate() {
+            for n in 0..N {
+                let scale = focal * inverse_depth[n];
+                let [by_x, by_y] = [scale * distorted.d_point[i][0][n], scale * distorted.d_point[i][1][n]];
+                uv[i][n] = focal * distorted.point[i][n] + self.parameters[2 + i];
+                d_point[i][0][n] = by_x;
+                d_point[i][1][n] = by_y;
+                d_point[i][2][n] = -by_x * normalised[0][n]
+                    - by_y * normalised[1][n]
+                    - scale * inverse_depth[n] * distorted.d_inverse_depth[i][n];
+            }
+        }
+        Some(Projections { uv, d_point, focal, distorted })
     }
 
     /// Basis functions of the displacement field where the formula images a point at `h` px: derivatives of u by its u components, and of v by its
@@ -164,7 +187,7 @@ impl Camera {
     }
 
     /// Displacement (px) on top of the formula where that images a point at `h`, and its derivative.
-    pub fn displacement(&self, h: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+    pub(in crate::model) fn displacement(&self, h: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let lattice = self.lattice();
         lattice.map_or_else(Default::default, |l| l.displacement(&self.parameters[self.parametric()..], h))
     }
@@ -204,7 +227,7 @@ impl Camera {
 
     /// True for a depth (m) that is imaged.
     #[inline(always)]
-    pub(super) fn is_before(depth: f64) -> bool {
+    fn is_before(depth: f64) -> bool {
         depth > 1e-6
     }
 

@@ -1,7 +1,6 @@
 //! Several points projected at once: place n of every array is of point n, so that loops over the points are compiled to wide registers.
 
 use super::formula::{DistortedPoints, MAX_PARAMETERS};
-use super::projection::Camera;
 
 /// Images of N points as the formula gives them, with derivatives.
 pub struct Projections<const N: usize> {
@@ -10,42 +9,9 @@ pub struct Projections<const N: usize> {
     /// Of each by the point in the camera frame, px/m.
     pub d_point: [[[f64; N]; 3]; 2],
     /// Focal lengths, px.
-    focal: [f64; 2],
-    distorted: DistortedPoints<N>,
-}
-
-impl Camera {
-    /// Projects N points in the camera frame (m) by the formula alone; `None` where one is behind the camera.
-    #[inline(always)]
-    pub fn project_together<const N: usize>(&self, points: &[[f64; N]; 3]) -> Option<Projections<N>> {
-        let [x, y, z] = points;
-        if z.iter().any(|z| !Self::is_before(*z)) {
-            return None;
-        }
-        let mut inverse_depth = [0.0; N];
-        let mut normalised = [[0.0; N]; 2];
-        for n in 0..N {
-            inverse_depth[n] = 1.0 / z[n];
-            normalised[0][n] = x[n] / z[n];
-            normalised[1][n] = y[n] / z[n];
-        }
-        let distorted = self.lens.distorted(&self.parameters[4..], &normalised, &inverse_depth);
-        let focal = [self.parameters[0], self.parameters[1]];
-        let (mut uv, mut d_point) = ([[0.0; N]; 2], [[[0.0; N]; 3]; 2]);
-        for (i, focal) in focal.into_iter().enumerate() {
-            for n in 0..N {
-                let scale = focal * inverse_depth[n];
-                let [by_x, by_y] = [scale * distorted.d_point[i][0][n], scale * distorted.d_point[i][1][n]];
-                uv[i][n] = focal * distorted.point[i][n] + self.parameters[2 + i];
-                d_point[i][0][n] = by_x;
-                d_point[i][1][n] = by_y;
-                d_point[i][2][n] = -by_x * normalised[0][n]
-                    - by_y * normalised[1][n]
-                    - scale * inverse_depth[n] * distorted.d_inverse_depth[i][n];
-            }
-        }
-        Some(Projections { uv, d_point, focal, distorted })
-    }
+    pub(super) focal: [f64; 2],
+    /// In units of the focal lengths.
+    pub(super) distorted: DistortedPoints<N>,
 }
 
 impl<const N: usize> Projections<N> {

@@ -33,19 +33,23 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
 
 fn list<'a>(reasons: impl IntoIterator<Item = &'a Reason>) -> Markup {
     html! {
-        ul { @for reason in reasons { li { b { (reason.what) } @if !reason.remedy.is_empty() { br; "→ " (reason.remedy) } } } }
+        ul { @for reason in reasons { li { b { (reason.what) } (remedy(&reason.remedy)) } } }
     }
+}
+
+/// On a line of its own; nothing where none is known.
+pub(super) fn remedy(words: &str) -> Markup {
+    html! { @if !words.is_empty() { br; span.note { "→ " (words) } } }
 }
 
 /// Notices that say the same: all places, then once what; each by itself where their numbers differ.
 fn notes(group: &[&Notice]) -> Markup {
-    let remedy = |n: &Notice| html! { @if !n.remedy.is_empty() { br; "→ " (n.remedy) } };
     let first = group[0];
     html! {
         @if group.iter().all(|n| n.what == first.what) {
-            li { @for n in group { code { (n.place) } " " } (first.what) (remedy(first)) }
+            li { @for n in group { code { (n.place) } " " } (first.what) (remedy(&first.remedy)) }
         } @else {
-            @for n in group { li { code { (n.place) } " " (n.what) (remedy(n)) } }
+            @for n in group { li { code { (n.place) } " " (n.what) (remedy(&n.remedy)) } }
         }
     }
 }

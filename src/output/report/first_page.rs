@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 
+use super::findings::remedy;
 use super::words::{count, significant};
 use crate::output::solution_json::SolutionRecord;
 use crate::output::verdict::{Trust, Verdict};
@@ -35,7 +36,7 @@ pub(super) fn first_page(r: &SolutionRecord) -> Markup {
         div class={ "verdict " (class) } {
             strong { (headline) }
             @if !v.reasons.is_empty() { ul { @for reason in &v.reasons {
-                li { (reason.what) @if !reason.remedy.is_empty() { br; span.note { "→ " (reason.remedy) } } }
+                li { (reason.what) (remedy(&reason.remedy)) }
             } } }
         }
         (promise(r, v.trust))
