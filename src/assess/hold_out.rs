@@ -221,8 +221,9 @@ fn predictions(fit: &Adjustment, folds: &[Vec<usize>], fitted: &Refit) -> Option
     Some((errors, states))
 }
 
-/// Newton decrement at which the fit of a fold ends: no unknown is off by more than this share of its sigma.
-const DECREMENT: f64 = 0.1;
+/// Newton decrement of the step with which the fit of a fold ends. Steps from the fit of all images shrink tenfold or more, so that no unknown is
+/// off by more than a tenth of its sigma.
+const DECREMENT: f64 = 1.0;
 
 /// The free columns fitted to the images in use, from where the adjustment stands, at its noise.
 pub fn refitted(adjustment: Adjustment) -> State {

@@ -79,12 +79,12 @@ fn is_far(camera_from_plate: &Pose, centre: &Vector3<f64>, radius_m: f64) -> boo
 pub struct Prediction {
     /// Column and row, px.
     pub uv: Vector2<f64>,
-    /// With respect to the body twist [rho, phi] of `camera_from_plate`.
-    pub d_pose: SMatrix<f64, 2, 6>,
+    /// With respect to the body twist [rho, phi] of `camera_from_plate`: of the column, and of the row.
+    pub d_pose: SMatrix<f64, 6, 2>,
     /// With respect to the marker's centre in the plate frame, px/m.
     pub d_marker: Matrix2x3<f64>,
-    /// With respect to the parameters of pinhole and lens formula.
-    pub d_camera: SMatrix<f64, 2, MAX_PARAMETERS>,
+    /// With respect to the parameters of pinhole and lens formula: of the column, and of the row.
+    pub d_camera: SMatrix<f64, MAX_PARAMETERS, 2>,
     /// With respect to the displacement field: control points that it touches, ascending, with the derivative by their u and v.
     pub d_field: Vec<(usize, Matrix2<f64>)>,
 }
@@ -94,14 +94,12 @@ pub struct Prediction {
 pub fn point(camera: &Camera, camera_from_plate: &Pose, x: &Vector3<f64>) -> Option<Prediction> {
     let p = camera.project_with_jacobian(&camera_from_plate.transform(x))?;
     let d_marker = p.d_point * camera_from_plate.rotation;
-    let mut d_pose = SMatrix::<f64, 2, 6>::zeros();
-    d_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&d_marker);
-    d_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-d_marker * skew(x)));
+    let d_pose = by_twist(&d_marker, &(-d_marker * skew(x)));
     let d_field = match camera.lens.has_field() {
         true => field_columns(camera, std::iter::once((p.by_formula, Matrix2::identity()))),
         false => Vec::new(),
     };
-    Some(Prediction { uv: p.uv, d_pose, d_marker, d_camera: p.d_parameters, d_field })
+    Some(Prediction { uv: p.uv, d_pose, d_marker, d_camera: p.d_parameters.transpose(), d_field })
 }
 
 /// Predicts the area centroid of the image of a circle of `radius_m` about `centre` (plate frame, m), parallel to the
@@ -155,7 +153,7 @@ struct Sums {
     /// `sum g d_point u` for both components of the places `u` of the samples on the unit circle.
     moments: [Matrix2x3<f64>; 2],
     /// `sum g d_parameters`.
-    d_camera: SMatrix<f64, 2, MAX_PARAMETERS>,
+    d_camera: SMatrix<f64, MAX_PARAMETERS, 2>,
 }
 
 impl Sums {
@@ -174,12 +172,8 @@ impl Sums {
                     moment[(i, j)] = weighted_sum(&by, &at.places[axis]);
                 }
             }
-            for (c, weights) in weights[i].iter().enumerate() {
-                let by = formula.by_parameters(c, weights, parameters);
-                for (k, by) in by.iter().enumerate() {
-                    sums.d_camera[(i, k)] += by;
-                }
-            }
+            let by = formula.by_parameters(&weights[i], parameters);
+            (0..MAX_PARAMETERS).for_each(|k| sums.d_camera[(k, i)] = by[k]);
         }
         sums
     }
@@ -202,11 +196,21 @@ impl Sums {
             across.column(2).into_owned(),
             along.column(0) - across.column(1),
         ]);
-        let mut d_pose = SMatrix::<f64, 2, 6>::zeros();
-        d_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&d_marker);
-        d_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-d_turn - d_marker * skew(centre)));
+        let d_pose = by_twist(&d_marker, &(-d_turn - d_marker * skew(centre)));
         Prediction { uv, d_pose, d_marker, d_camera: self.d_camera, d_field: Vec::new() }
     }
+}
+
+/// Derivatives by a body twist, from those by its translation and its rotation.
+#[inline(always)]
+fn by_twist(d_rho: &Matrix2x3<f64>, d_phi: &Matrix2x3<f64>) -> SMatrix<f64, 6, 2> {
+    let mut d = SMatrix::zeros();
+    for i in 0..2 {
+        for j in 0..3 {
+            (d[(j, i)], d[(3 + j, i)]) = (d_rho[(i, j)], d_phi[(i, j)]);
+        }
+    }
+    d
 }
 
 /// The product, compiled where it stands.

@@ -74,8 +74,8 @@ impl Collector {
         let pair = self.columns.as_mut_slice().chunks_exact_mut(2 * rows).nth(self.markers.len());
         for (first, second) in pair.into_iter().map(|pair| pair.split_at_mut(rows)) {
             whiten(&mut first[POSE..], &mut second[POSE..], root, &p.d_pose);
-            whiten(&mut first[MODE..], &mut second[MODE..], root, &(p.d_marker * modes));
-            whiten(&mut first[RESIDUAL..], &mut second[RESIDUAL..], root, r);
+            whiten(&mut first[MODE..], &mut second[MODE..], root, &modes.tr_mul(&p.d_marker.transpose()));
+            whiten(&mut first[RESIDUAL..], &mut second[RESIDUAL..], root, &r.transpose());
             whiten(&mut first[FORMULA..], &mut second[FORMULA..], root, &p.d_camera);
         }
         self.markers.push(marker);
@@ -90,12 +90,13 @@ impl Collector {
     }
 }
 
-/// Puts columns, as far as there are rows for them, into both equations.
+/// Puts rows, each a derivative of column and row of the image, as far as there is place for them, into both equations.
 #[inline(always)]
-fn whiten<const N: usize>(first: &mut [f64], second: &mut [f64], root: &Matrix2<f64>, columns: &SMatrix<f64, 2, N>) {
-    for ((first, second), uv) in first.iter_mut().zip(second).zip(columns.column_iter()) {
-        *first = root[(0, 0)] * uv[0] + root[(0, 1)] * uv[1];
-        *second = root[(1, 1)] * uv[1];
+fn whiten<const N: usize>(first: &mut [f64], second: &mut [f64], root: &Matrix2<f64>, rows: &SMatrix<f64, N, 2>) {
+    let (u, v) = rows.as_slice().split_at(N);
+    for (((first, second), u), v) in first.iter_mut().zip(second).zip(u).zip(v) {
+        *first = root[(0, 0)] * u + root[(0, 1)] * v;
+        *second = root[(1, 1)] * v;
     }
 }
 

@@ -235,9 +235,9 @@ fn circle_witness(
 fn circle_library(camera: &Camera, pose: &Pose, centre: &Vector3<f64>, radius: f64) -> (SMatrix<f64, 2, 18>, [f64; 2]) {
     let p = circle::centroid(camera, pose, centre, radius).unwrap();
     let mut all = SMatrix::<f64, 2, 18>::zeros();
-    all.fixed_view_mut::<2, 6>(0, 0).copy_from(&p.d_pose);
+    all.fixed_view_mut::<2, 6>(0, 0).copy_from(&p.d_pose.transpose());
     all.fixed_view_mut::<2, 3>(0, 6).copy_from(&p.d_marker);
-    all.fixed_view_mut::<2, 9>(0, 9).copy_from(&p.d_camera.fixed_columns::<9>(0));
+    all.fixed_view_mut::<2, 9>(0, 9).copy_from(&p.d_camera.fixed_rows::<9>(0).transpose());
     (all, p.uv.into())
 }
 
@@ -450,7 +450,7 @@ fn predictions_through_the_whole_chain() {
                 let chain = given.state.chained(&given.problem.layout, &given.problem.images[i], from).unwrap();
                 for o in image.used() {
                     let p = predict(image, &state, &chain.pose, o).unwrap();
-                    let through = p.d_pose * &chain.d_theta;
+                    let through = p.d_pose.transpose() * &chain.d_theta;
                     let scale = through.amax();
                     for c in 0..problem.layout.theta_len() {
                         let w = witness::predict(&state, &problem.layout, image, from, o, Some(Seed::Column(c)));

@@ -1,8 +1,6 @@
 //! Brown-Conrady distortion: three radial and two tangential coefficients.
 
-use nalgebra::Vector2;
-
-use super::formula::{Coefficients, Distorted, Formula};
+use super::formula::{Coefficients, Distorted, Formula, Ideal};
 use super::radial::{radial_tangential, tangential_columns};
 
 /// The formula.
@@ -14,8 +12,8 @@ impl Formula for Brown {
     const COMMON: &'static [f64] = &[-0.11, 0.09, 4e-4, -3e-4, -0.02];
 
     #[inline(always)]
-    fn distort(c: &[f64], point: &Vector2<f64>, _inverse_depth: f64) -> Distorted {
-        distort(c, point)
+    fn distort<const N: usize>(c: &Coefficients, point: Ideal, n: usize, into: &mut Distorted<N>) {
+        distort([c[0], c[1], c[2], c[3], c[4]], point, n, into);
     }
 
     fn is_monotonic_to(c: &[f64], r2: f64, _inverse_depth: f64) -> bool {
@@ -23,23 +21,19 @@ impl Formula for Brown {
     }
 }
 
-/// Distorts a point of the plane z = 1; `c` = k1 k2 p1 p2 k3.
+/// Puts a point that is distorted with k1 k2 p1 p2 k3 in place n.
 #[inline(always)]
-pub(super) fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
-    let (x, y) = (point.x, point.y);
-    let [k1, k2, p1, p2, k3] = [c[0], c[1], c[2], c[3], c[4]];
-    let r2 = x * x + y * y;
+pub(super) fn distort<const N: usize>([k1, k2, p1, p2, k3]: [f64; 5], point: Ideal, n: usize, into: &mut Distorted<N>) {
+    let (Ideal { x, y, .. }, r2) = (point, point.r2());
     let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
     let slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3));
     let (image, d_point) = radial_tangential(point, radial, slope, [p1, p2]);
-    let mut d_coefficients = Coefficients::zeros();
+    into.put(n, image, d_point);
     let (r4, r6) = (r2 * r2, r2 * r2 * r2);
-    let [a, b] = tangential_columns(x, y);
-    for (k, column) in [[x * r2, y * r2], [x * r4, y * r4], a, b, [x * r6, y * r6]].iter().enumerate() {
-        d_coefficients[(0, k)] = column[0];
-        d_coefficients[(1, k)] = column[1];
+    let [a, b] = tangential_columns(point);
+    for (k, column) in [[x * r2, y * r2], [x * r4, y * r4], a, b, [x * r6, y * r6]].into_iter().enumerate() {
+        into.put_column(n, k, column);
     }
-    Distorted::flat(image, d_point, d_coefficients)
 }
 
 /// True while `r (1 + k1 r^2 + k2 r^4 + k3 r^6)` still grows from the axis out to `r2 = r^2`.

@@ -3,15 +3,14 @@
 //! J. Kannala, S. Brandt, *A generic camera model and calibration method* (2006), as in OpenCV's fisheye and ROS `equidistant`.
 //! Points must lie before the camera (less than a right angle from the axis).
 
-use nalgebra::{Matrix2, Vector2};
-
-use super::formula::{Coefficients, Distorted, Formula};
+use super::formula::{Coefficients, Distorted, Formula, Ideal};
 use super::radial::grows_to;
 
 /// Below this distance from the axis the series is exact to rounding.
 const NEAR_AXIS: f64 = 1e-4;
 
 /// Image distance and its derivative by the angle.
+#[inline(always)]
 fn image_of(c: &[f64], t: f64) -> (f64, f64) {
     let s = t * t;
     let even = 1.0 + s * (c[0] + s * (c[1] + s * (c[2] + s * c[3])));
@@ -31,36 +30,30 @@ impl Formula for Fisheye {
     }
 
     #[inline(always)]
-    fn distort(c: &[f64], point: &Vector2<f64>, _inverse_depth: f64) -> Distorted {
-        distort(c, point)
+    fn distort<const N: usize>(c: &Coefficients, point: Ideal, n: usize, into: &mut Distorted<N>) {
+        let (Ideal { x, y, .. }, r2) = (point, point.r2());
+        let r = r2.sqrt();
+        let t = r.atan();
+        // The factor on the point, and its derivative by r over r.
+        let (factor, by_r) = if r < NEAR_AXIS {
+            let second = c[0] - 1.0 / 3.0;
+            (1.0 + second * r2, 2.0 * second)
+        } else {
+            let (image, slope) = image_of(c, t);
+            (image / r, (slope / (1.0 + r2) - image / r) / r2)
+        };
+        let cross = x * y * by_r;
+        into.put(n, [x * factor, y * factor], [[factor + x * x * by_r, cross], [cross, factor + y * y * by_r]]);
+        let mut power = if r < NEAR_AXIS { 1.0 } else { t / r };
+        for k in 0..Self::COEFFICIENTS.len() {
+            power *= t * t;
+            into.put_column(n, k, [x * power, y * power]);
+        }
     }
 
     fn is_monotonic_to(c: &[f64], r2: f64, _inverse_depth: f64) -> bool {
         is_monotonic_to(c, r2)
     }
-}
-
-/// Distorts a point of the plane z = 1.
-fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
-    let r2 = point.norm_squared();
-    let r = r2.sqrt();
-    let t = r.atan();
-    // The factor on the point, and its derivative by r over r.
-    let (factor, by_r) = if r < NEAR_AXIS {
-        let second = c[0] - 1.0 / 3.0;
-        (1.0 + second * r2, 2.0 * second)
-    } else {
-        let (image, slope) = image_of(c, t);
-        (image / r, (slope / (1.0 + r2) - image / r) / r2)
-    };
-    let mut d_coefficients = Coefficients::zeros();
-    let mut power = if r < NEAR_AXIS { 1.0 } else { t / r };
-    for k in 0..Fisheye::COEFFICIENTS.len() {
-        power *= t * t;
-        d_coefficients.set_column(k, &(point * power));
-    }
-    let d_point = Matrix2::identity() * factor + point * point.transpose() * by_r;
-    Distorted::flat(point * factor, d_point, d_coefficients)
 }
 
 /// True while the image still moves outwards from the axis to `r2 = r^2`.

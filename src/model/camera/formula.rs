@@ -1,31 +1,82 @@
-//! What the formula of a lens has to say of itself, and a distorted point with its derivatives.
-
-use nalgebra::{Matrix2, SMatrix, Vector2};
+//! What the formula of a lens has to say of itself, and distorted points with their derivatives.
 
 /// Most parameters that the formula of any camera has (pinhole and lens; a displacement field comes on top).
 pub const MAX_PARAMETERS: usize = 13;
 
 /// Most coefficients of a lens.
-const MOST: usize = MAX_PARAMETERS - 4;
+pub(super) const MOST: usize = MAX_PARAMETERS - 4;
 
-/// Derivatives of a distorted point by the coefficients of a lens, one column each.
-pub(super) type Coefficients = SMatrix<f64, 2, MOST>;
+/// Coefficients of a lens; zero behind those that it has.
+pub(super) type Coefficients = [f64; MOST];
 
-/// A distorted point of the plane z = 1 with its derivatives.
-pub(super) struct Distorted {
-    pub point: Vector2<f64>,
-    pub d_point: Matrix2<f64>,
-    /// One column per lens coefficient.
-    pub d_coefficients: Coefficients,
-    /// With respect to 1 / depth (1/m).
-    pub d_inverse_depth: Vector2<f64>,
+/// A point of the plane z = 1, as the formula of a lens takes it.
+#[derive(Clone, Copy)]
+pub(super) struct Ideal {
+    pub x: f64,
+    pub y: f64,
+    /// 1 / depth, 1/m.
+    pub inverse_depth: f64,
 }
 
-impl Distorted {
-    /// Of a lens that does not see the distance.
+impl Ideal {
+    /// Squared distance from the axis.
     #[inline(always)]
-    pub(super) fn flat(point: Vector2<f64>, d_point: Matrix2<f64>, d_coefficients: Coefficients) -> Self {
-        Self { point, d_point, d_coefficients, d_inverse_depth: Vector2::zeros() }
+    pub(super) fn r2(&self) -> f64 {
+        self.x * self.x + self.y * self.y
+    }
+}
+
+/// N points of the plane z = 1: place n of every array is of point n, so that loops over the points are compiled to wide registers.
+pub(super) struct Points<const N: usize> {
+    /// Two components.
+    pub at: [[f64; N]; 2],
+    /// 1 / depth, 1/m.
+    pub inverse_depth: [f64; N],
+}
+
+impl<const N: usize> Points<N> {
+    #[inline(always)]
+    pub(super) fn ideal(&self, n: usize) -> Ideal {
+        Ideal { x: self.at[0][n], y: self.at[1][n], inverse_depth: self.inverse_depth[n] }
+    }
+}
+
+/// N distorted points of the plane z = 1 with their derivatives, in the layout of [`Points`].
+pub(super) struct Distorted<const N: usize> {
+    /// Two components.
+    pub point: [[f64; N]; 2],
+    /// Of each component by each.
+    pub d_point: [[[f64; N]; 2]; 2],
+    /// Of each component by each coefficient.
+    pub d_coefficients: [[[f64; N]; MOST]; 2],
+    /// With respect to 1 / depth (1/m).
+    pub d_inverse_depth: [[f64; N]; 2],
+}
+
+impl<const N: usize> Distorted<N> {
+    #[inline(always)]
+    pub(super) fn zeros() -> Self {
+        Self {
+            point: [[0.0; N]; 2],
+            d_point: [[[0.0; N]; 2]; 2],
+            d_coefficients: [[[0.0; N]; MOST]; 2],
+            d_inverse_depth: [[0.0; N]; 2],
+        }
+    }
+
+    /// Puts point n, and its derivatives by the undistorted point.
+    #[inline(always)]
+    pub(super) fn put(&mut self, n: usize, point: [f64; 2], d_point: [[f64; 2]; 2]) {
+        for i in 0..2 {
+            self.point[i][n] = point[i];
+            (0..2).for_each(|j| self.d_point[i][j][n] = d_point[i][j]);
+        }
+    }
+
+    /// Puts the derivatives of point n by coefficient k.
+    #[inline(always)]
+    pub(super) fn put_column(&mut self, n: usize, k: usize, column: [f64; 2]) {
+        (0..2).for_each(|i| self.d_coefficients[i][k][n] = column[i]);
     }
 }
 
@@ -51,46 +102,9 @@ pub(super) trait Formula {
         angle.tan()
     }
 
-    /// Distorts a point of the plane z = 1, whose depth is `1 / inverse_depth` m; `c` are the coefficients.
-    fn distort(c: &[f64], point: &Vector2<f64>, inverse_depth: f64) -> Distorted;
+    /// Distorts a point and puts it, with its derivatives, in place n. To be `inline(always)`.
+    fn distort<const N: usize>(c: &Coefficients, point: Ideal, n: usize, into: &mut Distorted<N>);
 
     /// True while the image still moves outwards from the axis to `r2 = r^2`.
     fn is_monotonic_to(c: &[f64], r2: f64, inverse_depth: f64) -> bool;
-}
-
-/// N distorted points of the plane z = 1 with their derivatives: place n of every array is of point n.
-pub(super) struct DistortedPoints<const N: usize> {
-    /// Two components.
-    pub point: [[f64; N]; 2],
-    /// Of each component by each.
-    pub d_point: [[[f64; N]; 2]; 2],
-    /// Of each component by each coefficient.
-    pub d_coefficients: [[[f64; N]; MOST]; 2],
-    /// With respect to 1 / depth (1/m).
-    pub d_inverse_depth: [[f64; N]; 2],
-}
-
-/// Distorts N points of the plane z = 1 by a formula with the coefficients `c`.
-#[inline(always)]
-pub(super) fn distorted<F: Formula, const N: usize>(
-    c: &[f64],
-    x: &[[f64; N]; 2],
-    inverse_depth: &[f64; N],
-) -> DistortedPoints<N> {
-    let mut all = DistortedPoints {
-        point: [[0.0; N]; 2],
-        d_point: [[[0.0; N]; 2]; 2],
-        d_coefficients: [[[0.0; N]; MOST]; 2],
-        d_inverse_depth: [[0.0; N]; 2],
-    };
-    for n in 0..N {
-        let d = F::distort(c, &Vector2::new(x[0][n], x[1][n]), inverse_depth[n]);
-        for i in 0..2 {
-            all.point[i][n] = d.point[i];
-            all.d_inverse_depth[i][n] = d.d_inverse_depth[i];
-            (0..2).for_each(|j| all.d_point[i][j][n] = d.d_point[(i, j)]);
-            (0..F::COEFFICIENTS.len()).for_each(|k| all.d_coefficients[i][k][n] = d.d_coefficients[(i, k)]);
-        }
-    }
-    all
 }

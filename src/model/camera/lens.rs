@@ -1,11 +1,10 @@
 //! The table of lenses.
 
-use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 use super::brown::Brown;
 use super::fisheye::Fisheye;
-use super::formula::{Distorted, DistortedPoints, Formula, MAX_PARAMETERS, distorted};
+use super::formula::{Distorted, Formula, MAX_PARAMETERS, MOST, Points};
 use super::parallax::Parallax;
 use super::rational::Rational;
 use super::thin_prism::ThinPrism;
@@ -58,20 +57,10 @@ macro_rules! lenses {
                 match self { $(Self::$lens => <$formula>::ideal_radius(angle),)+ }
             }
 
+            /// Distorts N points; `c` are the coefficients.
             #[inline(always)]
-            pub(super) fn distort(self, c: &[f64], x: &Vector2<f64>, inverse_depth: f64) -> Distorted {
-                match self { $(Self::$lens => <$formula>::distort(c, x, inverse_depth),)+ }
-            }
-
-            /// As `distort`, of N points.
-            #[inline(always)]
-            pub(super) fn distorted<const N: usize>(
-                self,
-                c: &[f64],
-                x: &[[f64; N]; 2],
-                inverse_depth: &[f64; N],
-            ) -> DistortedPoints<N> {
-                match self { $(Self::$lens => distorted::<$formula, N>(c, x, inverse_depth),)+ }
+            pub(super) fn distort<const N: usize>(self, c: &[f64], points: &Points<N>) -> Distorted<N> {
+                match self { $(Self::$lens => distort::<$formula, N>(c, points),)+ }
             }
 
             pub(super) fn is_monotonic_to(self, c: &[f64], r2: f64, inverse_depth: f64) -> bool {
@@ -83,6 +72,16 @@ macro_rules! lenses {
             <$formula>::COEFFICIENTS.len() + 4 <= MAX_PARAMETERS && <$formula>::COMMON.len() == <$formula>::COEFFICIENTS.len()
         );)+
     };
+}
+
+#[inline(always)]
+fn distort<F: Formula, const N: usize>(c: &[f64], points: &Points<N>) -> Distorted<N> {
+    let (mut own, mut into) = ([0.0; MOST], Distorted::zeros());
+    own.iter_mut().zip(c).for_each(|(own, c)| *own = *c);
+    for n in 0..N {
+        F::distort(&own, points.ideal(n), n, &mut into);
+    }
+    into
 }
 
 lenses! {

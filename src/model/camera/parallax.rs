@@ -2,11 +2,10 @@
 //!
 //! The rays of a real lens do not meet in one point: the entrance pupil wanders with the angle, which near objects show.
 
-use nalgebra::Vector2;
-
 use super::brown;
-use super::formula::{Distorted, Formula};
+use super::formula::{Coefficients, Distorted, Formula, Ideal};
 
+#[inline(always)]
 fn effective(c: &[f64], inverse_depth: f64) -> [f64; 5] {
     [c[0] + c[5] * inverse_depth, c[1] + c[6] * inverse_depth, c[2], c[3], c[4]]
 }
@@ -27,24 +26,19 @@ impl Formula for Parallax {
     }
 
     #[inline(always)]
-    fn distort(c: &[f64], point: &Vector2<f64>, inverse_depth: f64) -> Distorted {
-        distort(c, point, inverse_depth)
+    fn distort<const N: usize>(c: &Coefficients, point: Ideal, n: usize, into: &mut Distorted<N>) {
+        brown::distort(effective(c, point.inverse_depth), point, n, into);
+        for i in 0..2 {
+            let [by_k1, by_k2] = [into.d_coefficients[i][0][n], into.d_coefficients[i][1][n]];
+            into.d_coefficients[i][5][n] = by_k1 * point.inverse_depth;
+            into.d_coefficients[i][6][n] = by_k2 * point.inverse_depth;
+            into.d_inverse_depth[i][n] = by_k1 * c[5] + by_k2 * c[6];
+        }
     }
 
     fn is_monotonic_to(c: &[f64], r2: f64, inverse_depth: f64) -> bool {
         is_monotonic_to(c, r2, inverse_depth)
     }
-}
-
-/// Distorts a point of the plane z = 1, whose depth is `1 / inverse_depth` m.
-fn distort(c: &[f64], point: &Vector2<f64>, inverse_depth: f64) -> Distorted {
-    let mut d = brown::distort(&effective(c, inverse_depth), point);
-    let radial = [d.d_coefficients.column(0).into_owned(), d.d_coefficients.column(1).into_owned()];
-    for (k, column) in radial.iter().enumerate() {
-        d.d_coefficients.set_column(5 + k, &(column * inverse_depth));
-    }
-    d.d_inverse_depth = radial[0] * c[5] + radial[1] * c[6];
-    d
 }
 
 /// As for Brown-Conrady at this depth.

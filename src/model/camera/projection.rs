@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::field::{Lattice, Touched};
-use super::formula::MAX_PARAMETERS;
+use super::formula::{MAX_PARAMETERS, Points};
 use super::lens::Lens;
 use super::projections::Projections;
 
@@ -124,8 +124,8 @@ impl Camera {
         if !self.lens.is_monotonic_to(&self.parameters[4..], x.norm_squared(), inverse_depth) {
             return None;
         }
-        let d = self.lens.distort(&self.parameters[4..], &x, inverse_depth);
-        let h = self.to_pixels(&d.point);
+        let (image, _) = self.distorted(&x, inverse_depth);
+        let h = self.to_pixels(&image);
         Some(h + self.displacement(&h).0)
     }
 
@@ -137,7 +137,8 @@ impl Camera {
         let (mut d_point, mut d_parameters) = (Matrix2x3::zeros(), SMatrix::<f64, 2, MAX_PARAMETERS>::zeros());
         for (i, by_point) in formula.d_point.iter().enumerate() {
             (0..3).for_each(|j| d_point[(i, j)] = by_point[j][0]);
-            let by = formula.by_parameters(i, &[1.0], self.parametric());
+            let of_component = [0, 1].map(|c| [f64::from(u8::from(c == i))]);
+            let by = formula.by_parameters(&of_component, self.parametric());
             by.iter().enumerate().for_each(|(k, by)| d_parameters[(i, k)] = *by);
         }
         if !self.lens.has_field() {
@@ -155,26 +156,25 @@ impl Camera {
         if z.iter().any(|z| !Self::is_before(*z)) {
             return None;
         }
-        let mut inverse_depth = [0.0; N];
-        let mut normalised = [[0.0; N]; 2];
+        let mut ideal = Points { at: [[0.0; N]; 2], inverse_depth: [0.0; N] };
         for n in 0..N {
-            inverse_depth[n] = 1.0 / z[n];
-            normalised[0][n] = x[n] / z[n];
-            normalised[1][n] = y[n] / z[n];
+            ideal.inverse_depth[n] = 1.0 / z[n];
+            ideal.at[0][n] = x[n] / z[n];
+            ideal.at[1][n] = y[n] / z[n];
         }
-        let distorted = self.lens.distorted(&self.parameters[4..], &normalised, &inverse_depth);
+        let distorted = self.lens.distort(&self.parameters[4..], &ideal);
         let focal = [self.parameters[0], self.parameters[1]];
         let (mut uv, mut d_point) = ([[0.0; N]; 2], [[[0.0; N]; 3]; 2]);
         for (i, focal) in focal.into_iter().enumerate() {
             for n in 0..N {
-                let scale = focal * inverse_depth[n];
+                let scale = focal * ideal.inverse_depth[n];
                 let [by_x, by_y] = [scale * distorted.d_point[i][0][n], scale * distorted.d_point[i][1][n]];
                 uv[i][n] = focal * distorted.point[i][n] + self.parameters[2 + i];
                 d_point[i][0][n] = by_x;
                 d_point[i][1][n] = by_y;
-                d_point[i][2][n] = -by_x * normalised[0][n]
-                    - by_y * normalised[1][n]
-                    - scale * inverse_depth[n] * distorted.d_inverse_depth[i][n];
+                d_point[i][2][n] = -by_x * ideal.at[0][n]
+                    - by_y * ideal.at[1][n]
+                    - scale * ideal.inverse_depth[n] * distorted.d_inverse_depth[i][n];
             }
         }
         Some(Projections { uv, d_point, focal, distorted })
@@ -200,10 +200,10 @@ impl Camera {
         let target = (uv - Vector2::new(p[2], p[3])).component_div(&scale);
         // Image on the plane z = 1, the field included, and its derivative.
         let image = |x: &Vector2<f64>| {
-            let d = self.lens.distort(&p[4..], x, 0.0);
-            let (shift, bend) = self.displacement(&self.to_pixels(&d.point));
+            let (point, by_x) = self.distorted(x, 0.0);
+            let (shift, bend) = self.displacement(&self.to_pixels(&point));
             let bend = Matrix2::from_fn(|i, k| bend[(i, k)] * scale[k] / scale[i]);
-            (d.point + shift.component_div(&scale), (Matrix2::identity() + bend) * d.d_point)
+            (point + shift.component_div(&scale), (Matrix2::identity() + bend) * by_x)
         };
         let mut x = target;
         for _ in 0..50 {
@@ -223,6 +223,13 @@ impl Camera {
     pub fn contains(&self, uv: &Vector2<f64>, margin_px: f64) -> bool {
         let inside = |x: f64, n: u32| x >= margin_px - 0.5 && x <= f64::from(n) - 0.5 - margin_px;
         inside(uv.x, self.width_px) && inside(uv.y, self.height_px)
+    }
+
+    /// A point of the plane z = 1, distorted, and its derivative by that point.
+    fn distorted(&self, x: &Vector2<f64>, inverse_depth: f64) -> (Vector2<f64>, Matrix2<f64>) {
+        let ideal = Points { at: [[x.x], [x.y]], inverse_depth: [inverse_depth] };
+        let d = self.lens.distort(&self.parameters[4..], &ideal);
+        (Vector2::new(d.point[0][0], d.point[1][0]), Matrix2::from_fn(|i, j| d.d_point[i][j][0]))
     }
 
     /// True for a depth (m) that is imaged.

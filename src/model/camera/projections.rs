@@ -1,6 +1,6 @@
 //! Several points projected at once: place n of every array is of point n, so that loops over the points are compiled to wide registers.
 
-use super::formula::{DistortedPoints, MAX_PARAMETERS};
+use super::formula::{Distorted, MAX_PARAMETERS};
 
 /// Images of N points as the formula gives them, with derivatives.
 pub struct Projections<const N: usize> {
@@ -11,18 +11,23 @@ pub struct Projections<const N: usize> {
     /// Focal lengths, px.
     pub(super) focal: [f64; 2],
     /// In units of the focal lengths.
-    pub(super) distorted: DistortedPoints<N>,
+    pub(super) distorted: Distorted<N>,
 }
 
 impl<const N: usize> Projections<N> {
-    /// `sum w_n d uv_n[i] / d parameter` over the points, for every one of the first `parameters` of the formula.
+    /// `sum w_in d uv_n[i] / d parameter` over points and components, for every one of the first `parameters` of the formula.
     #[inline(always)]
-    pub fn by_parameters(&self, i: usize, weights: &[f64; N], parameters: usize) -> [f64; MAX_PARAMETERS] {
+    pub fn by_parameters(&self, weights: &[[f64; N]; 2], parameters: usize) -> [f64; MAX_PARAMETERS] {
         let mut by = [0.0; MAX_PARAMETERS];
-        by[i] = weighted_sum(weights, &self.distorted.point[i]);
-        by[2 + i] = weights.iter().sum();
-        for (by, column) in by[4..parameters].iter_mut().zip(&self.distorted.d_coefficients[i]) {
-            *by = self.focal[i] * weighted_sum(weights, column);
+        let mut scaled = [[0.0; N]; 2];
+        for i in 0..2 {
+            by[i] = weighted_sum(&weights[i], &self.distorted.point[i]);
+            by[2 + i] = weighted_sum(&weights[i], &[1.0; N]);
+            (0..N).for_each(|n| scaled[i][n] = self.focal[i] * weights[i][n]);
+        }
+        let [of_u, of_v] = &self.distorted.d_coefficients;
+        for (by, (u, v)) in by[4..parameters].iter_mut().zip(of_u.iter().zip(of_v)) {
+            *by = sum_of_weighted([&scaled[0], &scaled[1]], [u, v]);
         }
         by
     }
@@ -31,13 +36,17 @@ impl<const N: usize> Projections<N> {
 /// `sum w_n x_n`.
 #[inline(always)]
 pub fn weighted_sum<const N: usize>(weights: &[f64; N], values: &[f64; N]) -> f64 {
-    let mut products = [0.0; N];
-    (0..N).for_each(|n| products[n] = weights[n] * values[n]);
-    let mut width = N;
-    // Halves onto each other, as wide registers add.
-    while width > 1 && width.is_multiple_of(2) {
-        width /= 2;
-        (0..width).for_each(|n| products[n] += products[n + width]);
+    sum_of_weighted([weights], [values])
+}
+
+/// `sum w_mn x_mn`.
+#[inline(always)]
+fn sum_of_weighted<const M: usize, const N: usize>(weights: [&[f64; N]; M], values: [&[f64; N]; M]) -> f64 {
+    let mut lanes = [0.0; 4];
+    for (weights, values) in weights.into_iter().zip(values) {
+        for n in 0..N {
+            lanes[n % 4] += weights[n] * values[n];
+        }
     }
-    products[..width].iter().sum()
+    (lanes[0] + lanes[2]) + (lanes[1] + lanes[3])
 }

@@ -1,33 +1,31 @@
 //! What several lenses share: a radial factor with two tangential (decentring) terms.
 
-use nalgebra::{Matrix2, Vector2};
+use super::formula::Ideal;
 
 /// `x radial + tangential` and its derivative; `slope` is twice the derivative of the radial factor by r^2.
 #[inline(always)]
 pub(super) fn radial_tangential(
-    x: &Vector2<f64>,
+    point: Ideal,
     radial: f64,
     slope: f64,
     [p1, p2]: [f64; 2],
-) -> (Vector2<f64>, Matrix2<f64>) {
-    let (x, y) = (x.x, x.y);
-    let [a, b] = tangential_columns(x, y);
+) -> ([f64; 2], [[f64; 2]; 2]) {
+    let Ideal { x, y, .. } = point;
+    let [a, b] = tangential_columns(point);
     let cross = x * y * slope + 2.0 * (p1 * x + p2 * y);
     (
-        Vector2::new(x * radial + p1 * a[0] + p2 * b[0], y * radial + p1 * a[1] + p2 * b[1]),
-        Matrix2::new(
-            radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x,
-            cross,
-            cross,
-            radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x,
-        ),
+        [x * radial + p1 * a[0] + p2 * b[0], y * radial + p1 * a[1] + p2 * b[1]],
+        [
+            [radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x, cross],
+            [cross, radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x],
+        ],
     )
 }
 
 /// Derivatives by p1 and p2.
 #[inline(always)]
-pub(super) fn tangential_columns(x: f64, y: f64) -> [[f64; 2]; 2] {
-    let r2 = x * x + y * y;
+pub(super) fn tangential_columns(point: Ideal) -> [[f64; 2]; 2] {
+    let (Ideal { x, y, .. }, r2) = (point, point.r2());
     [[2.0 * x * y, r2 + 2.0 * y * y], [r2 + 2.0 * x * x, 2.0 * x * y]]
 }
 

@@ -1,14 +1,18 @@
 //! Rational distortion: `(1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)` with two tangential coefficients.
 
-use nalgebra::Vector2;
-
-use super::formula::{Coefficients, Distorted, Formula};
+use super::formula::{Coefficients, Distorted, Formula, Ideal};
 use super::radial::{grows_to, radial_tangential, tangential_columns};
 
+/// `1 + a s + b s^2 + d s^3` and its derivative by s.
+#[inline(always)]
+fn cubic([a, b, d]: [f64; 3], s: f64) -> [f64; 2] {
+    [1.0 + s * (a + s * (b + s * d)), a + s * (2.0 * b + s * 3.0 * d)]
+}
+
 /// Numerator, denominator and their derivatives by r^2.
+#[inline(always)]
 fn parts(c: &[f64], r2: f64) -> [f64; 4] {
-    let cubic = |[a, b, d]: [f64; 3]| (1.0 + r2 * (a + r2 * (b + r2 * d)), a + r2 * (2.0 * b + r2 * 3.0 * d));
-    let ((n, dn), (m, dm)) = (cubic([c[0], c[1], c[4]]), cubic([c[5], c[6], c[7]]));
+    let ([n, dn], [m, dm]) = (cubic([c[0], c[1], c[4]], r2), cubic([c[5], c[6], c[7]], r2));
     [n, m, dn, dm]
 }
 
@@ -28,35 +32,27 @@ impl Formula for Rational {
     }
 
     #[inline(always)]
-    fn distort(c: &[f64], point: &Vector2<f64>, _inverse_depth: f64) -> Distorted {
-        distort(c, point)
+    fn distort<const N: usize>(c: &Coefficients, point: Ideal, n: usize, into: &mut Distorted<N>) {
+        let (Ideal { x, y, .. }, r2) = (point, point.r2());
+        let [num, den, d_num, d_den] = parts(c, r2);
+        let radial = num / den;
+        let slope = 2.0 * (d_num * den - num * d_den) / (den * den);
+        let (image, d_point) = radial_tangential(point, radial, slope, [c[2], c[3]]);
+        into.put(n, image, d_point);
+        let [a, b] = tangential_columns(point);
+        into.put_column(n, 2, a);
+        into.put_column(n, 3, b);
+        let powers = [r2, r2 * r2, r2 * r2 * r2];
+        for (power, (top, bottom)) in powers.into_iter().zip([(0, 5), (1, 6), (4, 7)]) {
+            for (k, factor) in [(top, power / den), (bottom, -radial * power / den)] {
+                into.put_column(n, k, [x * factor, y * factor]);
+            }
+        }
     }
 
     fn is_monotonic_to(c: &[f64], r2: f64, _inverse_depth: f64) -> bool {
         is_monotonic_to(c, r2)
     }
-}
-
-/// Distorts a point of the plane z = 1.
-fn distort(c: &[f64], point: &Vector2<f64>) -> Distorted {
-    let (x, y) = (point.x, point.y);
-    let r2 = x * x + y * y;
-    let [n, m, dn, dm] = parts(c, r2);
-    let radial = n / m;
-    let slope = 2.0 * (dn * m - n * dm) / (m * m);
-    let (image, d_point) = radial_tangential(point, radial, slope, [c[2], c[3]]);
-    let mut d_coefficients = Coefficients::zeros();
-    let [a, b] = tangential_columns(x, y);
-    for (k, [u, v]) in [(2, a), (3, b)] {
-        (d_coefficients[(0, k)], d_coefficients[(1, k)]) = (u, v);
-    }
-    let powers = [r2, r2 * r2, r2 * r2 * r2];
-    for (power, (top, bottom)) in powers.iter().zip([(0, 5), (1, 6), (4, 7)]) {
-        for (k, factor) in [(top, power / m), (bottom, -radial * power / m)] {
-            (d_coefficients[(0, k)], d_coefficients[(1, k)]) = (x * factor, y * factor);
-        }
-    }
-    Distorted::flat(image, d_point, d_coefficients)
 }
 
 /// True while the image still moves outwards from the axis to `r2 = r^2`.
