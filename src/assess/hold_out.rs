@@ -221,13 +221,12 @@ fn predictions(fit: &Adjustment, folds: &[Vec<usize>], fitted: &Refit) -> Option
     Some((errors, states))
 }
 
-/// Newton decrement of the step with which the fit of a fold ends. Steps from the fit of all images shrink tenfold or more, so that no unknown is
-/// off by more than a tenth of its sigma.
-const DECREMENT: f64 = 1.0;
+/// Bounds of the fit of a fold: no unknown is off by more than a tenth of its sigma.
+const OF_FOLD: Settings = Settings { iterations: 30, decrement: 0.1, margin: 0.3 };
 
 /// The free columns fitted to the images in use, from where the adjustment stands, at its noise.
 pub fn refitted(adjustment: Adjustment) -> State {
-    solve(adjustment, &Settings { iterations: 30, decrement: DECREMENT }).adjustment.state
+    solve(adjustment, &OF_FOLD).adjustment.state
 }
 
 /// Error of an image that `state` was not fitted to, predicted from its joint readings alone; `None` off the robot, or where

@@ -272,7 +272,7 @@ fn try_camera(
             quick.problem.layout.columns[c].free = problem.layout.columns[c].free && wanted;
         }
         let cost = quick.linearise().map_or(0.0, |lin| lin.cost);
-        let settings = Settings { iterations: 40, decrement: (START_DECREMENT * cost.sqrt()).max(0.1) };
+        let settings = Settings::new(40, (START_DECREMENT * cost.sqrt()).max(0.1));
         let outcome = solve(quick, &settings);
         quick = outcome.adjustment;
         let Some(lin) = outcome.linearised else { break };

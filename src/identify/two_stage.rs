@@ -65,7 +65,7 @@ impl PoseStage {
 
     /// As [`PoseStage::adjusted`], with the pixel noise that `start` has.
     pub fn at_noise_of(start: &Adjustment) -> Option<Self> {
-        Self::of(converged(with_free_poses(start)?, &NEAR_POSES)?)
+        Self::of(converged(with_free_poses(start)?, &AT_POSES)?)
     }
 
     /// The adjustment linearised at its poses, cameras and plates: one step from there, not iterated.
@@ -158,10 +158,7 @@ const ROUNDS: usize = 60;
 const STANDING: f64 = 1e-2;
 
 /// Bounds of the adjustment of free poses.
-const AT_POSES: Settings = Settings { iterations: 100, decrement: 0.1 };
-
-/// The same where the step that is taken from its end counts, which is a tenth of the last one, or less.
-const NEAR_POSES: Settings = Settings { iterations: 100, decrement: 1.0 };
+const AT_POSES: Settings = Settings::new(100, 0.1);
 
 /// Gauss-Newton steps at given weights, and the decrement (in sigma) that ends them.
 const STEPS: usize = 30;

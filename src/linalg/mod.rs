@@ -130,6 +130,11 @@ pub fn product_with_rows(a: &DMatrix<f64>, b: &DMatrix<f64>, rows: Range<usize>)
     multiply(view(a), view(b).get(rows, ..))
 }
 
+/// Product of some columns of `a` with `b`.
+pub fn columns_product(a: &DMatrix<f64>, columns: Range<usize>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    multiply(view(a).get(.., columns), view(b))
+}
+
 fn multiply(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
     let mut c = DMatrix::zeros(a.nrows(), b.ncols());
     matmul(view_mut(&mut c), Accum::Replace, a, b, 1.0, Par::Seq);

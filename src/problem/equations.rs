@@ -118,7 +118,12 @@ impl Equations {
 
     /// Derivatives by unknowns that move the pose as `pose_by` says (unknowns x 6), one column an equation.
     pub fn through_pose(&self, pose_by: &DMatrix<f64>) -> DMatrix<f64> {
-        product_with_rows(pose_by, &self.columns, POSE..POSE + P)
+        product_with_rows(pose_by, &self.columns, self.pose_rows())
+    }
+
+    /// Rows of the pose.
+    pub fn pose_rows(&self) -> Range<usize> {
+        POSE..POSE + P
     }
 
     /// Row of an intrinsic unknown before the field; `None` for padding.

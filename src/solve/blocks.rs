@@ -91,44 +91,38 @@ impl SeenMarkers {
     }
 }
 
-/// Coupling of the free dense columns with the markers that were seen.
-pub(super) struct DenseCoupling {
-    /// The free columns.
-    free: Vec<usize>,
-    /// How many of them act through the camera poses.
-    theta: usize,
-    /// Free columns x 3 markers.
-    values: DMatrix<f64>,
+/// Coupling of some unknowns with the markers that were seen.
+pub(super) struct MarkerRows {
+    /// Unknowns x 3 markers.
+    pub values: DMatrix<f64>,
 }
 
-impl DenseCoupling {
+impl MarkerRows {
     /// Of no image yet.
-    pub fn new(problem: &Problem, seen: &SeenMarkers) -> Self {
-        let columns = &problem.layout.columns;
-        let free: Vec<usize> = (0..columns.len()).filter(|&c| columns[c].free).collect();
-        let theta = free.partition_point(|&c| c < problem.layout.theta_len());
-        let values = DMatrix::zeros(free.len(), 3 * seen.order.len());
-        Self { free, theta, values }
+    pub fn new(unknowns: usize, seen: &SeenMarkers) -> Self {
+        Self { values: DMatrix::zeros(unknowns, 3 * seen.order.len()) }
     }
 
-    /// Adds an image with its intrinsic columns.
-    pub fn add(&mut self, own: LinearImage, seen: &SeenMarkers, equations: &Equations) {
-        let (image, theta) = (own.image, self.theta);
-        let by_theta = equations.through_pose(&own.chain.d_theta.select_columns(&self.free[..theta]).transpose());
-        let intrinsics: Vec<_> =
-            own.columns().into_iter().map(|c| c.and_then(|c| self.free.binary_search(&c).ok())).collect();
-        let runs = runs((0..E).filter_map(|e| Some((equations.intrinsic_row(e)?, intrinsics[e]?))));
+    /// Adds an image of a plate: its pose, where that has six rows from one on, and its intrinsics, each where it has a row.
+    pub fn add(
+        &mut self,
+        seen: &SeenMarkers,
+        (plate, equations): (usize, &Equations),
+        pose: Option<usize>,
+        intrinsics: &[Option<usize>],
+    ) {
+        let of_pose = pose.into_iter().flat_map(|row| equations.pose_rows().zip(row..));
+        let of_intrinsics = (0..E).filter_map(|e| Some((equations.intrinsic_row(e)?, intrinsics[e]?)));
+        let runs = runs(of_pose.chain(of_intrinsics));
         let values = &mut self.values;
         wide(
             #[inline(always)]
             || {
-                for (o, (&marker, sight)) in equations.markers.iter().zip(equations.sights()).enumerate() {
-                    let Some(at) = seen.number[image.plate][marker] else { continue };
-                    let (t0, t1) = (by_theta.column(2 * o), by_theta.column(2 * o + 1));
+                for (&marker, sight) in equations.markers.iter().zip(equations.sights()) {
+                    let Some(at) = seen.number[plate][marker] else { continue };
                     for (d, w) in sight.by_marker().row_iter().enumerate() {
                         let mut column = values.column_mut(3 * at + d);
                         let into = column.as_mut_slice();
-                        add_combination(&mut into[..theta], [t0.as_slice(), t1.as_slice()], [w[0], w[1]]);
                         for run in &runs {
                             let of = sight.row_range(run.from..run.from + run.length);
                             add_combination(&mut into[run.into..run.into + run.length], of, [w[0], w[1]]);
@@ -138,7 +132,7 @@ impl DenseCoupling {
             },
         );
         for (&marker, sight) in equations.markers.iter().zip(equations.sights()) {
-            let Some(at) = seen.number[image.plate][marker] else { continue };
+            let Some(at) = seen.number[plate][marker] else { continue };
             for (point, d) in sight.by_field() {
                 let own = sight.by_marker() * d;
                 for (component, column) in own.column_iter().enumerate() {
@@ -157,10 +151,55 @@ impl DenseCoupling {
             || matrices.enumerate().for_each(|(at, m)| times_right(&mut self.values, 3 * at, &m)),
         );
     }
+}
+
+/// Coupling of the free dense columns with the markers that were seen.
+pub(super) struct DenseCoupling {
+    /// The free columns.
+    free: Vec<usize>,
+    /// How many of them act through the camera poses.
+    theta: usize,
+    /// Of the free columns.
+    rows: MarkerRows,
+}
+
+impl DenseCoupling {
+    /// Of no image yet.
+    pub fn new(problem: &Problem, seen: &SeenMarkers) -> Self {
+        let columns = &problem.layout.columns;
+        let free: Vec<usize> = (0..columns.len()).filter(|&c| columns[c].free).collect();
+        let theta = free.partition_point(|&c| c < problem.layout.theta_len());
+        let rows = MarkerRows::new(free.len(), seen);
+        Self { free, theta, rows }
+    }
+
+    /// Adds an image with its intrinsic columns.
+    pub fn add(&mut self, own: LinearImage, seen: &SeenMarkers, equations: &Equations) {
+        let (plate, theta) = (own.image.plate, self.theta);
+        let by_theta = equations.through_pose(&own.chain.d_theta.select_columns(&self.free[..theta]).transpose());
+        let intrinsics: Vec<_> =
+            own.columns().into_iter().map(|c| c.and_then(|c| self.free.binary_search(&c).ok())).collect();
+        self.rows.add(seen, (plate, equations), None, &intrinsics);
+        let values = &mut self.rows.values;
+        wide(
+            #[inline(always)]
+            || {
+                for (o, (&marker, sight)) in equations.markers.iter().zip(equations.sights()).enumerate() {
+                    let Some(at) = seen.number[plate][marker] else { continue };
+                    let (t0, t1) = (by_theta.column(2 * o), by_theta.column(2 * o + 1));
+                    for (d, w) in sight.by_marker().row_iter().enumerate() {
+                        let mut column = values.column_mut(3 * at + d);
+                        let into = &mut column.as_mut_slice()[..theta];
+                        add_combination(into, [t0.as_slice(), t1.as_slice()], [w[0], w[1]]);
+                    }
+                }
+            },
+        );
+    }
 
     /// Copies the columns to those of `into` from `first` on.
     pub fn copy_to(&self, into: &mut DMatrix<f64>, first: usize) {
-        for (mut into, from) in into.columns_range_mut(first..).column_iter_mut().zip(self.values.column_iter()) {
+        for (mut into, from) in into.columns_range_mut(first..).column_iter_mut().zip(self.rows.values.column_iter()) {
             self.free.iter().zip(from.iter()).for_each(|(&row, value)| into[row] = *value);
         }
     }
@@ -199,7 +238,7 @@ fn runs(places: impl Iterator<Item = (usize, usize)>) -> Vec<Run> {
 
 /// `into += a s + b t`.
 #[inline(always)]
-fn add_combination(into: &mut [f64], [a, b]: [&[f64]; 2], [s, t]: [f64; 2]) {
+pub(super) fn add_combination(into: &mut [f64], [a, b]: [&[f64]; 2], [s, t]: [f64; 2]) {
     for ((x, a), b) in into.iter_mut().zip(a).zip(b) {
         *x += a * s + b * t;
     }

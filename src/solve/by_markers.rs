@@ -1,14 +1,16 @@
 //! Markers eliminated: the dense columns and what is latent at stops stay.
 //!
-//! With the information `V = F F'` of a marker (all images and the prior) and its coupling `B` with what stays, `Y = B F^-T`: the reduced
-//! information is the information without the elimination less `sum Y Y'`, one Gram product.
+//! With the information `V = F F'` of a marker (all images and the prior) and its coupling `B` with camera poses and intrinsics, `Y = B F^-T`:
+//! the reduced information is the information without the elimination less `T' (sum Y Y') T`, one Gram product in the space of poses and
+//! intrinsics, which what stays moves by `T` ([`PoseSpace`]).
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, SeenMarkers, latents_with_markers, times_right};
+use super::blocks::{MarkerRows, PoseRows, STOPS_A_PRODUCT, SeenMarkers, times_right};
 use super::distances::Distances;
 use super::linear::Carried;
 use super::linear::LinearProblem;
+use super::pose_space::PoseSpace;
 use crate::linalg::{mirror_upper, orthonormal, product, subtract_gram};
 use crate::model::plate_modes::MODES;
 use crate::problem::Step;
@@ -21,7 +23,9 @@ pub(super) struct MarkersEliminated {
     pub latent_start: Vec<usize>,
     /// `F^-1` of each that was seen.
     inverse_factors: Vec<Matrix3<f64>>,
-    /// `Y`, unknowns that stay x 3 markers; without what is held.
+    /// `T`.
+    space: PoseSpace,
+    /// `Y`, poses and intrinsics x 3 markers; without what is held.
     y: DMatrix<f64>,
     /// Orthonormal combinations of the whitened markers that are held, 3 markers x held.
     held: DMatrix<f64>,
@@ -63,16 +67,20 @@ impl MarkersEliminated {
             v.cholesky().and_then(|c| c.l().try_inverse()).unwrap_or_else(Matrix3::zeros)
         };
         let inverse_factors: Vec<Matrix3<f64>> = seen.information(linear).into_iter().map(damped).collect();
-        let y = whitened_coupling(linear, &seen, &inverse_factors, (n, &latent_start));
-        subtract_gram(&mut a, &y);
+        let space = PoseSpace::new(linear, &latent_start, n);
+        let y = whitened_coupling(linear, &seen, &inverse_factors, &space);
+        let mut taken = DMatrix::zeros(y.nrows(), y.nrows());
+        subtract_gram(&mut taken, &y);
+        mirror_upper(&mut taken);
+        a += space.congruent(&taken);
         mirror_upper(&mut a);
         let rhs = DVector::zeros(3 * seen.order.len());
         let held = DMatrix::zeros(rhs.len(), 0);
-        (a, Self { seen, latent_start, inverse_factors, y, held, rhs })
+        (a, Self { seen, latent_start, inverse_factors, space, y, held, rhs })
     }
 
     /// Holds combinations of markers (3 markers x held): `Y` becomes `Y (1 - O O')` with the orthonormal basis `O` of `F^-1` times the
-    /// combinations. Returns `Y O`, by whose Gram product the reduced information grows.
+    /// combinations. Returns `T' Y O`, by whose Gram product the reduced information grows.
     pub fn hold(&mut self, combinations: &DMatrix<f64>) -> DMatrix<f64> {
         let mut whitened = combinations.clone();
         for (at, inverse) in self.inverse_factors.iter().enumerate() {
@@ -82,19 +90,17 @@ impl MarkersEliminated {
         self.held = orthonormal(whitened);
         let taken = product(&self.y, &self.held);
         self.y -= product(&taken, &self.held.transpose());
-        taken
+        self.space.transposed_times(&taken)
     }
 
-    /// Takes the rows from `from` on times `by` to those from `to` on: unknowns `to` move those `from` along.
+    /// Unknowns from `to` on move those from `from` on along, times `by`.
     pub fn carry(&mut self, from: usize, to: usize, by: &DMatrix<f64>) {
-        let carried = by.tr_mul(&self.y.rows(from, by.nrows()));
-        let mut rows = self.y.rows_mut(to, by.ncols());
-        rows += carried;
+        self.space.carry(from, to, by);
     }
 
     /// Takes over the right-hand side of the markers at a linearisation; returns the reduced one, without the priors of the dense columns.
     pub fn reduce_gradient(&mut self, linear: LinearProblem) -> DVector<f64> {
-        let mut reduced = linear.dense_gradient().resize_vertically(self.y.nrows(), 0.0);
+        let mut reduced = linear.dense_gradient().resize_vertically(self.space.unknowns(), 0.0);
         for (stop, &start) in linear.stops().zip(&self.latent_start) {
             let own = stop.gradient();
             reduced.rows_mut(start, own.len()).copy_from(&own);
@@ -104,8 +110,7 @@ impl MarkersEliminated {
             let own = inverse * self.rhs.fixed_rows::<3>(3 * at);
             self.rhs.fixed_rows_mut::<3>(3 * at).copy_from(&own);
         }
-        reduced.gemv(-1.0, &self.y, &self.rhs, 1.0);
-        reduced
+        reduced - self.space.transposed_times(&column(&self.y * &self.rhs)).column(0)
     }
 
     /// `F^-1` times the right-hand side of the markers.
@@ -121,7 +126,7 @@ impl MarkersEliminated {
             whitened.rows_mut(3 * at, 3).copy_from(&own);
         }
         whitened -= &self.held * self.held.tr_mul(&whitened);
-        *rows -= product(&self.y, &whitened);
+        *rows -= self.space.transposed_times(&product(&self.y, &whitened));
         whitened
     }
 
@@ -134,7 +139,7 @@ impl MarkersEliminated {
     pub fn step(&self, linear: LinearProblem, x: &DVector<f64>, by_distances: Option<DVector<f64>>) -> Step {
         let dense = x.rows(0, linear.adjustment.problem.layout.len()).into_owned();
         let mut own = self.rhs.clone();
-        own.gemv_tr(-1.0, &self.y, x, 1.0);
+        own.gemv_tr(-1.0, &self.y, &self.space.times(&column(x.clone())).column(0), 1.0);
         by_distances.iter().for_each(|added| own += added);
         let of = |at: usize| self.inverse_factors[at].transpose() * own.fixed_rows::<3>(3 * at);
         let step = |at: &Option<usize>| at.map_or(Vector3::zeros(), of);
@@ -146,7 +151,7 @@ impl MarkersEliminated {
         step
     }
 
-    /// Covariance of every marker that was seen: `V^-1 + D cov(x) D'` with `D = V^-1 B'`, less what moves the marker with `x`
+    /// Covariance of every marker that was seen: `V^-1 + D cov(x) D'` with `D = V^-1 B' T`, less what moves the marker with `x`
     /// for a position instead of a correction.
     pub fn marker_covariances(
         &self,
@@ -155,55 +160,52 @@ impl MarkersEliminated {
         carried: Option<&Carried>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         let mut d = self.y.clone();
-        distances.add_to_coupling(&mut d);
         for (p, plate) in self.seen.number.iter().enumerate() {
             for (m, at) in plate.iter().enumerate().filter_map(|(m, at)| at.map(|at| (m, at))) {
                 times_right(&mut d, 3 * at, &self.inverse_factors[at]);
                 for (start, modes) in carried.into_iter().flat_map(|c| c(p, m)) {
-                    let mut own = d.view_mut((start, 3 * at), (MODES, 3));
+                    let Some(row) = self.space.row_of(start) else { continue };
+                    let mut own = d.view_mut((row, 3 * at), (MODES, 3));
                     own -= modes.transpose();
                 }
             }
         }
-        let cd = product(reduced, &d);
+        let cd = product(&self.space.spread(reduced), &d);
+        let with_distances = distances.with_markers(reduced, |r| self.space.times(r));
         let of = |at: usize| {
-            let c = d.columns(3 * at, 3).tr_mul(&cd.columns(3 * at, 3));
+            let d = d.columns(3 * at, 3);
+            let mut c = Matrix3::from_column_slice(d.tr_mul(&cd.columns(3 * at, 3)).as_slice());
             let (f, held) = (self.inverse_factors[at], self.held.rows(3 * at, 3));
+            if let Some(with) = &with_distances {
+                c += with.of_marker(at, &d, &f);
+            }
             let held = Matrix3::from_column_slice((held * held.transpose()).as_slice());
             let left = Matrix3::identity() - held - distances.of_marker(at);
-            f.transpose() * left * f + Matrix3::from_column_slice(c.as_slice())
+            f.transpose() * left * f + c
         };
         self.seen.number.iter().map(|plate| plate.iter().map(|at| at.map(of)).collect()).collect()
     }
 }
 
-/// `Y`, unknowns that stay x 3 markers.
+/// As a matrix.
+fn column(x: DVector<f64>) -> DMatrix<f64> {
+    DMatrix::from_column_slice(x.len(), 1, x.as_slice())
+}
+
+/// `Y`, poses and intrinsics x 3 markers.
 fn whitened_coupling(
     linear: LinearProblem,
     seen: &SeenMarkers,
     inverse_factors: &[Matrix3<f64>],
-    (n, latent_start): (usize, &[usize]),
+    space: &PoseSpace,
 ) -> DMatrix<f64> {
-    let mut y = DMatrix::zeros(n, 3 * seen.order.len());
-    let mut dense = DenseCoupling::new(&linear.adjustment.problem, seen);
-    for own in linear.images() {
-        let start = latent_start[own.stop];
+    let mut rows = MarkerRows::new(space.rows(), seen);
+    for (k, own) in linear.images().enumerate() {
         let Some(equations) = own.equations() else { continue };
-        dense.add(own, seen, &equations);
-        let number = &seen.number[own.image.plate];
-        let [joints, tie] = own.latents();
-        let (markers, mut coupling) = latents_with_markers(&own.chain.d_latent, &equations);
-        for (m, &marker) in markers.iter().enumerate() {
-            let Some(at) = number[marker] else { continue };
-            times_right(&mut coupling, 3 * m, &inverse_factors[at].transpose());
-            let coupling = coupling.columns(3 * m, 3);
-            let mut of_joints = y.view_mut((start + joints.start, 3 * at), (joints.len(), 3));
-            of_joints += coupling.rows(0, joints.len());
-            let mut of_tie = y.view_mut((start + tie.start, 3 * at), (tie.len(), 3));
-            of_tie += coupling.rows(joints.len(), tie.len());
-        }
+        let row_of = |c: usize| linear.adjustment.problem.layout.columns[c].free.then(|| space.row_of(c)).flatten();
+        let intrinsics: Vec<Option<usize>> = own.columns().into_iter().map(|c| c.and_then(row_of)).collect();
+        rows.add(seen, (own.image.plate, &equations), Some(6 * k), &intrinsics);
     }
-    dense.times_right(inverse_factors.iter().map(Matrix3::transpose));
-    dense.copy_to(&mut y, 0);
-    y
+    rows.times_right(inverse_factors.iter().map(Matrix3::transpose));
+    rows.values
 }

@@ -10,7 +10,7 @@
 //! the reduced information grows by `W S^-1 W'`, its right-hand side by `W S^-1 r'`, and the markers by `F^-T U S^-1 (r' - W' x)`
 //! (Woodbury). Where the markers stay, there is no `U`, and `W` holds their rows, too.
 
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3};
 
 use super::linear::LinearProblem;
 use crate::linalg::product;
@@ -83,11 +83,19 @@ impl Distances {
         self.residual.norm_squared() - self.reduced.dot(&(&self.weight * &self.reduced))
     }
 
-    /// Adds `W S^-1 U'` to how the markers follow the reduced unknowns, unknowns x 3 markers.
-    pub fn add_to_coupling(&self, coupling: &mut DMatrix<f64>) {
-        if !self.are_none() {
-            *coupling += product(&(&self.by_reduced * &self.weight), &self.by_markers.transpose());
-        }
+    /// How they take part in the covariance of the markers, given that of the reduced unknowns, `cov(x)`, and what these move by `T`.
+    pub fn with_markers(
+        &self,
+        reduced: &DMatrix<f64>,
+        times: impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
+    ) -> Option<WithMarkers<'_>> {
+        let of_reduced = || product(reduced, &self.by_reduced);
+        let parts = |of_reduced: DMatrix<f64>| WithMarkers {
+            distances: self,
+            moved: times(&of_reduced),
+            own: self.by_reduced.tr_mul(&of_reduced),
+        };
+        (!self.are_none()).then(|| parts(of_reduced()))
     }
 
     /// `U S^-1 U'` of one marker: by how much less it can give way.
@@ -105,5 +113,26 @@ impl Distances {
         let (w, s) = (self.by_reduced.column(k), self.weight[(k, k)].recip());
         let with = w.dot(&(reduced * w));
         (with < s).then(|| with * s / (s - with) + s - 1.0)
+    }
+}
+
+/// Part of measured distances in the covariance of markers: these follow the reduced unknowns by `D' = d' T + K' W'`, with the `d` of the
+/// images and `K = S^-1 U' F^-1`.
+pub(super) struct WithMarkers<'a> {
+    distances: &'a Distances,
+    /// `T cov(x) W`.
+    moved: DMatrix<f64>,
+    /// `W' cov(x) W`.
+    own: DMatrix<f64>,
+}
+
+impl WithMarkers<'_> {
+    /// `d' T cov(x) W K`, its transposed, and `K' W' cov(x) W K` of a marker with this `d` and `F^-1`.
+    pub fn of_marker(&self, at: usize, d: &DMatrixView<f64>, inverse_factor: &Matrix3<f64>) -> Matrix3<f64> {
+        let Distances { by_markers, weight, .. } = self.distances;
+        let k = weight * by_markers.rows(3 * at, 3).transpose() * inverse_factor;
+        let with = d.tr_mul(&self.moved) * &k;
+        let sum = &with + with.transpose() + k.tr_mul(&(&self.own * &k));
+        Matrix3::from_column_slice(sum.as_slice())
     }
 }

@@ -16,11 +16,20 @@ pub struct Settings {
     pub iterations: usize,
     /// Stop when the Newton decrement, an upper bound of every |step| / sigma, falls below this.
     pub decrement: f64,
+    /// Stop before a step that is predicted to be shorter than this share of that bound.
+    pub margin: f64,
+}
+
+impl Settings {
+    /// With the usual margin.
+    pub const fn new(iterations: usize, decrement: f64) -> Self {
+        Self { iterations, decrement, margin: 0.1 }
+    }
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { iterations: 100, decrement: 1e-3 }
+        Self::new(100, 1e-3)
     }
 }
 
@@ -97,8 +106,6 @@ impl fmt::Display for NoFit {
 const FIRST_LAMBDA: f64 = 1e-6;
 /// Relative rounding of a cost summed over thousands of residuals.
 const ROUNDING: f64 = 1e-12;
-/// A step that was not taken must be predicted to be this much below the bound.
-const PREDICTION_MARGIN: f64 = 0.1;
 const LARGEST_LAMBDA: f64 = 1e10;
 
 /// Observations an image that are enough to come close.
@@ -215,7 +222,7 @@ impl Expected {
         let next = shrunk.map_or(f64::INFINITY, |b| decrement * decrement / b);
         Self {
             small,
-            last: small || next < PREDICTION_MARGIN * settings.decrement,
+            last: small || next < settings.margin * settings.decrement,
             // Where the step promises less than the cost can resolve, the gradient is the better judge.
             below_rounding: small || decrement * decrement < 10.0 * ROUNDING * cost,
         }

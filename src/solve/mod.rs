@@ -15,6 +15,7 @@ mod levenberg;
 mod linear;
 mod noise_information;
 mod noise_uncertainty;
+mod pose_space;
 mod response;
 mod snoop;
 mod system;

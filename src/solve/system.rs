@@ -36,7 +36,7 @@ impl Elimination {
 /// What is needed to get the eliminated family back.
 #[derive(Debug, Clone)]
 pub(super) enum Eliminated {
-    Markers(MarkersEliminated),
+    Markers(Box<MarkersEliminated>),
     Stops(StopsEliminated),
 }
 
@@ -88,7 +88,7 @@ impl System {
         let (information, eliminated) = match which {
             Elimination::Markers => {
                 let (a, rest) = MarkersEliminated::build(linear, lambda);
-                (a, Eliminated::Markers(rest))
+                (a, Eliminated::Markers(Box::new(rest)))
             }
             Elimination::Stops | Elimination::StopsMarkersHeld => {
                 let held = which == Elimination::StopsMarkersHeld;

@@ -275,7 +275,7 @@ fn two_halves_of_an_image_at_one_stop_say_what_the_whole_says() {
     let request = Request { images: 10, lattice: (5, 4), joint_noise: sigma, ..Request::default() };
     let (mut problem, state) = problem(&mut dice, &request);
     problem.huber = f64::INFINITY;
-    let outcome = solve(Adjustment { problem, state }, &Settings { iterations: 200, decrement: 1e-9 });
+    let outcome = solve(Adjustment { problem, state }, &Settings::new(200, 1e-9));
     assert_eq!(outcome.status, Status::Converged);
     let whole = outcome.adjustment;
     let halves = in_halves(&whole);

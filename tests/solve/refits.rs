@@ -15,7 +15,7 @@ fn held_out_errors_are_those_of_fits_to_the_last_digit() {
         problem(&mut dice, &Request { images: 18, lattice: (5, 4), joint_noise: 3e-4, ..Request::default() });
     let solution = identify(truth.robot.chain, &[series(&problem)], &Options::default()).unwrap();
     let to_the_end = |left: Adjustment| {
-        let outcome = solve(left, &Settings { iterations: 300, decrement: 1e-7 });
+        let outcome = solve(left, &Settings::new(300, 1e-7));
         assert_eq!(outcome.status, Status::Converged);
         Some(outcome.adjustment.state)
     };

@@ -15,7 +15,7 @@ use robotcal::solve::{
 };
 
 /// Iterates to where rounding ends it.
-const TIGHT: Settings = Settings { iterations: 200, decrement: 1e-9 };
+const TIGHT: Settings = Settings::new(200, 1e-9);
 
 fn converged(problem: &Problem, start: State, settings: &Settings) -> Outcome {
     let outcome = solve(Adjustment { problem: problem.clone(), state: start }, settings);
@@ -120,7 +120,7 @@ fn large_joint_noise_tends_to_the_free_poses() {
     let parts = [[Part::Prismatic; 3], [Part::Revolute; 3]].concat();
     let (mut problem, state) = problem(&mut dice, &Request { parts, ..Request::default() });
     // The valley along which joints trade against twists is long and curved: many steps.
-    let settings = Settings { iterations: 1000, decrement: 1e-5 };
+    let settings = Settings::new(1000, 1e-5);
     let free = converged(&problem, free_poses(&problem, &state, |_| true), &settings);
     let differences = [0.1, 1.0].map(|sigma| {
         problem.noise.joint = vec![vec![sigma; 6]];

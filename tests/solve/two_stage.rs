@@ -26,7 +26,7 @@ fn covariance(adjustment: &Adjustment) -> Covariance {
 
 fn solved(problem: &Problem, start: State) -> Adjustment {
     let start = Adjustment { problem: problem.clone(), state: start };
-    let outcome = solve(start, &Settings { iterations: 200, decrement: 1e-9 });
+    let outcome = solve(start, &Settings::new(200, 1e-9));
     assert_eq!(outcome.status, Status::Converged);
     outcome.adjustment
 }
