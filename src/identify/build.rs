@@ -12,8 +12,8 @@ use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
-    Adjustment, Family, Image, ImageRejection, Layout, Mark, Measured, MeasuredSeries, MeasuredStop, Names, Noise,
-    PlateShape, Problem, State, Stop, Tie, intern, release_measured_scales,
+    Adjustment, DISPLACEMENT_SIZES, Family, Image, ImageRejection, Layout, Mark, Measured, MeasuredSeries,
+    MeasuredStop, Names, Noise, PlateShape, Problem, State, Stop, Tie, intern, release_measured_scales,
 };
 use crate::series::{Edge, Observation, Plate};
 
@@ -23,8 +23,8 @@ const DEFAULT_SIGMA_PX: f64 = 0.1;
 /// First guess of the joint noise: from above, rad or m.
 const FIRST_JOINT_NOISE: f64 = 3e-3;
 
-/// First guess of the apparent tilt of the plate in an image: from above, rad.
-const FIRST_TILT: f64 = 1e-3;
+/// First guess of the apparent displacement of the plate in an image: from above, rad or m.
+const FIRST_DISPLACEMENT: f64 = 1e-3;
 
 /// Huber bound: the 95 % point of the length of a 2-D standard normal vector.
 const HUBER: f64 = 2.45;
@@ -126,12 +126,12 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         pixel_factor: vec![1.0; cameras.len()],
         joint: vec![vec![FIRST_JOINT_NOISE; readings]; runs],
         local: first_local(&state, &layout),
-        tilt: vec![FIRST_TILT; runs],
+        displacement: Vec::new(),
         marker: Vec::new(),
         body: vec![[1.0; 2]; bodies.components],
     };
     let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
-    let problem = Problem {
+    let mut problem = Problem {
         layout,
         plates,
         placements,
@@ -148,6 +148,8 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         restraint: None,
         huber: HUBER,
     };
+    let sizes = if problem.tells_displacements().contains(&true) { DISPLACEMENT_SIZES } else { 1 };
+    problem.noise.displacement = vec![FIRST_DISPLACEMENT; runs * sizes];
     Ok(Adjustment { problem, state })
 }
 

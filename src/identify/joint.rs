@@ -179,7 +179,7 @@ fn fit(
 ) -> (Outcome, Option<NoiseInformation>) {
     let exact = options.joint_noise == JointNoise::Known(0.0);
     if exact {
-        start.problem.noise.tilt.clear();
+        start.problem.noise.displacement.clear();
     }
     start.tie_to_readings(exact);
     if let Some(solved) = near {

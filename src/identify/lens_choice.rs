@@ -123,7 +123,7 @@ fn evidence(fit: &Adjustment, (camera, depths_m): (usize, &[f64; 2]), lens: Lens
     let settings = Settings { decrement: DECREMENT, ..Settings::default() };
     // The size of a displacement field is found from above.
     let rounds = if lens.has_field() { FIELD_ROUNDS } else { ROUNDS };
-    let options = ComponentOptions { joint: false, tilt: false, rounds, settings };
+    let options = ComponentOptions { joint: false, displacement: false, rounds, settings };
     let outcome = estimate_components(other, &options);
     let linear = outcome.linear().filter(|_| outcome.status == Status::Converged)?;
     let Adjustment { problem, state } = &outcome.adjustment;

@@ -12,7 +12,7 @@ use crate::assess::refitted;
 use crate::fit::Fit;
 use crate::geom::{Pose, right_jacobian_se3};
 use crate::linalg::{SymmetricFactor, product};
-use crate::problem::{Adjustment, Chained, Problem, State, Step, TakenFrom, Tie};
+use crate::problem::{Adjustment, Chained, Problem, SIZE_OF_DISPLACEMENT, State, Step, TakenFrom, Tie};
 use crate::solve::{
     Acceleration, ComponentOptions, Elimination, JOINT_NOISE_FLOOR, LEAST_FIRST_GUESS, LinearImage, Settings, Status,
     Tally, converged, estimate_components, share_out,
@@ -174,8 +174,11 @@ impl ErrorModel {
             JointNoise::Estimated if of_joint_fit > 0.0 => of_joint_fit.max(LEAST_FIRST_GUESS),
             JointNoise::Estimated => FIRST_JOINT_NOISE,
         };
-        let tilt = |series: usize| problem.noise.tilt.get(series);
-        let of_series = |(k, own): (usize, &Vec<f64>)| own.iter().chain(tilt(k)).map(|s| first(*s)).collect::<Vec<_>>();
+        let count = problem.noise.displacement_sizes();
+        let of_series = |(k, own): (usize, &Vec<f64>)| {
+            let displacements = &problem.noise.displacement[count * k..count * (k + 1)];
+            own.iter().chain(displacements).map(|s| first(*s)).collect::<Vec<_>>()
+        };
         let sizes = || problem.noise.joint.iter().enumerate().flat_map(of_series).collect();
         let (together, sizes, estimated) = match estimator {
             Estimator::Isotropic => (None, vec![FIRST_ISOTROPIC; 2], true),
@@ -197,22 +200,23 @@ impl ErrorModel {
         Some(Latent { first, enters_by, component, beside: vec![0.0; 6] })
     }
 
-    /// Of the poses of one stop: they have the errors of its readings in common, and each its own tilt.
+    /// Of the poses of one stop: they have the errors of its readings in common, and each its own apparent displacement.
     fn of_stop(problem: &Problem, first: usize, images: &[usize], d_latent: &[DMatrix<f64>]) -> Latent {
         let stop = &problem.stops[problem.images[images[0]].stop];
         let (n, per_series) = (stop.readings(), sizes_per_series(problem));
         let all = n + d_latent.iter().map(|l| l.ncols() - n).sum::<usize>();
         let mut enters_by = DMatrix::zeros(6 * images.len(), all);
-        let mut tilt = n;
+        let mut component: Vec<usize> = (0..n).collect();
         for (k, l) in d_latent.iter().enumerate() {
+            let own = l.ncols() - n;
             enters_by.view_mut((6 * k, 0), (6, n)).copy_from(&l.columns(0, n));
-            enters_by.view_mut((6 * k, tilt), (6, l.ncols() - n)).copy_from(&l.columns_range(n..));
-            tilt += l.ncols() - n;
+            enters_by.view_mut((6 * k, component.len()), (6, own)).copy_from(&l.columns_range(n..));
+            component.extend(SIZE_OF_DISPLACEMENT[..own].iter().map(|size| n + size));
         }
         Latent {
             first,
             enters_by,
-            component: (0..all).map(|k| stop.series * per_series + k.min(per_series - 1)).collect(),
+            component: component.into_iter().map(|k| stop.series * per_series + k).collect(),
             beside: (0..all).map(|k| if k < n { problem.joint_error_variance(stop, k)[1] } else { 0.0 }).collect(),
         }
     }
@@ -294,7 +298,8 @@ impl ErrorModel {
         let mut change: f64 = 0.0;
         let per_series = sizes_per_series(problem);
         let mut groups = problem.noise.groups(kinds);
-        groups.extend((!problem.noise.tilt.is_empty()).then(|| vec![per_series - 1]));
+        let readings = per_series - problem.noise.displacement_sizes();
+        groups.extend((readings..per_series).map(|size| vec![size]));
         for group in groups {
             let of = |series: usize| group.iter().map(move |r| series * per_series + r);
             let series = 0..problem.noise.joint.len();
@@ -320,9 +325,9 @@ impl ErrorModel {
     }
 }
 
-/// Sizes of the joint-noise estimators per series: one a reading, and the apparent tilt of the plate if there is one.
+/// Sizes of the joint-noise estimators per series: one a reading, and those of the apparent displacements of the plate.
 fn sizes_per_series(problem: &Problem) -> usize {
-    problem.noise.joint.first().map_or(0, Vec::len) + usize::from(!problem.noise.tilt.is_empty())
+    problem.noise.joint.first().map_or(0, Vec::len) + problem.noise.displacement_sizes()
 }
 
 /// The predicted poses at a state, in the charts of the stage.
@@ -331,7 +336,7 @@ struct Predicted {
     residual: DVector<f64>,
     /// Derivative of the prediction by the columns that act through the poses; fixed columns are zero.
     jacobian: DMatrix<f64>,
-    /// Derivative of each prediction by the errors of its joint readings and its tilt.
+    /// Derivative of each prediction by the errors of its joint readings and its apparent displacement.
     d_latent: Vec<DMatrix<f64>>,
 }
 
@@ -339,11 +344,11 @@ fn predict(Adjustment { problem, state }: &Adjustment, stage: &PoseStage) -> Opt
     let theta = problem.layout.theta_len();
     let n = stage.offset.len();
     let mut p = Predicted { residual: stage.offset.clone(), jacobian: DMatrix::zeros(n, theta), d_latent: Vec::new() };
-    let (exact, upright) = (vec![0.0; state.robot.chain.readings.len()], problem.upright_tie());
+    let (exact, upright) = (vec![0.0; state.robot.chain.readings.len()], problem.upright_ties());
     for (k, &i) in stage.images.iter().enumerate() {
         let image = &problem.images[i];
         let posture = problem.posture(i)?;
-        let from = TakenFrom { posture: Some(posture), joint_errors: &exact, tie: &upright };
+        let from = TakenFrom { posture: Some(posture), joint_errors: &exact, tie: &upright[i] };
         let Chained { pose, d_theta, d_latent } = state.chained(&problem.layout, image, from)?;
         let x: Vector6<f64> = (stage.references[k].inverse() * pose).log();
         let chart = right_jacobian_se3(&x).try_inverse()?;
@@ -448,7 +453,7 @@ fn with_cameras_for_the_robot(at: Adjustment, sizes: &[f64]) -> State {
     refitted(given)
 }
 
-/// The problem with the joint noise and the tilt that an estimator found; as it is for one that has none.
+/// The problem with the joint noise and the apparent displacements that an estimator found; as it is for one that has none.
 pub(super) fn with_sizes(problem: &Problem, estimator: Estimator, sizes: &[f64]) -> Problem {
     let mut given = problem.clone();
     if !estimator.has_joint_noise() {
@@ -459,8 +464,10 @@ pub(super) fn with_sizes(problem: &Problem, estimator: Estimator, sizes: &[f64])
         let own = sizes[series * per_series..].iter().map(|s| s.max(f64::MIN_POSITIVE));
         joint.iter_mut().zip(own).for_each(|(s, own)| *s = own);
     }
-    for (series, tilt) in given.noise.tilt.iter_mut().enumerate() {
-        *tilt = sizes[(series + 1) * per_series - 1].max(f64::MIN_POSITIVE);
+    let count = problem.noise.displacement_sizes();
+    for (k, size) in given.noise.displacement.iter_mut().enumerate() {
+        let (series, kind) = (k / count, k % count);
+        *size = sizes[(series + 1) * per_series - count + kind].max(f64::MIN_POSITIVE);
     }
     given
 }
@@ -514,7 +521,7 @@ pub fn fit_joint(start: &Adjustment, estimator: Estimator, noise: JointNoise) ->
     }
     let options = ComponentOptions {
         joint: !hard && noise == JointNoise::Estimated,
-        tilt: !hard && noise == JointNoise::Estimated,
+        displacement: !hard && noise == JointNoise::Estimated,
         settings: Settings { decrement: 1e-4, ..Settings::default() },
         ..ComponentOptions::default()
     };

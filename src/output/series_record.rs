@@ -61,4 +61,8 @@ pub struct StopNoise {
     pub joint_interval: Vec<[Option<f64>; 2]>,
     /// Apparent tilt of the plate in each image, rad; 0 where it is not part of the model.
     pub apparent_tilt_rad: f64,
+    /// Apparent spin of the plate about its normal in each image, rad, and shift across the optical axis and along it, m; absent where no
+    /// two cameras saw the same stops.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub apparent_shift: Option<[f64; 3]>,
 }

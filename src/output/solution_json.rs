@@ -494,6 +494,7 @@ impl SolutionRecord {
             joint: c.joint_noise.clone(),
             joint_interval: c.joint_noise_interval.clone(),
             apparent_tilt_rad: c.apparent_tilt_rad,
+            apparent_shift: None,
         };
         if found.is_empty() { self.cameras.iter().map(|c| (c.name.as_str(), of_camera(c))).collect() } else { found }
     }

@@ -209,10 +209,13 @@ fn stop_noise(solution: &Solution, series: &[usize]) -> StopNoise {
         let ends = solution.uncertainty.joint_noise_of(series, r)?;
         Some(ends.map(|v| Some(v).filter(|v| v.is_finite())))
     };
+    let sizes = problem.noise.displacement_sizes();
+    let displacement = |kind: usize| rms(&|s| problem.noise.displacement.get(s * sizes + kind).copied().unwrap_or(0.0));
     StopNoise {
         joint: (0..readings).map(|r| rms(&|s| sigmas[s][r])).collect(),
         joint_interval: (0..readings).filter_map(interval).collect(),
-        apparent_tilt_rad: rms(&|s| problem.noise.tilt.get(s).copied().unwrap_or(0.0)),
+        apparent_tilt_rad: displacement(0),
+        apparent_shift: (sizes > 1).then(|| [displacement(1), displacement(2), displacement(3)]),
     }
 }
 

@@ -92,8 +92,8 @@ impl Adjustment {
         for (stop, errors) in problem.stops.iter().zip(&mut state.joint_errors) {
             *errors = vec![0.0; if readings_are_exact { 0 } else { stop.readings() }];
         }
-        for i in (0..problem.images.len()).filter(|&i| problem.on_robot(i)) {
-            state.ties[i] = if readings_are_exact { Tie::Rigid } else { problem.upright_tie() };
+        for (i, tie) in problem.upright_ties().into_iter().enumerate().filter(|(i, _)| problem.on_robot(*i)) {
+            state.ties[i] = if readings_are_exact { Tie::Rigid } else { tie };
         }
     }
 

@@ -7,12 +7,15 @@ use super::layout::Layout;
 use super::length::MeasuredLength;
 use super::noise::Noise;
 use super::restraint::{JointPrior, Restraint};
-use super::stop::{Stop, Tie};
+use super::stop::{SIZE_OF_DISPLACEMENT, Stop, Tie};
 use crate::model::robot::Posture;
 use crate::series::Plate;
 
 /// Smallest prior sigma of a marker coordinate, m: below it a marker counts as fixed.
 const FIXED_MARKER_SIGMA_M: f64 = 1e-9;
+
+/// Stops seen by several cameras that tell the sizes of apparent displacements from joint noise.
+const LEAST_SHARED_STOPS: usize = 8;
 
 /// Everything that is given.
 #[derive(Debug, Clone)]
@@ -90,25 +93,45 @@ impl Problem {
         errors.iter().enumerate().map(|(r, q)| q * q * self.joint_error_information(stop, r))
     }
 
-    /// Variance of a component of the apparent tilt of an image, rad^2.
-    pub fn tilt_variance(&self, image: &Image) -> f64 {
-        self.noise.tilt[self.stops[image.stop].series].powi(2)
+    /// Index of the size that a component of the apparent displacement of an image has.
+    pub fn size_of_displacement(&self, image: &Image, component: usize) -> usize {
+        self.noise.displacement_sizes() * self.stops[image.stop].series + SIZE_OF_DISPLACEMENT[component]
     }
 
-    /// Information (inverse of the variance) of a component of the apparent tilt of an image.
-    pub fn tilt_information(&self, image: &Image) -> f64 {
-        1.0 / self.tilt_variance(image)
+    /// Variance of a component of the apparent displacement of an image, rad^2 or m^2.
+    pub fn displacement_variance(&self, image: &Image, component: usize) -> f64 {
+        self.noise.displacement[self.size_of_displacement(image, component)].powi(2)
+    }
+
+    /// Information (inverse of the variance) of every unknown of a tie; zero for a free pose.
+    pub fn tie_information(&self, image: &Image, tie: &Tie) -> impl Iterator<Item = f64> {
+        let displaced = !tie.is_free();
+        (0..tie.len()).map(move |k| if displaced { 1.0 / self.displacement_variance(image, k) } else { 0.0 })
     }
 
     /// Squares of a tie in units of their variances; none for a free pose.
     pub fn tie_squares(&self, image: &Image, tie: &Tie) -> impl Iterator<Item = f64> {
-        let tilt = if let Tie::Tilted(tilt) = tie { tilt.as_slice() } else { &[] };
-        tilt.iter().map(|t| t * t * self.tilt_information(image))
+        let values = tie.displacement().iter();
+        values.enumerate().map(|(k, t)| t * t / self.displacement_variance(image, k))
     }
 
-    /// Tie of an image to its readings: rigid, or tilted by nothing where tilt has a size.
-    pub fn upright_tie(&self) -> Tie {
-        if self.noise.tilt.is_empty() { Tie::Rigid } else { Tie::Tilted([0.0; 2]) }
+    /// Of every series, by the index of its noise: true where enough of its stops were seen by several cameras, so that all components of apparent
+    /// displacements are told from errors of the joints.
+    pub fn tells_displacements(&self) -> Vec<bool> {
+        let mut shared = vec![0; self.noise.joint.len()];
+        for of_stop in self.images.chunk_by(|a, b| a.stop == b.stop).filter(|of_stop| of_stop.len() > 1) {
+            shared[self.stops[of_stop[0].stop].series] += 1;
+        }
+        shared.into_iter().map(|stops| stops >= LEAST_SHARED_STOPS).collect()
+    }
+
+    /// Tie of every image to its readings: rigid, or displaced by nothing where apparent displacements have a size.
+    pub fn upright_ties(&self) -> Vec<Tie> {
+        if self.noise.displacement.is_empty() {
+            return vec![Tie::Rigid; self.images.len()];
+        }
+        let tells = self.tells_displacements();
+        self.images.iter().map(|image| Tie::upright(tells[self.stops[image.stop].series])).collect()
     }
 
     /// Priors that say something of several columns together.

@@ -7,9 +7,9 @@
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, Matrix6xX, Vector2, Vector6};
 
 use super::equations::{Collector, E, Equations, MarkerTerms};
-use super::state::{seen_centre, tilt_axes};
+use super::state::{Displaced, seen_centre};
 use super::{Image, Layout, Measured, Problem, State, TakenFrom, Tie};
-use crate::geom::{Pose, adjoint, right_jacobian_se3};
+use crate::geom::{Pose, adjoint};
 use crate::linalg::wide;
 use crate::model::circle::Prediction;
 use crate::model::robot::{Kinematics, LinearOrigins};
@@ -263,17 +263,16 @@ impl State {
         let joints = from.joints();
         let l = kinematics.by_readings(&mounted.d_robot, joints).resize_horizontally(from.unknowns(), 0.0);
         let pose = mounted.camera_from_plate;
-        let Tie::Tilted([x, y]) = *from.tie else {
+        let values = from.tie.displacement();
+        if values.is_empty() {
             return Some(Chained { pose, d_theta: g, d_latent: l });
-        };
-        let axes = tilt_axes(&seen_centre(image, self));
-        let tilt = axes * Vector2::new(x, y);
-        let turned = Pose::exp(&tilt);
-        // What moves the pose before the tilt moves it after the tilt as seen from the tilted plate.
+        }
+        let Displaced { pose, turned, d_components } = Displaced::new(&pose, &seen_centre(image, self), values);
+        // What moves the pose before the plate is turned moves it after that as seen from the turned plate.
         let carry = adjoint(&turned.inverse());
         let carry = DMatrix::from_column_slice(6, 6, carry.as_slice());
         let mut l = &carry * l;
-        l.view_mut((0, joints), (6, 2)).copy_from(&(right_jacobian_se3(&tilt) * axes));
-        Some(Chained { pose: pose * turned, d_theta: carry * g, d_latent: l })
+        l.columns_mut(joints, values.len()).copy_from(&d_components);
+        Some(Chained { pose, d_theta: carry * g, d_latent: l })
     }
 }

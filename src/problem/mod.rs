@@ -50,4 +50,4 @@ pub use restraint::{JointPrior, Restraint};
 pub use select::short_name;
 pub use state::{PlateShape, State};
 pub use step::Step;
-pub use stop::{Stop, TakenFrom, Tie};
+pub use stop::{DISPLACEMENT_SIZES, SIZE_OF_DISPLACEMENT, Stop, TakenFrom, Tie};

@@ -11,8 +11,9 @@ pub struct Noise {
     pub joint: Vec<Vec<f64>>,
     /// Local error of every reading, rad or m: common to stops at the same reading. Zero where no stops share readings.
     pub local: Vec<f64>,
-    /// Apparent tilt of the plate in every image, rad: per series. Empty where there is none.
-    pub tilt: Vec<f64>,
+    /// Apparent displacement of the plate in every image: per series its tilt, rad; where several cameras see the same stops, behind it spin
+    /// (rad), shift across the optical axis and along it (m). Empty where there is none.
+    pub displacement: Vec<f64>,
     /// Factors on the stated sigmas of measured bodies, position and rotation, per component of the instruments.
     pub body: Vec<[f64; 2]>,
     /// Factor on the stated tolerances of the markers, per plate. Empty where they are taken as stated.
@@ -20,20 +21,31 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Every size of latent joint errors and tilts at `first`, rad or m.
+    /// Number of sizes of apparent displacements per series.
+    pub fn displacement_sizes(&self) -> usize {
+        self.displacement.len() / self.joint.len().max(1)
+    }
+
+    /// The sizes of apparent displacements that are of one kind, series by series.
+    pub fn displacement_groups(&self) -> impl Iterator<Item = Vec<usize>> + use<> {
+        let (sizes, all) = (self.displacement_sizes(), self.displacement.len());
+        (0..sizes).map(move |kind| (kind..all).step_by(sizes).collect())
+    }
+
+    /// Every size of latent joint errors and apparent displacements at `first`, rad or m.
     pub fn start_at(&mut self, first: f64) {
         self.joint.iter_mut().flatten().for_each(|s| *s = first);
         self.local.iter_mut().filter(|s| **s > 0.0).for_each(|s| *s = first);
-        self.tilt.fill(first);
+        self.displacement.fill(first);
     }
 
-    /// Takes over what another problem of the same series found; sizes of latent joint errors and tilts at `least`, rad or m, or more.
+    /// Takes over what another problem of the same series found; sizes of latent joint errors and apparent displacements at `least`, rad or m, or more.
     pub fn start_near(&mut self, other: &Self, least: f64) {
         self.pixel_factor.clone_from(&other.pixel_factor);
         self.body.clone_from(&other.body);
         self.marker.clone_from(&other.marker);
-        let own = self.joint.iter_mut().flatten().chain(&mut self.tilt);
-        let of_other = other.joint.iter().flatten().chain(&other.tilt);
+        let own = self.joint.iter_mut().flatten().chain(&mut self.displacement);
+        let of_other = other.joint.iter().flatten().chain(&other.displacement);
         let local = self.local.iter_mut().zip(&other.local).filter(|(s, _)| **s > 0.0);
         own.zip(of_other).chain(local).filter(|(_, other)| **other > 0.0).for_each(|(s, other)| *s = other.max(least));
     }

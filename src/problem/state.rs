@@ -1,10 +1,10 @@
 //! Every unknown, with its value.
 
-use nalgebra::{Matrix6x2, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix6, Matrix6x3, Matrix6xX, SMatrix, SVector, Vector3};
 
 use super::image::Image;
 use super::stop::{TakenFrom, Tie};
-use crate::geom::Pose;
+use crate::geom::{Pose, right_jacobian_se3};
 use crate::model::camera::Camera;
 use crate::model::plate_modes::{MODES, basis};
 use crate::model::robot::Robot;
@@ -85,8 +85,36 @@ impl State {
         let tip = self.robot.pose_at(from.posture?, &from.errors());
         let pose =
             image.mount.camera_from_plate(&self.mountings[image.mounting], &tip, &self.placements[image.placement]);
-        let Tie::Tilted([x, y]) = *from.tie else { return Some(pose) };
-        Some(pose * Pose::exp(&(tilt_axes(&seen_centre(image, self)) * Vector2::new(x, y))))
+        match from.tie.displacement() {
+            [] => Some(pose),
+            values => Some(Displaced::new(&pose, &seen_centre(image, self), values).pose),
+        }
+    }
+}
+
+/// A camera pose with an apparent displacement of the plate.
+pub(super) struct Displaced {
+    /// `camera_from_plate`.
+    pub pose: Pose,
+    /// By which the plate is turned, plate frame.
+    pub turned: Pose,
+    /// Derivatives of the pose by the components, body twists, 6 x components.
+    pub d_components: Matrix6xX<f64>,
+}
+
+impl Displaced {
+    /// The plate turned about the axes through `centre` (plate frame, m), then shifted along the axes of the camera.
+    pub fn new(pose: &Pose, centre: &Vector3<f64>, values: &[f64]) -> Self {
+        let component = |k: usize| values.get(k).copied().unwrap_or(0.0);
+        let axes = turning_axes(centre);
+        let twist = axes * Vector3::from_fn(|k, _| component(k));
+        let turned = Pose::exp(&twist);
+        let mut pose = *pose * turned;
+        pose.translation += Vector3::from_fn(|k, _| component(3 + k));
+        let mut all = Matrix6::zeros();
+        all.fixed_columns_mut::<3>(0).copy_from(&(right_jacobian_se3(&twist) * axes));
+        all.fixed_view_mut::<3, 3>(0, 3).copy_from(&pose.rotation.transpose());
+        Self { pose, turned, d_components: all.columns(0, values.len()).into_owned() }
     }
 }
 
@@ -97,10 +125,10 @@ pub(super) fn seen_centre(image: &Image, state: &State) -> Vector3<f64> {
     sum / image.observations.len().max(1) as f64
 }
 
-/// Body twists of `camera_from_plate` that turn the plate about its x and y axes through `centre`.
-pub(super) fn tilt_axes(centre: &Vector3<f64>) -> Matrix6x2<f64> {
-    let mut axes = Matrix6x2::zeros();
-    for (k, axis) in [Vector3::x(), Vector3::y()].into_iter().enumerate() {
+/// Body twists of `camera_from_plate` that turn the plate about its axes through `centre`.
+fn turning_axes(centre: &Vector3<f64>) -> Matrix6x3<f64> {
+    let mut axes = Matrix6x3::zeros();
+    for (k, axis) in [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().enumerate() {
         axes.fixed_view_mut::<3, 1>(0, k).copy_from(&centre.cross(&axis));
         axes.fixed_view_mut::<3, 1>(3, k).copy_from(&axis);
     }

@@ -5,7 +5,18 @@ use nalgebra::Vector6;
 use crate::geom::Pose;
 use crate::model::robot::Posture;
 
-/// Number of components of a tilt.
+/// Components of an apparent displacement where several cameras tell it from the errors of the joints; one camera tells of the first two, the
+/// tilt.
+const DISPLACEMENTS: usize = 6;
+
+/// Index, among the sizes of a series, of the size that a component of an apparent displacement has: tilt about x and y of the plate (rad),
+/// spin about its normal (rad), shift across the optical axis and along it (m).
+pub const SIZE_OF_DISPLACEMENT: [usize; DISPLACEMENTS] = [0, 0, 1, 2, 2, 3];
+
+/// Number of sizes that apparent displacements have, where all components are told.
+pub const DISPLACEMENT_SIZES: usize = 4;
+
+/// Number of components of an apparent displacement that one camera tells.
 const TILT: usize = 2;
 
 /// One standstill of the robot: what was read there, with one latent error of every reading.
@@ -31,19 +42,30 @@ impl Stop {
 pub enum Tie {
     /// It is as the robot says.
     Rigid,
-    /// The robot, and an apparent tilt of the plate about its x and y axes, rad: what smooth errors of an image (lens, focus, air) do
-    /// to the pose that it shows.
-    Tilted([f64; TILT]),
+    /// The robot, and an apparent displacement of the plate: what smooth errors of an image (lens, focus, air) do to the pose that it
+    /// shows. Turns about the x and y axes of the plate, rad; where several cameras saw the same stops, about its z axis, rad, and
+    /// shifts along the axes of the camera, m.
+    Displaced(Vec<f64>),
     /// Nothing: a free camera pose (`camera_from_plate`).
     Free(Pose),
 }
 
 impl Tie {
+    /// Displaced by nothing; with all components where stops seen by several cameras tell of them.
+    pub fn upright(with_all: bool) -> Self {
+        Self::Displaced(vec![0.0; if with_all { DISPLACEMENTS } else { TILT }])
+    }
+
+    /// The apparent displacement; empty where there is none.
+    pub fn displacement(&self) -> &[f64] {
+        if let Self::Displaced(values) = self { values } else { &[] }
+    }
+
     /// Number of unknowns.
     pub fn len(&self) -> usize {
         match self {
             Self::Rigid => 0,
-            Self::Tilted(_) => TILT,
+            Self::Displaced(values) => values.len(),
             Self::Free(_) => 6,
         }
     }
@@ -69,7 +91,7 @@ impl Tie {
     pub(super) fn moved(&self, step: &[f64]) -> Self {
         match self {
             Self::Rigid => Self::Rigid,
-            Self::Tilted(tilt) => Self::Tilted(std::array::from_fn(|k| tilt[k] + step[k])),
+            Self::Displaced(values) => Self::Displaced(values.iter().zip(step).map(|(v, s)| v + s).collect()),
             Self::Free(pose) => Self::Free(pose.perturbed(&Vector6::from_column_slice(step))),
         }
     }

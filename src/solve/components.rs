@@ -10,7 +10,7 @@ use super::body_components::{BodyTally, update_bodies};
 use super::fit::Fit;
 use super::levenberg::{Outcome, Settings, Status, minimise, minimise_near};
 use super::linear::{LinearImage, LinearStop};
-use crate::problem::{Adjustment, Noise, Problem, Tie};
+use crate::problem::{Adjustment, Noise, Problem};
 use crate::urdf::JointKind;
 
 /// What is estimated and how long.
@@ -18,8 +18,8 @@ use crate::urdf::JointKind;
 pub struct ComponentOptions {
     /// Estimate the joint noise; else it stays as given in the problem.
     pub joint: bool,
-    /// Estimate the apparent tilt of the plate; else it stays as given in the problem.
-    pub tilt: bool,
+    /// Estimate the apparent displacements of the plate; else they stay as given in the problem.
+    pub displacement: bool,
     /// Most rounds.
     pub rounds: usize,
     /// Bounds of each inner solve.
@@ -28,7 +28,7 @@ pub struct ComponentOptions {
 
 impl Default for ComponentOptions {
     fn default() -> Self {
-        Self { joint: true, tilt: true, rounds: 60, settings: Settings::default() }
+        Self { joint: true, displacement: true, rounds: 60, settings: Settings::default() }
     }
 }
 
@@ -95,10 +95,10 @@ pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Out
 
 /// Every component that is not zero, with its smallest value.
 fn components(problem: &mut Problem) -> impl Iterator<Item = (&mut f64, f64)> {
-    let Noise { pixel_factor, joint, local, tilt, marker, body } = &mut problem.noise;
+    let Noise { pixel_factor, joint, local, displacement, marker, body } = &mut problem.noise;
     let factors =
         pixel_factor.iter_mut().chain(marker).chain(body.iter_mut().flatten()).map(|s| (s, f64::MIN_POSITIVE));
-    let sizes = joint.iter_mut().flatten().chain(local).chain(tilt).map(|s| (s, JOINT_NOISE_FLOOR));
+    let sizes = joint.iter_mut().flatten().chain(local).chain(displacement).map(|s| (s, JOINT_NOISE_FLOOR));
     let families = problem.families.iter_mut().map(|f| (&mut f.factor, SMALLEST_FACTOR));
     factors.chain(sizes).chain(families).filter(|(s, _)| **s > 0.0)
 }
@@ -146,10 +146,10 @@ impl Fit {
             *factor *= ratio;
             change = change.max((ratio - 1.0).abs());
         }
-        if options.joint || options.tilt {
+        if options.joint || options.displacement {
             let found = self.tallies(stops.iter().zip(&latents));
-            if options.tilt {
-                change = change.max(update_tilt(&found.tilt, &mut noise));
+            if options.displacement {
+                change = change.max(update_displacements(&found.displacement, &mut noise));
             }
             if options.joint {
                 change = change.max(found.update_joint(self.state.robot.chain.reading_kinds.as_slice(), &mut noise));
@@ -228,13 +228,16 @@ impl Fit {
         let n = robot.chain.readings.len();
         let mut own = vec![Tally::new(n); noise.joint.len()];
         let mut local = Tally::new(n);
-        let mut tilt = Tally::new(noise.tilt.len());
+        let mut displacement = Tally::new(noise.displacement.len());
         for (at, c) in stops {
             let LinearStop { stop, joint_errors, .. } = at;
             for image in at.images() {
-                let Tie::Tilted(values) = image.tie else { continue };
-                let ([_, places], prior) = (image.latents(), problem.tilt_variance(image.image));
-                places.zip(values).for_each(|(k, value)| tilt.add(stop.series, *value, c[(k, k)], prior, prior));
+                let [_, places] = image.latents();
+                for (component, (k, value)) in places.zip(image.tie.displacement()).enumerate() {
+                    let size = problem.size_of_displacement(image.image, component);
+                    let prior = problem.displacement_variance(image.image, component);
+                    displacement.add(size, *value, c[(k, k)], prior, prior);
+                }
             }
             for (r, value) in joint_errors.iter().enumerate() {
                 let [own_part, local_part] = problem.joint_error_variance(stop, r);
@@ -251,7 +254,7 @@ impl Fit {
             let prior = noise.local[term.reading].powi(2);
             local.add(term.reading, term.value, cov.reduced[(c, c)], prior, prior);
         }
-        Tallies { own, local, tilt }
+        Tallies { own, local, displacement }
     }
 }
 
@@ -365,8 +368,8 @@ struct Tallies {
     /// Noise of the stops by themselves, per series.
     own: Vec<Tally>,
     local: Tally,
-    /// Apparent tilt, indexed by series.
-    tilt: Tally,
+    /// Apparent displacements, indexed as their sizes.
+    displacement: Tally,
 }
 
 impl Tallies {
@@ -393,10 +396,13 @@ impl Tallies {
     }
 }
 
-fn update_tilt(tilt: &Tally, noise: &mut Noise) -> f64 {
-    let all: Vec<usize> = (0..tilt.squares.len()).collect();
-    let usual = Tally::usual(all.iter().map(|&series| (tilt, vec![series])));
-    share_out(&all, tilt, usual, &mut noise.tilt)
+fn update_displacements(tally: &Tally, noise: &mut Noise) -> f64 {
+    let mut change: f64 = 0.0;
+    for all in noise.displacement_groups() {
+        let usual = Tally::usual(all.iter().map(|&size| (tally, vec![size])));
+        change = change.max(share_out(&all, tally, usual, &mut noise.displacement));
+    }
+    change
 }
 
 /// A variance of less than so many of its own standard deviations may be none: to go on towards it changes nothing.

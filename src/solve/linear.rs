@@ -427,11 +427,7 @@ impl<'a> LinearStop<'a> {
     pub fn prior(&self) -> Vec<f64> {
         let problem = &self.linear.adjustment.problem;
         let errors = (0..self.joint_errors.len()).map(|r| problem.joint_error_information(self.stop, r));
-        let ties = self.images().flat_map(|own| {
-            let is_tilted = matches!(own.tie, Tie::Tilted(_));
-            let information = if is_tilted { problem.tilt_information(own.image) } else { 0.0 };
-            std::iter::repeat_n(information, own.tie.len())
-        });
+        let ties = self.images().flat_map(|own| problem.tie_information(own.image, own.tie));
         errors.chain(ties).collect()
     }
 
@@ -460,10 +456,9 @@ impl<'a> LinearStop<'a> {
             latents.into_iter().zip(own.iter()).for_each(|(row, g)| gradient[row] += g);
         }
         for image in self.images() {
-            if let Tie::Tilted(tilt) = image.tie {
-                let [_, places] = image.latents();
-                places.zip(tilt).for_each(|(k, t)| gradient[k] -= t * problem.tilt_information(image.image));
-            }
+            let [_, places] = image.latents();
+            let pulls = image.tie.displacement().iter().zip(problem.tie_information(image.image, image.tie));
+            places.zip(pulls).for_each(|(k, (value, information))| gradient[k] -= value * information);
         }
         gradient
     }

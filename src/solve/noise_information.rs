@@ -12,7 +12,7 @@ use super::fit::Fit;
 use super::linear::LinearStop;
 use super::system::Elimination;
 use crate::linalg::SymmetricFactor;
-use crate::problem::{Adjustment, Family, Noise, Problem, Tie};
+use crate::problem::{Adjustment, Family, Noise, Problem};
 use crate::urdf::JointKind;
 
 /// Latents up to which those of different stops are taken together; of more, their coupling through the parameters is
@@ -81,7 +81,7 @@ pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
     };
     let cov = coupled.as_ref().unwrap_or(cov);
     let own = problem.noise.joint.iter().flatten();
-    let of_errors = own.chain(&problem.noise.local).chain(&problem.noise.tilt).copied();
+    let of_errors = own.chain(&problem.noise.local).chain(&problem.noise.displacement).copied();
     let twists = problem.families.iter().find(|f| f.is_of_twists());
     let variances: Vec<f64> = of_errors.chain(twists.map(|f| f.factor)).map(|s| s * s).collect();
     let of_twists = variances.len() - usize::from(twists.is_some());
@@ -182,18 +182,19 @@ fn stop_latents(Adjustment { problem, state }: &Adjustment, at: &LinearStop) -> 
         let b = if local > 0.0 { first + row } else { a };
         Latent { row, sigma: (own + local).sqrt(), parts: [(a, own / (own + local)), (b, local / (own + local))] }
     };
-    let tilted = at.images().filter(|image| matches!(image.tie, Tie::Tilted(_)));
-    let tilts = tilted.flat_map(|image| {
-        let component = first + problem.noise.local.len() + stop.series;
-        let sigma = problem.tilt_variance(image.image).sqrt();
-        let [_, tilt] = image.latents();
-        tilt.map(move |row| Latent { row, sigma, parts: [(component, 1.0), (component, 0.0)] })
+    let displacements = at.images().flat_map(|image| {
+        let ([_, rows], image, count) = (image.latents(), image.image, image.tie.displacement().len());
+        rows.zip(0..count).map(move |(row, k)| {
+            let component = first + problem.noise.local.len() + problem.size_of_displacement(image, k);
+            let sigma = problem.displacement_variance(image, k).sqrt();
+            Latent { row, sigma, parts: [(component, 1.0), (component, 0.0)] }
+        })
     });
-    (0..joint_errors.len()).map(error).chain(tilts).collect()
+    (0..joint_errors.len()).map(error).chain(displacements).collect()
 }
 
 /// Every variance is drawn to a common one as by so many observations, as in the estimate: joint noise to that of the readings of its group in the
-/// series, this and the tilt to that of all series, local errors to that of all readings of the kind, in which every variance counts with its size and its
+/// series, this and apparent displacements to that of all series, local errors to that of all readings of the kind, in which every variance counts with its size and its
 /// information.
 fn draw_together(
     noise: &Noise,
@@ -232,9 +233,11 @@ fn draw_together(
             local.iter().for_each(|c| draw(&alone(c), &common));
         }
     }
-    let tilts: Vec<usize> = (series * n + noise.local.len()..variances.len()).collect();
-    let all: Vec<_> = tilts.iter().flat_map(alone).collect();
-    tilts.iter().for_each(|c| draw(&alone(c), &all));
+    for group in noise.displacement_groups() {
+        let group: Vec<usize> = group.iter().map(|k| series * n + noise.local.len() + k).collect();
+        let all: Vec<_> = group.iter().flat_map(alone).collect();
+        group.iter().for_each(|c| draw(&alone(c), &all));
+    }
     for (from, to) in drawn {
         let contrast = from - to;
         information.ger(0.5 * SHRINKAGE, &contrast, &contrast, 1.0);

@@ -345,8 +345,11 @@ fn camera_poses_by_robot_terms_mounts_and_latents() {
                     let from = given.taken_from(i);
                     check_chained(&problem, &state, image, from);
                     check_chained(&problem, &state, image, TakenFrom::exact(from.posture.unwrap()));
-                    let tie = Tie::Tilted([deviation, -0.7 * deviation]);
-                    check_chained(&problem, &state, image, TakenFrom { tie: &tie, ..from });
+                    let values = [1.0, -0.7, 0.4, 0.3, -0.5, 0.8].map(|share| share * deviation);
+                    for components in [2, 6] {
+                        let tie = Tie::Displaced(values[..components].to_vec());
+                        check_chained(&problem, &state, image, TakenFrom { tie: &tie, ..from });
+                    }
                     let tie = Tie::Free(given.camera_from_plate(i).unwrap());
                     check_chained(&problem, &state, image, TakenFrom { tie: &tie, ..from });
                 }

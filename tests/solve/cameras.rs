@@ -17,6 +17,16 @@ use crate::support::small::Dice;
 const JOINT_SIGMA: f64 = 3e-4;
 const PIXEL_SIGMA: f64 = 0.05;
 
+fn displaced(pose: &Pose, [tilt, spin, across, along]: [f64; 4], dice: &mut Dice) -> Pose {
+    if [tilt, spin, across, along] == [0.0; 4] {
+        return *pose;
+    }
+    let turn = Vector3::new(dice.normal(tilt), dice.normal(tilt), dice.normal(spin));
+    let shift = Vector3::new(dice.normal(across), dice.normal(across), dice.normal(along));
+    let turned = *pose * Pose::new(exp_so3(&turn), Vector3::zeros());
+    Pose::new(turned.rotation, turned.translation + shift)
+}
+
 /// What cameras with these mounts saw at the same stops, and what the joints were off by at each of them.
 struct Seen {
     series: Vec<MeasuredSeries>,
@@ -40,6 +50,11 @@ fn placed(mounts: &[CameraMount], nominal: &Robot, k: usize) -> (Pose, Pose) {
 }
 
 fn seen(mounts: &[CameraMount], wanted: usize, seed: u64) -> Seen {
+    seen_displaced(mounts, wanted, seed, [0.0; 4])
+}
+
+/// The same, where the pose that an image shows is off by itself: tilt, spin (rad), shift across the optical axis and along it (m).
+fn seen_displaced(mounts: &[CameraMount], wanted: usize, seed: u64, sizes: [f64; 4]) -> Seen {
     println!("seed {seed}");
     let mut dice = Dice::new(seed);
     let nominal = Robot::nominal(robot().chain(None, None).unwrap());
@@ -57,6 +72,7 @@ fn seen(mounts: &[CameraMount], wanted: usize, seed: u64) -> Seen {
         let tip = nominal.base_from_tip(&moved);
         let poses: Vec<Pose> =
             cameras.iter().zip(mounts).map(|((c, p), mount)| mount.camera_from_plate(c, &tip, p)).collect();
+        let poses: Vec<Pose> = poses.into_iter().map(|pose| displaced(&pose, sizes, &mut dice)).collect();
         let faces = |p: &Pose| p.rotation.column(2).dot(&p.translation) < -0.5 * p.translation.norm();
         let shows = |p: &Pose| faces(p) && (0.12..0.9).contains(&p.translation.norm());
         let views: Vec<Vec<Observation>> = poses
@@ -179,6 +195,24 @@ fn a_record_keeps_which_images_are_of_one_stop() {
         let rows = |s: &MeasuredSeries| s.stops.iter().map(|s| (s.row, s.image.clone())).collect::<Vec<_>>();
         assert_eq!(rows(was), rows(is));
     }
+}
+
+#[test]
+fn what_single_images_are_off_by_is_no_joint_noise() {
+    let sizes = [1e-3, 5e-4, 3e-4, 6e-4];
+    let (mut squares, mut of_joints) = ([0.0; 4], 0.0);
+    let worlds = 6;
+    for seed in 0..worlds {
+        let solution = solved(&seen_displaced(&[CameraMount::Fixed; 2], 40, seed, sizes));
+        let noise = &solution.fit.problem.noise;
+        assert_eq!(noise.displacement_sizes(), sizes.len());
+        squares.iter_mut().zip(&noise.displacement).for_each(|(sum, size)| *sum += size * size / worlds as f64);
+        of_joints += noise.joint[0].iter().map(|s| s * s).sum::<f64>() / (6 * worlds) as f64;
+    }
+    for (found, size) in squares.iter().zip(sizes) {
+        assert!((0.75..1.25).contains(&(found.sqrt() / size)), "{} {size}", found.sqrt());
+    }
+    assert!((0.75..1.25).contains(&(of_joints.sqrt() / JOINT_SIGMA)), "{}", of_joints.sqrt());
 }
 
 /// Mean of the squared normalised errors over many worlds, with its 99 % interval, for every mixture of two cameras.

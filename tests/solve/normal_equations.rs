@@ -89,9 +89,9 @@ fn the_images_of_a_stop_have_its_joint_errors_in_common() {
         // One camera of a stop is left out, one is held by nothing, and plates seem to be tilted.
         problem.images[4].rejected = Some(ImageRejection::Excluded);
         state = free_poses(&problem, &state, |i| i == 7);
-        problem.noise.tilt = vec![2e-4];
+        problem.noise.displacement = vec![2e-4];
         for i in [0, 1, 9] {
-            state.ties[i] = Tie::Tilted([1e-4, -2e-4]);
+            state.ties[i] = Tie::Displaced(vec![1e-4, -2e-4]);
         }
         check_against_dense((problem, state));
     }

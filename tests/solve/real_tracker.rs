@@ -165,7 +165,7 @@ type Change = fn(&mut Adjustment, &PoseStage) -> bool;
 const CHANGES: [(&str, Change); 8] = [
     ("as it is", |_, _| false),
     ("no tilt", |a, _| {
-        a.problem.noise.tilt.clear();
+        a.problem.noise.displacement.clear();
         false
     }),
     ("no local errors", |a, _| {
@@ -173,7 +173,7 @@ const CHANGES: [(&str, Change); 8] = [
         false
     }),
     ("neither", |a, _| {
-        a.problem.noise.tilt.clear();
+        a.problem.noise.displacement.clear();
         a.without_local_errors();
         false
     }),
@@ -185,7 +185,7 @@ const CHANGES: [(&str, Change); 8] = [
         true
     }),
     ("tilt of every image free", |a, _| {
-        a.problem.noise.tilt.fill(0.1);
+        a.problem.noise.displacement.fill(0.1);
         true
     }),
     ("pixels five times as noisy", |a, _| {

@@ -1,7 +1,7 @@
 //! The whole adjustment as one dense least-squares problem, from dual numbers: no elimination, no blocks.
 
 use nalgebra::{DMatrix, DVector, Vector3};
-use robotcal::problem::{Adjustment, Problem, State, Tie};
+use robotcal::problem::{Adjustment, Problem, State};
 
 use super::witness::{self, Seed};
 
@@ -26,13 +26,13 @@ fn tie_start(problem: &Problem, state: &State, stop: usize, image: usize) -> usi
     state.joint_errors[stop].len() + before.map(|(i, _)| state.ties[i].len()).sum::<usize>()
 }
 
-/// What a latent is off by and its sigma, where it is a tilt.
-fn tilt(problem: &Problem, state: &State, stop: usize, k: usize) -> Option<(f64, f64)> {
+/// What a latent is off by and its sigma, where it is an apparent displacement.
+fn displacement(problem: &Problem, state: &State, stop: usize, k: usize) -> Option<(f64, f64)> {
     let own = problem.used().filter(|(_, image)| image.stop == stop);
     own.into_iter().find_map(|(i, image)| {
-        let Tie::Tilted(tilt) = &state.ties[i] else { return None };
         let component = k.checked_sub(tie_start(problem, state, stop, i))?;
-        Some((-tilt.get(component)?, problem.noise.tilt[image.series]))
+        let value = state.ties[i].displacement().get(component)?;
+        Some((-value, problem.displacement_variance(image, component).sqrt()))
     })
 }
 
@@ -127,7 +127,7 @@ impl Dense {
                 }
                 Unknown::Latent(stop, k) => match state.joint_errors[stop].get(k) {
                     Some(error) => (-error, problem.noise.joint[problem.stops[stop].series][k]),
-                    None => tilt(problem, state, stop, k).unwrap_or((0.0, f64::INFINITY)),
+                    None => displacement(problem, state, stop, k).unwrap_or((0.0, f64::INFINITY)),
                 },
                 Unknown::Marker(m, k) => (-state.plates[0].corrections[m][k], problem.plates[0].markers[m].sigma_m),
             };

@@ -261,7 +261,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
         pixel_factor: vec![request.pixel_factor; count],
         joint: vec![vec![request.joint_noise.max(1e-6); readings]],
         local: Vec::new(),
-        tilt: Vec::new(),
+        displacement: Vec::new(),
         marker: Vec::new(),
         body: Vec::new(),
     };

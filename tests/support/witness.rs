@@ -194,16 +194,21 @@ pub fn camera_from_plate(state: &State, layout: &Layout, image: &Image, from: Ta
         CameraMount::Hand => inverse(&(tip * camera)) * plate,
         CameraMount::Fixed => inverse(&camera) * tip * plate,
     };
-    let Tie::Tilted(tilt) = from.tie else { return pose };
+    let Tie::Displaced(values) = from.tie else { return pose };
+    let component = |k: usize| {
+        let value = values.get(k).copied().unwrap_or(0.0);
+        variable(value, seed == Some(Seed::Latent(from.joint_errors.len() + k)))
+    };
     // The plate turns about axes through the middle of what is seen: shift, turn, shift back.
     let seen = image.observations.iter().map(|o| state.plates[image.plate].nominal[o.marker]);
     let centre = seen.sum::<Vector3<f64>>() / image.observations.len() as f64;
     let mut turn = [constant(0.0); 6];
-    for k in 0..2 {
-        turn[3 + k] = variable(tilt[k], seed == Some(Seed::Latent(from.joint_errors.len() + k)));
-    }
+    (0..3).for_each(|k| turn[3 + k] = component(k));
+    // The pose as it then shows is shifted along the axes of the camera.
+    let mut along = [constant(0.0); 6];
+    (0..3).for_each(|k| along[k] = component(3 + k));
     let shift = |sign: f64| lift(&nalgebra::Matrix4::new_translation(&(centre * sign)));
-    pose * shift(1.0) * exp(&turn) * shift(-1.0)
+    exp(&along) * pose * shift(1.0) * exp(&turn) * shift(-1.0)
 }
 
 /// Pinhole and Brown-Conrady, in the order of OpenCV: fx fy cx cy k1 k2 p1 p2 k3.
