@@ -52,7 +52,7 @@ impl PoseSpace {
         self.unknowns
     }
 
-    /// Row of a dense column that acts directly; the first three rows of a pose are those of `6 * image`.
+    /// Row of a dense column that acts directly; `None` for one that acts through the poses.
     pub fn row_of(&self, column: usize) -> Option<usize> {
         Some(self.by_dense.nrows() + column.checked_sub(self.direct.start)?)
     }
