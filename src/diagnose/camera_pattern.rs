@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, gate_sentence};
 use crate::assess::{Accuracy, Bearer, Limits, Moved, Pattern, PatternTest, cause, patterns};
 use crate::error::{Code, Notice};
 use crate::fit::Fit;
@@ -81,7 +81,11 @@ impl ResidualPattern {
 
 impl fmt::Display for ResidualPattern {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.notice().fmt(f)
+        let notice = self.notice();
+        match self.matters {
+            true => f.write_str(&gate_sentence(&format!("{}: {}", notice.place, notice.what), &notice.remedy)),
+            false => notice.fmt(f),
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::kind::{Kind, Quantity, Subject, Weight, some_of};
+use super::kind::{Kind, Quantity, Subject, Weight, gate_sentence, some_of};
 use crate::error::{Code, Notice};
 
 /// Most images that are named.
@@ -123,7 +123,7 @@ impl fmt::Display for Displaced {
         let (what, remedy) = self.what_and_remedy();
         match self.weight {
             Weight::Note => self.notice().fmt(f),
-            _ => write!(f, "{what}; {remedy}"),
+            _ => f.write_str(&gate_sentence(&what, &remedy)),
         }
     }
 }

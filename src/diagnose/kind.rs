@@ -104,6 +104,11 @@ pub(super) trait Kind: fmt::Display {
     }
 }
 
+/// Sentence of a gate: what was found, and after the only semicolon what to do.
+pub(super) fn gate_sentence(what: &str, remedy: &str) -> String {
+    format!("{}; {remedy}", what.replace("; ", ", "))
+}
+
 /// Names of the first few, and how many more there are.
 pub(super) fn some_of(names: &[String], most: usize) -> String {
     let more = names.len().saturating_sub(most);
