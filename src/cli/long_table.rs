@@ -216,8 +216,8 @@ fn joint_noise(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         let of = if all.len() > 1 { format!(" ({name})") } else { String::new() };
         let tilt = Some(noise.apparent_tilt_rad).filter(|t| *t > 0.0);
         let tilt = tilt.map(|t| format!("; apparent tilt of the plate {:.3}", 1e3 * t));
-        let shift = noise.apparent_shift.map(|[spin, across, along]| {
-            let [spin, across, along] = [spin, across, along].map(|size| 1e3 * size);
+        let shift = noise.apparent_shift.map(|shift| {
+            let [spin, across, along] = [shift.spin_rad, shift.across_m, shift.along_m].map(|size| 1e3 * size);
             format!(", spin {spin:.3}, shift across the optical axis {across:.3} mm, along it {along:.3} mm")
         });
         let displaced = [tilt, shift].map(Option::unwrap_or_default).concat();

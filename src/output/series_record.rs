@@ -61,8 +61,18 @@ pub struct StopNoise {
     pub joint_interval: Vec<[Option<f64>; 2]>,
     /// Apparent tilt of the plate in each image, rad; 0 where it is not part of the model.
     pub apparent_tilt_rad: f64,
-    /// Apparent spin of the plate about its normal in each image, rad, and shift across the optical axis and along it, m; absent where no
-    /// two cameras saw the same stops.
+    /// The rest of the apparent displacement of the plate in each image; absent where no two cameras saw the same stops.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub apparent_shift: Option<[f64; 3]>,
+    pub apparent_shift: Option<ApparentShift>,
+}
+
+/// Apparent displacement of the plate beside its tilt.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ApparentShift {
+    /// About its normal, rad.
+    pub spin_rad: f64,
+    /// Across the optical axis, along each of two directions, m.
+    pub across_m: f64,
+    /// Along the optical axis, m.
+    pub along_m: f64,
 }

@@ -19,7 +19,7 @@ use crate::solve::PlateScale;
 use crate::urdf::{FoundOrigin, JointKind, Payload};
 
 pub use super::pose_record::{PlacedRecord, PoseRecord};
-pub use super::series_record::{SeriesRecord, StopNoise};
+pub use super::series_record::{ApparentShift, SeriesRecord, StopNoise};
 pub use super::solution_bytes::{read, to_bytes};
 
 /// Name of the file.

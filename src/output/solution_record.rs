@@ -12,9 +12,9 @@ use super::names::{ImageNames, plate_name, series_name};
 use super::pose_files::determined;
 use super::residuals::{poses, residuals};
 use super::solution_json::{
-    AccuracyRecord, CameraRecord, FORMAT, FreePoseRecord, ImageRecord, JointRecord, ObservationColumns, PlacedRecord,
-    PlateRecord, ProgramRecord, RobotRecord, ScatterRecord, SeriesRecord, SolutionRecord, StatisticsRecord, StopNoise,
-    TermRecord, UrdfRecord,
+    AccuracyRecord, ApparentShift, CameraRecord, FORMAT, FreePoseRecord, ImageRecord, JointRecord, ObservationColumns,
+    PlacedRecord, PlateRecord, ProgramRecord, RobotRecord, ScatterRecord, SeriesRecord, SolutionRecord,
+    StatisticsRecord, StopNoise, TermRecord, UrdfRecord,
 };
 use crate::assess::{ProjectionMap, median};
 use crate::error::Result;
@@ -215,7 +215,11 @@ fn stop_noise(solution: &Solution, series: &[usize]) -> StopNoise {
         joint: (0..readings).map(|r| rms(&|s| sigmas[s][r])).collect(),
         joint_interval: (0..readings).filter_map(interval).collect(),
         apparent_tilt_rad: displacement(0),
-        apparent_shift: (sizes > 1).then(|| [displacement(1), displacement(2), displacement(3)]),
+        apparent_shift: (sizes > 1).then(|| ApparentShift {
+            spin_rad: displacement(1),
+            across_m: displacement(2),
+            along_m: displacement(3),
+        }),
     }
 }
 

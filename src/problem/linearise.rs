@@ -267,12 +267,12 @@ impl State {
         if values.is_empty() {
             return Some(Chained { pose, d_theta: g, d_latent: l });
         }
-        let Displaced { pose, turned, d_components } = Displaced::new(&pose, &seen_centre(image, self), values);
+        let displaced = Displaced::new(&pose, &seen_centre(image, self), values);
         // What moves the pose before the plate is turned moves it after that as seen from the turned plate.
-        let carry = adjoint(&turned.inverse());
+        let carry = adjoint(&displaced.turned.inverse());
         let carry = DMatrix::from_column_slice(6, 6, carry.as_slice());
         let mut l = &carry * l;
-        l.columns_mut(joints, values.len()).copy_from(&d_components);
-        Some(Chained { pose, d_theta: carry * g, d_latent: l })
+        l.columns_mut(joints, values.len()).copy_from(&displaced.d_components().columns(0, values.len()));
+        Some(Chained { pose: displaced.pose, d_theta: carry * g, d_latent: l })
     }
 }

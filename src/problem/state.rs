@@ -1,6 +1,6 @@
 //! Every unknown, with its value.
 
-use nalgebra::{Matrix6, Matrix6x3, Matrix6xX, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix6, Matrix6x3, SMatrix, SVector, Vector3, Vector6};
 
 use super::image::Image;
 use super::stop::{TakenFrom, Tie};
@@ -98,8 +98,9 @@ pub(super) struct Displaced {
     pub pose: Pose,
     /// By which the plate is turned, plate frame.
     pub turned: Pose,
-    /// Derivatives of the pose by the components, body twists, 6 x components.
-    pub d_components: Matrix6xX<f64>,
+    /// The twist of that, and its derivative by the turns.
+    twist: Vector6<f64>,
+    axes: Matrix6x3<f64>,
 }
 
 impl Displaced {
@@ -111,10 +112,15 @@ impl Displaced {
         let turned = Pose::exp(&twist);
         let mut pose = *pose * turned;
         pose.translation += Vector3::from_fn(|k, _| component(3 + k));
+        Self { pose, turned, twist, axes }
+    }
+
+    /// Derivatives of the pose by all components, body twists.
+    pub fn d_components(&self) -> Matrix6<f64> {
         let mut all = Matrix6::zeros();
-        all.fixed_columns_mut::<3>(0).copy_from(&(right_jacobian_se3(&twist) * axes));
-        all.fixed_view_mut::<3, 3>(0, 3).copy_from(&pose.rotation.transpose());
-        Self { pose, turned, d_components: all.columns(0, values.len()).into_owned() }
+        all.fixed_columns_mut::<3>(0).copy_from(&(right_jacobian_se3(&self.twist) * self.axes));
+        all.fixed_view_mut::<3, 3>(0, 3).copy_from(&self.pose.rotation.transpose());
+        all
     }
 }
 

@@ -207,7 +207,7 @@ impl DenseCoupling {
 
 /// Multiplies three columns from `first` on by `m` from the right.
 #[inline(always)]
-pub(super) fn times_right(y: &mut DMatrix<f64>, first: usize, m: &Matrix3<f64>) {
+fn times_right(y: &mut DMatrix<f64>, first: usize, m: &Matrix3<f64>) {
     let rows = y.nrows();
     let (x, rest) = y.as_mut_slice()[first * rows..(first + 3) * rows].split_at_mut(rows);
     let (y, z) = rest.split_at_mut(rows);

@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::blocks::{MarkerRows, PoseRows, STOPS_A_PRODUCT, SeenMarkers, times_right};
+use super::blocks::{MarkerRows, PoseRows, STOPS_A_PRODUCT, SeenMarkers};
 use super::distances::Distances;
 use super::linear::Carried;
 use super::linear::LinearProblem;
@@ -159,15 +159,14 @@ impl MarkersEliminated {
         distances: &Distances,
         carried: Option<&Carried>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
-        let mut d = self.y.clone();
-        for (p, plate) in self.seen.number.iter().enumerate() {
-            for (m, at) in plate.iter().enumerate().filter_map(|(m, at)| at.map(|at| (m, at))) {
-                times_right(&mut d, 3 * at, &self.inverse_factors[at]);
-                for (start, modes) in carried.into_iter().flat_map(|c| c(p, m)) {
-                    let Some(row) = self.space.row_of(start) else { continue };
-                    let mut own = d.view_mut((row, 3 * at), (MODES, 3));
-                    own -= modes.transpose();
-                }
+        let mut rows = MarkerRows { values: self.y.clone() };
+        rows.times_right(self.inverse_factors.iter().copied());
+        let mut d = rows.values;
+        for (at, &(p, m)) in self.seen.order.iter().enumerate() {
+            for (start, modes) in carried.into_iter().flat_map(|c| c(p, m)) {
+                let Some(row) = self.space.row_of(start) else { continue };
+                let mut own = d.view_mut((row, 3 * at), (MODES, 3));
+                own -= modes.transpose();
             }
         }
         let cd = product(&self.space.spread(reduced), &d);

@@ -194,8 +194,8 @@ fn stop_latents(Adjustment { problem, state }: &Adjustment, at: &LinearStop) -> 
 }
 
 /// Every variance is drawn to a common one as by so many observations, as in the estimate: joint noise to that of the readings of its group in the
-/// series, this and apparent displacements to that of all series, local errors to that of all readings of the kind, in which every variance counts with its size and its
-/// information.
+/// series, this and apparent displacements to that of all series, local errors to that of all readings of the kind, in which every variance counts
+/// with its size and its information.
 fn draw_together(
     noise: &Noise,
     kinds: &[JointKind],
