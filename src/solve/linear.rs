@@ -367,11 +367,13 @@ impl<'a> LinearImage<'a> {
         by_latents(self.chain, self.latents().into_iter().flatten(), latent)
     }
 
-    /// Dense columns that it depends on and that are free.
+    /// Dense columns that it depends on and that are free, ascending.
     pub(super) fn free_columns(&self) -> Vec<usize> {
         let layout = &self.problem.layout;
         let all = (0..layout.theta_len()).chain(self.columns().into_iter().flatten());
-        all.filter(|&c| layout.columns[c].free).collect()
+        let mut free: Vec<usize> = all.filter(|&c| layout.columns[c].free).collect();
+        free.sort_unstable();
+        free
     }
 }
 

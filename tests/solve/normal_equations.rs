@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use robotcal::assess::{Limits, clustered_covariance};
 use robotcal::identify::{PoseStage, linear_step};
 use robotcal::linalg::SymmetricFactor;
+use robotcal::model::camera::Lens;
 use robotcal::model::joint_terms::Term;
 use robotcal::problem::{
     Adjustment, Image, ImageRejection, ObservationRejection, Problem, State, Step, Tie, release_measured_scales,
@@ -27,15 +28,28 @@ fn awkward(mount: CameraMount) -> (Problem, State) {
     state.joint_errors[4] = Vec::new();
     problem.stops[5].posture = None;
     problem.images[6].rejected = Some(ImageRejection::Excluded);
-    for image in &mut problem.images {
-        image.observations[UNSEEN].rejected = Some(ObservationRejection::Excluded);
-    }
+    hide(&mut problem);
     problem.images[1].observations[2].uv.x += 3.0;
     problem.images[2].observations[3].rejected = Some(ObservationRejection::Excluded);
     problem.plates[0].markers[4].sigma_m = 3e-5;
     measure_distance(&mut problem, 4, 11);
     problem.layout.set_free(false, |name| name.ends_with("joint_2/origin.rx") || name == "camera/front/lens.k3");
     (problem, state)
+}
+
+/// A displacement field: its columns stand before those of the plate, and after them in the blocks of an image.
+fn with_field() -> (Problem, State) {
+    let request = Request { lens: Lens::BrownField, images: 4, radius_m: 0.0, ..Request::default() };
+    let (mut problem, state) = problem(&mut Dice::new(15), &request);
+    hide(&mut problem);
+    (problem, state)
+}
+
+/// No image shows the unseen marker.
+fn hide(problem: &mut Problem) {
+    for image in &mut problem.images {
+        image.observations[UNSEEN].rejected = Some(ObservationRejection::Excluded);
+    }
 }
 
 /// A distance known better than the tolerances of the markers, and 0.3 mm longer than nominal.
@@ -74,6 +88,7 @@ fn the_reduced_system_equals_the_dense_normal_equations() {
     for mount in [CameraMount::Hand, CameraMount::Fixed] {
         check_against_dense(awkward(mount));
     }
+    check_against_dense(with_field());
 }
 
 #[test]
@@ -82,9 +97,7 @@ fn the_images_of_a_stop_have_its_joint_errors_in_common() {
         let mut dice = Dice::new(14);
         let request = Request { mount, images: 12, images_a_stop: 2, ..Request::default() };
         let (mut problem, mut state) = problem(&mut dice, &request);
-        for image in &mut problem.images {
-            image.observations[UNSEEN].rejected = Some(ObservationRejection::Excluded);
-        }
+        hide(&mut problem);
         measure_distance(&mut problem, 2, UNSEEN);
         // One camera of a stop is left out, one is held by nothing, and plates seem to be tilted.
         problem.images[4].rejected = Some(ImageRejection::Excluded);

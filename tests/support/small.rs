@@ -15,6 +15,10 @@ use robotcal::problem::{
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 use robotcal::urdf::{CarriedMass, Chain, Drive, Joint, JointKind};
 
+/// Size of the images.
+const WIDTH_PX: u32 = 1280;
+const HEIGHT_PX: u32 = 1024;
+
 /// Random numbers of a printed seed.
 pub struct Dice(ChaCha8Rng);
 
@@ -121,6 +125,7 @@ pub struct Request {
     pub radius_m: f64,
     /// True noise of the observations in units of the stated covariance.
     pub pixel_factor: f64,
+    pub lens: Lens,
 }
 
 impl Default for Request {
@@ -137,6 +142,7 @@ impl Default for Request {
             lattice: (4, 3),
             radius_m: 0.006,
             pixel_factor: 1.3,
+            lens: Lens::Brown,
         }
     }
 }
@@ -180,8 +186,10 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
     let mut shape = PlateShape::nominal(&plate);
     shape.modes = std::array::from_fn(|_| dice.normal(1e-4));
     shape.corrections.iter_mut().for_each(|c| *c = Vector3::from_fn(|_, _| dice.normal(1e-4)));
-    let mut camera = Camera::pinhole(Lens::Brown, 1280, 1024, 1000.0);
-    camera.parameters = vec![1010.0, 990.0, 655.0, 505.0, -0.15, 0.03, 8e-4, -5e-4, 0.004];
+    let mut camera = Camera::pinhole(request.lens, WIDTH_PX, HEIGHT_PX, 1000.0);
+    camera.parameters[..9].copy_from_slice(&[1010.0, 990.0, 655.0, 505.0, -0.15, 0.03, 8e-4, -5e-4, 0.004]);
+    let formula = camera.parametric();
+    camera.parameters[formula..].iter_mut().for_each(|c| *c = dice.normal(0.3));
     let mounting = dice.pose(0.2, 3.0);
     let mut noise = || (0..readings).map(|_| dice.normal(request.joint_noise)).collect();
     let joint_errors = (0..request.images / request.images_a_stop).map(|_| noise()).collect();
@@ -353,8 +361,8 @@ pub fn series(problem: &Problem) -> MeasuredSeries {
         camera: problem.cameras[0].clone(),
         mounting: problem.mountings[0].clone(),
         mount: problem.images[0].mount,
-        width_px: 1280,
-        height_px: 1024,
+        width_px: WIDTH_PX,
+        height_px: HEIGHT_PX,
         focal_px: None,
         known_camera: None,
         lens: Lens::Brown,

@@ -252,6 +252,9 @@ pub fn project_through(lens: Lens, p: &[D], x: &[D; 3]) -> [D; 2] {
     [p[0] * u + p[2], p[1] * v + p[3]]
 }
 
+/// Squares of the field of an image of 1280 x 1024.
+const FIELD_CELLS: [usize; 2] = [10, 8];
+
 /// A displacement field on top of an image point, whose control points hold u and v in `c`, row by row; the image is divided into
 /// `cells` squares, and the field goes on beyond it as it is at the border.
 pub fn displaced(h: [D; 2], c: &[D], size_px: [f64; 2], cells: [usize; 2]) -> [D; 2] {
@@ -320,11 +323,17 @@ pub fn samples(camera_from_plate: &D4, centre: &[D; 3], radius_m: f64) -> usize 
     if distance > 50.0 * radius_m { 8 } else { 12 }
 }
 
-/// Image of a circle with `samples` points of its contour; radius 0 is a point.
-pub fn circle(parameters: &[D], camera_from_plate: &D4, centre: &[D; 3], radius_m: f64, samples: usize) -> [D; 2] {
+/// Image of a circle with `samples` points of its contour, where `project` says what a point shows; radius 0 is a point.
+pub fn circle(
+    project: impl Fn(&[D; 3]) -> [D; 2],
+    camera_from_plate: &D4,
+    centre: &[D; 3],
+    radius_m: f64,
+    samples: usize,
+) -> [D; 2] {
     let image = |x: [D; 3]| {
         let h = camera_from_plate * SMatrix::<D, 4, 1>::new(x[0], x[1], x[2], constant(1.0));
-        project(parameters, &[h[0], h[1], h[2]])
+        project(&[h[0], h[1], h[2]])
     };
     if radius_m == 0.0 {
         return image(*centre);
@@ -370,9 +379,15 @@ pub fn predict(
     let pose = camera_from_plate(state, layout, image, from, seed);
     let centre = marker(state, layout, image.plate, observation.marker, seed);
     let range = layout.cameras[image.camera].clone();
-    let parameters: Vec<D> = (state.cameras[image.camera].parameters.iter().zip(range))
-        .map(|(p, c)| variable(*p, seed == Some(Seed::Column(c))))
-        .collect();
+    let camera = &state.cameras[image.camera];
+    let parameters: Vec<D> =
+        (camera.parameters.iter().zip(range)).map(|(p, c)| variable(*p, seed == Some(Seed::Column(c)))).collect();
+    let (formula, field) = parameters.split_at(camera.parametric());
+    let size_px = [camera.width_px, camera.height_px].map(f64::from);
+    let project = |x: &[D; 3]| match project_through(camera.lens, formula, x) {
+        h if field.is_empty() => h,
+        h => displaced(h, field, size_px, FIELD_CELLS),
+    };
     let samples = samples(&pose, &centre, observation.mark.radius_m());
-    circle(&parameters, &pose, &centre, observation.mark.radius_m(), samples)
+    circle(project, &pose, &centre, observation.mark.radius_m(), samples)
 }
