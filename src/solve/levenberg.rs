@@ -123,6 +123,11 @@ const LAMBDA_IF_REFUSED: f64 = 1e-9;
 const LAMBDA_IF_SINGULAR: f64 = 1e-3;
 const SMALLEST_LAMBDA: f64 = 1e-12;
 
+/// Most steps of a detour.
+const LONGEST_DETOUR: usize = 6;
+/// A detour goes on while every step leaves at most this share of the cost of the one before.
+const COMING_DOWN: f64 = 0.5;
+
 /// Newton decrement of the first step of a model up to which its information is that of the end: no unknown moved by more sigmas.
 const NEAR: f64 = 1.0;
 
@@ -335,53 +340,100 @@ pub(super) fn minimise_near(adjustment: Adjustment, settings: &Settings) -> Mini
 }
 
 fn minimise_by(
-    mut proposer: Proposer,
-    mut adjustment: Adjustment,
+    proposer: Proposer,
+    adjustment: Adjustment,
     linearised: Option<Linearised>,
     settings: &Settings,
 ) -> Minimised {
-    let mut iterations = 0;
-    let Some(mut lin) = linearised else {
-        let outcome = Outcome { status: Status::BadStart, adjustment, linearised: None, iterations };
+    let Some(lin) = linearised else {
+        let outcome = Outcome { status: Status::BadStart, adjustment, linearised: None, iterations: 0 };
         return Minimised { outcome, proposer };
     };
-    let mut lambda = SMALLEST_LAMBDA;
-    let mut status = Status::OutOfIterations;
-    while iterations < settings.iterations && lambda <= LARGEST_LAMBDA {
+    let mut descent = Descent { adjustment, lin, proposer, lambda: SMALLEST_LAMBDA, detour: None };
+    let (mut iterations, mut status) = (0, Status::OutOfIterations);
+    while iterations < settings.iterations && status == Status::OutOfIterations {
         iterations += 1;
-        let Some(proposal) = proposer.propose(adjustment.linear(&lin), lambda) else {
-            lambda = raised(lambda, LAMBDA_IF_SINGULAR);
-            continue;
-        };
-        let Proposal { decrement, kept, .. } = proposal;
-        let expected = Expected::of(decrement, proposer.before, lin.cost, settings);
-        let before = take_step(&mut adjustment, &proposal.step);
-        let tried = adjustment.linearise();
-        tracing::trace!(iterations, kept, lambda, decrement, from = lin.cost, to = tried.as_ref().map(|t| t.cost));
-        if let Some(better) = tried.filter(|t| expected.accepts(t.cost, lin.cost)) {
-            lin = better;
-            proposer.accepted(&proposal);
-            lambda = (lambda * 0.1).max(SMALLEST_LAMBDA);
-            if expected.last {
-                status = Status::Converged;
-                break;
-            }
-        } else {
-            adjustment.state = before;
-            if expected.small {
-                status = Status::Converged;
-                break;
-            }
-            proposer.refused();
-            if !kept {
-                lambda = raised(lambda, LAMBDA_IF_REFUSED);
-            }
-        }
+        status = descent.step(settings);
     }
-    if lambda > LARGEST_LAMBDA {
-        status = Status::Stalled;
-    }
+    descent.turn_back();
+    let Descent { adjustment, lin, proposer, .. } = descent;
     tracing::debug!(iterations, ?status, cost = lin.cost, "levenberg-marquardt");
     let outcome = Outcome { status, adjustment, linearised: Some(lin), iterations };
     Minimised { outcome, proposer }
+}
+
+/// A way over higher ground: where it began, and the cost there.
+struct Detour {
+    from: State,
+    cost: f64,
+    steps: usize,
+}
+
+/// An iteration under way.
+struct Descent {
+    adjustment: Adjustment,
+    /// At its state.
+    lin: Linearised,
+    proposer: Proposer,
+    lambda: f64,
+    detour: Option<Detour>,
+}
+
+impl Descent {
+    /// Tries one more step; out of iterations for as long as others may follow.
+    fn step(&mut self, settings: &Settings) -> Status {
+        let Some(proposal) = self.proposer.propose(self.adjustment.linear(&self.lin), self.lambda) else {
+            return self.refuse(raised(self.lambda, LAMBDA_IF_SINGULAR));
+        };
+        let Proposal { decrement, kept, .. } = proposal;
+        let least = self.detour.as_ref().map_or(self.lin.cost, |detour| detour.cost);
+        let expected = Expected::of(decrement, self.proposer.before, least, settings);
+        let before = take_step(&mut self.adjustment, &proposal.step);
+        let tried = self.adjustment.linearise();
+        let (lambda, to) = (self.lambda, tried.as_ref().map(|t| t.cost));
+        tracing::trace!(kept, lambda, decrement, from = self.lin.cost, to);
+        match tried {
+            Some(better) if expected.accepts(better.cost, least) => {
+                (self.lin, self.detour) = (better, None);
+                self.proposer.accepted(&proposal);
+                self.lambda = (lambda * 0.1).max(SMALLEST_LAMBDA);
+                if expected.last { Status::Converged } else { Status::OutOfIterations }
+            }
+            Some(worse) if !kept && !expected.small && self.may_pass(worse.cost) => {
+                let cost = std::mem::replace(&mut self.lin, worse).cost;
+                self.detour.get_or_insert(Detour { from: before, cost, steps: 0 }).steps += 1;
+                self.proposer.refused();
+                Status::OutOfIterations
+            }
+            _ => {
+                self.adjustment.state = before;
+                if expected.small && self.detour.is_none() {
+                    return Status::Converged;
+                }
+                self.refuse(if kept { lambda } else { raised(lambda, LAMBDA_IF_REFUSED) })
+            }
+        }
+    }
+
+    /// True where a step to a higher cost may be the first of a way that ends below: any one step, and those that come down at once after it.
+    fn may_pass(&self, cost: f64) -> bool {
+        self.detour.as_ref().is_none_or(|d| d.steps < LONGEST_DETOUR && cost < COMING_DOWN * self.lin.cost)
+    }
+
+    /// Goes on from the best state with other damping.
+    fn refuse(&mut self, lambda: f64) -> Status {
+        self.turn_back();
+        self.proposer.refused();
+        self.lambda = lambda;
+        if lambda > LARGEST_LAMBDA { Status::Stalled } else { Status::OutOfIterations }
+    }
+
+    fn turn_back(&mut self) {
+        let Some(Detour { from, .. }) = self.detour.take() else { return };
+        let away = std::mem::replace(&mut self.adjustment.state, from);
+        match self.adjustment.linearise() {
+            Some(lin) => self.lin = lin,
+            None => self.adjustment.state = away,
+        }
+    }
 }

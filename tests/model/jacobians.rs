@@ -227,7 +227,13 @@ fn circle_witness(
         let twist = std::array::from_fn(|k| variable(0.0, s[k]));
         let at = std::array::from_fn(|k| variable(centre[k], s[6 + k]));
         let p: Vec<D> = camera.parameters.iter().enumerate().map(|(k, v)| variable(*v, s[9 + k])).collect();
-        witness::circle(|x| witness::project(&p, x), &(witness::lift(&pose.matrix()) * witness::exp(&twist)), &at, radius, n)
+        witness::circle(
+            |x| witness::project(&p, x),
+            &(witness::lift(&pose.matrix()) * witness::exp(&twist)),
+            &at,
+            radius,
+            n,
+        )
     };
     (columns::<18>(evaluate), evaluate([false; 18]).map(|d| d.re))
 }

@@ -3,12 +3,12 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use crate::support::small::{Dice, Part, Request, free_poses, problem, series};
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix2, Vector2, Vector3};
 use robotcal::assess::Limits;
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
 use robotcal::model::joint_terms::Term;
-use robotcal::problem::{Adjustment, Problem, State, Tie};
+use robotcal::problem::{Adjustment, Problem, State, Tie, predict};
 use robotcal::solve::{
     ComponentOptions, Covariance, Fit, JOINT_NOISE_FLOOR, NoiseUncertainty, Outcome, Settings, Status,
     estimate_components, noise_information, solve,
@@ -389,6 +389,45 @@ fn assert_same_bits(one: &Solution, two: &Solution) {
     assert_eq!(one.fit.linearised.cost.to_bits(), two.fit.linearised.cost.to_bits());
     let markers = |s: &Solution| s.fit.covariance.markers();
     assert_eq!(markers(one), markers(two));
+}
+
+/// Images of a plate of 0.24 m all over the picture, from that far; one sigma of their tilt, per axis.
+fn far_views(depth_m: f64, tilt_rad: f64) -> (Problem, State) {
+    let mut dice = Dice::new(31);
+    let request = Request { images: 40, lattice: (9, 7), radius_m: 0.0, ..Request::default() };
+    let (mut problem, state) = problem(&mut dice, &request);
+    let mut state = free_poses(&problem, &state, |_| true);
+    state.cameras[0].parameters[4..].copy_from_slice(&[-0.4, 0.14, -0.003, -0.002, 0.1]);
+    for (i, image) in problem.images.iter_mut().enumerate() {
+        let turn = exp_so3(&Vector3::new(dice.normal(tilt_rad), dice.normal(tilt_rad), dice.normal(1.0)));
+        let place = Vector3::new(dice.between(-0.33, 0.33), dice.between(-0.25, 0.25), 1.0) * depth_m;
+        let pose = Pose::new(turn * exp_so3(&Vector3::new(std::f64::consts::PI, 0.0, 0.0)), place);
+        let exact: Vec<_> = image.observations.iter().map(|o| predict(image, &state, &pose, o).unwrap().uv).collect();
+        for (observation, uv) in image.observations.iter_mut().zip(exact) {
+            observation.uv = uv + Vector2::new(dice.normal(0.03), dice.normal(0.03));
+            observation.information = Matrix2::identity() / (0.03 * 0.03);
+        }
+        state.ties[i] = Tie::Free(pose);
+    }
+    (problem, state)
+}
+
+/// Focal length, distance, tilt and distortion of far views change together, along a narrow curved valley.
+#[test]
+fn a_start_far_up_the_valley_of_the_focal_length_comes_down() {
+    for (depth_m, tilt_rad) in [(2.0, 0.1), (3.0, 0.1), (3.0, 0.25), (3.0, 0.4)] {
+        let (problem, mut state) = far_views(depth_m, tilt_rad);
+        state.cameras[0].parameters[..2].iter_mut().for_each(|focal| *focal *= 1.4);
+        state.cameras[0].parameters[4..].fill(0.0);
+        for tie in &mut state.ties {
+            let Tie::Free(pose) = tie else { panic!("every image has a pose of its own") };
+            pose.translation.z *= 1.4;
+        }
+        let mut adjustment = Adjustment { problem, state };
+        adjustment.hold_poses();
+        let outcome = converged(&adjustment.problem.clone(), adjustment.state, &Settings::new(40, 0.1));
+        println!("{depth_m} m, {tilt_rad} rad: {} steps, cost {:.1}", outcome.iterations, cost(&outcome));
+    }
 }
 
 #[test]
