@@ -184,19 +184,41 @@ fn shown(text: &str) -> String {
 
 /// The known name that was probably meant by `given`: at most two letters (a third of a short word) away, else `None`.
 ///
-/// Case and the choice between `-`, `_` and blank do not count. Of equally near names the first one wins.
+/// Case and the choice between `-`, `_` and blank do not count. Numbers do: `stop 7` was not meant by `stop 8`. Of equally near names the first
+/// one wins.
 pub fn closest_name<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let plain = |s: &str| s.to_lowercase().replace(['-', ' '], "_").chars().collect::<Vec<_>>();
     let given = plain(given);
+    let numbers_of_given = numbers(&given);
     let reach = given.len().div_ceil(3).min(2);
     known
         .into_iter()
         .map(|name| (plain(name), name))
-        .filter(|(name, _)| name.len().abs_diff(given.len()) <= reach)
+        .filter(|(name, _)| name.len().abs_diff(given.len()) <= reach && numbers(name) == numbers_of_given)
         .map(|(plain, name)| (edit_distance(&given, &plain), name))
         .filter(|(distance, _)| *distance <= reach)
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, name)| name)
+}
+
+/// Letters without case, one separator, and digits for the letters that look like them behind a digit.
+fn plain(name: &str) -> Vec<char> {
+    let mut plain: Vec<char> = Vec::with_capacity(name.len());
+    for c in name.to_lowercase().chars() {
+        let behind_a_digit = plain.last().is_some_and(char::is_ascii_digit);
+        plain.push(match c {
+            '-' | ' ' => '_',
+            'o' if behind_a_digit => '0',
+            'l' | 'i' if behind_a_digit => '1',
+            c => c,
+        });
+    }
+    plain
+}
+
+/// The numbers in a name, without leading zeros.
+fn numbers(plain: &[char]) -> Vec<String> {
+    let digits = plain.split(|c| !c.is_ascii_digit()).filter(|digits| !digits.is_empty());
+    digits.map(|digits| digits.iter().skip_while(|c| **c == '0').collect()).collect()
 }
 
 /// Levenshtein distance.
@@ -256,5 +278,11 @@ mod tests {
         assert_eq!(closest_name("tipp", known), Some("tip"));
         assert_eq!(closest_name("velocity", known), None);
         assert_eq!(closest_name("", known), None);
+        let numbered = ["stop01", "stop07", "stop50", "joint_a1"];
+        assert_eq!(closest_name("stop5O", numbered), Some("stop50"));
+        assert_eq!(closest_name("stop_1", numbered), Some("stop01"));
+        assert_eq!(closest_name("stop60", numbered), None);
+        assert_eq!(closest_name("jont_a1", numbered), Some("joint_a1"));
+        assert_eq!(closest_name("joint_a2", numbered), None);
     }
 }
