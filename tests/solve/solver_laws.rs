@@ -425,7 +425,7 @@ fn a_start_far_up_the_valley_of_the_focal_length_comes_down() {
         }
         let mut adjustment = Adjustment { problem, state };
         adjustment.hold_poses();
-        let outcome = converged(&adjustment.problem.clone(), adjustment.state, &Settings::new(40, 0.1));
+        let outcome = converged(&adjustment.problem, adjustment.state, &Settings::new(40, 0.1));
         println!("{depth_m} m, {tilt_rad} rad: {} steps, cost {:.1}", outcome.iterations, cost(&outcome));
     }
 }
