@@ -28,6 +28,8 @@ pub enum Displacement {
     FromThenOn,
     /// Where its axis x, y or z (0, 1, 2) points up: held by its weight only.
     AxisUp(usize),
+    /// More in each than in the one before: it creeps.
+    AllThrough,
 }
 
 /// A body stands elsewhere in some images, by too little for any of them to be left out.
@@ -43,7 +45,7 @@ pub struct Displaced {
     pub displacement: Displacement,
     /// Images in which it stands elsewhere, in this order.
     pub images: Vec<String>,
-    /// How far, m, and sigma per axis.
+    /// How far, m, and sigma per axis; of what creeps, from the first to the last image.
     pub distance_m: (f64, f64),
     /// By which angle, rad, and sigma per axis.
     pub angle_rad: (f64, f64),
@@ -54,9 +56,9 @@ pub struct Displaced {
 }
 
 impl Displaced {
-    /// True where it happened once, in images of this mounting.
+    /// True where it happened in the course of time, in images of this mounting.
     pub(super) fn explains_two_places_of(&self, mounting: &str) -> bool {
-        self.displacement == Displacement::FromThenOn && self.mounting == mounting
+        !matches!(self.displacement, Displacement::AxisUp(_)) && self.mounting == mounting
     }
 
     fn is_camera(&self) -> bool {
@@ -114,6 +116,12 @@ impl Displaced {
                 );
                 (what, "fasten it, and take the series again".into())
             }
+            Displacement::AllThrough => {
+                let what = format!(
+                    "series {series}: from the first to the last image the {body} creeps by {size}: it is not yet warm, or gives way; {gain}"
+                );
+                (what, "let camera and robot warm up, fasten what creeps, and take the series again".into())
+            }
         }
     }
 }
@@ -133,6 +141,8 @@ impl Kind for Displaced {
         match (self.displacement, self.is_camera()) {
             (Displacement::FromThenOn, false) => Code::PlateDisplaced,
             (Displacement::FromThenOn, true) => Code::CameraDisplaced,
+            (Displacement::AllThrough, false) => Code::PlateDrifts,
+            (Displacement::AllThrough, true) => Code::CameraDrifts,
             (Displacement::AxisUp(_), false) => Code::PlateLoose,
             (Displacement::AxisUp(_), true) => Code::CameraLoose,
         }
@@ -144,7 +154,9 @@ impl Kind for Displaced {
 
     fn subjects(&self) -> Vec<Subject> {
         let mut all = vec![Subject::Series(self.series.clone()), Subject::Body(self.body().to_owned())];
-        all.extend(self.images.iter().cloned().map(Subject::Image));
+        if self.displacement != Displacement::AllThrough {
+            all.extend(self.images.iter().cloned().map(Subject::Image));
+        }
         all
     }
 

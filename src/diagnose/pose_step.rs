@@ -1,8 +1,8 @@
-//! A plate or a camera that stands elsewhere from some image on, by too little for any image to be left out.
+//! A plate or a camera that stands elsewhere from some image on, or creeps all through a series, by too little for any image to be left out.
 //!
 //! Rao's score test on the linearised fit: what the images of a stop tell of their poses, joint noise eliminated, has the root score `s` and
 //! the derivatives `T` by all columns ([`StopInformation`]). Let the pose of one body differ by a constant `x` at the stops of a part `P` of a
-//! series, `A` its columns of `T`. With `K` the covariance of all columns, `g = sum_P A' s` and
+//! series, `A` its columns of `T`; or by `w x` at all of them, `w` growing from 0 to 1 with the rows, `A` its columns times `w`. With `K` the covariance of all columns, `g = sum_P A' s` and
 //! `J = sum_P A' A - V' K V`, `V = sum_P T' A`, the cost falls by `D = g' J^-1 g`, chi-squared with six degrees of freedom where nothing
 //! moved, and `x = J^-1 g` with the covariance `J^-1`.
 //!
@@ -39,6 +39,8 @@ enum Order {
     Time,
     /// By how far this axis of what the robot carries points up: held by its weight only.
     Up(usize),
+    /// Not at all: it creeps with the rows.
+    Drift,
 }
 
 /// A step of one body between two parts of a series.
@@ -48,8 +50,10 @@ struct PoseStep {
     series: usize,
     body: Body,
     order: Order,
-    /// Images behind the step, in this order.
-    behind: Vec<usize>,
+    /// Rows of [`Linear`] that it moves, in this order, and by which part of it.
+    moved: Vec<(usize, f64)>,
+    /// Their images.
+    images: Vec<usize>,
     /// Displacement as a twist of the body: m, rad.
     twist: Vector6<f64>,
     /// Its covariance by the joint noise that was estimated without it.
@@ -134,7 +138,7 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<PoseStep> {
         let Some(mut best) = linear.best(problem, &tried, limits.displaced_images) else { break };
         best.share = best.fall / left;
         let chance = tried.len() as f64 * chance(best.share, left);
-        tracing::debug!(?best.body, ?best.order, first = %problem.images[best.behind[0]].name, behind = best.behind.len(),
+        tracing::debug!(?best.body, ?best.order, first = %problem.images[best.images[0]].name, moved = best.images.len(),
             fall = best.fall, left, share = best.share, chance, twist = ?best.twist, "step of a body");
         if chance > limits.displaced_false_alarms {
             break;
@@ -152,7 +156,7 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<PoseStep> {
             good.clone_from(&found);
         }
     }
-    good.sort_by_key(|s| (s.order != Order::Time, s.behind[0]));
+    good.sort_by_key(|s| (matches!(s.order, Order::Up(_)), s.images[0]));
     good
 }
 
@@ -166,7 +170,7 @@ fn chance(share: f64, squares: f64) -> f64 {
     (1.0 - x).powf(b) * (1.0 + b * x + 0.5 * b * (b + 1.0) * x * x)
 }
 
-/// Every way to divide the stops of a series: the rows of [`Linear`] behind the step, from the last on.
+/// A way to divide the stops of a series: the rows of [`Linear`] behind the step, from the last on.
 struct Candidate {
     series: usize,
     body: Body,
@@ -176,6 +180,15 @@ struct Candidate {
     from: usize,
 }
 
+impl Candidate {
+    /// The rows that it moves, and by which part of it.
+    fn moved(&self) -> impl Iterator<Item = (usize, f64)> {
+        let last = self.rows.len().saturating_sub(1).max(1) as f64;
+        let part = move |k: usize| if self.order == Order::Drift { k as f64 / last } else { 1.0 };
+        self.rows.iter().enumerate().skip(self.from).map(move |(k, row)| (*row, part(k)))
+    }
+}
+
 /// With at least so many stops on either side.
 fn candidates(problem: &Problem, linear: &Linear, fewest: usize) -> Vec<Candidate> {
     let mut all = Vec::new();
@@ -183,6 +196,9 @@ fn candidates(problem: &Problem, linear: &Linear, fewest: usize) -> Vec<Candidat
         let rows = Rc::new(rows);
         for from in (fewest..=rows.len().saturating_sub(fewest)).rev() {
             all.push(Candidate { series, body, order, rows: rows.clone(), from });
+        }
+        if order == Order::Time && rows.len() >= 2 * fewest {
+            all.push(Candidate { series, body, order: Order::Drift, rows, from: 0 });
         }
     };
     let count = problem.images.iter().map(|i| i.series + 1).max().unwrap_or(0);
@@ -243,35 +259,38 @@ impl Linear {
         let mut sums = Sums::new(self.information.ncols());
         for (c, candidate) in tried.iter().enumerate() {
             let (rows, columns) = (&candidate.rows, candidate.body.columns(&problem.layout));
-            if candidate.from + fewest == rows.len() {
+            // Behind a step are the rows behind the one before it, and one more.
+            if candidate.order == Order::Drift || candidate.from + fewest == rows.len() {
                 sums = Sums::new(self.information.ncols());
-                rows[candidate.from + 1..].iter().for_each(|&r| sums.add(&self.stops[r], &columns));
+                candidate.moved().for_each(|(r, part)| sums.add(&self.stops[r], &columns, part));
+            } else {
+                sums.add(&self.stops[rows[candidate.from]], &columns, 1.0);
             }
-            sums.add(&self.stops[rows[candidate.from]], &columns);
             let Some((fall, twist, own)) = sums.step(&covariance) else { continue };
             if best.as_ref().is_none_or(|b| fall > b.0) {
                 best = Some((fall, c, twist, own));
             }
         }
         let (fall, c, twist, covariance) = best?;
-        let Candidate { series, body, order, rows, from } = &tried[c];
-        let images = rows[*from..].iter().flat_map(|&r| self.stops[r].of(problem, *body));
-        let behind = images.map(|shown| shown.image).collect();
-        Some(PoseStep { series: *series, body: *body, order: *order, behind, twist, covariance, fall, share: 0.0 })
+        let Candidate { series, body, order, .. } = tried[c];
+        let moved: Vec<(usize, f64)> = tried[c].moved().collect();
+        let images = moved.iter().flat_map(|(r, _)| self.stops[*r].of(problem, body));
+        let images = images.map(|shown| shown.image).collect();
+        Some(PoseStep { series, body, order, moved, images, twist, covariance, fall, share: 0.0 })
     }
 
-    /// With the pose of the body behind the step as six more columns, at the optimum; and the way there.
+    /// With the displacement of the body as six more columns, at the optimum; and the way there.
     fn with(&self, problem: &Problem, step: &PoseStep) -> Option<(Self, DVector<f64>)> {
         let n = self.information.ncols();
         let mut information = self.information.clone().resize(n + 6, n + 6, 0.0);
         let mut gradient = DVector::zeros(n + 6);
         let mut derivatives = Vec::with_capacity(self.stops.len());
         let columns = step.body.columns(&problem.layout);
-        for row in &self.stops {
+        for (r, row) in self.stops.iter().enumerate() {
             let mut by_free = row.by_free.clone().resize_horizontally(n + 6, 0.0);
-            if row.images.iter().any(|shown| step.behind.contains(&shown.image)) {
-                by_free.columns_mut(n, 6).copy_from(&row.by(&columns));
-                let own = by_free.columns(n, 6).into_owned();
+            if let Some((_, part)) = step.moved.iter().find(|(moved, _)| *moved == r) {
+                let own = row.by(&columns) * *part;
+                by_free.columns_mut(n, 6).copy_from(&own);
                 let coupling = by_free.tr_mul(&own);
                 let mut right = information.columns_mut(n, 6);
                 right += &coupling;
@@ -295,7 +314,7 @@ impl Linear {
     }
 }
 
-/// Sums over the stops behind a step.
+/// Sums over the stops that a displacement moves.
 struct Sums {
     score: Vector6<f64>,
     own: Matrix6<f64>,
@@ -307,8 +326,8 @@ impl Sums {
         Self { score: Vector6::zeros(), own: Matrix6::zeros(), coupling: DMatrix::zeros(columns, 6) }
     }
 
-    fn add(&mut self, row: &Row, columns: &Range<usize>) {
-        let by = &row.by(columns);
+    fn add(&mut self, row: &Row, columns: &Range<usize>, part: f64) {
+        let by = &(row.by(columns) * part);
         let (score, own) = (by.tr_mul(&row.score), by.tr_mul(by));
         self.score += score.fixed_rows::<6>(0);
         self.own += own.fixed_view::<6, 6>(0, 0);
@@ -328,7 +347,7 @@ impl Sums {
 
 impl PoseStep {
     fn finding(&self, problem: &Problem, setting: &CheckContext) -> Displaced {
-        let image = &problem.images[self.behind[0]];
+        let image = &problem.images[self.images[0]];
         let body = match (self.body, image.mount) {
             (Body::Placement(_), CameraMount::Hand) => Carried::Plate,
             (Body::Placement(_), CameraMount::Fixed) => Carried::PlateInHand,
@@ -348,8 +367,9 @@ impl PoseStep {
             displacement: match self.order {
                 Order::Time => Displacement::FromThenOn,
                 Order::Up(axis) => Displacement::AxisUp(axis),
+                Order::Drift => Displacement::AllThrough,
             },
-            images: self.behind.iter().map(|&i| problem.images[i].name.clone()).collect(),
+            images: self.images.iter().map(|&i| problem.images[i].name.clone()).collect(),
             distance_m,
             angle_rad,
             share: self.share,

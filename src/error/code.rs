@@ -285,6 +285,8 @@ codes! {
         CameraMoved "camera_moved" "the camera was moved on its mount: images were left out",
         PlateDisplaced "plate_displaced" "the plate stands a little elsewhere from some image on",
         CameraDisplaced "camera_displaced" "the camera sits a little elsewhere from some image on",
+        PlateDrifts "plate_drifts" "the plate creeps all through the series",
+        CameraDrifts "camera_drifts" "the camera creeps all through the series",
         PlateLoose "plate_loose" "the plate tilts with gravity",
         CameraLoose "camera_loose" "the camera tilts with gravity",
         PlateSizeContradicted "plate_size_contradicted" "robot and plate file disagree on the size of the plate",

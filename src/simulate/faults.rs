@@ -70,6 +70,8 @@ pub enum Fault {
     MovedMarkers,
     /// A camera that tips over between two positions on its mount.
     LooseCamera,
+    /// A camera that creeps on its mount all through the series, as while it grows warm.
+    DriftingCamera,
 }
 
 /// What a fault is called and what the program must answer.
@@ -101,7 +103,7 @@ const fn row(
 }
 
 /// Every fault.
-pub const FAULTS: [Expectation; 24] = [
+pub const FAULTS: [Expectation; 25] = [
     row(Fault::DegreesAsRadians, "degrees-as-radians", false, &[2], &[Code::DegreesAsRadians], &["joints.csv"]),
     row(Fault::RadiansAsDegrees, "radians-as-degrees", false, &[2], &[Code::RadiansAsDegrees], &["joints.csv"]),
     row(Fault::UnknownJoint, "unknown-joint", false, &[2], &[Code::JointMissing], &["joints.csv", "joint_a3"]),
@@ -140,6 +142,7 @@ pub const FAULTS: [Expectation; 24] = [
     row(Fault::MovingRobot, "moving-robot", false, &[0, 1], &[Code::WronglyPaired], &["img_005.png", "img_013.png"]),
     row(Fault::MovedMarkers, "moved-markers", false, &[0, 1], &[Code::MarkerOff], &["17", "40"]),
     row(Fault::LooseCamera, "loose-camera", false, &[1], &[Code::LooseMounting], &["loose-camera"]),
+    row(Fault::DriftingCamera, "drifting-camera", false, &[1], &[Code::CameraDrifts], &["drifting-camera"]),
 ];
 
 impl Fault {
@@ -188,6 +191,7 @@ impl Fault {
             Self::MovingRobot => move_robot(series),
             Self::MovedMarkers => move_markers(series),
             Self::LooseCamera => loosen_camera(series),
+            Self::DriftingCamera => creep_camera(series),
             Self::MissingImage
             | Self::MissingImages
             | Self::UnreadableImage
@@ -353,6 +357,15 @@ fn loosen_camera(series: &mut SimulatedSeries) {
     for k in (0..series.observations.len()).filter(|k| matches!(k % 5, 1 | 2)) {
         let roll = Pose::exp(&Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 1.2e-3));
         observe_again(series, k..k + 1, |pose, _, _| *pose = roll * *pose);
+    }
+}
+
+/// From the first stop to the last the camera creeps by 0.2 mm and 0.6 mrad on its mount.
+fn creep_camera(series: &mut SimulatedSeries) {
+    let last = (series.observations.len().max(2) - 1) as f64;
+    for k in 0..series.observations.len() {
+        let crept = Vector6::new(0.1e-3, 0.0, 0.17e-3, 0.5e-3, -0.3e-3, 0.0) * (k as f64 / last);
+        observe_again(series, k..k + 1, |pose, _, _| *pose = Pose::exp(&crept) * *pose);
     }
 }
 

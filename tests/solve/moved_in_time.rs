@@ -1,5 +1,5 @@
-//! A plate or a camera that moves by a millimetre during a series is named with the image from which on it stands elsewhere;
-//! series in which nothing moved are not accused.
+//! A plate or a camera that moves by a millimetre during a series is named with the image from which on it stands elsewhere,
+//! one that creeps is said to creep; series in which nothing moved are not accused.
 
 #![allow(clippy::unwrap_used)]
 
@@ -128,6 +128,25 @@ fn a_plate_that_slips_in_the_hand_is_named() {
     let mut series = seen(CameraMount::Fixed, 24, 6);
     change(&mut series, 8..24, |pose| pose * by(0.0, 1e-3, 0.0));
     assert_moved_by_a_millimetre(told(&solved(&series)), Carried::PlateInHand, &series.stops.stops[8].image);
+}
+
+#[test]
+fn a_plate_and_a_camera_that_creep_are_not_called_moved_once() {
+    let far = |k: usize| 0.3e-3 * k as f64 / 23.0;
+    let mut plate = seen(CameraMount::Hand, 24, 8);
+    (0..24).for_each(|k| change(&mut plate, k..k + 1, |pose| pose * by(0.8 * far(k), -0.6 * far(k), 0.0)));
+    let mut camera = seen(CameraMount::Hand, 24, 9);
+    (0..24).for_each(|k| change(&mut camera, k..k + 1, |pose| by(0.0, 0.0, far(k)) * pose));
+    for (series, body, code) in
+        [(plate, Carried::Plate, Code::PlateDrifts), (camera, Carried::CameraInHand, Code::CameraDrifts)]
+    {
+        let solution = solved(&series);
+        let found = told(&solution);
+        assert_eq!((found.body, found.displacement), (body, Displacement::AllThrough), "{found}");
+        assert!(solution.findings.iter().any(|f| f.code() == code), "{:?}", solution.findings);
+        assert!((found.distance_m.0 - 0.3e-3).abs() < 5.0 * found.distance_m.1, "{found}");
+        assert!(found.distance_m.1 < 0.1e-3, "{found}");
+    }
 }
 
 #[test]

@@ -17,6 +17,7 @@ mod parameters;
 mod plan_page;
 mod plan_pictures;
 mod plots;
+mod pose_residuals;
 mod scene;
 mod sections;
 pub(crate) mod svg;
@@ -53,6 +54,7 @@ fn chapters(r: &SolutionRecord, pictures: &Thumbnails) -> Vec<Chapter> {
         chapter("coverage", "What the stops covered", coverage::section(r)),
         chapter("bodies", "Trackers and contacts", bodies::section(r)),
         chapter("images", "Residuals by image", images::table(r)),
+        chapter("pose-residuals", "Pose residuals by image", pose_residuals::section(r)),
         chapter("residuals", "Residuals", sections::residuals(r)),
         chapter("workspace", "How well the flange is known where", knowledge::workspace(r)),
         chapter("corrections", "What was corrected on the robot", parameters::robot(r)),
