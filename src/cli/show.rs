@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::files::{self, Kind};
 use crate::output::difference::{Difference, compare_solutions};
 use crate::output::solution_json::{self, SolutionRecord};
-use crate::output::{Thumbnails, recover, report_html, write_beside};
+use crate::output::{Thumbnails, figure_files, recover, report_html, write_beside};
 use crate::urdf::JointKind;
 
 /// Flags of `show`.
@@ -32,6 +32,9 @@ pub(super) struct ShowArgs {
     /// Write report.html again to this file, with pictures of the images that are still there
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    /// Write the figures of the report to this folder as SVG files
+    #[arg(long, value_name = "FOLDER")]
+    figures: Option<PathBuf>,
     /// Folder for at.csv
     #[arg(long, value_name = "FOLDER", default_value = ".")]
     out: PathBuf,
@@ -57,6 +60,11 @@ pub(super) fn run(args: &ShowArgs) -> Result<Verdict> {
         let name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let folder = file.parent().unwrap_or(Path::new("."));
         write_beside(folder, &[(name, page.as_bytes())], &args.solutions)?;
+    }
+    if let Some(folder) = &args.figures {
+        let all = figure_files(&first);
+        let files: Vec<(String, &[u8])> = all.iter().map(|f| (f.name.clone(), f.svg.as_bytes())).collect();
+        write_beside(folder, &files, &args.solutions)?;
     }
     if args.json {
         say!("{}", String::from_utf8_lossy(&solution_json::to_bytes(&first)?));

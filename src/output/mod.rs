@@ -69,7 +69,7 @@ pub use controller_files::kinematics_xacro;
 pub use kinematics_file::kinematics_yaml;
 pub use names::folder_name;
 #[cfg(feature = "report")]
-pub use report::{Shown, Thumbnail, Thumbnails, plan_html, report_html, sigma_text};
+pub use report::{FigureFile, Shown, Thumbnail, Thumbnails, figure_files, plan_html, report_html, sigma_text};
 pub use write::{NewFolder, NewResult, Place, recover, write_all, write_beside};
 
 use std::collections::BTreeMap;

@@ -6,6 +6,7 @@ mod bodies;
 mod coverage;
 mod describe;
 mod figure;
+mod figure_files;
 mod findings;
 mod first_page;
 mod gallery;
@@ -25,6 +26,7 @@ mod thumbnails;
 mod two_stage;
 mod words;
 
+pub use figure_files::{FigureFile, figure_files};
 pub use plan_page::{plan_html, sigma_text};
 pub use thumbnails::{Shown, Thumbnail, Thumbnails};
 

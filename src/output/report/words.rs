@@ -150,7 +150,9 @@ pub(super) fn plain(value: f64) -> String {
         return "0".into();
     }
     let d = (-value.abs().log10().floor()).clamp(0.0, 6.0) as usize;
-    format!("{value:.d$}")
+    let written = |d: usize| format!("{value:.d$}");
+    let is_whole = |d: &usize| written(*d).parse().is_ok_and(|v: f64| (v - value).abs() < 1e-6 * value.abs());
+    written((d..d + 3).find(is_whole).unwrap_or(d))
 }
 
 /// "2nd", "11th".
@@ -206,5 +208,6 @@ mod tests {
         assert_eq!(fixed(-0.0001, 2), "0.00");
         assert_eq!(significant(0.01234), "0.0123");
         assert_eq!((plain(0.5), plain(20.0), plain(0.02)), ("0.5".into(), "20".into(), "0.02".into()));
+        assert_eq!((plain(0.015), plain(2.5), plain(-0.25)), ("0.015".into(), "2.5".into(), "-0.25".into()), "steps");
     }
 }

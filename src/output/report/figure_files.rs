@@ -1,0 +1,76 @@
+//! The figures of the report as files of their own, for papers and pages.
+
+use super::{STYLE, Thumbnails, chapters};
+use crate::output::solution_json::SolutionRecord;
+
+/// A drawing as a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FigureFile {
+    /// Name: the chapter of the report, and a number where it has several.
+    pub name: String,
+    /// SVG with its style; light or dark as the reader's page.
+    pub svg: String,
+}
+
+/// Every figure of the report but the pictures.
+pub fn figure_files(record: &SolutionRecord) -> Vec<FigureFile> {
+    let of_chapter = |chapter: &super::page::Chapter| {
+        let all = drawings(&chapter.body.0);
+        let name = |k: usize| match all.len() {
+            1 => format!("{}.svg", chapter.id),
+            _ => format!("{}-{}.svg", chapter.id, k + 1),
+        };
+        all.iter().enumerate().map(|(k, svg)| FigureFile { name: name(k), svg: styled(svg) }).collect::<Vec<_>>()
+    };
+    chapters(record, &Thumbnails::default()).iter().flat_map(of_chapter).collect()
+}
+
+const OPENING: &str = "<svg";
+const CLOSING: &str = "</svg>";
+
+/// The outer drawings of a text.
+fn drawings(html: &str) -> Vec<&str> {
+    let (mut found, mut start, mut depth, mut at) = (Vec::new(), 0, 0usize, 0);
+    let after = |at: usize| html[at..].find(OPENING).into_iter().chain(html[at..].find(CLOSING)).min();
+    while let Some(next) = after(at) {
+        let here = at + next;
+        if html[here..].starts_with(OPENING) {
+            if depth == 0 {
+                start = here;
+            }
+            depth += 1;
+            at = here + OPENING.len();
+        } else {
+            at = here + CLOSING.len();
+            depth = depth.saturating_sub(1);
+            if depth == 0 {
+                found.push(&html[start..at]);
+            }
+        }
+    }
+    found
+}
+
+/// With what the style of the report says of drawings and colours.
+fn styled(svg: &str) -> String {
+    let is_of_drawings =
+        |line: &&str| ["svg ", ".scene", ":root", "@media (prefers"].iter().any(|start| line.starts_with(start));
+    let rules: Vec<&str> = STYLE.lines().filter(is_of_drawings).collect();
+    let style = format!("<style>{}svg{{background:var(--paper)}}</style>", rules.join(""));
+    match svg.find('>') {
+        Some(end) => format!("{}{style}{}", &svg[..=end], &svg[end + 1..]),
+        None => svg.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::drawings;
+
+    #[test]
+    fn a_drawing_inside_another_belongs_to_it() {
+        let page = "<p>a</p><svg id=1><svg id=2></svg><g/></svg><p>b</p><svg id=3></svg>";
+        assert_eq!(drawings(page), ["<svg id=1><svg id=2></svg><g/></svg>", "<svg id=3></svg>"]);
+        assert!(drawings("<p>none</p>").is_empty());
+    }
+}
