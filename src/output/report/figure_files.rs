@@ -1,7 +1,6 @@
 //! The figures of the report as files of their own, for papers and pages.
 
-use super::{STYLE, Thumbnails, chapters};
-use crate::output::solution_json::SolutionRecord;
+use super::page::Chapter;
 
 /// A drawing as a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -12,17 +11,18 @@ pub struct FigureFile {
     pub svg: String,
 }
 
-/// Every figure of the report but the pictures.
-pub fn figure_files(record: &SolutionRecord) -> Vec<FigureFile> {
-    let of_chapter = |chapter: &super::page::Chapter| {
+/// The drawings of some chapters, with what the style of their page says of drawings and colours.
+pub(super) fn drawn(chapters: &[Chapter], style: &str) -> Vec<FigureFile> {
+    let of_chapter = |chapter: &Chapter| {
         let all = drawings(&chapter.body.0);
         let name = |k: usize| match all.len() {
             1 => format!("{}.svg", chapter.id),
             _ => format!("{}-{}.svg", chapter.id, k + 1),
         };
-        all.iter().enumerate().map(|(k, svg)| FigureFile { name: name(k), svg: styled(svg) }).collect::<Vec<_>>()
+        let file = |(k, svg): (usize, &&str)| FigureFile { name: name(k), svg: styled(svg, style) };
+        all.iter().enumerate().map(file).collect::<Vec<_>>()
     };
-    chapters(record, &Thumbnails::default()).iter().flat_map(of_chapter).collect()
+    chapters.iter().flat_map(of_chapter).collect()
 }
 
 const OPENING: &str = "<svg";
@@ -51,14 +51,13 @@ fn drawings(html: &str) -> Vec<&str> {
     found
 }
 
-/// With what the style of the report says of drawings and colours.
-fn styled(svg: &str) -> String {
+/// A drawing that carries its style.
+fn styled(svg: &str, style: &str) -> String {
     let is_of_drawings =
         |line: &&str| ["svg ", ".scene", ":root", "@media (prefers"].iter().any(|start| line.starts_with(start));
-    let rules: Vec<&str> = STYLE.lines().filter(is_of_drawings).collect();
-    let style = format!("<style>{}svg{{background:var(--paper)}}</style>", rules.join(""));
-    match svg.find('>') {
-        Some(end) => format!("{}{style}{}", &svg[..=end], &svg[end + 1..]),
+    let rules: String = style.lines().filter(is_of_drawings).collect();
+    match svg.split_once('>') {
+        Some((opening, rest)) => format!("{opening}><style>{rules}svg{{background:var(--paper)}}</style>{rest}"),
         None => svg.to_owned(),
     }
 }

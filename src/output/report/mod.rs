@@ -26,7 +26,7 @@ mod thumbnails;
 mod two_stage;
 mod words;
 
-pub use figure_files::{FigureFile, figure_files};
+pub use figure_files::FigureFile;
 pub use plan_page::{plan_html, sigma_text};
 pub use thumbnails::{Shown, Thumbnail, Thumbnails};
 
@@ -42,6 +42,11 @@ const SCRIPT: &str = include_str!("report.js");
 pub fn report_html(record: &SolutionRecord, pictures: &Thumbnails) -> String {
     let title = format!("Calibration of {}", record.robot.name);
     page_of_chapters(&title, STYLE, SCRIPT, &first_page::first_page(record), &chapters(record, pictures))
+}
+
+/// Every figure of the report but the pictures.
+pub fn figure_files(record: &SolutionRecord) -> Vec<FigureFile> {
+    figure_files::drawn(&chapters(record, &Thumbnails::default()), STYLE)
 }
 
 /// All chapters; those without content are left out.
