@@ -75,9 +75,9 @@ fn the_page_is_complete_and_self_contained() {
         assert!(!page.contains(broken), "the page says {broken}");
     }
     // Histogram, workspace from above and from the side, two stages against one, joint noise, residuals over image and plate, distortion and uncertainty of the
-    // camera, plate corrections; residuals by image, joints and image that were covered, the scene.
+    // camera, plate corrections; residuals by image, pose residuals in the axes of camera and plate, joints and image that were covered, the scene.
     let drawings = drawings(&page);
-    assert_eq!(drawings.len(), 14);
+    assert_eq!(drawings.len(), 16);
     for drawing in drawings {
         let document = roxmltree::Document::parse(drawing).unwrap();
         assert!(document.descendants().filter(|n| n.is_element()).count() > 5);
