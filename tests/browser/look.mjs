@@ -1,13 +1,13 @@
 // Looks at reports in a browser, as a person does: contents, hover, the three-dimensional view, dark mode, print, and axe-core.
 //
 //   npm install --prefix look playwright-core axe-core
-//   NODE_PATH=look/node_modules CHROMIUM=/usr/bin/chromium node tests/browser/look.mjs pictures/ report.html ...
+//   NODE_PATH=look/node_modules node tests/browser/look.mjs pictures/ run1/report.html run2/report.html ...
 //
-// Pictures of every report go into the folder that stands first. The exit code is 1 where something is wrong; it is said in words.
-// CHROMIUM names the browser (default: chromium in the PATH).
+// Pictures of every report go into the folder that stands first, under the name of the report's folder. The exit code is 1 where
+// something is wrong; it is said in words. CHROMIUM names the browser (default: chromium in the PATH).
 import { createRequire } from "node:module";
-import { mkdirSync, readFileSync } from "node:fs";
-import { basename, resolve } from "node:path";
+import { existsSync, mkdirSync, readFileSync } from "node:fs";
+import { basename, delimiter, dirname, join, resolve } from "node:path";
 
 const require = createRequire(resolve(process.env.NODE_PATH ?? "node_modules", "x.js"));
 const { chromium } = require("playwright-core");
@@ -113,9 +113,15 @@ async function accessible(context, report, scheme) {
   await page.close();
 }
 
-const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "chromium", args: ["--no-sandbox"] });
+const inPath = (name) => process.env.PATH.split(delimiter).map((folder) => join(folder, name)).find(existsSync);
+const executablePath = process.env.CHROMIUM ?? inPath("chromium");
+if (!executablePath) {
+  console.log("there is no chromium in the PATH: name the browser with CHROMIUM");
+  process.exit(2);
+}
+const browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
 for (const report of reports) {
-  const name = basename(report, ".html");
+  const name = basename(dirname(resolve(report)));
   const context = await browser.newContext({ viewport: { width: 1000, height: 900 } });
   const page = await context.newPage();
   page.on("console", (m) => check(report, m.type() !== "error" && m.type() !== "warning", `console: ${m.text()}`));
