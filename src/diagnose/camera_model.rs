@@ -1,7 +1,5 @@
 //! Does the camera model explain the images, with a pose of its own for every one of them?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
 use crate::problem::Problem;
@@ -18,16 +16,6 @@ pub(super) fn check(_: &Problem, setting: &CheckContext) -> Option<CameraModelMi
     (rms_px > setting.limits.free_rms_px).then_some(CameraModelMisfit { rms_px })
 }
 
-impl fmt::Display for CameraModelMisfit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "camera: stand-alone camera poses leave {:.2} px per point; the camera model or the plate does not describe these images",
-            self.rms_px
-        )
-    }
-}
-
 impl Kind for CameraModelMisfit {
     fn code(&self) -> Code {
         Code::CameraModelMisfit
@@ -39,5 +27,20 @@ impl Kind for CameraModelMisfit {
 
     fn quantities(&self) -> Vec<Quantity> {
         vec![Quantity::new("free_pose_rms", self.rms_px, "px")]
+    }
+
+    fn place(&self) -> String {
+        "camera".into()
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "stand-alone camera poses leave {:.2} px per point: the camera model or the plate does not describe these images",
+            self.rms_px
+        )
+    }
+
+    fn remedy(&self) -> String {
+        "try --camera auto, and check that plate.toml describes the plate in the images".into()
     }
 }

@@ -1,10 +1,8 @@
 //! Is there a pattern in the residuals that noise does not explain, what would remove it, and does it matter?
 
-use std::fmt;
-
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, gate_sentence};
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::{Accuracy, Bearer, Limits, Moved, Pattern, PatternTest, cause, patterns};
-use crate::error::{Code, Notice};
+use crate::error::Code;
 use crate::fit::Fit;
 
 /// The residuals show a pattern.
@@ -66,25 +64,15 @@ impl ResidualPattern {
         let Some(Moved { flange_m, pose_m, pose_rad }) = self.found.moved else { return String::new() };
         match flange_m {
             Some([by, sigma]) => {
-                format!("; without it the flange moves by {:.3} mm (stated sigma {:.3} mm)", 1e3 * by, 1e3 * sigma)
+                format!(", without it the flange moves by {:.3} mm (stated sigma {:.3} mm)", 1e3 * by, 1e3 * sigma)
             }
             None => format!(
-                "; without it the camera poses move by {:.4} mm and {:.3} arcmin (stated sigmas {:.4} mm, {:.3} arcmin)",
+                ", without it the camera poses move by {:.4} mm and {:.3} arcmin (stated sigmas {:.4} mm, {:.3} arcmin)",
                 1e3 * pose_m[0],
                 60.0 * pose_rad[0].to_degrees(),
                 1e3 * pose_m[1],
                 60.0 * pose_rad[1].to_degrees()
             ),
-        }
-    }
-}
-
-impl fmt::Display for ResidualPattern {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let notice = self.notice();
-        match self.matters {
-            true => f.write_str(&gate_sentence(&format!("{}: {}", notice.place, notice.what), &notice.remedy)),
-            false => notice.fmt(f),
         }
     }
 }
@@ -123,25 +111,31 @@ impl Kind for ResidualPattern {
         all
     }
 
-    fn notice(&self) -> Notice {
+    fn place(&self) -> String {
+        match self.found.bearer {
+            Bearer::Camera(_) => format!("camera {}", self.bearer),
+            Bearer::Plate(_) => self.bearer.clone(),
+        }
+    }
+
+    fn seen(&self) -> String {
         let test = &self.found;
-        let [shape, remedy] = words(test.pattern);
-        let what = match test.pattern {
+        match test.pattern {
             Pattern::Tolerance => format!(
                 "the markers are off by {:.1} times the stated tolerance",
                 (test.statistic / test.degrees.max(1) as f64).sqrt()
             ),
-            _ => format!(
-                "the residuals show a pattern of {:.4} px RMS that noise does not leave: they {shape}{} (patterns from {:.4} px on are found)",
+            pattern => format!(
+                "the residuals show a pattern of {:.4} px RMS that noise does not leave: they {}{} (patterns from {:.4} px on are found)",
                 test.rms_px,
+                words(pattern)[0],
                 self.moves(),
                 test.least_px
             ),
-        };
-        let place = match test.bearer {
-            Bearer::Camera(_) => format!("camera {}", self.bearer),
-            Bearer::Plate(_) => self.bearer.clone(),
-        };
-        Notice::new(self.code(), place, what, remedy)
+        }
+    }
+
+    fn remedy(&self) -> String {
+        words(self.found.pattern)[1].into()
     }
 }

@@ -8,7 +8,7 @@ use super::{
     scatter, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
-use crate::error::{Error, Result};
+use crate::error::{Error, Notice, Result};
 use crate::fit::Fit;
 use crate::problem::{Adjustment, Problem};
 
@@ -150,17 +150,8 @@ impl<'a> Diagnosis<'a> {
     fn refusal(&self) -> Option<Error> {
         let all = || self.found.iter().flatten();
         let refusal = all().find(|f| f.weight() == Weight::Refusal)?;
-        let moved = all().find_map(|f| if let Finding::Moved(m) = f { Some(m) } else { None });
-        let (code, what, remedy) = moved.map_or_else(
-            || {
-                let remedy = "check joint_unit, the order and signs of the joints, that image names stand in the right rows, and that the plate did not move";
-                (refusal.code(), refusal.to_string(), remedy)
-            },
-            |m| {
-                let (what, remedy) = m.what_and_remedy();
-                (Finding::from(m.clone()).code(), what, remedy)
-            },
-        );
-        Some(Error::new(code, "joint readings", what, remedy))
+        let moved = all().find(|f| matches!(f, Finding::Moved(_)));
+        let Notice { code, place, what, remedy } = moved.unwrap_or(refusal).notice();
+        Some(Error::new(code, place, what, remedy))
     }
 }

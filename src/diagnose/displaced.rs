@@ -1,9 +1,7 @@
 //! The finding that a plate or a camera stands elsewhere in some of the images; [`super::pose_step`] looks for it.
 
-use std::fmt;
-
-use super::kind::{Kind, Quantity, Subject, Weight, gate_sentence, some_of};
-use crate::error::{Code, Notice};
+use super::kind::{Kind, Quantity, Subject, Weight, some_of};
+use crate::error::Code;
 
 /// Most images that are named.
 const MOST_IMAGES: usize = 5;
@@ -65,73 +63,17 @@ impl Displaced {
         matches!(self.body, Carried::CameraInHand | Carried::Camera)
     }
 
+    /// The first image in which it stands elsewhere.
+    fn first(&self) -> &str {
+        self.images.first().map_or("", String::as_str)
+    }
+
     fn body(&self) -> &'static str {
         match self.body {
             Carried::Plate => "plate",
             Carried::PlateInHand => "plate in the hand",
             Carried::CameraInHand => "camera on its mount",
             Carried::Camera => "camera on its stand",
-        }
-    }
-
-    fn what_and_remedy(&self) -> (String, String) {
-        let (series, body) = (&self.series, self.body());
-        let size = format!(
-            "{:.2} mm, {:.2} mrad (sigma at most {:.2} mm, {:.2} mrad per axis)",
-            1e3 * self.distance_m.0,
-            1e3 * self.angle_rad.0,
-            1e3 * self.distance_m.1,
-            1e3 * self.angle_rad.1
-        );
-        let gain = format!("what moved explains {:.0} % of the squares of the joint noise", 100.0 * self.share);
-        let first = self.images.first().map_or("", String::as_str);
-        match self.displacement {
-            Displacement::FromThenOn => {
-                let stands = match self.body {
-                    Carried::Plate | Carried::Camera => "stands",
-                    Carried::PlateInHand | Carried::CameraInHand => "sits",
-                };
-                let (why, remedy) = if self.is_camera() {
-                    let remedy = format!(
-                        "fasten the camera, and take the series again, or put the images from {first} on into a series of their own with the same [camera] name and another mounting"
-                    );
-                    ("it was moved, creeps, or its lens was touched", remedy)
-                } else {
-                    let remedy = format!(
-                        "write a column placement in joints.csv that differs from {first} on, or fasten the plate and take the series again"
-                    );
-                    ("it was moved, or creeps", remedy)
-                };
-                let what = format!(
-                    "series {series}: from {first} on the {body} {stands} {size} elsewhere than before: {why}; {gain}"
-                );
-                (what, remedy)
-            }
-            Displacement::AxisUp(axis) => {
-                let what = format!(
-                    "series {series}: where its {} axis points up the {body} sits {size} elsewhere ({} images: {}): it is loose, or bends under its weight; {gain}",
-                    ["x", "y", "z"][axis],
-                    self.images.len(),
-                    some_of(&self.images, MOST_IMAGES)
-                );
-                (what, "fasten it, and take the series again".into())
-            }
-            Displacement::AllThrough => {
-                let what = format!(
-                    "series {series}: from the first to the last image the {body} creeps by {size}: it is not yet warm, or gives way; {gain}"
-                );
-                (what, "let camera and robot warm up, fasten what creeps, and take the series again".into())
-            }
-        }
-    }
-}
-
-impl fmt::Display for Displaced {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (what, remedy) = self.what_and_remedy();
-        match self.weight {
-            Weight::Note => self.notice().fmt(f),
-            _ => f.write_str(&gate_sentence(&what, &remedy)),
         }
     }
 }
@@ -168,8 +110,60 @@ impl Kind for Displaced {
         ]
     }
 
-    fn notice(&self) -> Notice {
-        let (what, remedy) = self.what_and_remedy();
-        Notice::new(self.code(), "series", what, remedy)
+    fn place(&self) -> String {
+        format!("series {}", self.series)
+    }
+
+    fn seen(&self) -> String {
+        let body = self.body();
+        let size = format!(
+            "{:.2} mm, {:.2} mrad (sigma at most {:.2} mm, {:.2} mrad per axis)",
+            1e3 * self.distance_m.0,
+            1e3 * self.angle_rad.0,
+            1e3 * self.distance_m.1,
+            1e3 * self.angle_rad.1
+        );
+        let what = match self.displacement {
+            Displacement::FromThenOn => {
+                let stands = match self.body {
+                    Carried::Plate | Carried::Camera => "stands",
+                    Carried::PlateInHand | Carried::CameraInHand => "sits",
+                };
+                let touched = if self.is_camera() { ", creeps, or its lens was touched" } else { ", or creeps" };
+                format!(
+                    "from {} on the {body} {stands} {size} elsewhere than before: it was moved{touched}",
+                    self.first()
+                )
+            }
+            Displacement::AxisUp(axis) => format!(
+                "where its {} axis points up the {body} sits {size} elsewhere ({} images: {}): it is loose, or bends under its weight",
+                ["x", "y", "z"][axis],
+                self.images.len(),
+                some_of(&self.images, MOST_IMAGES)
+            ),
+            Displacement::AllThrough => {
+                format!(
+                    "from the first to the last image the {body} creeps by {size}: it is not yet warm, or gives way"
+                )
+            }
+        };
+        format!("{what}, what moved explains {:.0} % of the squares of the joint noise", 100.0 * self.share)
+    }
+
+    fn remedy(&self) -> String {
+        match self.displacement {
+            Displacement::FromThenOn if self.is_camera() => format!(
+                "fasten the camera, and take the series again, or put the images from {} on into a series of their own with the same [camera] name and another mounting",
+                self.first()
+            ),
+            Displacement::FromThenOn => format!(
+                "write a column placement in joints.csv that differs from {} on, or fasten the plate and take the series again",
+                self.first()
+            ),
+            Displacement::AxisUp(_) => "fasten it, and take the series again".into(),
+            Displacement::AllThrough => {
+                "let camera and robot warm up, fasten what creeps, and take the series again".into()
+            }
+        }
     }
 }

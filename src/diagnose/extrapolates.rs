@@ -1,10 +1,8 @@
 //! Is the corrected robot any good where no stop was?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::{Accuracy, Uncertainty, extrapolation_m};
-use crate::error::{Code, Notice};
+use crate::error::Code;
 
 /// Outside the region of the stops the corrected robot is known worse than the nominal one misses inside.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,12 +17,6 @@ pub(super) fn check(uncertainty: &Uncertainty, _: &Accuracy, setting: &CheckCont
     let nominal_m = uncertainty.flange?.nominal_m;
     let outside_m = extrapolation_m(&uncertainty.workspace, nominal_m, setting.limits)?;
     Some(Extrapolates { outside_m, nominal_m })
-}
-
-impl fmt::Display for Extrapolates {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.notice().fmt(f)
-    }
 }
 
 impl Kind for Extrapolates {
@@ -47,16 +39,19 @@ impl Kind for Extrapolates {
         ]
     }
 
-    fn notice(&self) -> Notice {
-        Notice::new(
-            self.code(),
-            "workspace",
-            format!(
-                "outside the region of the stops the flange is known to {:.1} mm only, where the nominal robot is off by {:.1} mm inside",
-                1e3 * self.outside_m,
-                1e3 * self.nominal_m
-            ),
-            "keep programs within the region, or add stops where they go; elsewhere the nominal robot may be better",
+    fn place(&self) -> String {
+        "workspace".into()
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "outside the region of the stops the flange is known to {:.1} mm only, where the nominal robot is off by {:.1} mm inside",
+            1e3 * self.outside_m,
+            1e3 * self.nominal_m
         )
+    }
+
+    fn remedy(&self) -> String {
+        "keep programs within the region, or add stops where they go; elsewhere the nominal robot may be better".into()
     }
 }

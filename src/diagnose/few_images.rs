@@ -1,10 +1,8 @@
 //! Are there enough images of the robot?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::Accuracy;
-use crate::error::{Code, Notice};
+use crate::error::Code;
 use crate::fit::Fit;
 
 /// Few images of the robot.
@@ -20,12 +18,6 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<F
     let are_stops = setting.on_robot == 0;
     let images = if are_stops { fit.problem.used_stops().len() } else { setting.on_robot };
     (images < setting.limits.few_images).then_some(FewImages { images, are_stops })
-}
-
-impl fmt::Display for FewImages {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.notice().fmt(f)
-    }
 }
 
 impl Kind for FewImages {
@@ -45,16 +37,19 @@ impl Kind for FewImages {
         vec![Quantity::new("images", self.images as f64, "1")]
     }
 
-    fn notice(&self) -> Notice {
-        Notice::new(
-            self.code(),
-            "series",
-            format!(
-                "{} {} of the robot are few: expect the prior (nominal model) to decide much of the result",
-                self.images,
-                if self.are_stops { "stops" } else { "images" }
-            ),
-            "take 30 to 50 stops that move every joint through its range",
+    fn place(&self) -> String {
+        "series".into()
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "{} {} of the robot are few: expect the prior (nominal model) to decide much of the result",
+            self.images,
+            if self.are_stops { "stops" } else { "images" }
         )
+    }
+
+    fn remedy(&self) -> String {
+        "take 30 to 50 stops that move every joint through its range".into()
     }
 }

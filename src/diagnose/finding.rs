@@ -1,4 +1,4 @@
-//! What the program found out about the data: a closed set, one file and one sentence each.
+//! What the program found out about the data: a closed set, one file each.
 
 use std::fmt;
 
@@ -98,9 +98,21 @@ impl Finding {
         self.kind().quantities()
     }
 
-    /// Place, sentence and remedy of a note.
+    /// What was seen of what, and why it matters.
+    pub fn seen(&self) -> String {
+        let Notice { place, what, .. } = self.notice();
+        format!("{place}: {what}")
+    }
+
+    /// What to do about it; empty where nothing is known.
+    pub fn remedy(&self) -> String {
+        self.notice().remedy
+    }
+
+    /// Place, what was seen and remedy apart, so that what is said of several places can be said once.
     pub fn notice(&self) -> Notice {
-        self.kind().notice()
+        let kind = self.kind();
+        Notice::new(kind.code(), kind.place(), kind.seen(), kind.remedy())
     }
 
     /// True where the result is not to be trusted.
@@ -109,9 +121,13 @@ impl Finding {
     }
 }
 
+/// What was seen, and what to do: of a note in brackets, else behind a semicolon.
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.kind().fmt(f)
+        match (self.fails(), self.remedy()) {
+            (true, remedy) if !remedy.is_empty() => write!(f, "{}; {remedy}", self.seen()),
+            _ => self.notice().fmt(f),
+        }
     }
 }
 

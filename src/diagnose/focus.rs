@@ -1,7 +1,5 @@
 //! Did focus or zoom change within the series? Every image votes for a focal length of its own.
 
-use std::fmt;
-
 use nalgebra::SVector;
 
 use super::kind::{CheckContext, Kind, Quantity, Subject};
@@ -71,17 +69,6 @@ fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
-impl fmt::Display for FocusChange {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { camera, image, change, significance } = self;
-        write!(
-            f,
-            "focus or zoom of camera {camera} changed before {image}: from there on the focal length differs by {:.2} % ({significance:.0} standard errors); fix focus and zoom",
-            100.0 * change
-        )
-    }
-}
-
 impl Kind for FocusChange {
     fn code(&self) -> Code {
         Code::FocusChanged
@@ -94,5 +81,22 @@ impl Kind for FocusChange {
     fn quantities(&self) -> Vec<Quantity> {
         let change = Quantity::new("relative_change", self.change, "1");
         vec![change.with_sigma(self.change.abs() / self.significance)]
+    }
+
+    fn place(&self) -> String {
+        format!("camera {}", self.camera)
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "focus or zoom changed before {}: from there on the focal length differs by {:.2} % ({:.0} standard errors)",
+            self.image,
+            100.0 * self.change,
+            self.significance
+        )
+    }
+
+    fn remedy(&self) -> String {
+        "fix focus and zoom".into()
     }
 }

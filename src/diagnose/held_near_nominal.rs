@@ -1,10 +1,8 @@
 //! Was the robot held near nominal because joint errors are no noise?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::Accuracy;
-use crate::error::{Code, Notice};
+use crate::error::Code;
 use crate::fit::Fit;
 
 /// The corrected robot is held near the nominal one outside the region of the stops.
@@ -19,12 +17,6 @@ pub struct HeldNearNominal {
 pub(super) fn check(fit: &Fit, _: &Accuracy, _: &CheckContext) -> Option<HeldNearNominal> {
     let held = fit.problem.restraint.as_ref()?;
     Some(HeldNearNominal { displacement_m: held.displacement_m, repeats: held.repeats })
-}
-
-impl fmt::Display for HeldNearNominal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.notice().fmt(f)
-    }
 }
 
 impl Kind for HeldNearNominal {
@@ -47,16 +39,19 @@ impl Kind for HeldNearNominal {
         ]
     }
 
-    fn notice(&self) -> Notice {
-        Notice::new(
-            self.code(),
-            "joint errors",
-            format!(
-                "they repeat at neighbouring readings ({:.1} standard deviations), so that the fit takes some of them for links; where the stops do not say, the corrected robot is held as near to the nominal one as it is at the stops ({:.2} mm RMS)",
-                self.repeats,
-                1e3 * self.displacement_m
-            ),
-            "add stops where programs go",
+    fn place(&self) -> String {
+        "joint errors".into()
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "they repeat at neighbouring readings ({:.1} standard deviations), so that the fit takes some of them for links; where the stops do not say, the corrected robot is held as near to the nominal one as it is at the stops ({:.2} mm RMS)",
+            self.repeats,
+            1e3 * self.displacement_m
         )
+    }
+
+    fn remedy(&self) -> String {
+        "add stops where programs go".into()
     }
 }

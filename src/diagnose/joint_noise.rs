@@ -1,10 +1,8 @@
 //! Do the joint readings explain the images as well as those of robots usually do?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::assess::{Accuracy, median};
-use crate::error::{Code, Notice};
+use crate::error::Code;
 use crate::fit::Fit;
 use crate::problem::Problem;
 
@@ -89,28 +87,6 @@ fn in_words(what: &str, images: &[ImageValue], shown: impl Fn(f64) -> String) ->
     if named.is_empty() { String::new() } else { format!("{what} {}", some_of(&named, MOST_IMAGES)) }
 }
 
-impl JointNoiseLarge {
-    fn worst(&self) -> String {
-        in_words("; the others predict worst", &self.worst_predicted, |mm| format!("{mm:.1} mm"))
-    }
-}
-
-impl fmt::Display for JointNoiseLarge {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.weight == Weight::Note {
-            return self.notice().fmt(f);
-        }
-        write!(
-            f,
-            "joint noise: {:.1} mrad ({} most) in series {}; the readings do not explain the images: look for loose camera or plate, motion, wrong robot model{}",
-            1e3 * self.sigma,
-            self.joint,
-            self.series,
-            self.worst()
-        )
-    }
-}
-
 impl Kind for JointNoiseLarge {
     fn code(&self) -> Code {
         Code::JointNoiseLarge
@@ -135,18 +111,27 @@ impl Kind for JointNoiseLarge {
         vec![Quantity::new("joint_noise", self.sigma, "rad or m")]
     }
 
-    fn notice(&self) -> Notice {
-        Notice::new(
-            self.code(),
-            format!("series {}", self.series),
-            format!(
-                "the joint noise is {:.2} mrad ({} most); robots repeat to some 0.1 mrad{}{}",
-                1e3 * self.sigma,
-                self.joint,
-                self.worst(),
-                in_words("; blurred or badly seen", &self.badly_seen, |px| format!("sigma {px:.3} px"))
-            ),
-            "did plate or camera move, were images taken before the arm stood still, are readings rounded? the stated sigmas contain it",
+    fn place(&self) -> String {
+        format!("series {}", self.series)
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "the joint noise is {:.2} mrad ({} most), where robots repeat to some 0.1 mrad{}{}",
+            1e3 * self.sigma,
+            self.joint,
+            in_words(", the others predict worst", &self.worst_predicted, |mm| format!("{mm:.1} mm")),
+            in_words(", blurred or badly seen", &self.badly_seen, |px| format!("sigma {px:.3} px"))
         )
+    }
+
+    fn remedy(&self) -> String {
+        let remedy = match self.weight {
+            Weight::Note => {
+                "did plate or camera move, were images taken before the arm stood still, are readings rounded? the stated sigmas contain it"
+            }
+            _ => "look for a loose camera or plate, motion, a wrong robot model",
+        };
+        remedy.into()
     }
 }

@@ -1,11 +1,9 @@
 //! What every finding answers, and what its checks look at.
 
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
 
 use crate::assess::Limits;
-use crate::error::{Code, Notice};
+use crate::error::Code;
 use crate::fit::FreePoses;
 use crate::problem::MeasuredSeries;
 
@@ -84,8 +82,8 @@ impl Quantity {
     }
 }
 
-/// What every kind of finding answers; its sentence is its `Display`.
-pub(super) trait Kind: fmt::Display {
+/// What every kind of finding answers.
+pub(super) trait Kind {
     /// Stable name for programs.
     fn code(&self) -> Code;
     /// How much it weighs.
@@ -98,15 +96,12 @@ pub(super) trait Kind: fmt::Display {
     fn quantities(&self) -> Vec<Quantity> {
         Vec::new()
     }
-    /// Place, sentence and remedy apart, so that what is said of several places can be said once.
-    fn notice(&self) -> Notice {
-        Notice::new(self.code(), "result", self, "")
-    }
-}
-
-/// Sentence of a gate: what was found, and after the only semicolon what to do.
-pub(super) fn gate_sentence(what: &str, remedy: &str) -> String {
-    format!("{}; {remedy}", what.replace("; ", ", "))
+    /// File, image, joint or body that it is about, in words.
+    fn place(&self) -> String;
+    /// What was seen of it, and why it matters.
+    fn seen(&self) -> String;
+    /// What to do.
+    fn remedy(&self) -> String;
 }
 
 /// Names of the first few, and how many more there are.

@@ -1,7 +1,5 @@
 //! Do measurements of trackers and contacts belong to their stops?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
 use crate::problem::Adjustment;
@@ -40,19 +38,6 @@ pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<M
     Some(MeasurementsLeftOut { named, all, weight })
 }
 
-impl fmt::Display for MeasurementsLeftOut {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named: Vec<String> =
-            self.named.iter().map(|[stop, instrument, why]| format!("stop {stop} ({instrument}): {why}")).collect();
-        let (out, all) = (self.named.len(), self.all);
-        write!(
-            f,
-            "measurements: {out} of {all} do not fit the others and are left out: {}",
-            some_of(&named, MOST_NAMED)
-        )
-    }
-}
-
 impl Kind for MeasurementsLeftOut {
     fn code(&self) -> Code {
         Code::MeasurementsLeftOut
@@ -71,5 +56,20 @@ impl Kind for MeasurementsLeftOut {
             Quantity::new("measurements_left_out", self.named.len() as f64, "1"),
             Quantity::new("measurements", self.all as f64, "1"),
         ]
+    }
+
+    fn place(&self) -> String {
+        "measurements".into()
+    }
+
+    fn seen(&self) -> String {
+        let named: Vec<String> =
+            self.named.iter().map(|[stop, instrument, why]| format!("stop {stop} ({instrument}): {why}")).collect();
+        let (out, all) = (self.named.len(), self.all);
+        format!("{out} of {all} do not fit the others and are left out: {}", some_of(&named, MOST_NAMED))
+    }
+
+    fn remedy(&self) -> String {
+        "check joint_unit, the order and signs of the joints, that every row names its own stop, and that instrument and targets did not move".into()
     }
 }

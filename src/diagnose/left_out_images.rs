@@ -1,10 +1,11 @@
 //! Do most images belong to their joint readings?
 
-use std::fmt;
-
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
 use crate::problem::{Adjustment, ImageRejection};
+
+/// Most images that are named.
+const MOST_IMAGES: usize = 5;
 
 /// Many images of the robot were left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,17 +34,6 @@ pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<I
     Some(ImagesLeftOut { left_out, on_robot, wrongly_paired, weight })
 }
 
-impl fmt::Display for ImagesLeftOut {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { left_out, on_robot, wrongly_paired, weight } = self;
-        if *weight == Weight::Gate {
-            return write!(f, "images: {left_out} of {on_robot} do not fit their joint readings");
-        }
-        let named: Vec<&str> = wrongly_paired.iter().map(String::as_str).take(5).collect();
-        write!(f, "{left_out} of {on_robot} images do not fit their joint readings ({} ...)", named.join(", "))
-    }
-}
-
 impl Kind for ImagesLeftOut {
     fn code(&self) -> Code {
         Code::ImagesLeftOut
@@ -62,5 +52,22 @@ impl Kind for ImagesLeftOut {
             Quantity::new("images_left_out", self.left_out as f64, "1"),
             Quantity::new("images", self.on_robot as f64, "1"),
         ]
+    }
+
+    fn place(&self) -> String {
+        "images".into()
+    }
+
+    fn seen(&self) -> String {
+        let Self { left_out, on_robot, wrongly_paired, .. } = self;
+        let named = match wrongly_paired.as_slice() {
+            [] => String::new(),
+            named => format!(" ({})", some_of(named, MOST_IMAGES)),
+        };
+        format!("{left_out} of {on_robot} do not fit their joint readings{named}")
+    }
+
+    fn remedy(&self) -> String {
+        "check joint_unit, the order and signs of the joints, that image names stand in the right rows, and that the plate did not move".into()
     }
 }

@@ -1,7 +1,5 @@
 //! Do most observations agree with the others?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
 use crate::problem::Adjustment;
@@ -30,18 +28,6 @@ pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<O
     (share > setting.limits.share_of_observations_left_out).then_some(found)
 }
 
-impl fmt::Display for ObservationsLeftOut {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "observations: {:.0} % were left out, {:.0} % in {}; look for markers taken for others, a bent plate, changed focus",
-            100.0 * self.share,
-            100.0 * self.worst.1,
-            self.worst.0
-        )
-    }
-}
-
 impl Kind for ObservationsLeftOut {
     fn code(&self) -> Code {
         Code::ObservationsLeftOut
@@ -53,5 +39,18 @@ impl Kind for ObservationsLeftOut {
 
     fn quantities(&self) -> Vec<Quantity> {
         vec![Quantity::new("share", self.share, "1"), Quantity::new("share_in_image", self.worst.1, "1")]
+    }
+
+    fn place(&self) -> String {
+        "observations".into()
+    }
+
+    fn seen(&self) -> String {
+        let (image, share) = &self.worst;
+        format!("{:.0} % were left out, {:.0} % in {image}", 100.0 * self.share, 100.0 * share)
+    }
+
+    fn remedy(&self) -> String {
+        "look for markers taken for others, a bent plate, changed focus".into()
     }
 }

@@ -1,9 +1,7 @@
 //! Can camera.yaml express the lens that was found?
 
-use std::fmt;
-
 use super::kind::{Kind, Quantity, Subject, Weight};
-use crate::error::{Code, Notice};
+use crate::error::Code;
 
 /// camera.yaml cannot express the lens of a camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,12 +14,6 @@ pub struct LensNotInRos {
     pub rms_px: f64,
     /// The most, px.
     pub worst_px: f64,
-}
-
-impl fmt::Display for LensNotInRos {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.notice().fmt(f)
-    }
 }
 
 impl Kind for LensNotInRos {
@@ -41,15 +33,18 @@ impl Kind for LensNotInRos {
         vec![Quantity::new("rms", self.rms_px, "px"), Quantity::new("worst", self.worst_px, "px")]
     }
 
-    fn notice(&self) -> Notice {
-        Notice::new(
-            self.code(),
-            format!("camera {}", self.camera),
-            format!(
-                "camera.yaml cannot express its {} lens: it is off by {:.3} px RMS over the image, at most {:.3} px",
-                self.lens, self.rms_px, self.worst_px
-            ),
-            "solution.json has the lens itself; --camera brown identifies one that camera.yaml can express",
+    fn place(&self) -> String {
+        format!("camera {}", self.camera)
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "camera.yaml cannot express its {} lens: it is off by {:.3} px RMS over the image, at most {:.3} px",
+            self.lens, self.rms_px, self.worst_px
         )
+    }
+
+    fn remedy(&self) -> String {
+        "solution.json has the lens itself; --camera brown identifies one that camera.yaml can express".into()
     }
 }

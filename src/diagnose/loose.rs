@@ -1,7 +1,5 @@
 //! A camera that sits loosely on its mount: it tips over between two positions, and the joint noise shows two heaps.
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject, some_of};
 use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
@@ -106,21 +104,6 @@ fn loose(fit: &Fit, mounting: usize, limits: &Limits) -> Option<LooseMounting> {
     })
 }
 
-impl fmt::Display for LooseMounting {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "camera mount {}: the {} of the camera has two values {:.2} mrad apart ({} of {} images: {}); the camera is loose on its mount, or slips: fasten it and take the series again",
-            self.mounting,
-            self.turn,
-            1e3 * self.angle_rad,
-            self.images.len(),
-            self.of,
-            some_of(&self.images, MOST_IMAGES)
-        )
-    }
-}
-
 impl Kind for LooseMounting {
     fn code(&self) -> Code {
         Code::LooseMounting
@@ -133,6 +116,25 @@ impl Kind for LooseMounting {
 
     fn quantities(&self) -> Vec<Quantity> {
         vec![Quantity::new("angle", self.angle_rad, "rad").with_sigma(self.spread_rad)]
+    }
+
+    fn place(&self) -> String {
+        format!("camera mount {}", self.mounting)
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "the {} of the camera has two values {:.2} mrad apart ({} of {} images: {}): it is loose on its mount, or slips",
+            self.turn,
+            1e3 * self.angle_rad,
+            self.images.len(),
+            self.of,
+            some_of(&self.images, MOST_IMAGES)
+        )
+    }
+
+    fn remedy(&self) -> String {
+        "fasten it and take the series again".into()
     }
 }
 

@@ -1,10 +1,8 @@
 //! Is every marker where the plate file says, within its tolerance?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::Accuracy;
-use crate::error::{Code, Notice};
+use crate::error::Code;
 use crate::fit::Fit;
 
 /// A marker lies elsewhere than its plate file says.
@@ -26,12 +24,6 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Mark
         .collect()
 }
 
-impl fmt::Display for MarkerOff {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.notice().fmt(f)
-    }
-}
-
 impl Kind for MarkerOff {
     fn code(&self) -> Code {
         Code::MarkerOff
@@ -49,12 +41,15 @@ impl Kind for MarkerOff {
         vec![Quantity::new("distance", self.distance_m, "m")]
     }
 
-    fn notice(&self) -> Notice {
-        Notice::new(
-            self.code(),
-            format!("marker {}", self.marker),
-            format!("lies {:.2} mm from where the plate file says, far beyond its tolerance", 1e3 * self.distance_m),
-            "printed wrongly, moved, or taken for another? its corrected position stands in plate.csv",
-        )
+    fn place(&self) -> String {
+        format!("marker {}", self.marker)
+    }
+
+    fn seen(&self) -> String {
+        format!("lies {:.2} mm from where the plate file says, far beyond its tolerance", 1e3 * self.distance_m)
+    }
+
+    fn remedy(&self) -> String {
+        "printed wrongly, moved, or taken for another? its corrected position stands in plate.csv".into()
     }
 }

@@ -1,6 +1,6 @@
-//! What the data contradict: one file a check with what it finds and the sentence for it, one row in [`CHECKS`].
+//! What the data contradict: one file a check with what it finds, one row in [`CHECKS`].
 //!
-//! To add one: a file with a function of the stage at which it runs and a type with `Display` and `Kind`; the type as a variant of
+//! To add one: a file with a function of the stage at which it runs and a type that is a `Kind`; the type as a variant of
 //! [`Finding`]; the function as a row of [`CHECKS`]. Numbers that decide stand in [`crate::assess::Limits`].
 
 mod camera_model;

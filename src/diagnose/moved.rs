@@ -1,7 +1,5 @@
 //! Images that disagree with their readings but agree with each other: the plate or the camera was moved.
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
 use crate::geom::Pose;
@@ -77,40 +75,6 @@ fn find_move(Adjustment { problem, state }: &Adjustment, setting: &CheckContext,
     })
 }
 
-impl Moved {
-    /// What was found, and what to do.
-    pub(super) fn what_and_remedy(&self) -> (String, &'static str) {
-        let (name, remedy) = match self.body {
-            MovedBody::Plate => (
-                "the plate",
-                "give the rows after the move a placement of their own in joints.csv, and fix the plate better",
-            ),
-            MovedBody::Camera => (
-                "the camera on its mount",
-                "put the images after the move into a series of their own with another [camera] mounting",
-            ),
-        };
-        let what = format!(
-            "{name} was moved between {} and {}: {} images, {} to {}, agree on a place {:.1} mm and {:.1} mrad from that of the others",
-            self.between[0],
-            self.between[1],
-            self.images.len(),
-            self.images.first().map_or("", String::as_str),
-            self.images.last().map_or("", String::as_str),
-            1e3 * self.distance_m,
-            1e3 * self.angle_rad
-        );
-        (what, remedy)
-    }
-}
-
-impl fmt::Display for Moved {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (what, remedy) = self.what_and_remedy();
-        write!(f, "{what}; {remedy}")
-    }
-}
-
 impl Kind for Moved {
     fn code(&self) -> Code {
         match self.body {
@@ -125,6 +89,38 @@ impl Kind for Moved {
 
     fn quantities(&self) -> Vec<Quantity> {
         vec![Quantity::new("distance", self.distance_m, "m"), Quantity::new("angle", self.angle_rad, "rad")]
+    }
+
+    fn place(&self) -> String {
+        match self.body {
+            MovedBody::Plate => "plate".into(),
+            MovedBody::Camera => "camera on its mount".into(),
+        }
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "was moved between {} and {}: {} images, {} to {}, agree on a place {:.1} mm and {:.1} mrad from that of the others",
+            self.between[0],
+            self.between[1],
+            self.images.len(),
+            self.images.first().map_or("", String::as_str),
+            self.images.last().map_or("", String::as_str),
+            1e3 * self.distance_m,
+            1e3 * self.angle_rad
+        )
+    }
+
+    fn remedy(&self) -> String {
+        let remedy = match self.body {
+            MovedBody::Plate => {
+                "give the rows after the move a placement of their own in joints.csv, and fix the plate better"
+            }
+            MovedBody::Camera => {
+                "put the images after the move into a series of their own with another [camera] mounting"
+            }
+        };
+        remedy.into()
     }
 }
 

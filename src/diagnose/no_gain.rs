@@ -1,7 +1,5 @@
 //! Does the corrected robot predict images that it has not seen better than the nominal one?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::assess::Accuracy;
 use crate::error::Code;
@@ -21,16 +19,6 @@ pub(super) fn check(_: &Fit, accuracy: &Accuracy, _: &CheckContext) -> Option<No
     (found.calibrated_mm > found.nominal_mm).then_some(found)
 }
 
-impl fmt::Display for NoGain {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "hold-out: the corrected robot predicts images no better than the nominal one ({:.3} mm against {:.3} mm)",
-            self.calibrated_mm, self.nominal_mm
-        )
-    }
-}
-
 impl Kind for NoGain {
     fn code(&self) -> Code {
         Code::NoGain
@@ -44,5 +32,20 @@ impl Kind for NoGain {
         [("calibrated", self.calibrated_mm), ("nominal", self.nominal_mm)]
             .map(|(name, mm)| Quantity::new(name, 1e-3 * mm, "m"))
             .into()
+    }
+
+    fn place(&self) -> String {
+        "hold-out".into()
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "the corrected robot predicts images no better than the nominal one ({:.3} mm against {:.3} mm)",
+            self.calibrated_mm, self.nominal_mm
+        )
+    }
+
+    fn remedy(&self) -> String {
+        "keep the nominal robot, and take more stops, and more different ones".into()
     }
 }

@@ -1,19 +1,11 @@
 //! What readers, detector and the choice of the lens noticed.
 
-use std::fmt;
-
 use super::kind::{Kind, Subject, Weight};
 use crate::error::{Code, Notice};
 
 /// A notice of a room below.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Noticed(pub Notice);
-
-impl fmt::Display for Noticed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
 
 impl Kind for Noticed {
     fn code(&self) -> Code {
@@ -28,7 +20,15 @@ impl Kind for Noticed {
         vec![Subject::Place(self.0.place.clone())]
     }
 
-    fn notice(&self) -> Notice {
-        self.0.clone()
+    fn place(&self) -> String {
+        self.0.place.clone()
+    }
+
+    fn seen(&self) -> String {
+        self.0.what.clone()
+    }
+
+    fn remedy(&self) -> String {
+        self.0.remedy.clone()
     }
 }

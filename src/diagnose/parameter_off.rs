@@ -1,10 +1,8 @@
 //! Is the robot as far from nominal as robots are?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::Accuracy;
-use crate::error::{Code, Notice};
+use crate::error::Code;
 use crate::fit::Fit;
 
 /// A parameter of the robot is far from nominal.
@@ -34,12 +32,6 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Para
     problem.layout.robot().filter_map(of_column).collect()
 }
 
-impl fmt::Display for ParameterOff {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.notice().fmt(f)
-    }
-}
-
 impl Kind for ParameterOff {
     fn code(&self) -> Code {
         Code::ParameterOff
@@ -60,13 +52,16 @@ impl Kind for ParameterOff {
         ]
     }
 
-    fn notice(&self) -> Notice {
+    fn place(&self) -> String {
+        self.parameter.clone()
+    }
+
+    fn seen(&self) -> String {
         let Self { value, unit, usual_deviations, .. } = self;
-        Notice::new(
-            self.code(),
-            &self.parameter,
-            format!("{value:.3e} {unit} is {usual_deviations:.0} times what robots usually deviate by"),
-            "check that the URDF is of this robot, and its mastering",
-        )
+        format!("{value:.3e} {unit} is {usual_deviations:.0} times what robots usually deviate by")
+    }
+
+    fn remedy(&self) -> String {
+        "check that the URDF is of this robot, and its mastering".into()
     }
 }

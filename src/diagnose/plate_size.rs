@@ -1,7 +1,5 @@
 //! Whether a plate has the size that its file states. The lengths of the robot's links are the only others there are.
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::assess::{Accuracy, refitted};
 use crate::error::Code;
@@ -52,37 +50,6 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
     doubts
 }
 
-impl fmt::Display for DoubtedSize {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Contradicted { measured, off, sigma } => {
-                let (word, remedy) = match measured {
-                    true => {
-                        ("[scale]", "check that distance, and that the lengths in the URDF are those of this robot")
-                    }
-                    false => (
-                        "its file",
-                        "measure two far markers and give [scale] in plate.toml, or correct pitch_m; if the plate is right, the URDF is of another robot or size",
-                    ),
-                };
-                write!(
-                    f,
-                    "plate: the links of the robot say that it is {:.2} % (+- {:.2} %) {} than {word} says; every length goes wrong with it; {remedy}",
-                    100.0 * off.abs(),
-                    100.0 * sigma,
-                    if *off > 0.0 { "larger" } else { "smaller" },
-                )
-            }
-            Self::Uneven { off, .. } => write!(
-                f,
-                "plate: its rows and columns differ in scale by {:.2} %, so it was not made to size, and all lengths of the robot hang on its size; \
-                 measure two far markers and give [scale] in plate.toml",
-                100.0 * off.abs()
-            ),
-        }
-    }
-}
-
 impl Kind for DoubtedSize {
     fn code(&self) -> Code {
         match self {
@@ -102,6 +69,39 @@ impl Kind for DoubtedSize {
                 vec![Quantity::new("relative_x_y_scale", off, "1"), Quantity::new("tolerance", tolerance, "1")]
             }
         }
+    }
+
+    fn place(&self) -> String {
+        "plate".into()
+    }
+
+    fn seen(&self) -> String {
+        match self {
+            Self::Contradicted { measured, off, sigma } => format!(
+                "the links of the robot say that it is {:.2} % (+- {:.2} %) {} than {} says, and every length goes wrong with it",
+                100.0 * off.abs(),
+                100.0 * sigma,
+                if *off > 0.0 { "larger" } else { "smaller" },
+                if *measured { "[scale]" } else { "its file" },
+            ),
+            Self::Uneven { off, .. } => format!(
+                "its rows and columns differ in scale by {:.2} %, so it was not made to size, and all lengths of the robot hang on its size",
+                100.0 * off.abs()
+            ),
+        }
+    }
+
+    fn remedy(&self) -> String {
+        let remedy = match self {
+            Self::Contradicted { measured: true, .. } => {
+                "check that distance, and that the lengths in the URDF are those of this robot"
+            }
+            Self::Contradicted { measured: false, .. } => {
+                "measure two far markers and give [scale] in plate.toml, or correct pitch_m; if the plate is right, the URDF is of another robot or size"
+            }
+            Self::Uneven { .. } => "measure two far markers and give [scale] in plate.toml",
+        };
+        remedy.into()
     }
 }
 

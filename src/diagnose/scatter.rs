@@ -1,10 +1,8 @@
 //! Do the images scatter as the noise model says?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::{Accuracy, Uncertainty};
-use crate::error::{Code, Notice};
+use crate::error::Code;
 
 /// The images scatter more than the noise model says.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,12 +14,6 @@ pub struct LargeScatter {
 pub(super) fn check(uncertainty: &Uncertainty, _: &Accuracy, _: &CheckContext) -> Option<LargeScatter> {
     let ratio = uncertainty.clustered_ratio.filter(|_| uncertainty.larger_stated);
     ratio.map(|ratio| LargeScatter { ratio })
-}
-
-impl fmt::Display for LargeScatter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.notice().fmt(f)
-    }
 }
 
 impl Kind for LargeScatter {
@@ -41,15 +33,18 @@ impl Kind for LargeScatter {
         vec![Quantity::new("flange_ratio", self.ratio, "1")]
     }
 
-    fn notice(&self) -> Notice {
-        Notice::new(
-            self.code(),
-            "uncertainty",
-            format!(
-                "the images scatter {:.1} times as much as the noise model says (flange, clusters of images); the larger sigmas are stated",
-                self.ratio
-            ),
-            "look for what changes from image to image: a loose camera or plate, motion, focus, light",
+    fn place(&self) -> String {
+        "uncertainty".into()
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "the images scatter {:.1} times as much as the noise model says (flange, clusters of images); the larger sigmas are stated",
+            self.ratio
         )
+    }
+
+    fn remedy(&self) -> String {
+        "look for what changes from image to image: a loose camera or plate, motion, focus, light".into()
     }
 }

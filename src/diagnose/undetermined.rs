@@ -1,7 +1,5 @@
 //! Is the corrected robot known better than the nominal one misses?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::assess::{Accuracy, Uncertainty, median};
 use crate::error::Code;
@@ -27,17 +25,6 @@ pub(super) fn check(
     found.map(|sigma_mm| FlangeUndetermined { sigma_mm, nominal_mm })
 }
 
-impl fmt::Display for FlangeUndetermined {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "flange: its place is known to {:.1} mm only in the region of the stops, and the nominal robot is off by {:.2} mm: these stops do \
-             not determine the robot; see what is unknown, and what to add",
-            self.sigma_mm, self.nominal_mm
-        )
-    }
-}
-
 impl Kind for FlangeUndetermined {
     fn code(&self) -> Code {
         Code::FlangeUndetermined
@@ -51,5 +38,21 @@ impl Kind for FlangeUndetermined {
         [("flange_sigma", self.sigma_mm), ("nominal_error", self.nominal_mm)]
             .map(|(name, mm)| Quantity::new(name, 1e-3 * mm, "m"))
             .into()
+    }
+
+    fn place(&self) -> String {
+        "flange".into()
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "its place is known to {:.1} mm only in the region of the stops, and the nominal robot is off by {:.2} mm: these stops do \
+             not determine the robot",
+            self.sigma_mm, self.nominal_mm
+        )
+    }
+
+    fn remedy(&self) -> String {
+        "see what is unknown, and what to add".into()
     }
 }

@@ -1,7 +1,5 @@
 //! Are the zeros of the joints, and the ways in which they count, those of the URDF?
 
-use std::fmt;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
 use crate::problem::Adjustment;
@@ -32,21 +30,6 @@ pub(super) fn check(fit: &Adjustment, setting: &CheckContext) -> Vec<ZeroOff> {
     fit.state.robot.chain.joints.iter().filter_map(of).collect()
 }
 
-impl fmt::Display for ZeroOff {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (size, unit) = match self.kind {
-            JointKind::Prismatic => (1e3 * self.offset, "mm"),
-            _ => (self.offset.to_degrees(), "deg"),
-        };
-        let counts = if self.is_reversed { "counts the other way, and " } else { "" };
-        write!(
-            f,
-            "{}: {counts}its zero is {size:+.1} {unit} from that of the URDF, by the images; the corrected URDF has it. Where that cannot be, URDF and joints.csv are not of the same robot",
-            self.joint
-        )
-    }
-}
-
 impl Kind for ZeroOff {
     fn code(&self) -> Code {
         Code::ZeroOff
@@ -60,5 +43,22 @@ impl Kind for ZeroOff {
         let unit = if self.kind == JointKind::Prismatic { "m" } else { "rad" };
         let sign = if self.is_reversed { -1.0 } else { 1.0 };
         vec![Quantity::new("offset", self.offset, unit), Quantity::new("sign", sign, "1")]
+    }
+
+    fn place(&self) -> String {
+        self.joint.clone()
+    }
+
+    fn seen(&self) -> String {
+        let (size, unit) = match self.kind {
+            JointKind::Prismatic => (1e3 * self.offset, "mm"),
+            _ => (self.offset.to_degrees(), "deg"),
+        };
+        let counts = if self.is_reversed { "counts the other way, and " } else { "" };
+        format!("{counts}its zero is {size:+.1} {unit} from that of the URDF, by the images; the corrected URDF has it")
+    }
+
+    fn remedy(&self) -> String {
+        "where that cannot be, give URDF and joints.csv of the same robot".into()
     }
 }

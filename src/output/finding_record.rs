@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::diagnose::{Finding, Quantity, Subject, Weight};
 use crate::error::Code;
 
-/// A finding: what kind it is, what it is about, its numbers, and the sentence for it.
+/// A finding: what kind it is, what it is about, its numbers, and what was seen and what to do in words.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FindingRecord {
     /// Stable name of its kind.
@@ -16,8 +16,14 @@ pub struct FindingRecord {
     pub subject: Vec<Subject>,
     /// Its numbers.
     pub quantities: Vec<Quantity>,
-    /// In words.
+    /// What was seen, and what to do, in one sentence.
     pub text: String,
+    /// What was seen; empty in files of earlier versions.
+    #[serde(default)]
+    pub seen: String,
+    /// What to do about it; empty where nothing is known, and in files of earlier versions.
+    #[serde(default)]
+    pub remedy: String,
 }
 
 impl From<&Finding> for FindingRecord {
@@ -28,6 +34,8 @@ impl From<&Finding> for FindingRecord {
             subject: finding.subjects(),
             quantities: finding.quantities(),
             text: finding.to_string(),
+            seen: finding.seen(),
+            remedy: finding.remedy(),
         }
     }
 }

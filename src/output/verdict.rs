@@ -36,16 +36,20 @@ impl Verdict {
     /// Failed gates first, then what asks for care.
     pub fn of(record: &SolutionRecord) -> Self {
         if !record.failed_gates.is_empty() {
-            return Self { trust: Trust::Failed, reasons: record.failed_gates.iter().map(|g| of_gate(g)).collect() };
+            return Self {
+                trust: Trust::Failed,
+                reasons: record.failed_gates.iter().map(|gate| of_gate(record, gate)).collect(),
+            };
         }
         let reasons = doubts(record);
         Self { trust: if reasons.is_empty() { Trust::Good } else { Trust::Doubts }, reasons }
     }
 }
 
-/// Sentences of gates say what was found, and after the first semicolon what to do.
-fn of_gate(sentence: &str) -> Reason {
-    let (what, remedy) = sentence.split_once("; ").unwrap_or((sentence, ""));
+/// The finding of a gate; of files of earlier versions its whole sentence.
+fn of_gate(record: &SolutionRecord, sentence: &str) -> Reason {
+    let found = record.findings.iter().find(|f| f.text == sentence && !f.seen.is_empty());
+    let (what, remedy) = found.map_or((sentence, ""), |f| (f.seen.as_str(), f.remedy.as_str()));
     Reason { what: what.to_owned(), remedy: remedy.to_owned() }
 }
 
