@@ -8,7 +8,7 @@ use super::{
     scatter, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
-use crate::error::{Error, Notice, Result};
+use crate::error::{Error, Result};
 use crate::fit::Fit;
 use crate::problem::{Adjustment, Problem};
 
@@ -151,7 +151,6 @@ impl<'a> Diagnosis<'a> {
         let all = || self.found.iter().flatten();
         let refusal = all().find(|f| f.weight() == Weight::Refusal)?;
         let moved = all().find(|f| matches!(f, Finding::Moved(_)));
-        let Notice { code, place, what, remedy } = moved.unwrap_or(refusal).notice();
-        Some(Error::new(code, place, what, remedy))
+        Some(moved.unwrap_or(refusal).refusal())
     }
 }

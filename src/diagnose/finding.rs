@@ -17,6 +17,7 @@ use super::left_out_observations::ObservationsLeftOut;
 use super::lens_not_in_ros::LensNotInRos;
 use super::loose::LooseMounting;
 use super::marker_off::MarkerOff;
+use super::mistake::Mistake;
 use super::moved::Moved;
 use super::no_gain::NoGain;
 use super::noticed::Noticed;
@@ -25,7 +26,7 @@ use super::plate_size::DoubtedSize;
 use super::scatter::LargeScatter;
 use super::undetermined::FlangeUndetermined;
 use super::zeros_off::ZeroOff;
-use crate::error::{Code, Notice};
+use crate::error::{Code, Error, Notice};
 
 macro_rules! findings {
     ($($kind:ident,)+) => {
@@ -68,6 +69,7 @@ findings! {
     LooseMounting,
     MarkerOff,
     MeasurementsLeftOut,
+    Mistake,
     Moved,
     NoGain,
     Noticed,
@@ -113,6 +115,12 @@ impl Finding {
     pub fn notice(&self) -> Notice {
         let kind = self.kind();
         Notice::new(kind.code(), kind.place(), kind.seen(), kind.remedy())
+    }
+
+    /// The finding as the reason why there is no result.
+    pub fn refusal(&self) -> Error {
+        let Notice { code, place, what, remedy } = self.notice();
+        Error { quantities: self.quantities(), ..Error::new(code, place, what, remedy) }
     }
 
     /// True where the result is not to be trusted.

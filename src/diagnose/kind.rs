@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::assess::Limits;
 use crate::error::Code;
+pub use crate::error::Quantity;
 use crate::fit::FreePoses;
 use crate::problem::MeasuredSeries;
 
@@ -54,32 +55,6 @@ pub enum Subject {
     Marker(u32),
     /// A parameter, by its name in the layout.
     Parameter(String),
-}
-
-/// A number of a finding.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Quantity {
-    /// What it is.
-    pub name: String,
-    /// Its value.
-    pub value: f64,
-    /// Its unit; 1 for a number without.
-    pub unit: String,
-    /// Its standard deviation, where it is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sigma: Option<f64>,
-}
-
-impl Quantity {
-    /// A quantity without stated sigma.
-    pub(super) fn new(name: &str, value: f64, unit: &str) -> Self {
-        Self { name: name.to_owned(), value, unit: unit.to_owned(), sigma: None }
-    }
-
-    /// With its standard deviation.
-    pub(super) fn with_sigma(self, sigma: f64) -> Self {
-        Self { sigma: Some(sigma), ..self }
-    }
 }
 
 /// What every kind of finding answers.

@@ -1,17 +1,19 @@
 //! One error type for the whole program: where, what, and what to do about it.
 
 mod code;
+mod quantity;
 
 use std::fmt;
 use std::path::Path;
 
 pub use code::{Code, ErrorKind};
+pub use quantity::Quantity;
 
 /// A failure that a person can act on.
 ///
 /// `place` names the file, line, image, joint or parameter; `what` says what was found there;
 /// `remedy` says the first thing to look at.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Error {
     /// What is wrong with what.
     pub code: Code,
@@ -21,6 +23,8 @@ pub struct Error {
     pub what: String,
     /// The first thing to look at.
     pub remedy: String,
+    /// Numbers of what was found, where it is a finding.
+    pub quantities: Vec<Quantity>,
 }
 
 /// Result with the program's error.
@@ -29,7 +33,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 impl Error {
     /// A failure; its code says whether it is of the input or of the solution.
     pub fn new(code: Code, place: impl fmt::Display, what: impl fmt::Display, remedy: impl fmt::Display) -> Self {
-        Self { code, place: place.to_string(), what: what.to_string(), remedy: remedy.to_string() }
+        let [place, what, remedy] = [place.to_string(), what.to_string(), remedy.to_string()];
+        Self { code, place, what, remedy, quantities: Vec::new() }
     }
 
     /// A file that could not be read or written.

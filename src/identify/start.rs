@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::start_verdict::{StartReached, StartVerdict};
 use super::suspects::Suspects;
 use crate::assess::{Limits, median};
+use crate::diagnose::{Finding, Mistake};
 use crate::error::{Code, Error, Result};
 use crate::fit::FreePoses;
 use crate::geom::{Pose, log_so3};
@@ -228,9 +229,9 @@ fn closed_form(
         });
     }
     let suspects = Suspects { problem, robot: &state.robot, series, pairs, limits };
-    if let Some(cause) = suspects.better_than(best.median_error) {
-        let place = if cause.joints.is_empty() { of.to_owned() } else { cause.joints.join(", ") };
-        return Err(Error::new(cause.code, place, cause.what, cause.remedy));
+    if let Some((kind, misfit_undone)) = suspects.better_than(best.median_error) {
+        let mistake = Mistake { kind, of: of.to_owned(), misfit: best.median_error, misfit_undone };
+        return Err(Finding::from(mistake).refusal());
     }
     if best.median_error > limits.hand_eye_spread {
         return Err(no_fit(

@@ -1,8 +1,9 @@
 //! The report: complete, self-contained, and safe against whatever stands in names.
 
 use crate::outputs_support::{context, robot, solved};
+use robotcal::diagnose::{DoubtedSize, Finding};
 use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
-use robotcal::output::verdict::Verdict;
+use robotcal::output::verdict::{Reason, Verdict};
 use robotcal::output::{Thumbnails, files, report_html, solution_json};
 use robotcal::series::{CameraMount, InputFile};
 
@@ -139,6 +140,31 @@ fn the_verdict_follows_the_gates_and_then_the_doubts() {
     record.failed_gates.push(gate.into());
     let page = report_html(&record, &Thumbnails::default());
     assert!(page.contains("class=\"verdict failed\"") && page.contains(gate));
+}
+
+#[test]
+fn what_was_seen_and_what_to_do_stay_apart() {
+    let found = Finding::from(DoubtedSize::Contradicted { measured: false, off: 0.02, sigma: 0.001 });
+    assert!(found.fails() && found.remedy().contains("; "), "a remedy of two parts: {found}");
+    let mut record = record();
+    record.failed_gates = vec![found.to_string()];
+    record.findings = vec![(&found).into()];
+    let reason = |record: &solution_json::SolutionRecord| {
+        let read = solution_json::read(&serde_json::to_vec(record).unwrap()).unwrap();
+        let [one] = Verdict::of(&read).reasons.try_into().unwrap();
+        one
+    };
+    assert_eq!(reason(&record), Reason { what: found.seen(), remedy: found.remedy() });
+    // Files of earlier versions have the sentence alone, or no findings at all.
+    let (alone, nothing) = (found.to_string(), String::new());
+    let mut earlier = serde_json::to_value(&record).unwrap();
+    for field in ["seen", "remedy"] {
+        earlier["findings"][0].as_object_mut().unwrap().remove(field).unwrap();
+    }
+    let earlier: solution_json::SolutionRecord = serde_json::from_value(earlier).unwrap();
+    assert_eq!(reason(&earlier), Reason { what: alone.clone(), remedy: nothing.clone() });
+    record.findings.clear();
+    assert_eq!(reason(&record), Reason { what: alone, remedy: nothing });
 }
 
 #[test]

@@ -1,0 +1,216 @@
+//! A usual mistake that, undone, lets the joint readings fit the images: there is no result until it is mended.
+
+use super::kind::{Kind, Quantity, Subject, Weight};
+use crate::error::Code;
+use crate::series::CameraMount;
+
+/// What was done wrong.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MistakeKind {
+    /// Readings have the wrong sign.
+    Signs(Vec<String>),
+    /// Columns stand in each other's place: the first takes the readings of the second, and so on, the last those of the first.
+    Columns(Vec<String>),
+    /// All columns stand in reverse order.
+    Reversed,
+    /// Angles are in another unit than they are read in; of one joint alone, or of all.
+    Unit {
+        /// The joint; none where it is all of them.
+        joint: Option<String>,
+        /// True where degrees are read as radians, else the other way round.
+        are_degrees: bool,
+    },
+    /// Every image stands beside the readings of the row below, or above.
+    Rows {
+        /// True for the row below.
+        below: bool,
+    },
+    /// The camera is mounted in the way that is not stated.
+    Mount(CameraMount),
+    /// Directions fit and distances do not, medians over the images.
+    Lengths {
+        /// Of the directions, rad.
+        angle_rad: f64,
+        /// Of the distances, m.
+        distance_m: f64,
+    },
+    /// The plate has another size.
+    PlateSize {
+        /// Its size over the stated one, by the links of the robot.
+        scale: f64,
+        /// Its pitch as stated, m.
+        pitch_m: f64,
+    },
+    /// A table of poses is to be read in another way.
+    Poses {
+        /// Which.
+        code: Code,
+        /// How it is to be read.
+        what: String,
+        /// What to do.
+        remedy: String,
+    },
+}
+
+/// A mistake that explains why readings and images do not fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mistake {
+    /// What was done wrong.
+    pub kind: MistakeKind,
+    /// Camera mounting and plate placement that do not fit.
+    pub of: String,
+    /// Median misfit of the camera poses as everything is stated, rad + m.
+    pub misfit: f64,
+    /// The same with the mistake undone; none of lengths, which were not corrected.
+    pub misfit_undone: Option<f64>,
+}
+
+impl Mistake {
+    /// Joints that it is about; none where it is about all.
+    fn joints(&self) -> &[String] {
+        match &self.kind {
+            MistakeKind::Signs(joints) | MistakeKind::Columns(joints) => joints,
+            MistakeKind::Unit { joint, .. } => joint.as_slice(),
+            _ => &[],
+        }
+    }
+}
+
+const fn unit(are_degrees: bool) -> [&'static str; 3] {
+    if are_degrees { ["degrees", "radians", "deg"] } else { ["radians", "degrees", "rad"] }
+}
+
+impl Kind for Mistake {
+    fn code(&self) -> Code {
+        match &self.kind {
+            MistakeKind::Signs(_) => Code::JointSignWrong,
+            MistakeKind::Columns(_) | MistakeKind::Reversed => Code::JointOrderWrong,
+            MistakeKind::Unit { .. } => Code::JointUnitWrong,
+            MistakeKind::Rows { .. } => Code::RowsShifted,
+            MistakeKind::Mount(_) => Code::CameraMountWrong,
+            MistakeKind::Lengths { .. } => Code::LinkLengthsWrong,
+            MistakeKind::PlateSize { .. } => Code::PlatePitchWrong,
+            MistakeKind::Poses { code, .. } => *code,
+        }
+    }
+
+    fn weight(&self) -> Weight {
+        Weight::Refusal
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        match self.joints() {
+            [] => vec![Subject::Body(self.of.clone())],
+            joints => joints.iter().cloned().map(Subject::Joint).collect(),
+        }
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        let mut all = vec![Quantity::new("misfit", self.misfit, "rad + m")];
+        all.extend(self.misfit_undone.map(|left| Quantity::new("misfit_undone", left, "rad + m")));
+        match self.kind {
+            MistakeKind::Lengths { angle_rad, distance_m } => {
+                all.extend([Quantity::new("angle", angle_rad, "rad"), Quantity::new("distance", distance_m, "m")]);
+            }
+            MistakeKind::PlateSize { scale, pitch_m } => {
+                all.extend([Quantity::new("plate_size", scale, "1"), Quantity::new("pitch", scale * pitch_m, "m")]);
+            }
+            _ => {}
+        }
+        all
+    }
+
+    fn place(&self) -> String {
+        match self.joints() {
+            [] => self.of.clone(),
+            joints => joints.join(", "),
+        }
+    }
+
+    fn seen(&self) -> String {
+        match &self.kind {
+            MistakeKind::Signs(joints) => format!(
+                "the readings of {} have the wrong sign: with {} negated the images fit",
+                joints.join(" and "),
+                if let [one] = joints.as_slice() { one } else { "both" }
+            ),
+            MistakeKind::Columns(joints) if joints.len() == 2 => {
+                format!("the joints stand in another order: with {} exchanged the images fit", joints.join(" and "))
+            }
+            MistakeKind::Columns(joints) => {
+                let mut right = joints.clone();
+                right.rotate_left(1);
+                format!(
+                    "the joints stand in another order: with the columns {} taken for {} the images fit",
+                    right.join(", "),
+                    joints.join(", ")
+                )
+            }
+            MistakeKind::Reversed => "the joints stand in reverse order: reversed, the images fit".into(),
+            MistakeKind::Unit { joint, are_degrees } => {
+                let [is, read_as, _] = unit(*are_degrees);
+                let values = joint.as_ref().map_or("the joint values".into(), |j| format!("the readings of {j} alone"));
+                format!("{values} are {is}, read as {read_as}: converted, the images fit")
+            }
+            MistakeKind::Rows { below } => format!(
+                "images and joint readings are shifted by one row: every image fits the readings of the row {}",
+                if *below { "below" } else { "above" }
+            ),
+            MistakeKind::Mount(CameraMount::Hand) => {
+                "the camera is in the hand and the plate stands still: read so, the images fit".into()
+            }
+            MistakeKind::Mount(CameraMount::Fixed) => {
+                "the camera stands still and the plate is in the hand: read so, the images fit".into()
+            }
+            MistakeKind::Lengths { angle_rad, distance_m } => format!(
+                "directions fit the joint readings (median {:.1} mrad), distances do not (median {:.0} mm): these are the axes of \
+                 such an arm with other link lengths",
+                1e3 * angle_rad,
+                1e3 * distance_m
+            ),
+            MistakeKind::PlateSize { scale, pitch_m } => format!(
+                "the plate is {scale:.3} times as large as plate.toml says, judged by the link lengths in the URDF (a pitch of {:.3} mm instead of {:.3} mm fits), \
+                 or else the robot is {:.3} times as large as the URDF",
+                1e3 * scale * pitch_m,
+                1e3 * pitch_m,
+                1.0 / scale
+            ),
+            MistakeKind::Poses { what, .. } => what.clone(),
+        }
+    }
+
+    fn remedy(&self) -> String {
+        match &self.kind {
+            MistakeKind::Signs(joints) => {
+                let (columns, axes) = if joints.len() == 1 { ("column", "axis") } else { ("columns", "axes") };
+                let names = joints.join(" and ");
+                format!(
+                    "negate the {columns} {names} of joints.csv, or the {axes} of {names} in the URDF if the controller counts that way"
+                )
+            }
+            MistakeKind::Columns(joints) if joints.len() == 2 => {
+                format!("exchange the column names {} in joints.csv", joints.join(" and "))
+            }
+            MistakeKind::Columns(joints) => format!("correct the column names {} in joints.csv", joints.join(", ")),
+            MistakeKind::Reversed => "reverse the column names in joints.csv".into(),
+            MistakeKind::Unit { joint: Some(joint), .. } => {
+                format!("bring the column {joint} of joints.csv to the unit of the others")
+            }
+            MistakeKind::Unit { joint: None, are_degrees } => {
+                format!("write joint_unit = \"{}\" in series.toml", unit(*are_degrees)[2])
+            }
+            MistakeKind::Rows { .. } => "shift the image names in joints.csv by one row".into(),
+            MistakeKind::Mount(mount) => {
+                let word = if *mount == CameraMount::Hand { "hand" } else { "fixed" };
+                format!("write camera_mount = \"{word}\" in series.toml")
+            }
+            MistakeKind::Lengths { .. } => {
+                "check that the URDF is of this robot and size, with lengths in metres, and that the tip link carries the camera".into()
+            }
+            MistakeKind::PlateSize { .. } => {
+                "measure the pitch of the plate with a ruler and correct pitch_m in plate.toml; if it is right, the URDF is of another size of this robot".into()
+            }
+            MistakeKind::Poses { remedy, .. } => remedy.clone(),
+        }
+    }
+}
