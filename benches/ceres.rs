@@ -15,7 +15,7 @@ use robotcal::init::{PosePair, solve_hand_eye};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::problem::{
-    Adjustment, Image, Layout, Mark, Measured, Names, Noise, PlateShape, Problem, State, Stop, Tie,
+    Adjustment, Image, Layout, Mark, MarkerObservation, Names, Noise, PlateShape, Problem, State, Stop, Tie,
 };
 use robotcal::series::{CameraMount, Edge, Marker, Plate, PlateKind};
 use robotcal::solve::{Outcome, Settings, solve};
@@ -66,18 +66,18 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
     };
     plate.markers = table(&folder.join("plate.csv"))?.iter().map(marker).collect();
     let information = Matrix2::identity() * number("pixel_sigma")?.powi(-2);
-    let mut observations: Vec<Vec<Measured>> = Vec::new();
+    let mut observations: Vec<Vec<MarkerObservation>> = Vec::new();
     for row in table(&folder.join("observations.csv"))? {
         observations.resize(observations.len().max(row[0] as usize + 1), Vec::new());
         let uv = Vector2::new(row[2], row[3]);
         let marker = row[1] as usize;
-        let own = Measured { marker, edge: Edge::Outer, mark: Mark::Corner, uv, information, rejected: None };
+        let own = MarkerObservation { marker, edge: Edge::Outer, mark: Mark::Corner, uv, information, rejected: None };
         observations[row[0] as usize].push(own);
     }
     let chain = robotcal::urdf::read(&folder.join("nominal.urdf"))?.chain(None, Some("tool0"))?;
     let readings = chain.readings.len();
     let joints = table(&folder.join("joints.csv"))?;
-    let image = |(i, observations): (usize, Vec<Measured>)| Image {
+    let image = |(i, observations): (usize, Vec<MarkerObservation>)| Image {
         name: format!("{i}"),
         series: 0,
         stop: i,

@@ -103,7 +103,7 @@ fn recording(bytes: &[u8]) {
 fn program(language: Language, bytes: &[u8]) {
     let chain = chain();
     let axes: Vec<usize> = (0..chain.readings.len()).collect();
-    let setting = programs::Setting {
+    let setting = programs::ProgramSetting {
         chain: &chain,
         axes: &axes,
         rad_per_unit: Some(1.0),

@@ -36,7 +36,7 @@ pub use identifiability::{
 pub use in_base::sigma_in_base;
 pub use limits::Limits;
 pub use near_nominal::{extrapolation_m, restraint};
-pub use patterns::{Bearer, Moved, Pattern, PatternTest, cause, patterns};
+pub use patterns::{Bearer, Pattern, PatternEffect, PatternTest, cause, patterns};
 pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
 pub use projection::ProjectionMap;
 pub use promise::{FlangeErrors, FlangeIntervals, usual_joint_sigma};

@@ -99,12 +99,12 @@ pub struct PatternTest {
     /// What it gains beyond its number of columns.
     pub gain: f64,
     /// By how much the step to the fit with these columns moves what counts, and what is stated of it; none of shifts in the plate.
-    pub moved: Option<Moved>,
+    pub moved: Option<PatternEffect>,
 }
 
 /// How far something is moved, RMS, beside its sigma.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moved {
+pub struct PatternEffect {
     /// The flange relative to the plate, m, and the stated sigma; none without a robot.
     pub flange_m: Option<[f64; 2]>,
     /// The camera relative to the plate over the images, m, and the stated sigma.
@@ -113,7 +113,7 @@ pub struct Moved {
     pub pose_rad: [f64; 2],
 }
 
-impl Moved {
+impl PatternEffect {
     /// The largest displacement in stated sigmas: of the flange where there is one, else of the poses.
     pub fn sigmas(&self) -> f64 {
         let ratio = |[moved, sigma]: [f64; 2]| if sigma > 0.0 { moved / sigma } else { 0.0 };
@@ -324,7 +324,7 @@ fn combined(steps: &[Step], y: &DVector<f64>) -> Option<Step> {
 
 /// What a step moves. Of the camera poses counts what no common displacement of the camera frame or the plate frame takes up: with the body
 /// twist `w_i` of the camera, `w_i - a - Ad(T_i) b`, least squares over `a` and `b` in units of the stated sigmas.
-fn moved(fit: &Fit, model: Option<&FlangeModel>, step: &Step) -> Moved {
+fn moved(fit: &Fit, model: Option<&FlangeModel>, step: &Step) -> PatternEffect {
     let linear = fit.linear();
     let count = linear.images().len().max(1) as f64;
     let mut variances = [0.0f64; 2];
@@ -342,7 +342,7 @@ fn moved(fit: &Fit, model: Option<&FlangeModel>, step: &Step) -> Moved {
     let rms =
         |part: usize| (left.iter().map(|w| w.fixed_rows::<3>(3 * part).norm_squared()).sum::<f64>() / count).sqrt();
     let theta = fit.problem.layout.theta_len();
-    Moved {
+    PatternEffect {
         flange_m: model.map(|m| m.moved_m(&step.dense.rows(0, theta).into_owned())),
         pose_m: [rms(0), sigmas[0]],
         pose_rad: [rms(1), sigmas[1]],

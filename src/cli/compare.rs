@@ -12,7 +12,7 @@ use super::{Verdict, progress};
 use crate::calibration::{Ends, Inputs, Observed};
 use crate::error::{Code, Error, Result};
 use crate::identify::Options;
-use crate::output::Place;
+use crate::output::ResultFolder;
 use crate::output::comparison::comparison_markdown;
 use crate::series::Series;
 use crate::simulate::truth::Truth;
@@ -56,8 +56,8 @@ pub(super) struct CompareArgs {
 
 impl CompareArgs {
     /// The folder for reports, tried before the work.
-    fn place(&self) -> Result<Place> {
-        Place::among(self.out.as_deref().unwrap_or(Path::new("reports")))
+    fn place(&self) -> Result<ResultFolder> {
+        ResultFolder::among(self.out.as_deref().unwrap_or(Path::new("reports")))
     }
 }
 
@@ -70,7 +70,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<Verdict> {
 }
 
 fn series(args: &CompareArgs) -> Result<Verdict> {
-    let place = args.out.as_deref().map(Place::among).transpose()?;
+    let place = args.out.as_deref().map(ResultFolder::among).transpose()?;
     let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
     let inputs = Inputs::read(&args.urdf, &args.series, ends)?.with_recordings(&args.recording.options(&[])?)?;
     let truth = truth_of(&inputs.series)?;
@@ -158,7 +158,7 @@ fn monte_carlo(args: &CompareArgs) -> Result<Verdict> {
 }
 
 /// Writes the files of a report and names the last of them.
-fn write<const N: usize>(place: &Place, files: [(&str, String); N]) -> Result<()> {
+fn write<const N: usize>(place: &ResultFolder, files: [(&str, String); N]) -> Result<()> {
     let listed = files.each_ref().map(|(name, text)| ((*name).to_owned(), text.as_bytes()));
     place.write_beside(&listed, &[])?;
     if let Some((name, _)) = files.last() {

@@ -11,16 +11,18 @@ use super::Verdict;
 use super::compensate_frames::{Choice, Side, Sides, known_error};
 use super::robot::noted_chain;
 use super::say::{say, say_line};
+use crate::diagnose::Weight;
 use crate::error::{Code, Error, Result};
 use crate::files;
 use crate::geom::Pose;
 use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
-use crate::output::corrections::{self, TABLE, Weight};
-use crate::output::{Place, compensated};
-use crate::programs::program::Posture;
+use crate::output::corrections::{self, TABLE};
+use crate::output::{ResultFolder, compensated};
+use crate::programs::program::MeantPosture;
 use crate::programs::{
-    self, Correction, Kind, Language, Left, Models, Outcome, Postures, Program, Setting, Target, TextFile,
+    self, Correction, Language, Left, Models, Postures, Program, ProgramSetting, Target, TargetKind, TargetOutcome,
+    TextFile,
 };
 use crate::urdf::{self, Chain, JointKind, RobotDescription};
 
@@ -120,7 +122,7 @@ enum Unit {
 }
 
 pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
-    let place = Place::among(&args.out)?;
+    let place = ResultFolder::among(&args.out)?;
     let robot = |file: &Path, compensation: Option<&PathBuf>| -> Result<Robot> {
         let description = urdf::read(file)?;
         let base = stands_on(args, &description).map(|(link, _)| link).or(args.base.as_deref());
@@ -140,7 +142,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     }
     let axes = axes(args, &controller.chain)?;
     let language = language(args)?;
-    let setting = Setting {
+    let setting = ProgramSetting {
         chain: &controller.chain,
         axes: &axes,
         rad_per_unit: args.joint_unit.map(|u| if u == Unit::Deg { 1f64.to_radians() } else { 1.0 }),
@@ -150,7 +152,8 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     };
     let files = args.programs.iter().map(|p| text_file(p)).collect::<Result<_>>()?;
     let mut program = programs::read(language, files, &setting)?;
-    let needs_controller = |t: &&Target| matches!(&t.kind, Kind::Pose(p) if p.joint_fields.iter().all(Option::is_none));
+    let needs_controller =
+        |t: &&Target| matches!(&t.kind, TargetKind::Pose(p) if p.joint_fields.iter().all(Option::is_none));
     if let (None, Some(t)) = (&args.nominal, program.targets.iter().find(needs_controller)) {
         let place = format!("{}:{} {}", program.files[t.file].name, t.line, t.name);
         let what = "is a pose, which the controller turns into joints by its own model";
@@ -158,10 +161,10 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     }
     if args.nearest_posture {
         for target in &mut program.targets {
-            if let Kind::Pose(pose) = &mut target.kind
-                && matches!(pose.posture, Posture::Coded(..) | Posture::Either(..))
+            if let TargetKind::Pose(pose) = &mut target.kind
+                && matches!(pose.posture, MeantPosture::Coded(..) | MeantPosture::Either(..))
             {
-                pose.posture = Posture::Nearest;
+                pose.posture = MeantPosture::Nearest;
             }
         }
     }
@@ -262,7 +265,7 @@ fn language(args: &CompensateArgs) -> Result<Language> {
 }
 
 fn text_file(path: &Path) -> Result<TextFile> {
-    let bytes = files::read(path, files::Kind::Program)?;
+    let bytes = files::read(path, files::FileKind::Program)?;
     if bytes.contains(&0) {
         let what = "is not a text of single bytes (it holds zero bytes, as UTF-16 does)";
         return Err(Error::new(
@@ -349,11 +352,11 @@ fn frame(flag: &str, numbers: &[f64], language: Language) -> Result<Option<Pose>
 /// Targets listed one by one on the terminal; more only by their largest corrections.
 const SHOWN: usize = 10;
 
-fn text(program: &Program, outcomes: &[Outcome], left: &[Left], chain: &Chain) -> String {
+fn text(program: &Program, outcomes: &[TargetOutcome], left: &[Left], chain: &Chain) -> String {
     let mut done: Vec<(usize, &Correction)> = outcomes
         .iter()
         .enumerate()
-        .filter_map(|(k, o)| if let Outcome::Done(c) = o { Some((k, c)) } else { None })
+        .filter_map(|(k, o)| if let TargetOutcome::Done(c) = o { Some((k, c)) } else { None })
         .collect();
     let rms = |of: fn(&Correction) -> f64| {
         1e3 * (done.iter().map(|(_, c)| of(c).powi(2)).sum::<f64>() / done.len().max(1) as f64).sqrt()

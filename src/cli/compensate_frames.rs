@@ -5,7 +5,7 @@ use std::path::Path;
 use super::show::read_solution;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 use crate::geom::Pose;
 use crate::model::robot::Robot;
 use crate::output::corrections::{self, FramedRobot, Meant};
@@ -48,7 +48,7 @@ type Known<T> = std::result::Result<T, String>;
 fn read_frames(path: &Path, side: &Side) -> Result<FramesRecord> {
     let named =
         |e: Error| Error { place: e.place.replacen(frames_record::FILE_NAME, &path.display().to_string(), 1), ..e };
-    let record = frames_record::read(&files::read(path, Kind::Solution)?).map_err(named)?;
+    let record = frames_record::read(&files::read(path, FileKind::Solution)?).map_err(named)?;
     record.check_robot(side.robot, &side.urdf.display().to_string())?;
     Ok(record)
 }

@@ -14,8 +14,10 @@ use crate::error::{Code, Error, Result};
 use crate::files::picture_size;
 use crate::model::robot::Robot;
 use crate::output::recording::{MAGNIFIED, overlay};
-use crate::output::{NewFolder, Place};
-use crate::series::{self, CameraInfo, Extracted, FramePoses, ImageMarks, Series, Shown, Source, convert_recording};
+use crate::output::{NewFolder, ResultFolder};
+use crate::series::{
+    self, CameraInfo, Extracted, FramePoses, ImageMarks, RecordingContent, Series, Source, convert_recording,
+};
 use crate::urdf::Chain;
 
 /// Flags of `convert`.
@@ -89,7 +91,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Verdict> {
 fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<()> {
     series::require_new(&args.to)?;
     let folder = args.to.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let _tried = Place::among(folder)?;
+    let _tried = ResultFolder::among(folder)?;
     let Some(chain) = chain else {
         let what = "the joints of a series mean nothing without their robot";
         return Err(Error::new(
@@ -107,8 +109,13 @@ fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<()> {
         Some(o) => (Some(o.camera.clone()), o.frames.clone(), o.marks.clone()),
         None => as_given(args, &series, &chain, &readings)?,
     };
-    let shown =
-        Shown { joints: &chain.readings, readings: &readings, camera: camera.as_ref(), frames: &frames, marks: &marks };
+    let shown = RecordingContent {
+        joints: &chain.readings,
+        readings: &readings,
+        camera: camera.as_ref(),
+        frames: &frames,
+        marks: &marks,
+    };
     let notices = series::write_recording(&args.to, &series, shown)?;
     let usable = series.stops.stops.iter().zip(&readings).filter(|(s, r)| s.path.is_some() && r.is_some()).count();
     let tip = if found.is_some() { "identified" } else { "nominal" };

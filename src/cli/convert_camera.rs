@@ -7,7 +7,7 @@ use serde::Deserialize;
 use super::say::say_line;
 use super::show::read_solution;
 use crate::error::{Code, Error, Result};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 use crate::model::camera::{Camera, Lens};
 use crate::output::camera_formats::{CameraFormat, OtherLens, camera_text, read_camera_file};
 use crate::output::restore::{self, depths_of_record};
@@ -120,7 +120,7 @@ fn camera(wanted: &Wanted) -> Result<Named> {
 
 /// Cameras of a solution.json or poses.json.
 fn of_results(path: &Path) -> Result<Vec<Named>> {
-    let bytes = files::read(path, Kind::Solution)?;
+    let bytes = files::read(path, FileKind::Solution)?;
     if let Ok(OfPoses { cameras }) = serde_json::from_slice(&bytes) {
         return cameras.into_iter().map(|c| of_poses(path, c)).collect();
     }

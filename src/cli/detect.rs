@@ -16,7 +16,7 @@ use crate::error::{Code, Error, Notice, Result};
 use crate::identify::{SeenImage, SeenSeries, detect_stops, flat_field_drift, pictures};
 use crate::output::detection_files::{DetectionContext, detection_files, dropped_counts, marker_counts, picture_names};
 use crate::output::overlay::{Palette, overlay_png};
-use crate::output::{NewResult, Place, folder_name};
+use crate::output::{NewResult, ResultFolder, folder_name};
 use crate::series::{self, InputFile, Plate, Series, series_of_images};
 
 /// Flags of `detect`.
@@ -60,11 +60,11 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
     }
     // Pictures of a recording are needed until they have been drawn on.
     let pictures = Pictures::new();
-    let claimed = args.out.as_deref().map(Place::claim).transpose()?;
+    let claimed = args.out.as_deref().map(ResultFolder::claim).transpose()?;
     let series = args.series.as_deref().map(series::read_images).transpose()?;
     let name = series.as_ref().map_or("images", |s| s.name.as_str()).to_owned();
     let folder = format!("{}-detected", folder_name(std::slice::from_ref(&name)));
-    let place = claimed.map_or_else(|| Place::claim(&Path::new("reports").join(folder)), Ok)?;
+    let place = claimed.map_or_else(|| ResultFolder::claim(&Path::new("reports").join(folder)), Ok)?;
     let looked = match (series, &args.plate) {
         (Some(series), _) => of_series(args, series, &pictures)?,
         (None, Some(plate)) => of_images(&args.images, plate)?,
@@ -120,7 +120,7 @@ fn of_images(images: &[PathBuf], plate: &Path) -> Result<Looked> {
 }
 
 /// Writes the results; returns the number of files.
-fn write(args: &DetectArgs, looked: &Looked, place: Place) -> Result<usize> {
+fn write(args: &DetectArgs, looked: &Looked, place: ResultFolder) -> Result<usize> {
     let names = if args.overlay { picture_names(&looked.images) } else { Vec::new() };
     let drawable: Vec<(&SeenImage, &PathBuf, &String)> = looked
         .images

@@ -10,11 +10,11 @@ use super::Verdict;
 use super::pose_argument::pose;
 use super::say::{say, say_line};
 use super::show::read_solution;
+use crate::diagnose::Weight;
 use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::frames::{FrameFit, Given, KnownRobot, Seen, Touches, fit};
 use crate::geom::{Pose, matrix_from_rpy};
 use crate::identify::measure_bodies;
-use crate::output::corrections::Weight;
 use crate::output::frame_files::{self, Frames, Named};
 use crate::output::frame_findings::{at_the_places, frame_findings};
 use crate::output::frames_record::{
@@ -23,7 +23,7 @@ use crate::output::frames_record::{
 };
 use crate::output::restore::{FoundModel, chain, found_model, robot_description};
 use crate::output::solution_json::SolutionRecord;
-use crate::output::{Place, folder_name};
+use crate::output::{ResultFolder, folder_name};
 use crate::problem::MeasuredSeries;
 use crate::series::{self, InputFile, Series};
 use crate::urdf::{RobotDescription, patch_origins};
@@ -65,7 +65,7 @@ struct Measured {
 }
 
 pub(super) fn run(args: &FramesArgs) -> Result<Verdict> {
-    let place = Place::among(&args.out)?;
+    let place = ResultFolder::among(&args.out)?;
     let record = read_solution(&args.from)?;
     let description = robot_description(&record)?;
     let found = found_model(&record)?;

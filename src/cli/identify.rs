@@ -15,7 +15,7 @@ use crate::calibration::{Calibration, Ends, Export, Inputs, Observed};
 use crate::error::{Code, Error, Result};
 use crate::identify::{Estimator, Options, dry_run};
 use crate::output::solution_json::{self, FILE_NAME, TIMINGS};
-use crate::output::{Offsets, Place, Poses, folder_name, restore};
+use crate::output::{Offsets, Poses, ResultFolder, folder_name, restore};
 
 /// Flags of `identify`.
 #[derive(Debug, Args)]
@@ -114,7 +114,7 @@ impl From<TwoStage> for Estimator {
 
 pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     // Tried before the work that the result costs.
-    let mut place = args.out.as_deref().filter(|_| !args.dry_run).map(Place::claim).transpose()?;
+    let mut place = args.out.as_deref().filter(|_| !args.dry_run).map(ResultFolder::claim).transpose()?;
     let earlier = args.from.as_deref().map(read_solution).transpose()?;
     let options = args.choices.options(earlier.as_ref().map_or_else(Options::default, restore::options))?;
     let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
@@ -127,7 +127,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
             };
             if place.is_none() && !args.dry_run {
                 let names: Vec<String> = inputs.series.iter().map(|s| s.name.clone()).collect();
-                place = Some(Place::claim(&Path::new("reports").join(folder_name(&names)))?);
+                place = Some(ResultFolder::claim(&Path::new("reports").join(folder_name(&names)))?);
             }
             let inputs = inputs.with_recordings(&args.recording.options(&[])?)?;
             if args.dry_run {
@@ -148,7 +148,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     write(args, &calibration, place)
 }
 
-fn write(args: &IdentifyArgs, calibration: &Calibration, place: Place) -> Result<Verdict> {
+fn write(args: &IdentifyArgs, calibration: &Calibration, place: ResultFolder) -> Result<Verdict> {
     let poses = if args.poses { Poses::Written } else { Poses::LeftOut };
     let command = super::command_line().join(" ");
     let mut files = calibration.files(&Export { offsets: args.offsets.into(), poses, command })?;

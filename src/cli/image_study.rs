@@ -8,7 +8,7 @@ use super::say::say_line;
 use super::{Verdict, progress};
 use crate::error::{Code, Error, Result};
 use crate::identify::SeenImage;
-use crate::output::Place;
+use crate::output::ResultFolder;
 use crate::output::overlay::{Palette, overlay_png};
 use crate::plan::plate_design::{PlateRequest, design};
 use crate::study::image_stage::tables::{
@@ -61,7 +61,7 @@ pub(super) fn run(args: &StudyArgs, out: &Path, overlay: bool) -> Result<Verdict
     if args.views == 0 {
         return Err(Error::new(Code::OptionRange, "--views", "0 views show nothing", "give 1 or more"));
     }
-    let place = Place::among(out)?;
+    let place = ResultFolder::among(out)?;
     let mut sections = Vec::new();
     let mut pictures = Vec::new();
     let wants = |part: Part| args.part.is_empty() || args.part.contains(&part);

@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::ValueEnum;
 
 use crate::error::{Code, Error, Result};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 use crate::urdf::JointKind;
 
 /// Unit of revolute joints in a file.
@@ -29,7 +29,7 @@ pub(super) fn read(
     let bad = |code, line: u64, what: String, remedy: &str| {
         Error::new(code, format!("{}:{line}", path.display()), what, remedy)
     };
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(files::open(path, Kind::Table)?.0);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(files::open(path, FileKind::Table)?.0);
     let header = reader
         .headers()
         .map_err(|e| bad(Code::CsvSyntax, 1, e.to_string(), "the first line names the columns"))?

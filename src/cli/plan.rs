@@ -21,7 +21,7 @@ use crate::geom::{OrientedBox, Pose};
 use crate::identify::RobotModel;
 use crate::model::camera::Camera;
 use crate::output::camera_formats::read_camera_file;
-use crate::output::{Place, plan_files, plan_html, plan_programs, plan_start, sigma_text};
+use crate::output::{ResultFolder, plan_files, plan_html, plan_programs, plan_start, sigma_text};
 use crate::plan::candidates::CandidateOptions;
 use crate::plan::refine::USUAL_ROUNDS;
 use crate::plan::scene::{self, SceneOptions, arm_length_m};
@@ -201,7 +201,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     if let Some(worlds) = args.study {
         return study(args, worlds);
     }
-    let place = Place::claim(&args.out)?;
+    let place = ResultFolder::claim(&args.out)?;
     let description = urdf::read(args.urdf())?;
     let chain = noted_chain(&description, args.base.as_deref(), args.tip.as_deref())?;
     let (capsules, meshes) = description.carried_capsules(&chain);
@@ -285,7 +285,7 @@ fn settle_place(args: &PlanArgs, request: &mut PlanRequest) -> Result<Vec<String
 const STUDIED: [usize; 2] = [30, 60];
 
 fn study(args: &PlanArgs, seeds: u64) -> Result<Verdict> {
-    let place = Place::among(&args.out)?;
+    let place = ResultFolder::among(&args.out)?;
     let chain = read_chain(args.urdf(), args.base.as_deref(), args.tip.as_deref())?;
     let robot = chain.robot.clone();
     let [planned, random] = STUDIED;

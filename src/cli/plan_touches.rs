@@ -12,11 +12,11 @@ use super::pose_argument::pose;
 use super::say::{say, say_line};
 use super::show::read_solution;
 use crate::error::{Code, Error, Result, plain_name};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 use crate::frames::{KnownRobot, PlannedTouch, TouchPlan, TouchRequest, plan_touches};
 use crate::geom::Pose;
 use crate::model::robot::Posture;
-use crate::output::Place;
+use crate::output::ResultFolder;
 use crate::output::restore::found_model;
 use crate::series::{AngleUnit, CameraMount, ContactSection, Manifest};
 use crate::urdf::{Chain, JointKind};
@@ -57,7 +57,7 @@ pub(super) fn run(
     count: usize,
     out: &Path,
 ) -> Result<Verdict> {
-    let place = Place::among(out)?;
+    let place = ResultFolder::among(out)?;
     let record = read_solution(from)?;
     let found = found_model(&record)?;
     let robot = found.known_robot(None)?;
@@ -109,7 +109,7 @@ fn robot_needs() -> usize {
 
 /// Points of a work object.
 fn read_points(path: &Path) -> Result<Vec<(String, Vector3<f64>)>> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(files::open(path, Kind::Table)?.0);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(files::open(path, FileKind::Table)?.0);
     let refuse = |code, line: u64, what: String, remedy: &str| {
         Err(Error::new(code, format!("{}:{line}", path.display()), what, remedy))
     };

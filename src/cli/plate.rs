@@ -10,7 +10,7 @@ use super::arguments::pair;
 use super::plate_board::{self, BoardArgs, BoardSize, Kind};
 use super::say::say;
 use crate::error::Result;
-use crate::output::Place;
+use crate::output::ResultFolder;
 use crate::output::plate_drawing::{Caption, pdf, png, svg};
 use crate::plan::plate_design::{PlateDesign, PlateRequest, Sheet, Viewing, design};
 use crate::series::{plate_csv, plate_toml};
@@ -67,7 +67,7 @@ fn sheet(text: &str) -> std::result::Result<Sheet, String> {
 }
 
 pub(super) fn run(args: &PlateArgs) -> Result<Verdict> {
-    let place = Place::among(&args.out)?;
+    let place = ResultFolder::among(&args.out)?;
     if args.board.kind != Kind::CodedCircles {
         let size = BoardSize {
             shape: args.shape,
@@ -102,7 +102,7 @@ pub(super) fn run(args: &PlateArgs) -> Result<Verdict> {
 }
 
 /// Writes the files and returns the name of the plate, which ends in four digits of the hash of its markers.
-fn write(place: &Place, made: &PlateDesign, dpi: f64) -> Result<String> {
+fn write(place: &ResultFolder, made: &PlateDesign, dpi: f64) -> Result<String> {
     let plate = &made.plate;
     let table = plate_csv(plate);
     let hash = Sha256::digest(table.as_bytes());

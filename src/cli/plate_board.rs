@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use super::arguments::pair;
 use super::say::say;
 use crate::error::{Code, Error, Result};
-use crate::output::Place;
+use crate::output::ResultFolder;
 use crate::output::plate_drawing::{Caption, pdf, png, svg};
 use crate::plan::plate_design::{Sheet, quiet_field_m};
 use crate::series::{Plate, parse_plate, plate_csv, plate_toml, regions};
@@ -83,7 +83,7 @@ const LARGER: f64 = 1.5;
 ///
 /// # Errors
 /// What the reader of plate.toml says; a board that the sheet does not hold.
-pub(super) fn draw(place: &Place, out: &Path, args: &BoardArgs, size: &BoardSize) -> Result<()> {
+pub(super) fn draw(place: &ResultFolder, out: &Path, args: &BoardArgs, size: &BoardSize) -> Result<()> {
     let plate = plate(args, size)?;
     regions(&plate)?;
     let sheet = size.sheet.unwrap_or_else(|| Sheet::fitting(&plate));

@@ -8,7 +8,7 @@ use super::at::AtArgs;
 use super::say::{say, say_line};
 use super::{Verdict, long_table, stages, summary};
 use crate::error::{Error, Result};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 use crate::output::difference::{Difference, compare_solutions};
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::output::{Thumbnails, figure_files, recover, report_html, write_beside};
@@ -45,7 +45,7 @@ pub(super) struct ShowArgs {
 /// Reads a solution.
 pub(super) fn read_solution(path: &Path) -> Result<SolutionRecord> {
     recover(path)?;
-    let bytes = files::read(path, Kind::Solution)?;
+    let bytes = files::read(path, FileKind::Solution)?;
     solution_json::read(&bytes)
         .map_err(|e| Error { place: e.place.replacen(solution_json::FILE_NAME, &path.display().to_string(), 1), ..e })
 }

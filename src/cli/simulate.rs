@@ -190,7 +190,7 @@ fn conditions(args: &SimulateArgs) -> Result<ImagingConditions> {
     let mut conditions = match &args.conditions {
         None => ImagingConditions::default(),
         Some(path) => {
-            let text = crate::files::read_text(path, crate::files::Kind::Settings)?;
+            let text = crate::files::read_text(path, crate::files::FileKind::Settings)?;
             toml::from_str(&text).map_err(|e| {
                 Error::new(
                     Code::SettingSyntax,

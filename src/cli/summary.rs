@@ -8,7 +8,7 @@ use super::paragraph::{WIDTH, indented, paragraph};
 use crate::assess::Advice;
 use crate::error::Code;
 use crate::output::solution_json::SolutionRecord;
-use crate::output::verdict::{Reason, Trust, Verdict};
+use crate::output::verdict::{Trust, Verdict, VerdictReason};
 use crate::urdf::JointKind;
 
 /// Most lines in all.
@@ -54,7 +54,7 @@ fn headline(verdict: &Verdict) -> String {
 
 /// What was found; of a failed result the remedies stand under "next".
 fn reasons(verdict: &Verdict, most: usize) -> Vec<String> {
-    let words = |r: &Reason| match verdict.trust == Trust::Failed || r.remedy.is_empty() {
+    let words = |r: &VerdictReason| match verdict.trust == Trust::Failed || r.remedy.is_empty() {
         true => r.what.clone(),
         false => format!("{} ({})", r.what, r.remedy),
     };

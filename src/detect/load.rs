@@ -7,7 +7,7 @@ use image::{DynamicImage, ImageError};
 
 use super::Picture;
 use crate::error::{Code, Error, Result};
-use crate::files::{self, Kind, MOST_SIDE_PX, decode_picture};
+use crate::files::{self, FileKind, MOST_SIDE_PX, decode_picture};
 
 /// Weights of red, green and blue in the grey value (luma of ITU-R BT.709), applied to the stored counts.
 pub const LUMA_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
@@ -20,7 +20,7 @@ pub const LUMA_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
 /// # Errors
 /// A missing, unreadable, empty, truncated or oversized file; `bits` outside 1..=16 or counts beyond it.
 pub fn load(path: &Path, bits: Option<u32>) -> Result<Picture> {
-    let (file, length) = files::open(path, Kind::Image)?;
+    let (file, length) = files::open(path, FileKind::Image)?;
     if length == 0 {
         return Err(Error::new(
             Code::ImageTruncated,

@@ -1,7 +1,7 @@
 //! Is there a pattern in the residuals that noise does not explain, what would remove it, and does it matter?
 
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
-use crate::assess::{Accuracy, Bearer, Limits, Moved, Pattern, PatternTest, cause, patterns};
+use crate::assess::{Accuracy, Bearer, Limits, Pattern, PatternEffect, PatternTest, cause, patterns};
 use crate::error::Code;
 use crate::fit::Fit;
 
@@ -61,7 +61,7 @@ fn words(pattern: Pattern) -> [&'static str; 2] {
 
 impl ResidualPattern {
     fn moves(&self) -> String {
-        let Some(Moved { flange_m, pose_m, pose_rad }) = self.found.moved else { return String::new() };
+        let Some(PatternEffect { flange_m, pose_m, pose_rad }) = self.found.moved else { return String::new() };
         match flange_m {
             Some([by, sigma]) => {
                 format!(", without it the flange moves by {:.3} mm (stated sigma {:.3} mm)", 1e3 * by, 1e3 * sigma)
@@ -103,7 +103,7 @@ impl Kind for ResidualPattern {
         if test.rms_px.is_finite() {
             all.push(Quantity::new("pattern_rms", test.rms_px, "px"));
         }
-        if let Some(Moved { flange_m, pose_m, pose_rad }) = test.moved {
+        if let Some(PatternEffect { flange_m, pose_m, pose_rad }) = test.moved {
             let moved = |name: &str, [by, sigma]: [f64; 2], unit: &str| Quantity::new(name, by, unit).with_sigma(sigma);
             all.extend(flange_m.map(|m| moved("flange_moved", m, "m")));
             all.extend([moved("pose_moved", pose_m, "m"), moved("pose_turned", pose_rad, "rad")]);

@@ -150,7 +150,7 @@ impl<'a> Diagnosis<'a> {
     fn refusal(&self) -> Option<Error> {
         let all = || self.found.iter().flatten();
         let refusal = all().find(|f| f.weight() == Weight::Refusal)?;
-        let moved = all().find(|f| matches!(f, Finding::Moved(_)));
+        let moved = all().find(|f| matches!(f, Finding::BodyMoved(_)));
         Some(moved.unwrap_or(refusal).refusal())
     }
 }

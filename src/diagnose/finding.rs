@@ -18,7 +18,7 @@ use super::lens_not_in_ros::LensNotInRos;
 use super::loose::LooseMounting;
 use super::marker_off::MarkerOff;
 use super::mistake::Mistake;
-use super::moved::Moved;
+use super::moved::BodyMoved;
 use super::no_gain::NoGain;
 use super::noticed::Noticed;
 use super::parameter_off::ParameterOff;
@@ -70,7 +70,7 @@ findings! {
     MarkerOff,
     MeasurementsLeftOut,
     Mistake,
-    Moved,
+    BodyMoved,
     NoGain,
     Noticed,
     ObservationsLeftOut,

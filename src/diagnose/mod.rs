@@ -49,7 +49,7 @@ pub use lens_not_in_ros::LensNotInRos;
 pub use loose::LooseMounting;
 pub use marker_off::MarkerOff;
 pub use mistake::{Mistake, MistakeKind};
-pub use moved::{Moved, MovedBody};
+pub use moved::{BodyMoved, MovedBody};
 pub use no_gain::NoGain;
 pub use noticed::Noticed;
 pub use parameter_off::ParameterOff;

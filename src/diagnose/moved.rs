@@ -8,7 +8,7 @@ use crate::problem::{Adjustment, ImageRejection};
 
 /// Plate or camera was moved within a series, by so much that its images were left out.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Moved {
+pub struct BodyMoved {
     /// What was moved.
     pub body: MovedBody,
     /// Last image before and first image after it.
@@ -30,13 +30,13 @@ pub enum MovedBody {
     Camera,
 }
 
-pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<Moved> {
+pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<BodyMoved> {
     let series = 0..setting.series.len();
     series.filter_map(|k| find_move(adjustment, setting, k)).collect()
 }
 
 /// Looks for one common new place among the wrongly paired images of a series.
-fn find_move(Adjustment { problem, state }: &Adjustment, setting: &CheckContext, series: usize) -> Option<Moved> {
+fn find_move(Adjustment { problem, state }: &Adjustment, setting: &CheckContext, series: usize) -> Option<BodyMoved> {
     let free = setting.free;
     let mut wrong: Vec<(usize, PosePair)> = Vec::new();
     for (i, image) in problem.images.iter().enumerate().filter(|(_, image)| image.series == series) {
@@ -66,7 +66,7 @@ fn find_move(Adjustment { problem, state }: &Adjustment, setting: &CheckContext,
     let neighbour = (*to + 1..problem.images.len()).find(own).or_else(|| (0..*from).rev().find(own))?;
     let (early, late) = if neighbour > *to { (*to, neighbour) } else { (neighbour, *from) };
     let name = |i: usize| problem.images[i].name.clone();
-    Some(Moved {
+    Some(BodyMoved {
         body,
         between: [name(early), name(late)],
         distance_m: place.moved.1,
@@ -75,7 +75,7 @@ fn find_move(Adjustment { problem, state }: &Adjustment, setting: &CheckContext,
     })
 }
 
-impl Kind for Moved {
+impl Kind for BodyMoved {
     fn code(&self) -> Code {
         match self.body {
             MovedBody::Plate => Code::PlateMoved,

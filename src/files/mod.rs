@@ -12,7 +12,7 @@ use crate::error::{Code, Error, Result};
 
 /// What a file is; says how long it may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum FileKind {
     /// TOML or YAML.
     Settings,
     /// CSV: some million cells.
@@ -29,7 +29,7 @@ pub enum Kind {
     Recording,
 }
 
-impl Kind {
+impl FileKind {
     /// Bytes that a file of this kind has at most.
     pub fn most_bytes(self) -> u64 {
         const MIB: u64 = 1 << 20;
@@ -49,7 +49,7 @@ impl Kind {
 ///
 /// # Errors
 /// A file that is not there, empty names, folders, pipes, sockets and devices; files too long for their kind.
-pub fn open(path: &Path, kind: Kind) -> Result<(File, u64)> {
+pub fn open(path: &Path, kind: FileKind) -> Result<(File, u64)> {
     let io = |e: std::io::Error| Error::io(path, &e);
     // Looked at before it is opened: a pipe without a writer would be waited for without end.
     refuse_special(path, &std::fs::metadata(path).map_err(io)?)?;
@@ -76,7 +76,7 @@ fn refuse_special(path: &Path, metadata: &std::fs::Metadata) -> Result<()> {
     Ok(())
 }
 
-fn refuse_long(path: &Path, bytes: u64, kind: Kind) -> Result<()> {
+fn refuse_long(path: &Path, bytes: u64, kind: FileKind) -> Result<()> {
     let most = kind.most_bytes();
     if bytes <= most {
         return Ok(());
@@ -89,7 +89,7 @@ fn refuse_long(path: &Path, bytes: u64, kind: Kind) -> Result<()> {
 ///
 /// # Errors
 /// Those of [`open`]; a file that grows beyond its kind while it is read.
-pub fn read(path: &Path, kind: Kind) -> Result<Vec<u8>> {
+pub fn read(path: &Path, kind: FileKind) -> Result<Vec<u8>> {
     let (file, length) = open(path, kind)?;
     let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0));
     file.take(kind.most_bytes().saturating_add(1)).read_to_end(&mut bytes).map_err(|e| Error::io(path, &e))?;
@@ -101,7 +101,7 @@ pub fn read(path: &Path, kind: Kind) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// Those of [`read`] and [`text`].
-pub fn read_text(path: &Path, kind: Kind) -> Result<String> {
+pub fn read_text(path: &Path, kind: FileKind) -> Result<String> {
     text(path, read(path, kind)?)
 }
 

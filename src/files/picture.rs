@@ -7,7 +7,7 @@ use std::path::Path;
 use image::error::{ImageFormatHint, LimitError, LimitErrorKind, UnsupportedError, UnsupportedErrorKind};
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Limits};
 
-use super::{Kind, open};
+use super::{FileKind, open};
 use crate::error::{Code, Result};
 
 /// Longest side that is accepted, px; the largest industrial sensors have about 20 000.
@@ -71,7 +71,7 @@ pub fn batches(sizes: &[u64], most: u64) -> Vec<Range<usize>> {
 /// # Errors
 /// A file that is none; a header that cannot be read.
 pub fn picture_size(path: &Path) -> Result<(u32, u32)> {
-    let (file, _) = open(path, Kind::Image)?;
+    let (file, _) = open(path, FileKind::Image)?;
     let size = decoder(BufReader::new(file)).map(|d| d.dimensions());
     size.map_err(|e| {
         crate::error::Error::new(

@@ -12,7 +12,7 @@ use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
-    Adjustment, DISPLACEMENT_SIZES, Family, Image, ImageRejection, Layout, Mark, Measured, MeasuredSeries,
+    Adjustment, DISPLACEMENT_SIZES, Family, Image, ImageRejection, Layout, Mark, MarkerObservation, MeasuredSeries,
     MeasuredStop, Names, Noise, PlateShape, Problem, State, Stop, Tie, intern, release_measured_scales,
 };
 use crate::series::{Edge, Observation, Plate};
@@ -195,7 +195,7 @@ pub fn stated_covariance(observation: &Observation) -> [f64; 3] {
     observation.covariance.unwrap_or([DEFAULT_SIGMA_PX.powi(2), 0.0, DEFAULT_SIGMA_PX.powi(2)])
 }
 
-fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<Measured>> {
+fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<MarkerObservation>> {
     let mut observations = Vec::with_capacity(stop.observations.len());
     for o in &stop.observations {
         let place = || format!("image {}, marker {}", stop.image, o.marker);
@@ -214,7 +214,7 @@ fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<Measured>> {
             Edge::Outer => s.plate.markers[marker].outer_radius_m,
             Edge::Inner => s.plate.markers[marker].inner_radius_m,
         };
-        observations.push(Measured {
+        observations.push(MarkerObservation {
             marker,
             edge: o.edge,
             mark: if s.centroid { Mark::of_radius(radius_m) } else { Mark::Corner },

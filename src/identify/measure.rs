@@ -19,7 +19,7 @@ use crate::urdf::Chain;
 
 /// A seen series with what the user should know of it.
 #[derive(Debug, Clone)]
-pub struct Measured {
+pub struct MeasuredWithNotices {
     /// The series, ready to be adjusted.
     pub series: MeasuredSeries,
     /// Notices of reading and detection.
@@ -36,7 +36,12 @@ struct Seen {
 ///
 /// # Errors
 /// Of the readings (unit, missing joints), of a series none of whose images can be used, and of differently sized images.
-pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(&Path) + Sync) -> Result<Measured> {
+pub fn measure(
+    series: &Series,
+    chain: &Chain,
+    several: bool,
+    progress: impl Fn(&Path) + Sync,
+) -> Result<MeasuredWithNotices> {
     if series.source == Source::NoImages {
         return measure_bodies(series, chain, several);
     }
@@ -86,18 +91,18 @@ pub fn measure(series: &Series, chain: &Chain, several: bool, progress: impl Fn(
     // The detector measures centroids, whatever observations would mean.
     let centroid = found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid;
     let measured = measured_series(series, lens, (width_px, height_px), centroid, stops);
-    Ok(Measured { series: MeasuredSeries { plate, bodies, lengths, ..measured }, notices })
+    Ok(MeasuredWithNotices { series: MeasuredSeries { plate, bodies, lengths, ..measured }, notices })
 }
 
 /// What was measured in space alone: touches, and what a tracker saw. Images are not looked at.
 ///
 /// # Errors
 /// Of the readings (unit, missing joints); distances between what was not measured.
-pub fn measure_bodies(series: &Series, chain: &Chain, several: bool) -> Result<Measured> {
+pub fn measure_bodies(series: &Series, chain: &Chain, several: bool) -> Result<MeasuredWithNotices> {
     let readings = readings_of(series, chain)?;
     let bodies = seen_bodies(series, several);
     let lengths = seen_lengths(series, several, &bodies)?;
-    Ok(Measured {
+    Ok(MeasuredWithNotices {
         series: MeasuredSeries { bodies, lengths, ..without_images(series, readings) },
         notices: notices_of(series, chain),
     })
@@ -114,7 +119,7 @@ fn notices_of(series: &Series, chain: &Chain) -> Vec<Notice> {
 
 /// A series of stops at which no image was taken.
 fn without_images(series: &Series, readings: Vec<Option<Vec<f64>>>) -> MeasuredSeries {
-    let of = |(row, (stop, readings)): (usize, (&crate::series::Stop, Option<Vec<f64>>))| MeasuredStop {
+    let of = |(row, (stop, readings)): (usize, (&crate::series::SeriesStop, Option<Vec<f64>>))| MeasuredStop {
         row,
         image: stop.image.clone(),
         readings,

@@ -46,7 +46,7 @@ pub use estimator::Estimator;
 pub use evidence::identify;
 pub use free_poses::adjust_free_poses;
 pub use lens_choice::{choose_lens, depths_m};
-pub use measure::{Measured, measure, measure_bodies};
+pub use measure::{MeasuredWithNotices, measure, measure_bodies};
 pub use options::{JointNoise, MarkerTolerance, Options};
 pub use pose_comparison::{OtherBody, PoseComparison, PoseDifference, compare_poses};
 pub use seen_image::SeenImage;

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::compensation::largest_nm;
 use crate::error::{Code, Error, Result};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 use crate::model::joint_terms::{Exported, JointTerm, Term};
 use crate::model::robot::Robot;
 use crate::urdf::{Chain, Payload};
@@ -101,7 +101,7 @@ pub fn compensated(chain: Chain, path: Option<&Path>) -> Result<Robot> {
 /// Names the file, and the line or joint: unreadable text, unknown keys, a joint that the chain does not have, wrong counts,
 /// a compliance where the URDF states no masses.
 pub fn read_compensation(path: &Path, chain: Chain) -> Result<Robot> {
-    parse_compensation(path, &files::read_text(path, Kind::Settings)?, chain)
+    parse_compensation(path, &files::read_text(path, FileKind::Settings)?, chain)
 }
 
 /// As [`read_compensation`] from the text of the file; `path` is for messages only.

@@ -7,13 +7,14 @@ use serde::{Deserialize, Serialize};
 
 use super::restore::FoundModel;
 use crate::assess::sigma_in_base;
+use crate::diagnose::Weight;
 use crate::error::{Code, Result};
 use crate::frames::knowledge::scatter_m;
 use crate::frames::{Knowledge, KnownRobot};
 use crate::geom::Pose;
 use crate::model::robot::Posture;
 use crate::programs::compensate::{Compensated, RESIDUAL};
-use crate::programs::{Kind, KnownError, Left, Outcome, Program};
+use crate::programs::{KnownError, Left, Program, TargetKind, TargetOutcome};
 use crate::urdf::Chain;
 
 /// Name of the table of corrections.
@@ -25,19 +26,9 @@ const SAME_MODEL: f64 = 5e-5;
 /// Joints and a pose further apart were taught with another tool or work frame, m.
 const SAME_FRAMES: f64 = 0.02;
 
-/// Whether a finding asks for something.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Weight {
-    /// To know.
-    Note,
-    /// The result is not what was asked for: exit code 1.
-    Gate,
-}
-
 /// What was found about a program or the models it was corrected with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Finding {
+pub struct FileFinding {
     /// Code that stays the same in every version.
     pub code: Code,
     /// Its weight.
@@ -64,7 +55,7 @@ fn largest(values: &[f64]) -> f64 {
 }
 
 /// Whether the nominal model is the one in the controller: by joints and poses that were taught together.
-pub fn nominal_findings(program: &Program, done: &Compensated) -> Vec<Finding> {
+pub fn nominal_findings(program: &Program, done: &Compensated) -> Vec<FileFinding> {
     let mut findings = Vec::new();
     for (k, file) in program.files.iter().enumerate() {
         let of_file = program.targets.iter().zip(&done.taught).filter(|(t, _)| t.file == k);
@@ -77,7 +68,7 @@ pub fn nominal_findings(program: &Program, done: &Compensated) -> Vec<Finding> {
                 "{} taught poses lie {rms_mm:.3} mm RMS ({max_mm:.3} mm at most) from where the nominal model puts the joints beside them: {words}",
                 values.len()
             );
-            findings.push(Finding { code, weight, subject: file.name.clone(), quantities, text });
+            findings.push(FileFinding { code, weight, subject: file.name.clone(), quantities, text });
         };
         if !same.is_empty() && rms(&same) <= SAME_MODEL {
             add(Code::NominalIsControllers, Weight::Note, &same, "it is the model in the controller");
@@ -97,14 +88,14 @@ pub fn nominal_findings(program: &Program, done: &Compensated) -> Vec<Finding> {
 }
 
 /// Displaced targets whose orientation is that of the point that they start from.
-pub fn displaced_finding(program: &Program, done: &Compensated) -> Option<Finding> {
-    let left = |o: &Outcome| match o {
-        Outcome::Done(c) if c.residual_rad > RESIDUAL => Some(1e3 * c.residual_rad),
+pub fn displaced_finding(program: &Program, done: &Compensated) -> Option<FileFinding> {
+    let left = |o: &TargetOutcome| match o {
+        TargetOutcome::Done(c) if c.residual_rad > RESIDUAL => Some(1e3 * c.residual_rad),
         _ => None,
     };
     let mrad: Vec<f64> = done.outcomes.iter().filter_map(left).collect();
     let max_mrad = largest(&mrad);
-    (!mrad.is_empty()).then(|| Finding {
+    (!mrad.is_empty()).then(|| FileFinding {
         code: Code::DisplacedOrientation,
         weight: Weight::Note,
         subject: program.files.first().map_or_else(String::new, |f| f.name.clone()),
@@ -114,21 +105,21 @@ pub fn displaced_finding(program: &Program, done: &Compensated) -> Option<Findin
 }
 
 /// Targets that stay as they are: how many, and how many for each reason.
-pub fn left_finding(left: &[Left], subject: &str) -> Option<Finding> {
+pub fn left_finding(left: &[Left], subject: &str) -> Option<FileFinding> {
     let mut quantities = numbers([("targets", left.len() as f64)]);
     left.iter().for_each(|l| *quantities.entry(l.why.reason.name().to_owned()).or_default() += 1.0);
     let text = format!("{} targets stay as they are, each with its reason in {TABLE}", left.len());
     let (code, weight, subject) = (Code::TargetsLeft, Weight::Gate, subject.to_owned());
-    (!left.is_empty()).then_some(Finding { code, weight, subject, quantities, text })
+    (!left.is_empty()).then_some(FileFinding { code, weight, subject, quantities, text })
 }
 
 /// Expected error of every corrected target with base and tool unknown, m.
 pub fn expected_errors(program: &Program, done: &Compensated, model: &FoundModel) -> Vec<Option<f64>> {
-    let expected = |(target, outcome): (&crate::programs::Target, &Outcome)| {
-        let Outcome::Done(c) = outcome else { return None };
+    let expected = |(target, outcome): (&crate::programs::Target, &TargetOutcome)| {
+        let TargetOutcome::Done(c) = outcome else { return None };
         let tool = match &target.kind {
-            Kind::Pose(pose) => pose.flange_from_tool,
-            Kind::Joints(_) => Pose::identity(),
+            TargetKind::Pose(pose) => pose.flange_from_tool,
+            TargetKind::Joints(_) => Pose::identity(),
         };
         Some(sigma_in_base(&model.robot, &model.layout, &model.covariance, &c.corrected, &tool))
     };
@@ -137,11 +128,11 @@ pub fn expected_errors(program: &Program, done: &Compensated, model: &FoundModel
 
 /// Expected error of every corrected target by measured frames, m: that of the tool in the work object, joint noise of one arrival included.
 pub fn expected_with_frames(program: &Program, done: &Compensated, sides: &[FramedRobot]) -> Vec<Option<f64>> {
-    let expected = |(target, outcome): (&crate::programs::Target, &Outcome)| {
-        let Outcome::Done(c) = outcome else { return None };
+    let expected = |(target, outcome): (&crate::programs::Target, &TargetOutcome)| {
+        let TargetOutcome::Done(c) = outcome else { return None };
         let own = match &target.kind {
-            Kind::Pose(pose) => pose.flange_from_tool,
-            Kind::Joints(_) => Pose::identity(),
+            TargetKind::Pose(pose) => pose.flange_from_tool,
+            TargetKind::Joints(_) => Pose::identity(),
         };
         let square = |side: &FramedRobot| {
             let tool = side.tool.unwrap_or(own);
@@ -206,13 +197,13 @@ pub fn expected_findings(
     done: &Compensated,
     meant: &Meant,
     subject: &str,
-) -> Vec<Finding> {
+) -> Vec<FileFinding> {
     let remedy =
         "measure them with a few touches (robotcal frames) and give --frames frames.json, or say --frames nominal";
     let finding =
-        |code, weight, quantities, text| Finding { code, weight, subject: subject.to_owned(), quantities, text };
+        |code, weight, quantities, text| FileFinding { code, weight, subject: subject.to_owned(), quantities, text };
     let shifts: Vec<f64> = (done.outcomes.iter())
-        .filter_map(|o| if let Outcome::Done(c) = o { Some(1e3 * c.shift_m) } else { None })
+        .filter_map(|o| if let TargetOutcome::Done(c) = o { Some(1e3 * c.shift_m) } else { None })
         .collect();
     if shifts.is_empty() {
         return Vec::new();
@@ -267,8 +258,8 @@ pub fn expected_findings(
 ///
 /// # Errors
 /// None in practice: every field can be written as JSON.
-pub fn findings_json(findings: &[Finding]) -> Result<String> {
-    let line = |f: &Finding| {
+pub fn findings_json(findings: &[FileFinding]) -> Result<String> {
+    let line = |f: &FileFinding| {
         serde_json::to_string(f)
             .map_err(|e| crate::error::Error::new(Code::RecordNotWritten, FINDINGS, e, "report this"))
     };
@@ -288,7 +279,7 @@ pub fn table(program: &Program, done: &Compensated, expected: Option<&[Option<f6
         let expected = millimetres(expected.and_then(|e| e[k]));
         let taught = millimetres(done.taught[k].map(|(_, m)| m));
         let _ = match outcome {
-            Outcome::Done(c) => {
+            TargetOutcome::Done(c) => {
                 let (joint, change) = c.largest_change();
                 let (mm, mrad) = (1e3 * c.shift_m, 1e3 * c.turn_rad);
                 let (name, rest_m, rest_rad) = (cell(&chain.readings[joint]), c.residual_m, c.residual_rad);
@@ -298,7 +289,7 @@ pub fn table(program: &Program, done: &Compensated, expected: Option<&[Option<f6
                     "{head},{mm:.4},{mrad:.4},{change:.9},{name},{rest_m:.2e},{rest_rad:.2e},,{posture},{expected},{taught},"
                 )
             }
-            Outcome::Left(why) => {
+            TargetOutcome::Left(why) => {
                 writeln!(out, "{head},,,,,,,{},,,{taught},{}", cell(&why.words), why.reason.name())
             }
         };

@@ -29,7 +29,7 @@ pub type Disagreement = (String, f64, f64, f64);
 
 /// What differs.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Comparison {
+pub struct SolutionDifference {
     /// In the region that the stops of both covered.
     pub covered: Option<Difference>,
     /// Over all joint limits.
@@ -44,7 +44,7 @@ pub struct Comparison {
 ///
 /// # Errors
 /// Solutions of robots with different joints, or without workspace map.
-pub fn compare_solutions(a: &SolutionRecord, b: &SolutionRecord) -> Result<Comparison> {
+pub fn compare_solutions(a: &SolutionRecord, b: &SolutionRecord) -> Result<SolutionDifference> {
     if a.robot.readings != b.robot.readings {
         let what = format!("joints {} against {}", a.robot.readings.join(", "), b.robot.readings.join(", "));
         return Err(Error::new(Code::RobotDiffers, "solutions", what, "compare solutions of the same robot"));
@@ -65,7 +65,7 @@ pub fn compare_solutions(a: &SolutionRecord, b: &SolutionRecord) -> Result<Compa
     let everywhere = difference(&first, &second, &all).ok_or_else(|| {
         Error::new(Code::SolutionDiffers, "solutions", "they have no workspace map in common", "identify both again")
     })?;
-    Ok(Comparison {
+    Ok(SolutionDifference {
         covered: difference(&first, &second, &covered),
         everywhere,
         parameters: disagreements(a, b),

@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
 
-use super::corrections::{Finding, Weight, numbers};
+use super::corrections::{FileFinding, numbers};
 use crate::assess::Limits;
+use crate::diagnose::Weight;
 use crate::error::Code;
 use crate::frames::{FrameFit, Touches};
 use crate::geom::{Pose, adjoint};
@@ -12,9 +13,9 @@ use crate::geom::{Pose, adjoint};
 const NAMED: usize = 5;
 
 /// Findings of a fit of tool and work object; `subject` is the file of the touches.
-pub fn frame_findings(fit: &FrameFit, touches: &Touches, limits: &Limits, subject: &str) -> Vec<Finding> {
+pub fn frame_findings(fit: &FrameFit, touches: &Touches, limits: &Limits, subject: &str) -> Vec<FileFinding> {
     let finding =
-        |code, weight, quantities, text| Finding { code, weight, subject: subject.to_owned(), quantities, text };
+        |code, weight, quantities, text| FileFinding { code, weight, subject: subject.to_owned(), quantities, text };
     let mut all = Vec::new();
     let left_out: Vec<usize> = (0..touches.all.len()).filter(|&k| fit.judged[k].left_out).collect();
     if !left_out.is_empty() {

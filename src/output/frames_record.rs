@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::corrections::Finding;
+use super::corrections::FileFinding;
 use super::pose_record::PoseRecord;
 use super::restore::FoundModel;
 use super::solution_bytes::field_per_line;
@@ -157,7 +157,7 @@ pub struct FramesRecord {
     /// Measurements.
     pub touches: Vec<TouchRecord>,
     /// What was found.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<FileFinding>,
     /// What goes on to targets.
     pub knowledge: KnowledgeRecord,
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::text::json;
 use crate::error::Result;
 use crate::plan::{Forecast, Plan, PlanRequest, image_name};
-use crate::series::{AngleUnit, DEFAULT_PLACEMENT, Manifest, Stop, Stops, plate_csv, plate_toml};
+use crate::series::{AngleUnit, DEFAULT_PLACEMENT, Manifest, SeriesStop, Stops, plate_csv, plate_toml};
 use crate::urdf::JointKind;
 
 /// Name of the file that lists the others.
@@ -94,11 +94,11 @@ pub fn plan_files(
 ) -> Result<BTreeMap<String, Vec<u8>>> {
     let setting = &request.setting;
     let chain = &setting.robot.chain;
-    let stop = |(k, leg): (usize, &crate::plan::order::Leg)| Stop {
+    let stop = |(k, leg): (usize, &crate::plan::order::Leg)| SeriesStop {
         image: image_name(k),
         raw_readings: Some(written(&plan.pool[leg.stop].readings, &chain.reading_kinds)),
         placement: placement_name(request, plan.pool[leg.stop].placement),
-        ..Stop::default()
+        ..SeriesStop::default()
     };
     let stops = Stops {
         joints: chain.readings.clone(),

@@ -7,14 +7,14 @@ use serde::Deserialize;
 
 use super::solution_json::{ImageRecord, ObservationColumns, SolutionRecord};
 use crate::error::{Code, Error, Result};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 use crate::geom::Pose;
 use crate::identify::RobotModel;
 use crate::model::camera::Camera;
 use crate::model::joint_terms::JointTerm;
 use crate::model::robot::{Posture, Robot};
 use crate::plan::setting::{PlannedStop, Setting};
-use crate::problem::{Image, Mark, Measured};
+use crate::problem::{Image, Mark, MarkerObservation};
 use crate::series::{Marker, Plate};
 use crate::urdf::Chain;
 
@@ -26,7 +26,7 @@ struct PoseFile {
 }
 
 fn text(path: &Path) -> Result<String> {
-    files::read_text(path, Kind::Settings)
+    files::read_text(path, FileKind::Settings)
 }
 
 /// The pose of a file like hand_camera.yaml or plate_pose.yaml.
@@ -137,7 +137,7 @@ fn taken(image: &ImageRecord, pixel_factor: f64, record: &SolutionRecord) -> Opt
     Some(PlannedStop { posture, image })
 }
 
-fn observations(columns: &ObservationColumns, pixel_factor: f64, ids: &[u32]) -> Vec<Measured> {
+fn observations(columns: &ObservationColumns, pixel_factor: f64, ids: &[u32]) -> Vec<MarkerObservation> {
     let one = |k: usize| {
         if columns.reason[k].is_some() {
             return None;
@@ -145,7 +145,7 @@ fn observations(columns: &ObservationColumns, pixel_factor: f64, ids: &[u32]) ->
         let [uu, uv, vv] = columns.covariance[k];
         let information = (Matrix2::new(uu, uv, uv, vv) * pixel_factor.powi(2)).try_inverse()?;
         let uv = Vector2::from(columns.uv[k]) - columns.duv[k].map_or(Vector2::zeros(), Vector2::from);
-        Some(Measured {
+        Some(MarkerObservation {
             marker: ids.iter().position(|id| *id == columns.marker[k])?,
             edge: columns.edge[k],
             mark: Mark::of_radius(columns.radius_m[k]),
@@ -154,7 +154,7 @@ fn observations(columns: &ObservationColumns, pixel_factor: f64, ids: &[u32]) ->
             rejected: None,
         })
     };
-    let mut all: Vec<Measured> = (0..columns.marker.len()).filter_map(one).collect();
+    let mut all: Vec<MarkerObservation> = (0..columns.marker.len()).filter_map(one).collect();
     all.sort_by_key(|o| (o.marker, o.edge));
     all
 }

@@ -16,7 +16,7 @@ pub enum Trust {
 
 /// What asks for a look, and the first thing to do about it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Reason {
+pub struct VerdictReason {
     /// What was found.
     pub what: String,
     /// What to do; empty where nothing is known.
@@ -29,7 +29,7 @@ pub struct Verdict {
     /// May it be used?
     pub trust: Trust,
     /// Failed gates, or doubts; none of a good result.
-    pub reasons: Vec<Reason>,
+    pub reasons: Vec<VerdictReason>,
 }
 
 impl Verdict {
@@ -47,16 +47,16 @@ impl Verdict {
 }
 
 /// The finding of a gate; of files of earlier versions its whole sentence.
-fn of_gate(record: &SolutionRecord, sentence: &str) -> Reason {
+fn of_gate(record: &SolutionRecord, sentence: &str) -> VerdictReason {
     let found = record.findings.iter().find(|f| f.text == sentence && !f.seen.is_empty());
     let (what, remedy) = found.map_or((sentence, ""), |f| (f.seen.as_str(), f.remedy.as_str()));
-    Reason { what: what.to_owned(), remedy: remedy.to_owned() }
+    VerdictReason { what: what.to_owned(), remedy: remedy.to_owned() }
 }
 
-fn doubts(r: &SolutionRecord) -> Vec<Reason> {
+fn doubts(r: &SolutionRecord) -> Vec<VerdictReason> {
     let noted: Vec<Notice> = r.notices.iter().filter(|n| !is_information(n.code)).cloned().collect();
     let noted = Notice::said_once(&noted).into_iter();
-    let noted = noted.map(|n| Reason { what: format!("{}: {}", n.place, n.what), remedy: n.remedy });
+    let noted = noted.map(|n| VerdictReason { what: format!("{}: {}", n.place, n.what), remedy: n.remedy });
     noted.chain(left_out(r)).chain(small_gain(r)).chain(odd_image(r)).collect()
 }
 
@@ -77,20 +77,20 @@ fn is_information(code: Code) -> bool {
     )
 }
 
-fn left_out(r: &SolutionRecord) -> Option<Reason> {
+fn left_out(r: &SolutionRecord) -> Option<VerdictReason> {
     let on_robot = || r.images.iter().filter(|i| i.readings.is_some());
     let (all, out) = (on_robot().count(), on_robot().filter(|i| i.reason.is_some()).count());
     let many = out as f64 > r.limits().doubtful_share_left_out * all as f64;
-    many.then(|| Reason {
+    many.then(|| VerdictReason {
         what: format!("{out} of {all} images of the robot were left out"),
         remedy: "look at their reasons (report, or show --all)".into(),
     })
 }
 
-fn small_gain(r: &SolutionRecord) -> Option<Reason> {
+fn small_gain(r: &SolutionRecord) -> Option<VerdictReason> {
     let (before, after) = (r.accuracy.nominal.rms_mm, r.accuracy.calibrated.rms_mm);
     let small = after * r.limits().doubtful_gain > before;
-    small.then(|| Reason {
+    small.then(|| VerdictReason {
         what: format!("the gain is small: {before:.3} mm before, {after:.3} mm after, on held-out images"),
         remedy:
             "the robot repeats no better, or the stops move its joints too little: take more, and more different ones"
@@ -98,12 +98,12 @@ fn small_gain(r: &SolutionRecord) -> Option<Reason> {
     })
 }
 
-fn odd_image(r: &SolutionRecord) -> Option<Reason> {
+fn odd_image(r: &SolutionRecord) -> Option<VerdictReason> {
     let after = &r.accuracy.calibrated;
     let odd = after.worst_mm > r.limits().doubtful_odd_image * after.rms_mm;
     let error = |i: &&crate::output::solution_json::ImageRecord| i.held_out_mm.map_or(0.0, |e| e[1]);
     let worst = r.images.iter().max_by(|a, b| error(a).total_cmp(&error(b)))?;
-    odd.then(|| Reason {
+    odd.then(|| VerdictReason {
         what: format!("image {} is off by {:.3} mm, far more than the others", worst.name, after.worst_mm),
         remedy: "look at it in the report; did the arm stand still?".into(),
     })

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::scene::{Scene, arm_length_m};
 use super::setting::Setting;
-use super::viewpoint::{View, ViewRange};
+use super::viewpoint::{ViewRange, Viewpoint};
 use super::visibility::{VisibilityLimits, seen_markers};
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
@@ -24,7 +24,7 @@ pub struct Candidate {
     /// Where the plate stands.
     pub placement: usize,
     /// The view.
-    pub view: View,
+    pub view: Viewpoint,
     /// The camera.
     pub camera_from_plate: Pose,
     /// Markers seen.
@@ -62,7 +62,7 @@ impl Default for CandidateOptions {
 
 /// Why views fell out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Tally {
+pub struct CandidateCounts {
     /// Views tried.
     pub views: usize,
     /// Views that show too little of the plate, or too obliquely, or unsharp.
@@ -75,7 +75,7 @@ pub struct Tally {
     pub colliding: usize,
 }
 
-impl Tally {
+impl CandidateCounts {
     /// Adds the counts of other views.
     pub fn add(&mut self, other: &Self) {
         self.views += other.views;
@@ -118,9 +118,13 @@ pub struct Search<'a> {
 ///
 /// # Errors
 /// Where there are none: which condition excludes them, and what to change.
-pub fn candidates(setting: &Setting, scene: &Scene, options: &CandidateOptions) -> Result<(Vec<Candidate>, Tally)> {
+pub fn candidates(
+    setting: &Setting,
+    scene: &Scene,
+    options: &CandidateOptions,
+) -> Result<(Vec<Candidate>, CandidateCounts)> {
     let search = Search::new(setting, scene, options);
-    let (mut found, mut tally) = (Vec::new(), Tally::default());
+    let (mut found, mut tally) = (Vec::new(), CandidateCounts::default());
     let mut first = 0;
     while found.len() < options.count && first < VIEWS_PER_CANDIDATE * options.count {
         let (some, counted) = search.drawn(first..first + ROUND);
@@ -139,11 +143,11 @@ impl<'a> Search<'a> {
     }
 
     /// Workable poses of the random views with these numbers, each in several configurations of the arm.
-    pub fn drawn(&self, views: Range<usize>) -> (Vec<Candidate>, Tally) {
+    pub fn drawn(&self, views: Range<usize>) -> (Vec<Candidate>, CandidateCounts) {
         let one = |index: usize| {
             let mut rng = self.rng(index as u64);
             let placement = index % self.setting.placements.len();
-            let view = View::random(&self.setting.plate, &self.options.views, &mut rng);
+            let view = Viewpoint::random(&self.setting.plate, &self.options.views, &mut rng);
             let starts: Vec<Vec<f64>> = (0..STARTS).map(|_| self.random_start(&mut rng)).collect();
             let (mut found, tally) = self.workable(view, placement, &starts);
             while found.len() > CONFIGURATIONS {
@@ -151,8 +155,8 @@ impl<'a> Search<'a> {
             }
             (found, tally)
         };
-        let each: Vec<(Vec<Candidate>, Tally)> = views.into_par_iter().map(one).collect();
-        let (mut found, mut tally) = (Vec::new(), Tally::default());
+        let each: Vec<(Vec<Candidate>, CandidateCounts)> = views.into_par_iter().map(one).collect();
+        let (mut found, mut tally) = (Vec::new(), CandidateCounts::default());
         for (some, counted) in each {
             found.extend(some);
             tally.add(&counted);
@@ -187,9 +191,9 @@ impl<'a> Search<'a> {
     }
 
     /// The poses that bring about a view from these starts, if it is workable: every condition is checked here.
-    fn workable(&self, view: View, placement: usize, starts: &[Vec<f64>]) -> (Vec<Candidate>, Tally) {
+    fn workable(&self, view: Viewpoint, placement: usize, starts: &[Vec<f64>]) -> (Vec<Candidate>, CandidateCounts) {
         let Self { setting, scene, options, limits } = self;
-        let mut tally = Tally { views: 1, ..Tally::default() };
+        let mut tally = CandidateCounts { views: 1, ..CandidateCounts::default() };
         let plate_from_camera = view.plate_from_camera();
         let camera_from_plate = plate_from_camera.inverse();
         let seen = seen_markers(&setting.plate, &setting.camera, &camera_from_plate);
@@ -230,7 +234,7 @@ fn posture(readings: &[f64], limits: &[(f64, f64)]) -> u32 {
 }
 
 /// Why there is no candidate at all.
-fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tally: &Tally) -> Error {
+fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tally: &CandidateCounts) -> Error {
     let sight = &options.sight;
     let markers = setting.plate.markers.len();
     if markers < sight.least_markers {

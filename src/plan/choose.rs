@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::error::{Code, Error, Result};
 use crate::linalg::LinearRow;
-use crate::plan::candidates::{Candidate, CandidateOptions, Search, Tally, candidates, workspace};
+use crate::plan::candidates::{Candidate, CandidateCounts, CandidateOptions, Search, candidates, workspace};
 use crate::plan::criterion::Criterion;
 use crate::plan::information::{Identified, candidate_information, flange_weight, stop_information};
 use crate::plan::order::{Leg, imbalance, tour};
@@ -99,7 +99,7 @@ pub struct Choice {
     /// Their information, in the identified directions ([`Identified`]).
     pub information: Vec<DMatrix<f64>>,
     /// What fell out.
-    pub tally: Tally,
+    pub tally: CandidateCounts,
     /// Relaxed weights.
     pub weights: Vec<f64>,
     /// Chosen candidates, ascending.

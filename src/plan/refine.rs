@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use rand::{Rng, RngExt};
 use rayon::prelude::*;
 
-use super::candidates::{Candidate, Search, Tally};
+use super::candidates::{Candidate, CandidateCounts, Search};
 use super::criterion::{Criterion, Evaluated};
 use super::relax::{Design, GOOD_ENOUGH, NoDesign, Relaxed};
 use super::rounding::Rounded;
@@ -44,7 +44,7 @@ pub struct Refined {
     /// Weights.
     pub relaxed: Relaxed,
     /// What fell out, with the views of all rounds.
-    pub tally: Tally,
+    pub tally: CandidateCounts,
     /// Number of the first view that was not drawn yet.
     fresh_from: usize,
     /// Criterion of the weights before the first round and after each.
@@ -121,7 +121,7 @@ impl Refinement<'_> {
         &self,
         pool: Vec<Candidate>,
         information: Vec<DMatrix<f64>>,
-        tally: Tally,
+        tally: CandidateCounts,
     ) -> Result<Refined, NoDesign> {
         let rows = (self.rows)(&pool);
         let relaxed = self.design(&information, &rows).relax()?;

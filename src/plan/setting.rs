@@ -7,7 +7,7 @@ use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
-    Adjustment, Image, Layout, Mark, Measured, Names, Noise, PlateShape, Problem, State, Stop, Tie, predict,
+    Adjustment, Image, Layout, Mark, MarkerObservation, Names, Noise, PlateShape, Problem, State, Stop, Tie, predict,
 };
 use crate::series::{CameraMount, Edge, Plate};
 
@@ -146,7 +146,7 @@ impl Setting {
                 if edge == Edge::Inner && radius_m <= 0.0 {
                     continue;
                 }
-                let mut o = Measured {
+                let mut o = MarkerObservation {
                     marker,
                     edge,
                     mark: Mark::of_radius(radius_m),

@@ -32,7 +32,7 @@ impl Default for ViewRange {
 
 /// A view by what a photographer would set.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct View {
+pub struct Viewpoint {
     /// The point looked at, in the plate frame, m.
     pub target_m: [f64; 2],
     /// Where the optical axis points beside it, about the camera's x and y, rad.
@@ -54,7 +54,7 @@ impl ViewRange {
     }
 }
 
-impl View {
+impl Viewpoint {
     /// A random view: log-uniform in distance, even over the cap of directions, every roll.
     pub fn random(plate: &Plate, range: &ViewRange, rng: &mut impl Rng) -> Self {
         let mut around = |size: f64| if size > 0.0 { rng.random_range(-size..size) } else { 0.0 };

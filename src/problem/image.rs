@@ -1,6 +1,6 @@
 //! An image of the problem: what it shows, and what it belongs to.
 
-use super::measured::Measured;
+use super::measured::MarkerObservation;
 use super::rejection::ImageRejection;
 use crate::series::CameraMount;
 
@@ -24,14 +24,14 @@ pub struct Image {
     /// Where the camera is.
     pub mount: CameraMount,
     /// Observations, ordered by marker.
-    pub observations: Vec<Measured>,
+    pub observations: Vec<MarkerObservation>,
     /// Why the image is left out; `None` while it is used.
     pub rejected: Option<ImageRejection>,
 }
 
 impl Image {
     /// Observations that take part.
-    pub fn used(&self) -> impl Iterator<Item = &Measured> {
+    pub fn used(&self) -> impl Iterator<Item = &MarkerObservation> {
         self.observations.iter().filter(|o| o.rejected.is_none())
     }
 }

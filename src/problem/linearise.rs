@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, Matrix6xX, Vector2, Vector6};
 
 use super::equations::{Collector, E, Equations, MarkerTerms};
 use super::state::{Displaced, seen_centre};
-use super::{Image, Layout, Measured, Problem, State, TakenFrom, Tie};
+use super::{Image, Layout, MarkerObservation, Problem, State, TakenFrom, Tie};
 use crate::geom::{Pose, adjoint};
 use crate::linalg::wide;
 use crate::model::circle::Prediction;
@@ -81,7 +81,7 @@ impl Weighting {
 }
 
 /// Prediction of one observation; `None` where the marker is behind the camera.
-pub fn predict(image: &Image, state: &State, pose: &Pose, observation: &Measured) -> Option<Prediction> {
+pub fn predict(image: &Image, state: &State, pose: &Pose, observation: &MarkerObservation) -> Option<Prediction> {
     let position = state.plates[image.plate].position(observation.marker);
     observation.mark.predict(&state.cameras[image.camera], pose, &position)
 }

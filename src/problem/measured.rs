@@ -10,7 +10,7 @@ use crate::series::Edge;
 
 /// One observation, ready for the adjustment.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
+pub struct MarkerObservation {
     /// Index of the marker on its plate.
     pub marker: usize,
     /// Contour.

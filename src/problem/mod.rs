@@ -38,7 +38,7 @@ pub use length::{Length, LengthEnds, MeasuredLength};
 pub use linearise::{
     Chained, ImageTerms, Residual, Weighting, equations, linearise, linearise_with_equations, predict,
 };
-pub use measured::{Mark, Measured};
+pub use measured::{Mark, MarkerObservation};
 pub use measured_series::{KnownCamera, LensChoice, MeasuredSeries, MeasuredStop, SeenBody, SeenLength, intern};
 pub use noise::Noise;
 pub use plate_distance::{

@@ -11,11 +11,13 @@ use std::collections::BTreeMap;
 use nalgebra::Vector6;
 
 use super::codes::Branch;
-use super::field::{Edit, Place, splice};
+use super::field::{Edit, FieldPlace, splice};
 use super::measured_frames::{KnownError, MeasuredFrames, Moved};
 use super::posture::{Before, Finder, Known};
-use super::program::{Approach, Displaced, Kind, Left, PoseTarget, Posture, Program, Target, Understood, write_joints};
-use super::reason::{Reason, Why};
+use super::program::{
+    Approach, DisplacedTarget, Left, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood, write_joints,
+};
+use super::reason::{LeftReason, Why};
 use crate::geom::Pose;
 use crate::model::inverse::{self, Reach, Stalled};
 use crate::model::robot::Robot;
@@ -62,7 +64,7 @@ pub struct Postures {
 
 /// What became of one target.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
+pub enum TargetOutcome {
     /// Corrected.
     Done(Correction),
     /// Left as it is, for this reason.
@@ -106,7 +108,7 @@ pub struct Compensated {
     /// New bytes of every file.
     pub files: Vec<Vec<u8>>,
     /// One for each target of the program, in its order.
-    pub outcomes: Vec<Outcome>,
+    pub outcomes: Vec<TargetOutcome>,
     /// Distance (rad, m) of each target with taught joints beside its pose from where the controller's model puts these joints.
     pub taught: Vec<Option<(f64, f64)>>,
 }
@@ -116,8 +118,10 @@ impl Compensated {
     pub fn left(&self, program: &Program) -> Vec<Left> {
         let visited = program.targets.iter().zip(&self.outcomes).filter(|(t, _)| t.visited);
         let unreached = visited.filter_map(|(t, o)| match o {
-            Outcome::Done(_) => None,
-            Outcome::Left(why) => Some(Left { file: t.file, line: t.line, name: t.name.clone(), why: why.clone() }),
+            TargetOutcome::Done(_) => None,
+            TargetOutcome::Left(why) => {
+                Some(Left { file: t.file, line: t.line, name: t.name.clone(), why: why.clone() })
+            }
         });
         let mut all: Vec<Left> = program.left.iter().cloned().chain(unreached).collect();
         all.sort_by_key(|l| (l.file, l.line));
@@ -136,20 +140,20 @@ pub fn compensate(program: &Program, models: Models<'_>, postures: &Postures) ->
             Ok((correction, own, later)) => {
                 edits.extend(own);
                 displaced.extend(later.map(|l| (k, l)));
-                outcomes.push(Outcome::Done(correction));
+                outcomes.push(TargetOutcome::Done(correction));
             }
             Err(why) => {
                 edits.extend(empty_cells(target));
-                outcomes.push(Outcome::Left(why));
+                outcomes.push(TargetOutcome::Left(why));
             }
         }
     }
     // Displaced points are written when the points that they start from are.
     for (k, later) in displaced {
-        if let Outcome::Done(correction) = &mut outcomes[k] {
+        if let TargetOutcome::Done(correction) = &mut outcomes[k] {
             match work.displaced(&later, correction, program) {
                 Ok(own) => edits.extend(own),
-                Err(why) => outcomes[k] = Outcome::Left(why),
+                Err(why) => outcomes[k] = TargetOutcome::Left(why),
             }
         }
     }
@@ -160,7 +164,7 @@ pub fn compensate(program: &Program, models: Models<'_>, postures: &Postures) ->
 
 /// Distance (rad, m) of the tool between a pose and the joints that were taught with it.
 fn taught(target: &Target, controller: &Robot) -> Option<(f64, f64)> {
-    let Kind::Pose(pose) = &target.kind else { return None };
+    let TargetKind::Pose(pose) = &target.kind else { return None };
     let tool = &pose.flange_from_tool;
     let by_joints = controller.base_from_tip(pose.taught.as_ref()?) * *tool;
     Some(by_joints.distance(&(pose.base_from_flange() * *tool)))
@@ -168,10 +172,10 @@ fn taught(target: &Target, controller: &Robot) -> Option<(f64, f64)> {
 
 /// Columns that a table gains stay empty in the rows that are left as they are.
 fn empty_cells(target: &Target) -> Vec<Edit> {
-    let Kind::Pose(pose) = &target.kind else { return Vec::new() };
+    let TargetKind::Pose(pose) = &target.kind else { return Vec::new() };
     let missing = pose.joint_fields.iter().flatten().filter_map(|field| match &field.place {
-        Place::Missing(at, words) => Some(Edit { file: field.file, range: *at..*at, text: words.clone() }),
-        Place::At(_) => None,
+        FieldPlace::Missing(at, words) => Some(Edit { file: field.file, range: *at..*at, text: words.clone() }),
+        FieldPlace::At(_) => None,
     });
     missing.collect()
 }
@@ -179,7 +183,7 @@ fn empty_cells(target: &Target) -> Vec<Edit> {
 /// A displaced target whose numbers are still to be written.
 struct Later {
     pose: PoseTarget,
-    displaced: Displaced,
+    displaced: DisplacedTarget,
     held: Vec<bool>,
     /// Readings of the target before, as corrected.
     previous: Option<Vec<f64>>,
@@ -250,15 +254,15 @@ impl<'a> Work<'a> {
         let at_tool = |flange: Pose| flange * moved.flange_from_tool;
         let (turn_rad, shift_m) = at_tool(pose_at(&programmed)).distance(&at_tool(wanted));
         let (edits, read, later) = match kind {
-            Kind::Joints(joints) => {
+            TargetKind::Joints(joints) => {
                 let (edits, read) = joints.edits(&corrected, &program.files);
                 (edits, read, None)
             }
-            Kind::Pose(pose) if pose.joint_fields.iter().any(Option::is_some) => {
+            TargetKind::Pose(pose) if pose.joint_fields.iter().any(Option::is_some) => {
                 let (edits, read) = write_joints(&pose.joint_fields, &corrected, &program.files);
                 (edits, read, None)
             }
-            Kind::Pose(pose) => match &pose.displaced {
+            TargetKind::Pose(pose) => match &pose.displaced {
                 None => {
                     let (edits, read) = self.pose_edits(pose, &held, &programmed, &corrected, program)?;
                     (edits, read, None)
@@ -275,9 +279,9 @@ impl<'a> Work<'a> {
         let beyond = residual_m > RESIDUAL || residual_rad > RESIDUAL;
         if beyond {
             let rest = in_words(residual_m, residual_rad);
-            return Err(Why::new(Reason::Coarse, format!("the decimals of the text leave {rest}")));
+            return Err(Why::new(LeftReason::Coarse, format!("the decimals of the text leave {rest}")));
         }
-        if let Kind::Pose(pose) = kind
+        if let TargetKind::Pose(pose) = kind
             && later.is_none()
         {
             let place = (target.file, kind.first_byte());
@@ -292,14 +296,14 @@ impl<'a> Work<'a> {
     }
 
     /// Joints that the program means, which of them stay, and how the posture is known.
-    fn meant(&mut self, kind: &Kind, straight: bool) -> Understood<(Vec<f64>, Vec<bool>, Known)> {
+    fn meant(&mut self, kind: &TargetKind, straight: bool) -> Understood<(Vec<f64>, Vec<bool>, Known)> {
         let held = |own: Vec<bool>| own.iter().zip(&self.postures.held).map(|(a, h)| *a || *h).collect::<Vec<bool>>();
         match kind {
-            Kind::Joints(joints) => {
+            TargetKind::Joints(joints) => {
                 let held = held(joints.fields.iter().map(Option::is_none).collect());
                 Ok((joints.readings.clone(), held, Known::Joints))
             }
-            Kind::Pose(pose) => {
+            TargetKind::Pose(pose) => {
                 let held = held(pose.fixed.iter().map(Option::is_some).collect());
                 let readings = self.places.last().and_then(|p| p.posture.clone());
                 let before = Before { readings: readings.as_deref(), straight };
@@ -326,7 +330,7 @@ impl<'a> Work<'a> {
 
     fn commanded(&self, base_from_flange: &Pose, held: &[bool], near: &[f64]) -> Understood<Vec<f64>> {
         let read = reach(self.models.controller, &self.limits, held, None).solve_from(base_from_flange, near);
-        read.map_err(|_| Why::new(Reason::Singular, "the corrected pose is singular for the controller's model"))
+        read.map_err(|_| Why::new(LeftReason::Singular, "the corrected pose is singular for the controller's model"))
     }
 
     /// Edits of a displaced target: its place is exact; so is its orientation where the displacement can turn, else it is that of the
@@ -354,17 +358,18 @@ impl<'a> Work<'a> {
         let turns = displaced.turned.is_none() && correction.residual_rad <= correction.turn_rad + RESIDUAL;
         if correction.residual_m > RESIDUAL || (correction.residual_rad > RESIDUAL && !turns) {
             let rest = in_words(correction.residual_m, correction.residual_rad);
-            return Err(Why::new(Reason::Coarse, format!("the point that it starts from leaves {rest}")));
+            return Err(Why::new(LeftReason::Coarse, format!("the point that it starts from leaves {rest}")));
         }
         Ok(edits)
     }
 
     /// The target with what its text leaves out, which is what the target before it says.
-    fn completed(&self, target: &Target, before: Option<&[f64]>) -> Understood<Kind> {
-        let unknown = || Why::new(Reason::Incomplete, "it leaves numbers out, and the target before it is not known");
+    fn completed(&self, target: &Target, before: Option<&[f64]>) -> Understood<TargetKind> {
+        let unknown =
+            || Why::new(LeftReason::Incomplete, "it leaves numbers out, and the target before it is not known");
         let mut kind = target.kind.clone();
         match &mut kind {
-            Kind::Joints(joints) => {
+            TargetKind::Joints(joints) => {
                 for (i, q) in joints.readings.iter_mut().enumerate().filter(|(_, q)| !q.is_finite()) {
                     // Axes that the target does not have keep their place, wherever that is.
                     let known = before.map(|b| b[i]);
@@ -374,16 +379,18 @@ impl<'a> Work<'a> {
                     };
                 }
             }
-            Kind::Pose(pose) if pose.is_partial() => {
+            TargetKind::Pose(pose) if pose.is_partial() => {
                 pose.complete(&self.models.controller.base_from_tip(before.ok_or_else(unknown)?));
             }
-            Kind::Pose(_) => {}
+            TargetKind::Pose(_) => {}
         }
         Ok(kind)
     }
 
     fn code_edits(&self, pose: &PoseTarget, programmed: &[f64], corrected: &[f64], program: &Program) -> Vec<Edit> {
-        let (Posture::Coded(codes, axes) | Posture::Either(codes, axes)) = &pose.posture else { return Vec::new() };
+        let (MeantPosture::Coded(codes, axes) | MeantPosture::Either(codes, axes)) = &pose.posture else {
+            return Vec::new();
+        };
         let six = |q: &[f64]| axes.map(|i| q[i]);
         let branch = |q: &[f64]| Branch::of(self.models.controller, axes, q);
         codes.edits((&six(programmed), branch(programmed)), (&six(corrected), branch(corrected)), &program.files)
@@ -394,7 +401,7 @@ impl<'a> Work<'a> {
         let beyond = |q: &[f64]| (0..q.len()).find(|&i| q[i] < self.limits[i].0 || q[i] > self.limits[i].1);
         if let Some(i) = beyond(start) {
             let words = format!("the program itself puts {}", self.beyond(i, start[i]));
-            return Err(Why::new(Reason::ProgramBeyondLimit, words));
+            return Err(Why::new(LeftReason::ProgramBeyondLimit, words));
         }
         let found = within_limits(to, wanted, start).map_err(|stalled| {
             let free: Vec<_> = start.iter().map(|_| (f64::NEG_INFINITY, f64::INFINITY)).collect();
@@ -403,12 +410,12 @@ impl<'a> Work<'a> {
                     let all = (0..q.len())
                         .filter(|&i| beyond(&q).is_some() && (q[i] < self.limits[i].0 || q[i] > self.limits[i].1));
                     let all: Vec<String> = all.map(|i| self.beyond(i, q[i])).collect();
-                    Why::new(Reason::BeyondLimit, format!("it would take {}", all.join(" and ")))
+                    Why::new(LeftReason::BeyondLimit, format!("it would take {}", all.join(" and ")))
                 }
                 _ => {
                     let remain = twist_in_words(&stalled.error);
                     let words = format!("no posture next to that of the program reaches it; {remain} remain");
-                    Why::new(Reason::OutOfReach, words)
+                    Why::new(LeftReason::OutOfReach, words)
                 }
             }
         })?;
@@ -417,7 +424,7 @@ impl<'a> Work<'a> {
             let name = &self.models.to.chain.readings[i];
             let change = self.amount(i, change);
             let words = format!("{name} would have to move by {change}: the target lies next to a singular posture");
-            return Err(Why::new(Reason::Singular, words));
+            return Err(Why::new(LeftReason::Singular, words));
         }
         Ok(found)
     }

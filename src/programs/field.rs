@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// Where a number stands, or where it has to be put.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub enum FieldPlace {
     /// Bytes of the number, its sign included.
     At(Range<usize>),
     /// Not in the text yet: it is inserted at this byte, after these words (`, Z `).
@@ -17,7 +17,7 @@ pub struct Field {
     /// Index of the file.
     pub file: usize,
     /// Where it stands.
-    pub place: Place,
+    pub place: FieldPlace,
     /// The number as written, in the unit of the language.
     pub written: f64,
     /// SI value of one unit of the language.
@@ -39,7 +39,7 @@ impl Field {
         let zero = number.bytes().all(|b| matches!(b, b'-' | b'0' | b'.'));
         let number = if zero { number.trim_start_matches('-').to_owned() } else { number };
         match &self.place {
-            Place::At(range) if text.get(range.start) == Some(&b'+') && !number.starts_with('-') => {
+            FieldPlace::At(range) if text.get(range.start) == Some(&b'+') && !number.starts_with('-') => {
                 format!("+{number}")
             }
             _ => number,
@@ -48,7 +48,7 @@ impl Field {
 
     /// Digits behind the point in the text, where it is written without an exponent.
     fn decimals_now(&self, text: &[u8]) -> usize {
-        let Place::At(range) = &self.place else { return 0 };
+        let FieldPlace::At(range) = &self.place else { return 0 };
         let number = text.get(range.clone()).unwrap_or_default();
         let digits = number.iter().rev().take_while(|b| b.is_ascii_digit()).count();
         match number.len().checked_sub(digits + 1).map(|i| number[i]) {
@@ -64,9 +64,11 @@ impl Field {
         let number = self.rounded(value, text);
         let read = number.parse::<f64>().unwrap_or(f64::NAN);
         match &self.place {
-            Place::At(_) if read == self.written => (None, self.value()),
-            Place::At(range) => (Some(Edit { file: self.file, range: range.clone(), text: number }), read * self.si),
-            Place::Missing(at, words) => {
+            FieldPlace::At(_) if read == self.written => (None, self.value()),
+            FieldPlace::At(range) => {
+                (Some(Edit { file: self.file, range: range.clone(), text: number }), read * self.si)
+            }
+            FieldPlace::Missing(at, words) => {
                 let text = format!("{words}{number}");
                 (Some(Edit { file: self.file, range: *at..*at, text }), read * self.si)
             }
@@ -107,7 +109,7 @@ mod tests {
 
     fn written(number: &str, decimals: usize, value: f64) -> String {
         let written = number.parse().unwrap();
-        let field = Field { file: 0, place: Place::At(0..number.len()), written, si: 1.0, decimals };
+        let field = Field { file: 0, place: FieldPlace::At(0..number.len()), written, si: 1.0, decimals };
         let (edit, _) = field.edit(value, number.as_bytes());
         String::from_utf8(splice(number.as_bytes(), 0, &edit.into_iter().collect::<Vec<_>>())).unwrap()
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::program::{Approach, Kind, Left, Program, Target};
+use super::program::{Approach, Left, Program, Target, TargetKind};
 
 /// A program that is being read.
 pub(super) struct Itinerary {
@@ -58,7 +58,7 @@ impl Itinerary {
     }
 
     /// True for a target that was visited.
-    pub fn has(&self, file: usize, kind: &Kind) -> bool {
+    pub fn has(&self, file: usize, kind: &TargetKind) -> bool {
         self.visited.contains_key(&(file, kind.first_byte()))
     }
 
@@ -85,7 +85,7 @@ impl Itinerary {
             return true;
         };
         let same = match (&self.program.targets[known].kind, &target.kind) {
-            (Kind::Pose(a), Kind::Pose(b)) => {
+            (TargetKind::Pose(a), TargetKind::Pose(b)) => {
                 (a.flange_from_tool, a.base_from_work) == (b.flange_from_tool, b.base_from_work)
             }
             _ => true,

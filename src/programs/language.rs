@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::program::Program;
-use super::setting::Setting;
+use super::setting::ProgramSetting;
 use super::text_file::TextFile;
 use super::{krl, rapid, table, urscript};
 use crate::error::{Code, Error, Result};
@@ -18,7 +18,7 @@ struct Row {
     /// Extensions of its files, in lower case.
     extensions: &'static [&'static str],
     /// Finds the targets in the texts.
-    read: fn(Vec<TextFile>, &Setting<'_>) -> Result<Program>,
+    read: fn(Vec<TextFile>, &ProgramSetting<'_>) -> Result<Program>,
     /// A frame as this language writes it, from its numbers; `None` for another count of them.
     frame: fn(&[f64]) -> Option<Pose>,
     /// These numbers in words.
@@ -141,6 +141,6 @@ impl Language {
 ///
 /// # Errors
 /// Text that the language does not allow, by file and line.
-pub fn read(language: Language, files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
+pub fn read(language: Language, files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
     (language.row().read)(files, setting)
 }

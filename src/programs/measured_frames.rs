@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::program::{Kind, Understood};
-use super::reason::{Reason, Why};
+use super::program::{TargetKind, Understood};
+use super::reason::{LeftReason, Why};
 use crate::geom::Pose;
 
 /// What is known of a robot beyond the model that it is written as.
@@ -89,10 +89,10 @@ impl Moved {
 
 impl MeasuredFrames {
     /// What becomes of a target; else why it cannot be told.
-    pub(super) fn moved(&self, kind: &Kind) -> Understood<Moved> {
+    pub(super) fn moved(&self, kind: &TargetKind) -> Understood<Moved> {
         let (own_tool, own_work) = match kind {
-            Kind::Pose(pose) => (Some(pose.flange_from_tool), Some(pose.base_from_work)),
-            Kind::Joints(_) => (self.tool, self.work),
+            TargetKind::Pose(pose) => (Some(pose.flange_from_tool), Some(pose.base_from_work)),
+            TargetKind::Joints(_) => (self.tool, self.work),
         };
         let tool = match (&self.to.tool, self.from.as_ref().map(|f| f.tool)) {
             (None, _) => Pose::identity(),
@@ -100,12 +100,12 @@ impl MeasuredFrames {
             (Some(to), _) => {
                 let own = own_tool.ok_or_else(|| {
                     let words = "the tool was measured, and the text does not tell which tool these joints mean: give it with --tool";
-                    Why::new(Reason::ToolUnknown, words)
+                    Why::new(LeftReason::ToolUnknown, words)
                 })?;
                 let apart = (own.translation - to.point()).norm();
                 if apart > self.same_tool_m {
                     let words = format!("its tool lies {:.1} mm from the measured one: another tool", 1e3 * apart);
-                    return Err(Why::new(Reason::ToolUnknown, words));
+                    return Err(Why::new(LeftReason::ToolUnknown, words));
                 }
                 MeasuredTool::Pose(own).onto(to)
             }
@@ -117,7 +117,7 @@ impl MeasuredFrames {
             (Some(to), _) => {
                 let own = own_work.ok_or_else(|| {
                     let words = "the work object was measured, and the text does not tell which one these joints mean: give it with --work";
-                    Why::new(Reason::FrameUnknown, words)
+                    Why::new(LeftReason::FrameUnknown, words)
                 })?;
                 let (rad, m) = own.distance(to);
                 if m > self.same_work.0 || rad > self.same_work.1 {
@@ -126,7 +126,7 @@ impl MeasuredFrames {
                         1e3 * m,
                         rad.to_degrees()
                     );
-                    return Err(Why::new(Reason::FrameUnknown, words));
+                    return Err(Why::new(LeftReason::FrameUnknown, words));
                 }
                 *to * own.inverse()
             }

@@ -31,11 +31,11 @@ mod table;
 mod text_file;
 mod urscript;
 
-pub use compensate::{Correction, Models, Outcome, Postures, compensate};
+pub use compensate::{Correction, Models, Postures, TargetOutcome, compensate};
 pub use language::{Language, read};
 pub use measured_frames::{KnownError, MeasuredFrames, MeasuredTool, RobotFrames};
 pub use posture::Known;
-pub use program::{Kind, Left, Program, Target};
-pub use reason::{Reason, Why};
-pub use setting::Setting;
+pub use program::{Left, Program, Target, TargetKind};
+pub use reason::{LeftReason, Why};
+pub use setting::ProgramSetting;
 pub use text_file::TextFile;

@@ -6,8 +6,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::codes::{Branch, Codes};
-use super::program::{PoseTarget, Posture, Understood};
-use super::reason::{Reason, Why};
+use super::program::{MeantPosture, PoseTarget, Understood};
+use super::reason::{LeftReason, Why};
 use crate::geom::Pose;
 use crate::model::inverse::{self, Reach};
 use crate::model::robot::Robot;
@@ -96,7 +96,7 @@ fn farthest(a: &[f64], b: &[f64]) -> f64 {
 
 fn unreached(posture: &str) -> Why {
     let remedy = "look at the base and tip link, and at tool and work frame";
-    Why::new(Reason::OutOfReach, format!("the controller's model does not reach this pose{posture} ({remedy})"))
+    Why::new(LeftReason::OutOfReach, format!("the controller's model does not reach this pose{posture} ({remedy})"))
 }
 
 impl<'a> Finder<'a> {
@@ -115,11 +115,13 @@ impl<'a> Finder<'a> {
     /// Joints by which the controller reaches a pose.
     pub fn joints(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>) -> Understood<(Vec<f64>, Known)> {
         match (&pose.posture, &pose.taught) {
-            (Posture::Coded(codes, axes), _) => self.by_codes(pose, held, before, (codes, axes)),
-            (Posture::Either(codes, axes), _) => self.by_either(pose, held, before, (codes, axes)),
-            (Posture::Near(q), _) => Ok((self.near(pose, held, q, false)?, Known::Near)),
-            (Posture::Nearest | Posture::Along, Some(q)) => Ok((self.near(pose, held, q, false)?, Known::Taught)),
-            (Posture::Nearest | Posture::Along, None) => self.by_approach(pose, held, before),
+            (MeantPosture::Coded(codes, axes), _) => self.by_codes(pose, held, before, (codes, axes)),
+            (MeantPosture::Either(codes, axes), _) => self.by_either(pose, held, before, (codes, axes)),
+            (MeantPosture::Near(q), _) => Ok((self.near(pose, held, q, false)?, Known::Near)),
+            (MeantPosture::Nearest | MeantPosture::Along, Some(q)) => {
+                Ok((self.near(pose, held, q, false)?, Known::Taught))
+            }
+            (MeantPosture::Nearest | MeantPosture::Along, None) => self.by_approach(pose, held, before),
         }
     }
 
@@ -128,7 +130,7 @@ impl<'a> Finder<'a> {
         let written = pose.joint_fields.iter().any(Option::is_some);
         match (before.readings, self.start) {
             (Some(q), _) => {
-                let along = before.straight && pose.posture == Posture::Along;
+                let along = before.straight && pose.posture == MeantPosture::Along;
                 if let Some(found) = along.then(|| self.along(pose, held, q)).flatten() {
                     return Ok((found, Known::Line));
                 }
@@ -139,7 +141,7 @@ impl<'a> Finder<'a> {
             (None, None) => {
                 let words =
                     "its posture is not known: nothing tells the joints from which the robot comes (give --start)";
-                Err(Why::new(Reason::PostureUnknown, words))
+                Err(Why::new(LeftReason::PostureUnknown, words))
             }
         }
     }
@@ -168,7 +170,7 @@ impl<'a> Finder<'a> {
                     farthest(&near, best).to_degrees(),
                     farthest(&near, second).to_degrees()
                 );
-                Err(Why::new(Reason::PostureUnknown, words))
+                Err(Why::new(LeftReason::PostureUnknown, words))
             }
         }
     }
@@ -229,7 +231,7 @@ impl<'a> Finder<'a> {
     ) -> Understood<(Vec<f64>, Known)> {
         let open = "its posture is not known: other routines switch the check of configurations off, and its confdata";
         let remedy = "(--nearest-posture heeds no confdata)";
-        let unknown = |why: &str| Err(Why::new(Reason::PostureUnknown, format!("{open} {why} {remedy}")));
+        let unknown = |why: &str| Err(Why::new(LeftReason::PostureUnknown, format!("{open} {why} {remedy}")));
         match (self.by_codes(pose, held, before, codes), self.by_approach(pose, held, before)) {
             (Ok(coded), Ok((near, _))) if farthest(&coded.0, &near) < SAME => Ok(coded),
             (Ok(_), Ok(_)) => unknown("mean another one than the way there"),

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::codes::Codes;
-use super::field::{Edit, Field, Place};
+use super::field::{Edit, Field, FieldPlace};
 use super::reason::Why;
 use super::text_file::TextFile;
 use crate::error::Notice;
@@ -54,7 +54,7 @@ pub struct Target {
     /// False for a point that no motion goes to, because only displacements start from it.
     pub visited: bool,
     /// What it says.
-    pub kind: Kind,
+    pub kind: TargetKind,
 }
 
 /// From where the robot comes to a target; targets by their index in the program.
@@ -88,19 +88,19 @@ impl Approach {
 
 /// What a target says.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Kind {
+pub enum TargetKind {
     /// Joint values.
     Joints(JointTarget),
     /// A pose of the tool.
     Pose(Box<PoseTarget>),
 }
 
-impl Kind {
+impl TargetKind {
     /// Where its first number stands in its file.
     pub(super) fn first_byte(&self) -> usize {
         let start = |f: &Field| match &f.place {
-            Place::At(range) => range.start,
-            Place::Missing(at, _) => *at,
+            FieldPlace::At(range) => range.start,
+            FieldPlace::Missing(at, _) => *at,
         };
         let first = match self {
             Self::Joints(joints) => joints.fields.iter().flatten().map(start).min(),
@@ -136,11 +136,11 @@ pub struct PoseTarget {
     /// Values of the axes that the target fixes beside the pose (external axes), by reading.
     pub fixed: Vec<Option<f64>>,
     /// Which of the postures that reach the pose is meant.
-    pub posture: Posture,
+    pub posture: MeantPosture,
     /// Joints that the text gives beside the pose, as taught; rad or m.
     pub taught: Option<Vec<f64>>,
     /// What lies between the point that the fields above say and the target.
-    pub displaced: Option<Displaced>,
+    pub displaced: Option<DisplacedTarget>,
     /// Where the joints of the corrected target go, beside the pose: numbers by reading.
     pub joint_fields: Vec<Option<Field>>,
 }
@@ -158,8 +158,8 @@ pub enum RotationFields {
 
 /// A target that is another point, displaced (`Offs`, `RelTool`).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Displaced {
-    /// File and first byte of the other point, as of `Kind::first_byte`.
+pub struct DisplacedTarget {
+    /// File and first byte of the other point, as of `TargetKind::first_byte`.
     pub base: (usize, usize),
     /// Displacement, m: along the axes of the tool with `turned`, else of the work object.
     pub by: [Field; 3],
@@ -167,7 +167,7 @@ pub struct Displaced {
     pub turned: Option<[Field; 3]>,
 }
 
-impl Displaced {
+impl DisplacedTarget {
     /// The displaced pose of a pose in the work object.
     pub fn applied(&self, work_from_base: &Pose) -> Pose {
         let by: nalgebra::Vector3<f64> = self.by.each_ref().map(Field::value).into();
@@ -207,7 +207,7 @@ impl Displaced {
 
 /// Which of the postures that reach a pose is meant.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Posture {
+pub enum MeantPosture {
     /// That next to the target before.
     Nearest,
     /// That to which a straight line of the tool from the target before leads.

@@ -5,7 +5,7 @@ use serde::Serialize;
 /// The closed set of reasons; their names stand in corrections.csv and, with counts, in findings.json.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Reason {
+pub enum LeftReason {
     /// It is computed, not written in numbers.
     Computed,
     /// It is relative to the position before.
@@ -38,7 +38,7 @@ pub enum Reason {
     Coarse,
 }
 
-impl Reason {
+impl LeftReason {
     /// Stable name for programs, `snake_case`.
     pub const fn name(self) -> &'static str {
         match self {
@@ -65,7 +65,7 @@ impl Reason {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Why {
     /// The reason.
-    pub reason: Reason,
+    pub reason: LeftReason,
     /// Declared name that it is about, where it is about one.
     pub about: Option<String>,
     /// The sentence.
@@ -74,17 +74,17 @@ pub struct Why {
 
 impl Why {
     /// A reason with its sentence.
-    pub(super) fn new(reason: Reason, words: impl Into<String>) -> Self {
+    pub(super) fn new(reason: LeftReason, words: impl Into<String>) -> Self {
         Self { reason, about: None, words: words.into() }
     }
 
     /// A reason that is about a declared name.
-    pub(super) fn of(name: &str, reason: Reason, words: impl Into<String>) -> Self {
+    pub(super) fn of(name: &str, reason: LeftReason, words: impl Into<String>) -> Self {
         Self { about: Some(name.to_owned()), ..Self::new(reason, words) }
     }
 
     /// The target is not written in numbers.
     pub(super) fn computed() -> Self {
-        Self::new(Reason::Computed, "its target is computed, not written in numbers")
+        Self::new(LeftReason::Computed, "its target is computed, not written in numbers")
     }
 }

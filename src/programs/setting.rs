@@ -5,7 +5,7 @@ use crate::urdf::Chain;
 
 /// What the text alone does not say.
 #[derive(Debug, Clone)]
-pub struct Setting<'a> {
+pub struct ProgramSetting<'a> {
     /// Chain of the controller's model, for names, kinds and the order of the joints.
     pub chain: &'a Chain,
     /// Reading of every axis of the program's language, in its order (A1.. or the list of a joint target, then external axes).

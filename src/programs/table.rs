@@ -5,9 +5,9 @@
 
 use std::ops::Range;
 
-use super::Setting;
-use super::field::{Edit, Field, Place};
-use super::program::{Approach, JointTarget, Kind, PoseTarget, Posture, Program, RotationFields, Target};
+use super::ProgramSetting;
+use super::field::{Edit, Field, FieldPlace};
+use super::program::{Approach, JointTarget, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result, closest_name};
 use crate::geom::Pose;
@@ -74,7 +74,7 @@ struct Columns {
     joints: Vec<usize>,
 }
 
-fn columns(file: &TextFile, header: &Row, setting: &Setting<'_>) -> Result<Columns> {
+fn columns(file: &TextFile, header: &Row, setting: &ProgramSetting<'_>) -> Result<Columns> {
     let text = |r: &Range<usize>| String::from_utf8_lossy(&file.bytes[r.clone()]).into_owned();
     let names: Vec<String> = header.cells.iter().map(text).collect();
     let place = || format!("{}:{}", file.name, header.line);
@@ -113,7 +113,7 @@ fn columns(file: &TextFile, header: &Row, setting: &Setting<'_>) -> Result<Colum
 }
 
 /// Reads one table.
-pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
+pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
     let mut program = Program { files, targets: Vec::new(), left: Vec::new(), edits: Vec::new(), notices: Vec::new() };
     let mut targets = Vec::new();
     for index in 0..program.files.len() {
@@ -146,7 +146,7 @@ struct Table<'a> {
     index: usize,
     columns: Columns,
     separator: u8,
-    setting: &'a Setting<'a>,
+    setting: &'a ProgramSetting<'a>,
 }
 
 impl Table<'_> {
@@ -162,8 +162,8 @@ impl Table<'_> {
             ));
         }
         let kind = match self.columns.pose {
-            None => Kind::Joints(self.joints(row)?),
-            Some(pose) => Kind::Pose(Box::new(self.pose(row, pose)?)),
+            None => TargetKind::Joints(self.joints(row)?),
+            Some(pose) => TargetKind::Pose(Box::new(self.pose(row, pose)?)),
         };
         let name = format!("row {}", row.line);
         Ok(Target { file: self.index, line: row.line, name, approach, visited: true, kind })
@@ -216,7 +216,7 @@ impl Table<'_> {
         }
         let empty = |c: &usize| row.cells[*c].is_empty();
         let given = !self.columns.joints.is_empty() && !self.columns.joints.iter().all(empty);
-        let posture = if given { Posture::Near(self.joints(row)?.readings) } else { Posture::Nearest };
+        let posture = if given { MeantPosture::Near(self.joints(row)?.readings) } else { MeantPosture::Nearest };
         let joint_fields = if given { self.joint_fields(row)? } else { self.new_joint_fields(row)? };
         Ok(PoseTarget {
             position: [field(0)?, field(1)?, field(2)?],
@@ -235,8 +235,8 @@ impl Table<'_> {
     fn new_joint_fields(&self, row: &Row) -> Result<Vec<Field>> {
         let new = |(k, (si, decimals)): (usize, (f64, usize))| {
             let place = match self.columns.joints.get(k) {
-                Some(&column) => Place::Missing(row.cells[column].start, String::new()),
-                None => Place::Missing(row.end, char::from(self.separator).to_string()),
+                Some(&column) => FieldPlace::Missing(row.cells[column].start, String::new()),
+                None => FieldPlace::Missing(row.end, char::from(self.separator).to_string()),
             };
             Field { file: self.index, place, written: f64::NAN, si, decimals }
         };
@@ -251,6 +251,6 @@ impl Table<'_> {
             let what = format!("column {}: \"{cell}\" is not a number", self.columns.names[column]);
             Error::new(Code::CsvNumber, place, what, "write a finite number with a decimal point")
         })?;
-        Ok(Field { file: self.index, place: Place::At(range), written, si, decimals })
+        Ok(Field { file: self.index, place: FieldPlace::At(range), written, si, decimals })
     }
 }

@@ -3,13 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use super::Setting;
-use super::field::{Field, Place};
+use super::ProgramSetting;
+use super::field::{Field, FieldPlace};
 use super::itinerary::Itinerary;
 use super::program::{
-    Approach, JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, Understood,
+    Approach, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind, Understood,
 };
-use super::reason::{Reason, Why};
+use super::reason::{LeftReason, Why};
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
@@ -38,8 +38,8 @@ enum Way {
 }
 
 impl Way {
-    fn posture(self) -> Posture {
-        if self == Self::Line { Posture::Along } else { Posture::Nearest }
+    fn posture(self) -> MeantPosture {
+        if self == Self::Line { MeantPosture::Along } else { MeantPosture::Nearest }
     }
 }
 
@@ -59,13 +59,13 @@ struct Argument {
     value: Value,
     /// Joints beside the pose: `name_q` of `name_p`.
     taught: Option<Vec<f64>>,
-    posture: Posture,
+    posture: MeantPosture,
     /// False where the move may change the posture to one that the text does not tell.
     keeps: bool,
 }
 
 /// Reads scripts; each file is a program of its own.
-pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
+pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
     let mut way = Itinerary::new();
     for (index, file) in files.iter().enumerate() {
         way.start_afresh();
@@ -93,7 +93,7 @@ enum Tool {
 
 struct Script<'a> {
     reader: Reader<'a>,
-    setting: &'a Setting<'a>,
+    setting: &'a ProgramSetting<'a>,
     /// Last value given to each variable.
     variables: BTreeMap<Vec<u8>, Value>,
     /// Statements that wait for their `end`; true for routines.
@@ -213,13 +213,13 @@ impl Script<'_> {
         self.reader.at += 2;
         self.skip_argument_name();
         let taught = self.taught();
-        let mut found = Argument { value: self.argument()?, taught, posture: Posture::Nearest, keeps: true };
+        let mut found = Argument { value: self.argument()?, taught, posture: MeantPosture::Nearest, keeps: true };
         if self.reader.take_mark(b',') {
             self.skip_argument_name();
             let own = self.reader.word() == Some(b"get_actual_joint_positions");
             match self.argument()? {
                 Value::Joints(fields, _) if fields.len() == self.setting.axes.len() => {
-                    found.posture = Posture::Near(self.readings(&fields));
+                    found.posture = MeantPosture::Near(self.readings(&fields));
                 }
                 // The joints beside the pose are better than a `qnear` that the text does not tell.
                 _ if own || found.taught.is_some() => {}
@@ -325,7 +325,7 @@ impl Script<'_> {
             self.reader.take_mark(b')').then_some(())?;
         }
         let si = if degrees { 1f64.to_radians() } else { 1.0 };
-        Some(Field { file: self.reader.index, place: Place::At(range), written, si, decimals: DECIMALS })
+        Some(Field { file: self.reader.index, place: FieldPlace::At(range), written, si, decimals: DECIMALS })
     }
 
     fn readings(&self, fields: &[Field]) -> Vec<f64> {
@@ -363,11 +363,11 @@ impl Script<'_> {
                 for (field, &reading) in fields.into_iter().zip(self.setting.axes) {
                     by_reading[reading] = Some(field);
                 }
-                (Kind::Joints(JointTarget { readings, fields: by_reading }), line)
+                (TargetKind::Joints(JointTarget { readings, fields: by_reading }), line)
             }
             Value::Pose(fields, line) => {
                 let pose = self.pose(*fields, argument.posture)?;
-                (Kind::Pose(Box::new(PoseTarget { taught: argument.taught, ..pose })), line)
+                (TargetKind::Pose(Box::new(PoseTarget { taught: argument.taught, ..pose })), line)
             }
             Value::Expression => return Err(Why::computed()),
         };
@@ -376,14 +376,14 @@ impl Script<'_> {
         if self.way.visit(target) {
             Ok(())
         } else {
-            Err(Why::new(Reason::FramesDiffer, "it is used with different tools; give it a pose for each"))
+            Err(Why::new(LeftReason::FramesDiffer, "it is used with different tools; give it a pose for each"))
         }
     }
 
-    fn pose(&self, fields: [Field; 6], posture: Posture) -> Understood<PoseTarget> {
+    fn pose(&self, fields: [Field; 6], posture: MeantPosture) -> Understood<PoseTarget> {
         let Tool::Known(tool) = self.tool else {
             let words = "its tool is not known: no set_tcp(p[..]) with numbers before it; give --tool";
-            return Err(Why::new(Reason::ToolUnknown, words));
+            return Err(Why::new(LeftReason::ToolUnknown, words));
         };
         let [x, y, z, rx, ry, rz] = fields;
         let readings = self.setting.chain.readings.len();

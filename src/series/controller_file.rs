@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::controller_poses::{ControllerPoses, ReadOtherwise};
 use super::inputs::InputFile;
-use super::joints::{DEFAULT_PLACEMENT, Stop, Stops, key_column, placement, stop_name};
+use super::joints::{DEFAULT_PLACEMENT, SeriesStop, Stops, key_column, placement, stop_name};
 use super::quaternion::quaternion;
 use super::rotation_kind::RotationKind;
 use super::stop_index::{position, position_columns};
@@ -56,14 +56,14 @@ fn from_table(table: &Table, kind: RotationKind) -> Result<(Stops, ControllerPos
     let rotation: Vec<usize> = kind.columns().iter().map(|c| table.require(c)).collect::<Result<_>>()?;
     let (placed, time) = (table.column("placement"), table.column("time_s"));
     let placed = placed.filter(|&c| table.rows().any(|r| !r.cell(c).is_empty()));
-    let (mut stops, mut poses): (Vec<Stop>, Vec<Option<Written>>) = (Vec::new(), Vec::new());
+    let (mut stops, mut poses): (Vec<SeriesStop>, Vec<Option<Written>>) = (Vec::new(), Vec::new());
     for row in table.rows() {
-        let stop = Stop {
+        let stop = SeriesStop {
             image: stop_name(table, row, name, key)?,
             placement: placed.map_or_else(|| Ok(DEFAULT_PLACEMENT.to_owned()), |c| placement(table, row, Some(c)))?,
             time_s: table.optional_number(row, time)?,
             line: row.line,
-            ..Stop::default()
+            ..SeriesStop::default()
         };
         if let Some(first) = stops.iter().find(|s| s.image == stop.image) {
             let what = format!("is the {} of line {} already", key.column(), first.line);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 
 /// A file that went into the result.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
@@ -32,7 +32,7 @@ impl InputFile {
     /// # Errors
     /// The file cannot be read.
     pub fn of_file(path: &Path) -> Result<Self> {
-        let (file, length) = files::open(path, Kind::Recording)?;
+        let (file, length) = files::open(path, FileKind::Recording)?;
         let mut file = file.take(length);
         let mut hasher = Sha256::new();
         let mut buffer = vec![0; 1 << 20];
@@ -46,7 +46,7 @@ impl InputFile {
 }
 
 /// Reads a text file without its byte order mark and notes its hash.
-pub(super) fn read_text(path: &Path, kind: Kind, inputs: &mut Vec<InputFile>) -> Result<String> {
+pub(super) fn read_text(path: &Path, kind: FileKind, inputs: &mut Vec<InputFile>) -> Result<String> {
     let bytes = files::read(path, kind)?;
     inputs.push(InputFile::of_bytes(path, &bytes));
     files::text(path, bytes)

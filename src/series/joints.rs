@@ -49,7 +49,7 @@ pub struct Covariates {
 
 /// One standstill of the robot, with its joint readings.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Stop {
+pub struct SeriesStop {
     /// Name of the stop: with [`StopKey::Image`] the file name of its image.
     pub image: String,
     /// The image file; `None` when it is not there, or when observations are given instead.
@@ -66,7 +66,7 @@ pub struct Stop {
     pub line: u64,
 }
 
-impl Stop {
+impl SeriesStop {
     /// Name of the stop.
     pub fn name(&self) -> &str {
         &self.image
@@ -83,7 +83,7 @@ pub struct Stops {
     /// Joints whose torques were measured, in the order of `Covariates::torques_nm`.
     pub torque_joints: Vec<String>,
     /// The stops in visiting order.
-    pub stops: Vec<Stop>,
+    pub stops: Vec<SeriesStop>,
 }
 
 impl Stops {
@@ -175,13 +175,13 @@ impl Columns {
         Ok(Self { key, name, placement, time, temperature, torques, joints })
     }
 
-    fn stop(&self, table: &Table, row: Row<'_>) -> Result<Stop> {
+    fn stop(&self, table: &Table, row: Row<'_>) -> Result<SeriesStop> {
         let torques = self.torques.iter().map(|&c| table.optional_number(row, Some(c)));
         let covariates = Covariates {
             temperature_c: table.optional_number(row, self.temperature)?,
             torques_nm: torques.collect::<Result<_>>()?,
         };
-        Ok(Stop {
+        Ok(SeriesStop {
             image: stop_name(table, row, self.name, self.key)?,
             path: None,
             raw_readings: readings(table, row, &self.joints)?,

@@ -11,7 +11,7 @@ use super::sections::{
 };
 use super::toml_file::{check_format, parse_toml, require_positive, to_toml};
 use crate::error::{Code, Error, Result};
-use crate::files::Kind;
+use crate::files::FileKind;
 
 /// Unit of the revolute columns of joints.csv.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -194,7 +194,7 @@ impl Manifest {
 
     /// Reads and checks `series.toml`.
     pub(super) fn read(path: &Path, inputs: &mut Vec<InputFile>) -> Result<Self> {
-        Self::parse(path, &read_text(path, Kind::Settings, inputs)?)
+        Self::parse(path, &read_text(path, FileKind::Settings, inputs)?)
     }
 
     /// Checks the text of a `series.toml`; `path` is for messages only.

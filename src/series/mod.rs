@@ -41,11 +41,11 @@ pub use contact_file::ContactRow;
 pub use controller_file::parse_controller;
 pub use controller_poses::{ControllerPoses, ReadOtherwise};
 pub use inputs::InputFile;
-pub use joints::{Covariates, DEFAULT_PLACEMENT, Stop, StopKey, Stops};
+pub use joints::{Covariates, DEFAULT_PLACEMENT, SeriesStop, StopKey, Stops};
 pub use manifest::{AngleUnit, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder};
 pub use mcap::{CameraInfo, Clock, Delay, Extracted, Motion, Picking, RecordingOptions, StopReport, extract};
 #[cfg(feature = "mcap")]
-pub use mcap::{FramePoses, ImageMarks, MarkKind, MarkLayer, Shown, require_new, write_recording};
+pub use mcap::{FramePoses, ImageMarks, MarkKind, MarkLayer, RecordingContent, require_new, write_recording};
 pub use named_poses::{NamedPoses, read_named_poses};
 pub use observation::{Edge, ImageObservations, Observation};
 pub use observation_file::{observations_csv, parse_observations};

@@ -12,7 +12,7 @@ use super::table::{Row, Table, to_csv};
 use super::tag_plates::{TagKeys, plate_of};
 use super::toml_file::{check_format, parse_toml, read_toml, require_positive, to_toml};
 use crate::error::{Code, Error, Result};
-use crate::files::Kind;
+use crate::files::FileKind;
 
 /// Prior sigma of a printed marker where the plate states none, m.
 pub const DEFAULT_TOLERANCE_M: f64 = 1e-4;
@@ -73,7 +73,7 @@ struct PlateFile {
 /// By file and line: unknown keys or columns, missing sizes, doubles, circles that are none or overlap, markers that do
 /// not lie where their id says, an impossible scale bar.
 pub fn read_plate(path: &Path, inputs: &mut Vec<InputFile>) -> Result<Plate> {
-    parse(path, &read_text(path, Kind::Settings, inputs)?, |csv| read_text(csv, Kind::Table, inputs))
+    parse(path, &read_text(path, FileKind::Settings, inputs)?, |csv| read_text(csv, FileKind::Table, inputs))
 }
 
 /// Reads a plate from the text of its plate.toml and, where that names one, of its marker file; `path` is for messages only.

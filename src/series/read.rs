@@ -9,7 +9,7 @@ use super::controller_file;
 use super::controller_poses::ControllerPoses;
 use super::image_file;
 use super::inputs::InputFile;
-use super::joints::{Stop, StopKey, Stops};
+use super::joints::{SeriesStop, StopKey, Stops};
 use super::manifest::{AngleUnit, Manifest};
 use super::mcap::require_recording;
 use super::observation::ImageObservations;
@@ -344,7 +344,7 @@ fn pictured(images: &Path, csv: &Path, stops: &mut Stops, notices: &mut Vec<Noti
 }
 
 /// The image of a stop that joints.csv names without the ending of its file.
-fn name_image(stop: &mut Stop, names: &BTreeSet<String>) {
+fn name_image(stop: &mut SeriesStop, names: &BTreeSet<String>) {
     let is_its_own = |file: &&String| file.rsplit_once('.').is_some_and(|(stem, _)| stem == stop.image);
     if let Some(file) = names.iter().find(is_its_own).filter(|_| !names.contains(&stop.image)) {
         stop.image.clone_from(file);

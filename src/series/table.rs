@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::inputs::{InputFile, read_text};
 use crate::error::{Code, Error, Result, closest_name, plain_name};
-use crate::files::Kind;
+use crate::files::FileKind;
 
 /// One data row.
 #[derive(Debug, Clone, Copy)]
@@ -52,7 +52,7 @@ pub(super) struct Table {
 
 impl Table {
     pub fn read(path: &Path, inputs: &mut Vec<InputFile>) -> Result<Self> {
-        Self::parse(path, &read_text(path, Kind::Table, inputs)?)
+        Self::parse(path, &read_text(path, FileKind::Table, inputs)?)
     }
 
     /// Rows under the header.
@@ -64,7 +64,7 @@ impl Table {
     /// Reads the text of a table; `path` is for messages only.
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
         let file = path.display().to_string();
-        if text.len() as u64 > Kind::Table.most_bytes() {
+        if text.len() as u64 > FileKind::Table.most_bytes() {
             return Err(Error::new(
                 Code::FileTooLarge,
                 file,

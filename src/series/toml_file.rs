@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 
 use super::inputs::{InputFile, read_text};
 use crate::error::{Code, Error, Result, closest_name, plain_name};
-use crate::files::Kind;
+use crate::files::FileKind;
 
 /// A value that must be positive and finite where it is given.
 pub(super) fn require_positive(path: &Path, key: &str, value: Option<f64>) -> Result<()> {
@@ -36,7 +36,7 @@ pub(super) fn to_toml(file: &str, value: &impl Serialize) -> Result<String> {
 
 /// Reads a TOML file; unknown keys and wrong values are named with their line.
 pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path, inputs: &mut Vec<InputFile>) -> Result<T> {
-    parse_toml(path, &read_text(path, Kind::Settings, inputs)?)
+    parse_toml(path, &read_text(path, FileKind::Settings, inputs)?)
 }
 
 /// A value from the text of a TOML file; `path` is for messages only.

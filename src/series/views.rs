@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::camera_section::{CameraMount, CameraSection};
 use super::controller_poses::ControllerPoses;
 use super::image_file::ImageRow;
-use super::joints::{Stop, StopKey, Stops};
+use super::joints::{SeriesStop, StopKey, Stops};
 use super::manifest::Manifest;
 
 /// What one camera saw.
@@ -57,7 +57,7 @@ impl Seen<'_> {
         };
         let stop = |row: &&ImageRow| {
             let stop = &self.stops.stops[row.stop];
-            Stop { image: row.image.clone(), line: row.line, ..stop.clone() }
+            SeriesStop { image: row.image.clone(), line: row.line, ..stop.clone() }
         };
         CameraView {
             name: called.map_or_else(|| self.series.to_owned(), |name| format!("{} {name}", self.series)),

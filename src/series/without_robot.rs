@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::camera_section::CameraMount;
 use super::controller_file;
-use super::joints::{DEFAULT_PLACEMENT, Stop, Stops};
+use super::joints::{DEFAULT_PLACEMENT, SeriesStop, Stops};
 use super::manifest::Manifest;
 use super::observation_file;
 use super::plate_file::read_plate;
@@ -87,10 +87,10 @@ pub fn series_of_images(images: &[PathBuf], plate: &Path) -> Result<Series> {
     })
 }
 
-fn of_file(path: PathBuf) -> Stop {
+fn of_file(path: PathBuf) -> SeriesStop {
     stop(file_name(&path), Some(path))
 }
 
-fn stop(image: String, path: Option<PathBuf>) -> Stop {
-    Stop { image, path, placement: DEFAULT_PLACEMENT.to_owned(), ..Stop::default() }
+fn stop(image: String, path: Option<PathBuf>) -> SeriesStop {
+    SeriesStop { image, path, placement: DEFAULT_PLACEMENT.to_owned(), ..SeriesStop::default() }
 }

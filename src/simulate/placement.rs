@@ -8,7 +8,7 @@ use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::inverse;
 use crate::model::robot::Robot;
-use crate::plan::viewpoint::View;
+use crate::plan::viewpoint::Viewpoint;
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
 
@@ -165,7 +165,7 @@ impl Setup {
         placement: usize,
         rng: &mut impl Rng,
     ) -> Option<Vec<f64>> {
-        let plate_from_camera = View::random(&request.plate, &request.views, rng).plate_from_camera();
+        let plate_from_camera = Viewpoint::random(&request.plate, &request.views, rng).plate_from_camera();
         let plate = &self.plates[placement];
         let base_from_tip = match request.mount {
             CameraMount::Hand => *plate * plate_from_camera * self.camera.inverse(),

@@ -52,7 +52,7 @@ pub struct TrueTerm {
 /// One stop as it really was.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct StopRecord {
+pub struct TrueStop {
     /// Image.
     pub image: String,
     /// Where the plate stood.
@@ -112,7 +112,7 @@ pub struct Truth {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fault: Option<String>,
     /// The stops.
-    pub stops: Vec<StopRecord>,
+    pub stops: Vec<TrueStop>,
     /// Joint vectors for judging the accuracy.
     pub held_out: Vec<HeldOutRecord>,
 }
@@ -123,7 +123,7 @@ impl Truth {
     /// # Errors
     /// A missing file, unknown keys, wrong values, another version of the format.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = crate::files::read_text(path, crate::files::Kind::Settings)?;
+        let text = crate::files::read_text(path, crate::files::FileKind::Settings)?;
         let truth: Self = toml::from_str(&text).map_err(|e| {
             Error::new(
                 Code::SettingSyntax,

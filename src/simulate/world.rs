@@ -16,14 +16,14 @@ use super::observe::observe;
 use super::placement::{self, Setup};
 use super::render::render;
 use super::request::WorldRequest;
-use super::truth::{HeldOutRecord, StopRecord, TruePose, TrueTerm, Truth};
+use super::truth::{HeldOutRecord, TruePose, TrueStop, TrueTerm, Truth};
 use crate::detect::Picture;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::joint_terms::{JointTerm, Term, USUAL_HARMONICS};
 use crate::model::plate_modes::{PRIOR_SIGMA, basis};
 use crate::model::robot::{Posture, Robot};
-use crate::series::{AngleUnit, CameraSection, ImageObservations, Manifest, Plate, Stop, Stops};
+use crate::series::{AngleUnit, CameraSection, ImageObservations, Manifest, Plate, SeriesStop, Stops};
 use crate::urdf::JointKind;
 
 /// Attempts at one more workable pose before the world is called impossible.
@@ -187,7 +187,7 @@ impl World<'_> {
         let request = self.request;
         let chain = &request.chain;
         let names = |at: usize| format!("placement_{at}");
-        let record = |s: &Seen| StopRecord {
+        let record = |s: &Seen| TrueStop {
             image: s.observations.image.clone(),
             placement: names(s.placement),
             joint_noise: s.noise.clone(),
@@ -212,11 +212,11 @@ impl World<'_> {
             stops: seen.iter().map(record).collect(),
             held_out,
         };
-        let stop = |s: &Seen| Stop {
+        let stop = |s: &Seen| SeriesStop {
             image: s.observations.image.clone(),
             raw_readings: Some(s.raw.clone()),
             placement: names(s.placement),
-            ..Stop::default()
+            ..SeriesStop::default()
         };
         SimulatedSeries {
             manifest: manifest(request),

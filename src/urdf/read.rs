@@ -8,7 +8,7 @@ use roxmltree::{Document, Node};
 use super::elements::{JointElement, Source};
 use super::inertial::{Inertial, inertial};
 use crate::error::{Code, Error, Notice, Result, closest_name, plain_name};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 
 /// A robot as its URDF describes it, with the text it came from.
 #[derive(Debug, Clone)]
@@ -36,7 +36,7 @@ pub struct RobotDescription {
 /// Names file, line and joint: unreadable file or XML, unexpanded xacro, an unknown joint type, numbers that are none,
 /// a zero axis, links or joints of the same name, unknown links, a link with two parents, loops.
 pub fn read(path: &Path) -> Result<RobotDescription> {
-    let bytes = files::read(path, Kind::Robot)?;
+    let bytes = files::read(path, FileKind::Robot)?;
     let text = String::from_utf8(bytes).map_err(|e| {
         let what = format!("is not UTF-8 text (byte {})", e.utf8_error().valid_up_to());
         Error::new(Code::TextEncoding, path.display(), what, "convert it: iconv -t UTF-8 in.urdf > out.urdf")

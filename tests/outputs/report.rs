@@ -3,7 +3,7 @@
 use crate::outputs_support::{context, robot, solved};
 use robotcal::diagnose::{DoubtedSize, Finding};
 use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
-use robotcal::output::verdict::{Reason, Verdict};
+use robotcal::output::verdict::{Verdict, VerdictReason};
 use robotcal::output::{Thumbnails, files, report_html, solution_json};
 use robotcal::series::{CameraMount, InputFile};
 
@@ -154,7 +154,7 @@ fn what_was_seen_and_what_to_do_stay_apart() {
         let [one] = Verdict::of(&read).reasons.try_into().unwrap();
         one
     };
-    assert_eq!(reason(&record), Reason { what: found.seen(), remedy: found.remedy() });
+    assert_eq!(reason(&record), VerdictReason { what: found.seen(), remedy: found.remedy() });
     // Files of earlier versions have the sentence alone, or no findings at all.
     let (alone, nothing) = (found.to_string(), String::new());
     let mut earlier = serde_json::to_value(&record).unwrap();
@@ -162,9 +162,9 @@ fn what_was_seen_and_what_to_do_stay_apart() {
         earlier["findings"][0].as_object_mut().unwrap().remove(field).unwrap();
     }
     let earlier: solution_json::SolutionRecord = serde_json::from_value(earlier).unwrap();
-    assert_eq!(reason(&earlier), Reason { what: alone.clone(), remedy: nothing.clone() });
+    assert_eq!(reason(&earlier), VerdictReason { what: alone.clone(), remedy: nothing.clone() });
     record.findings.clear();
-    assert_eq!(reason(&record), Reason { what: alone, remedy: nothing });
+    assert_eq!(reason(&record), VerdictReason { what: alone, remedy: nothing });
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use robotcal::Code;
-use robotcal::output::{NewFolder, Place, recover, write_all, write_beside};
+use robotcal::output::{NewFolder, ResultFolder, recover, write_all, write_beside};
 
 type Files = BTreeMap<String, Vec<u8>>;
 
@@ -287,7 +287,7 @@ fn what_the_user_puts_there_meanwhile_stays() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
     write_all(&out, &two_results()[0]).unwrap();
-    let place = Place::claim(&out).unwrap();
+    let place = ResultFolder::claim(&out).unwrap();
     let new = place.begin().unwrap();
     two_results()[1].iter().for_each(|(name, bytes)| new.put(name, bytes).unwrap());
     fs::write(out.join("overlay/mine.txt"), "mine").unwrap();
@@ -359,13 +359,13 @@ fn a_link_to_a_folder_is_followed_and_stays_a_link() {
 fn of_two_runs_into_one_folder_the_second_is_refused_at_once() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
-    let first = Place::claim(&out).unwrap();
-    let second = Place::claim(&out).unwrap_err();
+    let first = ResultFolder::claim(&out).unwrap();
+    let second = ResultFolder::claim(&out).unwrap_err();
     assert_eq!(second.exit_code(), 2);
     assert_eq!(NewFolder::begin(&out).unwrap_err().exit_code(), 2);
     first.write_all(&two_results()[0]).unwrap();
     assert_eq!(all_below(&out), two_results()[0]);
-    Place::claim(&out).unwrap().write_all(&two_results()[1]).unwrap();
+    ResultFolder::claim(&out).unwrap().write_all(&two_results()[1]).unwrap();
     assert_eq!(all_below(&out), two_results()[1]);
 }
 
@@ -387,7 +387,7 @@ fn many_processes_in_one_folder_leave_one_whole_result() {
 fn a_folder_made_for_nothing_goes_again() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("reports/2026/run1");
-    drop(Place::claim(&out).unwrap());
+    drop(ResultFolder::claim(&out).unwrap());
     drop(NewFolder::begin(&out).unwrap());
     assert_eq!(names(root.path()), Vec::<String>::new());
     let folder = NewFolder::begin(&out).unwrap();
@@ -419,11 +419,11 @@ fn files_among_others_come_together() {
 fn a_folder_that_vanishes_is_made_again() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("reports/out");
-    let place = Place::claim(&out).unwrap();
+    let place = ResultFolder::claim(&out).unwrap();
     fs::remove_dir_all(root.path().join("reports")).unwrap();
     place.write_all(&two_results()[0]).unwrap();
     assert_eq!(all_below(&out), two_results()[0]);
-    let new = Place::claim(&out).unwrap().begin().unwrap();
+    let new = ResultFolder::claim(&out).unwrap().begin().unwrap();
     two_results()[1].iter().for_each(|(name, bytes)| new.put(name, bytes).unwrap());
     fs::remove_dir_all(&out).unwrap();
     new.finish().unwrap();

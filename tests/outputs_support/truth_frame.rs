@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 use robotcal::assess::Limits;
 use robotcal::geom::{Pose, project_to_so3};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_poses, identify};
-use robotcal::problem::{Adjustment, Mark, Measured, PlateShape, State, Tie, release_measured_scales};
+use robotcal::problem::{Adjustment, Mark, MarkerObservation, PlateShape, State, Tie, release_measured_scales};
 use robotcal::series::{Plate, PlateKind, ScaleBar};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
 use robotcal::solve::{Fit, Settings, solve};
@@ -150,7 +150,7 @@ pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, 
         // The places of the plate take turns in every world.
         let mut image = images[k % problem.placements.len()].clone();
         image.name = seen.image.clone();
-        let measured = seen.observations.iter().map(|o| Measured {
+        let measured = seen.observations.iter().map(|o| MarkerObservation {
             marker: o.marker as usize,
             edge: o.edge,
             mark: Mark::of_radius(world.plate.markers[o.marker as usize].outer_radius_m),

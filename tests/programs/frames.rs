@@ -310,7 +310,7 @@ fn bad_touches_are_refused_by_file_and_place() {
 /// What is written for controllers is read back by the readers of their programs, the URDF by that of robots.
 #[test]
 fn frames_are_written_as_controllers_read_them() {
-    use robotcal::programs::{self, Kind, Language, Setting, TextFile};
+    use robotcal::programs::{self, Language, ProgramSetting, TargetKind, TextFile};
     let Files { folder, touches, world } = files("fixture", work(), 9);
     let out = folder.path().join("frames");
     let solution = repo(SOLUTION);
@@ -328,7 +328,7 @@ fn frames_are_written_as_controllers_read_them() {
     let (tool, work) = (Pose::from(&record.tool.as_ref().unwrap().pose), record.base_from_work());
     assert!((tool.rpy()[2].to_degrees() - 30.0).abs() < 1e-9);
     let chain = &world.truth.chain;
-    let setting = Setting {
+    let setting = ProgramSetting {
         chain,
         axes: &[0, 1, 2, 3, 4, 5],
         rad_per_unit: None,
@@ -357,7 +357,7 @@ fn frames_are_written_as_controllers_read_them() {
         let at = text.rfind(end).unwrap();
         let bytes = format!("{}{ending}", &text[..at]).into_bytes();
         let program = programs::read(language, vec![TextFile { name: format!("t.{kind}"), bytes }], &setting).unwrap();
-        let Kind::Pose(pose) = &program.targets.last().unwrap().kind else { panic!("{language:?}: no pose") };
+        let TargetKind::Pose(pose) = &program.targets.last().unwrap().kind else { panic!("{language:?}: no pose") };
         let apart = |a: &Pose, b: &Pose| {
             let (rad, m) = a.distance(b);
             assert!(m < 1e-6 && rad < 1e-7, "{language:?}: {m:.1e} m, {rad:.1e} rad");

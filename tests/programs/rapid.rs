@@ -9,7 +9,7 @@ use crate::said::assert_says;
 use robotcal::Code;
 use robotcal::geom::Pose;
 use robotcal::model::inverse;
-use robotcal::programs::Reason;
+use robotcal::programs::LeftReason;
 
 const MODULE: &str = "%%%\r\n  VERSION:1\r\n  LANGUAGE:ENGLISH\r\n%%%\r\n\r\nMODULE MainModule\r\n\
   ! [[1.0,2.0,3.0],[1,0,0,0]] is no target\r\n\
@@ -79,7 +79,7 @@ fn rapid_keeps_every_other_byte_and_meets_every_target() {
     let run = run.expect(1);
     let told = run.told();
     assert_eq!((told.corrected, told.left.len()), (6, 2), "{told:?}");
-    assert!(told.has(23, "MoveL", Reason::Computed) && told.has(12, "PLOST", Reason::Unvisited), "{told:?}");
+    assert!(told.has(23, "MoveL", LeftReason::Computed) && told.has(12, "PLOST", LeftReason::Unvisited), "{told:?}");
     let new = run.text("MainModule.mod");
     assert_eq!(String::from_utf8_lossy(&shape(new.as_bytes())), String::from_utf8_lossy(&shape(text.as_bytes())));
     for same in ["tGun:=", "wTable:=", "pLost:="] {
@@ -310,7 +310,7 @@ fn displaced_points_are_exact_and_the_points_they_start_from_are_corrected() {
         }
         assert_eq!(text.lines().nth(11), new.lines().nth(11), "a computed displacement stays");
         let left = run.told().left;
-        assert_eq!(left.iter().filter(|(.., reason)| *reason == Reason::Computed.name()).count(), 1, "{left:?}");
+        assert_eq!(left.iter().filter(|(.., reason)| *reason == LeftReason::Computed.name()).count(), 1, "{left:?}");
         let found: Vec<serde_json::Value> = serde_json::from_str(&run.text("findings.json")).unwrap();
         let turned = found.iter().find(|f| f["code"] == "displaced_orientation").unwrap();
         let mrad = turned["quantities"]["max_mrad"].as_f64().unwrap();

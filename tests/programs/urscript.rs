@@ -14,8 +14,8 @@ use robotcal::Code;
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::model::inverse;
 use robotcal::model::robot::Robot;
-use robotcal::programs::Reason;
-use robotcal::programs::{self, Language, Models, Outcome, Postures, Setting, TextFile};
+use robotcal::programs::LeftReason;
+use robotcal::programs::{self, Language, Models, Postures, ProgramSetting, TargetOutcome, TextFile};
 
 fn csv(header: &str, rows: &[Vec<f64>]) -> String {
     let row = |r: &Vec<f64>| r.iter().map(|v| format!("{v:.6}")).collect::<Vec<_>>().join(",");
@@ -172,7 +172,7 @@ fn what_a_script_does_not_say_in_numbers_is_named_and_left() {
     let file = cell.write("p.script", text.as_bytes());
     let run = cell.compensate(&[&file], &[]).expect(1);
     let told = run.told();
-    assert!(told.has(3, "movel", Reason::Computed) && told.has(4, "movel", Reason::ToolUnknown), "{told:?}");
+    assert!(told.has(3, "movel", LeftReason::Computed) && told.has(4, "movel", LeftReason::ToolUnknown), "{told:?}");
     let (weight, counts) = &findings(&run)["targets_left"];
     assert_eq!(weight, "gate");
     assert_eq!(
@@ -180,7 +180,7 @@ fn what_a_script_does_not_say_in_numbers_is_named_and_left() {
         [Some(told.left.len() as f64), Some(1.0)]
     );
     let run = cell.compensate(&[&file], &["--tool", "0,0,0,0,0,0"]).expect(1);
-    assert!(run.told().has(5, "movel", Reason::OutOfReach), "{:?}", run.told());
+    assert!(run.told().has(5, "movel", LeftReason::OutOfReach), "{:?}", run.told());
     let new = run.text("p.script");
     for (k, (a, b)) in text.lines().zip(new.lines()).enumerate() {
         assert_eq!(a == b, ![1, 3, 5].contains(&k), "line {}: {b}", k + 1);
@@ -211,12 +211,12 @@ fn targets_beyond_the_limits_are_named_by_line_and_left() {
             assert!(numbers(b).iter().zip(&limits).all(within), "line {}: {b}", k + 1);
         } else if row < 12 {
             left += 1;
-            assert!(told.has(k + 1, &format!("row {}", k + 1), Reason::BeyondLimit), "{told:?}");
+            assert!(told.has(k + 1, &format!("row {}", k + 1), LeftReason::BeyondLimit), "{told:?}");
             assert!(run.said().contains(&names[row / 2]), "{}", run.said());
         }
     }
     assert!((2..=10).contains(&left), "{left}: {told:?}");
-    assert!(told.has(14, "row 14", Reason::ProgramBeyondLimit), "{told:?}");
+    assert!(told.has(14, "row 14", LeftReason::ProgramBeyondLimit), "{told:?}");
     assert_eq!(run.text("corrections.csv").lines().count(), 14);
 }
 
@@ -295,7 +295,7 @@ fn ten_thousand_targets_take_less_than_a_second() {
     let mut cell = Cell::ur(11);
     let table: Vec<Vec<f64>> = (0..10_000).map(|_| cell.readings()).collect();
     let text = csv(&cell.nominal.chain.readings.join(","), &table);
-    let setting = Setting {
+    let setting = ProgramSetting {
         chain: &cell.nominal.chain,
         axes: &[0, 1, 2, 3, 4, 5],
         rad_per_unit: Some(1.0),
@@ -312,7 +312,7 @@ fn ten_thousand_targets_take_less_than_a_second() {
         Models { controller: &cell.nominal, from: &cell.nominal, to: real, frames: None, beyond: [None, None] };
     let done = programs::compensate(&program, models, &postures);
     let seconds = begin.elapsed().as_secs_f64();
-    let count = done.outcomes.iter().filter(|o| matches!(o, Outcome::Done(_))).count();
+    let count = done.outcomes.iter().filter(|o| matches!(o, TargetOutcome::Done(_))).count();
     println!("{count} of 10000 in {seconds:.3} s");
     assert_eq!(count, 10_000);
     assert!(cfg!(debug_assertions) || seconds < 1.0, "{seconds} s");

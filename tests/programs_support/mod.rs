@@ -14,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 use robotcal::geom::Pose;
 use robotcal::model::joint_terms::{JointTerm, Term};
 use robotcal::model::robot::{Posture, Robot};
-use robotcal::programs::Reason;
+use robotcal::programs::LeftReason;
 use robotcal::urdf::{Chain, patch_origins, read};
 
 /// A nominal robot, and the real one as corrected URDF and compensation.toml.
@@ -191,7 +191,7 @@ impl Run {
 
 impl Told {
     /// True where the target of that line and name was left for that reason.
-    pub fn has(&self, line: usize, target: &str, reason: Reason) -> bool {
+    pub fn has(&self, line: usize, target: &str, reason: LeftReason) -> bool {
         self.left.iter().any(|(l, t, r)| (*l, t.as_str(), r.as_str()) == (line, target, reason.name()))
     }
 }

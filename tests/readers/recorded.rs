@@ -8,8 +8,8 @@ use crate::said::assert_says;
 use robotcal::Code;
 use robotcal::geom::Pose;
 use robotcal::series::{
-    CameraInfo, Edge, FramePoses, ImageMarks, ImageObservations, MarkKind, MarkLayer, Observation, RecordingOptions,
-    Series, Shown, Source, convert_recording, extract, read, write_recording,
+    CameraInfo, Edge, FramePoses, ImageMarks, ImageObservations, MarkKind, MarkLayer, Observation, RecordingContent,
+    RecordingOptions, Series, Source, convert_recording, extract, read, write_recording,
 };
 use robotcal::urdf::{Chain, RobotDescription};
 use tempfile::TempDir;
@@ -170,8 +170,13 @@ fn a_folder_written_as_a_recording_reads_back_the_same() {
     let residual = vec![[3.0, 4.25], [5.0, 6.0]];
     marks[0].layers.push(MarkLayer { kind: MarkKind::Lines, colour: [1.0, 0.0, 0.0], points: residual });
     let camera_info = Some(&camera);
-    let shown =
-        Shown { joints: &chain.readings, readings: &readings, camera: camera_info, frames: &frames, marks: &marks };
+    let shown = RecordingContent {
+        joints: &chain.readings,
+        readings: &readings,
+        camera: camera_info,
+        frames: &frames,
+        marks: &marks,
+    };
     let path = folder.path().join("again.mcap");
     let notices = write_recording(&path, &series, shown).unwrap();
     assert_eq!(notices.len(), 1, "the image off the robot is told of: {notices:?}");

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use robotcal::series::{
-    AngleUnit, CameraMount, Edge, ImageObservations, Manifest, Observation, PlateKind, Series, Source, Stop, StopOrder,
-    Stops, observations_csv, read, read_images,
+    AngleUnit, CameraMount, Edge, ImageObservations, Manifest, Observation, PlateKind, Series, SeriesStop, Source,
+    StopOrder, Stops, observations_csv, read, read_images,
 };
 use robotcal::urdf::{Chain, RobotDescription};
 use robotcal::{Code, Error};
@@ -214,7 +214,8 @@ fn with_readings(unit: AngleUnit, rows: &[[f64; 3]]) -> Result<(), Error> {
     series.manifest.joint_unit = Some(unit);
     series.stops.joints = ["x", "j1", "j2"].map(String::from).into();
     let stop = series.stops.stops[0].clone();
-    series.stops.stops = rows.iter().map(|row| Stop { raw_readings: Some(row.to_vec()), ..stop.clone() }).collect();
+    series.stops.stops =
+        rows.iter().map(|row| SeriesStop { raw_readings: Some(row.to_vec()), ..stop.clone() }).collect();
     series.readings_for(&chain()).map(|_| ())
 }
 
@@ -293,14 +294,14 @@ fn what_is_written_reads_back_the_same() {
     let short: Manifest = Manifest { mcap: None, ..read(series_with(&[]).path()).unwrap().manifest };
     assert_eq!(short.to_toml().unwrap(), MANIFEST);
 
-    let stop = |image: &str, line, raw: Option<Vec<f64>>, placement: &str, time_s| Stop {
+    let stop = |image: &str, line, raw: Option<Vec<f64>>, placement: &str, time_s| SeriesStop {
         image: image.into(),
         path: None,
         raw_readings: raw,
         placement: placement.into(),
         time_s,
         line,
-        ..Stop::default()
+        ..SeriesStop::default()
     };
     let stops = Stops {
         joints: vec!["j 1".into(), "arm,2".into()],

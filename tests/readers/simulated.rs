@@ -152,7 +152,7 @@ impl Recorded {
 
     /// Stops whose picture shows something else than the scene at its joints.
     fn wrong(&self, extracted: &Extracted, most_counts: f64) -> usize {
-        let is_wrong = |stop: &&robotcal::series::Stop| {
+        let is_wrong = |stop: &&robotcal::series::SeriesStop| {
             let q = stop.raw_readings.as_ref().unwrap();
             let (got, wanted) =
                 (image::open(stop.path.as_ref().unwrap()).unwrap().into_luma8(), picture([q[0], q[1]], None));

@@ -37,7 +37,7 @@ fn poses(truth: &Truth, seed: u64) -> Vec<(String, Pose)> {
         let noise = Vector6::from_fn(|k, _| dice.normal(if k < 3 { SIGMA_M } else { SIGMA_RAD }));
         pose.perturbed(&noise)
     };
-    let of = |s: &robotcal::simulate::truth::StopRecord| plate * (camera * s.camera_from_plate.pose()).inverse();
+    let of = |s: &robotcal::simulate::truth::TrueStop| plate * (camera * s.camera_from_plate.pose()).inverse();
     truth.stops.iter().map(|s| (s.image.clone(), noisy(of(s)))).collect()
 }
 

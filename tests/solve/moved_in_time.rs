@@ -69,10 +69,10 @@ fn told(solution: &Solution) -> &Displaced {
 
 /// From `first` on a body stands a millimetre elsewhere.
 fn assert_moved_by_a_millimetre(found: &Displaced, body: Carried, first: &str) {
-    assert_eq!((found.body, found.displacement), (body, Displacement::FromThenOn), "{found}");
-    assert_eq!(found.images[0], first, "{found}");
+    assert_eq!((found.body, found.displacement), (body, Displacement::FromThenOn), "{found:?}");
+    assert_eq!(found.images[0], first, "{found:?}");
     // A tenth is five times what 12 images with 0.02 mrad of joint noise at 1 m leave unknown.
-    assert!((found.distance_m.0 - 1e-3).abs() < 1e-4, "{found}");
+    assert!((found.distance_m.0 - 1e-3).abs() < 1e-4, "{found:?}");
 }
 
 #[test]
@@ -106,8 +106,8 @@ fn a_camera_turned_once_is_not_called_loose() {
     change(&mut series, 10..24, |pose| turned * pose);
     let solution = solved(&series);
     let found = told(&solution);
-    assert_eq!((found.body, found.displacement), (Carried::CameraInHand, Displacement::FromThenOn), "{found}");
-    assert_eq!(found.images[0], series.stops.stops[10].image, "{found}");
+    assert_eq!((found.body, found.displacement), (Carried::CameraInHand, Displacement::FromThenOn), "{found:?}");
+    assert_eq!(found.images[0], series.stops.stops[10].image, "{found:?}");
     assert!(!solution.findings.iter().any(|f| f.code() == Code::LooseMounting), "{:?}", solution.findings);
 }
 
@@ -119,8 +119,8 @@ fn a_camera_that_its_weight_shifts_is_named() {
     change(&mut series, 0..24, |pose| if up(pose) > 0.0 { by(1e-3, 0.0, 0.0) * pose } else { pose });
     let solution = solved(&series);
     let found = told(&solution);
-    assert_eq!((found.body, found.displacement), (Carried::CameraInHand, Displacement::AxisUp(0)), "{found}");
-    assert!((found.distance_m.0 - 1e-3).abs() < 1e-4, "{found}");
+    assert_eq!((found.body, found.displacement), (Carried::CameraInHand, Displacement::AxisUp(0)), "{found:?}");
+    assert!((found.distance_m.0 - 1e-3).abs() < 1e-4, "{found:?}");
 }
 
 #[test]
@@ -142,10 +142,10 @@ fn a_plate_and_a_camera_that_creep_are_not_called_moved_once() {
     {
         let solution = solved(&series);
         let found = told(&solution);
-        assert_eq!((found.body, found.displacement), (body, Displacement::AllThrough), "{found}");
+        assert_eq!((found.body, found.displacement), (body, Displacement::AllThrough), "{found:?}");
         assert!(solution.findings.iter().any(|f| f.code() == code), "{:?}", solution.findings);
-        assert!((found.distance_m.0 - 0.3e-3).abs() < 5.0 * found.distance_m.1, "{found}");
-        assert!(found.distance_m.1 < 0.1e-3, "{found}");
+        assert!((found.distance_m.0 - 0.3e-3).abs() < 5.0 * found.distance_m.1, "{found:?}");
+        assert!(found.distance_m.1 < 0.1e-3, "{found:?}");
     }
 }
 

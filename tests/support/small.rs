@@ -10,7 +10,7 @@ use robotcal::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::problem::{Adjustment, State, Stop, TakenFrom, Tie, predict};
 use robotcal::problem::{
-    Image, Layout, Mark, Measured, MeasuredSeries, MeasuredStop, Names, Noise, PlateShape, Problem,
+    Image, Layout, Mark, MarkerObservation, MeasuredSeries, MeasuredStop, Names, Noise, PlateShape, Problem,
 };
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 use robotcal::urdf::{CarriedMass, Chain, Drive, Joint, JointKind};
@@ -323,7 +323,7 @@ fn observed(
         let (uu, vv) = (0.01 * dice.between(0.5, 2.0), 0.01 * dice.between(0.5, 2.0));
         let uv = 0.3 * (uu * vv).sqrt();
         let covariance = Matrix2::new(uu, uv, uv, vv);
-        let mut o = Measured {
+        let mut o = MarkerObservation {
             marker,
             edge: Edge::Outer,
             mark: if marker % 5 == 4 { Mark::Corner } else { Mark::of_radius(request.radius_m) },

@@ -9,7 +9,7 @@ use robotcal::geom::Pose;
 use robotcal::model::camera::Lens;
 use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::{Posture, Robot};
-use robotcal::problem::{Image, Layout, Measured, State, TakenFrom, Tie};
+use robotcal::problem::{Image, Layout, MarkerObservation, State, TakenFrom, Tie};
 use robotcal::series::CameraMount;
 use robotcal::urdf::{Chain, JointKind};
 use std::f64::consts::TAU;
@@ -373,7 +373,7 @@ pub fn predict(
     layout: &Layout,
     image: &Image,
     from: TakenFrom,
-    observation: &Measured,
+    observation: &MarkerObservation,
     seed: Option<Seed>,
 ) -> [D; 2] {
     let pose = camera_from_plate(state, layout, image, from, seed);

@@ -16,7 +16,7 @@ use std::path::Path;
 pub use self::model::ReadCamera;
 use self::model::Sayable;
 use crate::error::{Code, Error, Result};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 use crate::model::camera::{Camera, LensFit, fit_lens_holding};
 
 /// Loss below which a model is the same, px.
@@ -151,7 +151,7 @@ pub fn camera_text(
 /// # Errors
 /// Unreadable files, formats and models that are not known, several cameras of which none is named.
 pub fn read_camera_file(path: &Path, wanted: Option<&str>) -> Result<ReadCamera> {
-    let text = files::read_text(path, Kind::Settings)?;
+    let text = files::read_text(path, FileKind::Settings)?;
     let found = match format_of(path, &text) {
         Some(CameraFormat::Mrcal) => mrcal::read(path, &text)?,
         Some(CameraFormat::Kalibr) => kalibr::read(path, &text, wanted)?,

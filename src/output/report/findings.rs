@@ -4,14 +4,14 @@ use maud::{Markup, html};
 
 use crate::error::Notice;
 use crate::output::solution_json::SolutionRecord;
-use crate::output::verdict::{Reason, Trust, Verdict};
+use crate::output::verdict::{Trust, Verdict, VerdictReason};
 
 /// Failed gates or doubts, then notes.
 pub(super) fn section(r: &SolutionRecord) -> Markup {
     let v = Verdict::of(r);
     // Most doubts are notes, and stand there.
-    let is_noted = |reason: &&Reason| r.notices.iter().any(|n| reason.what.ends_with(&n.what));
-    let others: Vec<&Reason> = v.reasons.iter().filter(|reason| !is_noted(reason)).collect();
+    let is_noted = |reason: &&VerdictReason| r.notices.iter().any(|n| reason.what.ends_with(&n.what));
+    let others: Vec<&VerdictReason> = v.reasons.iter().filter(|reason| !is_noted(reason)).collect();
     html! {
         @match v.trust {
             Trust::Good => p { "Every check passed." },
@@ -31,7 +31,7 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
     }
 }
 
-fn list<'a>(reasons: impl IntoIterator<Item = &'a Reason>) -> Markup {
+fn list<'a>(reasons: impl IntoIterator<Item = &'a VerdictReason>) -> Markup {
     html! {
         ul { @for reason in reasons { li { b { (reason.what) } (remedy(&reason.remedy)) } } }
     }

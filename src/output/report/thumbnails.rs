@@ -7,7 +7,7 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
 use crate::detect::{Picture, load_bytes};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 use crate::output::solution_json::{ImageRecord, SolutionRecord};
 use crate::series::InputFile;
 
@@ -72,7 +72,7 @@ fn file_of<'a>(record: &'a SolutionRecord, image: &ImageRecord) -> Option<&'a In
 }
 
 fn read(file: &InputFile) -> Option<Thumbnail> {
-    let bytes = files::read(&file.path, Kind::Image).ok()?;
+    let bytes = files::read(&file.path, FileKind::Image).ok()?;
     if InputFile::of_bytes(&file.path, &bytes) != *file {
         return None;
     }

@@ -14,7 +14,7 @@ mod swap;
 mod tree;
 
 pub use new_result::{NewFolder, NewResult};
-pub use place::Place;
+pub use place::ResultFolder;
 pub use strays::recover;
 
 use std::collections::BTreeMap;
@@ -27,9 +27,9 @@ use crate::error::Result;
 /// Files in `dir` that do not belong to the earlier result (notes, say) are kept. Missing parents are made.
 ///
 /// # Errors
-/// As [`Place::claim`] and [`NewResult::finish`]; anything that cannot be written.
+/// As [`ResultFolder::claim`] and [`NewResult::finish`]; anything that cannot be written.
 pub fn write_all(dir: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
-    Place::claim(dir)?.write_all(files)
+    ResultFolder::claim(dir)?.write_all(files)
 }
 
 /// Writes files into a folder among whatever is there, all of them or none; none of them may be one of `inputs`.
@@ -37,5 +37,5 @@ pub fn write_all(dir: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
 /// # Errors
 /// A file that is one of the inputs; anything that cannot be written or renamed.
 pub fn write_beside(dir: &Path, files: &[(String, &[u8])], inputs: &[PathBuf]) -> Result<()> {
-    Place::among(dir)?.write_beside(files, inputs)
+    ResultFolder::among(dir)?.write_beside(files, inputs)
 }

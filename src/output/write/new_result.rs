@@ -6,13 +6,13 @@ use std::io;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-use super::place::Place;
+use super::place::ResultFolder;
 use super::staging::Staging;
 use super::tree::write_synced;
 use super::{journal, swap, tree};
 use crate::error::{Code, Error, Result};
 
-impl Place {
+impl ResultFolder {
     /// Writes a whole result.
     ///
     /// # Errors
@@ -38,7 +38,7 @@ impl Place {
 pub struct NewResult {
     staging: Staging,
     names: Mutex<BTreeSet<String>>,
-    place: Place,
+    place: ResultFolder,
 }
 
 impl NewResult {
@@ -90,7 +90,7 @@ impl NewResult {
 #[derive(Debug)]
 pub struct NewFolder {
     staging: Staging,
-    place: Place,
+    place: ResultFolder,
 }
 
 impl NewFolder {
@@ -99,7 +99,7 @@ impl NewFolder {
     /// # Errors
     /// A folder with something in it, one that cannot be written, one that another run writes.
     pub fn begin(dir: &Path) -> Result<Self> {
-        let place = Place::empty(dir)?;
+        let place = ResultFolder::empty(dir)?;
         Ok(Self { staging: place.stage()?, place })
     }
 

@@ -13,7 +13,7 @@ use crate::error::{Code, Error, Result};
 
 /// A folder that can be written, for as long as this lives; folders that were made for it go again when nothing was written.
 #[derive(Debug)]
-pub struct Place {
+pub struct ResultFolder {
     given: PathBuf,
     pub(super) target: PathBuf,
     made: Vec<PathBuf>,
@@ -21,7 +21,7 @@ pub struct Place {
     held: Option<Held>,
 }
 
-impl Place {
+impl ResultFolder {
     /// Claims a folder for a result: it is made, or is empty, or holds an earlier result, and no other run writes to it.
     /// What a run that was cut short left there is brought in order.
     ///
@@ -40,7 +40,7 @@ impl Place {
     /// Claims a folder that is new or empty.
     ///
     /// # Errors
-    /// As [`Place::claim`]; a folder with something in it.
+    /// As [`ResultFolder::claim`]; a folder with something in it.
     pub(super) fn empty(dir: &Path) -> Result<Self> {
         let place = Self::locked(dir)?;
         match place.holds_something()? {
@@ -172,7 +172,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for ResultFolder {
     fn drop(&mut self) {
         // Only folders in which nothing is go.
         self.made.iter().rev().all(|folder| fs::remove_dir(folder).is_ok());

@@ -5,8 +5,8 @@ use std::ops::Range;
 use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, matrix_from_rpy};
 use crate::programs::codes::PostureCode;
-use crate::programs::field::{Field, Place};
-use crate::programs::program::{JointTarget, Posture, RotationFields};
+use crate::programs::field::{Field, FieldPlace};
+use crate::programs::program::{JointTarget, MeantPosture, RotationFields};
 use crate::programs::scan::Reader;
 
 const MM: f64 = 1e-3;
@@ -101,8 +101,8 @@ impl Aggregate {
     /// A number of the text, or the place where it has to be put.
     fn field(&self, name: &str, si: f64, decimals: usize) -> Field {
         let (place, written) = match self.element(name) {
-            Some(Element::Number(value, range)) => (Place::At(range.clone()), *value),
-            _ => (Place::Missing(self.end, format!(", {name} ")), f64::NAN),
+            Some(Element::Number(value, range)) => (FieldPlace::At(range.clone()), *value),
+            _ => (FieldPlace::Missing(self.end, format!(", {name} ")), f64::NAN),
         };
         Field { file: self.file, place, written, si, decimals }
     }
@@ -134,13 +134,13 @@ impl Aggregate {
     }
 
     /// Status and turn, where there are any and the robot has six axes.
-    pub fn posture(&self, axes: &[usize]) -> Posture {
+    pub fn posture(&self, axes: &[usize]) -> MeantPosture {
         let (status, turn) = (self.code("S"), self.code("T"));
         match axes.get(..6).and_then(|a| <[usize; 6]>::try_from(a).ok()) {
             Some(six) if status.is_some() || turn.is_some() => {
-                Posture::Coded(crate::programs::codes::Codes::Krl { status, turn }, six)
+                MeantPosture::Coded(crate::programs::codes::Codes::Krl { status, turn }, six)
             }
-            _ => Posture::Nearest,
+            _ => MeantPosture::Nearest,
         }
     }
 

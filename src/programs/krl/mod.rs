@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 
 use aggregate::{Aggregate, index};
 
-use super::Setting;
+use super::ProgramSetting;
 use super::itinerary::Itinerary;
-use super::program::{Approach, Kind, Left, PoseTarget, Posture, Program, Target, Understood};
-use super::reason::{Reason, Why};
+use super::program::{Approach, Left, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood};
+use super::reason::{LeftReason, Why};
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
@@ -69,7 +69,7 @@ fn matching(name: &str, pattern: &str) -> Option<Vec<i64>> {
 }
 
 /// Reads a module of one or more files.
-pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
+pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
     let mut module = Module {
         setting,
         prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
@@ -94,7 +94,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Progra
 }
 
 struct Module<'a> {
-    setting: &'a Setting<'a>,
+    setting: &'a ProgramSetting<'a>,
     prismatic: Vec<bool>,
     values: BTreeMap<String, Value>,
     /// Positions declared in data files that are no data of the controller: name, file, line.
@@ -119,7 +119,7 @@ impl Module<'_> {
             if moves && let Some((_, count)) = MOVES.iter().find(|(name, _)| *name == word) {
                 self.motion(&mut reader, &word, *count)?;
             } else if moves && RELATIVE.contains(&word.as_str()) {
-                let why = Why::new(Reason::Relative, "it is relative to the position before");
+                let why = Why::new(LeftReason::Relative, "it is relative to the position before");
                 self.leave_at(reader.index, reader.line(), &word, why);
             } else if moves && self.flow(&reader, &word) {
                 // Frames of a spline block hold for all of it.
@@ -211,7 +211,7 @@ impl Module<'_> {
                     name = Some(n.as_str());
                     let missing = || {
                         let words = format!("{n} is in none of the files (give its .dat, or $config.dat, as well)");
-                        Why::of(n, Reason::Undeclared, words)
+                        Why::of(n, LeftReason::Undeclared, words)
                     };
                     value = self.values.get(n).ok_or_else(missing)?;
                 }
@@ -232,7 +232,7 @@ impl Module<'_> {
                 Some(frame) => FrameIs::Known(frame),
                 None => FrameIs::Unknown("not all of X, Y, Z, A, B, C are given".into()),
             },
-            Err(why) if why.reason == Reason::Computed => {
+            Err(why) if why.reason == LeftReason::Computed => {
                 FrameIs::Unknown("it is computed, not written in numbers".into())
             }
             Err(why) => FrameIs::Unknown(why.words),
@@ -456,27 +456,27 @@ impl Module<'_> {
         let (aggregate, name) = self.resolved(value)?;
         let named = name.unwrap_or(motion).to_owned();
         let mut kind = self.kind(aggregate, tool, base)?;
-        if let Kind::Pose(pose) = &mut kind
-            && pose.posture == Posture::Nearest
+        if let TargetKind::Pose(pose) = &mut kind
+            && pose.posture == MeantPosture::Nearest
             && ["LIN", "SLIN"].contains(&motion)
         {
-            pose.posture = Posture::Along;
+            pose.posture = MeantPosture::Along;
         }
         let place = if name.is_some() { (aggregate.file, aggregate.line) } else { from };
         let clash = format!("{named} is used with different $TOOL or $BASE; give it a position for each");
         let (file, line) = place;
         let target = Target { file, line, name: named, approach: Approach::Unknown, visited: true, kind };
-        if self.way.visit(target) { Ok(()) } else { Err(Why::new(Reason::FramesDiffer, clash)) }
+        if self.way.visit(target) { Ok(()) } else { Err(Why::new(LeftReason::FramesDiffer, clash)) }
     }
 
-    fn kind(&self, a: &Aggregate, tool: &FrameIs, base: &FrameIs) -> Understood<Kind> {
+    fn kind(&self, a: &Aggregate, tool: &FrameIs, base: &FrameIs) -> Understood<TargetKind> {
         let axes = self.setting.axes;
         if a.has(&AXIS_NAMES) {
-            return Ok(Kind::Joints(a.joints(axes, &self.prismatic)));
+            return Ok(TargetKind::Joints(a.joints(axes, &self.prismatic)));
         }
         if !a.has(&POSE_NAMES) {
             let words = "it has neither axes A1 to A6 nor components X to C";
-            return Err(Why::new(Reason::NotATarget, words));
+            return Err(Why::new(LeftReason::NotATarget, words));
         }
         let frame = |reason, name: &str, is: &FrameIs, flag: Option<Pose>, flag_name: &str| match (is, flag) {
             (FrameIs::Known(pose), _) => Ok(*pose),
@@ -486,12 +486,12 @@ impl Module<'_> {
             }
             (FrameIs::Unset, _) => Err(Why::new(reason, format!("{name} is not set before it; give {flag_name}"))),
         };
-        Ok(Kind::Pose(Box::new(PoseTarget {
+        Ok(TargetKind::Pose(Box::new(PoseTarget {
             position: a.position(),
             rotation: a.rotation(),
             base_from_work: self.setting.base
-                * frame(Reason::FrameUnknown, "$BASE", base, self.setting.work, "--work")?,
-            flange_from_tool: frame(Reason::ToolUnknown, "$TOOL", tool, self.setting.tool, "--tool")?,
+                * frame(LeftReason::FrameUnknown, "$BASE", base, self.setting.work, "--work")?,
+            flange_from_tool: frame(LeftReason::ToolUnknown, "$TOOL", tool, self.setting.tool, "--tool")?,
             fixed: a.external(axes, &self.prismatic),
             posture: a.posture(axes),
             taught: None,
@@ -525,7 +525,7 @@ impl Module<'_> {
             });
             if let Err(why) = done {
                 let words = format!("no motion of the files goes there, and {}", why.words);
-                self.leave_at(file, line, &name, Why::new(Reason::Unvisited, words));
+                self.leave_at(file, line, &name, Why::new(LeftReason::Unvisited, words));
             }
         }
     }

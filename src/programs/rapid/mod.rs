@@ -5,14 +5,15 @@ mod value;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::Setting;
+use super::ProgramSetting;
 use super::codes::{Codes, PostureCode};
-use super::field::{Field, Place};
+use super::field::{Field, FieldPlace};
 use super::itinerary::Itinerary;
 use super::program::{
-    Approach, Displaced, JointTarget, Kind, Left, PoseTarget, Posture, Program, RotationFields, Target, Understood,
+    Approach, DisplacedTarget, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target,
+    TargetKind, Understood,
 };
-use super::reason::{Reason, Why};
+use super::reason::{LeftReason, Why};
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
@@ -54,7 +55,7 @@ struct Datum {
 }
 
 /// Reads modules that belong together.
-pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Program> {
+pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
     let mut task = Task {
         setting,
         data: BTreeMap::new(),
@@ -78,7 +79,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &Setting<'_>) -> Result<Progra
 }
 
 struct Task<'a> {
-    setting: &'a Setting<'a>,
+    setting: &'a ProgramSetting<'a>,
     data: BTreeMap<String, Datum>,
     /// Points from which displaced ones start: how they would be visited.
     bases: BTreeMap<String, Target>,
@@ -323,7 +324,7 @@ impl Task<'_> {
         tool: &Option<String>,
         work: Option<&Node>,
     ) -> Result<Understood<()>> {
-        if let Node::Displaced(displaced) = value {
+        if let Node::DisplacedTarget(displaced) = value {
             return Ok(self.displaced(displaced, name, from, tool.as_deref(), work));
         }
         let (value, place, named) = match value {
@@ -345,17 +346,17 @@ impl Task<'_> {
     }
 
     /// The posture that a kind of move gives a target.
-    fn with_posture(&self, kind: Kind, name: &str) -> Kind {
-        let Kind::Pose(mut pose) = kind else { return kind };
+    fn with_posture(&self, kind: TargetKind, name: &str) -> TargetKind {
+        let TargetKind::Pose(mut pose) = kind else { return kind };
         let upper = name.to_ascii_uppercase();
         let of_joints = upper.starts_with("MOVEJ") || upper.starts_with("TRIGGJ") || upper.ends_with('J');
-        let near = if upper.starts_with("MOVEL") { Posture::Along } else { Posture::Nearest };
+        let near = if upper.starts_with("MOVEL") { MeantPosture::Along } else { MeantPosture::Nearest };
         pose.posture = match (self.watched[usize::from(!of_joints)], pose.posture) {
             (Watched::Off, _) => near,
-            (Watched::Unknown, Posture::Coded(codes, axes)) => Posture::Either(codes, axes),
+            (Watched::Unknown, MeantPosture::Coded(codes, axes)) => MeantPosture::Either(codes, axes),
             (_, posture) => posture,
         };
-        Kind::Pose(pose)
+        TargetKind::Pose(pose)
     }
 
     /// A move to `Offs(p, ..)` or `RelTool(p, ..)`.
@@ -371,7 +372,7 @@ impl Task<'_> {
         let by = displaced
             .by
             .clone()
-            .ok_or_else(|| Why::new(Reason::Computed, "its displacement is computed, not written in numbers"))?;
+            .ok_or_else(|| Why::new(LeftReason::Computed, "its displacement is computed, not written in numbers"))?;
         let (value, file, line) = match self.data.get(point) {
             Some(Datum { value: Some(value), file, line, .. }) => (value.clone(), *file, *line),
             Some(_) => return Err(computed(point)),
@@ -380,12 +381,12 @@ impl Task<'_> {
         let base = self.kind(&value, file, tool, work)?;
         let base = self.with_posture(base, name);
         let place = (file, base.first_byte());
-        let Kind::Pose(mut pose) = base.clone() else {
-            return Err(Why::of(point, Reason::NotATarget, format!("{point} is no robtarget")));
+        let TargetKind::Pose(mut pose) = base.clone() else {
+            return Err(Why::of(point, LeftReason::NotATarget, format!("{point} is no robtarget")));
         };
         let field = |(written, range): (f64, Range<usize>), si: f64, decimals: usize| Field {
             file: displaced.file,
-            place: Place::At(range),
+            place: FieldPlace::At(range),
             written,
             si,
             decimals,
@@ -394,18 +395,18 @@ impl Task<'_> {
             Some(number) => field(number, 1f64.to_radians(), DECIMALS_DEG),
             None => {
                 let words = format!("\\R{}:=", ["x", "y", "z"][k]);
-                let place = Place::Missing(displaced.missing_at[k], words);
+                let place = FieldPlace::Missing(displaced.missing_at[k], words);
                 Field { file: displaced.file, place, written: 0.0, si: 1f64.to_radians(), decimals: DECIMALS_DEG }
             }
         };
-        pose.displaced = Some(Displaced {
+        pose.displaced = Some(DisplacedTarget {
             base: place,
             by: by.map(|n| field(n, 1e-3, DECIMALS_MM)),
             turned: displaced.of_tool.then(|| [0, 1, 2].map(turn)),
         });
         let index = self.way.program.targets.len();
         let words = if displaced.of_tool { "RelTool" } else { "Offs" };
-        self.add(format!("{words}({point})"), from, Kind::Pose(pose))
+        self.add(format!("{words}({point})"), from, TargetKind::Pose(pose))
             .map_err(|why| Why { about: Some(point.clone()), ..why })?;
         // Its posture is that of the displaced point, where nothing else tells it.
         let approach = Approach::Beyond(index);
@@ -414,45 +415,45 @@ impl Task<'_> {
         Ok(())
     }
 
-    fn add(&mut self, name: String, (file, line): (usize, usize), kind: Kind) -> Understood<()> {
+    fn add(&mut self, name: String, (file, line): (usize, usize), kind: TargetKind) -> Understood<()> {
         let clash = format!("{name} is used with different tools or work objects; give it a robtarget for each");
         let named = name.clone();
         let target = Target { file, line, name, approach: Approach::Unknown, visited: true, kind };
-        if self.way.visit(target) { Ok(()) } else { Err(Why::of(&named, Reason::FramesDiffer, clash)) }
+        if self.way.visit(target) { Ok(()) } else { Err(Why::of(&named, LeftReason::FramesDiffer, clash)) }
     }
 
-    fn kind(&self, value: &Node, file: usize, tool: Option<&str>, work: Option<&Node>) -> Understood<Kind> {
+    fn kind(&self, value: &Node, file: usize, tool: Option<&str>, work: Option<&Node>) -> Understood<TargetKind> {
         let Node::List(parts) = value else {
-            return Err(Why::new(Reason::NotATarget, "it is no robtarget and no jointtarget"));
+            return Err(Why::new(LeftReason::NotATarget, "it is no robtarget and no jointtarget"));
         };
         let external = parts.last().and_then(numbers::<6>).unwrap_or_default();
         if parts.len() == 2 {
-            return Ok(Kind::Joints(self.joints(&parts[0], &external, file)?));
+            return Ok(TargetKind::Joints(self.joints(&parts[0], &external, file)?));
         }
-        let computed = || Why::new(Reason::Computed, "it is computed, not written in numbers");
+        let computed = || Why::new(LeftReason::Computed, "it is computed, not written in numbers");
         let trans = numbers::<3>(&parts[0]).ok_or_else(computed)?;
         let [w, x, y, z] = numbers::<4>(&parts[1]).ok_or_else(computed)?;
         let cf = numbers::<4>(&parts[2]).ok_or_else(computed)?;
         let field = |(written, range): (f64, Range<usize>), si: f64, decimals: usize| Field {
             file,
-            place: Place::At(range),
+            place: FieldPlace::At(range),
             written,
             si,
             decimals,
         };
         let axes = self.setting.axes;
         let posture = match axes.get(..6).and_then(|a| <[usize; 6]>::try_from(a).ok()) {
-            None => Posture::Nearest,
+            None => MeantPosture::Nearest,
             Some(six) => {
                 let cf = cf.map(|(value, range)| PostureCode { file, range, value: value as i64 });
-                Posture::Coded(Codes::Rapid(Box::new(cf)), six)
+                MeantPosture::Coded(Codes::Rapid(Box::new(cf)), six)
             }
         };
         let mut fixed = vec![None; axes.len()];
         for (&reading, (value, _)) in axes.iter().skip(6).zip(&external) {
             fixed[reading] = (*value < NO_AXIS).then_some(value * self.unit(reading).0);
         }
-        Ok(Kind::Pose(Box::new(PoseTarget {
+        Ok(TargetKind::Pose(Box::new(PoseTarget {
             position: trans.map(|t| field(t, 1e-3, DECIMALS_MM)),
             rotation: RotationFields::Quaternion([x, y, z, w].map(|q| field(q, 1.0, DECIMALS_QUATERNION))),
             base_from_work: self.setting.base * self.work(work)?,
@@ -474,8 +475,8 @@ impl Task<'_> {
     }
 
     fn joints(&self, axes: &Node, external: &[(f64, Range<usize>); 6], file: usize) -> Understood<JointTarget> {
-        let values =
-            numbers::<6>(axes).ok_or_else(|| Why::new(Reason::Computed, "it is computed, not written in numbers"))?;
+        let values = numbers::<6>(axes)
+            .ok_or_else(|| Why::new(LeftReason::Computed, "it is computed, not written in numbers"))?;
         let n = self.setting.axes.len();
         let mut target = JointTarget { readings: vec![f64::NAN; n], fields: vec![None; n] };
         for (&reading, (written, range)) in self.setting.axes.iter().zip(values.iter().chain(external)) {
@@ -484,13 +485,13 @@ impl Task<'_> {
             }
             let (si, decimals) = self.unit(reading);
             target.readings[reading] = written * si;
-            let place = Place::At(range.clone());
+            let place = FieldPlace::At(range.clone());
             target.fields[reading] = Some(Field { file, place, written: *written, si, decimals });
         }
         Ok(target)
     }
 
-    fn datum(&self, name: &str, kind: &str, flag: &str, reason: Reason) -> Understood<&Node> {
+    fn datum(&self, name: &str, kind: &str, flag: &str, reason: LeftReason) -> Understood<&Node> {
         let of_kind = self.data.get(name).filter(|d| d.kind == kind);
         let missing = || {
             let words = format!("{name} is not written in numbers in the files (give its module as well, or {flag})");
@@ -501,13 +502,13 @@ impl Task<'_> {
 
     fn tool(&self, name: Option<&str>) -> Understood<Pose> {
         let read = || {
-            let unknown = |words: String| Why::new(Reason::ToolUnknown, words);
+            let unknown = |words: String| Why::new(LeftReason::ToolUnknown, words);
             let name = name.ok_or_else(|| unknown("its tool is not named; give --tool".into()))?;
             if name == "TOOL0" {
                 return Ok(Pose::identity());
             }
             let numbers = || unknown(format!("{name} is not written in numbers"));
-            let found = self.datum(name, "TOOLDATA", "--tool", Reason::ToolUnknown)?;
+            let found = self.datum(name, "TOOLDATA", "--tool", LeftReason::ToolUnknown)?;
             let Node::List(parts) = found else { return Err(numbers()) };
             match parts.first() {
                 Some(Node::Word(w)) if w == "TRUE" => {}
@@ -523,11 +524,11 @@ impl Task<'_> {
             None => return Ok(self.setting.work.unwrap_or_else(Pose::identity)),
             Some(Node::Word(name)) if name == "WOBJ0" => return Ok(Pose::identity()),
             Some(Node::Word(name)) => name,
-            Some(_) => return Err(Why::new(Reason::FrameUnknown, "its work object is computed")),
+            Some(_) => return Err(Why::new(LeftReason::FrameUnknown, "its work object is computed")),
         };
         let read = || {
-            let unknown = |words: &str| Why::new(Reason::FrameUnknown, format!("{name} {words}"));
-            let found = self.datum(name, "WOBJDATA", "--work", Reason::FrameUnknown)?;
+            let unknown = |words: &str| Why::new(LeftReason::FrameUnknown, format!("{name} {words}"));
+            let found = self.datum(name, "WOBJDATA", "--work", LeftReason::FrameUnknown)?;
             let Node::List(parts) = found else { return Err(unknown("is not written in numbers")) };
             match (parts.first(), parts.get(1)) {
                 (Some(Node::Word(held)), Some(Node::Word(fixed))) if held == "FALSE" && fixed == "TRUE" => {}
@@ -560,7 +561,7 @@ impl Task<'_> {
             });
             if let Err(why) = done {
                 let words = format!("no move of the files goes there, and {}", why.words);
-                self.leave(place, &name, Why::new(Reason::Unvisited, words));
+                self.leave(place, &name, Why::new(LeftReason::Unvisited, words));
             }
         }
         Ok(())

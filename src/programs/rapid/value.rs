@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
-use crate::programs::reason::{Reason, Why};
+use crate::programs::reason::{LeftReason, Why};
 use crate::programs::scan::Reader;
 
 /// `[..]` with what is in it.
@@ -14,7 +14,7 @@ pub(super) enum Node {
     Number(f64, Range<usize>),
     Word(String),
     /// `Offs(..)` or `RelTool(..)`: a name, and what is in the brackets.
-    Displaced(Box<Displacement>),
+    DisplacedTarget(Box<Displacement>),
     Other,
 }
 
@@ -95,7 +95,7 @@ pub(super) fn node(reader: &mut Reader<'_>) -> Result<Node> {
     if !reader.is_mark(b'[') {
         let (name, at) = (reader.name(), reader.at);
         if let Some(displaced) = displacement(reader) {
-            return Ok(Node::Displaced(Box::new(displaced)));
+            return Ok(Node::DisplacedTarget(Box::new(displaced)));
         }
         reader.at = at + 1;
         return Ok(name.map_or(Node::Other, Node::Word));
@@ -140,10 +140,10 @@ pub(super) fn frame(node: &Node) -> Option<Pose> {
 
 /// A declared name whose value is computed.
 pub(super) fn computed(name: &str) -> Why {
-    Why::of(name, Reason::Computed, format!("{name} is computed, not written in numbers"))
+    Why::of(name, LeftReason::Computed, format!("{name} is computed, not written in numbers"))
 }
 
 /// A name that none of the files declares.
 pub(super) fn undeclared(name: &str) -> Why {
-    Why::of(name, Reason::Undeclared, format!("{name} is in none of the files (give its module as well)"))
+    Why::of(name, LeftReason::Undeclared, format!("{name} is in none of the files (give its module as well)"))
 }

@@ -16,7 +16,7 @@ use super::pixels::{self, Mean};
 use super::scan::time_ns;
 use crate::error::{Code, Error, Result};
 use crate::files::batches;
-use crate::series::{DEFAULT_PLACEMENT, Stop};
+use crate::series::{DEFAULT_PLACEMENT, SeriesStop};
 
 /// Memory of messages that wait for others of their stop, bytes.
 const MOST_HELD: usize = 256 << 20;
@@ -66,7 +66,7 @@ pub(super) struct Collector<'a> {
 /// Finished stops by the time of their picture.
 #[derive(Default)]
 pub(super) struct Taken {
-    pub rows: BTreeMap<i64, (Stop, StopReport)>,
+    pub rows: BTreeMap<i64, (SeriesStop, StopReport)>,
     /// How many pictures could not be read, and why the first could not.
     pub malformed: Option<(usize, String)>,
 }
@@ -170,13 +170,13 @@ impl<'a> Collector<'a> {
                 }
             },
         };
-        let stop = Stop {
+        let stop = SeriesStop {
             path: Some(self.images.join(&image)),
             image: image.clone(),
             raw_readings: Some(joints.positions),
             placement: DEFAULT_PLACEMENT.to_string(),
             time_s: Some(time as f64 * 1e-9),
-            ..Stop::default()
+            ..SeriesStop::default()
         };
         let report = StopReport {
             image,

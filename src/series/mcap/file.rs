@@ -8,7 +8,7 @@ use super::message::{MCAP, Message};
 use super::records;
 use super::sqlite;
 use crate::error::{Code, Error, Notice, Result, plain_name};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 
 /// The files of a recording, in the order in which they were written: one file, or a rosbag2 folder.
 ///
@@ -60,7 +60,7 @@ fn split_number(path: &Path) -> (Option<u64>, PathBuf) {
 
 fn head(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let (file, _) = files::open(path, Kind::Recording)?;
+    let (file, _) = files::open(path, FileKind::Recording)?;
     file.take(16).read_to_end(&mut bytes).map_err(|e| Error::io(path, &e))?;
     Ok(bytes)
 }

@@ -32,4 +32,4 @@ pub(super) use file::require_recording;
 pub use messages::CameraInfo;
 pub use options::{Clock, Motion, Picking, RecordingOptions};
 #[cfg(feature = "mcap")]
-pub use write::{FramePoses, ImageMarks, MarkKind, MarkLayer, Shown, require_new, write_recording};
+pub use write::{FramePoses, ImageMarks, MarkKind, MarkLayer, RecordingContent, require_new, write_recording};

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use super::message::{MCAP, Message};
 use crate::error::{Code, Error, Notice, Result};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 
 const FOOTER: u8 = 2;
 const SCHEMA: u8 = 3;
@@ -33,7 +33,7 @@ type Damage = String;
 
 /// Calls `visit` for every message of an MCAP file in the order of the file, and returns a notice where the file is damaged.
 pub(super) fn for_each(path: &Path, visit: impl FnMut(Message<'_>) -> Result<()>) -> Result<Option<Notice>> {
-    let (file, length) = files::open(path, Kind::Recording)?;
+    let (file, length) = files::open(path, FileKind::Recording)?;
     let file = BufReader::with_capacity(1 << 16, file);
     let mut walk = Walk { path, file, length, at: 0, contents: Contents::default(), starts: None, visit };
     walk.seek(MCAP.len() as u64)?;

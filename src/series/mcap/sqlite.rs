@@ -10,7 +10,7 @@ use std::path::Path;
 
 use super::message::Message;
 use crate::error::{Code, Error, Notice, Result};
-use crate::files::{self, Kind};
+use crate::files::{self, FileKind};
 
 /// First bytes of such a file.
 pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
@@ -197,7 +197,7 @@ impl Base {
         let refuse = |what: &str| {
             Error::new(Code::RecordingDamaged, path.display(), what, "copy it again, or convert it: ros2 bag convert")
         };
-        let (mut file, length) = files::open(path, Kind::Recording)?;
+        let (mut file, length) = files::open(path, FileKind::Recording)?;
         let mut header = [0; FILE_HEADER];
         file.read_exact(&mut header).map_err(|_| refuse("is cut off within its header"))?;
         let page_bytes = match u16::from_be_bytes([header[16], header[17]]) {

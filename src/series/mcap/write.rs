@@ -12,9 +12,9 @@ use mcap::{Compression, WriteOptions, Writer};
 use super::interfaces::{ANNOTATIONS, TRANSFORMS, definition};
 use super::messages::{CAMERA_INFO, COMPRESSED_IMAGE, CameraInfo, JOINT_STATE};
 use crate::error::{Code, Error, Notice, Result};
-use crate::files::{self, Kind, decode_picture};
+use crate::files::{self, FileKind, decode_picture};
 use crate::geom::Pose;
-use crate::series::{ImageObservations, Series, Stop};
+use crate::series::{ImageObservations, Series, SeriesStop};
 
 /// Joint states are written this often while the robot stands, ns.
 const PERIOD_NS: i64 = 20_000_000;
@@ -31,7 +31,7 @@ const THICKNESS_PX: f64 = 2.0;
 
 /// What a recording shows beside the images.
 #[derive(Debug, Clone, Copy)]
-pub struct Shown<'a> {
+pub struct RecordingContent<'a> {
     /// Names of the joints, in the order of the readings.
     pub joints: &'a [String],
     /// Readings of every stop, rad and m; a stop without any is left out.
@@ -101,7 +101,7 @@ impl From<&ImageObservations> for ImageMarks {
 ///
 /// # Errors
 /// A file that exists already or cannot be written, an image that cannot be read.
-pub fn write_recording(path: &Path, series: &Series, shown: Shown<'_>) -> Result<Vec<Notice>> {
+pub fn write_recording(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Result<Vec<Notice>> {
     require_new(path)?;
     let unfinished = unfinished(path);
     let done = write_stops(&unfinished, series, shown);
@@ -131,11 +131,11 @@ fn unfinished(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}.unfinished"))
 }
 
-fn write_stops(path: &Path, series: &Series, shown: Shown<'_>) -> Result<Vec<Notice>> {
+fn write_stops(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Result<Vec<Notice>> {
     let mut recording = Recording::create(path)?;
     let mut notices = Vec::new();
     let marks: BTreeMap<&str, &ImageMarks> = shown.marks.iter().map(|m| (m.image.as_str(), m)).collect();
-    let usable: Vec<(usize, &Stop, &Vec<f64>, &PathBuf)> = series
+    let usable: Vec<(usize, &SeriesStop, &Vec<f64>, &PathBuf)> = series
         .stops
         .stops
         .iter()
@@ -179,7 +179,7 @@ fn write_stops(path: &Path, series: &Series, shown: Shown<'_>) -> Result<Vec<Not
 }
 
 /// Times of the stops, ns, at least so far apart that every one is a standstill of its own.
-fn times(stops: &[&Stop]) -> Vec<i64> {
+fn times(stops: &[&SeriesStop]) -> Vec<i64> {
     let stated: Option<Vec<i64>> = stops.iter().map(|s| s.time_s.map(|t| (t * 1e9).round() as i64)).collect();
     let apart = |times: &Vec<i64>| {
         times.iter().all(|t| *t >= STANDING_NS) && times.windows(2).all(|w| w[1] - w[0] > 2 * STANDING_NS + PERIOD_NS)
@@ -229,7 +229,7 @@ impl Recording {
     }
 
     fn image(&mut self, time_ns: i64, path: &Path) -> Result<()> {
-        let mut bytes = files::read(path, Kind::Image)?;
+        let mut bytes = files::read(path, FileKind::Image)?;
         let unreadable =
             |e: image::ImageError| Error::new(Code::ImageUnreadable, path.display(), e, "remove the image or its row");
         let format = match image::guess_format(&bytes) {

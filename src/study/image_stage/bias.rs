@@ -17,7 +17,7 @@ use crate::simulate::render::render;
 
 /// Why a simple measurement would be wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Cause {
+pub enum BiasCause {
     /// Light with a gradient.
     Gradient {
         /// Change as a share of the light in the middle, 1/px.
@@ -50,7 +50,7 @@ pub enum Cause {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BiasCase {
     /// Why a simple measurement would be wrong.
-    pub cause: Cause,
+    pub cause: BiasCause,
     /// Sigma of the point spread, px.
     pub psf_sigma_px: f64,
     /// Semi-axis of a large marker before the lens's middle, px (decides the distance where the case does not).
@@ -91,14 +91,14 @@ pub fn bias_cases(blurs: &[f64]) -> Vec<BiasCase> {
     for &psf_sigma_px in blurs {
         let mut add = |cause, radius_px| cases.push(BiasCase { cause, psf_sigma_px, radius_px });
         for (radius_px, direction_deg) in [(5.0, 20.0), (8.0, 75.0), (12.0, 200.0)] {
-            add(Cause::Gradient { per_px: 0.005, direction_deg }, radius_px);
+            add(BiasCause::Gradient { per_px: 0.005, direction_deg }, radius_px);
         }
         for radius_px in [10.0, 14.0, 24.0] {
-            add(Cause::WideAngle { k1: -0.12, field_deg: 75.0 }, radius_px);
+            add(BiasCause::WideAngle { k1: -0.12, field_deg: 75.0 }, radius_px);
         }
-        add(Cause::Close { distance_m: 0.12, tilt_deg: 50.0 }, 0.0);
+        add(BiasCause::Close { distance_m: 0.12, tilt_deg: 50.0 }, 0.0);
         for corner_px in [1.0, 2.0, 4.0] {
-            add(Cause::Coma { corner_px }, 9.0);
+            add(BiasCause::Coma { corner_px }, 9.0);
         }
     }
     cases
@@ -120,10 +120,10 @@ impl BiasCase {
     fn scene(&self) -> (Camera, Direction, ImagingConditions) {
         let mut conditions = ImagingConditions::ideal(self.psf_sigma_px);
         let (width, height) = match self.cause {
-            Cause::Gradient { .. } => (GRADIENT_SIDE, GRADIENT_SIDE),
+            BiasCause::Gradient { .. } => (GRADIENT_SIDE, GRADIENT_SIDE),
             _ => (1280, 1024),
         };
-        let field_deg = if let Cause::WideAngle { field_deg, .. } = self.cause { field_deg } else { 75.0 };
+        let field_deg = if let BiasCause::WideAngle { field_deg, .. } = self.cause { field_deg } else { 75.0 };
         let mut camera = Camera::pinhole(Lens::Brown, width, height, focal_px(1280, field_deg));
         let mut direction = Direction {
             distance_m: camera.parameters[0] * LARGE_M / self.radius_px.max(1.0),
@@ -133,21 +133,21 @@ impl BiasCase {
             aim_m: [0.0031, -0.0047],
         };
         match self.cause {
-            Cause::Gradient { per_px, direction_deg } => {
+            BiasCause::Gradient { per_px, direction_deg } => {
                 let (sin, cos) = direction_deg.to_radians().sin_cos();
                 conditions.gradient_per_px = [per_px * cos, per_px * sin];
                 conditions.exposure = 0.5;
             }
-            Cause::WideAngle { k1, .. } => {
+            BiasCause::WideAngle { k1, .. } => {
                 camera.parameters[4] = k1;
                 direction.tilt_rad = 0.2;
                 // the plate's corner on the axis, and the plate towards a corner of the picture
                 (direction.roll_rad, direction.aim_m) = (0.1, [0.2, -0.12]);
             }
-            Cause::Close { distance_m, tilt_deg } => {
+            BiasCause::Close { distance_m, tilt_deg } => {
                 (direction.distance_m, direction.tilt_rad) = (distance_m, tilt_deg.to_radians());
             }
-            Cause::Coma { corner_px } => conditions.coma_px = corner_px,
+            BiasCause::Coma { corner_px } => conditions.coma_px = corner_px,
         }
         (camera, direction, conditions)
     }
@@ -158,8 +158,8 @@ impl BiasCase {
         let middle = Vector2::new(f64::from(camera.width_px) - 1.0, f64::from(camera.height_px) - 1.0) / 2.0;
         let at = outline.iter().sum::<Vector2<f64>>() / outline.len() as f64;
         let placed = match self.cause {
-            Cause::WideAngle { .. } => (at - middle).norm() > 0.8 * middle.norm(),
-            Cause::Gradient { .. } => conditions.illumination(at, middle) > 0.5,
+            BiasCause::WideAngle { .. } => (at - middle).norm() > 0.8 * middle.norm(),
+            BiasCause::Gradient { .. } => conditions.illumination(at, middle) > 0.5,
             _ => true,
         };
         let half = outline.len() / 2;
@@ -182,7 +182,7 @@ pub fn bias(case: &BiasCase, plate: &Plate) -> Result<Bias> {
     };
     let found = detect(&conditions)?;
     let lopsided_in_noise = match case.cause {
-        Cause::Coma { .. } => detect(&conditions.clone().with_contrast_to_noise(COMA_CONTRAST_TO_NOISE))?.lopsided,
+        BiasCause::Coma { .. } => detect(&conditions.clone().with_contrast_to_noise(COMA_CONTRAST_TO_NOISE))?.lopsided,
         _ => None,
     };
     let truth = |marker: u32, edge: Edge| -> Option<[Vector2<f64>; 2]> {
@@ -239,7 +239,7 @@ mod tests {
             let b = bias(case, &plate).unwrap();
             println!("{b:?}");
             let told = b.lopsided.unwrap().exceeds(LOPSIDED_PX);
-            if matches!(case.cause, Cause::Coma { .. }) {
+            if matches!(case.cause, BiasCause::Coma { .. }) {
                 assert!(told || b.largest_px < 0.003, "{b:?}");
             } else {
                 assert!(b.largest_px < 0.003 && b.markers > 0 && 100 * b.markers >= 95 * b.wanted, "{b:?}");

@@ -7,7 +7,7 @@ mod precision;
 pub mod tables;
 mod view;
 
-pub use bias::{Bias, BiasCase, COMA_CONTRAST_TO_NOISE, Cause, bias, bias_cases};
+pub use bias::{Bias, BiasCase, BiasCause, COMA_CONTRAST_TO_NOISE, bias, bias_cases};
 pub use identity::{
     Appearance, DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityRequest, IdentityView, MirrorAnswer, Plates,
     identity, identity_view,

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::{Claim, Section};
 use crate::detect::circles::LOPSIDED_PX;
-use crate::study::image_stage::{Bias, COMA_CONTRAST_TO_NOISE, Cause};
+use crate::study::image_stage::{Bias, BiasCause, COMA_CONTRAST_TO_NOISE};
 
 /// Largest distance to the true centroid that is allowed, px.
 const LARGEST_BIAS_PX: f64 = 0.003;
@@ -20,7 +20,7 @@ pub fn bias_section(study: &[Bias]) -> Section {
                     |---|---|---|---|---|---|---|---|\n"
         .to_owned();
     let (coma, plain): (Vec<&Bias>, Vec<&Bias>) =
-        study.iter().partition(|b| matches!(b.case.cause, Cause::Coma { .. }));
+        study.iter().partition(|b| matches!(b.case.cause, BiasCause::Coma { .. }));
     for b in &plain {
         let _ = writeln!(
             text,
@@ -47,7 +47,7 @@ pub fn bias_section(study: &[Bias]) -> Section {
          |---|---|---|---|---|---|\n"
     );
     for b in &coma {
-        let Cause::Coma { corner_px } = b.case.cause else { continue };
+        let BiasCause::Coma { corner_px } = b.case.cause else { continue };
         let noisy =
             b.lopsided_in_noise.map_or_else(String::new, |l| format!("{:.4} +- {:.4}", l.corner_px, l.corner_sigma_px));
         let _ = writeln!(
@@ -93,11 +93,13 @@ fn claims(plain: &[&Bias], coma: &[&Bias]) -> Vec<Claim> {
     ]
 }
 
-fn name(cause: &Cause) -> String {
+fn name(cause: &BiasCause) -> String {
     match cause {
-        Cause::Gradient { per_px, direction_deg } => format!("{:.1} %/px at {direction_deg:.0} deg", 100.0 * per_px),
-        Cause::WideAngle { k1, field_deg } => format!("corner, k1 = {k1} at {field_deg:.0} deg"),
-        Cause::Close { distance_m, tilt_deg } => format!("{distance_m} m, tilt {tilt_deg:.0} deg"),
-        Cause::Coma { corner_px } => format!("coma of {corner_px} px"),
+        BiasCause::Gradient { per_px, direction_deg } => {
+            format!("{:.1} %/px at {direction_deg:.0} deg", 100.0 * per_px)
+        }
+        BiasCause::WideAngle { k1, field_deg } => format!("corner, k1 = {k1} at {field_deg:.0} deg"),
+        BiasCause::Close { distance_m, tilt_deg } => format!("{distance_m} m, tilt {tilt_deg:.0} deg"),
+        BiasCause::Coma { corner_px } => format!("coma of {corner_px} px"),
     }
 }
