@@ -39,6 +39,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("diagnose/displaced.rs MOST_IMAGES", "how many are named"),
     ("diagnose/joint_noise.rs MOST_IMAGES", "how many are named"),
     ("diagnose/left_out_bodies.rs MOST_NAMED", "words"),
+    ("diagnose/left_out_images.rs MOST_IMAGES", "how many are named"),
     ("diagnose/loose.rs MOST_IMAGES", "how many are named"),
     ("diagnose/plate_size.rs ASPECT", "index of a mode"),
     ("frames/absorbed.rs HELD", "rounding"),
