@@ -64,10 +64,10 @@ impl ResidualPattern {
         let Some(PatternEffect { flange_m, pose_m, pose_rad }) = self.found.moved else { return String::new() };
         match flange_m {
             Some([by, sigma]) => {
-                format!(", without it the flange moves by {:.3} mm (stated sigma {:.3} mm)", 1e3 * by, 1e3 * sigma)
+                format!("; without it the flange moves by {:.3} mm (stated sigma {:.3} mm)", 1e3 * by, 1e3 * sigma)
             }
             None => format!(
-                ", without it the camera poses move by {:.4} mm and {:.3} arcmin (stated sigmas {:.4} mm, {:.3} arcmin)",
+                "; without it the camera poses move by {:.4} mm and {:.3} arcmin (stated sigmas {:.4} mm, {:.3} arcmin)",
                 1e3 * pose_m[0],
                 60.0 * pose_rad[0].to_degrees(),
                 1e3 * pose_m[1],
