@@ -24,6 +24,8 @@ pub(super) enum Kind {
     Chessboard,
     /// A chessboard with ArUco markers in its light squares
     Charuco,
+    /// A chessboard with dots that code the place (PuzzleBoard)
+    Puzzleboard,
     /// Kalibr's grid of AprilTags
     Aprilgrid,
     /// OpenCV's grid of ArUco markers
@@ -59,6 +61,9 @@ pub(super) struct BoardArgs {
     /// Radius of the dots of a circle-grid, mm [default: a quarter of the pitch]
     #[arg(long, value_name = "MM")]
     radius_mm: Option<f64>,
+    /// Column and row of the pattern of a puzzleboard at its top-left [default: 0x0]
+    #[arg(long, value_name = "CxR", value_parser = pair::<u32>)]
+    origin: Option<[u32; 2]>,
     /// Every other row of a circle-grid is shifted; rows are a pitch apart, the dots of a row two
     #[arg(long)]
     asymmetric: bool,
@@ -145,6 +150,12 @@ fn plate(args: &BoardArgs, size: &BoardSize) -> Result<Plate> {
         Kind::Charuco => {
             key("pitch_m", pitch()?);
             key("aruco", format!("{{ dictionary = {}, side_m = {} }}", dictionary()?, tag()?));
+        }
+        Kind::Puzzleboard => {
+            let [column, row] = args.origin.unwrap_or_default();
+            key("pitch_m", pitch()?);
+            key("origin_col", column.to_string());
+            key("origin_row", row.to_string());
         }
         Kind::Aprilgrid => {
             key("tag_m", tag()?);

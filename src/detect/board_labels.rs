@@ -70,9 +70,9 @@ pub(super) enum Labelling {
 }
 
 impl Placement {
-    /// Lattice coordinates that are board coordinates already.
-    pub fn identity(board: BoardSize) -> Self {
-        Self { board, turns: 0, light_first: false, origin: (0, 0) }
+    /// Lattice coordinates that are board coordinates already; the first square may be light.
+    pub fn on_board(board: BoardSize, light_first: bool) -> Self {
+        Self { board, turns: 0, light_first, origin: (0, 0) }
     }
 
     /// Extent of the board along u and v.
@@ -325,7 +325,7 @@ fn relative_shade(value: f64, cell: (i32, i32), inner: &[((i32, i32), f64)]) -> 
 }
 
 /// Mean of the 3 x 3 pixels around a point; `None` outside the picture.
-fn brightness(picture: &Picture, [u, v]: [f64; 2]) -> Option<f64> {
+pub(super) fn brightness(picture: &Picture, [u, v]: [f64; 2]) -> Option<f64> {
     let inside = u >= 1.0 && v >= 1.0 && u <= picture.width as f64 - 2.0 && v <= picture.height as f64 - 2.0;
     if !inside {
         return None;

@@ -11,6 +11,7 @@ use calib_targets_core::GrayImageView;
 use super::board_labels::{BoardSize, Lattice, Placement};
 use super::chessboard::{Bytes, WINDOW, board_size, corner_config};
 use super::corners::{Window, measure};
+use super::sizes::{best_of_sizes, on_picture};
 use super::{Detection, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::Plate;
@@ -42,13 +43,15 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
     let mut bytes = Bytes::of(picture);
     let prints = prints(plate)?;
-    let Some(Found { print, lattice, .. }) = find(&bytes, &prints, board)? else {
+    let found =
+        best_of_sizes(&bytes, board, |found: &Found| &found.lattice, |scale| at_scale(&bytes, scale, &prints, board))?;
+    let Some(Found { print, lattice, .. }) = found else {
         bytes.mirror();
         let mirrored = at_scale(&bytes, 1.0, &prints, board)?.is_some();
         return Err(if mirrored { mirrored_board() } else { no_board(plate) });
     };
     let window = Window { arm: 0.5 * (1.0 - print.ratio), keep_off_px: KEEP_OFF_PX, ..WINDOW };
-    let mut detection = measure(picture, &lattice, Placement::identity(board), window);
+    let mut detection = measure(picture, &lattice, Placement::on_board(board, false), window);
     if plate.aruco.is_none() {
         detection.notices.push(found_print(&print));
     }
@@ -60,37 +63,12 @@ fn position_on_board(id: u32, board: BoardSize) -> (i32, i32) {
     (id % board.columns, id / board.columns)
 }
 
-/// Sizes of the picture, over its own, at which markers are sought, until one shows most of the board; large pictures begin with half.
-const SCALES: [f64; 3] = [1.0, 0.5, 1.5];
-const SCALES_LARGE: [f64; 3] = [0.5, 1.0, 0.25];
-/// Pixels of a large picture.
-const LARGE_PX: usize = 2_000_000;
-/// Share of the board's corners from which no other size is tried.
-const MOST: f64 = 0.75;
-
 /// What was found at one of the sizes.
 struct Found {
     print: Print,
     markers: usize,
     /// Corners of the board in px of the picture.
     lattice: Lattice,
-}
-
-/// The best of all sizes; `None` where there is no board.
-fn find(bytes: &Bytes, prints: &[Print], board: BoardSize) -> Result<Option<Found>> {
-    let large = bytes.width * bytes.height > LARGE_PX;
-    let mut best: Option<Found> = None;
-    for scale in if large { SCALES_LARGE } else { SCALES } {
-        let Some(found) = at_scale(bytes, scale, prints, board)? else { continue };
-        if best.as_ref().is_none_or(|other| found.lattice.len() > other.lattice.len()) {
-            best = Some(found);
-        }
-        let corners = best.as_ref().map_or(0, |b| b.lattice.len());
-        if corners as f64 >= MOST * f64::from(board.columns * board.rows) {
-            break;
-        }
-    }
-    Ok(best)
 }
 
 /// The print that explains most markers in the picture at another size, with what was found.
@@ -105,9 +83,7 @@ fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize) -> Re
         if markers < least || best.as_ref().is_some_and(|other| other.markers >= markers) {
             continue;
         }
-        // Pixels are counted from their centres.
-        let on_picture = |c: f32| (f64::from(c) + 0.5) / scale - 0.5;
-        let place = |x: f32, y: f32| [on_picture(x), on_picture(y)];
+        let place = |x: f32, y: f32| [x, y].map(|c| on_picture(c, scale));
         let lattice =
             found.corners.iter().map(|c| (position_on_board(c.id, board), place(c.position.x, c.position.y))).collect();
         best = Some(Found { print: *print, markers, lattice });

@@ -16,7 +16,7 @@ use crate::series::Plate;
 
 /// Pixels for one corner: as far along the edges as the next corners do not disturb, and near enough that the lens
 /// does not bend the edges.
-pub(super) const WINDOW: Window = Window { reach: 0.4, radius_px: 16.0, arm: 1.0, keep_off_px: 0.0 };
+pub(super) const WINDOW: Window = Window { reach: 0.4, radius_px: 16.0, arm: 1.0, dot: 0.0, keep_off_px: 0.0 };
 
 /// Pictures with more pixels are looked at in half their size first.
 const LARGE_PX: usize = 500_000;

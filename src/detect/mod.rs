@@ -13,8 +13,10 @@ mod flat_field;
 mod flat_field_facts;
 mod load;
 mod picture;
+pub mod puzzleboard;
 mod quads;
 mod run;
+mod sizes;
 mod tag_code;
 pub mod tags;
 
@@ -55,6 +57,7 @@ fn by_kind(picture: &Picture, plate: &Plate) -> Result<Detection> {
         PlateKind::CodedCircles => circles::detect(picture, plate, &circles::Options::default()).map(Detection::from),
         PlateKind::CircleGrid => circles::detect_grid(picture, plate, &circles::Options::default()),
         PlateKind::Charuco => charuco::detect(picture, plate),
+        PlateKind::Puzzleboard => puzzleboard::detect(picture, plate),
         PlateKind::Aprilgrid | PlateKind::ArucoGrid | PlateKind::Tag => tags::detect(picture, plate),
         PlateKind::Points => Err(Error::new(
             Code::PlateNotDetectable,

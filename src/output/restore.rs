@@ -79,6 +79,7 @@ fn plate(p: &PlateRecord) -> Result<Plate> {
         tolerance_m: p.tolerance_m,
         aruco: None,
         tags: p.tags.clone(),
+        puzzle: p.puzzle,
         large: Vec::new(),
         scale: p.scale,
         markers: (0..n).map(marker).collect(),

@@ -14,7 +14,7 @@ use crate::error::{Notice, Result, plain_name};
 use crate::identify::{Comparison, Estimator, Evidence, LensEvidence, Options, StartVerdict};
 use crate::model::camera::Lens;
 use crate::problem::{ImageRejection, ObservationRejection, short_name};
-use crate::series::{CameraMount, Edge, InputFile, PlateKind, ScaleBar, Tags};
+use crate::series::{CameraMount, Edge, InputFile, PlateKind, Puzzle, ScaleBar, Tags};
 use crate::solve::PlateScale;
 use crate::urdf::{FoundOrigin, JointKind, Payload};
 
@@ -189,6 +189,9 @@ pub struct PlateRecord {
     /// The tags of a plate of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tags: Option<Tags>,
+    /// Which part of the pattern a PuzzleBoard is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub puzzle: Option<Puzzle>,
     /// Measured distance.
     pub scale: Option<ScaleBar>,
     /// Amplitudes of its modes.

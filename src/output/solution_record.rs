@@ -270,6 +270,7 @@ fn plates(solution: &Solution, context: &Context, gauge: &Gauge) -> Vec<PlateRec
             pitch_m: p.pitch_m,
             tolerance_m: p.tolerance_m,
             tags: p.tags.clone(),
+            puzzle: p.puzzle,
             scale: p.scale,
             modes: plate_modes::NAMES.iter().map(|n| n.to_string()).zip(shape.modes).collect(),
             id: p.markers.iter().map(|m| m.id).collect(),

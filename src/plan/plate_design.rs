@@ -148,7 +148,7 @@ impl Sheet {
 /// Half of the plate's printed field beyond the outermost marker centres, m (a whole square for a chessboard).
 fn widest_radius(plate: &Plate) -> f64 {
     match plate.kind.print().ink {
-        Ink::Squares | Ink::SquaresAndTags => plate.pitch_m,
+        Ink::Squares | Ink::SquaresAndTags | Ink::SquaresAndDots => plate.pitch_m,
         Ink::Tags => plate.tags.as_ref().map_or(0.0, |tags| tags.side_m / 2.0 + tags.gap_m),
         Ink::Circles | Ink::Unknown => plate.markers.iter().fold(0.0, |r, m| m.outer_radius_m.max(r)),
     }

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::plate_kind::PlateKind;
+use super::puzzle::Puzzle;
 use super::tags::Tags;
 
 /// One marker in the plate frame.
@@ -67,6 +68,9 @@ pub struct Plate {
     /// The tags of a plate of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tags: Option<Tags>,
+    /// Which part of the pattern a PuzzleBoard is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub puzzle: Option<Puzzle>,
     /// Ids of the dots of a grid that are larger than most, or ringed; the detector finds them where none is stated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub large: Vec<u32>,
@@ -130,6 +134,7 @@ impl Plate {
             tolerance_m,
             aruco: None,
             tags: None,
+            puzzle: None,
             large: Vec::new(),
             scale: None,
             markers,

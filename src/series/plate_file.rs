@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::inputs::{InputFile, read_text};
 use super::plate::{Aruco, Marker, Plate, ScaleBar};
 use super::plate_kind::{Ink, Places, PlateKind};
+use super::puzzle::Puzzle;
 use super::table::{Row, Table, to_csv};
 use super::tag_plates::{TagKeys, plate_of};
 use super::toml_file::{check_format, parse_toml, read_toml, require_positive, to_toml};
@@ -57,6 +58,14 @@ struct PlateFile {
     first_id: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     id: Option<u32>,
+    /// Row and column of the pattern of a puzzleboard at its top-left.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    origin_row: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    origin_col: Option<u32>,
+    /// Diameter of its dots over the side of a square.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dot_diameter_rel: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     markers: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -144,6 +153,7 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
             tolerance_m,
             aruco: None,
             tags: None,
+            puzzle: None,
             large: Vec::new(),
             scale,
             markers: Vec::new(),
@@ -168,6 +178,7 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
     }
     let mut plate = Plate {
         aruco: aruco(path, file, pitch_m)?,
+        puzzle: puzzle(path, file, [columns, rows])?,
         scale: file.scale,
         ..Plate::lattice(file.kind, columns, rows, pitch_m, tolerance_m)
     };
@@ -183,6 +194,19 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
     }
     plate.large = large(path, file, [columns, rows])?;
     Ok(plate)
+}
+
+/// The part of the pattern that a puzzleboard is; no other kind has any.
+fn puzzle(path: &Path, file: &PlateFile, size: [u32; 2]) -> Result<Option<Puzzle>> {
+    let origin = [file.origin_col, file.origin_row];
+    if file.kind.print().ink == Ink::SquaresAndDots {
+        return Puzzle::new(path, size, origin, file.dot_diameter_rel).map(Some);
+    }
+    if origin != [None; 2] || file.dot_diameter_rel.is_some() {
+        let what = "origin_row, origin_col and dot_diameter_rel are only for a puzzleboard";
+        return Err(Error::new(Code::SettingConflict, path.display(), what, "remove them or correct `kind`"));
+    }
+    Ok(None)
 }
 
 fn tag_keys(file: &PlateFile) -> TagKeys {
@@ -416,6 +440,9 @@ pub fn plate_toml(plate: &Plate, markers: Option<&str>) -> Result<String> {
             asymmetric: plate.has_shifted_rows().then_some(true).filter(|_| plate.kind.print().has_radius),
             large: Some(plate.large.iter().map(|id| [id % plate.columns, id / plate.columns]).collect())
                 .filter(|large: &Vec<_>| !large.is_empty()),
+            origin_row: plate.puzzle.map(|p| p.origin_row),
+            origin_col: plate.puzzle.map(|p| p.origin_col),
+            dot_diameter_rel: plate.puzzle.map(|p| p.dot_diameter_rel),
             markers: markers.map(str::to_string),
             tolerance_m: Some(plate.tolerance_m),
             aruco: plate.aruco.clone(),

@@ -14,6 +14,8 @@ pub enum Ink {
     Squares,
     /// These, with tags in the light ones.
     SquaresAndTags,
+    /// These, with a dot at the middle of every edge between two.
+    SquaresAndDots,
     /// Square tags with a code.
     Tags,
     /// Nothing that is known.
@@ -87,6 +89,8 @@ plate_kinds! {
     Chessboard { ink: Ink::Squares }
     /// A chessboard with ArUco markers in its light squares.
     Charuco { ink: Ink::SquaresAndTags, has_tags: true }
+    /// A chessboard with dots that code the place; the markers are its inner corners.
+    Puzzleboard { ink: Ink::SquaresAndDots }
     /// Kalibr's grid of AprilTags; the markers are the corners of the tags.
     Aprilgrid { ink: Ink::Tags, places: Places::Lattice }
     /// OpenCV's grid of ArUco markers.

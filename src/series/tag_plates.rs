@@ -1,4 +1,4 @@
-//! Plates of tags: from the keys of plate.toml to markers, and what is dark on the print.
+//! Plates of tags and of squares with a code: from the keys of plate.toml to markers, and what is dark on the print.
 
 use std::path::Path;
 
@@ -30,11 +30,14 @@ pub(super) fn plate_of(tags: Tags, kind: PlateKind, [columns, rows]: [u32; 2], t
     Plate { markers, tags: Some(tags), ..Plate::lattice(kind, columns, rows, pitch_m, tolerance_m) }
 }
 
-/// What is dark on a plate of tags, or on a ChArUco board whose markers are stated; nothing on a plate of another kind.
+/// What is dark on a plate of tags, on a PuzzleBoard, or on a ChArUco board whose markers are stated; nothing on a plate of another kind.
 ///
 /// # Errors
 /// As [`Tags::dictionary`].
 pub fn regions(plate: &Plate) -> Result<Vec<Region>> {
+    if let Some(puzzle) = plate.puzzle {
+        return Ok(puzzle.regions([plate.columns, plate.rows], plate.pitch_m));
+    }
     match (&plate.tags, &plate.aruco) {
         (Some(tags), _) => tags.regions(plate.columns, plate.rows),
         (None, Some(aruco)) => {

@@ -19,7 +19,7 @@ use crate::series::{Ink, Marker, Plate, Region, regions};
 
 /// Largest distance between a sampled outline and the true one, px.
 const OUTLINE_TOLERANCE_PX: f64 = 0.004;
-/// Samples along each side of a chessboard's square.
+/// Samples along the longest side of a dark polygon, such as a chessboard's square.
 const SIDE_SAMPLES: usize = 16;
 /// The same along a module of a tag.
 const MODULE_SAMPLES: usize = 4;
@@ -31,7 +31,7 @@ const MODULE_SAMPLES: usize = 4;
 pub fn check_drawable(plate: &Plate) -> Result<()> {
     let (what, remedy) = match plate.kind.print().ink {
         Ink::Squares => return Ok(()),
-        Ink::Tags => return regions(plate).map(|_| ()),
+        Ink::Tags | Ink::SquaresAndDots => return regions(plate).map(|_| ()),
         Ink::SquaresAndTags if plate.aruco.is_some() => return regions(plate).map(|_| ()),
         Ink::SquaresAndTags => (
             "the markers of the ChArUco board are not stated",
@@ -244,11 +244,13 @@ impl Marks<'_> {
         Some((outlines, self.camera_from_plate.transform(&middle).z))
     }
 
-    /// The image of a polygon with so many samples along each side.
+    /// The image of a polygon with so many samples along its longest side, and fewer along shorter ones.
     fn polygon(&self, corners: &[Vector3<f64>], samples: usize) -> Option<Vec<Vector2<f64>>> {
         let mut outline = Vec::with_capacity(corners.len() * samples);
-        for (k, a) in corners.iter().enumerate() {
-            let b = corners[(k + 1) % corners.len()];
+        let sides = || corners.iter().zip(corners.iter().cycle().skip(1));
+        let longest = sides().map(|(a, b)| (b - a).norm()).fold(0.0, f64::max);
+        for (a, b) in sides() {
+            let samples = (samples as f64 * (b - a).norm() / longest - 1e-6).ceil() as usize;
             for i in 0..samples {
                 let x = a + (b - a) * (i as f64 / samples as f64);
                 outline.push(self.camera.project(&self.camera_from_plate.transform(&x))?);

@@ -7,6 +7,7 @@ mod circles_support;
 #[path = "../said/mod.rs"]
 mod said;
 
+mod board_views;
 mod boards_charuco;
 mod boards_chessboard;
 mod boards_files;
@@ -15,4 +16,5 @@ mod circles;
 mod command;
 mod corners_rendered;
 mod grids;
+mod puzzleboards;
 mod tags;

@@ -144,6 +144,7 @@ fn what_is_written_reads_back_the_same() {
         tolerance_m: 1e-4,
         aruco: None,
         tags: None,
+        puzzle: None,
         large: vec![],
         scale: Some(ScaleBar { from: 3, to: 12, distance_m: 0.1 + 0.2, sigma_m: 1e-6 }),
         markers: vec![marker(3, 0.0, 0.01, 0.005, 1e-4), marker(12, 0.3, 0.0, 0.0, 3e-5)],

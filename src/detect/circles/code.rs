@@ -65,7 +65,7 @@ pub(super) enum Verdict {
 }
 
 /// A position counts when fewer than this many equally good ones are expected by chance.
-const FALSE_ALARMS: f64 = 1e-6;
+pub(in crate::detect) const FALSE_ALARMS: f64 = 1e-6;
 /// The next best position must disagree in at least this many cells more.
 const MARGIN: usize = 3;
 /// Side of the parts that a lattice is taken into, from one to the next half of it, and the fewest cells of one.
@@ -258,7 +258,7 @@ fn spread(known: &[(Cell, u8)], turns: u8, mirrored: bool) -> Vec<(Cell, u8)> {
 }
 
 /// Probability of at most `wrong` disagreements among `count` cells when each disagrees with probability `q`.
-fn binomial_tail(count: usize, wrong: usize, q: f64) -> f64 {
+pub(in crate::detect) fn binomial_tail(count: usize, wrong: usize, q: f64) -> f64 {
     if q <= 0.0 {
         return 1.0;
     }

@@ -42,6 +42,7 @@ pub(crate) mod synth;
 mod types;
 
 pub use asymmetry::Drift;
+pub(super) use code::{FALSE_ALARMS, binomial_tail};
 pub(super) use contour::{Contour, Encloses, contours};
 pub use ellipse::Ellipse;
 pub(super) use gauss::normal_tail;

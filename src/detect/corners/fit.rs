@@ -100,6 +100,8 @@ pub(in crate::detect) struct Window {
     pub radius_px: f64,
     /// Pixels further from both edges than this share of the side, less `keep_off_px`, are left out: something is printed there.
     pub arm: f64,
+    /// Pixels nearer to the middle of an edge than this share of the side, and `keep_off_px`, are left out, too; 0 where no dot is there.
+    pub dot: f64,
     /// Distance to keep from what is printed there, px.
     pub keep_off_px: f64,
 }
@@ -429,6 +431,9 @@ impl Pixels {
         let (from_b, from_a) = (area.abs() / bx.hypot(by), area.abs() / ax.hypot(ay));
         let near_px = (0.5 * window.radius_px).powi(2);
         let reach = window.reach.max((LEAST_REACH_PX / seed.side_px()).min(MOST_REACH));
+        let off = window.dot + window.keep_off_px / seed.side_px();
+        let free =
+            |p: f64, q: f64| window.dot == 0.0 || ((p.abs() - 0.5).hypot(q) >= off && p.hypot(q.abs() - 0.5) >= off);
         let (mut nearer, mut farther) = (Vec::new(), Vec::new());
         let mut y = low(cy);
         while y <= y1 {
@@ -439,7 +444,7 @@ impl Pixels {
                 let near = dx * dx + dy * dy <= window.radius_px * window.radius_px;
                 let on_arm = (p.abs() - window.arm) * from_b <= -window.keep_off_px
                     || (q.abs() - window.arm) * from_a <= -window.keep_off_px;
-                if near && on_arm && p.abs() <= reach && q.abs() <= reach {
+                if near && on_arm && free(p, q) && p.abs() <= reach && q.abs() <= reach {
                     let pixel = [dx, dy, f64::from(picture.at(x as usize, y as usize))];
                     if dx * dx + dy * dy <= near_px { nearer.push(pixel) } else { farther.push(pixel) }
                 }

@@ -1,0 +1,270 @@
+//! Rendered views of every kind of board: how much of what is in view is found, and whether any id is wrong.
+
+#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use image::codecs::jpeg::JpegEncoder;
+use image::{ExtendedColorType, ImageEncoder};
+use nalgebra::Vector2;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use robotcal::detect::{Picture, detect, load_bytes};
+use robotcal::model::camera::{Camera, Lens};
+use robotcal::series::{Edge, Plate, parse_plate};
+use robotcal::simulate::conditions::{Glare, Occluder};
+
+use crate::circles_support::{Scene, View, pose, scene};
+
+/// Boards of some 0.25 m.
+pub const BOARDS: [(&str, &str); 7] = [
+    ("chessboard", "kind = \"chessboard\"\ncolumns = 9\nrows = 6\npitch_m = 0.025"),
+    (
+        "charuco",
+        "kind = \"charuco\"\ncolumns = 8\nrows = 6\npitch_m = 0.03\naruco = { dictionary = \"DICT_4X4_50\", side_m = 0.0225 }",
+    ),
+    (
+        "puzzleboard",
+        "kind = \"puzzleboard\"\ncolumns = 10\nrows = 8\npitch_m = 0.025\norigin_row = 12\norigin_col = 31",
+    ),
+    ("aprilgrid", "kind = \"aprilgrid\"\ncolumns = 6\nrows = 5\ntag_m = 0.036\nspacing = 0.3"),
+    (
+        "aruco-grid",
+        "kind = \"aruco-grid\"\ncolumns = 6\nrows = 5\nmarker_m = 0.036\ngap_m = 0.01\ndictionary = \"DICT_4X4_50\"",
+    ),
+    ("tag", "kind = \"tag\"\ntag_m = 0.15\nfamily = \"36h11\"\nid = 17"),
+    (
+        "circle-grid",
+        "kind = \"circle-grid\"\ncolumns = 10\nrows = 8\npitch_m = 0.025\nradius_m = 0.006\nlarge = [[1, 0]]",
+    ),
+];
+
+/// What is hard about a view.
+pub const HARD: [&str; 7] = ["plain", "jpeg", "motion", "glare", "shadow", "hand", "fisheye"];
+
+const SIZE: [u32; 2] = [800, 600];
+
+fn plate(text: &str) -> Plate {
+    let mut plate = parse_plate(Path::new("plate.toml"), &format!("format = 1\n{text}\n"), "").unwrap();
+    for id in plate.large.clone() {
+        let k = plate.index_of(id).unwrap();
+        plate.markers[k].outer_radius_m *= 1.5;
+    }
+    plate
+}
+
+/// The plate as seen under what is hard, and the picture.
+fn look(plate: &Plate, hard: &str, seed: u64) -> (Scene, Picture) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let fisheye = hard == "fisheye";
+    let mut view = View {
+        size: SIZE,
+        focal_px: if fisheye { 260.0 } else { 750.0 },
+        distance_m: if fisheye { rng.random_range(0.1..0.2) } else { rng.random_range(0.35..0.8) },
+        tilt_deg: rng.random_range(0.0..if fisheye { 30.0 } else { 50.0 }),
+        azimuth_deg: rng.random_range(0.0..360.0),
+        roll_deg: rng.random_range(0.0..360.0),
+        aim_m: if fisheye { [0.0; 2] } else { [rng.random_range(-0.08..0.08), rng.random_range(-0.08..0.08)] },
+        ..View::default()
+    };
+    view.conditions.psf_sigma_px = rng.random_range(0.4..1.1);
+    let place = |rng: &mut ChaCha8Rng| [rng.random_range(200.0..600.0), rng.random_range(150.0..450.0)];
+    match hard {
+        "motion" => {
+            let turn: f64 = rng.random_range(0.0..std::f64::consts::TAU);
+            let length_m = 3.0 * view.distance_m / view.focal_px;
+            view.conditions.motion[..2].copy_from_slice(&[length_m * turn.cos(), length_m * turn.sin()]);
+        }
+        "glare" => {
+            let (at_px, radius_px) = (place(&mut rng), rng.random_range(40.0..90.0));
+            view.conditions.glare = vec![Glare { at_px, radius_px, strength: 1.2 }];
+        }
+        "hand" => {
+            let edge = rng.random_range(0.36..0.42) * f64::from(SIZE[0]);
+            let outline_px =
+                vec![[-50.0, -50.0], [edge, -50.0], [edge + 40.0, 300.0], [edge - 20.0, 650.0], [-50.0, 650.0]];
+            view.conditions.occluders = vec![Occluder { outline_px, reflectance: 0.35 }];
+        }
+        _ => {}
+    }
+    let mut scene = Scene { plate: plate.clone(), camera_from_plate: pose(&view), ..scene(&view) };
+    if fisheye {
+        scene.camera = Camera::pinhole(Lens::Fisheye, SIZE[0], SIZE[1], view.focal_px);
+    }
+    let mut picture = scene.render(seed);
+    match hard {
+        "jpeg" => picture = compressed(&picture, 30),
+        "shadow" => shade(&mut picture, place(&mut rng), rng.random_range(0.0..std::f64::consts::TAU)),
+        _ => {}
+    }
+    (scene, picture)
+}
+
+fn compressed(picture: &Picture, quality: u8) -> Picture {
+    let bytes: Vec<u8> = picture.pixels.iter().map(|&p| p as u8).collect();
+    let mut file = Vec::new();
+    let size = (picture.width as u32, picture.height as u32);
+    JpegEncoder::new_with_quality(&mut file, quality)
+        .write_image(&bytes, size.0, size.1, ExtendedColorType::L8)
+        .expect("a JPEG");
+    load_bytes("rendered.jpg".as_ref(), &file, None).expect("a picture")
+}
+
+/// A shadow with a soft edge through a place: a third of the light is left.
+fn shade(picture: &mut Picture, [x, y]: [f64; 2], turn: f64) {
+    let (sin, cos) = turn.sin_cos();
+    for (k, value) in picture.pixels.iter_mut().enumerate() {
+        let (u, v) = ((k % picture.width) as f64, (k / picture.width) as f64);
+        let into = (((u - x) * cos + (v - y) * sin) / 4.0).clamp(-1.0, 1.0);
+        *value = (*value * (1.0 - 0.33 * (into + 1.0)) as f32).round();
+    }
+}
+
+impl Scene {
+    /// Where a marker should be measured: the centroid of a dot, else the image of the point.
+    fn truth(&self, marker: usize) -> Option<Vector2<f64>> {
+        let m = &self.plate.markers[marker];
+        if m.outer_radius_m > 0.0 {
+            return self.centroid(marker, Edge::Outer);
+        }
+        self.camera.project(&self.camera_from_plate.transform(&m.position_m))
+    }
+
+    /// Whether a marker is in view, with the length of a square or tag around it, and nothing before it.
+    fn is_in_view(&self, marker: usize) -> bool {
+        let position = self.plate.markers[marker].position_m;
+        let reach = 0.4 * self.plate.pitch_m;
+        let seen = |[x, y]: [f64; 2]| {
+            let at = self.camera_from_plate.transform(&(position + nalgebra::Vector3::new(x, y, 0.0)));
+            self.camera.project(&at).is_some_and(|p| self.camera.contains(&p, 6.0) && !self.is_covered(&p))
+        };
+        [[reach, 0.0], [-reach, 0.0], [0.0, reach], [0.0, -reach]].into_iter().all(seen)
+    }
+
+    fn is_covered(&self, p: &Vector2<f64>) -> bool {
+        let inside = |o: &Occluder| {
+            let sides = o.outline_px.iter().zip(o.outline_px.iter().cycle().skip(1));
+            sides
+                .filter(|(a, b)| {
+                    (a[1] > p.y) != (b[1] > p.y) && p.x < a[0] + (p.y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+                })
+                .count()
+                % 2
+                == 1
+        };
+        self.conditions.occluders.iter().any(inside)
+    }
+}
+
+#[derive(Debug, Default)]
+pub struct Tally {
+    views: usize,
+    /// Views in which something was found.
+    seen: usize,
+    in_view: usize,
+    found: usize,
+    wrong: usize,
+    squares: f64,
+}
+
+impl Tally {
+    fn share(&self) -> f64 {
+        self.found as f64 / self.in_view.max(1) as f64
+    }
+
+    fn rms(&self) -> f64 {
+        (self.squares / (2.0 * self.found.max(1) as f64)).sqrt()
+    }
+}
+
+/// Further from the truth than this is another marker, or none, px.
+const WRONG_PX: f64 = 2.0;
+
+fn run(text: &str, hard: &str, seeds: std::ops::Range<u64>, kept: Option<&Path>) -> Tally {
+    let plate = plate(text);
+    let mut tally = Tally::default();
+    for seed in seeds {
+        let (scene, picture) = look(&plate, hard, seed);
+        let in_view: Vec<usize> = (0..plate.markers.len()).filter(|&k| scene.is_in_view(k)).collect();
+        tally.views += 1;
+        tally.in_view += in_view.len();
+        let observations = detect(&picture, &plate).map(|d| d.observations).unwrap_or_default();
+        tally.seen += usize::from(!observations.is_empty());
+        for o in observations.iter().filter(|o| o.edge == Edge::Outer) {
+            let k = plate.index_of(o.marker).unwrap();
+            let off = scene.truth(k).map_or(f64::INFINITY, |p| (Vector2::from(o.uv) - p).norm());
+            if off > WRONG_PX {
+                tally.wrong += 1;
+                println!("{hard} {seed}: marker {} is off by {off:.1} px", o.marker);
+            } else {
+                // What is cut or half covered was not asked for.
+                tally.found += usize::from(in_view.contains(&k));
+                tally.squares += off * off;
+            }
+        }
+        if let Some(folder) = kept {
+            keep(folder, &format!("{hard}-{seed:04}"), &scene, &picture, &in_view);
+        }
+    }
+    tally
+}
+
+/// The picture and what is in view, for other detectors.
+fn keep(folder: &Path, name: &str, scene: &Scene, picture: &Picture, in_view: &[usize]) {
+    std::fs::create_dir_all(folder).unwrap();
+    let bytes: Vec<u8> = picture.pixels.iter().map(|&p| p as u8).collect();
+    let size = (picture.width as u32, picture.height as u32);
+    image::save_buffer(folder.join(format!("{name}.png")), &bytes, size.0, size.1, ExtendedColorType::L8).unwrap();
+    let line = |&k: &usize| {
+        let p = scene.truth(k).unwrap();
+        format!("{},{},{}\n", scene.plate.markers[k].id, p.x, p.y)
+    };
+    std::fs::write(folder.join(format!("{name}.csv")), in_view.iter().map(line).collect::<String>()).unwrap();
+}
+
+#[test]
+fn no_board_gets_a_wrong_id() {
+    for (kind, text) in BOARDS {
+        let mut all = 0.0;
+        for hard in HARD {
+            let tally = run(text, hard, 0..2, None);
+            println!("{kind} {hard}: {tally:?}");
+            assert_eq!(tally.wrong, 0, "{kind} {hard}");
+            all += tally.share() / HARD.len() as f64;
+        }
+        assert!(all > 0.5, "{kind}: {all}");
+    }
+}
+
+/// The study of `reports/boards.md`. VIEWS: how many a line; KINDS and HARD: which; KEEP: a folder for the pictures and what is in view.
+#[test]
+#[ignore = "hours"]
+fn study_of_board_views() {
+    let text = |name: &str| std::env::var(name).ok();
+    let views = text("VIEWS").and_then(|v| v.parse().ok()).unwrap_or(200);
+    let chosen = |name: &str, all: &str| text(name).is_none_or(|list| list.split(',').any(|one| one == all));
+    let kept = text("KEEP").map(PathBuf::from);
+    let mut table = String::from(
+        "| board | view | views | with the board | in view | found | share | wrong | rms px |\n|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for (kind, board) in BOARDS.iter().filter(|(kind, _)| chosen("KINDS", kind)) {
+        for hard in HARD.iter().filter(|hard| chosen("HARD", hard)) {
+            let t = run(board, hard, 0..views, kept.as_ref().map(|folder| folder.join(kind)).as_deref());
+            let line = format!(
+                "| {kind} | {hard} | {} | {} | {} | {} | {:.2} % | {} | {:.4} |",
+                t.views,
+                t.seen,
+                t.in_view,
+                t.found,
+                100.0 * t.share(),
+                t.wrong,
+                t.rms()
+            );
+            println!("{line}");
+            writeln!(table, "{line}").unwrap();
+            assert_eq!(t.wrong, 0, "{line}");
+        }
+    }
+    println!("\n{table}");
+}
