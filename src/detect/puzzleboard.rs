@@ -18,6 +18,8 @@ use super::{Detection, Dropped, Picture};
 use crate::error::{Code, Error, Result};
 use crate::series::{Next, Plate, Puzzle};
 
+/// A board elsewhere on the pattern is only named: more places, and a looser limit on chance.
+const FALSE_NAMES: f64 = 1e-3;
 /// Blur of a dot that the window of a corner stays clear of, px.
 const KEEP_OFF_PX: f64 = 2.0;
 /// Squares around a corner whose dots must agree with its place.
@@ -75,6 +77,8 @@ struct Reader {
     first: [i32; 2],
     /// Places and turns at which a part of the board may be taken to be.
     places: f64,
+    /// Expected number of readings by chance up to which one is believed.
+    false_alarms: f64,
 }
 
 impl Reader {
@@ -82,25 +86,26 @@ impl Reader {
     fn declared(board: BoardSize, puzzle: Puzzle) -> std::result::Result<Self, PuzzleBoardSpecError> {
         let [rows, columns] = [board.rows + 1, board.columns + 1].map(i32::unsigned_abs);
         let spec = PuzzleBoardSpec::with_origin(rows, columns, 1.0, puzzle.origin_row, puzzle.origin_col)?;
-        Self::new(spec, PuzzleBoardSearchMode::FixedBoard, puzzle)
+        Self::new(spec, PuzzleBoardSearchMode::FixedBoard, puzzle, FALSE_ALARMS)
     }
 
     /// Of any part of the pattern.
     fn anywhere(puzzle: Puzzle) -> std::result::Result<Self, PuzzleBoardSpecError> {
-        Self::new(PuzzleBoardSpec::master(1.0)?, PuzzleBoardSearchMode::Full, puzzle)
+        Self::new(PuzzleBoardSpec::master(1.0)?, PuzzleBoardSearchMode::Full, puzzle, FALSE_NAMES)
     }
 
     fn new(
         spec: PuzzleBoardSpec,
         mode: PuzzleBoardSearchMode,
         puzzle: Puzzle,
+        false_alarms: f64,
     ) -> std::result::Result<Self, PuzzleBoardSpecError> {
         let mut params = PuzzleBoardParams::for_board(spec);
         params.decode.search_mode = mode;
         params.decode.sample_radius_rel = (puzzle.dot_diameter_rel / 2.0) as f32;
         let first = [spec.origin_row, spec.origin_col].map(|k| i32::try_from(k + 1).unwrap_or(i32::MAX));
         let places = 4.0 * f64::from(spec.rows) * f64::from(spec.cols);
-        Ok(Self { detector: PuzzleBoardDetector::new(params)?, first, places })
+        Ok(Self { detector: PuzzleBoardDetector::new(params)?, first, places, false_alarms })
     }
 
     /// The board in the picture at another size, where that is hardly a chance.
@@ -110,7 +115,7 @@ impl Reader {
         let found = self.detector.detect_with_corners(&scaled.view(), &corners).ok()?;
         let bits = found.decode.logical_bits;
         let wrong = (f64::from(found.decode.logical_bit_error_rate) * bits as f64).round() as usize;
-        if self.places * binomial_tail(bits, wrong, 0.5) > FALSE_ALARMS {
+        if self.places * binomial_tail(bits, wrong, 0.5) > self.false_alarms {
             return None;
         }
         let [row, column] = self.first;

@@ -237,7 +237,7 @@ fn no_board_gets_a_wrong_id() {
     }
 }
 
-/// The study of `reports/boards.md`. VIEWS: how many a line; KINDS and HARD: which; KEEP: a folder for the pictures and what is in view.
+/// All boards under all that is hard. VIEWS: how many a line; KINDS and HARD: which; KEEP: a folder for the pictures and what is in view.
 #[test]
 #[ignore = "hours"]
 fn study_of_board_views() {

@@ -70,11 +70,13 @@ fn a_board_drawn_as_its_makers_do_is_read() {
         let dot = dots.iter().find(|(here, inside, _)| *here && *inside).map(|(.., bit)| *bit == 1);
         if dot.unwrap_or((r + c + 7 + 30) % 2 == 1) { 200.0 } else { 30.0 }
     };
-    let (width, height) = (320, 300);
+    let (width, height) = (320, 330);
+    let (sin, cos) = 0.1_f64.sin_cos();
     // Means over a pixel and its neighbours: some blur.
     let pixel = |k: usize| {
-        let (x, y) = ((k % width) as f64 - 30.3, (k / width) as f64 - 40.6);
-        let samples = (0..100).map(|s| shade(x + 0.2 * f64::from(s % 10) - 0.9, y + 0.2 * f64::from(s / 10) - 0.9));
+        let (x, y) = ((k % width) as f64 - 50.3, (k / width) as f64 - 40.6);
+        let samples = (0..100).map(|s| [x + 0.2 * f64::from(s % 10) - 0.9, y + 0.2 * f64::from(s / 10) - 0.9]);
+        let samples = samples.map(|[x, y]| shade(cos * x + sin * y, cos * y - sin * x));
         (samples.sum::<f64>() / 100.0).round() as f32
     };
     let picture = Picture { width, height, pixels: (0..width * height).map(pixel).collect(), full_scale: 255.0 };
@@ -82,7 +84,7 @@ fn a_board_drawn_as_its_makers_do_is_read() {
     assert_eq!(detection.observations.len(), 72, "{:?}", detection.dropped);
     for o in &detection.observations {
         let at = [o.marker % 9, o.marker / 9].map(|k| f64::from(k + 1) * side);
-        let off = (o.uv[0] - at[0] - 30.3).hypot(o.uv[1] - at[1] - 40.6);
+        let off = (o.uv[0] - 50.3 - cos * at[0] + sin * at[1]).hypot(o.uv[1] - 40.6 - sin * at[0] - cos * at[1]);
         assert!(off < 0.1, "corner {}: {off}", o.marker);
     }
 }
