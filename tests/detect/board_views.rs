@@ -5,17 +5,17 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use image::codecs::jpeg::JpegEncoder;
-use image::{ExtendedColorType, ImageEncoder};
+use image::ExtendedColorType;
 use nalgebra::Vector2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use robotcal::detect::{Picture, detect, load_bytes};
+use robotcal::detect::{Picture, detect};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::series::{Edge, Plate, parse_plate};
 use robotcal::simulate::conditions::{Glare, Occluder};
 
 use crate::circles_support::{Scene, View, pose, scene};
+use crate::corners_rendered::compressed;
 
 /// Boards of some 0.25 m.
 pub const BOARDS: [(&str, &str); 7] = [
@@ -99,16 +99,6 @@ fn look(plate: &Plate, hard: &str, seed: u64) -> (Scene, Picture) {
         _ => {}
     }
     (scene, picture)
-}
-
-fn compressed(picture: &Picture, quality: u8) -> Picture {
-    let bytes: Vec<u8> = picture.pixels.iter().map(|&p| p as u8).collect();
-    let mut file = Vec::new();
-    let size = (picture.width as u32, picture.height as u32);
-    JpegEncoder::new_with_quality(&mut file, quality)
-        .write_image(&bytes, size.0, size.1, ExtendedColorType::L8)
-        .expect("a JPEG");
-    load_bytes("rendered.jpg".as_ref(), &file, None).expect("a picture")
 }
 
 /// A shadow with a soft edge through a place: a third of the light is left.

@@ -62,7 +62,7 @@ fn sharpened(picture: &Picture, amount: f64, sigma: f64) -> Picture {
     Picture { pixels: raw.iter().zip(&smooth).map(sharp).collect(), ..picture.clone() }
 }
 
-fn compressed(picture: &Picture, quality: u8) -> Picture {
+pub fn compressed(picture: &Picture, quality: u8) -> Picture {
     let bytes: Vec<u8> = picture.pixels.iter().map(|&p| p as u8).collect();
     let mut file = Vec::new();
     let size = (picture.width as u32, picture.height as u32);
