@@ -12,7 +12,7 @@ use crate::init::resect;
 use crate::linalg::symmetric_eigen;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Image, Problem, State, TakenFrom, Weighting, posture_groups, predict};
-use crate::solve::{Settings, solve};
+use crate::solve::{LinearProblem, LinearisedAdjustment, Settings, solve};
 use crate::stage::stage;
 
 /// Errors of predicted images.
@@ -44,7 +44,7 @@ pub struct Accuracy {
 }
 
 /// A fit of the images that are left, from where the adjustment stands.
-pub type Refit<'a> = dyn Fn(Adjustment) -> Option<State> + Sync + 'a;
+pub type Refit<'a> = dyn Fn(LinearisedAdjustment) -> Option<State> + Sync + 'a;
 
 const FOLDS: usize = 6;
 
@@ -52,14 +52,15 @@ const FOLDS: usize = 6;
 const NOMINAL_JOINT_ERROR: f64 = 3e-3;
 
 /// Predicts every image on the robot by models that have not seen it: of what is calibrated by `fitted`, from the images that are left, which is
-/// [`refitted`] for the joint fit. Also returns what was fitted, fold by fold.
-pub fn hold_out(fit: &Adjustment, fitted: &Refit, limits: &Limits) -> Option<(Accuracy, Vec<State>)> {
+/// [`refitted_near`] for the joint fit. Also returns what was fitted, fold by fold.
+pub fn hold_out(fit: LinearProblem, fitted: &Refit, limits: &Limits) -> Option<(Accuracy, Vec<State>)> {
     let _stage = stage("hold-out");
-    let folds = folds(&fit.problem, limits)?;
-    let nominal = nominal(fit);
-    let (nominal, _) = predictions(&nominal, &folds, &joint)?;
+    let problem = &fit.adjustment.problem;
+    let folds = folds(problem, limits)?;
+    let nominal = solve(nominal(fit.adjustment), &OF_FOLD);
+    let (nominal, _) = predictions(nominal.linear()?, &folds, &joint)?;
     let (calibrated, states) = predictions(fit, &folds, fitted)?;
-    let mut per_image_mm = vec![None; fit.problem.images.len()];
+    let mut per_image_mm = vec![None; problem.images.len()];
     for ((i, a), (_, b)) in nominal.iter().zip(&calibrated) {
         per_image_mm[*i] = Some([a.mm(), b.mm()]);
     }
@@ -83,12 +84,12 @@ pub(super) fn nominal(fit: &Adjustment) -> Adjustment {
 }
 
 /// Error of every image on the robot, predicted by fits of the free columns to the images of the other folds; `None` for too few.
-pub fn hold_out_images(fit: &Adjustment, limits: &Limits) -> Option<Vec<(usize, ImageError)>> {
-    predictions(fit, &folds(&fit.problem, limits)?, &joint).map(|(errors, _)| errors)
+pub fn hold_out_images(fit: LinearProblem, limits: &Limits) -> Option<Vec<(usize, ImageError)>> {
+    predictions(fit, &folds(&fit.adjustment.problem, limits)?, &joint).map(|(errors, _)| errors)
 }
 
-fn joint(adjustment: Adjustment) -> Option<State> {
-    Some(refitted(adjustment))
+fn joint(left: LinearisedAdjustment) -> Option<State> {
+    Some(refitted_near(left))
 }
 
 /// Squared errors of one predicted image, summed over its markers.
@@ -198,9 +199,13 @@ fn along_the_workspace(Adjustment { problem, state }: &Adjustment, postures: Vec
 /// Error of every held-out image with its index, and the state of every fold.
 type Predictions = (Vec<(usize, ImageError)>, Vec<State>);
 
-/// What `work` makes of the folds with their numbers, as many at a time as there are threads: each needs the memory of a solve.
+/// Members of all folds beyond which these are worked on one by one: each needs the memory of a solve.
+const MANY: usize = 2000;
+
+/// What `work` makes of the folds with their numbers, as many at a time as there are threads.
 pub fn side_by_side<T: Send>(folds: &[Vec<usize>], work: impl Fn(usize, &Vec<usize>) -> T + Sync) -> Vec<T> {
-    let at_a_time = rayon::current_num_threads().max(1);
+    let are_many = folds.iter().map(Vec::len).sum::<usize>() > MANY;
+    let at_a_time = if are_many { 1 } else { rayon::current_num_threads().max(1) };
     let numbered: Vec<(usize, &Vec<usize>)> = folds.iter().enumerate().collect();
     numbered
         .chunks(at_a_time)
@@ -208,13 +213,13 @@ pub fn side_by_side<T: Send>(folds: &[Vec<usize>], work: impl Fn(usize, &Vec<usi
         .collect()
 }
 
-fn predictions(fit: &Adjustment, folds: &[Vec<usize>], fitted: &Refit) -> Option<Predictions> {
+fn predictions(fit: LinearProblem, folds: &[Vec<usize>], fitted: &Refit) -> Option<Predictions> {
     let of_fold = |held: &Vec<usize>| fitted(fit.without_images(held));
     let states: Vec<State> = side_by_side(folds, |_, held| of_fold(held)).into_iter().collect::<Option<_>>()?;
     let mut errors = Vec::new();
     for (held, fitted) in folds.iter().zip(&states) {
         for &i in held {
-            errors.push((i, predict_image(&fit.problem, fitted, i)?));
+            errors.push((i, predict_image(fit.adjustment, fitted, i)?));
         }
     }
     errors.sort_by_key(|(i, _)| *i);
@@ -222,19 +227,25 @@ fn predictions(fit: &Adjustment, folds: &[Vec<usize>], fitted: &Refit) -> Option
 }
 
 /// Bounds of the fit of a fold: no unknown is off by more than a tenth of its sigma.
-const OF_FOLD: Settings = Settings { iterations: 30, decrement: 0.1, margin: 0.3 };
+pub(super) const OF_FOLD: Settings = Settings { iterations: 30, decrement: 0.1, margin: 0.3 };
 
 /// The free columns fitted to the images in use, from where the adjustment stands, at its noise.
 pub fn refitted(adjustment: Adjustment) -> State {
     solve(adjustment, &OF_FOLD).adjustment.state
 }
 
+/// The same from near the end.
+pub fn refitted_near(start: LinearisedAdjustment) -> State {
+    start.settled(&OF_FOLD)
+}
+
 /// Error of an image that `state` was not fitted to, predicted from its joint readings alone; `None` off the robot, or where
-/// its markers do not give a pose.
-pub fn predict_image(problem: &Problem, state: &State, image: usize) -> Option<ImageError> {
+/// its markers do not give a pose, which is near to that of the adjustment.
+pub fn predict_image(near: &Adjustment, state: &State, image: usize) -> Option<ImageError> {
+    let (problem, start) = (&near.problem, near.camera_from_plate(image)?);
     let (image, posture) = (&problem.images[image], problem.posture(image)?);
     let predicted = state.camera_from_plate(image, TakenFrom::exact(posture))?;
-    let (seen, _) = resect(image, state, &predicted, &Weighting::of(problem, image))?;
+    let (seen, _) = resect(image, state, &start, &Weighting::of(problem, image))?;
     Some(image_error(image, state, &predicted, &seen))
 }
 

@@ -2,16 +2,18 @@
 
 use std::collections::HashSet;
 
-use super::hold_out::{Accuracy, Errors, dealt, nominal, refitted, side_by_side};
+use super::hold_out::{Accuracy, Errors, OF_FOLD, dealt, nominal, refitted_near, side_by_side};
 use super::limits::Limits;
-use crate::problem::{Adjustment, State, TakenFrom};
+use crate::problem::{State, TakenFrom};
+use crate::solve::{LinearProblem, solve};
 use crate::stage::stage;
 
 /// Predicts what was measured of bodies by models that have not seen the stop. Also returns the states, fold by fold; `None` for too few stops.
-pub fn hold_out_bodies(fit: &Adjustment, limits: &Limits) -> Option<(Accuracy, Vec<State>)> {
+pub fn hold_out_bodies(fit: LinearProblem, limits: &Limits) -> Option<(Accuracy, Vec<State>)> {
     let _stage = stage("hold-out");
+    let problem = &fit.adjustment.problem;
     let stops: Vec<usize> = {
-        let mut all: Vec<usize> = fit.problem.used_bodies().map(|(_, m)| m.stop).collect();
+        let mut all: Vec<usize> = problem.used_bodies().map(|(_, m)| m.stop).collect();
         all.dedup();
         all
     };
@@ -19,9 +21,10 @@ pub fn hold_out_bodies(fit: &Adjustment, limits: &Limits) -> Option<(Accuracy, V
         return None;
     }
     let folds = dealt(stops.into_iter().map(|stop| vec![stop]).collect());
-    let (before, _) = predictions(&nominal(fit), &folds)?;
+    let nominal = solve(nominal(fit.adjustment), &OF_FOLD);
+    let (before, _) = predictions(nominal.linear()?, &folds)?;
     let (after, states) = predictions(fit, &folds)?;
-    let mut per_body_mm = vec![None; fit.problem.body_measurements.len()];
+    let mut per_body_mm = vec![None; problem.body_measurements.len()];
     for ((k, a), (_, b)) in before.iter().zip(&after) {
         per_body_mm[*k] = Some([*a, *b]);
     }
@@ -33,13 +36,14 @@ pub fn hold_out_bodies(fit: &Adjustment, limits: &Limits) -> Option<(Accuracy, V
 /// Distance of what was measured from what is predicted, mm, with the index of the measurement; ascending.
 type Predictions = (Vec<(usize, f64)>, Vec<State>);
 
-fn predictions(fit: &Adjustment, folds: &[Vec<usize>]) -> Option<Predictions> {
-    let states = side_by_side(folds, |_, held| refitted(fit.without_bodies_at(held)));
+fn predictions(fit: LinearProblem, folds: &[Vec<usize>]) -> Option<Predictions> {
+    let problem = &fit.adjustment.problem;
+    let states = side_by_side(folds, |_, held| refitted_near(fit.without_bodies_at(held)));
     let mut errors = Vec::new();
     for (held, state) in folds.iter().zip(&states) {
         let held: HashSet<usize> = held.iter().copied().collect();
-        for (k, measured) in fit.problem.used_bodies().filter(|(_, m)| held.contains(&m.stop)) {
-            let posture = fit.problem.stops[measured.stop].posture.as_ref()?;
+        for (k, measured) in problem.used_bodies().filter(|(_, m)| held.contains(&m.stop)) {
+            let posture = problem.stops[measured.stop].posture.as_ref()?;
             let predicted = state.instrument_from_body(measured, TakenFrom::exact(posture))?;
             errors.push((k, 1e3 * (measured.seen.position() - predicted.translation).norm()));
         }

@@ -16,6 +16,7 @@ use crate::geom::Pose;
 use crate::problem::{Adjustment, Problem, State};
 use crate::series::CameraMount;
 use crate::simulate::truth::Truth;
+use crate::solve::LinearisedAdjustment;
 use crate::stage::stage;
 
 /// Compares on the observations of a solution: its outliers and rejected images are left out for all estimators.
@@ -93,9 +94,15 @@ fn rows(
     estimators.iter().enumerate().map(row).collect()
 }
 
-/// What every estimator makes of the observations in use; `None` for one that has no solution. That of the joint fit may be `known`.
-fn fitted(start: &Adjustment, estimators: &[Estimator], known: Option<&State>) -> Vec<Option<State>> {
-    let stage = PoseStage::at_noise_of(start);
+/// What every estimator makes of the observations in use, some of those whose stand-alone poses are `solved`; `None` for one that has no solution.
+/// That of the joint fit may be `known`.
+fn fitted(
+    start: &Adjustment,
+    solved: Option<&LinearisedAdjustment>,
+    estimators: &[Estimator],
+    known: Option<&State>,
+) -> Vec<Option<State>> {
+    let stage = solved.and_then(|solved| PoseStage::of_left(solved, start));
     let noise = JointNoise::Estimated;
     let found = |estimator: &Estimator| match estimator {
         Estimator::Joint => Some(known.cloned().unwrap_or_else(|| refitted(start.clone()))),
@@ -115,9 +122,10 @@ fn held_out(
     (estimators, known): (&[Estimator], &[State]),
     tick: &(dyn Fn() + Sync),
 ) -> Errors {
+    let solved = PoseStage::solved(joint);
     let of_fold = |k: usize, fold: &Vec<usize>| -> Errors {
-        let found = fitted(&joint.without_images(fold), estimators, known.get(k));
-        let by_all = |&i: &usize| found.iter().map(|state| predict_image(&joint.problem, state.as_ref()?, i)).collect();
+        let found = fitted(&joint.without_images(fold), solved.as_ref(), estimators, known.get(k));
+        let by_all = |&i: &usize| found.iter().map(|state| predict_image(joint, state.as_ref()?, i)).collect();
         let errors = fold.iter().map(|i| (*i, by_all(i))).collect();
         tick();
         errors
@@ -141,7 +149,7 @@ fn summary(errors: &Errors, clusters: &[usize], k: usize, joint: Option<usize>) 
 }
 
 fn truth_errors(joint: &Adjustment, truth: &Truth) -> Result<Vec<Option<TruthError>>> {
-    let found = fitted(joint, &Estimator::ALL, None);
+    let found = fitted(joint, PoseStage::solved(joint).as_ref(), &Estimator::ALL, None);
     found.iter().map(|s| s.as_ref().map(|s| truth_error(s, truth)).transpose().map(Option::flatten)).collect()
 }
 

@@ -13,10 +13,10 @@ use super::options::Options;
 use super::solution::{Evidence, Solution};
 use super::turns;
 use crate::error::Result;
-use crate::fit::log_evidence;
+use crate::fit::{Fit, log_evidence};
 use crate::model::joint_terms::RobotModel;
 use crate::problem::{Adjustment, MeasuredSeries};
-use crate::solve::{Settings, solve};
+use crate::solve::{LinearProblem, Settings, solve};
 use crate::stage::stage;
 use crate::urdf::Chain;
 
@@ -77,7 +77,7 @@ fn best_model(
 }
 
 /// Evidence of every model that a fit of the full one holds, at its noise components, and its optimum there.
-fn compare_models(full: &Adjustment) -> Vec<(Evidence, Adjustment)> {
+fn compare_models(full: &Fit) -> Vec<(Evidence, Adjustment)> {
     let models = [RobotModel::Rigid, RobotModel::Gear, RobotModel::Full];
     let mut all: Vec<_> = models.into_par_iter().filter_map(|m| evidence(full, m)).collect();
     let best = all.iter().map(|(e, _)| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
@@ -85,21 +85,34 @@ fn compare_models(full: &Adjustment) -> Vec<(Evidence, Adjustment)> {
     all
 }
 
-fn evidence(full: &Adjustment, model: RobotModel) -> Option<(Evidence, Adjustment)> {
+fn evidence(full: &Fit, model: RobotModel) -> Option<(Evidence, Adjustment)> {
+    let Some(smaller) = without_terms(full, model) else {
+        return Some((told(full.linear(), model)?, full.adjustment.clone()));
+    };
+    let outcome = solve(smaller, &Settings { decrement: DECREMENT, ..Settings::default() });
+    let evidence = told(outcome.linear()?, model)?;
+    Some((evidence, outcome.adjustment))
+}
+
+/// With the terms of a smaller robot model alone; `None` where it has them all.
+fn without_terms(full: &Adjustment, model: RobotModel) -> Option<Adjustment> {
     let mut smaller = full.clone();
     let Adjustment { problem, state } = &mut smaller;
     let first = problem.layout.terms.start;
-    for (k, t) in state.robot.terms.iter_mut().enumerate().filter(|(_, t)| !model.has(t.term)) {
+    let mut dropped = state.robot.terms.iter_mut().enumerate().filter(|(_, t)| !model.has(t.term)).peekable();
+    dropped.peek()?;
+    for (k, t) in dropped {
         let column = &mut problem.layout.columns[first + k];
         // A fixed term stays at its prior mean, where its prior costs nothing.
         t.value = column.prior_mean;
         column.free = false;
     }
-    let outcome = solve(smaller, &Settings { decrement: DECREMENT, ..Settings::default() });
-    let linear = outcome.linear()?;
-    let layout = &outcome.adjustment.problem.layout;
+    Some(smaller)
+}
+
+/// Of the model that an adjustment has, at its optimum.
+fn told(linear: LinearProblem, model: RobotModel) -> Option<Evidence> {
+    let layout = &linear.adjustment.problem.layout;
     let parameters = layout.columns[layout.robot()].iter().filter(|c| c.free).count();
-    let log_evidence = log_evidence(linear)?;
-    let evidence = Evidence { model, log_evidence, cost: linear.lin.cost, parameters };
-    Some((evidence, outcome.adjustment))
+    Some(Evidence { model, log_evidence: log_evidence(linear)?, cost: linear.lin.cost, parameters })
 }

@@ -10,15 +10,17 @@ use super::staged::{refit, staged};
 use super::start::{StartGiven, start_robot, take_back};
 use super::start_verdict::StartVerdict;
 use super::stated::camera_starts;
-use crate::assess::{hold_out, hold_out_bodies, judge, refitted};
+use super::two_stage::PoseStage;
+use crate::assess::{hold_out, hold_out_bodies, judge, refitted_near};
 use crate::diagnose::{CheckContext, Diagnosis};
 use crate::error::{Code, Error, Result};
 use crate::fit::{Fit, FreePoses};
 use crate::problem::MeasuredSeries;
 use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem};
 use crate::solve::{
-    ComponentOptions, LEAST_FIRST_GUESS, NoiseInformation, Outcome, Status, estimate_components, reject_bodies,
-    reject_contradicting, reject_observations, reject_stops, without_unidentified_noise,
+    ComponentOptions, LEAST_FIRST_GUESS, LinearisedAdjustment, NoiseInformation, Outcome, Status, estimate_components,
+    estimate_components_from_above, reject_bodies, reject_contradicting, reject_observations, reject_stops,
+    without_unidentified_noise,
 };
 use crate::stage::stage;
 use crate::urdf::Chain;
@@ -124,14 +126,15 @@ impl JointFit {
         if estimator.is_two_stage() && !fit.problem.body_measurements.is_empty() {
             return Err(of_images_alone());
         }
-        let fitted = |left: Adjustment| match estimator.is_two_stage() {
-            true => refit(&left, estimator, noise),
-            false => Some(refitted(left)),
+        let free_poses = estimator.is_two_stage().then(|| PoseStage::solved(&fit)).flatten();
+        let fitted = |left: LinearisedAdjustment| match estimator.is_two_stage() {
+            true => refit(&left.adjustment, free_poses.as_ref()?, estimator, noise),
+            false => Some(refitted_near(left)),
         };
         let (accuracy, held_out) =
-            hold_out(&fit, &fitted, limits).or_else(|| hold_out_bodies(&fit, limits)).ok_or_else(|| {
-                Error::new(Code::NothingHeldOut, "hold-out", "too few images to hold any out", "take more images")
-            })?;
+            hold_out(fit.linear(), &fitted, limits).or_else(|| hold_out_bodies(fit.linear(), limits)).ok_or_else(
+                || Error::new(Code::NothingHeldOut, "hold-out", "too few images to hold any out", "take more images"),
+            )?;
         {
             let _stage = stage("diagnoses");
             diagnosis.after_fit(&fit, &accuracy);
@@ -190,7 +193,10 @@ fn fit(
     }
     let components =
         ComponentOptions { joint: options.joint_noise == JointNoise::Estimated, ..ComponentOptions::default() };
-    let mut outcome = estimate_components(start, &components);
+    let mut outcome = match near {
+        Some(_) => estimate_components(start, &components),
+        None => estimate_components_from_above(start, &components),
+    };
     if take_back(&mut outcome.adjustment, free, aside, &options.limits) {
         outcome = estimate_components(outcome.adjustment, &components);
     }

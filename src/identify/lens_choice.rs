@@ -13,7 +13,7 @@ use super::stated::camera_starts;
 use crate::assess::Limits;
 use crate::diagnose::LensNotInRos;
 use crate::error::{Code, Error, Notice, Result};
-use crate::fit::{FreePoses, log_evidence};
+use crate::fit::{Fit, FreePoses, log_evidence};
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Family, LensChoice, MeasuredSeries, Problem, predict};
@@ -116,7 +116,10 @@ fn compare_lenses(joint: &JointFit, camera: &str, choice: LensChoice, limits: &L
     all
 }
 
-fn evidence(fit: &Adjustment, (camera, depths_m): (usize, &[f64; 2]), lens: Lens) -> Option<LensEvidence> {
+fn evidence(fit: &Fit, (camera, depths_m): (usize, &[f64; 2]), lens: Lens) -> Option<LensEvidence> {
+    if fit.state.cameras[camera].lens == lens {
+        return told(fit.linear(), camera);
+    }
     let mut other = with_lens(fit, (camera, depths_m), lens)?;
     // Image noise follows the lens; joint noise, tilt and the sizes of families stay.
     other.problem.families.retain(|f| f.held.ncols() > 0);
@@ -125,12 +128,16 @@ fn evidence(fit: &Adjustment, (camera, depths_m): (usize, &[f64; 2]), lens: Lens
     let rounds = if lens.has_field() { FIELD_ROUNDS } else { ROUNDS };
     let options = ComponentOptions { joint: false, displacement: false, rounds, settings };
     let outcome = estimate_components(other, &options);
-    let linear = outcome.linear().filter(|_| outcome.status == Status::Converged)?;
-    let Adjustment { problem, state } = &outcome.adjustment;
-    let found = &state.cameras[camera];
+    told(outcome.linear().filter(|_| outcome.status == Status::Converged)?, camera)
+}
+
+/// Of the lens that a camera has at an optimum.
+fn told(linear: LinearProblem, camera: usize) -> Option<LensEvidence> {
+    let Adjustment { problem, state } = linear.adjustment;
+    let (found, camera) = (&state.cameras[camera], problem.cameras[camera].clone());
     let log_evidence = log_evidence(linear)? + of_noise(linear) + of_formula(found);
     let centre_px = [found.parameters[2], found.parameters[3]];
-    Some(LensEvidence { camera: problem.cameras[camera].clone(), lens, log_evidence, centre_px, taken: false })
+    Some(LensEvidence { camera, lens: found.lens, log_evidence, centre_px, taken: false })
 }
 
 /// The adjustment with another lens for one camera, which images as the present one does.

@@ -6,6 +6,7 @@ use super::two_stage::{Estimate, PoseStage, fit_poses, with_sizes};
 use crate::error::{Code, Error, Result};
 use crate::fit::Fit;
 use crate::problem::{Adjustment, State};
+use crate::solve::LinearisedAdjustment;
 
 fn unsolved(estimator: Estimator) -> Error {
     let remedy = "take more stops, or leave --two-stage away: the joint fit has a solution";
@@ -52,8 +53,13 @@ pub(super) fn staged(joint: &Fit, estimator: Estimator, noise: JointNoise) -> Re
     Ok(Fit { adjustment: own, linearised, covariance })
 }
 
-/// As the hold-out needs it: from the images that are left, with the pixel noise of all.
-pub(super) fn refit(start: &Adjustment, estimator: Estimator, noise: JointNoise) -> Option<State> {
-    let stage = PoseStage::at_noise_of(start)?;
-    Some(fit_poses(start, &stage, estimator, noise)?.state)
+/// As the hold-out needs it: from the images that are left, with the pixel noise of all, whose stand-alone poses are `solved`.
+pub(super) fn refit(
+    left: &Adjustment,
+    solved: &LinearisedAdjustment,
+    estimator: Estimator,
+    noise: JointNoise,
+) -> Option<State> {
+    let stage = PoseStage::of_left(solved, left)?;
+    Some(fit_poses(left, &stage, estimator, noise)?.state)
 }

@@ -8,14 +8,14 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
-use crate::assess::refitted;
+use crate::assess::refitted_near;
 use crate::fit::Fit;
 use crate::geom::{Pose, right_jacobian_se3};
 use crate::linalg::{SymmetricFactor, product};
 use crate::problem::{Adjustment, Chained, Problem, SIZE_OF_DISPLACEMENT, State, Step, TakenFrom, Tie};
 use crate::solve::{
-    Acceleration, ComponentOptions, Elimination, JOINT_NOISE_FLOOR, LEAST_FIRST_GUESS, LinearImage, Settings, Status,
-    Tally, converged, estimate_components, share_out,
+    Acceleration, ComponentOptions, Elimination, JOINT_NOISE_FLOOR, LEAST_FIRST_GUESS, LinearImage,
+    LinearisedAdjustment, Settings, Status, Tally, estimate_components, share_out, solve,
 };
 
 use super::block_diagonal::BlockDiagonal;
@@ -63,30 +63,34 @@ impl PoseStage {
         (outcome.status == Status::Converged).then(|| Self::linearised(&outcome.adjustment)).flatten()
     }
 
-    /// As [`PoseStage::adjusted`], with the pixel noise that `start` has.
-    pub fn at_noise_of(start: &Adjustment) -> Option<Self> {
-        Self::of(converged(with_free_poses(start)?, &AT_POSES)?)
+    /// The free-pose adjustment of all observations in use, with the pixel noise that `start` has.
+    pub fn solved(start: &Adjustment) -> Option<LinearisedAdjustment> {
+        let outcome = solve(with_free_poses(start)?, &AT_POSES);
+        let linearised = outcome.linearised.filter(|_| outcome.status == Status::Converged)?;
+        Some(LinearisedAdjustment { adjustment: outcome.adjustment, linearised })
+    }
+
+    /// Of the images that are `left` of those of a solved free-pose adjustment: one step from there. Images have nothing but cameras and plates
+    /// in common, which move by less than their sigmas.
+    pub fn of_left(solved: &LinearisedAdjustment, left: &Adjustment) -> Option<Self> {
+        let is_held = |i: &usize| left.problem.images[*i].rejected.is_some();
+        let held: Vec<usize> = solved.linearised.images.iter().copied().filter(is_held).collect();
+        Self::of(&solved.linear().without_images(&held))
     }
 
     /// The adjustment linearised at its poses, cameras and plates: one step from there, not iterated.
     pub fn linearised(at: &Adjustment) -> Option<Self> {
-        let adjustment = with_free_poses(at)?;
-        let linearised = adjustment.linearise()?;
-        let covariance = adjustment.linear(&linearised).covariance().ok()?;
-        Self::of(Fit { adjustment, linearised, covariance })
+        Self::of(&LinearisedAdjustment::of(with_free_poses(at)?)?)
     }
 
-    /// One step from where the fit ends.
-    fn of(fit: Fit) -> Option<Self> {
-        let Fit { adjustment: free, linearised, covariance: mut cov } = fit;
-        let linear = free.linear(&linearised);
+    /// One step from where the adjustment stands.
+    fn of(near: &LinearisedAdjustment) -> Option<Self> {
+        let (free, linear) = (&near.adjustment, near.linear());
         let on_robot = |own: &LinearImage| free.problem.on_robot(own.index);
         let images: Vec<LinearImage> = linear.images().filter(on_robot).collect();
         let are_together = images.len() <= MOST_TOGETHER;
-        if are_together && cov.system.latent_start.is_empty() {
-            cov = linear.covariance_by(Elimination::Markers).ok()?;
-        }
-        cov.system.take_gradient(linear);
+        let which = if are_together { Elimination::Markers } else { Elimination::cheaper(linear) };
+        let cov = linear.covariance_by(which).ok()?;
         let step = cov.system.step(linear, &(&cov.reduced * &cov.system.rhs));
         let offset = images.iter().flat_map(|own| step.ties[own.index].iter().copied());
         let of_images = linear.images().zip(cov.of_images(linear)).filter(|(own, _)| on_robot(own));
@@ -105,7 +109,7 @@ impl PoseStage {
             blocks: of_images.map(|(_, c)| Matrix6::from_column_slice(c.as_slice())).collect(),
             covariance: are_together.then(together),
             pixel_factor: free.problem.noise.pixel_factor.clone(),
-            state: free.state.clone(),
+            state: free.state.moved(&free.problem.layout, &step),
         })
     }
 }
@@ -156,6 +160,8 @@ const MOST_TOGETHER: usize = 100;
 /// Rounds of variance components, and relative change that ends them.
 const ROUNDS: usize = 60;
 const STANDING: f64 = 1e-2;
+/// Length of a step, in sigma, up to which poses are predicted as before it.
+const PREDICTED: f64 = 1e-2;
 
 /// Bounds of the adjustment of free poses.
 const AT_POSES: Settings = Settings::new(100, 0.1);
@@ -163,8 +169,6 @@ const AT_POSES: Settings = Settings::new(100, 0.1);
 /// Gauss-Newton steps at given weights, and the decrement (in sigma) that ends them.
 const STEPS: usize = 30;
 const DECREMENT: f64 = 1e-9;
-/// The same between rounds of variance components.
-const ROUGH_DECREMENT: f64 = 1e-4;
 
 impl ErrorModel {
     fn new(problem: &Problem, stage: &PoseStage, estimator: Estimator, noise: JointNoise) -> Option<Self> {
@@ -413,44 +417,77 @@ pub fn fit_poses(start: &Adjustment, stage: &PoseStage, estimator: Estimator, no
         at.without_local_errors();
     }
     let mut model = ErrorModel::new(&at.problem, stage, estimator, noise)?;
-    let kinds = at.state.robot.chain.reading_kinds.clone();
-    let mut standing = !model.estimated;
-    let mut acceleration = Acceleration::default();
-    for round in 1.. {
-        let p = predict(&at, stage)?;
-        let latents = model.latents(&at.problem, stage, &p)?;
-        let weight = model.covariance(&latents).inverse()?;
-        gauss_newton(&mut at, stage, &weight, if standing { DECREMENT } else { ROUGH_DECREMENT })?;
-        let p = predict(&at, stage)?;
-        let normal = normal(&at, &p, &weight);
-        let covariance = SymmetricFactor::new(&normal.information).ok()?.inverse();
-        if standing {
-            let covariance = zero_fixed(&at.problem, covariance);
-            let state = match estimator {
-                Estimator::FullAndRepeatability => with_cameras_for_the_robot(at, &model.sizes),
-                _ => at.state,
-            };
-            return Some(Estimate { estimator, state, covariance, components: model.sizes });
+    let weight = match model.estimated {
+        true => {
+            // Blocks tell where the sizes will be, at a small part of the cost.
+            if let Some(together) = model.together.take() {
+                estimate_sizes(&mut at, stage, &mut model)?;
+                model.sizes.iter_mut().for_each(|size| *size = size.max(LEAST_FIRST_GUESS));
+                model.together = Some(together);
+            }
+            estimate_sizes(&mut at, stage, &mut model)?
         }
-        let root = covariance.cholesky()?.l();
+        false => {
+            let p = predict(&at, stage)?;
+            model.covariance(&model.latents(&at.problem, stage, &p)?).inverse()?
+        }
+    };
+    gauss_newton(&mut at, stage, &weight)?;
+    let normal = normal(&at, &predict(&at, stage)?, &weight);
+    let covariance = zero_fixed(&at.problem, SymmetricFactor::new(&normal.information).ok()?.inverse());
+    let state = match estimator {
+        Estimator::FullAndRepeatability => with_cameras_for_the_robot(at, start, &model.sizes)?,
+        _ => at.state,
+    };
+    Some(Estimate { estimator, state, covariance, components: model.sizes })
+}
+
+/// Variance components of the second stage, with the robot that goes with them: rounds by one linear step from where the poses were last
+/// predicted, which is done again where that step ends. Returns the weights of the last round.
+fn estimate_sizes(at: &mut Adjustment, stage: &PoseStage, model: &mut ErrorModel) -> Option<BlockDiagonal> {
+    let kinds = at.state.robot.chain.reading_kinds.clone();
+    let mut acceleration = Acceleration::default();
+    let mut p = predict(at, stage)?;
+    let mut latents = model.latents(&at.problem, stage, &p)?;
+    for _ in 0..ROUNDS {
+        let weight = model.covariance(&latents).inverse()?;
+        let normal = normal(at, &p, &weight);
+        let factor = SymmetricFactor::new(&normal.information).ok()?;
+        let step = factor.solve(&normal.rhs);
+        let residual = &p.residual - &p.jacobian * &step;
+        let root = factor.inverse().cholesky()?.l();
         let taken = product(&normal.weighted_jacobian, &root);
-        let weighted = weight.times_vector(&p.residual);
+        let weighted = weight.times_vector(&residual);
         let before = model.sizes.clone();
         let change = model.update(&at.problem, &kinds, &latents, &weighted, (&weight, &taken));
         model.accelerate(&mut acceleration, &before, change);
         // Sizes that go to nothing never stand, but matter no more.
-        standing = change < STANDING || round >= ROUNDS;
+        let standing = change < STANDING;
+        let is_near = step.dot(&normal.rhs).max(0.0).sqrt() < PREDICTED;
+        if standing && is_near {
+            return model.covariance(&latents).inverse();
+        }
+        if standing {
+            at.state = moved(at, &step);
+            p = predict(at, stage)?;
+            latents = model.latents(&at.problem, stage, &p)?;
+        }
     }
-    None
+    model.covariance(&latents).inverse()
 }
 
-/// Cameras and plates at their optimum given robot, mountings and placements: what their covariance with the poses makes of them.
-fn with_cameras_for_the_robot(at: Adjustment, sizes: &[f64]) -> State {
+/// Cameras and plates at their optimum given robot, mountings and placements: what their covariance with the poses makes of them. All else is
+/// near what the joint fit has.
+fn with_cameras_for_the_robot(at: Adjustment, joint: &Adjustment, sizes: &[f64]) -> Option<State> {
     let problem = with_sizes(&at.problem, Estimator::FullAndRepeatability, sizes);
     let mut given = Adjustment { problem, state: at.state };
     given.hold_poses();
     given.tie_to_readings(sizes.iter().all(|s| *s == 0.0));
-    refitted(given)
+    let errors = given.state.joint_errors.iter_mut().zip(&joint.state.joint_errors);
+    errors.filter(|(own, known)| own.len() == known.len()).for_each(|(own, known)| own.clone_from(known));
+    let ties = given.state.ties.iter_mut().zip(&joint.state.ties);
+    ties.filter(|(own, known)| own.len() == known.len()).for_each(|(own, known)| own.clone_from(known));
+    Some(refitted_near(LinearisedAdjustment::of(given)?))
 }
 
 /// The problem with the joint noise and the apparent displacements that an estimator found; as it is for one that has none.
@@ -480,13 +517,13 @@ fn zero_fixed(problem: &Problem, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Solves at given weights; `None` where the normal equations are singular.
-fn gauss_newton(at: &mut Adjustment, stage: &PoseStage, weight: &BlockDiagonal, decrement: f64) -> Option<()> {
+fn gauss_newton(at: &mut Adjustment, stage: &PoseStage, weight: &BlockDiagonal) -> Option<()> {
     for _ in 0..STEPS {
         let p = predict(at, stage)?;
         let n = normal(at, &p, weight);
         let step = SymmetricFactor::new(&n.information).ok()?.solve(&n.rhs);
         at.state = moved(at, &step);
-        if step.dot(&n.rhs).max(0.0).sqrt() < decrement {
+        if step.dot(&n.rhs).max(0.0).sqrt() < DECREMENT {
             break;
         }
     }

@@ -51,7 +51,7 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
             "check that URDF, base, tip and series belong together",
         ));
     }
-    let errors = hold_out_images(&outcome.adjustment, limits).ok_or_else(|| {
+    let errors = outcome.linear().and_then(|fit| hold_out_images(fit, limits)).ok_or_else(|| {
         Error::new(
             Code::NothingHeldOut,
             "verification",

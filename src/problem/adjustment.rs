@@ -1,7 +1,11 @@
 //! A problem and where its solution stands.
 
+use std::collections::BTreeSet;
+
 use super::{BodyRejection, Image, ImageRejection, Problem, State, TakenFrom, Tie};
 use crate::geom::Pose;
+
+const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
 
 /// A problem with a value of every unknown: what a solve starts from and what it leaves.
 #[derive(Debug, Clone)]
@@ -57,9 +61,38 @@ impl Adjustment {
     /// The adjustment without what was measured of bodies at some stops.
     pub fn without_bodies_at(&self, stops: &[usize]) -> Self {
         let mut rest = self.clone();
+        let stops: BTreeSet<usize> = stops.iter().copied().collect();
         let held = rest.problem.body_measurements.iter_mut().filter(|m| stops.contains(&m.stop));
         held.for_each(|m| m.rejected = Some(BodyRejection::Excluded));
         rest
+    }
+
+    /// About `some` of the stops in use, evenly chosen, with all that was measured there, where there are more than `many`.
+    pub fn some_stops(&self, many: usize, some: usize) -> Option<Self> {
+        let images = self.problem.used().map(|(_, image)| image.stop);
+        let used: BTreeSet<usize> = images.chain(self.problem.used_bodies().map(|(_, m)| m.stop)).collect();
+        if used.len() <= many {
+            return None;
+        }
+        // By the golden ratio, and not every n-th: stops often come in turns of equal length.
+        let share = some as f64 / used.len() as f64;
+        let is_chosen = |k: usize| (k as f64 * GOLDEN_RATIO).fract() < share;
+        let rest: BTreeSet<usize> = used.iter().enumerate().filter(|(k, _)| !is_chosen(*k)).map(|(_, s)| *s).collect();
+        let held: Vec<usize> =
+            self.problem.used().filter(|(_, image)| rest.contains(&image.stop)).map(|(i, _)| i).collect();
+        let mut chosen = self.without_bodies_at(&rest.into_iter().collect::<Vec<_>>());
+        held.iter().for_each(|&i| chosen.problem.images[i].rejected = Some(ImageRejection::Excluded));
+        Some(chosen)
+    }
+
+    /// Starts where an adjustment of some of its stops ended; sizes of latent joint errors and apparent displacements at `least`, rad or m, or
+    /// more.
+    pub fn start_near_some(&mut self, solved: &Self, least: f64) {
+        self.state.clone_from(&solved.state);
+        self.problem.noise.start_near(&solved.problem.noise, least);
+        let factors = self.problem.families.iter_mut().zip(&solved.problem.families);
+        factors.for_each(|(own, known)| own.factor = known.factor);
+        self.hold_component_priors();
     }
 
     /// Leaves the local errors out: their columns stay at zero.

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use super::acceleration::Acceleration;
 use super::body_components::{BodyTally, update_bodies};
 use super::fit::Fit;
-use super::levenberg::{Outcome, Settings, Status, minimise, minimise_near};
+use super::levenberg::{Outcome, Settings, Status, minimise, minimise_near, minimise_with_priors};
 use super::linear::{LinearImage, LinearStop};
 use crate::problem::{Adjustment, Noise, Problem};
 use crate::urdf::JointKind;
@@ -44,6 +44,9 @@ pub(super) const SHRINKAGE: f64 = 5.0;
 /// Relative change of every component below which the rounds end.
 const CONVERGED: f64 = 0.01;
 
+/// The same in its own standard deviations, where that is more: nobody can tell the rest from none.
+const CONVERGED_SIGMAS: f64 = 0.1;
+
 /// Smallest factor of a family: with it, its parameters are as good as left out.
 const SMALLEST_FACTOR: f64 = 1e-3;
 
@@ -56,6 +59,23 @@ const FEWEST_MARKER_COORDINATES: f64 = 50.0;
 /// Newton decrement between rounds: the components need no better.
 const ROUGH_DECREMENT: f64 = 0.05;
 
+/// Relative change of a factor on the noise of measurements up to which it stays as it is, and what was linearised with it serves on.
+const STAYS: f64 = 1e-3;
+
+/// Stops of which some tell where the components of all will be, and how many those are: of few stops the components tell little.
+const MANY_STOPS: usize = 400;
+const SOME_STOPS: usize = 150;
+
+/// As [`estimate_components`], from sizes that are far off: of many stops, some come near at a small part of the cost.
+pub fn estimate_components_from_above(start: Adjustment, options: &ComponentOptions) -> Outcome {
+    let some = start.some_stops(MANY_STOPS, SOME_STOPS).map(|some| estimate_components(some, options));
+    let mut start = start;
+    if let Some(some) = some.filter(|some| some.status == Status::Converged) {
+        start.start_near_some(&some.adjustment, LEAST_FIRST_GUESS);
+    }
+    estimate_components(start, options)
+}
+
 /// Alternates solving and re-estimating until the components stand. The adjustment keeps the final components.
 pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Outcome {
     let rough = Settings { decrement: ROUGH_DECREMENT.max(options.settings.decrement), ..options.settings };
@@ -67,16 +87,20 @@ pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Out
             Ok(fit) => fit,
             Err(unsolved) => return Outcome { iterations, ..unsolved.outcome },
         };
-        let before = sizes(&mut fit.problem);
+        let (before, factors) = (sizes(&mut fit.problem), fit.problem.noise.clone());
         let change = fit.update_components(options);
         if change >= CONVERGED {
             let next = acceleration.next_after(change, &before, sizes(&mut fit.problem));
             set_sizes(&mut fit.problem, &next);
             fit.hold_component_priors();
         }
+        let serves_on = fit.keep_factors(&factors);
         let noise = &fit.problem.noise;
         tracing::debug!(round, change, pixel = ?noise.pixel_factor, joint = ?noise.joint, "variance components");
-        minimised = minimise_near(fit.adjustment, &rough);
+        minimised = match serves_on {
+            true => minimise_with_priors(fit.adjustment, fit.linearised, &rough),
+            false => minimise_near(fit.adjustment, &rough),
+        };
         iterations += minimised.outcome.iterations;
         if change < CONVERGED || minimised.outcome.status == Status::BadStart {
             break;
@@ -118,6 +142,19 @@ fn set_sizes(problem: &mut Problem, logarithms: &DVector<f64>) {
 }
 
 impl Fit {
+    /// Keeps the factors on the noise of measurements that are nearly as `before`; true where all are.
+    fn keep_factors(&mut self, before: &Noise) -> bool {
+        let noise = &mut self.problem.noise;
+        let own = noise.pixel_factor.iter_mut().chain(noise.body.iter_mut().flatten());
+        let before = before.pixel_factor.iter().chain(before.body.iter().flatten());
+        let keep = |(own, before): (&mut f64, &f64)| {
+            let stays = (*own / before - 1.0).abs() < STAYS;
+            *own = if stays { *before } else { *own };
+            stays
+        };
+        own.zip(before).map(keep).fold(true, |all, stays| all && stays)
+    }
+
     /// One round; returns the largest relative change.
     fn update_components(&mut self, options: &ComponentOptions) -> f64 {
         let problem = &self.problem;
@@ -178,7 +215,7 @@ impl Fit {
             }
             let next = family.asked(squares, determined).clamp(SMALLEST_FACTOR, 2.0 * family.factor);
             if next > SMALLEST_FACTOR {
-                change = change.max((next / family.factor - 1.0).abs());
+                change = change.max(change_told(next / family.factor, determined));
             }
             family.factor = next;
         }
@@ -413,6 +450,13 @@ fn is_not_told(information: f64) -> bool {
     (0.5 * information).sqrt() < NOT_TOLD_SIGMAS
 }
 
+/// Relative change of a size by a ratio, in the unit of [`CONVERGED`]: where the standard deviation of the size itself, `sqrt(1 / (2 information))`
+/// of it, is so large that the bound follows it, less.
+fn change_told(ratio: f64, information: f64) -> f64 {
+    let bound = CONVERGED.max(CONVERGED_SIGMAS * (0.5 / information).sqrt());
+    (ratio - 1.0).abs() * CONVERGED / bound
+}
+
 /// New noise from the sum of squares and the redundancy of each reading's latents; every reading is drawn to the common
 /// variance. Returns the largest relative change, but for sizes that go to nothing and matter no more.
 pub fn share_out(group: &[usize], tally: &Tally, common: Option<f64>, sigma: &mut [f64]) -> f64 {
@@ -423,7 +467,7 @@ pub fn share_out(group: &[usize], tally: &Tally, common: Option<f64>, sigma: &mu
         let variance = (squares[r] + SHRINKAGE * common) / (redundancy[r] + SHRINKAGE);
         let next = variance.sqrt().clamp(JOINT_NOISE_FLOOR, 2.0 * sigma[r].max(JOINT_NOISE_FLOOR));
         if next > sigma[r] || !is_not_told(tally.information[r]) {
-            change = change.max((next / sigma[r] - 1.0).abs());
+            change = change.max(change_told(next / sigma[r], tally.information[r]));
         }
         sigma[r] = next;
     }

@@ -5,6 +5,7 @@ use std::fmt;
 use super::covariance::Covariance;
 use super::fit::Fit;
 use super::linear::{LinearProblem, Linearised};
+use super::linearised_adjustment::LinearisedAdjustment;
 use super::system::{Elimination, Singular, System};
 use crate::linalg::SymmetricFactor;
 use crate::problem::{Adjustment, State, Step};
@@ -339,6 +340,27 @@ pub(super) fn minimise_near(adjustment: Adjustment, settings: &Settings) -> Mini
     minimise_by(Proposer::default(), adjustment, linearised, settings)
 }
 
+/// As [`minimise_near`], where a linearisation at the same state is known that differs in priors and sizes of what is latent alone.
+pub(super) fn minimise_with_priors(adjustment: Adjustment, linearised: Linearised, settings: &Settings) -> Minimised {
+    let linearised = adjustment.with_its_priors(linearised);
+    minimise_by(Proposer::default(), adjustment, Some(linearised), settings)
+}
+
+impl LinearisedAdjustment {
+    /// Minimises the cost from here.
+    pub fn solved(self, settings: &Settings) -> Outcome {
+        minimise_by(Proposer::default(), self.adjustment, Some(self.linearised), settings).outcome
+    }
+
+    /// The state at the optimum alone: the last step is taken on trust, and nothing is linearised where it ends.
+    pub fn settled(self, settings: &Settings) -> State {
+        let descent = Descent::new(Proposer::default(), self.adjustment, self.linearised);
+        let mut descent = Descent { is_trusting: true, ..descent };
+        descent.run(settings);
+        descent.adjustment.state
+    }
+}
+
 fn minimise_by(
     proposer: Proposer,
     adjustment: Adjustment,
@@ -349,15 +371,9 @@ fn minimise_by(
         let outcome = Outcome { status: Status::BadStart, adjustment, linearised: None, iterations: 0 };
         return Minimised { outcome, proposer };
     };
-    let mut descent = Descent { adjustment, lin, proposer, lambda: SMALLEST_LAMBDA, detour: None };
-    let (mut iterations, mut status) = (0, Status::OutOfIterations);
-    while iterations < settings.iterations && status == Status::OutOfIterations {
-        iterations += 1;
-        status = descent.step(settings);
-    }
-    descent.turn_back();
+    let mut descent = Descent::new(proposer, adjustment, lin);
+    let (iterations, status) = descent.run(settings);
     let Descent { adjustment, lin, proposer, .. } = descent;
-    tracing::debug!(iterations, ?status, cost = lin.cost, "levenberg-marquardt");
     let outcome = Outcome { status, adjustment, linearised: Some(lin), iterations };
     Minimised { outcome, proposer }
 }
@@ -377,9 +393,27 @@ struct Descent {
     proposer: Proposer,
     lambda: f64,
     detour: Option<Detour>,
+    /// The last step is taken on trust: the linearisation stays where it is.
+    is_trusting: bool,
 }
 
 impl Descent {
+    fn new(proposer: Proposer, adjustment: Adjustment, lin: Linearised) -> Self {
+        Self { adjustment, lin, proposer, lambda: SMALLEST_LAMBDA, detour: None, is_trusting: false }
+    }
+
+    /// Steps until it ends; returns how many there were, and how it ended.
+    fn run(&mut self, settings: &Settings) -> (usize, Status) {
+        let (mut iterations, mut status) = (0, Status::OutOfIterations);
+        while iterations < settings.iterations && status == Status::OutOfIterations {
+            iterations += 1;
+            status = self.step(settings);
+        }
+        self.turn_back();
+        tracing::debug!(iterations, ?status, cost = self.lin.cost, "levenberg-marquardt");
+        (iterations, status)
+    }
+
     /// Tries one more step; out of iterations for as long as others may follow.
     fn step(&mut self, settings: &Settings) -> Status {
         let Some(proposal) = self.proposer.propose(self.adjustment.linear(&self.lin), self.lambda) else {
@@ -389,6 +423,9 @@ impl Descent {
         let least = self.detour.as_ref().map_or(self.lin.cost, |detour| detour.cost);
         let expected = Expected::of(decrement, self.proposer.before, least, settings);
         let before = take_step(&mut self.adjustment, &proposal.step);
+        if self.is_trusting && expected.last && self.detour.is_none() {
+            return Status::Converged;
+        }
         let tried = self.adjustment.linearise();
         let (lambda, to) = (self.lambda, tried.as_ref().map(|t| t.cost));
         tracing::trace!(kept, lambda, decrement, from = self.lin.cost, to);

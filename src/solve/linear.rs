@@ -1,6 +1,7 @@
 //! An adjustment linearised at its state.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -34,7 +35,7 @@ pub struct Linearised {
     /// Robust cost of the pixels plus half the squares of priors, of what is latent at stops and of measured distances.
     pub cost: f64,
     /// Equations of each image in use, which the system is built from; empty where they are too many to keep.
-    equations: Arc<[Equations]>,
+    equations: Vec<Arc<Equations>>,
 }
 
 /// What was measured at one stop.
@@ -60,7 +61,7 @@ pub struct BodyPart {
 }
 
 /// One image as it is linearised, with its equations where they are kept.
-type Part = ((ImageTerms, Chained), Option<Equations>);
+type Part = ((ImageTerms, Chained), Option<Arc<Equations>>);
 
 /// Observations up to which their equations are kept, which takes about 60 MB.
 const MOST_KEPT: usize = 120_000;
@@ -68,7 +69,7 @@ const MOST_KEPT: usize = 120_000;
 impl Linearised {
     /// Without what only the solver needs.
     pub fn without_equations(self) -> Self {
-        Self { equations: Arc::default(), ..self }
+        Self { equations: Vec::new(), ..self }
     }
 
     /// A measurement of a body by its index; `None` for one that takes no part.
@@ -81,6 +82,10 @@ impl Linearised {
         let k = self.images.binary_search(&image).ok()?;
         Some((&self.terms[k], &self.chains[k]))
     }
+}
+
+fn left<T: Clone>(all: &[T], is_left: &[bool]) -> Vec<T> {
+    all.iter().zip(is_left).filter(|(_, is_left)| **is_left).map(|(one, _)| one.clone()).collect()
 }
 
 /// The linear least-squares problem that stands for an adjustment near its state.
@@ -181,30 +186,45 @@ impl Adjustment {
                 let chain = state.chained_from(&origins, &problem.layout, image, self.taken_from(i))?;
                 let weighting = Weighting::of(problem, image).thinned(image, enough);
                 let (terms, equations) = linearise_with_equations(image, state, &chain.pose, &weighting)?;
-                Some(((terms, chain), are_kept.then_some(equations)))
+                Some(((terms, chain), are_kept.then(|| Arc::new(equations))))
             })
             .collect();
         let (parts, equations): (Vec<_>, Vec<_>) = parts?.into_iter().unzip();
-        let (terms, chains): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
-        let pixels: f64 = terms.iter().map(|t| t.cost).sum();
+        let (terms, chains) = parts.into_iter().unzip();
+        let equations = equations.into_iter().flatten().collect();
         let bodies = self.linearised_bodies(&origins)?;
+        let lin =
+            self.with_its_priors(Linearised { images, terms, chains, equations, bodies, ..Linearised::default() });
+        lin.cost.is_finite().then_some(lin)
+    }
+
+    /// A linearisation at its state with its stops, measured distances and cost, of the parts of the images and bodies in use.
+    pub(super) fn with_its_priors(&self, parts: Linearised) -> Linearised {
+        let Self { problem, state } = self;
+        let Linearised { images, terms, bodies, .. } = &parts;
+        let pixels: f64 = terms.iter().map(|t| t.cost).sum();
         let of_bodies: f64 = bodies.iter().map(|b| b.terms.cost).sum();
-        let stops = self.stops_of(&images, &bodies);
-        let distances = self.distances(&images, &terms);
+        let stops = self.stops_of(images, bodies);
+        let distances = self.distances(images, terms);
         let lengths: Vec<Length> = problem.lengths.iter().filter_map(|l| l.linearise(&problem.layout, state)).collect();
         let residuals = distances.iter().map(|d| d.residual).chain(lengths.iter().map(|l| l.residual));
         let measured: f64 = residuals.map(|r| 0.5 * r * r).sum();
-        let cost = pixels + of_bodies + self.prior_cost(&images, &stops) + measured;
-        cost.is_finite().then_some(Linearised {
-            images,
-            stops,
-            terms,
-            chains,
-            bodies,
-            distances,
-            lengths,
-            cost,
-            equations: equations.into_iter().flatten().collect(),
+        let cost = pixels + of_bodies + self.prior_cost(images, &stops) + measured;
+        Linearised { stops, distances, lengths, cost, ..parts }
+    }
+
+    /// What is left of a linearisation at the same state that more images and measurements of bodies took part in.
+    pub(super) fn left_of(&self, whole: &Linearised) -> Linearised {
+        let (bodies, images): (HashSet<usize>, HashSet<usize>) =
+            (self.problem.used_bodies().map(|(k, _)| k).collect(), self.problem.used().map(|(i, _)| i).collect());
+        let is_left: Vec<bool> = whole.images.iter().map(|i| images.contains(i)).collect();
+        self.with_its_priors(Linearised {
+            images: left(&whole.images, &is_left),
+            terms: left(&whole.terms, &is_left),
+            chains: left(&whole.chains, &is_left),
+            equations: left(&whole.equations, &is_left),
+            bodies: whole.bodies.iter().filter(|b| bodies.contains(&b.index)).cloned().collect(),
+            ..Linearised::default()
         })
     }
 
@@ -312,7 +332,7 @@ impl<'a> LinearProblem<'a> {
         let before = lin.images[lin.stops[stop].images.start..k].iter();
         let tie_start = joints + before.map(|&i| state.ties[i].len()).sum::<usize>();
         let (terms, chain) = (&lin.terms[k], &lin.chains[k]);
-        let equations = lin.equations.get(k);
+        let equations = lin.equations.get(k).map(Arc::as_ref);
         LinearImage { problem, state, index, image, tie, terms, chain, stop, joints, tie_start, equations }
     }
 

@@ -209,7 +209,7 @@ fn held_out_mm(adjustment: &Adjustment, fit: impl Fn(Adjustment) -> Option<State
     for fold in folds(&adjustment.problem, &Limits::default())? {
         let found = fit(adjustment.without_images(&fold))?;
         for i in fold {
-            let e = predict_image(&adjustment.problem, &found, i)?;
+            let e = predict_image(adjustment, &found, i)?;
             squares += e.mm2;
             count += e.count;
         }

@@ -5,8 +5,10 @@
 use crate::support::small::{Dice, Request, problem, series};
 use robotcal::assess::{Limits, hold_out};
 use robotcal::identify::{Options, identify};
-use robotcal::problem::Adjustment;
-use robotcal::solve::{Settings, Status, solve};
+use robotcal::solve::{
+    ComponentOptions, LinearisedAdjustment, Settings, Status, estimate_components, estimate_components_from_above,
+    solve,
+};
 
 #[test]
 fn held_out_errors_are_those_of_fits_to_the_last_digit() {
@@ -14,12 +16,12 @@ fn held_out_errors_are_those_of_fits_to_the_last_digit() {
     let (problem, truth) =
         problem(&mut dice, &Request { images: 18, lattice: (5, 4), joint_noise: 3e-4, ..Request::default() });
     let solution = identify(truth.robot.chain, &[series(&problem)], &Options::default()).unwrap();
-    let to_the_end = |left: Adjustment| {
-        let outcome = solve(left, &Settings::new(300, 1e-7));
+    let to_the_end = |left: LinearisedAdjustment| {
+        let outcome = solve(left.adjustment, &Settings::new(300, 1e-7));
         assert_eq!(outcome.status, Status::Converged);
         Some(outcome.adjustment.state)
     };
-    let (honest, _) = hold_out(&solution.fit, &to_the_end, &Limits::default()).unwrap();
+    let (honest, _) = hold_out(solution.fit.linear(), &to_the_end, &Limits::default()).unwrap();
     for (stated, honest) in
         [(solution.accuracy.calibrated, honest.calibrated), (solution.accuracy.nominal, honest.nominal)]
     {
@@ -27,5 +29,42 @@ fn held_out_errors_are_those_of_fits_to_the_last_digit() {
             // The last steps were below a tenth of a standard deviation, of which a prediction has a few in all.
             assert!((stated / honest - 1.0).abs() < 0.02, "{stated} {honest}");
         }
+    }
+}
+
+#[test]
+fn what_is_left_of_a_linearisation_is_the_linearisation_of_what_is_left() {
+    let mut dice = Dice::new(82);
+    let (problem, truth) = problem(&mut dice, &Request { images: 12, lattice: (5, 4), ..Request::default() });
+    let solution = identify(truth.robot.chain, &[series(&problem)], &Options::default()).unwrap();
+    let left = solution.fit.linear().without_images(&[3, 7, 8]);
+    let again = LinearisedAdjustment::of(left.adjustment.clone()).unwrap();
+    assert_eq!(left.linearised.images, again.linearised.images);
+    assert_eq!(left.linearised.stops, again.linearised.stops);
+    assert!((left.linearised.cost / again.linearised.cost - 1.0).abs() < 1e-12);
+    let [step, of_again] = [left, again].map(|at| at.settled(&Settings::new(30, 1e-6)));
+    assert_eq!(step.robot.twists, of_again.robot.twists);
+}
+
+/// Stops of which some tell first where the sizes will be: the same end as from all at once.
+#[test]
+fn sizes_found_by_way_of_some_stops_are_those_of_all() {
+    let mut dice = Dice::new(83);
+    let (problem, truth) =
+        problem(&mut dice, &Request { images: 450, lattice: (4, 3), joint_noise: 2e-4, ..Request::default() });
+    let fit = identify(truth.robot.chain, &[series(&problem)], &Options::default()).unwrap().fit;
+    let mut from_above = fit.adjustment.clone();
+    from_above.problem.noise.start_at(3e-3);
+    let options = ComponentOptions::default();
+    let [by_some, by_all] = [estimate_components_from_above, estimate_components].map(|find| {
+        let outcome = find(from_above.clone(), &options);
+        assert_eq!(outcome.status, Status::Converged);
+        outcome.adjustment.problem.noise.joint
+    });
+    let by_some = by_some.iter().flatten();
+    for (by_some, by_all) in by_some.zip(by_all.iter().flatten()) {
+        // Both end within a hundredth of the fixed point in a round, of which what is left in all rounds is a few times as much.
+        assert!((by_some / by_all - 1.0).abs() < 0.03, "{by_some} {by_all}");
+        assert!((by_all / 2e-4 - 1.0).abs() < 0.25, "{by_all}");
     }
 }

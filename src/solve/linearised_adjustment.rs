@@ -1,0 +1,43 @@
+//! An adjustment near its optimum that is linearised where it stands, and what is left of it without some of its images.
+
+use super::linear::{LinearProblem, Linearised};
+use crate::problem::Adjustment;
+
+/// An adjustment, linearised where it stands.
+#[derive(Debug, Clone)]
+pub struct LinearisedAdjustment {
+    /// The adjustment.
+    pub adjustment: Adjustment,
+    /// Its linearisation.
+    pub linearised: Linearised,
+}
+
+impl LinearisedAdjustment {
+    /// `None` where a marker lies behind its camera.
+    pub fn of(adjustment: Adjustment) -> Option<Self> {
+        let linearised = adjustment.linearise()?;
+        Some(Self { adjustment, linearised })
+    }
+
+    /// The linear problem.
+    pub fn linear(&self) -> LinearProblem<'_> {
+        self.adjustment.linear(&self.linearised)
+    }
+}
+
+impl LinearProblem<'_> {
+    /// Without some of its images, and what was measured of bodies at their stops.
+    pub fn without_images(self, held: &[usize]) -> LinearisedAdjustment {
+        self.left_in(self.adjustment.without_images(held))
+    }
+
+    /// Without what was measured of bodies at some stops.
+    pub fn without_bodies_at(self, stops: &[usize]) -> LinearisedAdjustment {
+        self.left_in(self.adjustment.without_bodies_at(stops))
+    }
+
+    fn left_in(self, adjustment: Adjustment) -> LinearisedAdjustment {
+        let linearised = adjustment.left_of(self.lin);
+        LinearisedAdjustment { adjustment, linearised }
+    }
+}
