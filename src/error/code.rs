@@ -292,6 +292,7 @@ codes! {
         PlateSizeContradicted "plate_size_contradicted" "robot and plate file disagree on the size of the plate",
         PlateUneven "plate_uneven" "the plate is stretched more one way than the other",
         MeasurementsLeftOut "measurements_left_out" "measurements of trackers or contacts do not fit the others, and are left out",
+        MeasurementsScatter "measurements_scatter" "measurements of a tracker or of contacts scatter more than their stated sigma says",
         ImagesLeftOut "images_left_out" "many images were left out",
         ObservationsLeftOut "observations_left_out" "many observations were left out",
         LensNotInRos "lens_not_in_ros" "camera.yaml cannot express the lens",
