@@ -251,6 +251,7 @@ codes! {
         ReadingsContradict "readings_contradict" "joint readings and images do not belong together",
         JointSignWrong "joint_sign_wrong" "with joints negated the images fit",
         JointOrderWrong "joint_order_wrong" "with joints exchanged the images fit",
+        JointCoupled "joint_coupled" "with a joint counted from the joint before it, and not from the ground, the images fit",
         JointUnitWrong "joint_unit_wrong" "with the unit of single joints changed the images fit",
         RotationConvention "rotation_convention" "poses of the controller follow another convention of rotation than is stated",
         PosesInverted "poses_inverted" "with the poses of the controller inverted the images fit",
