@@ -116,8 +116,17 @@ limits! {
     /// Fewest coordinates of markers that the data must tell before they are compared with their tolerance: its size is then known to a tenth.
     tolerance_coordinates: f64 = 50.0;
 
+    /// Factor on the stated sigma of a tracker or of contacts from which it is said: sigmas are believed to a factor of two.
+    doubtful_measurement_factor: f64 = 3.0;
+    /// The same from which the measurements do not belong together: real trackers and sockets stay below 1.2.
+    measurement_factor: f64 = 10.0;
+
     /// Standard deviations from which on plate and links contradict each other.
     plate_size_sigmas: f64 = 3.0;
+    /// The same, of a first look from the fit with the stated size, from which a fit with a free size decides.
+    plate_size_suspected: f64 = 1.5;
+    /// Standard deviation of the size by the links from which on they say nothing of it: small deviations ask for a small robot.
+    plate_size_told: f64 = 0.02;
     /// Prior sigmas of the x/y scale beyond which a plate was not made to size.
     plate_aspect_sigmas: f64 = 5.0;
 

@@ -17,7 +17,7 @@ use crate::urdf::JointKind;
 /// Flags of `show`.
 #[derive(Debug, Args)]
 pub(super) struct ShowArgs {
-    /// solution.json; a second one is compared with it over the workspace
+    /// solution.json, or the folder that holds it; a second one is compared with it over the workspace
     #[arg(value_name = "SOLUTION", required = true, num_args = 1..=2)]
     solutions: Vec<PathBuf>,
     /// Print the long table: everything that was found, and what was left out
@@ -42,8 +42,10 @@ pub(super) struct ShowArgs {
     at: AtArgs,
 }
 
-/// Reads a solution.
+/// Reads a solution: the file, or that of a folder of results.
 pub(super) fn read_solution(path: &Path) -> Result<SolutionRecord> {
+    let within = path.join(solution_json::FILE_NAME);
+    let path = if path.is_dir() { &within } else { path };
     recover(path)?;
     let bytes = files::read(path, FileKind::Solution)?;
     solution_json::read(&bytes)

@@ -4,8 +4,8 @@ use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
 use super::{
     camera_model, camera_pattern, extrapolates, few_images, focus, held_near_nominal, joint_noise, left_out_bodies,
-    left_out_images, left_out_observations, loose, marker_off, moved, no_gain, parameter_off, plate_size, pose_step,
-    scatter, undetermined, zeros_off,
+    left_out_images, left_out_observations, loose, marker_off, measurement_scatter, moved, no_gain, parameter_off,
+    plate_size, pose_step, scatter, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -67,6 +67,7 @@ pub const CHECKS: &[Check] = &[
     check("moved", Stage::LeftOut(|a, s| found(moved::check(a, s)))),
     check("left_out_images", Stage::LeftOut(|a, s| found(left_out_images::check(a, s)))),
     check("left_out_bodies", Stage::LeftOut(|a, s| found(left_out_bodies::check(a, s)))),
+    check("measurement_scatter", Stage::Fit(|a, b, s| found(measurement_scatter::check(a, b, s)))),
     check("left_out_observations", Stage::LeftOut(|a, s| found(left_out_observations::check(a, s)))),
     check("no_gain", Stage::Fit(|a, b, s| found(no_gain::check(a, b, s)))),
     check("zeros_off", Stage::LeftOut(|a, s| found(zeros_off::check(a, s)))),

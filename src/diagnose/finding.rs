@@ -17,6 +17,7 @@ use super::left_out_observations::ObservationsLeftOut;
 use super::lens_not_in_ros::LensNotInRos;
 use super::loose::LooseMounting;
 use super::marker_off::MarkerOff;
+use super::measurement_scatter::MeasurementsScatter;
 use super::mistake::Mistake;
 use super::moved::BodyMoved;
 use super::no_gain::NoGain;
@@ -69,6 +70,7 @@ findings! {
     LooseMounting,
     MarkerOff,
     MeasurementsLeftOut,
+    MeasurementsScatter,
     Mistake,
     BodyMoved,
     NoGain,

@@ -20,6 +20,13 @@ pub enum MistakeKind {
         /// True where degrees are read as radians, else the other way round.
         are_degrees: bool,
     },
+    /// A joint is counted together with the one before it, as where it is counted from the ground.
+    Coupled {
+        /// The joint, and the one before it.
+        joints: [String; 2],
+        /// True where its own angle is the sum of both, false where it is the difference.
+        is_sum: bool,
+    },
     /// Every image stands beside the readings of the row below, or above.
     Rows {
         /// True for the row below.
@@ -71,6 +78,7 @@ impl Mistake {
         match &self.kind {
             MistakeKind::Signs(joints) | MistakeKind::Columns(joints) => joints,
             MistakeKind::Unit { joint, .. } => joint.as_slice(),
+            MistakeKind::Coupled { joints, .. } => &joints[..1],
             _ => &[],
         }
     }
@@ -86,6 +94,7 @@ impl Kind for Mistake {
             MistakeKind::Signs(_) => Code::JointSignWrong,
             MistakeKind::Columns(_) | MistakeKind::Reversed => Code::JointOrderWrong,
             MistakeKind::Unit { .. } => Code::JointUnitWrong,
+            MistakeKind::Coupled { .. } => Code::JointCoupled,
             MistakeKind::Rows { .. } => Code::RowsShifted,
             MistakeKind::Mount(_) => Code::CameraMountWrong,
             MistakeKind::Lengths { .. } => Code::LinkLengthsWrong,
@@ -152,6 +161,10 @@ impl Kind for Mistake {
                 let values = joint.as_ref().map_or("the joint values".into(), |j| format!("the readings of {j} alone"));
                 format!("{values} are {is}, read as {read_as}: converted, the images fit")
             }
+            MistakeKind::Coupled { joints: [joint, before], is_sum } => format!(
+                "the controller counts {joint} together with {before}, as where J3 is counted from the ground: with {joint} {} {before} the images fit",
+                if *is_sum { "plus" } else { "minus" }
+            ),
             MistakeKind::Rows { below } => format!(
                 "images and joint readings are shifted by one row: every image fits the readings of the row {}",
                 if *below { "below" } else { "above" }
@@ -198,6 +211,10 @@ impl Kind for Mistake {
             }
             MistakeKind::Unit { joint: None, are_degrees } => {
                 format!("write joint_unit = \"{}\" in series.toml", unit(*are_degrees)[2])
+            }
+            MistakeKind::Coupled { joints: [joint, before], is_sum } => {
+                let word = if *is_sum { "plus" } else { "minus" };
+                format!("write {joint} {word} {before} into the column {joint} of joints.csv")
             }
             MistakeKind::Rows { .. } => "shift the image names in joints.csv by one row".into(),
             MistakeKind::Mount(mount) => {

@@ -14,7 +14,10 @@ pub struct NoGain {
     pub nominal_mm: f64,
 }
 
-pub(super) fn check(_: &Fit, accuracy: &Accuracy, _: &CheckContext) -> Option<NoGain> {
+/// Nothing can be gained where nothing of the robot was free, as with poses of a controller alone.
+pub(super) fn check(fit: &Fit, accuracy: &Accuracy, _: &CheckContext) -> Option<NoGain> {
+    let layout = &fit.problem.layout;
+    layout.robot().any(|c| layout.columns[c].free).then_some(())?;
     let found = NoGain { calibrated_mm: accuracy.calibrated.rms_mm, nominal_mm: accuracy.nominal.rms_mm };
     (found.calibrated_mm > found.nominal_mm).then_some(found)
 }

@@ -1,10 +1,14 @@
 //! Whether a plate has the size that its file states. The lengths of the robot's links are the only others there are.
 
+use nalgebra::DVector;
+
 use super::kind::{CheckContext, Kind, Quantity, Subject};
-use crate::assess::{Accuracy, refitted};
+use crate::assess::Accuracy;
 use crate::error::Code;
 use crate::fit::Fit;
 use crate::problem::{Adjustment, Problem, SCALE, State, UNKNOWN_SCALE, seen_markers, size_by_distance};
+use crate::series::Plate;
+use crate::solve::{ComponentOptions, Status, System, estimate_components};
 
 const ASPECT: usize = 1;
 
@@ -34,10 +38,13 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
     let limits = setting.limits;
     let mut doubts = Vec::new();
     for (k, plate) in problem.plates.iter().enumerate() {
-        let far = |(off, sigma): &(f64, f64)| off.abs() > limits.plate_size_sigmas * sigma;
-        let told = if plate.scale.is_some() { against_distance(fit, k) } else { against_file(fit, k) };
-        let confirmed = told.filter(far).map(|(_, sigma)| (with_free_scale(fit, k), sigma));
-        if let Some((off, sigma)) = confirmed.filter(far) {
+        let released = ReleasedSize::of(&fit.adjustment, k);
+        let beyond = |told: &Told, sigmas: f64| told.off.abs() > sigmas * told.sigma;
+        // A size that is stated wrongly makes the links look worse than they are, and what they say less certain.
+        let suspected = released.one_step().filter(|told| beyond(told, limits.plate_size_suspected));
+        let told = suspected.and_then(|_| released.fitted()).filter(|told| beyond(told, limits.plate_size_sigmas));
+        let told = told.filter(|told| told.sigma < limits.plate_size_told);
+        if let Some(Told { off, sigma }) = told {
             doubts.push(DoubtedSize::Contradicted { measured: plate.scale.is_some(), off, sigma });
         }
         if plate.scale.is_none()
@@ -105,24 +112,78 @@ impl Kind for DoubtedSize {
     }
 }
 
-/// What the data say of the scale, less what the file of the plate says, with its standard deviation; `None` where they say nothing.
-fn against_file(fit: &Fit, plate: usize) -> Option<(f64, f64)> {
-    let at = fit.problem.layout.shapes[plate].start + SCALE;
-    let column = &fit.problem.layout.columns[at];
-    let (mean, prior) = (column.prior_mean, column.prior_sigma.powi(2));
-    let left = fit.covariance.reduced[(at, at)];
-    let told = 1.0 / left - 1.0 / prior;
-    let scale = fit.state.plates[plate].modes[SCALE];
-    (column.free && told > 0.0).then(|| ((scale - mean) / (left * told), (1.0 / told + prior).sqrt()))
+/// What images and links say of the size of a plate, less the stated one, and the standard deviation of that difference.
+#[derive(Clone, Copy)]
+struct Told {
+    off: f64,
+    sigma: f64,
 }
 
-/// What the data say of the measured distance of a plate, less the distance, with its standard deviation, over the distance; `None` where
-/// they say nothing.
-fn against_distance(fit: &Fit, plate: usize) -> Option<(f64, f64)> {
-    let (k, distance) = fit.linearised.distances.iter().enumerate().find(|(_, d)| d.plate == plate)?;
-    let predicted = 1.0 + fit.covariance.system.predicted_variance(&fit.covariance.reduced, k)?;
-    let unit = distance.sigma_m / distance.length_m;
-    Some((-distance.residual * predicted * unit, predicted.sqrt() * unit))
+/// An adjustment in which nothing but images and links tells the size of a plate.
+struct ReleasedSize<'a> {
+    adjustment: Adjustment,
+    index: usize,
+    /// The plate with what was measured of it.
+    plate: &'a Plate,
+    /// Sigma of the stated size.
+    stated: f64,
+}
+
+impl<'a> ReleasedSize<'a> {
+    fn of(whole: &'a Adjustment, index: usize) -> Self {
+        let mut adjustment = whole.clone();
+        let plate = &whole.problem.plates[index];
+        let column = &mut adjustment.problem.layout.columns[whole.problem.layout.shapes[index].start + SCALE];
+        let stated = plate.scale.map_or(column.prior_sigma, |bar| bar.sigma_m / bar.distance_m);
+        column.prior_sigma = UNKNOWN_SCALE;
+        let released = &mut adjustment.problem.plates[index];
+        released.scale = None;
+        // The markers keep the places that were found: as corrections with a tolerance in metres they would ask for a plate of no size.
+        released.markers.iter_mut().for_each(|m| m.sigma_m = 0.0);
+        let shape = &mut adjustment.state.plates[index];
+        for (nominal, correction) in shape.nominal.iter_mut().zip(&mut shape.corrections) {
+            *nominal += std::mem::take(correction);
+        }
+        Self { adjustment, index, plate, stated }
+    }
+
+    fn column(&self) -> usize {
+        self.adjustment.problem.layout.shapes[self.index].start + SCALE
+    }
+
+    /// By one step from the fit with the stated size; `None` where the size is held, or nothing tells it.
+    fn one_step(&self) -> Option<Told> {
+        let at = self.column();
+        let lin = self.adjustment.linearise()?;
+        let linear = self.adjustment.linear(&lin);
+        let system = System::new(linear, 0.0);
+        let factor = system.factor(linear).ok()?;
+        let mut along = DVector::zeros(system.rhs.len());
+        along[at] = 1.0;
+        let variance = factor.solve(&along)[at];
+        self.told(&self.adjustment.state, factor.solve(&system.rhs)[at], variance)
+    }
+
+    /// By a fit of its own, sizes of the errors included; `None` where it has no end.
+    fn fitted(&self) -> Option<Told> {
+        let options = ComponentOptions { joint: false, displacement: false, ..ComponentOptions::default() };
+        let outcome = estimate_components(self.adjustment.clone(), &options);
+        let fit = Some(outcome).filter(|o| o.status == Status::Converged)?.fit().ok()?;
+        self.told(&fit.state, 0.0, fit.covariance.reduced[(self.column(), self.column())])
+    }
+
+    /// From a state, a step of the scale that it lacks, and the variance of the scale with next to nothing known of it beforehand.
+    fn told(&self, state: &State, step: f64, variance: f64) -> Option<Told> {
+        let column = &self.adjustment.problem.layout.columns[self.column()];
+        let share = 1.0 - variance * UNKNOWN_SCALE.powi(-2);
+        let shape = &state.plates[self.index];
+        let off = match size_by_distance(self.plate, shape) {
+            Some(size) => 1.0 / size - 1.0,
+            None => shape.modes[SCALE] - column.prior_mean,
+        };
+        (column.free && share > 0.0)
+            .then(|| Told { off: (off + step) / share, sigma: (variance / share + self.stated.powi(2)).sqrt() })
+    }
 }
 
 /// The x/y scale of the markers that were seen, corrections included, and its prior sigma.
@@ -138,18 +199,4 @@ fn x_y_scale(problem: &Problem, state: &State, plate: usize) -> Option<(f64, f64
     }
     let prior = problem.layout.columns[problem.layout.shapes[plate].start + ASPECT].prior_sigma;
     (size > 0.0).then(|| (along / size, prior.hypot(loose.sqrt() / size)))
-}
-
-/// Size of a plate that nothing but images and links tells, less the stated one: where it is far off, the linear answer need not hold.
-fn with_free_scale(fit: &Fit, plate: usize) -> f64 {
-    let mut loose = fit.adjustment.clone();
-    let at = loose.problem.layout.shapes[plate].start + SCALE;
-    let mean = loose.problem.layout.columns[at].prior_mean;
-    loose.problem.layout.columns[at].prior_sigma = UNKNOWN_SCALE;
-    loose.problem.plates[plate].scale = None;
-    let found = &refitted(loose).plates[plate];
-    match size_by_distance(&fit.problem.plates[plate], found) {
-        Some(size) => 1.0 / size - 1.0,
-        None => found.modes[SCALE] - mean,
-    }
 }

@@ -130,6 +130,12 @@ impl Suspects<'_> {
                     }
                 }
             }
+            if k > 0 && [kinds[k - 1], kinds[k]] == [JointKind::Revolute; 2] {
+                for (is_sum, sign) in [(true, 1.0), (false, -1.0)] {
+                    let joints = [k, k - 1].map(|joint| names[joint].clone());
+                    add(MistakeKind::Coupled { joints, is_sum }, &|q| q[k] += sign * q[k - 1]);
+                }
+            }
             if kinds[k] == JointKind::Revolute {
                 for (are_degrees, factor) in units {
                     let joint = Some(names[k].clone());

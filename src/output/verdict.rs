@@ -89,7 +89,8 @@ fn left_out(r: &SolutionRecord) -> Option<VerdictReason> {
 
 fn small_gain(r: &SolutionRecord) -> Option<VerdictReason> {
     let (before, after) = (r.accuracy.nominal.rms_mm, r.accuracy.calibrated.rms_mm);
-    let small = after * r.limits().doubtful_gain > before;
+    let was_free = r.identifiability.as_ref().is_none_or(|i| i.parameters > 0);
+    let small = was_free && after * r.limits().doubtful_gain > before;
     small.then(|| VerdictReason {
         what: format!("the gain is small: {before:.3} mm before, {after:.3} mm after, on held-out images"),
         remedy:

@@ -121,6 +121,11 @@ fn read_recording(path: &Path) -> Result<Series> {
 fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     let name = folder_name(folder)?;
     let manifest_path = folder.join("series.toml");
+    if !manifest_path.exists() {
+        let remedy =
+            format!("give the folder that holds it; `robotcal doctor {}` says what a series needs", folder.display());
+        return Err(Error::new(Code::SeriesMissing, folder.display(), "holds no series.toml", remedy));
+    }
     let mut inputs = Vec::new();
     let manifest = Manifest::read(&manifest_path, &mut inputs)?;
     let by_cameras = manifest.mcap.is_none() && (manifest.cameras.len() > 1 || folder.join(image_file::NAME).is_file());

@@ -7,7 +7,7 @@ use std::path::Path;
 use nalgebra::{DVector, Vector3};
 use robotcal::assess::{MeasuredPoint, fit_points};
 use robotcal::calibration::Export;
-use robotcal::diagnose::Subject;
+use robotcal::diagnose::{Subject, Weight};
 use robotcal::error::Code;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
@@ -436,4 +436,35 @@ fn a_left_out_measurement_is_named_by_its_own_series_behind_several_cameras() {
     let solution = identify(world.chain.clone(), &series, &options).unwrap();
     let found = solution.findings.iter().find(|f| f.code() == Code::MeasurementsLeftOut).unwrap();
     assert_eq!(found.subjects(), [Subject::Stop("005".into())]);
+}
+
+/// What is said of the scatter of positions and of rotations.
+fn scatter(series: &MeasuredSeries, chain: &Chain) -> Vec<(String, Weight)> {
+    let solution = identify(chain.clone(), std::slice::from_ref(series), &Options::default()).unwrap();
+    let found = solution.findings.iter().filter(|f| f.code() == Code::MeasurementsScatter);
+    found.map(|f| (f.quantities()[0].name.clone(), f.weight())).collect()
+}
+
+#[test]
+fn measurements_that_miss_their_stated_sigma_by_far_are_named() {
+    let world = World::new(11, Kind::Poses, 40, (5e-5, 1e-4), 2e-5);
+    assert_eq!(scatter(&world.series, &world.chain), []);
+    let with = |change: &dyn Fn(usize, &mut Pose)| {
+        let mut series = world.series.clone();
+        for body in &mut series.bodies {
+            if let BodySeen::Pose(pose) = &mut body.seen {
+                change(body.stop, pose);
+            }
+        }
+        scatter(&series, &world.chain)
+    };
+    let positions = |weight| vec![("position_sigma_factor".to_owned(), weight)];
+    // The tracker was pushed by a millimetre, by five, and it counts x the other way.
+    let pushed = |by: f64| with(&|stop, pose| pose.translation.x += if stop >= 22 { by } else { 0.0 });
+    assert_eq!(pushed(1e-3), positions(Weight::Note));
+    assert_eq!(pushed(5e-3), positions(Weight::Gate));
+    assert_eq!(with(&|_, pose| pose.translation.x *= -1.0), positions(Weight::Gate));
+    // target_from_instrument for instrument_from_target.
+    let inverted = with(&|_, pose| pose.rotation = pose.rotation.transpose());
+    assert_eq!(inverted, [("rotation_sigma_factor".to_owned(), Weight::Gate)]);
 }

@@ -122,6 +122,17 @@ fn hand_eye_transform_and_noise_are_found_without_a_robot() {
     }
 }
 
+/// The poses are what they are: that nothing is gained over them is no fault.
+#[test]
+fn poses_without_a_robot_need_no_gain() {
+    for seed in 1..7 {
+        let folder = series("rotvec_rad", "rx,ry,rz", &poses(&truth(), seed), rotation_vector);
+        let calibration = calibrated(&folder).unwrap();
+        let solution = calibration.solution();
+        assert!(solution.findings.iter().all(|f| f.code() != Code::NoGain), "seed {seed}");
+    }
+}
+
 #[test]
 fn every_convention_of_rotation_says_the_same() {
     let poses = poses(&truth(), 6);

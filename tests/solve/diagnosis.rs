@@ -95,6 +95,11 @@ fn mistakes_in_single_columns_are_named() {
     assert_eq!((said.code, said.place.as_str()), (Code::JointUnitWrong, "joint_a5"), "{said}");
     let said = with(&|q| (q[3], q[5]) = (-q[3], -q[5]));
     assert_eq!((said.code, said.place.as_str()), (Code::JointSignWrong, "joint_a4, joint_a6"), "{said}");
+    // Counted from the ground, as some controllers do.
+    for sign in [1.0, -1.0] {
+        let said = with(&|q| q[2] += sign * q[1]);
+        assert_eq!((said.code, said.place.as_str()), (Code::JointCoupled, "joint_a3"), "{said}");
+    }
     let said = with(&|q| (q[3], q[4], q[5]) = (q[4], q[5], q[3]));
     assert_eq!((said.code, said.place.as_str()), (Code::JointOrderWrong, "joint_a4, joint_a6, joint_a5"), "{said}");
 }

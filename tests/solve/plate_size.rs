@@ -19,12 +19,14 @@ fn chain() -> Chain {
     robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap()
 }
 
-fn seen(chain: &Chain) -> (MeasuredSeries, Vec<[f64; 3]>) {
+fn request(chain: &Chain) -> WorldRequest {
     let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.1e-3);
     plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.01);
-    let request =
-        WorldRequest { images: 24, least_markers: 12, seed: 9, ..WorldRequest::typical(chain.clone(), plate) };
-    let world = series(&request).unwrap();
+    WorldRequest { images: 24, least_markers: 12, seed: 9, ..WorldRequest::typical(chain.clone(), plate) }
+}
+
+fn seen(chain: &Chain) -> (MeasuredSeries, Vec<[f64; 3]>) {
+    let world = series(&request(chain)).unwrap();
     (measured(&world, chain), world.truth.marker_errors_m)
 }
 
@@ -62,8 +64,8 @@ fn a_plate_as_stated_is_not_doubted() {
 }
 
 #[test]
-fn a_plate_two_percent_off_is_doubted_and_a_measured_distance_mends_it() {
-    for factor in [1.02, 0.98] {
+fn a_plate_one_or_two_percent_off_is_doubted_and_a_measured_distance_mends_it() {
+    for factor in [1.02, 1.01, 0.99, 0.98] {
         let wrong = stated(factor, factor, None);
         let said = doubts(&wrong);
         assert!(matches!(said[..], [(Code::PlateSizeContradicted, _)]), "{said:?}");
@@ -87,5 +89,22 @@ fn a_plate_that_a_printer_stretched_is_doubted_and_a_measured_distance_mends_it_
         assert_eq!(measured.failed_gates(), Vec::<String>::new());
         assert!((stretch(&measured, 0, 7) - (1.0 / 1.004 - 1.0)).abs() < 3e-4, "{bar:?}: {}", stretch(&measured, 0, 7));
         assert!(stretch(&measured, 0, 40).abs() < 3e-4, "{bar:?}: {}", stretch(&measured, 0, 40));
+    }
+}
+
+/// The wrist alone turns: its links are short, and say next to nothing of the size of the plate.
+#[test]
+fn a_wrist_alone_doubts_no_plate() {
+    let chain = chain();
+    let from = seen(&chain).0.stops[0].readings.clone().unwrap();
+    for seed in 1..6 {
+        let turned = |k: usize| {
+            let angle = |joint: usize, size: f64| from[joint] + size * (1.7 * (k * (joint + 1)) as f64).sin();
+            vec![from[0], from[1], from[2], angle(3, 0.8), angle(4, 0.4), angle(5, 2.0)]
+        };
+        let postures = Some((0..30).map(turned).collect());
+        let world = series(&WorldRequest { images: 30, postures, seed, ..request(&chain) }).unwrap();
+        let solution = identify(chain.clone(), &[measured(&world, &chain)], &Options::default()).unwrap();
+        assert_eq!(doubts(&solution), [], "seed {seed}");
     }
 }

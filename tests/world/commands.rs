@@ -126,6 +126,24 @@ fn as_json_the_solution_and_nothing_else_is_printed() {
 }
 
 #[test]
+fn a_folder_of_results_stands_for_its_solution() {
+    let [of_folder, of_file] =
+        ["reports/kr6_small", "reports/kr6_small/solution.json"].map(|path| robotcal(&["show", "--json", &root(path)]));
+    assert_eq!(of_folder.status.code(), Some(0), "{}", text(&of_folder));
+    assert_eq!(of_folder.stdout, of_file.stdout);
+}
+
+#[test]
+fn what_is_no_series_is_said_to_be_none() {
+    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    for [robot, series] in [[&root("datasets/kr6_small"), &urdf], [&urdf, &root("datasets")]] {
+        let output = robotcal(&["identify", "--urdf", robot, "--series", series]);
+        assert_eq!(output.status.code(), Some(2));
+        assert_says(&text(&output), Code::SeriesMissing, &[series]);
+    }
+}
+
+#[test]
 fn doctor_names_all_that_is_missing_at_once() {
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run1");

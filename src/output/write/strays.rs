@@ -19,6 +19,9 @@ pub fn recover(file: &Path) -> Result<()> {
     let Some(folder) = file.parent() else { return Ok(()) };
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     bring_back(folder);
+    if folder.is_file() {
+        return Ok(());
+    }
     match Held::at_once(folder) {
         Ok(_held) => journal::complete(folder),
         Err(Taken) => Ok(()),

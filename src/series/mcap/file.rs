@@ -33,7 +33,10 @@ pub(super) fn files_of(recording: &Path) -> Result<Vec<PathBuf>> {
     if let Some(other) = [".zstd", ".bag"].iter().find_map(|end| all.iter().find(ends(end))) {
         return Err(not_recording(other, &head(other)?));
     }
-    let remedy = "give an .mcap file, or a rosbag2 folder with .mcap or .db3 files";
+    let remedy = match recording.join("series.toml").is_file() {
+        true => "a series folder becomes a recording: let the second name end in .mcap",
+        false => "give an .mcap file, or a rosbag2 folder with .mcap or .db3 files",
+    };
     Err(Error::new(Code::RecordingFormat, recording.display(), "holds no .mcap or .db3 file", remedy))
 }
 
