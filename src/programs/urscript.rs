@@ -1,7 +1,7 @@
-//! URScript: `movej`, `movel`, `movep`, `movec` and `servoj` with joints `[..]` (rad) or poses `p[..]` (m, rotation vector in rad),
+//! URScript: `movej`, `movel`, `movep`, `movec`, `servoj`, `servoc`, `optimovej` and `optimovel` with joints `[..]` (rad) or poses `p[..]` (m, rotation vector in rad),
 //! written in the call or in a variable, `get_inverse_kin` around a pose, and `set_tcp`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::ProgramSetting;
 use super::field::{Field, FieldPlace};
@@ -17,12 +17,23 @@ use crate::geom::{Pose, exp_so3};
 
 const DIALECT: Dialect = Dialect { comment: b'#', quotes: b"\"'", header: None, based_numbers: false };
 /// Calls that move the robot to their first arguments, how many of them are targets, and how the tool gets there.
-const MOVES: [(&[u8], usize, Way); 5] = [
+const MOVES: [(&[u8], usize, Way); 8] = [
     (b"movej", 1, Way::Joints),
     (b"movel", 1, Way::Line),
     (b"movep", 1, Way::Line),
     (b"movec", 2, Way::Arc),
     (b"servoj", 1, Way::Joints),
+    (b"servoc", 1, Way::Arc),
+    (b"optimovej", 1, Way::Joints),
+    (b"optimovel", 1, Way::Line),
+];
+/// Calls that begin and end a motion on top of that of the targets.
+const ON_TOP: [(&[u8], bool); 5] = [
+    (b"track_conveyor_linear", true),
+    (b"track_conveyor_circular", true),
+    (b"stop_conveyor_tracking", false),
+    (b"path_offset_enable", true),
+    (b"path_offset_disable", false),
 ];
 /// Statements that end with `end`.
 const BLOCKS: [&[u8]; 6] = [b"def", b"thread", b"if", b"while", b"switch", b"for"];
@@ -69,14 +80,17 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
     let mut way = Itinerary::new();
     for (index, file) in files.iter().enumerate() {
         way.start_afresh();
-        let script = Script {
+        let mut script = Script {
             reader: Reader::new(file, index, DIALECT)?,
             setting,
             variables: BTreeMap::new(),
+            computed: BTreeSet::new(),
             blocks: Vec::new(),
+            on_top: false,
             tool: setting.tool.map(Tool::Known).unwrap_or(Tool::Unknown),
             way: &mut way,
         };
+        script.find_computed()?;
         script.read()?;
     }
     let mut program = way.program;
@@ -96,13 +110,43 @@ struct Script<'a> {
     setting: &'a ProgramSetting<'a>,
     /// Last value given to each variable.
     variables: BTreeMap<Vec<u8>, Value>,
+    /// Variables that get a computed value, or another number, anywhere: which value a move in a loop finds is not known.
+    computed: BTreeSet<Vec<u8>>,
     /// Statements that wait for their `end`; true for routines.
     blocks: Vec<bool>,
+    /// True while the robot moves by more than its targets say.
+    on_top: bool,
     tool: Tool,
     way: &'a mut Itinerary,
 }
 
 impl Script<'_> {
+    /// Looks through the whole text for variables with computed values.
+    fn find_computed(&mut self) -> Result<()> {
+        while !self.reader.done() {
+            let name = self.reader.word().map(<[u8]>::to_vec);
+            self.reader.at += 1;
+            let Some(name) = name else { continue };
+            let assigned = |reader: &Reader<'_>, ahead| {
+                reader.ahead_is_mark(ahead, b'=') && !reader.ahead_is_mark(ahead + 1, b'=')
+            };
+            if self.reader.is_mark(b'[') {
+                let close = self.reader.closing(self.reader.at);
+                let behind = close.map(|c| (c + 1) as isize - self.reader.at as isize);
+                if behind.is_some_and(|behind| assigned(&self.reader, behind)) {
+                    self.computed.insert(name);
+                }
+            } else if assigned(&self.reader, 0) {
+                self.reader.at += 1;
+                if matches!(self.value()?, Value::Expression) {
+                    self.computed.insert(name);
+                }
+            }
+        }
+        self.reader.at = 0;
+        Ok(())
+    }
+
     fn read(mut self) -> Result<()> {
         while !self.reader.done() {
             let at = self.reader.at;
@@ -116,6 +160,9 @@ impl Script<'_> {
             {
                 self.moves(*count, *way)?;
             } else if self.block(word, next) {
+                self.reader.at = at + 1;
+            } else if let Some((_, begins)) = ON_TOP.iter().find(|(name, _)| *name == word) {
+                self.on_top = *begins;
                 self.reader.at = at + 1;
             } else if word == b"set_tcp" && next == Some(TokenKind::Mark(b'(')) {
                 self.reader.at += 2;
@@ -252,7 +299,8 @@ impl Script<'_> {
         let value = match self.reader.word() {
             Some(word) if word != b"p" || !self.reader.ahead(1).is_some_and(|t| t.kind == TokenKind::Mark(b'[')) => {
                 self.reader.at += 1;
-                self.variables.get(word).cloned().unwrap_or(Value::Expression)
+                let known = self.variables.get(word).filter(|_| !self.computed.contains(word));
+                known.cloned().unwrap_or(Value::Expression)
             }
             _ => self.value()?,
         };
@@ -356,6 +404,10 @@ impl Script<'_> {
     }
 
     fn take(&mut self, name: &str, argument: Argument) -> Understood<()> {
+        if self.on_top {
+            let words = "a conveyor or an offset of the path moves the tool on top of it";
+            return Err(Why::new(LeftReason::FrameUnknown, words));
+        }
         let (kind, line) = match argument.value {
             Value::Joints(fields, line) => {
                 let mut by_reading = vec![None; self.setting.chain.readings.len()];

@@ -47,6 +47,10 @@ pub struct Aruco {
     pub dictionary: String,
     /// Side of a marker with its black border, m.
     pub side_m: f64,
+    /// OpenCV's layout before 4.6 (`setLegacyPattern` since): with an even number of rows of squares the first one is light and has
+    /// marker 0. With an odd number both layouts are the same.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub legacy: bool,
 }
 
 /// A plate of markers as designed (or as corrected by an earlier calibration).

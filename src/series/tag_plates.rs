@@ -48,22 +48,24 @@ pub fn regions(plate: &Plate) -> Result<Vec<Region>> {
                 gap_m: 0.0,
                 first_id: 0,
             };
-            charuco(plate, &tags)
+            charuco(plate, &tags, aruco.legacy)
         }
         (None, None) => Ok(Vec::new()),
     }
 }
 
-/// Squares around the inner corners, the one at the top-left dark, with tags in the light ones that count up row by row.
-fn charuco(plate: &Plate, tags: &Tags) -> Result<Vec<Region>> {
+/// Squares around the inner corners, the one at the top-left dark (light in a legacy board with an even number of rows), with tags in
+/// the light ones that count up row by row.
+fn charuco(plate: &Plate, tags: &Tags, legacy: bool) -> Result<Vec<Region>> {
     let (columns, rows) = (plate.columns + 1, plate.rows + 1);
     let dictionary = tags.dictionary("plate.toml", columns * rows / 2)?;
+    let first_dark = u32::from(legacy && rows.is_multiple_of(2));
     let mut next = 0;
     let mut all = Vec::new();
     for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
         let at = |k: u32, n: u32| (f64::from(k) - (f64::from(n) - 1.0) / 2.0) * plate.pitch_m;
         let middle = [at(column, columns), -at(row, rows)];
-        if (row + column) % 2 == 0 {
+        if (row + column) % 2 == first_dark {
             all.push(vec![square(middle, plate.pitch_m / 2.0)]);
         } else {
             all.push(tags.tag_region(&tags.modules(&dictionary, next), middle));

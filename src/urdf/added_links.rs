@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::patch::join;
-use super::read::{elements, parse};
+use super::read::{elements, parse, without_undeclared_prefixes};
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 
@@ -23,7 +23,9 @@ pub struct AddedLink {
 /// # Errors
 /// XML that cannot be read or is laid out in a way that cannot be edited, names that are taken, parents that are not there.
 pub fn add_links(text: &str, links: &[AddedLink]) -> Result<String> {
-    let document = parse(Path::new("URDF"), text)?;
+    let path = Path::new("URDF");
+    let plain = without_undeclared_prefixes(path, text)?;
+    let document = parse(path, &plain)?;
     let robot = document.root_element();
     let place = |link: &AddedLink| format!("URDF, link \"{}\"", link.name);
     let has = |kind: &'static str, name: &str| elements(robot, kind).any(|e| e.attribute("name") == Some(name));

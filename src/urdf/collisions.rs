@@ -5,7 +5,7 @@ use roxmltree::{Document, Node};
 
 use super::chain::Chain;
 use super::elements::{child, numbers};
-use super::read::RobotDescription;
+use super::read::{RobotDescription, without_undeclared_prefixes};
 use crate::geom::Pose;
 
 /// A capsule that a joint of the chain carries.
@@ -27,7 +27,8 @@ impl RobotDescription {
     pub fn carried_capsules(&self, chain: &Chain) -> (Vec<CarriedCapsule>, usize) {
         let (mut capsules, mut meshes) = (Vec::new(), 0);
         // The text was parsed before; a second failure would be one of the parser.
-        let Ok(document) = Document::parse(&self.text) else { return (capsules, meshes) };
+        let Ok(plain) = without_undeclared_prefixes(&self.path, &self.text) else { return (capsules, meshes) };
+        let Ok(document) = Document::parse(&plain) else { return (capsules, meshes) };
         for link in document.root_element().children().filter(|n| n.has_tag_name("link")) {
             let Some(name) = link.attribute("name") else { continue };
             let Some((joint, here_from_link)) = self.carrier(chain, name) else { continue };

@@ -7,7 +7,7 @@ use std::path::Path;
 use roxmltree::{Attribute, Node};
 
 use super::elements::{child, numbers};
-use super::read::{elements, parse, version};
+use super::read::{elements, parse, version, without_undeclared_prefixes};
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 
@@ -49,7 +49,9 @@ fn visit(
     new: &BTreeMap<String, Pose>,
     mut action: impl FnMut(&str, Node<'_, '_>, bool) -> Result<()>,
 ) -> Result<()> {
-    let document = parse(Path::new("URDF"), text)?;
+    let path = Path::new("URDF");
+    let plain = without_undeclared_prefixes(path, text)?;
+    let document = parse(path, &plain)?;
     let robot = document.root_element();
     let has_quaternions = version(robot) >= (1, 1);
     let mut seen: BTreeMap<&str, u32> = new.keys().map(|name| (name.as_str(), 0)).collect();

@@ -1,5 +1,6 @@
 //! Reading a URDF file.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -50,7 +51,8 @@ impl RobotDescription {
     /// # Errors
     /// As [`read`].
     pub fn from_text(path: &Path, text: String) -> Result<Self> {
-        let document = parse(path, &text)?;
+        let plain = without_undeclared_prefixes(path, &text)?;
+        let document = parse(path, &plain)?;
         let robot = document.root_element();
         let source = Source {
             file: path.display().to_string(),
@@ -69,7 +71,7 @@ impl RobotDescription {
         named(&source, robot, "joint")?;
         joint_nodes.iter().try_for_each(|n| source.check(*n))?;
 
-        let read = urdf_rs::read_from_string(text.trim_start_matches('\u{feff}')).map_err(|e| {
+        let read = urdf_rs::read_from_string(plain.trim_start_matches('\u{feff}')).map_err(|e| {
             let remedy = "check the file with check_urdf; every joint <limit> needs velocity, every link mass a value";
             Error::new(Code::UrdfSyntax, path.display(), format!("urdf-rs cannot read it: {e}"), remedy)
         })?;
@@ -119,6 +121,9 @@ impl RobotDescription {
     }
 }
 
+/// Undeclared prefixes that are let pass.
+const MOST_PREFIXES: usize = 8;
+
 /// Elements within elements: a robot description has some ten.
 const DEEPEST: usize = 64;
 
@@ -165,9 +170,29 @@ fn refuse_depth(path: &Path, text: &str) -> Result<()> {
     Ok(())
 }
 
-/// Parses XML, with an error that knows the line.
-pub(super) fn parse<'a>(path: &Path, text: &'a str) -> Result<Document<'a>> {
+/// The text with `drake:name` written `drake_name` where nothing declares the prefix, as the parsers of ROS and Drake let it pass. Every
+/// byte keeps its place. A xacro stays as it is.
+///
+/// # Errors
+/// Elements that are nested too deep for any parser.
+pub(super) fn without_undeclared_prefixes<'a>(path: &Path, text: &'a str) -> Result<Cow<'a, str>> {
     refuse_depth(path, text)?;
+    let mut plain = Cow::Borrowed(text);
+    for _ in 0..MOST_PREFIXES {
+        let Err(roxmltree::Error::UnknownNamespace(prefix, _)) = Document::parse(&plain) else { break };
+        if prefix == "xacro" {
+            return Ok(Cow::Borrowed(text));
+        }
+        let places = ["<", "</", " ", "\t", "\n"];
+        plain = places.iter().fold(plain, |text, before| {
+            text.replace(&format!("{before}{prefix}:"), &format!("{before}{prefix}_")).into()
+        });
+    }
+    Ok(plain)
+}
+
+/// Parses XML that [`without_undeclared_prefixes`] let pass, with an error that knows the line.
+pub(super) fn parse<'a>(path: &Path, text: &'a str) -> Result<Document<'a>> {
     Document::parse(text).map_err(|error| match &error {
         roxmltree::Error::UnknownNamespace(prefix, at) if prefix == "xacro" => xacro(path, at.row),
         _ => {

@@ -58,6 +58,8 @@ pub enum Print {
     Charuco {
         dictionary: Dictionary,
         ratio: f64,
+        /// The first square is light.
+        legacy: bool,
     },
     /// Dark dots: x, y (down) and radius.
     Dots(Vec<[f64; 3]>),
@@ -110,12 +112,17 @@ impl Scene {
         if !inside {
             return 1.0;
         }
-        if (c + r).rem_euclid(2.0) < 0.5 { 0.0 } else { self.light_square([x + 1.0 - c, y + 1.0 - r], c, r) }
+        let light_first = matches!(self.print, Print::Charuco { legacy: true, .. });
+        if ((c + r).rem_euclid(2.0) < 0.5) != light_first {
+            0.0
+        } else {
+            self.light_square([x + 1.0 - c, y + 1.0 - r], c, r)
+        }
     }
 
     /// Shade inside a light square; `at` runs from 0 to 1 along both sides.
     fn light_square(&self, at: [f64; 2], c: f64, r: f64) -> f64 {
-        let Print::Charuco { dictionary, ratio } = &self.print else { return 1.0 };
+        let Print::Charuco { dictionary, ratio, .. } = &self.print else { return 1.0 };
         let side = dictionary.marker_size() + 2;
         let bit = at.map(|t| ((t - 0.5) / ratio + 0.5) * side as f64);
         if bit.iter().any(|b| *b < 0.0 || *b >= side as f64) {

@@ -14,13 +14,16 @@ const COLUMNS: u32 = 8;
 const ROWS: u32 = 5;
 
 fn charuco_plate(aruco: Option<(&str, f64)>) -> Plate {
-    let aruco = aruco.map(|(name, ratio)| Aruco { dictionary: name.to_owned(), side_m: ratio * 0.01 });
+    let aruco = aruco.map(|(name, ratio)| Aruco { dictionary: name.to_owned(), side_m: ratio * 0.01, legacy: false });
     Plate { aruco, ..Plate::lattice(PlateKind::Charuco, COLUMNS, ROWS, 0.01, 1e-4) }
 }
 
 fn charuco_scene(angle: f64) -> Scene {
     let view = View::new(COLUMNS, ROWS, [321.3, 239.6], 46.0, angle, [0.015, -0.01]);
-    Scene { print: Print::Charuco { dictionary: DICT_4X4_50, ratio: 0.7 }, ..Scene::new(COLUMNS, ROWS, view) }
+    Scene {
+        print: Print::Charuco { dictionary: DICT_4X4_50, ratio: 0.7, legacy: false },
+        ..Scene::new(COLUMNS, ROWS, view)
+    }
 }
 
 fn rms(errors: &[[f64; 2]]) -> f64 {
@@ -65,6 +68,32 @@ fn part_of_a_charuco_board_keeps_its_ids() {
     assert!((15..40).contains(&detection.observations.len()), "{}", detection.observations.len());
     let error = rms(&errors(&detection, |id| scene.corner(id)));
     assert!(error < 0.006, "{error}");
+}
+
+/// Boards with an even number of rows of squares as OpenCV drew them before 4.6, and as others still do.
+#[test]
+fn a_board_of_the_layout_before_opencv_4_6_keeps_its_ids() {
+    let part = View::new(COLUMNS, ROWS, [120.0, 100.0], 60.0, 0.1, [0.0, 0.0]);
+    // An odd number of columns, and an even one, which takes other markers for each row.
+    for (columns, view, least) in [(8, None, 40), (7, None, 35), (8, Some(part), 15)] {
+        let whole = View::new(columns, ROWS, [321.3, 239.6], 46.0, 0.2, [0.015, -0.01]);
+        let new = Scene::new(columns, ROWS, view.unwrap_or(whole));
+        let print = |legacy: bool| Print::Charuco { dictionary: DICT_4X4_50, ratio: 0.7, legacy };
+        let pictures = [false, true].map(|legacy| Scene { print: print(legacy), ..new.clone() }.render(0));
+        let aruco = |legacy| Some(Aruco { dictionary: "DICT_4X4_50".to_owned(), side_m: 0.007, legacy });
+        let plate = |aruco| Plate { aruco, ..Plate::lattice(PlateKind::Charuco, columns, ROWS, 0.01, 1e-4) };
+        for legacy in [false, true] {
+            let detection = detect(&pictures[usize::from(legacy)], &plate(aruco(legacy))).unwrap();
+            assert!(detection.observations.len() >= least, "{columns} {legacy}: {:?}", detection.dropped);
+            let error = rms(&errors(&detection, |id| new.corner(id)));
+            assert!(error < 0.006, "{columns} {legacy}: {error}");
+            let other = detect(&pictures[usize::from(legacy)], &plate(aruco(!legacy))).expect_err("the other layout");
+            assert_eq!(other.code, Code::PlateNotDetectable, "{columns} {legacy}: {other}");
+        }
+        let guessed = detect(&pictures[1], &plate(None)).unwrap();
+        assert!(rms(&errors(&guessed, |id| new.corner(id))) < 0.006, "{columns}");
+        assert_says(&guessed.notices[0], Code::DictionaryGuessed, &["4.6"]);
+    }
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod said;
 mod frames;
 mod frames_study;
 mod krl;
+mod not_told;
 mod plan_choice;
 mod plan_poses;
 mod promise;

@@ -332,3 +332,26 @@ fn names_that_would_break_a_program_or_a_terminal_are_refused_with_their_line() 
         }
     }
 }
+
+/// Simulators add elements of their own, often under a prefix that nothing declares; the parsers of ROS let them pass.
+#[test]
+fn elements_under_an_undeclared_prefix_are_passed_over_and_kept() {
+    let tag = "<drake:proximity_properties><drake:mu value=\"1\"/></drake:proximity_properties>";
+    let link =
+        format!("<link name=\"a\"><collision>{tag}<geometry><sphere radius=\"0.1\"/></geometry></collision></link>");
+    let text = wrap(
+        &["b"],
+        &[joint(
+            "j",
+            "revolute",
+            "a",
+            "b",
+            "<origin xyz=\"0 0 1\"/><limit effort=\"1\" velocity=\"1\" lower=\"-1\" upper=\"1\" drake:acceleration=\"2\"/>",
+        )],
+    );
+    let text = text.replacen("<link", &format!("{link}<link"), 1);
+    assert_eq!(robot(&text).chain(None, None).unwrap().readings, ["j"]);
+    let new = [("j".to_owned(), Pose::from_xyz_rpy([0.0, 0.0, 1.5], [0.0; 3]))].into();
+    let patched = patch_origins(&text, &new).unwrap();
+    assert_eq!(patched, text.replace("xyz=\"0 0 1\"", "xyz=\"0 0 1.5\""));
+}

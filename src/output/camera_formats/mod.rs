@@ -172,7 +172,7 @@ fn format_of(path: &Path, text: &str) -> Option<CameraFormat> {
         () if path.extension().is_some_and(|e| e == "cameramodel") || has("lensmodel") => Some(CameraFormat::Mrcal),
         () if has("camera_model:") && has("intrinsics:") => Some(CameraFormat::Kalibr),
         () if has("opencv-matrix") || (has("%YAML") && has("camera_matrix")) => Some(CameraFormat::OpenCv),
-        () if has("camera_matrix:") => Some(CameraFormat::Ros),
+        () if has("camera_matrix:") || ros::is_message(text) => Some(CameraFormat::Ros),
         () => None,
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::distortion;
 use super::model::{ReadCamera, Sayable, camera_of};
-use super::yaml::{Calibration, parse};
+use super::yaml::{Calibration, parse, pinhole};
 use crate::error::Result;
 use crate::model::camera::{Camera, Lens};
 use crate::output::text::list;
@@ -45,8 +45,11 @@ pub(super) fn text(camera: &Camera) -> String {
 pub(super) fn read(path: &Path, text: &str) -> Result<ReadCamera> {
     let remedy = "give image_width, image_height, camera_matrix and distortion_coefficients, as OpenCV's calibration sample writes them";
     let file: Calibration = parse(path, text, remedy)?;
-    let (size, pinhole, d) =
-        ([file.image_width, file.image_height], file.pinhole(path)?, &file.distortion_coefficients.data);
+    let (size, pinhole, d) = (
+        [file.image_width, file.image_height],
+        pinhole(path, &file.camera_matrix.data)?,
+        &file.distortion_coefficients.data,
+    );
     if file.fisheye_model != 0 {
         let camera = camera_of(path, Lens::Fisheye, size, pinhole, d)?;
         return Ok(ReadCamera { name: file.camera_name, camera, loss_px: None });

@@ -29,20 +29,14 @@ pub(super) struct Calibration {
     pub distortion_coefficients: Numbers,
 }
 
-impl Calibration {
-    /// fx, fy, cx, cy.
-    pub fn pinhole(&self, path: &Path) -> Result<[f64; 4]> {
-        match self.camera_matrix.data[..] {
-            [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0] => Ok([fx, fy, cx, cy]),
-            _ => {
-                let what = "camera_matrix is not [fx, 0, cx, 0, fy, cy, 0, 0, 1]";
-                Err(Error::new(
-                    Code::SettingRange,
-                    path.display(),
-                    what,
-                    "a skew is not part of the models of this program",
-                ))
-            }
+/// fx, fy, cx, cy of a pinhole matrix.
+pub(super) fn pinhole(path: &Path, matrix: &[f64]) -> Result<[f64; 4]> {
+    match matrix[..] {
+        [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0] => Ok([fx, fy, cx, cy]),
+        _ => {
+            let what = "the camera matrix is not [fx, 0, cx, 0, fy, cy, 0, 0, 1]";
+            let remedy = "a skew is not part of the models of this program";
+            Err(Error::new(Code::SettingRange, path.display(), what, remedy))
         }
     }
 }

@@ -93,9 +93,9 @@ impl Aggregate {
         }
     }
 
-    /// True where components of a pose or of axes are computed.
+    /// True where components are variables or computed.
     pub fn is_computed(&self) -> bool {
-        self.elements.iter().any(|(_, e)| *e == Element::Other)
+        self.elements.iter().any(|(_, e)| !matches!(e, Element::Number(..)))
     }
 
     /// A number of the text, or the place where it has to be put.
@@ -193,17 +193,20 @@ pub(super) fn index(reader: &mut Reader<'_>) -> String {
 fn element(reader: &mut Reader<'_>, name: &str) -> Result<Element> {
     let number = reader.take_number();
     let mut element = number.map_or(Element::Other, |(value, range)| Element::Number(value, range));
-    let start = reader.at;
+    let mut start = reader.at;
     while !reader.is_mark(b',') && !reader.is_mark(b'}') {
         if reader.at_line_end() {
             let what = format!("the brace is not closed behind the component {name}");
             let place = format!("{}:{}", reader.file.name, reader.line_of(reader.at.saturating_sub(1)));
             return Err(Error::new(Code::ProgramSyntax, place, what, "close it on its line"));
         }
-        if matches!(element, Element::Other)
-            && reader.at == start
-            && let Some(word) = reader.name()
-        {
+        let begins = reader.at == start && matches!(element, Element::Other);
+        if begins && reader.is_mark(b'#') {
+            // A constant of an enumeration: its name is the word behind the mark.
+            reader.at += 1;
+            start += 1;
+        }
+        if begins && let Some(word) = reader.name() {
             element = Element::Word(word);
         } else if reader.at > start || !matches!(element, Element::Other) {
             element = Element::Other;

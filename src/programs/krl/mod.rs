@@ -43,16 +43,44 @@ enum FrameIs {
     Unknown(String),
 }
 
-/// Frames that a motion or a spline block states for itself (`WITH $TOOL=.., $BASE=..`).
-#[derive(Debug, Clone, Default)]
+/// `$TOOL`, `$BASE` and `$IPO_MODE` of a motion.
+#[derive(Debug, Clone)]
 struct Frames {
-    tool: Option<FrameIs>,
-    base: Option<FrameIs>,
+    tool: FrameIs,
+    base: FrameIs,
+    /// The tool is fixed in the room, and the robot holds the work (`#TCP`).
+    tool_in_room: bool,
 }
 
-impl Frames {
+impl Default for Frames {
+    fn default() -> Self {
+        Self { tool: FrameIs::Unset, base: FrameIs::Unset, tool_in_room: false }
+    }
+}
+
+/// What a motion or a spline block states for itself (`WITH $TOOL=.., $BASE=.., $IPO_MODE=..`).
+#[derive(Debug, Clone, Default)]
+struct OwnFrames {
+    tool: Option<FrameIs>,
+    base: Option<FrameIs>,
+    tool_in_room: Option<bool>,
+}
+
+impl OwnFrames {
     fn or(self, other: &Self) -> Self {
-        Self { tool: self.tool.or_else(|| other.tool.clone()), base: self.base.or_else(|| other.base.clone()) }
+        Self {
+            tool: self.tool.or_else(|| other.tool.clone()),
+            base: self.base.or_else(|| other.base.clone()),
+            tool_in_room: self.tool_in_room.or(other.tool_in_room),
+        }
+    }
+
+    fn over(self, active: &Frames) -> Frames {
+        Frames {
+            tool: self.tool.unwrap_or_else(|| active.tool.clone()),
+            base: self.base.unwrap_or_else(|| active.base.clone()),
+            tool_in_room: self.tool_in_room.unwrap_or(active.tool_in_room),
+        }
     }
 }
 
@@ -75,9 +103,9 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
         prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
         values: BTreeMap::new(),
         declared: Vec::new(),
-        tool: FrameIs::Unset,
-        base: FrameIs::Unset,
-        spline: Frames::default(),
+        root: FrameIs::Unset,
+        active: Frames::default(),
+        spline: OwnFrames::default(),
         way: Itinerary::new(),
     };
     // Data first: programs use them in whatever order the files are given.
@@ -99,16 +127,17 @@ struct Module<'a> {
     values: BTreeMap<String, Value>,
     /// Positions declared in data files that are no data of the controller: name, file, line.
     declared: Vec<(String, usize, usize)>,
-    tool: FrameIs,
-    base: FrameIs,
+    /// `$ROBROOT`: the foot of the robot in the world, of which `$BASE` is a part.
+    root: FrameIs,
+    active: Frames,
     /// Frames of the spline block that is open.
-    spline: Frames,
+    spline: OwnFrames,
     way: Itinerary,
 }
 
 impl Module<'_> {
     fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
-        (self.tool, self.base, self.spline) = (FrameIs::Unset, FrameIs::Unset, Frames::default());
+        (self.active, self.spline) = (Frames::default(), OwnFrames::default());
         self.way.start_afresh();
         let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {
@@ -151,13 +180,18 @@ impl Module<'_> {
         if name.is_empty() || !reader.take_mark(b'=') || reader.is_mark(b'=') {
             return Ok(());
         }
+        if name == "$IPO_MODE" {
+            self.active.tool_in_room = self.is_tool_in_room(reader);
+            return Ok(());
+        }
         let value = match component {
             true => Value::Expression,
             false => self.value(reader)?,
         };
         match name.as_str() {
-            "$TOOL" => self.tool = self.frame(&value),
-            "$BASE" => self.base = self.frame(&value),
+            "$TOOL" => self.active.tool = self.frame(&value),
+            "$BASE" => self.active.base = self.frame(&value),
+            "$ROBROOT" => self.root = self.frame(&value),
             "FDAT_ACT" => self.use_data(&value),
             _ => {
                 if !no_targets
@@ -248,28 +282,27 @@ impl Module<'_> {
     }
 
     /// Tool and base of a set of motion data, as `BAS` sets them.
-    fn data_frames(&self, data: &Aggregate) -> Option<(FrameIs, FrameIs)> {
+    fn data_frames(&self, data: &Aggregate) -> Option<Frames> {
         let (tool, base) = (data.whole("TOOL_NO")?, data.whole("BASE_NO")?);
-        if data.word("IPO_FRAME").is_some_and(|w| w == "TCP") {
-            let why = "the tool is fixed in the room (IPO_FRAME #TCP)".to_owned();
-            return Some((FrameIs::Unknown(why.clone()), FrameIs::Unknown(why)));
-        }
-        Some((self.numbered("TOOL_DATA", tool), self.numbered("BASE_DATA", base)))
+        Some(Frames {
+            tool: self.numbered("TOOL_DATA", tool),
+            base: self.numbered("BASE_DATA", base),
+            tool_in_room: data.word("IPO_FRAME") == Some("TCP"),
+        })
     }
 
     fn use_data(&mut self, value: &Value) {
         if let Ok((data, _)) = self.resolved(value)
-            && let Some((tool, base)) = self.data_frames(data)
+            && let Some(frames) = self.data_frames(data)
         {
-            (self.tool, self.base) = (tool, base);
+            self.active = frames;
         }
     }
 
     /// `WITH .., $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO), ..` in the rest of a line.
-    fn with(&self, reader: &mut Reader<'_>) -> Frames {
-        let mut frames = Frames::default();
+    fn with(&self, reader: &mut Reader<'_>) -> OwnFrames {
+        let mut frames = OwnFrames::default();
         let mut within = false;
-        let mut fixed_tool = false;
         while !reader.at_line_end() {
             let word = reader.name();
             within |= word.as_deref() == Some("WITH");
@@ -286,14 +319,10 @@ impl Module<'_> {
                 }
                 Some("$IPO_MODE") => {
                     reader.at += 1;
-                    fixed_tool = self.is_fixed_tool(reader);
+                    frames.tool_in_room = Some(self.is_tool_in_room(reader));
                 }
                 _ => {}
             }
-        }
-        if fixed_tool {
-            let why = || Some(FrameIs::Unknown("the tool is fixed in the room (IPO_FRAME #TCP)".to_owned()));
-            frames = Frames { tool: why(), base: why() };
         }
         frames
     }
@@ -324,15 +353,14 @@ impl Module<'_> {
         }
     }
 
-    /// `SIPO_MODE(FP1.IPO_FRAME)` and `#TCP`.
-    fn is_fixed_tool(&self, reader: &Reader<'_>) -> bool {
+    /// `#TCP`, `FP1.IPO_FRAME` and `SIPO_MODE(FP1.IPO_FRAME)`.
+    fn is_tool_in_room(&self, reader: &Reader<'_>) -> bool {
+        let named = |ahead| reader.ahead(ahead).map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase());
         if reader.is_mark(b'#') {
-            return reader.ahead(1).is_some_and(|t| reader.text(t).eq_ignore_ascii_case(b"TCP"));
+            return named(1).as_deref() == Some("TCP");
         }
-        let name = reader.ahead(2).map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase());
-        let data = name
-            .and_then(|n| self.resolved(&Value::Name(n)).ok().map(|(data, _)| data.word("IPO_FRAME") == Some("TCP")));
-        data.unwrap_or(false)
+        let data = named(if reader.ahead_is_mark(1, b'(') { 2 } else { 0 }).map(Value::Name);
+        data.is_some_and(|d| self.resolved(&d).is_ok_and(|(data, _)| data.word("IPO_FRAME") == Some("TCP")))
     }
 
     /// `BAS(#TOOL, n)` and `BAS(#BASE, n)`.
@@ -350,8 +378,8 @@ impl Module<'_> {
             None => FrameIs::Unknown("its number is computed".into()),
         };
         match what.as_deref() {
-            Some("TOOL") => self.tool = frame("TOOL_DATA"),
-            Some("BASE") => self.base = frame("BASE_DATA"),
+            Some("TOOL") => self.active.tool = frame("TOOL_DATA"),
+            Some("BASE") => self.active.base = frame("BASE_DATA"),
             _ => {}
         }
     }
@@ -363,7 +391,7 @@ impl Module<'_> {
         let at = reader.at;
         let own = self.with(reader);
         reader.at = at;
-        let frames = own.or(&self.spline);
+        let frames = own.or(&self.spline).over(&self.active);
         for k in 0..count {
             if k > 0 && !reader.take_mark(b',') {
                 let what = format!("{name} has {k} targets, not {count}");
@@ -388,8 +416,6 @@ impl Module<'_> {
             if matches!(&value, Value::Name(n) if n.starts_with('$')) {
                 continue;
             }
-            let tool = frames.tool.clone().unwrap_or_else(|| self.tool.clone());
-            let base = frames.base.clone().unwrap_or_else(|| self.base.clone());
             let elements = self.elements(value);
             // Which element of several the robot goes to, the text does not tell.
             let several = elements.len() > 1;
@@ -397,7 +423,7 @@ impl Module<'_> {
                 if several {
                     self.way.lose();
                 }
-                if let Err(why) = self.visit(&value, name, (reader.index, line), (&tool, &base)) {
+                if let Err(why) = self.visit(&value, name, (reader.index, line), &frames) {
                     self.leave_at(reader.index, line, name, why);
                 }
                 if several {
@@ -419,7 +445,7 @@ impl Module<'_> {
             "ELSE" | "CASE" | "DEFAULT" => self.way.next_branch(),
             "ENDIF" | "ENDSWITCH" | "ENDWHILE" | "ENDLOOP" | "ENDFOR" | "UNTIL" => self.way.branches_end(),
             "SPLINE" => {}
-            "ENDSPLINE" => self.spline = Frames::default(),
+            "ENDSPLINE" => self.spline = OwnFrames::default(),
             _ => return false,
         }
         true
@@ -446,16 +472,11 @@ impl Module<'_> {
         all.into_iter().map(|(_, v)| v).collect()
     }
 
-    fn visit(
-        &mut self,
-        value: &Value,
-        motion: &str,
-        from: (usize, usize),
-        (tool, base): (&FrameIs, &FrameIs),
-    ) -> Understood<()> {
+    fn visit(&mut self, value: &Value, motion: &str, from: (usize, usize), frames: &Frames) -> Understood<()> {
         let (aggregate, name) = self.resolved(value)?;
         let named = name.unwrap_or(motion).to_owned();
-        let mut kind = self.kind(aggregate, tool, base)?;
+        let about = |why: Why| Why { about: name.map(str::to_owned).or(why.about.clone()), ..why };
+        let mut kind = self.kind(aggregate, frames).map_err(about)?;
         if let TargetKind::Pose(pose) = &mut kind
             && pose.posture == MeantPosture::Nearest
             && ["LIN", "SLIN"].contains(&motion)
@@ -469,7 +490,7 @@ impl Module<'_> {
         if self.way.visit(target) { Ok(()) } else { Err(Why::new(LeftReason::FramesDiffer, clash)) }
     }
 
-    fn kind(&self, a: &Aggregate, tool: &FrameIs, base: &FrameIs) -> Understood<TargetKind> {
+    fn kind(&self, a: &Aggregate, frames: &Frames) -> Understood<TargetKind> {
         let axes = self.setting.axes;
         if a.has(&AXIS_NAMES) {
             return Ok(TargetKind::Joints(a.joints(axes, &self.prismatic)));
@@ -477,6 +498,19 @@ impl Module<'_> {
         if !a.has(&POSE_NAMES) {
             let words = "it has neither axes A1 to A6 nor components X to C";
             return Err(Why::new(LeftReason::NotATarget, words));
+        }
+        if frames.tool_in_room {
+            return Err(Why::new(LeftReason::ToolUnknown, "the tool is fixed in the room ($IPO_MODE #TCP)"));
+        }
+        let at_root = match &self.root {
+            FrameIs::Known(root) => *root == Pose::identity(),
+            FrameIs::Unset => true,
+            FrameIs::Unknown(_) => false,
+        };
+        if !at_root {
+            let words = "$ROBROOT is not zero: $BASE does not stand in the foot of the robot \
+                         (with --base of a link that is the world, leave out the file that sets it)";
+            return Err(Why::new(LeftReason::FrameUnknown, words));
         }
         let frame = |reason, name: &str, is: &FrameIs, flag: Option<Pose>, flag_name: &str| match (is, flag) {
             (FrameIs::Known(pose), _) => Ok(*pose),
@@ -490,8 +524,8 @@ impl Module<'_> {
             position: a.position(),
             rotation: a.rotation(),
             base_from_work: self.setting.base
-                * frame(LeftReason::FrameUnknown, "$BASE", base, self.setting.work, "--work")?,
-            flange_from_tool: frame(LeftReason::ToolUnknown, "$TOOL", tool, self.setting.tool, "--tool")?,
+                * frame(LeftReason::FrameUnknown, "$BASE", &frames.base, self.setting.work, "--work")?,
+            flange_from_tool: frame(LeftReason::ToolUnknown, "$TOOL", &frames.tool, self.setting.tool, "--tool")?,
             fixed: a.external(axes, &self.prismatic),
             posture: a.posture(axes),
             taught: None,
@@ -508,15 +542,16 @@ impl Module<'_> {
                 Some(Value::Aggregate(data)) => self.data_frames(data),
                 _ => None,
             });
-            let (tool, base) = data.unwrap_or((FrameIs::Unset, FrameIs::Unset));
-            let kind = self.kind(a, &tool, &base);
+            let kind = self.kind(a, &data.unwrap_or_default());
             if let Ok(kind) = &kind
                 && self.way.has(file, kind)
             {
                 continue;
             }
-            let visited = self.way.program.targets.iter().any(|t| t.file == file && t.line == line && t.name == name);
-            if visited {
+            let program = &self.way.program;
+            let visited = program.targets.iter().any(|t| t.file == file && t.line == line && t.name == name);
+            // A motion that goes there said why it stays.
+            if visited || program.left.iter().any(|l| l.why.about.as_deref() == Some(&name)) {
                 continue;
             }
             let done = kind.map(|kind| {

@@ -19,13 +19,15 @@ use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
-use value::{Displacement, Node, computed, frame, node, numbers, undeclared};
+use value::{Displacement, Node, check, computed, frame, node, numbers, undeclared};
 
 const DIALECT: Dialect = Dialect { comment: b'!', quotes: b"\"", header: None, based_numbers: false };
 /// Beginnings of the names of instructions that move the robot to their first arguments.
 const MOVES: [&str; 6] = ["MOVE", "TRIGGL", "TRIGGJ", "TRIGGC", "ARC", "SPOT"];
 /// Instructions that begin so, but move no robot.
 const NO_MOVES: [&str; 2] = ["MOVEEXTJ", "ARCREFRESH"];
+/// Instructions that move all robtargets behind them, until `PDispOff`.
+const DISPLACES: [&str; 2] = ["PDISPON", "PDISPSET"];
 const TYPES: [&str; 4] = ["ROBTARGET", "JOINTTARGET", "TOOLDATA", "WOBJDATA"];
 const DECIMALS_MM: usize = 4;
 const DECIMALS_DEG: usize = 6;
@@ -62,6 +64,8 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
         bases: BTreeMap::new(),
         switched_off: [false; 2],
         watched: [Watched::On; 2],
+        displaces: false,
+        displaced: false,
         way: Itinerary::new(),
     };
     for (index, file) in files.iter().enumerate() {
@@ -72,6 +76,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
         task.way.start_afresh();
         task.moves(Reader::new(file, index, DIALECT)?)?;
     }
+    task.displaced = false;
     task.unvisited()?;
     let mut program = task.way.program;
     program.files = files;
@@ -87,6 +92,10 @@ struct Task<'a> {
     switched_off: [bool; 2],
     /// State of these checks.
     watched: [Watched; 2],
+    /// True where a routine begins a program displacement, which holds in those that it calls.
+    displaces: bool,
+    /// True where such a displacement may be active.
+    displaced: bool,
     way: Itinerary,
 }
 
@@ -169,17 +178,18 @@ impl Task<'_> {
         Ok(())
     }
 
-    /// Which checks of configurations are switched off anywhere.
+    /// Which checks of configurations are switched off anywhere, and whether a displacement is begun.
     fn switches(&mut self, mut reader: Reader<'_>) {
         while !reader.done() {
             if let Some((which, Watched::Off)) = switch(&reader) {
                 self.switched_off[which] = true;
             }
+            self.displaces |= reader.name().is_some_and(|word| DISPLACES.contains(&word.as_str()));
             reader.at += 1;
         }
     }
 
-    /// Routines, branches and the check of configurations.
+    /// Routines, branches, program displacements and the check of configurations.
     fn flow(&mut self, reader: &Reader<'_>, word: &str) {
         let line_has = |wanted: &[u8]| {
             let line = (1..).map_while(|k| reader.ahead(k).filter(|t| t.kind != TokenKind::LineEnd));
@@ -193,7 +203,10 @@ impl Task<'_> {
                 self.way.start_afresh();
                 let state = |off: bool| if off { Watched::Unknown } else { Watched::On };
                 self.watched = self.switched_off.map(state);
+                self.displaced = self.displaces && !line_has(b"main");
             }
+            w if DISPLACES.contains(&w) => self.displaced = true,
+            "PDISPOFF" => self.displaced = false,
             // Without THEN it is a statement of one line.
             "IF" if line_has(b"THEN") => self.way.branches_begin(),
             "TEST" | "WHILE" | "FOR" => self.way.branches_begin(),
@@ -342,7 +355,8 @@ impl Task<'_> {
             _ => return Ok(Err(Why::computed())),
         };
         let kind = self.kind(&value, place.0, tool.as_deref(), work);
-        Ok(kind.and_then(|kind| self.add(named, place, self.with_posture(kind, name))))
+        let about = |why: Why| Why { about: Some(named.clone()), ..why };
+        Ok(kind.map_err(about).and_then(|kind| self.add(named, place, self.with_posture(kind, name))))
     }
 
     /// The posture that a kind of move gives a target.
@@ -429,6 +443,10 @@ impl Task<'_> {
         let external = parts.last().and_then(numbers::<6>).unwrap_or_default();
         if parts.len() == 2 {
             return Ok(TargetKind::Joints(self.joints(&parts[0], &external, file)?));
+        }
+        if self.displaced {
+            let words = "a program displacement (PDispOn, PDispSet) may be active";
+            return Err(Why::new(LeftReason::FrameUnknown, words));
         }
         let computed = || Why::new(LeftReason::Computed, "it is computed, not written in numbers");
         let trans = numbers::<3>(&parts[0]).ok_or_else(computed)?;
@@ -566,33 +584,4 @@ impl Task<'_> {
         }
         Ok(())
     }
-}
-
-/// The shape of the literal of a datum.
-fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result<()> {
-    let shape: &[usize] = match kind {
-        "ROBTARGET" => &[3, 4, 4, 6],
-        "JOINTTARGET" => &[6, 6],
-        _ => return Ok(()),
-    };
-    let Node::List(parts) = value else { return Ok(()) };
-    let count = |n: &Node| if let Node::List(l) = n { l.len() } else { 0 };
-    let found: Vec<usize> = parts.iter().map(count).collect();
-    if found != shape {
-        let what = format!("{name} has {found:?} numbers in its brackets, a {} has {shape:?}", kind.to_lowercase());
-        return Err(Error::new(Code::ProgramTargets, place, what, "complete it"));
-    }
-    let norm = (kind == "ROBTARGET").then(|| numbers::<4>(&parts[1])).flatten();
-    if let Some(q) = norm {
-        let norm = q.iter().map(|(v, _)| v * v).sum::<f64>().sqrt();
-        if (norm - 1.0).abs() > 0.01 {
-            return Err(Error::new(
-                Code::ProgramQuaternion,
-                place,
-                format!("the quaternion of {name} has the norm {norm:.4}, not 1"),
-                "correct it",
-            ));
-        }
-    }
-    Ok(())
 }

@@ -147,3 +147,32 @@ pub(super) fn computed(name: &str) -> Why {
 pub(super) fn undeclared(name: &str) -> Why {
     Why::of(name, LeftReason::Undeclared, format!("{name} is in none of the files (give its module as well)"))
 }
+
+/// The shape of the literal of a datum.
+pub(super) fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result<()> {
+    let shape: &[usize] = match kind {
+        "ROBTARGET" => &[3, 4, 4, 6],
+        "JOINTTARGET" => &[6, 6],
+        _ => return Ok(()),
+    };
+    let Node::List(parts) = value else { return Ok(()) };
+    let count = |n: &Node| if let Node::List(l) = n { l.len() } else { 0 };
+    let found: Vec<usize> = parts.iter().map(count).collect();
+    if found != shape {
+        let what = format!("{name} has {found:?} numbers in its brackets, a {} has {shape:?}", kind.to_lowercase());
+        return Err(Error::new(Code::ProgramTargets, place, what, "complete it"));
+    }
+    let norm = (kind == "ROBTARGET").then(|| numbers::<4>(&parts[1])).flatten();
+    if let Some(q) = norm {
+        let norm = q.iter().map(|(v, _)| v * v).sum::<f64>().sqrt();
+        if (norm - 1.0).abs() > 0.01 {
+            return Err(Error::new(
+                Code::ProgramQuaternion,
+                place,
+                format!("the quaternion of {name} has the norm {norm:.4}, not 1"),
+                "correct it",
+            ));
+        }
+    }
+    Ok(())
+}

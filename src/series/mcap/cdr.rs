@@ -28,7 +28,7 @@ impl<'a> Cdr<'a> {
             6 => (true, 4),
             7 => (false, 4),
             0x28b5 => {
-                return Err("is compressed by itself (zstd); convert the recording without message compression".into());
+                return Err("is compressed by itself (zstd) and cannot be unpacked".into());
             }
             other => return Err(format!("has the unknown encapsulation {other:#06x}")),
         };

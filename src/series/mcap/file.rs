@@ -87,7 +87,8 @@ fn not_recording(path: &Path, head: &[u8]) -> Error {
 pub(super) fn for_each(path: &Path, mut visit: impl FnMut(Message<'_>) -> Result<()>) -> Result<Option<Notice>> {
     let visit = |message: Message<'_>| {
         plain_name("topic", message.topic, path.display())?;
-        visit(message)
+        let data = unpacked(message.data);
+        visit(Message { data: &data, ..message })
     };
     let head = head(path)?;
     match () {
@@ -98,7 +99,13 @@ pub(super) fn for_each(path: &Path, mut visit: impl FnMut(Message<'_>) -> Result
 }
 
 #[cfg(feature = "mcap")]
-use records::for_each as mcap_messages;
+use records::{for_each as mcap_messages, unpacked};
+
+/// A build without the feature unpacks nothing.
+#[cfg(not(feature = "mcap"))]
+fn unpacked(data: &[u8]) -> std::borrow::Cow<'_, [u8]> {
+    data.into()
+}
 
 /// What a build without the feature says of MCAP.
 #[cfg(not(feature = "mcap"))]

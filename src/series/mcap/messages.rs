@@ -39,6 +39,13 @@ impl JointState {
         }
         Ok(Self { stamp_ns, names, positions })
     }
+
+    /// The joints that have a position: drivers write NaN for those that they do not measure.
+    pub fn finite(self) -> Self {
+        let both = self.names.into_iter().zip(self.positions).filter(|(_, q)| q.is_finite());
+        let (names, positions) = both.unzip();
+        Self { stamp_ns: self.stamp_ns, names, positions }
+    }
 }
 
 /// `sensor_msgs/Image`.

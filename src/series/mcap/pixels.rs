@@ -8,7 +8,8 @@ use super::messages::RawImage;
 /// How the bytes of an encoding are laid out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Layout {
-    Grey,
+    /// Place of the brightness in a pixel, and samples per pixel; what else a pixel has is its colour.
+    Grey(usize, usize),
     /// Offsets of red, green and blue in a pixel, and samples per pixel.
     Colour([usize; 3], usize),
     /// Colour (0 red, 1 green, 2 blue) at (row, column) of the 2x2 pattern.
@@ -18,6 +19,10 @@ enum Layout {
 /// Layout and bytes per sample of a ROS image encoding.
 fn layout(encoding: &str) -> Decoded<(Layout, usize)> {
     let (name, depth) = match encoding {
+        "yuv422" | "uyvy" => return Ok((Layout::Grey(1, 2), 1)),
+        "yuv422_yuy2" | "yuyv" => return Ok((Layout::Grey(0, 2), 1)),
+        // All of the brightness, then the colours.
+        "nv12" | "nv21" | "nv24" => ("mono", 1),
         "8UC1" => ("mono", 1),
         "16UC1" => ("mono", 2),
         "8UC3" => ("bgr", 1),
@@ -29,7 +34,7 @@ fn layout(encoding: &str) -> Decoded<(Layout, usize)> {
         },
     };
     let layout = match name {
-        "mono" => Layout::Grey,
+        "mono" => Layout::Grey(0, 1),
         "rgb" => Layout::Colour([0, 1, 2], 3),
         "bgr" => Layout::Colour([2, 1, 0], 3),
         "rgba" => Layout::Colour([0, 1, 2], 4),
@@ -40,7 +45,7 @@ fn layout(encoding: &str) -> Decoded<(Layout, usize)> {
         "bayer_grbg" => Layout::Bayer([[1, 0], [2, 1]]),
         _ => {
             return Err(format!(
-                "has the encoding \"{encoding}\"; known are mono, rgb, bgr, rgba, bgra and bayer_* of 8 or 16 bits"
+                "has the encoding \"{encoding}\"; known are mono, rgb, bgr, rgba, bgra and bayer_* of 8 or 16 bits, yuv422, yuyv and nv12"
             ));
         }
     };
@@ -51,8 +56,8 @@ fn layout(encoding: &str) -> Decoded<(Layout, usize)> {
 pub(super) fn to_image(raw: &RawImage) -> Decoded<DynamicImage> {
     let (layout, depth) = layout(&raw.encoding)?;
     let samples = match layout {
-        Layout::Colour(_, samples) => samples,
-        _ => 1,
+        Layout::Colour(_, samples) | Layout::Grey(_, samples) => samples,
+        Layout::Bayer(_) => 1,
     };
     let (width, height) = (raw.width as usize, raw.height as usize);
     let row_bytes = width.saturating_mul(samples * depth);
@@ -74,7 +79,7 @@ pub(super) fn to_image(raw: &RawImage) -> Decoded<DynamicImage> {
         }
     };
     let image = match layout {
-        Layout::Grey => grey(raw, depth, sample),
+        Layout::Grey(offset, samples) => grey(raw, depth, |r, c| sample(r, c * samples + offset)),
         Layout::Colour(offsets, samples) => colour(raw, depth, |r, c, k| sample(r, c * samples + offsets[k])),
         Layout::Bayer(pattern) => colour(raw, depth, |r, c, k| demosaic(&sample, pattern, (r, c), k, (height, width))),
     };
@@ -217,6 +222,12 @@ mod tests {
         assert_eq!(to_image(&deep).unwrap().as_luma16().unwrap().as_raw(), &[0x0102, 0x0304]);
         let image = to_image(&raw(1, 1, "bgra8", 4, &[1, 2, 3, 4])).unwrap();
         assert_eq!(image.as_rgb8().unwrap().as_raw(), &[3, 2, 1]);
+        let image = to_image(&raw(2, 2, "yuv422_yuy2", 5, &[1, 128, 2, 128, 99, 3, 128, 4, 128])).unwrap();
+        assert_eq!(image.as_luma8().unwrap().as_raw(), &[1, 2, 3, 4]);
+        let image = to_image(&raw(2, 1, "uyvy", 4, &[128, 1, 128, 2])).unwrap();
+        assert_eq!(image.as_luma8().unwrap().as_raw(), &[1, 2]);
+        let image = to_image(&raw(2, 2, "nv12", 2, &[1, 2, 3, 4, 128, 128])).unwrap();
+        assert_eq!(image.as_luma8().unwrap().as_raw(), &[1, 2, 3, 4]);
         let image = to_image(&raw(1, 1, "rgb16", 6, &[1, 0, 2, 0, 3, 0])).unwrap();
         assert_eq!(image.as_rgb16().unwrap().as_raw(), &[1, 2, 3]);
     }
@@ -227,7 +238,7 @@ mod tests {
         assert!(to_image(&raw(2, 2, "mono8", 1, &[1; 9])).is_err());
         assert!(to_image(&raw(0, 2, "mono8", 2, &[1; 9])).is_err());
         assert!(to_image(&raw(u32::MAX, u32::MAX, "rgb16", usize::MAX, &[1; 9])).is_err());
-        assert!(to_image(&raw(2, 2, "yuv422", 4, &[1; 9])).unwrap_err().contains("yuv422"));
+        assert!(to_image(&raw(2, 2, "yuv411", 4, &[1; 9])).unwrap_err().contains("yuv411"));
         assert!(to_image(&raw(2, 2, "32FC1", 8, &[1; 16])).is_err());
     }
 

@@ -305,6 +305,16 @@ fn expand(content: &[u8]) -> std::result::Result<Cow<'_, [u8]>, Damage> {
     Ok(expanded)
 }
 
+/// How a zstd frame begins; no CDR message begins so.
+const ZSTD: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
+
+/// A message as rosbag2 packs it by itself (`compression_mode: MESSAGE`), unpacked; any other, and one that is damaged, as it is.
+pub(super) fn unpacked(data: &[u8]) -> Cow<'_, [u8]> {
+    let whole = |bytes: &Cow<'_, [u8]>| bytes.len() as u64 <= LONGEST;
+    let unpack = || read_all(zstd::stream::read::Decoder::new(data).ok()?, LONGEST).ok().filter(whole);
+    data.starts_with(ZSTD).then(unpack).flatten().unwrap_or(Cow::Borrowed(data))
+}
+
 fn read_all<'a>(source: impl Read, size: u64) -> std::io::Result<Cow<'a, [u8]>> {
     let mut bytes = Vec::new();
     source.take(size + 1).read_to_end(&mut bytes)?;

@@ -107,12 +107,11 @@ impl Scan {
         match message.schema {
             messages::JOINT_STATE => {
                 let state = JointState::read(message.data)?;
+                let had_positions = !state.positions.is_empty();
+                let state = state.finite();
                 let time_ns = self.stamped(message, state.stamp_ns, clock);
                 if state.positions.is_empty() {
-                    return Ok(());
-                }
-                if state.positions.iter().any(|q| !q.is_finite()) {
-                    return Err("has a position that is not finite".into());
+                    return if had_positions { Err("has no position that is finite".into()) } else { Ok(()) };
                 }
                 let samples = self.joints.entry(message.topic.to_string()).or_default();
                 let names = match samples.last() {
@@ -312,5 +311,49 @@ impl Scan {
         let mut delays = self.topics.get(topic).map(|t| t.delays_ns.clone()).unwrap_or_default();
         delays.sort_unstable();
         delays.get(delays.len() / 2).map_or(0.0, |d| *d as f64 * 1e-9)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `sensor_msgs/JointState` at one second.
+    fn joint_state(joints: &[(&str, f64)]) -> Vec<u8> {
+        let mut body = vec![1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0];
+        let number = |body: &mut Vec<u8>, value: usize| {
+            body.resize(body.len().next_multiple_of(4), 0);
+            body.extend((value as u32).to_le_bytes());
+        };
+        number(&mut body, joints.len());
+        for (name, _) in joints {
+            number(&mut body, name.len() + 1);
+            body.extend(name.bytes());
+            body.push(0);
+        }
+        number(&mut body, joints.len());
+        body.resize(body.len().next_multiple_of(8), 0);
+        joints.iter().for_each(|(_, q)| body.extend(q.to_le_bytes()));
+        [vec![0, 1, 0, 0], body].concat()
+    }
+
+    /// Drivers of grippers and of passive joints write NaN for what they do not measure.
+    #[test]
+    fn joints_without_a_position_cost_no_others() {
+        let mut scan = Scan::default();
+        for (data, topic) in [
+            (joint_state(&[("gripper", f64::NAN), ("a", 0.5), ("b", -0.25)]), "/joints"),
+            (joint_state(&[("gripper", f64::NAN)]), "/gripper"),
+        ] {
+            let schema = messages::JOINT_STATE;
+            scan.note(&Message { topic, schema, encoding: "cdr", log_time_ns: 1, data: &data }, Clock::Stamp);
+        }
+        let sample = &scan.joints["/joints"][0];
+        assert_eq!(
+            (sample.names.as_slice(), sample.positions.as_slice()),
+            (&["a".to_owned(), "b".to_owned()][..], &[0.5, -0.25][..])
+        );
+        assert_eq!(scan.topics["/joints"].malformed, 0);
+        assert_eq!((scan.topics["/gripper"].malformed, scan.joints.contains_key("/gripper")), (1, false));
     }
 }

@@ -1,0 +1,159 @@
+//! Programs whose numbers alone do not say where the robot goes: such targets stay as they are, by name.
+
+#![allow(clippy::unwrap_used)]
+
+use crate::programs_support::{Cell, status_turn};
+use robotcal::geom::{Pose, log_so3};
+use robotcal::programs::LeftReason;
+
+/// A flange pose as KRL has it, with status and turn.
+fn krl(cell: &Cell, q: &[f64]) -> String {
+    let pose = cell.nominal.base_from_tip(q);
+    let [c, b, a] = pose.rpy().map(f64::to_degrees);
+    let [x, y, z] = pose.xyz().map(|v| 1e3 * v);
+    let (s, t) = status_turn(q);
+    format!("{{X {x:.4},Y {y:.4},Z {z:.4},A {a:.6},B {b:.6},C {c:.6},S {s},T {t}}}")
+}
+
+/// How many targets were corrected, and the reasons of those that were left.
+fn told(cell: &Cell, files: &[(&str, String)], flags: &[&str]) -> (usize, Vec<String>) {
+    let paths: Vec<_> = files.iter().map(|(name, text)| cell.write(name, text.as_bytes())).collect();
+    let flags = [&["--unordered"], flags].concat();
+    let told = cell.compensate(&paths.iter().collect::<Vec<_>>(), &flags).told();
+    (told.corrected, told.left.into_iter().map(|(_, _, reason)| reason).collect())
+}
+
+/// Two poses `XP1` and `XP2`, the motion data of the first in the frame `IPO`.
+fn krl_module(cell: &mut Cell, ipo: &str, moves: &str) -> Vec<(&'static str, String)> {
+    let (a, b) = (cell.readings(), cell.readings());
+    let (first, second) = (krl(cell, &a), krl(cell, &b));
+    let data = |n: u8, ipo: &str| format!("DECL FDAT FP{n}={{TOOL_NO 0,BASE_NO 0,IPO_FRAME #{ipo},POINT2[] \" \"}}\n");
+    let dat = format!(
+        "DEFDAT a\nDECL E6POS XP1={first}\n{}DECL E6POS XP2={second}\n{}ENDDAT\n",
+        data(1, ipo),
+        data(2, "BASE")
+    );
+    vec![("a.src", format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{moves}END\n")), ("a.dat", dat)]
+}
+
+#[test]
+fn targets_of_a_tool_that_is_fixed_in_the_room_are_left() {
+    let mut cell = Cell::kuka(61);
+    let unknown = vec![LeftReason::ToolUnknown.name().to_owned()];
+    let with = |n: u8| {
+        format!(
+            "SPTP XP{n} WITH $TOOL=STOOL2(FP{n}), $BASE=SBASE(FP{n}.BASE_NO), $IPO_MODE=SIPO_MODE(FP{n}.IPO_FRAME)\n"
+        )
+    };
+    for (ipo, moves) in [
+        ("TCP", "FDAT_ACT=FP1\nPTP XP1\nFDAT_ACT=FP2\nPTP XP2\n".to_owned()),
+        ("TCP", with(1) + &with(2)),
+        ("BASE", "$IPO_MODE=#TCP\nPTP XP1\n$IPO_MODE=#BASE\nPTP XP2\n".to_owned()),
+    ] {
+        let files = krl_module(&mut cell, ipo, &moves);
+        assert_eq!(told(&cell, &files, &["--tool=0,0,100,0,0,0"]), (1, unknown.clone()), "{ipo}: {moves}");
+    }
+}
+
+#[test]
+fn targets_of_a_robot_whose_foot_is_not_the_origin_of_the_world_are_left() {
+    let mut cell = Cell::kuka(62);
+    let unknown = vec![LeftReason::FrameUnknown.name().to_owned()];
+    let machine = |z: &str| {
+        (
+            "$machine.dat",
+            format!("DEFDAT $MACHINE PUBLIC\nFRAME $ROBROOT={{X 0.0,Y 0.0,Z {z},A 0.0,B 0.0,C 0.0}}\nENDDAT\n"),
+        )
+    };
+    let mut files = krl_module(&mut cell, "BASE", "PTP XP1\n");
+    files[1].1 = files[1].1.lines().filter(|l| !l.contains("P2=")).collect::<Vec<_>>().join("\n");
+    for (z, left) in [("0.0", vec![]), ("500.0", unknown)] {
+        files.truncate(2);
+        files.push(machine(z));
+        assert_eq!(told(&cell, &files, &[]), (1 - left.len(), left), "{z}");
+    }
+}
+
+/// A variable in the place of a number stays the only value of its component.
+#[test]
+fn a_pose_with_a_variable_in_it_is_computed() {
+    let mut cell = Cell::kuka(63);
+    let q = cell.readings();
+    let text = krl(&cell, &q);
+    let (_, rest) = text.split_once(',').unwrap();
+    let source = format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {text}\nLIN {{X XV,{rest}\nEND\n");
+    let file = cell.write("a.src", source.as_bytes());
+    let run = cell.compensate(&[&file], &["--unordered"]).expect(1);
+    assert!(run.told().has(5, "LIN", LeftReason::Computed), "{:?}", run.told());
+    assert!(run.text("a.src").contains(&format!("LIN {{X XV,{rest}\n")), "{}", run.text("a.src"));
+}
+
+/// Axes beside which the targets lie, deg.
+const START: [f64; 6] = [10.0, -80.0, 100.0, 20.0, 40.0, 30.0];
+
+#[test]
+fn robtargets_under_a_program_displacement_are_left() {
+    let mut cell = Cell::kuka(64);
+    let target = |cell: &mut Cell| {
+        let q: Vec<f64> = START.iter().map(|q| q.to_radians() + 0.05 * cell.readings()[0].sin()).collect();
+        let pose = cell.nominal.base_from_tip(&q);
+        let ([x, y, z], [i, j, k, w]) = (pose.xyz().map(|v| 1e3 * v), pose.quaternion_xyzw());
+        format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{k:.9}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
+    };
+    let unknown = LeftReason::FrameUnknown.name().to_owned();
+    for (body, corrected, left) in [
+        (
+            "MoveJ @,v10,fine,tool0;PDispSet [[100,0,0],[1,0,0,0],[0,0,0],[0,0,0]];\nMoveJ @,v10,fine,tool0;\nPDispOff;\nMoveJ @,v10,fine,tool0;\nENDPROC",
+            2,
+            1,
+        ),
+        ("PDispOn \\Rot \\ExeP:=p1,p2,tool0;\nMoveJ @,v10,fine,tool0;\nENDPROC", 0, 1),
+        (
+            "MoveJ @,v10,fine,tool0;\nsub;\nENDPROC\nPROC sub()\nConfJ\\Off;\nMoveJ @,v10,fine,tool0;\nENDPROC\nPROC other()\nPDispSet d;\nENDPROC",
+            1,
+            1,
+        ),
+        ("MoveJ @,v10,fine,tool0;\nsub;\nENDPROC\nPROC sub()\nConfJ\\Off;\nMoveJ @,v10,fine,tool0;\nENDPROC", 2, 0),
+    ] {
+        let mut text = format!("MODULE m\nPROC main()\nConfJ\\Off;\n{body}\nENDMODULE\n");
+        while text.contains('@') {
+            text = text.replacen('@', &target(&mut cell), 1);
+        }
+        let start = format!("--start={}", START.map(|q| q.to_string()).join(","));
+        assert_eq!(told(&cell, &[("m.mod", text)], &[&start]), (corrected, vec![unknown.clone(); left]), "{body}");
+    }
+}
+
+/// A pose of the tool as URScript has it.
+fn script_pose(flange: &Pose) -> String {
+    let (xyz, r) = (flange.xyz(), log_so3(&flange.rotation));
+    format!("p[{:.9},{:.9},{:.9},{:.9},{:.9},{:.9}]", xyz[0], xyz[1], xyz[2], r[0], r[1], r[2])
+}
+
+#[test]
+fn script_targets_that_change_while_the_program_runs_are_left() {
+    let mut cell = Cell::ur(65);
+    let (computed, moved) = (LeftReason::Computed.name(), LeftReason::FrameUnknown.name());
+    let before = cell.readings();
+    for (body, corrected, left) in [
+        ("  P=@\n  P[2]=P[2]+0.05\n  movel(P)\n", 0, vec![computed]),
+        ("  P=@\n  while True:\n    movel(P)\n    P=pose_add(P,p[0,0,0.1,0,0,0])\n  end\n", 0, vec![computed]),
+        ("  P=@\n  if P[2] == 0:\n    x=P[2]\n  end\n  movel(P)\n", 1, vec![]),
+        (
+            "  track_conveyor_linear(p[1,0,0,0,0,0],400)\n  movel(@)\n  stop_conveyor_tracking()\n  movel(@)\n",
+            1,
+            vec![moved],
+        ),
+        ("  path_offset_enable()\n  movel(@)\n  path_offset_disable()\n  movel(@)\n", 1, vec![moved]),
+        ("  optimovel(@, a=0.3, v=0.3)\n  optimovej(@)\n  servoc(@,1,0.1,0)\n", 3, vec![]),
+    ] {
+        let mut text = format!("def p():\n  set_tcp(p[0,0,0,0,0,0])\n  movej({before:?})\n{body}end\n");
+        while text.contains('@') {
+            // Beside the one before: no posture is open.
+            let q: Vec<f64> = before.iter().enumerate().map(|(k, v)| v + 0.02 * (k as f64 + 1.0).sin()).collect();
+            text = text.replacen('@', &script_pose(&cell.nominal.base_from_tip(&q)), 1);
+        }
+        let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
+        assert_eq!(told(&cell, &[("a.script", text)], &[]), (1 + corrected, left), "{body}");
+    }
+}
