@@ -147,12 +147,14 @@ impl Fit {
         let noise = &mut self.problem.noise;
         let own = noise.pixel_factor.iter_mut().chain(noise.body.iter_mut().flatten());
         let before = before.pixel_factor.iter().chain(before.body.iter().flatten());
-        let keep = |(own, before): (&mut f64, &f64)| {
-            let stays = (*own / before - 1.0).abs() < STAYS;
-            *own = if stays { *before } else { *own };
-            stays
-        };
-        own.zip(before).map(keep).fold(true, |all, stays| all && stays)
+        let mut all_stay = true;
+        for (own, before) in own.zip(before) {
+            match (*own / before - 1.0).abs() < STAYS {
+                true => *own = *before,
+                false => all_stay = false,
+            }
+        }
+        all_stay
     }
 
     /// One round; returns the largest relative change.
