@@ -88,7 +88,12 @@ fn a_board_of_the_layout_before_opencv_4_6_keeps_its_ids() {
             let error = rms(&errors(&detection, |id| new.corner(id)));
             assert!(error < 0.006, "{columns} {legacy}: {error}");
             let other = detect(&pictures[usize::from(legacy)], &plate(aruco(!legacy))).expect_err("the other layout");
-            assert_eq!(other.code, Code::PlateNotDetectable, "{columns} {legacy}: {other}");
+            // The markers of a small part fit into both, moved by a column; then a line of corners is missing that should be in view.
+            let in_part = view.is_some() && other.code == Code::PlateLineHidden;
+            assert!(in_part || other.code == Code::PlateNotDetectable, "{columns} {legacy}: {other}");
+        }
+        if view.is_some() {
+            continue;
         }
         let guessed = detect(&pictures[1], &plate(None)).unwrap();
         assert!(rms(&errors(&guessed, |id| new.corner(id))) < 0.006, "{columns}");
