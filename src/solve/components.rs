@@ -44,9 +44,6 @@ pub(super) const SHRINKAGE: f64 = 5.0;
 /// Relative change of every component below which the rounds end.
 const CONVERGED: f64 = 0.01;
 
-/// The same in its own standard deviations, where that is more: nobody can tell the rest from none.
-const CONVERGED_SIGMAS: f64 = 0.1;
-
 /// Smallest factor of a family: with it, its parameters are as good as left out.
 const SMALLEST_FACTOR: f64 = 1e-3;
 
@@ -217,7 +214,7 @@ impl Fit {
             }
             let next = family.asked(squares, determined).clamp(SMALLEST_FACTOR, 2.0 * family.factor);
             if next > SMALLEST_FACTOR {
-                change = change.max(change_told(next / family.factor, determined));
+                change = change.max((next / family.factor - 1.0).abs());
             }
             family.factor = next;
         }
@@ -452,13 +449,6 @@ fn is_not_told(information: f64) -> bool {
     (0.5 * information).sqrt() < NOT_TOLD_SIGMAS
 }
 
-/// Relative change of a size by a ratio, in the unit of [`CONVERGED`]: where the standard deviation of the size itself, `sqrt(1 / (2 information))`
-/// of it, is so large that the bound follows it, less.
-fn change_told(ratio: f64, information: f64) -> f64 {
-    let bound = CONVERGED.max(CONVERGED_SIGMAS * (0.5 / information).sqrt());
-    (ratio - 1.0).abs() * CONVERGED / bound
-}
-
 /// New noise from the sum of squares and the redundancy of each reading's latents; every reading is drawn to the common
 /// variance. Returns the largest relative change, but for sizes that go to nothing and matter no more.
 pub fn share_out(group: &[usize], tally: &Tally, common: Option<f64>, sigma: &mut [f64]) -> f64 {
@@ -469,7 +459,7 @@ pub fn share_out(group: &[usize], tally: &Tally, common: Option<f64>, sigma: &mu
         let variance = (squares[r] + SHRINKAGE * common) / (redundancy[r] + SHRINKAGE);
         let next = variance.sqrt().clamp(JOINT_NOISE_FLOOR, 2.0 * sigma[r].max(JOINT_NOISE_FLOOR));
         if next > sigma[r] || !is_not_told(tally.information[r]) {
-            change = change.max(change_told(next / sigma[r], tally.information[r]));
+            change = change.max((next / sigma[r] - 1.0).abs());
         }
         sigma[r] = next;
     }

@@ -51,7 +51,7 @@ fn what_is_left_of_a_linearisation_is_the_linearisation_of_what_is_left() {
 fn sizes_found_by_way_of_some_stops_are_those_of_all() {
     let mut dice = Dice::new(83);
     let (problem, truth) =
-        problem(&mut dice, &Request { images: 450, lattice: (4, 3), joint_noise: 2e-4, ..Request::default() });
+        problem(&mut dice, &Request { images: 450, lattice: (5, 4), joint_noise: 4e-4, ..Request::default() });
     let fit = identify(truth.robot.chain, &[series(&problem)], &Options::default()).unwrap().fit;
     let mut from_above = fit.adjustment.clone();
     from_above.problem.noise.start_at(3e-3);
@@ -65,6 +65,6 @@ fn sizes_found_by_way_of_some_stops_are_those_of_all() {
     for (by_some, by_all) in by_some.zip(by_all.iter().flatten()) {
         // Both end within a hundredth of the fixed point in a round, of which what is left in all rounds is a few times as much.
         assert!((by_some / by_all - 1.0).abs() < 0.03, "{by_some} {by_all}");
-        assert!((by_all / 2e-4 - 1.0).abs() < 0.25, "{by_all}");
+        assert!((by_all / 4e-4 - 1.0).abs() < 0.25, "{by_all}");
     }
 }
