@@ -9,7 +9,7 @@ use super::solution::Solution;
 use super::two_stage::{PoseStage, fit_joint, fit_poses};
 use crate::assess::{
     ImageError, bootstrap_ratio, by_cluster, camera_errors_m, cluster_of_images, flange_error_m, folds, predict_image,
-    refitted, regions, root_mean_square, side_by_side,
+    refitted_near, regions, root_mean_square, side_by_side,
 };
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
@@ -97,15 +97,16 @@ fn rows(
 /// What every estimator makes of the observations in use, some of those whose stand-alone poses are `solved`; `None` for one that has no solution.
 /// That of the joint fit may be `known`.
 fn fitted(
-    start: &Adjustment,
+    left: LinearisedAdjustment,
     solved: Option<&LinearisedAdjustment>,
     estimators: &[Estimator],
     known: Option<&State>,
 ) -> Vec<Option<State>> {
+    let start = &left.adjustment;
     let stage = solved.and_then(|solved| PoseStage::of_left(solved, start));
     let noise = JointNoise::Estimated;
     let found = |estimator: &Estimator| match estimator {
-        Estimator::Joint => Some(known.cloned().unwrap_or_else(|| refitted(start.clone()))),
+        Estimator::Joint => Some(known.cloned().unwrap_or_else(|| refitted_near(left.clone()))),
         Estimator::HardJoint => fit_joint(start, *estimator, noise).map(|(_, found)| found.state),
         _ => Some(fit_poses(start, stage.as_ref()?, *estimator, noise)?.state),
     };
@@ -122,9 +123,11 @@ fn held_out(
     (estimators, known): (&[Estimator], &[State]),
     tick: &(dyn Fn() + Sync),
 ) -> Errors {
-    let solved = PoseStage::solved(joint);
+    let (solved, whole) = (PoseStage::solved(joint), LinearisedAdjustment::of(joint.clone()));
     let of_fold = |k: usize, fold: &Vec<usize>| -> Errors {
-        let found = fitted(&joint.without_images(fold), solved.as_ref(), estimators, known.get(k));
+        let Some(whole) = &whole else { return Vec::new() };
+        let left = whole.linear().without_images(fold);
+        let found = fitted(left, solved.as_ref(), estimators, known.get(k));
         let by_all = |&i: &usize| found.iter().map(|state| predict_image(joint, state.as_ref()?, i)).collect();
         let errors = fold.iter().map(|i| (*i, by_all(i))).collect();
         tick();
@@ -149,7 +152,8 @@ fn summary(errors: &Errors, clusters: &[usize], k: usize, joint: Option<usize>) 
 }
 
 fn truth_errors(joint: &Adjustment, truth: &Truth) -> Result<Vec<Option<TruthError>>> {
-    let found = fitted(joint, PoseStage::solved(joint).as_ref(), &Estimator::ALL, None);
+    let Some(whole) = LinearisedAdjustment::of(joint.clone()) else { return Ok(vec![None; Estimator::ALL.len()]) };
+    let found = fitted(whole, PoseStage::solved(joint).as_ref(), &Estimator::ALL, None);
     found.iter().map(|s| s.as_ref().map(|s| truth_error(s, truth)).transpose().map(Option::flatten)).collect()
 }
 
