@@ -347,11 +347,6 @@ pub(super) fn minimise_with_priors(adjustment: Adjustment, linearised: Linearise
 }
 
 impl LinearisedAdjustment {
-    /// Minimises the cost from here.
-    pub fn solved(self, settings: &Settings) -> Outcome {
-        minimise_by(Proposer::default(), self.adjustment, Some(self.linearised), settings).outcome
-    }
-
     /// The state at the optimum alone: the last step is taken on trust, and nothing is linearised where it ends.
     pub fn settled(self, settings: &Settings) -> State {
         let descent = Descent::new(Proposer::default(), self.adjustment, self.linearised);
