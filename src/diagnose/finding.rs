@@ -14,6 +14,7 @@ use super::kind::{Kind, Quantity, Subject, Weight};
 use super::left_out_bodies::MeasurementsLeftOut;
 use super::left_out_images::ImagesLeftOut;
 use super::left_out_observations::ObservationsLeftOut;
+use super::length_standard::ContradictedLengths;
 use super::lens_not_in_ros::LensNotInRos;
 use super::loose::LooseMounting;
 use super::marker_off::MarkerOff;
@@ -56,6 +57,7 @@ macro_rules! findings {
 
 findings! {
     CameraModelMisfit,
+    ContradictedLengths,
     Displaced,
     DoubtedSize,
     Extrapolates,

@@ -291,6 +291,7 @@ codes! {
         PlateLoose "plate_loose" "the plate tilts with gravity",
         CameraLoose "camera_loose" "the camera tilts with gravity",
         PlateSizeContradicted "plate_size_contradicted" "robot and plate file disagree on the size of the plate",
+        LengthsContradicted "lengths_contradicted" "what a tracker, given places or measured distances say contradicts the lengths of the robot's links",
         PlateUneven "plate_uneven" "the plate is stretched more one way than the other",
         MeasurementsLeftOut "measurements_left_out" "measurements of trackers or contacts do not fit the others, and are left out",
         MeasurementsScatter "measurements_scatter" "measurements of a tracker or of contacts scatter more than their stated sigma says",

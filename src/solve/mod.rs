@@ -19,6 +19,7 @@ mod noise_uncertainty;
 mod pose_space;
 mod response;
 mod snoop;
+mod stretch;
 mod system;
 mod unidentified_noise;
 
@@ -39,5 +40,6 @@ pub use noise_information::{NoiseInformation, Spread, noise_information};
 pub use noise_uncertainty::NoiseUncertainty;
 pub use response::Response;
 pub use snoop::{reject_bodies, reject_contradicting, reject_observations, reject_stops};
+pub use stretch::{LengthStandard, Stretch};
 pub use system::{Elimination, Singular, System};
 pub use unidentified_noise::without_unidentified_noise;

@@ -1,6 +1,6 @@
 //! Trackers and sockets in the place of a camera: simulated robots with known truth.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::path::Path;
 
@@ -467,4 +467,44 @@ fn measurements_that_miss_their_stated_sigma_by_far_are_named() {
     // target_from_instrument for instrument_from_target.
     let inverted = with(&|_, pose| pose.rotation = pose.rotation.transpose());
     assert_eq!(inverted, [("rotation_sigma_factor".to_owned(), Weight::Gate)]);
+}
+
+/// What is said of the size of measured lengths: by how much they are too long.
+fn sizes_doubted(series: MeasuredSeries, chain: &Chain) -> Vec<f64> {
+    let solution = identify(chain.clone(), &[series], &Options::default()).unwrap();
+    let doubted = solution.findings.iter().filter(|f| f.code() == Code::LengthsContradicted && f.fails());
+    doubted.map(|f| f.quantities()[0].value).collect()
+}
+
+#[test]
+fn a_tracker_one_or_two_percent_off_is_doubted_and_one_in_order_is_not() {
+    for (kind, sigma_rad) in [(Kind::Points, 0.0), (Kind::Poses, 5e-5)] {
+        let world = World::new(41, kind, 60, (3e-5, sigma_rad), 2e-5);
+        for factor in [1.0, 1.02, 1.01, 0.99, 0.98] {
+            let mut series = world.series.clone();
+            for seen in &mut series.bodies {
+                match &mut seen.seen {
+                    BodySeen::Point(at) => *at *= factor,
+                    BodySeen::Pose(pose) => pose.translation *= factor,
+                }
+            }
+            let said = sizes_doubted(series, &world.chain);
+            match said[..] {
+                [] => assert_eq!(factor, 1.0),
+                // The links are found to a few parts in a thousand.
+                [off] => assert!(factor != 1.0 && (off - (factor - 1.0)).abs() < 4e-3, "{factor}: {off}"),
+                _ => panic!("{said:?}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn distances_between_sockets_that_are_wrong_alike_are_doubted() {
+    let world = World::sockets(42, 4, 25, 5e-5, 2e-5);
+    assert_eq!(sizes_doubted(world.series.clone(), &world.chain), Vec::<f64>::new());
+    let mut series = world.series;
+    series.lengths.iter_mut().for_each(|l| l.distance_m *= 1.02);
+    let said = sizes_doubted(series, &world.chain);
+    assert!(matches!(said[..], [off] if (off - 0.02).abs() < 6e-3), "{said:?}");
 }
