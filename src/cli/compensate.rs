@@ -80,6 +80,9 @@ pub(super) struct CompensateArgs {
     /// Joints that keep their programmed value, separated by commas
     #[arg(long, value_name = "NAMES", value_delimiter = ',', help_heading = "How the program is read")]
     hold: Vec<String>,
+    /// External axes of the program that the description lacks move neither robot nor work (a gun, a gripper)
+    #[arg(long, help_heading = "How the program is read")]
+    axes_apart: bool,
     /// Joint values near which a pose is reached where the text does not tell from where the robot comes (the first pose), in deg (mm) and in the order of the axes, separated by commas
     #[arg(
         long,
@@ -149,6 +152,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
         base: stands_on(args, &urdf::read(nominal)?).map_or_else(Pose::identity, |(_, pose)| pose),
         tool: frame("--tool", &args.tool, language)?,
         work: frame("--work", &args.work, language)?,
+        axes_apart: args.axes_apart,
     };
     let files = args.programs.iter().map(|p| text_file(p)).collect::<Result<_>>()?;
     let mut program = programs::read(language, files, &setting)?;

@@ -8,12 +8,14 @@
 //! | [`posture`] | which joints a pose means |
 //! | [`measured_frames`] | tool and work object of the real robot instead of those of the program |
 //! | [`mod@compensate`] | targets of one robot to targets of another |
+//! | `branches` | what holds behind a statement with branches |
 //! | `scan` | tokens that all languages share |
 //! | `language` | the table of languages |
 //! | `table`, `krl`, `rapid`, `urscript` | text -> targets |
 //!
 //! To add a language: a file that turns texts into a [`Program`], and a row of the table in `language`.
 
+mod branches;
 pub mod codes;
 pub mod compensate;
 pub mod field;

@@ -20,6 +20,8 @@ pub enum LeftReason {
     ToolUnknown,
     /// Its work frame is not known.
     FrameUnknown,
+    /// An external axis that the description lacks is not at zero: it may carry the robot or the work.
+    ExternalAxis,
     /// It is used with different tools or frames.
     FramesDiffer,
     /// No motion of the files goes there, and so much of it is not known.
@@ -49,6 +51,7 @@ impl LeftReason {
             Self::Incomplete => "incomplete",
             Self::ToolUnknown => "tool_unknown",
             Self::FrameUnknown => "frame_unknown",
+            Self::ExternalAxis => "external_axis",
             Self::FramesDiffer => "frames_differ",
             Self::Unvisited => "unvisited",
             Self::PostureUnknown => "posture_unknown",
@@ -81,6 +84,14 @@ impl Why {
     /// A reason that is about a declared name.
     pub(super) fn of(name: &str, reason: LeftReason, words: impl Into<String>) -> Self {
         Self { about: Some(name.to_owned()), ..Self::new(reason, words) }
+    }
+
+    /// An external axis of which the description knows nothing stands elsewhere than at zero.
+    pub(super) fn external(axis: &str, value: f64) -> Self {
+        let words = format!(
+            "{axis} is {value}, and the description has no such axis: it may carry the robot or the work (give a description that has it, or --axes-apart where it does neither)"
+        );
+        Self::new(LeftReason::ExternalAxis, words)
     }
 
     /// The target is not written in numbers.

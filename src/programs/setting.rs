@@ -18,4 +18,6 @@ pub struct ProgramSetting<'a> {
     pub tool: Option<Pose>,
     /// `base_from_work` (work object, `$BASE`) where the text sets none.
     pub work: Option<Pose>,
+    /// True where external axes that the chain lacks move neither robot nor work.
+    pub axes_apart: bool,
 }

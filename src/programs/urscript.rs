@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::ProgramSetting;
+use super::branches::{Branches, Branching, Merged};
 use super::field::{Field, FieldPlace};
 use super::itinerary::Itinerary;
 use super::program::{
@@ -88,6 +89,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
             blocks: Vec::new(),
             on_top: false,
             tool: setting.tool.map(Tool::Known).unwrap_or(Tool::Unknown),
+            branches: Branches::new(),
             way: &mut way,
         };
         script.find_computed()?;
@@ -99,10 +101,16 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
 }
 
 /// The active tool.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Tool {
     Known(Pose),
     Unknown,
+}
+
+impl Merged for Tool {
+    fn merged(&self, other: &Self) -> Self {
+        if self == other { *self } else { Self::Unknown }
+    }
 }
 
 struct Script<'a> {
@@ -117,6 +125,8 @@ struct Script<'a> {
     /// True while the robot moves by more than its targets say.
     on_top: bool,
     tool: Tool,
+    /// What of it depends on branches.
+    branches: Branches<Tool>,
     way: &'a mut Itinerary,
 }
 
@@ -193,11 +203,25 @@ impl Script<'_> {
         match word {
             _ if assigned => return false,
             _ if begins && routine => self.way.routine_begins(),
-            _ if begins => self.way.branches_begin(),
-            b"else" | b"elif" | b"case" => self.way.next_branch(),
+            _ if begins => {
+                self.way.branches_begin();
+                let kind = match word {
+                    b"if" => Branching::If,
+                    b"switch" => Branching::Cases,
+                    _ => Branching::Loop,
+                };
+                self.branches.begin(&self.tool, kind);
+            }
+            b"else" | b"elif" | b"case" | b"default" => {
+                self.way.next_branch();
+                self.branches.next(&mut self.tool, matches!(word, b"else" | b"default"));
+            }
             b"end" => match self.blocks.pop() {
                 Some(true) => self.way.routine_ends(),
-                Some(false) => self.way.branches_end(),
+                Some(false) => {
+                    self.way.branches_end();
+                    self.branches.end(&mut self.tool);
+                }
                 None => {}
             },
             _ => return false,

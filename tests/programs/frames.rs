@@ -335,6 +335,7 @@ fn frames_are_written_as_controllers_read_them() {
         base: Pose::identity(),
         tool: None,
         work: None,
+        axes_apart: false,
     };
     let moves = [
         (Language::Krl, "src", "END\n", "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\nEND\n"),

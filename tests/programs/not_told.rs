@@ -157,3 +157,93 @@ fn script_targets_that_change_while_the_program_runs_are_left() {
         assert_eq!(told(&cell, &[("a.script", text)], &[]), (1 + corrected, left), "{body}");
     }
 }
+
+#[test]
+fn poses_with_an_external_axis_that_the_description_lacks_are_left_unless_it_is_at_zero() {
+    let cell = Cell::kuka(66);
+    let q: Vec<f64> = START.iter().map(|q| q.to_radians()).collect();
+    let external = LeftReason::ExternalAxis.name().to_owned();
+    let in_krl = krl(&cell, &q).replace('}', ",E1 @}");
+    let joints: Vec<String> = q.iter().enumerate().map(|(k, v)| format!("A{} {}", k + 1, v.to_degrees())).collect();
+    let src = format!(
+        "DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {in_krl}\nPTP {{E6AXIS: {},E1 @}}\nEND\n",
+        joints.join(",")
+    );
+    let pose = cell.nominal.base_from_tip(&q);
+    let ([x, y, z], [i, j, k, w]) = (pose.xyz().map(|v| 1e3 * v), pose.quaternion_xyzw());
+    let target = format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{k:.9}],[0,0,0,0],[@,9E9,9E9,9E9,9E9,9E9]]");
+    let rapid = |before: &str| {
+        format!("MODULE m\nPROC main()\nConfJ\\Off;\n{before}MoveJ {target},v10,fine,tool0;\nENDPROC\nENDMODULE\n")
+    };
+    let start = format!("--start={}", START.map(|q| q.to_string()).join(","));
+    for (name, text, at, flags, corrected, left) in [
+        ("a.src", src.clone(), "0.0", vec![], 2, 0),
+        // Angles of the six axes are those of the robot wherever it stands.
+        ("a.src", src.clone(), "500.0", vec![], 1, 1),
+        ("a.src", src, "500.0", vec!["--axes-apart"], 2, 0),
+        ("m.mod", rapid(""), "9E9", vec![], 1, 0),
+        ("m.mod", rapid(""), "0", vec![], 1, 0),
+        ("m.mod", rapid(""), "500", vec![], 0, 1),
+        ("m.mod", rapid(""), "500", vec!["--axes-apart"], 1, 0),
+        ("m.mod", rapid("EOffsSet [100,0,0,0,0,0];\n"), "0", vec![], 0, 1),
+        ("m.mod", rapid("IF a>1 EOffsOn \\ExeP:=p1, p2;\n"), "0", vec![], 0, 1),
+        ("m.mod", rapid("EOffsSet [100,0,0,0,0,0];\nEOffsOff;\n"), "0", vec![], 1, 0),
+    ] {
+        let flags = [&[start.as_str()][..], &flags].concat();
+        let found = told(&cell, &[(name, text.replace('@', at))], &flags);
+        assert_eq!(found, (corrected, vec![external.clone(); left]), "{name} {at} {flags:?}");
+    }
+}
+
+#[test]
+fn poses_behind_branches_that_set_tool_frame_or_displacement_differently_are_left() {
+    let mut cell = Cell::kuka(67);
+    let q = cell.readings();
+    let pose = krl(&cell, &q);
+    let frame = "{X 0.0,Y 0.0,Z 50.0,A 0.0,B 0.0,C 0.0}";
+    let in_krl = |body: &str| {
+        let body = body.replace("SET", &format!("$TOOL={frame}")).replace("MOVE", &format!("PTP {pose}"));
+        ("a.src", format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{body}\nEND\n"))
+    };
+    let (tool, work) = (LeftReason::ToolUnknown.name(), LeftReason::FrameUnknown.name());
+    for (body, left) in [
+        ("IF $IN[1] THEN\nSET\nENDIF\nMOVE", vec![tool]),
+        ("IF $IN[1] THEN\nSET\nELSE\nSET\nENDIF\nMOVE", vec![]),
+        ("IF $IN[1] THEN\nSET\nELSE\nMOVE\nENDIF", vec![]),
+        ("SWITCH N\nCASE 1\nSET\nCASE 2\nSET\nDEFAULT\nSET\nENDSWITCH\nMOVE", vec![]),
+        ("SWITCH N\nCASE 1\nSET\nCASE 2\nSET\nENDSWITCH\nMOVE", vec![tool]),
+        ("FOR I=1 TO 3\n$BASE=$WORLD\nENDFOR\nMOVE", vec![work]),
+        ("REPEAT\nSET\nUNTIL $IN[1]\nMOVE", vec![]),
+    ] {
+        let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
+        assert_eq!(told(&cell, &[in_krl(body)], &[]), (1 - left.len(), left), "{body}");
+    }
+    let (tip, start) = (cell.nominal.base_from_tip(&q), q.iter().map(|q| q.to_degrees().to_string()));
+    let ([x, y, z], [i, j, k, w]) = (tip.xyz().map(|v| 1e3 * v), tip.quaternion_xyzw());
+    let start = format!("--start={}", start.collect::<Vec<_>>().join(","));
+    let displaced = "PDispSet [[100,0,0],[1,0,0,0],[0,0,0],[0,0,0]];\n";
+    for (body, left) in [
+        (format!("IF a THEN\n{displaced}ENDIF\n"), vec![work]),
+        (format!("IF a {displaced}"), vec![work]),
+        (format!("{displaced}IF a THEN\nPDispOff;\nENDIF\n"), vec![work]),
+        (format!("{displaced}IF a THEN\nPDispOff;\nELSE\nPDispOff;\nENDIF\n"), vec![]),
+    ] {
+        let target =
+            format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{k:.9}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
+        let text =
+            format!("MODULE m\nPROC main()\nConfJ\\Off;\n{body}MoveJ {target},v10,fine,tool0;\nENDPROC\nENDMODULE\n");
+        let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
+        assert_eq!(told(&cell, &[("m.mod", text)], &[&start]), (1 - left.len(), left), "{body}");
+    }
+    let mut cell = Cell::ur(68);
+    let q = cell.readings();
+    let pose = script_pose(&cell.nominal.base_from_tip(&q));
+    for (body, left) in [
+        ("  if a:\n    set_tcp(p[0,0,0.1,0,0,0])\n  end\n", vec![tool]),
+        ("  if a:\n    set_tcp(p[0,0,0,0,0,0])\n  end\n", vec![]),
+    ] {
+        let text = format!("def p():\n  set_tcp(p[0,0,0,0,0,0])\n  movej({q:?})\n{body}  movel({pose})\nend\n");
+        let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
+        assert_eq!(told(&cell, &[("a.script", text)], &[]), (2 - left.len(), left), "{body}");
+    }
+}

@@ -301,6 +301,7 @@ fn the_time_for_many_targets_grows_with_their_number() {
         base: Pose::identity(),
         tool: None,
         work: None,
+        axes_apart: false,
     };
     let postures = Postures { held: vec![false; 6], start: Some(vec![0.5; 6]) };
     let real: &Robot = &cell.real;

@@ -163,6 +163,20 @@ impl Aggregate {
         target
     }
 
+    /// The first external axis behind `axes` that is not at zero.
+    pub fn foreign(&self, axes: &[usize]) -> Option<(String, f64)> {
+        let numbers = self.elements.iter().filter_map(|(name, element)| match element {
+            Element::Number(value, _) => Some((name, *value)),
+            _ => None,
+        });
+        let is_foreign = |name: &str| {
+            let number = name.strip_prefix('E').and_then(|n| n.parse::<usize>().ok());
+            number.is_some_and(|n| n + 6 > axes.len().max(6))
+        };
+        let mut off_zero = numbers.filter(|(name, value)| *value != 0.0 && is_foreign(name));
+        off_zero.next().map(|(name, value)| (name.clone(), value))
+    }
+
     /// Values of the external axes by reading; `None` for the others and for those that are missing.
     pub fn external(&self, axes: &[usize], prismatic: &[bool]) -> Vec<Option<f64>> {
         let mut fixed = vec![None; axes.len()];

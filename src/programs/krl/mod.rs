@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use aggregate::{Aggregate, index};
 
 use super::ProgramSetting;
+use super::branches::{Branches, Branching, Merged};
 use super::itinerary::Itinerary;
 use super::program::{Approach, Left, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
@@ -34,7 +35,7 @@ enum Value {
 }
 
 /// Where a frame comes from.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 enum FrameIs {
     Known(Pose),
     /// Not set in the text so far.
@@ -55,6 +56,20 @@ struct Frames {
 impl Default for Frames {
     fn default() -> Self {
         Self { tool: FrameIs::Unset, base: FrameIs::Unset, tool_in_room: false }
+    }
+}
+
+impl Merged for Frames {
+    fn merged(&self, other: &Self) -> Self {
+        let alike = |a: &FrameIs, b: &FrameIs| match a == b {
+            true => a.clone(),
+            false => FrameIs::Unknown("it is set in a branch or a loop".into()),
+        };
+        Self {
+            tool: alike(&self.tool, &other.tool),
+            base: alike(&self.base, &other.base),
+            tool_in_room: self.tool_in_room || other.tool_in_room,
+        }
     }
 }
 
@@ -105,6 +120,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
         declared: Vec::new(),
         root: FrameIs::Unset,
         active: Frames::default(),
+        branches: Branches::new(),
         spline: OwnFrames::default(),
         way: Itinerary::new(),
     };
@@ -130,6 +146,8 @@ struct Module<'a> {
     /// `$ROBROOT`: the foot of the robot in the world, of which `$BASE` is a part.
     root: FrameIs,
     active: Frames,
+    /// What of them depends on branches.
+    branches: Branches<Frames>,
     /// Frames of the spline block that is open.
     spline: OwnFrames,
     way: Itinerary,
@@ -138,7 +156,7 @@ struct Module<'a> {
 impl Module<'_> {
     fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
         (self.active, self.spline) = (Frames::default(), OwnFrames::default());
-        self.way.start_afresh();
+        self.start_afresh();
         let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {
             let Some(word) = reader.name() else {
@@ -437,18 +455,38 @@ impl Module<'_> {
     /// Statements that decide from where the robot comes; false for any other word.
     fn flow(&mut self, reader: &Reader<'_>, word: &str) -> bool {
         match word {
-            "DEF" | "DEFFCT" => self.way.start_afresh(),
+            "DEF" | "DEFFCT" => self.start_afresh(),
             "GLOBAL" if reader.ahead(1).is_some_and(|t| reader.text(t).to_ascii_uppercase().starts_with(b"DEF")) => {
-                self.way.start_afresh();
+                self.start_afresh();
             }
-            "IF" | "SWITCH" | "WHILE" | "LOOP" | "FOR" | "REPEAT" => self.way.branches_begin(),
-            "ELSE" | "CASE" | "DEFAULT" => self.way.next_branch(),
-            "ENDIF" | "ENDSWITCH" | "ENDWHILE" | "ENDLOOP" | "ENDFOR" | "UNTIL" => self.way.branches_end(),
+            "IF" | "SWITCH" | "WHILE" | "LOOP" | "FOR" | "REPEAT" => {
+                self.way.branches_begin();
+                let kind = match word {
+                    "IF" => Branching::If,
+                    "SWITCH" => Branching::Cases,
+                    "LOOP" | "REPEAT" => Branching::LoopTaken,
+                    _ => Branching::Loop,
+                };
+                self.branches.begin(&self.active, kind);
+            }
+            "ELSE" | "CASE" | "DEFAULT" => {
+                self.way.next_branch();
+                self.branches.next(&mut self.active, word != "CASE");
+            }
+            "ENDIF" | "ENDSWITCH" | "ENDWHILE" | "ENDLOOP" | "ENDFOR" | "UNTIL" => {
+                self.way.branches_end();
+                self.branches.end(&mut self.active);
+            }
             "SPLINE" => {}
             "ENDSPLINE" => self.spline = OwnFrames::default(),
             _ => return false,
         }
         true
+    }
+
+    fn start_afresh(&mut self) {
+        self.way.start_afresh();
+        self.branches.start_afresh();
     }
 
     fn leave_at(&mut self, file: usize, line: usize, name: &str, why: Why) {
@@ -511,6 +549,9 @@ impl Module<'_> {
             let words = "$ROBROOT is not zero: $BASE does not stand in the foot of the robot \
                          (with --base of a link that is the world, leave out the file that sets it)";
             return Err(Why::new(LeftReason::FrameUnknown, words));
+        }
+        if let Some((name, value)) = a.foreign(axes).filter(|_| !self.setting.axes_apart) {
+            return Err(Why::external(&name, value));
         }
         let frame = |reason, name: &str, is: &FrameIs, flag: Option<Pose>, flag_name: &str| match (is, flag) {
             (FrameIs::Known(pose), _) => Ok(*pose),

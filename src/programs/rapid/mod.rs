@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::ProgramSetting;
+use super::branches::{Branches, Branching, Merged};
 use super::codes::{Codes, PostureCode};
 use super::field::{Field, FieldPlace};
 use super::itinerary::Itinerary;
@@ -28,6 +29,8 @@ const MOVES: [&str; 6] = ["MOVE", "TRIGGL", "TRIGGJ", "TRIGGC", "ARC", "SPOT"];
 const NO_MOVES: [&str; 2] = ["MOVEEXTJ", "ARCREFRESH"];
 /// Instructions that move all robtargets behind them, until `PDispOff`.
 const DISPLACES: [&str; 2] = ["PDISPON", "PDISPSET"];
+/// Instructions that move external axes, until `EOffsOff`.
+const OFFSETS: [&str; 2] = ["EOFFSON", "EOFFSSET"];
 const TYPES: [&str; 4] = ["ROBTARGET", "JOINTTARGET", "TOOLDATA", "WOBJDATA"];
 const DECIMALS_MM: usize = 4;
 const DECIMALS_DEG: usize = 6;
@@ -44,6 +47,28 @@ enum Watched {
     Off,
     /// Other routines switch it.
     Unknown,
+}
+
+/// What instructions switch for those behind them.
+#[derive(Debug, Clone, Copy)]
+struct Switched {
+    /// The checks of configurations.
+    watched: [Watched; 2],
+    /// True where a program displacement may be active.
+    displaced: bool,
+    /// True where an offset of external axes may be active.
+    offset: bool,
+}
+
+impl Merged for Switched {
+    fn merged(&self, other: &Self) -> Self {
+        let alike = |k: usize| if self.watched[k] == other.watched[k] { self.watched[k] } else { Watched::Unknown };
+        Self {
+            watched: [0, 1].map(alike),
+            displaced: self.displaced || other.displaced,
+            offset: self.offset || other.offset,
+        }
+    }
 }
 
 /// Declared data.
@@ -63,9 +88,10 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
         data: BTreeMap::new(),
         bases: BTreeMap::new(),
         switched_off: [false; 2],
-        watched: [Watched::On; 2],
         displaces: false,
-        displaced: false,
+        offsets: false,
+        now: Switched { watched: [Watched::On; 2], displaced: false, offset: false },
+        branches: Branches::new(),
         way: Itinerary::new(),
     };
     for (index, file) in files.iter().enumerate() {
@@ -76,7 +102,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
         task.way.start_afresh();
         task.moves(Reader::new(file, index, DIALECT)?)?;
     }
-    task.displaced = false;
+    (task.now.displaced, task.now.offset) = (false, false);
     task.unvisited()?;
     let mut program = task.way.program;
     program.files = files;
@@ -90,12 +116,14 @@ struct Task<'a> {
     bases: BTreeMap<String, Target>,
     /// True where a routine switches the check of configurations off: for moves of the joints, and on paths.
     switched_off: [bool; 2],
-    /// State of these checks.
-    watched: [Watched; 2],
     /// True where a routine begins a program displacement, which holds in those that it calls.
     displaces: bool,
-    /// True where such a displacement may be active.
-    displaced: bool,
+    /// The same of an offset of external axes.
+    offsets: bool,
+    /// What is switched where the text stands.
+    now: Switched,
+    /// What of it depends on branches.
+    branches: Branches<Switched>,
     way: Itinerary,
 }
 
@@ -184,7 +212,10 @@ impl Task<'_> {
             if let Some((which, Watched::Off)) = switch(&reader) {
                 self.switched_off[which] = true;
             }
-            self.displaces |= reader.name().is_some_and(|word| DISPLACES.contains(&word.as_str()));
+            let name = reader.name();
+            let is_of = |all: [&str; 2]| name.as_ref().is_some_and(|word| all.contains(&word.as_str()));
+            self.displaces |= is_of(DISPLACES);
+            self.offsets |= is_of(OFFSETS);
             reader.at += 1;
         }
     }
@@ -196,24 +227,43 @@ impl Task<'_> {
             line.into_iter().any(|t| reader.text(t).eq_ignore_ascii_case(wanted))
         };
         if let Some((which, state)) = switch(reader) {
-            self.watched[which] = state;
+            self.now.watched[which] = state;
         }
         match word {
             w if ROUTINES.contains(&w) => {
                 self.way.start_afresh();
                 let state = |off: bool| if off { Watched::Unknown } else { Watched::On };
-                self.watched = self.switched_off.map(state);
-                self.displaced = self.displaces && !line_has(b"main");
+                let is_called = !line_has(b"main");
+                self.now = Switched {
+                    watched: self.switched_off.map(state),
+                    displaced: self.displaces && is_called,
+                    offset: self.offsets && is_called,
+                };
+                self.branches.start_afresh();
             }
-            w if DISPLACES.contains(&w) => self.displaced = true,
-            "PDISPOFF" => self.displaced = false,
+            w if DISPLACES.contains(&w) => self.now.displaced = true,
+            w if OFFSETS.contains(&w) => self.now.offset = true,
+            "PDISPOFF" => self.now.displaced = false,
+            "EOFFSOFF" => self.now.offset = false,
             // Without THEN it is a statement of one line.
-            "IF" if line_has(b"THEN") => self.way.branches_begin(),
-            "TEST" | "WHILE" | "FOR" => self.way.branches_begin(),
-            "ELSE" | "ELSEIF" | "CASE" | "DEFAULT" => self.way.next_branch(),
-            "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => self.way.branches_end(),
+            "IF" if line_has(b"THEN") => self.begin(Branching::If),
+            "TEST" => self.begin(Branching::Cases),
+            "WHILE" | "FOR" => self.begin(Branching::Loop),
+            "ELSE" | "ELSEIF" | "CASE" | "DEFAULT" => {
+                self.way.next_branch();
+                self.branches.next(&mut self.now, matches!(word, "ELSE" | "DEFAULT"));
+            }
+            "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => {
+                self.way.branches_end();
+                self.branches.end(&mut self.now);
+            }
             _ => {}
         }
+    }
+
+    fn begin(&mut self, kind: Branching) {
+        self.way.branches_begin();
+        self.branches.begin(&self.now, kind);
     }
 
     fn moves(&mut self, mut reader: Reader<'_>) -> Result<()> {
@@ -233,6 +283,10 @@ impl Task<'_> {
             } else {
                 if begins || word == "PROC" || word == "FUNC" || word == "TRAP" {
                     self.flow(&reader, &word);
+                } else {
+                    // Behind the condition of a statement of one line: it may take place.
+                    self.now.displaced |= DISPLACES.contains(&word.as_str());
+                    self.now.offset |= OFFSETS.contains(&word.as_str());
                 }
                 reader.at += 1;
             }
@@ -365,7 +419,7 @@ impl Task<'_> {
         let upper = name.to_ascii_uppercase();
         let of_joints = upper.starts_with("MOVEJ") || upper.starts_with("TRIGGJ") || upper.ends_with('J');
         let near = if upper.starts_with("MOVEL") { MeantPosture::Along } else { MeantPosture::Nearest };
-        pose.posture = match (self.watched[usize::from(!of_joints)], pose.posture) {
+        pose.posture = match (self.now.watched[usize::from(!of_joints)], pose.posture) {
             (Watched::Off, _) => near,
             (Watched::Unknown, MeantPosture::Coded(codes, axes)) => MeantPosture::Either(codes, axes),
             (_, posture) => posture,
@@ -444,7 +498,7 @@ impl Task<'_> {
         if parts.len() == 2 {
             return Ok(TargetKind::Joints(self.joints(&parts[0], &external, file)?));
         }
-        if self.displaced {
+        if self.now.displaced {
             let words = "a program displacement (PDispOn, PDispSet) may be active";
             return Err(Why::new(LeftReason::FrameUnknown, words));
         }
@@ -467,6 +521,16 @@ impl Task<'_> {
                 MeantPosture::Coded(Codes::Rapid(Box::new(cf)), six)
             }
         };
+        let foreign = external.iter().enumerate().skip(axes.len().saturating_sub(6));
+        let mut off_zero = foreign.filter(|(_, (value, _))| *value != 0.0 && *value < NO_AXIS);
+        if let Some((k, (value, _))) = off_zero.next().filter(|_| !self.setting.axes_apart) {
+            return Err(Why::external(&format!("eax_{}", char::from(b"abcdef"[k])), *value));
+        }
+        let has_external = external.iter().any(|(value, _)| *value < NO_AXIS);
+        if self.now.offset && has_external && !self.setting.axes_apart {
+            let words = "an offset of external axes (EOffsOn, EOffsSet) may be active";
+            return Err(Why::new(LeftReason::ExternalAxis, words));
+        }
         let mut fixed = vec![None; axes.len()];
         for (&reading, (value, _)) in axes.iter().skip(6).zip(&external) {
             fixed[reading] = (*value < NO_AXIS).then_some(value * self.unit(reading).0);
