@@ -57,6 +57,8 @@ limits! {
     times_usual_blur: f64 = 2.0;
     /// Prior sigmas beyond which a deviation is no longer within tolerance.
     sigmas_beyond_tolerance: f64 = 5.0;
+    /// The same beyond which the URDF is of another robot or its zeros are elsewhere: offsets of 2 degrees, origins 15 mm off.
+    far_beyond_tolerance: f64 = 15.0;
 
     /// Change of dark images over full scale, in common or from place to place, that is said: a fifth of a percent tilts edges of 100 counts
     /// by half a percent of their contrast.
@@ -123,6 +125,8 @@ limits! {
 
     /// Standard deviations from which on plate and links contradict each other.
     plate_size_sigmas: f64 = 3.0;
+    /// The same from which on it is said of a plate that nobody measured: by chance one in eighty.
+    plate_size_doubtful: f64 = 2.5;
     /// The same, of a first look from the fit with the stated size, from which a fit with a free size decides.
     plate_size_suspected: f64 = 1.5;
     /// Standard deviation of the size by the links from which on they say nothing of it: small deviations ask for a small robot.

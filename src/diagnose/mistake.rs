@@ -70,6 +70,8 @@ pub struct Mistake {
     pub misfit: f64,
     /// The same with the mistake undone; none of lengths, which were not corrected.
     pub misfit_undone: Option<f64>,
+    /// True where images showed it, false where a tracker did.
+    pub by_images: bool,
 }
 
 impl Mistake {
@@ -137,6 +139,52 @@ impl Kind for Mistake {
     }
 
     fn seen(&self) -> String {
+        let words = self.in_words();
+        if self.by_images { words } else { words.replace("image", "measurement") }
+    }
+
+    fn remedy(&self) -> String {
+        match &self.kind {
+            MistakeKind::Signs(joints) => {
+                let (columns, axes) = if joints.len() == 1 { ("column", "axis") } else { ("columns", "axes") };
+                let names = joints.join(" and ");
+                format!(
+                    "negate the {columns} {names} of joints.csv, or the {axes} of {names} in the URDF if the controller counts that way"
+                )
+            }
+            MistakeKind::Columns(joints) if joints.len() == 2 => {
+                format!("exchange the column names {} in joints.csv", joints.join(" and "))
+            }
+            MistakeKind::Columns(joints) => format!("correct the column names {} in joints.csv", joints.join(", ")),
+            MistakeKind::Reversed => "reverse the column names in joints.csv".into(),
+            MistakeKind::Unit { joint: Some(joint), .. } => {
+                format!("bring the column {joint} of joints.csv to the unit of the others")
+            }
+            MistakeKind::Unit { joint: None, are_degrees } => {
+                format!("write joint_unit = \"{}\" in series.toml", unit(*are_degrees)[2])
+            }
+            MistakeKind::Coupled { joints: [joint, before], is_sum } => {
+                let word = if *is_sum { "plus" } else { "minus" };
+                format!("write {joint} {word} {before} into the column {joint} of joints.csv")
+            }
+            MistakeKind::Rows { .. } => "shift the names in the first column of joints.csv by one row".into(),
+            MistakeKind::Mount(mount) => {
+                let word = if *mount == CameraMount::Hand { "hand" } else { "fixed" };
+                format!("write camera_mount = \"{word}\" in series.toml")
+            }
+            MistakeKind::Lengths { .. } => {
+                "check that the URDF is of this robot and size, with lengths in metres, and that the tip link carries the camera".into()
+            }
+            MistakeKind::PlateSize { .. } => {
+                "measure the pitch of the plate with a ruler and correct pitch_m in plate.toml; if it is right, the URDF is of another size of this robot".into()
+            }
+            MistakeKind::Poses { remedy, .. } => remedy.clone(),
+        }
+    }
+}
+
+impl Mistake {
+    fn in_words(&self) -> String {
         match &self.kind {
             MistakeKind::Signs(joints) => format!(
                 "the readings of {} have the wrong sign: with {} negated the images fit",
@@ -189,45 +237,6 @@ impl Kind for Mistake {
                 1.0 / scale
             ),
             MistakeKind::Poses { what, .. } => what.clone(),
-        }
-    }
-
-    fn remedy(&self) -> String {
-        match &self.kind {
-            MistakeKind::Signs(joints) => {
-                let (columns, axes) = if joints.len() == 1 { ("column", "axis") } else { ("columns", "axes") };
-                let names = joints.join(" and ");
-                format!(
-                    "negate the {columns} {names} of joints.csv, or the {axes} of {names} in the URDF if the controller counts that way"
-                )
-            }
-            MistakeKind::Columns(joints) if joints.len() == 2 => {
-                format!("exchange the column names {} in joints.csv", joints.join(" and "))
-            }
-            MistakeKind::Columns(joints) => format!("correct the column names {} in joints.csv", joints.join(", ")),
-            MistakeKind::Reversed => "reverse the column names in joints.csv".into(),
-            MistakeKind::Unit { joint: Some(joint), .. } => {
-                format!("bring the column {joint} of joints.csv to the unit of the others")
-            }
-            MistakeKind::Unit { joint: None, are_degrees } => {
-                format!("write joint_unit = \"{}\" in series.toml", unit(*are_degrees)[2])
-            }
-            MistakeKind::Coupled { joints: [joint, before], is_sum } => {
-                let word = if *is_sum { "plus" } else { "minus" };
-                format!("write {joint} {word} {before} into the column {joint} of joints.csv")
-            }
-            MistakeKind::Rows { .. } => "shift the image names in joints.csv by one row".into(),
-            MistakeKind::Mount(mount) => {
-                let word = if *mount == CameraMount::Hand { "hand" } else { "fixed" };
-                format!("write camera_mount = \"{word}\" in series.toml")
-            }
-            MistakeKind::Lengths { .. } => {
-                "check that the URDF is of this robot and size, with lengths in metres, and that the tip link carries the camera".into()
-            }
-            MistakeKind::PlateSize { .. } => {
-                "measure the pitch of the plate with a ruler and correct pitch_m in plate.toml; if it is right, the URDF is of another size of this robot".into()
-            }
-            MistakeKind::Poses { remedy, .. } => remedy.clone(),
         }
     }
 }

@@ -16,6 +16,8 @@ pub struct ParameterOff {
     pub unit: &'static str,
     /// How many times what robots usually deviate by.
     pub usual_deviations: f64,
+    /// Gate or note.
+    pub weight: Weight,
 }
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<ParameterOff> {
@@ -26,7 +28,9 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Para
         let usual_deviations = ((values[c] - column.prior_mean) / problem.stated_sigma(c)).abs();
         (usual_deviations > setting.limits.sigmas_beyond_tolerance).then(|| {
             let parameter = column.name.clone();
-            ParameterOff { parameter, value: values[c], unit: column.unit, usual_deviations }
+            let is_far = usual_deviations > setting.limits.far_beyond_tolerance;
+            let weight = if is_far { Weight::Gate } else { Weight::Note };
+            ParameterOff { parameter, value: values[c], unit: column.unit, usual_deviations, weight }
         })
     };
     problem.layout.robot().filter_map(of_column).collect()
@@ -38,7 +42,7 @@ impl Kind for ParameterOff {
     }
 
     fn weight(&self) -> Weight {
-        Weight::Note
+        self.weight
     }
 
     fn subjects(&self) -> Vec<Subject> {

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::kind::{CheckContext, Kind, Quantity, Subject};
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::Accuracy;
 use crate::error::Code;
 use crate::fit::Fit;
@@ -23,6 +23,8 @@ pub enum DoubtedSize {
         off: f64,
         /// Its standard deviation.
         sigma: f64,
+        /// Gate or note.
+        weight: Weight,
     },
     /// Rows and columns differ in scale.
     Uneven {
@@ -42,10 +44,16 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
         let beyond = |told: &Told, sigmas: f64| told.off.abs() > sigmas * told.sigma;
         // A size that is stated wrongly makes the links look worse than they are, and what they say less certain.
         let suspected = released.one_step().filter(|told| beyond(told, limits.plate_size_suspected));
-        let told = suspected.and_then(|_| released.fitted()).filter(|told| beyond(told, limits.plate_size_sigmas));
-        let told = told.filter(|told| told.sigma < limits.plate_size_told);
-        if let Some(Told { off, sigma }) = told {
-            doubts.push(DoubtedSize::Contradicted { measured: plate.scale.is_some(), off, sigma });
+        let told = suspected.and_then(|_| released.fitted()).filter(|told| told.sigma < limits.plate_size_told);
+        let measured = plate.scale.is_some();
+        if let Some(told) = told
+            && let Some(weight) = match told {
+                told if beyond(&told, limits.plate_size_sigmas) => Some(Weight::Gate),
+                told if !measured && beyond(&told, limits.plate_size_doubtful) => Some(Weight::Note),
+                _ => None,
+            }
+        {
+            doubts.push(DoubtedSize::Contradicted { measured, off: told.off, sigma: told.sigma, weight });
         }
         if plate.scale.is_none()
             && let Some((off, tolerance)) = x_y_scale(problem, state, k)
@@ -62,6 +70,13 @@ impl Kind for DoubtedSize {
         match self {
             Self::Contradicted { .. } => Code::PlateSizeContradicted,
             Self::Uneven { .. } => Code::PlateUneven,
+        }
+    }
+
+    fn weight(&self) -> Weight {
+        match self {
+            Self::Contradicted { weight, .. } => *weight,
+            Self::Uneven { .. } => Weight::Gate,
         }
     }
 
@@ -84,7 +99,7 @@ impl Kind for DoubtedSize {
 
     fn seen(&self) -> String {
         match self {
-            Self::Contradicted { measured, off, sigma } => format!(
+            Self::Contradicted { measured, off, sigma, .. } => format!(
                 "the links of the robot say that it is {:.2} % (+- {:.2} %) {} than {} says, and every length goes wrong with it",
                 100.0 * off.abs(),
                 100.0 * sigma,

@@ -8,10 +8,14 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::mistakes::mistakes_undone;
+use crate::assess::{Limits, median};
+use crate::diagnose::{Finding, Mistake};
 use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, project_to_so3};
 use crate::init::{PosePair, solve_hand_eye};
 use crate::linalg::SymmetricFactor;
+use crate::model::robot::Robot;
 use crate::problem::{Adjustment, BodyMeasurement, BodySeen, InstrumentKind, Problem};
 
 /// Information of a prior on unknown lengths, 1/m^2 where measurements have 1: it holds what they do not tell near zero.
@@ -26,8 +30,8 @@ const STANDING_M: f64 = 1e-7;
 /// Fills in instruments and bodies.
 ///
 /// # Errors
-/// Too few measurements of a body; poses that no closed form explains.
-pub(super) fn start_bodies(adjustment: &mut Adjustment) -> Result<()> {
+/// Too few measurements of a body; poses that no closed form explains; a usual mistake in the readings that does.
+pub(super) fn start_bodies(adjustment: &mut Adjustment, limits: &Limits) -> Result<()> {
     let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (k, measured) in adjustment.problem.used_bodies() {
         groups.entry((measured.instrument, measured.body)).or_default().push(k);
@@ -41,6 +45,7 @@ pub(super) fn start_bodies(adjustment: &mut Adjustment) -> Result<()> {
         let (sockets, others): (Vec<_>, Vec<_>) = seen_by.into_iter().partition(|(i, _)| is_socket(i));
         for (instrument, measured) in others {
             let (frame, at) = framed(adjustment, instrument, &measured)?;
+            name_mistake(adjustment, (instrument, &measured), limits)?;
             adjustment.state.instruments[instrument] = frame;
             adjustment.state.bodies[body] = at;
         }
@@ -102,10 +107,72 @@ fn framed(adjustment: &Adjustment, instrument: usize, measured: &[usize]) -> Res
     if points.len() < FEWEST_POINTS {
         return Err(too_few(problem, instrument, points.len(), FEWEST_POINTS));
     }
-    let starts = [all_linear(&points), Some(alternating(&points, Matrix3::identity()))];
-    let refined = starts.into_iter().flatten().map(|(frame, _)| alternating(&points, frame.rotation));
-    let best = refined.min_by(|a, b| misfit(&points, a).total_cmp(&misfit(&points, b)));
-    best.ok_or_else(|| too_few(problem, instrument, points.len(), FEWEST_POINTS))
+    nearest(&points).ok_or_else(|| too_few(problem, instrument, points.len(), FEWEST_POINTS))
+}
+
+/// What a body was seen as, and the readings at its stops.
+struct SeenAt {
+    seen: BodySeen,
+    readings: Vec<f64>,
+}
+
+/// Refuses readings that fit what an instrument saw of a body with one of the usual mistakes undone, and only then.
+fn name_mistake(
+    Adjustment { problem, state }: &Adjustment,
+    (instrument, measured): (usize, &[usize]),
+    limits: &Limits,
+) -> Result<()> {
+    let robot = &state.robot;
+    let at = |k: &usize| {
+        let BodyMeasurement { stop, seen, .. } = problem.body_measurements[*k];
+        let readings = problem.stops[stop].posture.as_ref()?.readings.clone();
+        Some(SeenAt { seen, readings })
+    };
+    let seen: Vec<SeenAt> = measured.iter().filter_map(at).collect();
+    let given: Vec<Vec<f64>> = seen.iter().map(|s| s.readings.clone()).collect();
+    let as_described = usual_misfit(robot, &seen, &given);
+    if as_described < limits.suspicious_misfit || robot.chain.pose_coordinates().is_some() {
+        return Ok(());
+    }
+    let tried = mistakes_undone(robot, &given).into_iter().map(|(readings, kind)| {
+        let left = usual_misfit(robot, &seen, &readings);
+        (left, kind)
+    });
+    let best = tried
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .filter(|(left, _)| *left < limits.mistake_explains * as_described && *left < limits.suspicious_misfit);
+    best.map_or(Ok(()), |(left, kind)| {
+        let instrument = &problem.instruments[instrument];
+        let of = format!("{} {}", instrument.kind.block(), instrument.name);
+        let mistake = Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false };
+        Err(Finding::from(mistake).refusal())
+    })
+}
+
+/// Median misfit of the poses (rad + m), or of the points (m), with readings.
+fn usual_misfit(robot: &Robot, seen: &[SeenAt], readings: &[Vec<f64>]) -> f64 {
+    let tips: Vec<Pose> = readings.iter().map(|q| robot.base_from_tip(q)).collect();
+    let pair = |(seen, tip): (&SeenAt, &Pose)| match seen.seen {
+        BodySeen::Pose(pose) => Some(PosePair { camera_from_plate: pose, chain: *tip }),
+        BodySeen::Point(_) => None,
+    };
+    let pairs: Vec<PosePair> = seen.iter().zip(&tips).filter_map(pair).collect();
+    if pairs.len() >= FEWEST_POSES {
+        return solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error);
+    }
+    let points: Vec<(Vector3<f64>, Pose)> = seen.iter().map(|s| s.seen.position()).zip(tips).collect();
+    let distances = |(frame, body): (Pose, Pose)| {
+        let of = |(p, tip): &(Vector3<f64>, Pose)| (frame.transform(p) - tip.transform(&body.translation)).norm();
+        median(&points.iter().map(of).collect::<Vec<f64>>())
+    };
+    nearest(&points).and_then(distances).unwrap_or(f64::INFINITY)
+}
+
+/// Frame and body that points fit best.
+fn nearest(points: &[(Vector3<f64>, Pose)]) -> Option<(Pose, Pose)> {
+    let starts = [all_linear(points), Some(alternating(points, Matrix3::identity()))];
+    let refined = starts.into_iter().flatten().map(|(frame, _)| alternating(points, frame.rotation));
+    refined.min_by(|a, b| misfit(points, a).total_cmp(&misfit(points, b)))
 }
 
 /// Poses from which the closed forms follow.

@@ -85,7 +85,7 @@ pub(super) fn fit_model(
     let on_robot = start.problem.used_on_robot().count();
     check_on_robot(&start.problem, on_robot)?;
     let aside = start_robot(&mut start, free, StartGiven { series, limits: &options.limits }, &mut starts)?;
-    start_bodies(&mut start)?;
+    start_bodies(&mut start, &options.limits)?;
     let (mut outcome, before) = {
         let _stage = stage("joint fit");
         fit(start, free, (&aside, near.as_ref()), options)

@@ -18,6 +18,7 @@ mod joint;
 mod lens_choice;
 mod local_errors;
 mod measure;
+mod mistakes;
 mod near_nominal;
 mod options;
 mod pose_comparison;

@@ -230,7 +230,8 @@ fn closed_form(
     }
     let suspects = Suspects { problem, robot: &state.robot, series, pairs, limits };
     if let Some((kind, misfit_undone)) = suspects.better_than(best.median_error) {
-        let mistake = Mistake { kind, of: of.to_owned(), misfit: best.median_error, misfit_undone };
+        let misfit = best.median_error;
+        let mistake = Mistake { kind, of: of.to_owned(), misfit, misfit_undone, by_images: true };
         return Err(Finding::from(mistake).refusal());
     }
     if best.median_error > limits.hand_eye_spread {

@@ -1,12 +1,12 @@
 //! When readings and images do not fit: the usual mistakes, tried one by one, named where one of them explains it.
 
+use super::mistakes::{mistakes_undone, shifted_rows};
 use crate::assess::Limits;
 use crate::diagnose::MistakeKind;
 use crate::init::{PosePair, plate_scale, solve_hand_eye};
 use crate::model::robot::Robot;
 use crate::problem::{MeasuredSeries, Problem};
 use crate::series::CameraMount;
-use crate::urdf::JointKind;
 
 /// Images of one camera mounting and one plate placement with what they say.
 pub(super) struct Suspects<'a> {
@@ -33,7 +33,8 @@ impl Suspects<'_> {
         if !is_suspicious {
             return None;
         }
-        let hypotheses = if of_poses { self.shifted_rows() } else { self.hypotheses() };
+        let hypotheses =
+            if of_poses { shifted_rows(&self.readings()) } else { mistakes_undone(self.robot, &self.readings()) };
         let tried = hypotheses.into_iter().map(|(readings, mistake)| (self.misfit(&readings), mistake));
         let best = tried.chain([self.wrong_mount()]).filter(explains).min_by(|a, b| a.0.total_cmp(&b.0));
         match best {
@@ -104,64 +105,6 @@ impl Suspects<'_> {
         let (angle_rad, distance_m) = (angles[angles.len() / 2], distances[distances.len() / 2]);
         (angle_rad < self.limits.suspicious_misfit && distance_m > self.limits.other_lengths_m)
             .then_some(MistakeKind::Lengths { angle_rad, distance_m })
-    }
-
-    /// Readings with one mistake undone, and its name.
-    fn hypotheses(&self) -> Vec<(Vec<Vec<f64>>, MistakeKind)> {
-        let given = self.readings();
-        let (names, kinds) = (&self.robot.chain.readings, &self.robot.chain.reading_kinds);
-        let n = names.len();
-        let named = |joints: &[usize]| joints.iter().map(|&k| names[k].clone()).collect();
-        let mut all = Vec::new();
-        let mut add = |mistake, change: &dyn Fn(&mut Vec<f64>)| {
-            let mut changed = given.clone();
-            changed.iter_mut().for_each(change);
-            all.push((changed, mistake));
-        };
-        let units = [(true, 1f64.to_radians()), (false, 1f64.to_degrees())];
-        for k in 0..n {
-            add(MistakeKind::Signs(named(&[k])), &|q| q[k] = -q[k]);
-            for other in k + 1..n {
-                add(MistakeKind::Columns(named(&[k, other])), &|q| q.swap(k, other));
-                add(MistakeKind::Signs(named(&[k, other])), &|q| (q[k], q[other]) = (-q[k], -q[other]));
-                for third in other + 1..n {
-                    for (a, b) in [(other, third), (third, other)] {
-                        add(MistakeKind::Columns(named(&[k, a, b])), &|q| (q[k], q[a], q[b]) = (q[a], q[b], q[k]));
-                    }
-                }
-            }
-            if k > 0 && [kinds[k - 1], kinds[k]] == [JointKind::Revolute; 2] {
-                for (is_sum, sign) in [(true, 1.0), (false, -1.0)] {
-                    let joints = [k, k - 1].map(|joint| names[joint].clone());
-                    add(MistakeKind::Coupled { joints, is_sum }, &|q| q[k] += sign * q[k - 1]);
-                }
-            }
-            if kinds[k] == JointKind::Revolute {
-                for (are_degrees, factor) in units {
-                    let joint = Some(names[k].clone());
-                    add(MistakeKind::Unit { joint, are_degrees }, &|q| q[k] *= factor);
-                }
-            }
-        }
-        for (are_degrees, factor) in units {
-            add(MistakeKind::Unit { joint: None, are_degrees }, &|q| {
-                let revolute = q.iter_mut().zip(kinds).filter(|(_, kind)| **kind == JointKind::Revolute);
-                revolute.for_each(|(v, _)| *v *= factor);
-            });
-        }
-        add(MistakeKind::Reversed, &|q| q.reverse());
-        all.extend(self.shifted_rows());
-        all
-    }
-
-    fn shifted_rows(&self) -> Vec<(Vec<Vec<f64>>, MistakeKind)> {
-        let given = self.readings();
-        let shifted = |below: bool| {
-            let mut shifted = given.clone();
-            shifted.rotate_left(if below { 1 } else { given.len().saturating_sub(1) });
-            (shifted, MistakeKind::Rows { below })
-        };
-        [true, false].map(shifted).into()
     }
 
     fn wrong_scale(&self) -> Option<(f64, MistakeKind)> {

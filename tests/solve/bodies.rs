@@ -508,3 +508,34 @@ fn distances_between_sockets_that_are_wrong_alike_are_doubted() {
     let said = sizes_doubted(series, &world.chain);
     assert!(matches!(said[..], [off] if (off - 0.02).abs() < 6e-3), "{said:?}");
 }
+
+/// Usual mistakes in the readings are refused by name, as with images, and not fitted away.
+#[test]
+fn mistakes_in_readings_are_named_by_a_tracker_alone() {
+    for (kind, sigma_rad) in [(Kind::Points, 0.0), (Kind::Poses, 5e-5)] {
+        let world = World::new(43, kind, 60, (3e-5, sigma_rad), 2e-5);
+        let named = |change: &dyn Fn(&mut Vec<f64>)| {
+            let mut series = world.series.clone();
+            series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(change);
+            let said = identify(world.chain.clone(), &[series], &Options::default()).map(|_| ()).unwrap_err();
+            (said.code, said.place)
+        };
+        let at = |joints: &str| joints.to_owned();
+        assert_eq!(named(&|q| q[2] = -q[2]), (Code::JointSignWrong, at("joint_a3")));
+        assert_eq!(named(&|q| q[4] = -q[4]), (Code::JointSignWrong, at("joint_a5")));
+        assert_eq!(named(&|q| q.swap(3, 5)), (Code::JointOrderWrong, at("joint_a4, joint_a6")));
+        assert_eq!(named(&|q| q[2] += q[1]), (Code::JointCoupled, at("joint_a3")));
+    }
+}
+
+#[test]
+fn zeros_that_are_far_off_are_no_good_result_of_a_tracker() {
+    let world = World::new(44, Kind::Poses, 60, (3e-5, 5e-5), 2e-5);
+    let mut series = world.series.clone();
+    for q in series.stops.iter_mut().filter_map(|s| s.readings.as_mut()) {
+        (q[1], q[2]) = (q[1] + 8f64.to_radians(), q[2] - 10f64.to_radians());
+    }
+    let solution = identify(world.chain.clone(), &[series], &Options::default()).unwrap();
+    let off = solution.findings.iter().filter(|f| f.code() == Code::ParameterOff && f.fails()).count();
+    assert!(off > 0, "{:?}", solution.findings);
+}

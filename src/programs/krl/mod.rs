@@ -1,13 +1,15 @@
 //! KUKA KRL, `.src` with its `.dat`: motions to `E6POS`, `POS`, `FRAME`, `E6AXIS` and `AXIS`, `$TOOL` and `$BASE` (mm and degrees).
 
 mod aggregate;
+mod frames;
 
 use std::collections::BTreeMap;
 
 use aggregate::{Aggregate, index};
+use frames::{FrameIs, Frames, OwnFrames};
 
 use super::ProgramSetting;
-use super::branches::{Branches, Branching, Merged};
+use super::branches::{Branches, Branching};
 use super::itinerary::Itinerary;
 use super::program::{Approach, Left, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
@@ -32,71 +34,6 @@ enum Value {
     /// Another name.
     Name(String),
     Expression,
-}
-
-/// Where a frame comes from.
-#[derive(Debug, Clone, PartialEq)]
-enum FrameIs {
-    Known(Pose),
-    /// Not set in the text so far.
-    Unset,
-    /// Set to something that the text does not tell.
-    Unknown(String),
-}
-
-/// `$TOOL`, `$BASE` and `$IPO_MODE` of a motion.
-#[derive(Debug, Clone)]
-struct Frames {
-    tool: FrameIs,
-    base: FrameIs,
-    /// The tool is fixed in the room, and the robot holds the work (`#TCP`).
-    tool_in_room: bool,
-}
-
-impl Default for Frames {
-    fn default() -> Self {
-        Self { tool: FrameIs::Unset, base: FrameIs::Unset, tool_in_room: false }
-    }
-}
-
-impl Merged for Frames {
-    fn merged(&self, other: &Self) -> Self {
-        let alike = |a: &FrameIs, b: &FrameIs| match a == b {
-            true => a.clone(),
-            false => FrameIs::Unknown("it is set in a branch or a loop".into()),
-        };
-        Self {
-            tool: alike(&self.tool, &other.tool),
-            base: alike(&self.base, &other.base),
-            tool_in_room: self.tool_in_room || other.tool_in_room,
-        }
-    }
-}
-
-/// What a motion or a spline block states for itself (`WITH $TOOL=.., $BASE=.., $IPO_MODE=..`).
-#[derive(Debug, Clone, Default)]
-struct OwnFrames {
-    tool: Option<FrameIs>,
-    base: Option<FrameIs>,
-    tool_in_room: Option<bool>,
-}
-
-impl OwnFrames {
-    fn or(self, other: &Self) -> Self {
-        Self {
-            tool: self.tool.or_else(|| other.tool.clone()),
-            base: self.base.or_else(|| other.base.clone()),
-            tool_in_room: self.tool_in_room.or(other.tool_in_room),
-        }
-    }
-
-    fn over(self, active: &Frames) -> Frames {
-        Frames {
-            tool: self.tool.unwrap_or_else(|| active.tool.clone()),
-            base: self.base.unwrap_or_else(|| active.base.clone()),
-            tool_in_room: self.tool_in_room.unwrap_or(active.tool_in_room),
-        }
-    }
 }
 
 /// The numbers of an element of an array, where its name is that of the pattern with numbers in the place of words.

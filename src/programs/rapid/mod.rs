@@ -1,12 +1,13 @@
 //! ABB RAPID: moves to `robtarget` and `jointtarget`, declared or in the instruction, with `tooldata` and `wobjdata` (mm and degrees).
 
+mod switched;
 mod value;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::ProgramSetting;
-use super::branches::{Branches, Branching, Merged};
+use super::branches::{Branches, Branching};
 use super::codes::{Codes, PostureCode};
 use super::field::{Field, FieldPlace};
 use super::itinerary::Itinerary;
@@ -20,56 +21,20 @@ use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
-use value::{Displacement, Node, check, computed, frame, node, numbers, undeclared};
+use switched::{DISPLACES, OFFSETS, Switched, Watched, switch};
+use value::{Displacement, NO_AXIS, Node, check, computed, foreign_axis, frame, node, numbers, undeclared};
 
 const DIALECT: Dialect = Dialect { comment: b'!', quotes: b"\"", header: None, based_numbers: false };
 /// Beginnings of the names of instructions that move the robot to their first arguments.
 const MOVES: [&str; 6] = ["MOVE", "TRIGGL", "TRIGGJ", "TRIGGC", "ARC", "SPOT"];
 /// Instructions that begin so, but move no robot.
 const NO_MOVES: [&str; 2] = ["MOVEEXTJ", "ARCREFRESH"];
-/// Instructions that move all robtargets behind them, until `PDispOff`.
-const DISPLACES: [&str; 2] = ["PDISPON", "PDISPSET"];
-/// Instructions that move external axes, until `EOffsOff`.
-const OFFSETS: [&str; 2] = ["EOFFSON", "EOFFSSET"];
 const TYPES: [&str; 4] = ["ROBTARGET", "JOINTTARGET", "TOOLDATA", "WOBJDATA"];
 const DECIMALS_MM: usize = 4;
 const DECIMALS_DEG: usize = 6;
 const DECIMALS_QUATERNION: usize = 9;
 /// Beginnings and ends of routines, and statements with branches.
 const ROUTINES: [&str; 3] = ["PROC", "FUNC", "TRAP"];
-/// An external axis that is not there.
-const NO_AXIS: f64 = 9e9;
-
-/// Whether confdata count for a kind of move.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Watched {
-    On,
-    Off,
-    /// Other routines switch it.
-    Unknown,
-}
-
-/// What instructions switch for those behind them.
-#[derive(Debug, Clone, Copy)]
-struct Switched {
-    /// The checks of configurations.
-    watched: [Watched; 2],
-    /// True where a program displacement may be active.
-    displaced: bool,
-    /// True where an offset of external axes may be active.
-    offset: bool,
-}
-
-impl Merged for Switched {
-    fn merged(&self, other: &Self) -> Self {
-        let alike = |k: usize| if self.watched[k] == other.watched[k] { self.watched[k] } else { Watched::Unknown };
-        Self {
-            watched: [0, 1].map(alike),
-            displaced: self.displaced || other.displaced,
-            offset: self.offset || other.offset,
-        }
-    }
-}
 
 /// Declared data.
 #[derive(Debug, Clone)]
@@ -125,21 +90,6 @@ struct Task<'a> {
     /// What of it depends on branches.
     branches: Branches<Switched>,
     way: Itinerary,
-}
-
-/// `ConfJ \Off`, `ConfL \On`: which check, and its state; the reader stands on the name.
-fn switch(reader: &Reader<'_>) -> Option<(usize, Watched)> {
-    let which = match reader.name()?.as_str() {
-        "CONFJ" => 0,
-        "CONFL" => 1,
-        _ => return None,
-    };
-    let state = reader.ahead(2).filter(|_| reader.ahead_is_mark(1, b'\\'))?;
-    match reader.text(state).to_ascii_uppercase().as_slice() {
-        b"ON" => Some((which, Watched::On)),
-        b"OFF" => Some((which, Watched::Off)),
-        _ => None,
-    }
 }
 
 /// To behind the next semicolon.
@@ -521,10 +471,8 @@ impl Task<'_> {
                 MeantPosture::Coded(Codes::Rapid(Box::new(cf)), six)
             }
         };
-        let foreign = external.iter().enumerate().skip(axes.len().saturating_sub(6));
-        let mut off_zero = foreign.filter(|(_, (value, _))| *value != 0.0 && *value < NO_AXIS);
-        if let Some((k, (value, _))) = off_zero.next().filter(|_| !self.setting.axes_apart) {
-            return Err(Why::external(&format!("eax_{}", char::from(b"abcdef"[k])), *value));
+        if let Some((axis, value)) = foreign_axis(&external, axes.len()).filter(|_| !self.setting.axes_apart) {
+            return Err(Why::external(&axis, value));
         }
         let has_external = external.iter().any(|(value, _)| *value < NO_AXIS);
         if self.now.offset && has_external && !self.setting.axes_apart {

@@ -176,3 +176,13 @@ pub(super) fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result
     }
     Ok(())
 }
+
+/// An external axis that is not there.
+pub(super) const NO_AXIS: f64 = 9e9;
+
+/// The first external axis behind the `known` axes, the robot's six included, that is not at zero.
+pub(super) fn foreign_axis(external: &[(f64, Range<usize>); 6], known: usize) -> Option<(String, f64)> {
+    let foreign = external.iter().map(|(value, _)| *value).zip("abcdef".chars()).skip(known.saturating_sub(6));
+    let mut off_zero = foreign.filter(|(value, _)| *value != 0.0 && *value < NO_AXIS);
+    off_zero.next().map(|(value, letter)| (format!("eax_{letter}"), value))
+}

@@ -1,0 +1,65 @@
+//! The usual mistakes in joint readings, each undone.
+
+use crate::diagnose::MistakeKind;
+use crate::model::robot::Robot;
+use crate::urdf::JointKind;
+
+/// The readings of all stops with one mistake undone, and its name.
+pub(super) type Undone = (Vec<Vec<f64>>, MistakeKind);
+
+/// Every one of a single joint, of two or three, of all, and of rows.
+pub(super) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> {
+    let (names, kinds) = (&robot.chain.readings, &robot.chain.reading_kinds);
+    let n = names.len();
+    let named = |joints: &[usize]| joints.iter().map(|&k| names[k].clone()).collect();
+    let mut all = Vec::new();
+    let mut add = |mistake, change: &dyn Fn(&mut Vec<f64>)| {
+        let mut changed = given.to_vec();
+        changed.iter_mut().for_each(change);
+        all.push((changed, mistake));
+    };
+    let units = [(true, 1f64.to_radians()), (false, 1f64.to_degrees())];
+    for k in 0..n {
+        add(MistakeKind::Signs(named(&[k])), &|q| q[k] = -q[k]);
+        for other in k + 1..n {
+            add(MistakeKind::Columns(named(&[k, other])), &|q| q.swap(k, other));
+            add(MistakeKind::Signs(named(&[k, other])), &|q| (q[k], q[other]) = (-q[k], -q[other]));
+            for third in other + 1..n {
+                for (a, b) in [(other, third), (third, other)] {
+                    add(MistakeKind::Columns(named(&[k, a, b])), &|q| (q[k], q[a], q[b]) = (q[a], q[b], q[k]));
+                }
+            }
+        }
+        if k > 0 && [kinds[k - 1], kinds[k]] == [JointKind::Revolute; 2] {
+            for (is_sum, sign) in [(true, 1.0), (false, -1.0)] {
+                let joints = [k, k - 1].map(|joint| names[joint].clone());
+                add(MistakeKind::Coupled { joints, is_sum }, &|q| q[k] += sign * q[k - 1]);
+            }
+        }
+        if kinds[k] == JointKind::Revolute {
+            for (are_degrees, factor) in units {
+                let joint = Some(names[k].clone());
+                add(MistakeKind::Unit { joint, are_degrees }, &|q| q[k] *= factor);
+            }
+        }
+    }
+    for (are_degrees, factor) in units {
+        add(MistakeKind::Unit { joint: None, are_degrees }, &|q| {
+            let revolute = q.iter_mut().zip(kinds).filter(|(_, kind)| **kind == JointKind::Revolute);
+            revolute.for_each(|(v, _)| *v *= factor);
+        });
+    }
+    add(MistakeKind::Reversed, &|q| q.reverse());
+    all.extend(shifted_rows(given));
+    all
+}
+
+/// Readings of the row below, or above.
+pub(super) fn shifted_rows(given: &[Vec<f64>]) -> Vec<Undone> {
+    let shifted = |below: bool| {
+        let mut shifted = given.to_vec();
+        shifted.rotate_left(if below { 1 } else { given.len().saturating_sub(1) });
+        (shifted, MistakeKind::Rows { below })
+    };
+    [true, false].map(shifted).into()
+}
