@@ -110,6 +110,7 @@ fn program(language: Language, bytes: &[u8]) {
         base: Pose::identity(),
         tool: None,
         work: None,
+        axes_apart: false,
     };
     let file = TextFile { name: "program".into(), bytes: bytes.to_vec() };
     drop(programs::read(language, vec![file], &setting));

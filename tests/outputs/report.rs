@@ -1,7 +1,7 @@
 //! The report: complete, self-contained, and safe against whatever stands in names.
 
 use crate::outputs_support::{context, robot, solved};
-use robotcal::diagnose::{DoubtedSize, Finding};
+use robotcal::diagnose::{DoubtedSize, Finding, Weight};
 use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
 use robotcal::output::verdict::{Verdict, VerdictReason};
 use robotcal::output::{Thumbnails, files, report_html, solution_json};
@@ -144,7 +144,8 @@ fn the_verdict_follows_the_gates_and_then_the_doubts() {
 
 #[test]
 fn what_was_seen_and_what_to_do_stay_apart() {
-    let found = Finding::from(DoubtedSize::Contradicted { measured: false, off: 0.02, sigma: 0.001 });
+    let found =
+        Finding::from(DoubtedSize::Contradicted { measured: false, off: 0.02, sigma: 0.001, weight: Weight::Gate });
     assert!(found.fails() && found.remedy().contains("; "), "a remedy of two parts: {found}");
     let mut record = record();
     record.failed_gates = vec![found.to_string()];
