@@ -1,12 +1,18 @@
 //! A result in two stages, with everything that a joint one has: model, covariance, residuals, accuracy.
 
+use nalgebra::{DMatrix, DVector};
+
 use super::estimator::Estimator;
 use super::options::JointNoise;
 use super::two_stage::{Estimate, PoseStage, fit_poses, with_sizes};
 use crate::error::{Code, Error, Result};
 use crate::fit::Fit;
-use crate::problem::{Adjustment, State};
+use crate::geom::Pose;
+use crate::problem::{Adjustment, Layout, Problem, SCALE, State};
 use crate::solve::LinearisedAdjustment;
+
+/// Relative size of a plate by which it is varied.
+const VARIED: f64 = 3e-4;
 
 fn unsolved(estimator: Estimator) -> Error {
     let remedy = "take more stops, or leave --two-stage away: the joint fit has a solution";
@@ -33,8 +39,12 @@ pub(super) fn staged(joint: &Fit, estimator: Estimator, noise: JointNoise) -> Re
     }
     let none = || unsolved(estimator);
     let stage = PoseStage::adjusted(joint).ok_or_else(none)?;
-    let Estimate { state, covariance: of_theta, components, .. } =
-        fit_poses(joint, &stage, estimator, noise).ok_or_else(none)?;
+    let found = fit_poses(joint, &stage, estimator, noise).ok_or_else(none)?;
+    let of_theta = match estimator {
+        Estimator::FullAndRepeatability => found.covariance.clone(),
+        _ => with_sizes_of_plates(joint, &stage, &found, noise).ok_or_else(none)?,
+    };
+    let Estimate { state, components, .. } = found;
     let mut own = Adjustment { problem: with_sizes(&joint.problem, estimator, &components), state };
     own.problem.noise.pixel_factor.clone_from(&stage.pixel_factor);
     if !estimator.has_joint_noise() || noise != JointNoise::Estimated {
@@ -62,4 +72,43 @@ pub(super) fn refit(
 ) -> Option<State> {
     let stage = PoseStage::of_left(solved, left)?;
     Some(fit_poses(left, &stage, estimator, noise)?.state)
+}
+
+/// The covariance of an estimate with what is not known of the sizes of plates, which all poses have in common and which no estimator knows that
+/// takes them for independent.
+fn with_sizes_of_plates(joint: &Fit, stage: &PoseStage, found: &Estimate, noise: JointNoise) -> Option<DMatrix<f64>> {
+    let (problem, mut covariance) = (&joint.problem, found.covariance.clone());
+    for plate in 0..problem.plates.len() {
+        let sigma = size_sigma(problem, plate);
+        let mut varied = stage.clone();
+        let own = stage.images.iter().enumerate().filter(|(_, i)| problem.images[**i].plate == plate);
+        for (k, reference) in own.map(|(k, _)| (k, &stage.references[k])) {
+            let moved = reference.rotation.tr_mul(&reference.translation) * VARIED;
+            (0..3).for_each(|axis| varied.offset[6 * k + axis] += moved[axis]);
+        }
+        let other = fit_poses(joint, &varied, found.estimator, noise)?.state;
+        let by_size = between(&found.state, &other, &problem.layout, covariance.nrows()) * (sigma / VARIED);
+        covariance += &by_size * by_size.transpose();
+    }
+    Some(covariance)
+}
+
+/// Relative sigma of the size of a plate, as stated or measured.
+fn size_sigma(problem: &Problem, plate: usize) -> f64 {
+    let stated = problem.layout.columns[problem.layout.shapes[plate].start + SCALE].prior_sigma;
+    problem.plates[plate].scale.map_or(stated, |bar| bar.sigma_m / bar.distance_m)
+}
+
+/// The step from one state to another in the first columns of a layout, those of the robot and of the poses that carry camera and plate.
+fn between(from: &State, to: &State, layout: &Layout, columns: usize) -> DVector<f64> {
+    let difference = to.values(layout) - from.values(layout);
+    let mut step = DVector::from_fn(columns, |c, _| if layout.robot().contains(&c) { difference[c] } else { 0.0 });
+    let mut put = |places: &[std::ops::Range<usize>], from: &[Pose], to: &[Pose]| {
+        for ((own, from), to) in places.iter().zip(from).zip(to) {
+            step.rows_mut(own.start, 6).copy_from(&(from.inverse() * *to).log());
+        }
+    };
+    put(&layout.mountings, &from.mountings, &to.mountings);
+    put(&layout.placements, &from.placements, &to.placements);
+    step
 }

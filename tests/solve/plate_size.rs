@@ -7,7 +7,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 use robotcal::Code;
 use robotcal::diagnose::Finding;
-use robotcal::identify::{Options, Solution, identify};
+use robotcal::identify::{Estimator, Options, Solution, identify};
 use robotcal::problem::MeasuredSeries;
 use robotcal::series::{Plate, PlateKind, ScaleBar};
 use robotcal::simulate::{WorldRequest, series};
@@ -106,5 +106,32 @@ fn a_wrist_alone_doubts_no_plate() {
         let world = series(&WorldRequest { images: 30, postures, seed, ..request(&chain) }).unwrap();
         let solution = identify(chain.clone(), &[measured(&world, &chain)], &Options::default()).unwrap();
         assert_eq!(doubts(&solution), [], "seed {seed}");
+    }
+}
+
+/// Poses that count as independent know nothing of the size that they have in common.
+#[test]
+fn a_two_stage_result_states_what_is_not_known_of_the_size_of_the_plate() {
+    let chain = chain();
+    let (mut series, _) = seen(&chain);
+    let sigma = |series: &MeasuredSeries, estimator| {
+        let options = Options { estimator, ..Options::default() };
+        let solution = identify(chain.clone(), std::slice::from_ref(series), &options).unwrap();
+        solution.uncertainty.flange.unwrap().urdf_m
+    };
+    let between = |series: &MeasuredSeries| {
+        let at = |id| series.plate.markers[series.plate.index_of(id).unwrap()].position_m;
+        (at(0) - at(47)).norm()
+    };
+
+    let distance_m = between(&series);
+    let bar = |relative: f64| Some(ScaleBar { from: 0, to: 47, distance_m, sigma_m: relative * distance_m });
+    for estimator in [Estimator::Isotropic, Estimator::Blocks, Estimator::BlocksAndRepeatability] {
+        series.plate.scale = bar(1e-5);
+        let exact = sigma(&series, estimator);
+        series.plate.scale = bar(2e-3);
+        let [staged, joint] = [estimator, Estimator::Joint].map(|e| sigma(&series, e));
+        println!("{}: size known {exact:.2e}, not known {staged:.2e}, joint {joint:.2e} m", estimator.title());
+        assert!(staged > 2.0 * exact && (0.5..3.0).contains(&(staged / joint)), "{exact} {staged} {joint}");
     }
 }

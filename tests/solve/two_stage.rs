@@ -204,11 +204,12 @@ fn identify_and_compare_answer_the_same_question_alike_and_a_two_stage_result_st
         assert_eq!(found.state.robot, staged.fit.state.robot);
         for c in staged.fit.problem.layout.robot().filter(|&c| staged.fit.problem.layout.columns[c].free) {
             let (own, of_fit) = (staged.fit.covariance.sigma(c), found.covariance[(c, c)].sqrt());
-            let same = if estimator == Estimator::FullAndRepeatability { 0.3 } else { 1e-9 };
-            assert!(
-                own > 0.0 && (own / of_fit - 1.0).abs() < same || staged.uncertainty.larger_stated,
-                "{own} {of_fit}"
-            );
+            // What is not known of the size of the plate comes on top where poses count as independent.
+            let same = match estimator {
+                Estimator::FullAndRepeatability => (own / of_fit - 1.0).abs() < 0.3,
+                _ => own >= of_fit * (1.0 - 1e-9),
+            };
+            assert!(own > 0.0 && same || staged.uncertainty.larger_stated, "{own} {of_fit}");
         }
         let again = beside_two_stages(&staged).unwrap();
         assert_eq!(again.rows, beside.rows);

@@ -89,6 +89,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/second_pass.rs FEWEST_IMAGES", "first guess of a detector"),
     ("identify/second_pass.rs REACH", "reach of a detector"),
     ("identify/stand_alone.rs MOST_TOGETHER", "how many are written"),
+    ("identify/staged.rs VARIED", "step of a derivative"),
     ("identify/start.rs COMPARED", "how many starts are compared"),
     ("identify/turns.rs MOST_MISFIT", "robust loss of a choice"),
     ("identify/turns.rs ROUNDS", "most iterations"),
