@@ -50,3 +50,24 @@ fn all_corners_of_the_real_boards_are_found_with_the_right_ids() {
         }
     }
 }
+
+/// Webcams that sharpen and compress: squares from 11 px, edges steeper than a lens makes them.
+#[test]
+fn boards_of_webcams_are_complete() {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/real"));
+    if !root.is_dir() {
+        println!("skipped: no recordings in {}", root.display());
+        return;
+    }
+    let plate = Plate::lattice(PlateKind::Chessboard, 9, 7, 0.02, 1e-4);
+    for series in ["ur3a-cam1", "ur3a-cam2"] {
+        let mut images: Vec<PathBuf> =
+            std::fs::read_dir(root.join(series).join("images")).unwrap().map(|e| e.unwrap().path()).collect();
+        images.sort();
+        assert_eq!(images.len(), 40, "{series}");
+        for (path, found) in images.iter().zip(detect_series(&images, &plate, |path| load(path, None), |_| ())) {
+            let detection = found.detection;
+            assert_eq!(detection.observations.len(), 63, "{}: {:?}", path.display(), detection.dropped);
+        }
+    }
+}

@@ -116,36 +116,57 @@ fn bound(square: f64, blur: f64, noise: f64) -> f64 {
     noise / information.sqrt()
 }
 
-#[test]
-fn noise_costs_little_more_than_it_must_and_is_stated() {
+/// Rms error, px; that over the bound; root of the mean normalised square.
+fn with_noise(square: f64, blur: f64, noise: f64, seeds: u64) -> [f64; 3] {
     // Taken off the stated covariance: what real boards have beyond the noise.
     let systematic = 0.015_f64.powi(2);
-    let noise = 3.0;
-    // At 0.3 px some corners look sharpened, and the picture is smoothed: 1.2 of the bound by the integrals in the guide, and its rim.
-    let cases =
-        [(6.0, 0.6, 1.3), (10.0, 0.6, 1.3), (20.0, 0.3, 1.5), (20.0, 1.0, 1.3), (33.0, 0.6, 1.3), (33.0, 2.0, 1.3)];
-    for (square, blur, most) in cases {
-        let (mut squares, mut normalised, mut count) = (0.0, 0.0, 0.0);
-        for seed in 0..5 {
-            let scene = scene(square, blur, noise, seed);
-            let detection = found(&scene.render(seed));
-            assert_eq!(detection.observations.len(), CORNERS, "{square} {blur}: {:?}", detection.dropped);
-            for (o, e) in detection.observations.iter().zip(errors(&scene, &detection)) {
-                let [uu, uv, vv] = o.covariance.expect("a covariance");
-                let (uu, vv) = (uu - systematic, vv - systematic);
-                squares += (e[0] * e[0] + e[1] * e[1]) / 2.0;
-                normalised +=
-                    (e[0] * e[0] * vv - 2.0 * e[0] * e[1] * uv + e[1] * e[1] * uu) / (uu * vv - uv * uv) / 2.0;
-                count += 1.0;
-            }
+    let (mut squares, mut normalised, mut count) = (0.0, 0.0, 0.0);
+    for seed in 0..seeds {
+        let scene = scene(square, blur, noise, seed);
+        let detection = found(&scene.render(seed));
+        assert_eq!(detection.observations.len(), CORNERS, "{square} {blur}: {:?}", detection.dropped);
+        for (o, e) in detection.observations.iter().zip(errors(&scene, &detection)) {
+            let [uu, uv, vv] = o.covariance.expect("a covariance");
+            let (uu, vv) = (uu - systematic, vv - systematic);
+            squares += (e[0] * e[0] + e[1] * e[1]) / 2.0;
+            normalised += (e[0] * e[0] * vv - 2.0 * e[0] * e[1] * uv + e[1] * e[1] * uu) / (uu * vv - uv * uv) / 2.0;
+            count += 1.0;
         }
-        let (rms, normalised) = (f64::sqrt(squares / count), f64::sqrt(normalised / count));
-        let ratio = rms / bound(square, blur, noise);
+    }
+    let rms = f64::sqrt(squares / count);
+    [rms, rms / bound(square, blur, noise), f64::sqrt(normalised / count)]
+}
+
+#[test]
+fn noise_costs_little_more_than_it_must_and_is_stated() {
+    let cases = [(6.0, 0.6), (10.0, 0.6), (20.0, 0.3), (20.0, 1.0), (33.0, 0.6), (33.0, 2.0)];
+    for (square, blur) in cases {
+        let [rms, ratio, normalised] = with_noise(square, blur, 3.0, 5);
         println!(
             "squares of {square} px, blur {blur} px: {rms:.4} px, {ratio:.2} of the bound, normalised {normalised:.2}"
         );
-        assert!(ratio < most, "{square} {blur}: {ratio} of the bound");
-        // 1 +- 0.1, and 3 / sqrt(2 * 5 * 2 * 54) by chance.
-        assert!((normalised - 1.0).abs() < 0.1 + 0.09, "{square} {blur}: {normalised}");
+        assert!(ratio < 1.3, "{square} {blur}: {ratio} of the bound");
+        // 1 +- 0.05 (0.9 to 1.1 squared), and 3 / sqrt(2 * 5 * 2 * 54) by chance.
+        assert!((normalised - 1.0).abs() < 0.05 + 0.09, "{square} {blur}: {normalised}");
+    }
+}
+
+/// SEEDS: pictures a line.
+#[test]
+#[ignore = "minutes"]
+fn study_of_noise() {
+    let seeds = std::env::var("SEEDS").ok().and_then(|s| s.parse().ok()).unwrap_or(20);
+    println!("| square px | blur px | noise | rms px | of the bound | normalised square |\n|---|---|---|---|---|---|");
+    for square in [6.0, 10.0, 20.0, 33.0, 60.0] {
+        for blur in [0.3, 0.45, 0.6, 1.0, 2.0] {
+            // The blur of a picture in which squares are told apart.
+            if blur > square / 6.0 {
+                continue;
+            }
+            for noise in [1.0, 3.0] {
+                let [rms, ratio, normalised] = with_noise(square, blur, noise, seeds);
+                println!("| {square} | {blur} | {noise} | {rms:.4} | {ratio:.2} | {:.2} |", normalised.powi(2));
+            }
+        }
     }
 }

@@ -12,6 +12,10 @@ const ROUGH: Descent = Descent { tolerance_px: 1e-2, damping: 1e-3 };
 /// A step below the tolerance moves no corner visibly. Slopes of the light and place of the corner are alike in a small window: damping would
 /// slow both down.
 const FINE: Descent = Descent { tolerance_px: 1e-4, damping: 1e-8 };
+/// A greater share of a step is as good as the whole.
+const NEARLY_WHOLE: f64 = 0.8;
+/// No smaller share of a step is taken.
+const LEAST_SHARE: f64 = 0.1;
 /// Noise of the pixels over half the step of an edge, as long as it is not known.
 const START_NOISE: f64 = 0.03;
 /// Prior sigma of the slope of the light, share of the contrast per px.
@@ -24,6 +28,8 @@ const HALO_SIGMA: f64 = 0.3;
 const LN_BLUR_SIGMA: f64 = 1.0;
 /// Blurs outside are no edges of a usable picture, px.
 const BLUR_RANGE_PX: (f64, f64) = (0.2, 12.0);
+/// What a halo of 1 adds to the slope of an edge, over that slope.
+const STEEPENING: f64 = 1.0 - 1.0 / HALO_BLUR;
 /// A corner further from its seed than this share of the square's side is another structure.
 const OFF_LATTICE: f64 = 0.2;
 /// A corner nearer to the edge of the picture is not fitted, px.
@@ -235,14 +241,16 @@ impl Problem {
     fn minimise(&self, start: Point, part: Part, descent: Descent) -> Result<Point, Refusal> {
         let mut point = start;
         let mut damping = descent.damping;
-        // Length of the step before.
-        let mut last = 0.0;
+        // Length of the step before, and which share of a step is taken.
+        let (mut last, mut share) = (0.0, 1.0);
         for _ in 0..MAX_STEPS {
             let (normal, right, cost) = self.with_priors(&point);
-            let step = solve(&normal, &right, damping).ok_or(Refusal::NoCrossing)?;
+            let step = solve(&normal, &right, damping).ok_or(Refusal::NoCrossing)? * share;
             let trial = self.at(&(point.state + step), part);
             let length = step[0].hypot(step[1]);
-            let accepted = self.cost(&trial) <= cost;
+            let change = self.cost(&trial) - cost;
+            let accepted = change <= 0.0;
+            share = shortened(share, 2.0 * right.dot(&step), change);
             if accepted {
                 point = trial;
                 damping = f64::max(damping * 0.1, 1e-9);
@@ -307,7 +315,8 @@ impl Problem {
         let state = &end.state;
         let blurs = LN_BLUR.map(|i| state[i].exp());
         let crossing = (state[THETA[0]] - state[THETA[1]]).sin().abs();
-        let in_range = |s: &f64| (BLUR_RANGE_PX.0..=BLUR_RANGE_PX.1).contains(s);
+        // Where the halo is negative, most of an edge has the blur of the halo.
+        let in_range = |s: &f64| (BLUR_RANGE_PX.0..=BLUR_RANGE_PX.1).contains(&(s / steepening(state[HALO]).min(1.0)));
         if !blurs.iter().all(in_range) || crossing < LEAST_CROSSING {
             return Err(Refusal::NoCrossing);
         }
@@ -345,9 +354,15 @@ impl Problem {
 }
 
 impl Saddle {
-    /// Blur of a Gaussian edge as steep in its middle, px.
-    pub fn steepness_px(&self) -> f64 {
-        self.blur_px / (1.0 + self.halo * (1.0 - 1.0 / HALO_BLUR)).max(0.1)
+    /// Blur of a Gaussian edge as steep in its middle, px, with its sigma.
+    pub fn steepness_px(&self) -> [f64; 2] {
+        let steepness = self.blur_px / steepening(self.halo);
+        let Some(factor) = self.problem.with_priors(&self.end).0.cholesky() else { return [steepness, f64::INFINITY] };
+        let mut gradient = Vector::zeros();
+        LN_BLUR.iter().for_each(|&i| gradient[i] = 0.5 * self.end.state[i].exp() / self.blur_px);
+        gradient[HALO] = -STEEPENING / steepening(self.halo);
+        let relative = (gradient.dot(&factor.solve(&gradient))).sqrt() * self.noise;
+        [steepness, steepness * relative]
     }
 
     /// What each pixel adds to the corner, after the other parameters have been eliminated; none for a normal matrix without inverse.
@@ -475,6 +490,19 @@ fn start(seed: &Seed, pixels: &Pixels, look: Look) -> Vector {
         .sum();
     state[STEP] = signed / pixels.all.pixels as f64;
     state
+}
+
+/// The share of a step at which the parabola through the cost and its slope before a step and the cost after it is least; `share` of it was
+/// taken. Where residuals and model are curved (edges that are no Gaussian), whole steps overshoot by nearly their own length, time and again.
+fn shortened(share: f64, descent: f64, change: f64) -> f64 {
+    let curvature = change + descent;
+    let least = if curvature > 0.0 { 0.5 * share * descent / curvature } else { 1.0 };
+    if least > NEARLY_WHOLE { 1.0 } else { least.max(LEAST_SHARE) }
+}
+
+/// Slope of an edge in its middle over that without halo.
+fn steepening(halo: f64) -> f64 {
+    (1.0 + STEEPENING * halo).max(0.1)
 }
 
 fn solve(normal: &Matrix, right: &Vector, damping: f64) -> Option<Vector> {

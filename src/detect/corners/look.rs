@@ -37,21 +37,29 @@ pub(super) struct Sight<'a> {
 impl<'a> Sight<'a> {
     /// Looks at some corners of a lattice.
     pub fn of(picture: &'a Picture, lattice: &Lattice, window: Window) -> Self {
-        let step = lattice.len().div_ceil(SAMPLES).max(1);
-        let seeds: Vec<Seed> = lattice.keys().step_by(step).filter_map(|&key| seed(lattice, key, REACH)).collect();
+        let seeds = samples(lattice);
         let mut sight = Self { picture: Cow::Borrowed(picture), window, look: START, smoothing_px: None };
-        let mut fits = sight.sample(&seeds);
+        let fits = sight.sample(&seeds);
         // A corner that cannot be fitted as it is counts as too steep.
-        let steep = seeds.len() - fits.iter().filter(|s| s.steepness_px() >= LEAST_BLUR_PX).count();
+        let steep = seeds.len() - fits.iter().filter(|s| !is_steep(s)).count();
         if steep as f64 > STEEP_SHARE * seeds.len() as f64 {
-            sight.picture = Cow::Owned(smoothed(picture, SMOOTHING_PX));
-            sight.smoothing_px = Some(SMOOTHING_PX);
-            fits = sight.sample(&seeds);
+            return sight.smoothed(lattice);
         }
-        let middle = |of: fn(&Saddle) -> f64| quantile(fits.iter().map(of), 0.5);
-        let halo = middle(|s| s.halo).is_some_and(|halo| halo > LEAST_HALO);
-        sight.look = Look { blur_px: middle(|s| s.blur_px).unwrap_or(START.blur_px), halo };
+        sight.look = usual(&fits);
         sight
+    }
+
+    /// The same picture smoothed.
+    pub fn smoothed(self, lattice: &Lattice) -> Self {
+        let picture = Cow::Owned(smoothed(&self.picture, SMOOTHING_PX));
+        let mut sight = Self { picture, smoothing_px: Some(SMOOTHING_PX), look: START, ..self };
+        sight.look = usual(&sight.sample(&samples(lattice)));
+        sight
+    }
+
+    /// Whether a corner whose fit does not converge may do so once the picture is smoothed: it was sharpened.
+    pub fn may_be_smoothed(&self) -> bool {
+        self.look.halo && self.smoothing_px.is_none()
     }
 
     fn sample(&self, seeds: &[Seed]) -> Vec<Saddle> {
@@ -62,6 +70,25 @@ impl<'a> Sight<'a> {
     pub fn fit(&self, seed: &Seed) -> Result<Saddle, Refusal> {
         refine(&self.picture, seed, self.window, self.look)
     }
+}
+
+/// Seeds of corners in all parts of a lattice.
+fn samples(lattice: &Lattice) -> Vec<Seed> {
+    let step = lattice.len().div_ceil(SAMPLES).max(1);
+    lattice.keys().step_by(step).filter_map(|&key| seed(lattice, key, REACH)).collect()
+}
+
+/// Without a halo, which says that the picture was sharpened, noise alone may have made an edge look steep.
+fn is_steep(corner: &Saddle) -> bool {
+    let [blur_px, sigma_px] = corner.steepness_px();
+    let doubt = if corner.halo > LEAST_HALO { 0.0 } else { sigma_px };
+    blur_px + doubt < LEAST_BLUR_PX
+}
+
+fn usual(fits: &[Saddle]) -> Look {
+    let middle = |of: fn(&Saddle) -> f64| quantile(fits.iter().map(of), 0.5);
+    let halo = middle(|s| s.halo).is_some_and(|halo| halo > LEAST_HALO);
+    Look { blur_px: middle(|s| s.blur_px).unwrap_or(START.blur_px), halo }
 }
 
 /// The value below which a share of the values lies.

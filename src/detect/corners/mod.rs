@@ -33,21 +33,13 @@ const NOISE_CORNERS: usize = 16;
 
 /// Sub-pixel positions of all corners of the board, also of those that the lattice finder left out.
 pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement, window: Window) -> Detection {
-    let view = Sight::of(picture, lattice, window);
-    let mut detection = Detection::default();
-    let mut fitted = BTreeMap::new();
-    let mut retry = BTreeMap::new();
-    for (&key, &uv) in lattice {
-        if placement.id(key).is_none() {
-            detection.dropped.push(Dropped::point(uv, "off the board"));
-            continue;
-        }
-        match seed(lattice, key, REACH).ok_or(Refusal::NoNeighbours).and_then(|seed| view.fit(&seed)) {
-            Ok(saddle) => drop(fitted.insert(key, saddle)),
-            Err(refusal) if refusal.may_pass() => drop(retry.insert(key, Dropped::point(uv, refusal.reason()))),
-            Err(refusal) => detection.dropped.push(Dropped::point(uv, refusal.reason())),
-        }
+    let mut view = Sight::of(picture, lattice, window);
+    let mut first = First::of(&view, lattice, placement);
+    if first.is_unfinished && view.may_be_smoothed() {
+        view = view.smoothed(lattice);
+        first = First::of(&view, lattice, placement);
     }
+    let First { fitted, retry, mut detection, .. } = first;
     let usual = Usual::of(&fitted);
     let mut kept = BTreeMap::new();
     let mut closed: BTreeSet<(i32, i32)> = lattice.keys().copied().filter(|key| !retry.contains_key(key)).collect();
@@ -71,6 +63,39 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
     }
     detection.observations.sort_by_key(|o| o.marker);
     detection
+}
+
+/// Fits from where the lattice finder says that corners are.
+#[derive(Default)]
+struct First {
+    fitted: BTreeMap<(i32, i32), Saddle>,
+    /// What another start may find.
+    retry: BTreeMap<(i32, i32), Dropped>,
+    /// Whether a fit did not converge.
+    is_unfinished: bool,
+    /// What is none.
+    detection: Detection,
+}
+
+impl First {
+    fn of(view: &Sight, lattice: &Lattice, placement: Placement) -> Self {
+        let mut first = Self::default();
+        for (&key, &uv) in lattice {
+            if placement.id(key).is_none() {
+                first.detection.dropped.push(Dropped::point(uv, "off the board"));
+                continue;
+            }
+            match seed(lattice, key, REACH).ok_or(Refusal::NoNeighbours).and_then(|seed| view.fit(&seed)) {
+                Ok(saddle) => drop(first.fitted.insert(key, saddle)),
+                Err(refusal) if refusal.may_pass() => {
+                    first.is_unfinished |= refusal == Refusal::NotConverged;
+                    first.retry.insert(key, Dropped::point(uv, refusal.reason()));
+                }
+                Err(refusal) => first.detection.dropped.push(Dropped::point(uv, refusal.reason())),
+            }
+        }
+        first
+    }
 }
 
 /// The search for corners that the lattice lacks, or whose first start led nowhere.
