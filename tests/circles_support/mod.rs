@@ -1,6 +1,8 @@
 //! Scenes with known truth for the tests of the circle detector.
 #![allow(dead_code)] // every test binary uses a part
 
+use std::sync::LazyLock;
+
 use nalgebra::{Vector2, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -53,7 +55,9 @@ pub struct Scene {
 }
 
 pub fn standard_plate() -> Plate {
-    design(&PlateRequest::default()).unwrap().plate
+    // The search for its code takes two seconds.
+    static PLATE: LazyLock<Plate> = LazyLock::new(|| design(&PlateRequest::default()).unwrap().plate);
+    PLATE.clone()
 }
 
 /// `camera_from_plate` for a view: the aim on the axis at the distance, tilted about an axis in the image plane.
