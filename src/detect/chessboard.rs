@@ -12,6 +12,7 @@ use super::board_labels::{BoardSize, Labelling, Lattice, label};
 use super::corners::{Window, measure};
 use super::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
+use crate::linalg::wide;
 use crate::series::Plate;
 
 /// Pixels for one corner: as far along the edges as the next corners do not disturb, and near enough that the lens
@@ -97,9 +98,12 @@ pub(super) struct Bytes {
 impl Bytes {
     /// Bright 8-bit pictures stay as they are, others are stretched so that all but the brightest thousandth of their pixels fit.
     pub fn of(picture: &Picture) -> Self {
-        let bright = bright_level(picture);
-        let scale = if (128.0..=255.0).contains(&bright) && picture.full_scale <= 255.0 { 1.0 } else { 255.0 / bright };
-        let data = picture.pixels.iter().map(|&p| (p * scale + 0.5) as u8).collect();
+        let scale = if is_bright(picture) { 1.0 } else { 255.0 / bright_level(picture) };
+        let mut data = vec![0; picture.pixels.len()];
+        wide(
+            #[inline(always)]
+            || data.iter_mut().zip(&picture.pixels).for_each(|(byte, p)| *byte = (p * scale + 0.5) as u8),
+        );
         Self { width: picture.width, height: picture.height, data }
     }
 
@@ -109,8 +113,9 @@ impl Bytes {
         let mut data = Vec::with_capacity(width * height);
         for pair in self.data.chunks_exact(2 * self.width) {
             let (top, bottom) = pair.split_at(self.width);
-            let sum = |(t, b): (&[u8], &[u8])| t.iter().chain(b).map(|&v| u16::from(v)).sum::<u16>();
-            data.extend(top.chunks_exact(2).zip(bottom.chunks_exact(2)).map(|p| ((sum(p) + 2) / 4) as u8));
+            let sum = |(t, b): (&[u8; 2], &[u8; 2])| [t[0], t[1], b[0], b[1]].map(u16::from).iter().sum::<u16>();
+            let (top, bottom) = (top.as_chunks::<2>().0, bottom.as_chunks::<2>().0);
+            data.extend(top.iter().zip(bottom).map(|p| ((sum(p) + 2) / 4) as u8));
         }
         Self { width, height, data }
     }
@@ -163,6 +168,15 @@ pub(super) fn corner_config() -> DetectorConfig {
         config.max_offset = 3.0;
     }
     default_chess_config().with_refiner(refiner)
+}
+
+/// Whether an 8-bit picture has more than a thousandth of its pixels in the upper half of its range.
+fn is_bright(picture: &Picture) -> bool {
+    let upper = wide(
+        #[inline(always)]
+        || picture.pixels.iter().map(|&p| u32::from(p >= 128.0)).sum::<u32>(),
+    );
+    picture.full_scale <= 255.0 && upper as usize > picture.pixels.len() / 1000
 }
 
 /// Count below which all but a thousandth of the pixels lie.

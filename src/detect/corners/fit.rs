@@ -5,6 +5,7 @@ use super::model::{
     STEP_SLOPE, THETA, Vector,
 };
 use crate::detect::Picture;
+use crate::linalg::wide;
 
 const MAX_STEPS: usize = 30;
 /// Before the noise is known.
@@ -304,10 +305,15 @@ impl Problem {
         let mut sum = Sum { normal: [[0.0; PARAMETERS]; PARAMETERS], right: [0.0; PARAMETERS], squares: 0.0 };
         let edges = Edges::new(state, self.look.halo);
         let mut predicted = Prediction::NONE;
-        for block in &self.pixels.blocks[..part.blocks] {
-            edges.predict(block, &mut predicted);
-            sum.add(block, &predicted, self.full_scale);
-        }
+        wide(
+            #[inline(always)]
+            || {
+                for block in &self.pixels.blocks[..part.blocks] {
+                    edges.predict(block, &mut predicted);
+                    sum.add(block, &predicted, self.full_scale);
+                }
+            },
+        );
         Point { state: *state, sum }
     }
 
@@ -365,6 +371,15 @@ impl Saddle {
         [steepness, steepness * relative]
     }
 
+    /// uu, uv and vv of the corner for pixels of variance 1 that are not correlated.
+    pub fn white_covariance(&self) -> Option<[f64; 3]> {
+        let factor = self.problem.with_priors(&self.end).0.cholesky()?;
+        let normal = &self.end.sum.normal;
+        let of_pixels = Matrix::from_fn(|i, j| normal[i.max(j)][i.min(j)]);
+        let [u, v] = [0, 1].map(|axis| factor.solve(&Vector::from_fn(|i, _| if i == axis { 1.0 } else { 0.0 })));
+        Some([u.dot(&(of_pixels * u)), u.dot(&(of_pixels * v)), v.dot(&(of_pixels * v))])
+    }
+
     /// What each pixel adds to the corner, after the other parameters have been eliminated; none for a normal matrix without inverse.
     pub fn terms(&self) -> Vec<Term> {
         let Some(factor) = self.problem.with_priors(&self.end).0.cholesky() else { return Vec::new() };
@@ -395,6 +410,7 @@ impl Saddle {
 }
 
 impl Sum {
+    #[inline(always)]
     fn add(&mut self, block: &Block, predicted: &Prediction, full_scale: f64) {
         let (mut residual, mut open) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {

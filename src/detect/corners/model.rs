@@ -89,10 +89,12 @@ impl<'a> Edges<'a> {
         }
     }
 
+    #[inline(always)]
     pub fn predict(&self, block: &Block, out: &mut Prediction) {
         if self.halo { self.fill::<true>(block, out) } else { self.fill::<false>(block, out) }
     }
 
+    #[inline(always)]
     #[allow(clippy::needless_range_loop, reason = "lanes of many arrays beside each other")]
     fn fill<const HALOED: bool>(&self, block: &Block, out: &mut Prediction) {
         let state = self.state;

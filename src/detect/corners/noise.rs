@@ -136,9 +136,8 @@ impl Correlation {
 
     /// Covariance uu, uv, vv of a corner in px^2, with what the noise does not explain.
     pub fn covariance(&self, corner: &Saddle) -> [f64; 3] {
-        let terms = corner.terms();
-        let white = sum(&terms, &Self::WHITE);
-        let found = sum(&terms, self);
+        let white = corner.white_covariance().unwrap_or([0.0; 3]);
+        let found = if *self == Self::WHITE { white } else { sum(&corner.terms(), self) };
         // Never far below noise without correlation: what a few corners say about large lags is uncertain.
         let [white_trace, trace] = [white, found].map(|c| c[0] + c[2]);
         let chosen = if trace < LEAST_SHARE * white_trace { white.map(|c| LEAST_SHARE * c) } else { found };
@@ -173,8 +172,6 @@ fn sum(terms: &[Term], noise: &Correlation) -> [f64; 3] {
         sum[2] += weight * q * s;
     };
     terms.iter().for_each(|t| add(noise.variance, t, t));
-    if noise.lags != Correlation::WHITE.lags {
-        Raster::new(terms).for_pairs(|lag, a, b| add(2.0 * noise.lags[lag], &terms[a], &terms[b]));
-    }
+    Raster::new(terms).for_pairs(|lag, a, b| add(2.0 * noise.lags[lag], &terms[a], &terms[b]));
     sum
 }
