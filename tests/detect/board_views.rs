@@ -155,6 +155,8 @@ pub struct Tally {
     in_view: usize,
     found: usize,
     wrong: usize,
+    /// Further from the truth than five of the stated sigmas.
+    far: usize,
     squares: f64,
 }
 
@@ -183,7 +185,9 @@ fn run(text: &str, hard: &str, seeds: std::ops::Range<u64>, kept: Option<&Path>)
         tally.seen += usize::from(!observations.is_empty());
         for o in observations.iter().filter(|o| o.edge == Edge::Outer) {
             let k = plate.index_of(o.marker).unwrap();
+            let sigma = o.covariance.map_or(f64::INFINITY, |[uu, _, vv]| (uu + vv).sqrt());
             let off = scene.truth(k).map_or(f64::INFINITY, |p| (Vector2::from(o.uv) - p).norm());
+            tally.far += usize::from(off > 5.0 * sigma);
             if off > WRONG_PX {
                 tally.wrong += 1;
                 println!("{hard} {seed}: marker {} is off by {off:.1} px", o.marker);
@@ -213,6 +217,15 @@ fn keep(folder: &Path, name: &str, scene: &Scene, picture: &Picture, in_view: &[
     std::fs::write(folder.join(format!("{name}.csv")), in_view.iter().map(line).collect::<String>()).unwrap();
 }
 
+/// The light of a window washes out some of its corners: what is left of them must not be taken for others.
+#[test]
+fn washed_out_corners_are_no_corners() {
+    let (kind, board) = BOARDS[0];
+    let tally = run(board, "glare", 663..664, None);
+    println!("{kind}: {tally:?}");
+    assert!(tally.found > 40 && tally.wrong == 0 && tally.far == 0, "{tally:?}");
+}
+
 #[test]
 fn no_board_gets_a_wrong_id() {
     for (kind, text) in BOARDS {
@@ -227,34 +240,38 @@ fn no_board_gets_a_wrong_id() {
     }
 }
 
-/// All boards under all that is hard. VIEWS: how many a line; KINDS and HARD: which; KEEP: a folder for the pictures and what is in view.
+/// All boards under all that is hard. VIEWS: how many a line; FROM: the first of them; KINDS and HARD: which; KEEP: a folder for the pictures and what is in view.
 #[test]
 #[ignore = "hours"]
 fn study_of_board_views() {
     let text = |name: &str| std::env::var(name).ok();
-    let views = text("VIEWS").and_then(|v| v.parse().ok()).unwrap_or(200);
+    let number = |name: &str| text(name).and_then(|v| v.parse().ok());
+    let (first, views) = (number("FROM").unwrap_or(0), number("VIEWS").unwrap_or(200));
     let chosen = |name: &str, all: &str| text(name).is_none_or(|list| list.split(',').any(|one| one == all));
+    let mut wrong = 0;
     let kept = text("KEEP").map(PathBuf::from);
     let mut table = String::from(
-        "| board | view | views | with the board | in view | found | share | wrong | rms px |\n|---|---|---|---|---|---|---|---|---|\n",
+        "| board | view | views | with the board | in view | found | share | wrong | beyond 5 sigma | rms px |\n|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for (kind, board) in BOARDS.iter().filter(|(kind, _)| chosen("KINDS", kind)) {
         for hard in HARD.iter().filter(|hard| chosen("HARD", hard)) {
-            let t = run(board, hard, 0..views, kept.as_ref().map(|folder| folder.join(kind)).as_deref());
+            let t = run(board, hard, first..first + views, kept.as_ref().map(|folder| folder.join(kind)).as_deref());
             let line = format!(
-                "| {kind} | {hard} | {} | {} | {} | {} | {:.2} % | {} | {:.4} |",
+                "| {kind} | {hard} | {} | {} | {} | {} | {:.2} % | {} | {} | {:.4} |",
                 t.views,
                 t.seen,
                 t.in_view,
                 t.found,
                 100.0 * t.share(),
                 t.wrong,
+                t.far,
                 t.rms()
             );
             println!("{line}");
             writeln!(table, "{line}").unwrap();
-            assert_eq!(t.wrong, 0, "{line}");
+            wrong += t.wrong;
         }
     }
     println!("\n{table}");
+    assert_eq!(wrong, 0);
 }

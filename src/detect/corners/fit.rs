@@ -371,6 +371,22 @@ impl Saddle {
         [steepness, steepness * relative]
     }
 
+    /// Largest share of either dark square's pixels that reach a level.
+    pub fn dark_share_from(&self, level: f64) -> f64 {
+        let state = &self.end.state;
+        let tangents = THETA.map(|i| [state[i].cos(), state[i].sin()]);
+        let (mut reached, mut all) = ([0.0; 2], [1.0_f64; 2]);
+        for [px, py, value] in self.problem.pixels.iter() {
+            let [side1, side2] = tangents.map(|[c, s]| (py - state[1]) * c - (px - state[0]) * s);
+            if side1 * side2 * state[STEP] < 0.0 {
+                let square = usize::from(side1 > 0.0);
+                all[square] += 1.0;
+                reached[square] += f64::from(u8::from(value >= level));
+            }
+        }
+        f64::max(reached[0] / all[0], reached[1] / all[1])
+    }
+
     /// uu, uv and vv of the corner for pixels of variance 1 that are not correlated.
     pub fn white_covariance(&self) -> Option<[f64; 3]> {
         let factor = self.problem.with_priors(&self.end).0.cholesky()?;

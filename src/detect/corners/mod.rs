@@ -21,6 +21,10 @@ use super::board_labels::{Lattice, Placement};
 use super::{Detection, Dropped, Picture};
 use crate::series::{Edge, Observation};
 
+/// Share of full scale from which a pixel is clipped.
+const CLIPPED: f32 = 0.99;
+/// A dark square with a greater share of clipped pixels is washed out.
+const WASHED_OUT: f64 = 0.2;
 /// A corner with less than this share of the usual contrast is none.
 const WEAK: f64 = 0.3;
 /// A fit this many times worse than usual is disturbed by something else in the window ...
@@ -40,7 +44,7 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
         first = First::of(&view, lattice, placement);
     }
     let First { fitted, retry, mut detection, .. } = first;
-    let usual = Usual::of(&fitted);
+    let usual = Usual::of(picture, &fitted);
     let mut kept = BTreeMap::new();
     let mut closed: BTreeSet<(i32, i32)> = lattice.keys().copied().filter(|key| !retry.contains_key(key)).collect();
     for (key, saddle) in fitted {
@@ -104,7 +108,7 @@ struct Missing<'a> {
     /// Corners that are found, or are none.
     closed: BTreeSet<(i32, i32)>,
     placement: Placement,
-    usual: &'a Usual,
+    usual: &'a Usual<'a>,
 }
 
 impl Missing<'_> {
@@ -135,16 +139,18 @@ impl Missing<'_> {
 }
 
 /// What most corners of the picture have in common.
-struct Usual {
+struct Usual<'a> {
+    picture: &'a Picture,
     /// Half the step between the squares, counts.
     contrast: f64,
     /// Residual of the fit over that.
     residual: f64,
 }
 
-impl Usual {
-    fn of(fitted: &BTreeMap<(i32, i32), Saddle>) -> Self {
+impl<'a> Usual<'a> {
+    fn of(picture: &'a Picture, fitted: &BTreeMap<(i32, i32), Saddle>) -> Self {
         Self {
+            picture,
             contrast: median(fitted.values().map(|s| s.contrast.abs())),
             residual: median(fitted.values().map(|s| s.noise / s.contrast.abs())),
         }
@@ -157,10 +163,21 @@ impl Usual {
             Some("weak or wrong contrast")
         } else if saddle.noise > f64::max(DISTURBED * self.residual, LEAST_DISTURBED) * contrast {
             Some("disturbed surroundings")
+        } else if is_washed_out(self.picture, saddle) {
+            Some("over-exposed")
         } else {
             None
         }
     }
+}
+
+/// Whether a crossing is over-exposed: an edge is where the picture is half-way between dark and light, and both dark squares must be dark.
+fn is_washed_out(picture: &Picture, saddle: &Saddle) -> bool {
+    let level = CLIPPED * picture.full_scale;
+    let [x, y] = saddle.uv.map(|c| c.floor() as usize);
+    let around = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
+    let clipped = |&(x, y): &(usize, usize)| x >= picture.width || y >= picture.height || picture.at(x, y) >= level;
+    around.iter().all(clipped) || saddle.dark_share_from(f64::from(level)) > WASHED_OUT
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {
