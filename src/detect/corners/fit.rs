@@ -9,14 +9,12 @@ use crate::linalg::wide;
 
 const MAX_STEPS: usize = 30;
 /// Before the noise is known.
-const ROUGH: Descent = Descent { tolerance_px: 1e-2, damping: 1e-3 };
+const ROUGH: Descent = Descent { tolerance_px: 1e-2, damping: 1e-3, least_share: 1.0 };
 /// A step below the tolerance moves no corner visibly. Slopes of the light and place of the corner are alike in a small window: damping would
 /// slow both down.
-const FINE: Descent = Descent { tolerance_px: 1e-4, damping: 1e-8 };
+const FINE: Descent = Descent { tolerance_px: 1e-4, damping: 1e-8, least_share: 0.1 };
 /// A greater share of a step is as good as the whole.
 const NEARLY_WHOLE: f64 = 0.8;
-/// No smaller share of a step is taken.
-const LEAST_SHARE: f64 = 0.1;
 /// Noise of the pixels over half the step of an edge, as long as it is not known.
 const START_NOISE: f64 = 0.03;
 /// Prior sigma of the slope of the light, share of the contrast per px.
@@ -48,6 +46,8 @@ struct Descent {
     tolerance_px: f64,
     /// Damping to begin with.
     damping: f64,
+    /// No smaller share of a step is taken.
+    least_share: f64,
 }
 
 /// Why no corner came out of a fit.
@@ -246,12 +246,13 @@ impl Problem {
         let (mut last, mut share) = (0.0, 1.0);
         for _ in 0..MAX_STEPS {
             let (normal, right, cost) = self.with_priors(&point);
-            let step = solve(&normal, &right, damping).ok_or(Refusal::NoCrossing)? * share;
+            let whole = solve(&normal, &right, damping).ok_or(Refusal::NoCrossing)?;
+            let step = whole * share;
             let trial = self.at(&(point.state + step), part);
-            let length = step[0].hypot(step[1]);
+            let length = whole[0].hypot(whole[1]);
             let change = self.cost(&trial) - cost;
             let accepted = change <= 0.0;
-            share = shortened(share, 2.0 * right.dot(&step), change);
+            share = shortened(share, 2.0 * right.dot(&step), change).max(descent.least_share);
             if accepted {
                 point = trial;
                 damping = f64::max(damping * 0.1, 1e-9);
@@ -529,7 +530,7 @@ fn start(seed: &Seed, pixels: &Pixels, look: Look) -> Vector {
 fn shortened(share: f64, descent: f64, change: f64) -> f64 {
     let curvature = change + descent;
     let least = if curvature > 0.0 { 0.5 * share * descent / curvature } else { 1.0 };
-    if least > NEARLY_WHOLE { 1.0 } else { least.max(LEAST_SHARE) }
+    if least > NEARLY_WHOLE { 1.0 } else { least }
 }
 
 /// Slope of an edge in its middle over that without halo.
