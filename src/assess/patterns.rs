@@ -154,6 +154,7 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
     let model = flange_model.as_ref().and_then(|(s, postures)| {
         FlangeModel::new(&fit.state.robot, &fit.problem.layout, *s, &fit.covariance.reduced, postures, limits)
     });
+    let views = Views::of(fit);
     let (n, squares) = (response.equations as f64, response.squares);
     let points: usize = linear.images().map(|i| i.terms.residuals.len()).sum();
     let sum: f64 = linear.images().flat_map(|i| i.terms.residuals.iter()).map(|r| r.duv.norm_squared()).sum();
@@ -173,7 +174,7 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
             least_px: rms_px * (least(degrees, limits.pattern_sigmas) / squares).sqrt(),
             gain: statistic - degrees as f64 * n.ln(),
             // Shifts in the plate trade against its size, by which the step moves everything: that is judged by itself.
-            moved: (g.pattern != Pattern::PlatePrint).then(|| moved(fit, model.as_ref(), &step)),
+            moved: (g.pattern != Pattern::PlatePrint).then(|| moved(fit, model.as_ref(), &views, &step)),
         })
     };
     let mut tests: Vec<PatternTest> = groups.iter().filter_map(of_group).collect();
@@ -322,22 +323,38 @@ fn combined(steps: &[Step], y: &DVector<f64>) -> Option<Step> {
     Some(steps.iter().zip(y.iter()).fold(none, |sum, (step, y)| sum.plus(-y, step)))
 }
 
+/// The images in use, as what moves is judged in them.
+struct Views {
+    /// Adjoint of the pose of each.
+    adjoints: Vec<Matrix6<f64>>,
+    /// Stated sigma of their cameras relative to the plate, RMS: position, m, and direction, rad.
+    sigmas: [f64; 2],
+}
+
+impl Views {
+    fn of(fit: &Fit) -> Self {
+        let linear = fit.linear();
+        let mut variances = [0.0f64; 2];
+        let mut adjoints = Vec::with_capacity(linear.images().len());
+        for own in linear.images() {
+            let ad = adjoint(&own.chain.pose);
+            let covariance = ad * fit.covariance.pose_of(&linear.stop(own.stop), &own) * ad.transpose();
+            for (part, sum) in variances.iter_mut().enumerate() {
+                *sum += (0..3).map(|k| covariance[(3 * part + k, 3 * part + k)]).sum::<f64>().max(0.0);
+            }
+            adjoints.push(ad);
+        }
+        let count = adjoints.len().max(1) as f64;
+        Self { adjoints, sigmas: variances.map(|sum| (sum / count).sqrt()) }
+    }
+}
+
 /// What a step moves. Of the camera poses counts what no common displacement of the camera frame or the plate frame takes up: with the body
 /// twist `w_i` of the camera, `w_i - a - Ad(T_i) b`, least squares over `a` and `b` in units of the stated sigmas.
-fn moved(fit: &Fit, model: Option<&FlangeModel>, step: &Step) -> PatternEffect {
-    let linear = fit.linear();
-    let count = linear.images().len().max(1) as f64;
-    let mut variances = [0.0f64; 2];
-    let mut twists: Vec<(Matrix6<f64>, Vector6<f64>)> = Vec::new();
-    for own in linear.images() {
-        let ad = adjoint(&own.chain.pose);
-        let covariance = ad * fit.covariance.pose_of(&linear.stop(own.stop), &own) * ad.transpose();
-        for (part, sum) in variances.iter_mut().enumerate() {
-            *sum += (0..3).map(|k| covariance[(3 * part + k, 3 * part + k)]).sum::<f64>().max(0.0) / count;
-        }
-        twists.push((ad, ad * own.pose_step(step)));
-    }
-    let sigmas = variances.map(f64::sqrt);
+fn moved(fit: &Fit, model: Option<&FlangeModel>, Views { adjoints, sigmas }: &Views, step: &Step) -> PatternEffect {
+    let (sigmas, count) = (*sigmas, adjoints.len().max(1) as f64);
+    let twist = |(own, ad): (LinearImage, &Matrix6<f64>)| (*ad, ad * own.pose_step(step));
+    let twists: Vec<(Matrix6<f64>, Vector6<f64>)> = fit.linear().images().zip(adjoints).map(twist).collect();
     let left = without_frames(&twists, sigmas);
     let rms =
         |part: usize| (left.iter().map(|w| w.fixed_rows::<3>(3 * part).norm_squared()).sum::<f64>() / count).sqrt();

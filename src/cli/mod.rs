@@ -42,7 +42,7 @@ mod verify;
 mod verify_args;
 mod verify_series;
 
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -190,7 +190,8 @@ fn start_log(verbose: u8) {
         _ => tracing::Level::TRACE,
     };
     let from = move |m: &tracing::Metadata| m.level() <= &level && (verbose > 1 || is_own(m.target()));
-    let words = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_target(verbose > 1).without_time();
+    let words = tracing_subscriber::fmt::layer().with_ansi(std::io::stderr().is_terminal());
+    let words = words.with_writer(std::io::stderr).with_target(verbose > 1).without_time();
     tracing_subscriber::registry().with(words.with_filter(filter_fn(from))).with(stages::layer()).init();
 }
 

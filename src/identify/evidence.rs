@@ -3,6 +3,7 @@
 //! `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what the models share, with the whole information `N` (dense columns,
 //! latents and markers) at the optimum of each (D. MacKay, *Bayesian interpolation*, 1992).
 
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::estimator::Estimator;
@@ -14,6 +15,7 @@ use super::solution::{Evidence, Solution};
 use super::turns;
 use crate::error::Result;
 use crate::fit::{Fit, log_evidence};
+use crate::linalg::SymmetricFactor;
 use crate::model::joint_terms::RobotModel;
 use crate::problem::{Adjustment, MeasuredSeries};
 use crate::solve::{LinearProblem, Settings, solve};
@@ -86,28 +88,46 @@ fn compare_models(full: &Fit) -> Vec<(Evidence, Adjustment)> {
 }
 
 fn evidence(full: &Fit, model: RobotModel) -> Option<(Evidence, Adjustment)> {
-    let Some(smaller) = without_terms(full, model) else {
+    let dropped = dropped_terms(full, model);
+    if dropped.is_empty() {
         return Some((told(full.linear(), model)?, full.adjustment.clone()));
-    };
+    }
+    let smaller = without_terms(full, &dropped);
     let outcome = solve(smaller, &Settings { decrement: DECREMENT, ..Settings::default() });
     let evidence = told(outcome.linear()?, model)?;
     Some((evidence, outcome.adjustment))
 }
 
-/// With the terms of a smaller robot model alone; `None` where it has them all.
-fn without_terms(full: &Adjustment, model: RobotModel) -> Option<Adjustment> {
-    let mut smaller = full.clone();
+/// Terms of the robot that a smaller model does not have.
+fn dropped_terms(full: &Adjustment, model: RobotModel) -> Vec<usize> {
+    let terms = full.state.robot.terms.iter().enumerate();
+    terms.filter(|(_, t)| !model.has(t.term)).map(|(k, _)| k).collect()
+}
+
+/// Without some terms of the robot: a condition on the full model, under which everything else goes where the covariance leads.
+fn without_terms(full: &Fit, dropped: &[usize]) -> Adjustment {
+    let (layout, covariance) = (&full.problem.layout, &full.covariance);
+    let first = layout.terms.start;
+    let told = |k: &usize| layout.columns[first + k].free && covariance.system.touched(first + k);
+    let columns: Vec<usize> = dropped.iter().copied().filter(told).map(|k| first + k).collect();
+    let by_condition = DVector::from_iterator(
+        columns.len(),
+        columns.iter().map(|c| layout.columns[*c].prior_mean - full.state.robot.terms[c - first].value),
+    );
+    let of_columns = covariance.reduced.select_columns(&columns);
+    let mut smaller = full.adjustment.clone();
+    if let Ok(factor) = SymmetricFactor::new(&of_columns.select_rows(&columns)) {
+        let step = covariance.system.step(full.linear(), &(of_columns * factor.solve(&by_condition)));
+        smaller.state = full.state.moved(layout, &step);
+    }
     let Adjustment { problem, state } = &mut smaller;
-    let first = problem.layout.terms.start;
-    let mut dropped = state.robot.terms.iter_mut().enumerate().filter(|(_, t)| !model.has(t.term)).peekable();
-    dropped.peek()?;
-    for (k, t) in dropped {
+    for k in dropped {
         let column = &mut problem.layout.columns[first + k];
         // A fixed term stays at its prior mean, where its prior costs nothing.
-        t.value = column.prior_mean;
+        state.robot.terms[*k].value = column.prior_mean;
         column.free = false;
     }
-    Some(smaller)
+    smaller
 }
 
 /// Of the model that an adjustment has, at its optimum.

@@ -197,7 +197,10 @@ fn fit(
         Some(_) => estimate_components(start, &components),
         None => estimate_components_from_above(start, &components),
     };
-    if take_back(&mut outcome.adjustment, free, aside, &options.limits) {
+    for _ in 0..ROUNDS {
+        if !take_back(&mut outcome.adjustment, free, aside, &options.limits) {
+            break;
+        }
         outcome = estimate_components(outcome.adjustment, &components);
     }
     for _ in 0..ROUNDS {

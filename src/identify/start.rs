@@ -318,7 +318,8 @@ pub(super) fn take_back(adjustment: &mut Adjustment, free: &FreePoses, aside: &[
     let on_robot = adjustment.problem.used_on_robot();
     let Some(usual) = median(&on_robot.filter_map(size).collect::<Vec<f64>>()) else { return false };
     let fits = |i: &usize| size(*i).is_some_and(|s| s < limits.set_aside_factor * usual);
-    let back: Vec<usize> = aside.iter().copied().filter(fits).collect();
+    let is_out = |i: &usize| adjustment.problem.images[*i].rejected.is_some();
+    let back: Vec<usize> = aside.iter().copied().filter(|i| is_out(i) && fits(i)).collect();
     back.iter().for_each(|&i| adjustment.problem.images[i].rejected = None);
     !back.is_empty()
 }

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix3x2, Matrix6x2, SMatrix, SVector, Vector2, Vector3};
 
-use crate::linalg::{gram, product_with_rows};
+use crate::linalg::{gram, product, product_with_rows};
 use crate::model::camera::MAX_PARAMETERS;
 use crate::model::circle::Prediction;
 use crate::model::plate_modes::MODES;
@@ -131,6 +131,21 @@ impl Equations {
         Some(intrinsic_row(e)).filter(|row| *row < self.columns.nrows())
     }
 
+    /// Sums of products of every row with other columns that have a value an equation (equations x columns).
+    pub fn with_columns(&self, columns: &DMatrix<f64>) -> RowSums {
+        RowSums(product(&self.columns, columns))
+    }
+
+    /// What steps of the pose (6 x steps) and of the intrinsics before the field (E x steps) change, equations x steps.
+    pub fn along(&self, pose: &DMatrix<f64>, intrinsics: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut steps = DMatrix::zeros(self.columns.nrows(), pose.ncols());
+        steps.rows_range_mut(self.pose_rows()).copy_from(pose);
+        for (e, row) in (0..E).filter_map(|e| Some((e, self.intrinsic_row(e)?))) {
+            steps.row_mut(row).copy_from(&intrinsics.row(e));
+        }
+        product(&self.columns.transpose(), &steps)
+    }
+
     /// Sums of products of all rows.
     pub(super) fn products(&self) -> Products {
         Products(gram(&self.columns))
@@ -163,6 +178,21 @@ impl Equations {
             all.iter_mut().last().into_iter().for_each(|last| last.add(&sight));
         }
         all
+    }
+}
+
+/// Sums of products of the rows of an image with other columns.
+pub struct RowSums(DMatrix<f64>);
+
+impl RowSums {
+    /// Of the pose, with one of the columns.
+    pub fn pose(&self, column: usize) -> SVector<f64, P> {
+        self.0.fixed_view::<P, 1>(POSE, column).into_owned()
+    }
+
+    /// Of an intrinsic unknown before the field, with one of the columns; zero for padding.
+    pub fn intrinsic(&self, e: usize, column: usize) -> f64 {
+        self.0.get((intrinsic_row(e), column)).copied().unwrap_or(0.0)
     }
 }
 

@@ -32,6 +32,16 @@ impl Noise {
         (0..sizes).map(move |kind| (kind..all).step_by(sizes).collect())
     }
 
+    /// Sizes of what is latent at stops, rad or m: joint noise, local errors, apparent displacements.
+    pub fn latent_sizes(&self) -> impl Iterator<Item = f64> + '_ {
+        self.joint.iter().flatten().chain(&self.local).chain(&self.displacement).copied()
+    }
+
+    /// As [`Noise::latent_sizes`].
+    pub fn latent_sizes_mut(&mut self) -> impl Iterator<Item = &mut f64> {
+        self.joint.iter_mut().flatten().chain(&mut self.local).chain(&mut self.displacement)
+    }
+
     /// Every size of latent joint errors and apparent displacements at `first`, rad or m.
     pub fn start_at(&mut self, first: f64) {
         self.joint.iter_mut().flatten().for_each(|s| *s = first);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3};
+use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
 
 use super::linear::{BodyPart, LinearImage, LinearProblem, StopParts};
 use crate::linalg::{product, wide};
@@ -40,6 +40,12 @@ impl SeenMarkers {
             }
         }
         seen
+    }
+
+    /// A step of every marker of every plate, from that of each that was seen by its number.
+    pub fn steps(&self, of: impl Fn(usize) -> Vector3<f64>) -> Vec<Vec<Vector3<f64>>> {
+        let step = |at: &Option<usize>| at.map_or(Vector3::zeros(), &of);
+        self.number.iter().map(|plate| plate.iter().map(step).collect()).collect()
     }
 
     /// Information of each, prior included.

@@ -4,13 +4,14 @@
 //! the reduced information is the information without the elimination less `T' (sum Y Y') T`, one Gram product in the space of poses and
 //! intrinsics, which what stays moves by `T` ([`PoseSpace`]).
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, DVectorView, Matrix3};
 
 use super::blocks::{MarkerRows, PoseRows, STOPS_A_PRODUCT, SeenMarkers};
 use super::distances::Distances;
 use super::linear::Carried;
 use super::linear::LinearProblem;
 use super::pose_space::PoseSpace;
+use super::right_hand_sides::RightHandSides;
 use crate::linalg::{mirror_upper, orthonormal, product, subtract_gram};
 use crate::model::plate_modes::MODES;
 use crate::problem::Step;
@@ -141,14 +142,47 @@ impl MarkersEliminated {
         let mut own = self.rhs.clone();
         own.gemv_tr(-1.0, &self.y, &self.space.times(&column(x.clone())).column(0), 1.0);
         by_distances.iter().for_each(|added| own += added);
-        let of = |at: usize| self.inverse_factors[at].transpose() * own.fixed_rows::<3>(3 * at);
-        let step = |at: &Option<usize>| at.map_or(Vector3::zeros(), of);
-        let markers = self.seen.number.iter().map(|plate| plate.iter().map(step).collect()).collect();
+        let markers = self.seen.steps(|at| self.inverse_factors[at].transpose() * own.fixed_rows::<3>(3 * at));
         let mut step = Step::of(dense, markers, &linear.adjustment.state);
         for (stop, &start) in linear.stops().zip(&self.latent_start) {
             stop.put(x.rows(start, stop.unknowns()).as_slice(), &mut step);
         }
         step
+    }
+
+    /// Whole steps for right-hand sides of their own, by what solves the reduced system.
+    pub fn steps(
+        &self,
+        linear: LinearProblem,
+        of: &RightHandSides,
+        distances: &Distances,
+        solve: impl Fn(DMatrix<f64>) -> DMatrix<f64>,
+    ) -> Vec<Step> {
+        let dense = of.dense.nrows();
+        let mut whitened = of.markers.clone();
+        for (at, inverse) in self.inverse_factors.iter().enumerate() {
+            let own = inverse * whitened.rows(3 * at, 3);
+            whitened.rows_mut(3 * at, 3).copy_from(&own);
+        }
+        let mut reduced = of.dense.clone().resize_vertically(self.space.unknowns(), 0.0);
+        for (own, &start) in of.stops.iter().zip(&self.latent_start) {
+            reduced.rows_mut(start, own.nrows()).copy_from(own);
+        }
+        reduced -= self.space.transposed_times(&product(&self.y, &whitened));
+        distances.reduced_by(&whitened).iter().for_each(|added| reduced += added);
+        let x = solve(reduced);
+        let mut own = &whitened - product(&self.y.transpose(), &self.space.times(&x));
+        distances.markers_by(&whitened, &x).iter().for_each(|added| own += added);
+        let whole = |(x, own): (DVectorView<f64>, DVectorView<f64>)| {
+            let of_marker = |at: usize| self.inverse_factors[at].transpose() * own.fixed_rows::<3>(3 * at);
+            let markers = self.seen.steps(of_marker);
+            let mut step = Step::of(x.rows(0, dense).into_owned(), markers, &linear.adjustment.state);
+            for (stop, &start) in linear.stops().zip(&self.latent_start) {
+                stop.put(x.rows(start, stop.unknowns()).as_slice(), &mut step);
+            }
+            step
+        };
+        x.column_iter().zip(own.column_iter()).map(whole).collect()
     }
 
     /// Covariance of every marker that was seen: `V^-1 + D cov(x) D'` with `D = V^-1 B' T`, less what moves the marker with `x`

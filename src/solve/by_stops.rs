@@ -6,12 +6,13 @@
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 
-use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, SMatrix, Vector3};
+use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, Matrix3, SMatrix};
 use rayon::prelude::*;
 
 use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, SeenMarkers, latents_with_markers};
 use super::linear::Carried;
 use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
+use super::right_hand_sides::RightHandSides;
 use crate::linalg::{gram, mirror_upper, orthonormal, product, subtract_gram};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Equations, Step};
@@ -154,9 +155,7 @@ impl StopsEliminated {
 
     /// The whole step from the solution `x` of the reduced system.
     pub fn step(&self, linear: LinearProblem, x: &DVector<f64>) -> Step {
-        let of = |at: usize| x.fixed_rows::<3>(self.dense + 3 * at).into_owned();
-        let step = |at: &Option<usize>| at.map_or(Vector3::zeros(), of);
-        let markers = self.seen.number.iter().map(|plate| plate.iter().map(step).collect()).collect();
+        let markers = self.seen.steps(|at| x.fixed_rows::<3>(self.dense + 3 * at).into_owned());
         let mut step = Step::of(x.rows(0, self.dense).into_owned(), markers, &linear.adjustment.state);
         for (block, stop) in self.blocks.iter().zip(linear.stops()) {
             let own = DVector::from_iterator(block.rows.len(), block.rows.iter().map(|&c| x[c]));
@@ -164,6 +163,39 @@ impl StopsEliminated {
             stop.put(dl.as_slice(), &mut step);
         }
         step
+    }
+
+    /// Whole steps for right-hand sides of their own, by what solves the reduced system.
+    pub fn steps(
+        &self,
+        linear: LinearProblem,
+        of: &RightHandSides,
+        solve: impl Fn(DMatrix<f64>) -> DMatrix<f64>,
+    ) -> Vec<Step> {
+        let dense = self.dense;
+        let mut reduced = of.dense.clone().resize_vertically(dense + of.markers.nrows(), 0.0);
+        reduced.rows_range_mut(dense..).copy_from(&of.markers);
+        let whitened: Vec<DMatrix<f64>> =
+            self.blocks.iter().zip(&of.stops).map(|(block, own)| &block.inverse_factor * own).collect();
+        for (block, own) in self.blocks.iter().zip(&whitened) {
+            let taken = product(&block.y, own);
+            for (&row, taken) in block.rows.iter().zip(taken.row_iter()) {
+                let mut row = reduced.row_mut(row);
+                row -= taken;
+            }
+        }
+        let x = solve(reduced);
+        let whole = |x: DVectorView<f64>| {
+            let markers = self.seen.steps(|at| x.fixed_rows::<3>(dense + 3 * at).into_owned());
+            Step::of(x.rows(0, dense).into_owned(), markers, &linear.adjustment.state)
+        };
+        let mut steps: Vec<Step> = x.column_iter().map(whole).collect();
+        for ((block, own), stop) in self.blocks.iter().zip(&whitened).zip(linear.stops()) {
+            let left = own - product(&block.y.transpose(), &x.select_rows(&block.rows));
+            let latents = block.inverse_factor.tr_mul(&left);
+            steps.iter_mut().zip(latents.column_iter()).for_each(|(step, own)| stop.put(own.as_slice(), step));
+        }
+        steps
     }
 
     /// `H^-1 + H^-1 B' cov(x) B H^-1` of stops by their places among those in use.

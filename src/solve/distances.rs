@@ -78,6 +78,17 @@ impl Distances {
         (!self.are_none()).then(|| &self.by_markers * (&self.weight * left()))
     }
 
+    /// What they add to reduced right-hand sides that are none of theirs, with `F^-1 b` of the markers: `-W S^-1 U' F^-1 b`.
+    pub fn reduced_by(&self, markers: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        (!self.are_none()).then(|| &self.by_reduced * (&self.weight * self.by_markers.tr_mul(markers)) * -1.0)
+    }
+
+    /// As [`Distances::of_markers`] for right-hand sides that are none of theirs: `-U S^-1 (U' F^-1 b + W' x)`.
+    pub fn markers_by(&self, markers: &DMatrix<f64>, x: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let left = || self.by_markers.tr_mul(markers) + self.by_reduced.tr_mul(x);
+        (!self.are_none()).then(|| &self.by_markers * (&self.weight * left()) * -1.0)
+    }
+
     /// What they add to the square of the Newton decrement: `r' r` less what the markers cannot take of it.
     pub fn squares(&self) -> f64 {
         self.residual.norm_squared() - self.reduced.dot(&(&self.weight * &self.reduced))

@@ -445,6 +445,15 @@ impl<'a> LinearStop<'a> {
         self.joint_errors.len() + self.images().map(|image| image.tie.len()).sum::<usize>()
     }
 
+    /// What is latent at it; zero for a free pose, of which there is nothing to deviate from.
+    pub(super) fn values(&self) -> DVector<f64> {
+        let ties = self.images().flat_map(|own| {
+            let displaced = own.tie.displacement();
+            (0..own.tie.len()).map(move |k| displaced.get(k).copied().unwrap_or_default())
+        });
+        DVector::from_vec(self.joint_errors.iter().copied().chain(ties).collect())
+    }
+
     /// Information of what is latent at it, by its prior alone; zero for a free pose.
     pub fn prior(&self) -> Vec<f64> {
         let problem = &self.linear.adjustment.problem;

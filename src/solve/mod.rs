@@ -11,6 +11,8 @@ mod distances;
 mod fit;
 mod frame;
 mod in_frame;
+mod latent;
+mod latent_data;
 mod levenberg;
 mod linear;
 mod linearised_adjustment;
@@ -18,17 +20,16 @@ mod noise_information;
 mod noise_uncertainty;
 mod pose_space;
 mod response;
+mod right_hand_sides;
 mod snoop;
 mod stretch;
 mod system;
+mod tally;
 mod unidentified_noise;
 
 pub use acceleration::Acceleration;
 pub use blocks::SeenMarkers;
-pub use components::{
-    ComponentOptions, JOINT_NOISE_FLOOR, LEAST_FIRST_GUESS, Tally, estimate_components, estimate_components_from_above,
-    share_out,
-};
+pub use components::{ComponentOptions, LEAST_FIRST_GUESS, estimate_components, estimate_components_from_above};
 pub use covariance::Covariance;
 pub use fit::Fit;
 pub use frame::{Frame, PlateScale, Similarity, frames};
@@ -42,4 +43,5 @@ pub use response::Response;
 pub use snoop::{reject_bodies, reject_contradicting, reject_observations, reject_stops};
 pub use stretch::{LengthStandard, Stretch};
 pub use system::{Elimination, Singular, System};
+pub use tally::{JOINT_NOISE_FLOOR, Tally, share_out};
 pub use unidentified_noise::without_unidentified_noise;

@@ -6,11 +6,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::components::SHRINKAGE;
 use super::covariance::Covariance;
 use super::fit::Fit;
-use super::linear::LinearStop;
+use super::latent::{Latent, local_latents, stop_latents};
 use super::system::Elimination;
+use super::tally::SHRINKAGE;
 use crate::linalg::SymmetricFactor;
 use crate::problem::{Adjustment, Family, Noise, Problem};
 use crate::urdf::JointKind;
@@ -61,14 +61,6 @@ impl Spread {
     }
 }
 
-/// One latent: row in the covariance, standard deviation, components with their shares of its variance.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Latent {
-    pub row: usize,
-    pub sigma: f64,
-    pub parts: [(usize, f64); 2],
-}
-
 /// The information at a solution; `None` without joint noise, or where the data do not tell it at all.
 pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
     let (linear, Adjustment { problem, state }, cov) = (fit.linear(), &fit.adjustment, &fit.covariance);
@@ -80,8 +72,7 @@ pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
         None
     };
     let cov = coupled.as_ref().unwrap_or(cov);
-    let own = problem.noise.joint.iter().flatten();
-    let of_errors = own.chain(&problem.noise.local).chain(&problem.noise.displacement).copied();
+    let of_errors = problem.noise.latent_sizes();
     let twists = problem.families.iter().find(|f| f.is_of_twists());
     let variances: Vec<f64> = of_errors.chain(twists.map(|f| f.factor)).map(|s| s * s).collect();
     let of_twists = variances.len() - usize::from(twists.is_some());
@@ -143,20 +134,6 @@ pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
     Some(NoiseInformation { readings, series, locals, variances, covariance, touched, scatter, together, coupled })
 }
 
-fn local_latents(
-    Adjustment { problem, state }: &Adjustment,
-    touched: impl Fn(usize) -> bool,
-    first: usize,
-) -> Vec<Latent> {
-    let terms = problem.layout.terms.start;
-    let used = problem.layout.locals.clone().filter(|&c| touched(c));
-    let latent = |c: usize| {
-        let reading = state.robot.terms[c - terms].reading;
-        Latent { row: c, sigma: problem.noise.local[reading], parts: [(first + reading, 1.0), (first + reading, 0.0)] }
-    };
-    used.map(latent).filter(|l| l.sigma > 0.0).collect()
-}
-
 /// Twists whose common size is estimated: their priors have one variance.
 fn twist_latents(
     problem: &Problem,
@@ -169,28 +146,6 @@ fn twist_latents(
         let sigma = problem.layout.columns[row].prior_sigma;
         Latent { row, sigma, parts: [(component, 1.0), (component, 0.0)] }
     })
-}
-
-/// What is latent at a stop and has a variance, numbered within it.
-fn stop_latents(Adjustment { problem, state }: &Adjustment, at: &LinearStop) -> Vec<Latent> {
-    let LinearStop { stop, joint_errors, .. } = at;
-    let n = state.robot.chain.readings.len();
-    let first = problem.noise.joint.len() * n;
-    let error = |row: usize| {
-        let [own, local] = problem.joint_error_variance(stop, row);
-        let a = stop.series * n + row;
-        let b = if local > 0.0 { first + row } else { a };
-        Latent { row, sigma: (own + local).sqrt(), parts: [(a, own / (own + local)), (b, local / (own + local))] }
-    };
-    let displacements = at.images().flat_map(|image| {
-        let ([_, rows], image, count) = (image.latents(), image.image, image.tie.displacement().len());
-        rows.zip(0..count).map(move |(row, k)| {
-            let component = first + problem.noise.local.len() + problem.size_of_displacement(image, k);
-            let sigma = problem.displacement_variance(image, k).sqrt();
-            Latent { row, sigma, parts: [(component, 1.0), (component, 0.0)] }
-        })
-    });
-    (0..joint_errors.len()).map(error).chain(displacements).collect()
 }
 
 /// Every variance is drawn to a common one as by so many observations, as in the estimate: joint noise to that of the readings of its group in the

@@ -4,9 +4,10 @@
 
 use nalgebra::DMatrix;
 
-use super::components::JOINT_NOISE_FLOOR;
 use super::fit::Fit;
-use super::noise_information::{Latent, NoiseInformation};
+use super::latent::Latent;
+use super::noise_information::NoiseInformation;
+use super::tally::JOINT_NOISE_FLOOR;
 use crate::linalg::{SymmetricFactor, product};
 
 /// Standard deviation of the logarithm of a variance up to which terms of second order mean anything; what the data do not tell at all, as

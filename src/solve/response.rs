@@ -10,11 +10,14 @@
 //! `s` is the score of `y = 0`, `M` its information with everything else estimated; `s' M^-1 s` is chi-squared where `y = 0`, and `y`, `dx`
 //! are the step to the fit with the columns.
 
-use nalgebra::{DMatrix, DVector, SVector, Vector2, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Vector2, Vector6};
 use rayon::prelude::*;
 
-use super::linear::{LinearImage, LinearProblem, Linearised};
+use super::blocks::{STOPS_A_PRODUCT, SeenMarkers};
+use super::linear::{LinearImage, LinearProblem};
+use super::right_hand_sides::{OfImage, RightHandSides};
 use super::system::{Singular, System};
+use crate::linalg::product;
 use crate::problem::{E, Equations, Step};
 
 /// Response to some columns.
@@ -44,7 +47,7 @@ impl<'a> LinearProblem<'a> {
         count: usize,
         of_image: impl Fn(&LinearImage<'a>, &Equations) -> DMatrix<f64> + Sync,
     ) -> Result<Response, Singular> {
-        let mut system = System::new(self, 0.0);
+        let system = System::new(self, 0.0);
         let factor = system.factor(self)?;
         let places: Vec<usize> = (0..self.images().len()).collect();
         let columns_of = |k: usize| {
@@ -53,38 +56,17 @@ impl<'a> LinearProblem<'a> {
             let columns = of_image(&image, &equations);
             Some((image, equations, columns))
         };
-        // Right-hand sides are affine in what the pixels say: those of priors and of other measurements are taken off.
-        let right_hand_sides: Vec<Vec<RightHandSide>> = places
-            .par_iter()
-            .map(|&k| {
-                let Some((_, equations, columns)) = columns_of(k) else { return Vec::new() };
-                columns
-                    .column_iter()
-                    .map(|c| RightHandSide::new(&equations, c.as_slice(), self.lin.terms[k].be.len()))
-                    .collect()
-            })
-            .collect();
-        let mut lin = self.lin.clone().without_equations();
-        let mut solve = |put: &dyn Fn(&mut Linearised)| {
-            put(&mut lin);
-            let linear = self.adjustment.linear(&lin);
-            system.take_gradient(linear);
-            let x = factor.solve(&system.rhs);
-            system.step(linear, &x)
-        };
-        let none = solve(&|lin| lin.terms.iter_mut().for_each(|t| RightHandSide::none(t.be.len()).put(t)));
-        let mut steps = Vec::with_capacity(count);
-        for c in 0..count {
-            let step = solve(&|lin| {
-                for (terms, own) in lin.terms.iter_mut().zip(&right_hand_sides) {
-                    match own.get(c) {
-                        Some(own) => own.put(terms),
-                        None => RightHandSide::none(terms.be.len()).put(terms),
-                    }
-                }
-            });
-            steps.push(step.plus(-1.0, &none));
+        let seen = SeenMarkers::of(self);
+        let mut right_hand_sides = RightHandSides::none(self, &seen, count);
+        for some in places.chunks(STOPS_A_PRODUCT) {
+            let of = |&k: &usize| {
+                let (image, equations, columns) = columns_of(k)?;
+                Some((image, OfImage::new(&equations, &columns, self.lin.terms[k].be.len())))
+            };
+            let own: Vec<_> = some.par_iter().map(of).collect();
+            own.iter().flatten().for_each(|(image, own)| right_hand_sides.add(&seen, image, own));
         }
+        let steps = system.steps(self, &factor, &right_hand_sides);
         let parts: Vec<Sums> = places
             .par_iter()
             .filter_map(|&k| {
@@ -97,50 +79,6 @@ impl<'a> LinearProblem<'a> {
         let information = (&all.information + all.information.transpose()) * 0.5;
         let Sums { by_itself, score, squares, equations, .. } = all;
         Ok(Response { information, by_itself, score, steps, squares, equations })
-    }
-}
-
-/// What one column says in the place of the residuals of an image.
-struct RightHandSide {
-    bp: Vector6<f64>,
-    be: DVector<f64>,
-    /// Of every marker of the image.
-    bm: Vec<Vector3<f64>>,
-}
-
-impl RightHandSide {
-    fn none(intrinsics: usize) -> Self {
-        Self { bp: Vector6::zeros(), be: DVector::zeros(intrinsics), bm: Vec::new() }
-    }
-
-    fn new(equations: &Equations, column: &[f64], intrinsics: usize) -> Self {
-        let mut own = Self::none(intrinsics);
-        let mut last = None;
-        for ((sight, e), &marker) in equations.sights().zip(column.chunks_exact(2)).zip(&equations.markers) {
-            let e = Vector2::new(e[0], e[1]);
-            own.bp += sight.by_pose() * e;
-            let mut formula = own.be.fixed_rows_mut::<E>(0);
-            formula += sight.by_intrinsics() * e;
-            for (k, d) in sight.by_field() {
-                let mut field = own.be.fixed_rows_mut::<2>(E + 2 * k);
-                field += d.transpose() * e;
-            }
-            if last != Some(marker) {
-                own.bm.push(Vector3::zeros());
-                last = Some(marker);
-            }
-            let of_marker = sight.by_marker() * e;
-            own.bm.iter_mut().last().into_iter().for_each(|b| *b += of_marker);
-        }
-        own
-    }
-
-    fn put(&self, terms: &mut crate::problem::ImageTerms) {
-        terms.bp = self.bp;
-        terms.be.copy_from(&self.be);
-        for (k, marker) in terms.markers.iter_mut().enumerate() {
-            marker.bm = self.bm.get(k).copied().unwrap_or_default();
-        }
     }
 }
 
@@ -161,20 +99,22 @@ impl Sums {
 
     fn of(image: &LinearImage, equations: &Equations, columns: &DMatrix<f64>, steps: &[Step]) -> Self {
         let count = steps.len();
-        let mut left = columns.clone();
-        for (c, step) in steps.iter().enumerate() {
-            let moved = image.pose_step(step);
-            let of_intrinsics: Vec<f64> = image.columns().iter().map(|c| c.map_or(0.0, |c| step.dense[c])).collect();
-            let formula = SVector::<f64, E>::from_iterator(of_intrinsics.iter().copied());
+        let own = image.columns();
+        let dense = |k: usize, step: &Step| own[k].map_or(0.0, |c| step.dense[c]);
+        let poses: Vec<Vector6<f64>> = steps.iter().map(|step| image.pose_step(step)).collect();
+        let pose = DMatrix::from_fn(6, count, |k, c| poses[c][k]);
+        let intrinsics = DMatrix::from_fn(E, count, |e, c| dense(e, &steps[c]));
+        let mut left = columns - equations.along(&pose, &intrinsics);
+        for (mut left, step) in left.column_iter_mut().zip(steps) {
             let markers = &step.markers[image.image.plate];
-            for (o, (sight, &marker)) in equations.sights().zip(&equations.markers).enumerate() {
-                let mut by = sight.by_pose().tr_mul(&moved) + sight.by_intrinsics().tr_mul(&formula);
-                by += sight.by_marker().tr_mul(&markers[marker]);
+            let left = left.as_mut_slice().chunks_exact_mut(2);
+            for ((sight, &marker), left) in equations.sights().zip(&equations.markers).zip(left) {
+                let mut by = sight.by_marker().tr_mul(&markers[marker]);
                 for (k, d) in sight.by_field() {
-                    by += d * Vector2::new(of_intrinsics[E + 2 * k], of_intrinsics[E + 2 * k + 1]);
+                    by += d * Vector2::new(dense(E + 2 * k, step), dense(E + 2 * k + 1, step));
                 }
-                left[(2 * o, c)] -= by[0];
-                left[(2 * o + 1, c)] -= by[1];
+                left[0] -= by[0];
+                left[1] -= by[1];
             }
         }
         let residuals = DVector::from_iterator(
@@ -182,7 +122,7 @@ impl Sums {
             equations.sights().flat_map(|s| [s.residual()[0], s.residual()[1]]),
         );
         Self {
-            information: columns.tr_mul(&left),
+            information: product(&columns.transpose(), &left),
             by_itself: DVector::from_iterator(count, columns.column_iter().map(|c| c.norm_squared())),
             score: columns.tr_mul(&residuals),
             squares: residuals.norm_squared(),

@@ -9,6 +9,7 @@ use super::by_markers::MarkersEliminated;
 use super::by_stops::StopsEliminated;
 use super::distances::Distances;
 use super::linear::{Carried, LinearPose, LinearProblem, LinearStop};
+use super::right_hand_sides::RightHandSides;
 use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Adjustment, Length, Problem, Step};
@@ -248,6 +249,20 @@ impl System {
         match &self.eliminated {
             Eliminated::Markers(e) => e.step(linear, x, self.distances.of_markers(x)),
             Eliminated::Stops(e) => e.step(linear, x),
+        }
+    }
+
+    /// Steps for right-hand sides of their own, from the factor of the information: those of the linearisation take no part.
+    pub(super) fn steps(&self, linear: LinearProblem, factor: &SymmetricFactor, of: &RightHandSides) -> Vec<Step> {
+        let columns = &linear.adjustment.problem.layout.columns;
+        let solve = |mut reduced: DMatrix<f64>| {
+            let held = columns.iter().enumerate().filter(|(i, c)| !c.free || !self.touched[*i]);
+            held.for_each(|(i, _)| reduced.row_mut(i).fill(0.0));
+            factor.solve_many(&reduced)
+        };
+        match &self.eliminated {
+            Eliminated::Markers(e) => e.steps(linear, of, &self.distances, solve),
+            Eliminated::Stops(e) => e.steps(linear, of, solve),
         }
     }
 

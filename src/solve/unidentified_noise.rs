@@ -4,9 +4,9 @@
 //! large. The estimate is compared with its spread where there is no noise (the test of a component on the edge of its range;
 //! S. Self, K.-Y. Liang 1987).
 
-use super::components::JOINT_NOISE_FLOOR;
 use super::levenberg::{Outcome, Settings, solve};
 use super::noise_information::{NoiseInformation, noise_information};
+use super::tally::JOINT_NOISE_FLOOR;
 use crate::problem::Adjustment;
 
 /// Sigmas of an estimate where there is no noise that it must reach: one of a hundred robots without noise gets past.
