@@ -224,6 +224,15 @@ impl Fit {
         self.covariance.markers().iter().enumerate().map(of_plate).collect()
     }
 
+    /// The sizes of what is latent where their likelihood has its maximum at this linearisation.
+    pub(super) fn most_likely_noise(&self, options: &ComponentOptions) -> Noise {
+        let stops = self.stops_with_noise();
+        let data = self.latent_data(&stops, &self.covariance.latents(&stops));
+        let mut noise = self.problem.noise.clone();
+        data.most_likely(options, &self.state.robot.chain.reading_kinds, &mut noise);
+        noise
+    }
+
     /// Stops at which something latent has a prior.
     fn stops_with_noise(&self) -> Vec<LinearStop<'_>> {
         self.linear().stops().filter(|stop| stop.prior().iter().any(|prior| *prior > 0.0)).collect()

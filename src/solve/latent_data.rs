@@ -94,12 +94,33 @@ impl OfData {
 }
 
 impl LatentData {
-    /// Estimates the sizes; returns the largest relative change of the first round, which tells how far they were off.
+    /// Estimates the sizes; returns the largest relative change of the first round, which tells how far they were off. After that round, sizes that
+    /// shrink and may be none stay: of a few stops they would go to nothing, and to overstate them is harmless.
     pub fn update(&self, options: &ComponentOptions, kinds: &[JointKind], noise: &mut Noise) -> f64 {
+        let keep = |round: usize, found: &Tallies, before: &[f64], noise: &mut Noise| {
+            if round > 0 {
+                found.keep_untold(before, noise);
+            }
+        };
+        self.rounds(options, kinds, noise, keep)
+    }
+
+    /// As [`LatentData::update`], with sizes that may be none where the likelihood has its maximum.
+    pub fn most_likely(&self, options: &ComponentOptions, kinds: &[JointKind], noise: &mut Noise) {
+        self.rounds(options, kinds, noise, |_, _, _, _| ());
+    }
+
+    fn rounds(
+        &self,
+        options: &ComponentOptions,
+        kinds: &[JointKind],
+        noise: &mut Noise,
+        keep: impl Fn(usize, &Tallies, &[f64], &mut Noise),
+    ) -> f64 {
         let nonzero = noise.latent_sizes().filter(|s| *s > 0.0);
         let most: Vec<f64> = nonzero.map(|s| MOST_GROWTH * s.max(JOINT_NOISE_FLOOR)).collect();
         let (mut acceleration, mut first) = (Acceleration::default(), None);
-        for _ in 0..MOST_ROUNDS {
+        for round in 0..MOST_ROUNDS {
             let before: Vec<f64> = noise.latent_sizes().collect();
             let found = self.tallies(noise);
             let mut change: f64 = 0.0;
@@ -109,6 +130,7 @@ impl LatentData {
             if options.joint {
                 change = change.max(found.update_joint(kinds, noise));
             }
+            keep(round, &found, &before, noise);
             if change < STANDS || *first.get_or_insert(change) > FAR_OFF {
                 break;
             }

@@ -108,6 +108,14 @@ impl Tallies {
         self.all.add(size, value, left, prior, share);
     }
 
+    /// Sizes that shrink and may be none go back to where they were `before`.
+    pub fn keep_untold(&self, before: &[f64], noise: &mut Noise) {
+        let sizes = noise.latent_sizes_mut().zip(before).zip(&self.all.information);
+        for ((size, before), _) in sizes.filter(|((s, before), told)| **s < **before && is_not_told(**told)) {
+            *size = *before;
+        }
+    }
+
     /// New sizes of the apparent displacements; returns as [`share_out`].
     pub fn update_displacements(&self, noise: &mut Noise) -> f64 {
         let tally = self.all.part(self.series * self.readings + self.locals..self.all.squares.len());

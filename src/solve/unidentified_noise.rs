@@ -1,13 +1,14 @@
 //! Joint noise that the data do not separate from none counts as none.
 //!
 //! An estimate cannot be below zero: of a robot without joint noise half of the series find some, and their covariances are too
-//! large. The estimate is compared with its spread where there is no noise (the test of a component on the edge of its range;
+//! large. The most likely size is compared with its spread where there is no noise (the test of a component on the edge of its range;
 //! S. Self, K.-Y. Liang 1987).
 
+use super::components::ComponentOptions;
 use super::levenberg::{Outcome, Settings, solve};
 use super::noise_information::{NoiseInformation, noise_information};
 use super::tally::JOINT_NOISE_FLOOR;
-use crate::problem::Adjustment;
+use crate::problem::{Adjustment, Noise};
 
 /// Sigmas of an estimate where there is no noise that it must reach: one of a hundred robots without noise gets past.
 const IDENTIFIED: f64 = 2.326;
@@ -21,7 +22,7 @@ type Group = Vec<usize>;
 /// The outcome with such noise at its floor, and what was known of all noise before, where that changed.
 pub fn without_unidentified_noise(outcome: Outcome, settings: &Settings) -> (Outcome, Option<NoiseInformation>) {
     let (outcome, found) = information(outcome);
-    let Some(found) = found else { return (outcome, None) };
+    let Some(Found { information: found, most_likely }) = found else { return (outcome, None) };
     let noise = &outcome.adjustment.problem.noise;
     let series: Vec<usize> = (0..noise.joint.len()).collect();
     let above_floor = |r: &usize| noise.joint.iter().any(|own| own[*r] > JOINT_NOISE_FLOOR);
@@ -33,9 +34,11 @@ pub fn without_unidentified_noise(outcome: Outcome, settings: &Settings) -> (Out
         return (outcome, None);
     }
     let (at_none, spread) = information(solved_without(&outcome.adjustment, &in_doubt, settings));
-    let Some(spread) = spread else { return (outcome, None) };
+    let Some(Found { information: spread, .. }) = spread else { return (outcome, None) };
     let is_identified = |group: &Group| {
-        found.mean_variance(&series, group).variance > IDENTIFIED * spread.mean_variance(&series, group).sigma
+        let of_series = |own: &Vec<f64>| group.iter().map(|&r| own[r] * own[r]).sum::<f64>() / group.len() as f64;
+        let variance = most_likely.joint.iter().map(of_series).sum::<f64>() / series.len() as f64;
+        variance > IDENTIFIED * spread.mean_variance(&series, group).sigma
     };
     let (kept, unidentified): (Vec<Group>, Vec<Group>) = in_doubt.into_iter().partition(is_identified);
     match (kept.is_empty(), unidentified.is_empty()) {
@@ -51,12 +54,19 @@ fn groups(Adjustment { problem, state }: &Adjustment) -> impl Iterator<Item = Gr
     of_stops.filter(|g| g.iter().all(|&r| problem.noise.local.get(r).is_none_or(|s| *s == 0.0)))
 }
 
+/// What an outcome tells of the noise.
+struct Found {
+    information: NoiseInformation,
+    most_likely: Noise,
+}
+
 /// The outcome as it is, and what it tells of the noise.
-fn information(outcome: Outcome) -> (Outcome, Option<NoiseInformation>) {
+fn information(outcome: Outcome) -> (Outcome, Option<Found>) {
     let Outcome { status, iterations, .. } = outcome;
     match outcome.fit() {
         Ok(fit) => {
-            let found = noise_information(&fit);
+            let most_likely = fit.most_likely_noise(&ComponentOptions::default());
+            let found = noise_information(&fit).map(|information| Found { information, most_likely });
             (Outcome { status, iterations, adjustment: fit.adjustment, linearised: Some(fit.linearised) }, found)
         }
         Err(unsolved) => (Outcome { status, ..unsolved.outcome }, None),
