@@ -15,7 +15,7 @@ use crate::error::{Code, Error, Result};
 pub enum FileKind {
     /// TOML or YAML.
     Settings,
-    /// CSV: some million cells.
+    /// CSV: ten thousand images of the standard plate have 250 MB of observations.
     Table,
     /// URDF.
     Robot,
@@ -37,7 +37,7 @@ impl FileKind {
             Self::Settings => 4 * MIB,
             Self::Robot => 16 * MIB,
             Self::Program => 64 * MIB,
-            Self::Table => 128 * MIB,
+            Self::Table => 1024 * MIB,
             Self::Solution => 256 * MIB,
             Self::Image => 1024 * MIB,
             Self::Recording => u64::MAX,
