@@ -86,7 +86,7 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
         placement: 0,
         plate: 0,
         mount: CameraMount::Hand,
-        observations,
+        observations: observations.into(),
         rejected: None,
     };
     let images: Vec<Image> = observations.into_iter().enumerate().map(image).collect();

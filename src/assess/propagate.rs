@@ -62,7 +62,7 @@ pub fn predict_pose(fit: &Fit, view: View, readings: &[f64]) -> Option<Predicted
         placement: view.placement,
         plate: 0,
         mount: view.mount,
-        observations: Vec::new(),
+        observations: Vec::new().into(),
         rejected: None,
     };
     let (posture, exact) = (Posture::at(readings), vec![0.0; readings.len()]);

@@ -79,7 +79,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
                 placement: intern(&mut placements, &stop.placement),
                 plate,
                 mount: s.mount,
-                observations,
+                observations: observations.into(),
                 rejected,
             });
         }

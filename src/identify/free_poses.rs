@@ -11,7 +11,8 @@ use crate::geom::{Pose, adjoint};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
 use crate::problem::{
-    Adjustment, Image, ImageRejection, Mark, ObservationRejection, Problem, State, Tie, Weighting, size_by_distance,
+    Adjustment, Image, ImageRejection, Mark, MarkerObservation, ObservationRejection, Problem, State, Tie, Weighting,
+    size_by_distance,
 };
 use crate::solve::{
     ComponentOptions, Elimination, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status,
@@ -73,7 +74,9 @@ impl FreeStart {
         state.ties.clone_from(&self.ties);
         for (image, left) in problem.images.iter_mut().zip(&self.images) {
             image.rejected.clone_from(&left.image);
-            image.observations.iter_mut().zip(&left.observations).for_each(|(o, rejected)| o.rejected = *rejected);
+            if !image.observations.iter().map(|o| &o.rejected).eq(&left.observations) {
+                image.observations.iter_mut().zip(&left.observations).for_each(|(o, rejected)| o.rejected = *rejected);
+            }
         }
         problem.noise.pixel_factor.clone_from(&self.free.pixel_factor);
         problem.noise.marker.clone_from(&self.marker_factor);
@@ -170,8 +173,8 @@ fn quick_problem(problem: &Problem, camera: usize) -> Problem {
             image.rejected = Some(ImageRejection::Excluded);
         }
         let every = Weighting::of(problem, image).thinned(image, ENOUGH).every;
-        image.observations = image.observations.iter().step_by(every).cloned().collect();
-        image.observations.iter_mut().for_each(|o| o.mark = Mark::Corner);
+        let some = image.observations.iter().step_by(every);
+        image.observations = some.map(|o| MarkerObservation { mark: Mark::Corner, ..o.clone() }).collect();
     }
     quick.plates.iter_mut().flat_map(|p| &mut p.markers).for_each(|m| m.sigma_m = 0.0);
     let shapes = quick.layout.shapes.clone();

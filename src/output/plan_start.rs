@@ -131,7 +131,7 @@ fn taken(image: &ImageRecord, pixel_factor: f64, record: &SolutionRecord) -> Opt
         placement: image.placement,
         plate: 0,
         mount: image.camera_mount,
-        observations: observations(&image.observations, pixel_factor, &plate.id),
+        observations: observations(&image.observations, pixel_factor, &plate.id).into(),
         rejected: None,
     };
     Some(PlannedStop { posture, image })
@@ -163,7 +163,7 @@ fn observations(columns: &ObservationColumns, pixel_factor: f64, ids: &[u32]) ->
 fn typical_sigma(stops: &[PlannedStop]) -> f64 {
     let mut all: Vec<f64> = stops
         .iter()
-        .flat_map(|s| &s.image.observations)
+        .flat_map(|s| s.image.observations.iter())
         .map(|o| (2.0 / o.information.trace().max(f64::MIN_POSITIVE)).sqrt())
         .collect();
     all.sort_by(f64::total_cmp);

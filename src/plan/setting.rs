@@ -136,7 +136,7 @@ impl Setting {
             placement,
             plate: 0,
             mount: self.mount,
-            observations: Vec::new(),
+            observations: Vec::new().into(),
             rejected: None,
         };
         let information = Matrix2::identity() * self.pixel_sigma_px.powi(-2);

@@ -153,7 +153,7 @@ impl Equations {
 
     /// Blocks of every marker that was seen, by itself; observations of one marker stand together.
     pub(super) fn marker_terms(&self) -> Vec<MarkerTerms> {
-        let mut all: Vec<MarkerTerms> = Vec::with_capacity(self.markers.len());
+        let mut all: Vec<MarkerTerms> = Vec::with_capacity(self.markers.chunk_by(|a, b| a == b).count());
         for (&marker, sight) in self.markers.iter().zip(self.sights()) {
             let by_marker = sight.by_marker();
             let (mm, bm) = (by_marker * by_marker.transpose(), by_marker * sight.residual());

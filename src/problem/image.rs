@@ -2,6 +2,7 @@
 
 use super::measured::MarkerObservation;
 use super::rejection::ImageRejection;
+use super::shared::Shared;
 use crate::series::CameraMount;
 
 /// One image with what belongs to it.
@@ -24,7 +25,7 @@ pub struct Image {
     /// Where the camera is.
     pub mount: CameraMount,
     /// Observations, ordered by marker.
-    pub observations: Vec<MarkerObservation>,
+    pub observations: Shared<Vec<MarkerObservation>>,
     /// Why the image is left out; `None` while it is used.
     pub rejected: Option<ImageRejection>,
 }

@@ -83,7 +83,10 @@ impl Weighting {
 /// Prediction of one observation; `None` where the marker is behind the camera.
 pub fn predict(image: &Image, state: &State, pose: &Pose, observation: &MarkerObservation) -> Option<Prediction> {
     let position = state.plates[image.plate].position(observation.marker);
-    observation.mark.predict(&state.cameras[image.camera], pose, &position)
+    wide(
+        #[inline(always)]
+        || observation.mark.predict(&state.cameras[image.camera], pose, &position),
+    )
 }
 
 /// Normal-equation blocks of one image at a camera pose; `None` where an observed marker is behind the camera.

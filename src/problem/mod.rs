@@ -22,6 +22,7 @@ mod postures;
 mod rejection;
 mod restraint;
 mod select;
+mod shared;
 mod state;
 mod step;
 mod stop;
@@ -48,6 +49,7 @@ pub use postures::{common_readings, joined, nearly_common_readings, posture_grou
 pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};
 pub use restraint::{JointPrior, Restraint};
 pub use select::short_name;
+pub use shared::Shared;
 pub use state::{PlateShape, State};
 pub use step::Step;
 pub use stop::{DISPLACEMENT_SIZES, SIZE_OF_DISPLACEMENT, Stop, TakenFrom, Tie};

@@ -5,6 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
 
 use super::linear::{BodyPart, LinearImage, LinearProblem, StopParts};
+use super::runs::runs;
 use crate::linalg::{product, wide};
 use crate::problem::{Adjustment, E, Equations, Layout, Problem};
 
@@ -222,24 +223,6 @@ fn times_right(y: &mut DMatrix<f64>, first: usize, m: &Matrix3<f64>) {
         let new = |k: usize| old[0] * m[(0, k)] + old[1] * m[(1, k)] + old[2] * m[(2, k)];
         (*x, *y, *z) = (new(0), new(1), new(2));
     }
-}
-
-/// Places one after the other that go to places one after the other.
-struct Run {
-    from: usize,
-    into: usize,
-    length: usize,
-}
-
-fn runs(places: impl Iterator<Item = (usize, usize)>) -> Vec<Run> {
-    let mut runs: Vec<Run> = Vec::new();
-    for (from, into) in places {
-        match runs.last_mut().filter(|r| (r.from + r.length, r.into + r.length) == (from, into)) {
-            Some(run) => run.length += 1,
-            None => runs.push(Run { from, into, length: 1 }),
-        }
-    }
-    runs
 }
 
 /// `into += a s + b t`.

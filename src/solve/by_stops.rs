@@ -4,16 +4,18 @@
 //! what stays, `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product.
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, Matrix3, SMatrix};
 use rayon::prelude::*;
 
+use super::alike::alike;
 use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, SeenMarkers, latents_with_markers};
+use super::group::Group;
 use super::linear::Carried;
 use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
-use crate::linalg::{gram, mirror_upper, orthonormal, product, subtract_gram};
+use crate::linalg::{gram, mirror_upper, orthonormal, product};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Equations, Step};
 
@@ -37,6 +39,8 @@ struct Block {
 #[derive(Debug, Clone)]
 pub(super) struct StopsEliminated {
     blocks: Vec<Block>,
+    /// Places of stops that show much the same markers.
+    groups: Vec<Vec<usize>>,
     seen: SeenMarkers,
     /// Number of dense columns: the first unknown of the markers.
     dense: usize,
@@ -65,17 +69,14 @@ impl StopsEliminated {
             }
         }
         coupling.copy_to(&mut a, dense);
-        for part in blocks.chunks(STOPS_A_PRODUCT) {
-            let mut y = DMatrix::zeros(n, part.iter().map(|b| b.y.ncols()).sum());
-            let mut into = y.column_iter_mut();
-            for column in part.iter().flat_map(|b| b.y.column_iter().map(|column| (&b.rows, column))) {
-                let Some(mut into) = into.next() else { break };
-                column.0.iter().zip(column.1.iter()).for_each(|(&row, value)| into[row] = *value);
-            }
-            subtract_gram(&mut a, &y);
+        let groups = alike(linear);
+        for places in &groups {
+            let own = || places.iter().map(|&at: &usize| &blocks[at]);
+            let group = Group::of(own().map(|block| &block.rows));
+            group.subtract_gram(&mut a, &group.side_by_side(own().map(|block| (&block.rows, &block.y))));
         }
         mirror_upper(&mut a);
-        (a, Self { blocks, seen, dense })
+        (a, Self { blocks, groups, seen, dense })
     }
 
     /// Takes over the right-hand sides of the latents at a linearisation; returns the reduced one, without the priors of the dense columns.
@@ -200,26 +201,26 @@ impl StopsEliminated {
 
     /// `H^-1 + H^-1 B' cov(x) B H^-1` of stops by their places among those in use.
     pub fn latent_covariances(&self, reduced: &DMatrix<f64>, stops: &[usize]) -> Vec<DMatrix<f64>> {
-        let of_part = |part: &[usize]| {
-            let blocks = || part.iter().map(|&at| &self.blocks[at]);
-            let mut d = DMatrix::zeros(reduced.nrows(), blocks().map(|b| b.y.ncols()).sum());
-            let mut into = d.column_iter_mut();
-            for (block, d) in blocks().map(|b| (b, &b.y * &b.inverse_factor)) {
-                for (own, mut into) in d.column_iter().zip(&mut into) {
-                    block.rows.iter().zip(own.iter()).for_each(|(&row, value)| into[row] = *value);
-                }
-            }
-            let of_reduced = product(reduced, &d);
+        let asked: HashMap<usize, usize> = stops.iter().enumerate().map(|(k, &at)| (at, k)).collect();
+        let of_group = |places: &Vec<usize>| {
+            let places = || places.iter().filter(|at| asked.contains_key(at));
+            let own: Vec<(&Block, DMatrix<f64>)> =
+                places().map(|&at| &self.blocks[at]).map(|b| (b, &b.y * &b.inverse_factor)).collect();
+            let group = Group::of(own.iter().map(|(block, _)| &block.rows));
+            let d = group.side_by_side(own.iter().map(|(block, d)| (&block.rows, d)));
+            let of_reduced = product(&group.part_of(reduced), &d);
             let mut first = 0;
-            let of = |block: &Block| {
+            let of = |(block, _): &(&Block, DMatrix<f64>)| {
                 let (start, own) = (first, block.y.ncols());
                 first += own;
                 let part = d.columns(start, own).tr_mul(&of_reduced.columns(start, own));
                 block.inverse_factor.tr_mul(&block.inverse_factor) + part
             };
-            blocks().map(of).collect::<Vec<_>>()
+            places().map(|at| asked[at]).zip(own.iter().map(of)).collect::<Vec<_>>()
         };
-        stops.par_chunks(STOPS_A_PRODUCT).flat_map_iter(of_part).collect()
+        let mut covariances: Vec<_> = self.groups.par_iter().flat_map_iter(of_group).collect();
+        covariances.sort_by_key(|(k, _)| *k);
+        covariances.into_iter().map(|(_, covariance)| covariance).collect()
     }
 
     /// Covariance of a pose that something shows at a stop, as its body twist: that of the unknowns that stay through `G - L D'`, and what is

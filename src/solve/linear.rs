@@ -23,9 +23,9 @@ pub struct Linearised {
     /// Stops at which something in use was measured.
     pub stops: Vec<StopParts>,
     /// Pixel blocks of each image in use.
-    pub terms: Vec<ImageTerms>,
+    pub terms: Vec<Arc<ImageTerms>>,
     /// Chain of each image in use.
-    pub chains: Vec<Chained>,
+    pub chains: Vec<Arc<Chained>>,
     /// Measurements of bodies in use, in the order of their stops.
     pub bodies: Vec<BodyPart>,
     /// Measured distances of the plates.
@@ -61,7 +61,7 @@ pub struct BodyPart {
 }
 
 /// One image as it is linearised, with its equations where they are kept.
-type Part = ((ImageTerms, Chained), Option<Arc<Equations>>);
+type Part = ((Arc<ImageTerms>, Arc<Chained>), Option<Arc<Equations>>);
 
 /// Observations up to which their equations are kept, which takes about 60 MB.
 const MOST_KEPT: usize = 120_000;
@@ -186,7 +186,7 @@ impl Adjustment {
                 let chain = state.chained_from(&origins, &problem.layout, image, self.taken_from(i))?;
                 let weighting = Weighting::of(problem, image).thinned(image, enough);
                 let (terms, equations) = linearise_with_equations(image, state, &chain.pose, &weighting)?;
-                Some(((terms, chain), are_kept.then(|| Arc::new(equations))))
+                Some(((Arc::new(terms), Arc::new(chain)), are_kept.then(|| Arc::new(equations))))
             })
             .collect();
         let (parts, equations): (Vec<_>, Vec<_>) = parts?.into_iter().unzip();
@@ -229,10 +229,10 @@ impl Adjustment {
     }
 
     /// Measured distances of the plates that some images show.
-    fn distances(&self, images: &[usize], terms: &[ImageTerms]) -> Vec<PlateDistance> {
+    fn distances(&self, images: &[usize], terms: &[Arc<ImageTerms>]) -> Vec<PlateDistance> {
         let Self { problem, state } = self;
         let of = |plate: usize| {
-            let shows = |&(&i, _): &(&usize, &ImageTerms)| problem.images[i].plate == plate;
+            let shows = |&(&i, _): &(&usize, &Arc<ImageTerms>)| problem.images[i].plate == plate;
             let own = || images.iter().zip(terms).filter(shows).flat_map(|(_, t)| &t.markers);
             own().next()?;
             PlateDistance::of(problem, plate, &state.plates[plate], |m| own().any(|seen| seen.marker == m))

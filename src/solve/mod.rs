@@ -1,6 +1,7 @@
 //! The solver: block elimination, Levenberg-Marquardt, variance components, rejection.
 
 mod acceleration;
+mod alike;
 mod blocks;
 mod body_components;
 mod by_markers;
@@ -10,6 +11,7 @@ mod covariance;
 mod distances;
 mod fit;
 mod frame;
+mod group;
 mod in_frame;
 mod latent;
 mod latent_data;
@@ -21,6 +23,7 @@ mod noise_uncertainty;
 mod pose_space;
 mod response;
 mod right_hand_sides;
+mod runs;
 mod snoop;
 mod stretch;
 mod system;

@@ -223,7 +223,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
                 placement: i % request.placements,
                 plate: 0,
                 mount: request.mount,
-                observations: Vec::new(),
+                observations: Vec::new().into(),
                 rejected: None,
             };
             let joint_errors = &state.joint_errors[stops.len()];

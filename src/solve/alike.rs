@@ -1,0 +1,73 @@
+//! Stops whose images show much the same part of a plate: they touch much the same markers, so that their products are small when taken together.
+
+use super::linear::{LinearProblem, LinearStop};
+
+/// Most stops of a group. Fewer make products too short, more have fewer markers in common.
+const MOST: usize = 24;
+/// As if plates lay so far apart, m: stops of different plates are parted first.
+const APART_M: f64 = 1e3;
+
+/// Bounds of what the images of a stop show: least x and y, largest x and y, m.
+type Bounds = [f64; 4];
+
+/// Places of the stops in use, in groups.
+pub(super) fn alike(linear: LinearProblem) -> Vec<Vec<usize>> {
+    let mut stops: Vec<(usize, Bounds)> = linear.stops().map(|stop| (stop.at, bounds(linear, &stop))).collect();
+    let mut groups = Vec::new();
+    part(&mut stops, &mut groups);
+    groups
+}
+
+/// Of the markers as they should be; zero where no image shows any.
+fn bounds(linear: LinearProblem, stop: &LinearStop) -> Bounds {
+    let mut bounds: Option<Bounds> = None;
+    for own in stop.images() {
+        let plate = &linear.adjustment.problem.plates[own.image.plate];
+        let from = own.image.plate as f64 * APART_M;
+        for seen in &own.terms.markers {
+            let nominal = plate.markers[seen.marker].position_m;
+            let (x, y) = (from + nominal.x, from + nominal.y);
+            let [x0, y0, x1, y1] = bounds.unwrap_or([x, y, x, y]);
+            bounds = Some([x0.min(x), y0.min(y), x1.max(x), y1.max(y)]);
+        }
+    }
+    bounds.unwrap_or_default()
+}
+
+/// Halves by the bound in which stops differ most until groups are small enough.
+fn part(stops: &mut [(usize, Bounds)], groups: &mut Vec<Vec<usize>>) {
+    if stops.len() <= MOST {
+        groups.push(stops.iter().map(|(at, _)| *at).collect());
+        return;
+    }
+    let spread = |k: usize| {
+        let of = || stops.iter().map(|(_, bounds)| bounds[k]);
+        of().fold(f64::NEG_INFINITY, f64::max) - of().fold(f64::INFINITY, f64::min)
+    };
+    let widest = (1..4).fold(0, |best, k| if spread(k) > spread(best) { k } else { best });
+    stops.sort_by(|a, b| a.1[widest].total_cmp(&b.1[widest]));
+    let (first, second) = stops.split_at_mut((stops.len() / 2).next_multiple_of(MOST));
+    part(first, groups);
+    part(second, groups);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stop_is_in_one_group_with_those_beside_it() {
+        let places = 100;
+        // Those with even places show one corner, the others another.
+        let of = |at: usize| (at, if at % 2 == 0 { [0.0, 0.0, 0.1, 0.1] } else { [0.3, 0.2, 0.4, 0.3] });
+        let mut stops: Vec<_> = (0..places).map(of).collect();
+        let mut groups = Vec::new();
+        part(&mut stops, &mut groups);
+        assert!(groups.iter().all(|g| g.len() <= MOST));
+        let mixed = groups.iter().filter(|g| g.iter().any(|at| at % 2 != g[0] % 2)).count();
+        assert!(mixed <= 1, "{groups:?}");
+        let mut all: Vec<usize> = groups.into_iter().flatten().collect();
+        all.sort_unstable();
+        assert_eq!(all, (0..places).collect::<Vec<_>>());
+    }
+}
