@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::limits::Limits;
 use crate::geom::Pose;
-use crate::init::resect;
+use crate::init::resect_near;
 use crate::linalg::symmetric_eigen;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Image, Problem, State, TakenFrom, Weighting, posture_groups, predict};
@@ -216,12 +216,10 @@ pub fn side_by_side<T: Send>(folds: &[Vec<usize>], work: impl Fn(usize, &Vec<usi
 fn predictions(fit: LinearProblem, folds: &[Vec<usize>], fitted: &Refit) -> Option<Predictions> {
     let of_fold = |held: &Vec<usize>| fitted(fit.without_images(held));
     let states: Vec<State> = side_by_side(folds, |_, held| of_fold(held)).into_iter().collect::<Option<_>>()?;
-    let mut errors = Vec::new();
-    for (held, fitted) in folds.iter().zip(&states) {
-        for &i in held {
-            errors.push((i, predict_image(fit.adjustment, fitted, i)?));
-        }
-    }
+    let held: Vec<(usize, &State)> =
+        folds.iter().zip(&states).flat_map(|(held, fitted)| held.iter().map(move |&i| (i, fitted))).collect();
+    let predicted = held.par_iter().map(|(i, fitted)| Some((*i, predict_image(fit.adjustment, fitted, *i)?)));
+    let mut errors: Vec<(usize, ImageError)> = predicted.collect::<Option<_>>()?;
     errors.sort_by_key(|(i, _)| *i);
     Some((errors, states))
 }
@@ -245,7 +243,7 @@ pub fn predict_image(near: &Adjustment, state: &State, image: usize) -> Option<I
     let (problem, start) = (&near.problem, near.camera_from_plate(image)?);
     let (image, posture) = (&problem.images[image], problem.posture(image)?);
     let predicted = state.camera_from_plate(image, TakenFrom::exact(posture))?;
-    let (seen, _) = resect(image, state, &start, &Weighting::of(problem, image))?;
+    let seen = resect_near(image, state, &start, &Weighting::of(problem, image))?;
     Some(image_error(image, state, &predicted, &seen))
 }
 

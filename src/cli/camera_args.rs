@@ -61,22 +61,19 @@ impl CameraArgs {
                 }
             },
         };
-        let ReadCamera { camera, loss_px, .. } = read_camera_file(&path, Some(&name))?;
-        let [rms_px, worst_px] = loss_px.unwrap_or_default();
-        let lost = format!(
-            "its distortion is not a lens of this program: the nearest ({}) loses {rms_px:.4} px RMS over the image, at most {worst_px:.4} px",
-            camera.lens.name()
-        );
-        if self.hold_camera && loss_px.is_some() {
+        let read = read_camera_file(&path, Some(&name))?;
+        let lost = read.what_is_lost();
+        if let (true, Some(lost)) = (self.hold_camera, &lost) {
             let remedy = "leave --hold-camera out, to start from the nearest";
             return Err(Error::new(Code::LensUnknown, path.display(), lost, remedy));
         }
+        let ReadCamera { camera, .. } = read;
         for s in series.iter_mut().filter(|s| s.camera == name) {
             require_size(&path, [camera.width_px, camera.height_px], s)?;
             (s.lens, s.lens_choice) = (camera.lens, LensChoice::Settled);
             s.known_camera = Some(KnownCamera { camera: camera.clone(), held: self.hold_camera });
         }
-        Ok(loss_px.map(|_| Notice::new(Code::LensChosen, path.display(), lost, "")))
+        Ok(lost.map(|lost| Notice::new(Code::LensChosen, path.display(), lost, "")))
     }
 }
 

@@ -9,7 +9,7 @@ use super::show::read_solution;
 use crate::error::{Code, Error, Result};
 use crate::files::{self, FileKind};
 use crate::model::camera::{Camera, Lens};
-use crate::output::camera_formats::{CameraFormat, OtherLens, camera_text, read_camera_file};
+use crate::output::camera_formats::{CameraFormat, OtherLens, camera_text, loss_words, read_camera_file};
 use crate::output::restore::{self, depths_of_record};
 use crate::output::write_beside;
 
@@ -80,11 +80,8 @@ pub(super) fn run(wanted: &Wanted, format: CameraFormat) -> Result<()> {
     let folder = wanted.to.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     write_beside(folder, &[(name_of_file, written.text.as_bytes())], &[wanted.from.to_path_buf()])?;
     say_line!("camera    {name}: {}, written for {}", camera.lens.name(), format.name());
-    if let Some([rms_px, worst_px]) = written.loss_px {
-        say_line!(
-            "loss      {rms_px:.4} px RMS over the image, at most {worst_px:.4} px: the nearest model of {}",
-            format.name()
-        );
+    if let Some(loss_px) = written.loss_px {
+        say_line!("loss      {}: the nearest model of {}", loss_words(loss_px), format.name());
     }
     Ok(())
 }
@@ -94,11 +91,7 @@ fn camera(wanted: &Wanted) -> Result<Named> {
         of_results(wanted.from)?
     } else {
         let read = read_camera_file(wanted.from, wanted.name)?;
-        if let Some([rms_px, worst_px]) = read.loss_px {
-            let what = format!(
-                "its distortion is not a lens of this program: the nearest ({}) loses {rms_px:.4} px RMS over the image, at most {worst_px:.4} px",
-                read.camera.lens.name()
-            );
+        if let Some(what) = read.what_is_lost() {
             return Err(Error::new(
                 Code::LensUnknown,
                 wanted.from.display(),

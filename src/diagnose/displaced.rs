@@ -147,7 +147,7 @@ impl Kind for Displaced {
                 )
             }
         };
-        format!("{what}, what moved explains {:.0} % of the squares of the joint noise", 100.0 * self.share)
+        format!("{what} (this explains {:.0} % of the squares of the joint noise)", 100.0 * self.share)
     }
 
     fn remedy(&self) -> String {

@@ -45,7 +45,7 @@ impl Kind for Extrapolates {
 
     fn seen(&self) -> String {
         format!(
-            "outside the region of the stops the flange is known to {:.1} mm only, where the nominal robot is off by {:.1} mm inside",
+            "outside the region of the stops the flange is known to {:.1} mm only (inside, the nominal robot is off by {:.1} mm)",
             1e3 * self.outside_m,
             1e3 * self.nominal_m
         )

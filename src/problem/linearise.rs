@@ -235,6 +235,18 @@ pub struct Chained {
     pub d_latent: DMatrix<f64>,
 }
 
+impl Chained {
+    /// How steps of the dense columns and of what is latent move the pose, as a body twist.
+    pub fn moved(&self, dense: &DVector<f64>, latents: impl Iterator<Item = f64>) -> Vector6<f64> {
+        let mut twist = Vector6::zeros();
+        twist.gemv(1.0, &self.d_theta, &dense.rows(0, self.d_theta.ncols()), 0.0);
+        for (column, latent) in self.d_latent.column_iter().zip(latents) {
+            twist.axpy(latent, &column, 1.0);
+        }
+        twist
+    }
+}
+
 impl State {
     /// Pose of an image and its derivatives as body twists; `None` for an image off the robot that has no free pose.
     pub fn chained(&self, layout: &Layout, image: &Image, from: TakenFrom) -> Option<Chained> {

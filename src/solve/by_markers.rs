@@ -83,12 +83,7 @@ impl MarkersEliminated {
     /// Holds combinations of markers (3 markers x held): `Y` becomes `Y (1 - O O')` with the orthonormal basis `O` of `F^-1` times the
     /// combinations. Returns `T' Y O`, by whose Gram product the reduced information grows.
     pub fn hold(&mut self, combinations: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut whitened = combinations.clone();
-        for (at, inverse) in self.inverse_factors.iter().enumerate() {
-            let own = inverse * whitened.rows(3 * at, 3);
-            whitened.rows_mut(3 * at, 3).copy_from(&own);
-        }
-        self.held = orthonormal(whitened);
+        self.held = orthonormal(self.whitened(combinations.clone()));
         let taken = product(&self.y, &self.held);
         self.y -= product(&taken, &self.held.transpose());
         self.space.transposed_times(&taken)
@@ -106,11 +101,7 @@ impl MarkersEliminated {
             let own = stop.gradient();
             reduced.rows_mut(start, own.len()).copy_from(&own);
         }
-        self.rhs = self.seen.gradient(linear);
-        for (at, inverse) in self.inverse_factors.iter().enumerate() {
-            let own = inverse * self.rhs.fixed_rows::<3>(3 * at);
-            self.rhs.fixed_rows_mut::<3>(3 * at).copy_from(&own);
-        }
+        self.rhs = self.whitened(column(self.seen.gradient(linear))).column(0).into_owned();
         reduced - self.space.transposed_times(&column(&self.y * &self.rhs)).column(0)
     }
 
@@ -121,11 +112,7 @@ impl MarkersEliminated {
 
     /// `U = F^-1 H_m` of measured distances, less what is held, from whose rows `H_x` by what stays `Y U` is taken.
     pub fn reduce_rows(&self, linear: LinearProblem, rows: &mut DMatrix<f64>) -> DMatrix<f64> {
-        let mut whitened = self.seen.by_distances(linear);
-        for (at, inverse) in self.inverse_factors.iter().enumerate() {
-            let own = inverse * whitened.rows(3 * at, 3);
-            whitened.rows_mut(3 * at, 3).copy_from(&own);
-        }
+        let mut whitened = self.whitened(self.seen.by_distances(linear));
         whitened -= &self.held * self.held.tr_mul(&whitened);
         *rows -= self.space.transposed_times(&product(&self.y, &whitened));
         whitened
@@ -138,16 +125,30 @@ impl MarkersEliminated {
 
     /// The whole step from the solution `x` of the reduced system, with what measured distances add to that of the whitened markers.
     pub fn step(&self, linear: LinearProblem, x: &DVector<f64>, by_distances: Option<DVector<f64>>) -> Step {
-        let dense = x.rows(0, linear.adjustment.problem.layout.len()).into_owned();
         let mut own = self.rhs.clone();
         own.gemv_tr(-1.0, &self.y, &self.space.times(&column(x.clone())).column(0), 1.0);
         by_distances.iter().for_each(|added| own += added);
+        self.whole(linear, x.column(0), own.column(0))
+    }
+
+    /// The step from the solution `x` of the reduced system and that of the whitened markers.
+    fn whole(&self, linear: LinearProblem, x: DVectorView<f64>, own: DVectorView<f64>) -> Step {
         let markers = self.seen.steps(|at| self.inverse_factors[at].transpose() * own.fixed_rows::<3>(3 * at));
+        let dense = x.rows(0, linear.adjustment.problem.layout.len()).into_owned();
         let mut step = Step::of(dense, markers, &linear.adjustment.state);
         for (stop, &start) in linear.stops().zip(&self.latent_start) {
             stop.put(x.rows(start, stop.unknowns()).as_slice(), &mut step);
         }
         step
+    }
+
+    /// `F^-1` times the rows of every marker.
+    fn whitened(&self, mut rows: DMatrix<f64>) -> DMatrix<f64> {
+        for (at, inverse) in self.inverse_factors.iter().enumerate() {
+            let own = inverse * rows.fixed_rows::<3>(3 * at);
+            rows.fixed_rows_mut::<3>(3 * at).copy_from(&own);
+        }
+        rows
     }
 
     /// Whole steps for right-hand sides of their own, by what solves the reduced system.
@@ -158,12 +159,7 @@ impl MarkersEliminated {
         distances: &Distances,
         solve: impl Fn(DMatrix<f64>) -> DMatrix<f64>,
     ) -> Vec<Step> {
-        let dense = of.dense.nrows();
-        let mut whitened = of.markers.clone();
-        for (at, inverse) in self.inverse_factors.iter().enumerate() {
-            let own = inverse * whitened.rows(3 * at, 3);
-            whitened.rows_mut(3 * at, 3).copy_from(&own);
-        }
+        let whitened = self.whitened(of.markers.clone());
         let mut reduced = of.dense.clone().resize_vertically(self.space.unknowns(), 0.0);
         for (own, &start) in of.stops.iter().zip(&self.latent_start) {
             reduced.rows_mut(start, own.nrows()).copy_from(own);
@@ -173,16 +169,7 @@ impl MarkersEliminated {
         let x = solve(reduced);
         let mut own = &whitened - product(&self.y.transpose(), &self.space.times(&x));
         distances.markers_by(&whitened, &x).iter().for_each(|added| own += added);
-        let whole = |(x, own): (DVectorView<f64>, DVectorView<f64>)| {
-            let of_marker = |at: usize| self.inverse_factors[at].transpose() * own.fixed_rows::<3>(3 * at);
-            let markers = self.seen.steps(of_marker);
-            let mut step = Step::of(x.rows(0, dense).into_owned(), markers, &linear.adjustment.state);
-            for (stop, &start) in linear.stops().zip(&self.latent_start) {
-                stop.put(x.rows(start, stop.unknowns()).as_slice(), &mut step);
-            }
-            step
-        };
-        x.column_iter().zip(own.column_iter()).map(whole).collect()
+        x.column_iter().zip(own.column_iter()).map(|(x, own)| self.whole(linear, x, own)).collect()
     }
 
     /// Covariance of every marker that was seen: `V^-1 + D cov(x) D'` with `D = V^-1 B' T`, less what moves the marker with `x`

@@ -156,14 +156,19 @@ impl StopsEliminated {
 
     /// The whole step from the solution `x` of the reduced system.
     pub fn step(&self, linear: LinearProblem, x: &DVector<f64>) -> Step {
-        let markers = self.seen.steps(|at| x.fixed_rows::<3>(self.dense + 3 * at).into_owned());
-        let mut step = Step::of(x.rows(0, self.dense).into_owned(), markers, &linear.adjustment.state);
+        let mut step = self.of_what_stays(linear, x.column(0));
         for (block, stop) in self.blocks.iter().zip(linear.stops()) {
             let own = DVector::from_iterator(block.rows.len(), block.rows.iter().map(|&c| x[c]));
             let dl = block.inverse_factor.tr_mul(&(&block.rhs - block.y.tr_mul(&own)));
             stop.put(dl.as_slice(), &mut step);
         }
         step
+    }
+
+    /// The step of what stays.
+    fn of_what_stays(&self, linear: LinearProblem, x: DVectorView<f64>) -> Step {
+        let markers = self.seen.steps(|at| x.fixed_rows::<3>(self.dense + 3 * at).into_owned());
+        Step::of(x.rows(0, self.dense).into_owned(), markers, &linear.adjustment.state)
     }
 
     /// Whole steps for right-hand sides of their own, by what solves the reduced system.
@@ -186,11 +191,7 @@ impl StopsEliminated {
             }
         }
         let x = solve(reduced);
-        let whole = |x: DVectorView<f64>| {
-            let markers = self.seen.steps(|at| x.fixed_rows::<3>(dense + 3 * at).into_owned());
-            Step::of(x.rows(0, dense).into_owned(), markers, &linear.adjustment.state)
-        };
-        let mut steps: Vec<Step> = x.column_iter().map(whole).collect();
+        let mut steps: Vec<Step> = x.column_iter().map(|x| self.of_what_stays(linear, x)).collect();
         for ((block, own), stop) in self.blocks.iter().zip(&whitened).zip(linear.stops()) {
             let left = own - product(&block.y.transpose(), &x.select_rows(&block.rows));
             let latents = block.inverse_factor.tr_mul(&left);

@@ -142,11 +142,7 @@ impl Sums {
 impl LinearImage<'_> {
     /// How a step moves its camera pose, as a body twist.
     pub fn pose_step(&self, step: &Step) -> Vector6<f64> {
-        let theta = self.chain.d_theta.ncols();
         let joints: &[f64] = if self.tie.is_free() { &[] } else { &step.joint_errors[self.image.stop] };
-        let latents =
-            DVector::from_iterator(self.chain.d_latent.ncols(), joints.iter().chain(&step.ties[self.index]).copied());
-        let moved = &self.chain.d_theta * step.dense.rows(0, theta) + &self.chain.d_latent * latents;
-        Vector6::from_column_slice(moved.as_slice())
+        self.chain.moved(&step.dense, joints.iter().chain(&step.ties[self.index]).copied())
     }
 }

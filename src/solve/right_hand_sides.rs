@@ -1,9 +1,9 @@
 //! Several right-hand sides of the normal equations at once.
 
-use nalgebra::{DMatrix, Vector2};
+use nalgebra::{DMatrix, Vector2, Vector6};
 
 use super::blocks::SeenMarkers;
-use super::linear::{LinearImage, LinearProblem};
+use super::linear::{BodyPart, LinearImage, LinearProblem};
 use crate::problem::{E, Equations};
 
 /// Right-hand sides of all unknowns before any is eliminated, one column each.
@@ -46,6 +46,21 @@ impl RightHandSides {
         for (k, at) in own.seen.iter().enumerate().filter_map(|(k, m)| Some((k, number[*m]?))) {
             let mut rows = self.markers.rows_mut(3 * at, 3);
             rows += own.markers.rows(3 * k, 3);
+        }
+    }
+
+    /// Adds what a measurement of a body says in the first column, given that by its pose.
+    pub fn add_body(
+        &mut self,
+        linear: LinearProblem,
+        BodyPart { index, chain, .. }: &BodyPart,
+        by_pose: &Vector6<f64>,
+    ) {
+        let stop = linear.adjustment.problem.body_measurements[*index].stop;
+        let at = linear.lin.stops.partition_point(|s| s.stop < stop);
+        for (whole, derivatives) in [(&mut self.dense, &chain.d_theta), (&mut self.stops[at], &chain.d_latent)] {
+            let mut own = whole.view_mut((0, 0), (derivatives.ncols(), 1));
+            own += derivatives.tr_mul(by_pose);
         }
     }
 }

@@ -3,7 +3,9 @@
 
 use nalgebra::Vector6;
 
+use super::blocks::SeenMarkers;
 use super::linear::{BodyPart, LinearProblem};
+use super::right_hand_sides::RightHandSides;
 use super::system::System;
 use crate::problem::Step;
 
@@ -28,18 +30,17 @@ pub struct Stretch {
 impl LinearProblem<'_> {
     /// The stretch by one step from the optimum; `None` where nothing tells it.
     pub fn stretch(self, standard: LengthStandard) -> Option<Stretch> {
-        let mut system = System::new(self, 0.0);
+        let system = System::new(self, 0.0);
         let factor = system.factor(self).ok()?;
-        let mut lin = self.lin.clone();
-        for (part, twist) in lin.bodies.iter_mut().zip(self.stretched(standard)) {
-            part.terms.bp += part.terms.pp * twist;
-        }
         let lengths = self.stretched_lengths(standard);
-        lin.lengths.iter_mut().zip(&lengths).for_each(|(l, by)| l.residual += by);
-        let before = system.step(self, &factor.solve(&system.rhs));
-        let moved = self.adjustment.linear(&lin);
-        system.take_gradient(moved);
-        let response = system.step(moved, &factor.solve(&system.rhs)).plus(-1.0, &before);
+        let mut column = RightHandSides::none(self, &SeenMarkers::of(self), 1);
+        for (part, twist) in self.lin.bodies.iter().zip(self.stretched(standard)) {
+            column.add_body(self, part, &(part.terms.pp * twist));
+        }
+        for (length, by) in self.lin.lengths.iter().zip(&lengths) {
+            length.by_columns.iter().for_each(|(c, d)| column.dense[*c] += d * by);
+        }
+        let response = system.steps(self, &factor, &column).into_iter().next()?;
         let (mut information, mut score) = (0.0, 0.0);
         for (part, twist) in self.lin.bodies.iter().zip(self.stretched(standard)) {
             information += twist.dot(&(part.terms.pp * (twist - self.body_step(part, &response))));
@@ -78,10 +79,6 @@ impl LinearProblem<'_> {
     /// How a step moves what is predicted of a measured body, as a body twist.
     fn body_step(self, part: &BodyPart, step: &Step) -> Vector6<f64> {
         let stop = self.adjustment.problem.body_measurements[part.index].stop;
-        let theta = part.chain.d_theta.ncols();
-        let latents = step.joint_errors[stop].iter().take(part.chain.d_latent.ncols()).copied();
-        let latents = nalgebra::DVector::from_iterator(part.chain.d_latent.ncols(), latents);
-        let moved = &part.chain.d_theta * step.dense.rows(0, theta) + &part.chain.d_latent * latents;
-        Vector6::from_column_slice(moved.as_slice())
+        part.chain.moved(&step.dense, step.joint_errors[stop].iter().copied())
     }
 }

@@ -13,8 +13,8 @@ mod yaml;
 
 use std::path::Path;
 
-pub use self::model::ReadCamera;
 use self::model::Sayable;
+pub use self::model::{ReadCamera, loss_words};
 use crate::error::{Code, Error, Result};
 use crate::files::{self, FileKind};
 use crate::model::camera::{Camera, LensFit, fit_lens_holding};
@@ -124,16 +124,18 @@ pub fn camera_text(
     };
     if other == OtherLens::Refused && rms_px > SAME_PX {
         let what = format!(
-            "{} cannot express its {lens} lens: the nearest model there ({}) loses {rms_px:.4} px RMS over the image, at most {worst_px:.4} px",
+            "{} cannot express its {lens} lens: the nearest model there ({}) loses {}",
             format.name(),
-            near.lens.name()
+            near.lens.name(),
+            loss_words([rms_px, worst_px])
         );
         return Err(refuse(what, "give --nearest to write that model, or identify with a lens that the format has"));
     }
     let remark = format!(
-        "# NOT THE IDENTIFIED LENS ({lens}) but the nearest {}: loss {rms_px:.4} px RMS over the image, at most {worst_px:.4} px,\n\
+        "# NOT THE IDENTIFIED LENS ({lens}) but the nearest {}: loss {},\n\
          # for points {:.3} to {:.3} m away.\n",
         near.lens.name(),
+        loss_words([rms_px, worst_px]),
         depths_m[0],
         depths_m[1]
     );

@@ -39,6 +39,23 @@ pub struct ReadCamera {
     pub loss_px: Option<[f64; 2]>,
 }
 
+/// RMS and largest loss over the image, px, with two digits that count at least.
+pub fn loss_words([rms_px, worst_px]: [f64; 2]) -> String {
+    let px = |value: f64| {
+        let decimals = (1.0 - value.max(f64::MIN_POSITIVE).log10().floor()).clamp(4.0, 9.0) as usize;
+        format!("{value:.decimals$} px")
+    };
+    format!("{} RMS over the image, at most {}", px(rms_px), px(worst_px))
+}
+
+impl ReadCamera {
+    /// What the nearest lens loses; `None` where the lens is that of the file.
+    pub fn what_is_lost(&self) -> Option<String> {
+        let (loss, nearest) = (loss_words(self.loss_px?), self.camera.lens.name());
+        Some(format!("its distortion is not a lens of this program: the nearest ({nearest}) loses {loss}"))
+    }
+}
+
 /// A camera with its pinhole parameters and coefficients, all of them finite and of a sensible size.
 pub(super) fn camera_of(
     path: &Path,

@@ -104,25 +104,26 @@ pub(super) fn by_image(record: &SolutionRecord) -> Option<String> {
     if most <= 0.0 {
         return None;
     }
-    let width = 720.0;
+    // Ticks have up to six characters.
+    let (width, left) = (720.0, 68.0);
     let mut svg = Svg::new(width, HEIGHT, "Residuals of every image, px RMS");
-    let (w, h) = (width - LEFT - RIGHT, HEIGHT - TOP - BOTTOM);
+    let (w, h) = (width - left - RIGHT, HEIGHT - TOP - BOTTOM);
     let y = |px: f64| TOP + h * (1.0 - px / (1.05 * most));
     for t in ticks(most) {
-        svg.line([LEFT, y(t)], [LEFT + w, y(t)], "grid");
-        svg.text([LEFT - 6.0, y(t) + 4.0], Anchor::End, &plain(t));
+        svg.line([left, y(t)], [left + w, y(t)], "grid");
+        svg.text([left - 6.0, y(t) + 4.0], Anchor::End, &plain(t));
     }
     let step = w / record.images.len() as f64;
     let bar = (0.8 * step).min(24.0);
     for (k, image) in record.images.iter().enumerate() {
-        let x = LEFT + step * (k as f64 + 0.5) - bar / 2.0;
+        let x = left + step * (k as f64 + 0.5) - bar / 2.0;
         svg.titled(&describe(record, image), |svg| match (image.rms_px, &image.reason) {
             (Some(px), None) => svg.rect([x, y(px)], [bar, TOP + h - y(px)], "after"),
             _ => svg.rect([x, TOP + h - 8.0], [bar, 8.0], "gone"),
         });
     }
-    svg.line([LEFT, TOP + h], [LEFT + w, TOP + h], "axis");
-    svg.text([LEFT + w / 2.0, HEIGHT - 22.0], Anchor::Middle, "images in the order of the series; red: left out");
+    svg.line([left, TOP + h], [left + w, TOP + h], "axis");
+    svg.text([left + w / 2.0, HEIGHT - 22.0], Anchor::Middle, "images in the order of the series; red: left out");
     svg.text_upwards([13.0, TOP + h / 2.0], "px RMS");
     Some(svg.finish())
 }
