@@ -59,7 +59,7 @@ mod tests {
     fn every_stop_is_in_one_group_with_those_beside_it() {
         let places = 100;
         // Those with even places show one corner, the others another.
-        let of = |at: usize| (at, if at % 2 == 0 { [0.0, 0.0, 0.1, 0.1] } else { [0.3, 0.2, 0.4, 0.3] });
+        let of = |at: usize| (at, if at.is_multiple_of(2) { [0.0, 0.0, 0.1, 0.1] } else { [0.3, 0.2, 0.4, 0.3] });
         let mut stops: Vec<_> = (0..places).map(of).collect();
         let mut groups = Vec::new();
         part(&mut stops, &mut groups);
