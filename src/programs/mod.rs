@@ -8,17 +8,17 @@
 //! | [`posture`] | which joints a pose means |
 //! | [`measured_frames`] | tool and work object of the real robot instead of those of the program |
 //! | [`mod@compensate`] | targets of one robot to targets of another |
-//! | `branches` | what holds behind a statement with branches |
+//! | `flow` | what statements set, followed through branches, loops and calls |
 //! | `scan` | tokens that all languages share |
 //! | `language` | the table of languages |
 //! | `table`, `krl`, `rapid`, `urscript` | text -> targets |
 //!
 //! To add a language: a file that turns texts into a [`Program`], and a row of the table in `language`.
 
-mod branches;
 pub mod codes;
 pub mod compensate;
 pub mod field;
+mod flow;
 mod itinerary;
 mod krl;
 mod language;

@@ -4,8 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::ProgramSetting;
-use super::branches::{Branches, Branching, Merged};
 use super::field::{Field, FieldPlace};
+use super::flow::{Branching, Flow, Followed, Held, Places, settled};
 use super::itinerary::Itinerary;
 use super::program::{
     Approach, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind, Understood,
@@ -78,7 +78,13 @@ struct Argument {
 
 /// Reads scripts; each file is a program of its own.
 pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
-    let mut way = Itinerary::new();
+    let program = settled(|known| reading(&files, setting, known))?;
+    Ok(Program { files, ..program })
+}
+
+/// One reading, with what the one before found, and what it found itself.
+fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Tool>) -> Result<(Program, Places<Tool>)> {
+    let (mut way, mut flow) = (Itinerary::new(), Flow::new(known));
     for (index, file) in files.iter().enumerate() {
         way.start_afresh();
         let mut script = Script {
@@ -88,28 +94,30 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
             computed: BTreeSet::new(),
             blocks: Vec::new(),
             on_top: false,
-            tool: setting.tool.map(Tool::Known).unwrap_or(Tool::Unknown),
-            branches: Branches::new(),
+            tool: Held::new(setting.tool),
+            flow: &mut flow,
             way: &mut way,
         };
         script.find_computed()?;
         script.read()?;
     }
-    let mut program = way.program;
-    program.files = files;
-    Ok(program)
+    Ok((way.program, flow.found()))
 }
 
-/// The active tool.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Tool {
-    Known(Pose),
-    Unknown,
-}
+/// The active tool; `None` where it is not known.
+type Tool = Held<Option<Pose>>;
 
-impl Merged for Tool {
-    fn merged(&self, other: &Self) -> Self {
-        if self == other { *self } else { Self::Unknown }
+impl Followed for Tool {
+    fn merged(&self, other: &Self, _: &str) -> Self {
+        Held::merged(self, other, |_, _| None)
+    }
+
+    fn at_top(&self) -> Self {
+        Self::new(self.value)
+    }
+
+    fn behind_call(&self, end: &Self) -> Self {
+        Held::behind_call(self, end)
     }
 }
 
@@ -125,8 +133,8 @@ struct Script<'a> {
     /// True while the robot moves by more than its targets say.
     on_top: bool,
     tool: Tool,
-    /// What of it depends on branches.
-    branches: Branches<Tool>,
+    /// How it changes.
+    flow: &'a mut Flow<Tool>,
     way: &'a mut Itinerary,
 }
 
@@ -170,17 +178,18 @@ impl Script<'_> {
             {
                 self.moves(*count, *way)?;
             } else if self.block(word, next) {
-                self.reader.at = at + 1;
+                // Behind the name of a routine, too: there it is not called.
+                self.reader.at = at + 1 + usize::from(matches!(word, b"def" | b"thread"));
             } else if let Some((_, begins)) = ON_TOP.iter().find(|(name, _)| *name == word) {
                 self.on_top = *begins;
                 self.reader.at = at + 1;
             } else if word == b"set_tcp" && next == Some(TokenKind::Mark(b'(')) {
                 self.reader.at += 2;
                 let value = self.argument()?;
-                self.tool = match &value {
-                    Value::Pose(fields, _) => Tool::Known(pose_of(fields)),
-                    _ => Tool::Unknown,
-                };
+                self.tool.set(match &value {
+                    Value::Pose(fields, _) => Some(pose_of(fields)),
+                    _ => None,
+                });
             } else if next == Some(TokenKind::Mark(b'='))
                 && self.reader.ahead(2).map(|t| t.kind) != Some(TokenKind::Mark(b'='))
             {
@@ -189,9 +198,13 @@ impl Script<'_> {
                 let value = self.value()?;
                 self.variables.insert(name, value);
             } else {
+                if next == Some(TokenKind::Mark(b'(')) {
+                    self.flow.call(String::from_utf8_lossy(word).into_owned(), &mut self.tool);
+                }
                 self.reader.at = at + 1;
             }
         }
+        self.flow.all_end(&mut self.tool);
         Ok(())
     }
 
@@ -202,7 +215,14 @@ impl Script<'_> {
         let routine = matches!(word, b"def" | b"thread");
         match word {
             _ if assigned => return false,
-            _ if begins && routine => self.way.routine_begins(),
+            _ if begins && routine => {
+                self.way.routine_begins();
+                let name = self
+                    .reader
+                    .ahead(1)
+                    .map_or_else(String::new, |t| String::from_utf8_lossy(self.reader.text(t)).into_owned());
+                self.flow.routine_begins(name, &mut self.tool, &Held::new(self.setting.tool));
+            }
             _ if begins => {
                 self.way.branches_begin();
                 let kind = match word {
@@ -210,20 +230,27 @@ impl Script<'_> {
                     b"switch" => Branching::Cases,
                     _ => Branching::Loop,
                 };
-                self.branches.begin(&self.tool, kind);
+                self.flow.begin(&mut self.tool, kind);
             }
             b"else" | b"elif" | b"case" | b"default" => {
                 self.way.next_branch();
-                self.branches.next(&mut self.tool, matches!(word, b"else" | b"default"));
+                self.flow.next(&mut self.tool, matches!(word, b"else" | b"default"));
             }
             b"end" => match self.blocks.pop() {
-                Some(true) => self.way.routine_ends(),
+                Some(true) => {
+                    self.way.routine_ends();
+                    self.flow.routine_ends(&mut self.tool);
+                }
                 Some(false) => {
                     self.way.branches_end();
-                    self.branches.end(&mut self.tool);
+                    self.flow.end(&mut self.tool);
                 }
                 None => {}
             },
+            b"return" => {
+                self.flow.returns(&self.tool);
+                return false;
+            }
             _ => return false,
         }
         if begins {
@@ -457,7 +484,7 @@ impl Script<'_> {
     }
 
     fn pose(&self, fields: [Field; 6], posture: MeantPosture) -> Understood<PoseTarget> {
-        let Tool::Known(tool) = self.tool else {
+        let Some(tool) = self.tool.value else {
             let words = "its tool is not known: no set_tcp(p[..]) with numbers before it; give --tool";
             return Err(Why::new(LeftReason::ToolUnknown, words));
         };

@@ -200,11 +200,7 @@ fn poses_behind_branches_that_set_tool_frame_or_displacement_differently_are_lef
     let mut cell = Cell::kuka(67);
     let q = cell.readings();
     let pose = krl(&cell, &q);
-    let frame = "{X 0.0,Y 0.0,Z 50.0,A 0.0,B 0.0,C 0.0}";
-    let in_krl = |body: &str| {
-        let body = body.replace("SET", &format!("$TOOL={frame}")).replace("MOVE", &format!("PTP {pose}"));
-        ("a.src", format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{body}\nEND\n"))
-    };
+    let in_krl = |body: &str| ("a.src", krl_text(&pose, body));
     let (tool, work) = (LeftReason::ToolUnknown.name(), LeftReason::FrameUnknown.name());
     for (body, left) in [
         ("IF $IN[1] THEN\nSET\nENDIF\nMOVE", vec![tool]),
@@ -245,5 +241,101 @@ fn poses_behind_branches_that_set_tool_frame_or_displacement_differently_are_lef
         let text = format!("def p():\n  set_tcp(p[0,0,0,0,0,0])\n  movej({q:?})\n{body}  movel({pose})\nend\n");
         let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
         assert_eq!(told(&cell, &[("a.script", text)], &[]), (2 - left.len(), left), "{body}");
+    }
+}
+
+/// A module of KRL whose tool and base are flange and foot at first; `SET` sets another tool, `MOVE` goes to a pose.
+fn krl_text(pose: &str, body: &str) -> String {
+    let set = "$TOOL={X 0.0,Y 0.0,Z 50.0,A 0.0,B 0.0,C 0.0}";
+    let body = body.replace("SET", set).replace("MOVE", &format!("PTP {pose}"));
+    format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{body}\nEND\n")
+}
+
+/// The motions of a module as they were corrected.
+fn krl_moves(cell: &Cell, text: &str) -> Vec<String> {
+    let file = cell.write("a.src", text.as_bytes());
+    let run = cell.compensate(&[&file], &["--unordered"]);
+    run.text("a.src").lines().filter(|line| line.starts_with("PTP")).map(str::to_owned).collect()
+}
+
+#[test]
+fn poses_in_loops_are_visited_with_what_the_loop_set_before_too() {
+    let mut cell = Cell::kuka(69);
+    let q = cell.readings();
+    let pose = krl(&cell, &q);
+    let tool = LeftReason::ToolUnknown.name();
+    for (body, left) in [
+        ("LOOP\nMOVE\nSET\nENDLOOP", vec![tool]),
+        ("WHILE $IN[1]\nFOR I=1 TO 3\nMOVE\nENDFOR\nSET\nENDWHILE", vec![tool]),
+        ("FOR I=1 TO 3\nSET\nMOVE\nENDFOR", vec![]),
+        ("SET\nREPEAT\nMOVE\nSET\nUNTIL $IN[1]", vec![]),
+    ] {
+        let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
+        assert_eq!(told(&cell, &[("a.src", krl_text(&pose, body))], &[]), (1 - left.len(), left), "{body}");
+    }
+}
+
+#[test]
+fn a_routine_has_the_tool_of_its_calls_and_leaves_the_one_that_it_sets() {
+    let mut cell = Cell::kuka(70);
+    let q = cell.readings();
+    let pose = krl(&cell, &q);
+    let moves = |body: &str| krl_moves(&cell, &krl_text(&pose, body));
+    let [flange, other] = ["MOVE", "SET\nMOVE"].map(moves);
+    assert_ne!(flange, other);
+    for (body, wanted) in [
+        ("sub()\nMOVE\nEND\nDEF sub()\nSET", &other),
+        ("MOVE\nsub()\nEND\nDEF sub()\nSET", &flange),
+        ("sub()\nMOVE\nEND\nDEF sub()\nRETURN", &flange),
+        ("SET\nsub()\n$TOOL=$NULLFRAME\nEND\nDEF sub()\nMOVE", &other),
+        ("first()\nMOVE\nEND\nDEF first()\nsecond()\nEND\nDEF second()\nSET", &other),
+    ] {
+        assert_eq!(&moves(body), wanted, "{body}");
+    }
+    let (tool, work) = (LeftReason::ToolUnknown.name(), LeftReason::FrameUnknown.name());
+    for (body, left) in [
+        ("sub()\nMOVE\nEND\nDEF sub()\nIF $IN[1] THEN\nRETURN\nENDIF\nSET", tool),
+        ("sub()\nSET\nsub()\nEND\nDEF sub()\nMOVE", tool),
+        ("SET\nEND\nDEF uncalled()\nMOVE", work),
+    ] {
+        assert_eq!(told(&cell, &[("a.src", krl_text(&pose, body))], &[]), (0, vec![left.to_owned()]), "{body}");
+    }
+}
+
+#[test]
+fn routines_of_scripts_and_modules_that_set_tool_or_displacement_are_followed_too() {
+    let mut cell = Cell::ur(71);
+    let q = cell.readings();
+    let pose = script_pose(&cell.nominal.base_from_tip(&q));
+    let (tool, work) = (LeftReason::ToolUnknown.name(), LeftReason::FrameUnknown.name());
+    let routine = "  def grip():\n    set_tcp(get_target_tcp_pose())\n  end\n";
+    for (body, left) in [
+        (format!("{routine}  movel({pose})\n"), vec![]),
+        (format!("{routine}  grip()\n  movel({pose})\n"), vec![tool]),
+        (format!("  while a:\n    movel({pose})\n    set_tcp(p[0,0,0.1,0,0,0])\n  end\n"), vec![tool]),
+    ] {
+        let text = format!("def p():\n  set_tcp(p[0,0,0,0,0,0])\n  movej({q:?})\n{body}end\n");
+        let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
+        assert_eq!(told(&cell, &[("a.script", text)], &[]), (2 - left.len(), left), "{body}");
+    }
+    let mut cell = Cell::kuka(72);
+    let q = cell.readings();
+    let (tip, start) = (cell.nominal.base_from_tip(&q), q.iter().map(|q| q.to_degrees().to_string()));
+    let ([x, y, z], [i, j, k, w]) = (tip.xyz().map(|v| 1e3 * v), tip.quaternion_xyzw());
+    let start = format!("--start={}", start.collect::<Vec<_>>().join(","));
+    let displace = "PDispSet [[100,0,0],[1,0,0,0],[0,0,0],[0,0,0]];\n";
+    let target = format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{k:.9}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
+    let step = format!("MoveJ {target},v10,fine,tool0;\n");
+    for (body, left) in [
+        (format!("Shift;\n{step}"), vec![work]),
+        (format!("IF a Shift;\n{step}"), vec![work]),
+        (format!("{step}Shift;\n"), vec![]),
+        (format!("WHILE a DO\n{step}{displace}ENDWHILE\n"), vec![work]),
+        (format!("WHILE a DO\n{step}{displace}PDispOff;\nENDWHILE\n"), vec![]),
+    ] {
+        let text =
+            format!("MODULE m\nPROC main()\nConfJ\\Off;\n{body}ENDPROC\nPROC Shift()\n{displace}ENDPROC\nENDMODULE\n");
+        let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
+        assert_eq!(told(&cell, &[("m.mod", text)], &[&start]), (1 - left.len(), left), "{body}");
     }
 }

@@ -1,7 +1,7 @@
 //! Tool and base of a motion: `$TOOL`, `$BASE` and `$IPO_MODE`.
 
 use crate::geom::Pose;
-use crate::programs::branches::Merged;
+use crate::programs::flow::{Followed, Held};
 
 /// Where a frame comes from.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,16 +28,52 @@ impl Default for Frames {
     }
 }
 
-impl Merged for Frames {
-    fn merged(&self, other: &Self) -> Self {
-        let alike = |a: &FrameIs, b: &FrameIs| match a == b {
-            true => a.clone(),
-            false => FrameIs::Unknown("it is set in a branch or a loop".into()),
-        };
+/// What statements have set for the motions behind them.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Active {
+    pub tool: Held<FrameIs>,
+    pub base: Held<FrameIs>,
+    pub tool_in_room: Held<bool>,
+}
+
+impl Active {
+    /// Nothing yet.
+    pub fn unset() -> Self {
+        let Frames { tool, base, tool_in_room } = Frames::default();
+        Self { tool: Held::new(tool), base: Held::new(base), tool_in_room: Held::new(tool_in_room) }
+    }
+
+    /// All of it.
+    pub fn set(&mut self, frames: Frames) {
+        self.tool.set(frames.tool);
+        self.base.set(frames.base);
+        self.tool_in_room.set(frames.tool_in_room);
+    }
+}
+
+impl Followed for Active {
+    fn merged(&self, other: &Self, why: &str) -> Self {
+        let unknown = |_: &FrameIs, _: &FrameIs| FrameIs::Unknown(why.to_owned());
         Self {
-            tool: alike(&self.tool, &other.tool),
-            base: alike(&self.base, &other.base),
-            tool_in_room: self.tool_in_room || other.tool_in_room,
+            tool: self.tool.merged(&other.tool, unknown),
+            base: self.base.merged(&other.base, unknown),
+            tool_in_room: self.tool_in_room.merged(&other.tool_in_room, |_, _| true),
+        }
+    }
+
+    fn at_top(&self) -> Self {
+        Self {
+            tool: Held::new(self.tool.value.clone()),
+            base: Held::new(self.base.value.clone()),
+            tool_in_room: Held::new(self.tool_in_room.value),
+        }
+    }
+
+    fn behind_call(&self, end: &Self) -> Self {
+        Self {
+            tool: self.tool.behind_call(&end.tool),
+            base: self.base.behind_call(&end.base),
+            tool_in_room: self.tool_in_room.behind_call(&end.tool_in_room),
         }
     }
 }
@@ -59,11 +95,11 @@ impl OwnFrames {
         }
     }
 
-    pub fn over(self, active: &Frames) -> Frames {
+    pub fn over(self, active: &Active) -> Frames {
         Frames {
-            tool: self.tool.unwrap_or_else(|| active.tool.clone()),
-            base: self.base.unwrap_or_else(|| active.base.clone()),
-            tool_in_room: self.tool_in_room.unwrap_or(active.tool_in_room),
+            tool: self.tool.unwrap_or_else(|| active.tool.value.clone()),
+            base: self.base.unwrap_or_else(|| active.base.value.clone()),
+            tool_in_room: self.tool_in_room.unwrap_or(active.tool_in_room.value),
         }
     }
 }

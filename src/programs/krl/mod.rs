@@ -6,10 +6,10 @@ mod frames;
 use std::collections::BTreeMap;
 
 use aggregate::{Aggregate, index};
-use frames::{FrameIs, Frames, OwnFrames};
+use frames::{Active, FrameIs, Frames, OwnFrames};
 
 use super::ProgramSetting;
-use super::branches::{Branches, Branching};
+use super::flow::{Branching, Flow, Places, settled};
 use super::itinerary::Itinerary;
 use super::program::{Approach, Left, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
@@ -50,14 +50,24 @@ fn matching(name: &str, pattern: &str) -> Option<Vec<i64>> {
 
 /// Reads a module of one or more files.
 pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
+    let program = settled(|known| reading(&files, setting, known))?;
+    Ok(Program { files, ..program })
+}
+
+/// One reading, with what the one before found, and what it found itself.
+fn reading(
+    files: &[TextFile],
+    setting: &ProgramSetting<'_>,
+    known: Places<Active>,
+) -> Result<(Program, Places<Active>)> {
     let mut module = Module {
         setting,
         prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
         values: BTreeMap::new(),
         declared: Vec::new(),
         root: FrameIs::Unset,
-        active: Frames::default(),
-        branches: Branches::new(),
+        active: Active::unset(),
+        flow: Flow::new(known),
         spline: OwnFrames::default(),
         way: Itinerary::new(),
     };
@@ -69,9 +79,18 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
         }
     }
     module.unvisited();
-    let mut program = module.way.program;
-    program.files = files;
-    Ok(program)
+    Ok((module.way.program, module.flow.found()))
+}
+
+/// Name of the routine that a line begins: `[GLOBAL] DEF NAME(..)`, `[GLOBAL] DEFFCT TYPE NAME(..)`.
+fn routine_name(reader: &Reader<'_>) -> Option<String> {
+    let word = |k| Some(String::from_utf8_lossy(reader.text(reader.ahead(k)?)).to_ascii_uppercase());
+    let first = isize::from(word(0)? == "GLOBAL");
+    match word(first)?.as_str() {
+        "DEF" => word(first + 1),
+        "DEFFCT" => word(first + 2),
+        _ => None,
+    }
 }
 
 struct Module<'a> {
@@ -82,9 +101,9 @@ struct Module<'a> {
     declared: Vec<(String, usize, usize)>,
     /// `$ROBROOT`: the foot of the robot in the world, of which `$BASE` is a part.
     root: FrameIs,
-    active: Frames,
-    /// What of them depends on branches.
-    branches: Branches<Frames>,
+    active: Active,
+    /// How they change.
+    flow: Flow<Active>,
     /// Frames of the spline block that is open.
     spline: OwnFrames,
     way: Itinerary,
@@ -92,7 +111,7 @@ struct Module<'a> {
 
 impl Module<'_> {
     fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
-        (self.active, self.spline) = (Frames::default(), OwnFrames::default());
+        (self.active, self.spline) = (Active::unset(), OwnFrames::default());
         self.start_afresh();
         let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {
@@ -100,6 +119,9 @@ impl Module<'_> {
                 reader.skip_line();
                 continue;
             };
+            if moves {
+                self.calls(&reader);
+            }
             if moves && let Some((_, count)) = MOVES.iter().find(|(name, _)| *name == word) {
                 self.motion(&mut reader, &word, *count)?;
             } else if moves && RELATIVE.contains(&word.as_str()) {
@@ -136,7 +158,8 @@ impl Module<'_> {
             return Ok(());
         }
         if name == "$IPO_MODE" {
-            self.active.tool_in_room = self.is_tool_in_room(reader);
+            let is_in_room = self.is_tool_in_room(reader);
+            self.active.tool_in_room.set(is_in_room);
             return Ok(());
         }
         let value = match component {
@@ -144,8 +167,8 @@ impl Module<'_> {
             false => self.value(reader)?,
         };
         match name.as_str() {
-            "$TOOL" => self.active.tool = self.frame(&value),
-            "$BASE" => self.active.base = self.frame(&value),
+            "$TOOL" => self.active.tool.set(self.frame(&value)),
+            "$BASE" => self.active.base.set(self.frame(&value)),
             "$ROBROOT" => self.root = self.frame(&value),
             "FDAT_ACT" => self.use_data(&value),
             _ => {
@@ -247,11 +270,9 @@ impl Module<'_> {
     }
 
     fn use_data(&mut self, value: &Value) {
-        if let Ok((data, _)) = self.resolved(value)
-            && let Some(frames) = self.data_frames(data)
-        {
-            self.active = frames;
-        }
+        let data = self.resolved(value).ok().and_then(|(data, _)| self.data_frames(data));
+        let unknown = || FrameIs::Unknown("its motion data are in none of the files (give the .dat as well)".into());
+        self.active.set(data.unwrap_or_else(|| Frames { tool: unknown(), base: unknown(), ..Frames::default() }));
     }
 
     /// `WITH .., $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO), ..` in the rest of a line.
@@ -333,8 +354,8 @@ impl Module<'_> {
             None => FrameIs::Unknown("its number is computed".into()),
         };
         match what.as_deref() {
-            Some("TOOL") => self.active.tool = frame("TOOL_DATA"),
-            Some("BASE") => self.active.base = frame("BASE_DATA"),
+            Some("TOOL") => self.active.tool.set(frame("TOOL_DATA")),
+            Some("BASE") => self.active.base.set(frame("BASE_DATA")),
             _ => {}
         }
     }
@@ -392,10 +413,13 @@ impl Module<'_> {
     /// Statements that decide from where the robot comes; false for any other word.
     fn flow(&mut self, reader: &Reader<'_>, word: &str) -> bool {
         match word {
-            "DEF" | "DEFFCT" => self.start_afresh(),
-            "GLOBAL" if reader.ahead(1).is_some_and(|t| reader.text(t).to_ascii_uppercase().starts_with(b"DEF")) => {
+            "DEF" | "DEFFCT" | "GLOBAL" => {
+                let Some(name) = routine_name(reader) else { return false };
                 self.start_afresh();
+                self.flow.routine_begins(name, &mut self.active, &Active::unset());
             }
+            "RETURN" => self.flow.returns(&self.active),
+            "END" | "ENDFCT" => self.flow.routine_ends(&mut self.active),
             "IF" | "SWITCH" | "WHILE" | "LOOP" | "FOR" | "REPEAT" => {
                 self.way.branches_begin();
                 let kind = match word {
@@ -404,15 +428,15 @@ impl Module<'_> {
                     "LOOP" | "REPEAT" => Branching::LoopTaken,
                     _ => Branching::Loop,
                 };
-                self.branches.begin(&self.active, kind);
+                self.flow.begin(&mut self.active, kind);
             }
             "ELSE" | "CASE" | "DEFAULT" => {
                 self.way.next_branch();
-                self.branches.next(&mut self.active, word != "CASE");
+                self.flow.next(&mut self.active, word != "CASE");
             }
             "ENDIF" | "ENDSWITCH" | "ENDWHILE" | "ENDLOOP" | "ENDFOR" | "UNTIL" => {
                 self.way.branches_end();
-                self.branches.end(&mut self.active);
+                self.flow.end(&mut self.active);
             }
             "SPLINE" => {}
             "ENDSPLINE" => self.spline = OwnFrames::default(),
@@ -421,9 +445,25 @@ impl Module<'_> {
         true
     }
 
+    /// Routines that a line calls, which may set frames; the reader stands at its beginning.
+    fn calls(&mut self, reader: &Reader<'_>) {
+        // What BAS sets stands in its arguments.
+        let is_none = ["BAS", "EXT", "EXTFCT"].map(str::to_owned);
+        if routine_name(reader).is_some() || reader.name().is_some_and(|word| is_none.contains(&word)) {
+            return;
+        }
+        let line = (0..).map_while(|k| Some((k, reader.ahead(k).filter(|t| t.kind != TokenKind::LineEnd)?)));
+        for (k, token) in line {
+            if token.kind == TokenKind::Word && reader.ahead_is_mark(k + 1, b'(') {
+                let name = String::from_utf8_lossy(reader.text(token)).to_ascii_uppercase();
+                self.flow.call(name, &mut self.active);
+            }
+        }
+    }
+
     fn start_afresh(&mut self) {
         self.way.start_afresh();
-        self.branches.start_afresh();
+        self.flow.all_end(&mut self.active);
     }
 
     fn leave_at(&mut self, file: usize, line: usize, name: &str, why: Why) {

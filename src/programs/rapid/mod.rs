@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::ProgramSetting;
-use super::branches::{Branches, Branching};
 use super::codes::{Codes, PostureCode};
 use super::field::{Field, FieldPlace};
+use super::flow::{Branching, Flow, Followed, Places, settled};
 use super::itinerary::Itinerary;
 use super::program::{
     Approach, DisplacedTarget, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target,
@@ -48,6 +48,16 @@ struct Datum {
 
 /// Reads modules that belong together.
 pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
+    let program = settled(|known| reading(&files, setting, known))?;
+    Ok(Program { files, ..program })
+}
+
+/// One reading, with what the one before found, and what it found itself.
+fn reading(
+    files: &[TextFile],
+    setting: &ProgramSetting<'_>,
+    known: Places<Switched>,
+) -> Result<(Program, Places<Switched>)> {
     let mut task = Task {
         setting,
         data: BTreeMap::new(),
@@ -55,8 +65,8 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
         switched_off: [false; 2],
         displaces: false,
         offsets: false,
-        now: Switched { watched: [Watched::On; 2], displaced: false, offset: false },
-        branches: Branches::new(),
+        now: Switched::new([Watched::On; 2], false, false),
+        flow: Flow::new(known),
         way: Itinerary::new(),
     };
     for (index, file) in files.iter().enumerate() {
@@ -66,12 +76,10 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
     for (index, file) in files.iter().enumerate() {
         task.way.start_afresh();
         task.moves(Reader::new(file, index, DIALECT)?)?;
+        task.flow.all_end(&mut task.now);
     }
-    (task.now.displaced, task.now.offset) = (false, false);
     task.unvisited()?;
-    let mut program = task.way.program;
-    program.files = files;
-    Ok(program)
+    Ok((task.way.program, task.flow.found()))
 }
 
 struct Task<'a> {
@@ -87,9 +95,16 @@ struct Task<'a> {
     offsets: bool,
     /// What is switched where the text stands.
     now: Switched,
-    /// What of it depends on branches.
-    branches: Branches<Switched>,
+    /// How it changes.
+    flow: Flow<Switched>,
     way: Itinerary,
+}
+
+/// Name of the routine that the reader stands on: `PROC NAME(..)`, `FUNC TYPE NAME(..)`, `TRAP NAME`.
+fn routine_name(reader: &Reader<'_>) -> String {
+    let behind = if reader.name().as_deref() == Some("FUNC") { 2 } else { 1 };
+    let name = reader.ahead(behind).map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase());
+    name.unwrap_or_default()
 }
 
 /// To behind the next semicolon.
@@ -177,43 +192,50 @@ impl Task<'_> {
             line.into_iter().any(|t| reader.text(t).eq_ignore_ascii_case(wanted))
         };
         if let Some((which, state)) = switch(reader) {
-            self.now.watched[which] = state;
+            self.now.watched[which].set(state);
         }
         match word {
             w if ROUTINES.contains(&w) => {
                 self.way.start_afresh();
                 let state = |off: bool| if off { Watched::Unknown } else { Watched::On };
                 let is_called = !line_has(b"main");
-                self.now = Switched {
-                    watched: self.switched_off.map(state),
-                    displaced: self.displaces && is_called,
-                    offset: self.offsets && is_called,
-                };
-                self.branches.start_afresh();
+                let uncalled =
+                    Switched::new(self.switched_off.map(state), self.displaces && is_called, self.offsets && is_called);
+                self.flow.all_end(&mut self.now);
+                self.flow.routine_begins(routine_name(reader), &mut self.now, &uncalled);
             }
-            w if DISPLACES.contains(&w) => self.now.displaced = true,
-            w if OFFSETS.contains(&w) => self.now.offset = true,
-            "PDISPOFF" => self.now.displaced = false,
-            "EOFFSOFF" => self.now.offset = false,
+            "ENDPROC" | "ENDFUNC" | "ENDTRAP" => self.flow.routine_ends(&mut self.now),
             // Without THEN it is a statement of one line.
             "IF" if line_has(b"THEN") => self.begin(Branching::If),
             "TEST" => self.begin(Branching::Cases),
             "WHILE" | "FOR" => self.begin(Branching::Loop),
             "ELSE" | "ELSEIF" | "CASE" | "DEFAULT" => {
                 self.way.next_branch();
-                self.branches.next(&mut self.now, matches!(word, "ELSE" | "DEFAULT"));
+                self.flow.next(&mut self.now, matches!(word, "ELSE" | "DEFAULT"));
             }
             "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => {
                 self.way.branches_end();
-                self.branches.end(&mut self.now);
+                self.flow.end(&mut self.now);
             }
-            _ => {}
+            _ => self.step(word),
+        }
+    }
+
+    /// A statement without branches.
+    fn step(&mut self, word: &str) {
+        match word {
+            "RETURN" => self.flow.returns(&self.now),
+            w if DISPLACES.contains(&w) => self.now.displaced.set(true),
+            w if OFFSETS.contains(&w) => self.now.offset.set(true),
+            "PDISPOFF" => self.now.displaced.set(false),
+            "EOFFSOFF" => self.now.offset.set(false),
+            _ => self.flow.call(word.to_owned(), &mut self.now),
         }
     }
 
     fn begin(&mut self, kind: Branching) {
         self.way.branches_begin();
-        self.branches.begin(&self.now, kind);
+        self.flow.begin(&mut self.now, kind);
     }
 
     fn moves(&mut self, mut reader: Reader<'_>) -> Result<()> {
@@ -235,8 +257,9 @@ impl Task<'_> {
                     self.flow(&reader, &word);
                 } else {
                     // Behind the condition of a statement of one line: it may take place.
-                    self.now.displaced |= DISPLACES.contains(&word.as_str());
-                    self.now.offset |= OFFSETS.contains(&word.as_str());
+                    let before = self.now.clone();
+                    self.step(&word);
+                    self.now = self.now.merged(&before, "");
                 }
                 reader.at += 1;
             }
@@ -369,7 +392,7 @@ impl Task<'_> {
         let upper = name.to_ascii_uppercase();
         let of_joints = upper.starts_with("MOVEJ") || upper.starts_with("TRIGGJ") || upper.ends_with('J');
         let near = if upper.starts_with("MOVEL") { MeantPosture::Along } else { MeantPosture::Nearest };
-        pose.posture = match (self.now.watched[usize::from(!of_joints)], pose.posture) {
+        pose.posture = match (self.now.watched[usize::from(!of_joints)].value, pose.posture) {
             (Watched::Off, _) => near,
             (Watched::Unknown, MeantPosture::Coded(codes, axes)) => MeantPosture::Either(codes, axes),
             (_, posture) => posture,
@@ -448,7 +471,7 @@ impl Task<'_> {
         if parts.len() == 2 {
             return Ok(TargetKind::Joints(self.joints(&parts[0], &external, file)?));
         }
-        if self.now.displaced {
+        if self.now.displaced.value {
             let words = "a program displacement (PDispOn, PDispSet) may be active";
             return Err(Why::new(LeftReason::FrameUnknown, words));
         }
@@ -475,7 +498,7 @@ impl Task<'_> {
             return Err(Why::external(&axis, value));
         }
         let has_external = external.iter().any(|(value, _)| *value < NO_AXIS);
-        if self.now.offset && has_external && !self.setting.axes_apart {
+        if self.now.offset.value && has_external && !self.setting.axes_apart {
             let words = "an offset of external axes (EOffsOn, EOffsSet) may be active";
             return Err(Why::new(LeftReason::ExternalAxis, words));
         }

@@ -1,6 +1,6 @@
 //! What instructions switch for all moves behind them: checks of configurations, displacements.
 
-use crate::programs::branches::Merged;
+use crate::programs::flow::{Followed, Held};
 use crate::programs::scan::Reader;
 
 /// Instructions that move all robtargets behind them, until `PDispOff`.
@@ -18,23 +18,42 @@ pub(super) enum Watched {
 }
 
 /// What instructions switch for those behind them.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Switched {
     /// The checks of configurations.
-    pub watched: [Watched; 2],
+    pub watched: [Held<Watched>; 2],
     /// True where a program displacement may be active.
-    pub displaced: bool,
+    pub displaced: Held<bool>,
     /// True where an offset of external axes may be active.
-    pub offset: bool,
+    pub offset: Held<bool>,
 }
 
-impl Merged for Switched {
-    fn merged(&self, other: &Self) -> Self {
-        let alike = |k: usize| if self.watched[k] == other.watched[k] { self.watched[k] } else { Watched::Unknown };
+impl Switched {
+    /// Where nothing has switched anything yet.
+    pub fn new(watched: [Watched; 2], displaced: bool, offset: bool) -> Self {
+        Self { watched: watched.map(Held::new), displaced: Held::new(displaced), offset: Held::new(offset) }
+    }
+}
+
+impl Followed for Switched {
+    fn merged(&self, other: &Self, _: &str) -> Self {
+        let watched = |k: usize| self.watched[k].merged(&other.watched[k], |_, _| Watched::Unknown);
         Self {
-            watched: [0, 1].map(alike),
-            displaced: self.displaced || other.displaced,
-            offset: self.offset || other.offset,
+            watched: [0, 1].map(watched),
+            displaced: self.displaced.merged(&other.displaced, |_, _| true),
+            offset: self.offset.merged(&other.offset, |_, _| true),
+        }
+    }
+
+    fn at_top(&self) -> Self {
+        Self::new([0, 1].map(|k| self.watched[k].value), self.displaced.value, self.offset.value)
+    }
+
+    fn behind_call(&self, end: &Self) -> Self {
+        Self {
+            watched: [0, 1].map(|k| self.watched[k].behind_call(&end.watched[k])),
+            displaced: self.displaced.behind_call(&end.displaced),
+            offset: self.offset.behind_call(&end.offset),
         }
     }
 }

@@ -1,0 +1,356 @@
+//! What statements set, as a tool, followed through branches, loops and calls of routines.
+//!
+//! What holds at the top of a loop depends on its end, and at the top of a routine on its calls, which may stand further on. So a text is read again
+//! with what the reading before found there until that repeats itself ([`settled`]).
+
+use std::collections::BTreeMap;
+
+use crate::error::Result;
+
+/// Readings after which what differs from one to the next is not known: routines that call each other may never agree.
+const MOST_READINGS: usize = 8;
+/// Why something is not known.
+const BRANCHES: &str = "it is set in a branch or a loop";
+const CALLS: &str = "it is not the same at all calls of the routine";
+
+/// One thing that statements set.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Held<V> {
+    /// What holds.
+    pub value: V,
+    /// True where the routine has set it.
+    is_set: bool,
+}
+
+impl<V: Clone + PartialEq> Held<V> {
+    /// Not set by the routine.
+    pub fn new(value: V) -> Self {
+        Self { value, is_set: false }
+    }
+
+    /// A statement sets it.
+    pub fn set(&mut self, value: V) {
+        *self = Self { value, is_set: true };
+    }
+
+    /// Where either holds, with what `differing` values leave.
+    pub fn merged(&self, other: &Self, differing: impl FnOnce(&V, &V) -> V) -> Self {
+        let value = if self.value == other.value { self.value.clone() } else { differing(&self.value, &other.value) };
+        Self { value, is_set: self.is_set || other.is_set }
+    }
+
+    /// Behind a call of a routine that ended with `end`.
+    pub fn behind_call(&self, end: &Self) -> Self {
+        if end.is_set { end.clone() } else { self.clone() }
+    }
+}
+
+/// All that statements set.
+pub(super) trait Followed: Clone + PartialEq {
+    /// What is known where either holds; `why` says how they came together.
+    fn merged(&self, other: &Self, why: &str) -> Self;
+    /// The same at the top of a routine, which has set nothing yet.
+    fn at_top(&self) -> Self;
+    /// What a caller has behind a call of a routine that ended with `end`.
+    fn behind_call(&self, end: &Self) -> Self;
+}
+
+/// Kinds of statements with branches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Branching {
+    /// Its first branch begins with it.
+    If,
+    /// Nothing stands before its first branch.
+    Cases,
+    /// A loop that may not run at all.
+    Loop,
+    /// A loop that runs at least once.
+    LoopTaken,
+}
+
+/// What a reading found at places that others depend on.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Places<T> {
+    /// At the ends of loops, in the order of their beginnings; `None` for one that is still open.
+    loops: Vec<Option<T>>,
+    /// At the calls of each routine.
+    calls: BTreeMap<String, T>,
+    /// At the end of each routine.
+    ends: BTreeMap<String, T>,
+}
+
+impl<T> Default for Places<T> {
+    fn default() -> Self {
+        Self { loops: Vec::new(), calls: BTreeMap::new(), ends: BTreeMap::new() }
+    }
+}
+
+impl<T: Followed> Places<T> {
+    fn merged(mut self, other: &Self) -> Self {
+        let merge = |own: &mut T, other: &T| *own = own.merged(other, CALLS);
+        let loops = self.loops.iter_mut().zip(&other.loops);
+        loops.for_each(|(own, other)| own.iter_mut().zip(other).for_each(|(own, other)| merge(own, other)));
+        for (own, other) in [(&mut self.calls, &other.calls), (&mut self.ends, &other.ends)] {
+            own.iter_mut().for_each(|(name, own)| other.get(name).iter().for_each(|other| merge(own, other)));
+        }
+        self
+    }
+}
+
+/// What a text says once its readings agree: `read` makes one, given what the one before found.
+///
+/// # Errors
+/// Those of a reading.
+pub(super) fn settled<T: Followed, R>(read: impl Fn(Places<T>) -> Result<(R, Places<T>)>) -> Result<R> {
+    let mut known = Places::default();
+    for reading in 0.. {
+        let (said, found) = read(known.clone())?;
+        if found == known {
+            return Ok(said);
+        }
+        known = if reading < MOST_READINGS { found } else { found.merged(&known) };
+    }
+    read(known).map(|(said, _)| said)
+}
+
+/// A reading under way.
+pub(super) struct Flow<T> {
+    known: Places<T>,
+    found: Places<T>,
+    open: Vec<Open<T>>,
+    routines: Vec<Routine<T>>,
+}
+
+/// A statement with branches, or a loop.
+struct Open<T> {
+    before: T,
+    /// What holds at the end of the branches so far.
+    ends: Vec<T>,
+    /// False while none of the branches need be taken.
+    one_is_taken: bool,
+    /// False before the first branch.
+    is_in_branch: bool,
+    /// Its number among loops.
+    number: Option<usize>,
+}
+
+struct Routine<T> {
+    name: String,
+    /// What holds around it.
+    around: T,
+    /// What holds where it returns.
+    end: Option<T>,
+    /// Statements open around it.
+    open: usize,
+}
+
+impl<T: Followed> Flow<T> {
+    /// With what the reading before found.
+    pub fn new(known: Places<T>) -> Self {
+        Self { known, found: Places::default(), open: Vec::new(), routines: Vec::new() }
+    }
+
+    /// What this reading found.
+    pub fn found(self) -> Places<T> {
+        self.found
+    }
+
+    /// A statement with branches, or a loop, begins.
+    pub fn begin(&mut self, now: &mut T, kind: Branching) {
+        let before = now.clone();
+        let is_loop = matches!(kind, Branching::Loop | Branching::LoopTaken);
+        let number = is_loop.then_some(self.found.loops.len());
+        if let Some(number) = number {
+            self.found.loops.push(None);
+            if let Some(Some(end)) = self.known.loops.get(number) {
+                *now = now.merged(end, BRANCHES);
+            }
+        }
+        self.open.push(Open {
+            before,
+            ends: Vec::new(),
+            one_is_taken: kind == Branching::LoopTaken,
+            is_in_branch: kind != Branching::Cases,
+            number,
+        });
+    }
+
+    /// Another branch begins, with what held before the statement; the last one is taken where no other is.
+    pub fn next(&mut self, now: &mut T, is_last: bool) {
+        if let Some(open) = self.open.last_mut() {
+            let end = std::mem::replace(now, open.before.clone());
+            open.ends.extend(std::mem::replace(&mut open.is_in_branch, true).then_some(end));
+            open.one_is_taken |= is_last;
+        }
+    }
+
+    /// The statement ends.
+    pub fn end(&mut self, now: &mut T) {
+        let Some(open) = self.open.pop() else { return };
+        if let Some(number) = open.number {
+            self.found.loops[number] = Some(now.clone());
+        }
+        let not_taken = (!open.one_is_taken).then_some(open.before);
+        for other in open.ends.iter().chain(&not_taken) {
+            *now = now.merged(other, BRANCHES);
+        }
+    }
+
+    /// A routine begins, inside another one where that is still open; `uncalled` holds at its top where nothing calls it.
+    pub fn routine_begins(&mut self, name: String, now: &mut T, uncalled: &T) {
+        let top = self.known.calls.get(&name).unwrap_or(uncalled).at_top();
+        let around = std::mem::replace(now, top);
+        self.routines.push(Routine { name, around, end: None, open: self.open.len() });
+    }
+
+    /// The innermost routine returns from where `now` holds.
+    pub fn returns(&mut self, now: &T) {
+        if let Some(routine) = self.routines.last_mut() {
+            routine.end = Some(routine.end.as_ref().map_or_else(|| now.clone(), |end| end.merged(now, BRANCHES)));
+        }
+    }
+
+    /// The innermost routine ends.
+    pub fn routine_ends(&mut self, now: &mut T) {
+        self.returns(now);
+        let Some(Routine { name, around, end, open }) = self.routines.pop() else { return };
+        self.open.truncate(open);
+        *now = around;
+        self.found.ends.extend(end.map(|end| (name, end)));
+    }
+
+    /// All routines that are still open end.
+    pub fn all_end(&mut self, now: &mut T) {
+        while !self.routines.is_empty() {
+            self.routine_ends(now);
+        }
+        self.open.clear();
+    }
+
+    /// A routine is called.
+    pub fn call(&mut self, name: String, now: &mut T) {
+        let behind = self.known.ends.get(&name).map(|end| now.behind_call(end));
+        let before = std::mem::replace(now, behind.unwrap_or_else(|| now.clone()));
+        let calls = self.found.calls.entry(name);
+        calls.and_modify(|all| *all = all.merged(&before, CALLS)).or_insert(before);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Tool = Held<Option<u8>>;
+
+    impl Followed for Tool {
+        fn merged(&self, other: &Self, _: &str) -> Self {
+            Held::merged(self, other, |_, _| None)
+        }
+
+        fn at_top(&self) -> Self {
+            Self::new(self.value)
+        }
+
+        fn behind_call(&self, end: &Self) -> Self {
+            Held::behind_call(self, end)
+        }
+    }
+
+    /// Behind a statement whose branches leave these tools, begun with tool 0.
+    fn behind(branches: &[u8], has_else: bool) -> Option<u8> {
+        let both = [Branching::If, Branching::Cases].map(|kind| behind_a(kind, branches, has_else));
+        assert_eq!(both[0], both[1]);
+        both[0]
+    }
+
+    fn behind_a(kind: Branching, branches: &[u8], has_else: bool) -> Option<u8> {
+        let (mut flow, mut now) = (Flow::new(Places::default()), Tool::new(Some(0)));
+        flow.begin(&mut now, kind);
+        for (k, tool) in branches.iter().enumerate() {
+            if k > 0 || kind == Branching::Cases {
+                flow.next(&mut now, has_else && k + 1 == branches.len());
+            }
+            assert_eq!(now.value, Some(0));
+            now.set(Some(*tool));
+        }
+        flow.end(&mut now);
+        now.value
+    }
+
+    #[test]
+    fn what_all_branches_leave_alike_holds_behind_them() {
+        assert_eq!(behind(&[1], false), None);
+        assert_eq!(behind(&[0], false), Some(0));
+        assert_eq!(behind(&[1, 1], true), Some(1));
+        assert_eq!(behind(&[1, 1], false), None);
+        assert_eq!(behind(&[1, 2], true), None);
+    }
+
+    /// Tools at the top of a loop, and behind it, that begins with tool 0 and sets this one at its end.
+    fn at_loop(kind: Branching, tool: u8) -> [Option<u8>; 2] {
+        settled(|known| {
+            let (mut flow, mut now) = (Flow::new(known), Tool::new(Some(0)));
+            flow.begin(&mut now, kind);
+            let top = now.value;
+            now.set(Some(tool));
+            flow.end(&mut now);
+            Ok(([top, now.value], flow.found()))
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn what_a_loop_sets_at_its_end_holds_at_its_top_from_the_second_time_on() {
+        assert_eq!(at_loop(Branching::LoopTaken, 1), [None, Some(1)]);
+        assert_eq!(at_loop(Branching::Loop, 1), [None, None]);
+        assert_eq!(at_loop(Branching::Loop, 0), [Some(0), Some(0)]);
+    }
+
+    /// Tools at the top of a routine that may set one, and behind its two calls, with tools 1 and 2.
+    fn at_calls(callers: [u8; 2], sets: Option<u8>) -> [Option<u8>; 3] {
+        settled(|known| {
+            let (mut flow, mut now) = (Flow::new(known), Tool::new(None));
+            let behind = callers.map(|tool| {
+                now.set(Some(tool));
+                flow.call("routine".to_owned(), &mut now);
+                now.value
+            });
+            flow.routine_begins("routine".to_owned(), &mut now, &Tool::new(Some(9)));
+            let top = now.value;
+            sets.iter().for_each(|tool| now.set(Some(*tool)));
+            flow.routine_ends(&mut now);
+            assert_eq!(now.value, behind[1]);
+            Ok(([top, behind[0], behind[1]], flow.found()))
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn a_routine_begins_with_what_its_calls_have_in_common_and_leaves_what_it_sets() {
+        assert_eq!(at_calls([1, 1], None), [Some(1), Some(1), Some(1)]);
+        assert_eq!(at_calls([1, 2], None), [None, Some(1), Some(2)]);
+        assert_eq!(at_calls([1, 2], Some(3)), [None, Some(3), Some(3)]);
+    }
+
+    #[test]
+    fn a_routine_that_nothing_calls_begins_with_what_is_said_of_it() {
+        let (mut flow, mut now) = (Flow::new(Places::default()), Tool::new(Some(0)));
+        flow.routine_begins("alone".to_owned(), &mut now, &Tool::new(Some(9)));
+        assert_eq!(now.value, Some(9));
+    }
+
+    /// Each of two routines sets what the other is then called with: no reading repeats the one before.
+    #[test]
+    fn routines_that_call_each_other_end_as_not_known() {
+        let top = settled(|known| {
+            let (mut flow, mut now) = (Flow::new(known), Tool::new(Some(0)));
+            flow.routine_begins("a".to_owned(), &mut now, &Tool::new(Some(1)));
+            let top = now.value;
+            now.set(top.map(|tool| (tool + 1) % 2));
+            flow.call("a".to_owned(), &mut now);
+            flow.routine_ends(&mut now);
+            Ok((top, flow.found()))
+        });
+        assert_eq!(top.unwrap(), None);
+    }
+}
