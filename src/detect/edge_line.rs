@@ -3,21 +3,22 @@
 //! With x along the side from its middle and y across it, towards the light, px:
 //!
 //! ```text
-//! I = min(full scale, dark + (light - dark) Phi((y - e(x)) / s))
-//! e(x) = o + a x + c x^2,  light = l0 + l1 x,  dark = d0 + d1 x
+//! I = min(full scale, d(x) + h(x) Phi((y - e(x)) / s))
+//! e(x) = o + a x + c x^2,  h(x) = h0 + h1 x,  d(x) = d0 + d1 x + d2 x^2
 //! ```
 //!
-//! `c` carries what lens distortion bends, with a prior of [`BEND`] per picture width; everything else is free but for a wide prior
-//! of the blur `s`. The ends are left out, where the next side rounds the corner off. Two sides cross at the corner; its covariance is
-//! that of their `(o, a, c)` at the noise that the residuals show.
+//! `c` carries what lens distortion bends, with a prior of [`BEND`] per picture width; everything else is free but for wide priors.
+//! Glare adds the same to ink and paper: where it clips the paper, the curve of the ink says where half of the step is. The ends
+//! are left out, where the next side rounds the corner off. Two sides cross at the corner; its covariance is that of their
+//! `(o, a, c)` at the noise that the residuals show.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
 
 use super::Picture;
 use super::circles::normal_tail;
 
-/// Parameters: o, a, c, ln s, l0, l1, d0, d1.
-const PARAMETERS: usize = 8;
+/// Parameters: o, a, c, ln s, h0, h1, d0, d1, d2.
+const PARAMETERS: usize = 9;
 type Normal = SMatrix<f64, PARAMETERS, PARAMETERS>;
 type Column = SVector<f64, PARAMETERS>;
 
@@ -34,7 +35,7 @@ const AT_REST_PX: f64 = 1e-4;
 const NEARLY_AT_REST_PX: f64 = 5e-3;
 /// Prior sigma of a level, as a share of the contrast at the start: paper that is clipped does not tell its own.
 const LEVEL: f64 = 0.3;
-/// Prior sigma of a slope of the light along the side, as a share of the contrast per px.
+/// Prior sigma of a slope of the light along the side, as a share of the contrast per px; it may change by itself over the side.
 const SLOPE_PER_PX: f64 = 0.01;
 /// A side that moves further than this part of its length, or by more than this many px, is another edge.
 const FARTHEST: f64 = 0.1;
@@ -63,7 +64,16 @@ pub(super) struct EdgeLine {
     along: Vector2<f64>,
     across: Vector2<f64>,
     shape: Vector3<f64>,
+    fit: Fit,
+}
+
+/// How well a side is known.
+#[derive(Debug, Clone, Copy)]
+struct Fit {
     covariance: SMatrix<f64, 3, 3>,
+    /// Root mean square of the residuals on the paper, and its step to the ink, counts.
+    paper_residual: f64,
+    contrast: f64,
 }
 
 struct Pixel {
@@ -87,7 +97,7 @@ impl EdgeLine {
             along,
             across: Vector2::new(along.y, -along.x),
             shape: Vector3::zeros(),
-            covariance: SMatrix::zeros(),
+            fit: Fit { covariance: SMatrix::zeros(), paper_residual: 0.0, contrast: 0.0 },
         };
         let mut state = Column::zeros();
         state[3] = USUAL_BLUR_PX.ln();
@@ -98,7 +108,7 @@ impl EdgeLine {
             if round == 0 {
                 start(&pixels, &mut state)?;
             }
-            line.covariance = iterate(picture, &pixels, length, &mut state)?;
+            line.fit = iterate(picture, &pixels, length, &mut state)?;
         }
         line.shape = Vector3::new(state[0], state[1], state[2]);
         Ok(line)
@@ -138,6 +148,16 @@ impl EdgeLine {
         self.shape[0] + x * (self.shape[1] + x * self.shape[2])
     }
 
+    /// Root mean square of the residuals on the paper, counts.
+    pub fn paper_residual(&self) -> f64 {
+        self.fit.paper_residual
+    }
+
+    /// Step between ink and paper, counts.
+    pub fn contrast(&self) -> f64 {
+        self.fit.contrast
+    }
+
     /// How far a side that goes on in the line of this one, with its ink on the other side, lies to the light of it, px.
     pub fn step_to(&self, other: &Self) -> f64 {
         let d = other.middle + other.across * other.shape[0] - self.middle;
@@ -164,7 +184,7 @@ impl EdgeLine {
                 let slope = line.across - line.along * (line.shape[1] + 2.0 * line.shape[2] * x);
                 slopes.set_row(k, &slope.transpose());
                 let terms = Vector3::new(1.0, x, x * x);
-                variance[k] = (terms.transpose() * line.covariance * terms)[0];
+                variance[k] = (terms.transpose() * line.fit.covariance * terms)[0];
             }
             p -= slopes.try_inverse()? * left;
         }
@@ -183,22 +203,18 @@ fn start(pixels: &[Pixel], state: &mut Column) -> Result<(), &'static str> {
         let values: Vec<f64> = pixels.iter().filter(|p| sign * p.y > 0.5 * far).map(|p| p.value).collect();
         values.iter().sum::<f64>() / values.len().max(1) as f64
     };
-    (state[4], state[6]) = (mean(1.0), mean(-1.0));
-    if state[4] > state[6] { Ok(()) } else { Err("no contrast") }
+    state[6] = mean(-1.0);
+    state[4] = mean(1.0) - state[6];
+    if state[4] > 0.0 { Ok(()) } else { Err("no contrast") }
 }
 
-/// Gauss-Newton steps to the end; returns the covariance of the shape.
-fn iterate(
-    picture: &Picture,
-    pixels: &[Pixel],
-    length: f64,
-    state: &mut Column,
-) -> Result<SMatrix<f64, 3, 3>, &'static str> {
-    let mut noise = 0.03 * (state[4] - state[6]);
+/// Gauss-Newton steps to the end.
+fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column) -> Result<Fit, &'static str> {
+    let mut noise = 0.03 * state[4];
     let bend = BEND / picture.width.max(picture.height) as f64;
     let farthest = (FARTHEST * length).max(FARTHEST_PX);
     let first = *state;
-    let (level, slope) = (LEVEL * (first[4] - first[6]), SLOPE_PER_PX * (first[4] - first[6]));
+    let (level, slope) = (LEVEL * first[4], SLOPE_PER_PX * first[4]);
     let priors = [
         (2, 0.0, bend),
         (3, USUAL_BLUR_PX.ln(), BLUR_SIGMA),
@@ -206,9 +222,10 @@ fn iterate(
         (5, 0.0, slope),
         (6, first[6], level),
         (7, 0.0, slope),
+        (8, 0.0, slope / (2.0 * length)),
     ];
     for round in 1..=MOST_STEPS {
-        let Sums { mut normal, mut gradient, square, used } = sums(pixels, state, picture.full_scale);
+        let Sums { mut normal, mut gradient, square, used, paper } = sums(pixels, state, picture.full_scale);
         if used < 2 * PARAMETERS {
             return Err("saturated");
         }
@@ -234,9 +251,10 @@ fn iterate(
         }
         let rest = if round < MOST_STEPS { AT_REST_PX } else { NEARLY_AT_REST_PX };
         if step[0].abs() + step[1].abs() * length / 2.0 < rest {
-            let contrast = state[4] - state[6];
+            let (contrast, paper_residual) = (state[4], (paper.0 / paper.1.max(1.0)).sqrt());
             let covariance = factor.inverse().fixed_view::<3, 3>(0, 0).into_owned();
-            return if noise < WORST * contrast { Ok(covariance) } else { Err("disturbed surroundings") };
+            let fit = Fit { covariance, paper_residual, contrast };
+            return if noise < WORST * contrast { Ok(fit) } else { Err("disturbed surroundings") };
         }
     }
     Err("no convergence")
@@ -247,23 +265,25 @@ struct Sums {
     gradient: Column,
     square: f64,
     used: usize,
+    /// Squares of the residuals on the paper, and their number.
+    paper: (f64, f64),
 }
 
 fn sums(pixels: &[Pixel], state: &Column, full_scale: f32) -> Sums {
-    let mut out = Sums { normal: Normal::zeros(), gradient: Column::zeros(), square: 0.0, used: 0 };
+    let mut out = Sums { normal: Normal::zeros(), gradient: Column::zeros(), square: 0.0, used: 0, paper: (0.0, 0.0) };
     let blur = state[3].exp();
     let limit = f64::from(SATURATED * full_scale);
     for p in pixels {
         let u = (p.y - state[0] - p.x * (state[1] + p.x * state[2])) / blur;
-        let (light, dark) = (state[4] + state[5] * p.x, state[6] + state[7] * p.x);
+        let (step, dark) = (state[4] + state[5] * p.x, state[6] + p.x * (state[7] + p.x * state[8]));
         let (tail, phi) = normal_tail(u as f32);
         let share = 1.0 - f64::from(tail);
-        let value = dark + (light - dark) * share;
+        let value = dark + step * share;
         if p.saturated && value >= limit {
             continue; // says no more than that
         }
         let residual = p.value - value;
-        let density = (light - dark) * f64::from(phi) / blur;
+        let density = step * f64::from(phi) / blur;
         let row = Column::from([
             -density,
             -density * p.x,
@@ -271,13 +291,17 @@ fn sums(pixels: &[Pixel], state: &Column, full_scale: f32) -> Sums {
             -density * u * blur,
             share,
             share * p.x,
-            1.0 - share,
-            (1.0 - share) * p.x,
+            1.0,
+            p.x,
+            p.x * p.x,
         ]);
         out.normal += row * row.transpose();
         out.gradient += row * residual;
         out.square += residual * residual;
         out.used += 1;
+        if u > 0.0 {
+            out.paper = (out.paper.0 + residual * residual, out.paper.1 + 1.0);
+        }
     }
     out
 }

@@ -12,6 +12,7 @@ mod edge_line;
 mod flat_field;
 mod flat_field_facts;
 mod load;
+mod misfit;
 mod picture;
 pub mod puzzleboard;
 mod quads;

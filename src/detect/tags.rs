@@ -9,6 +9,7 @@
 use std::collections::BTreeMap;
 
 use super::edge_line::{EdgeLine, Side};
+use super::misfit::Usual;
 use super::quads::{Quad, quads};
 use super::tag_code::{Reader, Reading};
 use super::{Detection, Dropped, Picture};
@@ -29,6 +30,10 @@ const OFF: f64 = 0.5;
 
 /// Corners of tags by their place on the plate, counter-clockwise from the bottom-left.
 type Found = BTreeMap<usize, Quad>;
+/// A side, or why there is none.
+type Measured = std::result::Result<EdgeLine, &'static str>;
+/// Sides of tags by their place on the plate: bottom, right, top, left as printed.
+type Sides = BTreeMap<usize, [Measured; 4]>;
 
 /// Finds the tags of a plate and measures their corners; tags may be out of view or covered.
 ///
@@ -162,40 +167,32 @@ impl Board<'_> {
     }
 
     fn measure(&self, found: &Found, detection: &mut Detection) {
-        let mut sides = BTreeMap::new();
-        for (place, corners) in found {
-            match self.sides(corners) {
-                Ok(four) => drop(sides.insert(*place, four)),
-                Err(reason) => detection.dropped.push(Dropped::point(middle(corners), reason)),
-            }
-        }
-        let grown_px = self.grown(found, &sides);
+        let sides: Sides = found.iter().map(|(place, corners)| (*place, self.sides(corners))).collect();
+        let (grown_px, usual) = (self.grown(found, &sides), Usual::of(sides.values().flatten().flatten()));
         for (place, four) in sides {
             let id = self.number(place);
-            let [bottom, right, top, left] = four.map(|side| side.shrunk(grown_px));
-            let crossings = [(&left, &bottom), (&bottom, &right), (&right, &top), (&top, &left)];
+            let [bottom, right, top, left] = four.map(|side| Ok(usual.undisturbed(side?)?.shrunk(grown_px)));
+            let crossings = [(left, bottom), (bottom, right), (right, top), (top, left)];
             for ((k, (a, b)), start) in (0..).zip(crossings).zip(found[&place]) {
-                match a.crossing(b, start) {
-                    Some((uv, covariance)) => {
+                match crossing(a, b, start) {
+                    Ok((uv, covariance)) => {
                         let (marker, covariance) = (4 * id + k, Some(covariance));
                         detection.observations.push(Observation { marker, edge: Edge::Outer, uv, covariance });
                     }
-                    None => detection.dropped.push(Dropped::point(start, "no crossing of two sides")),
+                    Err(reason) => detection.dropped.push(Dropped::point(start, reason)),
                 }
             }
         }
         detection.observations.sort_by_key(|o| o.marker);
     }
 
-    /// The sides of a tag: bottom, right, top, left as printed.
-    fn sides(&self, corners: &Quad) -> std::result::Result<[EdgeLine; 4], &'static str> {
-        let side = |k: usize| {
+    fn sides(&self, corners: &Quad) -> [Measured; 4] {
+        [0, 1, 2, 3].map(|k: usize| {
             let (from, to) = (corners[k], corners[(k + 1) % 4]);
             let module = distance(from, to) / self.reader.side() as f64;
             let (ink_px, paper_px) = (module * self.reader.border() as f64, module * self.gap().min(2.0));
             EdgeLine::fit(self.picture, &Side { from: to, to: from, ink_px, paper_px })
-        };
-        Ok([side(0)?, side(1)?, side(2)?, side(3)?])
+        })
     }
 
     /// Paper beside a tag, modules.
@@ -205,7 +202,7 @@ impl Board<'_> {
 
     /// How far ink reaches beyond its place, px: where a side of a tag of an AprilGrid ends, the side of a dark square goes on with its
     /// ink on the other side, so that printing and clipping move the two apart by twice that.
-    fn grown(&self, found: &Found, sides: &BTreeMap<usize, [EdgeLine; 4]>) -> f64 {
+    fn grown(&self, found: &Found, sides: &Sides) -> f64 {
         if self.tags.print != TagPrint::Kalibr {
             return 0.0;
         }
@@ -213,7 +210,7 @@ impl Board<'_> {
         let mut grown: Vec<f64> = Vec::new();
         for (place, four) in sides {
             let corners = found[place];
-            for (k, side) in four.iter().enumerate() {
+            for (k, side) in four.iter().enumerate().filter_map(|(k, side)| Some((k, side.as_ref().ok()?))) {
                 for (near, far) in [(corners[k], corners[(k + 1) % 4]), (corners[(k + 1) % 4], corners[k])] {
                     let end = [0, 1].map(|a| near[a] + share * (near[a] - far[a]));
                     let px = 0.5 * share * distance(near, far);
@@ -233,6 +230,11 @@ impl Board<'_> {
             |quad: &Quad| self.reader.read(self.picture, quad, true).is_some_and(|r| self.reader.is_sure(r.wrong));
         PASSES.iter().any(|pass| self.quads(*pass).iter().any(reads))
     }
+}
+
+/// Where two sides cross, with the covariance.
+fn crossing(a: Measured, b: Measured, start: [f64; 2]) -> std::result::Result<([f64; 2], [f64; 3]), &'static str> {
+    a?.crossing(&b?, start).ok_or("no crossing of two sides")
 }
 
 /// From the order as printed to clockwise on the screen.

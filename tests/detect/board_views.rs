@@ -157,6 +157,8 @@ pub struct Tally {
     wrong: usize,
     /// Further from the truth than five of the stated sigmas.
     far: usize,
+    /// Further from the truth than a pixel.
+    off: usize,
     squares: f64,
 }
 
@@ -188,6 +190,7 @@ fn run(text: &str, hard: &str, seeds: std::ops::Range<u64>, kept: Option<&Path>)
             let sigma = o.covariance.map_or(f64::INFINITY, |[uu, _, vv]| (uu + vv).sqrt());
             let off = scene.truth(k).map_or(f64::INFINITY, |p| (Vector2::from(o.uv) - p).norm());
             tally.far += usize::from(off > 5.0 * sigma);
+            tally.off += usize::from(off > 1.0);
             if off > WRONG_PX {
                 tally.wrong += 1;
                 println!("{hard} {seed}: marker {} is off by {off:.1} px", o.marker);
@@ -226,6 +229,40 @@ fn washed_out_corners_are_no_corners() {
     assert!(tally.found > 40 && tally.wrong == 0, "{tally:?}");
 }
 
+/// All views of one kind together.
+fn views(kind: &str, hard: &str, seeds: &[u64]) -> Tally {
+    let text = BOARDS.iter().find(|(name, _)| *name == kind).unwrap().1;
+    let mut all = Tally::default();
+    for seed in seeds {
+        let t = run(text, hard, *seed..seed + 1, None);
+        all.in_view += t.in_view;
+        all.found += t.found;
+        all.wrong += t.wrong;
+        all.far += t.far;
+        all.off += t.off;
+    }
+    println!("{kind} {hard}: {all:?}");
+    all
+}
+
+/// The edge of a shadow along the side of a tag looks like that side, two pixels off.
+#[test]
+fn the_edge_of_a_shadow_is_no_side_of_a_tag() {
+    for (kind, seeds) in [("aprilgrid", [176, 333, 393, 453]), ("aruco-grid", [30, 43, 44, 96])] {
+        let tally = views(kind, "shadow", &seeds);
+        assert_eq!((tally.wrong, tally.off, tally.far), (0, 0, 0), "{kind}: {tally:?}");
+        assert!(tally.share() > 0.8, "{kind}: {tally:?}");
+    }
+}
+
+/// Glare clips the paper beside a tag and changes along its sides by more than a slope.
+#[test]
+fn glare_moves_no_side_of_a_tag_beyond_its_sigmas() {
+    let tally = views("aprilgrid", "glare", &[16, 25, 30, 33]);
+    assert_eq!((tally.wrong, tally.far), (0, 0), "{tally:?}");
+    assert!(tally.share() > 0.8, "{tally:?}");
+}
+
 #[test]
 fn no_board_gets_a_wrong_id() {
     for (kind, text) in BOARDS {
@@ -251,13 +288,13 @@ fn study_of_board_views() {
     let mut wrong = 0;
     let kept = text("KEEP").map(PathBuf::from);
     let mut table = String::from(
-        "| board | view | views | with the board | in view | found | share | wrong | beyond 5 sigma | rms px |\n|---|---|---|---|---|---|---|---|---|---|\n",
+        "| board | view | views | with the board | in view | found | share | wrong | beyond 5 sigma | beyond 1 px | rms px |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for (kind, board) in BOARDS.iter().filter(|(kind, _)| chosen("KINDS", kind)) {
         for hard in HARD.iter().filter(|hard| chosen("HARD", hard)) {
             let t = run(board, hard, first..first + views, kept.as_ref().map(|folder| folder.join(kind)).as_deref());
             let line = format!(
-                "| {kind} | {hard} | {} | {} | {} | {} | {:.2} % | {} | {} | {:.4} |",
+                "| {kind} | {hard} | {} | {} | {} | {} | {:.2} % | {} | {} | {} | {:.4} |",
                 t.views,
                 t.seen,
                 t.in_view,
@@ -265,6 +302,7 @@ fn study_of_board_views() {
                 100.0 * t.share(),
                 t.wrong,
                 t.far,
+                t.off,
                 t.rms()
             );
             println!("{line}");

@@ -92,7 +92,7 @@ fn usual(fits: &[Saddle]) -> Look {
 }
 
 /// The value below which a share of the values lies.
-pub(super) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> Option<f64> {
+pub(in crate::detect) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> Option<f64> {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);
     sorted.get((share * sorted.len() as f64) as usize).copied()

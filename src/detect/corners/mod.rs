@@ -12,7 +12,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) use fit::Window;
 use fit::{Refusal, Saddle};
-use look::{Sight, quantile};
+use look::Sight;
+pub(super) use look::quantile;
 use neighbours::{FAR_REACH, REACH, seed};
 use noise::Correlation;
 use outline::outline;
