@@ -219,24 +219,27 @@ fn what_another_routine_switches_is_not_guessed() {
     ];
     let right = robtarget(&cell, &near, &tool, &base, &confdata(&near));
     let wrong = robtarget(&cell, &q, &tool, &base, &confdata(&flipped));
-    let text = format!(
-        "MODULE m\n{TOOL}{WORK}PROC Init()\n ConfL\\Off;\nENDPROC\nPROC main()\n Init;\n MoveAbsJ {},v1,z1,tGun;\n MoveL {right},v1,z1,tGun\\WObj:=wTable;\n MoveL {wrong},v1,z1,tGun\\WObj:=wTable;\n ConfL\\On;\n MoveL {wrong},v1,z1,tGun\\WObj:=wTable;\nENDPROC\nENDMODULE\n",
-        jointtarget(&q)
-    );
-    let file = cell.write("m.mod", text.as_bytes());
-    let run = cell.compensate(&[&file], &["--unordered"]).expect(1);
-    let (old, new) = (lines(&text, "wTable;"), lines(&run.text("m.mod"), "wTable;"));
-    assert_tool_meets(
-        &cell,
-        &tool,
-        &(base * pose(&old[0])),
-        &(base * pose(&new[0])),
-        &near,
-        1e-6,
-        "both mean the same",
-    );
+    let text = |init: &str| {
+        format!(
+            "MODULE m\n{TOOL}{WORK}PROC Init()\n ConfL\\Off;\nENDPROC\nPROC main()\n {init}\n MoveAbsJ {},v1,z1,tGun;\n MoveL {right},v1,z1,tGun\\WObj:=wTable;\n MoveL {wrong},v1,z1,tGun\\WObj:=wTable;\n ConfL\\On;\n MoveL {wrong},v1,z1,tGun\\WObj:=wTable;\nENDPROC\nENDMODULE\n",
+            jointtarget(&q)
+        )
+    };
+    let poses = |init: &str, code: i32| {
+        let file = cell.write("m.mod", text(init).as_bytes());
+        let run = cell.compensate(&[&file], &["--unordered"]).expect(code);
+        (lines(&text(init), "wTable;"), lines(&run.text("m.mod"), "wTable;"))
+    };
+    let meets = |old: &[f64], new: &[f64], q: &[f64], what: &str| {
+        assert_tool_meets(&cell, &tool, &(base * pose(old)), &(base * pose(new)), q, 1e-6, what);
+    };
+    let (old, new) = poses("IF a Init;", 1);
+    meets(&old[0], &new[0], &near, "both mean the same");
     assert_eq!(old[1], new[1], "the two mean different postures");
-    assert_tool_meets(&cell, &tool, &(base * pose(&old[2])), &(base * pose(&new[2])), &flipped, 1e-6, "switched on");
+    meets(&old[2], &new[2], &flipped, "switched on");
+    let (old, new) = poses("Init;", 0);
+    meets(&old[1], &new[1], &q, "switched off by the routine that is called");
+    meets(&old[2], &new[2], &flipped, "switched on");
 }
 
 /// The pose that `Offs(..)` or `RelTool(..)` in a line means, from the declarations of the text.

@@ -111,8 +111,8 @@ struct Module<'a> {
 
 impl Module<'_> {
     fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
-        (self.active, self.spline) = (Active::unset(), OwnFrames::default());
         self.start_afresh();
+        (self.active, self.spline) = (Active::unset(), OwnFrames::default());
         let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {
             let Some(word) = reader.name() else {

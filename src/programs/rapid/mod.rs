@@ -1,5 +1,6 @@
 //! ABB RAPID: moves to `robtarget` and `jointtarget`, declared or in the instruction, with `tooldata` and `wobjdata` (mm and degrees).
 
+mod flow;
 mod switched;
 mod value;
 
@@ -9,7 +10,7 @@ use std::ops::Range;
 use super::ProgramSetting;
 use super::codes::{Codes, PostureCode};
 use super::field::{Field, FieldPlace};
-use super::flow::{Branching, Flow, Followed, Places, settled};
+use super::flow::{Flow, Followed, Places, settled};
 use super::itinerary::Itinerary;
 use super::program::{
     Approach, DisplacedTarget, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target,
@@ -21,6 +22,7 @@ use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
+use flow::ROUTINES;
 use switched::{DISPLACES, OFFSETS, Switched, Watched, switch};
 use value::{Displacement, NO_AXIS, Node, check, computed, foreign_axis, frame, node, numbers, undeclared};
 
@@ -33,9 +35,6 @@ const TYPES: [&str; 4] = ["ROBTARGET", "JOINTTARGET", "TOOLDATA", "WOBJDATA"];
 const DECIMALS_MM: usize = 4;
 const DECIMALS_DEG: usize = 6;
 const DECIMALS_QUATERNION: usize = 9;
-/// Beginnings and ends of routines, and statements with branches.
-const ROUTINES: [&str; 3] = ["PROC", "FUNC", "TRAP"];
-
 /// Declared data.
 #[derive(Debug, Clone)]
 struct Datum {
@@ -98,13 +97,6 @@ struct Task<'a> {
     /// How it changes.
     flow: Flow<Switched>,
     way: Itinerary,
-}
-
-/// Name of the routine that the reader stands on: `PROC NAME(..)`, `FUNC TYPE NAME(..)`, `TRAP NAME`.
-fn routine_name(reader: &Reader<'_>) -> String {
-    let behind = if reader.name().as_deref() == Some("FUNC") { 2 } else { 1 };
-    let name = reader.ahead(behind).map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase());
-    name.unwrap_or_default()
 }
 
 /// To behind the next semicolon.
@@ -185,59 +177,6 @@ impl Task<'_> {
         }
     }
 
-    /// Routines, branches, program displacements and the check of configurations.
-    fn flow(&mut self, reader: &Reader<'_>, word: &str) {
-        let line_has = |wanted: &[u8]| {
-            let line = (1..).map_while(|k| reader.ahead(k).filter(|t| t.kind != TokenKind::LineEnd));
-            line.into_iter().any(|t| reader.text(t).eq_ignore_ascii_case(wanted))
-        };
-        if let Some((which, state)) = switch(reader) {
-            self.now.watched[which].set(state);
-        }
-        match word {
-            w if ROUTINES.contains(&w) => {
-                self.way.start_afresh();
-                let state = |off: bool| if off { Watched::Unknown } else { Watched::On };
-                let is_called = !line_has(b"main");
-                let uncalled =
-                    Switched::new(self.switched_off.map(state), self.displaces && is_called, self.offsets && is_called);
-                self.flow.all_end(&mut self.now);
-                self.flow.routine_begins(routine_name(reader), &mut self.now, &uncalled);
-            }
-            "ENDPROC" | "ENDFUNC" | "ENDTRAP" => self.flow.routine_ends(&mut self.now),
-            // Without THEN it is a statement of one line.
-            "IF" if line_has(b"THEN") => self.begin(Branching::If),
-            "TEST" => self.begin(Branching::Cases),
-            "WHILE" | "FOR" => self.begin(Branching::Loop),
-            "ELSE" | "ELSEIF" | "CASE" | "DEFAULT" => {
-                self.way.next_branch();
-                self.flow.next(&mut self.now, matches!(word, "ELSE" | "DEFAULT"));
-            }
-            "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => {
-                self.way.branches_end();
-                self.flow.end(&mut self.now);
-            }
-            _ => self.step(word),
-        }
-    }
-
-    /// A statement without branches.
-    fn step(&mut self, word: &str) {
-        match word {
-            "RETURN" => self.flow.returns(&self.now),
-            w if DISPLACES.contains(&w) => self.now.displaced.set(true),
-            w if OFFSETS.contains(&w) => self.now.offset.set(true),
-            "PDISPOFF" => self.now.displaced.set(false),
-            "EOFFSOFF" => self.now.offset.set(false),
-            _ => self.flow.call(word.to_owned(), &mut self.now),
-        }
-    }
-
-    fn begin(&mut self, kind: Branching) {
-        self.way.branches_begin();
-        self.flow.begin(&mut self.now, kind);
-    }
-
     fn moves(&mut self, mut reader: Reader<'_>) -> Result<()> {
         while !reader.done() {
             let Some(word) = reader.name() else {
@@ -253,8 +192,8 @@ impl Task<'_> {
                 self.instruction(&mut reader)?;
                 skip_statement(&mut reader);
             } else {
-                if begins || word == "PROC" || word == "FUNC" || word == "TRAP" {
-                    self.flow(&reader, &word);
+                if begins || ROUTINES.contains(&word.as_str()) {
+                    reader.at += self.flow(&reader, &word);
                 } else {
                     // Behind the condition of a statement of one line: it may take place.
                     let before = self.now.clone();
