@@ -2,7 +2,7 @@
 
 use super::Task;
 use super::switched::{DISPLACES, OFFSETS, Switched, Watched, switch};
-use crate::programs::flow::Branching;
+use crate::programs::flow::{Branching, Followed};
 use crate::programs::scan::{Reader, TokenKind};
 
 /// Beginnings of routines.
@@ -37,6 +37,8 @@ impl Task<'_> {
                 self.flow.all_end(&mut self.now);
                 let (behind, name) = routine_name(reader);
                 self.flow.routine_begins(name, &mut self.now, &uncalled);
+                // Modules that are not given may call it, too.
+                self.now = self.now.merged(&uncalled, "");
                 return behind;
             }
             "ENDPROC" | "ENDFUNC" | "ENDTRAP" => self.flow.routine_ends(&mut self.now),
