@@ -1,7 +1,7 @@
 //! ABB RAPID: moves to `robtarget` and `jointtarget`, declared or in the instruction, with `tooldata` and `wobjdata` (mm and degrees).
 
-mod flow;
 mod switched;
+mod switching;
 mod value;
 
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::ProgramSetting;
 use super::codes::{Codes, PostureCode};
 use super::field::{Field, FieldPlace};
-use super::flow::{Flow, Followed, Places, settled};
+use super::flow::{Places, settled};
 use super::itinerary::Itinerary;
 use super::program::{
     Approach, DisplacedTarget, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target,
@@ -22,8 +22,8 @@ use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
-use flow::ROUTINES;
-use switched::{DISPLACES, OFFSETS, Switched, Watched, switch};
+use switched::{Switched, Watched};
+use switching::{ROUTINES, Switching};
 use value::{Displacement, NO_AXIS, Node, check, computed, foreign_axis, frame, node, numbers, undeclared};
 
 const DIALECT: Dialect = Dialect { comment: b'!', quotes: b"\"", header: None, based_numbers: false };
@@ -61,24 +61,20 @@ fn reading(
         setting,
         data: BTreeMap::new(),
         bases: BTreeMap::new(),
-        switched_off: [false; 2],
-        displaces: false,
-        offsets: false,
-        now: Switched::new([Watched::On; 2], false, false),
-        flow: Flow::new(known),
+        switching: Switching::new(known),
         way: Itinerary::new(),
     };
     for (index, file) in files.iter().enumerate() {
         task.declarations(Reader::new(file, index, DIALECT)?)?;
-        task.switches(Reader::new(file, index, DIALECT)?);
+        task.switching.look_through(Reader::new(file, index, DIALECT)?);
     }
     for (index, file) in files.iter().enumerate() {
         task.way.start_afresh();
         task.moves(Reader::new(file, index, DIALECT)?)?;
-        task.flow.all_end(&mut task.now);
+        task.switching.all_end();
     }
     task.unvisited()?;
-    Ok((task.way.program, task.flow.found()))
+    Ok((task.way.program, task.switching.found()))
 }
 
 struct Task<'a> {
@@ -86,16 +82,8 @@ struct Task<'a> {
     data: BTreeMap<String, Datum>,
     /// Points from which displaced ones start: how they would be visited.
     bases: BTreeMap<String, Target>,
-    /// True where a routine switches the check of configurations off: for moves of the joints, and on paths.
-    switched_off: [bool; 2],
-    /// True where a routine begins a program displacement, which holds in those that it calls.
-    displaces: bool,
-    /// The same of an offset of external axes.
-    offsets: bool,
-    /// What is switched where the text stands.
-    now: Switched,
-    /// How it changes.
-    flow: Flow<Switched>,
+    /// What instructions switch for those behind them.
+    switching: Switching,
     way: Itinerary,
 }
 
@@ -163,20 +151,6 @@ impl Task<'_> {
         Ok(())
     }
 
-    /// Which checks of configurations are switched off anywhere, and whether a displacement is begun.
-    fn switches(&mut self, mut reader: Reader<'_>) {
-        while !reader.done() {
-            if let Some((which, Watched::Off)) = switch(&reader) {
-                self.switched_off[which] = true;
-            }
-            let name = reader.name();
-            let is_of = |all: [&str; 2]| name.as_ref().is_some_and(|word| all.contains(&word.as_str()));
-            self.displaces |= is_of(DISPLACES);
-            self.offsets |= is_of(OFFSETS);
-            reader.at += 1;
-        }
-    }
-
     fn moves(&mut self, mut reader: Reader<'_>) -> Result<()> {
         while !reader.done() {
             let Some(word) = reader.name() else {
@@ -192,15 +166,10 @@ impl Task<'_> {
                 self.instruction(&mut reader)?;
                 skip_statement(&mut reader);
             } else {
-                if begins || ROUTINES.contains(&word.as_str()) {
-                    reader.at += self.flow(&reader, &word);
-                } else {
-                    // Behind the condition of a statement of one line: it may take place.
-                    let before = self.now.clone();
-                    self.step(&word);
-                    self.now = self.now.merged(&before, "");
-                }
-                reader.at += 1;
+                reader.at += match begins || ROUTINES.contains(&word.as_str()) {
+                    true => self.switching.statement(&reader, &word, &mut self.way),
+                    false => self.switching.behind_condition(&word),
+                };
             }
         }
         Ok(())
@@ -331,7 +300,7 @@ impl Task<'_> {
         let upper = name.to_ascii_uppercase();
         let of_joints = upper.starts_with("MOVEJ") || upper.starts_with("TRIGGJ") || upper.ends_with('J');
         let near = if upper.starts_with("MOVEL") { MeantPosture::Along } else { MeantPosture::Nearest };
-        pose.posture = match (self.now.watched[usize::from(!of_joints)].value, pose.posture) {
+        pose.posture = match (self.switching.now().watched[usize::from(!of_joints)].value, pose.posture) {
             (Watched::Off, _) => near,
             (Watched::Unknown, MeantPosture::Coded(codes, axes)) => MeantPosture::Either(codes, axes),
             (_, posture) => posture,
@@ -410,7 +379,7 @@ impl Task<'_> {
         if parts.len() == 2 {
             return Ok(TargetKind::Joints(self.joints(&parts[0], &external, file)?));
         }
-        if self.now.displaced.value {
+        if self.switching.now().displaced.value {
             let words = "a program displacement (PDispOn, PDispSet) may be active";
             return Err(Why::new(LeftReason::FrameUnknown, words));
         }
@@ -437,7 +406,7 @@ impl Task<'_> {
             return Err(Why::external(&axis, value));
         }
         let has_external = external.iter().any(|(value, _)| *value < NO_AXIS);
-        if self.now.offset.value && has_external && !self.setting.axes_apart {
+        if self.switching.now().offset.value && has_external && !self.setting.axes_apart {
             let words = "an offset of external axes (EOffsOn, EOffsSet) may be active";
             return Err(Why::new(LeftReason::ExternalAxis, words));
         }

@@ -1,0 +1,131 @@
+//! What instructions of RAPID switch for all behind them, followed through routines, branches and loops.
+
+use super::switched::{DISPLACES, OFFSETS, Switched, Watched, switch};
+use crate::programs::flow::{Branching, Flow, Followed, Places};
+use crate::programs::itinerary::Itinerary;
+use crate::programs::scan::{Reader, TokenKind};
+
+/// Beginnings of routines.
+pub(super) const ROUTINES: [&str; 3] = ["PROC", "FUNC", "TRAP"];
+
+/// Name of the routine that the reader stands on, and its place behind the first word: `PROC NAME(..)`, `FUNC TYPE NAME(..)`, `TRAP NAME`.
+fn routine_name(reader: &Reader<'_>) -> (usize, String) {
+    let behind = if reader.name().as_deref() == Some("FUNC") { 2 } else { 1 };
+    let name = reader.ahead(behind).map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase());
+    (behind as usize, name.unwrap_or_default())
+}
+
+/// What instructions switch, where the text stands.
+pub(super) struct Switching {
+    /// True where a routine switches the check of configurations off: for moves of the joints, and on paths.
+    switched_off: [bool; 2],
+    /// True where a routine begins a program displacement, which holds in those that it calls.
+    displaces: bool,
+    /// The same of an offset of external axes.
+    offsets: bool,
+    now: Switched,
+    flow: Flow<Switched>,
+}
+
+impl Switching {
+    /// With what the reading before found.
+    pub fn new(known: Places<Switched>) -> Self {
+        let now = Switched::new([Watched::On; 2], false, false);
+        Self { switched_off: [false; 2], displaces: false, offsets: false, now, flow: Flow::new(known) }
+    }
+
+    /// What holds here.
+    pub fn now(&self) -> &Switched {
+        &self.now
+    }
+
+    /// What this reading found.
+    pub fn found(self) -> Places<Switched> {
+        self.flow.found()
+    }
+
+    /// A text ends.
+    pub fn all_end(&mut self) {
+        self.flow.all_end(&mut self.now);
+    }
+
+    /// Which checks of configurations are switched off anywhere in a text, and whether a displacement is begun.
+    pub fn look_through(&mut self, mut reader: Reader<'_>) {
+        while !reader.done() {
+            if let Some((which, Watched::Off)) = switch(&reader) {
+                self.switched_off[which] = true;
+            }
+            let name = reader.name();
+            let is_of = |all: [&str; 2]| name.as_ref().is_some_and(|word| all.contains(&word.as_str()));
+            self.displaces |= is_of(DISPLACES);
+            self.offsets |= is_of(OFFSETS);
+            reader.at += 1;
+        }
+    }
+
+    /// A statement that begins with a word; returns how many words of it were read.
+    pub fn statement(&mut self, reader: &Reader<'_>, word: &str, way: &mut Itinerary) -> usize {
+        let line_has = |wanted: &[u8]| {
+            let line = (1..).map_while(|k| reader.ahead(k).filter(|t| t.kind != TokenKind::LineEnd));
+            line.into_iter().any(|t| reader.text(t).eq_ignore_ascii_case(wanted))
+        };
+        if let Some((which, state)) = switch(reader) {
+            self.now.watched[which].set(state);
+        }
+        match word {
+            w if ROUTINES.contains(&w) => {
+                way.start_afresh();
+                let state = |off: bool| if off { Watched::Unknown } else { Watched::On };
+                let is_called = !line_has(b"main");
+                let uncalled =
+                    Switched::new(self.switched_off.map(state), self.displaces && is_called, self.offsets && is_called);
+                self.flow.all_end(&mut self.now);
+                let (behind, name) = routine_name(reader);
+                self.flow.routine_begins(name, &mut self.now, &uncalled);
+                // Modules that are not given may call it, too.
+                self.now = self.now.merged(&uncalled, "");
+                return 1 + behind;
+            }
+            "ENDPROC" | "ENDFUNC" | "ENDTRAP" => self.flow.routine_ends(&mut self.now),
+            // Without THEN it is a statement of one line.
+            "IF" if line_has(b"THEN") => self.begin(Branching::If, way),
+            "TEST" => self.begin(Branching::Cases, way),
+            "WHILE" | "FOR" => self.begin(Branching::Loop, way),
+            "ELSE" | "ELSEIF" | "CASE" | "DEFAULT" => {
+                way.next_branch();
+                self.flow.next(&mut self.now, matches!(word, "ELSE" | "DEFAULT"));
+            }
+            "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => {
+                way.branches_end();
+                self.flow.end(&mut self.now);
+            }
+            _ => self.step(word),
+        }
+        1
+    }
+
+    /// A word behind the condition of a statement of one line: it may take place; returns how many were read.
+    pub fn behind_condition(&mut self, word: &str) -> usize {
+        let before = self.now.clone();
+        self.step(word);
+        self.now = self.now.merged(&before, "");
+        1
+    }
+
+    /// A statement without branches.
+    fn step(&mut self, word: &str) {
+        match word {
+            "RETURN" => self.flow.returns(&self.now),
+            w if DISPLACES.contains(&w) => self.now.displaced.set(true),
+            w if OFFSETS.contains(&w) => self.now.offset.set(true),
+            "PDISPOFF" => self.now.displaced.set(false),
+            "EOFFSOFF" => self.now.offset.set(false),
+            _ => self.flow.call(word.to_owned(), &mut self.now),
+        }
+    }
+
+    fn begin(&mut self, kind: Branching, way: &mut Itinerary) {
+        way.branches_begin();
+        self.flow.begin(&mut self.now, kind);
+    }
+}
