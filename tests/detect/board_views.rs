@@ -263,6 +263,14 @@ fn glare_moves_no_side_of_a_tag_beyond_its_sigmas() {
     assert!(tally.share() > 0.8, "{tally:?}");
 }
 
+/// Dots beside glare: where it clips the paper their centres move away from it, and at its rim the ink has the gradient of the paper.
+#[test]
+fn glare_moves_no_dot_beyond_its_sigmas() {
+    let tally = views("circle-grid", "glare", &[0, 1, 7, 8]);
+    assert_eq!((tally.wrong, tally.far), (0, 0), "{tally:?}");
+    assert!(tally.share() > 0.7, "{tally:?}");
+}
+
 #[test]
 fn no_board_gets_a_wrong_id() {
     for (kind, text) in BOARDS {

@@ -13,6 +13,7 @@ use std::collections::BTreeSet;
 
 use super::candidate::Candidate;
 use super::code::MarkerCode;
+use super::glare::leave_out_glare;
 use super::grid_dots::{Dot, Dots};
 use super::grid_missing::missing_dots;
 use super::grid_place::{Classes, Laid, place};
@@ -50,7 +51,8 @@ pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Resul
         if !spoilt(&best) {
             break;
         }
-        let (found, other) = grid.look(&smoothed(picture, sigma_px), options)?;
+        let (mut found, other) = grid.look(&smoothed(picture, sigma_px), options)?;
+        leave_out_glare(&mut found, picture.full_scale);
         if found.found.len() > best.found.len() {
             (best, facts) = (as_before(found, sigma_px), other);
         }

@@ -19,6 +19,7 @@ mod ellipse;
 mod exact_edge;
 mod flat_zone;
 mod gauss;
+mod glare;
 mod grid;
 mod grid_dots;
 mod grid_missing;

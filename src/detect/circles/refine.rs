@@ -56,6 +56,13 @@ pub(super) struct Fit {
 }
 
 impl Fit {
+    /// The light over ink and paper has the same gradient in counts: what the ink has beyond its share of the paper's is then, over the
+    /// contrast, what the paper has over its own brightness.
+    fn is_in_glare(&self) -> bool {
+        let (ink, paper) = (self.ink_slope.0, self.measured.gradient);
+        (ink[0] - paper[0]).hypot(ink[1] - paper[1]) < ADDED * paper[0].hypot(paper[1])
+    }
+
     /// Standard deviation of the distance of inner and outer centre, px (the larger of both axes); infinite where the
     /// inner circle is not measured for itself.
     pub fn apart_sigma(&self) -> f64 {
@@ -83,10 +90,27 @@ pub(super) const WHOLE: f64 = 0.98;
 const THIRD_PART: f64 = 0.25;
 const ITERATIONS: usize = 14;
 /// A pixel at this part of the range or above counts as saturated.
-const SATURATED: f32 = 0.995;
+pub(super) const SATURATED: f32 = 0.995;
 
-/// Measures one marker. The work arrays `pixels` are reused from call to call.
+/// A gradient of the ink that exceeds its prior sigma by this factor may be that of glare ...
+const STRAINED: f64 = 5.0;
+/// ... which is steep: glare of full scale and 40 px changes by this part of the contrast per px.
+const GLARE_SLOPE: f64 = 0.02;
+/// Glare adds the same to ink and paper; their gradients agree to this part.
+const ADDED: f64 = 0.5;
+
+/// Measures one marker, once more where glare lights the ink. The work arrays `pixels` are reused from call to call.
 pub(super) fn refine(picture: &Picture, start: &Start, pixels: &mut Pixels) -> Result<Fit, Reason> {
+    let fit = measure(picture, start, pixels)?;
+    let [x, y] = fit.ink_slope.0;
+    if x.hypot(y) <= STRAINED * start.ink_slope {
+        return Ok(fit);
+    }
+    let free = measure(picture, &Start { ink_slope: GLARE_SLOPE, ..*start }, pixels);
+    Ok(free.ok().filter(Fit::is_in_glare).unwrap_or(fit))
+}
+
+fn measure(picture: &Picture, start: &Start, pixels: &mut Pixels) -> Result<Fit, Reason> {
     let anchor = start.ellipse.centre.map(f64::round);
     let first = once(picture, start, anchor, pixels)?;
     let slack = SLACK * first.0.blur;
