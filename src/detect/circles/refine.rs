@@ -56,13 +56,6 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// The light over ink and paper has the same gradient in counts: what the ink has beyond its share of the paper's is then, over the
-    /// contrast, what the paper has over its own brightness.
-    fn is_in_glare(&self) -> bool {
-        let (ink, paper) = (self.ink_slope.0, self.measured.gradient);
-        (ink[0] - paper[0]).hypot(ink[1] - paper[1]) < ADDED * paper[0].hypot(paper[1])
-    }
-
     /// Standard deviation of the distance of inner and outer centre, px (the larger of both axes); infinite where the
     /// inner circle is not measured for itself.
     pub fn apart_sigma(&self) -> f64 {
@@ -107,7 +100,11 @@ pub(super) fn refine(picture: &Picture, start: &Start, pixels: &mut Pixels) -> R
         return Ok(fit);
     }
     let free = measure(picture, &Start { ink_slope: GLARE_SLOPE, ..*start }, pixels);
-    Ok(free.ok().filter(Fit::is_in_glare).unwrap_or(fit))
+    // What the ink has beyond its share of the paper's is then, over the contrast, what the paper has over its own brightness.
+    let is_in_glare = |Fit { ink_slope: ([x, y], _), measured: Measured { gradient: [u, v], .. }, .. }: &Fit| {
+        (x - u).hypot(y - v) < ADDED * u.hypot(*v)
+    };
+    Ok(free.ok().filter(is_in_glare).unwrap_or(fit))
 }
 
 fn measure(picture: &Picture, start: &Start, pixels: &mut Pixels) -> Result<Fit, Reason> {
