@@ -103,14 +103,21 @@ impl<T: Followed> Places<T> {
 /// Those of a reading.
 pub(super) fn settled<T: Followed, R>(read: impl Fn(Places<T>) -> Result<(R, Places<T>)>) -> Result<R> {
     let mut known = Places::default();
-    for reading in 0.. {
+    for _ in 0..MOST_READINGS {
         let (said, found) = read(known.clone())?;
         if found == known {
             return Ok(said);
         }
-        known = if reading < MOST_READINGS { found } else { found.merged(&known) };
+        known = found;
     }
-    read(known).map(|(said, _)| said)
+    loop {
+        let (said, found) = read(known.clone())?;
+        let either = found.merged(&known);
+        if either == known {
+            return Ok(said);
+        }
+        known = either;
+    }
 }
 
 /// A reading under way.
