@@ -39,6 +39,11 @@ impl<V: Clone + PartialEq> Held<V> {
         Self { value, is_set: self.is_set || other.is_set }
     }
 
+    /// The same at the top of a routine.
+    pub fn at_top(&self) -> Self {
+        Self::new(self.value.clone())
+    }
+
     /// Behind a call of a routine that ended with `end`.
     pub fn behind_call(&self, end: &Self) -> Self {
         if end.is_set { end.clone() } else { self.clone() }
@@ -53,6 +58,21 @@ pub(super) trait Followed: Clone + PartialEq {
     fn at_top(&self) -> Self;
     /// What a caller has behind a call of a routine that ended with `end`.
     fn behind_call(&self, end: &Self) -> Self;
+}
+
+/// One thing alone, `None` where it is not known.
+impl<V: Clone + PartialEq> Followed for Held<Option<V>> {
+    fn merged(&self, other: &Self, _: &str) -> Self {
+        Held::merged(self, other, |_, _| None)
+    }
+
+    fn at_top(&self) -> Self {
+        Held::at_top(self)
+    }
+
+    fn behind_call(&self, end: &Self) -> Self {
+        Held::behind_call(self, end)
+    }
 }
 
 /// Kinds of statements with branches.
@@ -102,21 +122,15 @@ impl<T: Followed> Places<T> {
 /// # Errors
 /// Those of a reading.
 pub(super) fn settled<T: Followed, R>(read: impl Fn(Places<T>) -> Result<(R, Places<T>)>) -> Result<R> {
-    let mut known = Places::default();
-    for _ in 0..MOST_READINGS {
-        let (said, found) = read(known.clone())?;
-        if found == known {
-            return Ok(said);
-        }
-        known = found;
-    }
+    let (mut known, mut readings) = (Places::default(), 0);
     loop {
         let (said, found) = read(known.clone())?;
-        let either = found.merged(&known);
-        if either == known {
+        let next = if readings < MOST_READINGS { found } else { found.merged(&known) };
+        if next == known {
             return Ok(said);
         }
-        known = either;
+        known = next;
+        readings += 1;
     }
 }
 
@@ -248,20 +262,6 @@ mod tests {
     use super::*;
 
     type Tool = Held<Option<u8>>;
-
-    impl Followed for Tool {
-        fn merged(&self, other: &Self, _: &str) -> Self {
-            Held::merged(self, other, |_, _| None)
-        }
-
-        fn at_top(&self) -> Self {
-            Self::new(self.value)
-        }
-
-        fn behind_call(&self, end: &Self) -> Self {
-            Held::behind_call(self, end)
-        }
-    }
 
     /// Behind a statement whose branches leave these tools, begun with tool 0.
     fn behind(branches: &[u8], has_else: bool) -> Option<u8> {

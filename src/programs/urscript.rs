@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::ProgramSetting;
 use super::field::{Field, FieldPlace};
-use super::flow::{Branching, Flow, Followed, Held, Places, settled};
+use super::flow::{Branching, Flow, Held, Places, settled};
 use super::itinerary::Itinerary;
 use super::program::{
     Approach, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind, Understood,
@@ -106,20 +106,6 @@ fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Tool>
 
 /// The active tool; `None` where it is not known.
 type Tool = Held<Option<Pose>>;
-
-impl Followed for Tool {
-    fn merged(&self, other: &Self, _: &str) -> Self {
-        Held::merged(self, other, |_, _| None)
-    }
-
-    fn at_top(&self) -> Self {
-        Self::new(self.value)
-    }
-
-    fn behind_call(&self, end: &Self) -> Self {
-        Held::behind_call(self, end)
-    }
-}
 
 struct Script<'a> {
     reader: Reader<'a>,

@@ -62,11 +62,7 @@ impl Followed for Active {
     }
 
     fn at_top(&self) -> Self {
-        Self {
-            tool: Held::new(self.tool.value.clone()),
-            base: Held::new(self.base.value.clone()),
-            tool_in_room: Held::new(self.tool_in_room.value),
-        }
+        Self { tool: self.tool.at_top(), base: self.base.at_top(), tool_in_room: self.tool_in_room.at_top() }
     }
 
     fn behind_call(&self, end: &Self) -> Self {

@@ -448,8 +448,7 @@ impl Module<'_> {
     /// Routines that a line calls, which may set frames; the reader stands at its beginning.
     fn calls(&mut self, reader: &Reader<'_>) {
         // What BAS sets stands in its arguments.
-        let is_none = ["BAS", "EXT", "EXTFCT"].map(str::to_owned);
-        if routine_name(reader).is_some() || reader.name().is_some_and(|word| is_none.contains(&word)) {
+        if routine_name(reader).is_some() || matches!(reader.name().as_deref(), Some("BAS" | "EXT" | "EXTFCT")) {
             return;
         }
         let line = (0..).map_while(|k| Some((k, reader.ahead(k).filter(|t| t.kind != TokenKind::LineEnd)?)));

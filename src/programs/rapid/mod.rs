@@ -35,6 +35,7 @@ const TYPES: [&str; 4] = ["ROBTARGET", "JOINTTARGET", "TOOLDATA", "WOBJDATA"];
 const DECIMALS_MM: usize = 4;
 const DECIMALS_DEG: usize = 6;
 const DECIMALS_QUATERNION: usize = 9;
+
 /// Declared data.
 #[derive(Debug, Clone)]
 struct Datum {
@@ -166,9 +167,11 @@ impl Task<'_> {
                 self.instruction(&mut reader)?;
                 skip_statement(&mut reader);
             } else {
-                reader.at += match begins || ROUTINES.contains(&word.as_str()) {
-                    true => self.switching.statement(&reader, &word, &mut self.way),
-                    false => self.switching.behind_condition(&word),
+                reader.at += if begins || ROUTINES.contains(&word.as_str()) {
+                    self.switching.statement(&reader, &word, &mut self.way)
+                } else {
+                    self.switching.behind_condition(&word);
+                    1
                 };
             }
         }

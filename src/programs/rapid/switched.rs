@@ -46,7 +46,11 @@ impl Followed for Switched {
     }
 
     fn at_top(&self) -> Self {
-        Self::new([0, 1].map(|k| self.watched[k].value), self.displaced.value, self.offset.value)
+        Self {
+            watched: [0, 1].map(|k| self.watched[k].at_top()),
+            displaced: self.displaced.at_top(),
+            offset: self.offset.at_top(),
+        }
     }
 
     fn behind_call(&self, end: &Self) -> Self {

@@ -104,12 +104,11 @@ impl Switching {
         1
     }
 
-    /// A word behind the condition of a statement of one line: it may take place; returns how many were read.
-    pub fn behind_condition(&mut self, word: &str) -> usize {
+    /// A word behind the condition of a statement of one line: it may take place.
+    pub fn behind_condition(&mut self, word: &str) {
         let before = self.now.clone();
         self.step(word);
         self.now = self.now.merged(&before, "");
-        1
     }
 
     /// A statement without branches.
