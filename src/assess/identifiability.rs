@@ -312,6 +312,9 @@ fn correlations(
         let remedy = match (camera(&all[first]), camera(&all[second])) {
             (true, true) => "fill the whole image, tilt by 20 to 45 degrees, and vary the distance".to_owned(),
             _ if v.norm() > 0.0 => adviser.in_words(Some(&v)),
+            _ if [first, second].iter().any(|&k| MEASURED_FRAMES.iter().any(|kind| all[k].starts_with(kind))) => {
+                "measure at stops with the tip turned to more different directions".to_owned()
+            }
             _ => "roll the camera about its axis at some stops, tilt by 20 to 45 degrees, and vary the distance"
                 .to_owned(),
         };
@@ -319,6 +322,9 @@ fn correlations(
     };
     pairs.into_iter().map(in_words).collect()
 }
+
+/// Beginnings of the names of frames of instruments and bodies, which no camera sees.
+const MEASURED_FRAMES: [&str; 4] = ["tracker.", "contact.", "places.", "body."];
 
 /// Poses of two plates, or of two mountings: all hang on the same robot, which makes them move together.
 fn share_a_frame(a: &str, b: &str) -> bool {

@@ -1,6 +1,7 @@
 //! How far a result can be trusted: hold-out, identifiability, points of another device.
 
 mod advice;
+mod alone;
 mod clustered;
 mod flange;
 mod hold_out;
@@ -22,6 +23,7 @@ mod truth;
 mod uncertainty;
 
 pub use advice::Advice;
+pub use alone::urdf_alone;
 pub use clustered::{Clustered, RootInformation, StopInformation, clustered_covariance};
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
 pub use hold_out::{

@@ -39,7 +39,7 @@ pub fn restraint(fit: &Fit, limits: &Limits) -> Option<Restraint> {
     let repeats = Repeats::of(fit).filter(|r| r.deviate > limits.pattern_sigmas)?;
     let (robot, layout, stops) = (&fit.state.robot, &fit.problem.layout, stops(&fit.problem));
     let model = FlangeModel::new(robot, layout, still(fit)?, &fit.covariance.reduced, &stops, limits)?;
-    let flange = FlangeErrors::new(&model, robot, &usual_joint_sigma(&on_robot_sigmas(&fit.problem)), &stops)?;
+    let flange = FlangeErrors::new(&model, (robot, None), &usual_joint_sigma(&on_robot_sigmas(&fit.problem)), &stops)?;
     extrapolation_m(&model.workspace(), flange.nominal_m, limits)?;
     let exported = robot.without_local_errors();
     let displacement_m = nominal_laid_over(&exported, &stops)?.rms_m;

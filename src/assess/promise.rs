@@ -19,8 +19,11 @@ use crate::model::robot::{Posture, Robot};
 pub struct FlangeErrors {
     /// Of the nominal robot.
     pub nominal_m: f64,
-    /// Of the corrected origins with the joint offsets alone: what a URDF holds.
+    /// Of the corrected origins with the joint offsets alone: the corrected URDF without its compensation.toml.
     pub urdf_m: f64,
+    /// Of the origins that do best by themselves; none where nothing beside origins and offsets was found, and in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alone_m: Option<f64>,
     /// Of the whole model: with what compensation.toml holds, too.
     pub model_m: f64,
     /// The part of each of them that no model removes: joint noise and local errors of a stop.
@@ -35,20 +38,36 @@ pub struct FlangeErrors {
 pub struct FlangeIntervals {
     /// Of the nominal robot.
     pub nominal_m: [f64; 2],
-    /// Of the corrected URDF alone.
+    /// Of the corrected URDF without its compensation.toml.
     pub urdf_m: [f64; 2],
+    /// Of the origins that do best by themselves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alone_m: Option<[f64; 2]>,
     /// Of the whole model.
     pub model_m: [f64; 2],
 }
 
 impl FlangeErrors {
-    /// `joint_sigma` is that of the readings at a stop, rad or m; `None` where the nominal robot cannot be laid over the model.
-    pub fn new(model: &FlangeModel, robot: &Robot, joint_sigma: &[f64], stops: &[Posture]) -> Option<Self> {
+    /// Of the best URDF without compensation.toml, with its 95 % interval, m.
+    pub fn best_urdf_m(&self) -> (f64, Option<[f64; 2]>) {
+        let interval = self.intervals.map(|i| i.alone_m.unwrap_or(i.urdf_m));
+        (self.alone_m.unwrap_or(self.urdf_m), interval)
+    }
+
+    /// `alone` has the origins that do best by themselves ([`urdf_alone`](super::urdf_alone)). `joint_sigma` is that of the readings at a stop, rad
+    /// or m; `None` where the nominal robot cannot be laid over the model.
+    pub fn new(
+        model: &FlangeModel,
+        (robot, alone): (&Robot, Option<&Robot>),
+        joint_sigma: &[f64],
+        stops: &[Posture],
+    ) -> Option<Self> {
         let samples = model.region();
         // Local errors belong to single readings of the series: at others they are noise.
         let whole = with(robot, |t| !matches!(t, Term::Local(_)));
         let nominal = nominal_laid_over(&whole, &samples)?;
         let lacking = displacements(&whole, &with(robot, |t| t == Term::Offset), &samples, stops);
+        let alone_lacks = alone.map(|alone| displacements(&whole, alone, &samples, stops));
         let scatter_m = scatter_m(&whole, joint_sigma, &samples);
         let model_m = model.sigma_m(&samples).hypot(scatter_m);
         let in_flange = |k: usize| exact(&whole, &samples[k]).rotation.transpose() * nominal.residuals_m[k];
@@ -58,11 +77,13 @@ impl FlangeErrors {
         Some(Self {
             nominal_m: model_m.hypot(nominal.rms_m),
             urdf_m: model_m.hypot(rms(&lacking)),
+            alone_m: alone_lacks.as_ref().map(|lacking| model_m.hypot(rms(lacking))),
             model_m,
             scatter_m,
             intervals: Some(FlangeIntervals {
                 nominal_m: interval(&in_flange),
                 urdf_m: interval(&|k| -lacking[k]),
+                alone_m: alone_lacks.as_ref().map(|lacking| interval(&|k| -lacking[k])),
                 model_m: interval(&|_| Vector3::zeros()),
             }),
         })

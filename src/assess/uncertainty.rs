@@ -4,10 +4,10 @@ use nalgebra::DMatrix;
 
 use crate::assess::{
     FlangeErrors, FlangeModel, Identifiability, Limits, WorkspacePoint, clustered_covariance, identifiability,
-    usual_joint_sigma,
+    urdf_alone, usual_joint_sigma,
 };
 use crate::geom::Pose;
-use crate::model::robot::Posture;
+use crate::model::robot::{Posture, Robot};
 use crate::problem::{Adjustment, Noise, Problem};
 use crate::series::CameraMount;
 use crate::solve::{Covariance, Fit, JOINT_NOISE_FLOOR, NoiseInformation, NoiseUncertainty, noise_information};
@@ -34,6 +34,8 @@ pub struct Uncertainty {
     pub noise_information: Option<NoiseInformation>,
     /// Expected error of the flange where the stops were, before and after; none without stops.
     pub flange: Option<FlangeErrors>,
+    /// The origins that do best by themselves; none without stops, or where nothing beside origins and offsets was found.
+    pub alone: Option<Robot>,
     /// Workspace map; empty where plate (or fixed camera) and robot are not tied.
     pub workspace: Vec<WorkspacePoint>,
 }
@@ -102,7 +104,9 @@ pub fn judge(
     }
     let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops, limits));
     let noise = usual_joint_sigma(&on_robot_sigmas(problem));
-    let promise = |m: &FlangeModel| FlangeErrors::new(m, &state.robot, &noise, &stops);
+    found.alone = model.as_ref().and_then(|m| urdf_alone(&state.robot, layout, &m.region()));
+    let robots = (&state.robot, found.alone.as_ref());
+    let promise = |m: &FlangeModel| FlangeErrors::new(m, robots, &noise, &stops);
     found.flange = model.as_ref().and_then(promise);
     found.workspace = model.map(|m| m.workspace()).unwrap_or_default();
     found

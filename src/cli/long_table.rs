@@ -70,6 +70,11 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         let images = || r.images.iter().filter(|i| i.series == one.name);
         let used = || images().filter(|i| i.reason.is_none());
         let observations: usize = used().map(|i| i.observations.reason.iter().filter(|o| o.is_none()).count()).sum();
+        if images().next().is_none() {
+            let of_series = r.bodies.stops.iter().filter(|s| s.series == one.name).count();
+            writeln!(out, "series    {}: no images; {of_series} stops", one.name)?;
+            continue;
+        }
         writeln!(
             out,
             "series    {}: {} of {} images used, {observations} markers observed, {}x{} px",
@@ -94,11 +99,13 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         r.starts.iter().filter(|v| v.won).map(|v| format!("{}: {} ({})", v.of, v.origin, v.reached)),
     )?;
     cameras(out, r)?;
-    writeln!(
-        out,
-        "alone     {:.3} px RMS per point with a stand-alone camera pose for every image, over {} observations",
-        r.statistics.free_pose_rms_px, r.statistics.free_pose_observations
-    )?;
+    if r.statistics.free_pose_observations > 0 {
+        writeln!(
+            out,
+            "alone     {:.3} px RMS per point with a stand-alone camera pose for every image, over {} observations",
+            r.statistics.free_pose_rms_px, r.statistics.free_pose_observations
+        )?;
+    }
     marker_tolerance(out, r)?;
     joint_noise(out, r)?;
     twists(out, r)?;
@@ -129,11 +136,17 @@ fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     let mm = |m: f64| format!("{:>8.3} mm", 1e3 * m);
     writeln!(
         out,
-        "flange    expected error of its position relative to the plate in the region of the stops, by model and covariance, RMS:"
+        "flange    expected error of its position relative to {} in the region of the stops, by model and covariance, RMS:",
+        if r.images.is_empty() { "the base and tool that fit the stops" } else { "the plate" }
     )?;
     writeln!(out, "          nominal    {}   base and tool that fit it best", mm(e.nominal_m))?;
-    writeln!(out, "          calibrated {}   corrected URDF alone", mm(e.urdf_m))?;
+    let (alone_m, _) = e.best_urdf_m();
+    writeln!(out, "          calibrated {}   corrected URDF alone", mm(alone_m))?;
     if r.beyond_urdf() {
+        if let Some(_) = e.alone_m {
+            let words = "the URDF that belongs to compensation.toml, without it";
+            writeln!(out, "          calibrated {}   {words}", mm(e.urdf_m))?;
+        }
         writeln!(out, "          calibrated {}   with compensation.toml", mm(e.model_m))?;
     }
     writeln!(out, "          {:.3} mm of each is noise from stop to stop, which no model takes away", 1e3 * e.scatter_m)
@@ -263,12 +276,16 @@ fn lenses(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 }
 
 fn accuracy(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    let row = |e: &Errors| format!("{:>8.3} mm {:>8.3} px   worst image {:.3} mm", e.rms_mm, e.rms_px, e.worst_mm);
-    writeln!(
-        out,
-        "held out  images that the fit had not seen ({} folds), where the plate stood, repeatability included, RMS over the markers:",
-        r.accuracy.folds
-    )?;
+    let by_images = !r.images.is_empty();
+    let row = |e: &Errors| match by_images {
+        true => format!("{:>8.3} mm {:>8.3} px   worst image {:.3} mm", e.rms_mm, e.rms_px, e.worst_mm),
+        false => format!("{:>8.3} mm   worst stop {:.3} mm", e.rms_mm, e.worst_mm),
+    };
+    let what = match by_images {
+        true => "images that the fit had not seen, where the plate stood, repeatability included, RMS over the markers",
+        false => "stops that the fit had not seen, repeatability included, RMS over the measurements",
+    };
+    writeln!(out, "held out  {what} ({} folds):", r.accuracy.folds)?;
     writeln!(out, "          nominal    {}", row(&r.accuracy.nominal))?;
     writeln!(out, "          calibrated {}", row(&r.accuracy.calibrated))
 }

@@ -9,6 +9,7 @@ use crate::assess::Advice;
 use crate::error::Code;
 use crate::output::solution_json::SolutionRecord;
 use crate::output::verdict::{Trust, Verdict, VerdictReason};
+use crate::output::{ALONE, CALIBRATED};
 use crate::urdf::JointKind;
 
 /// Most lines in all.
@@ -82,10 +83,11 @@ fn flange(r: &SolutionRecord) -> Vec<String> {
     };
     let told = if e.intervals.is_some() { " (95 % interval)" } else { "" };
     let i = e.intervals.as_ref();
+    let (alone_m, of_alone) = e.best_urdf_m();
     let mut lines = vec![
         format!("accuracy  expected flange error where the stops were, RMS{told}:"),
         row("nominal robot", e.nominal_m, i.map(|i| i.nominal_m)),
-        row("corrected URDF alone", e.urdf_m, i.map(|i| i.urdf_m)),
+        row("corrected URDF alone", alone_m, of_alone),
     ];
     if r.beyond_urdf() {
         lines.push(row("with compensation.toml", e.model_m, i.map(|i| i.model_m)));
@@ -98,7 +100,8 @@ fn flange_in_brief(r: &SolutionRecord) -> Vec<String> {
     let Some(e) = &r.flange else { return Vec::new() };
     let whole =
         if r.beyond_urdf() { format!(", {:.3} with compensation.toml", 1e3 * e.model_m) } else { String::new() };
-    let words = format!("not valid: flange {:.3} mm nominal, {:.3} URDF{whole}", 1e3 * e.nominal_m, 1e3 * e.urdf_m);
+    let words =
+        format!("not valid: flange {:.3} mm nominal, {:.3} URDF{whole}", 1e3 * e.nominal_m, 1e3 * e.best_urdf_m().0);
     vec![indented("accuracy", &words)]
 }
 
@@ -177,8 +180,11 @@ fn advice(r: &SolutionRecord, a: &Advice) -> String {
 
 /// Where all of it stands.
 fn results(r: &SolutionRecord, folder: &Path) -> String {
-    let urdf = r.files.iter().find(|f| f.ends_with(".calibrated.urdf")).map_or("", |f| f.as_str());
+    let urdf = match (r.file_ending_with(ALONE), r.file_ending_with(CALIBRATED)) {
+        (Some(alone), Some(_)) => format!("; robot alone: {alone}"),
+        (_, Some(urdf)) => format!("; robot: {urdf}"),
+        _ => String::new(),
+    };
     let report = indented("report", &folder.join(crate::output::REPORT).display().to_string());
-    let beside = format!("{report}; robot: {urdf}");
-    if beside.len() <= WIDTH && !urdf.is_empty() { beside } else { report }
+    if report.len() + urdf.len() <= WIDTH { report + &urdf } else { report }
 }

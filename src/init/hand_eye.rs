@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use crate::geom::{Pose, log_so3, project_to_so3};
 use crate::linalg::{SymmetricFactor, symmetric_eigen};
 use crate::model::robot::Robot;
-use crate::series::CameraMount;
+use crate::series::{CameraMount, spread};
 
 /// What one image says: `X * camera_from_plate = chain * Z`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,8 +95,13 @@ const SAMPLE_SIZE: usize = 5;
 /// Share of the images, by smallest error, with which the best sample is solved again.
 const CONSENSUS_SHARE: f64 = 0.5;
 
-/// Candidates, best robust spread first. Empty where no closed form has a solution.
+/// Pairs that are enough for a start: its median error is then known to a twentieth.
+const ENOUGH: usize = 500;
+
+/// Candidates, best robust spread first. Empty where no closed form has a solution. Of very many pairs, some tell as much.
 pub fn solve_hand_eye(pairs: &[PosePair]) -> Vec<HandEyeStart> {
+    let some: Vec<PosePair> = spread(pairs.len(), ENOUGH).map(|k| pairs[k]).collect();
+    let pairs = some.as_slice();
     let mut starts = Vec::new();
     let mut add = |origin: String, solution: Option<HandEye>| {
         if let Some(solution) = solution {

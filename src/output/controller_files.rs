@@ -14,9 +14,14 @@ use crate::urdf::{Chain, JointKind};
 
 /// The robot as the files of this result describe it: offsets folded into origins, or left to the controller.
 pub(super) fn exported(solution: &Solution, context: &Context) -> Robot {
+    of_controller(&solution.fit.state.robot, context)
+}
+
+/// A robot with its offsets folded into origins, or left to the controller.
+pub(super) fn of_controller(robot: &Robot, context: &Context) -> Robot {
     match context.offsets {
-        Offsets::Folded => solution.fit.state.robot.clone(),
-        Offsets::Mastering => solution.fit.state.robot.mastered().0,
+        Offsets::Folded => robot.clone(),
+        Offsets::Mastering => robot.mastered().0,
     }
 }
 

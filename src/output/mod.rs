@@ -70,6 +70,7 @@ pub use kinematics_file::kinematics_yaml;
 pub use names::folder_name;
 #[cfg(feature = "report")]
 pub use report::{FigureFile, Shown, Thumbnail, Thumbnails, figure_files, plan_html, report_html, sigma_text};
+pub use robot_files::{ALONE, CALIBRATED};
 pub use write::{NewFolder, NewResult, ResultFolder, recover, write_all, write_beside};
 
 use std::collections::BTreeMap;

@@ -477,6 +477,11 @@ impl SolutionRecord {
         self.robot.terms.iter().any(|t| t.term != "offset" && !t.term.starts_with("local_"))
     }
 
+    /// The file that was written under a name that ends so.
+    pub fn file_ending_with(&self, end: &str) -> Option<&str> {
+        self.files.iter().find(|f| f.ends_with(end)).map(String::as_str)
+    }
+
     /// Robot parameters that stay near nominal for want of data, without those that no series can tell from base and tip.
     pub fn undetermined(&self) -> Vec<&EstimateRecord> {
         let told = self.identifiability.iter().flat_map(|found| &found.unknown);

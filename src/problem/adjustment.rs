@@ -4,8 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{BodyRejection, Image, ImageRejection, Problem, State, TakenFrom, Tie};
 use crate::geom::Pose;
-
-const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
+use crate::series::spread;
 
 /// A problem with a value of every unknown: what a solve starts from and what it leaves.
 #[derive(Debug, Clone)]
@@ -67,17 +66,21 @@ impl Adjustment {
         rest
     }
 
+    /// Stops at which something in use was seen, ascending.
+    pub fn used_stops(&self) -> BTreeSet<usize> {
+        let images = self.problem.used().map(|(_, image)| image.stop);
+        images.chain(self.problem.used_bodies().map(|(_, m)| m.stop)).collect()
+    }
+
     /// About `some` of the stops in use, evenly chosen, with all that was measured there, where there are more than `many`.
     pub fn some_stops(&self, many: usize, some: usize) -> Option<Self> {
-        let images = self.problem.used().map(|(_, image)| image.stop);
-        let used: BTreeSet<usize> = images.chain(self.problem.used_bodies().map(|(_, m)| m.stop)).collect();
+        let used = self.used_stops();
         if used.len() <= many {
             return None;
         }
-        // By the golden ratio, and not every n-th: stops often come in turns of equal length.
-        let share = some as f64 / used.len() as f64;
-        let is_chosen = |k: usize| (k as f64 * GOLDEN_RATIO).fract() < share;
-        let rest: BTreeSet<usize> = used.iter().enumerate().filter(|(k, _)| !is_chosen(*k)).map(|(_, s)| *s).collect();
+        let chosen: BTreeSet<usize> = spread(used.len(), some).collect();
+        let rest: BTreeSet<usize> =
+            used.iter().enumerate().filter(|(k, _)| !chosen.contains(k)).map(|(_, s)| *s).collect();
         let held: Vec<usize> =
             self.problem.used().filter(|(_, image)| rest.contains(&image.stop)).map(|(i, _)| i).collect();
         let mut chosen = self.without_bodies_at(&rest.into_iter().collect::<Vec<_>>());

@@ -28,6 +28,7 @@ mod rotation_kind;
 mod run;
 mod sections;
 mod spatial;
+mod spread;
 mod stop_index;
 mod table;
 mod tag_plates;
@@ -65,6 +66,7 @@ pub use sections::{
     ContactSection, ControllerSection, DistanceSection, PlateMountSection, SecondRobotSection, TrackerSection,
 };
 pub use spatial::SpatialFiles;
+pub use spread::spread;
 pub use tag_plates::regions;
 pub use tags::{Region, TagPrint, Tags};
 pub(crate) use toml_file::read_toml;

@@ -47,19 +47,24 @@ const FEWEST_DETERMINED: f64 = 1e-6;
 /// Coordinates of markers that the data must tell before they decide how far markers are off: the deviation is then known to a tenth.
 const FEWEST_MARKER_COORDINATES: f64 = 50.0;
 
-/// Newton decrement between rounds: the components need no better.
+/// Newton decrement between rounds, and its square a stop: it moves the components of so many by less than they are known to.
 const ROUGH_DECREMENT: f64 = 0.05;
+const ROUGH_SQUARE_A_STOP: f64 = 2.5e-5;
 
 /// Relative change of a factor on the noise of measurements up to which it stays as it is, and what was linearised with it serves on.
 const STAYS: f64 = 1e-3;
 
-/// Stops of which some tell where the components of all will be, and how many those are: of few stops the components tell little.
+/// Stops of which some tell where the components of all will be, and how many those are, at least: of few stops the components tell little.
 const MANY_STOPS: usize = 400;
 const SOME_STOPS: usize = 150;
+/// One in so many of more.
+const ONE_IN: usize = 8;
 
 /// As [`estimate_components`], from sizes that are far off: of many stops, some come near at a small part of the cost.
 pub fn estimate_components_from_above(start: Adjustment, options: &ComponentOptions) -> Outcome {
-    let some = start.some_stops(MANY_STOPS, SOME_STOPS).map(|some| estimate_components(some, options));
+    let stops = start.used_stops().len();
+    let some = start.some_stops(MANY_STOPS, SOME_STOPS.max(stops / ONE_IN));
+    let some = some.map(|some| estimate_components_from_above(some, options));
     let mut start = start;
     if let Some(some) = some.filter(|some| some.status == Status::Converged) {
         start.start_near_some(&some.adjustment, LEAST_FIRST_GUESS);
@@ -69,7 +74,9 @@ pub fn estimate_components_from_above(start: Adjustment, options: &ComponentOpti
 
 /// Alternates solving and re-estimating until the components stand. The adjustment keeps the final components.
 pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Outcome {
-    let rough = Settings { decrement: ROUGH_DECREMENT.max(options.settings.decrement), ..options.settings };
+    let by_stops = (ROUGH_SQUARE_A_STOP * start.used_stops().len() as f64).sqrt();
+    let rough =
+        Settings { decrement: ROUGH_DECREMENT.max(by_stops).max(options.settings.decrement), ..options.settings };
     let mut minimised = minimise(start, &rough);
     let mut iterations = minimised.outcome.iterations;
     let mut acceleration = Acceleration::default();

@@ -46,6 +46,30 @@ fn rows(text: &str) -> Vec<BTreeMap<String, String>> {
         .collect()
 }
 
+/// The one that goes without compensation.toml: no term, the origins of the robot that does best by itself, in either place of the offsets.
+#[test]
+fn the_urdf_for_those_who_read_nothing_else_is_a_file_of_its_own() {
+    let description = robot();
+    let name = "kuka_kr6_r900.calibrated_alone.urdf";
+    let rigid = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    assert!(rigid.uncertainty.alone.is_none());
+    assert!(!files(&rigid, &context(&description)).unwrap().contains_key(name));
+
+    let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
+    let alone = solution.uncertainty.alone.as_ref().unwrap();
+    let mut mastering = context(&description);
+    mastering.offsets = Offsets::Mastering;
+    for (of, context) in [(alone.clone(), context(&description)), (alone.mastered().0, mastering)] {
+        let urdf = text(&files(&solution, &context).unwrap(), name);
+        let chain = RobotDescription::from_text(Path::new("c.urdf"), urdf).unwrap().chain(None, None).unwrap();
+        let (written, q) = (Robot::nominal(chain), [0.4, -1.2, 1.1, 0.7, -0.9, 2.0]);
+        let (angle, distance) = written.base_from_tip(&q).distance(&of.base_from_tip(&q));
+        assert!(angle < 1e-9 && distance < 1e-9, "{angle} rad, {distance} m");
+    }
+    let e = solution.uncertainty.flange.unwrap();
+    assert!(e.alone_m.unwrap() <= e.urdf_m && e.model_m <= e.alone_m.unwrap(), "{e:?}");
+}
+
 #[test]
 fn offsets_in_the_controller_or_in_the_origins_are_the_same_robot() {
     let description = robot();

@@ -301,7 +301,7 @@ fn relative_error_m(
 fn what_is_promised_of_the_flange_is_what_is_found() {
     const SIGMA: f64 = 1e-4;
     let full = Options { model: RobotModel::Full, ..Options::default() };
-    let (mut found, mut stated) = ([0.0; 3], [0.0; 3]);
+    let (mut found, mut stated) = ([0.0; 4], [0.0; 4]);
     for seed in 11..=14 {
         let errors = RobotErrors::default().with(TermKind::Gear, 5e-4).with(TermKind::Gravity, 0.2e-3);
         let made = series(&WorldRequest { errors, ..request(seed, SIGMA) }).unwrap();
@@ -345,15 +345,19 @@ fn what_is_promised_of_the_flange_is_what_is_found() {
         let of = |robot: &Robot| {
             relative_error_m((robot, &solution.fit.state.placements[0]), (&truth, &plate), &stops, &places)
         };
-        let left = [fit_points(&Robot::nominal(chain()), &points).unwrap().rms_m, of(&urdf), of(&whole)];
+        let alone = solution.uncertainty.alone.as_ref().unwrap();
+        let left = [fit_points(&Robot::nominal(chain()), &points).unwrap().rms_m, of(&urdf), of(&whole), of(alone)];
         let e = solution.uncertainty.flange.unwrap();
+        let alone_m = e.alone_m.unwrap();
         println!("seed {seed}: found {left:?}, stated {e:?}");
-        for (k, (f, s)) in left.into_iter().zip([e.nominal_m, e.urdf_m, e.model_m]).enumerate() {
+        for (k, (f, s)) in left.into_iter().zip([e.nominal_m, e.urdf_m, e.model_m, alone_m]).enumerate() {
             (found[k], stated[k]) = (found[k] + f * f, stated[k] + s * s);
         }
         assert!(e.scatter_m < e.model_m && e.model_m < e.urdf_m && e.model_m < e.nominal_m, "{e:?}");
+        assert!(e.model_m < alone_m && alone_m < 0.8 * e.urdf_m, "{e:?}");
+        assert!(left[3] < left[1], "{left:?}");
     }
-    for k in 0..3 {
+    for k in 0..4 {
         // Four worlds with some twenty directions each that matter.
         let ratio = (stated[k] / found[k]).sqrt();
         println!("{k}: stated over found {ratio:.3}");

@@ -6,6 +6,7 @@ use super::findings::remedy;
 use super::words::{count, significant};
 use crate::output::solution_json::SolutionRecord;
 use crate::output::verdict::{Trust, Verdict};
+use crate::output::{ALONE, CALIBRATED};
 
 /// Most stops that are proposed.
 const MOST_NEXT: usize = 3;
@@ -50,9 +51,10 @@ pub(super) fn first_page(r: &SolutionRecord) -> Markup {
 fn promise(r: &SolutionRecord, trust: Trust) -> Markup {
     let Some(e) = &r.flange else { return html! {} };
     let i = e.intervals.as_ref();
+    let (alone_m, of_alone) = e.best_urdf_m();
     let mut rows = vec![
         ("Nominal robot", e.nominal_m, i.map(|i| i.nominal_m), "before"),
-        ("Corrected URDF alone", e.urdf_m, i.map(|i| i.urdf_m), "after"),
+        ("Corrected URDF alone", alone_m, of_alone, "after"),
     ];
     if r.beyond_urdf() {
         rows.push(("Corrected URDF with compensation.toml", e.model_m, i.map(|i| i.model_m), "after"));
@@ -101,12 +103,18 @@ fn steps(r: &SolutionRecord, v: &Verdict) -> Vec<Markup> {
         return remedies.chain([html! { "Identify again; keep the earlier robot model until then." }]).collect();
     }
     let mut all = Vec::new();
-    if let Some(urdf) = r.files.iter().find(|f| f.ends_with(".calibrated.urdf")) {
-        all.push(html! { "Use " code { (urdf) } ": joint offsets are in it, controller angles stay as they are." });
+    let alone = r.file_ending_with(ALONE);
+    if let Some(urdf) = alone.or(r.file_ending_with(CALIBRATED)) {
+        all.push(html! {
+            "Use " code { (urdf) } @if alone.is_some() { " where nothing else than a URDF is read" }
+            ": joint offsets are in it, controller angles stay as they are."
+        });
     }
     if r.beyond_urdf() {
+        let with = r.file_ending_with(CALIBRATED);
         all.push(html! {
-            "Correct programs with " code { "robotcal compensate" } " and " code { "compensation.toml" }
+            "Correct programs with " code { "robotcal compensate" } ", "
+            @if let Some(urdf) = with { code { (urdf) } " and " } code { "compensation.toml" }
             ": it holds what a URDF cannot (gears, sag, backlash)."
         });
     }
