@@ -57,7 +57,7 @@ pub fn hold_out(fit: LinearProblem, fitted: &Refit, limits: &Limits) -> Option<(
     let _stage = stage("hold-out");
     let problem = &fit.adjustment.problem;
     let folds = folds(problem, limits)?;
-    let nominal = solve(nominal(fit.adjustment), &OF_FOLD);
+    let nominal = solve(nominal(fit.adjustment), &of_fold(fit.adjustment));
     let (nominal, _) = predictions(nominal.linear()?, &folds, &joint)?;
     let (calibrated, states) = predictions(fit, &folds, fitted)?;
     let mut per_image_mm = vec![None; problem.images.len()];
@@ -224,17 +224,21 @@ fn predictions(fit: LinearProblem, folds: &[Vec<usize>], fitted: &Refit) -> Opti
     Some((errors, states))
 }
 
-/// Bounds of the fit of a fold: no unknown is off by more than a tenth of its sigma.
-pub(super) const OF_FOLD: Settings = Settings { iterations: 30, decrement: 0.1, margin: 0.3 };
+/// Bounds of the fit of a fold: no unknown is off by more than a tenth of its sigma, of very many stops a little more.
+pub(super) fn of_fold(adjustment: &Adjustment) -> Settings {
+    Settings { iterations: 30, decrement: 0.1, margin: 0.3 }.of_stops(adjustment.used_stops().len())
+}
 
 /// The free columns fitted to the images in use, from where the adjustment stands, at its noise.
 pub fn refitted(adjustment: Adjustment) -> State {
-    solve(adjustment, &OF_FOLD).adjustment.state
+    let settings = of_fold(&adjustment);
+    solve(adjustment, &settings).adjustment.state
 }
 
 /// The same from near the end.
 pub fn refitted_near(start: LinearisedAdjustment) -> State {
-    start.settled(&OF_FOLD)
+    let settings = of_fold(&start.adjustment);
+    start.settled(&settings)
 }
 
 /// Error of an image that `state` was not fitted to, predicted from its joint readings alone; `None` off the robot, or where

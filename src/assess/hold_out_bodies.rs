@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::hold_out::{Accuracy, Errors, OF_FOLD, dealt, nominal, refitted_near, side_by_side};
+use super::hold_out::{Accuracy, Errors, dealt, nominal, of_fold, refitted_near, side_by_side};
 use super::limits::Limits;
 use crate::problem::{State, TakenFrom};
 use crate::solve::{LinearProblem, solve};
@@ -21,7 +21,7 @@ pub fn hold_out_bodies(fit: LinearProblem, limits: &Limits) -> Option<(Accuracy,
         return None;
     }
     let folds = dealt(stops.into_iter().map(|stop| vec![stop]).collect());
-    let nominal = solve(nominal(fit.adjustment), &OF_FOLD);
+    let nominal = solve(nominal(fit.adjustment), &of_fold(fit.adjustment));
     let (before, _) = predictions(nominal.linear()?, &folds)?;
     let (after, states) = predictions(fit, &folds)?;
     let mut per_body_mm = vec![None; problem.body_measurements.len()];

@@ -324,7 +324,7 @@ fn correlations(
 }
 
 /// Beginnings of the names of frames of instruments and bodies, which no camera sees.
-const MEASURED_FRAMES: [&str; 4] = ["tracker.", "contact.", "places.", "body."];
+const MEASURED_FRAMES: [&str; 4] = ["tracker.", "contact.", "places.", "target."];
 
 /// Poses of two plates, or of two mountings: all hang on the same robot, which makes them move together.
 fn share_a_frame(a: &str, b: &str) -> bool {

@@ -47,9 +47,8 @@ const FEWEST_DETERMINED: f64 = 1e-6;
 /// Coordinates of markers that the data must tell before they decide how far markers are off: the deviation is then known to a tenth.
 const FEWEST_MARKER_COORDINATES: f64 = 50.0;
 
-/// Newton decrement between rounds, and its square a stop: it moves the components of so many by less than they are known to.
+/// Newton decrement between rounds: the components need no better.
 const ROUGH_DECREMENT: f64 = 0.05;
-const ROUGH_SQUARE_A_STOP: f64 = 2.5e-5;
 
 /// Relative change of a factor on the noise of measurements up to which it stays as it is, and what was linearised with it serves on.
 const STAYS: f64 = 1e-3;
@@ -74,9 +73,8 @@ pub fn estimate_components_from_above(start: Adjustment, options: &ComponentOpti
 
 /// Alternates solving and re-estimating until the components stand. The adjustment keeps the final components.
 pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Outcome {
-    let by_stops = (ROUGH_SQUARE_A_STOP * start.used_stops().len() as f64).sqrt();
-    let rough =
-        Settings { decrement: ROUGH_DECREMENT.max(by_stops).max(options.settings.decrement), ..options.settings };
+    let rough = Settings { decrement: ROUGH_DECREMENT.max(options.settings.decrement), ..options.settings };
+    let rough = rough.of_stops(start.used_stops().len());
     let mut minimised = minimise(start, &rough);
     let mut iterations = minimised.outcome.iterations;
     let mut acceleration = Acceleration::default();

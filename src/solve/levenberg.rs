@@ -26,6 +26,11 @@ impl Settings {
     pub const fn new(iterations: usize, decrement: f64) -> Self {
         Self { iterations, decrement, margin: 0.1 }
     }
+
+    /// For sums of squares of what is measured at so many stops: the square of the decrement, which they change by, may be a share of them.
+    pub fn of_stops(self, stops: usize) -> Self {
+        Self { decrement: self.decrement.max((SQUARE_A_STOP * stops as f64).sqrt()), ..self }
+    }
 }
 
 impl Default for Settings {
@@ -33,6 +38,9 @@ impl Default for Settings {
         Self::new(100, 1e-3)
     }
 }
+
+/// Share of a sum of squares that is far below what so many are known to: 0.05 of a sigma for a hundred stops.
+const SQUARE_A_STOP: f64 = 2.5e-5;
 
 /// How the iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
