@@ -75,6 +75,21 @@ impl<V: Clone + PartialEq> Followed for Held<Option<V>> {
     }
 }
 
+/// Two things.
+impl<A: Followed, B: Followed> Followed for (A, B) {
+    fn merged(&self, other: &Self, why: &str) -> Self {
+        (self.0.merged(&other.0, why), self.1.merged(&other.1, why))
+    }
+
+    fn at_top(&self) -> Self {
+        (self.0.at_top(), self.1.at_top())
+    }
+
+    fn behind_call(&self, end: &Self) -> Self {
+        (self.0.behind_call(&end.0), self.1.behind_call(&end.1))
+    }
+}
+
 /// Kinds of statements with branches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Branching {

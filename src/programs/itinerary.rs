@@ -2,14 +2,37 @@
 
 use std::collections::BTreeMap;
 
+use super::flow::{Flow, Followed};
 use super::program::{Approach, Left, Program, Target, TargetKind};
+
+/// File of a target, and its first byte there.
+type Place = (usize, usize);
+
+/// Where a routine has left the robot: none where it has not moved it, and no place where the text does not tell.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Stands(Option<Option<Place>>);
+
+/// Of several ways to here the one that stands last in the text counts, as it does for the targets behind it.
+impl Followed for Stands {
+    fn merged(&self, other: &Self, _: &str) -> Self {
+        Self(self.0.or(other.0))
+    }
+
+    fn at_top(&self) -> Self {
+        Self(None)
+    }
+
+    fn behind_call(&self, end: &Self) -> Self {
+        Self(end.0.or(self.0))
+    }
+}
 
 /// A program that is being read.
 pub(super) struct Itinerary {
     /// What was found so far.
     pub program: Program,
     /// File and first byte of a target -> its index in the program.
-    visited: BTreeMap<(usize, usize), usize>,
+    visited: BTreeMap<Place, usize>,
     /// From where the robot comes to the next target.
     from: Approach,
     /// From where it came to the branches, loops and routines that are open.
@@ -55,6 +78,25 @@ impl Itinerary {
     /// Behind such a routine.
     pub fn routine_ends(&mut self) {
         self.from = self.open.pop().unwrap_or(Approach::Unknown);
+    }
+
+    /// Where the routine that is being read has moved the robot.
+    pub fn stands(&self) -> Stands {
+        let place = |k: usize| self.program.targets.get(k).map(|t| (t.file, t.kind.first_byte()));
+        Stands(Some(self.from.target().and_then(place)))
+    }
+
+    /// Follows a call of a routine: behind it the robot comes from where that has left it.
+    pub fn call<T: Followed>(&mut self, name: String, flow: &mut Flow<(T, Stands)>, now: &mut (T, Stands)) {
+        let before = std::mem::take(&mut now.1);
+        flow.call(name, now);
+        match now.1.0 {
+            None => now.1 = before,
+            Some(place) => {
+                let index = place.and_then(|place| self.visited.get(&place));
+                self.from = index.map_or(Approach::Unknown, |&index| Approach::Beyond(index));
+            }
+        }
     }
 
     /// True for a target that was visited.

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::ProgramSetting;
 use super::field::{Field, FieldPlace};
 use super::flow::{Branching, Flow, Held, Places, settled};
-use super::itinerary::Itinerary;
+use super::itinerary::{Itinerary, Stands};
 use super::program::{
     Approach, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind, Understood,
 };
@@ -83,7 +83,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
 }
 
 /// One reading, with what the one before found, and what it found itself.
-fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Tool>) -> Result<(Program, Places<Tool>)> {
+fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>) -> Result<(Program, Places<Now>)> {
     let (mut way, mut flow) = (Itinerary::new(), Flow::new(known));
     for (index, file) in files.iter().enumerate() {
         way.start_afresh();
@@ -94,7 +94,7 @@ fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Tool>
             computed: BTreeSet::new(),
             blocks: Vec::new(),
             on_top: false,
-            tool: Held::new(setting.tool),
+            now: (Held::new(setting.tool), Stands::default()),
             flow: &mut flow,
             way: &mut way,
         };
@@ -107,6 +107,9 @@ fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Tool>
 /// The active tool; `None` where it is not known.
 type Tool = Held<Option<Pose>>;
 
+/// With where the robot stands.
+type Now = (Tool, Stands);
+
 struct Script<'a> {
     reader: Reader<'a>,
     setting: &'a ProgramSetting<'a>,
@@ -118,9 +121,9 @@ struct Script<'a> {
     blocks: Vec<bool>,
     /// True while the robot moves by more than its targets say.
     on_top: bool,
-    tool: Tool,
+    now: Now,
     /// How it changes.
-    flow: &'a mut Flow<Tool>,
+    flow: &'a mut Flow<Now>,
     way: &'a mut Itinerary,
 }
 
@@ -172,7 +175,7 @@ impl Script<'_> {
             } else if word == b"set_tcp" && next == Some(TokenKind::Mark(b'(')) {
                 self.reader.at += 2;
                 let value = self.argument()?;
-                self.tool.set(match &value {
+                self.now.0.set(match &value {
                     Value::Pose(fields, _) => Some(pose_of(fields)),
                     _ => None,
                 });
@@ -185,12 +188,12 @@ impl Script<'_> {
                 self.variables.insert(name, value);
             } else {
                 if next == Some(TokenKind::Mark(b'(')) {
-                    self.flow.call(String::from_utf8_lossy(word).into_owned(), &mut self.tool);
+                    self.way.call(String::from_utf8_lossy(word).into_owned(), self.flow, &mut self.now);
                 }
                 self.reader.at = at + 1;
             }
         }
-        self.flow.all_end(&mut self.tool);
+        self.flow.all_end(&mut self.now);
         Ok(())
     }
 
@@ -207,7 +210,7 @@ impl Script<'_> {
                     .reader
                     .ahead(1)
                     .map_or_else(String::new, |t| String::from_utf8_lossy(self.reader.text(t)).into_owned());
-                self.flow.routine_begins(name, &mut self.tool, &Held::new(self.setting.tool));
+                self.flow.routine_begins(name, &mut self.now, &(Held::new(self.setting.tool), Stands::default()));
             }
             _ if begins => {
                 self.way.branches_begin();
@@ -216,25 +219,25 @@ impl Script<'_> {
                     b"switch" => Branching::Cases,
                     _ => Branching::Loop,
                 };
-                self.flow.begin(&mut self.tool, kind);
+                self.flow.begin(&mut self.now, kind);
             }
             b"else" | b"elif" | b"case" | b"default" => {
                 self.way.next_branch();
-                self.flow.next(&mut self.tool, matches!(word, b"else" | b"default"));
+                self.flow.next(&mut self.now, matches!(word, b"else" | b"default"));
             }
             b"end" => match self.blocks.pop() {
                 Some(true) => {
                     self.way.routine_ends();
-                    self.flow.routine_ends(&mut self.tool);
+                    self.flow.routine_ends(&mut self.now);
                 }
                 Some(false) => {
                     self.way.branches_end();
-                    self.flow.end(&mut self.tool);
+                    self.flow.end(&mut self.now);
                 }
                 None => {}
             },
             b"return" => {
-                self.flow.returns(&self.tool);
+                self.flow.returns(&self.now);
                 return false;
             }
             _ => return false,
@@ -436,6 +439,7 @@ impl Script<'_> {
         let keeps = argument.keeps;
         if let Err(why) = self.take(name, argument) {
             self.way.leave(Left { file: self.reader.index, line, name: name.to_owned(), why }, keeps);
+            self.now.1 = self.way.stands();
         }
         Ok(())
     }
@@ -462,7 +466,9 @@ impl Script<'_> {
         };
         let file = self.reader.index;
         let target = Target { file, line, name: name.to_owned(), approach: Approach::Unknown, visited: true, kind };
-        if self.way.visit(target) {
+        let visited = self.way.visit(target);
+        self.now.1 = self.way.stands();
+        if visited {
             Ok(())
         } else {
             Err(Why::new(LeftReason::FramesDiffer, "it is used with different tools; give it a pose for each"))
@@ -470,7 +476,7 @@ impl Script<'_> {
     }
 
     fn pose(&self, fields: [Field; 6], posture: MeantPosture) -> Understood<PoseTarget> {
-        let Some(tool) = self.tool.value else {
+        let Some(tool) = self.now.0.value else {
             let words = "its tool is not known: no set_tcp(p[..]) with numbers before it; give --tool";
             return Err(Why::new(LeftReason::ToolUnknown, words));
         };

@@ -497,6 +497,46 @@ fn branches_and_routines_do_not_hand_their_posture_to_each_other() {
     assert_eq!(column(&run, "posture"), ["joints", "joints", "line", ""]);
 }
 
+/// Behind a call the robot stands where the routine has left it, in the posture that this left it in.
+#[test]
+fn behind_a_call_the_posture_is_that_in_which_the_routine_ends() {
+    let mut cell = Cell::ur(73);
+    let none = Pose::identity();
+    let q = cell.readings();
+    let other = others(&mut cell, &q).into_iter().max_by(|a, b| a[4].total_cmp(&b[4])).unwrap();
+    let beside = |q: &[f64]| -> Vec<f64> { q.iter().enumerate().map(|(i, v)| v + 0.05 * (i as f64).sin()).collect() };
+    let pose = tool_pose(&cell.nominal, &beside(&q), &none);
+    // The same pose in the posture of `q`, and nearest to the other one.
+    let limits = vec![(-3.1, 3.1); 6];
+    let wanted = cell.nominal.base_from_tip(&beside(&q));
+    let (here, there) = (beside(&q), inverse::solve_from(&cell.nominal, &limits, &wanted, &other).unwrap());
+    let (a, b) = (joint_list(&q), joint_list(&other));
+    let leaves = format!("def sub():\n  movej({b})\n end\n");
+    let inner = format!("{leaves} def outer():\n  sub()\n end\n");
+    let returns = format!("def sub():\n  movej({b})\n  movej({a})\n end\n");
+    for (routines, call, meant, posture) in [
+        (leaves.as_str(), "sub()", &there, "line"),
+        (inner.as_str(), "outer()", &there, "line"),
+        (returns.as_str(), "sub()", &here, "line"),
+        ("def sub():\n  textmsg(\"x\")\n end\n", "sub()", &here, "line"),
+    ] {
+        let text = format!("def p():\n set_tcp(p[0,0,0,0,0,0])\n {routines} movej({a})\n {call}\n c={pose}\n movel(c)\nend\n");
+        let file = cell.write("calls.script", text.as_bytes());
+        let run = cell.compensate(&[&file], &["--unordered"]).expect(0);
+        let new = run.text("calls.script");
+        let left = left_over(&cell, &none, &literal(&text, "c"), &literal(&new, "c"), meant);
+        assert!(left < 1e-6, "{call} {routines}: {left}");
+        assert_eq!(column(&run, "posture").last().unwrap(), posture);
+    }
+    // A path of the routine that the text does not tell.
+    let text = format!(
+        "def p():\n set_tcp(p[0,0,0,0,0,0])\n def sub():\n  movej(get_actual_joint_positions())\n end\n movej({a})\n sub()\n c={pose}\n movel(c)\nend\n"
+    );
+    let file = cell.write("untold.script", text.as_bytes());
+    let run = cell.compensate(&[&file], &["--unordered"]).expect(1);
+    assert_eq!(literal(&text, "c"), literal(&run.text("untold.script"), "c"));
+}
+
 #[test]
 fn poses_and_joints_taught_together_tell_whether_the_nominal_model_is_the_controllers() {
     let mut cell = Cell::ur(46);

@@ -10,7 +10,7 @@ use frames::{Active, FrameIs, Frames, OwnFrames};
 
 use super::ProgramSetting;
 use super::flow::{Branching, Flow, Places, settled};
-use super::itinerary::Itinerary;
+use super::itinerary::{Itinerary, Stands};
 use super::program::{Approach, Left, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
 use super::scan::{Dialect, Reader, TokenKind};
@@ -58,15 +58,15 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
 fn reading(
     files: &[TextFile],
     setting: &ProgramSetting<'_>,
-    known: Places<Active>,
-) -> Result<(Program, Places<Active>)> {
+    known: Places<Now>,
+) -> Result<(Program, Places<Now>)> {
     let mut module = Module {
         setting,
         prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
         values: BTreeMap::new(),
         declared: Vec::new(),
         root: FrameIs::Unset,
-        active: Active::unset(),
+        now: unset(),
         flow: Flow::new(known),
         spline: OwnFrames::default(),
         way: Itinerary::new(),
@@ -93,6 +93,14 @@ fn routine_name(reader: &Reader<'_>) -> Option<String> {
     }
 }
 
+/// Frames that statements have set, and where the robot stands.
+type Now = (Active, Stands);
+
+/// Nothing set, and nothing moved.
+fn unset() -> Now {
+    (Active::unset(), Stands::default())
+}
+
 struct Module<'a> {
     setting: &'a ProgramSetting<'a>,
     prismatic: Vec<bool>,
@@ -101,9 +109,9 @@ struct Module<'a> {
     declared: Vec<(String, usize, usize)>,
     /// `$ROBROOT`: the foot of the robot in the world, of which `$BASE` is a part.
     root: FrameIs,
-    active: Active,
+    now: Now,
     /// How they change.
-    flow: Flow<Active>,
+    flow: Flow<Now>,
     /// Frames of the spline block that is open.
     spline: OwnFrames,
     way: Itinerary,
@@ -112,7 +120,7 @@ struct Module<'a> {
 impl Module<'_> {
     fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
         self.start_afresh();
-        (self.active, self.spline) = (Active::unset(), OwnFrames::default());
+        (self.now, self.spline) = (unset(), OwnFrames::default());
         let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {
             let Some(word) = reader.name() else {
@@ -159,7 +167,7 @@ impl Module<'_> {
         }
         if name == "$IPO_MODE" {
             let is_in_room = self.is_tool_in_room(reader);
-            self.active.tool_in_room.set(is_in_room);
+            self.now.0.tool_in_room.set(is_in_room);
             return Ok(());
         }
         let value = match component {
@@ -167,8 +175,8 @@ impl Module<'_> {
             false => self.value(reader)?,
         };
         match name.as_str() {
-            "$TOOL" => self.active.tool.set(self.frame(&value)),
-            "$BASE" => self.active.base.set(self.frame(&value)),
+            "$TOOL" => self.now.0.tool.set(self.frame(&value)),
+            "$BASE" => self.now.0.base.set(self.frame(&value)),
             "$ROBROOT" => self.root = self.frame(&value),
             "FDAT_ACT" => self.use_data(&value),
             _ => {
@@ -272,7 +280,7 @@ impl Module<'_> {
     fn use_data(&mut self, value: &Value) {
         let data = self.resolved(value).ok().and_then(|(data, _)| self.data_frames(data));
         let unknown = || FrameIs::Unknown("its motion data are in none of the files (give the .dat as well)".into());
-        self.active.set(data.unwrap_or_else(|| Frames { tool: unknown(), base: unknown(), ..Frames::default() }));
+        self.now.0.set(data.unwrap_or_else(|| Frames { tool: unknown(), base: unknown(), ..Frames::default() }));
     }
 
     /// `WITH .., $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO), ..` in the rest of a line.
@@ -354,8 +362,8 @@ impl Module<'_> {
             None => FrameIs::Unknown("its number is computed".into()),
         };
         match what.as_deref() {
-            Some("TOOL") => self.active.tool.set(frame("TOOL_DATA")),
-            Some("BASE") => self.active.base.set(frame("BASE_DATA")),
+            Some("TOOL") => self.now.0.tool.set(frame("TOOL_DATA")),
+            Some("BASE") => self.now.0.base.set(frame("BASE_DATA")),
             _ => {}
         }
     }
@@ -367,7 +375,7 @@ impl Module<'_> {
         let at = reader.at;
         let own = self.with(reader);
         reader.at = at;
-        let frames = own.or(&self.spline).over(&self.active);
+        let frames = own.or(&self.spline).over(&self.now.0);
         for k in 0..count {
             if k > 0 && !reader.take_mark(b',') {
                 let what = format!("{name} has {k} targets, not {count}");
@@ -404,6 +412,7 @@ impl Module<'_> {
                 }
                 if several {
                     self.way.lose();
+                    self.now.1 = self.way.stands();
                 }
             }
         }
@@ -416,10 +425,10 @@ impl Module<'_> {
             "DEF" | "DEFFCT" | "GLOBAL" => {
                 let Some(name) = routine_name(reader) else { return false };
                 self.start_afresh();
-                self.flow.routine_begins(name, &mut self.active, &Active::unset());
+                self.flow.routine_begins(name, &mut self.now, &unset());
             }
-            "RETURN" => self.flow.returns(&self.active),
-            "END" | "ENDFCT" => self.flow.routine_ends(&mut self.active),
+            "RETURN" => self.flow.returns(&self.now),
+            "END" | "ENDFCT" => self.flow.routine_ends(&mut self.now),
             "IF" | "SWITCH" | "WHILE" | "LOOP" | "FOR" | "REPEAT" => {
                 self.way.branches_begin();
                 let kind = match word {
@@ -428,15 +437,15 @@ impl Module<'_> {
                     "LOOP" | "REPEAT" => Branching::LoopTaken,
                     _ => Branching::Loop,
                 };
-                self.flow.begin(&mut self.active, kind);
+                self.flow.begin(&mut self.now, kind);
             }
             "ELSE" | "CASE" | "DEFAULT" => {
                 self.way.next_branch();
-                self.flow.next(&mut self.active, word != "CASE");
+                self.flow.next(&mut self.now, word != "CASE");
             }
             "ENDIF" | "ENDSWITCH" | "ENDWHILE" | "ENDLOOP" | "ENDFOR" | "UNTIL" => {
                 self.way.branches_end();
-                self.flow.end(&mut self.active);
+                self.flow.end(&mut self.now);
             }
             "SPLINE" => {}
             "ENDSPLINE" => self.spline = OwnFrames::default(),
@@ -455,20 +464,21 @@ impl Module<'_> {
         for (k, token) in line {
             if token.kind == TokenKind::Word && reader.ahead_is_mark(k + 1, b'(') {
                 let name = String::from_utf8_lossy(reader.text(token)).to_ascii_uppercase();
-                self.flow.call(name, &mut self.active);
+                self.way.call(name, &mut self.flow, &mut self.now);
             }
         }
     }
 
     fn start_afresh(&mut self) {
         self.way.start_afresh();
-        self.flow.all_end(&mut self.active);
+        self.flow.all_end(&mut self.now);
     }
 
     fn leave_at(&mut self, file: usize, line: usize, name: &str, why: Why) {
         // Status and turn may mean another posture, but on a path of the tool it goes on.
         let same_posture = !name.starts_with("PTP") && !name.starts_with("SPTP");
         self.way.leave(Left { file, line, name: name.to_owned(), why }, same_posture);
+        self.now.1 = self.way.stands();
     }
 
     /// `P[I]` stands for all elements of `P` that the text has, in the order of their numbers; anything else for itself.
@@ -501,7 +511,9 @@ impl Module<'_> {
         let clash = format!("{named} is used with different $TOOL or $BASE; give it a position for each");
         let (file, line) = place;
         let target = Target { file, line, name: named, approach: Approach::Unknown, visited: true, kind };
-        if self.way.visit(target) { Ok(()) } else { Err(Why::new(LeftReason::FramesDiffer, clash)) }
+        let visited = self.way.visit(target);
+        self.now.1 = self.way.stands();
+        if visited { Ok(()) } else { Err(Why::new(LeftReason::FramesDiffer, clash)) }
     }
 
     fn kind(&self, a: &Aggregate, frames: &Frames) -> Understood<TargetKind> {

@@ -23,7 +23,7 @@ use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
 use switched::{Switched, Watched};
-use switching::{ROUTINES, Switching};
+use switching::{Now, ROUTINES, Switching};
 use value::{Displacement, NO_AXIS, Node, check, computed, foreign_axis, frame, node, numbers, undeclared};
 
 const DIALECT: Dialect = Dialect { comment: b'!', quotes: b"\"", header: None, based_numbers: false };
@@ -56,8 +56,8 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
 fn reading(
     files: &[TextFile],
     setting: &ProgramSetting<'_>,
-    known: Places<Switched>,
-) -> Result<(Program, Places<Switched>)> {
+    known: Places<Now>,
+) -> Result<(Program, Places<Now>)> {
     let mut task = Task {
         setting,
         data: BTreeMap::new(),
@@ -170,7 +170,7 @@ impl Task<'_> {
                 reader.at += if begins || ROUTINES.contains(&word.as_str()) {
                     self.switching.statement(&reader, &word, &mut self.way)
                 } else {
-                    self.switching.behind_condition(&word);
+                    self.switching.behind_condition(&word, &mut self.way);
                     1
                 };
             }
@@ -265,6 +265,7 @@ impl Task<'_> {
         let same_posture =
             !upper.starts_with("MOVEJ") && !upper.starts_with("MOVEABSJ") && !upper.starts_with("TRIGGJ");
         self.way.leave(Left { file, line, name: name.to_owned(), why }, same_posture);
+        self.switching.moved(&self.way);
     }
 
     fn visit(
@@ -371,7 +372,9 @@ impl Task<'_> {
         let clash = format!("{name} is used with different tools or work objects; give it a robtarget for each");
         let named = name.clone();
         let target = Target { file, line, name, approach: Approach::Unknown, visited: true, kind };
-        if self.way.visit(target) { Ok(()) } else { Err(Why::of(&named, LeftReason::FramesDiffer, clash)) }
+        let visited = self.way.visit(target);
+        self.switching.moved(&self.way);
+        if visited { Ok(()) } else { Err(Why::of(&named, LeftReason::FramesDiffer, clash)) }
     }
 
     fn kind(&self, value: &Node, file: usize, tool: Option<&str>, work: Option<&Node>) -> Understood<TargetKind> {

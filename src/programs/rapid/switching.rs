@@ -2,7 +2,7 @@
 
 use super::switched::{DISPLACES, OFFSETS, Switched, Watched, switch};
 use crate::programs::flow::{Branching, Flow, Followed, Places};
-use crate::programs::itinerary::Itinerary;
+use crate::programs::itinerary::{Itinerary, Stands};
 use crate::programs::scan::{Reader, TokenKind};
 
 /// Beginnings of routines.
@@ -15,6 +15,9 @@ fn routine_name(reader: &Reader<'_>) -> (usize, String) {
     (behind as usize, name.unwrap_or_default())
 }
 
+/// What instructions have switched, and where the robot stands.
+pub(super) type Now = (Switched, Stands);
+
 /// What instructions switch, where the text stands.
 pub(super) struct Switching {
     /// True where a routine switches the check of configurations off: for moves of the joints, and on paths.
@@ -23,24 +26,29 @@ pub(super) struct Switching {
     displaces: bool,
     /// The same of an offset of external axes.
     offsets: bool,
-    now: Switched,
-    flow: Flow<Switched>,
+    now: Now,
+    flow: Flow<Now>,
 }
 
 impl Switching {
     /// With what the reading before found.
-    pub fn new(known: Places<Switched>) -> Self {
-        let now = Switched::new([Watched::On; 2], false, false);
+    pub fn new(known: Places<Now>) -> Self {
+        let now = (Switched::new([Watched::On; 2], false, false), Stands::default());
         Self { switched_off: [false; 2], displaces: false, offsets: false, now, flow: Flow::new(known) }
     }
 
     /// What holds here.
     pub fn now(&self) -> &Switched {
-        &self.now
+        &self.now.0
+    }
+
+    /// The robot was moved.
+    pub fn moved(&mut self, way: &Itinerary) {
+        self.now.1 = way.stands();
     }
 
     /// What this reading found.
-    pub fn found(self) -> Places<Switched> {
+    pub fn found(self) -> Places<Now> {
         self.flow.found()
     }
 
@@ -70,7 +78,7 @@ impl Switching {
             line.into_iter().any(|t| reader.text(t).eq_ignore_ascii_case(wanted))
         };
         if let Some((which, state)) = switch(reader) {
-            self.now.watched[which].set(state);
+            self.now.0.watched[which].set(state);
         }
         match word {
             w if ROUTINES.contains(&w) => {
@@ -79,6 +87,7 @@ impl Switching {
                 let is_called = !line_has(b"main");
                 let uncalled =
                     Switched::new(self.switched_off.map(state), self.displaces && is_called, self.offsets && is_called);
+                let uncalled = (uncalled, Stands::default());
                 self.flow.all_end(&mut self.now);
                 let (behind, name) = routine_name(reader);
                 self.flow.routine_begins(name, &mut self.now, &uncalled);
@@ -99,27 +108,27 @@ impl Switching {
                 way.branches_end();
                 self.flow.end(&mut self.now);
             }
-            _ => self.step(word),
+            _ => self.step(word, way),
         }
         1
     }
 
     /// A word behind the condition of a statement of one line: it may take place.
-    pub fn behind_condition(&mut self, word: &str) {
+    pub fn behind_condition(&mut self, word: &str, way: &mut Itinerary) {
         let before = self.now.clone();
-        self.step(word);
+        self.step(word, way);
         self.now = self.now.merged(&before, "");
     }
 
     /// A statement without branches.
-    fn step(&mut self, word: &str) {
+    fn step(&mut self, word: &str, way: &mut Itinerary) {
         match word {
             "RETURN" => self.flow.returns(&self.now),
-            w if DISPLACES.contains(&w) => self.now.displaced.set(true),
-            w if OFFSETS.contains(&w) => self.now.offset.set(true),
-            "PDISPOFF" => self.now.displaced.set(false),
-            "EOFFSOFF" => self.now.offset.set(false),
-            _ => self.flow.call(word.to_owned(), &mut self.now),
+            w if DISPLACES.contains(&w) => self.now.0.displaced.set(true),
+            w if OFFSETS.contains(&w) => self.now.0.offset.set(true),
+            "PDISPOFF" => self.now.0.displaced.set(false),
+            "EOFFSOFF" => self.now.0.offset.set(false),
+            _ => way.call(word.to_owned(), &mut self.flow, &mut self.now),
         }
     }
 
