@@ -180,11 +180,9 @@ fn advice(r: &SolutionRecord, a: &Advice) -> String {
 
 /// Where all of it stands.
 fn results(r: &SolutionRecord, folder: &Path) -> String {
-    let urdf = match (r.file_ending_with(ALONE), r.file_ending_with(CALIBRATED)) {
-        (Some(alone), Some(_)) => format!("; robot alone: {alone}"),
-        (_, Some(urdf)) => format!("; robot: {urdf}"),
-        _ => String::new(),
-    };
     let report = indented("report", &folder.join(crate::output::REPORT).display().to_string());
-    if report.len() + urdf.len() <= WIDTH { report + &urdf } else { report }
+    let urdf = [ALONE, CALIBRATED].into_iter().find_map(|end| Some((r.file_ending_with(end)?, end)));
+    let names = urdf.into_iter().flat_map(|(name, end)| [format!("; robot: {name}"), format!("; robot: *{end}")]);
+    let beside = names.map(|name| format!("{report}{name}")).find(|line| line.len() <= WIDTH);
+    beside.unwrap_or(report)
 }

@@ -96,4 +96,7 @@ pub mod decisions {
 
     #[doc = include_str!("decisions/0007_one_stage_or_two.md")]
     pub mod d0007_one_stage_or_two {}
+
+    #[doc = include_str!("decisions/0008_the_urdf_alone.md")]
+    pub mod d0008_the_urdf_alone {}
 }

@@ -520,7 +520,8 @@ fn behind_a_call_the_posture_is_that_in_which_the_routine_ends() {
         (returns.as_str(), "sub()", &here, "line"),
         ("def sub():\n  textmsg(\"x\")\n end\n", "sub()", &here, "line"),
     ] {
-        let text = format!("def p():\n set_tcp(p[0,0,0,0,0,0])\n {routines} movej({a})\n {call}\n c={pose}\n movel(c)\nend\n");
+        let text =
+            format!("def p():\n set_tcp(p[0,0,0,0,0,0])\n {routines} movej({a})\n {call}\n c={pose}\n movel(c)\nend\n");
         let file = cell.write("calls.script", text.as_bytes());
         let run = cell.compensate(&[&file], &["--unordered"]).expect(0);
         let new = run.text("calls.script");

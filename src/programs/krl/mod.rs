@@ -55,11 +55,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
 }
 
 /// One reading, with what the one before found, and what it found itself.
-fn reading(
-    files: &[TextFile],
-    setting: &ProgramSetting<'_>,
-    known: Places<Now>,
-) -> Result<(Program, Places<Now>)> {
+fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>) -> Result<(Program, Places<Now>)> {
     let mut module = Module {
         setting,
         prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),

@@ -22,7 +22,7 @@ use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
-use switched::{Switched, Watched};
+use switched::Watched;
 use switching::{Now, ROUTINES, Switching};
 use value::{Displacement, NO_AXIS, Node, check, computed, foreign_axis, frame, node, numbers, undeclared};
 
@@ -53,11 +53,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
 }
 
 /// One reading, with what the one before found, and what it found itself.
-fn reading(
-    files: &[TextFile],
-    setting: &ProgramSetting<'_>,
-    known: Places<Now>,
-) -> Result<(Program, Places<Now>)> {
+fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>) -> Result<(Program, Places<Now>)> {
     let mut task = Task {
         setting,
         data: BTreeMap::new(),
