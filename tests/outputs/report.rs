@@ -6,6 +6,7 @@ use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
 use robotcal::output::verdict::{Verdict, VerdictReason};
 use robotcal::output::{Thumbnails, files, report_html, solution_json};
 use robotcal::series::{CameraMount, InputFile};
+use serde_json::json;
 
 fn record() -> solution_json::SolutionRecord {
     let description = robot();
@@ -239,6 +240,34 @@ fn a_result_without_robot_terms_plots_or_covariances_still_has_a_page() {
     // words: the page is for people, and no number stands where nothing was estimated.
     assert!(page.contains("The readings were taken as exact."));
     assert!(!page.contains("NaN"));
+}
+
+/// Two megabytes: what a mail takes.
+const LARGEST: usize = 2_000_000;
+
+#[test]
+fn a_series_of_many_stops_without_images_has_a_small_page_without_chapters_of_images() {
+    let mut record = record();
+    let readings = |k: usize| (0..6).map(|j| ((k * (j + 3)) as f64 * 0.37).sin()).collect::<Vec<f64>>();
+    let stop = |k: usize| json!({ "series": "run", "name": format!("stop {k}"), "readings": readings(k) });
+    record.bodies.stops = serde_json::from_value((0..12_000).map(stop).collect()).unwrap();
+    record.images.clear();
+    record.plates.clear();
+    record.cameras.clear();
+    record.mountings.clear();
+    record.placements.clear();
+    let page = report_html(&record, &Thumbnails::default());
+    assert!(page.len() < LARGEST, "{}", page.len());
+    let has = |id: &str| page.contains(&format!("<section id=\"{id}\""));
+    for of_images in ["images", "residuals", "plate", "poses", "scene", "pictures"] {
+        assert!(!has(of_images), "{of_images}");
+    }
+    assert!(["coverage", "known", "corrections", "record"].into_iter().all(has));
+    // Of few stops each has a dot of its own, also where two have the same reading.
+    record.bodies.stops.truncate(30);
+    record.bodies.stops.iter_mut().for_each(|s| s.readings = Some(vec![0.1; 6]));
+    let page = report_html(&record, &Thumbnails::default());
+    assert_eq!(page.matches("class=\"stop\"").count(), 30 * 6);
 }
 
 #[test]

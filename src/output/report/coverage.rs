@@ -1,5 +1,7 @@
 //! What the stops covered: the range of every joint, and the image of every camera.
 
+use std::collections::BTreeSet;
+
 use maud::{Markup, html};
 
 use super::describe::name;
@@ -10,6 +12,8 @@ use crate::output::solution_json::{ImageRecord, SolutionRecord};
 use crate::urdf::JointKind;
 
 const WIDTH: f64 = 640.0;
+/// Stops of which those in one place of the drawing are one dot.
+const MANY: usize = 400;
 /// Columns of the picture of the image.
 const COLUMNS: usize = 20;
 
@@ -56,6 +60,7 @@ fn joints(r: &SolutionRecord) -> Option<String> {
     if names.is_empty() || stops(r).next().is_none() {
         return None;
     }
+    let are_many = stops(r).count() > MANY;
     let (left, row) = (130.0, 34.0);
     let reach = WIDTH - left - 12.0;
     let mut svg = Svg::new(WIDTH, row * names.len() as f64 + 8.0, "Readings of every joint within its range");
@@ -69,7 +74,12 @@ fn joints(r: &SolutionRecord) -> Option<String> {
         };
         svg.text([left - 8.0, top + 12.0], Anchor::End, &joint.chars().take(18).collect::<String>());
         svg.rect([left, top], [reach, 16.0], "span");
+        let mut drawn = BTreeSet::new();
         for stop in stops(r) {
+            let place = (x(stop.readings[k]).round() as i64, stop.is_gone);
+            if !drawn.insert(place) && are_many {
+                continue;
+            }
             let (q, class) = (stop.readings[k], if stop.is_gone { "gone" } else { "stop" });
             svg.titled(&format!("{}: {joint} {}", stop.name, shown(q)), |svg| {
                 svg.circle([x(q), top + 8.0], 4.0, class);

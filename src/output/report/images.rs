@@ -9,6 +9,9 @@ use crate::output::solution_json::{ImageRecord, SolutionRecord};
 
 /// One row for each image: what it contributed, how well it is predicted, why it was left out.
 pub(super) fn table(r: &SolutionRecord) -> Markup {
+    if r.images.is_empty() {
+        return html! {};
+    }
     let several = r.images.iter().any(|i| i.series != r.images[0].series);
     html! {
         @if let Some(svg) = plots::by_image(r) { (pointed(&svg, "Point at a bar, or touch it: image, pose, joints, residual.")) }

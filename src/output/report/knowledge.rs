@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::figure::figure;
 use super::maps;
 use super::svg::{Anchor, Svg};
-use super::words::{count, significant};
+use super::words::{count, data, significant};
 use crate::assess::{Cause, UnknownDirection};
 use crate::output::solution_json::SolutionRecord;
 
@@ -22,7 +22,7 @@ pub(super) fn identifiable(r: &SolutionRecord) -> Markup {
     html! {
         p {
             "The robot model has " (count(found.parameters, "free parameter")) ". Stops over the whole range of all joints could tell "
-            (found.tellable) " independent directions of them; these images tell " b { (found.rank) } ". "
+            (found.tellable) " independent directions of them; these " (data(r)) " tell " b { (found.rank) } ". "
             "The rest follows from the priors (the nominal model)."
         }
         @if found.next.is_empty() {
@@ -36,7 +36,7 @@ pub(super) fn identifiable(r: &SolutionRecord) -> Markup {
             ul { @for d in of(&[Cause::Stops]) { li { (names(d)) @if let Some(remedy) = &d.remedy { ": " (remedy) } } } }
         }
         h3 { "What is unobservable, and does no harm" }
-        p.note { "These directions change nothing that a camera sees, or only what the poses of plate and camera take up as well." }
+        p.note { "These directions change nothing that is measured, or only what target pose and hand-eye transform take up as well." }
         ul {
             (group("Unobservable beside the target pose (base frame)", of(&[Cause::Base])))
             (group("Unobservable beside the hand-eye transform (tip frame)", of(&[Cause::Tip])))
@@ -46,7 +46,7 @@ pub(super) fn identifiable(r: &SolutionRecord) -> Markup {
         @if !found.correlations.is_empty() {
             h3 { "Correlated parameters" }
             p.note {
-                "The images fix a combination of the two well, and each alone badly (correlation beyond 0.9). "
+                "The data fix a combination of the two well, and each alone badly (correlation beyond 0.9). "
                 "This does not harm the accuracy as long as both are used together."
             }
             ul { @for c in found.correlations.iter().take(MOST_PAIRS) { li {
@@ -98,7 +98,7 @@ pub(super) fn workspace(r: &SolutionRecord) -> Markup {
     let bounds = bounds(r);
     html! {
         p {
-            "Uncertainty of the position of the flange relative to the plate, one sigma over all three axes, by the calibrated model. "
+            "Uncertainty of the position of the flange relative to " (if r.images.is_empty() { "the base and tool that fit the stops" } else { "the plate" }) ", one sigma over all three axes, by the calibrated model. "
             "Joint noise of a single move comes on top. "
             @if let Some(median) = inside.get(inside.len() / 2) {
                 "In the region of the stops it is typically " b { (significant(*median)) " mm" } "; "

@@ -35,7 +35,7 @@ pub(super) fn robot(r: &SolutionRecord) -> Markup {
         }
         h3 { "All corrections" }
         p.note {
-            "Estimate ± sigma. The bar says how much of it the data decided: full, the images decided alone; "
+            "Estimate ± sigma. The bar says how much of it the data decided: full, they decided alone; "
             "empty, they said nothing and the parameter stays at its nominal value within the tolerance stated in the head."
         }
         (grid(r, "Joint origin", |block, _| block.strip_suffix("/origin")))
@@ -153,7 +153,7 @@ pub(super) fn undetermined(r: &SolutionRecord) -> Markup {
         } @else {
             p {
                 (weak.len()) " of " (r.robot_parameters().count()) " robot parameters stay near nominal, because the data decide less than " (format!("{:.0}", 100.0 * r.limits().share_of_data)) " % of them: "
-                "stops that move these joints further would. What only the pose of the plate or of the camera takes up is not among them."
+                "stops that move these joints further would. What only the target pose or the hand-eye transform takes up is not among them."
             }
             ul { @for line in grouped(weak.iter().copied()) { li { (line) } } }
         }
@@ -173,8 +173,11 @@ pub(super) fn placed(r: &SolutionRecord) -> Markup {
     };
     let cameras = r.mountings.iter().map(|m| (format!("camera in {camera}"), m, r.mountings.len()));
     let plates = r.placements.iter().map(|p| (format!("plate in {plate}"), p, r.placements.len()));
+    if r.mountings.is_empty() && r.placements.is_empty() {
+        return html! {};
+    }
     html! {
-        p.note { "Sigmas are per axis of the camera (of the plate). Roll, pitch, yaw as in URDF." }
+        p.note { "Sigmas are per axis of what is placed. Roll, pitch, yaw as in URDF." }
         div.wide { table {
             thead { tr {
                 th { "Pose" } th.n { "x, mm" } th.n { "y, mm" } th.n { "z, mm" } th.n { "roll, °" } th.n { "pitch, °" } th.n { "yaw, °" }

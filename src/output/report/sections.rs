@@ -3,7 +3,7 @@
 use maud::{Markup, PreEscaped, html};
 
 use super::figure::figure;
-use super::words::{count, plus_minus, significant, unit};
+use super::words::{count, data, plus_minus, significant, unit};
 use super::{maps, plots};
 use crate::identify::StartReached;
 use crate::output::solution_json::SolutionRecord;
@@ -91,7 +91,7 @@ fn series_row(r: &SolutionRecord, name: &str) -> Markup {
 pub(super) fn joint_noise(r: &SolutionRecord) -> Markup {
     html! {
         p {
-            "How far a joint typically stands from where its reading and the model say (one sigma), as the images show it. "
+            "How far a joint typically stands from where its reading and the model say (one sigma), as the " (data(r)) " show it. "
             "No model can remove this part: it bounds the accuracy of a single move."
         }
         @match plots::joint_noise(r) {
@@ -103,6 +103,9 @@ pub(super) fn joint_noise(r: &SolutionRecord) -> Markup {
 
 /// Residual maps.
 pub(super) fn residuals(r: &SolutionRecord) -> Markup {
+    if r.images.is_empty() {
+        return html! {};
+    }
     html! {
         p {
             "What the model leaves unexplained in the images (measured minus predicted). A healthy map looks like noise: "
@@ -130,6 +133,9 @@ fn of_several(r: &SolutionRecord, plate: &str) -> String {
 
 /// The plates as found.
 pub(super) fn plates(r: &SolutionRecord) -> Markup {
+    if r.plates.is_empty() {
+        return html! {};
+    }
     let modes: Vec<_> = r.estimates.iter().filter(|e| e.name.starts_with("plate_shape")).collect();
     let tables = || r.files.iter().filter(|f| f.starts_with("plate") && f.ends_with(".csv"));
     html! {

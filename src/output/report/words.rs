@@ -1,6 +1,6 @@
 //! Names and numbers for people.
 
-use crate::output::solution_json::EstimateRecord;
+use crate::output::solution_json::{EstimateRecord, SolutionRecord};
 
 /// Block and component of a parameter's name; the component of a local error has a point of its own (`local_0.3298`).
 pub(super) fn split(name: &str) -> (&str, &str) {
@@ -165,6 +165,11 @@ pub(super) fn ordinal(n: usize) -> String {
         _ => "th",
     };
     format!("{n}{ending}")
+}
+
+/// What the data are, in the plural.
+pub(super) fn data(r: &SolutionRecord) -> &'static str {
+    if r.images.is_empty() { "measurements" } else { "images" }
 }
 
 /// "1 image", "3 images".
