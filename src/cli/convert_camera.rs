@@ -9,7 +9,9 @@ use super::show::read_solution;
 use crate::error::{Code, Error, Result};
 use crate::files::{self, FileKind};
 use crate::model::camera::{Camera, Lens};
-use crate::output::camera_formats::{CameraFormat, OtherLens, camera_text, loss_words, read_camera_file};
+use crate::output::camera_formats::{
+    CameraFormat, OtherLens, camera_text, is_camera_file, loss_words, read_camera_file,
+};
 use crate::output::restore::{self, depths_of_record};
 use crate::output::write_beside;
 
@@ -57,11 +59,17 @@ struct Value {
 
 /// The format that is asked for: by name, or by the extension that only mrcal has.
 pub(super) fn format(wanted: &Wanted) -> Result<Option<CameraFormat>> {
+    let names = CameraFormat::ALL.map(CameraFormat::name).join(", ");
     let of_mrcal = wanted.to.extension().is_some_and(|e| e == "cameramodel");
     match wanted.format {
+        None if !of_mrcal && wanted.from.is_file() && is_camera_file(wanted.from) => Err(Error::new(
+            Code::OptionMissing,
+            wanted.from.display(),
+            "is a camera file, and the format to write is not named",
+            format!("add --as with one of: {names}"),
+        )),
         None => Ok(of_mrcal.then_some(CameraFormat::Mrcal)),
         Some(name) => CameraFormat::from_name(name).map(Some).ok_or_else(|| {
-            let names = CameraFormat::ALL.map(CameraFormat::name).join(", ");
             Error::new(
                 Code::OptionRange,
                 "--as",
@@ -87,7 +95,7 @@ pub(super) fn run(wanted: &Wanted, format: CameraFormat) -> Result<()> {
 }
 
 fn camera(wanted: &Wanted) -> Result<Named> {
-    let all = if wanted.from.extension().is_some_and(|e| e == "json") {
+    let all = if wanted.from.extension().is_some_and(|e| e == "json") && !is_camera_file(wanted.from) {
         of_results(wanted.from)?
     } else {
         let read = read_camera_file(wanted.from, wanted.name)?;

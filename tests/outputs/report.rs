@@ -97,7 +97,7 @@ fn what_may_be_promised_stands_first() {
         page.find(&shown).unwrap_or_else(|| panic!("{shown} is not in the page"))
     };
     let held_out = page.find("had not seen").unwrap();
-    assert!(at(1e3 * e.urdf_m) < held_out && at(1e3 * e.model_m) < held_out);
+    assert!(at(1e3 * e.best_urdf_m().0) < held_out && at(1e3 * e.model_m) < held_out);
     let [weak, all] = [record.undetermined().len(), record.robot_parameters().count()];
     assert!(all == record.identifiability.as_ref().unwrap().parameters, "{all}");
     assert!(weak > 0 && page.contains(&format!("{weak} of {all} ")));

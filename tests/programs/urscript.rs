@@ -515,9 +515,9 @@ fn behind_a_call_the_posture_is_that_in_which_the_routine_ends() {
     let inner = format!("{leaves} def outer():\n  sub()\n end\n");
     let returns = format!("def sub():\n  movej({b})\n  movej({a})\n end\n");
     for (routines, call, meant, posture) in [
-        (leaves.as_str(), "sub()", &there, "line"),
-        (inner.as_str(), "outer()", &there, "line"),
-        (returns.as_str(), "sub()", &here, "line"),
+        (leaves.as_str(), "sub()", &there, "before"),
+        (inner.as_str(), "outer()", &there, "before"),
+        (returns.as_str(), "sub()", &here, "before"),
         ("def sub():\n  textmsg(\"x\")\n end\n", "sub()", &here, "line"),
     ] {
         let text =

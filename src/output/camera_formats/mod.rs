@@ -25,7 +25,7 @@ const SAME_PX: f64 = 1e-6;
 /// Formats by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CameraFormat {
-    /// `cv::FileStorage` in YAML, as the calibration sample of OpenCV writes it.
+    /// `cv::FileStorage`, as the calibration sample of OpenCV writes it.
     OpenCv,
     /// The camchain of Kalibr.
     Kalibr,
@@ -161,11 +161,16 @@ pub fn read_camera_file(path: &Path, wanted: Option<&str>) -> Result<ReadCamera>
         Some(CameraFormat::Ros) => ros::read(path, &text)?,
         None => {
             let what = "is no camera file of OpenCV, Kalibr, mrcal or ROS";
-            let remedy = "give a FileStorage yaml with camera_matrix and image_width, a camchain, a .cameramodel or a camera_info";
+            let remedy = "give a FileStorage (yaml, xml or json) with camera_matrix and image_width, a camchain, a .cameramodel or a camera_info";
             return Err(Error::new(Code::SettingSyntax, path.display(), what, remedy));
         }
     };
     Ok(found)
+}
+
+/// True for a camera file of another program.
+pub fn is_camera_file(path: &Path) -> bool {
+    files::read_text(path, FileKind::Settings).is_ok_and(|text| format_of(path, &text).is_some())
 }
 
 fn format_of(path: &Path, text: &str) -> Option<CameraFormat> {

@@ -16,16 +16,19 @@ pub(super) struct Numbers {
 /// Pinhole matrix, distortion and size: OpenCV and ROS have the same keys.
 #[derive(Deserialize)]
 pub(super) struct Calibration {
+    // Capitals: the sample of OpenCV 2.
+    #[serde(alias = "image_Width")]
     pub image_width: u32,
+    #[serde(alias = "image_Height")]
     pub image_height: u32,
     pub camera_name: Option<String>,
     pub distortion_model: Option<String>,
     /// The calibration sample of OpenCV says so of a Kannala-Brandt lens.
     #[serde(default)]
     pub fisheye_model: u8,
-    #[serde(alias = "cameraMatrix")]
+    #[serde(alias = "cameraMatrix", alias = "Camera_Matrix")]
     pub camera_matrix: Numbers,
-    #[serde(alias = "distCoeffs", alias = "distortionCoefficients")]
+    #[serde(alias = "distCoeffs", alias = "distortionCoefficients", alias = "Distortion_Coefficients")]
     pub distortion_coefficients: Numbers,
 }
 
