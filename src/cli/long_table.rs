@@ -281,11 +281,13 @@ fn accuracy(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         true => format!("{:>8.3} mm {:>8.3} px   worst image {:.3} mm", e.rms_mm, e.rms_px, e.worst_mm),
         false => format!("{:>8.3} mm   worst stop {:.3} mm", e.rms_mm, e.worst_mm),
     };
-    let what = match by_images {
-        true => "images that the fit had not seen, where the plate stood, repeatability included, RMS over the markers",
-        false => "stops that the fit had not seen, repeatability included, RMS over the measurements",
+    let [unseen, over] = match by_images {
+        true => {
+            ["images that the fit had not seen", "where the plate stood, repeatability included, RMS over the markers"]
+        }
+        false => ["stops that the fit had not seen", "repeatability included, RMS over the measurements"],
     };
-    writeln!(out, "held out  {what} ({} folds):", r.accuracy.folds)?;
+    writeln!(out, "held out  {unseen} ({} folds), {over}:", r.accuracy.folds)?;
     writeln!(out, "          nominal    {}", row(&r.accuracy.nominal))?;
     writeln!(out, "          calibrated {}", row(&r.accuracy.calibrated))
 }
