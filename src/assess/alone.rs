@@ -18,8 +18,9 @@ const STEPS: usize = 2;
 /// Length of a tool, m: at its end turns count as displacements.
 const TOOL_M: f64 = 0.2;
 
-/// Displacement, m, that an origin must do away with before it moves by the sigma of its prior: `e`.
-const HELD_M: f64 = 1e-6;
+/// Displacement, m, that an origin must do away with before it moves by the sigma of its prior, `e`: a hundredth of a millimetre, which no robot
+/// repeats to. Less would move origins far for next to nothing, and shows outside the region.
+const HELD_M: f64 = 1e-5;
 
 /// The robot without errors of its drives, its origins moved so that it comes nearest to the whole one at samples; `None` where it has none, or
 /// no origin is free.

@@ -9,7 +9,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("assess/advice.rs BASES", "stops that are varied"),
     ("assess/advice.rs MOST_NEXT", "how many proposals are kept"),
     ("assess/advice.rs VALUES", "grid of the search"),
-    ("assess/alone.rs HELD_M", "rounding"),
+    ("assess/alone.rs HELD_M", "repeatability of the best robots"),
     ("assess/alone.rs STEPS", "iterations"),
     ("assess/alone.rs TOOL_M", "unit of a column"),
     ("assess/clustered.rs SINGULAR", "rounding of an eigenvalue"),
