@@ -263,6 +263,21 @@ fn glare_moves_no_side_of_a_tag_beyond_its_sigmas() {
     assert!(tally.share() > 0.8, "{tally:?}");
 }
 
+/// Glare changes by more per pixel than any other light, from one side of a corner to the other: one corner in ten of these views was beyond
+/// its sigmas, and more of them were lost.
+#[test]
+fn glare_moves_no_corner_beyond_its_sigmas() {
+    for (kind, seeds, share) in [
+        ("chessboard", [10, 16, 30, 59, 80], 0.8),
+        ("charuco", [17, 27, 53, 75, 80], 0.8),
+        ("puzzleboard", [10, 16, 48, 84, 89], 0.8),
+    ] {
+        let tally = views(kind, "glare", &seeds);
+        assert_eq!((tally.wrong, tally.off, tally.far), (0, 0, 0), "{kind}: {tally:?}");
+        assert!(tally.share() > share, "{kind}: {tally:?}");
+    }
+}
+
 /// Dots beside glare: where it clips the paper their centres move away from it, and at its rim the ink has the gradient of the paper. Two of
 /// these views keep a dot that is; one dot in ten was, before.
 #[test]

@@ -19,6 +19,12 @@ const NEARLY_WHOLE: f64 = 0.8;
 const START_NOISE: f64 = 0.03;
 /// Prior sigma of the slope of the light, share of the contrast per px.
 const SLOPE_PER_PX: f64 = 0.0003;
+/// The same in glare: that of full scale and 40 px changes by this share per px.
+const GLARE_SLOPE: f64 = 0.02;
+/// A slope this many times further from its prior than it and the noise explain may be that of glare ...
+const STRAINED: f64 = 4.0;
+/// ... if it is steeper than this share of the contrast per px: print and rough edges of real boards look like 0.0063 and less.
+const LEAST_GLARE: f64 = 0.007;
 /// Prior sigma of the growth of the dark squares, in blurs.
 const GROWTH_SIGMA: f64 = 0.3;
 /// Prior sigma of the halo, share of the step.
@@ -156,13 +162,15 @@ pub(super) fn refine(picture: &Picture, seed: &Seed, window: Window, look: Look)
     let guess = start(seed, &pixels, look);
     let contrast = guess[STEP];
     let full_scale = f64::from(picture.full_scale);
-    let mut problem = Problem { pixels, look, noise: START_NOISE * contrast.abs(), contrast, full_scale };
+    let mut problem =
+        Problem { pixels, look, noise: START_NOISE * contrast.abs(), contrast, full_scale, level_slope: SLOPE_PER_PX };
     let near = problem.pixels.near;
     let rough = problem.minimise(problem.at(&guess, near), near, ROUGH)?;
-    problem.noise = (rough.sum.squares / near.degrees_of_freedom()).sqrt();
+    problem.noise = near.noise(&rough);
     problem.contrast = rough.state[STEP];
     let all = problem.pixels.all;
-    let end = problem.minimise(problem.at(&rough.state, all), all, FINE)?;
+    let usual = problem.minimise(problem.at(&rough.state, all), all, FINE)?;
+    let end = problem.lit(usual)?;
     problem.finish(seed, end)
 }
 
@@ -210,6 +218,11 @@ impl Part {
     fn degrees_of_freedom(&self) -> f64 {
         (self.pixels - PARAMETERS) as f64
     }
+
+    /// Root mean square of the residuals at a point, counts.
+    fn noise(self, point: &Point) -> f64 {
+        (point.sum.squares / self.degrees_of_freedom()).sqrt()
+    }
 }
 
 /// Least squares over the pixels of one corner.
@@ -220,6 +233,8 @@ struct Problem {
     noise: f64,
     contrast: f64,
     full_scale: f64,
+    /// Prior sigma of the slope of the level, share of the contrast per px.
+    level_slope: f64,
 }
 
 /// Sums over the pixels at a state: normal matrix (lower triangle), right side, squares of the residuals.
@@ -269,18 +284,52 @@ impl Problem {
         Err(Refusal::NotConverged)
     }
 
+    /// The minimum where glare, which adds the same light to dark and light squares, is allowed for, if there is any. In a smoothed picture,
+    /// whose noise is correlated, nothing tells it from noise.
+    fn lit(&mut self, usual: Point) -> Result<Point, Refusal> {
+        if self.full_scale.is_infinite() || self.strain(&usual) <= STRAINED {
+            return Ok(usual);
+        }
+        let (all, noise, mut lit) = (self.pixels.all, self.noise, usual);
+        self.level_slope = GLARE_SLOPE;
+        // Light that the usual fit lacks is no noise, the second time.
+        for _ in 0..2 {
+            self.noise = all.noise(&lit);
+            lit = self.minimise(lit, all, FINE)?;
+        }
+        let [x, y] = LEVEL_SLOPE.map(|i| lit.state[i]);
+        if x.hypot(y) > LEAST_GLARE * lit.state[STEP].abs() {
+            return Ok(lit);
+        }
+        (self.level_slope, self.noise) = (SLOPE_PER_PX, noise);
+        Ok(usual)
+    }
+
+    /// How far the slope of the level is from its prior, in sigmas of what prior and noise together let expect: with the variance `p` of the
+    /// prior and `q` after the fit, a slope is `(1 - q / p)` of what the pixels say, whose variance is then `p / (1 - q / p)`.
+    fn strain(&self, point: &Point) -> f64 {
+        let Some(factor) = self.with_priors(point).0.cholesky() else { return 0.0 };
+        let sigma = self.level_slope * self.contrast.abs();
+        let of = |i: usize| {
+            let variance = factor.solve(&Vector::from_fn(|k, _| if k == i { 1.0 } else { 0.0 }))[i];
+            let open = 1.0 - variance * (self.noise / sigma).powi(2);
+            point.state[i].abs() / (sigma * open.max(f64::EPSILON).sqrt())
+        };
+        LEVEL_SLOPE.map(of).into_iter().fold(0.0, f64::max)
+    }
+
     /// Weights and centres of the parameters that are known beforehand.
     fn priors(&self) -> [(usize, f64, f64); 8] {
         let weight = |sigma: f64| (self.noise / sigma).powi(2);
-        let slope = weight(SLOPE_PER_PX * self.contrast);
+        let [level_slope, slope] = [self.level_slope, SLOPE_PER_PX].map(|share| weight(share * self.contrast));
         let (blur, ln_blur) = (weight(LN_BLUR_SIGMA), self.look.blur_px.ln());
         [
             (LN_BLUR[0], blur, ln_blur),
             (LN_BLUR[1], blur, ln_blur),
             (GROWTH, weight(GROWTH_SIGMA), 0.0),
             (HALO, weight(HALO_SIGMA), 0.0),
-            (LEVEL_SLOPE[0], slope, 0.0),
-            (LEVEL_SLOPE[1], slope, 0.0),
+            (LEVEL_SLOPE[0], level_slope, 0.0),
+            (LEVEL_SLOPE[1], level_slope, 0.0),
             (STEP_SLOPE[0], slope, 0.0),
             (STEP_SLOPE[1], slope, 0.0),
         ]
