@@ -23,8 +23,8 @@ const SLOPE_PER_PX: f64 = 0.0003;
 const GLARE_SLOPE: f64 = 0.02;
 /// A slope this many times further from its prior than it and the noise explain may be that of glare ...
 const STRAINED: f64 = 4.0;
-/// ... if it is steeper than this share of the contrast per px: print and rough edges of real boards look like 0.0063 and less.
-const LEAST_GLARE: f64 = 0.007;
+/// ... if it is steeper than this share of the contrast per px: print and rough edges of real boards look like 0.0094 and less.
+const LEAST_GLARE: f64 = 0.01;
 /// Prior sigma of the growth of the dark squares, in blurs.
 const GROWTH_SIGMA: f64 = 0.3;
 /// Prior sigma of the halo, share of the step.
