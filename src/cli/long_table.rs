@@ -143,7 +143,7 @@ fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     let (alone_m, _) = e.best_urdf_m();
     writeln!(out, "          calibrated {}   corrected URDF alone", mm(alone_m))?;
     if r.beyond_urdf() {
-        if let Some(_) = e.alone_m {
+        if e.alone_m.is_some() {
             let words = "the URDF that belongs to compensation.toml, without it";
             writeln!(out, "          calibrated {}   {words}", mm(e.urdf_m))?;
         }
