@@ -18,9 +18,13 @@ mod tests {
         assert_eq!(spread(7, 7).collect::<Vec<_>>(), (0..7).collect::<Vec<_>>());
         let some: Vec<usize> = spread(12_000, 500).collect();
         assert!((495..=505).contains(&some.len()), "{}", some.len());
+        // Every n-th would take some places of such turns always, and the others never.
         for turn in 2..40 {
-            let (expected, one) = (500.0 / turn as f64, some.iter().filter(|k| *k % turn == 0).count() as f64);
-            assert!((one / expected - 1.0).abs() < 0.35, "{one} of {expected} in the same place of a turn of {turn}");
+            let expected = 500.0 / turn as f64;
+            for place in 0..turn {
+                let taken = some.iter().filter(|k| *k % turn == place).count();
+                assert!(taken > 0 && (taken as f64) < 2.0 * expected, "{taken} of {expected} at {place} of {turn}");
+            }
         }
         assert!(some.windows(2).all(|w| w[1] - w[0] < 40));
     }
