@@ -5,7 +5,7 @@
 //! the twists of the origins, these minimise the mean of `|A x - d|^2` over the region of the stops, turns at the length of a tool. What that
 //! does not tell stays as it is: with the prior `S`, `e^2 x' S^-1 x` is added.
 
-use nalgebra::{DMatrix, DVector, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use crate::linalg::SymmetricFactor;
 use crate::model::joint_terms::Term;
@@ -31,35 +31,29 @@ pub fn urdf_alone(whole: &Robot, layout: &Layout, samples: &[Posture]) -> Option
     if alone.terms.len() == whole.terms.len() || samples.is_empty() {
         return None;
     }
-    let columns: Vec<usize> = layout.twists.clone().filter(|&c| layout.columns[c].free).collect();
+    let free: Vec<usize> = layout.twists.clone().filter(|&c| layout.columns[c].free).collect();
+    let place = |c: &usize| ((c - layout.twists.start) / 6, (c - layout.twists.start) % 6);
+    let hold = |&c: &usize| (HELD_M / layout.columns[c].prior_sigma).powi(2);
+    let hold = DVector::from_iterator(free.len(), free.iter().map(hold));
     let noiseless = |s: &Posture| vec![0.0; s.readings.len()];
     let weights = Vector6::from_fn(|k, _| if k < 3 { 1.0 } else { TOOL_M * TOOL_M }) / samples.len() as f64;
-    let weights = DMatrix::from_diagonal(&DVector::from_column_slice(weights.as_slice()));
     for _ in 0..STEPS {
-        let hold = |&c: &usize| (HELD_M / layout.columns[c].prior_sigma).powi(2);
-        let mut normal = DMatrix::from_diagonal(&DVector::from_iterator(columns.len(), columns.iter().map(hold)));
-        let moved = |&c: &usize| {
-            let (joint, axis) = ((c - layout.twists.start) / 6, (c - layout.twists.start) % 6);
-            alone.twists[joint][axis] - whole.twists[joint][axis]
-        };
-        let mut rhs = -DVector::from_iterator(columns.len(), columns.iter().map(|c| hold(c) * moved(c)));
+        let moved = free.iter().map(place).map(|(joint, k)| alone.twists[joint][k] - whole.twists[joint][k]);
+        let mut rhs = -hold.component_mul(&DVector::from_iterator(free.len(), moved));
+        let mut normal = DMatrix::from_diagonal(&hold);
         for sample in samples {
             let kinematics = alone.kinematics(sample, &noiseless(sample));
             let d = (kinematics.base_from_tip.inverse() * whole.pose_at(sample, &noiseless(sample))).log();
-            let mut a = DMatrix::zeros(6, columns.len());
-            for (&c, mut column) in columns.iter().zip(a.column_iter_mut()) {
-                let twist = c - layout.twists.start;
-                column.copy_from(&kinematics.d_twists[twist / 6].column(twist % 6));
+            let mut a = DMatrix::zeros(6, free.len());
+            for (&c, mut column) in free.iter().zip(a.column_iter_mut()) {
+                column.copy_from(&layout.derivative(&kinematics, c));
             }
-            let weighted = &weights * &a;
+            let weighted = Matrix6::from_diagonal(&weights) * &a;
             rhs += weighted.tr_mul(&d);
             normal += a.tr_mul(&weighted);
         }
-        let x = SymmetricFactor::new(&normal).ok().filter(|_| !columns.is_empty())?.solve(&rhs);
-        for (&c, x) in columns.iter().zip(x.iter()) {
-            let twist = c - layout.twists.start;
-            alone.twists[twist / 6][twist % 6] += x;
-        }
+        let x = SymmetricFactor::new(&normal).ok().filter(|_| !free.is_empty())?.solve(&rhs);
+        free.iter().map(place).zip(x.iter()).for_each(|((joint, k), x)| alone.twists[joint][k] += x);
     }
     Some(alone)
 }

@@ -12,7 +12,7 @@ use super::limits::Limits;
 use super::stops::{StopsKnowledge, Structural, information_of_share, structural};
 use crate::linalg::symmetric_eigen;
 use crate::model::robot::{Posture, Robot};
-use crate::problem::{Layout, short_name};
+use crate::problem::{Layout, places_body, short_name};
 
 /// Most pairs that are kept.
 const MOST_PAIRS: usize = 60;
@@ -312,7 +312,7 @@ fn correlations(
         let remedy = match (camera(&all[first]), camera(&all[second])) {
             (true, true) => "fill the whole image, tilt by 20 to 45 degrees, and vary the distance".to_owned(),
             _ if v.norm() > 0.0 => adviser.in_words(Some(&v)),
-            _ if [first, second].iter().any(|&k| MEASURED_FRAMES.iter().any(|kind| all[k].starts_with(kind))) => {
+            _ if [first, second].iter().any(|&k| places_body(&all[k])) => {
                 "measure at stops with the tip turned to more different directions".to_owned()
             }
             _ => "roll the camera about its axis at some stops, tilt by 20 to 45 degrees, and vary the distance"
@@ -322,9 +322,6 @@ fn correlations(
     };
     pairs.into_iter().map(in_words).collect()
 }
-
-/// Beginnings of the names of frames of instruments and bodies, which no camera sees.
-const MEASURED_FRAMES: [&str; 4] = ["tracker.", "contact.", "places.", "target."];
 
 /// Poses of two plates, or of two mountings: all hang on the same robot, which makes them move together.
 fn share_a_frame(a: &str, b: &str) -> bool {

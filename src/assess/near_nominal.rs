@@ -76,14 +76,7 @@ fn derivatives(robot: &Robot, layout: &Layout, columns: &[usize], at: &Posture) 
     let kinematics = robot.kinematics(at, &vec![0.0; at.readings.len()]);
     let mut j = DMatrix::zeros(3, columns.len());
     for (place, &c) in columns.iter().enumerate() {
-        let d = match c.checked_sub(layout.terms.start) {
-            Some(term) => kinematics.d_terms[term],
-            None => {
-                let twist = c - layout.twists.start;
-                kinematics.d_twists[twist / 6].column(twist % 6).into_owned()
-            }
-        };
-        j.set_column(place, &d.fixed_rows::<3>(0));
+        j.set_column(place, &layout.derivative(&kinematics, c).fixed_rows::<3>(0));
     }
     let mut f = DMatrix::identity(3, 9);
     f.view_mut((0, 3), (3, 6)).copy_from(&adjoint(&kinematics.base_from_tip.inverse()).fixed_rows::<3>(0));

@@ -79,13 +79,7 @@ impl StopsKnowledge {
         let n = self.columns.len();
         let mut j = DMatrix::zeros(6, n + FRAMES);
         for (k, (&c, scale)) in self.columns.iter().zip(&self.scale).enumerate() {
-            let d = if layout.twists.contains(&c) {
-                let at = c - layout.twists.start;
-                kinematics.d_twists[at / 6].column(at % 6).into_owned()
-            } else {
-                kinematics.d_terms[c - layout.terms.start]
-            };
-            j.column_mut(k).copy_from(&(d * *scale));
+            j.column_mut(k).copy_from(&(layout.derivative(&kinematics, c) * *scale));
         }
         j.fixed_view_mut::<6, 6>(0, n).copy_from(&Matrix6::identity());
         j.fixed_view_mut::<6, 6>(0, n + 6).copy_from(&adjoint(&kinematics.base_from_tip.inverse()));

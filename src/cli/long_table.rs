@@ -137,7 +137,7 @@ fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     writeln!(
         out,
         "flange    expected error of its position relative to {} in the region of the stops, by model and covariance, RMS:",
-        if r.images.is_empty() { "the base and tool that fit the stops" } else { "the plate" }
+        r.flange_is_relative_to()
     )?;
     writeln!(out, "          nominal    {}   base and tool that fit it best", mm(e.nominal_m))?;
     let (alone_m, _) = e.best_urdf_m();

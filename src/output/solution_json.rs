@@ -477,6 +477,11 @@ impl SolutionRecord {
         self.robot.terms.iter().any(|t| t.term != "offset" && !t.term.starts_with("local_"))
     }
 
+    /// What the position of the flange is stated relative to, in words.
+    pub fn flange_is_relative_to(&self) -> &'static str {
+        if self.images.is_empty() { "the base and tool that fit the stops" } else { "the plate" }
+    }
+
     /// The file that was written under a name that ends so.
     pub fn file_ending_with(&self, end: &str) -> Option<&str> {
         self.files.iter().find(|f| f.ends_with(end)).map(String::as_str)

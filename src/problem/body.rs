@@ -33,7 +33,19 @@ pub enum InstrumentKind {
     Places,
 }
 
+/// Name of the block of the columns of a body.
+pub(super) const BODY: &str = "target";
+
+/// True for a column, by its name for people, that places an instrument or a body: no camera sees it.
+pub fn places_body(name: &str) -> bool {
+    let block = name.split('.').next();
+    block == Some(BODY) || InstrumentKind::ALL.iter().any(|kind| block == Some(kind.block()))
+}
+
 impl InstrumentKind {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Tracker, Self::Socket, Self::Places];
+
     /// Name of the block of its columns.
     pub fn block(self) -> &'static str {
         match self {

@@ -2,11 +2,14 @@
 
 use std::ops::Range;
 
-use super::body::Instrument;
+use nalgebra::Vector6;
+
+use super::body::{BODY, Instrument};
 use super::{Image, State};
 use crate::model::camera::{Camera, MAX_PARAMETERS};
 use crate::model::joint_terms::Term;
 use crate::model::plate_modes;
+use crate::model::robot::Kinematics;
 use crate::urdf::BASE_FROM_BASE;
 
 /// One scalar unknown of the dense part of the problem.
@@ -157,7 +160,7 @@ impl Layout {
         let mountings = mountings.iter().map(|m| b.pose(&named("hand_camera", m, mountings.len()))).collect();
         let placements = placements.iter().map(|p| b.pose(&format!("plate/{p}"))).collect();
         let instruments = instruments.iter().map(|i| b.pose(&format!("{}/{}", i.kind.block(), i.name))).collect();
-        let bodies = bodies.iter().map(|body| b.pose(&format!("target/{body}"))).collect();
+        let bodies = bodies.iter().map(|body| b.pose(&format!("{BODY}/{body}"))).collect();
         let cameras: Vec<Range<usize>> =
             (cameras.iter().zip(&state.cameras)).map(|(name, camera)| b.camera(name, camera)).collect();
         let fields = (cameras.iter().zip(&state.cameras))
@@ -229,6 +232,16 @@ impl Layout {
     /// True without any column.
     pub fn is_empty(&self) -> bool {
         self.columns.is_empty()
+    }
+
+    /// Derivative of the pose of the tip, as its body twist, by a column of the robot.
+    pub fn derivative(&self, kinematics: &Kinematics, column: usize) -> Vector6<f64> {
+        if self.twists.contains(&column) {
+            let component = column - self.twists.start;
+            kinematics.d_twists[component / 6].column(component % 6).into_owned()
+        } else {
+            kinematics.d_terms[column - self.terms.start]
+        }
     }
 
     /// Number of leading columns that act through poses (robot, mountings, placements, instruments, bodies).

@@ -28,7 +28,9 @@ mod step;
 mod stop;
 
 pub use adjustment::Adjustment;
-pub use body::{BodyMeasurement, BodyRejection, BodySeen, BodyTerms, Instrument, InstrumentKind, body_bound};
+pub use body::{
+    BodyMeasurement, BodyRejection, BodySeen, BodyTerms, Instrument, InstrumentKind, body_bound, places_body,
+};
 pub use condensed::{SeenAtStop, by_columns, condensed};
 pub use equations::{E, Equations, MarkerCoupling, MarkerTerms, Sight};
 pub use family::Family;

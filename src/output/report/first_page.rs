@@ -73,7 +73,7 @@ fn promise(r: &SolutionRecord, trust: Trust) -> Markup {
             } } }
         } }
         p.note {
-            "Position of the flange relative to " (if r.images.is_empty() { "the base and tool that fit the stops" } else { "the plate" }) " in the region of the stops, by model and covariance; the nominal robot with the base and "
+            "Position of the flange relative to " (r.flange_is_relative_to()) " in the region of the stops, by model and covariance; the nominal robot with the base and "
             "the tool that fit it best. " (significant(1e3 * e.scatter_m)) " mm of each is noise from stop to stop, which no model takes away. "
             "This is the figure to quote; " a href="#workspace" { "elsewhere in the workspace" } " it is larger."
         }

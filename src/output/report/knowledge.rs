@@ -98,7 +98,7 @@ pub(super) fn workspace(r: &SolutionRecord) -> Markup {
     let bounds = bounds(r);
     html! {
         p {
-            "Uncertainty of the position of the flange relative to " (if r.images.is_empty() { "the base and tool that fit the stops" } else { "the plate" }) ", one sigma over all three axes, by the calibrated model. "
+            "Uncertainty of the position of the flange relative to " (r.flange_is_relative_to()) ", one sigma over all three axes, by the calibrated model. "
             "Joint noise of a single move comes on top. "
             @if let Some(median) = inside.get(inside.len() / 2) {
                 "In the region of the stops it is typically " b { (significant(*median)) " mm" } "; "
