@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::compensation::largest_nm;
+use super::robot_files::{ALONE, CALIBRATED};
 use crate::error::{Code, Error, Result};
 use crate::files::{self, FileKind};
 use crate::model::joint_terms::{Exported, JointTerm, Term};
@@ -84,15 +85,18 @@ fn terms_of(joint: &BTreeMap<String, Values>) -> std::result::Result<Vec<(Term, 
     Ok(all.into_iter().filter_map(|term| Some((term, value(term)?))).collect())
 }
 
-/// The robot of a chain, with the joint terms of a compensation.toml where there is one.
+/// The robot of a chain of a URDF, with the joint terms of a compensation.toml where there is one.
 ///
 /// # Errors
-/// Those of [`read_compensation`].
-pub fn compensated(chain: Chain, path: Option<&Path>) -> Result<Robot> {
-    match path {
-        Some(path) => read_compensation(path, chain),
-        None => Ok(Robot::nominal(chain)),
+/// Those of [`read_compensation`]; a URDF in whose origins the terms are already.
+pub fn compensated((urdf, chain): (&Path, Chain), path: Option<&Path>) -> Result<Robot> {
+    let Some(path) = path else { return Ok(Robot::nominal(chain)) };
+    if urdf.to_string_lossy().ends_with(ALONE) {
+        let what = "is for use without compensation.toml, and its terms would count twice";
+        let remedy = format!("give the *{CALIBRATED} that was written beside it, or leave compensation.toml out");
+        return Err(Error::new(Code::OptionConflict, urdf.display(), what, remedy));
     }
+    read_compensation(path, chain)
 }
 
 /// The robot of a chain with the joint terms of a compensation.toml, joints matched by name.

@@ -7,12 +7,15 @@ use std::path::Path;
 
 use crate::outputs_support::{context, robot, series_in_postures, solved};
 use nalgebra::{Matrix4, Vector3, Vector6};
+use robotcal::Code;
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::{Options, RobotModel, identify};
 use robotcal::model::robot::Robot;
 use robotcal::output::flange_table::flange_at;
 use robotcal::output::restore::found_model;
-use robotcal::output::{Offsets, files, kinematics_xacro, kinematics_yaml, read_compensation, solution_json};
+use robotcal::output::{
+    Offsets, compensated, files, kinematics_xacro, kinematics_yaml, read_compensation, solution_json,
+};
 use robotcal::series::CameraMount;
 use robotcal::urdf::{RobotDescription, patch_origins};
 use serde::Deserialize;
@@ -66,6 +69,12 @@ fn the_urdf_for_those_who_read_nothing_else_is_a_file_of_its_own() {
         let (angle, distance) = written.base_from_tip(&q).distance(&of.base_from_tip(&q));
         assert!(angle < 1e-9 && distance < 1e-9, "{angle} rad, {distance} m");
     }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("compensation.toml");
+    std::fs::write(&path, text(&files(&solution, &context(&description)).unwrap(), "compensation.toml")).unwrap();
+    let with = |urdf: &str, path| compensated((Path::new(urdf), alone.chain.clone()), path).map_err(|e| e.code);
+    assert_eq!(with(name, Some(path.as_path())).unwrap_err(), Code::OptionConflict, "terms would count twice");
+    assert!(with(name, None).is_ok() && with("kuka_kr6_r900.calibrated.urdf", Some(path.as_path())).is_ok());
     let e = solution.uncertainty.flange.unwrap();
     assert!(e.alone_m.unwrap() <= e.urdf_m && e.model_m <= e.alone_m.unwrap(), "{e:?}");
 }
