@@ -56,16 +56,12 @@ fn in_comment(name: &str) -> String {
     name.replace("--", "- -")
 }
 
-/// Origins as xacro properties `NAME_origin_xyz` and `NAME_origin_rpy`, each under the element in which they are to be used.
-pub(super) fn xacro(solution: &Solution, context: &Context) -> String {
-    kinematics_xacro(&exported(solution, context), offsets_in_words(context))
-}
-
-/// As kinematics.xacro; `offsets` says for the head how joint offsets are dealt with.
-pub fn kinematics_xacro(robot: &Robot, offsets: &str) -> String {
+/// Origins as xacro properties `NAME_origin_xyz` and `NAME_origin_rpy`, each under the element in which they are to be used; `note` says in
+/// the head how joint offsets are dealt with.
+pub fn kinematics_xacro(robot: &Robot, note: &str) -> String {
     let mut out = format!(
         "<?xml version=\"1.0\"?>\n<!-- Corrected joint origins (m, rad) as properties, for robot descriptions written in xacro (ROS): include this file, and write\n\
-         \x20    in every joint the origin that stands here above its properties. {offsets} -->\n\
+         \x20    in every joint the origin that stands here above its properties. {note} -->\n\
          <robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\">\n"
     );
     let origins = robot.urdf_origins();
@@ -139,16 +135,15 @@ pub(super) fn postures(chain: &Chain) -> impl Iterator<Item = Vec<f64>> {
     (0..POSTURES).map(move |_| inverse::random_readings(&limits, &chain.reading_kinds, &mut rng))
 }
 
-/// Modified Denavit-Hartenberg parameters, or why there are none.
-pub(super) fn mdh_csv(solution: &Solution, context: &Context) -> String {
-    let mut robot = exported(solution, context);
+/// Modified Denavit-Hartenberg parameters, or why there are none; `note` as in [`kinematics_xacro`].
+pub(super) fn mdh_csv(robot: &Robot, note: &str) -> String {
+    let mut robot = robot.clone();
     let origins = robot.corrected_origins();
     robot.chain.joints.iter_mut().zip(origins).for_each(|(j, o)| j.origin = o);
     let robot = Robot::nominal(robot.chain);
     let head = format!(
         "# Modified Denavit-Hartenberg parameters (Craig), for controllers and toolboxes that take no other model. Link i:\n\
-         # T = RotX(alpha_rad) TransX(a_m) RotZ(q + theta_offset_rad) TransZ(d_m) (prismatic: TransZ(d_m + q)); base and tip are full poses. {}\n",
-        offsets_in_words(context)
+         # T = RotX(alpha_rad) TransX(a_m) RotZ(q + theta_offset_rad) TransZ(d_m) (prismatic: TransZ(d_m + q)); base and tip are full poses. {note}\n"
     );
     let mdh = match Mdh::of(&robot.chain) {
         Ok(mdh) => mdh,

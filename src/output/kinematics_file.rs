@@ -4,11 +4,9 @@
 
 use sha2::{Digest, Sha256};
 
-use super::Context;
-use super::controller_files::{exported, offsets_in_words, postures};
+use super::controller_files::postures;
 use super::text::{key, number};
 use crate::geom::Pose;
-use crate::identify::Solution;
 use crate::model::robot::Robot;
 use crate::urdf::{Chain, JointKind, RobotDescription};
 
@@ -48,20 +46,15 @@ struct Reader {
     behind: Pose,
 }
 
-/// kinematics.yaml of a solution.
-pub(super) fn of_solution(solution: &Solution, context: &Context) -> String {
-    kinematics_yaml(&exported(solution, context), context.robot, offsets_in_words(context))
-}
-
-/// Corrected origins of a robot in the layout that its own description reads, under the names of its joints where none does; `offsets`
-/// says for the head how joint offsets are dealt with.
-pub fn kinematics_yaml(robot: &Robot, description: &RobotDescription, offsets: &str) -> String {
+/// Corrected origins of a robot in the layout that its own description reads, under the names of its joints where none does; `note`
+/// says in the head how joint offsets are dealt with.
+pub fn kinematics_yaml(robot: &Robot, description: &RobotDescription, note: &str) -> String {
     let Some(reader) = recognised(description, &robot.chain) else {
         let head = "# Corrected joint origins (m, rad) under the joint names of the URDF, for programs of your own: this is none of the robots whose description\n\
                     # reads a file of kinematics (ur_description, franka_description, xarm_description). The corrected URDF and kinematics.xacro say the same.";
         let origins = robot.urdf_origins();
         let body: String = origins.iter().map(|(name, o)| entry("  ", name, o)).collect();
-        return format!("{head} {offsets}\nkinematics:\n{body}");
+        return format!("{head} {note}\nkinematics:\n{body}");
     };
     let read = reader.origins(robot);
     let loss_m = reader.loss_m(robot, &read);
@@ -72,7 +65,7 @@ pub fn kinematics_yaml(robot: &Robot, description: &RobotDescription, offsets: &
         ),
         false => String::new(),
     };
-    format!("{}\n# {offsets}\n{loss}{}", reader.head(), reader.body(&robot.chain, &read, description))
+    format!("{}\n# {note}\n{loss}{}", reader.head(), reader.body(&robot.chain, &read, description))
 }
 
 /// Which description reads the kinematics of this robot, by the names of its joints; all axes are z there.

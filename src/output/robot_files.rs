@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::controller_files::{self, exported, of_controller};
+use super::controller_files::{self, kinematics_xacro, mdh_csv, of_controller, offsets_in_words};
+use super::kinematics_file::kinematics_yaml;
 use super::names::file_part;
-use super::{Context, compensation, kinematics_file};
+use super::{Context, compensation};
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::identify::Solution;
@@ -13,26 +14,37 @@ use crate::urdf::patch_origins;
 
 /// Every file about the robot: name and text.
 pub(super) fn all(solution: &Solution, context: &Context) -> Result<Vec<(String, String)>> {
-    let alone = solution.uncertainty.alone.as_ref().map(|robot| of_controller(robot, context));
-    let alone = alone.map(|robot| Ok((name(context, ALONE), urdf(&robot, context)?))).transpose()?;
-    let files = vec![
-        (name(context, CALIBRATED), urdf(&exported(solution, context), context)?),
-        ("kinematics.yaml".into(), kinematics_file::of_solution(solution, context)),
-        ("kinematics.xacro".into(), controller_files::xacro(solution, context)),
-        ("mdh.csv".into(), controller_files::mdh_csv(solution, context)),
-        ("mastering.csv".into(), controller_files::mastering_csv(solution, context)),
-        ("compensation.toml".into(), compensation::compensation_toml(solution, context)),
-    ];
-    Ok(files.into_iter().chain(alone).collect())
+    let alone = solution.uncertainty.alone.as_ref();
+    let note = alone.map_or("", |_| WITH_TERMS);
+    let mut files = described(&solution.fit.state.robot, "", note, context)?;
+    files.push(("mastering.csv".into(), controller_files::mastering_csv(solution, context)));
+    files.push(("compensation.toml".into(), compensation::compensation_toml(solution, context)));
+    if let Some(robot) = alone {
+        files.extend(described(robot, "_alone", BY_ITSELF, context)?);
+    }
+    Ok(files)
 }
+
+/// Heads of the files to which compensation.toml adds, and of those that do without.
+const WITH_TERMS: &str = "compensation.toml adds to these origins: a program that does not read it does better with those of the files _alone.";
+const BY_ITSELF: &str = "These origins do best by themselves and do not go with compensation.toml.";
 
 /// End of the name of the corrected URDF.
 pub const CALIBRATED: &str = ".calibrated.urdf";
 /// End of the name of the one that does best by itself.
 pub const ALONE: &str = ".calibrated_alone.urdf";
 
-fn name(context: &Context, end: &str) -> String {
-    format!("{}{end}", file_part(context.robot_name))
+/// A robot in every format that its readers take; `mark` stands in the names, `note` in the heads.
+fn described(robot: &Robot, mark: &str, note: &str, context: &Context) -> Result<Vec<(String, String)>> {
+    let robot = of_controller(robot, context);
+    let note = [offsets_in_words(context), note].join(" ");
+    let note = note.trim_end();
+    Ok(vec![
+        (format!("{}.calibrated{mark}.urdf", file_part(context.robot_name)), urdf(&robot, context)?),
+        (format!("kinematics{mark}.yaml"), kinematics_yaml(&robot, context.robot, note)),
+        (format!("kinematics{mark}.xacro"), kinematics_xacro(&robot, note)),
+        (format!("mdh{mark}.csv"), mdh_csv(&robot, note)),
+    ])
 }
 
 /// The URDF with the corrected origins of the chain, joint offsets folded in or left to the controller; every other byte as it was.
