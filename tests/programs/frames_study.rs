@@ -129,7 +129,7 @@ impl Robots {
     }
 
     /// Mean square error that the best linear prediction of the tool at the targets has, m^2: touches, the robot's covariance as prior, base
-    /// and tool free (universal kriging, dense).
+    /// and tool free (universal kriging, dense). Infinite where the touches leave a direction of the frames free.
     fn bound(&self, touches: &Touches, targets: &[Vec<f64>], tool: &Vector3<f64>, work: &Pose) -> f64 {
         let n = self.layout.locals.start;
         let c = self.covariance.view((0, 0), (n, n)).into_owned();
@@ -146,7 +146,9 @@ impl Robots {
         v += &g * &c * g.transpose();
         let v = SymmetricFactor::new(&v).unwrap();
         let va = v.solve_many(&a);
-        let information = SymmetricFactor::new(&(a.transpose() * &va)).unwrap();
+        let Ok(information) = SymmetricFactor::new(&(a.transpose() * &va)) else {
+            return f64::INFINITY;
+        };
         let square = |q: &Vec<f64>| {
             let [at, gt, _] = self.rows(&Posture::at(q), tool, work);
             let cross = &g * &c * gt.transpose();
