@@ -189,7 +189,7 @@ fn start_log(verbose: u8) {
         2 => tracing::Level::DEBUG,
         _ => tracing::Level::TRACE,
     };
-    let from = move |m: &tracing::Metadata| m.level() <= &level && (verbose > 1 || is_own(m.target()));
+    let from = move |m: &tracing::Metadata| m.level() <= &level && is_own(m.target());
     let words = tracing_subscriber::fmt::layer().with_ansi(std::io::stderr().is_terminal());
     let words = words.with_writer(std::io::stderr).with_target(verbose > 1).without_time();
     tracing_subscriber::registry().with(words.with_filter(filter_fn(from))).with(stages::layer()).init();
