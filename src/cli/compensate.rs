@@ -130,7 +130,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
         let description = urdf::read(file)?;
         let base = stands_on(args, &description).map(|(link, _)| link).or(args.base.as_deref());
         let chain = noted_chain(&description, base, args.tip.as_deref())?;
-        let mut robot = compensated((file, chain), compensation.map(PathBuf::as_path))?;
+        let mut robot = compensated(chain, compensation.map(PathBuf::as_path))?;
         robot.terms.retain(|t| !args.unordered || t.term != Term::Backlash);
         Ok(robot)
     };

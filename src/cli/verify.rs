@@ -28,7 +28,7 @@ fn points(args: &VerifyArgs, points_file: &std::path::Path, unit: Unit) -> Resul
     let rms = |file: &PathBuf, compensation: Option<&PathBuf>| -> Result<(usize, f64, f64)> {
         let chain = read_chain(file, args.base.as_deref(), args.tip.as_deref())?;
         let points = read_points(points_file, &chain, unit)?;
-        let robot = compensated((file, chain), compensation.map(PathBuf::as_path))?;
+        let robot = compensated(chain, compensation.map(PathBuf::as_path))?;
         let fit = fit_points(&robot, &points).ok_or_else(|| {
             Error::new(
                 Code::PointsUndetermined,

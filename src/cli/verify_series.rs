@@ -59,7 +59,7 @@ fn judged(
     let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
     let inputs = Inputs::read(urdf, &args.series, ends)?.with_recordings(&recording.options(&[])?)?;
     let Observed { chain, series: measured, .. } = inputs.observe(&progress::of_series())?;
-    let robot = compensated((urdf, chain), compensation)?;
+    let robot = compensated(chain, compensation)?;
     let bar = progress::bar(1, &urdf.display().to_string());
     let found = verify_series(&robot, &measured);
     bar.finish_and_clear();

@@ -5,8 +5,10 @@ use std::collections::BTreeMap;
 use super::Context;
 use super::controller_files::{exported, offsets_in_words};
 use super::text::{key, list, number};
+use crate::geom::Pose;
 use crate::identify::Solution;
 use crate::model::joint_terms::{Exported, Term};
+use crate::model::robot::Robot;
 use crate::urdf::Chain;
 
 /// Acceleration of gravity, m/s^2 (standard).
@@ -74,13 +76,22 @@ pub(super) fn compensation_toml(solution: &Solution, context: &Context) -> Strin
         joints[t.reading].take(t.term, t.value, largest_nm(&robot.chain, t.reading));
     }
     let sections = robot.chain.readings.iter().zip(&joints).map(|(name, joint)| (name, joint.text()));
-    let sections = sections.filter(|(_, text)| !text.is_empty());
+    let sections: Vec<_> = sections.filter(|(_, text)| !text.is_empty()).collect();
+    let urdf = if sections.is_empty() { String::new() } else { origins(&robot) };
     let payload = robot.chain.payload().map_or_else(String::new, |p| {
         format!("\n[payload]\nmass_kg = {}\ncentre_m = {}\n", number(p.mass_kg), list(p.centre_m.iter().copied()))
     });
-    sections.fold(format!("{}# {}\n{payload}", header(), offsets_in_words(context)), |out, (name, text)| {
-        out + &format!("\n[joint.{}]\n{text}", key(name))
-    })
+    let head = format!("{}# {}\n{urdf}{payload}", header(), offsets_in_words(context));
+    sections.into_iter().fold(head, |out, (name, text)| out + &format!("\n[joint.{}]\n{text}", key(name)))
+}
+
+/// The origins to which the terms were found, for a reader who mixes files up.
+fn origins(robot: &Robot) -> String {
+    let row = |(name, o): (&str, Pose)| format!("{} = {}\n", key(name), list(o.xyz().into_iter().chain(o.rpy())));
+    let rows: String = robot.urdf_origins().into_iter().map(row).collect();
+    format!(
+        "\n# The URDF to which the terms belong, by its origins (x y z in m, roll pitch yaw in rad): with another one they are wrong.\n[urdf]\n{rows}"
+    )
 }
 
 #[cfg(test)]

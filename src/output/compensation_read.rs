@@ -6,9 +6,10 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::compensation::largest_nm;
-use super::robot_files::{ALONE, CALIBRATED};
+use super::robot_files::CALIBRATED;
 use crate::error::{Code, Error, Result};
 use crate::files::{self, FileKind};
+use crate::geom::Pose;
 use crate::model::joint_terms::{Exported, JointTerm, Term};
 use crate::model::robot::Robot;
 use crate::urdf::{Chain, Payload};
@@ -17,6 +18,9 @@ use crate::urdf::{Chain, Payload};
 #[serde(deny_unknown_fields)]
 struct File {
     payload: Option<Payload>,
+    /// Origins of the URDF to which the terms belong, by their joints.
+    #[serde(default)]
+    urdf: BTreeMap<String, [f64; 6]>,
     #[serde(default)]
     joint: BTreeMap<String, BTreeMap<String, Values>>,
 }
@@ -88,22 +92,19 @@ fn terms_of(joint: &BTreeMap<String, Values>) -> std::result::Result<Vec<(Term, 
 /// The robot of a chain of a URDF, with the joint terms of a compensation.toml where there is one.
 ///
 /// # Errors
-/// Those of [`read_compensation`]; a URDF in whose origins the terms are already.
-pub fn compensated((urdf, chain): (&Path, Chain), path: Option<&Path>) -> Result<Robot> {
-    let Some(path) = path else { return Ok(Robot::nominal(chain)) };
-    if urdf.to_string_lossy().ends_with(ALONE) {
-        let what = "is for use without compensation.toml, and its terms would count twice";
-        let remedy = format!("give the *{CALIBRATED} that was written beside it, or leave compensation.toml out");
-        return Err(Error::new(Code::OptionConflict, urdf.display(), what, remedy));
+/// Those of [`read_compensation`].
+pub fn compensated(chain: Chain, path: Option<&Path>) -> Result<Robot> {
+    match path {
+        Some(path) => read_compensation(path, chain),
+        None => Ok(Robot::nominal(chain)),
     }
-    read_compensation(path, chain)
 }
 
 /// The robot of a chain with the joint terms of a compensation.toml, joints matched by name.
 ///
 /// # Errors
 /// Names the file, and the line or joint: unreadable text, unknown keys, a joint that the chain does not have, wrong counts,
-/// a compliance where the URDF states no masses.
+/// a compliance where the URDF states no masses, terms of another URDF.
 pub fn read_compensation(path: &Path, chain: Chain) -> Result<Robot> {
     parse_compensation(path, &files::read_text(path, FileKind::Settings)?, chain)
 }
@@ -116,6 +117,7 @@ pub fn parse_compensation(path: &Path, text: &str, chain: Chain) -> Result<Robot
     let file: File = toml::from_str(text).map_err(|e| {
         Error::new(Code::SettingSyntax, path.display(), e, "use the compensation.toml that identify wrote")
     })?;
+    check_urdf(path, &file.urdf, &chain)?;
     let chain =
         chain.carrying(file.payload.as_ref()).map_err(|e| Error::new(e.code, path.display(), e.what, e.remedy))?;
     let mut terms = Vec::new();
@@ -147,6 +149,27 @@ pub fn parse_compensation(path: &Path, text: &str, chain: Chain) -> Result<Robot
         }
     }
     Ok(Robot { terms, ..Robot::nominal(chain) })
+}
+
+/// Numbers of a URDF that was written again by others may be rounded by this, m and rad.
+const ROUNDED: f64 = 1e-5;
+
+/// Terms were found beside origins; with others they are wrong, or count twice.
+fn check_urdf(path: &Path, stated: &BTreeMap<String, [f64; 6]>, chain: &Chain) -> Result<()> {
+    for (name, own) in Robot::nominal(chain.clone()).urdf_origins() {
+        let Some([x, y, z, roll, pitch, yaw]) = stated.get(name).copied() else { continue };
+        let (angle, distance) = own.distance(&Pose::from_xyz_rpy([x, y, z], [roll, pitch, yaw]));
+        if angle > ROUNDED || distance > ROUNDED {
+            let what = format!(
+                "belongs to another URDF: the origin of {name} is {:.3} mm and {:.3} mrad elsewhere there",
+                1e3 * distance,
+                1e3 * angle
+            );
+            let remedy = format!("give the *{CALIBRATED} that was written beside it, or leave compensation.toml out");
+            return Err(Error::new(Code::OptionConflict, path.display(), what, remedy));
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

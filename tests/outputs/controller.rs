@@ -72,9 +72,15 @@ fn the_urdf_for_those_who_read_nothing_else_is_a_file_of_its_own() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("compensation.toml");
     std::fs::write(&path, text(&files(&solution, &context(&description)).unwrap(), "compensation.toml")).unwrap();
-    let with = |urdf: &str, path| compensated((Path::new(urdf), alone.chain.clone()), path).map_err(|e| e.code);
-    assert_eq!(with(name, Some(path.as_path())).unwrap_err(), Code::OptionConflict, "terms would count twice");
-    assert!(with(name, None).is_ok() && with("kuka_kr6_r900.calibrated.urdf", Some(path.as_path())).is_ok());
+    let of = |name: &str| text(&files(&solution, &context(&description)).unwrap(), name);
+    let with = |urdf: String, path| {
+        let chain = RobotDescription::from_text(Path::new("c.urdf"), urdf).unwrap().chain(None, None).unwrap();
+        compensated(chain, path).map(|_| ()).map_err(|e| e.code)
+    };
+    let terms = Some(path.as_path());
+    assert_eq!(with(of(name), terms), Err(Code::OptionConflict), "terms would count twice");
+    assert_eq!(with(description.text.clone(), terms), Err(Code::OptionConflict), "the nominal URDF");
+    assert_eq!((with(of(name), None), with(of("kuka_kr6_r900.calibrated.urdf"), terms)), (Ok(()), Ok(())));
     let e = solution.uncertainty.flange.unwrap();
     assert!(e.alone_m.unwrap() <= e.urdf_m && e.model_m <= e.alone_m.unwrap(), "{e:?}");
 }

@@ -54,10 +54,13 @@ fn assert_covariance(c: &Matrix6<f64>, what: &str) {
     assert!(least > 0.0, "{what} has the eigenvalue {least:e} in units of its diagonal");
 }
 
-fn reread_chain(files: &Files) -> robotcal::urdf::Chain {
-    let urdf = text(files, "kuka_kr6_r900.calibrated.urdf").to_owned();
-    let description = robotcal::urdf::RobotDescription::from_text(Path::new("calibrated.urdf"), urdf).unwrap();
+fn chain_of(urdf: &str) -> robotcal::urdf::Chain {
+    let description = robotcal::urdf::RobotDescription::from_text(Path::new("calibrated.urdf"), urdf.into()).unwrap();
     description.chain(None, None).unwrap()
+}
+
+fn reread_chain(files: &Files) -> robotcal::urdf::Chain {
+    chain_of(text(files, "kuka_kr6_r900.calibrated.urdf"))
 }
 
 #[test]
@@ -78,7 +81,7 @@ fn kinematics_of_the_reread_urdf_are_those_of_the_rigid_model() {
 }
 
 #[test]
-fn kinematics_yaml_says_the_same_as_the_urdf() {
+fn kinematics_yaml_says_the_same_as_the_urdf_that_it_belongs_to() {
     #[derive(Deserialize)]
     struct Origin {
         x: f64,
@@ -89,17 +92,27 @@ fn kinematics_yaml_says_the_same_as_the_urdf() {
         yaw: f64,
     }
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
-    let files = files(&solution, &context(&description)).unwrap();
-    let yaml: BTreeMap<String, BTreeMap<String, Origin>> =
-        serde_saphyr::from_str(text(&files, "kinematics.yaml")).unwrap();
-    let chain = reread_chain(&files);
-    assert_eq!(yaml["kinematics"].len(), chain.joints.len());
-    for joint in &chain.joints {
-        let o = &yaml["kinematics"][&joint.name];
-        let pose = Pose::from_xyz_rpy([o.x, o.y, o.z], [o.roll, o.pitch, o.yaw]);
-        let (angle, distance) = pose.distance(&joint.origin);
-        assert!(angle < 1e-12 && distance < 1e-15, "{}: {angle:e} {distance:e}", joint.name);
+    let origins = |model: RobotModel, mark: &str| {
+        let files = files(&solved(CameraMount::Hand, model, &description), &context(&description)).unwrap();
+        let yaml: BTreeMap<String, BTreeMap<String, Origin>> =
+            serde_saphyr::from_str(text(&files, &format!("kinematics{mark}.yaml"))).unwrap();
+        let chain = chain_of(text(&files, &format!("kuka_kr6_r900.calibrated{mark}.urdf")));
+        assert_eq!(yaml["kinematics"].len(), chain.joints.len());
+        for joint in &chain.joints {
+            let o = &yaml["kinematics"][&joint.name];
+            let pose = Pose::from_xyz_rpy([o.x, o.y, o.z], [o.roll, o.pitch, o.yaw]);
+            let (angle, distance) = pose.distance(&joint.origin);
+            assert!(angle < 1e-12 && distance < 1e-15, "{}: {angle:e} {distance:e}", joint.name);
+        }
+        files
+    };
+    let rigid = origins(RobotModel::Rigid, "");
+    assert!(!rigid.contains_key("kinematics_alone.yaml"), "nothing stands in compensation.toml");
+    origins(RobotModel::Full, "");
+    let full = origins(RobotModel::Full, "_alone");
+    for name in ["kinematics", "mdh"] {
+        let of = |mark: &str| full.iter().find(|(n, _)| n.starts_with(&format!("{name}{mark}."))).unwrap().1;
+        assert_ne!(of(""), of("_alone"));
     }
 }
 
@@ -215,6 +228,8 @@ fn compensation_has_every_term_but_the_offset() {
     #[serde(deny_unknown_fields)]
     struct Compensation {
         #[serde(default)]
+        urdf: BTreeMap<String, [f64; 6]>,
+        #[serde(default)]
         joint: BTreeMap<String, Joint>,
     }
     let description = robot();
@@ -236,10 +251,18 @@ fn compensation_has_every_term_but_the_offset() {
         };
         assert_eq!(value, t.value, "{:?}", t.term);
     }
+    // The origins beside which the terms were found.
+    let chain = reread_chain(&files);
+    assert_eq!(read.urdf.len(), chain.joints.len());
+    for joint in &chain.joints {
+        let [x, y, z, roll, pitch, yaw] = read.urdf[&joint.name];
+        let (angle, distance) = Pose::from_xyz_rpy([x, y, z], [roll, pitch, yaw]).distance(&joint.origin);
+        assert!(angle < 1e-12 && distance < 1e-15, "{}: {angle:e} {distance:e}", joint.name);
+    }
     let rigid = solved(CameraMount::Hand, RobotModel::Rigid, &description);
     let rigid = robotcal::output::files(&rigid, &context(&description)).unwrap();
     let none: Compensation = toml::from_str(text(&rigid, "compensation.toml")).unwrap();
-    assert!(none.joint.is_empty());
+    assert!(none.joint.is_empty() && none.urdf.is_empty());
 }
 
 #[test]
