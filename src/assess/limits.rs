@@ -224,7 +224,7 @@ limits! {
     scale_error: f64 = 0.015;
     /// Correcting the scale must leave less than this share of the misfit.
     scale_explains: f64 = 0.6;
-    /// The readings of another row are named for an image where they leave less than this share of its misfit.
+    /// The readings of another row are named for an image where they leave less than this share of its misfit beyond what is usual.
     other_readings_explain: f64 = 0.1;
 
     /// Share of the stops that must have a reading in common with others before the local errors of that joint are told apart: a

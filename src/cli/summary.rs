@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::paragraph::{WIDTH, indented, paragraph};
 use crate::assess::Advice;
+use crate::diagnose::Subject;
 use crate::error::Code;
 use crate::output::solution_json::SolutionRecord;
 use crate::output::verdict::{Trust, Verdict, VerdictReason};
@@ -116,8 +117,13 @@ fn held_out(r: &SolutionRecord) -> Vec<String> {
 /// Images and observations that took no part, counted by reason.
 fn left_out(r: &SolutionRecord) -> Vec<String> {
     let mut reasons: BTreeMap<Code, Vec<&str>> = BTreeMap::new();
+    let exchanged = |name: &str| {
+        let mut found = r.findings.iter().filter(|f| f.code == Code::ReadingsExchanged);
+        found.any(|f| f.subject.contains(&Subject::Image(name.to_owned())))
+    };
     for (name, rejection) in r.images.iter().filter_map(|i| Some((&i.name, i.rejection()?))) {
-        reasons.entry(rejection.code()).or_default().push(name);
+        let code = if exchanged(name) { Code::ReadingsExchanged } else { rejection.code() };
+        reasons.entry(code).or_default().push(name);
     }
     let out: usize = reasons.values().map(Vec::len).sum();
     let named: Vec<String> = reasons.iter().map(|(code, names)| reason(*code, names)).collect();
@@ -151,6 +157,7 @@ const MOST_NAMED: usize = 3;
 fn spoken(code: Code) -> String {
     match code {
         Code::WronglyPaired => "wrongly paired".into(),
+        Code::ReadingsExchanged => "with exchanged rows of joints.csv".into(),
         Code::ImageDuplicate => "duplicates".into(),
         Code::MarkersTooFew => "with too few markers".into(),
         other => other.name().replace('_', " "),

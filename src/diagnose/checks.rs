@@ -3,9 +3,9 @@
 use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
 use super::{
-    camera_model, camera_pattern, extrapolates, few_images, focus, held_near_nominal, joint_noise, left_out_bodies,
-    left_out_images, left_out_observations, length_standard, loose, marker_off, measurement_scatter, moved, no_gain,
-    parameter_off, plate_size, pose_step, scatter, undetermined, zeros_off,
+    camera_model, camera_pattern, exchanged_readings, extrapolates, few_images, focus, held_near_nominal, joint_noise,
+    left_out_bodies, left_out_images, left_out_observations, length_standard, loose, marker_off, measurement_scatter,
+    moved, no_gain, parameter_off, plate_size, pose_step, scatter, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -65,6 +65,7 @@ pub const CHECKS: &[Check] = &[
     check("joint_noise", Stage::Fit(|a, b, s| found(joint_noise::check(a, b, s)))),
     check("loose", Stage::Fit(|a, b, s| found(loose::check(a, b, s)))),
     check("moved", Stage::LeftOut(|a, s| found(moved::check(a, s)))),
+    check("exchanged_readings", Stage::LeftOut(|a, _| found(exchanged_readings::check(a)))),
     check("left_out_images", Stage::LeftOut(|a, s| found(left_out_images::check(a, s)))),
     check("left_out_bodies", Stage::LeftOut(|a, s| found(left_out_bodies::check(a, s)))),
     check("measurement_scatter", Stage::Fit(|a, b, s| found(measurement_scatter::check(a, b, s)))),

@@ -5,6 +5,7 @@ use std::fmt;
 use super::camera_model::CameraModelMisfit;
 use super::camera_pattern::ResidualPattern;
 use super::displaced::Displaced;
+use super::exchanged_readings::ExchangedReadings;
 use super::extrapolates::Extrapolates;
 use super::few_images::FewImages;
 use super::focus::FocusChange;
@@ -60,6 +61,7 @@ findings! {
     ContradictedLengths,
     Displaced,
     DoubtedSize,
+    ExchangedReadings,
     Extrapolates,
     FewImages,
     FlangeUndetermined,

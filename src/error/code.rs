@@ -256,6 +256,7 @@ codes! {
         RotationConvention "rotation_convention" "poses of the controller follow another convention of rotation than is stated",
         PosesInverted "poses_inverted" "with the poses of the controller inverted the images fit",
         PoseOutOfReach "pose_out_of_reach" "the nominal robot reaches no such pose",
+        ReadingsExchanged "readings_exchanged" "images that were left out fit the readings of each other",
         RowsShifted "rows_shifted" "with the rows of joints.csv shifted by one the images fit",
         CameraMountWrong "camera_mount_wrong" "with the camera mounted the other way the images fit",
         LinkLengthsWrong "link_lengths_wrong" "directions fit and distances do not: another size of robot",

@@ -7,7 +7,7 @@ use super::free_poses::{FreeStart, adjust_free_poses};
 use super::options::{JointNoise, MarkerTolerance, Options};
 use super::solution::Solution;
 use super::staged::{refit, staged};
-use super::start::{StartGiven, start_robot, take_back};
+use super::start::{StartGiven, start_robot, take_back, usual_misfit};
 use super::start_verdict::StartVerdict;
 use super::stated::camera_starts;
 use super::two_stage::PoseStage;
@@ -217,6 +217,7 @@ fn fit(
 /// Adds to every wrongly paired image by how much its readings miss, and whose readings would fit it.
 fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f64) {
     let problem = &adjustment.problem;
+    let usual = usual_misfit(adjustment, free).unwrap_or(0.0);
     let mut remarks = Vec::new();
     for (i, image) in problem.images.iter().enumerate() {
         let wrong = image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair);
@@ -230,7 +231,7 @@ fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f6
                 Some((a + d, k))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0));
-        let better = better.filter(|(size, _)| *size < explained * (angle_rad + distance_m));
+        let better = better.filter(|(size, _)| *size < usual + explained * (angle_rad + distance_m));
         let fits = better.map(|(misfit, k)| FitsReadings { of: problem.images[k].name.clone(), misfit });
         remarks.push((i, Mismatch::Fit { misfit: Misfit { distance_m, angle_rad }, fits }));
     }

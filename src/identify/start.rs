@@ -309,15 +309,22 @@ fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &Hand
     aside
 }
 
+/// How far the stand-alone camera pose of an image is from that of its readings, rad + m.
+fn misfit(adjustment: &Adjustment, free: &FreePoses, image: usize) -> Option<f64> {
+    let (angle, distance) = adjustment.misfit(&free.poses[image].as_ref()?.camera_from_plate, image)?;
+    Some(angle + distance)
+}
+
+/// Median of these of the images in use.
+pub(super) fn usual_misfit(adjustment: &Adjustment, free: &FreePoses) -> Option<f64> {
+    let of_used = adjustment.problem.used_on_robot().filter_map(|i| misfit(adjustment, free, i));
+    median(&of_used.collect::<Vec<f64>>())
+}
+
 /// Takes images back that were set `aside` with the nominal robot, and fit the robot that was found as the others do. True where there are some.
 pub(super) fn take_back(adjustment: &mut Adjustment, free: &FreePoses, aside: &[usize], limits: &Limits) -> bool {
-    let size = |i: usize| {
-        let (angle, distance) = adjustment.misfit(&free.poses[i].as_ref()?.camera_from_plate, i)?;
-        Some(angle + distance)
-    };
-    let on_robot = adjustment.problem.used_on_robot();
-    let Some(usual) = median(&on_robot.filter_map(size).collect::<Vec<f64>>()) else { return false };
-    let fits = |i: &usize| size(*i).is_some_and(|s| s < limits.set_aside_factor * usual);
+    let Some(usual) = usual_misfit(adjustment, free) else { return false };
+    let fits = |i: &usize| misfit(adjustment, free, *i).is_some_and(|s| s < limits.set_aside_factor * usual);
     let is_out = |i: &usize| adjustment.problem.images[*i].rejected.is_some();
     let back: Vec<usize> = aside.iter().copied().filter(|i| is_out(i) && fits(i)).collect();
     back.iter().for_each(|&i| adjustment.problem.images[i].rejected = None);

@@ -122,7 +122,7 @@ pub const FAULTS: [Expectation; 25] = [
         "wrong-pairs",
         false,
         &[0, 1],
-        &[Code::WronglyPaired],
+        &[Code::ReadingsExchanged, Code::WronglyPaired],
         &["img_004.png", "img_009.png", "img_012.png"],
     ),
     row(Fault::MirroredPlate, "mirrored-plate", false, &[2, 3], &[Code::PlateMirrored], &[]),

@@ -11,6 +11,7 @@ use robotcal::simulate::{WorldRequest, series};
 use robotcal::study::measured;
 use robotcal::urdf::Chain;
 use robotcal::{Code, Error};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 fn chain() -> Chain {
@@ -115,6 +116,34 @@ fn images_that_fit_the_robot_found_are_not_left_out_for_missing_the_nominal_one(
     assert!(left_out.is_empty(), "{left_out:?}");
     let off = |f: &Finding| matches!(f, Finding::ParameterOff(p) if p.parameter == "robot/joint_a2.offset");
     assert!(solution.findings.iter().any(off), "{:?}", solution.findings);
+}
+
+#[test]
+fn rows_that_were_exchanged_are_named_with_one_another() {
+    let chain = chain();
+    // Two, of a robot that repeats badly; three; and one whose readings are nobody's.
+    let cases: [(f64, &[(usize, usize)], &[usize]); 3] =
+        [(2e-3, &[(3, 8), (8, 3)], &[3, 8]), (2e-5, &[(2, 7), (7, 11), (11, 2)], &[2, 7, 11]), (2e-5, &[(2, 7)], &[])];
+    for (joint_noise_rad, moved, circle) in cases {
+        let world = WorldRequest { images: 24, joint_noise_rad, ..request(&chain) };
+        let mut series = measured(&series(&world).unwrap(), &chain);
+        let given: Vec<_> = series.stops.iter().map(|s| s.readings.clone()).collect();
+        for &(to, from) in moved {
+            series.stops[to].readings.clone_from(&given[from]);
+        }
+        let solution = identify(chain.clone(), &[series], &Options::default()).unwrap();
+        let names: Vec<String> = circle.iter().map(|&k| solution.fit.problem.images[k].name.clone()).collect();
+        let wrong: Vec<usize> = (0..24).filter(|&i| solution.fit.problem.images[i].rejected.is_some()).collect();
+        let rows: Vec<usize> = moved.iter().map(|m| m.0).collect();
+        assert_eq!(wrong, rows);
+        let found = solution.findings.iter().filter_map(|f| match f {
+            Finding::ExchangedReadings(found) => Some(found.circle.iter().cloned().collect::<BTreeSet<_>>()),
+            _ => None,
+        });
+        let wanted: Vec<BTreeSet<String>> =
+            [names.into_iter().collect()].into_iter().filter(|n: &BTreeSet<_>| !n.is_empty()).collect();
+        assert_eq!(found.collect::<Vec<_>>(), wanted, "{moved:?}");
+    }
 }
 
 #[test]

@@ -40,6 +40,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("assess/stops.rs WIDEST_M", "range of the ideal series"),
     ("assess/stops.rs WIDEST_RAD", "range of the ideal series"),
     ("assess/uncertainty.rs NORMAL_95", "quantile of the normal distribution"),
+    ("diagnose/exchanged_readings.rs MOST_STOPS", "how many are named"),
     ("diagnose/displaced.rs MOST_IMAGES", "how many are named"),
     ("diagnose/joint_noise.rs MOST_IMAGES", "how many are named"),
     ("diagnose/left_out_bodies.rs MOST_NAMED", "words"),

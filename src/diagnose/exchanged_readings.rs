@@ -1,0 +1,98 @@
+//! Do images that were left out fit the readings of each other?
+
+use super::kind::{Kind, Quantity, Subject, Weight, some_of};
+use crate::error::Code;
+use crate::problem::{Adjustment, Image, ImageRejection, Mismatch, Problem};
+
+/// Most stops that are named.
+const MOST_STOPS: usize = 5;
+
+/// Stops whose rows were written in another order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExchangedReadings {
+    /// Images in a circle: each fits the readings that stand beside the next, the last those of the first.
+    pub circle: Vec<String>,
+    /// All images of these stops.
+    pub images: Vec<String>,
+    /// How well the worst of them does, m + rad.
+    pub misfit: f64,
+}
+
+/// Every circle once, and once for all cameras that saw its stops.
+pub(super) fn check(adjustment: &Adjustment) -> Vec<ExchangedReadings> {
+    let problem = &adjustment.problem;
+    let mut found: Vec<ExchangedReadings> = Vec::new();
+    for (first, image) in problem.images.iter().enumerate() {
+        let Some(circle) = circle_from(problem, first) else { continue };
+        if found.iter().any(|f| f.images.contains(&image.name)) {
+            continue;
+        }
+        let of_circle = |i: &&Image| circle.iter().any(|&(k, _)| problem.images[k].stop == i.stop);
+        found.push(ExchangedReadings {
+            circle: circle.iter().map(|&(i, _)| problem.images[i].name.clone()).collect(),
+            images: problem.images.iter().filter(of_circle).map(|i| i.name.clone()).collect(),
+            misfit: circle.iter().map(|&(_, misfit)| misfit).fold(0.0, f64::max),
+        });
+    }
+    found
+}
+
+/// Wrongly paired images from one to the one whose readings it fits, with how well, until the first is met again.
+fn circle_from(problem: &Problem, first: usize) -> Option<Vec<(usize, f64)>> {
+    let mut circle: Vec<(usize, f64)> = Vec::new();
+    let mut at = first;
+    while !circle.iter().any(|&(i, _)| i == at) {
+        let (next, misfit) = whose_readings_fit(problem, at)?;
+        circle.push((at, misfit));
+        at = next;
+    }
+    (at == first).then_some(circle)
+}
+
+fn whose_readings_fit(problem: &Problem, image: usize) -> Option<(usize, f64)> {
+    let image = &problem.images[image];
+    let Some(ImageRejection::WronglyPaired(Mismatch::Fit { fits: Some(fits), .. })) = &image.rejected else {
+        return None;
+    };
+    let other = problem.images.iter().position(|i| i.series == image.series && i.name == fits.of)?;
+    Some((other, fits.misfit))
+}
+
+impl Kind for ExchangedReadings {
+    fn code(&self) -> Code {
+        Code::ReadingsExchanged
+    }
+
+    fn weight(&self) -> Weight {
+        Weight::Note
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        self.images.iter().cloned().map(Subject::Image).collect()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![Quantity::new("misfit_exchanged", self.misfit, "m + rad")]
+    }
+
+    fn place(&self) -> String {
+        "joints.csv".into()
+    }
+
+    fn seen(&self) -> String {
+        let named = some_of(&self.circle, MOST_STOPS);
+        let to = 1e3 * self.misfit;
+        match self.circle.len() {
+            2 => format!(
+                "the rows of {named} are exchanged: each image fits the readings of the other to {to:.1} (mm plus mrad)"
+            ),
+            _ => format!(
+                "the rows of {named} are mixed up: each image fits the readings of the next, the last those of the first, to {to:.1} (mm plus mrad)"
+            ),
+        }
+    }
+
+    fn remedy(&self) -> String {
+        "write these readings beside the images that they fit, and all of them are used".into()
+    }
+}
