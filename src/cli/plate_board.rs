@@ -1,5 +1,6 @@
 //! `robotcal plate --kind`: draws a board of any kind but coded circles, which are designed.
 
+use std::cell::RefCell;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -129,54 +130,64 @@ fn plate(args: &BoardArgs, size: &BoardSize) -> Result<Plate> {
     let mut key = |name: &str, value: String| writeln!(text, "{name} = {value}").unwrap_or_default();
     let metres = |mm: f64| format!("{:?}", mm / 1e3);
     let quoted = |name: &Option<String>| name.as_ref().map(|n| format!("{n:?}"));
-    let shape = size.shape.ok_or_else(|| missing("--shape"));
+    let lacking = RefCell::new(Vec::new());
+    let needed = |flag: &'static str, value: Option<String>| {
+        value.unwrap_or_else(|| {
+            lacking.borrow_mut().push(flag);
+            String::new()
+        })
+    };
     if args.kind != Kind::Tag {
-        let [columns, rows] = shape?;
-        key("columns", columns.to_string());
-        key("rows", rows.to_string());
+        let [columns, rows] = [0, 1].map(|k| size.shape.map(|shape| shape[k].to_string()));
+        key("columns", needed("--shape", columns));
+        key("rows", rows.unwrap_or_default());
     }
-    let tag = || args.tag_mm.map(metres).ok_or_else(|| missing("--tag-mm"));
-    let pitch = || size.pitch_mm.map(metres).ok_or_else(|| missing("--pitch-mm"));
-    let dictionary = || quoted(&args.dictionary).ok_or_else(|| missing("--dictionary"));
+    let tag = || needed("--tag-mm", args.tag_mm.map(metres));
+    let pitch = || needed("--pitch-mm", size.pitch_mm.map(metres));
+    let dictionary = || needed("--dictionary", quoted(&args.dictionary));
     match args.kind {
-        Kind::CodedCircles | Kind::Chessboard => key("pitch_m", pitch()?),
+        Kind::CodedCircles | Kind::Chessboard => key("pitch_m", pitch()),
         Kind::CircleGrid => {
             let dots = size.pitch_mm.map(|mm| args.radius_mm.unwrap_or(0.25 * mm)).map(metres);
-            key("pitch_m", pitch()?);
-            key("radius_m", dots.ok_or_else(|| missing("--pitch-mm"))?);
+            key("pitch_m", pitch());
+            key("radius_m", dots.unwrap_or_default());
             key("asymmetric", args.asymmetric.to_string());
             key("large", format!("{:?}", args.large));
         }
         Kind::Charuco => {
-            key("pitch_m", pitch()?);
-            key("aruco", format!("{{ dictionary = {}, side_m = {} }}", dictionary()?, tag()?));
+            key("pitch_m", pitch());
+            key("aruco", format!("{{ dictionary = {}, side_m = {} }}", dictionary(), tag()));
         }
         Kind::Puzzleboard => {
             let [column, row] = args.origin.unwrap_or_default();
-            key("pitch_m", pitch()?);
+            key("pitch_m", pitch());
             key("origin_col", column.to_string());
             key("origin_row", row.to_string());
         }
         Kind::Aprilgrid => {
-            key("tag_m", tag()?);
+            key("tag_m", tag());
             key("spacing", format!("{:?}", args.spacing.unwrap_or(0.3)));
             key("family", quoted(&args.family).unwrap_or_else(|| "\"36h11\"".to_owned()));
             key("first_id", args.id.to_string());
         }
         Kind::ArucoGrid => {
-            key("marker_m", tag()?);
-            key("gap_m", args.gap_mm.map(metres).ok_or_else(|| missing("--gap-mm"))?);
-            key("dictionary", dictionary()?);
+            key("marker_m", tag());
+            key("gap_m", needed("--gap-mm", args.gap_mm.map(metres)));
+            key("dictionary", dictionary());
             key("first_id", args.id.to_string());
         }
         Kind::Tag => {
-            key("tag_m", tag()?);
+            key("tag_m", tag());
             key("id", args.id.to_string());
             match quoted(&args.family) {
                 Some(family) => key("family", family),
-                None => key("dictionary", dictionary()?),
+                None => key("dictionary", dictionary()),
             }
         }
+    }
+    let lacking = lacking.into_inner();
+    if !lacking.is_empty() {
+        return Err(missing(&lacking.join(", "), &kind_name(args.kind)));
     }
     let mut plate = parse_plate(Path::new("plate.toml"), &text, "")?;
     for id in std::mem::take(&mut plate.large) {
@@ -201,11 +212,11 @@ fn name(args: &BoardArgs, plate: &Plate) -> String {
     }
 }
 
-fn missing(flag: &str) -> Error {
+fn missing(flags: &str, kind: &str) -> Error {
     Error::new(
         Code::OptionMissing,
-        "plate",
-        format!("{flag} is needed for this kind"),
-        "give it; lengths in millimetres",
+        format!("--kind {kind}"),
+        format!("needs {flags}"),
+        "give what is missing; lengths in millimetres",
     )
 }

@@ -3,15 +3,11 @@
 //! The `calib-targets` library decodes the markers and so tells which corner is which; the positions are measured as on
 //! a plain chessboard, from the pixels along the edges that the markers leave free.
 
-use std::collections::BTreeMap;
-use std::sync::Mutex;
-
-use calib_targets_aruco::{Dictionary, builtins, resolve_dictionary};
-use calib_targets_charuco::{CharucoBoardSpec, CharucoDetection, CharucoDetector, CharucoParams};
-use calib_targets_chessboard::{ChessCorner, detect_corners};
-use calib_targets_core::GrayImageView;
+use calib_targets_chessboard::detect_corners;
 
 use super::board_labels::{BoardSize, Lattice, Placement};
+use super::charuco_markers::{Print, decode, prints};
+use super::charuco_seen::{Seen, instead};
 use super::chessboard::{Bytes, WINDOW, board_size, corner_config};
 use super::corners::{Window, measure};
 use super::sizes::{best_of_sizes, on_picture};
@@ -21,20 +17,8 @@ use crate::series::Plate;
 
 /// Blur of a marker's border that the window of a corner stays clear of, px.
 const KEEP_OFF_PX: f64 = 2.0;
-/// Sides of a marker over that of a square that are tried where the plate does not state it.
-const USUAL_RATIOS: [f64; 5] = [0.75, 0.8, 0.7, 0.6, 0.5];
 /// Markers that must be read where the dictionary is not stated.
 const LEAST_MARKERS: usize = 4;
-
-/// The dictionary and the relative size of the markers.
-#[derive(Debug, Clone, Copy)]
-struct Print {
-    dictionary: Dictionary,
-    /// Side of a marker over that of a square.
-    ratio: f64,
-    /// OpenCV's layout before 4.6 on a board with an even number of rows: first square light, with marker 0.
-    legacy: bool,
-}
 
 /// Finds the inner corners of a ChArUco board (markers in the light squares counting up row by row; first square dark, or light in
 /// OpenCV's layout before 4.6); parts of the board may be out of view or covered.
@@ -54,7 +38,12 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let Some(Found { print, lattice, .. }) = found else {
         bytes.mirror();
         let mirrored = at_scale(&bytes, 1.0)?.is_some();
-        return Err(if mirrored { mirrored_board() } else { no_board(plate) });
+        bytes.mirror();
+        return Err(match plate.aruco.as_ref().and_then(|_| instead(&bytes, plate, &prints, board)) {
+            _ if mirrored => mirrored_board(),
+            Some(seen) => other_board(plate, seen),
+            None => no_board(plate),
+        });
     };
     if plate.aruco.is_some() && prints.first().is_some_and(|stated| stated.legacy != print.legacy) {
         return Err(other_layout(print.legacy));
@@ -113,81 +102,6 @@ fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least
     Ok(best)
 }
 
-fn decode(
-    view: &GrayImageView<'_>,
-    corners: &[ChessCorner],
-    print: &Print,
-    board: BoardSize,
-) -> Result<Option<CharucoDetection>> {
-    let [rows, columns] = [board.rows + 1, board.columns + 1].map(i32::unsigned_abs);
-    let (rows, dictionary) = match print.legacy {
-        false => (rows, print.dictionary),
-        true => match behind_a_row(print.dictionary, columns as usize / 2) {
-            Some(dictionary) => (rows + 1, dictionary),
-            None => return Ok(None),
-        },
-    };
-    let spec = CharucoBoardSpec::new(rows, columns, 1.0, print.ratio as f32, dictionary);
-    let mut params = CharucoParams::for_board(spec);
-    params.chess = corner_config();
-    let detector = match CharucoDetector::new(params) {
-        Ok(detector) => detector,
-        // The row that is not printed takes more markers than the dictionary has.
-        Err(_) if print.legacy => return Ok(None),
-        Err(e) => {
-            let what = format!("the ChArUco board is impossible: {e}");
-            let remedy = "check `columns`, `rows` (inner corners) and [aruco] of the plate file";
-            return Err(Error::new(Code::PlateNotDetectable, "plate", what, remedy));
-        }
-    };
-    Ok(detector.detect_with_corners(view, corners).ok())
-}
-
-/// Dictionaries of [`behind_a_row`]: the library wants their codes to live for ever, so each is made once.
-static SHIFTED: Mutex<BTreeMap<(&'static str, usize), Dictionary>> = Mutex::new(BTreeMap::new());
-
-/// The dictionary with its numbers `by` higher: with a row of `by` markers above it that is not printed, a legacy board is one of the
-/// present layout. Its last codes, which stand for that row, are on no board that has enough.
-fn behind_a_row(dictionary: Dictionary, by: usize) -> Option<Dictionary> {
-    let mut made = SHIFTED.lock().ok()?;
-    if let Some(known) = made.get(&(dictionary.name(), by)) {
-        return Some(*known);
-    }
-    let codes = dictionary.codes();
-    let (first, last) = codes.split_at_checked(codes.len().checked_sub(by)?)?;
-    let codes = [last, first].concat().leak();
-    let (size, bits) = (dictionary.marker_size(), dictionary.max_correction_bits());
-    let shifted = Dictionary::from_static_codes(dictionary.name(), size, bits, codes).ok()?;
-    made.insert((dictionary.name(), by), shifted);
-    Some(shifted)
-}
-
-/// What is printed according to the plate and in the other layout, or all that OpenCV prints.
-fn prints(plate: &Plate) -> Result<Vec<Print>> {
-    let even_rows = plate.rows % 2 == 1;
-    let layouts = |legacy: bool| [legacy, !legacy].into_iter().take(if even_rows { 2 } else { 1 });
-    if let Some(aruco) = &plate.aruco {
-        let dictionary = resolve_dictionary(&aruco.dictionary).ok_or_else(|| {
-            Error::new(
-                Code::DictionaryUnknown,
-                "plate",
-                format!("the dictionary {:?} is not known", aruco.dictionary),
-                "use a name of OpenCV, such as DICT_4X4_50 or DICT_APRILTAG_36h11",
-            )
-        })?;
-        let ratio = aruco.side_m / plate.pitch_m;
-        return Ok(layouts(aruco.legacy && even_rows).map(|legacy| Print { dictionary, ratio, legacy }).collect());
-    }
-    let needed = (plate.columns + 1) * (plate.rows + 1) / 2;
-    let largest = [builtins::DICT_4X4_1000, builtins::DICT_5X5_1000, builtins::DICT_6X6_1000, builtins::DICT_7X7_1000];
-    let others = [builtins::DICT_ARUCO_ORIGINAL, builtins::DICT_APRILTAG_36h11];
-    let able = largest.into_iter().chain(others).filter(|d| d.codes().len() >= needed as usize);
-    let sizes = able.flat_map(|dictionary| USUAL_RATIOS.map(|ratio| (dictionary, ratio)));
-    Ok(sizes
-        .flat_map(|(dictionary, ratio)| layouts(false).map(move |legacy| Print { dictionary, ratio, legacy }))
-        .collect())
-}
-
 fn found_print(print: &Print) -> Notice {
     Notice::new(
         Code::DictionaryGuessed,
@@ -207,14 +121,31 @@ fn found_print(print: &Print) -> Notice {
     )
 }
 
-fn no_board(plate: &Plate) -> Error {
-    let what = match &plate.aruco {
+fn not_found(plate: &Plate) -> String {
+    match &plate.aruco {
         Some(aruco) => format!("no ChArUco board with markers of {} found", aruco.dictionary),
         None => "no ChArUco board with markers of a usual kind found".to_owned(),
-    };
+    }
+}
+
+fn no_board(plate: &Plate) -> Error {
     let remedy =
         "check that the board is in view and sharp, and columns, rows (inner corners) and [aruco] of the plate file";
-    Error::new(Code::PlateNotFound, "image", what, remedy)
+    Error::new(Code::PlateNotFound, "image", not_found(plate), remedy)
+}
+
+fn other_board(plate: &Plate, seen: Seen) -> Error {
+    let (what, remedy) = match seen {
+        Seen::Columns(columns) => (
+            format!("the markers stand as on a board with {columns} inner corners in a row, not {}", plate.columns),
+            "correct columns and rows of the plate file: they count inner corners (one less than squares), columns from left to right".to_owned(),
+        ),
+        Seen::Print(print) => (
+            format!("the markers are those of {}, with a side of about {} squares", print.dictionary.name(), print.ratio),
+            "correct dictionary (this one, or a shorter one of its kind) and side_m under [aruco] of the plate file".to_owned(),
+        ),
+    };
+    Error::new(Code::PlateNotFound, "image", format!("{}: {what}", not_found(plate)), remedy)
 }
 
 fn other_layout(legacy: bool) -> Error {

@@ -4,6 +4,8 @@
 
 mod board_labels;
 pub mod charuco;
+mod charuco_markers;
+mod charuco_seen;
 pub mod chessboard;
 pub mod circles;
 mod corners;

@@ -108,11 +108,27 @@ fn an_unstated_dictionary_is_found_and_a_wrong_one_or_a_mirror_refused() {
     assert_eq!(detection.observations.len(), 40);
     assert_says(&detection.notices[0], Code::DictionaryGuessed, &["4X4", "0.7"]);
     let wrong = detect(&picture, &charuco_plate(Some(("DICT_6X6_250", 0.7)))).expect_err("another dictionary");
-    assert_says(&wrong, Code::PlateNotFound, &["DICT_6X6_250"]);
+    assert_says(&wrong, Code::PlateNotFound, &["DICT_6X6_250", "DICT_4X4_1000"]);
     let unknown = detect(&picture, &charuco_plate(Some(("DICT_9X9", 0.7)))).expect_err("no such dictionary");
     assert_says(&unknown, Code::DictionaryUnknown, &["DICT_9X9"]);
     let mirrored = detect(&mirror(&picture), &charuco_plate(Some(("DICT_4X4_50", 0.7)))).expect_err("mirrored");
     assert_eq!(mirrored.code, Code::PlateMirrored, "{mirrored}");
+}
+
+#[test]
+fn a_board_of_another_size_or_with_other_markers_is_named() {
+    let picture = charuco_scene(0.1).render(0);
+    // Squares counted instead of corners; columns and rows exchanged; a column too few.
+    for (columns, rows) in [(COLUMNS + 1, ROWS + 1), (ROWS, COLUMNS), (COLUMNS - 1, ROWS)] {
+        let plate = Plate { columns, rows, ..charuco_plate(Some(("DICT_4X4_50", 0.7))) };
+        let other = detect(&picture, &plate).expect_err("another size");
+        assert_says(&other, Code::PlateNotFound, &["8 inner corners in a row"]);
+    }
+    let side = detect(&picture, &charuco_plate(Some(("DICT_4X4_50", 0.45)))).expect_err("smaller markers");
+    assert_says(&side, Code::PlateNotFound, &["0.7 squares"]);
+    let empty = Picture { pixels: vec![0.5; picture.pixels.len()], ..picture.clone() };
+    let nothing = detect(&empty, &charuco_plate(Some(("DICT_4X4_50", 0.7)))).expect_err("nothing to see");
+    assert_says(&nothing, Code::PlateNotFound, &["DICT_4X4_50 found"]);
 }
 
 /// A grid of dots of 0.25 steps radius; `large` have 0.36.

@@ -193,6 +193,21 @@ fn a_dry_run_says_all_that_it_counts() {
 }
 
 #[test]
+fn all_flags_that_a_board_lacks_are_named_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    for (kind, flags) in [
+        ("charuco", ["--shape", "--pitch-mm", "--tag-mm", "--dictionary"].as_slice()),
+        ("aruco-grid", &["--shape", "--tag-mm", "--gap-mm", "--dictionary"]),
+        ("circle-grid", &["--shape", "--pitch-mm"]),
+        ("tag", &["--tag-mm", "--dictionary"]),
+    ] {
+        let (output, plate) = plate(folder.path(), &["--kind", kind]);
+        assert!(plate.is_none());
+        assert_says(&text(&output), Code::OptionMissing, flags);
+    }
+}
+
+#[test]
 fn boards_that_cannot_be_drawn_are_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
