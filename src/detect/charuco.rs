@@ -140,8 +140,8 @@ fn other_board(plate: &Plate, seen: Seen) -> Error {
             format!("the markers stand as on a board with {columns} inner corners in a row, not {}", plate.columns),
             "correct columns and rows of the plate file: they count inner corners (one less than squares), columns from left to right".to_owned(),
         ),
-        Seen::Print(print) => (
-            format!("the markers are those of {}, with a side of about {} squares", print.dictionary.name(), print.ratio),
+        Seen::Print { dictionary, sides: [least, most] } => (
+            format!("the markers are those of {dictionary}, with a side of {least} to {most} squares"),
             "correct dictionary (this one, or a shorter one of its kind) and side_m under [aruco] of the plate file".to_owned(),
         ),
     };

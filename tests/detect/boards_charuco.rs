@@ -122,13 +122,13 @@ fn a_board_of_another_size_or_with_other_markers_is_named() {
     for (columns, rows) in [(COLUMNS + 1, ROWS + 1), (ROWS, COLUMNS), (COLUMNS - 1, ROWS)] {
         let plate = Plate { columns, rows, ..charuco_plate(Some(("DICT_4X4_50", 0.7))) };
         let other = detect(&picture, &plate).expect_err("another size");
-        assert_says(&other, Code::PlateNotFound, &["8 inner corners in a row"]);
+        assert_says(&other, Code::PlateNotFound, &[" 8 "]);
     }
     let side = detect(&picture, &charuco_plate(Some(("DICT_4X4_50", 0.45)))).expect_err("smaller markers");
-    assert_says(&side, Code::PlateNotFound, &["0.7 squares"]);
+    assert_says(&side, Code::PlateNotFound, &["DICT_4X4_1000", "0.6", "0.75"]);
     let empty = Picture { pixels: vec![0.5; picture.pixels.len()], ..picture.clone() };
     let nothing = detect(&empty, &charuco_plate(Some(("DICT_4X4_50", 0.7)))).expect_err("nothing to see");
-    assert_says(&nothing, Code::PlateNotFound, &["DICT_4X4_50 found"]);
+    assert_says(&nothing, Code::PlateNotFound, &["DICT_4X4_50"]);
 }
 
 /// A grid of dots of 0.25 steps radius; `large` have 0.36.
