@@ -13,6 +13,10 @@ use crate::geom::Pose;
 /// Elements that URDF knows below `<joint>`.
 const KNOWN_CHILDREN: [&str; 9] =
     ["origin", "parent", "child", "axis", "limit", "mimic", "calibration", "dynamics", "safety_controller"];
+/// Five turns, rad: no wrist with stops turns farther.
+const MOST_RADIANS: f64 = 10.0 * std::f64::consts::PI;
+/// Two turns, degrees; what is larger says that there is no limit.
+const MOST_DEGREES: f64 = 720.0;
 const TYPES: [&str; 7] = ["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical"];
 
 /// One joint as the file states it.
@@ -141,7 +145,7 @@ impl Source<'_> {
                         "correct the numbers (point as decimal mark)",
                     ));
                 }
-                None if matches!(tag, "origin" | "axis") => {
+                None if matches!(tag, "origin" | "axis") || is_misspelt_mimic(tag, key) => {
                     let what = format!("<{tag}> has an unknown attribute {key}=\"{value}\"");
                     let names = known.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
                     return Err(self.refuse(Code::UrdfElement, element, joint, what, &format!("known are {names}")));
@@ -245,6 +249,11 @@ impl Source<'_> {
     }
 }
 
+/// True for an attribute of `<mimic>` that nearly is one that would count.
+fn is_misspelt_mimic(tag: &str, key: &str) -> bool {
+    tag == "mimic" && key != "joint" && closest_name(key, ["multiplier", "offset"]).is_some()
+}
+
 /// Limits where they mean something: not for continuous joints, not the pair 0, 0 that defaults and CAD exports leave.
 fn limits(
     node: Node<'_, '_>,
@@ -259,8 +268,16 @@ fn limits(
     if !element.has_attribute("lower") && !element.has_attribute("upper") {
         return None;
     }
-    let (lower, upper) = (read.limit.lower, read.limit.upper);
+    let bound = |key: &str| element.attribute(key).and_then(|v| numbers(v, 1)).map_or(0.0, |v| v[0]);
+    let (lower, upper) = (bound("lower"), bound("upper"));
     if lower < upper {
+        let farthest = upper.max(-lower);
+        if read.joint_type == JointType::Revolute && farthest > MOST_RADIANS && farthest <= MOST_DEGREES {
+            let what = format!(
+                "its limits, lower {lower} and upper {upper}, are more than five turns; URDF angles are radians"
+            );
+            notices.push(Notice::new(Code::UrdfAngleUnit, place(), what, "convert degrees to radians"));
+        }
         return Some((lower, upper));
     }
     let what = format!("its limits, lower {lower} and upper {upper}, leave no room to move and are not used");

@@ -10,6 +10,7 @@ mod patch;
 mod pose_robot;
 mod read;
 mod second_arm;
+mod skeleton;
 mod tips;
 mod tree;
 

@@ -8,6 +8,7 @@ use roxmltree::{Document, Node};
 
 use super::elements::{JointElement, Source};
 use super::inertial::{Inertial, inertial};
+use super::skeleton::skeleton;
 use crate::error::{Code, Error, Notice, Result, closest_name, plain_name};
 use crate::files::{self, FileKind};
 
@@ -40,7 +41,12 @@ pub fn read(path: &Path) -> Result<RobotDescription> {
     let bytes = files::read(path, FileKind::Robot)?;
     let text = String::from_utf8(bytes).map_err(|e| {
         let what = format!("is not UTF-8 text (byte {})", e.utf8_error().valid_up_to());
-        Error::new(Code::TextEncoding, path.display(), what, "convert it: iconv -t UTF-8 in.urdf > out.urdf")
+        Error::new(
+            Code::TextEncoding,
+            path.display(),
+            what,
+            "convert it: iconv -f LATIN1 -t UTF-8 in.urdf > out.urdf (-f UTF-16 where it is that)",
+        )
     })?;
     RobotDescription::from_text(path, text)
 }
@@ -71,9 +77,10 @@ impl RobotDescription {
         named(&source, robot, "joint")?;
         joint_nodes.iter().try_for_each(|n| source.check(*n))?;
 
-        let read = urdf_rs::read_from_string(plain.trim_start_matches('\u{feff}')).map_err(|e| {
-            let remedy = "check the file with check_urdf; every joint <limit> needs velocity, every link mass a value";
-            Error::new(Code::UrdfSyntax, path.display(), format!("urdf-rs cannot read it: {e}"), remedy)
+        let skeleton = skeleton(&plain, robot);
+        let read = urdf_rs::read_from_string(skeleton.trim_start_matches('\u{feff}')).map_err(|e| {
+            let what = format!("urdf-rs cannot read it: {e}");
+            Error::new(Code::UrdfSyntax, path.display(), what, "check the file with check_urdf")
         })?;
         if read.joints.len() != joint_nodes.len() || read.links.len() != links.len() {
             let what = "two readers disagree on the number of its links and joints";
@@ -86,9 +93,9 @@ impl RobotDescription {
             .map(|(node, joint)| source.joint(*node, joint, &mut notices))
             .collect::<Result<Vec<_>>>()?;
         let mut inertials = BTreeMap::new();
-        for (node, link) in elements(robot, "link").zip(&read.links) {
+        for (node, link) in elements(robot, "link").zip(&links) {
             if let Some(found) = inertial(&source, node, link)? {
-                inertials.insert(link.name.clone(), found);
+                inertials.insert(link.clone(), found);
             }
         }
         let mut description = Self {

@@ -347,7 +347,10 @@ fn kind(element: &JointElement) -> Result<JointKind> {
         JointType::Floating | JointType::Planar | JointType::Spherical => {
             let place = format!("{}, joint \"{}\"", element.place, element.name);
             let what = format!("is {:?} and has no single reading", element.joint_type).to_lowercase();
-            let remedy = format!("choose a base below it, for example base = \"{}\"", element.child);
+            let (above, below) = (&element.parent, &element.child);
+            let remedy = format!(
+                "choose a base below it, for example base = \"{below}\", or a tip before it, tip = \"{above}\""
+            );
             Err(Error::new(Code::ChainImpossible, place, what, remedy))
         }
     }

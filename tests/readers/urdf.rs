@@ -355,3 +355,50 @@ fn elements_under_an_undeclared_prefix_are_passed_over_and_kept() {
     let patched = patch_origins(&text, &new).unwrap();
     assert_eq!(patched, text.replace("xyz=\"0 0 1\"", "xyz=\"0 0 1.5\""));
 }
+
+#[test]
+fn what_moves_no_link_may_be_incomplete() {
+    let limit = "<limit lower=\"-1\" upper=\"3\"/><dynamics damping=\"\"/>";
+    let links = "<material name=\"m\"><texture/><color rgba=\"1 0 0\"/></material><link name=\"a\"><visual/><visual><geometry><cone/></geometry></visual></link>\
+                 <link name=\"b\"><inertial><mass value=\" 2.5 \"/></inertial></link>";
+    let joints = joint("j", "revolute", "a", "b", &format!("{Z}<origin xyz=\"0 0 1\"/>{limit}"));
+    let read = robot(&format!("\u{feff}<robot name=\"r\">{links}{joints}<gazebo><joint/></gazebo></robot>"));
+    let chain = read.chain(None, None).unwrap();
+    assert_eq!(chain.joints[0].origin.translation, Vector3::z());
+    assert_eq!(chain.joints[0].limits, Some((-1.0, 3.0)));
+    assert_eq!(read.inertials()["b"].mass_kg, 2.5);
+    for mass in ["", "<mass/>", "<mass value=\"2,5\"/>", "<mass value=\"-1\"/>"] {
+        let text = format!("<robot name=\"r\">\n<link name=\"a\"><inertial>{mass}</inertial></link></robot>");
+        assert_says(&refusal(&text), Code::UrdfNumber, &["r.urdf:2", "\"a\""]);
+    }
+}
+
+#[test]
+fn a_misspelt_factor_of_a_mimic_joint_is_not_taken_as_one() {
+    let text = |mimic: &str| {
+        let follower = joint("f", "revolute", "b", "c", &format!("{Z}<mimic joint=\"j\" {mimic}/>"));
+        wrap(&["a", "b", "c"], &[joint("j", "revolute", "a", "b", Z), follower])
+    };
+    for wrong in ["multiplyer=\"-2\"", "Multiplier=\"-2\"", "ofset=\"1\""] {
+        assert_says(&refusal(&text(wrong)), Code::UrdfElement, &["\"f\"", wrong]);
+    }
+    assert_eq!(
+        robot(&text("plugin=\"p\" multiplier=\"-2\"")).chain(None, None).unwrap().joints[1].drive.unwrap().multiplier,
+        -2.0
+    );
+}
+
+#[test]
+fn limits_in_degrees_are_noticed() {
+    let noticed = |kind: &str, bounds: &str| {
+        let limit = format!("{Z}<limit {bounds} effort=\"0\" velocity=\"0\"/>");
+        robot(&wrap(&["a", "b"], &[joint("j", kind, "a", "b", &limit)]))
+            .notices
+            .iter()
+            .any(|n| n.code == Code::UrdfAngleUnit)
+    };
+    assert!(noticed("revolute", "lower=\"-170\" upper=\"170\""));
+    assert!(!noticed("revolute", "lower=\"-15.8\" upper=\"15.8\""), "a wrist of 900 degrees");
+    assert!(!noticed("revolute", "lower=\"-1e16\" upper=\"1e16\""), "no limit");
+    assert!(!noticed("prismatic", "lower=\"0\" upper=\"40\""), "a rail of 40 m");
+}
