@@ -166,9 +166,10 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     if args.nearest_posture {
         for target in &mut program.targets {
             if let TargetKind::Pose(pose) = &mut target.kind
-                && matches!(pose.posture, MeantPosture::Coded(..) | MeantPosture::Either(..))
+                && pose.posture.codes().is_some()
             {
-                pose.posture = MeantPosture::Nearest;
+                let on_path = matches!(pose.posture, MeantPosture::Unheeded(..));
+                pose.posture = if on_path { MeantPosture::Along } else { MeantPosture::Nearest };
             }
         }
     }

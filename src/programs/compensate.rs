@@ -15,7 +15,7 @@ use super::field::{Edit, FieldPlace, splice};
 use super::measured_frames::{KnownError, MeasuredFrames, Moved};
 use super::posture::{Before, Finder, Known};
 use super::program::{
-    Approach, DisplacedTarget, Left, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood, write_joints,
+    Approach, DisplacedTarget, Left, PoseTarget, Program, Target, TargetKind, Understood, write_joints,
 };
 use super::reason::{LeftReason, Why};
 use crate::geom::Pose;
@@ -388,9 +388,7 @@ impl<'a> Work<'a> {
     }
 
     fn code_edits(&self, pose: &PoseTarget, programmed: &[f64], corrected: &[f64], program: &Program) -> Vec<Edit> {
-        let (MeantPosture::Coded(codes, axes) | MeantPosture::Either(codes, axes)) = &pose.posture else {
-            return Vec::new();
-        };
+        let Some((codes, axes)) = pose.posture.codes() else { return Vec::new() };
         let six = |q: &[f64]| axes.map(|i| q[i]);
         let branch = |q: &[f64]| Branch::of(self.models.controller, axes, q);
         codes.edits((&six(programmed), branch(programmed)), (&six(corrected), branch(corrected)), &program.files)

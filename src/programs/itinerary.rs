@@ -138,6 +138,11 @@ impl Itinerary {
         same
     }
 
+    /// The robot goes on beyond the target, in its posture.
+    pub fn go_beyond(&mut self) {
+        self.from = self.from.beyond();
+    }
+
     /// The next target is approached from one of several: from none in particular.
     pub fn lose(&mut self) {
         self.from = Approach::Unknown;

@@ -117,6 +117,7 @@ impl<'a> Finder<'a> {
         match (&pose.posture, &pose.taught) {
             (MeantPosture::Coded(codes, axes), _) => self.by_codes(pose, held, before, (codes, axes)),
             (MeantPosture::Either(codes, axes), _) => self.by_either(pose, held, before, (codes, axes)),
+            (MeantPosture::Unheeded(codes, axes), _) => self.by_way(pose, held, before, (codes, axes)),
             (MeantPosture::Near(q), _) => Ok((self.near(pose, held, q, false)?, Known::Near)),
             (MeantPosture::Nearest | MeantPosture::Along, Some(q)) => {
                 Ok((self.near(pose, held, q, false)?, Known::Taught))
@@ -237,6 +238,28 @@ impl<'a> Finder<'a> {
             (Ok(_), Ok(_)) => unknown("mean another one than the way there"),
             (Ok(_), Err(_)) => unknown("may not count"),
             (Err(_), near) => near,
+        }
+    }
+
+    /// The way there must not lead to another posture than that of codes which count for nothing on it.
+    fn by_way(
+        &mut self,
+        pose: &PoseTarget,
+        held: &[bool],
+        before: Before<'_>,
+        codes: (&Codes, &[usize; 6]),
+    ) -> Understood<(Vec<f64>, Known)> {
+        let way = before.readings.filter(|_| before.straight).and_then(|q| self.along(pose, held, q));
+        match (self.by_codes(pose, held, before, codes), way) {
+            (Ok((coded, _)), Some(way)) if farthest(&coded, &way) > SAME => {
+                let words = format!(
+                    "its posture is not known: the way there leads to another one than {}, which no path of the tool heeds (--nearest-posture heeds no codes)",
+                    codes.0.shown()
+                );
+                Err(Why::new(LeftReason::PostureUnknown, words))
+            }
+            (Err(_), Some(way)) => Ok((way, Known::Line)),
+            (coded, _) => coded,
         }
     }
 

@@ -216,8 +216,20 @@ pub enum MeantPosture {
     Either(Codes, [usize; 6]),
     /// That next to these joint values, rad or m.
     Near(Vec<f64>),
+    /// That to which the way there leads; codes, which the controller does not heed on it, must not say another one.
+    Unheeded(Codes, [usize; 6]),
     /// That of the codes in the text; the six readings are those of axes 1 to 6.
     Coded(Codes, [usize; 6]),
+}
+
+impl MeantPosture {
+    /// Codes that stand in the text, heeded or not.
+    pub fn codes(&self) -> Option<(&Codes, &[usize; 6])> {
+        match self {
+            Self::Coded(codes, axes) | Self::Either(codes, axes) | Self::Unheeded(codes, axes) => Some((codes, axes)),
+            Self::Nearest | Self::Along | Self::Near(_) => None,
+        }
+    }
 }
 
 impl PoseTarget {

@@ -160,6 +160,17 @@ impl<'a> Reader<'a> {
         self.ahead(n).is_some_and(|t| t.kind == TokenKind::Mark(mark))
     }
 
+    /// True for a word in capital or small letters.
+    pub fn ahead_is_word(&self, n: isize, word: &str) -> bool {
+        self.ahead(n).is_some_and(|t| t.kind == TokenKind::Word && self.text(t).eq_ignore_ascii_case(word.as_bytes()))
+    }
+
+    /// True where a word stands in the rest of the line.
+    pub fn rest_of_line_has(&self, word: &str) -> bool {
+        let line = (0..).take_while(|&n| self.ahead(n).is_some_and(|t| t.kind != TokenKind::LineEnd));
+        line.into_iter().any(|n| self.ahead_is_word(n, word))
+    }
+
     pub fn done(&self) -> bool {
         self.at >= self.tokens.len()
     }

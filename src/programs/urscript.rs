@@ -128,12 +128,15 @@ struct Script<'a> {
 }
 
 impl Script<'_> {
-    /// Looks through the whole text for variables with computed values.
+    /// Looks through the whole text for variables with computed values, or with one of several: which of them holds is known only where the text
+    /// is read from top to bottom.
     fn find_computed(&mut self) -> Result<()> {
+        let (mut given, mut blocks) = (BTreeMap::<Vec<u8>, usize>::new(), 0);
         while !self.reader.done() {
             let name = self.reader.word().map(<[u8]>::to_vec);
             self.reader.at += 1;
             let Some(name) = name else { continue };
+            blocks += usize::from(BLOCKS.contains(&name.as_slice()));
             let assigned = |reader: &Reader<'_>, ahead| {
                 reader.ahead_is_mark(ahead, b'=') && !reader.ahead_is_mark(ahead + 1, b'=')
             };
@@ -145,11 +148,14 @@ impl Script<'_> {
                 }
             } else if assigned(&self.reader, 0) {
                 self.reader.at += 1;
-                if matches!(self.value()?, Value::Expression) {
-                    self.computed.insert(name);
+                match self.value()? {
+                    Value::Expression => _ = self.computed.insert(name),
+                    _ => *given.entry(name).or_default() += 1,
                 }
             }
         }
+        let several = given.into_iter().filter(|(_, times)| blocks > 1 && *times > 1);
+        self.computed.extend(several.map(|(name, _)| name));
         self.reader.at = 0;
         Ok(())
     }
@@ -322,7 +328,8 @@ impl Script<'_> {
     /// Joints of `name_q` where the reader stands on `name_p`.
     fn taught(&self) -> Option<Vec<f64>> {
         let stem = self.reader.word()?.strip_suffix(b"_p")?;
-        match self.variables.get(&[stem, b"_q"].concat())? {
+        let name = [stem, b"_q"].concat();
+        match self.variables.get(&name).filter(|_| !self.computed.contains(&name))? {
             Value::Joints(fields, _) if fields.len() == self.setting.axes.len() => Some(self.readings(fields)),
             _ => None,
         }

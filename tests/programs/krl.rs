@@ -96,9 +96,9 @@ fn check(seed: u64) {
     tools.insert("base", pose(&aggregate(&format!("{{{BASE}}}"), "")));
     let (tool, base) = (tools["tool"], tools["base"]);
     let mut q: Vec<Vec<f64>> = (0..9).map(|_| cell.readings()).collect();
-    // P5 and P6 have no status: they mean the posture of the target before them, as does P4, 20 mm above P3.
-    for k in [5, 6] {
-        q[k] = q[3].iter().enumerate().map(|(i, v)| v + 0.05 * ((k + i) as f64).sin()).collect();
+    // P5 and P6 have no status: they mean the posture of the target before them, as does P4, 20 mm above P3. A line leads to P2.
+    for (k, from) in [(2, 1), (5, 3), (6, 3)] {
+        q[k] = q[from].iter().enumerate().map(|(i, v)| v + 0.05 * ((k + i) as f64).sin()).collect();
     }
     let work = |q: &[f64]| base.inverse() * cell.nominal.base_from_tip(q) * tool;
     let mut src = SRC.replace("@TOOL@", TOOL).replace("@BASE@", BASE).replace("@Q7@", &axes_text(&q[7]));
@@ -248,7 +248,9 @@ fn frames_that_a_motion_states_for_itself_hold_for_it_alone() {
     let mut cell = Cell::kuka(26);
     let frame = |text: &str| pose(&aggregate(&format!("{{{text}}}"), ""));
     let (tool, base) = (frame(TOOL), frame(BASE));
-    let q: Vec<Vec<f64>> = (0..4).map(|_| cell.readings()).collect();
+    let (a, b) = (cell.readings(), cell.readings());
+    let beside = |q: &[f64]| q.iter().map(|v| v + 0.03).collect::<Vec<_>>();
+    let q = [a.clone(), beside(&a), b.clone(), beside(&b)];
     let at = |q: &[f64], base: &Pose, tool: &Pose| {
         let (s, t) = status_turn(q);
         format!("{{{},S {s},T {t}}}", pose_text(&(base.inverse() * cell.nominal.base_from_tip(q) * *tool)))

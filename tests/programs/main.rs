@@ -5,6 +5,7 @@ mod programs_support;
 #[path = "../said/mod.rs"]
 mod said;
 
+mod changing;
 mod frames;
 mod frames_study;
 mod krl;

@@ -1,17 +1,21 @@
 //! KUKA KRL, `.src` with its `.dat`: motions to `E6POS`, `POS`, `FRAME`, `E6AXIS` and `AXIS`, `$TOOL` and `$BASE` (mm and degrees).
 
 mod aggregate;
+mod assigned;
 mod frames;
+mod motions;
 
 use std::collections::BTreeMap;
 
 use aggregate::{Aggregate, index};
+use assigned::{Assigned, assigned, matching};
 use frames::{Active, FrameIs, Frames, OwnFrames};
+use motions::{MOVES, RELATIVE, posture_of};
 
 use super::ProgramSetting;
 use super::flow::{Branching, Flow, Places, settled};
 use super::itinerary::{Itinerary, Stands};
-use super::program::{Approach, Left, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood};
+use super::program::{Approach, Left, PoseTarget, Program, Target, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
@@ -20,10 +24,6 @@ use crate::geom::Pose;
 use crate::urdf::JointKind;
 
 const DIALECT: Dialect = Dialect { comment: b';', quotes: b"\"", header: Some(b'&'), based_numbers: true };
-/// Motions and how many targets they have.
-const MOVES: [(&str, usize); 7] =
-    [("PTP", 1), ("LIN", 1), ("CIRC", 2), ("SPTP", 1), ("SLIN", 1), ("SCIRC", 2), ("SPL", 1)];
-const RELATIVE: [&str; 6] = ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL"];
 const POSE_NAMES: [&str; 8] = ["X", "Y", "Z", "A", "B", "C", "S", "T"];
 const AXIS_NAMES: [&str; 6] = ["A1", "A2", "A3", "A4", "A5", "A6"];
 
@@ -34,18 +34,6 @@ enum Value {
     /// Another name.
     Name(String),
     Expression,
-}
-
-/// The numbers of an element of an array, where its name is that of the pattern with numbers in the place of words.
-fn matching(name: &str, pattern: &str) -> Option<Vec<i64>> {
-    let (array, indices) = name.strip_suffix(']')?.split_once('[')?;
-    let (wanted, pattern) = pattern.strip_suffix(']')?.split_once('[')?;
-    let numbers = indices.split(',').map(|n| n.parse().ok()).collect::<Option<Vec<i64>>>()?;
-    let patterns: Vec<&str> = pattern.split(',').collect();
-    let same = array == wanted
-        && patterns.len() == numbers.len()
-        && patterns.iter().zip(&numbers).all(|(p, n)| p.parse::<i64>().map_or(true, |p| p == *n));
-    same.then_some(numbers)
 }
 
 /// Reads a module of one or more files.
@@ -60,6 +48,7 @@ fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>)
         setting,
         prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
         values: BTreeMap::new(),
+        assigned: Assigned::default(),
         declared: Vec::new(),
         root: FrameIs::Unset,
         now: unset(),
@@ -67,8 +56,11 @@ fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>)
         spline: OwnFrames::default(),
         way: Itinerary::new(),
     };
-    // Data first: programs use them in whatever order the files are given.
     let has_moves = |file: &TextFile| !file.name.to_ascii_lowercase().ends_with(".dat");
+    for (index, file) in files.iter().enumerate() {
+        module.assigned.look_through(Reader::new(file, index, DIALECT)?, !has_moves(file));
+    }
+    // Data first: programs use them in whatever order the files are given.
     for wanted in [false, true] {
         for (index, file) in files.iter().enumerate().filter(|(_, f)| has_moves(f) == wanted) {
             module.file(Reader::new(file, index, DIALECT)?, wanted)?;
@@ -101,6 +93,8 @@ struct Module<'a> {
     setting: &'a ProgramSetting<'a>,
     prismatic: Vec<bool>,
     values: BTreeMap<String, Value>,
+    /// What of them changes.
+    assigned: Assigned,
     /// Positions declared in data files that are no data of the controller: name, file, line.
     declared: Vec<(String, usize, usize)>,
     /// `$ROBROOT`: the foot of the robot in the world, of which `$BASE` is a part.
@@ -126,16 +120,18 @@ impl Module<'_> {
             if moves {
                 self.calls(&reader);
             }
-            if moves && let Some((_, count)) = MOVES.iter().find(|(name, _)| *name == word) {
+            let spline = word == "SPLINE" || (word == "PTP" && reader.ahead_is_word(1, "SPLINE"));
+            if moves && spline {
+                // Frames of a spline block hold for all of it.
+                self.spline = self.with(&mut reader);
+            } else if moves && reader.ahead_is_mark(1, b':') {
+                self.label();
+            } else if moves && let Some((_, count)) = MOVES.iter().find(|(name, _)| *name == word) {
                 self.motion(&mut reader, &word, *count)?;
             } else if moves && RELATIVE.contains(&word.as_str()) {
                 let why = Why::new(LeftReason::Relative, "it is relative to the position before");
                 self.leave_at(reader.index, reader.line(), &word, why);
             } else if moves && self.flow(&reader, &word) {
-                // Frames of a spline block hold for all of it.
-                if word == "SPLINE" {
-                    self.spline = self.with(&mut reader);
-                }
             } else if moves && word == "BAS" {
                 self.bas(&mut reader);
             } else {
@@ -148,19 +144,8 @@ impl Module<'_> {
 
     /// `[DECL] [GLOBAL] [TYPE] NAME[n] = value`.
     fn assignment(&mut self, reader: &mut Reader<'_>, no_targets: bool) -> Result<()> {
-        let mut name = String::new();
-        while let Some(word) = reader.name() {
-            reader.at += 1;
-            name = word + &index(reader);
-        }
-        let component = reader.is_mark(b'.');
-        while component && !reader.at_line_end() && !reader.is_mark(b'=') {
-            reader.at += 1;
-        }
         let (file, line) = (reader.index, reader.line());
-        if name.is_empty() || !reader.take_mark(b'=') || reader.is_mark(b'=') {
-            return Ok(());
-        }
+        let Some((name, component)) = assigned(reader) else { return Ok(()) };
         if name == "$IPO_MODE" {
             let is_in_room = self.is_tool_in_room(reader);
             self.now.0.tool_in_room.set(is_in_room);
@@ -192,7 +177,7 @@ impl Module<'_> {
     /// Modules have names of their own: two of them cannot be read together.
     fn refuse_twins(&self, name: &str, value: &Value, reader: &Reader<'_>) -> Result<()> {
         match (self.values.get(name), value) {
-            (Some(Value::Aggregate(a)), Value::Aggregate(b)) if a.file != b.file => {
+            (Some(Value::Aggregate(a)), Value::Aggregate(b)) if a.file != b.file && !self.assigned.changes(name) => {
                 let what = format!("{name} has a value in another of the files already");
                 Err(Error::new(Code::ProgramTwin, reader.place(), what, "correct modules one after the other"))
             }
@@ -223,6 +208,11 @@ impl Module<'_> {
             match value {
                 Value::Aggregate(a) if a.is_computed() && !a.has(&["IPO_FRAME"]) => break,
                 Value::Aggregate(a) => return Ok((a, name)),
+                Value::Name(n) if self.assigned.changes(n) => {
+                    let words =
+                        format!("{n} gets another value in the program: which of them holds, the text does not tell");
+                    return Err(Why::of(n, LeftReason::Computed, words));
+                }
                 Value::Name(n) => {
                     name = Some(n.as_str());
                     let missing = || {
@@ -412,6 +402,10 @@ impl Module<'_> {
                 }
             }
         }
+        if reader.rest_of_line_has("CA") {
+            // The circle goes on, or ends before the point.
+            self.way.go_beyond();
+        }
         Ok(())
     }
 
@@ -443,11 +437,18 @@ impl Module<'_> {
                 self.way.branches_end();
                 self.flow.end(&mut self.now);
             }
-            "SPLINE" => {}
             "ENDSPLINE" => self.spline = OwnFrames::default(),
             _ => return false,
         }
         true
+    }
+
+    /// `NAME:`, to which GOTO may come from anywhere in the routine.
+    fn label(&mut self) {
+        let unknown = || FrameIs::Unknown("a GOTO may come from elsewhere".into());
+        self.now.0.set(Frames { tool: unknown(), base: unknown(), tool_in_room: self.now.0.tool_in_room.value });
+        self.way.lose();
+        self.now.1 = self.way.stands();
     }
 
     /// Routines that a line calls, which may set frames; the reader stands at its beginning.
@@ -497,11 +498,8 @@ impl Module<'_> {
         let named = name.unwrap_or(motion).to_owned();
         let about = |why: Why| Why { about: name.map(str::to_owned).or(why.about.clone()), ..why };
         let mut kind = self.kind(aggregate, frames).map_err(about)?;
-        if let TargetKind::Pose(pose) = &mut kind
-            && pose.posture == MeantPosture::Nearest
-            && ["LIN", "SLIN"].contains(&motion)
-        {
-            pose.posture = MeantPosture::Along;
+        if let TargetKind::Pose(pose) = &mut kind {
+            pose.posture = posture_of(motion, pose.posture.clone());
         }
         let place = if name.is_some() { (aggregate.file, aggregate.line) } else { from };
         let clash = format!("{named} is used with different $TOOL or $BASE; give it a position for each");

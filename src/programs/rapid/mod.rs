@@ -28,7 +28,11 @@ use value::{Displacement, NO_AXIS, Node, check, computed, foreign_axis, frame, n
 
 const DIALECT: Dialect = Dialect { comment: b'!', quotes: b"\"", header: None, based_numbers: false };
 /// Beginnings of the names of instructions that move the robot to their first arguments.
-const MOVES: [&str; 6] = ["MOVE", "TRIGGL", "TRIGGJ", "TRIGGC", "ARC", "SPOT"];
+const MOVES: [&str; 7] = ["MOVE", "TRIGGL", "TRIGGJ", "TRIGGC", "ARC", "SPOT", SEARCH];
+/// Behind a signal and the point that is found.
+const SEARCH: &str = "SEARCH";
+/// Beginnings of lines in which a position in numbers is not where the robot goes.
+const DECLARE: [&str; 8] = ["CONST", "PERS", "VAR", "LOCAL", "TASK", "PROC", "FUNC", "TRAP"];
 /// Instructions that begin so, but move no robot.
 const NO_MOVES: [&str; 2] = ["MOVEEXTJ", "ARCREFRESH"];
 const TYPES: [&str; 4] = ["ROBTARGET", "JOINTTARGET", "TOOLDATA", "WOBJDATA"];
@@ -89,6 +93,24 @@ fn skip_statement(reader: &mut Reader<'_>) {
     while !reader.done() && !reader.take_mark(b';') {
         reader.at += 1;
     }
+}
+
+/// True where a robtarget is written in the rest of a line that sets no data.
+fn has_literal(reader: &mut Reader<'_>) -> Result<bool> {
+    let start = reader.at;
+    let mut found = false;
+    while !found && !reader.at_line_end() && !reader.is_mark(b';') {
+        let assigned = reader.is_mark(b':') && reader.ahead_is_mark(1, b'=') && !reader.ahead_is_mark(-2, b'\\');
+        if assigned {
+            break;
+        }
+        let nested = reader.is_mark(b'[') && reader.ahead_is_mark(1, b'[');
+        let at = reader.at;
+        found = nested && node(reader)?.is_robtarget();
+        reader.at = at + 1;
+    }
+    reader.at = start;
+    Ok(found)
 }
 
 impl Task<'_> {
@@ -163,6 +185,10 @@ impl Task<'_> {
                 self.instruction(&mut reader)?;
                 skip_statement(&mut reader);
             } else {
+                if begins && !DECLARE.contains(&word.as_str()) && has_literal(&mut reader)? {
+                    let words = format!("a position stands in it, and what {word} does with it is not known");
+                    self.leave((reader.index, reader.line()), &word, Why::new(LeftReason::NotATarget, words));
+                }
                 reader.at += if begins || ROUTINES.contains(&word.as_str()) {
                     self.switching.statement(&reader, &word, &mut self.way)
                 } else {
@@ -226,6 +252,10 @@ impl Task<'_> {
                 }
             }
         }
+        if name.to_ascii_uppercase().starts_with(SEARCH) {
+            arguments.drain(..arguments.len().min(2));
+            plain.drain(..plain.len().min(2));
+        }
         let count = self.targets_of(&name, &arguments);
         let tool = self.tool_of(&arguments, count);
         for k in 0..count {
@@ -243,7 +273,7 @@ impl Task<'_> {
     /// Number of arguments that are targets: two for circles.
     fn targets_of(&self, name: &str, arguments: &[Node]) -> usize {
         let name = name.to_ascii_uppercase();
-        let circle = ["MOVEC", "TRIGGC", "ARCC", "SPOTC"].iter().any(|c| name.starts_with(c));
+        let circle = ["MOVEC", "TRIGGC", "ARCC", "SPOTC", "SEARCHC"].iter().any(|c| name.starts_with(c));
         (1 + usize::from(circle)).min(arguments.len())
     }
 

@@ -18,6 +18,15 @@ pub(super) enum Node {
     Other,
 }
 
+impl Node {
+    /// Place, quaternion, confdata and external axes.
+    pub fn is_robtarget(&self) -> bool {
+        let Self::List(parts) = self else { return false };
+        let lengths = parts.iter().map(|part| if let Self::List(numbers) = part { numbers.len() } else { 0 });
+        lengths.eq([3, 4, 4, 6])
+    }
+}
+
 /// `Offs(p, x, y, z)` or `RelTool(p, x, y, z \Rx:=.. \Ry:=.. \Rz:=..)`.
 #[derive(Debug, Clone)]
 pub(super) struct Displacement {
