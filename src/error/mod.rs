@@ -205,6 +205,20 @@ pub fn closest_name<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -
         .map(|(_, name)| name)
 }
 
+/// Units at the ends of names.
+const UNITS: [&str; 10] = ["m", "mm", "cm", "um", "rad", "mrad", "deg", "s", "ms", "ns"];
+
+/// What to do with a name that is there instead of the wanted one: one of another unit is not renamed alone.
+pub fn renaming(there: &str, wanted: &str) -> String {
+    let unit = |name: &str| name.rsplit_once('_').and_then(|(_, end)| UNITS.into_iter().find(|u| *u == end));
+    match (unit(there), unit(wanted)) {
+        (Some(from), Some(to)) if from != to => {
+            format!("convert \"{there}\" from {from} to {to}, and name it \"{wanted}\"")
+        }
+        _ => format!("rename \"{there}\" to \"{wanted}\""),
+    }
+}
+
 /// Letters without case, one separator, and digits for the letters that look like them behind a digit.
 fn plain(name: &str) -> Vec<char> {
     let mut plain: Vec<char> = Vec::with_capacity(name.len());
@@ -243,7 +257,16 @@ fn edit_distance(a: &[char], b: &[char]) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::{Code, Error, Notice, closest_name, plain_name};
+    use super::{Code, Error, Notice, closest_name, plain_name, renaming};
+
+    #[test]
+    fn a_column_of_another_unit_is_converted_not_renamed() {
+        assert!(renaming("x_mm", "x_m").contains("from mm to m"));
+        assert!(renaming("pitch_deg", "pitch_rad").contains("from deg to rad"));
+        for (there, wanted) in [("X_m", "x_m"), ("qx_", "qx"), ("joint_b", "joint_a")] {
+            assert!(renaming(there, wanted).starts_with("rename"), "{there}");
+        }
+    }
 
     #[test]
     fn names_with_control_characters_are_refused_and_never_shown_raw() {

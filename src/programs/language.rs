@@ -123,7 +123,10 @@ impl Language {
                 Code::ProgramLanguage,
                 path.display(),
                 what,
-                format!("rename it (known are {}) or give --language", known.join(", ")),
+                format!(
+                    "write its targets to a table (.csv); or, where it is in a language of these, rename it ({}) or give --language",
+                    known.join(", ")
+                ),
             )
         })
     }

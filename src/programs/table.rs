@@ -9,7 +9,7 @@ use super::ProgramSetting;
 use super::field::{Edit, Field, FieldPlace};
 use super::program::{Approach, JointTarget, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind};
 use super::text_file::TextFile;
-use crate::error::{Code, Error, Result, closest_name};
+use crate::error::{Code, Error, Result, closest_name, renaming};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
 
@@ -93,7 +93,7 @@ fn columns(file: &TextFile, header: &Row, setting: &ProgramSetting<'_>) -> Resul
             Some(name) if !there.is_empty() => {
                 let what = format!("has no column \"{name}\" (its columns are {})", names.join(", "));
                 let remedy = match closest_name(name, names.iter().map(String::as_str)) {
-                    Some(meant) => format!("rename \"{meant}\" to \"{name}\""),
+                    Some(meant) => renaming(meant, name),
                     None => format!("add it: {} belong together", wanted.join(", ")),
                 };
                 Err(Error::new(Code::CsvColumnMissing, place(), what, remedy))

@@ -137,6 +137,9 @@ impl Script<'_> {
             self.reader.at += 1;
             let Some(name) = name else { continue };
             blocks += usize::from(BLOCKS.contains(&name.as_slice()));
+            if name == b"def" {
+                self.computed.extend(self.parameters());
+            }
             let assigned = |reader: &Reader<'_>, ahead| {
                 reader.ahead_is_mark(ahead, b'=') && !reader.ahead_is_mark(ahead + 1, b'=')
             };
@@ -158,6 +161,14 @@ impl Script<'_> {
         self.computed.extend(several.map(|(name, _)| name));
         self.reader.at = 0;
         Ok(())
+    }
+
+    /// Parameters of the routine on whose name the reader stands.
+    fn parameters(&self) -> Vec<Vec<u8>> {
+        let open = self.reader.at + 1;
+        let close = self.reader.closing(open).filter(|_| self.reader.ahead_is_mark(1, b'(')).unwrap_or(open);
+        let tokens = (1..).map_while(|n| self.reader.ahead(n).filter(|_| self.reader.at + (n as usize) < close));
+        tokens.filter(|t| t.kind == TokenKind::Word).map(|t| self.reader.text(t).to_vec()).collect()
     }
 
     fn read(mut self) -> Result<()> {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::inputs::{InputFile, read_text};
-use crate::error::{Code, Error, Result, closest_name, plain_name};
+use crate::error::{Code, Error, Result, closest_name, plain_name, renaming};
 use crate::files::FileKind;
 
 /// One data row.
@@ -161,7 +161,7 @@ impl Table {
         self.column(name).ok_or_else(|| {
             let what = format!("has no column \"{name}\"; its columns are: {}", self.headers.join(", "));
             let remedy = match closest_name(name, self.headers.iter().map(String::as_str)) {
-                Some(meant) => format!("rename \"{meant}\" to \"{name}\""),
+                Some(meant) => renaming(meant, name),
                 None => format!("add the column \"{name}\""),
             };
             Error::new(Code::CsvColumnMissing, self.place_of_header(), what, remedy)
@@ -175,7 +175,7 @@ impl Table {
             Some(name) => {
                 let what = format!("unknown column \"{name}\"");
                 let remedy = match closest_name(name, known.iter().copied()) {
-                    Some(meant) => format!("is \"{meant}\" meant?"),
+                    Some(meant) => renaming(name, meant),
                     None => format!("known columns are: {}", known.join(", ")),
                 };
                 Err(Error::new(Code::CsvColumnUnknown, self.place_of_header(), what, remedy))

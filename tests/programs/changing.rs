@@ -64,6 +64,7 @@ fn variables_of_krl_that_change_while_the_program_runs_are_left() {
         "LOOP\nLIN XQ\nXQ.X=XQ.X+10\nENDLOOP\nPTP P[1]\nPTP P[2]\n",
         "LIN XQ\nXQ=@\nPTP P[1]\nPTP P[2]\n",
         "FOR I=1 TO 2\nP[I].Z=300\nENDFOR\nPTP P[1]\nLIN XQ\n",
+        "LIN XQ\nGO(@)\nPTP P[1]\nPTP P[2]\nEND\nDEF GO(XQ :IN)\nLIN XQ\n",
         "P[1]=@\nFOR I=1 TO 2\nPTP P[I]\nENDFOR\nLIN XQ\n",
     ] {
         let (_, reasons) = told(&cell, &[("a.src", krl(&cell, body)), data.clone()], &["--start=10,-80,97,20,40,28"]);
@@ -126,6 +127,7 @@ fn a_variable_of_urscript_with_one_of_several_values_is_computed() {
         ("  w=@\n  movel(w)\n  w=@\n  movel(w)\n", 2, 0),
         ("  if x == 1:\n    w=@\n  else:\n    w=@\n  end\n  movel(w)\n", 0, 1),
         ("  w=@\n  while True:\n    movel(w)\n    w=@\n  end\n", 0, 1),
+        ("  w=@\n  movel(w)\n  def go(a, w):\n    movej(w)\n  end\n  go(1, @)\n", 0, 2),
     ] {
         let mut text = format!("def p():\n  set_tcp(p[0,0,0,0,0,0])\n  movej({start:?})\n{body}end\n");
         for k in 1..=body.matches('@').count() {

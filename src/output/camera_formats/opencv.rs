@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::distortion;
-use super::model::{ReadCamera, Sayable, camera_of};
+use super::model::{ReadCamera, Sayable};
+use super::ros;
 use super::yaml::{Calibration, parse, pinhole};
 use crate::error::{Code, Error, Result};
 use crate::model::camera::{Camera, Lens};
@@ -50,16 +50,11 @@ pub(super) fn read(path: &Path, text: &str) -> Result<ReadCamera> {
         [b'<', ..] => of_xml(text).map_err(|e| Error::new(Code::SettingSyntax, path.display(), e, remedy))?,
         _ => parse(path, text, remedy)?,
     };
-    let (size, pinhole, d) = (
-        [file.image_width, file.image_height],
-        pinhole(path, &file.camera_matrix.data)?,
-        &file.distortion_coefficients.data,
-    );
-    if file.fisheye_model != 0 {
-        let camera = camera_of(path, Lens::Fisheye, size, pinhole, d)?;
-        return Ok(ReadCamera { name: file.camera_name, camera, loss_px: None });
-    }
-    distortion::read(path, file.camera_name, size, pinhole, d)
+    let (size, d) = ([file.image_width, file.image_height], &file.distortion_coefficients.data);
+    let pinhole = pinhole(path, &file.camera_matrix.data)?;
+    // Files with the keys of both name the model as ROS does.
+    let model = if file.fisheye_model != 0 { Some("fisheye") } else { file.distortion_model.as_deref() };
+    ros::with_model(path, model, (file.camera_name, size, pinhole), d)
 }
 
 /// The same from XML: every element of the storage is a number, a text or a matrix.
@@ -112,6 +107,23 @@ mod tests {
         {
             assert_eq!(of(name, text), camera, "{name}");
         }
+    }
+
+    #[test]
+    fn a_storage_that_names_its_model_is_read_as_that() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("camera.xml");
+        let named = |model: &str| {
+            let four = XML.replace("<rows>5", "<rows>4").replace(" 0.</data></distortion", "</data></distortion");
+            let model = format!("<distortion_model>{model}</distortion_model>\n<distortion_coefficients ");
+            std::fs::write(&path, four.replace("<distortion_coefficients ", &model)).unwrap();
+            read_camera_file(&path, None)
+        };
+        for (model, lens) in [("plumb_bob", Lens::Brown), ("radtan", Lens::Brown), ("equidistant", Lens::Fisheye)] {
+            let camera = named(model).unwrap().camera;
+            assert_eq!((camera.lens, &camera.parameters[4..8]), (lens, &[-0.1, 0.02, 1e-3, -2e-3][..]), "{model}");
+        }
+        assert_eq!(named("omni").unwrap_err().code, Code::LensUnknown);
     }
 
     #[test]

@@ -99,14 +99,16 @@ pub(super) fn read(path: &Path, text: &str) -> Result<ReadCamera> {
 }
 
 /// The camera of a distortion model as ROS names it.
-fn with_model(
+pub(super) fn with_model(
     path: &Path,
     model: Option<&str>,
     (name, size, pinhole): (Option<String>, [u32; 2], [f64; 4]),
     d: &[f64],
 ) -> Result<ReadCamera> {
     match model {
-        Some("plumb_bob" | "rational_polynomial" | "") | None => distortion::read(path, name, size, pinhole, d),
+        Some("plumb_bob" | "radtan" | "rational_polynomial" | "") | None => {
+            distortion::read(path, name, size, pinhole, d)
+        }
         Some("equidistant" | "fisheye") => {
             let camera = camera_of(path, Lens::Fisheye, size, pinhole, d)?;
             Ok(ReadCamera { name, camera, loss_px: None })

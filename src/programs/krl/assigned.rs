@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::aggregate::index;
-use crate::programs::scan::Reader;
+use crate::programs::scan::{Reader, TokenKind};
 
 /// Words behind which the text is not read from top to bottom.
 const BRANCHES: [&str; 9] = ["IF", "SWITCH", "WHILE", "LOOP", "FOR", "REPEAT", "GOTO", "DEF", "DEFFCT"];
@@ -35,6 +35,13 @@ pub(super) fn matching(name: &str, pattern: &str) -> Option<Vec<i64>> {
     same.then_some(numbers)
 }
 
+/// Parameters in the rest of a line, `NAME :IN`: they are what the call has.
+fn parameters(reader: &Reader<'_>) -> Vec<String> {
+    let line = (0..).take_while(|&n| reader.ahead(n).is_some_and(|t| t.kind != TokenKind::LineEnd));
+    let names = line.filter(|&n| reader.ahead_is_mark(n + 1, b':')).filter_map(|n| reader.ahead(n));
+    names.map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase()).collect()
+}
+
 /// How often a name is set, in data and in statements.
 #[derive(Debug, Clone, Copy, Default)]
 struct Times {
@@ -60,6 +67,9 @@ impl Assigned {
             let word = if routine == 1 { reader.ahead(1).map(|t| reader.text(t).to_ascii_uppercase()) } else { None };
             let word = word.map_or(first, |w| String::from_utf8_lossy(&w).into_owned());
             self.branches += usize::from(BRANCHES.contains(&word.as_str()));
+            if matches!(word.as_str(), "DEF" | "DEFFCT") {
+                parameters(&reader).into_iter().for_each(|name| self.times.entry(name).or_default().components += 1);
+            }
             if let Some((name, component)) = assigned(&mut reader).filter(|(name, _)| !name.starts_with('$')) {
                 let times = self.times.entry(name).or_default();
                 times.components += usize::from(component);
@@ -69,7 +79,7 @@ impl Assigned {
         }
     }
 
-    /// True for a name whose value changes: by a component, beside its data, by an index that is computed, or by one of several statements, unless
+    /// True for a name whose value changes: as a parameter, by a component, beside its data, by an index that is computed, or by one of several statements, unless
     /// there is one routine that runs from top to bottom.
     pub fn changes(&self, name: &str) -> bool {
         let by_index = |other: &String| other != name && matching(name, other).is_some();
