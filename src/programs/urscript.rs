@@ -131,12 +131,18 @@ impl Script<'_> {
     /// Looks through the whole text for variables with computed values, or with one of several: which of them holds is known only where the text
     /// is read from top to bottom.
     fn find_computed(&mut self) -> Result<()> {
-        let (mut given, mut blocks) = (BTreeMap::<Vec<u8>, usize>::new(), 0);
+        let (mut given, mut routines, mut open) = (BTreeMap::<Vec<u8>, (usize, bool)>::new(), 0, Vec::new());
         while !self.reader.done() {
             let name = self.reader.word().map(<[u8]>::to_vec);
             self.reader.at += 1;
             let Some(name) = name else { continue };
-            blocks += usize::from(BLOCKS.contains(&name.as_slice()));
+            let is_routine = matches!(&name[..], b"def" | b"thread");
+            routines += usize::from(is_routine);
+            if BLOCKS.contains(&&name[..]) {
+                open.push(is_routine);
+            } else if name == b"end" {
+                open.pop();
+            }
             if name == b"def" {
                 self.computed.extend(self.parameters());
             }
@@ -153,11 +159,14 @@ impl Script<'_> {
                 self.reader.at += 1;
                 match self.value()? {
                     Value::Expression => _ = self.computed.insert(name),
-                    _ => *given.entry(name).or_default() += 1,
+                    _ => {
+                        let (times, nested) = given.entry(name).or_default();
+                        (*times, *nested) = (*times + 1, *nested || open.contains(&false));
+                    }
                 }
             }
         }
-        let several = given.into_iter().filter(|(_, times)| blocks > 1 && *times > 1);
+        let several = given.into_iter().filter(|(_, (times, nested))| *times > 1 && (*nested || routines > 1));
         self.computed.extend(several.map(|(name, _)| name));
         self.reader.at = 0;
         Ok(())

@@ -55,6 +55,7 @@ fn variables_of_krl_that_change_while_the_program_runs_are_left() {
         ("P=@\nLOOP\nLIN P\nP=@\nENDLOOP\n", 0, 1),
         ("P=@\nAGAIN:\nLIN P\nP=@\nGOTO AGAIN\n", 0, 1),
         ("P=@\nSUB()\nLIN P\nEND\nDEF SUB()\nP=@\n", 0, 1),
+        ("FOR I=1 TO 6\n$VEL_AXIS[I]=50\nENDFOR\nP=@\nLOOP\nLIN P\nENDLOOP\nP=@\nLIN P\n", 2, 0),
         ("GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM ( )\nP=@\nLIN P\nP=@\nLIN P\n", 2, 0),
     ] {
         let (done, reasons) = told(&cell, &[("a.src", krl(&cell, body))], &[]);
@@ -126,6 +127,7 @@ fn a_variable_of_urscript_with_one_of_several_values_is_computed() {
     for (body, corrected, left) in [
         ("  w=@\n  movel(w)\n  w=@\n  movel(w)\n", 2, 0),
         ("  if x == 1:\n    w=@\n  else:\n    w=@\n  end\n  movel(w)\n", 0, 1),
+        ("  while x == 1:\n    x=2\n  end\n  w=@\n  movel(w)\n  w=@\n  movel(w)\n", 2, 0),
         ("  w=@\n  while True:\n    movel(w)\n    w=@\n  end\n", 0, 1),
         ("  w=@\n  movel(w)\n  def go(a, w):\n    movej(w)\n  end\n  go(1, @)\n", 0, 2),
     ] {

@@ -1,12 +1,13 @@
 //! Variables that hold something else at one time than at another: which of it a motion finds, the text does not tell.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::aggregate::index;
 use crate::programs::scan::{Reader, TokenKind};
 
-/// Words behind which the text is not read from top to bottom.
-const BRANCHES: [&str; 9] = ["IF", "SWITCH", "WHILE", "LOOP", "FOR", "REPEAT", "GOTO", "DEF", "DEFFCT"];
+/// Beginnings and ends of branches and loops.
+const BEGIN: [&str; 6] = ["IF", "SWITCH", "WHILE", "LOOP", "FOR", "REPEAT"];
+const END: [&str; 6] = ["ENDIF", "ENDSWITCH", "ENDWHILE", "ENDLOOP", "ENDFOR", "UNTIL"];
 
 /// `[DECL] [GLOBAL] [TYPE] NAME[n][.COMPONENT] =`: the name, and true where it is a component alone that is set. The reader ends behind the mark.
 pub(super) fn assigned(reader: &mut Reader<'_>) -> Option<(String, bool)> {
@@ -42,51 +43,59 @@ fn parameters(reader: &Reader<'_>) -> Vec<String> {
     names.map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase()).collect()
 }
 
-/// How often a name is set, in data and in statements.
+/// How often a name is set: in data, in statements, and of these in branches and loops; by its components, or by a call.
 #[derive(Debug, Clone, Copy, Default)]
 struct Times {
     data: usize,
     statements: usize,
-    components: usize,
+    nested: usize,
+    parts: usize,
 }
 
 /// All names that are set in the files.
 #[derive(Debug, Default)]
 pub(super) struct Assigned {
     times: BTreeMap<String, Times>,
-    /// Routines, branches and loops.
-    branches: usize,
+    /// Elements of arrays whose index is computed: any of the array may be meant.
+    any_of: BTreeSet<String>,
+    routines: usize,
+    /// Jumps from statement to statement.
+    jumps: usize,
 }
 
 impl Assigned {
     /// Looks through a file of data, or of statements.
     pub fn look_through(&mut self, mut reader: Reader<'_>, is_data: bool) {
+        let mut depth = 0_usize;
         while !reader.done() {
-            let first = reader.name().unwrap_or_default();
-            let routine = usize::from(first == "GLOBAL");
-            let word = if routine == 1 { reader.ahead(1).map(|t| reader.text(t).to_ascii_uppercase()) } else { None };
-            let word = word.map_or(first, |w| String::from_utf8_lossy(&w).into_owned());
-            self.branches += usize::from(BRANCHES.contains(&word.as_str()));
-            if matches!(word.as_str(), "DEF" | "DEFFCT") {
-                parameters(&reader).into_iter().for_each(|name| self.times.entry(name).or_default().components += 1);
+            let of_all = isize::from(reader.ahead_is_word(0, "GLOBAL"));
+            let is_one_of = |words: &[&str]| words.iter().any(|word| reader.ahead_is_word(of_all, word));
+            depth = (depth + usize::from(is_one_of(&BEGIN))).saturating_sub(usize::from(is_one_of(&END)));
+            self.jumps += usize::from(is_one_of(&["GOTO"]));
+            if is_one_of(&["DEF", "DEFFCT"]) {
+                self.routines += 1;
+                parameters(&reader).into_iter().for_each(|name| self.times.entry(name).or_default().parts += 1);
             }
             if let Some((name, component)) = assigned(&mut reader).filter(|(name, _)| !name.starts_with('$')) {
+                if name.ends_with(']') && matching(&name, &name).is_none() {
+                    self.any_of.insert(name.clone());
+                }
                 let times = self.times.entry(name).or_default();
-                times.components += usize::from(component);
+                times.parts += usize::from(component);
+                times.nested += usize::from(depth > 0);
                 *(if is_data { &mut times.data } else { &mut times.statements }) += 1;
             }
             reader.skip_line();
         }
     }
 
-    /// True for a name whose value changes: as a parameter, by a component, beside its data, by an index that is computed, or by one of several statements, unless
-    /// there is one routine that runs from top to bottom.
+    /// True for a name whose value changes: as a parameter, by a component, beside its data, by an index that is computed, or by one of several
+    /// statements, unless all of them are reached from top to bottom.
     pub fn changes(&self, name: &str) -> bool {
-        let by_index = |other: &String| other != name && matching(name, other).is_some();
         let itself = self.times.get(name).is_some_and(|t| {
-            let is_straight = self.branches <= 1 && t.data == 0;
-            t.components > 0 || (t.statements > 0 && t.data + t.statements > 1 && !is_straight)
+            let is_straight = self.routines <= 1 && self.jumps == 0 && t.nested == 0 && t.data == 0;
+            t.parts > 0 || (t.statements > 0 && t.data + t.statements > 1 && !is_straight)
         });
-        itself || (name.ends_with(']') && self.times.keys().any(by_index))
+        itself || self.any_of.iter().any(|any| matching(name, any).is_some())
     }
 }
