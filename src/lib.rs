@@ -54,5 +54,5 @@ pub mod study;
 pub mod urdf;
 
 pub use calibration::{Calibration, calibrate};
-pub use error::{Code, Error, ErrorKind, Notice, Result, closest_name, plain_name, renaming};
+pub use error::{Code, Error, ErrorKind, Notice, Result, closest_name, plain_name};
 pub use identify::Options;
