@@ -134,7 +134,7 @@ pub(super) fn several_cameras(series: &Series) -> Error {
     Error::new(Code::SettingUnsupported, series.folder.join("series.toml").display(), what, remedy)
 }
 
-/// When none of the images can be used: what is wrong with the first ones.
+/// When none of the images can be used: what is wrong with all of them, or with the first ones.
 ///
 /// # Errors
 /// When no image has an observation.
@@ -144,14 +144,17 @@ pub fn require_some<'a>(place: &str, images: impl Iterator<Item = (&'a str, usiz
         if failure.is_none() && observations > 0 {
             return Ok(());
         }
-        if reasons.len() < 3 {
-            reasons.push(format!("{name}: {}", failure.unwrap_or("no marker found")));
-        }
+        reasons.push((name, failure.unwrap_or("no marker found")));
     }
+    let alike = reasons.iter().filter(|(_, why)| Some(*why) == reasons.first().map(|(_, first)| *first)).count();
+    let why = match reasons.as_slice() {
+        [(name, why), _, ..] if alike == reasons.len() => format!("{name} and the {} others: {why}", alike - 1),
+        _ => reasons.iter().take(3).map(|(name, why)| format!("{name}: {why}")).collect::<Vec<_>>().join("; "),
+    };
     Err(Error::new(
         Code::PlateNowhere,
         place,
-        format!("no image can be used ({})", reasons.join("; ")),
+        format!("no image can be used ({why})"),
         "look at one of the images: is the plate in it, sharp, and the one that plate.toml describes?",
     ))
 }
