@@ -37,13 +37,12 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let found = best_of_sizes(&bytes, board, |found: &Found| &found.lattice, |scale| at_scale(&bytes, scale))?;
     let Some(Found { print, lattice, .. }) = found else {
         bytes.mirror();
-        let mirrored = at_scale(&bytes, 1.0)?.is_some();
+        if at_scale(&bytes, 1.0)?.is_some() {
+            return Err(mirrored_board());
+        }
         bytes.mirror();
-        return Err(match plate.aruco.as_ref().and_then(|_| instead(&bytes, plate, &prints, board)) {
-            _ if mirrored => mirrored_board(),
-            Some(seen) => other_board(plate, seen),
-            None => no_board(plate),
-        });
+        let seen = plate.aruco.as_ref().and_then(|_| instead(&bytes, plate, &prints, board));
+        return Err(seen.map_or_else(|| no_board(plate), |seen| other_board(plate, seen)));
     };
     if plate.aruco.is_some() && prints.first().is_some_and(|stated| stated.legacy != print.legacy) {
         return Err(other_layout(print.legacy));
