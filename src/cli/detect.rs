@@ -13,7 +13,7 @@ use crate::assess::Limits;
 use crate::calibration::{Pictures, require_unchanged};
 use crate::detect::{FlatField, FlatFieldFacts, load};
 use crate::error::{Code, Error, Notice, Result};
-use crate::identify::{SeenImage, SeenSeries, detect_stops, flat_field_drift, pictures};
+use crate::identify::{SeenImage, SeenSeries, Unused, detect_stops, flat_field_drift, pictures, require_some};
 use crate::output::detection_files::{DetectionContext, detection_files, dropped_counts, marker_counts, picture_names};
 use crate::output::overlay::{Palette, overlay_png};
 use crate::output::{NewResult, ResultFolder, folder_name};
@@ -86,9 +86,11 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
     Notice::said_once(&notices).iter().for_each(|n| say_line!("note      {}", n.coded()));
     say_line!("results   {} ({written} files)", out.display());
     let failures: Vec<&Error> = looked.images.iter().filter_map(|i| i.detection.failure.as_ref()).collect();
-    let seen = |i: &SeenImage| (i.detection.observations.len(), i.detection.failure.as_ref().map(|f| f.what.clone()));
-    let states: Vec<_> = looked.images.iter().map(|i| (i.name.as_str(), seen(i))).collect();
-    crate::identify::require_some(&name, states.iter().map(|(n, (count, failure))| (*n, *count, failure.as_deref())))?;
+    let found = |i: &SeenImage| i.detection.observations.len();
+    require_some(
+        &name,
+        looked.images.iter().map(|i| (i.name.as_str(), found(i), i.detection.failure.as_ref().map(Unused::from))),
+    )?;
     Ok(if failures.is_empty() { Verdict::Good } else { Verdict::GateFailed })
 }
 

@@ -28,6 +28,11 @@ pub(super) struct BoardSize {
 }
 
 impl BoardSize {
+    /// Whether an inner corner of this column and row is on the board.
+    pub fn contains(self, (column, row): (i32, i32)) -> bool {
+        (0..self.columns).contains(&column) && (0..self.rows).contains(&row)
+    }
+
     /// Quarter turns and colours of the first square (whether light) under which the board may be seen.
     ///
     /// With an odd and an even number of columns and rows the first square is dark, which settles the turn; else half a turn keeps the
@@ -96,8 +101,7 @@ impl Placement {
     /// Marker id of a lattice corner; `None` off the board.
     pub fn id(self, lattice: (i32, i32)) -> Option<u32> {
         let (column, row) = self.board_from_lattice(lattice);
-        let inside = (0..self.board.columns).contains(&column) && (0..self.board.rows).contains(&row);
-        inside.then(|| u32::try_from(row * self.board.columns + column).ok()).flatten()
+        self.board.contains((column, row)).then(|| u32::try_from(row * self.board.columns + column).ok()).flatten()
     }
 
     /// Lattice coordinates of all corners of the board.

@@ -40,15 +40,18 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
         if at_scale(&bytes, 1.0)?.is_some() {
             return Err(mirrored_board());
         }
-        bytes.mirror();
-        let seen = plate.aruco.as_ref().and_then(|_| instead(&bytes, plate, &prints, board));
-        return Err(seen.map_or_else(|| no_board(plate), |seen| other_board(plate, seen)));
+        return Err(instead(picture, plate).map_or_else(|| no_board(plate), |seen| other_board(plate, &seen)));
     };
     if plate.aruco.is_some() && prints.first().is_some_and(|stated| stated.legacy != print.legacy) {
         return Err(other_layout(print.legacy));
     }
     let window = Window { arm: 0.5 * (1.0 - print.ratio), keep_off_px: KEEP_OFF_PX, ..WINDOW };
     let mut detection = measure(picture, &lattice, Placement::on_board(board, print.legacy), window);
+    if detection.observations.is_empty()
+        && let Some(seen) = instead(picture, plate)
+    {
+        return Err(other_board(plate, &seen));
+    }
     if plate.aruco.is_none() {
         detection.notices.push(found_print(&print));
     }
@@ -133,18 +136,32 @@ fn no_board(plate: &Plate) -> Error {
     Error::new(Code::PlateNotFound, "image", not_found(plate), remedy)
 }
 
-fn other_board(plate: &Plate, seen: Seen) -> Error {
-    let (what, remedy) = match seen {
-        Seen::Columns(columns) => (
-            format!("the markers stand as on a board with {columns} inner corners in a row, not {}", plate.columns),
-            "correct columns and rows of the plate file: they count inner corners (one less than squares), columns from left to right".to_owned(),
-        ),
-        Seen::Print { dictionary, sides: [least, most] } => (
-            format!("the markers are those of {dictionary}, with a side of {least} to {most} squares"),
-            "correct dictionary (this one, or a shorter one of its kind) and side_m under [aruco] of the plate file".to_owned(),
-        ),
+fn other_board(plate: &Plate, seen: &Seen) -> Error {
+    let mut differs = Vec::new();
+    if seen.dictionary_differs(plate) {
+        differs.push(format!("the markers are those of {}", seen.dictionary));
+    }
+    if seen.side_by_side {
+        differs.push("they stand side by side, as on an aruco-grid".to_owned());
+    } else {
+        if let Some(columns) = seen.columns.filter(|n| *n != plate.columns) {
+            differs
+                .push(format!("they stand as on a board with {columns} inner corners in a row, not {}", plate.columns));
+        }
+        if let Some(side) = seen.side.filter(|_| seen.side_differs(plate)) {
+            differs.push(format!("their side is {side:.2} squares"));
+        }
+    }
+    let remedy = match seen.side_by_side {
+        true => {
+            "write kind = \"aruco-grid\" in the plate file, with columns, rows (markers), marker_m, gap_m and dictionary"
+        }
+        false => {
+            "correct the plate file: columns and rows count inner corners (one less than squares), columns from left to right; dictionary \
+             (this one, or a shorter one of its kind) and side_m stand under [aruco]"
+        }
     };
-    Error::new(Code::PlateNotFound, "image", format!("{}: {what}", not_found(plate)), remedy)
+    Error::new(Code::PlateNotFound, "image", format!("{}: {}", not_found(plate), differs.join(", ")), remedy)
 }
 
 fn other_layout(legacy: bool) -> Error {

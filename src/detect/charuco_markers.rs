@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use calib_targets_aruco::{Dictionary, builtins, resolve_dictionary};
+use calib_targets_aruco::{Dictionary, resolve_dictionary};
 use calib_targets_charuco::{CharucoBoardSpec, CharucoDetection, CharucoDetector, CharucoParams};
 use calib_targets_chessboard::ChessCorner;
 use calib_targets_core::GrayImageView;
 
 use super::board_labels::BoardSize;
 use super::chessboard::corner_config;
+use super::tag_scan::usual_dictionaries;
 use crate::error::{Code, Error, Result};
 use crate::series::Plate;
 
@@ -99,11 +100,9 @@ pub(super) fn prints(plate: &Plate) -> Result<Vec<Print>> {
 }
 
 /// All that OpenCV prints with enough markers for the plate, in the usual sizes.
-pub(super) fn usual_prints(plate: &Plate) -> Vec<Print> {
+fn usual_prints(plate: &Plate) -> Vec<Print> {
     let needed = (plate.columns + 1) * (plate.rows + 1) / 2;
-    let largest = [builtins::DICT_4X4_1000, builtins::DICT_5X5_1000, builtins::DICT_6X6_1000, builtins::DICT_7X7_1000];
-    let others = [builtins::DICT_ARUCO_ORIGINAL, builtins::DICT_APRILTAG_36h11];
-    let able = largest.into_iter().chain(others).filter(|d| d.codes().len() >= needed as usize);
+    let able = usual_dictionaries().filter(|d| d.codes().len() >= needed as usize);
     let sizes = able.flat_map(|dictionary| USUAL_RATIOS.map(|ratio| (dictionary, ratio)));
     sizes
         .flat_map(|(dictionary, ratio)| layouts(plate, false).map(move |legacy| Print { dictionary, ratio, legacy }))

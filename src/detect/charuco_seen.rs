@@ -1,53 +1,75 @@
 //! Which ChArUco board is in a picture that does not show the one of the plate file.
 
-use calib_targets_chessboard::detect_corners;
+use calib_targets_aruco::{Dictionary, resolve_dictionary};
 
-use super::board_labels::BoardSize;
-use super::charuco_markers::{Print, decode, usual_prints};
-use super::chessboard::{Bytes, corner_config};
-use crate::series::Plate;
+use super::Picture;
+use super::quads::Quad;
+use super::tag_code::Reader;
+use super::tag_layout::Layout;
+use super::tag_scan::{corners, passes, scan, usual_dictionaries};
+use crate::series::{Plate, TagPrint, Tags};
 
-/// Markers that must agree.
-const LEAST_MARKERS: usize = 6;
-/// Most inner corners in a row that are tried.
-const MOST_COLUMNS: i32 = 30;
+/// Pairs of markers two squares apart that must agree on the numbers.
+const LEAST_PAIRS: usize = 4;
+/// Sides over squares that differ by less are the same.
+const ALIKE: f64 = 0.06;
 
 /// What the markers of the picture say.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Seen {
-    /// Markers of the stated dictionary, as on a board with so many inner corners in a row.
-    Columns(i32),
-    /// A board of the stated size with markers of another dictionary or size: least and largest side over that of a square.
-    Print { dictionary: &'static str, sides: [f64; 2] },
+pub(super) struct Seen {
+    pub dictionary: &'static str,
+    /// Inner corners in a row.
+    pub columns: Option<u32>,
+    /// Side of a marker over that of a square.
+    pub side: Option<f64>,
+    /// Markers in all places, as on an ArUco grid.
+    pub side_by_side: bool,
+    pairs: usize,
 }
 
-/// The board that most markers agree with: of the stated print with other columns, or of the stated size with another print.
-pub(super) fn instead(bytes: &Bytes, plate: &Plate, stated: &[Print], board: BoardSize) -> Option<Seen> {
-    let view = bytes.view();
-    let corners = detect_corners(&view, &corner_config());
-    let markers = |print: &Print, board: BoardSize| {
-        // A size that the dictionary cannot fill is none.
-        decode(&view, &corners, print, board).ok().flatten().map_or(0, |found| found.markers.len())
-    };
-    let sizes = (2..=MOST_COLUMNS).filter(|&columns| columns != board.columns);
-    let sizes = sizes.flat_map(|columns| stated.iter().map(move |print| (columns, print)));
-    let by_size = sizes.map(|(columns, print)| {
-        let codes = i32::try_from(print.dictionary.codes().len()).unwrap_or(i32::MAX);
-        // Rows below the board's own hold no marker of it.
-        let rows = (2 * codes / (columns + 1) - 1).clamp(3, MOST_COLUMNS);
-        (markers(print, BoardSize { columns, rows: rows - (rows - board.rows).rem_euclid(2) }), columns)
-    });
-    let prints = usual_prints(plate);
-    let by_print: Vec<(usize, &Print)> = prints.iter().map(|print| (markers(print, board), print)).collect();
-    let (columns, print) = (by_size.max_by_key(|(count, _)| *count)?, by_print.iter().max_by_key(|(count, _)| *count)?);
-    if columns.0.max(print.0) < LEAST_MARKERS {
-        return None;
+impl Seen {
+    fn of(picture: &Picture, passes: &[Vec<Quad>], dictionary: Dictionary) -> Self {
+        let print = TagPrint::Opencv;
+        let tags = Tags { dictionary: dictionary.name().to_owned(), print, side_m: 1.0, gap_m: 0.0, first_id: 0 };
+        let layout = Layout::of(&corners(&scan(picture, &Reader::of(&tags, &dictionary), passes, false)));
+        let (across, down) = (layout.agreed((2, 0)), layout.agreed((0, -2)));
+        let pairs = [across, down].into_iter().flatten().map(|(_, count)| count).sum();
+        let columns = down.and_then(|(squares, _)| u32::try_from(squares - 1).ok());
+        let side_by_side = layout.change((1, 0)) == Some(1);
+        Self {
+            dictionary: dictionary.name(),
+            columns,
+            side: layout.length(2).map(|two| 2.0 / two),
+            side_by_side,
+            pairs,
+        }
     }
-    if columns.0 > print.0 {
-        return Some(Seen::Columns(columns.1));
+
+    /// Whether this is the board of the plate file, as far as it says.
+    fn is(&self, plate: &Plate) -> bool {
+        let columns = self.columns.is_none_or(|n| n == plate.columns);
+        !self.dictionary_differs(plate) && columns && !self.side_differs(plate) && !self.side_by_side
     }
-    let dictionary = print.1.dictionary.name();
-    let alike = by_print.iter().filter(|(count, p)| *count == print.0 && p.dictionary.name() == dictionary);
-    let sides = alike.fold([f64::MAX, 0.0], |[least, most], (_, p)| [p.ratio.min(least), p.ratio.max(most)]);
-    Some(Seen::Print { dictionary, sides })
+
+    /// Whether the plate file states another dictionary, or none.
+    pub fn dictionary_differs(&self, plate: &Plate) -> bool {
+        let stated = plate.aruco.as_ref().and_then(|aruco| resolve_dictionary(&aruco.dictionary));
+        stated.is_none_or(|stated| stated.name() != self.dictionary)
+    }
+
+    /// Whether the plate file states another side.
+    pub fn side_differs(&self, plate: &Plate) -> bool {
+        let stated = plate.aruco.as_ref().map(|aruco| aruco.side_m / plate.pitch_m);
+        self.side.zip(stated).is_some_and(|(seen, stated)| (seen - stated).abs() > ALIKE)
+    }
+}
+
+/// The board that most markers agree with, where it is another one.
+pub(super) fn instead(picture: &Picture, plate: &Plate) -> Option<Seen> {
+    let passes: Vec<Vec<Quad>> = passes(picture).collect();
+    let stated = plate.aruco.as_ref().and_then(|aruco| resolve_dictionary(&aruco.dictionary));
+    let all = stated.into_iter().chain(usual_dictionaries()).map(|dictionary| Seen::of(picture, &passes, dictionary));
+    // The first of equals.
+    let best = all.reduce(|best, other| if other.pairs > best.pairs { other } else { best })?;
+    (best.pairs >= LEAST_PAIRS && !best.is(plate)).then_some(best)
 }

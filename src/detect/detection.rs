@@ -15,7 +15,7 @@ pub struct Detection {
     pub circles: Option<Circles>,
     /// What the user should know though the work went on.
     pub notices: Vec<Notice>,
-    /// Whether the outer lines of a chessboard were there.
+    /// Whether the outer lines of a board were there.
     pub outline: Outline,
     /// Why the image cannot be used, with no observations then; `None` where it can.
     pub failure: Option<Error>,
@@ -30,16 +30,18 @@ pub struct Sizes {
     pub large: Vec<u32>,
 }
 
-/// What an image tells about the size of a chessboard.
+/// What an image tells about the size of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Outline {
-    /// Some outer line of corners is out of view, or the plate has none.
+    /// Some outer line of corners or tags is out of view, or the plate has none.
     #[default]
     Open,
-    /// All four outer lines of corners were found.
+    /// All four outer lines of corners were found, or a tag in each.
     Whole,
     /// An outer line of corners is not where it should be in view: it is covered, or the board is smaller than the plate says.
     LineMissing,
+    /// The same of tags, whose numbers tell their places all the same.
+    TagsMissing,
 }
 
 /// What an image of circles tells beyond their places.

@@ -67,13 +67,17 @@ pub(super) struct EdgeLine {
     fit: Fit,
 }
 
+/// A side, or why there is none.
+pub(super) type Measured = Result<EdgeLine, &'static str>;
+
 /// How well a side is known.
 #[derive(Debug, Clone, Copy)]
 struct Fit {
     covariance: SMatrix<f64, 3, 3>,
-    /// Root mean square of the residuals on the paper, and its step to the ink, counts.
+    /// Root mean square of the residuals on the paper, the step to it from the ink, and the ink, counts.
     paper_residual: f64,
     contrast: f64,
+    dark: f64,
 }
 
 struct Pixel {
@@ -97,7 +101,7 @@ impl EdgeLine {
             along,
             across: Vector2::new(along.y, -along.x),
             shape: Vector3::zeros(),
-            fit: Fit { covariance: SMatrix::zeros(), paper_residual: 0.0, contrast: 0.0 },
+            fit: Fit { covariance: SMatrix::zeros(), paper_residual: 0.0, contrast: 0.0, dark: 0.0 },
         };
         let mut state = Column::zeros();
         state[3] = USUAL_BLUR_PX.ln();
@@ -156,6 +160,11 @@ impl EdgeLine {
     /// Step between ink and paper, counts.
     pub fn contrast(&self) -> f64 {
         self.fit.contrast
+    }
+
+    /// Level of the ink, counts.
+    pub fn dark(&self) -> f64 {
+        self.fit.dark
     }
 
     /// How far a side that goes on in the line of this one, with its ink on the other side, lies to the light of it, px.
@@ -253,7 +262,7 @@ fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column)
         if step[0].abs() + step[1].abs() * length / 2.0 < rest {
             let (contrast, paper_residual) = (state[4], (paper.0 / paper.1.max(1.0)).sqrt());
             let covariance = factor.inverse().fixed_view::<3, 3>(0, 0).into_owned();
-            let fit = Fit { covariance, paper_residual, contrast };
+            let fit = Fit { covariance, paper_residual, contrast, dark: state[6] };
             return if noise < WORST * contrast { Ok(fit) } else { Err("disturbed surroundings") };
         }
     }

@@ -21,6 +21,9 @@ mod quads;
 mod run;
 mod sizes;
 mod tag_code;
+mod tag_layout;
+mod tag_scan;
+mod tag_seen;
 pub mod tags;
 
 pub use detection::{Circles, Detection, Dropped, Outline, Sizes};

@@ -6,7 +6,8 @@
 
 use calib_targets_chessboard::detect_corners;
 use calib_targets_puzzleboard::{
-    PuzzleBoardDetector, PuzzleBoardParams, PuzzleBoardSearchMode, PuzzleBoardSpec, PuzzleBoardSpecError,
+    MASTER_COLS, MASTER_ROWS, PuzzleBoardDetector, PuzzleBoardParams, PuzzleBoardSearchMode, PuzzleBoardSpec,
+    PuzzleBoardSpecError,
 };
 
 use super::board_labels::{BoardSize, Lattice, Placement, brightness};
@@ -40,34 +41,23 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let puzzle = plate.puzzle.ok_or_else(|| nothing(plate))?;
     let mut bytes = Bytes::of(picture);
     let declared = Reader::declared(board, puzzle).map_err(impossible)?;
-    let look = |bytes: &Bytes| {
-        best_of_sizes(
-            bytes,
-            board,
-            |lattice| lattice,
-            |scale| Ok(declared.read(bytes, scale).map(|found| found.lattice)),
-        )
-    };
+    let look = |bytes: &Bytes| best_of_sizes(bytes, board, |lattice| lattice, |scale| Ok(declared.read(bytes, scale)));
     let Some(lattice) = look(&bytes)? else {
         if let Some(found) = Reader::anywhere(puzzle).map_err(impossible)?.read(&bytes, 1.0) {
-            return Err(elsewhere(&found));
+            return Err(elsewhere(&found, [0, 0]));
         }
         bytes.mirror();
         return Err(if look(&bytes)?.is_some() { mirrored() } else { nothing(plate) });
     };
     let (lattice, dropped) = Dots { picture, puzzle, lattice: &lattice }.checked();
+    let beyond = lattice.keys().filter(|key| !board.contains(**key)).count();
+    if 2 * beyond as i32 > board.columns.min(board.rows) {
+        return Err(elsewhere(&lattice, [puzzle.origin_col, puzzle.origin_row].map(|k| k as i32)));
+    }
     let window = Window { dot: puzzle.dot_diameter_rel / 2.0, keep_off_px: KEEP_OFF_PX, ..WINDOW };
     let mut detection = measure(picture, &lattice, Placement::on_board(board, puzzle.is_light_first()), window);
     detection.dropped.extend(dropped);
     if detection.observations.is_empty() { Err(nothing(plate)) } else { Ok(detection) }
-}
-
-/// What the dots of a picture say.
-struct Read {
-    /// Corners in px of the picture by column and row of the board.
-    lattice: Lattice,
-    /// Row and column of the pattern at the first square that was seen.
-    origin: [i32; 2],
 }
 
 /// Reads the dots of some part of the pattern.
@@ -108,8 +98,8 @@ impl Reader {
         Ok(Self { detector: PuzzleBoardDetector::new(params)?, first, places, false_alarms })
     }
 
-    /// The board in the picture at another size, where that is hardly a chance.
-    fn read(&self, bytes: &Bytes, scale: f64) -> Option<Read> {
+    /// Corners in px of the picture by column and row of the board, seen at another size, where that is hardly a chance.
+    fn read(&self, bytes: &Bytes, scale: f64) -> Option<Lattice> {
         let scaled = bytes.scaled(scale);
         let corners = detect_corners(&scaled.view(), &corner_config());
         let found = self.detector.detect_with_corners(&scaled.view(), &corners).ok()?;
@@ -123,8 +113,7 @@ impl Reader {
             let at = [c.position.x, c.position.y].map(|p| on_picture(p, scale));
             ((c.grid.u - column, c.grid.v - row), at)
         };
-        let origin = [found.decode.master_origin_row, found.decode.master_origin_col];
-        Some(Read { lattice: found.corners.iter().map(corner).collect(), origin })
+        Some(found.corners.iter().map(corner).collect())
     }
 }
 
@@ -182,12 +171,22 @@ fn nothing(plate: &Plate) -> Error {
     )
 }
 
-fn elsewhere(found: &Read) -> Error {
-    let [row, column] = found.origin;
+/// Column and row of the pattern at the first square of the board that the lattice counts from.
+fn elsewhere(lattice: &Lattice, origin: [i32; 2]) -> Error {
+    let along = |pick: fn(&(i32, i32)) -> i32, origin: i32, pattern: u32| {
+        let all = || lattice.keys().map(pick);
+        let (least, most) = (all().min().unwrap_or(0), all().max().unwrap_or(0));
+        (most - least + 1, (origin + least).rem_euclid(pattern as i32))
+    };
+    let (columns, column) = along(|k| k.0, origin[0], MASTER_COLS);
+    let (rows, row) = along(|k| k.1, origin[1], MASTER_ROWS);
     Error::new(
         Code::PlateContradicted,
         "image",
-        format!("a puzzleboard, but another part of the pattern: near row {row}, column {column} of it"),
+        format!(
+            "the puzzleboard that is seen is another part of the pattern: {columns} x {rows} inner corners from origin_row = {row}, \
+             origin_col = {column}"
+        ),
         "check columns, rows (inner corners), origin_row and origin_col of the plate file, or whether it is the right board",
     )
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::{Detection, Outline, Picture, chessboard, examine};
-use crate::error::{Code, Error, Result};
+use super::{Detection, Outline, Picture, chessboard, examine, tags};
+use crate::error::{Code, Error, Notice, Result};
 use crate::files::{batches, picture_size};
 use crate::series::Plate;
 
@@ -61,6 +61,7 @@ pub fn detect_series(
         found.par_extend(images[batch].par_iter().map(one));
     }
     refuse_unproven_boards(images, plate, &mut found);
+    note_unseen_tags(images, plate, &mut found);
     refuse_odd_sizes(images, &mut found);
     refuse_odd_dots(images, &mut found);
     found
@@ -100,6 +101,17 @@ fn refuse_unproven_boards(images: &[PathBuf], plate: &Plate, found: &mut [Series
     for (path, image) in images.iter().zip(found).filter(|(_, image)| image.detection.failure.is_none()) {
         image.detection.observations.clear();
         image.detection.failure = Some(Error { place: path.display().to_string(), ..chessboard::line_missing(plate) });
+    }
+}
+
+/// Tags have numbers, so that an outer line which no image shows puts no marker in doubt; only the middle of the plate.
+fn note_unseen_tags(images: &[PathBuf], plate: &Plate, found: &mut [SeriesImage]) {
+    if found.iter().any(|i| i.detection.outline == Outline::Whole) {
+        return;
+    }
+    let without = |i: &&mut SeriesImage| i.detection.outline == Outline::TagsMissing;
+    if let Some((path, image)) = images.iter().zip(found).find(|(_, i)| without(i)) {
+        image.detection.notices.push(Notice { place: path.display().to_string(), ..tags::unseen_line(plate) });
     }
 }
 

@@ -1,10 +1,11 @@
 //! Reading the code of a square tag.
 
+use calib_targets_aruco::Dictionary;
+
 use super::Picture;
 use super::quads::Quad;
-use crate::error::Result;
 use crate::geom::PlaneMap;
-use crate::series::{Plate, Tags};
+use crate::series::Tags;
 
 /// Share of the modules of the border that must be dark.
 const LEAST_BORDER: f64 = 0.9;
@@ -13,44 +14,37 @@ const ONE_WRONG_IN: usize = 16;
 /// The next best reading must differ in at least this many modules more.
 const MARGIN: u32 = 2;
 /// A reading counts alone when fewer than one in two to the power of this is one by chance.
-const SURE_BITS: f64 = 18.0;
+pub(super) const SURE_BITS: f64 = 18.0;
 /// Contrast of light and dark modules, as a part of the light.
 const LEAST_CONTRAST: f32 = 0.15;
 
 /// What a quadrilateral says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Reading {
-    /// Place of the tag on the plate, counted row by row from the top-left.
-    pub place: usize,
+    /// Number of the tag in its dictionary.
+    pub id: u32,
     /// Its corners, counter-clockwise from the bottom-left as printed.
     pub corners: Quad,
     /// So many modules are wrong.
     pub wrong: u32,
 }
 
-/// The codes of a plate's tags.
+/// The codes of a dictionary, as they are printed.
 pub(super) struct Reader {
     bits: usize,
     border: usize,
-    /// Code of every tag of the plate by its place.
-    own: Vec<u64>,
-    /// The other tags of the dictionary.
-    foreign: Vec<u64>,
+    codes: Vec<u64>,
 }
 
 impl Reader {
-    pub fn of(plate: &Plate, tags: &Tags) -> Result<Self> {
-        let (columns, rows) = (plate.columns, plate.rows);
-        let dictionary = tags.dictionary("plate", columns * rows)?;
+    pub fn of(tags: &Tags, dictionary: &Dictionary) -> Self {
         let (bits, border) = (dictionary.marker_size(), tags.print.border());
         let code = |id: u32| {
-            let modules = tags.modules(&dictionary, id);
+            let modules = tags.modules(dictionary, id);
             let inner = modules[border..border + bits].iter().flat_map(|line| &line[border..border + bits]);
             inner.enumerate().fold(0u64, |code, (k, dark)| code | u64::from(*dark) << k)
         };
-        let ids: Vec<u32> = (0..columns * rows).map(|place| tags.tag_at(place, columns, rows).0).collect();
-        let others = (0..dictionary.codes().len() as u32).filter(|id| !ids.contains(id));
-        Ok(Self { bits, border, own: ids.iter().map(|id| code(*id)).collect(), foreign: others.map(code).collect() })
+        Self { bits, border, codes: (0..dictionary.codes().len() as u32).map(code).collect() }
     }
 
     /// Modules along a side, with the border.
@@ -67,43 +61,52 @@ impl Reader {
         (self.bits * self.bits / ONE_WRONG_IN) as u32
     }
 
-    /// A reading with so many modules wrong is no chance.
-    pub fn is_sure(&self, wrong: u32) -> bool {
+    /// Bits by which a reading as one of so many tags, with so many modules wrong, exceeds chance.
+    pub fn bits_beyond_chance(&self, wrong: u32, among: usize) -> f64 {
         let n = (self.bits * self.bits) as f64;
         let ways: f64 = (0..wrong).map(|k| ((n - f64::from(k)) / f64::from(k + 1)).log2()).sum();
-        n - ways - (4.0 * self.own.len() as f64).log2() >= SURE_BITS
+        n - ways - (4.0 * among as f64).log2()
     }
 
-    /// Reads a quadrilateral; `None` where it is no tag of this plate. `mirrored` reads it as in a mirror.
+    /// A reading as one of so many tags, with so many modules wrong, is no chance.
+    pub fn is_sure(&self, wrong: u32, among: usize) -> bool {
+        self.bits_beyond_chance(wrong, among) >= SURE_BITS
+    }
+
+    /// Number of tags in the dictionary.
+    pub fn count(&self) -> usize {
+        self.codes.len()
+    }
+
+    /// Reads a quadrilateral; `None` where it is no tag of the dictionary. `mirrored` reads it as in a mirror.
     pub fn read(&self, picture: &Picture, quad: &Quad, mirrored: bool) -> Option<Reading> {
         let modules = self.modules(picture, quad)?;
-        let mut best: Option<(u32, usize, usize)> = None;
+        let mut best: Option<(u32, u32, usize)> = None;
         let mut second = u32::MAX;
         for turn in 0..4 {
             let seen = self.code(&modules, turn, mirrored);
-            let own = self.own.iter().enumerate().map(|(place, code)| (Some(place), code));
-            for (place, code) in own.chain(self.foreign.iter().map(|code| (None, code))) {
+            for (id, code) in (0..).zip(&self.codes) {
                 let wrong = (seen ^ code).count_ones();
                 if best.is_none_or(|(least, ..)| wrong < least) {
                     second = best.map_or(u32::MAX, |(least, ..)| least);
-                    best = Some((wrong, place.unwrap_or(usize::MAX), turn));
+                    best = Some((wrong, id, turn));
                 } else {
                     second = second.min(wrong);
                 }
             }
         }
-        let (wrong, place, turn) = best?;
-        let good = place != usize::MAX && wrong <= self.wrong_allowed() && second >= wrong + MARGIN;
-        good.then(|| Reading { place, corners: as_printed(quad, turn), wrong })
+        let (wrong, id, turn) = best?;
+        let good = wrong <= self.wrong_allowed() && second >= wrong + MARGIN;
+        good.then(|| Reading { id, corners: as_printed(quad, turn), wrong })
     }
 
-    /// Whether the tag at `place` stands where its corners (as printed) are predicted; one module in eight may be wrong.
-    pub fn confirms(&self, picture: &Picture, place: usize, corners: &Quad) -> bool {
+    /// Whether a tag stands where its corners (as printed) are predicted; one module in eight may be wrong.
+    pub fn confirms(&self, picture: &Picture, id: u32, corners: &Quad) -> bool {
         let [bottom_left, bottom_right, top_right, top_left] = *corners;
         let quad = [top_left, top_right, bottom_right, bottom_left];
         let Some(modules) = self.modules(picture, &quad) else { return false };
-        let wrong = (self.code(&modules, 0, false) ^ self.own[place]).count_ones();
-        wrong <= 2 * self.wrong_allowed()
+        let wrong = self.codes.get(id as usize).map(|code| (self.code(&modules, 0, false) ^ code).count_ones());
+        wrong.is_some_and(|wrong| wrong <= 2 * self.wrong_allowed())
     }
 
     /// Dark modules within the border, from the first corner of the quadrilateral; `None` where the border is not dark.

@@ -8,19 +8,18 @@
 
 use std::collections::BTreeMap;
 
-use super::edge_line::{EdgeLine, Side};
+use super::edge_line::{EdgeLine, Measured, Side};
 use super::misfit::Usual;
-use super::quads::{Quad, quads};
-use super::tag_code::{Reader, Reading};
-use super::{Detection, Dropped, Picture};
-use crate::error::{Code, Error, Result};
+use super::quads::Quad;
+use super::tag_code::{Reader, SURE_BITS};
+use super::tag_layout::{Layout, Tagged};
+use super::tag_scan::{certain, corners, passes, read_pass, scan};
+use super::tag_seen::{MEASURED, contradiction, gap_contradiction, instead};
+use super::{Detection, Dropped, Outline, Picture};
+use crate::error::{Code, Error, Notice, Result};
 use crate::geom::PlaneMap;
 use crate::series::{Edge, Observation, Plate, TagPrint, Tags};
 
-/// Largest tags, as shares of the picture's longer side, that are looked for one after the other (the threshold follows the light
-/// over this length), and thresholds between paper and ink: above the middle, where the crossing of two dark squares is light, and
-/// further up for squares that blur joins.
-const PASSES: [(f64, f32); 5] = [(0.1, 0.6), (0.3, 0.6), (0.9, 0.6), (0.1, 0.75), (0.3, 0.75)];
 /// Sides that must say by how much ink has grown before they are believed.
 const LEAST_GROWN: usize = 8;
 /// Tags that say where another one stands.
@@ -30,8 +29,6 @@ const OFF: f64 = 0.5;
 
 /// Corners of tags by their place on the plate, counter-clockwise from the bottom-left.
 type Found = BTreeMap<usize, Quad>;
-/// A side, or why there is none.
-type Measured = std::result::Result<EdgeLine, &'static str>;
 /// Sides of tags by their place on the plate: bottom, right, top, left as printed.
 type Sides = BTreeMap<usize, [Measured; 4]>;
 
@@ -43,24 +40,27 @@ type Sides = BTreeMap<usize, [Measured; 4]>;
 /// A dictionary that is not known; no tag of the plate in the picture; a mirrored picture.
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let tags = plate.tags.as_ref().ok_or_else(no_tags)?;
-    let board = Board { picture, plate, tags, reader: Reader::of(plate, tags)? };
-    let (mut found, mut detection) = (Found::new(), Detection::default());
-    for pass in PASSES {
-        board.read(pass, &mut found);
-        if found.len() == board.count() {
-            break;
-        }
+    let board = Board::of(picture, plate, tags)?;
+    let seen = board.read();
+    if let Some(error) = contradiction(plate, tags, &seen) {
+        return Err(error);
     }
+    let mut detection = Detection::default();
+    let mut found: Found =
+        seen.into_iter().filter_map(|(id, corners)| Some((*board.places.get(&id)?, corners))).collect();
     board.check(&mut found, &mut detection.dropped);
     if found.is_empty() {
-        return Err(if board.is_mirrored() { mirrored() } else { nothing(tags) });
+        return Err(board.why_nothing());
     }
     board.complete(&mut found);
     board.measure(&found, &mut detection);
-    if detection.observations.is_empty() {
-        return Err(nothing(tags));
+    detection.outline = board.outline(&found);
+    let measured = Layout::of(&whole(&detection.observations));
+    match gap_contradiction(tags, &measured, &MEASURED) {
+        Some(error) => Err(error),
+        None if detection.observations.is_empty() => Err(nothing(tags)),
+        None => Ok(detection),
     }
-    Ok(detection)
 }
 
 struct Board<'a> {
@@ -68,31 +68,33 @@ struct Board<'a> {
     plate: &'a Plate,
     tags: &'a Tags,
     reader: Reader,
+    /// Places of the tags by their numbers.
+    places: BTreeMap<u32, usize>,
 }
 
-impl Board<'_> {
+impl<'a> Board<'a> {
+    fn of(picture: &'a Picture, plate: &'a Plate, tags: &'a Tags) -> Result<Self> {
+        let count = plate.columns * plate.rows;
+        let reader = Reader::of(tags, &tags.dictionary("plate", count)?);
+        let number = |place: u32| tags.tag_at(place, plate.columns, plate.rows).0;
+        let places = (0..count).map(|place| (number(place), place as usize)).collect();
+        Ok(Self { picture, plate, tags, reader, places })
+    }
+
     fn count(&self) -> usize {
-        (self.plate.columns * self.plate.rows) as usize
+        self.places.len()
     }
 
-    fn quads(&self, (share, threshold): (f64, f32)) -> Vec<Quad> {
-        quads(self.picture, share * self.picture.width.max(self.picture.height) as f64, threshold)
-    }
-
-    /// Reads all quadrilaterals; of two that say the same none is known to be right.
-    fn read(&self, pass: (f64, f32), found: &mut Found) {
-        let mut seen: BTreeMap<usize, Vec<Reading>> = BTreeMap::new();
-        for reading in self.quads(pass).iter().filter_map(|quad| self.reader.read(self.picture, quad, false)) {
-            let alone = self.count() == 1 || self.reader.is_sure(reading.wrong);
-            if alone || self.count() > 1 {
-                seen.entry(reading.place).or_default().push(reading);
+    /// Reads all quadrilaterals, until all tags of the plate are found.
+    fn read(&self) -> Tagged {
+        let mut found = BTreeMap::new();
+        for quads in passes(self.picture) {
+            read_pass(&quads, |quad| self.reader.read(self.picture, quad, false), &mut found);
+            if self.places.keys().all(|id| found.contains_key(id)) {
+                break;
             }
         }
-        for (place, readings) in seen {
-            if let ([reading], false) = (&readings[..], found.contains_key(&place)) {
-                found.insert(place, reading.corners);
-            }
-        }
+        corners(&found)
     }
 
     /// Leaves out tags that do not stand where the others say; a single one must be sure of its code.
@@ -108,7 +110,8 @@ impl Board<'_> {
         }
         if let (1, Some(place)) = (found.len(), found.keys().next().copied()) {
             let again = self.reader.read(self.picture, &clockwise(&found[&place]), false);
-            let sure = again.is_some_and(|r| r.wrong == 0 && (self.count() == 1 || self.reader.is_sure(0)));
+            let sure =
+                again.is_some_and(|r| r.wrong == 0 && (self.count() == 1 || self.reader.is_sure(0, self.count())));
             if !sure {
                 drop_tag(found, place, dropped);
             }
@@ -157,7 +160,7 @@ impl Board<'_> {
             let missing = (0..self.count()).filter(|place| !found.contains_key(place));
             let seen: Vec<(usize, Quad)> = missing
                 .filter_map(|place| Some((place, self.predict(found, place).filter(|_| found.len() > 1)?)))
-                .filter(|(place, corners)| self.reader.confirms(self.picture, *place, corners))
+                .filter(|(place, corners)| self.reader.confirms(self.picture, self.number(*place), corners))
                 .collect();
             if seen.is_empty() {
                 return;
@@ -171,7 +174,7 @@ impl Board<'_> {
         let (grown_px, usual) = (self.grown(found, &sides), Usual::of(sides.values().flatten().flatten()));
         for (place, four) in sides {
             let id = self.number(place);
-            let [bottom, right, top, left] = four.map(|side| Ok(usual.undisturbed(side?)?.shrunk(grown_px)));
+            let [bottom, right, top, left] = usual.undisturbed(four).map(|side| Ok(side?.shrunk(grown_px)));
             let crossings = [(left, bottom), (bottom, right), (right, top), (top, left)];
             for ((k, (a, b)), start) in (0..).zip(crossings).zip(found[&place]) {
                 match crossing(a, b, start) {
@@ -184,6 +187,24 @@ impl Board<'_> {
             }
         }
         detection.observations.sort_by_key(|o| o.marker);
+    }
+
+    /// Whether each outer line of tags shows one, or should be in view.
+    fn outline(&self, found: &Found) -> Outline {
+        let [columns, rows] = [self.plate.columns, self.plate.rows].map(|n| n as usize);
+        let row = |r: usize| (0..columns).map(|c| r * columns + c).collect::<Vec<_>>();
+        let column = |c: usize| (0..rows).map(|r| r * columns + c).collect::<Vec<_>>();
+        let unseen = [row(0), row(rows - 1), column(0), column(columns - 1)]
+            .into_iter()
+            .filter(|line| !line.iter().any(|place| found.contains_key(place)));
+        let size = [self.picture.width, self.picture.height].map(|n| n as f64 - 1.0);
+        let inside = |p: &[f64; 2]| (0..2).all(|a| (0.0..size[a]).contains(&p[a]));
+        let in_view = |place: &usize| self.predict(found, *place).is_some_and(|tag| tag.iter().all(inside));
+        unseen.fold(Outline::Whole, |so_far, line| match so_far {
+            Outline::TagsMissing => so_far,
+            _ if line.iter().all(in_view) => Outline::TagsMissing,
+            _ => Outline::Open,
+        })
     }
 
     fn sides(&self, corners: &Quad) -> [Measured; 4] {
@@ -225,11 +246,23 @@ impl Board<'_> {
         if grown.len() < LEAST_GROWN { 0.0 } else { grown[grown.len() / 2] }
     }
 
-    fn is_mirrored(&self) -> bool {
-        let reads =
-            |quad: &Quad| self.reader.read(self.picture, quad, true).is_some_and(|r| self.reader.is_sure(r.wrong));
-        PASSES.iter().any(|pass| self.quads(*pass).iter().any(reads))
+    /// What is in the picture, where the plate is not.
+    fn why_nothing(&self) -> Error {
+        let quads: Vec<Vec<Quad>> = passes(self.picture).collect();
+        let reflected = scan(self.picture, &self.reader, &quads, true);
+        if !certain(&self.reader, &reflected, SURE_BITS).is_empty() {
+            return mirrored();
+        }
+        instead(self.picture, self.plate, self.tags, &quads).unwrap_or_else(|| nothing(self.tags))
     }
+}
+
+/// The tags all of whose corners are measured.
+fn whole(observations: &[Observation]) -> Tagged {
+    let of_tag = observations.chunk_by(|a, b| a.marker / 4 == b.marker / 4);
+    of_tag
+        .filter_map(|tag| Some((tag[0].marker / 4, <&[Observation; 4]>::try_from(tag).ok()?.each_ref().map(|o| o.uv))))
+        .collect()
 }
 
 /// Where two sides cross, with the covariance.
@@ -270,6 +303,19 @@ fn nothing(tags: &Tags) -> Error {
     let remedy = "check that the plate is in view and sharp, and that plate.toml describes it: dictionary or family, first_id, \
                   columns and rows";
     Error::new(Code::PlateNotFound, "image", what, remedy)
+}
+
+/// What to say where no image shows an outer line of the tags.
+pub(super) fn unseen_line(plate: &Plate) -> Notice {
+    Notice::new(
+        Code::PlateLineHidden,
+        "image",
+        format!(
+            "an outer row or column of the {} x {} tags is not seen where it should be, in no image",
+            plate.columns, plate.rows
+        ),
+        "if nothing covers it, the board is smaller: correct columns and rows of the plate file, in whose middle its frame is",
+    )
 }
 
 fn mirrored() -> Error {

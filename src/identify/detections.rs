@@ -134,27 +134,44 @@ pub(super) fn several_cameras(series: &Series) -> Error {
     Error::new(Code::SettingUnsupported, series.folder.join("series.toml").display(), what, remedy)
 }
 
-/// When none of the images can be used: what is wrong with all of them, or with the first ones.
+/// Why an image cannot be used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unused<'a> {
+    /// What was seen.
+    pub what: &'a str,
+    /// What the detector advises.
+    pub remedy: Option<&'a str>,
+}
+
+impl<'a> From<&'a Error> for Unused<'a> {
+    fn from(error: &'a Error) -> Self {
+        Self { what: &error.what, remedy: Some(&error.remedy) }
+    }
+}
+
+const NO_MARKER: Unused<'static> = Unused { what: "no marker found", remedy: None };
+
+/// When none of the images can be used: what is wrong with all of them, or with the first ones; images are names, numbers of observations
+/// and failures.
 ///
 /// # Errors
 /// When no image has an observation.
-pub fn require_some<'a>(place: &str, images: impl Iterator<Item = (&'a str, usize, Option<&'a str>)>) -> Result<()> {
-    let mut reasons = Vec::new();
+pub fn require_some<'a>(place: &str, images: impl Iterator<Item = (&'a str, usize, Option<Unused<'a>>)>) -> Result<()> {
+    let mut unused = Vec::new();
     for (name, observations, failure) in images {
         if failure.is_none() && observations > 0 {
             return Ok(());
         }
-        reasons.push((name, failure.unwrap_or("no marker found")));
+        unused.push((name, failure.unwrap_or(NO_MARKER)));
     }
-    let alike = reasons.iter().filter(|(_, why)| Some(*why) == reasons.first().map(|(_, first)| *first)).count();
-    let why = match reasons.as_slice() {
-        [(name, why), _, ..] if alike == reasons.len() => format!("{name} and the {} others: {why}", alike - 1),
-        _ => reasons.iter().take(3).map(|(name, why)| format!("{name}: {why}")).collect::<Vec<_>>().join("; "),
+    let first = unused.first().map_or(NO_MARKER, |(_, first)| *first);
+    let why = match unused.as_slice() {
+        [(name, _), _, ..] if unused.iter().all(|(_, one)| one.what == first.what) => {
+            format!("{name} and the {} others: {}", unused.len() - 1, first.what)
+        }
+        _ => unused.iter().take(3).map(|(name, one)| format!("{name}: {}", one.what)).collect::<Vec<_>>().join("; "),
     };
-    Err(Error::new(
-        Code::PlateNowhere,
-        place,
-        format!("no image can be used ({why})"),
-        "look at one of the images: is the plate in it, sharp, and the one that plate.toml describes?",
-    ))
+    let advised = first.remedy.filter(|_| unused.iter().all(|(_, one)| one.remedy == first.remedy));
+    let look = "look at one of the images: is the plate in it, sharp, and the one that plate.toml describes?";
+    Err(Error::new(Code::PlateNowhere, place, format!("no image can be used ({why})"), advised.unwrap_or(look)))
 }

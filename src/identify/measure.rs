@@ -6,7 +6,7 @@ use std::path::Path;
 use super::bodies_measured::{seen_bodies, seen_lengths};
 use super::controller_readings::{self, readings_of};
 use super::detections::{
-    SeenSeries, detect_stops, flat_field_drift, no_images, recording, require_some, several_cameras,
+    SeenSeries, Unused, detect_stops, flat_field_drift, no_images, recording, require_some, several_cameras,
 };
 use super::seen_image::SeenImage;
 use super::stated::{lens_of, measured_series, on_the_tip_beside_others};
@@ -29,6 +29,8 @@ pub struct MeasuredWithNotices {
 struct Seen {
     observations: Vec<Observation>,
     left_out: Option<ImageRejection>,
+    /// What the detector advises where it found no plate.
+    remedy: Option<String>,
 }
 
 /// Reads joint values in the order of the chain and finds the plate in every image; `series` is what one camera saw. `several` series qualify the names
@@ -58,8 +60,8 @@ pub fn measure(
             let by_name: BTreeMap<&str, &Vec<Observation>> =
                 all.iter().map(|i| (i.image.as_str(), &i.observations)).collect();
             let given = |image: &str| match by_name.get(image) {
-                Some(o) => Seen { observations: (*o).clone(), left_out: None },
-                None => Seen { observations: vec![], left_out: Some(ImageRejection::NoObservations) },
+                Some(o) => Seen { observations: (*o).clone(), left_out: None, remedy: None },
+                None => Seen { observations: vec![], left_out: Some(ImageRejection::NoObservations), remedy: None },
             };
             (series.stops.stops.iter().map(|s| given(&s.image)).collect(), None)
         }
@@ -67,11 +69,15 @@ pub fn measure(
         Source::NoImages => return Err(no_images(series)),
         Source::Cameras(_) => return Err(several_cameras(series)),
     };
-    let failures: Vec<Option<String>> = seen.iter().map(|s| s.left_out.as_ref().map(ToString::to_string)).collect();
+    let said = |s: &Seen| s.left_out.as_ref().map(|why| (why.to_string(), s.remedy.clone()));
+    let failures: Vec<Option<(String, Option<String>)>> = seen.iter().map(said).collect();
     let stops = series.stops.stops.iter().zip(&seen).zip(&failures);
     require_some(
         &format!("series {}", series.name),
-        stops.map(|((stop, s), failure)| (stop.image.as_str(), s.observations.len(), failure.as_deref())),
+        stops.map(|((stop, s), failure)| {
+            let unused = failure.as_ref().map(|(what, remedy)| Unused { what, remedy: remedy.as_deref() });
+            (stop.image.as_str(), s.observations.len(), unused)
+        }),
     )?;
     let (width_px, height_px) = found_size.or(camera.size_px()).ok_or_else(|| {
         Error::new(
@@ -84,7 +90,7 @@ pub fn measure(
     let mut stops = Vec::with_capacity(readings.len());
     for (k, ((stop, readings), seen)) in series.stops.stops.iter().zip(readings).zip(seen.drain(..)).enumerate() {
         let placement = placement_of(series, &stop.placement, several);
-        let Seen { observations, left_out } = seen;
+        let Seen { observations, left_out, .. } = seen;
         let (image, row) = (stop.image.clone(), series.row(k));
         stops.push(MeasuredStop { row, image, readings, placement, observations, left_out });
     }
@@ -189,10 +195,9 @@ fn look_through(
     let size = usable.filter_map(|i| i.size).next().map(|(w, h)| (w as u32, h as u32));
     let seen = |image: SeenImage| {
         let Detection { observations, failure, .. } = image.detection;
-        Seen {
-            observations,
-            left_out: failure.map(|error| ImageRejection::Unusable { why: error.code, what: error.what }),
-        }
+        let remedy = failure.as_ref().map(|error| error.remedy.clone());
+        let left_out = failure.map(|error| ImageRejection::Unusable { why: error.code, what: error.what });
+        Seen { observations, left_out, remedy }
     };
     Ok((images.into_iter().map(seen).collect(), size))
 }

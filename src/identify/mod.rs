@@ -41,7 +41,7 @@ pub use build::{build, stated_covariance};
 pub use compare::{beside_two_stages, compare, truth_error};
 pub use comparison::{Comparison, ComparisonRow, HeldOut, TruthError};
 pub use controller_readings::readings_of;
-pub use detections::{SeenSeries, detect_images, detect_stops, flat_field_drift, pictures, require_some};
+pub use detections::{SeenSeries, Unused, detect_images, detect_stops, flat_field_drift, pictures, require_some};
 pub use dry_run::dry_run;
 pub use estimator::Estimator;
 pub use evidence::identify;

@@ -240,3 +240,20 @@ fn an_image_that_changes_while_it_is_looked_at_is_named() {
     assert_says(&text(&output), Code::SeriesChanged, &["growing.png"]);
     assert!(!out.exists());
 }
+
+/// Where all images fail alike, the advice is that of the detector: which keys of plate.toml to correct.
+#[test]
+fn a_plate_file_of_another_board_is_named_with_its_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let drawn =
+        robotcal(&["plate", "--kind", "aprilgrid", "--shape", "6x5", "--tag-mm", "30", "--out", name(&file("board"))]);
+    assert_eq!(drawn.status.code(), Some(0), "{}", text(&drawn));
+    let plate = std::fs::read_to_string(file("board/plate.toml")).unwrap();
+    std::fs::write(file("plate.toml"), plate.replace("columns = 6", "columns = 5")).unwrap();
+    let picture = file("board/plate.png");
+    let output =
+        robotcal(&["detect", name(&picture), "--plate", name(&file("plate.toml")), "--out", name(&file("seen"))]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert_says(&text(&output), Code::PlateNowhere, &["columns", "rows", "first_id"]);
+}

@@ -15,6 +15,7 @@ use robotcal::detect::{Detection, Picture, detect, detect_series};
 use robotcal::series::{Plate, parse_plate};
 
 use crate::circles_support::{Scene, View, pose, scene};
+use crate::said::assert_says;
 
 const PITCH_M: f64 = 0.02;
 
@@ -229,4 +230,19 @@ fn an_image_without_the_larger_dot_that_the_others_show_is_refused() {
         let printed = if sizes.large.contains(id) { 0.4 } else { 0.24 } * PITCH_M;
         assert!((outer / printed - 1.0).abs() < 0.06, "{id}: {outer} m for {printed}");
     }
+}
+
+/// The larger dot is not where plate.toml says: the outline leaves the turn open, and nothing settles it.
+#[test]
+fn a_larger_dot_in_another_place_than_stated_is_named() {
+    let view = view(&mut ChaCha8Rng::seed_from_u64(0), Spoiling::None);
+    let board = grid("columns = 8\nrows = 6");
+    let scene = Scene { plate: printed(&board, &[1], &[]), camera_from_plate: pose(&view), ..scene(&view) };
+    let picture = scene.render(0);
+    for stated in ["columns = 8\nrows = 6\nlarge = [[3, 3]]", "columns = 6\nrows = 8\nlarge = [[1, 0]]"] {
+        let error = detect(&picture, &grid(stated)).expect_err(stated);
+        assert_says(&error, Code::PlateContradicted, &["large"]);
+    }
+    let found = detect(&picture, &grid("columns = 8\nrows = 6\nlarge = [[1, 0]]")).unwrap();
+    assert!(found.notices.is_empty(), "{:?}", found.notices);
 }

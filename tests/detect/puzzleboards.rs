@@ -10,6 +10,7 @@ use robotcal::detect::{Picture, detect};
 use robotcal::series::{Plate, parse_plate, plate_toml};
 
 use crate::circles_support::{Scene, View, pose, scene};
+use crate::said::assert_says;
 
 fn plate(more: &str) -> Plate {
     let text = format!("format = 1\nkind = \"puzzleboard\"\ncolumns = 9\nrows = 8\npitch_m = 0.025\n{more}\n");
@@ -96,6 +97,14 @@ fn mirrors_and_other_boards_are_named() {
     let (_, mut picture) = shown(&board, &view);
     let other = detect(&picture, &plate("origin_row = 100")).expect_err("another part");
     assert_eq!(other.code, Code::PlateContradicted, "{other}");
+    assert_says(&other, Code::PlateContradicted, &["9 x 8", "origin_row = 3", "origin_col = 0"]);
+    // A board that is larger than stated, and one that begins earlier.
+    let seen = ["9 x 8", "origin_row = 3", "origin_col = 0"];
+    let smaller = Plate { columns: 8, ..board.clone() };
+    for stated in [smaller, plate("origin_row = 4"), plate("origin_row = 3\norigin_col = 1")] {
+        let error = detect(&picture, &stated).expect_err("part of the board");
+        assert_says(&error, Code::PlateContradicted, &seen);
+    }
     picture.pixels.chunks_exact_mut(picture.width).for_each(<[f32]>::reverse);
     let mirrored = detect(&picture, &board).expect_err("mirrored");
     assert_eq!(mirrored.code, Code::PlateMirrored, "{mirrored}");

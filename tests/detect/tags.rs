@@ -2,21 +2,24 @@
 
 #![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use robotcal::Code;
-use robotcal::detect::{Picture, detect};
+use robotcal::detect::{Picture, detect, detect_series};
 use robotcal::series::{Plate, parse_plate};
 
 use crate::circles_support::{Scene, View, pose, scene, standard_plate};
+use crate::said::assert_says;
 
 const APRILGRID: &str = "kind = \"aprilgrid\"\ncolumns = 6\nrows = 6\ntag_m = 0.04\nspacing = 0.3";
 const ARUCO: &str =
     "kind = \"aruco-grid\"\ncolumns = 7\nrows = 5\nmarker_m = 0.04\ngap_m = 0.01\ndictionary = \"DICT_4X4_50\"";
 const APRILTAG: &str = "kind = \"tag\"\ntag_m = 0.15\nfamily = \"36h11\"\nid = 17";
 const MARKER: &str = "kind = \"tag\"\ntag_m = 0.15\ndictionary = \"DICT_5X5_100\"\nid = 3";
+
+const SHORT: &str = "kind = \"tag\"\ntag_m = 0.15\ndictionary = \"DICT_4X4_50\"\nid = 3";
 
 fn plate(text: &str) -> Plate {
     parse_plate(Path::new("plate.toml"), &format!("format = 1\n{text}\n"), "").unwrap()
@@ -95,7 +98,7 @@ fn run(text: &str, paper: f64) -> Tally {
 /// 0.015 px for print and lens are in the covariance and not in the picture: the normalised error is below 1.
 #[test]
 fn every_kind_of_tags_is_found_and_measured() {
-    for text in [APRILGRID, ARUCO, APRILTAG, MARKER] {
+    for text in [APRILGRID, ARUCO, APRILTAG, MARKER, SHORT] {
         let tally = run(text, 0.72);
         assert_eq!(tally.wrong, 0, "{text}");
         assert!(tally.found as f64 >= 0.97 * tally.visible as f64, "{text}: {tally:?}");
@@ -130,4 +133,98 @@ fn other_plates_and_mirrors_are_no_tags() {
     }
     let error = detect(&mirror(&shown(plate(APRILGRID))), &plate(APRILGRID)).expect_err("mirrored");
     assert_eq!(error.code, Code::PlateMirrored, "{error}");
+}
+
+/// Which tags are seen, in which rows, and how far apart: with the keys of plate.toml that are to be corrected.
+#[test]
+fn a_grid_with_other_rows_numbers_or_gaps_is_named() {
+    let look = View { distance_m: 0.7, tilt_deg: 20.0, roll_deg: 30.0, ..View::default() };
+    let shown = |text: &str| Scene { plate: plate(text), camera_from_plate: pose(&look), ..scene(&look) }.render(1);
+    let layouts = [
+        ("columns", &["columns", "0 to "][..]),
+        ("exchanged", &["columns", "rows"]),
+        ("rows", &["rows"]),
+        ("first_id", &["first_id"]),
+        ("row_later", &["first_id"]),
+    ];
+    for (text, columns, rows) in [(APRILGRID, 6, 6), (ARUCO, 7, 5)] {
+        let (picture, last) = (shown(text), columns * rows - 1);
+        let size = |c: i32, r: i32, more: &str| {
+            let old = format!("columns = {columns}\nrows = {rows}");
+            format!("{}{more}", text.replace(&old, &format!("columns = {c}\nrows = {r}")))
+        };
+        for (what, keys) in layouts {
+            let stated = match what {
+                "columns" => size(columns - 1, rows, ""),
+                "exchanged" => size(rows + 1, columns - 1, ""),
+                "rows" => size(columns, rows - 1, ""),
+                "first_id" => size(columns, rows, "\nfirst_id = 1"),
+                _ => size(columns, rows, &format!("\nfirst_id = {columns}")),
+            };
+            let error = detect(&picture, &plate(&stated)).expect_err(what);
+            let seen = [format!("tags 0 to {last} "), format!("{rows} rows of {columns}")];
+            let words: Vec<&str> = seen.iter().map(String::as_str).chain(keys.iter().copied()).collect();
+            assert_says(&error, Code::PlateContradicted, &words);
+        }
+    }
+    // Kalibr's ratio in metres, inverted, from middle to middle, and of another board; gaps that are pitches; another marker.
+    for (text, old, wrong, gap) in [
+        (APRILGRID, "spacing = 0.3", "spacing = 0.012", " 0.3 "),
+        (APRILGRID, "spacing = 0.3", "spacing = 3.33", " 0.3 "),
+        (APRILGRID, "spacing = 0.3", "spacing = 1.3", " 0.3 "),
+        (APRILGRID, "spacing = 0.3", "spacing = 0.25", " 0.30 "),
+        (ARUCO, "gap_m = 0.01", "gap_m = 0.05", " 0.3 "),
+        (ARUCO, "gap_m = 0.01", "gap_m = 0.012", " 0.25 "),
+        (ARUCO, "marker_m = 0.04", "marker_m = 0.05", " 0.25 "),
+    ] {
+        let error = detect(&shown(text), &plate(&text.replace(old, wrong))).expect_err(wrong);
+        assert_says(&error, Code::PlateContradicted, &[gap]);
+    }
+}
+
+#[test]
+fn tags_of_another_dictionary_number_or_kind_are_named() {
+    let look = View { distance_m: 0.7, tilt_deg: 20.0, roll_deg: 30.0, ..View::default() };
+    let shown = |text: &str| Scene { plate: plate(text), camera_from_plate: pose(&look), ..scene(&look) }.render(1);
+    let as_aruco = APRILGRID.replace("aprilgrid", "aruco-grid").replace("tag_m", "marker_m");
+    let as_aruco = as_aruco.replace("spacing = 0.3", "gap_m = 0.012\ndictionary = \"DICT_APRILTAG_36h11\"");
+    let charuco = "kind = \"charuco\"\ncolumns = 8\nrows = 6\npitch_m = 0.04\naruco = { dictionary = \"DICT_4X4_50\", side_m = 0.03 }";
+    for (seen, stated, code, words) in [
+        (
+            APRILGRID,
+            &*format!("{APRILGRID}\nfamily = \"36h10\""),
+            Code::PlateNotFound,
+            &["36 tags from 0 to 35", "36h11", "family"][..],
+        ),
+        (
+            ARUCO,
+            &ARUCO.replace("4X4_50", "6X6_50"),
+            Code::PlateNotFound,
+            &["35 tags from 0 to 34", "4X4", "dictionary"],
+        ),
+        (APRILTAG, &APRILTAG.replace("17", "18"), Code::PlateNotFound, &["tag 18", "tag 17", "id"]),
+        (MARKER, &MARKER.replace("5X5_100", "7X7_50"), Code::PlateNotFound, &["tag 3 ", "5X5"]),
+        (APRILGRID, &as_aruco, Code::PlateNotFound, &["border of 2 modules", "kind"]),
+        (charuco, ARUCO, Code::PlateContradicted, &["kind = \"charuco\""]),
+        (ARUCO, charuco, Code::PlateNotFound, &["kind = \"aruco-grid\""]),
+    ] {
+        let error = detect(&shown(seen), &plate(stated)).expect_err(stated);
+        assert_says(&error, code, words);
+    }
+}
+
+/// The numbers tell the places: more rows than there are put the frame of the plate elsewhere, and no corner.
+#[test]
+fn a_row_that_no_image_shows_is_said() {
+    let look = View { distance_m: 0.7, tilt_deg: 20.0, roll_deg: 30.0, ..View::default() };
+    let picture = Scene { plate: plate(ARUCO), camera_from_plate: pose(&look), ..scene(&look) }.render(1);
+    let paths = ["1.png", "2.png"].map(PathBuf::from);
+    for (rows, said) in [("rows = 5", 0), ("rows = 6", 1)] {
+        let stated = plate(&ARUCO.replace("rows = 5", rows));
+        let images = detect_series(&paths, &stated, |_| Ok(picture.clone()), |_| {});
+        assert!(images.iter().all(|i| i.detection.observations.len() == 140));
+        let notices: Vec<_> = images.iter().flat_map(|i| &i.detection.notices).collect();
+        assert_eq!(notices.len(), said, "{notices:?}");
+        notices.iter().for_each(|n| assert_says(*n, Code::PlateLineHidden, &["7 x 6 tags", "rows"]));
+    }
 }

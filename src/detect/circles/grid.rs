@@ -171,6 +171,10 @@ impl<'a> Grid<'a> {
             Told::Radii | Told::Places => plate,
             Told::Nothing => self.with_found(&dots, chosen),
         };
+        let elsewhere = others(chosen, &dots);
+        if laid.len() > 1 && self.contradicts(&plate, &elsewhere) {
+            return Err(dots_elsewhere(&elsewhere));
+        }
         let classes = self.code(&plate)?.classes_of(lattice, candidates);
         let board = board(chosen, lattice, &classes);
         let sizes = match told {
@@ -202,6 +206,16 @@ impl<'a> Grid<'a> {
         stated.sort_by(f64::total_cmp);
         let usual = stated[stated.len() / 2];
         usual <= 0.0 || (dots.usual.radius / usual).ln().abs() < RADIUS_OFF
+    }
+
+    /// Whether dots that are not as most are stand at these rows and columns, none of which are those of the plate.
+    fn contradicts(&self, plate: &Plate, seen: &[(i32, i32)]) -> bool {
+        let mut radii: Vec<f64> = plate.markers.iter().map(|m| m.outer_radius_m).collect();
+        radii.sort_by(f64::total_cmp);
+        let usual = radii[radii.len() / 2];
+        let others = self.cells.iter().zip(&plate.markers).filter(|(_, m)| (m.outer_radius_m - usual).abs() > 1e-9);
+        let stated: BTreeSet<(i32, i32)> = others.map(|(&(column, row), _)| (row, column)).collect();
+        !stated.is_empty() && !seen.is_empty() && !seen.iter().any(|place| stated.contains(place))
     }
 
     /// The plate with the radii seen; the large ones have those of the dots that are not as most are.
@@ -287,6 +301,19 @@ fn no_lattice() -> Error {
         "plate",
         "the markers do not lie on a square lattice",
         "check the positions in the plate file: a symmetric grid, or every other row shifted by half a step",
+    )
+}
+
+fn dots_elsewhere(seen: &[(i32, i32)]) -> Error {
+    let places: Vec<String> = seen.iter().map(|(row, column)| format!("[{column}, {row}]")).collect();
+    Error::new(
+        Code::PlateContradicted,
+        "image",
+        format!(
+            "the dots of another size stand at [column, row] = {} or the same after a turn, not as stated",
+            places.join(", ")
+        ),
+        "correct columns, rows and large (or plate.csv) of the plate file: both count from 0 at the top-left dot",
     )
 }
 
