@@ -135,10 +135,31 @@ pub fn columns_product(a: &DMatrix<f64>, columns: Range<usize>, b: &DMatrix<f64>
     multiply(view(a).get(.., columns), view(b))
 }
 
+/// Adds `a b` to the first rows of `c`.
+pub fn add_product(c: &mut DMatrix<f64>, a: &DMatrix<f64>, b: &DMatrix<f64>) {
+    multiply_into(c, Accum::Add, view(a), view(b));
+}
+
 fn multiply(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
     let mut c = DMatrix::zeros(a.nrows(), b.ncols());
-    matmul(view_mut(&mut c), Accum::Replace, a, b, 1.0, Par::Seq);
+    multiply_into(&mut c, Accum::Replace, a, b);
     c
+}
+
+/// Multiplications of a product from which on its blocks of columns are worth being made side by side.
+const LARGE: usize = 4_000_000;
+
+/// `a b` into the first rows of `c`.
+fn multiply_into(c: &mut DMatrix<f64>, how: Accum, a: MatRef<'_, f64>, b: MatRef<'_, f64>) {
+    let rows = c.nrows();
+    if a.nrows() * a.ncols() * b.ncols() < LARGE {
+        return matmul(view_mut(c).get_mut(..a.nrows(), ..), how, a, b, 1.0, Par::Seq);
+    }
+    c.as_mut_slice().par_chunks_mut(COLUMNS_A_BLOCK * rows).enumerate().for_each(|(block, columns)| {
+        let (first, own) = (block * COLUMNS_A_BLOCK, columns.len() / rows);
+        let (into, _) = MatMut::from_column_major_slice_mut(columns, rows, own).split_at_row_mut(a.nrows());
+        matmul(into, how, a, b.get(.., first..first + own), 1.0, Par::Seq);
+    });
 }
 
 /// `y y'`.
@@ -146,7 +167,7 @@ pub fn gram(y: &DMatrix<f64>) -> DMatrix<f64> {
     multiply(view(y), view(y).transpose())
 }
 
-/// Columns of a Gram product that are made together.
+/// Columns of a product that are made together.
 const COLUMNS_A_BLOCK: usize = 192;
 
 /// `a -= y y'` in the upper triangle of the square matrix `a`; what lies below the diagonal is left as it is. Blocks of columns side by side.

@@ -3,11 +3,12 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
+use rayon::prelude::*;
 
 use super::linear::{BodyPart, LinearImage, LinearProblem, StopParts};
-use super::runs::runs;
-use crate::linalg::{product, wide};
-use crate::problem::{Adjustment, E, Equations, Layout, Problem};
+use super::runs::{Run, runs};
+use crate::linalg::{add_product, product, wide};
+use crate::problem::{Adjustment, E, Equations, Layout, Problem, Sight};
 
 /// Stops whose equations are taken together.
 pub(super) const STOPS_A_PRODUCT: usize = 48;
@@ -104,32 +105,45 @@ pub(super) struct MarkerRows {
     pub values: DMatrix<f64>,
 }
 
-impl MarkerRows {
-    /// Of no image yet.
-    pub fn new(unknowns: usize, seen: &SeenMarkers) -> Self {
-        Self { values: DMatrix::zeros(unknowns, 3 * seen.order.len()) }
+/// Markers whose columns are made together: those of as many stay in the cache of a processor while the images are gone through.
+const MARKERS_A_BLOCK: usize = 32;
+
+/// The equations of an image of a plate, and the rows of its unknowns.
+pub(super) struct ImageRows<'a> {
+    pub plate: usize,
+    pub equations: &'a Equations,
+    /// The first of the six of its pose, where that has rows.
+    pub pose: Option<usize>,
+    /// Those of its intrinsics, each where it has one.
+    pub intrinsics: Vec<Option<usize>>,
+}
+
+impl ImageRows<'_> {
+    fn runs(&self) -> Vec<Run> {
+        let of_pose = self.pose.into_iter().flat_map(|row| self.equations.pose_rows().zip(row..));
+        let row_of = |e: usize| Some((self.equations.intrinsic_row(e)?, self.intrinsics[e]?));
+        runs(of_pose.chain((0..E).filter_map(row_of)))
     }
 
-    /// Adds an image of a plate: its pose, where that has six rows from one on, and its intrinsics, each where it has a row.
-    pub fn add(
-        &mut self,
-        seen: &SeenMarkers,
-        (plate, equations): (usize, &Equations),
-        pose: Option<usize>,
-        intrinsics: &[Option<usize>],
-    ) {
-        let of_pose = pose.into_iter().flat_map(|row| equations.pose_rows().zip(row..));
-        let of_intrinsics = (0..E).filter_map(|e| Some((equations.intrinsic_row(e)?, intrinsics[e]?)));
-        let runs = runs(of_pose.chain(of_intrinsics));
-        let values = &mut self.values;
+    /// Observations of some of the markers that were seen, with their place among these.
+    fn sights<'s>(&'s self, seen: &'s SeenMarkers, some: &'s Range<usize>) -> impl Iterator<Item = (usize, Sight<'s>)> {
+        let number = &seen.number[self.plate];
+        let all = self.equations.markers.iter().zip(self.equations.sights());
+        all.filter_map(|(&marker, sight)| {
+            let at = number[marker].filter(|at| some.contains(at))?;
+            Some((at - some.start, sight))
+        })
+    }
+
+    /// Adds the coupling with some markers to their columns, of so many rows each.
+    fn add_to(&self, (columns, rows): (&mut [f64], usize), seen: &SeenMarkers, some: &Range<usize>) {
+        let runs = self.runs();
         wide(
             #[inline(always)]
             || {
-                for (&marker, sight) in equations.markers.iter().zip(equations.sights()) {
-                    let Some(at) = seen.number[plate][marker] else { continue };
-                    for (d, w) in sight.by_marker().row_iter().enumerate() {
-                        let mut column = values.column_mut(3 * at + d);
-                        let into = column.as_mut_slice();
+                for (at, sight) in self.sights(seen, some) {
+                    let of_marker = columns[3 * at * rows..].chunks_exact_mut(rows);
+                    for (into, w) in of_marker.zip(sight.by_marker().row_iter()) {
                         for run in &runs {
                             let of = sight.row_range(run.from..run.from + run.length);
                             add_combination(&mut into[run.into..run.into + run.length], of, [w[0], w[1]]);
@@ -138,17 +152,36 @@ impl MarkerRows {
                 }
             },
         );
-        for (&marker, sight) in equations.markers.iter().zip(equations.sights()) {
-            let Some(at) = seen.number[plate][marker] else { continue };
+        for (at, sight) in self.sights(seen, some) {
             for (point, d) in sight.by_field() {
                 let own = sight.by_marker() * d;
                 for (component, column) in own.column_iter().enumerate() {
-                    if let Some(row) = intrinsics[E + 2 * point + component] {
-                        (0..3).for_each(|d| self.values[(row, 3 * at + d)] += column[d]);
+                    if let Some(row) = self.intrinsics[E + 2 * point + component] {
+                        (0..3).for_each(|d| columns[(3 * at + d) * rows + row] += column[d]);
                     }
                 }
             }
         }
+    }
+}
+
+impl MarkerRows {
+    /// Of no image yet.
+    pub fn new(unknowns: usize, seen: &SeenMarkers) -> Self {
+        Self { values: DMatrix::zeros(unknowns, 3 * seen.order.len()) }
+    }
+
+    /// Adds some images, blocks of markers side by side.
+    pub fn add(&mut self, seen: &SeenMarkers, images: &[ImageRows]) {
+        let rows = self.values.nrows();
+        if rows == 0 {
+            return;
+        }
+        let blocks = self.values.as_mut_slice().par_chunks_mut(3 * MARKERS_A_BLOCK * rows);
+        blocks.enumerate().for_each(|(block, columns)| {
+            let some = block * MARKERS_A_BLOCK..(block + 1) * MARKERS_A_BLOCK;
+            images.iter().for_each(|image| image.add_to((columns, rows), seen, &some));
+        });
     }
 
     /// Multiplies the columns of every marker from the right by a matrix of its own.
@@ -180,28 +213,25 @@ impl DenseCoupling {
         Self { free, theta, rows }
     }
 
-    /// Adds an image with its intrinsic columns.
-    pub fn add(&mut self, own: LinearImage, seen: &SeenMarkers, equations: &Equations) {
-        let (plate, theta) = (own.image.plate, self.theta);
-        let by_theta = equations.through_pose(&own.chain.d_theta.select_columns(&self.free[..theta]).transpose());
-        let intrinsics: Vec<_> =
-            own.columns().into_iter().map(|c| c.and_then(|c| self.free.binary_search(&c).ok())).collect();
-        self.rows.add(seen, (plate, equations), None, &intrinsics);
-        let values = &mut self.rows.values;
-        wide(
-            #[inline(always)]
-            || {
-                for (o, (&marker, sight)) in equations.markers.iter().zip(equations.sights()).enumerate() {
-                    let Some(at) = seen.number[plate][marker] else { continue };
-                    let (t0, t1) = (by_theta.column(2 * o), by_theta.column(2 * o + 1));
-                    for (d, w) in sight.by_marker().row_iter().enumerate() {
-                        let mut column = values.column_mut(3 * at + d);
-                        let into = &mut column.as_mut_slice()[..theta];
-                        add_combination(into, [t0.as_slice(), t1.as_slice()], [w[0], w[1]]);
-                    }
-                }
-            },
-        );
+    /// Adds images with their equations: the pose of each moves by `G`, so that theirs are one product.
+    pub fn add(&mut self, images: &[(LinearImage, &Equations)], seen: &SeenMarkers) {
+        let place = |c: Option<usize>| self.free.binary_search(&c?).ok();
+        let mut by_theta = DMatrix::zeros(self.theta, 6 * images.len());
+        let (mut of_poses, mut direct) = (Vec::new(), Vec::new());
+        for (k, (own, equations)) in images.iter().enumerate() {
+            for (mut row, &c) in by_theta.row_iter_mut().zip(&self.free) {
+                row.columns_mut(6 * k, 6).tr_copy_from(&own.chain.d_theta.column(c));
+            }
+            let (plate, columns) = (own.image.plate, own.columns());
+            let none = vec![None; columns.len()];
+            of_poses.push(ImageRows { plate, equations, pose: Some(6 * k), intrinsics: none });
+            let intrinsics = columns.into_iter().map(place).collect();
+            direct.push(ImageRows { plate, equations, pose: None, intrinsics });
+        }
+        self.rows.add(seen, &direct);
+        let mut poses = MarkerRows::new(6 * images.len(), seen);
+        poses.add(seen, &of_poses);
+        add_product(&mut self.rows.values, &by_theta, &poses.values);
     }
 
     /// Copies the columns to those of `into` from `first` on.

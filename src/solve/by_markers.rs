@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector, DVectorView, Matrix3};
 
-use super::blocks::{MarkerRows, PoseRows, STOPS_A_PRODUCT, SeenMarkers};
+use super::blocks::{ImageRows, MarkerRows, PoseRows, STOPS_A_PRODUCT, SeenMarkers};
 use super::distances::Distances;
 use super::linear::Carried;
 use super::linear::LinearProblem;
@@ -220,12 +220,17 @@ fn whitened_coupling(
     space: &PoseSpace,
 ) -> DMatrix<f64> {
     let mut rows = MarkerRows::new(space.rows(), seen);
-    for (k, own) in linear.images().enumerate() {
-        let Some(equations) = own.equations() else { continue };
-        let row_of = |c: usize| linear.adjustment.problem.layout.columns[c].free.then(|| space.row_of(c)).flatten();
-        let intrinsics: Vec<Option<usize>> = own.columns().into_iter().map(|c| c.and_then(row_of)).collect();
-        rows.add(seen, (own.image.plate, &equations), Some(6 * k), &intrinsics);
-    }
+    let row_of = |c: usize| linear.adjustment.problem.layout.columns[c].free.then(|| space.row_of(c)).flatten();
+    let images: Vec<_> = linear.images().enumerate().filter_map(|(k, own)| Some((k, own, own.equations()?))).collect();
+    let images: Vec<ImageRows> = (images.iter())
+        .map(|(k, own, equations)| ImageRows {
+            plate: own.image.plate,
+            equations,
+            pose: Some(6 * k),
+            intrinsics: own.columns().into_iter().map(|c| c.and_then(row_of)).collect(),
+        })
+        .collect();
+    rows.add(seen, &images);
     rows.times_right(inverse_factors.iter().map(Matrix3::transpose));
     rows.values
 }

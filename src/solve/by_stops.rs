@@ -63,10 +63,11 @@ impl StopsEliminated {
             rows.add_to(&mut a);
             let stops: Vec<LinearStop> = linear.stops_of(stops).collect();
             let own: Vec<_> = stops.par_iter().map(|stop| Block::of(stop, &rows, (dense, &seen), lambda)).collect();
-            for (stop, (block, equations)) in stops.iter().zip(own) {
-                stop.images().zip(&equations).for_each(|(image, e)| coupling.add(image, &seen, e));
-                blocks.push(block);
-            }
+            let (own, equations): (Vec<Block>, Vec<_>) = own.into_iter().unzip();
+            let equations = equations.iter().flatten().map(Cow::as_ref);
+            let images: Vec<_> = stops.iter().flat_map(LinearStop::images).zip(equations).collect();
+            coupling.add(&images, &seen);
+            blocks.extend(own);
         }
         coupling.copy_to(&mut a, dense);
         let groups = alike(linear);
