@@ -99,6 +99,37 @@ fn unreached(posture: &str) -> Why {
     Why::new(LeftReason::OutOfReach, format!("the controller's model does not reach this pose{posture} ({remedy})"))
 }
 
+/// The codes and the way there must mean the same, where it is not known which of them counts.
+fn by_either(
+    coded: Understood<(Vec<f64>, Known)>,
+    way: Understood<(Vec<f64>, Known)>,
+) -> Understood<(Vec<f64>, Known)> {
+    let open = "its posture is not known: other routines switch the check of configurations off, and its confdata";
+    let remedy = "(--nearest-posture heeds no confdata)";
+    let unknown = |why: &str| Err(Why::new(LeftReason::PostureUnknown, format!("{open} {why} {remedy}")));
+    match (coded, way) {
+        (Ok(coded), Ok((near, _))) if farthest(&coded.0, &near) < SAME => Ok(coded),
+        (Ok(_), Ok(_)) => unknown("mean another one than the way there"),
+        (Ok(_), Err(_)) => unknown("may not count"),
+        (Err(_), way) => way,
+    }
+}
+
+/// The way there must not lead to another posture than that of codes which count for nothing on it.
+fn by_way(coded: Understood<(Vec<f64>, Known)>, way: Option<Vec<f64>>, codes: &Codes) -> Understood<(Vec<f64>, Known)> {
+    match (coded, way) {
+        (Ok((coded, _)), Some(way)) if farthest(&coded, &way) > SAME => {
+            let words = format!(
+                "its posture is not known: the way there leads to another one than {}, which no path of the tool heeds (--nearest-posture heeds no codes)",
+                codes.shown()
+            );
+            Err(Why::new(LeftReason::PostureUnknown, words))
+        }
+        (Err(_), Some(way)) => Ok((way, Known::Line)),
+        (coded, _) => coded,
+    }
+}
+
 impl<'a> Finder<'a> {
     pub fn new(robot: &'a Robot, limits: &[(f64, f64)], start: Option<&'a [f64]>) -> Self {
         let ranges = inverse::reading_limits(&robot.chain);
@@ -116,8 +147,14 @@ impl<'a> Finder<'a> {
     pub fn joints(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>) -> Understood<(Vec<f64>, Known)> {
         match (&pose.posture, &pose.taught) {
             (MeantPosture::Coded(codes, axes), _) => self.by_codes(pose, held, before, (codes, axes)),
-            (MeantPosture::Either(codes, axes), _) => self.by_either(pose, held, before, (codes, axes)),
-            (MeantPosture::Unheeded(codes, axes), _) => self.by_way(pose, held, before, (codes, axes)),
+            (MeantPosture::Either(codes, axes), _) => {
+                let coded = self.by_codes(pose, held, before, (codes, axes));
+                by_either(coded, self.by_approach(pose, held, before))
+            }
+            (MeantPosture::Unheeded(codes, axes), _) => {
+                let way = before.readings.filter(|_| before.straight).and_then(|q| self.along(pose, held, q));
+                by_way(self.by_codes(pose, held, before, (codes, axes)), way, codes)
+            }
             (MeantPosture::Near(q), _) => Ok((self.near(pose, held, q, false)?, Known::Near)),
             (MeantPosture::Nearest | MeantPosture::Along, Some(q)) => {
                 Ok((self.near(pose, held, q, false)?, Known::Taught))
@@ -220,47 +257,6 @@ impl<'a> Finder<'a> {
         })?;
         self.by_code.insert(codes.0.shown(), found.clone());
         Ok((found, Known::Codes))
-    }
-
-    /// The codes and the way there must mean the same, where it is not known which of them counts.
-    fn by_either(
-        &mut self,
-        pose: &PoseTarget,
-        held: &[bool],
-        before: Before<'_>,
-        codes: (&Codes, &[usize; 6]),
-    ) -> Understood<(Vec<f64>, Known)> {
-        let open = "its posture is not known: other routines switch the check of configurations off, and its confdata";
-        let remedy = "(--nearest-posture heeds no confdata)";
-        let unknown = |why: &str| Err(Why::new(LeftReason::PostureUnknown, format!("{open} {why} {remedy}")));
-        match (self.by_codes(pose, held, before, codes), self.by_approach(pose, held, before)) {
-            (Ok(coded), Ok((near, _))) if farthest(&coded.0, &near) < SAME => Ok(coded),
-            (Ok(_), Ok(_)) => unknown("mean another one than the way there"),
-            (Ok(_), Err(_)) => unknown("may not count"),
-            (Err(_), near) => near,
-        }
-    }
-
-    /// The way there must not lead to another posture than that of codes which count for nothing on it.
-    fn by_way(
-        &mut self,
-        pose: &PoseTarget,
-        held: &[bool],
-        before: Before<'_>,
-        codes: (&Codes, &[usize; 6]),
-    ) -> Understood<(Vec<f64>, Known)> {
-        let way = before.readings.filter(|_| before.straight).and_then(|q| self.along(pose, held, q));
-        match (self.by_codes(pose, held, before, codes), way) {
-            (Ok((coded, _)), Some(way)) if farthest(&coded, &way) > SAME => {
-                let words = format!(
-                    "its posture is not known: the way there leads to another one than {}, which no path of the tool heeds (--nearest-posture heeds no codes)",
-                    codes.0.shown()
-                );
-                Err(Why::new(LeftReason::PostureUnknown, words))
-            }
-            (Err(_), Some(way)) => Ok((way, Known::Line)),
-            (coded, _) => coded,
-        }
     }
 
     fn reach<'r>(&'r self, held: &'r [bool]) -> Reach<'r> {
