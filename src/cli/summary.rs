@@ -30,7 +30,10 @@ pub(super) fn text(record: &SolutionRecord, folder: &Path) -> String {
     figures.extend(held_out(record));
     figures.extend(left_out(record));
     let free = MOST_LINES.saturating_sub(figures.len() + 2);
-    let least = verdict.reasons.len().min(if failed { free / 2 } else { MOST_DOUBTS });
+    let least = match failed {
+        true => verdict.reasons.len().min(free / 2),
+        false => reasons(&verdict, MOST_DOUBTS.min(free.saturating_sub(1))).len(),
+    };
     let next = next(record, &verdict, free.saturating_sub(least).min(MOST_NEXT));
     let reasons = reasons(&verdict, free.saturating_sub(next.len()));
     let mut lines = vec![headline(&verdict)];
@@ -166,10 +169,8 @@ fn spoken(code: Code) -> String {
 
 /// Remedies of a failed result, else the stops that would help most; the most useful first.
 fn next(r: &SolutionRecord, verdict: &Verdict, most: usize) -> Vec<String> {
-    let remedies = verdict.reasons.iter().filter(|_| verdict.trust == Trust::Failed).map(|r| r.remedy.clone());
-    let remedies: Vec<String> = remedies.filter(|r| !r.is_empty()).collect();
-    if !remedies.is_empty() {
-        return shared("next      ", &remedies, most);
+    if !verdict.remedies.is_empty() {
+        return shared("next      ", &verdict.remedies, most);
     }
     let stops = r.identifiability.iter().flat_map(|found| &found.next);
     stops.map(|a| indented("next", &advice(r, a))).take(most).collect()

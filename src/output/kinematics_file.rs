@@ -51,7 +51,7 @@ struct Reader {
 pub fn kinematics_yaml(robot: &Robot, description: &RobotDescription, note: &str) -> String {
     let Some(reader) = recognised(description, &robot.chain) else {
         let head = "# Corrected joint origins (m, rad) under the joint names of the URDF, for programs of your own: this is none of the robots whose description\n\
-                    # reads a file of kinematics (ur_description, franka_description, xarm_description). The corrected URDF and kinematics.xacro say the same.";
+                    # reads a file of kinematics (ur_description, franka_description, xarm_description). The URDF and the xacro file beside it say the same.";
         let origins = robot.urdf_origins();
         let body: String = origins.iter().map(|(name, o)| entry("  ", name, o)).collect();
         return format!("{head} {note}\nkinematics:\n{body}");

@@ -30,20 +30,29 @@ pub struct Verdict {
     pub trust: Trust,
     /// Failed gates, or doubts; none of a good result.
     pub reasons: Vec<VerdictReason>,
+    /// What to do before a failed result is tried again, the first thing first; none of any other.
+    pub remedies: Vec<String>,
 }
 
 impl Verdict {
     /// Failed gates first, then what asks for care.
     pub fn of(record: &SolutionRecord) -> Self {
         if !record.failed_gates.is_empty() {
-            return Self {
-                trust: Trust::Failed,
-                reasons: record.failed_gates.iter().map(|gate| of_gate(record, gate)).collect(),
-            };
+            let reasons: Vec<VerdictReason> = record.failed_gates.iter().map(|gate| of_gate(record, gate)).collect();
+            let remedies = reasons.iter().map(|r| r.remedy.clone()).chain(of_rows(record));
+            let remedies = remedies.filter(|remedy| !remedy.is_empty()).collect();
+            return Self { trust: Trust::Failed, reasons, remedies };
         }
         let reasons = doubts(record);
-        Self { trust: if reasons.is_empty() { Trust::Good } else { Trust::Doubts }, reasons }
+        let trust = if reasons.is_empty() { Trust::Good } else { Trust::Doubts };
+        Self { trust, reasons, remedies: Vec::new() }
     }
+}
+
+/// Rows of readings that stand beside the wrong images are to be put right whatever else failed.
+fn of_rows(record: &SolutionRecord) -> impl Iterator<Item = String> {
+    let exchanged = record.findings.iter().filter(|f| f.code == Code::ReadingsExchanged);
+    exchanged.map(|f| format!("{}: {}", f.seen, f.remedy))
 }
 
 /// The finding of a gate; of files of earlier versions its whole sentence.

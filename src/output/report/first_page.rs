@@ -99,7 +99,7 @@ fn held_out(r: &SolutionRecord) -> Markup {
 /// Remedies of a failed result; else what to install, and what would help most.
 fn steps(r: &SolutionRecord, v: &Verdict) -> Vec<Markup> {
     if v.trust == Trust::Failed {
-        let remedies = v.reasons.iter().filter(|r| !r.remedy.is_empty()).map(|r| html! { (r.remedy) "." });
+        let remedies = v.remedies.iter().map(|remedy| html! { (remedy) "." });
         return remedies.chain([html! { "Identify again; keep the earlier robot model until then." }]).collect();
     }
     let mut all = Vec::new();
