@@ -8,7 +8,7 @@ use super::file::for_each;
 use super::messages::CameraInfo;
 use super::motion::{Posture, Standstill, interpolate, postures, standstills};
 use super::options::{Motion, RecordingOptions};
-use super::scan::{Scan, scan};
+use super::scan::{JointReadings, Scan, scan};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::{InputFile, Stops};
 
@@ -26,7 +26,7 @@ pub struct Extracted {
     pub stops: Stops,
     /// How each stop was taken, in the same order.
     pub reports: Vec<StopReport>,
-    /// Topic of the joint states.
+    /// Topic of the joint states; several where each joint has one of its own.
     pub joint_topic: String,
     /// Topic of the images.
     pub image_topic: String,
@@ -49,7 +49,7 @@ pub struct Extracted {
 /// images and joints that were never taken at the same time; a robot that never stands still.
 pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> Result<Extracted> {
     let mut scan = scan(recording, options.clock)?;
-    let (joint_topic, samples, joints) = scan.joint_topic(options)?;
+    let JointReadings { topics, samples, joints } = scan.joint_readings(options)?;
     let (image_topic, mut times) = scan.image_topic(options)?;
     times.sort_unstable();
     times.dedup();
@@ -91,7 +91,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
             "they are left out",
         ));
     }
-    let image_delay_s = scan.delay_s(&image_topic) - scan.delay_s(&joint_topic);
+    let image_delay_s = scan.delay_s(std::slice::from_ref(&image_topic)) - scan.delay_s(&topics);
     if image_delay_s.abs() > NOTABLE_DELAY_S {
         let sign = if image_delay_s < 0.0 { "earlier" } else { "later" };
         let what = format!("images arrive {:.3} s {sign} after their stamp than joint states", image_delay_s.abs());
@@ -105,7 +105,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         image_delay_s,
         late,
         camera_info: scan.camera_info(&image_topic).cloned(),
-        joint_topic,
+        joint_topic: topics.join(", "),
         image_topic,
         notices,
         inputs: scan.inputs,

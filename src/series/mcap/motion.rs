@@ -25,21 +25,26 @@ const INTERRUPTION_NS: i64 = 500_000_000;
 
 /// Postures of the named joints from samples that may each hold some of them, in the order of time.
 ///
-/// A joint keeps its last value until a sample has a new one; nothing is given out before all are known.
+/// A joint keeps its last value until a sample has a new one, for as long as nothing else can have happened; nothing is given out while
+/// some are not known.
 pub(super) fn postures(samples: &[JointSample], joints: &[String]) -> Vec<Posture> {
     let mut order: Vec<&JointSample> = samples.iter().collect();
     order.sort_by_key(|s| s.time_ns);
-    let mut last: Vec<Option<f64>> = vec![None; joints.len()];
+    let mut last: Vec<Option<(f64, i64)>> = vec![None; joints.len()];
     let mut postures: Vec<Posture> = Vec::new();
     for sample in order {
         let mut new = false;
         for (slot, joint) in last.iter_mut().zip(joints) {
             if let Some(i) = sample.names.iter().position(|n| n == joint) {
-                *slot = Some(sample.positions[i]);
+                *slot = Some((sample.positions[i], sample.time_ns));
                 new = true;
             }
         }
-        let Some(positions) = last.iter().copied().collect::<Option<Vec<f64>>>().filter(|_| new) else { continue };
+        let known = |slot: &Option<(f64, i64)>| {
+            let (position, time_ns) = (*slot)?;
+            (sample.time_ns.saturating_sub(time_ns) <= LONGEST_GAP_NS).then_some(position)
+        };
+        let Some(positions) = last.iter().map(known).collect::<Option<Vec<f64>>>().filter(|_| new) else { continue };
         match postures.last_mut() {
             Some(previous) if previous.time_ns == sample.time_ns => previous.positions = positions,
             _ => postures.push(Posture { time_ns: sample.time_ns, positions }),
@@ -209,5 +214,9 @@ mod tests {
         let joints = ["a".to_string(), "b".to_string()];
         let got: Vec<_> = postures(&samples, &joints).into_iter().map(|p| (p.time_ns, p.positions)).collect();
         assert_eq!(got, [(20, vec![1.0, 2.0]), (30, vec![3.0, 2.0])]);
+        // One that falls silent may have moved.
+        let silent =
+            [samples.to_vec(), vec![sample(20 + LONGEST_GAP_NS, "a", 5.0), sample(21 + LONGEST_GAP_NS, "a", 5.0)]];
+        assert_eq!(postures(&silent.concat(), &joints).len(), 3);
     }
 }

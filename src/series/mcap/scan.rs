@@ -21,6 +21,15 @@ pub(super) struct JointSample {
     pub positions: Vec<f64>,
 }
 
+/// The joint states of a robot.
+pub(super) struct JointReadings {
+    /// Where they were recorded.
+    pub topics: Vec<String>,
+    pub samples: Vec<JointSample>,
+    /// The joints to read.
+    pub joints: Vec<String>,
+}
+
 /// Type and number of messages of a topic.
 #[derive(Debug, Clone, Default)]
 struct Topic {
@@ -215,36 +224,44 @@ impl Scan {
         }
     }
 
-    /// The topic of the joint states, its samples, and the joints to read (all of the topic when none are asked for).
-    pub fn joint_topic(&mut self, options: &RecordingOptions) -> Result<(String, Vec<JointSample>, Vec<String>)> {
-        let names_of = |topic: &str| -> Vec<String> {
-            let mut names: Vec<String> = Vec::new();
-            for sample in self.joints.get(topic).into_iter().flatten() {
-                for name in sample.names.iter() {
-                    if !names.contains(name) {
-                        names.push(name.clone());
-                    }
-                }
+    /// Joints of which a topic has positions.
+    fn joints_of(&self, topic: &str) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for name in self.joints.get(topic).into_iter().flatten().flat_map(|sample| sample.names.iter()) {
+            if !names.contains(name) {
+                names.push(name.clone());
             }
-            names
-        };
-        let mut candidates: Vec<&str> = self.with_schema(&[messages::JOINT_STATE]).collect();
-        let has_all = |topic: &&str| {
-            let names = names_of(topic);
-            options.joints.iter().all(|j| names.contains(j))
-        };
-        if candidates.len() > 1 && options.joint_topic.is_none() && candidates.iter().any(has_all) {
-            candidates.retain(has_all);
         }
+        names
+    }
+
+    /// The topics that have the joints: one with all of them, or several where each joint has one of its own.
+    fn joint_topics(&self, options: &RecordingOptions) -> Result<Vec<String>> {
+        let mut candidates: Vec<&str> = self.with_schema(&[messages::JOINT_STATE]).collect();
         let asked = options.joint_topic.as_deref();
-        let topic = self.choose(asked, &candidates, "joint states", "--joint-topic")?.to_string();
-        let names = names_of(&topic);
-        let place = || format!("{}, topic {topic}", self.recording.display());
-        names.iter().try_for_each(|n| plain_name("joint", n, place()).map(|_| ()))?;
+        if candidates.len() > 1 && asked.is_none() {
+            let joints: BTreeMap<&str, Vec<String>> = candidates.iter().map(|t| (*t, self.joints_of(t))).collect();
+            let has = |topic: &str, joint: &String| joints[topic].contains(joint);
+            let has_all = |topic: &&str| options.joints.iter().all(|joint| has(topic, joint));
+            if candidates.iter().any(has_all) {
+                candidates.retain(has_all);
+            } else if options.joints.iter().all(|joint| joints.keys().filter(|t| has(t, joint)).count() == 1) {
+                candidates.retain(|topic| options.joints.iter().any(|joint| has(topic, joint)));
+                return Ok(candidates.into_iter().map(str::to_owned).collect());
+            }
+        }
+        Ok(vec![self.choose(asked, &candidates, "joint states", "--joint-topic")?.to_owned()])
+    }
+
+    /// The joint states, with the joints to read (all that there are when none are asked for).
+    pub fn joint_readings(&mut self, options: &RecordingOptions) -> Result<JointReadings> {
+        let topics = self.joint_topics(options)?;
+        let names: Vec<String> = topics.iter().flat_map(|topic| self.joints_of(topic)).collect();
+        let place = format!("{}, topic {}", self.recording.display(), topics.join(", "));
+        names.iter().try_for_each(|n| plain_name("joint", n, &place).map(|_| ()))?;
         let missing: Vec<&str> = options.joints.iter().filter(|j| !names.contains(j)).map(String::as_str).collect();
-        let place = format!("{}, topic {topic}", self.recording.display());
         if names.is_empty() {
-            return Err(self.unreadable(&topic, "joint states"));
+            return Err(self.unreadable(&topics[0], "joint states"));
         }
         if !missing.is_empty() {
             let what = format!("has no positions of {}; its joints are: {}", missing.join(", "), names.join(", "));
@@ -261,7 +278,8 @@ impl Scan {
             let what = format!("joints that the chain does not need: {}", extra.join(", "));
             self.notices.push(Notice::new(Code::JointUnused, place, what, "they are ignored"));
         }
-        Ok((topic.clone(), self.joints.remove(&topic).unwrap_or_default(), joints))
+        let samples = topics.iter().flat_map(|topic| self.joints.remove(topic).unwrap_or_default()).collect();
+        Ok(JointReadings { topics, samples, joints })
     }
 
     /// The topic of the images and their times, ns.
@@ -306,9 +324,10 @@ impl Scan {
         }
     }
 
-    /// Median time from stamp to recording, s.
-    pub fn delay_s(&self, topic: &str) -> f64 {
-        let mut delays = self.topics.get(topic).map(|t| t.delays_ns.clone()).unwrap_or_default();
+    /// Median time from stamp to recording over some topics, s.
+    pub fn delay_s(&self, topics: &[String]) -> f64 {
+        let all = topics.iter().filter_map(|topic| self.topics.get(topic));
+        let mut delays: Vec<i64> = all.flat_map(|topic| topic.delays_ns.iter().copied()).collect();
         delays.sort_unstable();
         delays.get(delays.len() / 2).map_or(0.0, |d| *d as f64 * 1e-9)
     }
@@ -355,5 +374,30 @@ mod tests {
         );
         assert_eq!(scan.topics["/joints"].malformed, 0);
         assert_eq!((scan.topics["/gripper"].malformed, scan.joints.contains_key("/gripper")), (1, false));
+    }
+
+    /// A rail and the arm on it often have a topic each.
+    #[test]
+    fn joints_of_several_topics_are_put_together_where_each_has_its_own() {
+        let mut scan = Scan::default();
+        let note = |scan: &mut Scan, topic: &str, joints: &[(&str, f64)]| {
+            let (data, schema) = (joint_state(joints), messages::JOINT_STATE);
+            scan.note(&Message { topic, schema, encoding: "cdr", log_time_ns: 1, data: &data }, Clock::Stamp);
+        };
+        note(&mut scan, "/arm", &[("a", 0.5), ("b", -0.25)]);
+        note(&mut scan, "/gripper", &[("finger", 0.01)]);
+        note(&mut scan, "/rail", &[("x", 2.0)]);
+        let wanted = |joints: &[&str]| RecordingOptions {
+            joints: joints.iter().map(|&joint| joint.to_owned()).collect(),
+            ..RecordingOptions::default()
+        };
+        assert_eq!(scan.joint_topics(&wanted(&["x", "a", "b"])).unwrap(), ["/arm", "/rail"]);
+        assert_eq!(scan.joint_topics(&wanted(&["b", "a"])).unwrap(), ["/arm"]);
+        let code = |scan: &Scan, joints: &[&str]| scan.joint_topics(&wanted(joints)).unwrap_err().code;
+        assert_eq!(code(&scan, &["x", "a", "c"]), Code::TopicAmbiguous);
+        note(&mut scan, "/copy", &[("a", 0.4)]);
+        assert_eq!(code(&scan, &["x", "a", "b"]), Code::TopicAmbiguous);
+        let readings = scan.joint_readings(&wanted(&["x", "b"])).unwrap();
+        assert_eq!((readings.samples.len(), readings.joints), (2, vec!["x".to_owned(), "b".to_owned()]));
     }
 }
