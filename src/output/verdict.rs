@@ -69,7 +69,8 @@ fn doubts(r: &SolutionRecord) -> Vec<VerdictReason> {
     noted.chain(left_out(r)).chain(small_gain(r)).chain(odd_image(r)).collect()
 }
 
-/// Notices that tell of a choice, or of what is counted among the images left out, and cast no doubt on the result.
+/// Notices that tell of a choice, of what is counted among the images left out, or of what every recording has between its stops, and cast no
+/// doubt on the result.
 fn is_information(code: Code) -> bool {
     matches!(
         code,
@@ -77,6 +78,7 @@ fn is_information(code: Code) -> bool {
             | Code::ImageDelayFound
             | Code::ImageNotThere
             | Code::ImageUnlisted
+            | Code::ImagesInMotion
             | Code::JointUnused
             | Code::LensChosen
             | Code::ObservationsMissing
