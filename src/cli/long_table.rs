@@ -334,7 +334,8 @@ fn map(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     if let (Some(median), Some(most)) = (at(&inside, 0.5), at(&inside, 0.95)) {
         writeln!(
             out,
-            "map       sigma of the flange relative to the plate, by the model: {median:.3} mm (95 % below {most:.3} mm) in the region of the stops{}",
+            "map       sigma of the flange relative to {}, by the model: {median:.3} mm (95 % below {most:.3} mm) in the region of the stops{}",
+            r.flange_is_relative_to(),
             at(&all, 1.0).map_or(String::new(), |w| format!(", up to {w:.2} mm elsewhere"))
         )?;
     }

@@ -32,7 +32,7 @@ pub(super) fn text(record: &SolutionRecord, folder: &Path) -> String {
     let free = MOST_LINES.saturating_sub(figures.len() + 2);
     let least = match failed {
         true => verdict.reasons.len().min(free / 2),
-        false => reasons(&verdict, MOST_DOUBTS.min(free.saturating_sub(1))).len(),
+        false => with_their_remedies(&verdict, free),
     };
     let next = next(record, &verdict, free.saturating_sub(least).min(MOST_NEXT));
     let reasons = reasons(&verdict, free.saturating_sub(next.len()));
@@ -64,6 +64,12 @@ fn reasons(verdict: &Verdict, most: usize) -> Vec<String> {
         false => format!("{} ({})", r.what, r.remedy),
     };
     shared("          - ", &verdict.reasons.iter().map(words).collect::<Vec<_>>(), most)
+}
+
+/// Lines of what asks for a look: one for each at least, as many as they need where a line is left for what to do next.
+fn with_their_remedies(verdict: &Verdict, free: usize) -> usize {
+    let needed = reasons(verdict, MOST_DOUBTS.min(free.saturating_sub(1))).len();
+    needed.max(verdict.reasons.len().min(MOST_DOUBTS))
 }
 
 /// Several things in `most` lines, at least one for each, the first ones in full; those that find no room are counted.

@@ -185,11 +185,19 @@ impl MarkerRows {
     }
 
     /// Multiplies the columns of every marker from the right by a matrix of its own.
-    pub fn times_right(&mut self, matrices: impl Iterator<Item = Matrix3<f64>>) {
-        wide(
-            #[inline(always)]
-            || matrices.enumerate().for_each(|(at, m)| times_right(&mut self.values, 3 * at, &m)),
-        );
+    pub fn times_right(&mut self, matrices: &[Matrix3<f64>]) {
+        let rows = self.values.nrows();
+        if rows == 0 {
+            return;
+        }
+        let blocks = self.values.as_mut_slice().par_chunks_mut(3 * MARKERS_A_BLOCK * rows);
+        blocks.zip(matrices.par_chunks(MARKERS_A_BLOCK)).for_each(|(columns, matrices)| {
+            let each = columns.chunks_exact_mut(3 * rows).zip(matrices);
+            wide(
+                #[inline(always)]
+                || each.for_each(|(columns, m)| times_right(columns, m)),
+            );
+        });
     }
 }
 
@@ -242,12 +250,11 @@ impl DenseCoupling {
     }
 }
 
-/// Multiplies three columns from `first` on by `m` from the right.
+/// Multiplies three columns by `m` from the right.
 #[inline(always)]
-fn times_right(y: &mut DMatrix<f64>, first: usize, m: &Matrix3<f64>) {
-    let rows = y.nrows();
-    let (x, rest) = y.as_mut_slice()[first * rows..(first + 3) * rows].split_at_mut(rows);
-    let (y, z) = rest.split_at_mut(rows);
+fn times_right(columns: &mut [f64], m: &Matrix3<f64>) {
+    let (x, rest) = columns.split_at_mut(columns.len() / 3);
+    let (y, z) = rest.split_at_mut(x.len());
     for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
         let old = [*x, *y, *z];
         let new = |k: usize| old[0] * m[(0, k)] + old[1] * m[(1, k)] + old[2] * m[(2, k)];

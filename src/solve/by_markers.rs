@@ -181,7 +181,7 @@ impl MarkersEliminated {
         carried: Option<&Carried>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
         let mut rows = MarkerRows { values: self.y.clone() };
-        rows.times_right(self.inverse_factors.iter().copied());
+        rows.times_right(&self.inverse_factors);
         let mut d = rows.values;
         for (at, &(p, m)) in self.seen.order.iter().enumerate() {
             for (start, modes) in carried.into_iter().flat_map(|c| c(p, m)) {
@@ -231,6 +231,6 @@ fn whitened_coupling(
         })
         .collect();
     rows.add(seen, &images);
-    rows.times_right(inverse_factors.iter().map(Matrix3::transpose));
+    rows.times_right(&inverse_factors.iter().map(Matrix3::transpose).collect::<Vec<_>>());
     rows.values
 }

@@ -1,9 +1,10 @@
 //! The report: complete, self-contained, and safe against whatever stands in names.
 
 use crate::outputs_support::{context, robot, solved};
-use robotcal::diagnose::{DoubtedSize, Finding, Weight};
+use robotcal::diagnose::{DoubtedSize, ExchangedReadings, Finding, Weight};
+use robotcal::error::{Code, Notice};
 use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
-use robotcal::output::verdict::{Verdict, VerdictReason};
+use robotcal::output::verdict::{Trust, Verdict, VerdictReason};
 use robotcal::output::{Thumbnails, files, report_html, solution_json};
 use robotcal::series::{CameraMount, InputFile};
 use serde_json::json;
@@ -128,6 +129,12 @@ fn the_verdict_follows_the_gates_and_then_the_doubts() {
     let mut record = record();
     assert!(report_html(&record, &Thumbnails::default()).contains("class=\"verdict good\""));
     let good = record.clone();
+    // A camera goes on recording between the stops; a stop without an image is worth a look.
+    record.notices.push(Notice::new(Code::ImagesInMotion, "run1", "", ""));
+    assert_eq!(Verdict::of(&record).trust, Trust::Good);
+    record.notices.push(Notice::new(Code::StandstillWithoutImage, "run1", "", ""));
+    assert_eq!(Verdict::of(&record).trust, Trust::Doubts);
+    record = good.clone();
     record.accuracy.calibrated.worst_mm = 10.0 * record.accuracy.calibrated.rms_mm;
     let page = report_html(&record, &Thumbnails::default());
     assert!(page.contains("class=\"verdict care\""));
@@ -167,6 +174,22 @@ fn what_was_seen_and_what_to_do_stay_apart() {
     assert_eq!(reason(&earlier), VerdictReason { what: alone.clone(), remedy: nothing.clone() });
     record.findings.clear();
     assert_eq!(reason(&record), VerdictReason { what: alone, remedy: nothing });
+}
+
+#[test]
+fn rows_that_were_exchanged_are_put_right_before_a_failed_result_is_tried_again() {
+    let doubted = DoubtedSize::Contradicted { measured: false, off: 0.02, sigma: 0.001, weight: Weight::Gate };
+    let pair = vec!["img_003.png".to_owned(), "img_008.png".to_owned()];
+    let exchanged = Finding::from(ExchangedReadings { circle: pair.clone(), images: pair, misfit: 1e-4 });
+    let (gate, mut record) = (Finding::from(doubted), record());
+    record.findings = vec![(&gate).into(), (&exchanged).into()];
+    assert_eq!(Verdict::of(&record).remedies, Vec::<String>::new());
+    record.failed_gates = vec![gate.to_string()];
+    let verdict = Verdict::of(&record);
+    let [of_gate, of_rows] = verdict.remedies.try_into().unwrap();
+    assert_eq!((verdict.reasons.len(), of_gate), (1, gate.remedy()));
+    assert!(of_rows.contains(&exchanged.seen()) && of_rows.contains(&exchanged.remedy()), "{of_rows}");
+    assert!(report_html(&record, &Thumbnails::default()).contains(&of_rows));
 }
 
 #[test]
