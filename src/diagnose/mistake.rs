@@ -176,7 +176,7 @@ impl Kind for Mistake {
                 "check that the URDF is of this robot and size, with lengths in metres, and that the tip link carries the camera".into()
             }
             MistakeKind::PlateSize { .. } => {
-                "measure the pitch of the plate with a ruler and correct pitch_m in plate.toml; if it is right, the URDF is of another size of this robot".into()
+                "measure the plate with a ruler and correct pitch_m (of tags tag_m or marker_m) in plate.toml; if it is right, the URDF is of another size of this robot".into()
             }
             MistakeKind::Poses { remedy, .. } => remedy.clone(),
         }

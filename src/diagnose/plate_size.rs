@@ -119,7 +119,7 @@ impl Kind for DoubtedSize {
                 "check that distance, and that the lengths in the URDF are those of this robot"
             }
             Self::Contradicted { measured: false, .. } => {
-                "measure two far markers and give [scale] in plate.toml, or correct pitch_m; if the plate is right, the URDF is of another robot or size"
+                "measure two far markers and give [scale] in plate.toml, or correct its pitch_m (of tags tag_m or marker_m); if the plate is right, the URDF is of another robot or size"
             }
             Self::Uneven { .. } => "measure two far markers and give [scale] in plate.toml",
         };
