@@ -147,7 +147,7 @@ fn multiply(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
 }
 
 /// Multiplications of a product from which on its blocks of columns are worth being made side by side.
-const LARGE: usize = 4_000_000;
+const LARGE: usize = 20_000_000;
 
 /// `a b` into the first rows of `c`.
 fn multiply_into(c: &mut DMatrix<f64>, how: Accum, a: MatRef<'_, f64>, b: MatRef<'_, f64>) {

@@ -106,7 +106,7 @@ pub(super) struct MarkerRows {
 }
 
 /// Markers whose columns are made together: those of as many stay in the cache of a processor while the images are gone through.
-const MARKERS_A_BLOCK: usize = 32;
+const MARKERS_A_BLOCK: usize = 64;
 
 /// The equations of an image of a plate, and the rows of its unknowns.
 pub(super) struct ImageRows<'a> {
@@ -118,33 +118,36 @@ pub(super) struct ImageRows<'a> {
     pub intrinsics: Vec<Option<usize>>,
 }
 
-impl ImageRows<'_> {
-    fn runs(&self) -> Vec<Run> {
-        let of_pose = self.pose.into_iter().flat_map(|row| self.equations.pose_rows().zip(row..));
-        let row_of = |e: usize| Some((self.equations.intrinsic_row(e)?, self.intrinsics[e]?));
-        runs(of_pose.chain((0..E).filter_map(row_of)))
-    }
+/// An image with its observations in the order of the markers that were seen.
+struct Ordered<'a> {
+    image: &'a ImageRows<'a>,
+    runs: Vec<Run>,
+    sights: Vec<(usize, Sight<'a>)>,
+}
 
-    /// Observations of some of the markers that were seen, with their place among these.
-    fn sights<'s>(&'s self, seen: &'s SeenMarkers, some: &'s Range<usize>) -> impl Iterator<Item = (usize, Sight<'s>)> {
-        let number = &seen.number[self.plate];
-        let all = self.equations.markers.iter().zip(self.equations.sights());
-        all.filter_map(|(&marker, sight)| {
-            let at = number[marker].filter(|at| some.contains(at))?;
-            Some((at - some.start, sight))
-        })
+impl<'a> Ordered<'a> {
+    fn new(image: &'a ImageRows<'a>, seen: &SeenMarkers) -> Self {
+        let ImageRows { plate, equations, pose, intrinsics } = image;
+        let of_pose = pose.into_iter().flat_map(|&row| equations.pose_rows().zip(row..));
+        let row_of = |e: usize| Some((equations.intrinsic_row(e)?, intrinsics[e]?));
+        let runs = runs(of_pose.chain((0..E).filter_map(row_of)));
+        let numbered = equations.markers.iter().zip(equations.sights());
+        let mut sights: Vec<_> = numbered.filter_map(|(&m, sight)| Some((seen.number[*plate][m]?, sight))).collect();
+        sights.sort_by_key(|(at, _)| *at);
+        Self { image, runs, sights }
     }
 
     /// Adds the coupling with some markers to their columns, of so many rows each.
-    fn add_to(&self, (columns, rows): (&mut [f64], usize), seen: &SeenMarkers, some: &Range<usize>) {
-        let runs = self.runs();
+    fn add_to(&self, (columns, rows): (&mut [f64], usize), some: &Range<usize>) {
+        let place = |at: usize| self.sights.partition_point(|sight| sight.0 < at);
+        let sights = &self.sights[place(some.start)..place(some.end)];
         wide(
             #[inline(always)]
             || {
-                for (at, sight) in self.sights(seen, some) {
-                    let of_marker = columns[3 * at * rows..].chunks_exact_mut(rows);
+                for (at, sight) in sights {
+                    let of_marker = columns[3 * (at - some.start) * rows..].chunks_exact_mut(rows);
                     for (into, w) in of_marker.zip(sight.by_marker().row_iter()) {
-                        for run in &runs {
+                        for run in &self.runs {
                             let of = sight.row_range(run.from..run.from + run.length);
                             add_combination(&mut into[run.into..run.into + run.length], of, [w[0], w[1]]);
                         }
@@ -152,12 +155,12 @@ impl ImageRows<'_> {
                 }
             },
         );
-        for (at, sight) in self.sights(seen, some) {
+        for (at, sight) in sights {
             for (point, d) in sight.by_field() {
                 let own = sight.by_marker() * d;
                 for (component, column) in own.column_iter().enumerate() {
-                    if let Some(row) = self.intrinsics[E + 2 * point + component] {
-                        (0..3).for_each(|d| columns[(3 * at + d) * rows + row] += column[d]);
+                    if let Some(row) = self.image.intrinsics[E + 2 * point + component] {
+                        (0..3).for_each(|d| columns[(3 * (at - some.start) + d) * rows + row] += column[d]);
                     }
                 }
             }
@@ -177,10 +180,11 @@ impl MarkerRows {
         if rows == 0 {
             return;
         }
+        let images: Vec<Ordered> = images.iter().map(|image| Ordered::new(image, seen)).collect();
         let blocks = self.values.as_mut_slice().par_chunks_mut(3 * MARKERS_A_BLOCK * rows);
         blocks.enumerate().for_each(|(block, columns)| {
             let some = block * MARKERS_A_BLOCK..(block + 1) * MARKERS_A_BLOCK;
-            images.iter().for_each(|image| image.add_to((columns, rows), seen, &some));
+            images.iter().for_each(|image| image.add_to((columns, rows), &some));
         });
     }
 
