@@ -128,7 +128,7 @@ struct Ordered<'a> {
 impl<'a> Ordered<'a> {
     fn new(image: &'a ImageRows<'a>, seen: &SeenMarkers) -> Self {
         let ImageRows { plate, equations, pose, intrinsics } = image;
-        let of_pose = pose.into_iter().flat_map(|&row| equations.pose_rows().zip(row..));
+        let of_pose = pose.iter().flat_map(|&row| equations.pose_rows().zip(row..));
         let row_of = |e: usize| Some((equations.intrinsic_row(e)?, intrinsics[e]?));
         let runs = runs(of_pose.chain((0..E).filter_map(row_of)));
         let numbered = equations.markers.iter().zip(equations.sights());
