@@ -2,11 +2,12 @@
 //!
 //! With the information `V = F F'` of a marker (all images and the prior) and its coupling `B` with camera poses and intrinsics, `Y = B F^-T`:
 //! the reduced information is the information without the elimination less `T' (sum Y Y') T`, one Gram product in the space of poses and
-//! intrinsics, which what stays moves by `T` ([`PoseSpace`]).
+//! intrinsics, which what stays moves by `T` ([`PoseSpace`]). Where nothing is latent what stays is less than the poses, and `B` is taken
+//! with it at once (`T = 1`).
 
 use nalgebra::{DMatrix, DVector, DVectorView, Matrix3};
 
-use super::blocks::{ImageRows, MarkerRows, PoseRows, STOPS_A_PRODUCT, SeenMarkers};
+use super::blocks::{DenseCoupling, ImageRows, MarkerRows, PoseRows, STOPS_A_PRODUCT, SeenMarkers};
 use super::distances::Distances;
 use super::linear::Carried;
 use super::linear::LinearProblem;
@@ -26,7 +27,7 @@ pub(super) struct MarkersEliminated {
     inverse_factors: Vec<Matrix3<f64>>,
     /// `T`.
     space: PoseSpace,
-    /// `Y`, poses and intrinsics x 3 markers; without what is held.
+    /// `Y`, rows of the space x 3 markers; without what is held.
     y: DMatrix<f64>,
     /// Orthonormal combinations of the whitened markers that are held, 3 markers x held.
     held: DMatrix<f64>,
@@ -68,8 +69,15 @@ impl MarkersEliminated {
             v.cholesky().and_then(|c| c.l().try_inverse()).unwrap_or_else(Matrix3::zeros)
         };
         let inverse_factors: Vec<Matrix3<f64>> = seen.information(linear).into_iter().map(damped).collect();
-        let space = PoseSpace::new(linear, &latent_start, n);
-        let y = whitened_coupling(linear, &seen, &inverse_factors, &space);
+        let (space, mut coupling) = if n == linear.adjustment.problem.layout.len() {
+            (PoseSpace::of_unknowns(n), coupling_of_unknowns(linear, &seen))
+        } else {
+            let space = PoseSpace::new(linear, &latent_start, n);
+            let coupling = coupling_of_poses(linear, &seen, &space);
+            (space, coupling)
+        };
+        coupling.times_right(&inverse_factors.iter().map(Matrix3::transpose).collect::<Vec<_>>());
+        let y = coupling.values;
         let mut taken = DMatrix::zeros(y.nrows(), y.nrows());
         subtract_gram(&mut taken, &y);
         mirror_upper(&mut taken);
@@ -91,7 +99,13 @@ impl MarkersEliminated {
 
     /// Unknowns from `to` on move those from `from` on along, times `by`.
     pub fn carry(&mut self, from: usize, to: usize, by: &DMatrix<f64>) {
-        self.space.carry(from, to, by);
+        if self.space.is_of_unknowns() {
+            let moved = by.tr_mul(&self.y.rows(from, by.nrows()));
+            let mut into = self.y.rows_mut(to, by.ncols());
+            into += moved;
+        } else {
+            self.space.carry(from, to, by);
+        }
     }
 
     /// Takes over the right-hand side of the markers at a linearisation; returns the reduced one, without the priors of the dense columns.
@@ -212,13 +226,8 @@ fn column(x: DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_column_slice(x.len(), 1, x.as_slice())
 }
 
-/// `Y`, poses and intrinsics x 3 markers.
-fn whitened_coupling(
-    linear: LinearProblem,
-    seen: &SeenMarkers,
-    inverse_factors: &[Matrix3<f64>],
-    space: &PoseSpace,
-) -> DMatrix<f64> {
+/// Of poses and intrinsics, by rows of their space.
+fn coupling_of_poses(linear: LinearProblem, seen: &SeenMarkers, space: &PoseSpace) -> MarkerRows {
     let mut rows = MarkerRows::new(space.rows(), seen);
     let row_of = |c: usize| linear.adjustment.problem.layout.columns[c].free.then(|| space.row_of(c)).flatten();
     let images: Vec<_> = linear.images().enumerate().filter_map(|(k, own)| Some((k, own, own.equations()?))).collect();
@@ -231,6 +240,19 @@ fn whitened_coupling(
         })
         .collect();
     rows.add(seen, &images);
-    rows.times_right(&inverse_factors.iter().map(Matrix3::transpose).collect::<Vec<_>>());
-    rows.values
+    rows
+}
+
+/// Of the dense columns, where nothing is latent.
+fn coupling_of_unknowns(linear: LinearProblem, seen: &SeenMarkers) -> MarkerRows {
+    let problem = &linear.adjustment.problem;
+    let mut coupling = DenseCoupling::new(problem, seen);
+    for stops in linear.lin.stops.chunks(STOPS_A_PRODUCT) {
+        let images = linear.stops_of(stops).flat_map(|stop| stop.images());
+        let images: Vec<_> = images.filter_map(|own| Some((own, own.equations()?))).collect();
+        coupling.add(&images.iter().map(|(own, equations)| (*own, equations.as_ref())).collect::<Vec<_>>(), seen);
+    }
+    let mut rows = MarkerRows::new(problem.layout.len(), seen);
+    coupling.copy_to(&mut rows.values, 0);
+    rows
 }

@@ -42,6 +42,16 @@ impl PoseSpace {
         Self { by_dense, by_latents, direct: layout.theta_len()..layout.len(), unknowns }
     }
 
+    /// The unknowns themselves, where nothing is latent: they are fewer than the rows of the poses.
+    pub fn of_unknowns(unknowns: usize) -> Self {
+        Self { by_dense: DMatrix::zeros(0, unknowns), by_latents: Vec::new(), direct: 0..unknowns, unknowns }
+    }
+
+    /// Whether `T` is the identity.
+    pub fn is_of_unknowns(&self) -> bool {
+        self.direct.len() == self.unknowns
+    }
+
     /// Number of its rows.
     pub fn rows(&self) -> usize {
         self.by_dense.nrows() + self.direct.len()
