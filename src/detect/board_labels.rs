@@ -217,14 +217,14 @@ fn score(placement: Placement, corners: usize, shades: &Shades) -> Scored {
     Scored { placement, corners, score: corners as f64 + colours, agreement: agreement / f64::max(seen, 1.0) }
 }
 
-fn bounds(lattice: &Lattice) -> Option<((i32, i32), (i32, i32))> {
+pub(super) fn bounds(lattice: &Lattice) -> Option<((i32, i32), (i32, i32))> {
     let us = lattice.keys().map(|k| k.0);
     let vs = lattice.keys().map(|k| k.1);
     Some(((us.clone().min()?, vs.clone().min()?), (us.max()?, vs.max()?)))
 }
 
 /// Shade of every lattice cell in view: -1 as dark as the dark squares near it, 1 as light as the light ones.
-struct Shades {
+pub(super) struct Shades {
     origin: (i32, i32),
     width: i32,
     values: Vec<Option<f64>>,
@@ -232,7 +232,7 @@ struct Shades {
 
 impl Shades {
     /// Reads the cells up to `reach` beyond the lattice.
-    fn read(picture: &Picture, lattice: &Lattice, reach: i32) -> Option<Self> {
+    pub fn read(picture: &Picture, lattice: &Lattice, reach: i32) -> Option<Self> {
         let (low, high) = bounds(lattice)?;
         let maps = Maps::of(lattice)?;
         let inner = inner_cells(picture, lattice);
@@ -248,7 +248,8 @@ impl Shades {
         Some(Self { origin, width, values })
     }
 
-    fn at(&self, (u, v): (i32, i32)) -> Option<f64> {
+    /// `None` out of view.
+    pub fn at(&self, (u, v): (i32, i32)) -> Option<f64> {
         let (i, j) = (u - self.origin.0, v - self.origin.1);
         if i < 0 || j < 0 || i >= self.width {
             return None;

@@ -9,6 +9,7 @@ use calib_targets_chessboard::{ChessboardDetector, ChessboardParams, detect_corn
 use calib_targets_core::{DetectorConfig, GrayImageView, ImageRefiner, default_chess_config};
 
 use super::board_labels::{BoardSize, Labelling, Lattice, label};
+use super::board_seen::BoardSeen;
 use super::corners::{Window, measure};
 use super::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
@@ -31,7 +32,7 @@ const LARGE_PX: usize = 500_000;
 ///
 /// # Errors
 /// No board in the picture; colours that contradict the plate; so little of the outline that the part seen could lie in several
-/// places.
+/// places. A board of another size is a failure of the detection.
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
     let lattice = find_lattice(picture, board).ok_or_else(no_board)?;
@@ -42,15 +43,24 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
             notices.push(symmetric_notice(board));
             placement
         }
-        Labelling::Ambiguous => return Err(ambiguous()),
-        Labelling::Contradiction => return Err(contradiction(board)),
+        Labelling::Ambiguous => return refusal(picture, &lattice, board, ambiguous()),
+        Labelling::Contradiction => return refusal(picture, &lattice, board, contradiction(board)),
     };
     let mut detection = measure(picture, &lattice, placement, WINDOW);
     if detection.outline == Outline::LineMissing {
+        detection.size_seen = BoardSeen::of(picture, &lattice).and_then(|seen| seen.size());
         notices.push(hidden_line(board));
     }
     detection.notices = notices;
     Ok(detection)
+}
+
+/// A board of another size is named as that, whatever else there is to say.
+fn refusal(picture: &Picture, lattice: &Lattice, board: BoardSize, otherwise: Error) -> Result<Detection> {
+    match BoardSeen::of(picture, lattice).and_then(|seen| seen.contradiction(board)) {
+        Some(error) => Ok(Detection::other_size(error)),
+        None => Err(otherwise),
+    }
 }
 
 pub(super) fn board_size(plate: &Plate) -> Result<BoardSize> {
@@ -232,19 +242,6 @@ fn symmetric_notice(board: BoardSize) -> Notice {
             board.columns, board.rows
         ),
         "with joint readings `identify` settles the turn; without, use a board with an odd and an even number of squares",
-    )
-}
-
-/// The refusal where an outer line is not there.
-pub(super) fn line_missing(plate: &Plate) -> Error {
-    Error::new(
-        Code::PlateLineHidden,
-        "image",
-        format!(
-            "an outer line of the {} x {} inner corners is not where it should be in view",
-            plate.columns, plate.rows
-        ),
-        "check `columns` and `rows` of the plate file (inner corners); a covered line is accepted beside images that show the whole board",
     )
 }
 

@@ -17,8 +17,17 @@ pub struct Detection {
     pub notices: Vec<Notice>,
     /// Whether the outer lines of a board were there.
     pub outline: Outline,
+    /// Columns and rows of a chessboard or a grid of dots, in either order, where an outer line is missing and all ends are in view.
+    pub size_seen: Option<[u32; 2]>,
     /// Why the image cannot be used, with no observations then; `None` where it can.
     pub failure: Option<Error>,
+}
+
+impl Detection {
+    /// A board without a code that is not as large as the plate says.
+    pub(super) fn other_size(error: Error) -> Self {
+        Self { failure: Some(error), outline: Outline::OtherSize, ..Self::default() }
+    }
 }
 
 /// The sizes of the dots of a grid as an image shows them, where the plate does not state them.
@@ -42,6 +51,8 @@ pub enum Outline {
     LineMissing,
     /// The same of tags, whose numbers tell their places all the same.
     TagsMissing,
+    /// A board without a code ends in view, and not where the plate says.
+    OtherSize,
 }
 
 /// What an image of circles tells beyond their places.

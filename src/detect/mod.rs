@@ -3,6 +3,7 @@
 //! A new kind of plate is one file that maps a [`Picture`] and a [`Plate`] to a [`Detection`], and one row in `by_kind`.
 
 mod board_labels;
+mod board_seen;
 pub mod charuco;
 mod charuco_markers;
 mod charuco_seen;
@@ -19,6 +20,7 @@ mod picture;
 pub mod puzzleboard;
 mod quads;
 mod run;
+mod size_seen;
 mod sizes;
 mod tag_code;
 mod tag_layout;
@@ -39,12 +41,12 @@ use crate::series::{Plate, PlateKind};
 /// Finds and identifies the markers of a plate in a picture.
 ///
 /// # Errors
-/// What the detector of the plate's kind says; a chessboard of which an outer line is not where it should be in view. The place is
+/// What the detector of the plate's kind says; a chessboard or grid of dots of which an outer line is not where it should be in view. The place is
 /// then `image`, for the caller to fill in the name.
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let detection = examine(picture, plate);
     if detection.outline == Outline::LineMissing {
-        return Err(chessboard::line_missing(plate));
+        return Err(size_seen::line_missing(plate, &detection));
     }
     match detection.failure {
         None => Ok(detection),

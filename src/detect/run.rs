@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::{Detection, Outline, Picture, chessboard, examine, tags};
+use super::size_seen::{line_missing, nowhere_whole};
+use super::{Detection, Outline, Picture, examine, tags};
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::{batches, picture_size};
-use crate::series::Plate;
+use crate::series::{Plate, PlateKind};
 
 /// Of a picture of three colours and its grey values.
 const BYTES_PER_PX: u64 = 7;
@@ -34,8 +35,8 @@ impl SeriesImage {
 /// Detects the plate in all images of a series.
 ///
 /// Results stand in the order of `images`, whatever the number of threads; an image that cannot be read or shows no
-/// plate is a failure in its own place only, and so is one whose size differs from that of most; where outer lines of a chessboard are
-/// missing in view and no image shows all of them, all are failures. Each thread holds one image at a
+/// plate is a failure in its own place only, and so is one whose size differs from that of most; where outer lines of a chessboard or a grid
+/// of dots are missing in view, or one ends where the plate file does not say, and no image shows all of it, all are failures. Each thread holds one image at a
 /// time, which `picture` reads, and all of them together a gigabyte or one image; `progress` is called after every image, from any thread.
 pub fn detect_series(
     images: &[PathBuf],
@@ -61,6 +62,7 @@ pub fn detect_series(
         found.par_extend(images[batch].par_iter().map(one));
     }
     refuse_unproven_boards(images, plate, &mut found);
+    note_board_nowhere_whole(plate, &mut found);
     note_unseen_tags(images, plate, &mut found);
     refuse_odd_sizes(images, &mut found);
     refuse_odd_dots(images, &mut found);
@@ -91,16 +93,36 @@ fn refuse_odd_dots(images: &[PathBuf], found: &mut [SeriesImage]) {
     }
 }
 
-/// A line of a board that is missing in view may be covered only where another image shows the whole board: else the board is smaller
-/// than the plate says, and every id is in doubt.
+/// A line of a board that is missing in view may be covered only where another image shows the whole board: else the board is not as large
+/// as the plate says, and every id is in doubt. An image that shows where the board ends says how large it is.
 fn refuse_unproven_boards(images: &[PathBuf], plate: &Plate, found: &mut [SeriesImage]) {
-    let any = |outline: Outline| found.iter().any(|i| i.detection.outline == outline);
-    if any(Outline::Whole) || !any(Outline::LineMissing) {
+    if found.iter().any(|i| i.detection.outline == Outline::Whole) {
         return;
     }
-    for (path, image) in images.iter().zip(found).filter(|(_, image)| image.detection.failure.is_none()) {
+    let other =
+        found.iter().find(|i| i.detection.outline == Outline::OtherSize).and_then(|i| i.detection.failure.clone());
+    let missing = || found.iter().filter(|i| i.detection.outline == Outline::LineMissing);
+    let line = || {
+        let told = missing().find(|i| i.detection.size_seen.is_some()).or_else(|| missing().next())?;
+        Some(line_missing(plate, &told.detection))
+    };
+    let Some(error) = other.or_else(line) else { return };
+    // Too little of the outline is what such a board shows, too.
+    let in_doubt = |i: &SeriesImage| i.detection.failure.as_ref().is_none_or(|f| f.code == Code::PlateIncomplete);
+    for (path, image) in images.iter().zip(found).filter(|(_, image)| in_doubt(image)) {
         image.detection.observations.clear();
-        image.detection.failure = Some(Error { place: path.display().to_string(), ..chessboard::line_missing(plate) });
+        image.detection.failure = Some(Error { place: path.display().to_string(), ..error.clone() });
+    }
+}
+
+/// A board without a code that no image shows from end to end has the size that the plate file says.
+fn note_board_nowhere_whole(plate: &Plate, found: &mut [SeriesImage]) {
+    let is_open = |i: &SeriesImage| i.detection.outline == Outline::Open;
+    if ![PlateKind::Chessboard, PlateKind::CircleGrid].contains(&plate.kind) || !found.iter().all(is_open) {
+        return;
+    }
+    if let Some(image) = found.iter_mut().find(|i| i.detection.failure.is_none()) {
+        image.detection.notices.push(nowhere_whole(plate));
     }
 }
 

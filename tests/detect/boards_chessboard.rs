@@ -3,8 +3,9 @@
 #![allow(missing_docs, clippy::expect_used, clippy::panic)]
 
 use crate::boards_scene::{Scene, View};
+use crate::said::assert_says;
 use robotcal::Code;
-use robotcal::detect::{Detection, Picture, detect};
+use robotcal::detect::{Detection, Picture, detect, detect_series};
 use robotcal::series::{Plate, PlateKind};
 
 fn plate(columns: u32, rows: u32) -> Plate {
@@ -175,16 +176,73 @@ fn a_board_that_is_its_own_half_turn_is_upright_with_a_notice() {
     }
 }
 
+/// The sizes that a board may be taken for, in its own order.
+fn other_sizes([columns, rows]: [u32; 2]) -> [[u32; 2]; 7] {
+    [
+        [columns - 1, rows],
+        [columns + 1, rows],
+        [columns, rows - 1],
+        [columns, rows + 1],
+        [columns + 1, rows + 1],
+        [columns - 1, rows - 1],
+        [columns + 2, rows + 3],
+    ]
+}
+
 #[test]
-fn another_board_than_the_plate_file_says_is_refused() {
-    let picture = tilted(9, 6, 0.1).render(0);
-    for (columns, rows) in [(6, 5), (8, 6), (9, 5), (10, 6), (9, 7), (12, 9), (11, 6), (9, 8)] {
-        let found = detect(&picture, &plate(columns, rows));
-        assert!(found.is_err(), "{columns} x {rows}");
+fn a_board_of_another_size_is_named_by_what_is_seen() {
+    let sizes = [[9, 6], [9, 7], [7, 7], [8, 6], [5, 3]];
+    for (size, turn) in sizes.into_iter().zip(0..) {
+        let picture = tilted(size[0], size[1], 0.1 + 1.7 * f64::from(turn)).render(0);
+        for [columns, rows] in other_sizes(size).into_iter().flat_map(|[a, b]| [[a, b], [b, a]]) {
+            let error = detect(&picture, &plate(columns, rows)).expect_err("another size");
+            assert_says(&error, Code::PlateContradicted, &["columns", "rows", &format!("{columns} x {rows}")]);
+            let seen = [[size[0], size[1]], [size[1], size[0]]].map(|[a, b]| format!("{a} x {b}"));
+            assert!(seen.iter().any(|s| error.what.contains(s)), "{size:?} for {columns} x {rows}: {error}");
+        }
+        let turned = detect(&picture, &plate(size[1], size[0])).expect("the same board after a quarter turn");
+        assert_eq!(turned.observations.len(), (size[0] * size[1]) as usize);
     }
+    let picture = tilted(9, 6, 0.1).render(0);
     let empty = Picture { pixels: vec![80.0; picture.pixels.len()], ..picture };
     let error = detect(&empty, &plate(9, 6)).expect_err("nothing there");
     assert_eq!(error.code, Code::PlateNotFound, "{error}");
+}
+
+/// Both ends of the rows are in view, and neither end of the columns.
+#[test]
+fn a_number_that_is_seen_is_named_where_the_other_is_not() {
+    let scene = Scene::new(6, 15, View::new(6, 15, [320.0, 240.0], 55.0, 0.02, [0.0, 0.0]));
+    let error = detect(&scene.render(0), &plate(7, 15)).expect_err("another size");
+    assert_says(&error, Code::PlateContradicted, &["6 inner corners", "7 x 15"]);
+    let error = detect(&scene.render(0), &plate(6, 15)).expect_err("the place on the board is unknown");
+    assert_eq!(error.code, Code::PlateIncomplete, "{error}");
+}
+
+/// Pictures that are cut by the border could be of a larger board; one that shows all of it says that they are not.
+#[test]
+fn a_series_of_another_size_is_refused_as_a_whole_and_one_that_does_not_tell_says_so() {
+    let centres = [[60.0, 240.0], [321.0, 240.0], [590.0, 240.0]];
+    let views = centres.map(|centre| Scene::new(9, 6, View::new(9, 6, centre, 33.0, 0.05, [0.01, 0.01])).render(0));
+    let paths = ["left.png", "whole.png", "right.png"].map(std::path::PathBuf::from);
+    let seen = |columns: u32, images: &[usize]| {
+        let chosen: Vec<_> = images.iter().map(|&k| paths[k].clone()).collect();
+        let picture = |path: &std::path::Path| Ok(views[paths.iter().position(|p| p == path).expect("one")].clone());
+        detect_series(&chosen, &plate(columns, 6), picture, |_| {})
+    };
+    for columns in [8, 10] {
+        for image in seen(columns, &[0, 1, 2]) {
+            assert!(image.detection.observations.is_empty());
+            assert_says(&image.detection.failure.expect("refused"), Code::PlateContradicted, &["9 x 6", ".png"]);
+        }
+    }
+    let notices = |images: &[usize]| {
+        let all = seen(9, images);
+        assert!(all.iter().all(|i| i.detection.observations.len() >= 25));
+        all.into_iter().flat_map(|i| i.detection.notices).map(|n| n.code).collect::<Vec<_>>()
+    };
+    assert_eq!(notices(&[0, 1, 2]), []);
+    assert_eq!(notices(&[0, 2]), [Code::PlateLineHidden]);
 }
 
 #[test]
@@ -195,6 +253,6 @@ fn a_line_more_than_printed_is_missing_from_large_boards() {
     assert_eq!(detect(&picture, &plate(28, 17)).expect("the board itself").observations.len(), 28 * 17);
     for (columns, rows) in [(29, 17), (28, 18)] {
         let error = detect(&picture, &plate(columns, rows)).expect_err("another size");
-        assert!([Code::PlateLineHidden, Code::PlateIncomplete].contains(&error.code), "{columns} x {rows}: {error}");
+        assert_says(&error, Code::PlateContradicted, &["28 x 17", "columns", "rows"]);
     }
 }

@@ -71,3 +71,34 @@ fn boards_of_webcams_are_complete() {
         }
     }
 }
+
+/// A plate file with a line more or fewer than real boards have: no image is used, and the size that is seen is named.
+#[test]
+fn another_size_than_that_of_a_real_board_is_named() {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/real"));
+    if !root.is_dir() {
+        println!("skipped: no recordings in {}", root.display());
+        return;
+    }
+    for (series, kind, [columns, rows]) in [
+        ("nachi-2025-01-17", PlateKind::Chessboard, [COLUMNS, ROWS]),
+        ("ur3a-cam1", PlateKind::Chessboard, [9, 7]),
+        ("ric-10x10", PlateKind::CircleGrid, [10, 10]),
+    ] {
+        let mut images: Vec<PathBuf> =
+            std::fs::read_dir(root.join(series).join("images")).unwrap().map(|e| e.unwrap().path()).collect();
+        images.sort();
+        images.truncate(6);
+        let sizes = [[columns - 1, rows], [columns + 1, rows], [columns, rows - 1], [columns, rows + 1]];
+        for [c, r] in sizes {
+            let plate = Plate::lattice(kind, c, r, 0.02, 1e-4);
+            let all = detect_series(&images, &plate, |path| load(path, None), |_| ());
+            let failures: Vec<_> = all.into_iter().map(|i| i.detection.failure.expect("another size")).collect();
+            let named = |f: &&robotcal::Error| {
+                [[columns, rows], [rows, columns]].iter().any(|[a, b]| f.what.contains(&format!("{a} x {b}")))
+            };
+            println!("{series} {c} x {r}: {} of {} named", failures.iter().filter(named).count(), failures.len());
+            assert!(2 * failures.iter().filter(named).count() > failures.len(), "{series} {c} x {r}: {failures:?}");
+        }
+    }
+}

@@ -245,15 +245,22 @@ fn an_image_that_changes_while_it_is_looked_at_is_named() {
 #[test]
 fn a_plate_file_of_another_board_is_named_with_its_remedy() {
     let folder = tempfile::tempdir().unwrap();
-    let file = |name: &str| folder.path().join(name);
-    let drawn =
-        robotcal(&["plate", "--kind", "aprilgrid", "--shape", "6x5", "--tag-mm", "30", "--out", name(&file("board"))]);
-    assert_eq!(drawn.status.code(), Some(0), "{}", text(&drawn));
-    let plate = std::fs::read_to_string(file("board/plate.toml")).unwrap();
-    std::fs::write(file("plate.toml"), plate.replace("columns = 6", "columns = 5")).unwrap();
-    let picture = file("board/plate.png");
-    let output =
-        robotcal(&["detect", name(&picture), "--plate", name(&file("plate.toml")), "--out", name(&file("seen"))]);
-    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
-    assert_says(&text(&output), Code::PlateNowhere, &["columns", "rows", "first_id"]);
+    for (kind, shape, more, names) in [
+        ("aprilgrid", "6x5", &["--tag-mm", "30"][..], ["first_id", "5"]),
+        ("chessboard", "9x6", &["--pitch-mm", "20"], ["9 x 6", "not 10 x 6"]),
+        ("circle-grid", "9x6", &["--pitch-mm", "20"], ["9 x 6", "not 10 x 6"]),
+    ] {
+        let [board, other, seen] = ["board", "plate.toml", "seen"].map(|f| folder.path().join(format!("{kind}-{f}")));
+        let command = ["plate", "--kind", kind, "--shape", shape, "--out", name(&board)];
+        let drawn = robotcal(&[&command, more].concat());
+        assert_eq!(drawn.status.code(), Some(0), "{}", text(&drawn));
+        let plate = std::fs::read_to_string(board.join("plate.toml")).unwrap();
+        let plate = plate.replace("columns = 6", "columns = 5").replace("columns = 9", "columns = 10");
+        std::fs::write(&other, plate).unwrap();
+        let picture = board.join("plate.png");
+        let args = ["detect", name(&picture), "--plate", name(&other), "--out", name(&seen)];
+        let output = robotcal(&args);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert_says(&text(&output), Code::PlateNowhere, &["columns", "rows", names[0], names[1]]);
+    }
 }

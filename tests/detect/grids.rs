@@ -13,6 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use robotcal::Code;
 use robotcal::detect::{Detection, Picture, detect, detect_series};
 use robotcal::series::{Plate, parse_plate};
+use robotcal::simulate::conditions::Glare;
 
 use crate::circles_support::{Scene, View, pose, scene};
 use crate::said::assert_says;
@@ -245,4 +246,84 @@ fn a_larger_dot_in_another_place_than_stated_is_named() {
     }
     let found = detect(&picture, &grid("columns = 8\nrows = 6\nlarge = [[1, 0]]")).unwrap();
     assert!(found.notices.is_empty(), "{:?}", found.notices);
+}
+
+/// A grid of these dots in the middle of the picture.
+fn shown(printed: &Plate, seed: u64, nearer: f64) -> Picture {
+    let mut view = view(&mut ChaCha8Rng::seed_from_u64(seed), Spoiling::None);
+    view.distance_m *= nearer;
+    Scene { plate: printed.clone(), camera_from_plate: pose(&view), ..scene(&view) }.render(seed)
+}
+
+/// Ink that the light of a lamp brightens over the whole board, on paper that is clipped: a tenth of the contrast and more from dot to dot of
+/// the far sides, and hardly anything over one dot.
+#[test]
+fn a_sheen_on_clipped_paper_costs_no_dot() {
+    let stated = grid("columns = 10\nrows = 10");
+    let print = printed(&stated, &[0], &[]);
+    let mut tally = Tally::default();
+    for seed in 0..views() {
+        let mut view = view(&mut ChaCha8Rng::seed_from_u64(seed), Spoiling::Clipped(1.2));
+        view.conditions.glare = vec![Glare { at_px: [800.0, 650.0], radius_px: 250.0, strength: 0.3 }];
+        let scene = Scene { plate: print.clone(), camera_from_plate: pose(&view), ..scene(&view) };
+        tally.add(&scene, &detect(&scene.render(seed), &stated).unwrap(), &|id| id);
+    }
+    tally.report("sheen");
+    assert_eq!((tally.found, tally.wrong), (tally.dots, 0));
+    assert!((0.2..1.15).contains(&tally.normalised), "{}", tally.normalised);
+}
+
+/// Every kind of grid beside those with a line more or fewer, in both directions: none passes for another.
+#[test]
+fn a_grid_of_another_size_is_named_by_what_is_seen() {
+    const LARGE: &str = "large = [[0, 0]]";
+    for (columns, rows, more) in [
+        (9, 6, ""),
+        (8, 8, ""),
+        (10, 10, "large = [[0, 0]]"),
+        (5, 4, LARGE),
+        (4, 11, "asymmetric = true"),
+        (5, 8, "asymmetric = true"),
+    ] {
+        let keys = |columns: u32, rows: u32| format!("columns = {columns}\nrows = {rows}\n{more}");
+        let printed = printed(&grid(&keys(columns, rows)), if more == LARGE { &[0] } else { &[] }, &[]);
+        let picture = shown(&printed, 0, 1.0);
+        assert_eq!(detect(&picture, &grid(&keys(columns, rows))).unwrap().observations.len(), printed.markers.len());
+        let sizes = [
+            (columns - 1, rows),
+            (columns + 1, rows),
+            (columns, rows - 1),
+            (columns, rows + 1),
+            (columns + 2, rows + 1),
+        ];
+        let exchanged = (more == "asymmetric = true" && (columns, rows) == (4, 11)).then_some((rows, columns));
+        for (c, r) in sizes.into_iter().chain(exchanged) {
+            let error = detect(&picture, &grid(&keys(c, r))).expect_err("another size");
+            assert_says(&error, Code::PlateContradicted, &["columns", "rows", &format!("{c} x {r}")]);
+            // 5 dots in 8 shifted rows look like 4 in 10.
+            let seen = [(columns, rows), (rows, columns), (rows / 2, 2 * columns)];
+            let named = seen.iter().any(|(a, b)| error.what.contains(&format!("{a} x {b}")));
+            assert!(named, "{columns} x {rows} {more} for {c} x {r}: {error}");
+        }
+    }
+}
+
+#[test]
+fn shifted_rows_are_named_and_columns_and_rows_exchanged_are_a_quarter_turn() {
+    let symmetric = shown(&printed(&grid("columns = 9\nrows = 6"), &[], &[]), 1, 1.0);
+    let shifted = shown(&printed(&grid("columns = 4\nrows = 11\nasymmetric = true"), &[], &[]), 1, 1.0);
+    assert_eq!(detect(&symmetric, &grid("columns = 6\nrows = 9")).unwrap().observations.len(), 54);
+    let error = detect(&symmetric, &grid("columns = 4\nrows = 11\nasymmetric = true")).expect_err("no row is shifted");
+    assert_says(&error, Code::PlateContradicted, &["asymmetric", "9 x 6"]);
+    let error = detect(&shifted, &grid("columns = 9\nrows = 6")).expect_err("every other row is shifted");
+    assert_says(&error, Code::PlateContradicted, &["asymmetric", "4 x 11"]);
+}
+
+#[test]
+fn a_grid_that_the_border_cuts_does_not_tell_its_size() {
+    let picture = shown(&printed(&grid("columns = 16\nrows = 12"), &[], &[]), 2, 0.5);
+    for stated in ["columns = 16\nrows = 12", "columns = 17\nrows = 12"] {
+        let error = detect(&picture, &grid(stated)).expect_err("too near");
+        assert_eq!(error.code, Code::PlateIncomplete, "{error}");
+    }
 }

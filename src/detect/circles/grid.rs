@@ -9,20 +9,22 @@
 //! is turned so that the first of them has the least id: that is the same corner in every picture. What no dot tells is left as the
 //! more upright of the turns.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::candidate::Candidate;
 use super::code::MarkerCode;
-use super::glare::leave_out_glare;
+use super::glare::allow_for_glare;
 use super::grid_dots::{Dot, Dots};
 use super::grid_missing::missing_dots;
 use super::grid_place::{Classes, Laid, place};
+use super::grid_seen::{Extent, Outer, Shape, is_in_view, outline, seen};
 use super::lattice::{Cell, Lattice};
 use super::neighbour_check::{Board, Placed};
 use super::pipeline::{Cut, Identified, detect_coded};
 use super::smoothed::{as_before, smoothed};
 use super::types::{CircleDetection, Options, Outcome, Reason};
-use crate::detect::{Detection, Picture, Sizes};
+use crate::detect::size_seen::{Counted, beyond, other_rows, other_size};
+use crate::detect::{Detection, Outline, Picture, Sizes};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::{Marker, Plate};
 
@@ -32,6 +34,8 @@ const OFF_LATTICE: f64 = 0.2;
 const SMALLEST_PX: f64 = 1.5;
 /// Smoothings that are tried where edges are not blurred steps, px.
 const SMOOTHINGS_PX: [f64; 2] = [0.7, 1.0];
+/// Lines beyond the lattice at which dots of the plate are looked for.
+const FURTHER: i32 = 4;
 /// A stated radius and the one seen differ by no more than this, as a logarithm.
 const RADIUS_OFF: f64 = 0.4;
 
@@ -51,13 +55,15 @@ pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Resul
         if !spoilt(&best) {
             break;
         }
-        let (mut found, other) = grid.look(&smoothed(picture, sigma_px), options)?;
-        leave_out_glare(&mut found, picture.full_scale);
+        let (found, other) = grid.look(&smoothed(picture, sigma_px), options)?;
         if found.found.len() > best.found.len() {
-            (best, facts) = (as_before(found, sigma_px), other);
+            best = as_before(found, sigma_px);
+            allow_for_glare(&mut best, picture.full_scale, sigma_px);
+            facts = other;
         }
     }
     let mut detection = Detection::from(best);
+    detection.say(&facts);
     if let Some(circles) = &mut detection.circles {
         circles.sizes = facts.sizes;
     }
@@ -65,6 +71,22 @@ pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Resul
         detection.notices.push(symmetric_notice());
     }
     Ok(detection)
+}
+
+impl Detection {
+    /// What is known of the size of the grid.
+    fn say(&mut self, facts: &Facts) {
+        let is_found = |id: u32| self.observations.iter().any(|o| o.marker == id);
+        let ambiguous = self.failure.as_ref().is_some_and(|f| f.code == Code::PlateIncomplete);
+        match &facts.other_size {
+            Some(error) if ambiguous => (self.outline, self.failure) = (Outline::OtherSize, Some(error.clone())),
+            None if ambiguous && facts.cut => self.failure = Some(cut_grid()),
+            _ => {
+                self.outline = outline(&facts.outer, is_found);
+                self.size_seen = facts.size.filter(|_| self.outline == Outline::LineMissing);
+            }
+        }
+    }
 }
 
 /// Dots are missing, or seen but not measured.
@@ -79,6 +101,14 @@ struct Facts {
     /// It looks the same after a turn.
     symmetric: bool,
     sizes: Sizes,
+    /// Columns and rows of dots, where all ends are in view.
+    size: Option<[u32; 2]>,
+    /// Why it is not the grid of the plate.
+    other_size: Option<Error>,
+    /// The dots reach the border of the picture.
+    cut: bool,
+    /// The outer lines of the plate.
+    outer: Vec<Vec<Outer>>,
 }
 
 /// A plate of dots on a square lattice.
@@ -158,6 +188,14 @@ impl<'a> Grid<'a> {
             Told::Nothing => lattice.cells.keys().map(|cell| (*cell, Some(0))).collect(),
         };
         let (mut laid, outcome) = place(&code, &self.cells, &classes);
+        let shape = seen(picture, lattice, candidates);
+        let mut facts = Facts { cut: shape.is_some_and(|(_, in_view)| !in_view), ..Facts::default() };
+        let shape = shape.filter(|(_, in_view)| *in_view).map(|(shape, _)| shape);
+        facts.size = shape.and_then(Shape::columns_and_rows);
+        facts.other_size = self.other_size(shape, lattice, laid.first(), outcome);
+        if facts.other_size.is_some() {
+            return Ok((self.identified(self.plate.clone(), Board::new(), Outcome::Ambiguous)?, facts));
+        }
         let outline_tells = laid.len() == 1;
         if let (Told::Nothing, Some(any)) = (&told, laid.first()) {
             dots.add(missing_dots(picture, lattice, candidates, (any, &self.cells), &dots.usual));
@@ -165,7 +203,7 @@ impl<'a> Grid<'a> {
             laid.retain(|l| first.as_ref() == Some(&others(l, &dots)));
         }
         let Some(chosen) = laid.iter().min_by(|a, b| a.lean(lattice).total_cmp(&b.lean(lattice))) else {
-            return nothing(outcome);
+            return Ok((self.identified(self.plate.clone(), Board::new(), outcome)?, facts));
         };
         let plate = match told {
             Told::Radii | Told::Places => plate,
@@ -181,8 +219,55 @@ impl<'a> Grid<'a> {
             Told::Radii => Sizes::default(),
             Told::Places | Told::Nothing => self.sizes(&plate, &dots),
         };
-        let sizes = if outline_tells { Sizes { large: Vec::new(), ..sizes } } else { sizes };
-        Ok((self.identified(plate, board, outcome)?, Facts { symmetric: laid.len() > 1, sizes }))
+        facts.sizes = if outline_tells { Sizes { large: Vec::new(), ..sizes } } else { sizes };
+        facts.symmetric = laid.len() > 1;
+        facts.outer = self.outer(picture, lattice, candidates, chosen);
+        Ok((self.identified(plate, board, outcome)?, facts))
+    }
+
+    /// Why the dots are not those of the plate by their number, where they lie on it as `laid` says, or nowhere.
+    fn other_size(
+        &self,
+        shape: Option<Shape>,
+        lattice: &Lattice,
+        laid: Option<&Laid>,
+        outcome: Outcome,
+    ) -> Option<Error> {
+        let stated = Extent::of(self.cells.iter().copied())?;
+        let goes_on = |laid: &Laid| {
+            let on_plate: BTreeSet<Cell> = lattice.cells.keys().map(|cell| laid.apply(*cell)).collect();
+            let there = |line: &Vec<Cell>| line.iter().filter(|cell| on_plate.contains(cell)).count();
+            stated.sides(true).iter().any(|line| 2 * there(line) >= line.len())
+        };
+        let goes_on = laid.map_or(outcome == Outcome::Ambiguous, goes_on);
+        let other = shape.filter(|shape| goes_on && !shape.is_as(stated.shape));
+        let (of_plate, stated) = (stated.shape.columns_and_rows()?, stated.shape);
+        match other.map(|shape| (shape.asymmetric, shape.columns_and_rows())) {
+            Some((asymmetric, Some(seen))) => {
+                let counted = if asymmetric { Counted::ShiftedDots } else { Counted::Dots };
+                let alike = asymmetric == stated.asymmetric;
+                Some(if alike { other_size(counted, seen, of_plate) } else { other_rows(counted, seen) })
+            }
+            Some((_, None)) => None,
+            None => (goes_on && laid.is_some()).then(|| beyond(of_plate)),
+        }
+    }
+
+    /// The outer lines of the plate, and which of their dots should be in view.
+    fn outer(&self, picture: &Picture, lattice: &Lattice, candidates: &[Candidate], laid: &Laid) -> Vec<Vec<Outer>> {
+        let Some(stated) = Extent::of(self.cells.iter().copied()) else { return Vec::new() };
+        let range = |pick: fn(&Cell) -> i32| {
+            let all = lattice.cells.keys().map(pick);
+            all.clone().min().unwrap_or(0) - FURTHER..=all.max().unwrap_or(0) + FURTHER
+        };
+        let around = range(|c| c.0).flat_map(|i| range(|c| c.1).map(move |j| (i, j)));
+        let on_lattice: BTreeMap<Cell, Cell> = around.map(|cell| (laid.apply(cell), cell)).collect();
+        let outer = |cell: &Cell| {
+            let marker = self.cells.iter().position(|c| c == cell)?;
+            let in_view = |at: &Cell| is_in_view(picture, lattice, candidates, *at);
+            Some((self.plate.markers[marker].id, on_lattice.get(cell).is_some_and(in_view)))
+        };
+        stated.sides(false).iter().map(|line| line.iter().filter_map(outer).collect()).collect()
     }
 
     fn code(&self, plate: &Plate) -> Result<MarkerCode> {
@@ -314,6 +399,15 @@ fn dots_elsewhere(seen: &[(i32, i32)]) -> Error {
             places.join(", ")
         ),
         "correct columns, rows and large (or plate.csv) of the plate file: both count from 0 at the top-left dot",
+    )
+}
+
+fn cut_grid() -> Error {
+    Error::new(
+        Code::PlateIncomplete,
+        "image",
+        "the grid of dots reaches the border of the image, and the part that is seen lies on the plate in several ways",
+        "take the image so that all dots are in view with some paper around them; are columns and rows of the plate file right?",
     )
 }
 

@@ -24,6 +24,7 @@ mod grid;
 mod grid_dots;
 mod grid_missing;
 mod grid_place;
+mod grid_seen;
 mod lattice;
 mod levels;
 mod local_map;

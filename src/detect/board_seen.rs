@@ -1,0 +1,130 @@
+//! How large the chessboard in a picture is, whatever the plate file says.
+//!
+//! The squares go on as long as the cells of a further line alternate in their two colours, and end in view where they do not.
+
+use super::Picture;
+use super::board_labels::{BoardSize, Lattice, Shades, bounds};
+use super::size_seen::{Counted, end_to_end, other_size};
+use crate::error::Error;
+
+/// Lines beyond the corners that were found at which the squares are looked for.
+const REACH: i32 = 8;
+/// Mean agreement with the two colours of squares of a board, and of a line beyond its end: three uniform cells have a third.
+const SQUARES: f64 = 0.5;
+const NO_SQUARES: f64 = 0.35;
+/// Share of a line that must be in view.
+const IN_VIEW: f64 = 0.5;
+
+/// What lies beyond the last corners of one side.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Beyond {
+    Squares,
+    /// The board ends.
+    Nothing,
+    /// The border of the picture, or something that is neither.
+    Unclear,
+}
+
+/// The part of the lattice that is a board.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BoardSeen {
+    /// Least and largest coordinate of its inner corners along u and v.
+    range: [[i32; 2]; 2],
+    /// Whether it ends there in view.
+    ends: [[bool; 2]; 2],
+}
+
+impl BoardSeen {
+    /// `None` where the lattice does not have the colours of a board.
+    pub fn of(picture: &Picture, lattice: &Lattice) -> Option<Self> {
+        let shades = Shades::read(picture, lattice, REACH)?;
+        let range = trimmed(lattice)?;
+        let even = even_cells(&shades, range).filter(|mean| mean.abs() >= SQUARES)?.signum();
+        let mut seen = Self { range, ends: [[false; 2]; 2] };
+        for (axis, end) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            seen.follow(&shades, even, axis, end);
+        }
+        Some(seen)
+    }
+
+    /// Inner corners along u and v, where all ends are in view.
+    pub fn size(&self) -> Option<[u32; 2]> {
+        Some([self.along(0)?, self.along(1)?])
+    }
+
+    /// Why it is not the board of the plate file; `None` where it may be.
+    pub fn contradiction(&self, board: BoardSize) -> Option<Error> {
+        let stated = [board.columns, board.rows].map(i32::unsigned_abs);
+        let is_stated = |[a, b]: [u32; 2]| [a, b] == stated || [b, a] == stated;
+        match (self.size(), self.along(0).or(self.along(1))) {
+            (Some(size), _) if is_stated(size) => None,
+            (Some(size), _) => Some(other_size(Counted::InnerCorners, size, stated)),
+            (None, Some(one)) if !stated.contains(&one) => Some(end_to_end(Counted::InnerCorners, one, stated)),
+            _ => None,
+        }
+    }
+
+    fn along(&self, axis: usize) -> Option<u32> {
+        let [low, high] = self.range[axis];
+        (self.ends[axis] == [true; 2]).then_some((high - low + 1).unsigned_abs())
+    }
+
+    /// Takes lines up to the end of the squares.
+    fn follow(&mut self, shades: &Shades, even: f64, axis: usize, end: usize) {
+        for _ in 1..REACH {
+            match self.beyond(shades, even, axis, end) {
+                Beyond::Squares => self.range[axis][end] += if end == 0 { -1 } else { 1 },
+                Beyond::Nothing => {
+                    self.ends[axis][end] = true;
+                    return;
+                }
+                Beyond::Unclear => return,
+            }
+        }
+    }
+
+    /// The next line of cells after the squares around the last corners; `even`: shade of the cells with an even sum.
+    fn beyond(&self, shades: &Shades, even: f64, axis: usize, end: usize) -> Beyond {
+        let along = if end == 0 { self.range[axis][0] - 2 } else { self.range[axis][1] + 1 };
+        let [low, high] = self.range[1 - axis];
+        let cells = (low - 1..=high).map(|other| if axis == 0 { (along, other) } else { (other, along) });
+        let signed = |(u, v): (i32, i32)| shades.at((u, v)).map(|shade| even * parity(u, v) * shade);
+        let seen: Vec<f64> = cells.filter_map(signed).collect();
+        let mean = seen.iter().sum::<f64>() / seen.len().max(1) as f64;
+        match seen.len() as f64 >= IN_VIEW * f64::from(high - low + 2) {
+            true if mean >= SQUARES => Beyond::Squares,
+            true if mean.abs() <= NO_SQUARES => Beyond::Nothing,
+            _ => Beyond::Unclear,
+        }
+    }
+}
+
+fn parity(u: i32, v: i32) -> f64 {
+    if (u + v).rem_euclid(2) == 0 { 1.0 } else { -1.0 }
+}
+
+/// Mean shade of the squares between the corners, those with an odd sum with the other sign.
+fn even_cells(shades: &Shades, [[u0, u1], [v0, v1]]: [[i32; 2]; 2]) -> Option<f64> {
+    let cells = (v0..v1).flat_map(|v| (u0..u1).map(move |u| (u, v)));
+    let seen: Vec<f64> = cells.filter_map(|(u, v)| Some(parity(u, v) * shades.at((u, v))?)).collect();
+    (!seen.is_empty()).then(|| seen.iter().sum::<f64>() / seen.len() as f64)
+}
+
+/// The corners without outer lines of which less than half is there.
+fn trimmed(lattice: &Lattice) -> Option<[[i32; 2]; 2]> {
+    let (low, high) = bounds(lattice)?;
+    let mut range = [[low.0, high.0], [low.1, high.1]];
+    loop {
+        let thin = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().find(|&(axis, end)| {
+            let [from, to] = range[1 - axis];
+            let at = range[axis][end];
+            let key = |other| if axis == 0 { (at, other) } else { (other, at) };
+            2 * (from..=to).filter(|other| lattice.contains_key(&key(*other))).count() < (to - from + 1) as usize
+        });
+        let Some((axis, end)) = thin else { return Some(range) };
+        range[axis][end] += if end == 0 { 1 } else { -1 };
+        if range[axis][0] >= range[axis][1] {
+            return None;
+        }
+    }
+}

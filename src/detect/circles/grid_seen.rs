@@ -1,0 +1,177 @@
+//! How large the grid of dots in a picture is, whatever the plate file says.
+
+use std::collections::BTreeSet;
+
+use super::candidate::Candidate;
+use super::lattice::{Cell, Lattice};
+use crate::detect::{Outline, Picture};
+
+/// Share of its dots that a grid must show to count as one, and share of the lattice that must belong to it.
+const FILLED: f64 = 0.9;
+/// Share of a line that must be there, or in view.
+const MOST: f64 = 0.5;
+/// A line of which a smaller share of the dots in view is found is missing, where so many are in view.
+const MISSING: f64 = 0.3;
+const LEAST_IN_VIEW: usize = 3;
+
+/// Lines of dots one way and the other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Shape {
+    /// Every other row is shifted: the lines are the diagonals of the lattice, with every other place empty.
+    pub asymmetric: bool,
+    pub lines: [i32; 2],
+}
+
+impl Shape {
+    pub fn is_as(self, other: Self) -> bool {
+        let [a, b] = other.lines;
+        self.asymmetric == other.asymmetric && (self.lines == [a, b] || self.lines == [b, a])
+    }
+
+    /// Columns and rows as a plate file states them, in either order where the dots leave it open; `None` where no plate file can.
+    pub fn columns_and_rows(self) -> Option<[u32; 2]> {
+        let [a, b] = self.lines.map(i32::unsigned_abs);
+        match (self.asymmetric, a % 2, b % 2) {
+            (false, ..) => Some([a, b]),
+            // the dots of a row are two steps apart
+            (true, 0, _) => Some([a / 2, b]),
+            (true, _, 0) => Some([b / 2, a]),
+            _ => None,
+        }
+    }
+}
+
+/// The shape that cells make, and the part of the lattice that is in it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extent {
+    pub shape: Shape,
+    low: [i32; 2],
+}
+
+impl Extent {
+    /// `None` where too many places of the shape are empty.
+    pub fn of(cells: impl Iterator<Item = Cell> + Clone) -> Option<Self> {
+        [false, true].into_iter().find_map(|asymmetric| Self::among(cells.clone(), asymmetric))
+    }
+
+    fn among(cells: impl Iterator<Item = Cell>, asymmetric: bool) -> Option<Self> {
+        let places: BTreeSet<[i32; 2]> = cells.map(|cell| on_lines(cell, asymmetric)).collect();
+        let range = trimmed(&places, asymmetric)?;
+        let lines = range.map(|[low, high]| high - low + 1);
+        let inside = |p: &&[i32; 2]| (0..2).all(|a| (range[a][0]..=range[a][1]).contains(&p[a]));
+        let wanted = f64::from(lines[0] * lines[1]) / if asymmetric { 2.0 } else { 1.0 };
+        let there = places.iter().filter(inside).count() as f64;
+        let filled = there >= FILLED * wanted.max(places.len() as f64);
+        (filled && lines[0].min(lines[1]) > 1)
+            .then_some(Self { shape: Shape { asymmetric, lines }, low: [range[0][0], range[1][0]] })
+    }
+
+    /// The cells of the outer lines of the shape, and of the next lines beyond them.
+    pub fn sides(&self, beyond: bool) -> [Vec<Cell>; 4] {
+        let out = i32::from(beyond);
+        let line = |axis: usize, at: i32| {
+            let all = (0..self.shape.lines[1 - axis]).map(|k| {
+                let other = self.low[1 - axis] + k;
+                if axis == 0 { [at, other] } else { [other, at] }
+            });
+            all.filter_map(|place| from_lines(place, self.shape.asymmetric)).collect()
+        };
+        let last = |axis: usize| self.low[axis] + self.shape.lines[axis] - 1;
+        [line(0, self.low[0] - out), line(0, last(0) + out), line(1, self.low[1] - out), line(1, last(1) + out)]
+    }
+}
+
+/// Places of cells among the lines of a shape.
+fn on_lines((i, j): Cell, asymmetric: bool) -> [i32; 2] {
+    if asymmetric { [i - j, i + j] } else { [i, j] }
+}
+
+/// `None` for the places between dots.
+fn from_lines([a, b]: [i32; 2], asymmetric: bool) -> Option<Cell> {
+    match asymmetric {
+        true => ((a + b).rem_euclid(2) == 0).then(|| ((a + b) / 2, (b - a) / 2)),
+        false => Some((a, b)),
+    }
+}
+
+/// Without outer lines of which less than half is there: something else than dots.
+fn trimmed(places: &BTreeSet<[i32; 2]>, asymmetric: bool) -> Option<[[i32; 2]; 2]> {
+    let bounds = |axis: usize| {
+        let all = places.iter().map(|p| p[axis]);
+        Some([all.clone().min()?, all.max()?])
+    };
+    let mut range = [bounds(0)?, bounds(1)?];
+    loop {
+        let thin = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().find(|&(axis, end)| {
+            let ([from, to], at) = (range[1 - axis], range[axis][end]);
+            let place = |other| if axis == 0 { [at, other] } else { [other, at] };
+            let there = (from..=to).filter(|other| places.contains(&place(*other))).count() as f64;
+            let wanted = f64::from(to - from + 1) / if asymmetric { 2.0 } else { 1.0 };
+            there < MOST * wanted
+        });
+        let Some((axis, end)) = thin else { return Some(range) };
+        range[axis][end] += if end == 0 { 1 } else { -1 };
+        if range[axis][0] >= range[axis][1] {
+            return None;
+        }
+    }
+}
+
+/// Whether a dot in a cell of the lattice would be in view, by the nearest one that is there.
+pub(super) fn is_in_view(picture: &Picture, lattice: &Lattice, candidates: &[Candidate], (i, j): Cell) -> bool {
+    let nearest = lattice.cells.iter().min_by_key(|((a, b), _)| (a - i).pow(2) + (b - j).pow(2));
+    let Some(((a, b), site)) = nearest else { return false };
+    let ellipse = &candidates[site.candidate].ellipse;
+    let (across, down) = (f64::from(i - a), f64::from(j - b));
+    let uv = [0, 1].map(|k| ellipse.centre[k] + across * site.basis[0][k] + down * site.basis[1][k]);
+    let (half, size) = (ellipse.half_extent(), [picture.width, picture.height].map(|n| n as f64 - 1.0));
+    (0..2).all(|k| uv[k] - 1.5 * half[k] > 0.0 && uv[k] + 1.5 * half[k] < size[k])
+}
+
+/// The shape of the dots in the picture, and whether all its ends are in view.
+pub(super) fn seen(picture: &Picture, lattice: &Lattice, candidates: &[Candidate]) -> Option<(Shape, bool)> {
+    let extent = Extent::of(lattice.cells.keys().copied())?;
+    let in_view = |cell: &&Cell| is_in_view(picture, lattice, candidates, **cell);
+    let ends = |line: &Vec<Cell>| line.iter().filter(in_view).count() as f64 >= MOST * line.len() as f64;
+    Some((extent.shape, extent.sides(true).iter().all(ends)))
+}
+
+/// A dot of an outer line: its id, and whether it should be in view.
+pub(super) type Outer = (u32, bool);
+
+/// What the dots that were found say about the outer lines.
+pub(super) fn outline(lines: &[Vec<Outer>], is_found: impl Fn(u32) -> bool) -> Outline {
+    let found = |line: &[Outer]| line.iter().filter(|(id, _)| is_found(*id)).count();
+    let visible = |line: &[Outer]| line.iter().filter(|(id, in_view)| *in_view || is_found(*id)).count();
+    let missing =
+        |line: &Vec<Outer>| visible(line) >= LEAST_IN_VIEW && (found(line) as f64) < MISSING * visible(line) as f64;
+    if lines.iter().any(missing) {
+        Outline::LineMissing
+    } else if !lines.is_empty() && lines.iter().all(|line| found(line) as f64 >= MOST * line.len() as f64) {
+        Outline::Whole
+    } else {
+        Outline::Open
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_make_a_shape_with_some_of_them_missing_and_others_beside_it() {
+        let square: Vec<Cell> = (0..7).flat_map(|i| (0..5).map(move |j| (i - 2, j + 4))).collect();
+        let shifted: Vec<Cell> =
+            (0..8).flat_map(|a| (0..11).map(move |b| [a, b])).filter_map(|place| from_lines(place, true)).collect();
+        for (cells, asymmetric, lines, size) in [(square, false, [7, 5], [7, 5]), (shifted, true, [8, 11], [4, 11])] {
+            let more = cells.iter().copied().filter(|c| *c != cells[9]).chain([(20, 5)]);
+            let extent = Extent::of(more).unwrap();
+            assert_eq!(extent.shape, Shape { asymmetric, lines });
+            assert_eq!(extent.shape.columns_and_rows(), Some(size));
+            let rim = extent.sides(false);
+            assert!(rim.iter().flatten().all(|cell| cells.contains(cell)), "{rim:?}");
+            assert!(extent.sides(true).iter().flatten().all(|cell| !cells.contains(cell)));
+        }
+        assert!(Extent::of((0..9).map(|k| (k, k))).is_none());
+    }
+}
