@@ -5,6 +5,7 @@
 //! the top-left square, a square is dark when r + c is even.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use super::Picture;
 use crate::geom::PlaneMap;
@@ -14,6 +15,13 @@ use crate::geom::PlaneMap;
 const WRONG_COLOUR: f64 = 3.0;
 /// Least mean agreement (-1 to 1) of the visible squares.
 const LEAST_AGREEMENT: f64 = 0.65;
+
+/// Cells whose shades agree less with the two colours in turn are no squares: three uniform ones do by a third.
+const NO_SQUARES: f64 = 0.35;
+/// Mean shade of paper.
+const PAPER: f64 = 0.5;
+/// Where in a cell beyond the board paper is looked for, in squares from the side of the board.
+const NEAR: f64 = 0.25;
 
 /// Corners further from the map of all than this share of a square show that the lens bends the board.
 const BENT: f64 = 0.1;
@@ -148,10 +156,13 @@ struct Scored {
 
 /// Finds where the lattice lies on the board from the colours of the squares.
 pub(super) fn label(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Labelling {
-    let Some(shades) = Shades::read(picture, lattice, board.columns.max(board.rows) + 1) else {
-        return Labelling::Contradiction;
-    };
-    choose(lattice, &shades, board)
+    let reach = board.columns.max(board.rows) + 1;
+    let shades = Shader::of(picture, lattice).and_then(|shader| {
+        let mut shades = Shades::read(&shader, reach)?;
+        shades.forget_covered(&shader);
+        Some(shades)
+    });
+    shades.map_or(Labelling::Contradiction, |shades| choose(lattice, &shades, board))
 }
 
 fn choose(lattice: &Lattice, shades: &Shades, board: BoardSize) -> Labelling {
@@ -223,8 +234,55 @@ pub(super) fn bounds(lattice: &Lattice) -> Option<((i32, i32), (i32, i32))> {
     Some(((us.clone().min()?, vs.clone().min()?), (us.max()?, vs.max()?)))
 }
 
-/// Shade of every lattice cell in view: -1 as dark as the dark squares near it, 1 as light as the light ones.
-pub(super) struct Shades {
+/// What a line of cells shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Line {
+    /// The two colours in turn, at least along a part of it.
+    Squares,
+    Paper,
+    /// Neither.
+    Covered,
+}
+
+/// Reads the shade of lattice cells: -1 as dark as the dark squares near it, 1 as light as the light ones.
+pub(super) struct Shader<'a> {
+    picture: &'a Picture,
+    maps: Maps<'a>,
+    inner: Vec<((i32, i32), f64)>,
+}
+
+impl<'a> Shader<'a> {
+    pub fn of(picture: &'a Picture, lattice: &'a Lattice) -> Option<Self> {
+        Some(Self { picture, maps: Maps::of(lattice)?, inner: inner_cells(picture, lattice) })
+    }
+
+    /// At a place within a cell, whose corners are 0 and 1; `None` out of view.
+    pub fn at(&self, cell: (i32, i32), place: [f64; 2]) -> Option<f64> {
+        relative_shade(brightness(self.picture, self.maps.place(cell, place)?)?, cell, &self.inner)
+    }
+
+    /// The cells of a line beyond the end (0: the lesser) of an axis, at their side towards the lattice: there may be little paper. With the
+    /// mean of the shades, those of cells with an odd sum with the other sign, and their number; `None` where none is in view.
+    pub fn line(&self, [axis, end]: [usize; 2], at: i32, across: RangeInclusive<i32>) -> Option<(Line, f64, usize)> {
+        let near = if end == 0 { 1.0 - NEAR } else { NEAR };
+        let place = if axis == 0 { [near, 0.5] } else { [0.5, near] };
+        let cells = across.map(|other| if axis == 0 { (at, other) } else { (other, at) });
+        let seen: Vec<(f64, f64)> = cells
+            .filter_map(|(u, v)| Some((self.at((u, v), place)?, f64::from(1 - 2 * (u + v).rem_euclid(2)))))
+            .collect();
+        let mean = |of: fn(&(f64, f64)) -> f64| seen.iter().map(of).sum::<f64>() / seen.len() as f64;
+        let alternating = mean(|(shade, sign)| shade * sign);
+        let line = match mean(|(shade, _)| *shade) {
+            _ if alternating.abs() > NO_SQUARES => Line::Squares,
+            shade if shade < PAPER => Line::Covered,
+            _ => Line::Paper,
+        };
+        (!seen.is_empty()).then_some((line, alternating, seen.len()))
+    }
+}
+
+/// Shade of every lattice cell in view.
+struct Shades {
     origin: (i32, i32),
     width: i32,
     values: Vec<Option<f64>>,
@@ -232,24 +290,53 @@ pub(super) struct Shades {
 
 impl Shades {
     /// Reads the cells up to `reach` beyond the lattice.
-    pub fn read(picture: &Picture, lattice: &Lattice, reach: i32) -> Option<Self> {
-        let (low, high) = bounds(lattice)?;
-        let maps = Maps::of(lattice)?;
-        let inner = inner_cells(picture, lattice);
+    fn read(shader: &Shader, reach: i32) -> Option<Self> {
+        let (low, high) = bounds(shader.maps.lattice)?;
         let origin = (low.0 - reach, low.1 - reach);
         let (width, height) = (high.0 - low.0 + 2 * reach + 1, high.1 - low.1 + 2 * reach + 1);
         let cells = (0..height).flat_map(|j| (0..width).map(move |i| (origin.0 + i, origin.1 + j)));
-        let values = cells
-            .map(|cell| {
-                let centre = maps.centre(cell)?;
-                relative_shade(brightness(picture, centre)?, cell, &inner)
-            })
-            .collect();
+        let values = cells.map(|cell| shader.at(cell, [0.5; 2])).collect();
         Some(Self { origin, width, values })
     }
 
-    /// `None` out of view.
-    pub fn at(&self, (u, v): (i32, i32)) -> Option<f64> {
+    /// Leaves out the lines beyond the lattice that show neither squares nor paper: something lies there, and the board may go on below.
+    fn forget_covered(&mut self, shader: &Shader) {
+        let Some((low, high)) = bounds(shader.maps.lattice) else { return };
+        for (side, first, step) in
+            [([0, 0], low.0 - 2, -1), ([0, 1], high.0 + 1, 1), ([1, 0], low.1 - 2, -1), ([1, 1], high.1 + 1, 1)]
+        {
+            let across = if side[0] == 0 { low.1 - 1..=high.1 } else { low.0 - 1..=high.0 };
+            let mut line = first;
+            while self.has(side[0], line)
+                && let Some((look, ..)) = shader.line(side, line, across.clone())
+                && look != Line::Paper
+            {
+                if look == Line::Covered {
+                    self.forget(side[0], line);
+                }
+                line += step;
+            }
+        }
+    }
+
+    fn has(&self, axis: usize, line: i32) -> bool {
+        let height = self.values.len() as i32 / self.width;
+        let [first, count] = if axis == 0 { [self.origin.0, self.width] } else { [self.origin.1, height] };
+        (first..first + count).contains(&line)
+    }
+
+    fn forget(&mut self, axis: usize, line: i32) {
+        let (width, [u0, v0]) = (self.width, [self.origin.0, self.origin.1]);
+        for (k, value) in (0..).zip(&mut self.values) {
+            let at = if axis == 0 { u0 + k % width } else { v0 + k / width };
+            if at == line {
+                *value = None;
+            }
+        }
+    }
+
+    /// `None` out of view, or covered.
+    fn at(&self, (u, v): (i32, i32)) -> Option<f64> {
         let (i, j) = (u - self.origin.0, v - self.origin.1);
         if i < 0 || j < 0 || i >= self.width {
             return None;
@@ -278,9 +365,9 @@ impl<'a> Maps<'a> {
         Some(Self { lattice, whole, bent })
     }
 
-    /// Where the middle of a cell lies, px.
-    fn centre(&self, (u, v): (i32, i32)) -> Option<[f64; 2]> {
-        let at = [f64::from(u) + 0.5, f64::from(v) + 0.5];
+    /// Where a place within a cell lies, px.
+    fn place(&self, (u, v): (i32, i32), [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+        let at = [f64::from(u) + x, f64::from(v) + y];
         if self.bent
             && let Some(near) = self.around((u, v))
         {

@@ -3,15 +3,14 @@
 //! The squares go on as long as the cells of a further line alternate in their two colours, and end in view where they do not.
 
 use super::Picture;
-use super::board_labels::{BoardSize, Lattice, Shades, bounds};
+use super::board_labels::{BoardSize, Lattice, Line, Shader, bounds};
 use super::size_seen::{Counted, end_to_end, other_size};
 use crate::error::Error;
 
 /// Lines beyond the corners that were found at which the squares are looked for.
 const REACH: i32 = 8;
-/// Mean agreement with the two colours of squares of a board, and of a line beyond its end: three uniform cells have a third.
+/// Mean agreement with the two colours of squares of a board.
 const SQUARES: f64 = 0.5;
-const NO_SQUARES: f64 = 0.35;
 /// Share of a line that must be in view.
 const IN_VIEW: f64 = 0.5;
 
@@ -19,7 +18,7 @@ const IN_VIEW: f64 = 0.5;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Beyond {
     Squares,
-    /// The board ends.
+    /// The board ends: paper, or what it is fixed to.
     Nothing,
     /// The border of the picture, or something that is neither.
     Unclear,
@@ -37,12 +36,12 @@ pub(super) struct BoardSeen {
 impl BoardSeen {
     /// `None` where the lattice does not have the colours of a board.
     pub fn of(picture: &Picture, lattice: &Lattice) -> Option<Self> {
-        let shades = Shades::read(picture, lattice, REACH)?;
+        let shader = Shader::of(picture, lattice)?;
         let range = trimmed(lattice)?;
-        let even = even_cells(&shades, range).filter(|mean| mean.abs() >= SQUARES)?.signum();
+        let even = even_cells(&shader, range).filter(|mean| mean.abs() >= SQUARES)?.signum();
         let mut seen = Self { range, ends: [[false; 2]; 2] };
         for (axis, end) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            seen.follow(&shades, even, axis, end);
+            seen.follow(&shader, even, axis, end);
         }
         Some(seen)
     }
@@ -70,9 +69,9 @@ impl BoardSeen {
     }
 
     /// Takes lines up to the end of the squares.
-    fn follow(&mut self, shades: &Shades, even: f64, axis: usize, end: usize) {
+    fn follow(&mut self, shader: &Shader, even: f64, axis: usize, end: usize) {
         for _ in 1..REACH {
-            match self.beyond(shades, even, axis, end) {
+            match self.beyond(shader, even, axis, end) {
                 Beyond::Squares => self.range[axis][end] += if end == 0 { -1 } else { 1 },
                 Beyond::Nothing => {
                     self.ends[axis][end] = true;
@@ -84,16 +83,13 @@ impl BoardSeen {
     }
 
     /// The next line of cells after the squares around the last corners; `even`: shade of the cells with an even sum.
-    fn beyond(&self, shades: &Shades, even: f64, axis: usize, end: usize) -> Beyond {
-        let along = if end == 0 { self.range[axis][0] - 2 } else { self.range[axis][1] + 1 };
+    fn beyond(&self, shader: &Shader, even: f64, axis: usize, end: usize) -> Beyond {
+        let at = if end == 0 { self.range[axis][0] - 2 } else { self.range[axis][1] + 1 };
         let [low, high] = self.range[1 - axis];
-        let cells = (low - 1..=high).map(|other| if axis == 0 { (along, other) } else { (other, along) });
-        let signed = |(u, v): (i32, i32)| shades.at((u, v)).map(|shade| even * parity(u, v) * shade);
-        let seen: Vec<f64> = cells.filter_map(signed).collect();
-        let mean = seen.iter().sum::<f64>() / seen.len().max(1) as f64;
-        match seen.len() as f64 >= IN_VIEW * f64::from(high - low + 2) {
-            true if mean >= SQUARES => Beyond::Squares,
-            true if mean.abs() <= NO_SQUARES => Beyond::Nothing,
+        match shader.line([axis, end], at, low - 1..=high) {
+            Some((_, _, count)) if (count as f64) < IN_VIEW * f64::from(high - low + 2) => Beyond::Unclear,
+            Some((Line::Squares, alternating, _)) if even * alternating >= SQUARES => Beyond::Squares,
+            Some((Line::Paper | Line::Covered, ..)) => Beyond::Nothing,
             _ => Beyond::Unclear,
         }
     }
@@ -104,9 +100,9 @@ fn parity(u: i32, v: i32) -> f64 {
 }
 
 /// Mean shade of the squares between the corners, those with an odd sum with the other sign.
-fn even_cells(shades: &Shades, [[u0, u1], [v0, v1]]: [[i32; 2]; 2]) -> Option<f64> {
+fn even_cells(shader: &Shader, [[u0, u1], [v0, v1]]: [[i32; 2]; 2]) -> Option<f64> {
     let cells = (v0..v1).flat_map(|v| (u0..u1).map(move |u| (u, v)));
-    let seen: Vec<f64> = cells.filter_map(|(u, v)| Some(parity(u, v) * shades.at((u, v))?)).collect();
+    let seen: Vec<f64> = cells.filter_map(|(u, v)| Some(parity(u, v) * shader.at((u, v), [0.5; 2])?)).collect();
     (!seen.is_empty()).then(|| seen.iter().sum::<f64>() / seen.len() as f64)
 }
 

@@ -307,6 +307,13 @@ fn hardly_any_dot_beside_glare_is_beyond_its_sigmas() {
     assert!(tally.share() > 0.6, "{tally:?}");
 }
 
+/// Of a board a hand leaves six by six corners; below, it may go on beyond the border, and beside them, below the hand: its turn is open.
+#[test]
+fn a_board_that_may_go_on_below_a_hand_gets_no_ids() {
+    let tally = views("chessboard", "hand", &[1004]);
+    assert_eq!((tally.wrong, tally.found), (0, 0), "{tally:?}");
+}
+
 #[test]
 fn no_board_gets_a_wrong_id() {
     for (kind, text) in BOARDS {

@@ -321,9 +321,9 @@ fn shifted_rows_are_named_and_columns_and_rows_exchanged_are_a_quarter_turn() {
 
 #[test]
 fn a_grid_that_the_border_cuts_does_not_tell_its_size() {
-    let picture = shown(&printed(&grid("columns = 16\nrows = 12"), &[], &[]), 2, 0.5);
-    for stated in ["columns = 16\nrows = 12", "columns = 17\nrows = 12"] {
-        let error = detect(&picture, &grid(stated)).expect_err("too near");
+    let picture = shown(&printed(&grid("columns = 20\nrows = 20"), &[], &[]), 2, 0.35);
+    for stated in ["columns = 20\nrows = 20", "columns = 21\nrows = 20", "columns = 14\nrows = 10"] {
+        let error = detect(&picture, &grid(stated)).expect_err(stated);
         assert_eq!(error.code, Code::PlateIncomplete, "{error}");
     }
 }

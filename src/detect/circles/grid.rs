@@ -17,7 +17,7 @@ use super::glare::allow_for_glare;
 use super::grid_dots::{Dot, Dots};
 use super::grid_missing::missing_dots;
 use super::grid_place::{Classes, Laid, place};
-use super::grid_seen::{Extent, Outer, Shape, is_in_view, outline, seen};
+use super::grid_seen::{Extent, Outer, Shape, View, outline};
 use super::lattice::{Cell, Lattice};
 use super::neighbour_check::{Board, Placed};
 use super::pipeline::{Cut, Identified, detect_coded};
@@ -105,7 +105,7 @@ struct Facts {
     size: Option<[u32; 2]>,
     /// Why it is not the grid of the plate.
     other_size: Option<Error>,
-    /// The dots reach the border of the picture.
+    /// Not all of them end in view.
     cut: bool,
     /// The outer lines of the plate.
     outer: Vec<Vec<Outer>>,
@@ -188,7 +188,8 @@ impl<'a> Grid<'a> {
             Told::Nothing => lattice.cells.keys().map(|cell| (*cell, Some(0))).collect(),
         };
         let (mut laid, outcome) = place(&code, &self.cells, &classes);
-        let shape = seen(picture, lattice, candidates);
+        let view = View { picture, lattice, candidates };
+        let shape = view.shape();
         let mut facts = Facts { cut: shape.is_some_and(|(_, in_view)| !in_view), ..Facts::default() };
         let shape = shape.filter(|(_, in_view)| *in_view).map(|(shape, _)| shape);
         facts.size = shape.and_then(Shape::columns_and_rows);
@@ -221,7 +222,7 @@ impl<'a> Grid<'a> {
         };
         facts.sizes = if outline_tells { Sizes { large: Vec::new(), ..sizes } } else { sizes };
         facts.symmetric = laid.len() > 1;
-        facts.outer = self.outer(picture, lattice, candidates, chosen);
+        facts.outer = self.outer(&view, chosen);
         Ok((self.identified(plate, board, outcome)?, facts))
     }
 
@@ -253,19 +254,18 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// The outer lines of the plate, and which of their dots should be in view.
-    fn outer(&self, picture: &Picture, lattice: &Lattice, candidates: &[Candidate], laid: &Laid) -> Vec<Vec<Outer>> {
+    /// The outer lines of the plate, and of which of their dots there is only paper.
+    fn outer(&self, view: &View, laid: &Laid) -> Vec<Vec<Outer>> {
         let Some(stated) = Extent::of(self.cells.iter().copied()) else { return Vec::new() };
         let range = |pick: fn(&Cell) -> i32| {
-            let all = lattice.cells.keys().map(pick);
+            let all = view.lattice.cells.keys().map(pick);
             all.clone().min().unwrap_or(0) - FURTHER..=all.max().unwrap_or(0) + FURTHER
         };
         let around = range(|c| c.0).flat_map(|i| range(|c| c.1).map(move |j| (i, j)));
         let on_lattice: BTreeMap<Cell, Cell> = around.map(|cell| (laid.apply(cell), cell)).collect();
         let outer = |cell: &Cell| {
             let marker = self.cells.iter().position(|c| c == cell)?;
-            let in_view = |at: &Cell| is_in_view(picture, lattice, candidates, *at);
-            Some((self.plate.markers[marker].id, on_lattice.get(cell).is_some_and(in_view)))
+            Some((self.plate.markers[marker].id, on_lattice.get(cell).is_some_and(|at| view.is_blank(*at))))
         };
         stated.sides(false).iter().map(|line| line.iter().filter_map(outer).collect()).collect()
     }
@@ -406,8 +406,8 @@ fn cut_grid() -> Error {
     Error::new(
         Code::PlateIncomplete,
         "image",
-        "the grid of dots reaches the border of the image, and the part that is seen lies on the plate in several ways",
-        "take the image so that all dots are in view with some paper around them; are columns and rows of the plate file right?",
+        "the dots reach the border of the image, or what covers them: neither their number nor their place on the plate can be told",
+        "take the image so that all dots are in view with paper around them, and check columns and rows of the plate file",
     )
 }
 

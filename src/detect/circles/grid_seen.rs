@@ -3,11 +3,12 @@
 use std::collections::BTreeSet;
 
 use super::candidate::Candidate;
-use super::lattice::{Cell, Lattice};
+use super::lattice::{Cell, Lattice, Site};
 use crate::detect::{Outline, Picture};
 
-/// Share of its dots that a grid must show to count as one, and share of the lattice that must belong to it.
+/// Share of its dots that a grid must show to count as one, and share of the lattice that must belong to it: letters beside it may, too.
 const FILLED: f64 = 0.9;
+const OF_LATTICE: f64 = 0.7;
 /// Share of a line that must be there, or in view.
 const MOST: f64 = 0.5;
 /// A line of which a smaller share of the dots in view is found is missing, where so many are in view.
@@ -51,19 +52,21 @@ pub(super) struct Extent {
 impl Extent {
     /// `None` where too many places of the shape are empty.
     pub fn of(cells: impl Iterator<Item = Cell> + Clone) -> Option<Self> {
-        [false, true].into_iter().find_map(|asymmetric| Self::among(cells.clone(), asymmetric))
+        let shapes = [false, true].into_iter().filter_map(|asymmetric| Self::among(cells.clone(), asymmetric));
+        shapes.max_by_key(|(dots, _)| *dots).map(|(_, extent)| extent)
     }
 
-    fn among(cells: impl Iterator<Item = Cell>, asymmetric: bool) -> Option<Self> {
+    /// With the number of its dots.
+    fn among(cells: impl Iterator<Item = Cell>, asymmetric: bool) -> Option<(usize, Self)> {
         let places: BTreeSet<[i32; 2]> = cells.map(|cell| on_lines(cell, asymmetric)).collect();
         let range = trimmed(&places, asymmetric)?;
         let lines = range.map(|[low, high]| high - low + 1);
         let inside = |p: &&[i32; 2]| (0..2).all(|a| (range[a][0]..=range[a][1]).contains(&p[a]));
+        let dots = places.iter().filter(inside).count();
         let wanted = f64::from(lines[0] * lines[1]) / if asymmetric { 2.0 } else { 1.0 };
-        let there = places.iter().filter(inside).count() as f64;
-        let filled = there >= FILLED * wanted.max(places.len() as f64);
-        (filled && lines[0].min(lines[1]) > 1)
-            .then_some(Self { shape: Shape { asymmetric, lines }, low: [range[0][0], range[1][0]] })
+        let filled = dots as f64 >= (FILLED * wanted).max(OF_LATTICE * places.len() as f64);
+        let extent = Self { shape: Shape { asymmetric, lines }, low: [range[0][0], range[1][0]] };
+        (filled && lines[0].min(lines[1]) > 1).then_some((dots, extent))
     }
 
     /// The cells of the outer lines of the shape, and of the next lines beyond them.
@@ -117,32 +120,45 @@ fn trimmed(places: &BTreeSet<[i32; 2]>, asymmetric: bool) -> Option<[[i32; 2]; 2
     }
 }
 
-/// Whether a dot in a cell of the lattice would be in view, by the nearest one that is there.
-pub(super) fn is_in_view(picture: &Picture, lattice: &Lattice, candidates: &[Candidate], (i, j): Cell) -> bool {
-    let nearest = lattice.cells.iter().min_by_key(|((a, b), _)| (a - i).pow(2) + (b - j).pow(2));
-    let Some(((a, b), site)) = nearest else { return false };
-    let ellipse = &candidates[site.candidate].ellipse;
-    let (across, down) = (f64::from(i - a), f64::from(j - b));
-    let uv = [0, 1].map(|k| ellipse.centre[k] + across * site.basis[0][k] + down * site.basis[1][k]);
-    let (half, size) = (ellipse.half_extent(), [picture.width, picture.height].map(|n| n as f64 - 1.0));
-    (0..2).all(|k| uv[k] - 1.5 * half[k] > 0.0 && uv[k] + 1.5 * half[k] < size[k])
+/// The lattice in the picture.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View<'a> {
+    pub picture: &'a Picture,
+    pub lattice: &'a Lattice,
+    pub candidates: &'a [Candidate],
 }
 
-/// The shape of the dots in the picture, and whether all its ends are in view.
-pub(super) fn seen(picture: &Picture, lattice: &Lattice, candidates: &[Candidate]) -> Option<(Shape, bool)> {
-    let extent = Extent::of(lattice.cells.keys().copied())?;
-    let in_view = |cell: &&Cell| is_in_view(picture, lattice, candidates, **cell);
-    let ends = |line: &Vec<Cell>| line.iter().filter(in_view).count() as f64 >= MOST * line.len() as f64;
-    Some((extent.shape, extent.sides(true).iter().all(ends)))
+impl View<'_> {
+    /// Whether a dot in a cell would be in view, and there is paper half a step towards it from the nearest one that is there.
+    pub fn is_blank(&self, (i, j): Cell) -> bool {
+        let near = |&(&(a, b), _): &(&Cell, &Site)| (a - i).pow(2) + (b - j).pow(2);
+        let Some(((a, b), site)) = self.lattice.cells.iter().min_by_key(near) else { return false };
+        let dot = &self.candidates[site.candidate];
+        let (across, down) = (i - a, j - b);
+        let step = [0, 1].map(|k| f64::from(across) * site.basis[0][k] + f64::from(down) * site.basis[1][k]);
+        let at = |share: f64| [0, 1].map(|k| dot.ellipse.centre[k] + share * step[k]);
+        let (half, size) = (dot.ellipse.half_extent(), [self.picture.width, self.picture.height]);
+        let is_inside = |uv: [f64; 2]| (0..2).all(|k| uv[k] > half[k] + 1.0 && uv[k] + half[k] + 2.0 < size[k] as f64);
+        let [x, y] = at(0.5 / f64::from(across.abs().max(down.abs()).max(1))).map(|c| c.round() as usize);
+        is_inside(at(1.0)) && self.picture.at(x, y) > 0.5 * (dot.paper + dot.ink)
+    }
+
+    /// The shape of the dots, and whether they end in view all around.
+    pub fn shape(&self) -> Option<(Shape, bool)> {
+        let extent = Extent::of(self.lattice.cells.keys().copied())?;
+        let ends =
+            |line: &Vec<Cell>| line.iter().filter(|c| self.is_blank(**c)).count() as f64 >= MOST * line.len() as f64;
+        Some((extent.shape, extent.sides(true).iter().all(ends)))
+    }
 }
 
-/// A dot of an outer line: its id, and whether it should be in view.
+/// A dot of an outer line: its id, and whether there is paper and no dot in view.
 pub(super) type Outer = (u32, bool);
 
 /// What the dots that were found say about the outer lines.
 pub(super) fn outline(lines: &[Vec<Outer>], is_found: impl Fn(u32) -> bool) -> Outline {
     let found = |line: &[Outer]| line.iter().filter(|(id, _)| is_found(*id)).count();
-    let visible = |line: &[Outer]| line.iter().filter(|(id, in_view)| *in_view || is_found(*id)).count();
+    let visible = |line: &[Outer]| line.iter().filter(|(id, blank)| *blank || is_found(*id)).count();
     let missing =
         |line: &Vec<Outer>| visible(line) >= LEAST_IN_VIEW && (found(line) as f64) < MISSING * visible(line) as f64;
     if lines.iter().any(missing) {
