@@ -67,6 +67,32 @@ fn the_stated_covariance_covers_the_noise() {
     assert!((0.85..1.15).contains(&mean), "{mean} over {}", normalised.len());
 }
 
+/// As drawn, without a lens: some corners lie where all around is symmetric, and a fit that begins there has nowhere to move.
+#[test]
+fn corners_in_the_middle_of_a_pixel_of_a_drawing_are_found() {
+    let (columns, rows, side, middle) = (9, 7, 40.25, [320.0, 240.0]);
+    // Means over a pixel of what is inside, and of the two colours in turn.
+    let along = |at: f64, first: f64, count: f64| {
+        let steps = (0..8).map(|k| (at + (f64::from(k) + 0.5) / 8.0 - 0.5 - first) / side + 1.0);
+        let inside = steps.filter(|t| (0.0..count + 1.0).contains(t));
+        inside.fold([0.0_f64, 0.0], |[m, s], t| [m + 0.125, s + if t.rem_euclid(2.0) < 1.0 { 0.125 } else { -0.125 }])
+    };
+    let first = [middle[0] - 4.0 * side, middle[1] - 3.0 * side];
+    let pixel = |k: usize| {
+        let [mx, sx] = along((k % 640) as f64, first[0], f64::from(columns));
+        let [my, sy] = along((k / 640) as f64, first[1], f64::from(rows));
+        (255.0 - 127.5 * (mx * my + sx * sy)).round() as f32
+    };
+    let picture = Picture { width: 640, height: 480, pixels: (0..640 * 480).map(pixel).collect(), full_scale: 255.0 };
+    let detection = detect(&picture, &plate(columns, rows)).expect("a board");
+    assert_eq!(detection.observations.len(), 63, "{:?}", detection.dropped);
+    for o in &detection.observations {
+        let [c, r] = [o.marker % columns, o.marker / columns].map(f64::from);
+        let [x, y] = [first[0] + c * side - o.uv[0], first[1] + r * side - o.uv[1]];
+        assert!(x.hypot(y) < 0.02, "{}: {x} {y}", o.marker);
+    }
+}
+
 #[test]
 fn uneven_light_does_not_move_corners() {
     let even = tilted(9, 6, 0.3);
@@ -197,8 +223,9 @@ fn a_board_of_another_size_is_named_by_what_is_seen() {
         for [columns, rows] in other_sizes(size).into_iter().flat_map(|[a, b]| [[a, b], [b, a]]) {
             let error = detect(&picture, &plate(columns, rows)).expect_err("another size");
             assert_says(&error, Code::PlateContradicted, &["columns", "rows", &format!("{columns} x {rows}")]);
-            let seen = [[size[0], size[1]], [size[1], size[0]]].map(|[a, b]| format!("{a} x {b}"));
-            assert!(seen.iter().any(|s| error.what.contains(s)), "{size:?} for {columns} x {rows}: {error}");
+            let mut seen = [[size[0], size[1]], [size[1], size[0]]].into_iter();
+            let named = seen.any(|[a, b]| error.what.contains(&format!("{a} x {b}")));
+            assert!(named, "{size:?} for {columns} x {rows}: {error}");
         }
         let turned = detect(&picture, &plate(size[1], size[0])).expect("the same board after a quarter turn");
         assert_eq!(turned.observations.len(), (size[0] * size[1]) as usize);
@@ -214,7 +241,7 @@ fn a_board_of_another_size_is_named_by_what_is_seen() {
 fn a_number_that_is_seen_is_named_where_the_other_is_not() {
     let scene = Scene::new(6, 15, View::new(6, 15, [320.0, 240.0], 55.0, 0.02, [0.0, 0.0]));
     let error = detect(&scene.render(0), &plate(7, 15)).expect_err("another size");
-    assert_says(&error, Code::PlateContradicted, &["6 inner corners", "7 x 15"]);
+    assert_says(&error, Code::PlateContradicted, &["6", "7 x 15"]);
     let error = detect(&scene.render(0), &plate(6, 15)).expect_err("the place on the board is unknown");
     assert_eq!(error.code, Code::PlateIncomplete, "{error}");
 }

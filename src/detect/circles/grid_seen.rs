@@ -1,6 +1,6 @@
 //! How large the grid of dots in a picture is, whatever the plate file says.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::candidate::Candidate;
 use super::lattice::{Cell, Lattice, Site};
@@ -59,7 +59,7 @@ impl Extent {
     /// With the number of its dots.
     fn among(cells: impl Iterator<Item = Cell>, asymmetric: bool) -> Option<(usize, Self)> {
         let places: BTreeSet<[i32; 2]> = cells.map(|cell| on_lines(cell, asymmetric)).collect();
-        let range = trimmed(&places, asymmetric)?;
+        let range = trimmed(&places)?;
         let lines = range.map(|[low, high]| high - low + 1);
         let inside = |p: &&[i32; 2]| (0..2).all(|a| (range[a][0]..=range[a][1]).contains(&p[a]));
         let dots = places.iter().filter(inside).count();
@@ -97,23 +97,28 @@ fn from_lines([a, b]: [i32; 2], asymmetric: bool) -> Option<Cell> {
     }
 }
 
-/// Without outer lines of which less than half is there: something else than dots.
-fn trimmed(places: &BTreeSet<[i32; 2]>, asymmetric: bool) -> Option<[[i32; 2]; 2]> {
+/// Without outer lines that are not part of a grid: they, or the next ones, have less than half the dots of the fullest.
+fn trimmed(places: &BTreeSet<[i32; 2]>) -> Option<[[i32; 2]; 2]> {
     let bounds = |axis: usize| {
         let all = places.iter().map(|p| p[axis]);
         Some([all.clone().min()?, all.max()?])
     };
     let mut range = [bounds(0)?, bounds(1)?];
     loop {
-        let thin = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().find(|&(axis, end)| {
-            let ([from, to], at) = (range[1 - axis], range[axis][end]);
-            let place = |other| if axis == 0 { [at, other] } else { [other, at] };
-            let there = (from..=to).filter(|other| places.contains(&place(*other))).count() as f64;
-            let wanted = f64::from(to - from + 1) / if asymmetric { 2.0 } else { 1.0 };
-            there < MOST * wanted
-        });
-        let Some((axis, end)) = thin else { return Some(range) };
-        range[axis][end] += if end == 0 { 1 } else { -1 };
+        let inside = places.iter().filter(|p| (0..2).all(|a| (range[a][0]..=range[a][1]).contains(&p[a])));
+        let mut counts: [BTreeMap<i32, usize>; 2] = Default::default();
+        inside.for_each(|p| (0..2).for_each(|a| *counts[a].entry(p[a]).or_default() += 1));
+        let is_thin = |axis: usize, at: i32| {
+            let fullest = counts[axis].values().max().copied().unwrap_or(0);
+            (counts[axis].get(&at).copied().unwrap_or(0) as f64) < MOST * fullest as f64
+        };
+        let sides = [(0, 0, 1), (0, 1, -1), (1, 0, 1), (1, 1, -1)];
+        let outside = |(axis, end, inwards): &(usize, usize, i32)| {
+            let at = range[*axis][*end];
+            is_thin(*axis, at) || is_thin(*axis, at + inwards)
+        };
+        let Some((axis, end, inwards)) = sides.into_iter().find(outside) else { return Some(range) };
+        range[axis][end] += inwards;
         if range[axis][0] >= range[axis][1] {
             return None;
         }
@@ -180,7 +185,9 @@ mod tests {
         let shifted: Vec<Cell> =
             (0..8).flat_map(|a| (0..11).map(move |b| [a, b])).filter_map(|place| from_lines(place, true)).collect();
         for (cells, asymmetric, lines, size) in [(square, false, [7, 5], [7, 5]), (shifted, true, [8, 11], [4, 11])] {
-            let more = cells.iter().copied().filter(|c| *c != cells[9]).chain([(20, 5)]);
+            // letters on a line of their own
+            let beside = cells.iter().filter(|c| c.1 == cells[0].1).map(|(i, _)| (*i, 30));
+            let more = cells.iter().copied().filter(|c| *c != cells[9]).chain([(20, 5)]).chain(beside);
             let extent = Extent::of(more).unwrap();
             assert_eq!(extent.shape, Shape { asymmetric, lines });
             assert_eq!(extent.shape.columns_and_rows(), Some(size));

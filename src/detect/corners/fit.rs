@@ -9,10 +9,10 @@ use crate::linalg::wide;
 
 const MAX_STEPS: usize = 30;
 /// Before the noise is known.
-const ROUGH: Descent = Descent { tolerance_px: 1e-2, damping: 1e-3, least_share: 1.0 };
+const ROUGH: Descent = Descent { tolerance_px: 1e-2, damping: 1e-3, least_share: 1.0, rest: f64::MAX };
 /// A step below the tolerance moves no corner visibly. Slopes of the light and place of the corner are alike in a small window: damping would
 /// slow both down.
-const FINE: Descent = Descent { tolerance_px: 1e-4, damping: 1e-8, least_share: 0.1 };
+const FINE: Descent = Descent { tolerance_px: 1e-4, damping: 1e-8, least_share: 0.1, rest: 1e-5 };
 /// A greater share of a step is as good as the whole.
 const NEARLY_WHOLE: f64 = 0.8;
 /// Noise of the pixels over half the step of an edge, as long as it is not known.
@@ -54,6 +54,8 @@ struct Descent {
     damping: f64,
     /// No smaller share of a step is taken.
     least_share: f64,
+    /// What a step may still take off the mean square of the residuals over the contrast: amid symmetric pixels a corner rests at once.
+    rest: f64,
 }
 
 /// Why no corner came out of a fit.
@@ -274,9 +276,10 @@ impl Problem {
             } else {
                 damping *= 10.0;
             }
+            let rests = right.dot(&whole) <= descent.rest * self.contrast.powi(2) * part.pixels as f64;
             let next = if last > 0.0 { length * f64::min(length / last, 1.0) } else { length };
             let close = length < descent.tolerance_px || (accepted && next < descent.tolerance_px);
-            if close || damping > 1e9 {
+            if (close && rests) || damping > 1e9 {
                 return Ok(point);
             }
             last = length;
