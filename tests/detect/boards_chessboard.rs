@@ -89,7 +89,8 @@ fn corners_in_the_middle_of_a_pixel_of_a_drawing_are_found() {
     for o in &detection.observations {
         let [c, r] = [o.marker % columns, o.marker / columns].map(f64::from);
         let [x, y] = [first[0] + c * side - o.uv[0], first[1] + r * side - o.uv[1]];
-        assert!(x.hypot(y) < 0.02, "{}: {x} {y}", o.marker);
+        // Two of the 0.015 px per axis that are stated beyond noise: edges without a lens are no Gaussian.
+        assert!(x.hypot(y) < 0.042, "{}: {x} {y}", o.marker);
     }
 }
 
