@@ -7,7 +7,7 @@ mod quadratic;
 mod wide;
 
 pub use quadratic::{LinearRow, NotSolved, minimise_quadratic};
-pub use wide::wide;
+pub use wide::{add_combination, wide};
 
 use std::ops::Range;
 
@@ -125,6 +125,21 @@ pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     multiply(view(a), view(b))
 }
 
+/// Product of the transpose of `a` with `b`.
+pub fn transposed_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    multiply(view(a).transpose(), view(b))
+}
+
+/// Product of the transpose of `a` with a part of `b`.
+pub fn transposed_product_with(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    rows: Range<usize>,
+    columns: Range<usize>,
+) -> DMatrix<f64> {
+    multiply(view(a).transpose(), view(b).get(rows, columns))
+}
+
 /// Product of `a` with some rows of `b`.
 pub fn product_with_rows(a: &DMatrix<f64>, b: &DMatrix<f64>, rows: Range<usize>) -> DMatrix<f64> {
     multiply(view(a), view(b).get(rows, ..))
@@ -133,11 +148,6 @@ pub fn product_with_rows(a: &DMatrix<f64>, b: &DMatrix<f64>, rows: Range<usize>)
 /// Product of some columns of `a` with `b`.
 pub fn columns_product(a: &DMatrix<f64>, columns: Range<usize>, b: &DMatrix<f64>) -> DMatrix<f64> {
     multiply(view(a).get(.., columns), view(b))
-}
-
-/// Adds `a b` to the first rows of `c`.
-pub fn add_product(c: &mut DMatrix<f64>, a: &DMatrix<f64>, b: &DMatrix<f64>) {
-    multiply_into(c, Accum::Add, view(a), view(b));
 }
 
 fn multiply(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
@@ -162,13 +172,20 @@ fn multiply_into(c: &mut DMatrix<f64>, how: Accum, a: MatRef<'_, f64>, b: MatRef
     });
 }
 
+/// The first rows of `y y'`, in some of its columns, to the first rows and columns of `into`.
+pub fn part_of_gram(into: &mut DMatrix<f64>, y: &DMatrix<f64>, rows: usize, columns: Range<usize>) {
+    let into = view_mut(into).get_mut(..rows, ..columns.len());
+    let of_columns = view(y).get(columns, ..);
+    matmul(into, Accum::Replace, view(y).get(..rows, ..), of_columns.transpose(), 1.0, Par::Seq);
+}
+
 /// `y y'`.
 pub fn gram(y: &DMatrix<f64>) -> DMatrix<f64> {
     multiply(view(y), view(y).transpose())
 }
 
 /// Columns of a product that are made together.
-const COLUMNS_A_BLOCK: usize = 192;
+pub const COLUMNS_A_BLOCK: usize = 192;
 
 /// `a -= y y'` in the upper triangle of the square matrix `a`; what lies below the diagonal is left as it is. Blocks of columns side by side.
 pub fn subtract_gram(a: &mut DMatrix<f64>, y: &DMatrix<f64>) {

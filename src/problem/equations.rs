@@ -85,8 +85,11 @@ impl Collector {
     }
 
     pub fn finish(self) -> Equations {
-        let columns = self.columns.resize_horizontally(2 * self.markers.len(), 0.0);
-        Equations { columns, markers: self.markers, field: self.field }
+        let Self { mut columns, markers, field } = self;
+        if columns.ncols() > 2 * markers.len() {
+            columns = columns.resize_horizontally(2 * markers.len(), 0.0);
+        }
+        Equations { columns, markers, field }
     }
 }
 

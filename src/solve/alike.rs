@@ -1,9 +1,12 @@
-//! Stops whose images show much the same part of a plate: they touch much the same markers, so that their products are small when taken together.
+//! Stops whose images show much the same part of a plate, and markers that stand beside each other: the ones touch much the same markers, the others
+//! are seen by much the same images, so that their products are small when taken together.
+
+use nalgebra::Vector3;
 
 use super::linear::{LinearProblem, LinearStop};
 
-/// Most stops of a group. Fewer make products too short, more have fewer markers in common.
-const MOST: usize = 24;
+/// Most stops or markers of a group, and as many in all groups but the last. Fewer make products too short, more have less in common.
+pub(super) const MOST: usize = 24;
 /// As if plates lay so far apart, m: stops of different plates are parted first.
 const APART_M: f64 = 1e3;
 
@@ -18,15 +21,30 @@ pub(super) fn alike(linear: LinearProblem) -> Vec<Vec<usize>> {
     groups
 }
 
+/// Places of markers, each of a plate, with those beside each other in groups.
+pub(super) fn neighbours<'a>(markers: impl Iterator<Item = (usize, &'a Vector3<f64>)>) -> Vec<Vec<usize>> {
+    let bounds = |(plate, position): (usize, &Vector3<f64>)| {
+        let [x, y] = place(plate, position);
+        [x, y, x, y]
+    };
+    let mut markers: Vec<(usize, Bounds)> = markers.map(bounds).enumerate().collect();
+    let mut groups = Vec::new();
+    part(&mut markers, &mut groups);
+    groups
+}
+
+/// Of a marker among those of all plates, m.
+fn place(plate: usize, position: &Vector3<f64>) -> [f64; 2] {
+    [plate as f64 * APART_M + position.x, position.y]
+}
+
 /// Of the markers as they should be; zero where no image shows any.
 fn bounds(linear: LinearProblem, stop: &LinearStop) -> Bounds {
     let mut bounds: Option<Bounds> = None;
     for own in stop.images() {
         let plate = &linear.adjustment.problem.plates[own.image.plate];
-        let from = own.image.plate as f64 * APART_M;
         for seen in &own.terms.markers {
-            let nominal = plate.markers[seen.marker].position_m;
-            let (x, y) = (from + nominal.x, from + nominal.y);
+            let [x, y] = place(own.image.plate, &plate.markers[seen.marker].position_m);
             let [x0, y0, x1, y1] = bounds.unwrap_or([x, y, x, y]);
             bounds = Some([x0.min(x), y0.min(y), x1.max(x), y1.max(y)]);
         }

@@ -5,15 +5,19 @@
 //! intrinsics, which what stays moves by `T` ([`PoseSpace`]). Where nothing is latent what stays is less than the poses, and `B` is taken
 //! with it at once (`T = 1`).
 
-use nalgebra::{DMatrix, DVector, DVectorView, Matrix3};
+use std::borrow::Cow;
 
-use super::blocks::{DenseCoupling, ImageRows, MarkerRows, PoseRows, STOPS_A_PRODUCT, SeenMarkers};
+use nalgebra::{DMatrix, DVector, DVectorView, Matrix3};
+use rayon::prelude::*;
+
+use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT};
 use super::distances::Distances;
-use super::linear::Carried;
-use super::linear::LinearProblem;
+use super::linear::{Carried, LinearImage, LinearProblem};
+use super::marker_rows::{ImageRows, MarkerBlock, MarkerRows, times_right};
 use super::pose_space::PoseSpace;
 use super::right_hand_sides::RightHandSides;
-use crate::linalg::{mirror_upper, orthonormal, product, subtract_gram};
+use super::seen_markers::SeenMarkers;
+use crate::linalg::{mirror_upper, orthonormal, product};
 use crate::model::plate_modes::MODES;
 use crate::problem::Step;
 
@@ -27,10 +31,12 @@ pub(super) struct MarkersEliminated {
     inverse_factors: Vec<Matrix3<f64>>,
     /// `T`.
     space: PoseSpace,
-    /// `Y`, rows of the space x 3 markers; without what is held.
-    y: DMatrix<f64>,
-    /// Orthonormal combinations of the whitened markers that are held, 3 markers x held.
+    /// `Y`, rows of the space x 3 markers, of which what is held is to be taken away.
+    y: MarkerRows,
+    /// `O`, orthonormal combinations of the whitened markers that are held, 3 markers x held.
     held: DMatrix<f64>,
+    /// `Y O`.
+    taken: DMatrix<f64>,
     /// `F^-1` times the right-hand side.
     rhs: DVector<f64>,
 }
@@ -38,7 +44,8 @@ pub(super) struct MarkersEliminated {
 impl MarkersEliminated {
     /// Information with the priors of latents and markers, without those of the dense columns.
     pub fn build(linear: LinearProblem, lambda: f64) -> (DMatrix<f64>, Self) {
-        let mut n = linear.adjustment.problem.layout.len();
+        let (layout, seen) = (&linear.adjustment.problem.layout, SeenMarkers::of(linear));
+        let mut n = layout.len();
         let latent_start: Vec<usize> = (linear.stops())
             .map(|stop| {
                 let own = stop.unknowns();
@@ -47,10 +54,20 @@ impl MarkersEliminated {
             })
             .collect();
         let mut a = DMatrix::zeros(n, n);
+        let mut of_unknowns = (n == layout.len()).then(|| DenseCoupling::new(layout, &seen));
         let mut starts = latent_start.iter();
         for stops in linear.lin.stops.chunks(STOPS_A_PRODUCT) {
             let rows = PoseRows::new(linear, stops);
             rows.add_to(&mut a);
+            if let Some(coupling) = &mut of_unknowns {
+                let images: Vec<_> = linear.stops_of(stops).flat_map(|stop| stop.images()).collect();
+                let equations: Vec<_> = images.iter().filter_map(LinearImage::equations).collect();
+                coupling.add(
+                    &rows,
+                    &images.into_iter().zip(equations.iter().map(Cow::as_ref)).collect::<Vec<_>>(),
+                    &seen,
+                );
+            }
             for (stop, &start) in linear.stops_of(stops).zip(&mut starts) {
                 for pose in stop.poses() {
                     let with_dense = rows.of(pose.place).tr_mul(&pose.chain.d_latent);
@@ -63,49 +80,48 @@ impl MarkersEliminated {
                 a.view_mut((start, start), own.shape()).copy_from(&own);
             }
         }
-        let seen = SeenMarkers::of(linear);
         let damped = |mut v: Matrix3<f64>| {
             (0..3).for_each(|d| v[(d, d)] *= 1.0 + lambda);
             v.cholesky().and_then(|c| c.l().try_inverse()).unwrap_or_else(Matrix3::zeros)
         };
         let inverse_factors: Vec<Matrix3<f64>> = seen.information(linear).into_iter().map(damped).collect();
-        let (space, mut coupling) = if n == linear.adjustment.problem.layout.len() {
-            (PoseSpace::of_unknowns(n), coupling_of_unknowns(linear, &seen))
-        } else {
-            let space = PoseSpace::new(linear, &latent_start, n);
-            let coupling = coupling_of_poses(linear, &seen, &space);
-            (space, coupling)
+        let (space, mut y) = match of_unknowns {
+            Some(coupling) => (PoseSpace::of_unknowns(layout), coupling.of_all(layout)),
+            None => {
+                let space = PoseSpace::new(linear, &latent_start, n);
+                let coupling = coupling_of_poses(linear, &seen, &space);
+                (space, coupling)
+            }
         };
-        coupling.times_right(&inverse_factors.iter().map(Matrix3::transpose).collect::<Vec<_>>());
-        let y = coupling.values;
-        let mut taken = DMatrix::zeros(y.nrows(), y.nrows());
-        subtract_gram(&mut taken, &y);
-        mirror_upper(&mut taken);
-        a += space.congruent(&taken);
+        y.times_right(&inverse_factors.iter().map(Matrix3::transpose).collect::<Vec<_>>());
         mirror_upper(&mut a);
+        a -= space.congruent(&y.gram());
         let rhs = DVector::zeros(3 * seen.order.len());
-        let held = DMatrix::zeros(rhs.len(), 0);
-        (a, Self { seen, latent_start, inverse_factors, space, y, held, rhs })
+        let (held, taken) = (DMatrix::zeros(rhs.len(), 0), DMatrix::zeros(space.rows(), 0));
+        (a, Self { seen, latent_start, inverse_factors, space, y, held, taken, rhs })
     }
 
     /// Holds combinations of markers (3 markers x held): `Y` becomes `Y (1 - O O')` with the orthonormal basis `O` of `F^-1` times the
     /// combinations. Returns `T' Y O`, by whose Gram product the reduced information grows.
     pub fn hold(&mut self, combinations: &DMatrix<f64>) -> DMatrix<f64> {
         self.held = orthonormal(self.whitened(combinations.clone()));
-        let taken = product(&self.y, &self.held);
-        self.y -= product(&taken, &self.held.transpose());
-        self.space.transposed_times(&taken)
+        self.taken = self.y.times(&self.held);
+        self.space.transposed_times(&self.taken)
+    }
+
+    /// `Y` without what is held, times a matrix of 3 markers rows.
+    fn times(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+        self.y.times(right) - &self.taken * self.held.tr_mul(right)
+    }
+
+    /// Its transpose times a matrix over the rows of the space.
+    fn transposed_times(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+        self.y.transposed_times(right) - &self.held * self.taken.tr_mul(right)
     }
 
     /// Unknowns from `to` on move those from `from` on along, times `by`.
     pub fn carry(&mut self, from: usize, to: usize, by: &DMatrix<f64>) {
-        if self.space.is_of_unknowns() {
-            let moved = by.tr_mul(&self.y.rows(from, by.nrows()));
-            let mut into = self.y.rows_mut(to, by.ncols());
-            into += moved;
-        } else {
-            self.space.carry(from, to, by);
-        }
+        self.space.carry(from, to, by);
     }
 
     /// Takes over the right-hand side of the markers at a linearisation; returns the reduced one, without the priors of the dense columns.
@@ -116,7 +132,7 @@ impl MarkersEliminated {
             reduced.rows_mut(start, own.len()).copy_from(&own);
         }
         self.rhs = self.whitened(column(self.seen.gradient(linear))).column(0).into_owned();
-        reduced - self.space.transposed_times(&column(&self.y * &self.rhs)).column(0)
+        reduced - self.space.transposed_times(&self.times(&column(self.rhs.clone()))).column(0)
     }
 
     /// `F^-1` times the right-hand side of the markers.
@@ -128,7 +144,7 @@ impl MarkersEliminated {
     pub fn reduce_rows(&self, linear: LinearProblem, rows: &mut DMatrix<f64>) -> DMatrix<f64> {
         let mut whitened = self.whitened(self.seen.by_distances(linear));
         whitened -= &self.held * self.held.tr_mul(&whitened);
-        *rows -= self.space.transposed_times(&product(&self.y, &whitened));
+        *rows -= self.space.transposed_times(&self.times(&whitened));
         whitened
     }
 
@@ -140,7 +156,7 @@ impl MarkersEliminated {
     /// The whole step from the solution `x` of the reduced system, with what measured distances add to that of the whitened markers.
     pub fn step(&self, linear: LinearProblem, x: &DVector<f64>, by_distances: Option<DVector<f64>>) -> Step {
         let mut own = self.rhs.clone();
-        own.gemv_tr(-1.0, &self.y, &self.space.times(&column(x.clone())).column(0), 1.0);
+        own -= self.transposed_times(&self.space.times(&column(x.clone()))).column(0);
         by_distances.iter().for_each(|added| own += added);
         self.whole(linear, x.column(0), own.column(0))
     }
@@ -178,10 +194,10 @@ impl MarkersEliminated {
         for (own, &start) in of.stops.iter().zip(&self.latent_start) {
             reduced.rows_mut(start, own.nrows()).copy_from(own);
         }
-        reduced -= self.space.transposed_times(&product(&self.y, &whitened));
+        reduced -= self.space.transposed_times(&self.times(&whitened));
         distances.reduced_by(&whitened).iter().for_each(|added| reduced += added);
         let x = solve(reduced);
-        let mut own = &whitened - product(&self.y.transpose(), &self.space.times(&x));
+        let mut own = &whitened - self.transposed_times(&self.space.times(&x));
         distances.markers_by(&whitened, &x).iter().for_each(|added| own += added);
         x.column_iter().zip(own.column_iter()).map(|(x, own)| self.whole(linear, x, own)).collect()
     }
@@ -194,30 +210,47 @@ impl MarkersEliminated {
         distances: &Distances,
         carried: Option<&Carried>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
-        let mut rows = MarkerRows { values: self.y.clone() };
-        rows.times_right(&self.inverse_factors);
-        let mut d = rows.values;
-        for (at, &(p, m)) in self.seen.order.iter().enumerate() {
-            for (start, modes) in carried.into_iter().flat_map(|c| c(p, m)) {
-                let Some(row) = self.space.row_of(start) else { continue };
-                let mut own = d.view_mut((row, 3 * at), (MODES, 3));
-                own -= modes.transpose();
-            }
-        }
-        let cd = product(&self.space.spread(reduced), &d);
+        let spread = self.space.spread(reduced);
         let with_distances = distances.with_markers(reduced, |r| self.space.times(r));
-        let of = |at: usize| {
-            let d = d.columns(3 * at, 3);
-            let mut c = Matrix3::from_column_slice(d.tr_mul(&cd.columns(3 * at, 3)).as_slice());
-            let (f, held) = (self.inverse_factors[at], self.held.rows(3 * at, 3));
-            if let Some(with) = &with_distances {
-                c += with.of_marker(at, &d, &f);
+        let has_all_rows = self.held.ncols() > 0 || carried.is_some() || with_distances.is_some();
+        let of_block = |block: &MarkerBlock| {
+            let markers = block.markers.clone();
+            let (mut d, of_rows) = match has_all_rows {
+                true => (self.all_rows(block), Cow::Borrowed(&spread)),
+                false => (block.values.clone(), Cow::Owned(block.part_of(&spread))),
+            };
+            times_right(&mut d, &self.inverse_factors[markers.clone()]);
+            for (k, at) in markers.clone().enumerate() {
+                let (p, m) = self.seen.order[at];
+                for (start, modes) in carried.into_iter().flat_map(|c| c(p, m)) {
+                    let Some(row) = self.space.row_of(start) else { continue };
+                    let mut own = d.view_mut((row, 3 * k), (MODES, 3));
+                    own -= modes.transpose();
+                }
             }
-            let held = Matrix3::from_column_slice((held * held.transpose()).as_slice());
-            let left = Matrix3::identity() - held - distances.of_marker(at);
-            f.transpose() * left * f + c
+            let cd = product(&of_rows, &d);
+            let of = |(k, at): (usize, usize)| {
+                let d = d.columns(3 * k, 3);
+                let mut c = Matrix3::from_column_slice(d.tr_mul(&cd.columns(3 * k, 3)).as_slice());
+                let (f, held) = (self.inverse_factors[at], self.held.rows(3 * at, 3));
+                if let Some(with) = &with_distances {
+                    c += with.of_marker(at, &d, &f);
+                }
+                let held = Matrix3::from_column_slice((held * held.transpose()).as_slice());
+                let left = Matrix3::identity() - held - distances.of_marker(at);
+                f.transpose() * left * f + c
+            };
+            markers.enumerate().map(of).collect::<Vec<_>>()
         };
-        self.seen.number.iter().map(|plate| plate.iter().map(|at| at.map(of)).collect()).collect()
+        let all: Vec<Vec<Matrix3<f64>>> = self.y.blocks.par_iter().map(of_block).collect();
+        let all = all.concat();
+        self.seen.number.iter().map(|plate| plate.iter().map(|at| at.map(|at| all[at])).collect()).collect()
+    }
+
+    /// All rows of a block of `Y`, without what is held.
+    fn all_rows(&self, block: &MarkerBlock) -> DMatrix<f64> {
+        let held = self.held.rows(3 * block.markers.start, 3 * block.markers.len());
+        block.whole(self.space.rows()) - &self.taken * held.transpose()
     }
 }
 
@@ -228,31 +261,15 @@ fn column(x: DVector<f64>) -> DMatrix<f64> {
 
 /// Of poses and intrinsics, by rows of their space.
 fn coupling_of_poses(linear: LinearProblem, seen: &SeenMarkers, space: &PoseSpace) -> MarkerRows {
-    let mut rows = MarkerRows::new(space.rows(), seen);
     let row_of = |c: usize| linear.adjustment.problem.layout.columns[c].free.then(|| space.row_of(c)).flatten();
     let images: Vec<_> = linear.images().enumerate().filter_map(|(k, own)| Some((k, own, own.equations()?))).collect();
     let images: Vec<ImageRows> = (images.iter())
         .map(|(k, own, equations)| ImageRows {
             plate: own.image.plate,
             equations,
-            pose: Some(6 * k),
+            pose: 6 * k,
             intrinsics: own.columns().into_iter().map(|c| c.and_then(row_of)).collect(),
         })
         .collect();
-    rows.add(seen, &images);
-    rows
-}
-
-/// Of the dense columns, where nothing is latent.
-fn coupling_of_unknowns(linear: LinearProblem, seen: &SeenMarkers) -> MarkerRows {
-    let problem = &linear.adjustment.problem;
-    let mut coupling = DenseCoupling::new(problem, seen);
-    for stops in linear.lin.stops.chunks(STOPS_A_PRODUCT) {
-        let images = linear.stops_of(stops).flat_map(|stop| stop.images());
-        let images: Vec<_> = images.filter_map(|own| Some((own, own.equations()?))).collect();
-        coupling.add(&images.iter().map(|(own, equations)| (*own, equations.as_ref())).collect::<Vec<_>>(), seen);
-    }
-    let mut rows = MarkerRows::new(problem.layout.len(), seen);
-    coupling.copy_to(&mut rows.values, 0);
-    rows
+    MarkerRows::of(space.rows(), seen, &images)
 }

@@ -4,17 +4,18 @@
 //! what stays, `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product.
 
 use std::borrow::Cow;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, Matrix3, SMatrix};
 use rayon::prelude::*;
 
 use super::alike::alike;
-use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, SeenMarkers, latents_with_markers};
+use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, latents_with_markers};
 use super::group::Group;
 use super::linear::Carried;
 use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
+use super::seen_markers::SeenMarkers;
 use crate::linalg::{gram, mirror_upper, orthonormal, product};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Equations, Step};
@@ -56,7 +57,7 @@ impl StopsEliminated {
         for (at, information) in seen.information(linear).iter().enumerate() {
             a.fixed_view_mut::<3, 3>(dense + 3 * at, dense + 3 * at).copy_from(information);
         }
-        let mut coupling = DenseCoupling::new(&linear.adjustment.problem, &seen);
+        let mut coupling = DenseCoupling::new(&linear.adjustment.problem.layout, &seen);
         let mut blocks = Vec::with_capacity(linear.stops().len());
         for stops in linear.lin.stops.chunks(STOPS_A_PRODUCT) {
             let rows = PoseRows::new(linear, stops);
@@ -66,7 +67,7 @@ impl StopsEliminated {
             let (own, equations): (Vec<Block>, Vec<_>) = own.into_iter().unzip();
             let equations = equations.iter().flatten().map(Cow::as_ref);
             let images: Vec<_> = stops.iter().flat_map(LinearStop::images).zip(equations).collect();
-            coupling.add(&images, &seen);
+            coupling.add(&rows, &images, &seen);
             blocks.extend(own);
         }
         coupling.copy_to(&mut a, dense);
@@ -305,10 +306,13 @@ impl Coupled {
             let number = &seen.number[image.image.plate];
             let (markers, with_markers) = latents_with_markers(l, equations);
             let first = rows.len();
-            let starts = markers.iter().filter_map(|&m| number[m].map(|at| dense + 3 * at));
-            rows.extend(starts.flat_map(|start| start..start + 3));
+            let numbered = markers.iter().enumerate().filter_map(|(k, &m)| Some((number[m]?, k)));
+            let numbered: BTreeMap<usize, usize> = numbered.collect();
+            rows.extend(numbered.keys().flat_map(|at| dense + 3 * at..dense + 3 * at + 3));
             coupling = coupling.resize_horizontally(rows.len(), 0.0);
-            coupling.columns_range_mut(first..).copy_from(&with_markers);
+            for (into, k) in (first..).step_by(3).zip(numbered.values()) {
+                coupling.fixed_columns_mut::<3>(into).copy_from(&with_markers.fixed_columns::<3>(3 * k));
+            }
         }
         Self { latents: image.latents().into_iter().flatten().collect(), rows, coupling }
     }

@@ -11,10 +11,10 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
-use super::blocks::SeenMarkers;
 use super::covariance::Covariance;
 use super::frame::{Frame, frames};
 use super::linear::{LinearImage, LinearProblem};
+use super::seen_markers::SeenMarkers;
 use super::system::{Eliminated, Elimination, Singular, System};
 use crate::error::{Code, Error, Result};
 use crate::model::plate_modes::MODES;

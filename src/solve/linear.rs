@@ -72,6 +72,11 @@ impl Linearised {
         Self { equations: Vec::new(), ..self }
     }
 
+    /// Forgets the equations, which are made again where the system is built once more.
+    pub(super) fn forget_equations(&mut self) {
+        self.equations = Vec::new();
+    }
+
     /// A measurement of a body by its index; `None` for one that takes no part.
     pub fn body(&self, index: usize) -> Option<&BodyPart> {
         Some(&self.bodies[self.bodies.binary_search_by_key(&index, |part| part.index).ok()?])

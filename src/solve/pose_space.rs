@@ -1,24 +1,26 @@
 //! The space in which pixels speak: six rows a camera pose, then the dense columns that act on images directly.
 //!
 //! What stays of the unknowns moves them by `T`: rows `[G, L]` of every pose, and the identity for the direct columns. Columns that are held are
-//! zero.
+//! zero. Where nothing is latent, the dense columns stand for the poses that they move, and `T = 1` until something is carried along.
 
 use std::ops::Range;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector6};
 
-use super::blocks::add_combination;
 use super::linear::LinearProblem;
-use crate::linalg::{columns_product, wide};
+use crate::linalg::{add_combination, columns_product, product, transposed_product_with, wide};
+use crate::problem::Layout;
 
-/// Unknowns that are latent at the stop of an image, and how they move its pose, 6 x unknowns.
-type ByLatents = (Vec<usize>, DMatrix<f64>);
+/// Unknowns that are latent at the stop of an image, and how each moves its pose.
+type ByLatents = Vec<(usize, Vector6<f64>)>;
 
 /// `T`, rows of the space x unknowns: the dense columns, then what is latent at the stops.
 #[derive(Debug, Clone)]
 pub(super) struct PoseSpace {
-    /// Of the poses by the dense columns, 6 images x dense.
-    by_dense: DMatrix<f64>,
+    /// Dense columns that move poses.
+    columns: Vec<usize>,
+    /// Of the poses by these, 6 images x columns.
+    by_columns: DMatrix<f64>,
     by_latents: Vec<ByLatents>,
     /// The dense columns that act directly.
     direct: Range<usize>,
@@ -29,32 +31,36 @@ impl PoseSpace {
     /// Of the images in use; `latent_start` is the first unknown of what is latent at each stop, of so many unknowns in all.
     pub fn new(linear: LinearProblem, latent_start: &[usize], unknowns: usize) -> Self {
         let layout = &linear.adjustment.problem.layout;
-        let mut by_dense = DMatrix::zeros(6 * linear.images().len(), layout.len());
+        let columns: Vec<usize> = (0..layout.theta_len()).filter(|&c| layout.columns[c].free).collect();
+        let mut by_columns = DMatrix::zeros(6 * linear.images().len(), columns.len());
         let mut by_latents = Vec::with_capacity(linear.images().len());
         for (k, own) in linear.images().enumerate() {
-            for c in (0..layout.theta_len()).filter(|&c| layout.columns[c].free) {
-                by_dense.fixed_view_mut::<6, 1>(6 * k, c).copy_from(&own.chain.d_theta.column(c));
+            for (at, &c) in columns.iter().enumerate() {
+                by_columns.fixed_view_mut::<6, 1>(6 * k, at).copy_from(&own.chain.d_theta.column(c));
             }
             let start = latent_start[own.stop];
-            let places = own.latents().into_iter().flatten().map(|place| start + place).collect();
-            by_latents.push((places, own.chain.d_latent.clone()));
+            let places = own.latents().into_iter().flatten().map(|place| start + place);
+            let moves = own.chain.d_latent.fixed_rows::<6>(0);
+            by_latents.push(places.zip(moves.column_iter().map(|l| l.into_owned())).collect());
         }
-        Self { by_dense, by_latents, direct: layout.theta_len()..layout.len(), unknowns }
+        Self { columns, by_columns, by_latents, direct: layout.theta_len()..layout.len(), unknowns }
     }
 
-    /// The unknowns themselves, where nothing is latent: they are fewer than the rows of the poses.
-    pub fn of_unknowns(unknowns: usize) -> Self {
-        Self { by_dense: DMatrix::zeros(0, unknowns), by_latents: Vec::new(), direct: 0..unknowns, unknowns }
-    }
-
-    /// Whether `T` is the identity.
-    pub fn is_of_unknowns(&self) -> bool {
-        self.direct.len() == self.unknowns
+    /// The dense columns themselves, where nothing is latent: they are fewer than the rows of the poses.
+    pub fn of_unknowns(layout: &Layout) -> Self {
+        let (theta, unknowns) = (layout.theta_len(), layout.len());
+        let (columns, by_columns) = ((0..theta).collect(), DMatrix::identity(theta, theta));
+        Self { columns, by_columns, by_latents: Vec::new(), direct: theta..unknowns, unknowns }
     }
 
     /// Number of its rows.
     pub fn rows(&self) -> usize {
-        self.by_dense.nrows() + self.direct.len()
+        self.poses() + self.direct.len()
+    }
+
+    /// Number of the rows of poses.
+    fn poses(&self) -> usize {
+        self.by_columns.nrows()
     }
 
     /// Number of what stays.
@@ -64,55 +70,94 @@ impl PoseSpace {
 
     /// Row of a dense column that acts directly; `None` for one that acts through the poses.
     pub fn row_of(&self, column: usize) -> Option<usize> {
-        Some(self.by_dense.nrows() + column.checked_sub(self.direct.start)?)
+        Some(self.poses() + column.checked_sub(self.direct.start)?)
     }
 
     /// `T x`.
     pub fn times(&self, x: &DMatrix<f64>) -> DMatrix<f64> {
-        self.times_transposed(&x.transpose()).transpose()
+        let mut all = product(&self.by_columns, &x.select_rows(&self.columns)).resize_vertically(self.rows(), 0.0);
+        for (mut into, x) in all.column_iter_mut().zip(x.column_iter()) {
+            into.rows_range_mut(self.poses()..).copy_from(&x.rows_range(self.direct.clone()));
+            for (k, latents) in self.by_latents.iter().enumerate() {
+                let mut pose = into.fixed_rows_mut::<6>(6 * k);
+                pose += latents.iter().map(|(place, l)| l * x[*place]).sum::<Vector6<f64>>();
+            }
+        }
+        all
     }
 
     /// `T' y`.
     pub fn transposed_times(&self, y: &DMatrix<f64>) -> DMatrix<f64> {
-        self.times_space(&y.transpose()).transpose()
+        let mut all = self.without_columns(y);
+        self.add_columns_of(y, &mut all, y.ncols());
+        all
+    }
+
+    /// `T' y` of what is latent and of the columns that act directly.
+    fn without_columns(&self, y: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut all = DMatrix::zeros(self.unknowns, y.ncols());
+        for (mut into, y) in all.column_iter_mut().zip(y.column_iter()) {
+            into.rows_range_mut(self.direct.clone()).copy_from(&y.rows_range(self.poses()..));
+            for (k, latents) in self.by_latents.iter().enumerate() {
+                let pose = y.fixed_rows::<6>(6 * k);
+                latents.iter().for_each(|(place, l)| into[*place] += l.dot(&pose));
+            }
+        }
+        all
+    }
+
+    /// Adds to the first columns of `T' y` what those that move poses have in it.
+    fn add_columns_of(&self, y: &DMatrix<f64>, all: &mut DMatrix<f64>, first: usize) {
+        let own = transposed_product_with(&self.by_columns, y, 0..self.poses(), 0..first);
+        for (own, &row) in own.row_iter().zip(&self.columns) {
+            let mut sum = all.view_mut((row, 0), (1, first));
+            sum += own;
+        }
     }
 
     /// `T' m T` of a symmetric matrix.
     pub fn congruent(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
-        self.times_space(&self.times_space(m).transpose())
+        let dense = self.direct.end;
+        let half = self.times_space(m);
+        let mut all = self.without_columns(&half);
+        self.add_columns_of(&half, &mut all, dense);
+        for latent in dense..self.unknowns {
+            (0..dense).for_each(|row| all[(row, latent)] = all[(latent, row)]);
+        }
+        all
     }
 
     /// `T c T'` of a symmetric matrix.
     pub fn spread(&self, c: &DMatrix<f64>) -> DMatrix<f64> {
-        self.times_transposed(&self.times_transposed(c).transpose())
+        self.times(&self.times_transposed(c))
     }
 
     /// `m T`.
     fn times_space(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
-        let poses = self.by_dense.nrows();
-        let of_dense = columns_product(m, 0..poses, &self.by_dense);
-        let mut all = of_dense.resize_horizontally(self.unknowns, 0.0);
-        let mut direct = all.columns_range_mut(self.direct.clone());
-        direct += m.columns_range(poses..);
-        for (k, (places, l)) in self.by_latents.iter().enumerate() {
+        let mut all = DMatrix::zeros(m.nrows(), self.unknowns);
+        all.columns_range_mut(self.direct.clone()).copy_from(&m.columns_range(self.poses()..));
+        let own = columns_product(m, 0..self.poses(), &self.by_columns);
+        for (own, &column) in own.column_iter().zip(&self.columns) {
+            let mut sum = all.column_mut(column);
+            sum += own;
+        }
+        for (k, latents) in self.by_latents.iter().enumerate() {
             let of_pose: Vec<usize> = (6 * k..6 * k + 6).collect();
-            for (place, l) in places.iter().zip(l.column_iter()) {
-                add_columns((&mut all, *place), (m, &of_pose), l.as_slice());
-            }
+            latents.iter().for_each(|(place, l)| add_columns((&mut all, *place), (m, &of_pose), l.as_slice()));
         }
         all
     }
 
     /// `m T'`.
     fn times_transposed(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
-        let (poses, dense) = self.by_dense.shape();
-        let of_dense = columns_product(m, 0..dense, &self.by_dense.transpose());
-        let mut all = of_dense.resize_horizontally(self.rows(), 0.0);
-        all.columns_range_mut(poses..).copy_from(&m.columns_range(self.direct.clone()));
-        for (k, (places, l)) in self.by_latents.iter().enumerate() {
-            for (row, l) in l.row_iter().enumerate() {
-                let by: Vec<f64> = l.iter().copied().collect();
-                add_columns((&mut all, 6 * k + row), (m, places), &by);
+        let of_columns = product(&m.select_columns(&self.columns), &self.by_columns.transpose());
+        let mut all = of_columns.resize_horizontally(self.rows(), 0.0);
+        all.columns_range_mut(self.poses()..).copy_from(&m.columns_range(self.direct.clone()));
+        for (k, latents) in self.by_latents.iter().enumerate() {
+            let (places, by): (Vec<usize>, Vec<Vector6<f64>>) = latents.iter().copied().unzip();
+            for row in 0..6 {
+                let by: Vec<f64> = by.iter().map(|l| l[row]).collect();
+                add_columns((&mut all, 6 * k + row), (m, &places), &by);
             }
         }
         all
@@ -120,20 +165,26 @@ impl PoseSpace {
 
     /// From now on the direct columns from `to` on move what the unknowns from `from` on move, too, times `by`.
     pub fn carry(&mut self, from: usize, to: usize, by: &DMatrix<f64>) {
-        let dense = self.by_dense.ncols();
-        if from + by.nrows() <= dense {
-            let moved = self.by_dense.columns(from, by.nrows()) * by;
-            let mut into = self.by_dense.columns_mut(to, by.ncols());
-            into += moved;
-            return;
-        }
-        for (k, (places, l)) in self.by_latents.iter().enumerate() {
-            for (place, l) in places.iter().zip(l.column_iter()) {
-                if let Some(row) = place.checked_sub(from).filter(|row| *row < by.nrows()) {
-                    let mut into = self.by_dense.view_mut((6 * k, to), (6, by.ncols()));
-                    into += l * by.row(row);
-                }
+        let mut moved = DMatrix::zeros(self.poses(), by.nrows());
+        for (&column, own) in self.columns.iter().zip(self.by_columns.column_iter()) {
+            if (from..from + by.nrows()).contains(&column) {
+                moved.column_mut(column - from).copy_from(&own);
             }
+        }
+        for (k, latents) in self.by_latents.iter().enumerate() {
+            for (place, l) in latents.iter().filter(|(place, _)| (from..from + by.nrows()).contains(place)) {
+                moved.fixed_view_mut::<6, 1>(6 * k, place - from).copy_from(l);
+            }
+        }
+        for (column, added) in (to..).zip((moved * by).column_iter()) {
+            let at = self.columns.iter().position(|c| *c == column).unwrap_or_else(|| {
+                self.columns.push(column);
+                let width = self.columns.len();
+                self.by_columns.resize_horizontally_mut(width, 0.0);
+                width - 1
+            });
+            let mut sum = self.by_columns.column_mut(at);
+            sum += added;
         }
     }
 }

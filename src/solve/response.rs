@@ -13,9 +13,10 @@
 use nalgebra::{DMatrix, DVector, Vector2, Vector6};
 use rayon::prelude::*;
 
-use super::blocks::{STOPS_A_PRODUCT, SeenMarkers};
+use super::blocks::STOPS_A_PRODUCT;
 use super::linear::{LinearImage, LinearProblem};
 use super::right_hand_sides::{OfImage, RightHandSides};
+use super::seen_markers::SeenMarkers;
 use super::system::{Singular, System};
 use crate::linalg::product;
 use crate::problem::{E, Equations, Step};

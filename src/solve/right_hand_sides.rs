@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, Vector2, Vector6};
 
-use super::blocks::SeenMarkers;
 use super::linear::{BodyPart, LinearImage, LinearProblem};
+use super::seen_markers::SeenMarkers;
 use crate::problem::{E, Equations};
 
 /// Right-hand sides of all unknowns before any is eliminated, one column each.

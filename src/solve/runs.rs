@@ -1,6 +1,7 @@
 //! Places one after the other that go to places one after the other.
 
 /// So many places from one on go to those from another on.
+#[derive(Debug, Clone)]
 pub(super) struct Run {
     /// First place that something is taken from.
     pub from: usize,

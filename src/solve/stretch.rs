@@ -3,9 +3,9 @@
 
 use nalgebra::Vector6;
 
-use super::blocks::SeenMarkers;
 use super::linear::{BodyPart, LinearProblem};
 use super::right_hand_sides::RightHandSides;
+use super::seen_markers::SeenMarkers;
 use super::system::System;
 use crate::problem::Step;
 

@@ -4,12 +4,12 @@ use std::fmt;
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 
-use super::blocks::SeenMarkers;
 use super::by_markers::MarkersEliminated;
 use super::by_stops::StopsEliminated;
 use super::distances::Distances;
 use super::linear::{Carried, LinearPose, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
+use super::seen_markers::SeenMarkers;
 use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Adjustment, Length, Problem, Step};
