@@ -67,6 +67,9 @@ impl Known {
     }
 }
 
+/// Joints of a pose, rad or m, and how its posture became known.
+type Posture = (Vec<f64>, Known);
+
 /// Where the robot comes from.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Before<'a> {
@@ -100,10 +103,7 @@ fn unreached(posture: &str) -> Why {
 }
 
 /// The codes and the way there must mean the same, where it is not known which of them counts.
-fn by_either(
-    coded: Understood<(Vec<f64>, Known)>,
-    way: Understood<(Vec<f64>, Known)>,
-) -> Understood<(Vec<f64>, Known)> {
+fn by_either(coded: Understood<Posture>, way: Understood<Posture>) -> Understood<Posture> {
     let open = "its posture is not known: other routines switch the check of configurations off, and its confdata";
     let remedy = "(--nearest-posture heeds no confdata)";
     let unknown = |why: &str| Err(Why::new(LeftReason::PostureUnknown, format!("{open} {why} {remedy}")));
@@ -116,7 +116,7 @@ fn by_either(
 }
 
 /// The way there must not lead to another posture than that of codes which count for nothing on it.
-fn by_way(coded: Understood<(Vec<f64>, Known)>, way: Option<Vec<f64>>, codes: &Codes) -> Understood<(Vec<f64>, Known)> {
+fn by_way(coded: Understood<Posture>, way: Option<Vec<f64>>, codes: &Codes) -> Understood<Posture> {
     match (coded, way) {
         (Ok((coded, _)), Some(way)) if farthest(&coded, &way) > SAME => {
             let words = format!(
@@ -144,7 +144,7 @@ impl<'a> Finder<'a> {
     }
 
     /// Joints by which the controller reaches a pose.
-    pub fn joints(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>) -> Understood<(Vec<f64>, Known)> {
+    pub fn joints(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>) -> Understood<Posture> {
         match (&pose.posture, &pose.taught) {
             (MeantPosture::Coded(codes, axes), _) => self.by_codes(pose, held, before, (codes, axes)),
             (MeantPosture::Either(codes, axes), _) => {
@@ -164,7 +164,7 @@ impl<'a> Finder<'a> {
     }
 
     /// The posture that goes on from the target before, or the one next to `--start`.
-    fn by_approach(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>) -> Understood<(Vec<f64>, Known)> {
+    fn by_approach(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>) -> Understood<Posture> {
         let written = pose.joint_fields.iter().any(Option::is_some);
         match (before.readings, self.start) {
             (Some(q), _) => {
@@ -242,7 +242,7 @@ impl<'a> Finder<'a> {
         held: &[bool],
         before: Before<'_>,
         codes: (&Codes, &[usize; 6]),
-    ) -> Understood<(Vec<f64>, Known)> {
+    ) -> Understood<Posture> {
         let wanted = pose.base_from_flange();
         let near = Self::fixed(pose, before.readings.or(self.start).unwrap_or(&self.middle));
         // Postures that a code had before are good starts for it.
