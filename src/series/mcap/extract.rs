@@ -9,6 +9,7 @@ use super::messages::CameraInfo;
 use super::motion::{Posture, Standstill, interpolate, postures, standstills};
 use super::options::{Motion, RecordingOptions};
 use super::scan::{JointReadings, Scan, scan};
+use super::silence;
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::{InputFile, Stops};
 
@@ -55,6 +56,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     times.dedup();
     let mut postures = postures(&samples, &joints);
     require_overlap(&scan, &postures, &times)?;
+    scan.notices.extend(silence::notices(recording, &samples, &joints, &times));
     let late = late(&scan, &image_topic, &postures, &times, options)?;
     if let Some(delay_s) = options.image_delay_s.or(late.map(|d| d.delay_s)) {
         // In the time of the images, the joints were there so much later.

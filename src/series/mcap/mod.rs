@@ -21,6 +21,7 @@ mod pixels;
 #[cfg(feature = "mcap")]
 mod records;
 mod scan;
+mod silence;
 mod sqlite;
 #[cfg(feature = "mcap")]
 mod write;

@@ -19,7 +19,7 @@ pub(super) struct Standstill {
 /// Speed is taken over this time to either side, so that the encoder's last digit is no motion, ns.
 const WINDOW_NS: i64 = 50_000_000;
 /// Without a sample for this long nobody knows whether the robot moved, ns.
-const LONGEST_GAP_NS: i64 = 1_000_000_000;
+pub(super) const LONGEST_GAP_NS: i64 = 1_000_000_000;
 /// Two standstills at the same posture that are interrupted for less than this are one, ns.
 const INTERRUPTION_NS: i64 = 500_000_000;
 
