@@ -76,6 +76,10 @@ pub(super) fn nominal(fit: &Adjustment) -> Adjustment {
     state.robot = Robot { terms: fit.state.robot.terms.clone(), ..Robot::nominal(fit.state.robot.chain.clone()) };
     state.robot.terms.iter_mut().for_each(|t| t.value = 0.0);
     let robot = problem.layout.twists.start..problem.layout.terms.end;
+    // Readings that count as exact miss by what the robot is off.
+    for (stop, errors) in problem.stops.iter().zip(&mut state.joint_errors).filter(|(_, errors)| errors.is_empty()) {
+        *errors = vec![0.0; stop.readings()];
+    }
     let known: Vec<usize> = robot.filter(|c| !problem.layout.is_between_bases(*c)).collect();
     known.into_iter().for_each(|c| problem.layout.columns[c].free = false);
     problem.noise.local.fill(0.0);

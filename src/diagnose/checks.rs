@@ -76,7 +76,16 @@ pub const CHECKS: &[Check] = &[
     check("length_standard", Stage::Fit(|a, b, s| found(length_standard::check(a, b, s)))),
     check("marker_off", Stage::Fit(|a, b, s| found(marker_off::check(a, b, s)))),
     check("parameter_off", Stage::Fit(|a, b, s| found(parameter_off::check(a, b, s)))),
-    check("scatter", Stage::Uncertainty(|a, b, s| found(scatter::check(a, b, s)))),
+    Check {
+        // Readings that are trusted too much make the arm look as if something had moved.
+        explains: |own, other| match own {
+            Finding::LargeScatter(own) => {
+                own.stated_noise.is_some() && matches!(other, Finding::Displaced(_) | Finding::LooseMounting(_))
+            }
+            _ => false,
+        },
+        ..check("scatter", Stage::Uncertainty(|a, b, s| found(scatter::check(a, b, s))))
+    },
     check("held_near_nominal", Stage::Fit(|a, b, s| found(held_near_nominal::check(a, b, s)))),
     check("extrapolates", Stage::Uncertainty(|a, b, s| found(extrapolates::check(a, b, s)))),
     check("undetermined", Stage::Uncertainty(|a, b, s| found(undetermined::check(a, b, s)))),
@@ -102,6 +111,9 @@ impl<'a> Diagnosis<'a> {
             found.retain(|f| !self.is_explained(f));
             self.found[row] = found;
         }
+        // What was found before may be explained now.
+        let left = self.found.clone().map(|all| all.into_iter().filter(|f| !self.is_explained(f)).collect());
+        self.found = left;
     }
 
     fn is_explained(&self, finding: &Finding) -> bool {

@@ -17,6 +17,8 @@ pub struct CheckContext<'a> {
     pub free: &'a FreePoses,
     /// Images of the robot before any was left out.
     pub on_robot: usize,
+    /// Joint noise as it was stated, rad or m; none where it is estimated.
+    pub stated_noise: Option<f64>,
     /// Numbers that decide.
     pub limits: &'a Limits,
 }

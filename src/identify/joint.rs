@@ -11,7 +11,7 @@ use super::start::{StartGiven, start_robot, take_back, usual_misfit};
 use super::start_verdict::StartVerdict;
 use super::stated::camera_starts;
 use super::two_stage::PoseStage;
-use crate::assess::{hold_out, hold_out_bodies, judge, refitted_near};
+use crate::assess::{folds, hold_out, hold_out_bodies, judge, refitted_near};
 use crate::diagnose::{CheckContext, Diagnosis};
 use crate::error::{Code, Error, Result};
 use crate::fit::{Fit, FreePoses};
@@ -92,7 +92,8 @@ pub(super) fn fit_model(
     };
     let (status, iterations) = (outcome.status, outcome.iterations);
     name_wrong_pairs(&mut outcome.adjustment, free, options.limits.other_readings_explain);
-    let mut diagnosis = Diagnosis::new(CheckContext { series, free, on_robot, limits: &options.limits });
+    let stated_noise = options.joint_noise.stated();
+    let mut diagnosis = Diagnosis::new(CheckContext { series, free, on_robot, stated_noise, limits: &options.limits });
     diagnosis.after_free_poses(&outcome.adjustment.problem);
     diagnosis.after_left_out(&outcome.adjustment)?;
     if status != Status::Converged {
@@ -120,7 +121,8 @@ impl JointFit {
         let Self { options, fit, start, starts, on_robot, before, status, iterations } = self;
         let options = Options { estimator, ..options };
         let (free, limits, noise) = (start.free, &options.limits, options.joint_noise);
-        let mut diagnosis = Diagnosis::new(CheckContext { series, free: &free, on_robot, limits });
+        let mut diagnosis =
+            Diagnosis::new(CheckContext { series, free: &free, on_robot, stated_noise: noise.stated(), limits });
         diagnosis.after_free_poses(&fit.problem);
         diagnosis.after_left_out(&fit)?;
         if estimator.is_two_stage() && !fit.problem.body_measurements.is_empty() {
@@ -131,10 +133,9 @@ impl JointFit {
             true => refit(&left.adjustment, free_poses.as_ref()?, estimator, noise),
             false => Some(refitted_near(left)),
         };
-        let (accuracy, held_out) =
-            hold_out(fit.linear(), &fitted, limits).or_else(|| hold_out_bodies(fit.linear(), limits)).ok_or_else(
-                || Error::new(Code::NothingHeldOut, "hold-out", "too few images to hold any out", "take more images"),
-            )?;
+        let (accuracy, held_out) = hold_out(fit.linear(), &fitted, limits)
+            .or_else(|| hold_out_bodies(fit.linear(), limits))
+            .ok_or_else(|| nothing_held_out(folds(&fit.problem, limits).is_some(), noise))?;
         {
             let _stage = stage("diagnoses");
             diagnosis.after_fit(&fit, &accuracy);
@@ -238,6 +239,22 @@ fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f6
     for (i, mismatch) in remarks {
         adjustment.problem.images[i].rejected = Some(ImageRejection::WronglyPaired(mismatch));
     }
+}
+
+/// Too few images; or `enough`, but fits without some of them cannot predict these.
+fn nothing_held_out(enough: bool, noise: JointNoise) -> Error {
+    let (what, remedy) = match (enough, noise) {
+        (false, _) => ("too few images to hold any out", "take more images"),
+        (true, JointNoise::Known(_)) => (
+            "fits without some of the images do not predict these at all: the readings do not err as little as was stated",
+            "leave out --joint-noise: it is estimated then",
+        ),
+        (true, JointNoise::Estimated) => (
+            "fits without some of the images do not predict these at all",
+            "look at the per-image table for images that do not belong, and take stops that move every joint",
+        ),
+    };
+    Error::new(Code::NothingHeldOut, "hold-out", what, remedy)
 }
 
 /// A two-step calibration goes by camera poses.

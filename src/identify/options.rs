@@ -19,6 +19,16 @@ pub enum JointNoise {
     Known(f64),
 }
 
+impl JointNoise {
+    /// As it was stated, rad or m; none where it is estimated.
+    pub fn stated(self) -> Option<f64> {
+        match self {
+            Self::Estimated => None,
+            Self::Known(sigma) => Some(sigma),
+        }
+    }
+}
+
 /// What is assumed of how far the markers are from nominal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

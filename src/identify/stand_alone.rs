@@ -87,7 +87,8 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     let stated = camera_starts(&start.problem.cameras, &series);
     let (mut adjustment, free_poses, starts) = adjust_free_poses(start, &stated, limits)?;
     adjustment.hold_poses();
-    let mut diagnosis = Diagnosis::new(CheckContext { series: &series, free: &free_poses, on_robot: 0, limits });
+    let mut diagnosis =
+        Diagnosis::new(CheckContext { series: &series, free: &free_poses, on_robot: 0, stated_noise: None, limits });
     diagnosis.after_free_poses(&adjustment.problem);
     let mut findings = diagnosis.findings();
     let fit = at_solution(adjustment)?;

@@ -12,7 +12,7 @@ use robotcal::assess::{
     Cause, Identifiability, Limits, MeasuredPoint, fit_points, ideal_stops, identifiability_of_stops, minimal_set,
     structural,
 };
-use robotcal::diagnose::Subject;
+use robotcal::diagnose::{Finding, Subject, Weight};
 use robotcal::geom::Pose;
 use robotcal::identify::{
     Config, JointNoise, Options, Parameters, RobotModel, Selection, Solution, StatedPrior, identify, verify_series,
@@ -452,6 +452,25 @@ fn clusters_contradict_a_wrong_noise_model_and_no_right_one() {
     println!("right noise model {right:?}, readings taken as exact {:?}", wrong.clustered_ratio);
     assert!(right.iter().all(|r| (0.8..1.15).contains(r)), "{right:?}");
     assert!(wrong.larger_stated && wrong.clustered_ratio.unwrap() > 1.5, "{:?}", wrong.clustered_ratio);
+}
+
+/// Readings that are trusted too much make the arm look as if something had moved.
+#[test]
+fn a_joint_noise_that_the_images_contradict_is_named_and_nothing_else() {
+    let found = |joint_noise: JointNoise| {
+        let options = Options { model: RobotModel::Rigid, joint_noise, ..Options::default() };
+        identify(chain(), &[world(1, 1e-4)], &options).unwrap().findings
+    };
+    for stated in [0.0, 1e-6] {
+        let findings = found(JointNoise::Known(stated));
+        let failed: Vec<Code> = findings.iter().filter(|f| f.weight() == Weight::Gate).map(|f| f.code()).collect();
+        println!("{stated}: {failed:?}");
+        assert!(failed.contains(&Code::LargeScatter), "{stated}: {findings:?}");
+        assert!(findings.iter().all(|f| !matches!(f, Finding::Displaced(_) | Finding::LooseMounting(_))), "{stated}");
+    }
+    assert!(found(JointNoise::Estimated).iter().all(|f| f.weight() != Weight::Gate));
+    let true_size = found(JointNoise::Known(1e-4));
+    assert!(true_size.iter().all(|f| f.code() != Code::LargeScatter), "{true_size:?}");
 }
 
 #[test]

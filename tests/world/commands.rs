@@ -348,3 +348,17 @@ fn poses_need_no_robot_and_no_joint_values() {
     assert!(text(&output).starts_with("error[file_missing]: "), "{}", text(&output));
     assert_eq!(std::fs::read_to_string(Path::new(out).join("poses.csv")).unwrap(), poses);
 }
+
+/// Readings that err by 0.3 mrad, taken as exact: the fits without some of the images are no good, and images there are enough of.
+#[test]
+fn a_joint_noise_stated_too_small_is_to_be_left_out() {
+    let repo = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (urdf, series) = (repo.join("robots/ur10e/ur10e.urdf"), repo.join("datasets/ur10e_observations"));
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let [urdf, series, out] = [&urdf, &series, &out].map(|path| path.to_str().unwrap());
+    let output = robotcal(&["identify", "--urdf", urdf, "--series", series, "--out", out, "--joint-noise", "0", "-q"]);
+    let said = text(&output);
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.starts_with("error[nothing_held_out]: ") && said.contains("--joint-noise"), "{said}");
+}
