@@ -111,8 +111,10 @@ fn parse(path: &Path, toml: &str, marker_text: impl FnOnce(&Path) -> Result<Stri
     let mut plate = nominal(path, &file)?;
     if let Some(markers) = &file.markers {
         let csv = path.with_file_name(markers);
+        let nominal = plate.clone();
         plate.markers = read_markers(&Table::parse(&csv, &marker_text(&csv)?)?, &plate)?;
         check_ids(&csv, &plate)?;
+        check_spread(&csv, &plate, &nominal)?;
     }
     check_overlap(path, &plate)?;
     check_scale(path, &plate)?;
@@ -358,6 +360,25 @@ fn check_ids(csv: &Path, plate: &Plate) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Markers that may be numbered otherwise spread over the lattice that columns, rows and pitch make.
+fn check_spread(csv: &Path, plate: &Plate, nominal: &Plate) -> Result<()> {
+    if plate.kind.print().places != Places::Lattice {
+        return Ok(());
+    }
+    let spread = |plate: &Plate, axis: usize| {
+        let all = || plate.markers.iter().map(|m| m.position_m[axis]);
+        all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
+    };
+    let [own, wanted] = [plate, nominal].map(|plate| [0, 1].map(|axis| spread(plate, axis)));
+    if (0..2).all(|axis| (own[axis] - wanted[axis]).abs() < 0.5 * plate.pitch_m) {
+        return Ok(());
+    }
+    let [own, wanted] = [own, wanted].map(|[x, y]| format!("{x:.4} x {y:.4} m"));
+    let what = format!("its markers spread over {own}, but columns, rows and pitch_m of plate.toml over {wanted}");
+    let remedy = "correct columns, rows or pitch_m, or the marker file: metres, x right, y UP on the printed face";
+    Err(Error::new(Code::MarkerMisplaced, csv.display(), what, remedy))
 }
 
 /// Neighbours must be apart by more than their radii.

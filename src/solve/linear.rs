@@ -63,7 +63,7 @@ pub struct BodyPart {
 /// One image as it is linearised, with its equations where they are kept.
 type Part = ((Arc<ImageTerms>, Arc<Chained>), Option<Arc<Equations>>);
 
-/// Observations up to which their equations are kept, which takes about 60 MB.
+/// Observations up to which their equations are kept, which takes about 40 MB.
 const MOST_KEPT: usize = 120_000;
 
 impl Linearised {

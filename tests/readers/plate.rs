@@ -173,3 +173,30 @@ fn what_is_written_reads_back_the_same() {
     }
     assert_says(&refusal(&format!("{shifted}large = [[4, 0]]\n"), ""), Code::SettingRange, &["column 4"]);
 }
+
+/// The marker file of a grid may number its dots otherwise, and says where they lie; columns and rows belong to it.
+#[test]
+fn a_grid_is_as_large_as_its_marker_file() {
+    for (columns, rows, asymmetric) in [(4, 3, false), (4, 11, true)] {
+        let toml = |columns: u32, rows: u32, pitch_m: f64, more: &str| {
+            format!(
+                "format = 1\nkind = \"circle-grid\"\ncolumns = {columns}\nrows = {rows}\npitch_m = {pitch_m}\nasymmetric = \
+                 {asymmetric}\n{more}"
+            )
+        };
+        let nominal = plate(&toml(columns, rows, 0.01, "radius_m = 0.003\n"), "");
+        let row = |(k, m): (usize, &Marker)| {
+            format!("{},{},{},0,0.003,0\n", 500 - k, m.position_m.x + 2e-4, m.position_m.y - 1e-4)
+        };
+        let dots: String = nominal.markers.iter().enumerate().map(row).collect();
+        let csv = format!("id,x_m,y_m,z_m,outer_radius_m,inner_radius_m\n{dots}");
+        let named = |columns, rows, pitch_m| toml(columns, rows, pitch_m, "markers = \"plate.csv\"\n");
+        assert_eq!(plate(&named(columns, rows, 0.01), &csv).markers.len(), (columns * rows) as usize);
+        for (c, r, pitch_m) in
+            [(columns + 1, rows, 0.01), (columns, rows - 1, 0.01), (rows, columns, 0.01), (columns, rows, 0.02)]
+        {
+            let refused = refusal(&named(c, r, pitch_m), &csv);
+            assert_says(&refused, Code::MarkerMisplaced, &["columns", "plate.csv"]);
+        }
+    }
+}
