@@ -172,11 +172,15 @@ fn multiply_into(c: &mut DMatrix<f64>, how: Accum, a: MatRef<'_, f64>, b: MatRef
     });
 }
 
-/// The first rows of `y y'`, in some of its columns, to the first rows and columns of `into`.
-pub fn part_of_gram(into: &mut DMatrix<f64>, y: &DMatrix<f64>, rows: usize, columns: Range<usize>) {
-    let into = view_mut(into).get_mut(..rows, ..columns.len());
-    let of_columns = view(y).get(columns, ..);
-    matmul(into, Accum::Replace, view(y).get(..rows, ..), of_columns.transpose(), 1.0, Par::Seq);
+/// `y y'` in some of its columns down to the diagonal, to the first rows and columns of `into`; what lies below is left as it is.
+pub fn part_of_gram(into: &mut DMatrix<f64>, y: &DMatrix<f64>, columns: Range<usize>) {
+    let (upper, full) = (BlockStructure::TriangularUpper, BlockStructure::Rectangular);
+    let into = view_mut(into).get_mut(..columns.end, ..columns.len());
+    let (above, diagonal) = into.split_at_row_mut(columns.start);
+    let (above_columns, of_columns) = (view(y).get(..columns.start, ..), view(y).get(columns, ..));
+    matmul(above, Accum::Replace, above_columns, of_columns.transpose(), 1.0, Par::Seq);
+    let how = Accum::Replace;
+    triangular::matmul(diagonal, upper, how, of_columns, full, of_columns.transpose(), full, 1.0, Par::Seq);
 }
 
 /// `y y'`.

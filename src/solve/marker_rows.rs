@@ -238,7 +238,7 @@ impl MarkerBlock {
     /// Adds its product with its transpose, down to the diagonal, to the columns `own`; by way of `gram`.
     fn add_gram_to(&self, into: &mut [f64], own: &Range<usize>, gram: &mut DMatrix<f64>) {
         let (first, end) = (self.place(own.start), self.place(own.end));
-        part_of_gram(gram, &self.values, end, first..end);
+        part_of_gram(gram, &self.values, first..end);
         let rows = into.len() / own.len();
         for of in &self.runs {
             for column in of.into.max(own.start)..(of.into + of.length).min(own.end) {
