@@ -63,8 +63,9 @@ fn part(stops: &mut [(usize, Bounds)], groups: &mut Vec<Vec<usize>>) {
         of().fold(f64::NEG_INFINITY, f64::max) - of().fold(f64::INFINITY, f64::min)
     };
     let widest = (1..4).fold(0, |best, k| if spread(k) > spread(best) { k } else { best });
-    stops.sort_by(|a, b| a.1[widest].total_cmp(&b.1[widest]));
-    let (first, second) = stops.split_at_mut((stops.len() / 2).next_multiple_of(MOST));
+    let half = (stops.len() / 2).next_multiple_of(MOST);
+    stops.select_nth_unstable_by(half, |a, b| a.1[widest].total_cmp(&b.1[widest]));
+    let (first, second) = stops.split_at_mut(half);
     part(first, groups);
     part(second, groups);
 }
