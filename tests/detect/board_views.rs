@@ -307,6 +307,13 @@ fn hardly_any_dot_beside_glare_is_beyond_its_sigmas() {
     assert!(tally.share() > 0.6, "{tally:?}");
 }
 
+/// Glare eats the rim of the one larger dot, which then looks like the others: the grid fits after half a turn as well.
+#[test]
+fn a_grid_whose_larger_dot_is_eaten_by_glare_is_not_turned() {
+    let tally = views("circle-grid", "glare", &[200179]);
+    assert_eq!(tally.wrong, 0, "{tally:?}");
+}
+
 /// Of a board a hand leaves six by six corners; below, it may go on beyond the border, and beside them, below the hand: its turn is open.
 #[test]
 fn a_board_that_may_go_on_below_a_hand_gets_no_ids() {

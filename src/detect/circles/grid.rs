@@ -214,6 +214,10 @@ impl<'a> Grid<'a> {
         if laid.len() > 1 && self.contradicts(&plate, &elsewhere) {
             return Err(dots_elsewhere(&elsewhere));
         }
+        // Dots that tell the turn are seen as other than they are.
+        if laid.iter().any(|other| chosen.is_told_from(other, &code, &self.cells)) {
+            return nothing(Outcome::Ambiguous);
+        }
         let classes = self.code(&plate)?.classes_of(lattice, candidates);
         let board = board(chosen, lattice, &classes);
         let sizes = match told {

@@ -39,6 +39,13 @@ impl Laid {
         if self.mirrored { (j, i) } else { (i, j) }
     }
 
+    /// Whether the plate has a dot of another size, or none, where `other` puts the same dot; neither is mirrored.
+    pub fn is_told_from(&self, other: &Self, code: &MarkerCode, cells: &[Cell]) -> bool {
+        let on_lattice =
+            |cell: Cell| turned((cell.0 - self.shift.0, cell.1 - self.shift.1), (4 - self.turns) % 4, false);
+        cells.iter().any(|&cell| code.class_at(cell) != code.class_at(other.apply(on_lattice(cell))))
+    }
+
     fn score(&self) -> i64 {
         self.seen as i64 - self.wrong as i64
     }

@@ -168,7 +168,7 @@ pub(super) fn refine(picture: &Picture, seed: &Seed, window: Window, look: Look)
         Problem { pixels, look, noise: START_NOISE * contrast.abs(), contrast, full_scale, level_slope: SLOPE_PER_PX };
     let near = problem.pixels.near;
     let rough = problem.minimise(problem.at(&guess, near), near, ROUGH)?;
-    problem.noise = near.noise(&rough);
+    problem.noise = problem.noise_of(rough.sum.squares, &rough, near);
     problem.contrast = rough.state[STEP];
     let all = problem.pixels.all;
     let usual = problem.minimise(problem.at(&rough.state, all), all, FINE)?;
@@ -213,17 +213,6 @@ impl Pixels {
             (0..LANES).filter(move |&lane| weight[lane] > 0.0).map(move |lane| [x[lane], y[lane], value[lane]])
         };
         self.blocks.iter().flat_map(pixels)
-    }
-}
-
-impl Part {
-    fn degrees_of_freedom(&self) -> f64 {
-        (self.pixels - PARAMETERS) as f64
-    }
-
-    /// Root mean square of the residuals at a point, counts.
-    fn noise(self, point: &Point) -> f64 {
-        (point.sum.squares / self.degrees_of_freedom()).sqrt()
     }
 }
 
@@ -297,7 +286,7 @@ impl Problem {
         self.level_slope = GLARE_SLOPE;
         // Light that the usual fit lacks is no noise, the second time.
         for _ in 0..2 {
-            self.noise = all.noise(&lit);
+            self.noise = self.noise_of(lit.sum.squares, &lit, all);
             lit = self.minimise(lit, all, FINE)?;
         }
         let [x, y] = LEVEL_SLOPE.map(|i| lit.state[i]);
@@ -354,6 +343,15 @@ impl Problem {
         (normal, right, self.cost(point))
     }
 
+    /// Noise of a pixel whose squares leave this sum at a minimum, counts. With the normal matrix `N` of the pixels and `W` of the priors the
+    /// fit takes `tr((N + W)^-1 N)` of them, not one a parameter: priors hold most slopes.
+    fn noise_of(&self, squares: f64, point: &Point, part: Part) -> f64 {
+        let held = |inverse: Matrix| self.priors().iter().map(|&(i, weight, _)| weight * inverse[(i, i)]).sum::<f64>();
+        let (normal, _, _) = self.with_priors(point);
+        let taken = PARAMETERS as f64 - normal.cholesky().map_or(0.0, |factor| held(factor.inverse()));
+        (squares / (part.pixels as f64 - taken)).sqrt()
+    }
+
     fn at(&self, state: &Vector, part: Part) -> Point {
         let mut sum = Sum { normal: [[0.0; PARAMETERS]; PARAMETERS], right: [0.0; PARAMETERS], squares: 0.0 };
         let edges = Edges::new(state, self.look.halo);
@@ -385,7 +383,7 @@ impl Problem {
         Ok(Saddle {
             uv: [seed.uv[0] + state[0], seed.uv[1] + state[1]],
             contrast: state[STEP],
-            noise: (self.cost(&end) / self.pixels.all.degrees_of_freedom()).sqrt(),
+            noise: self.noise_of(self.cost(&end), &end, self.pixels.all),
             blur_px: 0.5 * (blurs[0] + blurs[1]),
             halo: state[HALO],
             problem: self,

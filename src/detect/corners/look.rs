@@ -85,10 +85,12 @@ fn is_steep(corner: &Saddle) -> bool {
     blur_px + doubt < LEAST_BLUR_PX
 }
 
+/// What most fits with a halo show. One of no halo may have come out as one of -1, whose edge has the blur of the halo.
 fn usual(fits: &[Saddle]) -> Look {
-    let middle = |of: fn(&Saddle) -> f64| quantile(fits.iter().map(of), 0.5);
-    let halo = middle(|s| s.halo).is_some_and(|halo| halo > LEAST_HALO);
-    Look { blur_px: middle(|s| s.blur_px).unwrap_or(START.blur_px), halo }
+    let middle = |of: &dyn Fn(&Saddle) -> f64| quantile(fits.iter().map(of), 0.5);
+    let halo = middle(&|s| s.halo).is_some_and(|halo| halo > LEAST_HALO);
+    let blur_px = middle(&|s| if halo { s.blur_px } else { s.steepness_px()[0] });
+    Look { blur_px: blur_px.unwrap_or(START.blur_px), halo }
 }
 
 /// The value below which a share of the values lies.
