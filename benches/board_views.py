@@ -40,15 +40,13 @@ def circle_grid(grey):
     return (centres if found else [], None)
 
 
-def tally(folder, detect):
-    """By what is hard: views, views with the board, in view, found, wrong ids, squares in px^2."""
-    sums = collections.OrderedDict()
-    for path in sorted(folder.glob("*.png")):
-        hard = path.stem.rsplit("-", 1)[0]
+def tally(paths, detect):
+    """Views, views with the board, in view, found, wrong ids, squares in px^2."""
+    of_view = np.zeros(6)
+    for path in paths:
         truth = {int(i): np.array([float(u), float(v)]) for i, u, v in csv.reader(open(path.with_suffix(".csv")))}
         corners, ids = detect(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE))
         places = np.reshape(corners, (-1, 2))
-        of_view = sums.setdefault(hard, np.zeros(6))
         of_view[:3] += 1, len(places) > 0, len(truth)
         for marker, at in truth.items() if len(places) else ():
             if ids is None:
@@ -61,7 +59,7 @@ def tally(folder, detect):
             if off <= FOUND_PX:
                 of_view[3] += 1
                 of_view[5] += off * off
-    return sums
+    return of_view
 
 
 def main():
@@ -69,7 +67,11 @@ def main():
     print("| board | view | views | with the board | in view | found | share | wrong | rms px |\n|---|---|---|---|---|---|---|---|---|")
     detectors = {"chessboard": chessboard, "charuco": charuco(), "circle-grid": circle_grid}
     for kind, detect in detectors.items():
-        for hard, (views, seen, in_view, found, wrong, squares) in tally(pathlib.Path(sys.argv[1]) / kind, detect).items():
+        by_hard = collections.defaultdict(list)
+        for path in sorted((pathlib.Path(sys.argv[1]) / kind).glob("*.png")):
+            by_hard[path.stem.rsplit("-", 1)[0]].append(path)
+        for hard, paths in by_hard.items():
+            views, seen, in_view, found, wrong, squares = tally(paths, detect)
             rms = (squares / (2 * max(found, 1))) ** 0.5
             wrong = int(wrong) if kind == "charuco" else "-"
             print(
