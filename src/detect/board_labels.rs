@@ -267,9 +267,7 @@ impl<'a> Shader<'a> {
         let near = if end == 0 { 1.0 - NEAR } else { NEAR };
         let place = if axis == 0 { [near, 0.5] } else { [0.5, near] };
         let cells = across.map(|other| if axis == 0 { (at, other) } else { (other, at) });
-        let seen: Vec<(f64, f64)> = cells
-            .filter_map(|(u, v)| Some((self.at((u, v), place)?, f64::from(1 - 2 * (u + v).rem_euclid(2)))))
-            .collect();
+        let seen: Vec<(f64, f64)> = cells.filter_map(|(u, v)| Some((self.at((u, v), place)?, parity(u, v)))).collect();
         let mean = |of: fn(&(f64, f64)) -> f64| seen.iter().map(of).sum::<f64>() / seen.len() as f64;
         let alternating = mean(|(shade, sign)| shade * sign);
         let line = match mean(|(shade, _)| *shade) {
@@ -279,6 +277,11 @@ impl<'a> Shader<'a> {
         };
         (!seen.is_empty()).then_some((line, alternating, seen.len()))
     }
+}
+
+/// 1 of cells with an even sum, -1 of those with an odd one.
+pub(super) fn parity(u: i32, v: i32) -> f64 {
+    f64::from(1 - 2 * (u + v).rem_euclid(2))
 }
 
 /// Shade of every lattice cell in view.

@@ -3,7 +3,7 @@
 //! The squares go on as long as the cells of a further line alternate in their two colours, and end in view where they do not.
 
 use super::Picture;
-use super::board_labels::{BoardSize, Lattice, Line, Shader, bounds};
+use super::board_labels::{BoardSize, Lattice, Line, Shader, bounds, parity};
 use super::size_seen::{Counted, end_to_end, other_size};
 use crate::error::Error;
 
@@ -93,10 +93,6 @@ impl BoardSeen {
             _ => Beyond::Unclear,
         }
     }
-}
-
-fn parity(u: i32, v: i32) -> f64 {
-    if (u + v).rem_euclid(2) == 0 { 1.0 } else { -1.0 }
 }
 
 /// Mean shade of the squares between the corners, those with an odd sum with the other sign.

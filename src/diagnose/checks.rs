@@ -5,7 +5,7 @@ use super::kind::{CheckContext, Weight};
 use super::{
     camera_model, camera_pattern, exchanged_readings, extrapolates, few_images, focus, held_near_nominal, joint_noise,
     left_out_bodies, left_out_images, left_out_observations, length_standard, loose, marker_off, measurement_scatter,
-    moved, no_gain, parameter_off, plate_size, pose_step, scatter, undetermined, zeros_off,
+    moved, no_gain, parameter_off, plate_size, pose_step, scatter, stated_noise, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -50,6 +50,7 @@ pub const CHECKS: &[Check] = &[
         // What moved once has two places.
         explains: |own, other| match (own, other) {
             (Finding::Displaced(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
+            (Finding::Displaced(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
             _ => false,
         },
         ..check("pose_step", Stage::Fit(|a, b, s| found(pose_step::check(a, b, s))))
@@ -63,7 +64,11 @@ pub const CHECKS: &[Check] = &[
     check("camera_pattern", Stage::Fit(|a, b, s| found(camera_pattern::check(a, b, s)))),
     check("few_images", Stage::Fit(|a, b, s| found(few_images::check(a, b, s)))),
     check("joint_noise", Stage::Fit(|a, b, s| found(joint_noise::check(a, b, s)))),
-    check("loose", Stage::Fit(|a, b, s| found(loose::check(a, b, s)))),
+    check("stated_noise", Stage::Fit(|a, b, s| found(stated_noise::check(a, b, s)))),
+    Check {
+        explains: |_, other| matches!(other, Finding::NoiseContradicted(noise) if noise.is_explained_by(Weight::Gate)),
+        ..check("loose", Stage::Fit(|a, b, s| found(loose::check(a, b, s))))
+    },
     check("moved", Stage::LeftOut(|a, s| found(moved::check(a, s)))),
     check("exchanged_readings", Stage::LeftOut(|a, _| found(exchanged_readings::check(a)))),
     check("left_out_images", Stage::LeftOut(|a, s| found(left_out_images::check(a, s)))),
@@ -76,16 +81,7 @@ pub const CHECKS: &[Check] = &[
     check("length_standard", Stage::Fit(|a, b, s| found(length_standard::check(a, b, s)))),
     check("marker_off", Stage::Fit(|a, b, s| found(marker_off::check(a, b, s)))),
     check("parameter_off", Stage::Fit(|a, b, s| found(parameter_off::check(a, b, s)))),
-    Check {
-        // Readings that are trusted too much make the arm look as if something had moved.
-        explains: |own, other| match own {
-            Finding::LargeScatter(own) => {
-                own.stated_noise.is_some() && matches!(other, Finding::Displaced(_) | Finding::LooseMounting(_))
-            }
-            _ => false,
-        },
-        ..check("scatter", Stage::Uncertainty(|a, b, s| found(scatter::check(a, b, s))))
-    },
+    check("scatter", Stage::Uncertainty(|a, b, s| found(scatter::check(a, b, s)))),
     check("held_near_nominal", Stage::Fit(|a, b, s| found(held_near_nominal::check(a, b, s)))),
     check("extrapolates", Stage::Uncertainty(|a, b, s| found(extrapolates::check(a, b, s)))),
     check("undetermined", Stage::Uncertainty(|a, b, s| found(undetermined::check(a, b, s)))),

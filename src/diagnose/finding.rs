@@ -27,6 +27,7 @@ use super::noticed::Noticed;
 use super::parameter_off::ParameterOff;
 use super::plate_size::DoubtedSize;
 use super::scatter::LargeScatter;
+use super::stated_noise::NoiseContradicted;
 use super::undetermined::FlangeUndetermined;
 use super::zeros_off::ZeroOff;
 use crate::error::{Code, Error, Notice};
@@ -78,6 +79,7 @@ findings! {
     Mistake,
     BodyMoved,
     NoGain,
+    NoiseContradicted,
     Noticed,
     ObservationsLeftOut,
     ParameterOff,

@@ -38,7 +38,7 @@ pub struct JointNoiseLarge {
 pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> Vec<JointNoiseLarge> {
     let limits = setting.limits;
     let of_series = |(k, of): (usize, &crate::problem::MeasuredSeries)| {
-        let (joint, sigma) = noisiest_joint(fit, k)?;
+        let (joint, sigma) = noisiest_joint(setting.with_noise_found(fit), k)?;
         let weight = match sigma {
             s if s > limits.joint_noise => Weight::Gate,
             s if s >= limits.unusual_joint_noise => Weight::Note,

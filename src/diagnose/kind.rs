@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::assess::Limits;
 use crate::error::Code;
 pub use crate::error::Quantity;
-use crate::fit::FreePoses;
+use crate::fit::{Fit, FreePoses};
 use crate::problem::MeasuredSeries;
 
 /// What every check may look at.
@@ -17,10 +17,26 @@ pub struct CheckContext<'a> {
     pub free: &'a FreePoses,
     /// Images of the robot before any was left out.
     pub on_robot: usize,
-    /// Joint noise as it was stated, rad or m; none where it is estimated.
-    pub stated_noise: Option<f64>,
+    /// What the data say of a joint noise that was stated; none where it is estimated.
+    pub stated_noise: Option<StatedNoise<'a>>,
     /// Numbers that decide.
     pub limits: &'a Limits,
+}
+
+/// A joint noise that was stated, and the same fit with the noise that the data show.
+#[derive(Clone, Copy)]
+pub struct StatedNoise<'a> {
+    /// As stated, rad or m.
+    pub sigma: f64,
+    /// The fit that found it.
+    pub found: &'a Fit,
+}
+
+impl CheckContext<'_> {
+    /// The fit whose joint noise was found from the data. One that was stated too small makes the arm look as if something had moved.
+    pub(super) fn with_noise_found<'f>(&'f self, fit: &'f Fit) -> &'f Fit {
+        self.stated_noise.map_or(fit, |stated| stated.found)
+    }
 }
 
 /// How much a finding weighs.

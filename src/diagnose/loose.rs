@@ -67,8 +67,8 @@ fn split(values: &[f64], fewest: usize) -> Option<Split> {
 
 /// Every mounting whose camera turned between two positions.
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<LooseMounting> {
-    let mountings = 0..fit.problem.mountings.len();
-    mountings.filter_map(|m| loose(fit, m, setting.limits)).collect()
+    let fit = setting.with_noise_found(fit);
+    (0..fit.problem.mountings.len()).filter_map(|m| loose(fit, m, setting.limits)).collect()
 }
 
 fn loose(fit: &Fit, mounting: usize, limits: &Limits) -> Option<LooseMounting> {

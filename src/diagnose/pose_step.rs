@@ -117,6 +117,7 @@ impl Row {
 }
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Displaced> {
+    let fit = setting.with_noise_found(fit);
     find_steps(fit, setting.limits).iter().map(|step| step.finding(&fit.problem, setting)).collect()
 }
 

@@ -9,13 +9,11 @@ use crate::error::Code;
 pub struct LargeScatter {
     /// Sigma of the flange by clusters of images over that by the noise model.
     pub ratio: f64,
-    /// Joint noise as it was stated, rad or m; none where it was estimated.
-    pub stated_noise: Option<f64>,
 }
 
-pub(super) fn check(uncertainty: &Uncertainty, _: &Accuracy, setting: &CheckContext) -> Option<LargeScatter> {
+pub(super) fn check(uncertainty: &Uncertainty, _: &Accuracy, _: &CheckContext) -> Option<LargeScatter> {
     let ratio = uncertainty.clustered_ratio.filter(|_| uncertainty.larger_stated);
-    ratio.map(|ratio| LargeScatter { ratio, stated_noise: setting.stated_noise })
+    ratio.map(|ratio| LargeScatter { ratio })
 }
 
 impl Kind for LargeScatter {
@@ -24,7 +22,7 @@ impl Kind for LargeScatter {
     }
 
     fn weight(&self) -> Weight {
-        if self.stated_noise.is_some() { Weight::Gate } else { Weight::Note }
+        Weight::Note
     }
 
     fn subjects(&self) -> Vec<Subject> {
@@ -32,8 +30,7 @@ impl Kind for LargeScatter {
     }
 
     fn quantities(&self) -> Vec<Quantity> {
-        let stated = self.stated_noise.map(|sigma| Quantity::new("stated_joint_noise", sigma, "rad or m"));
-        [Quantity::new("flange_ratio", self.ratio, "1")].into_iter().chain(stated).collect()
+        vec![Quantity::new("flange_ratio", self.ratio, "1")]
     }
 
     fn place(&self) -> String {
@@ -41,21 +38,13 @@ impl Kind for LargeScatter {
     }
 
     fn seen(&self) -> String {
-        let model = match self.stated_noise {
-            Some(sigma) => format!("the stated joint noise of {} mrad", 1e3 * sigma),
-            None => "the noise model".into(),
-        };
         format!(
-            "the images scatter {:.1} times as much as {model} says (flange, clusters of images); the larger sigmas are stated",
+            "the images scatter {:.1} times as much as the noise model says (flange, clusters of images); the larger sigmas are stated",
             self.ratio
         )
     }
 
     fn remedy(&self) -> String {
-        let remedy = match self.stated_noise {
-            Some(_) => "leave out --joint-noise: it is estimated then",
-            None => "look for what changes from image to image: a loose camera or plate, motion, focus, light",
-        };
-        remedy.into()
+        "look for what changes from image to image: a loose camera or plate, motion, focus, light".into()
     }
 }

@@ -284,6 +284,7 @@ codes! {
         FewImages "few_images" "few images: the nominal model decides much of the result",
         FocusChanged "focus_changed" "focus or zoom changed during the series",
         JointNoiseLarge "joint_noise_large" "the joint noise is larger than robots have",
+        JointNoiseContradicted "joint_noise_contradicted" "the data show another joint noise than the stated one",
         PlateMoved "plate_moved" "the plate was moved: images were left out",
         CameraMoved "camera_moved" "the camera was moved on its mount: images were left out",
         PlateDisplaced "plate_displaced" "the plate stands a little elsewhere from some image on",

@@ -72,7 +72,7 @@ fn best_model(
         None | Some((RobotModel::Full, _)) => full,
         Some((model, near)) => {
             let options = Options { model, ..options.clone() };
-            fit_model(chain, series, &options, Some((full.start, near)))?
+            fit_model(chain, series, &options, Some((full.start, Some(near))))?
         }
     };
     Ok((chosen, evidences))

@@ -12,7 +12,7 @@ use super::start_verdict::StartVerdict;
 use super::stated::camera_starts;
 use super::two_stage::PoseStage;
 use crate::assess::{folds, hold_out, hold_out_bodies, judge, refitted_near};
-use crate::diagnose::{CheckContext, Diagnosis};
+use crate::diagnose::{CheckContext, Diagnosis, StatedNoise};
 use crate::error::{Code, Error, Result};
 use crate::fit::{Fit, FreePoses};
 use crate::problem::MeasuredSeries;
@@ -54,7 +54,7 @@ pub(super) fn fit_model(
     chain: Chain,
     series: &[MeasuredSeries],
     options: &Options,
-    known: Option<(FreeStart, Adjustment)>,
+    known: Option<(FreeStart, Option<Adjustment>)>,
 ) -> Result<JointFit> {
     let _stage = stage(options.model.title());
     let robot = options.model.robot_with(chain, options.harmonics);
@@ -66,7 +66,7 @@ pub(super) fn fit_model(
     if options.marker_tolerance == MarkerTolerance::Estimated {
         problem.noise.marker = vec![1.0; problem.plates.len()];
     }
-    let (known, near) = known.unzip();
+    let (known, near) = known.map_or((None, None), |(start, near)| (Some(start), near));
     let left = match known {
         Some(known) => {
             known.carry_to(&mut start);
@@ -92,8 +92,8 @@ pub(super) fn fit_model(
     };
     let (status, iterations) = (outcome.status, outcome.iterations);
     name_wrong_pairs(&mut outcome.adjustment, free, options.limits.other_readings_explain);
-    let stated_noise = options.joint_noise.stated();
-    let mut diagnosis = Diagnosis::new(CheckContext { series, free, on_robot, stated_noise, limits: &options.limits });
+    let context = CheckContext { series, free, on_robot, stated_noise: None, limits: &options.limits };
+    let mut diagnosis = Diagnosis::new(context);
     diagnosis.after_free_poses(&outcome.adjustment.problem);
     diagnosis.after_left_out(&outcome.adjustment)?;
     if status != Status::Converged {
@@ -112,17 +112,27 @@ pub(super) fn fit_model(
 }
 
 impl JointFit {
+    /// The same fit with the joint noise that the data show, where one was stated and they show one.
+    fn with_noise_found(&self, series: &[MeasuredSeries]) -> Option<Self> {
+        self.options.joint_noise.stated()?;
+        let options = Options { joint_noise: JointNoise::Estimated, ..self.options.clone() };
+        let chain = self.fit.state.robot.chain.clone();
+        fit_model(chain, series, &options, Some((self.start.clone(), None))).ok()
+    }
+
     /// The result by an estimator, with everything that is known of it.
     ///
     /// # Errors
     /// Too few images to hold any out; an estimator that has no solution.
     pub fn judged(self, series: &[MeasuredSeries], estimator: Estimator) -> Result<Solution> {
         let _stage = stage(self.options.model.title());
+        let with_noise_found = self.with_noise_found(series);
         let Self { options, fit, start, starts, on_robot, before, status, iterations } = self;
         let options = Options { estimator, ..options };
         let (free, limits, noise) = (start.free, &options.limits, options.joint_noise);
-        let mut diagnosis =
-            Diagnosis::new(CheckContext { series, free: &free, on_robot, stated_noise: noise.stated(), limits });
+        let stated = noise.stated().zip(with_noise_found.as_ref());
+        let stated_noise = stated.map(|(sigma, own)| StatedNoise { sigma, found: &own.fit });
+        let mut diagnosis = Diagnosis::new(CheckContext { series, free: &free, on_robot, stated_noise, limits });
         diagnosis.after_free_poses(&fit.problem);
         diagnosis.after_left_out(&fit)?;
         if estimator.is_two_stage() && !fit.problem.body_measurements.is_empty() {

@@ -43,14 +43,9 @@ impl DenseCoupling {
             row.columns_mut(0, poses).tr_copy_from(&stops.chain.view((0, c), (poses, 1)));
         }
         transposed.view_mut((*theta, poses), (direct, direct)).fill_with_identity();
-        let row_of = |c: Option<usize>| Some(poses + free.binary_search(&c?).ok()?.checked_sub(*theta)?);
+        let row_of = |c: usize| Some(poses + free.binary_search(&c).ok()?.checked_sub(*theta)?);
         let images: Vec<ImageRows> = (images.iter().enumerate())
-            .map(|(k, (own, equations))| ImageRows {
-                plate: own.image.plate,
-                equations,
-                pose: 6 * k,
-                intrinsics: own.columns().into_iter().map(row_of).collect(),
-            })
+            .map(|(k, (own, equations))| ImageRows::of(own, equations, 6 * k, row_of))
             .collect();
         MarkerRows::of(poses + direct, seen, &images).add_product_to(values, &transposed);
     }

@@ -263,13 +263,7 @@ fn column(x: DVector<f64>) -> DMatrix<f64> {
 fn coupling_of_poses(linear: LinearProblem, seen: &SeenMarkers, space: &PoseSpace) -> MarkerRows {
     let row_of = |c: usize| linear.adjustment.problem.layout.columns[c].free.then(|| space.row_of(c)).flatten();
     let images: Vec<_> = linear.images().enumerate().filter_map(|(k, own)| Some((k, own, own.equations()?))).collect();
-    let images: Vec<ImageRows> = (images.iter())
-        .map(|(k, own, equations)| ImageRows {
-            plate: own.image.plate,
-            equations,
-            pose: 6 * k,
-            intrinsics: own.columns().into_iter().map(|c| c.and_then(row_of)).collect(),
-        })
-        .collect();
+    let images: Vec<ImageRows> =
+        images.iter().map(|(k, own, equations)| ImageRows::of(own, equations, 6 * k, row_of)).collect();
     MarkerRows::of(space.rows(), seen, &images)
 }

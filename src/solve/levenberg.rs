@@ -429,7 +429,7 @@ impl Descent {
         if self.is_trusting && expected.last && self.detour.is_none() {
             return Status::Converged;
         }
-        self.lin.forget_equations();
+        self.lin.equations = Vec::new();
         let tried = self.adjustment.linearise();
         let (lambda, to) = (self.lambda, tried.as_ref().map(|t| t.cost));
         tracing::trace!(kept, lambda, decrement, from = self.lin.cost, to);

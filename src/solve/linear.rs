@@ -35,7 +35,7 @@ pub struct Linearised {
     /// Robust cost of the pixels plus half the squares of priors, of what is latent at stops and of measured distances.
     pub cost: f64,
     /// Equations of each image in use, which the system is built from; empty where they are too many to keep.
-    equations: Vec<Arc<Equations>>,
+    pub(super) equations: Vec<Arc<Equations>>,
 }
 
 /// What was measured at one stop.
@@ -67,14 +67,9 @@ type Part = ((Arc<ImageTerms>, Arc<Chained>), Option<Arc<Equations>>);
 const MOST_KEPT: usize = 120_000;
 
 impl Linearised {
-    /// Without what only the solver needs.
+    /// Without the equations, which only the solver needs, and makes again where the system is built once more.
     pub fn without_equations(self) -> Self {
         Self { equations: Vec::new(), ..self }
-    }
-
-    /// Forgets the equations, which are made again where the system is built once more.
-    pub(super) fn forget_equations(&mut self) {
-        self.equations = Vec::new();
     }
 
     /// A measurement of a body by its index; `None` for one that takes no part.

@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, Matrix3};
 use rayon::prelude::*;
 
 use super::alike::MOST;
+use super::linear::LinearImage;
 use super::runs::{Run, runs};
 use super::seen_markers::SeenMarkers;
 use crate::linalg::{
@@ -41,6 +42,19 @@ pub(super) struct ImageRows<'a> {
     pub pose: usize,
     /// Those of its intrinsics, each where it has one.
     pub intrinsics: Vec<Option<usize>>,
+}
+
+impl<'a> ImageRows<'a> {
+    /// Of an image whose pose begins at a row, and its columns at those that `row_of` says.
+    pub fn of(
+        own: &LinearImage,
+        equations: &'a Equations,
+        pose: usize,
+        row_of: impl Fn(usize) -> Option<usize>,
+    ) -> Self {
+        let intrinsics = own.columns().into_iter().map(|c| c.and_then(&row_of)).collect();
+        Self { plate: own.image.plate, equations, pose, intrinsics }
+    }
 }
 
 /// An image with its observations in the order of the markers that were seen.

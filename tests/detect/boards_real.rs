@@ -26,18 +26,24 @@ fn largest_misfit(detection: &Detection) -> f64 {
     pairs.iter().map(distance).fold(0.0, f64::max)
 }
 
-#[test]
-fn all_corners_of_the_real_boards_are_found_with_the_right_ids() {
+/// The images of a real series in order of their names; none where no recordings are at hand.
+fn images_of(series: &str) -> Option<Vec<PathBuf>> {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/real"));
     if !root.is_dir() {
         println!("skipped: no recordings in {}", root.display());
-        return;
+        return None;
     }
+    let mut images: Vec<PathBuf> =
+        std::fs::read_dir(root.join(series).join("images")).unwrap().map(|e| e.unwrap().path()).collect();
+    images.sort();
+    Some(images)
+}
+
+#[test]
+fn all_corners_of_the_real_boards_are_found_with_the_right_ids() {
     let plate = Plate::lattice(PlateKind::Chessboard, COLUMNS, ROWS, 0.01, 5e-5);
     for series in ["nachi-2025-01-17", "nachi-2025-02-04", "nachi-2025-02-19", "aubo-2024-12-16"] {
-        let mut images: Vec<PathBuf> =
-            std::fs::read_dir(root.join(series).join("images")).unwrap().map(|e| e.unwrap().path()).collect();
-        images.sort();
+        let Some(images) = images_of(series) else { return };
         assert_eq!(images.len(), 24, "{series}");
         for (path, found) in images.iter().zip(detect_series(&images, &plate, |path| load(path, None), |_| ())) {
             let detection = found.detection;
@@ -54,16 +60,9 @@ fn all_corners_of_the_real_boards_are_found_with_the_right_ids() {
 /// Webcams that sharpen and compress: squares from 11 px, edges steeper than a lens makes them.
 #[test]
 fn boards_of_webcams_are_complete() {
-    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/real"));
-    if !root.is_dir() {
-        println!("skipped: no recordings in {}", root.display());
-        return;
-    }
     let plate = Plate::lattice(PlateKind::Chessboard, 9, 7, 0.02, 1e-4);
     for series in ["ur3a-cam1", "ur3a-cam2"] {
-        let mut images: Vec<PathBuf> =
-            std::fs::read_dir(root.join(series).join("images")).unwrap().map(|e| e.unwrap().path()).collect();
-        images.sort();
+        let Some(images) = images_of(series) else { return };
         assert_eq!(images.len(), 40, "{series}");
         for (path, found) in images.iter().zip(detect_series(&images, &plate, |path| load(path, None), |_| ())) {
             let detection = found.detection;
@@ -75,19 +74,12 @@ fn boards_of_webcams_are_complete() {
 /// A plate file with a line more or fewer than real boards have: no image is used, and the size that is seen is named.
 #[test]
 fn another_size_than_that_of_a_real_board_is_named() {
-    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/real"));
-    if !root.is_dir() {
-        println!("skipped: no recordings in {}", root.display());
-        return;
-    }
     for (series, kind, [columns, rows]) in [
         ("nachi-2025-01-17", PlateKind::Chessboard, [COLUMNS, ROWS]),
         ("ur3a-cam1", PlateKind::Chessboard, [9, 7]),
         ("ric-10x10", PlateKind::CircleGrid, [10, 10]),
     ] {
-        let mut images: Vec<PathBuf> =
-            std::fs::read_dir(root.join(series).join("images")).unwrap().map(|e| e.unwrap().path()).collect();
-        images.sort();
+        let Some(mut images) = images_of(series) else { return };
         images.truncate(6);
         let sizes = [[columns - 1, rows], [columns + 1, rows], [columns, rows - 1], [columns, rows + 1]];
         for [c, r] in sizes {

@@ -465,12 +465,12 @@ fn a_joint_noise_that_the_images_contradict_is_named_and_nothing_else() {
         let findings = found(JointNoise::Known(stated));
         let failed: Vec<Code> = findings.iter().filter(|f| f.weight() == Weight::Gate).map(|f| f.code()).collect();
         println!("{stated}: {failed:?}");
-        assert!(failed.contains(&Code::LargeScatter), "{stated}: {findings:?}");
+        assert!(failed.contains(&Code::JointNoiseContradicted), "{stated}: {findings:?}");
         assert!(findings.iter().all(|f| !matches!(f, Finding::Displaced(_) | Finding::LooseMounting(_))), "{stated}");
     }
     assert!(found(JointNoise::Estimated).iter().all(|f| f.weight() != Weight::Gate));
     let true_size = found(JointNoise::Known(1e-4));
-    assert!(true_size.iter().all(|f| f.code() != Code::LargeScatter), "{true_size:?}");
+    assert!(true_size.iter().all(|f| f.code() != Code::JointNoiseContradicted), "{true_size:?}");
 }
 
 #[test]

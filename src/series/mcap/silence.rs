@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::rc::Rc;
 
 use super::motion::LONGEST_GAP_NS;
 use super::scan::JointSample;
@@ -15,9 +16,13 @@ fn silences<'a>(samples: &[JointSample], joints: &'a [String]) -> BTreeMap<Span,
     let times = samples.iter().map(|s| s.time_ns);
     let mut silent: BTreeMap<Span, Vec<&str>> = BTreeMap::new();
     let Some((first, last)) = times.clone().min().zip(times.max()) else { return silent };
+    let mut by_names: BTreeMap<&[String], Vec<i64>> = BTreeMap::new();
+    for of_one_topic in samples.chunk_by(|a, b| Rc::ptr_eq(&a.names, &b.names)) {
+        by_names.entry(&of_one_topic[0].names).or_default().extend(of_one_topic.iter().map(|s| s.time_ns));
+    }
     for joint in joints {
-        let own = samples.iter().filter(|s| s.names.contains(joint)).map(|s| s.time_ns);
-        let mut told: Vec<i64> = own.chain([first, last]).collect();
+        let own = by_names.iter().filter(|(names, _)| names.contains(joint)).flat_map(|(_, times)| times);
+        let mut told: Vec<i64> = own.copied().chain([first, last]).collect();
         told.sort_unstable();
         let gaps = told.windows(2).filter(|w| w[1].saturating_sub(w[0]) > LONGEST_GAP_NS);
         gaps.for_each(|w| silent.entry((w[0], w[1])).or_default().push(joint));
@@ -46,7 +51,6 @@ pub(super) fn notices(recording: &Path, samples: &[JointSample], joints: &[Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::rc::Rc;
 
     const SECOND: i64 = 1_000_000_000;
 
