@@ -336,9 +336,9 @@ impl Views {
         let linear = fit.linear();
         let mut variances = [0.0f64; 2];
         let mut adjoints = Vec::with_capacity(linear.images().len());
-        for own in linear.images() {
+        for (own, covariance) in linear.images().zip(fit.covariance.camera_poses(linear)) {
             let ad = adjoint(&own.chain.pose);
-            let covariance = ad * fit.covariance.pose_of(&linear.stop(own.stop), &own) * ad.transpose();
+            let covariance = ad * covariance * ad.transpose();
             for (part, sum) in variances.iter_mut().enumerate() {
                 *sum += (0..3).map(|k| covariance[(3 * part + k, 3 * part + k)]).sum::<f64>().max(0.0);
             }

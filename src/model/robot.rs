@@ -106,7 +106,7 @@ impl Robot {
 
     /// As [`Robot::kinematics`], where the origins of this robot are at hand.
     pub fn kinematics_from(&self, origins: &LinearOrigins, stop: &Posture, noise: &[f64]) -> Kinematics {
-        let (positions, contexts) = self.positions(stop, noise);
+        let (positions, bases) = self.positions(stop, noise);
         let joints = &self.chain.joints;
         let mut d_twists = vec![Matrix6::zeros(); joints.len()];
         let mut d_readings = vec![Vector6::zeros(); self.chain.readings.len()];
@@ -122,7 +122,7 @@ impl Robot {
             d_twists[i] = adjoint(&rest_from_tip.inverse()) * d_twist;
             rest_from_tip = origin * &rest_from_tip;
         }
-        let d_terms = self.terms.iter().map(|t| d_readings[t.reading] * t.term.basis(&contexts[t.reading])).collect();
+        let d_terms = self.terms.iter().zip(bases).map(|(t, basis)| d_readings[t.reading] * basis).collect();
         Kinematics { base_from_tip: rest_from_tip, d_twists, d_readings, d_terms }
     }
 
@@ -214,8 +214,8 @@ impl Robot {
         (robot, shifts)
     }
 
-    /// True position of every joint of the chain, and the context of the terms of every reading.
-    fn positions(&self, stop: &Posture, noise: &[f64]) -> (Vec<f64>, Vec<TermContext>) {
+    /// True position of every joint of the chain, and the basis function of every term.
+    fn positions(&self, stop: &Posture, noise: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut contexts: Vec<TermContext> = (0..stop.readings.len())
             .map(|r| TermContext {
                 reading: stop.readings[r],
@@ -228,11 +228,10 @@ impl Robot {
             self.fill_gravity(&mut contexts);
         }
         let mut moved: Vec<f64> = stop.readings.iter().zip(noise).map(|(q, dq)| q + dq).collect();
-        for t in &self.terms {
-            moved[t.reading] += t.value * t.term.basis(&contexts[t.reading]);
-        }
+        let bases: Vec<f64> = self.terms.iter().map(|t| t.term.basis(&contexts[t.reading])).collect();
+        self.terms.iter().zip(&bases).for_each(|(t, basis)| moved[t.reading] += t.value * basis);
         let position = |joint: &Joint| joint.drive.map_or(0.0, |d| d.multiplier * moved[d.reading] + d.offset);
-        (self.chain.joints.iter().map(position).collect(), contexts)
+        (self.chain.joints.iter().map(position).collect(), bases)
     }
 
     /// Gravity moments in the nominal posture, gravity along -z of the base (of the link above both ends, where the base is carried); a

@@ -169,6 +169,17 @@ pub struct BodyTerms {
     pub weight: f64,
 }
 
+impl BodyTerms {
+    /// Second derivative of the robust cost, by a residual that is linear in the pose. The information takes the Huber weight as constant; a
+    /// residual beyond the bound, `l` sigmas long, is bent by `J' w S^-1 r r' S^-1 J / l^2` less.
+    pub fn robust_curvature(&self) -> Matrix6<f64> {
+        match self.weight < 1.0 {
+            true => self.pp - self.bp * self.bp.transpose() / (self.weight * self.length[0].powi(2)),
+            false => self.pp,
+        }
+    }
+}
+
 impl BodyMeasurement {
     /// Blocks at a predicted pose, with factors on the stated sigmas of position and rotation.
     pub fn linearise(&self, predicted: &Pose, factors: [f64; 2]) -> BodyTerms {

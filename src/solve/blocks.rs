@@ -117,7 +117,10 @@ impl<'a> PoseRows<'a> {
         }
         for (k, BodyPart { terms, chain: by_theta, .. }) in (images.len()..).zip(&linear.lin.bodies[bodies.clone()]) {
             chain.rows_mut(6 * k, 6).copy_from(&by_theta.d_theta);
-            coupling.view_mut((6 * k, 0), (6, theta)).copy_from(&(terms.pp * &by_theta.d_theta));
+            for c in 0..theta {
+                let of_column = terms.pp * by_theta.d_theta.fixed_view::<6, 1>(0, c);
+                coupling.fixed_view_mut::<6, 1>(6 * k, c).copy_from(&of_column);
+            }
         }
         Self { linear, images, bodies, chain, coupling }
     }

@@ -3,6 +3,7 @@
 use nalgebra::Matrix6;
 
 use super::fit::Fit;
+use super::linear::LinearStop;
 use crate::problem::Noise;
 
 /// Weight, in coordinates, with which a stated sigma is believed: 95 % of the factor lie between 1/2 and 2 before the data.
@@ -36,10 +37,10 @@ impl Fit {
     pub(super) fn body_tallies(&self) -> Vec<[BodyTally; 2]> {
         let problem = &self.problem;
         let mut tallies = vec![[BodyTally::default(); 2]; problem.noise.body.len()];
-        for stop in self.linear().stops() {
-            for (pose, part) in stop.poses().skip(stop.places().len()).zip(stop.bodies()) {
+        let stops: Vec<LinearStop> = self.linear().stops().filter(|stop| !stop.bodies().is_empty()).collect();
+        for (stop, covariances) in stops.iter().zip(self.covariance.poses(&stops)) {
+            for (covariance, part) in covariances.iter().skip(stop.places().len()).zip(stop.bodies()) {
                 let measured = &problem.body_measurements[part.index];
-                let covariance = self.covariance.pose(&stop, &pose);
                 let used_up: Matrix6<f64> = Matrix6::from_column_slice(covariance.as_slice()) * part.terms.pp;
                 let tally = &mut tallies[problem.instruments[measured.instrument].component];
                 // The rotation of a pose moves no position: the trace falls apart as its blocks do.

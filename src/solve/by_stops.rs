@@ -4,14 +4,14 @@
 //! what stays, `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product.
 
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, Matrix3, SMatrix};
 use rayon::prelude::*;
 
 use super::alike::alike;
 use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, latents_with_markers};
-use super::group::Group;
+use super::group::{Group, union};
 use super::linear::Carried;
 use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
@@ -202,42 +202,74 @@ impl StopsEliminated {
         steps
     }
 
-    /// `H^-1 + H^-1 B' cov(x) B H^-1` of stops by their places among those in use.
-    pub fn latent_covariances(&self, reduced: &DMatrix<f64>, stops: &[usize]) -> Vec<DMatrix<f64>> {
-        let asked: HashMap<usize, usize> = stops.iter().enumerate().map(|(k, &at)| (at, k)).collect();
+    /// `D' cov(x) D` of matrices over the unknowns that a stop touches, for every stop by its place among those in use.
+    fn spreads(
+        &self,
+        reduced: &DMatrix<f64>,
+        of: impl Fn(usize) -> Vec<DMatrix<f64>> + Sync,
+    ) -> Vec<Vec<DMatrix<f64>>> {
         let of_group = |places: &Vec<usize>| {
-            let places = || places.iter().filter(|at| asked.contains_key(at));
-            let own: Vec<(&Block, DMatrix<f64>)> =
-                places().map(|&at| &self.blocks[at]).map(|b| (b, &b.y * &b.inverse_factor)).collect();
-            let group = Group::of(own.iter().map(|(block, _)| &block.rows));
-            let d = group.side_by_side(own.iter().map(|(block, d)| (&block.rows, d)));
+            let own: Vec<(usize, Vec<DMatrix<f64>>)> = places.iter().map(|&at| (at, of(at))).collect();
+            let all = || own.iter().flat_map(|(at, of)| of.iter().map(|d| (&self.blocks[*at].rows, d)));
+            let group = Group::of(all().map(|(rows, _)| rows));
+            let d = group.side_by_side(all());
             let of_reduced = product(&group.part_of(reduced), &d);
-            let mut first = 0;
-            let of = |(block, _): &(&Block, DMatrix<f64>)| {
-                let (start, own) = (first, block.y.ncols());
-                first += own;
-                let part = d.columns(start, own).tr_mul(&of_reduced.columns(start, own));
-                block.inverse_factor.tr_mul(&block.inverse_factor) + part
+            let mut end = 0;
+            let mut spread = |columns: usize| {
+                end += columns;
+                d.columns(end - columns, columns).tr_mul(&of_reduced.columns(end - columns, columns))
             };
-            places().map(|at| asked[at]).zip(own.iter().map(of)).collect::<Vec<_>>()
+            let mut of_stop =
+                |(at, of): &(usize, Vec<DMatrix<f64>>)| (*at, of.iter().map(|d| spread(d.ncols())).collect());
+            own.iter().map(&mut of_stop).collect::<Vec<(usize, Vec<DMatrix<f64>>)>>()
         };
-        let mut covariances: Vec<_> = self.groups.par_iter().flat_map_iter(of_group).collect();
-        covariances.sort_by_key(|(k, _)| *k);
-        covariances.into_iter().map(|(_, covariance)| covariance).collect()
+        let mut all = vec![Vec::new(); self.blocks.len()];
+        let found: Vec<_> = self.groups.par_iter().flat_map_iter(of_group).collect();
+        found.into_iter().for_each(|(at, spreads)| all[at] = spreads);
+        all
     }
 
-    /// Covariance of a pose that something shows at a stop, as its body twist: that of the unknowns that stay through `G - L D'`, and what is
-    /// left of the latents through `L`.
-    pub fn pose_covariance(&self, reduced: &DMatrix<f64>, at: usize, pose: &LinearPose) -> DMatrix<f64> {
+    /// `H^-1 + H^-1 B' cov(x) B H^-1` of stops by their places among those in use.
+    pub fn latent_covariances(&self, reduced: &DMatrix<f64>, stops: &[usize]) -> Vec<DMatrix<f64>> {
+        let asked: HashSet<usize> = stops.iter().copied().collect();
+        let by_latents = |at: usize| {
+            let Block { inverse_factor, y, .. } = &self.blocks[at];
+            if asked.contains(&at) { vec![y * inverse_factor] } else { Vec::new() }
+        };
+        let spreads = self.spreads(reduced, by_latents);
+        let of = |&at: &usize| {
+            let inverse_factor = &self.blocks[at].inverse_factor;
+            spreads[at].iter().fold(inverse_factor.tr_mul(inverse_factor), |sum, spread| sum + spread)
+        };
+        stops.iter().map(of).collect()
+    }
+
+    /// Covariances of all poses that something shows at some stops in use, as their body twists: those of the unknowns that stay through
+    /// `G - L D'`, and what is left of the latents through `L`.
+    pub fn pose_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<Vec<DMatrix<f64>>> {
+        let asked: HashMap<usize, &LinearStop> = stops.iter().map(|stop| (stop.at, stop)).collect();
+        let poses = |at: usize| asked.get(&at).into_iter().flat_map(|stop| stop.poses());
+        let through = self.spreads(reduced, |at| poses(at).map(|pose| self.through(at, &pose).0).collect());
+        let of = |stop: &LinearStop| {
+            let with_latents = |(pose, through): (LinearPose, &DMatrix<f64>)| {
+                let (_, by_latents) = self.through(stop.at, &pose);
+                through + by_latents.tr_mul(&by_latents)
+            };
+            stop.poses().zip(&through[stop.at]).map(with_latents).collect()
+        };
+        stops.iter().map(of).collect()
+    }
+
+    /// Derivatives of a pose by the unknowns that its stop touches, `(G - L D')'`, and by what is left of the latents, `(L F^-T)'`.
+    fn through(&self, at: usize, pose: &LinearPose) -> (DMatrix<f64>, DMatrix<f64>) {
         let Block { inverse_factor, rows, y, .. } = &self.blocks[at];
         let theta = pose.chain.d_theta.ncols();
-        let column =
-            |&row: &usize| if row < theta { pose.chain.d_theta.column(row).into_owned() } else { DVector::zeros(6) };
-        let mut by_rows = DMatrix::from_columns(&rows.iter().map(column).collect::<Vec<_>>());
-        let by_latents = pose.by_latents(inverse_factor.ncols()) * inverse_factor.transpose();
-        by_rows -= &by_latents * y.transpose();
-        let own = DMatrix::from_fn(rows.len(), rows.len(), |i, j| reduced[(rows[i], rows[j])]);
-        &by_rows * own * by_rows.transpose() + &by_latents * by_latents.transpose()
+        let by_latents = inverse_factor * pose.by_latents(inverse_factor.ncols()).transpose();
+        let mut by_rows = -y * &by_latents;
+        for (mut row, &c) in by_rows.row_iter_mut().zip(rows).filter(|(_, c)| **c < theta) {
+            row += pose.chain.d_theta.column(c).transpose();
+        }
+        (by_rows, by_latents)
     }
 
     /// Covariance of every marker that was seen; with what moves it with the dense columns for a position.
@@ -343,8 +375,7 @@ impl Block {
         (0..n).for_each(|s| h[(s, s)] *= 1.0 + lambda);
         let factor = h.cholesky().and_then(|c| c.l().try_inverse());
         let inverse_factor = factor.unwrap_or_else(|| DMatrix::zeros(n, n));
-        let rows: BTreeSet<usize> = images.iter().flat_map(|own| own.rows.iter().copied()).collect();
-        let rows: Vec<usize> = rows.into_iter().collect();
+        let rows = union(images.iter().map(|own| &own.rows));
         let mut coupling = DMatrix::zeros(rows.len(), n);
         for Coupled { latents, rows: touched, coupling: own } in images {
             let mut at = 0;

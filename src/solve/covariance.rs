@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
-use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
+use super::linear::{LinearProblem, LinearStop};
 use super::system::{Elimination, Singular, System};
 use crate::linalg::SymmetricFactor;
 use crate::problem::Problem;
@@ -105,15 +105,17 @@ impl Covariance {
         linear.images().map(|own| own.part_of(&of_stops[own.stop])).collect()
     }
 
-    /// Covariance of a pose that something shows at a stop, as its body twist, m and rad.
-    pub(super) fn pose(&self, stop: &LinearStop, pose: &LinearPose) -> DMatrix<f64> {
-        self.system.pose_covariance(&self.reduced, stop, pose)
+    /// Covariances of all poses that something shows at some stops (images first), as their body twists, m and rad.
+    pub(super) fn poses(&self, stops: &[LinearStop]) -> Vec<Vec<DMatrix<f64>>> {
+        self.system.pose_covariances(&self.reduced, stops)
     }
 
-    /// Covariance of the camera pose of an image, as its body twist, m and rad.
-    pub fn pose_of(&self, stop: &LinearStop, image: &LinearImage) -> Matrix6<f64> {
-        let own = stop.poses().zip(stop.places()).find(|(_, place)| stop.image_index(*place) == image.index);
-        own.map_or_else(Matrix6::zeros, |(pose, _)| Matrix6::from_column_slice(self.pose(stop, &pose).as_slice()))
+    /// Covariance of the camera pose of every image in use, as its body twist, m and rad.
+    pub fn camera_poses(&self, linear: LinearProblem) -> Vec<Matrix6<f64>> {
+        let stops: Vec<LinearStop> = linear.stops().collect();
+        let of_images = |(of, stop): (Vec<DMatrix<f64>>, &LinearStop)| of.into_iter().take(stop.places().len());
+        let all = self.poses(&stops).into_iter().zip(&stops).flat_map(of_images);
+        all.map(|own| Matrix6::from_column_slice(own.as_slice())).collect()
     }
 
     /// Covariance of the correction of every marker that was seen, m^2, per plate and marker, in the frame of the priors (the

@@ -1,7 +1,5 @@
 //! Unknowns that some stops touch between them, and products in their space.
 
-use std::collections::BTreeSet;
-
 use nalgebra::DMatrix;
 
 use super::runs::{Run, runs};
@@ -15,11 +13,21 @@ pub(super) struct Group {
     runs: Vec<Run>,
 }
 
+/// What is in any of some ascending lists, ascending.
+pub(super) fn union<'a>(lists: impl Iterator<Item = &'a Vec<usize>>) -> Vec<usize> {
+    let mut is_in = Vec::new();
+    for list in lists {
+        let end = list.last().map_or(0, |last| last + 1);
+        is_in.resize(is_in.len().max(end), false);
+        list.iter().for_each(|&at| is_in[at] = true);
+    }
+    (0..is_in.len()).filter(|at| is_in[*at]).collect()
+}
+
 impl Group {
     /// Of the unknowns that each stop touches.
     pub fn of<'a>(touched: impl Iterator<Item = &'a Vec<usize>>) -> Self {
-        let rows: BTreeSet<usize> = touched.flatten().copied().collect();
-        let rows: Vec<usize> = rows.into_iter().collect();
+        let rows = union(touched);
         let runs = runs(rows.iter().copied().enumerate());
         Self { rows, runs }
     }

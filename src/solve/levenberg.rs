@@ -137,6 +137,10 @@ const LONGEST_DETOUR: usize = 6;
 /// A detour goes on while every step leaves at most this share of the cost of the one before.
 const COMING_DOWN: f64 = 0.5;
 
+/// Square of the Newton decrement, as a share of the cost, from which on the robust cost is taken as it bends: few residuals pass their bound on
+/// the way, each moving by some hundredths of a sigma.
+const NEARLY_THERE: f64 = 5e-4;
+
 /// Newton decrement of the first step of a model up to which its information is that of the end: no unknown moved by more sigmas.
 const NEAR: f64 = 1.0;
 
@@ -148,6 +152,8 @@ struct Model {
     lambda: f64,
     /// Nothing is held that is free.
     is_whole: bool,
+    /// It has the curvature of the robust cost in place of the information.
+    is_curved: bool,
     /// Newton decrement of its first step.
     decrement: f64,
 }
@@ -156,13 +162,13 @@ impl Model {
     fn new(which: Elimination, linear: LinearProblem, lambda: f64) -> Option<Self> {
         let system = System::with(which, linear, lambda);
         let factor = system.factor(linear).inspect_err(|singular| tracing::debug!(lambda, "{singular}")).ok()?;
-        let is_whole = which != Elimination::StopsMarkersHeld;
-        Some(Self { system, factor, lambda, is_whole, decrement: f64::INFINITY })
+        let is_whole = which != Elimination::StopsMarkersHeld || linear.adjustment.problem.plates.is_empty();
+        Some(Self { system, factor, lambda, is_whole, is_curved: false, decrement: f64::INFINITY })
     }
 
     /// The covariance, where the model stands for the end of the iteration.
     fn covariance(self, adjustment: &Adjustment) -> Option<Covariance> {
-        let is_near = self.is_whole && self.decrement <= NEAR && self.lambda <= LAMBDA_IF_REFUSED;
+        let is_near = self.is_whole && !self.is_curved && self.decrement <= NEAR && self.lambda <= LAMBDA_IF_REFUSED;
         is_near.then(|| Covariance::of(&adjustment.problem, self.system, &self.factor))
     }
 
@@ -186,11 +192,15 @@ struct Proposer {
     model: Option<Model>,
     /// Decrement of the step before, where that step was taken.
     before: Option<f64>,
+    /// The curvature of the robust cost led uphill: the next steps go by the information.
+    curvature_failed: bool,
 }
 
 impl Proposer {
-    /// The next step; `None` where the information is not positive definite.
+    /// The next step; `None` where the information is not positive definite. Where the steps of a model shrink slowly, the robust cost bends
+    /// less than the information says.
     fn propose(&mut self, linear: LinearProblem, lambda: f64) -> Option<Proposal> {
+        let mut curved = None;
         if let (Some(mut model), Some(before)) = (self.model.take(), self.before) {
             model.system.take_gradient(linear);
             let proposal = model.proposal(linear);
@@ -198,11 +208,18 @@ impl Proposer {
                 self.model = Some(model);
                 return Some(Proposal { kept: true, ..proposal });
             }
+            if proposal.decrement.powi(2) < NEARLY_THERE * linear.lin.cost && !self.curvature_failed {
+                curved = linear.lin.with_robust_curvature();
+            }
         }
         let plates = &linear.adjustment.problem.plates;
         let are_held = plates.iter().flat_map(|p| &p.markers).all(|m| m.sigma_m == 0.0);
         let which = if are_held { Elimination::StopsMarkersHeld } else { Elimination::cheaper(linear) };
-        let mut model = Model::new(which, linear, lambda)?;
+        let curved = curved.and_then(|lin| Model::new(which, linear.adjustment.linear(&lin), lambda));
+        let mut model = match curved {
+            Some(model) => Model { is_curved: true, ..model },
+            None => Model::new(which, linear, lambda)?,
+        };
         let proposal = model.proposal(linear);
         model.decrement = proposal.decrement;
         self.model = Some(model);
@@ -210,11 +227,22 @@ impl Proposer {
     }
 
     fn accepted(&mut self, proposal: &Proposal) {
-        self.before = Some(proposal.decrement);
+        (self.before, self.curvature_failed) = (Some(proposal.decrement), false);
     }
 
     fn refused(&mut self) {
         (self.model, self.before) = (None, None);
+    }
+
+    /// True where the last step went by the curvature of the robust cost.
+    fn is_curved(&self) -> bool {
+        self.model.as_ref().is_some_and(|model| model.is_curved)
+    }
+
+    /// Goes on by the information.
+    fn refuse_curvature(&mut self) {
+        self.refused();
+        self.curvature_failed = true;
     }
 }
 
@@ -439,6 +467,11 @@ impl Descent {
                 self.proposer.accepted(&proposal);
                 self.lambda = (lambda * 0.1).max(SMALLEST_LAMBDA);
                 if expected.last { Status::Converged } else { Status::OutOfIterations }
+            }
+            _ if self.proposer.is_curved() && !expected.small => {
+                self.adjustment.state = before;
+                self.proposer.refuse_curvature();
+                Status::OutOfIterations
             }
             Some(worse) if !kept && !expected.small && self.may_pass(worse.cost) => {
                 let cost = std::mem::replace(&mut self.lin, worse).cost;

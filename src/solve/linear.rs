@@ -57,7 +57,7 @@ pub struct BodyPart {
     /// Its blocks.
     pub terms: BodyTerms,
     /// Its chain.
-    pub chain: Chained,
+    pub chain: Arc<Chained>,
 }
 
 /// One image as it is linearised, with its equations where they are kept.
@@ -70,6 +70,16 @@ impl Linearised {
     /// Without the equations, which only the solver needs, and makes again where the system is built once more.
     pub fn without_equations(self) -> Self {
         Self { equations: Vec::new(), ..self }
+    }
+
+    /// With the curvature of the robust cost of measured bodies in place of their information; `None` where both are the same.
+    pub(super) fn with_robust_curvature(&self) -> Option<Self> {
+        if self.bodies.iter().all(|part| part.terms.weight == 1.0) {
+            return None;
+        }
+        let mut own = self.clone();
+        own.bodies.iter_mut().for_each(|part| part.terms.pp = part.terms.robust_curvature());
+        Some(own)
     }
 
     /// A measurement of a body by its index; `None` for one that takes no part.
@@ -247,7 +257,7 @@ impl Adjustment {
         let part = |&(index, measured): &(usize, &BodyMeasurement)| {
             let chain = state.body_chained(origins, &problem.layout, measured, self.body_taken_from(index))?;
             let terms = measured.linearise(&chain.pose, problem.body_factors(measured));
-            Some(BodyPart { index, terms, chain })
+            Some(BodyPart { index, terms, chain: Arc::new(chain) })
         };
         used.par_iter().map(part).collect()
     }
@@ -348,7 +358,7 @@ impl<'a> LinearProblem<'a> {
             }
         }
         for BodyPart { terms, chain, .. } in &self.lin.bodies {
-            gradient.rows_mut(0, layout.theta_len()).gemv_tr(1.0, &chain.d_theta, &terms.bp, 1.0);
+            (0..layout.theta_len()).for_each(|c| gradient[c] += chain.d_theta.fixed_view::<6, 1>(0, c).dot(&terms.bp));
         }
         gradient
     }
@@ -433,11 +443,6 @@ impl<'a> LinearStop<'a> {
     /// Places of its images among those in use.
     pub fn places(&self) -> Range<usize> {
         self.images.clone()
-    }
-
-    /// Index among all images of that at a place among those in use.
-    pub(super) fn image_index(&self, place: usize) -> usize {
-        self.linear.lin.images[place]
     }
 
     /// Number of unknowns that are latent at it.

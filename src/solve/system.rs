@@ -291,19 +291,24 @@ impl System {
         }
     }
 
-    /// Covariance of a pose that something shows at a stop, as its body twist, m and rad.
-    pub(super) fn pose_covariance(&self, reduced: &DMatrix<f64>, stop: &LinearStop, pose: &LinearPose) -> DMatrix<f64> {
-        match &self.eliminated {
-            Eliminated::Markers(e) => {
-                let (start, n) = (e.latent_start[stop.at], stop.unknowns());
+    /// Covariances of all poses that something shows at some stops, as their body twists, m and rad.
+    pub(super) fn pose_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<Vec<DMatrix<f64>>> {
+        let e = match &self.eliminated {
+            Eliminated::Markers(e) => e,
+            Eliminated::Stops(e) => return e.pose_covariances(reduced, stops),
+        };
+        let of_stop = |stop: &LinearStop| {
+            let (start, n) = (e.latent_start[stop.at], stop.unknowns());
+            let of = |pose: LinearPose| {
                 let theta = pose.chain.d_theta.ncols();
                 let rows: Vec<usize> = (0..theta).chain(start..start + n).collect();
                 let mut by = pose.chain.d_theta.clone().resize_horizontally(theta + n, 0.0);
                 by.columns_mut(theta, n).copy_from(&pose.by_latents(n));
                 &by * reduced.select_rows(&rows).select_columns(&rows) * by.transpose()
-            }
-            Eliminated::Stops(e) => e.pose_covariance(reduced, stop.at, pose),
-        }
+            };
+            stop.poses().map(of).collect()
+        };
+        stops.iter().map(of_stop).collect()
     }
 
     /// Covariance of the correction of every marker that was seen, per plate and marker.

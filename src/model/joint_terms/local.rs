@@ -7,6 +7,9 @@ use super::robot_model::RobotModel;
 /// Range of readings (rad or m, one sigma) over which the local error of a joint is the same.
 pub const LOCAL_RANGE: f64 = 3e-3;
 
+/// Ranges beyond which a local error is less than the smallest number.
+const BEYOND: f64 = 39.0;
+
 /// The reading of a local error, in urad or um: in names in rad or m.
 impl Index for i32 {
     fn suffix(self) -> String {
@@ -42,7 +45,7 @@ impl JointError for Local {
 
     fn basis(at: Self::Index, context: &TermContext) -> f64 {
         let distance = (context.reading - 1e-6 * f64::from(at)) / LOCAL_RANGE;
-        (-0.5 * distance * distance).exp()
+        if distance.abs() > BEYOND { 0.0 } else { (-0.5 * distance * distance).exp() }
     }
 
     fn exported(_at: Self::Index) -> Exported {
