@@ -227,3 +227,37 @@ impl BodyMeasurement {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_curvature_is_the_second_derivative_of_the_robust_cost() {
+        let turned = Pose::exp(&Vector6::new(0.4, -0.2, 0.9, 0.5, -1.1, 0.3));
+        for off in [Vector3::new(1e-3, -5e-4, 2e-4), Vector3::new(4e-3, 7e-3, -2e-3)] {
+            let measured = BodyMeasurement {
+                stop: 0,
+                read: (0, 0),
+                instrument: 0,
+                body: 0,
+                seen: BodySeen::Point(turned.translation + off),
+                sigma_m: 5e-4,
+                sigma_rad: 0.0,
+                rejected: None,
+            };
+            let terms = measured.linearise(&turned, [1.0; 2]);
+            let step = 1e-6;
+            let cost = |x: Vector3<f64>| {
+                measured.linearise(&(turned * Pose::exp(&Vector6::new(x.x, x.y, x.z, 0.0, 0.0, 0.0))), [1.0; 2]).cost
+            };
+            let curvature = terms.robust_curvature();
+            for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+                let (a, b) = (Vector3::ith(i, step), Vector3::ith(j, step));
+                let second = (cost(a + b) - cost(a - b) - cost(b - a) + cost(-a - b)) / (4.0 * step * step);
+                assert!((second - curvature[(i, j)]).abs() < 1e-3 * terms.pp[(0, 0)], "{off}: {second} {curvature}");
+            }
+            assert_eq!(terms.weight < 1.0, off.norm() > 5e-3);
+        }
+    }
+}
