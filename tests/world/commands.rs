@@ -349,7 +349,6 @@ fn poses_need_no_robot_and_no_joint_values() {
     assert_eq!(std::fs::read_to_string(Path::new(out).join("poses.csv")).unwrap(), poses);
 }
 
-/// Readings that err by 0.3 mrad, taken as exact: the fits without some of the images are no good, and images there are enough of.
 /// What moves makes the noise larger than it is: it is named, and the true noise is not blamed.
 #[test]
 fn a_loose_camera_is_named_also_where_the_joint_noise_is_stated() {
@@ -370,6 +369,7 @@ fn a_loose_camera_is_named_also_where_the_joint_noise_is_stated() {
     }
 }
 
+/// Readings that err by 0.3 mrad, taken as exact: the fits without some of the images are no good, and images there are enough of.
 #[test]
 fn a_joint_noise_stated_too_small_is_to_be_left_out() {
     let repo = Path::new(env!("CARGO_MANIFEST_DIR"));
