@@ -82,10 +82,40 @@ pub(super) enum Labelling {
     Contradiction,
 }
 
+impl Labelling {
+    /// Where the board lies, if that can be told.
+    pub fn placement(self) -> Option<Placement> {
+        match self {
+            Self::Unique(placement) | Self::Symmetric(placement) => Some(placement),
+            Self::Ambiguous | Self::Contradiction => None,
+        }
+    }
+}
+
 impl Placement {
     /// Lattice coordinates that are board coordinates already; the first square may be light.
     pub fn on_board(board: BoardSize, light_first: bool) -> Self {
         Self { board, turns: 0, light_first, origin: (0, 0) }
+    }
+
+    /// All placements of a board around the corners with these least and largest coordinates along u and v.
+    pub fn around(board: BoardSize, [u, v]: [[i32; 2]; 2]) -> impl Iterator<Item = Self> {
+        board.looks().flat_map(move |(turns, light_first)| {
+            let at = move |origin| Self { board, turns, light_first, origin };
+            let (width, height) = at((0, 0)).extent();
+            (v[1] - height + 1..=v[0]).flat_map(move |v0| (u[1] - width + 1..=u[0]).map(move |u0| at((u0, v0))))
+        })
+    }
+
+    /// Least and largest coordinate of the board's corners along u and v.
+    pub fn range(self) -> [[i32; 2]; 2] {
+        let ((u, v), (width, height)) = (self.origin, self.extent());
+        [[u, u + width - 1], [v, v + height - 1]]
+    }
+
+    /// Quarter turns away from upright.
+    pub fn tilt(self) -> u8 {
+        self.turns.min(4 - self.turns)
     }
 
     /// Extent of the board along u and v.
@@ -183,7 +213,7 @@ fn choose(lattice: &Lattice, shades: &Shades, board: BoardSize) -> Labelling {
     if !rivals.iter().all(same_part) {
         return Labelling::Ambiguous;
     }
-    let upright = rivals.iter().min_by_key(|p| p.turns.min(4 - p.turns));
+    let upright = rivals.iter().min_by_key(|p| p.tilt());
     Labelling::Symmetric(*upright.unwrap_or(&best.placement))
 }
 
@@ -259,6 +289,27 @@ impl<'a> Shader<'a> {
     /// At a place within a cell, whose corners are 0 and 1; `None` out of view.
     pub fn at(&self, cell: (i32, i32), place: [f64; 2]) -> Option<f64> {
         relative_shade(brightness(self.picture, self.maps.place(cell, place)?)?, cell, &self.inner)
+    }
+
+    /// Counts at a place in the frame of a cell.
+    pub fn brightness(&self, cell: (i32, i32), place: [f64; 2]) -> Option<f64> {
+        brightness(self.picture, self.maps.place(cell, place)?)
+    }
+
+    /// Length of a cell along an axis, px.
+    pub fn side_px(&self, cell: (i32, i32), axis: usize) -> Option<f64> {
+        let ends = if axis == 0 { [[0.0, 0.5], [1.0, 0.5]] } else { [[0.5, 0.0], [0.5, 1.0]] };
+        let [Some(a), Some(b)] = ends.map(|place| self.maps.place(cell, place)) else { return None };
+        Some((a[0] - b[0]).hypot(a[1] - b[1]))
+    }
+
+    /// Mean of light squares less that of dark ones, counts.
+    pub fn contrast(&self) -> f64 {
+        let mean = |odd: i32| {
+            let of = self.inner.iter().filter(|((u, v), _)| (u + v).rem_euclid(2) == odd);
+            of.clone().map(|(_, counts)| counts).sum::<f64>() / of.count() as f64
+        };
+        (mean(0) - mean(1)).abs()
     }
 
     /// The cells of a line beyond the end (0: the lesser) of an axis, at their side towards the lattice: there may be little paper. With the

@@ -8,9 +8,9 @@ use super::size_seen::{Counted, end_to_end, other_size};
 use crate::error::Error;
 
 /// Lines beyond the corners that were found at which the squares are looked for.
-const REACH: i32 = 8;
+pub(super) const REACH: i32 = 8;
 /// Mean agreement with the two colours of squares of a board.
-const SQUARES: f64 = 0.5;
+pub(super) const SQUARES: f64 = 0.5;
 /// Share of a line that must be in view.
 const IN_VIEW: f64 = 0.5;
 
@@ -96,14 +96,14 @@ impl BoardSeen {
 }
 
 /// Mean shade of the squares between the corners, those with an odd sum with the other sign.
-fn even_cells(shader: &Shader, [[u0, u1], [v0, v1]]: [[i32; 2]; 2]) -> Option<f64> {
+pub(super) fn even_cells(shader: &Shader, [[u0, u1], [v0, v1]]: [[i32; 2]; 2]) -> Option<f64> {
     let cells = (v0..v1).flat_map(|v| (u0..u1).map(move |u| (u, v)));
     let seen: Vec<f64> = cells.filter_map(|(u, v)| Some(parity(u, v) * shader.at((u, v), [0.5; 2])?)).collect();
     (!seen.is_empty()).then(|| seen.iter().sum::<f64>() / seen.len() as f64)
 }
 
 /// The corners without outer lines of which less than half is there.
-fn trimmed(lattice: &Lattice) -> Option<[[i32; 2]; 2]> {
+pub(super) fn trimmed(lattice: &Lattice) -> Option<[[i32; 2]; 2]> {
     let (low, high) = bounds(lattice)?;
     let mut range = [[low.0, high.0], [low.1, high.1]];
     loop {

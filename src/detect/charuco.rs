@@ -3,6 +3,7 @@
 //! The `calib-targets` library decodes the markers and so tells which corner is which; the positions are measured as on
 //! a plain chessboard, from the pixels along the edges that the markers leave free.
 
+use calib_targets_aruco::MarkerDetection;
 use calib_targets_chessboard::detect_corners;
 
 use super::board_labels::{BoardSize, Lattice, Placement};
@@ -11,14 +12,16 @@ use super::charuco_seen::{Seen, instead};
 use super::chessboard::{Bytes, WINDOW, board_size, corner_config};
 use super::corners::{Window, measure};
 use super::sizes::{best_of_sizes, on_picture};
-use super::{Detection, Picture};
+use super::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::Plate;
 
 /// Blur of a marker's border that the window of a corner stays clear of, px.
 const KEEP_OFF_PX: f64 = 2.0;
-/// Markers that must be read where the dictionary is not stated.
+/// Markers that must be read where the dictionary is not stated, or where an outer line is not seen.
 const LEAST_MARKERS: usize = 4;
+/// Wrong bits of a marker that proves where the board lies.
+const SURE_BITS: u8 = 1;
 
 /// Finds the inner corners of a ChArUco board (markers in the light squares counting up row by row; first square dark, or light in
 /// OpenCV's layout before 4.6); parts of the board may be out of view or covered.
@@ -35,7 +38,7 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let least = if plate.aruco.is_some() { 1 } else { LEAST_MARKERS };
     let at_scale = |bytes: &Bytes, scale: f64| at_scale(bytes, scale, &prints, board, least);
     let found = best_of_sizes(&bytes, board, |found: &Found| &found.lattice, |scale| at_scale(&bytes, scale))?;
-    let Some(Found { print, lattice, .. }) = found else {
+    let Some(Found { print, lattice, is_sure, .. }) = found else {
         bytes.mirror();
         if at_scale(&bytes, 1.0)?.is_some() {
             return Err(mirrored_board());
@@ -47,6 +50,9 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     }
     let window = Window { arm: 0.5 * (1.0 - print.ratio), keep_off_px: KEEP_OFF_PX, ..WINDOW };
     let mut detection = measure(picture, &lattice, Placement::on_board(board, print.legacy), window);
+    if detection.outline == Outline::LineMissing && is_sure {
+        detection.outline = Outline::TagsMissing;
+    }
     if detection.observations.is_empty()
         && let Some(seen) = instead(picture, plate)
     {
@@ -71,6 +77,8 @@ struct Found {
     markers: usize,
     /// Corners of the board in px of the picture.
     lattice: Lattice,
+    /// Whether the markers alone say which corner is which, wherever the board seems to end.
+    is_sure: bool,
 }
 
 impl Found {
@@ -85,6 +93,7 @@ fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least
     let scaled = bytes.scaled(scale);
     let corners = detect_corners(&scaled.view(), &corner_config());
     let mut best: Option<Found> = None;
+    let mut others: Vec<(bool, usize)> = Vec::new();
     for print in prints {
         let Some(found) = decode(&scaled.view(), &corners, print, board)? else { continue };
         let markers = found.markers.len();
@@ -96,12 +105,28 @@ fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least
         let corners = found.corners.iter();
         let lattice: Lattice =
             corners.filter_map(|c| Some((on_board(c.id)?, place(c.position.x, c.position.y)))).collect();
-        let found = Found { print: *print, markers, lattice };
+        let is_sure = are_sure(&found.markers, board);
+        others.push((print.legacy, markers));
+        let found = Found { print: *print, markers, lattice, is_sure };
         if best.as_ref().is_none_or(|other| other.explains() < found.explains()) {
             best = Some(found);
         }
     }
+    if let Some(best) = &mut best {
+        // The markers of a part of the board may fit into the other layout as well, moved by a column.
+        best.is_sure &= others.iter().all(|(legacy, markers)| *legacy == best.print.legacy || *markers < best.markers);
+    }
     Ok(best)
+}
+
+/// Whether enough markers, in more than one row, say where the board lies: with twenty cells of 4 x 4 bits, one such place in 50 million boards
+/// is there by chance.
+fn are_sure(markers: &[MarkerDetection], board: BoardSize) -> bool {
+    let squares = board.columns.unsigned_abs() + 1;
+    // The first row has one fewer, where they are odd.
+    let row = |id: u32| 2 * (id / squares) + u32::from(id % squares >= squares / 2);
+    let rows: Vec<u32> = markers.iter().filter(|m| m.hamming <= SURE_BITS).map(|m| row(m.id)).collect();
+    rows.len() >= LEAST_MARKERS && rows.iter().any(|r| *r != rows[0])
 }
 
 fn found_print(print: &Print) -> Notice {

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use calib_targets_aruco::{Dictionary, resolve_dictionary};
-use calib_targets_charuco::{CharucoBoardSpec, CharucoDetection, CharucoDetector, CharucoParams};
+use calib_targets_charuco::{
+    CharucoAdvancedTuning, CharucoBoardSpec, CharucoDetection, CharucoDetector, CharucoParams,
+};
 use calib_targets_chessboard::ChessCorner;
 use calib_targets_core::GrayImageView;
 
@@ -45,6 +47,11 @@ pub(super) fn decode(
     let spec = CharucoBoardSpec::new(rows, columns, 1.0, print.ratio as f32, dictionary);
     let mut params = CharucoParams::for_board(spec);
     params.chess = corner_config();
+    // They hold for pictures without distortion and squares of one size; what is no corner falls to the fit and its neighbours.
+    let mut tuning = CharucoAdvancedTuning::new();
+    tuning.grid_smoothness_threshold_rel = f32::INFINITY;
+    tuning.corner_validation_threshold_rel = f32::INFINITY;
+    let params = params.with_advanced(tuning);
     let detector = match CharucoDetector::new(params) {
         Ok(detector) => detector,
         // The row that is not printed takes more markers than the dictionary has.

@@ -8,7 +8,8 @@ use std::borrow::Cow;
 use calib_targets_chessboard::{ChessboardDetector, ChessboardParams, detect_corners};
 use calib_targets_core::{DetectorConfig, GrayImageView, ImageRefiner, default_chess_config};
 
-use super::board_labels::{BoardSize, Labelling, Lattice, label};
+use super::board_ends::Ends;
+use super::board_labels::{BoardSize, Labelling, Lattice, Placement, label};
 use super::board_seen::BoardSeen;
 use super::corners::{Window, measure};
 use super::{Detection, Outline, Picture};
@@ -36,17 +37,30 @@ const LARGE_PX: usize = 500_000;
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
     let lattice = find_lattice(picture, board).ok_or_else(no_board)?;
-    let mut notices = Vec::new();
-    let placement = match label(picture, &lattice, board) {
-        Labelling::Unique(placement) => placement,
-        Labelling::Symmetric(placement) => {
-            notices.push(symmetric_notice(board));
-            placement
-        }
-        Labelling::Ambiguous => return refusal(picture, &lattice, board, ambiguous()),
-        Labelling::Contradiction => return refusal(picture, &lattice, board, contradiction(board)),
+    let ends = Ends::of(picture, &lattice);
+    let by_ends = || ends.and_then(|ends| ends.place(board));
+    let measured = |placement: Placement| measure(picture, &lattice, placement, WINDOW);
+    let by_colours = label(picture, &lattice, board);
+    let (mut labelling, mut detection) = match by_colours.placement() {
+        Some(placement) => (by_colours, measured(placement)),
+        None => match by_ends().and_then(|l| Some((l, measured(l.placement()?)))) {
+            Some(other) => other,
+            None if by_colours == Labelling::Ambiguous => return refusal(picture, &lattice, board, ambiguous()),
+            None => return refusal(picture, &lattice, board, contradiction(board)),
+        },
     };
-    let mut detection = measure(picture, &lattice, placement, WINDOW);
+    // Light that hides a line looks like the end of the board: what is taken for hidden may as well be what is taken for paper.
+    let doubted = |p: Placement| ends.is_none_or(|ends| !ends.leave_only(board, p));
+    if detection.outline == Outline::LineMissing && labelling.placement().is_some_and(doubted) {
+        let Some((other, placement)) = by_ends().and_then(|l| Some((l, l.placement()?))) else {
+            return refusal(picture, &lattice, board, ambiguous());
+        };
+        (labelling, detection) = (other, measured(placement));
+    }
+    let mut notices = Vec::new();
+    if matches!(labelling, Labelling::Symmetric(_)) {
+        notices.push(symmetric_notice(board));
+    }
     if detection.outline == Outline::LineMissing {
         detection.size_seen = BoardSeen::of(picture, &lattice).and_then(|seen| seen.size());
         notices.push(hidden_line(board));

@@ -49,7 +49,7 @@ pub enum Outline {
     Whole,
     /// An outer line of corners is not where it should be in view: it is covered, or the board is smaller than the plate says.
     LineMissing,
-    /// The same of tags, whose numbers tell their places all the same.
+    /// The same of tags, or of corners beside tags, whose numbers tell their places all the same.
     TagsMissing,
     /// A board without a code ends in view, and not where the plate says.
     OtherSize,

@@ -2,6 +2,7 @@
 //!
 //! A new kind of plate is one file that maps a [`Picture`] and a [`Plate`] to a [`Detection`], and one row in `by_kind`.
 
+mod board_ends;
 mod board_labels;
 mod board_seen;
 pub mod charuco;

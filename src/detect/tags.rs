@@ -18,7 +18,7 @@ use super::tag_seen::{MEASURED, contradiction, gap_contradiction, instead};
 use super::{Detection, Dropped, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::geom::PlaneMap;
-use crate::series::{Edge, Observation, Plate, TagPrint, Tags};
+use crate::series::{Edge, Observation, Plate, PlateKind, TagPrint, Tags};
 
 /// Sides that must say by how much ink has grown before they are believed.
 const LEAST_GROWN: usize = 8;
@@ -305,14 +305,16 @@ fn nothing(tags: &Tags) -> Error {
     Error::new(Code::PlateNotFound, "image", what, remedy)
 }
 
-/// What to say where no image shows an outer line of the tags.
+/// What to say where no image shows an outer line of the tags, or of the corners between them.
 pub(super) fn unseen_line(plate: &Plate) -> Notice {
     Notice::new(
         Code::PlateLineHidden,
         "image",
         format!(
-            "an outer row or column of the {} x {} tags is not seen where it should be, in no image",
-            plate.columns, plate.rows
+            "an outer row or column of the {} x {} {} is not seen where it should be, in no image",
+            plate.columns,
+            plate.rows,
+            if plate.kind == PlateKind::Charuco { "inner corners" } else { "tags" }
         ),
         "if nothing covers it, the board is smaller: correct columns and rows of the plate file, in whose middle its frame is",
     )
