@@ -1,22 +1,29 @@
-"""Rendered views under difficulties: the share of the visible corners that OpenCV finds.
+"""Rendered views under difficulties: the share of the visible corners that `robotcal` and OpenCV find in the same pictures.
 
-    KEEP=FOLDER VIEWS=200 KINDS=chessboard,charuco,circle-grid cargo test --release --test detect study_of_board_views -- --ignored --nocapture
-    python benches/board_views.py FOLDER
+    KEEP=FOLDER FROM=300000 VIEWS=200 KINDS=chessboard,charuco,circle-grid cargo test --release --test detect study_of_board_views -- --ignored --nocapture
+    python benches/board_views.py FOLDER [ROBOTCAL]
 
-The first line draws the views, puts down what is in view of each, and prints what `robotcal` finds; the second prints the same of OpenCV.
-The boards are those of tests/detect/board_views.rs. A corner is found where OpenCV has one within 2 px; ids count for ChArUco alone, whose corners
-have them, and OpenCV's order of the others is not judged.
+The first line draws the views and puts down what is in view of each; the second prints what is found of that. The boards are those of
+tests/detect/board_views.rs. OpenCV sees one image at a time; ROBOTCAL, the program, once one image at a time and once all of a kind as a series. A
+corner is found where there is one within 2 px, with its id; OpenCV's order of chessboards and dots is not judged.
 """
 
 import collections
 import csv
 import pathlib
+import subprocess
 import sys
+import tempfile
 
 import cv2
 import numpy as np
 
 FOUND_PX = 2.0
+PLATES = {
+    "chessboard": "columns = 9\nrows = 6\npitch_m = 0.025",
+    "charuco": 'columns = 8\nrows = 6\npitch_m = 0.03\naruco = { dictionary = "DICT_4X4_50", side_m = 0.0225 }',
+    "circle-grid": "columns = 10\nrows = 8\npitch_m = 0.025\nradius_m = 0.006\nlarge = [[1, 0]]",
+}
 
 
 def charuco():
@@ -40,12 +47,35 @@ def circle_grid(grey):
     return (centres if found else [], None)
 
 
-def tally(paths, detect):
+def of_opencv(paths, detect):
+    """Places and ids by view; no ids where OpenCV has none."""
+    return {path.stem: detect(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)) for path in paths}
+
+
+def of_robotcal(program, kind, paths, together):
+    """Places and ids by view, of images one by one or of all as a series."""
+    found = collections.defaultdict(lambda: ([], []))
+    with tempfile.TemporaryDirectory() as folder:
+        plate, out = pathlib.Path(folder) / "plate.toml", pathlib.Path(folder) / "out"
+        plate.write_text(f'format = 1\nkind = "{kind}"\n{PLATES[kind]}\n')
+        for images in [paths] if together else [[path] for path in paths]:
+            for old in out.glob("*"):
+                old.unlink()
+            subprocess.run([program, "detect", "--plate", plate, "--out", out, *images], capture_output=True)
+            seen = out / "observations.csv"
+            for row in csv.DictReader(open(seen)) if seen.is_file() else ():
+                places, ids = found[pathlib.Path(row["image"]).stem]
+                places.append((float(row["u"]), float(row["v"])))
+                ids.append(int(row["marker"]))
+    return found
+
+
+def tally(paths, found):
     """Views, views with the board, in view, found, wrong ids, squares in px^2."""
     of_view = np.zeros(6)
     for path in paths:
         truth = {int(i): np.array([float(u), float(v)]) for i, u, v in csv.reader(open(path.with_suffix(".csv")))}
-        corners, ids = detect(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE))
+        corners, ids = found[path.stem]
         places = np.reshape(corners, (-1, 2))
         of_view[:3] += 1, len(places) > 0, len(truth)
         for marker, at in truth.items() if len(places) else ():
@@ -64,20 +94,26 @@ def tally(paths, detect):
 
 def main():
     cv2.setNumThreads(1)
-    print("| board | view | views | with the board | in view | found | share | wrong | rms px |\n|---|---|---|---|---|---|---|---|---|")
+    print("| board | view | detector | views with the board | found | share | wrong | rms px |\n|---|---|---|---|---|---|---|---|")
     detectors = {"chessboard": chessboard, "charuco": charuco(), "circle-grid": circle_grid}
     for kind, detect in detectors.items():
         by_hard = collections.defaultdict(list)
         for path in sorted((pathlib.Path(sys.argv[1]) / kind).glob("*.png")):
             by_hard[path.stem.rsplit("-", 1)[0]].append(path)
+        everything = sum(by_hard.values(), [])
+        series = of_robotcal(sys.argv[2], kind, everything, True) if len(sys.argv) > 2 else None
         for hard, paths in by_hard.items():
-            views, seen, in_view, found, wrong, squares = tally(paths, detect)
-            rms = (squares / (2 * max(found, 1))) ** 0.5
-            wrong = int(wrong) if kind == "charuco" else "-"
-            print(
-                f"| {kind} | {hard} | {views:.0f} | {seen:.0f} | {in_view:.0f} | {found:.0f} | {100 * found / in_view:.2f} % | {wrong} | {rms:.4f} |",
-                flush=True,
-            )
+            found = {"OpenCV": of_opencv(paths, detect)}
+            if series is not None:
+                found |= {"robotcal": of_robotcal(sys.argv[2], kind, paths, False), "robotcal, series": series}
+            for name, of_name in found.items():
+                views, seen, in_view, right, wrong, squares = tally(paths, of_name)
+                rms = (squares / (2 * max(right, 1))) ** 0.5
+                wrong = "-" if name == "OpenCV" and kind != "charuco" else int(wrong)
+                print(
+                    f"| {kind} | {hard} | {name} | {seen:.0f} of {views:.0f} | {right:.0f} of {in_view:.0f} | {100 * right / in_view:.2f} % | {wrong} | {rms:.4f} |",
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ mod model;
 mod neighbours;
 mod noise;
 mod outline;
+mod rim;
 mod smooth;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,6 +18,7 @@ pub(super) use look::quantile;
 use neighbours::{FAR_REACH, REACH, seed};
 use noise::Correlation;
 use outline::outline;
+use rim::out_of_line;
 
 use super::board_labels::{Lattice, Placement};
 use super::{Detection, Dropped, Picture};
@@ -57,6 +59,9 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
     closed.extend(kept.keys());
     Missing { view: &view, closed, placement, usual: &usual }.find(&mut kept);
     detection.dropped.extend(retry.into_iter().filter(|(key, _)| !kept.contains_key(key)).map(|(_, dropped)| dropped));
+    while let Some(saddle) = out_of_line(&kept).and_then(|key| kept.remove(&key)) {
+        detection.dropped.push(Dropped::point(saddle.uv, "out of line"));
+    }
     detection.outline = outline(picture, &kept, placement);
     let some = kept.values().step_by(kept.len().div_ceil(NOISE_CORNERS).max(1));
     let correlation = view.smoothing_px.map_or(Correlation::WHITE, |sigma| Correlation::of(some, sigma));
