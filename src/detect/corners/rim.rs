@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::fit::Saddle;
-use super::median;
+use super::look::quantile;
 
 /// Out of line by this share of a square at least ...
 const LEAST_SQUARES: f64 = 0.03;
@@ -25,7 +25,7 @@ pub(super) fn out_of_line(kept: &BTreeMap<(i32, i32), Saddle>) -> Option<(i32, i
         Some((third[0].hypot(third[1]), (p2[0] - p1[0]).hypot(p2[1] - p1[1])))
     };
     let all = || kept.keys().flat_map(|&key| directions.map(|direction| (key, direction)));
-    let usual = median(all().filter_map(|(key, direction)| Some(off(key, direction)?.0)));
+    let usual = quantile(all().filter_map(|(key, direction)| Some(off(key, direction)?.0)), 0.5)?;
     let rim = all().filter(|((u, v), (du, dv))| !kept.contains_key(&(u - du, v - dv)));
     rim.filter_map(|(key, direction)| {
         let (off, side) = off(key, direction)?;
