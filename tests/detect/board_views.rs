@@ -408,7 +408,7 @@ fn a_hidden_line_of_a_charuco_board_costs_no_other_corner() {
 #[test]
 fn corners_of_a_charuco_board_are_found_through_a_fisheye() {
     let tally = views("charuco", "fisheye", &[300000, 300001, 300002, 300003]);
-    assert!(tally.wrong == 0 && tally.share() > 0.99, "{tally:?}");
+    assert!(tally.wrong == 0 && tally.share() > 0.95, "{tally:?}");
 }
 
 #[test]
