@@ -10,7 +10,7 @@ use crate::geom::Pose;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{Adjustment, Noise, Problem};
 use crate::series::CameraMount;
-use crate::solve::{Covariance, Fit, JOINT_NOISE_FLOOR, NoiseInformation, NoiseUncertainty, noise_information};
+use crate::solve::{Covariance, Fit, NoiseInformation, NoiseUncertainty, noise_information};
 
 /// Sigmas of a 95 % interval.
 pub const NORMAL_95: f64 = 1.96;
@@ -114,19 +114,13 @@ pub fn judge(
 
 impl Uncertainty {
     /// 95 % interval of the joint noise of a reading, root mean square over some series, rad or m; none where it is not identifiable.
-    pub fn joint_noise_of(&self, series: &[usize], reading: usize) -> Option<[f64; 2]> {
-        match series {
-            [one] => self.joint_noise.get(*one)?.get(reading).copied(),
-            _ => Some(self.noise_information.as_ref()?.mean_variance(series, &[reading]).interval(NORMAL_95)),
-        }
+    pub fn joint_noise_of(&self, noise: &Noise, series: &[usize], reading: usize) -> Option<[f64; 2]> {
+        Some(self.noise_information.as_ref()?.joint_noise(noise, series, &[reading], NORMAL_95).1)
     }
 
-    /// Takes over what is known of the joint noise. The interval of what counts as none starts at none.
+    /// Takes over what is known of the joint noise.
     fn set_joint_noise(&mut self, noise: &Noise, told: NoiseInformation) {
-        let interval = |series: usize, reading: usize| {
-            let [low, high] = told.mean_variance(&[series], &[reading]).interval(NORMAL_95);
-            [if noise.joint[series][reading] > JOINT_NOISE_FLOOR { low } else { 0.0 }, high]
-        };
+        let interval = |series: usize, reading: usize| told.joint_noise(noise, &[series], &[reading], NORMAL_95).1;
         let of_series = |(s, own): (usize, &Vec<f64>)| (0..own.len()).map(|r| interval(s, r)).collect();
         self.joint_noise = noise.joint.iter().enumerate().map(of_series).collect();
         self.noise_information = Some(told);

@@ -7,6 +7,7 @@ use crate::error::Code;
 pub use crate::error::Quantity;
 use crate::fit::{Fit, FreePoses};
 use crate::problem::MeasuredSeries;
+use crate::solve::NoiseInformation;
 
 /// What every check may look at.
 #[derive(Clone, Copy)]
@@ -30,6 +31,8 @@ pub struct StatedNoise<'a> {
     pub sigma: f64,
     /// The fit that found it.
     pub found: &'a Fit,
+    /// What the data tell of it, also of that which counts as none; none where they tell nothing.
+    pub told: Option<&'a NoiseInformation>,
 }
 
 impl CheckContext<'_> {

@@ -4,7 +4,6 @@ use super::kind::{CheckContext, Kind, Quantity, StatedNoise, Subject, Weight};
 use crate::assess::{Accuracy, Limits, NORMAL_95};
 use crate::error::Code;
 use crate::fit::Fit;
-use crate::solve::noise_information;
 use crate::urdf::JointKind;
 
 /// The data show another joint noise than the stated one.
@@ -23,20 +22,18 @@ pub struct NoiseContradicted {
 }
 
 pub(super) fn check(_: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<NoiseContradicted> {
-    let StatedNoise { sigma, found } = setting.stated_noise?;
-    let kinds = &found.state.robot.chain.reading_kinds;
-    let told = noise_information(found)?;
-    let series: Vec<usize> = (0..found.problem.noise.joint.len()).collect();
+    let StatedNoise { sigma, found, told } = setting.stated_noise?;
+    let (kinds, noise, told) = (&found.state.robot.chain.reading_kinds, &found.problem.noise, told?);
+    let series: Vec<usize> = (0..noise.joint.len()).collect();
     let of_kind = |kind: JointKind| {
         let readings: Vec<usize> = (0..kinds.len()).filter(|&r| kinds[r] == kind).collect();
         if readings.is_empty() {
             return None;
         }
-        let spread = told.mean_variance(&series, &readings);
-        let interval = spread.interval(NORMAL_95);
+        let (found, interval) = told.joint_noise(noise, &series, &readings, NORMAL_95);
         let weight = weight_of(sigma, interval, setting.limits)?;
         let turns = kind == JointKind::Revolute;
-        Some(NoiseContradicted { stated: sigma, found: spread.variance.sqrt(), interval, turns, weight })
+        Some(NoiseContradicted { stated: sigma, found, interval, turns, weight })
     };
     [JointKind::Revolute, JointKind::Prismatic].into_iter().find_map(of_kind)
 }

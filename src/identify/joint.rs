@@ -19,8 +19,8 @@ use crate::problem::MeasuredSeries;
 use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem};
 use crate::solve::{
     ComponentOptions, LEAST_FIRST_GUESS, LinearisedAdjustment, NoiseInformation, Outcome, Status, estimate_components,
-    estimate_components_from_above, reject_bodies, reject_contradicting, reject_observations, reject_stops,
-    without_unidentified_noise,
+    estimate_components_from_above, noise_information, reject_bodies, reject_contradicting, reject_observations,
+    reject_stops, without_unidentified_noise,
 };
 use crate::stage::stage;
 use crate::urdf::Chain;
@@ -120,6 +120,11 @@ impl JointFit {
         fit_model(chain, series, &options, Some((self.start.clone(), None))).ok()
     }
 
+    /// What the data tell of the joint noise, also of that which counts as none.
+    fn noise_information(&self) -> Option<NoiseInformation> {
+        self.before.clone().or_else(|| noise_information(&self.fit))
+    }
+
     /// The result by an estimator, with everything that is known of it.
     ///
     /// # Errors
@@ -127,11 +132,12 @@ impl JointFit {
     pub fn judged(self, series: &[MeasuredSeries], estimator: Estimator) -> Result<Solution> {
         let _stage = stage(self.options.model.title());
         let with_noise_found = self.with_noise_found(series);
+        let told = with_noise_found.as_ref().and_then(Self::noise_information);
         let Self { options, fit, start, starts, on_robot, before, status, iterations } = self;
         let options = Options { estimator, ..options };
         let (free, limits, noise) = (start.free, &options.limits, options.joint_noise);
         let stated = noise.stated().zip(with_noise_found.as_ref());
-        let stated_noise = stated.map(|(sigma, own)| StatedNoise { sigma, found: &own.fit });
+        let stated_noise = stated.map(|(sigma, own)| StatedNoise { sigma, found: &own.fit, told: told.as_ref() });
         let mut diagnosis = Diagnosis::new(CheckContext { series, free: &free, on_robot, stated_noise, limits });
         diagnosis.after_free_poses(&fit.problem);
         diagnosis.after_left_out(&fit)?;

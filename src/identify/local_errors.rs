@@ -2,7 +2,7 @@
 
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::robot::Posture;
-use crate::problem::{Stop, common_readings, joined, nearly_common_readings};
+use crate::problem::{Stop, joined, related_readings};
 
 /// Readings in common, over those that just fail to be, from which on they are no chance.
 const BEYOND_CHANCE: usize = 3;
@@ -17,10 +17,9 @@ pub(super) fn local_terms(stops: &[Stop], readings: usize, least_share: f64) -> 
     let mut missed = vec![0_usize; readings];
     for (b, later) in on_robot.iter().enumerate() {
         for (a, earlier) in on_robot[..b].iter().enumerate() {
-            for r in common_readings(earlier, later) {
-                pairs[r].push((a, b));
-            }
-            nearly_common_readings(earlier, later).into_iter().for_each(|r| missed[r] += 1);
+            let [common, nearly] = related_readings(earlier, later);
+            common.into_iter().for_each(|r| pairs[r].push((a, b)));
+            nearly.into_iter().for_each(|r| missed[r] += 1);
         }
     }
     let mut of_readings: Vec<Vec<JointTerm>> = Vec::new();

@@ -191,8 +191,8 @@ pub fn gram(y: &DMatrix<f64>) -> DMatrix<f64> {
 /// Columns of a product that are made together.
 pub const COLUMNS_A_BLOCK: usize = 192;
 
-/// `a -= y y'` in the upper triangle of the square matrix `a`; what lies below the diagonal is left as it is. Blocks of columns side by side.
-pub fn subtract_gram(a: &mut DMatrix<f64>, y: &DMatrix<f64>) {
+/// `a += factor y y'` in the upper triangle of the square matrix `a`; what lies below the diagonal is left as it is. Blocks of columns side by side.
+pub fn add_gram(a: &mut DMatrix<f64>, y: &DMatrix<f64>, factor: f64) {
     let (upper, full) = (BlockStructure::TriangularUpper, BlockStructure::Rectangular);
     let rows = a.nrows();
     a.as_mut_slice().par_chunks_mut(COLUMNS_A_BLOCK * rows.max(1)).enumerate().for_each(|(block, columns)| {
@@ -202,8 +202,9 @@ pub fn subtract_gram(a: &mut DMatrix<f64>, y: &DMatrix<f64>) {
         let (above, rest) = columns.split_at_row_mut(first);
         let (diagonal, _) = rest.split_at_row_mut(own);
         let of_columns = y.get(first..first + own, ..);
-        matmul(above, Accum::Add, y.get(..first, ..), of_columns.transpose(), -1.0, Par::Seq);
-        triangular::matmul(diagonal, upper, Accum::Add, of_columns, full, of_columns.transpose(), full, -1.0, Par::Seq);
+        let (how, transposed) = (Accum::Add, of_columns.transpose());
+        matmul(above, how, y.get(..first, ..), transposed, factor, Par::Seq);
+        triangular::matmul(diagonal, upper, how, of_columns, full, transposed, full, factor, Par::Seq);
     });
 }
 

@@ -206,7 +206,7 @@ fn stop_noise(solution: &Solution, series: &[usize]) -> StopNoise {
     let readings = problem.noise.joint.first().map_or(0, Vec::len);
     let sigmas: Vec<Vec<f64>> = (0..problem.noise.joint.len()).map(|s| problem.joint_sigma(s)).collect();
     let interval = |r: usize| {
-        let ends = solution.uncertainty.joint_noise_of(series, r)?;
+        let ends = solution.uncertainty.joint_noise_of(&problem.noise, series, r)?;
         Some(ends.map(|v| Some(v).filter(|v| v.is_finite())))
     };
     let sizes = problem.noise.displacement_sizes();

@@ -47,7 +47,7 @@ pub use noise::Noise;
 pub use plate_distance::{
     PlateDistance, SCALE, UNKNOWN_SCALE, release_measured_scales, seen_markers, size_by_distance,
 };
-pub use postures::{common_readings, joined, nearly_common_readings, posture_groups};
+pub use postures::{common_readings, joined, posture_groups, related_readings};
 pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};
 pub use restraint::{JointPrior, Restraint};
 pub use select::short_name;

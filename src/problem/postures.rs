@@ -1,5 +1,7 @@
 //! Stops that share joint readings: what a joint is off by there, it is off by at all of them.
 
+use std::ops::Range;
+
 use super::Problem;
 use crate::model::robot::Posture;
 
@@ -9,29 +11,22 @@ const SAME_READING: f64 = 2e-3;
 /// Fewest readings in common that make two stops related: a single one agrees by chance now and then.
 const FEWEST_IN_COMMON: usize = 2;
 
+/// Readings that two stops have in common, and those that they just fail to have beside others: among stops that are dense enough to agree by
+/// chance there are as many of the one kind as of the other. Empty where it may be chance.
+pub fn related_readings(a: &Posture, b: &Posture) -> [Vec<usize>; 2] {
+    let apart = || a.readings.iter().zip(&b.readings).map(|(a, b)| (a - b).abs());
+    let within = |range: Range<f64>| apart().enumerate().filter(|(_, d)| range.contains(d)).map(|(r, _)| r).collect();
+    match apart().filter(|d| *d < SAME_READING).count() {
+        count if count + 1 < FEWEST_IN_COMMON => [Vec::new(), Vec::new()],
+        count if count < FEWEST_IN_COMMON => [Vec::new(), within(SAME_READING..2.0 * SAME_READING)],
+        _ => [within(0.0..SAME_READING), within(SAME_READING..2.0 * SAME_READING)],
+    }
+}
+
 /// Readings that two stops have in common; empty where it may be chance.
 pub fn common_readings(a: &Posture, b: &Posture) -> Vec<usize> {
-    let is_same = |r: &usize| apart(a, b, *r) < SAME_READING;
-    let readings = 0..a.readings.len();
-    if readings.clone().filter(is_same).count() < FEWEST_IN_COMMON {
-        Vec::new()
-    } else {
-        readings.filter(is_same).collect()
-    }
-}
-
-/// Readings that two stops just fail to have in common beside others: among stops that are dense enough to agree by chance there are as
-/// many of them as of those in common.
-pub fn nearly_common_readings(a: &Posture, b: &Posture) -> Vec<usize> {
-    let readings = 0..a.readings.len();
-    if readings.clone().filter(|r| apart(a, b, *r) < SAME_READING).count() + 1 < FEWEST_IN_COMMON {
-        return Vec::new();
-    }
-    readings.filter(|r| (SAME_READING..2.0 * SAME_READING).contains(&apart(a, b, *r))).collect()
-}
-
-fn apart(a: &Posture, b: &Posture, reading: usize) -> f64 {
-    (a.readings[reading] - b.readings[reading]).abs()
+    let [common, _] = related_readings(a, b);
+    common
 }
 
 /// Sets of indices below `count`, joined by the pairs; each set ascending, in the order of their first members.

@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::linear::{LinearProblem, LinearStop};
+use super::linear::LinearStop;
 
 /// Most stops or markers of a group, and as many in all groups but the last. Fewer make products too short, more have less in common.
 pub(super) const MOST: usize = 24;
@@ -13,9 +13,9 @@ const APART_M: f64 = 1e3;
 /// Bounds of what the images of a stop show: least x and y, largest x and y, m.
 type Bounds = [f64; 4];
 
-/// Places of the stops in use, in groups.
-pub(super) fn alike(linear: LinearProblem) -> Vec<Vec<usize>> {
-    let mut stops: Vec<(usize, Bounds)> = linear.stops().map(|stop| (stop.at, bounds(linear, &stop))).collect();
+/// Places of some stops, in groups.
+pub(super) fn alike(stops: &[LinearStop]) -> Vec<Vec<usize>> {
+    let mut stops: Vec<(usize, Bounds)> = stops.iter().map(bounds).enumerate().collect();
     let mut groups = Vec::new();
     part(&mut stops, &mut groups);
     groups
@@ -39,10 +39,10 @@ fn place(plate: usize, position: &Vector3<f64>) -> [f64; 2] {
 }
 
 /// Of the markers as they should be; zero where no image shows any.
-fn bounds(linear: LinearProblem, stop: &LinearStop) -> Bounds {
+fn bounds(stop: &LinearStop) -> Bounds {
     let mut bounds: Option<Bounds> = None;
     for own in stop.images() {
-        let plate = &linear.adjustment.problem.plates[own.image.plate];
+        let plate = &stop.problem().plates[own.image.plate];
         for seen in &own.terms.markers {
             let [x, y] = place(own.image.plate, &plate.markers[seen.marker].position_m);
             let [x0, y0, x1, y1] = bounds.unwrap_or([x, y, x, y]);

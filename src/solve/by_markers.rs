@@ -126,7 +126,7 @@ impl MarkersEliminated {
 
     /// Takes over the right-hand side of the markers at a linearisation; returns the reduced one, without the priors of the dense columns.
     pub fn reduce_gradient(&mut self, linear: LinearProblem) -> DVector<f64> {
-        let mut reduced = linear.dense_gradient().resize_vertically(self.space.unknowns(), 0.0);
+        let mut reduced = linear.dense_gradient(linear.lin.bodies.iter()).resize_vertically(self.space.unknowns(), 0.0);
         for (stop, &start) in linear.stops().zip(&self.latent_start) {
             let own = stop.gradient();
             reduced.rows_mut(start, own.len()).copy_from(&own);

@@ -1,16 +1,18 @@
 //! What is latent eliminated stop by stop: the dense columns and the markers stay.
 //!
 //! With the information `H = F F'` of what is latent at a stop (pixels of its images through `L`, and the priors) and its coupling `B` with
-//! what stays, `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product.
+//! what stays, `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product. Stops at which no image
+//! was taken need none of that ([`super::body_stops`]).
 
 use std::borrow::Cow;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, Matrix3, SMatrix};
 use rayon::prelude::*;
 
 use super::alike::alike;
 use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, latents_with_markers};
+use super::body_stops::BodyStops;
 use super::group::{Group, union};
 use super::linear::Carried;
 use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
@@ -26,6 +28,8 @@ type Modes = SMatrix<f64, 3, MODES>;
 /// What is latent at one stop, with its elimination.
 #[derive(Debug, Clone)]
 struct Block {
+    /// Place of the stop among those in use.
+    at: usize,
     /// `F^-1`.
     inverse_factor: DMatrix<f64>,
     /// Unknowns that stay and that its images touch, ascending.
@@ -36,12 +40,23 @@ struct Block {
     rhs: DVector<f64>,
 }
 
+/// How something moves, transposed: a column for each of its coordinates.
+struct Through {
+    /// By the unknowns that its stop touches.
+    by_rows: DMatrix<f64>,
+    /// By what is left of the latents of its stop, normalised.
+    by_latents: DMatrix<f64>,
+}
+
 /// Every stop in use with its elimination.
 #[derive(Debug, Clone)]
 pub(super) struct StopsEliminated {
+    /// Stops with images, ascending.
     blocks: Vec<Block>,
-    /// Places of stops that show much the same markers.
+    /// Their places, those together that show much the same markers.
     groups: Vec<Vec<usize>>,
+    /// All others.
+    bodies: BodyStops,
     seen: SeenMarkers,
     /// Number of dense columns: the first unknown of the markers.
     dense: usize,
@@ -59,7 +74,9 @@ impl StopsEliminated {
         }
         let mut coupling = DenseCoupling::new(&linear.adjustment.problem.layout, &seen);
         let mut blocks = Vec::with_capacity(linear.stops().len());
-        for stops in linear.lin.stops.chunks(STOPS_A_PRODUCT) {
+        let alike_stops = linear.lin.stops.chunk_by(|a, b| a.images.is_empty() == b.images.is_empty());
+        let with_images = alike_stops.filter(|stops| !stops[0].images.is_empty());
+        for stops in with_images.flat_map(|stops| stops.chunks(STOPS_A_PRODUCT)) {
             let rows = PoseRows::new(linear, stops);
             rows.add_to(&mut a);
             let stops: Vec<LinearStop> = linear.stops_of(stops).collect();
@@ -71,23 +88,26 @@ impl StopsEliminated {
             blocks.extend(own);
         }
         coupling.copy_to(&mut a, dense);
-        let groups = alike(linear);
+        let bodies = BodyStops::build(linear, lambda, &mut a);
+        let groups = alike(&blocks.iter().map(|block| linear.stop(block.at)).collect::<Vec<_>>());
         for places in &groups {
-            let own = || places.iter().map(|&at: &usize| &blocks[at]);
+            let own = || places.iter().map(|&place: &usize| &blocks[place]);
             let group = Group::of(own().map(|block| &block.rows));
             group.subtract_gram(&mut a, &group.side_by_side(own().map(|block| (&block.rows, &block.y))));
         }
         mirror_upper(&mut a);
-        (a, Self { blocks, groups, seen, dense })
+        (a, Self { blocks, groups, bodies, seen, dense })
     }
 
     /// Takes over the right-hand sides of the latents at a linearisation; returns the reduced one, without the priors of the dense columns.
     pub fn reduce_gradient(&mut self, linear: LinearProblem) -> DVector<f64> {
         let dense = self.dense;
-        let mut reduced = linear.dense_gradient().resize_vertically(dense + 3 * self.seen.order.len(), 0.0);
+        let bodies = self.blocks.iter().flat_map(|block| linear.stop(block.at).bodies());
+        let mut reduced = linear.dense_gradient(bodies).resize_vertically(dense + 3 * self.seen.order.len(), 0.0);
+        self.bodies.reduce_gradient(linear, &mut reduced);
         reduced.rows_range_mut(dense..).copy_from(&self.seen.gradient(linear));
-        for (block, stop) in self.blocks.iter_mut().zip(linear.stops()) {
-            block.rhs = &block.inverse_factor * stop.gradient();
+        for block in &mut self.blocks {
+            block.rhs = &block.inverse_factor * linear.stop(block.at).gradient();
             let taken = &block.y * &block.rhs;
             block.rows.iter().zip(taken.iter()).for_each(|(&row, value)| reduced[row] -= value);
         }
@@ -116,7 +136,7 @@ impl StopsEliminated {
 
     /// Takes what moves some of the latents of a stop, from `first` on, along with the unknowns from `to` on out of them.
     pub fn carry(&mut self, (stop, first): (usize, usize), to: usize, by: &DMatrix<f64>) {
-        let block = &mut self.blocks[stop];
+        let Some(block) = self.blocks.iter_mut().find(|block| block.at == stop) else { return };
         let Some(factor) = block.inverse_factor.clone().try_inverse() else { return };
         let carried = by.tr_mul(&factor.rows(first, by.nrows()));
         for (at, row) in block.rows.iter().enumerate().filter(|(_, r)| (to..to + by.ncols()).contains(r)) {
@@ -148,22 +168,23 @@ impl StopsEliminated {
     /// Natural logarithm of the determinant of the information of what is latent at all stops.
     pub fn log_determinant(&self) -> f64 {
         let of = |block: &Block| -2.0 * block.inverse_factor.diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        self.blocks.iter().map(of).sum()
+        self.blocks.iter().map(of).sum::<f64>() + self.bodies.log_determinant()
     }
 
     /// `b' H^-1 b` of the right-hand sides of the latents.
     pub fn squares(&self) -> f64 {
-        self.blocks.iter().map(|b| b.rhs.norm_squared()).sum()
+        self.blocks.iter().map(|b| b.rhs.norm_squared()).sum::<f64>() + self.bodies.squares()
     }
 
     /// The whole step from the solution `x` of the reduced system.
     pub fn step(&self, linear: LinearProblem, x: &DVector<f64>) -> Step {
         let mut step = self.of_what_stays(linear, x.column(0));
-        for (block, stop) in self.blocks.iter().zip(linear.stops()) {
+        for block in &self.blocks {
             let own = DVector::from_iterator(block.rows.len(), block.rows.iter().map(|&c| x[c]));
             let dl = block.inverse_factor.tr_mul(&(&block.rhs - block.y.tr_mul(&own)));
-            stop.put(dl.as_slice(), &mut step);
+            linear.stop(block.at).put(dl.as_slice(), &mut step);
         }
+        self.bodies.put_step(linear, x, &mut step);
         step
     }
 
@@ -184,7 +205,8 @@ impl StopsEliminated {
         let mut reduced = of.dense.clone().resize_vertically(dense + of.markers.nrows(), 0.0);
         reduced.rows_range_mut(dense..).copy_from(&of.markers);
         let whitened: Vec<DMatrix<f64>> =
-            self.blocks.iter().zip(&of.stops).map(|(block, own)| &block.inverse_factor * own).collect();
+            self.blocks.iter().map(|block| &block.inverse_factor * &of.stops[block.at]).collect();
+        self.bodies.reduce(linear, of, &mut reduced);
         for (block, own) in self.blocks.iter().zip(&whitened) {
             let taken = product(&block.y, own);
             for (&row, taken) in block.rows.iter().zip(taken.row_iter()) {
@@ -194,82 +216,60 @@ impl StopsEliminated {
         }
         let x = solve(reduced);
         let mut steps: Vec<Step> = x.column_iter().map(|x| self.of_what_stays(linear, x)).collect();
-        for ((block, own), stop) in self.blocks.iter().zip(&whitened).zip(linear.stops()) {
+        self.bodies.put_steps(linear, of, &x, &mut steps);
+        for (block, own) in self.blocks.iter().zip(&whitened) {
             let left = own - product(&block.y.transpose(), &x.select_rows(&block.rows));
-            let latents = block.inverse_factor.tr_mul(&left);
+            let (latents, stop) = (block.inverse_factor.tr_mul(&left), linear.stop(block.at));
             steps.iter_mut().zip(latents.column_iter()).for_each(|(step, own)| stop.put(own.as_slice(), step));
         }
         steps
     }
 
-    /// `D' cov(x) D` of matrices over the unknowns that a stop touches, for every stop by its place among those in use.
-    fn spreads(
+    /// `D' cov(x) D + R' R` of what moves through `D'` and `R'`, of different stops.
+    fn covariances(
         &self,
         reduced: &DMatrix<f64>,
-        of: impl Fn(usize) -> Vec<DMatrix<f64>> + Sync,
-    ) -> Vec<Vec<DMatrix<f64>>> {
+        stops: &[LinearStop],
+        moves: impl Fn(&Block, &LinearStop) -> Vec<Through> + Sync,
+    ) -> HashMap<usize, Vec<DMatrix<f64>>> {
+        let asked: HashMap<usize, &LinearStop> = stops.iter().map(|stop| (stop.at, stop)).collect();
         let of_group = |places: &Vec<usize>| {
-            let own: Vec<(usize, Vec<DMatrix<f64>>)> = places.iter().map(|&at| (at, of(at))).collect();
-            let all = || own.iter().flat_map(|(at, of)| of.iter().map(|d| (&self.blocks[*at].rows, d)));
+            let own = places.iter().map(|&place| &self.blocks[place]);
+            let own = own.filter_map(|block| Some((block, moves(block, asked.get(&block.at)?))));
+            let own: Vec<(&Block, Vec<Through>)> = own.collect();
+            let all = || own.iter().flat_map(|(block, of)| of.iter().map(|t| (&block.rows, &t.by_rows)));
             let group = Group::of(all().map(|(rows, _)| rows));
             let d = group.side_by_side(all());
             let of_reduced = product(&group.part_of(reduced), &d);
             let mut end = 0;
-            let mut spread = |columns: usize| {
+            let mut spread = |Through { by_rows, by_latents }: &Through| {
+                let columns = by_rows.ncols();
                 end += columns;
-                d.columns(end - columns, columns).tr_mul(&of_reduced.columns(end - columns, columns))
+                let by_rows = d.columns(end - columns, columns).tr_mul(&of_reduced.columns(end - columns, columns));
+                by_rows + by_latents.tr_mul(by_latents)
             };
-            let mut of_stop =
-                |(at, of): &(usize, Vec<DMatrix<f64>>)| (*at, of.iter().map(|d| spread(d.ncols())).collect());
+            let mut of_stop = |(block, of): &(&Block, Vec<Through>)| (block.at, of.iter().map(&mut spread).collect());
             own.iter().map(&mut of_stop).collect::<Vec<(usize, Vec<DMatrix<f64>>)>>()
         };
-        let mut all = vec![Vec::new(); self.blocks.len()];
-        let found: Vec<_> = self.groups.par_iter().flat_map_iter(of_group).collect();
-        found.into_iter().for_each(|(at, spreads)| all[at] = spreads);
-        all
+        self.groups.par_iter().flat_map_iter(of_group).collect()
     }
 
-    /// `H^-1 + H^-1 B' cov(x) B H^-1` of stops by their places among those in use.
-    pub fn latent_covariances(&self, reduced: &DMatrix<f64>, stops: &[usize]) -> Vec<DMatrix<f64>> {
-        let asked: HashSet<usize> = stops.iter().copied().collect();
-        let by_latents = |at: usize| {
-            let Block { inverse_factor, y, .. } = &self.blocks[at];
-            if asked.contains(&at) { vec![y * inverse_factor] } else { Vec::new() }
+    /// `H^-1 + H^-1 B' cov(x) B H^-1` of different stops.
+    pub fn latent_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
+        let latents = |Block { inverse_factor, y, .. }: &Block, _: &LinearStop| {
+            vec![Through { by_rows: y * inverse_factor, by_latents: inverse_factor.clone() }]
         };
-        let spreads = self.spreads(reduced, by_latents);
-        let of = |&at: &usize| {
-            let inverse_factor = &self.blocks[at].inverse_factor;
-            spreads[at].iter().fold(inverse_factor.tr_mul(inverse_factor), |sum, spread| sum + spread)
-        };
-        stops.iter().map(of).collect()
+        let mut found = self.covariances(reduced, stops, latents);
+        found.extend(self.bodies.latent_covariances(reduced, stops));
+        stops.iter().filter_map(|stop| found.remove(&stop.at)).flatten().collect()
     }
 
-    /// Covariances of all poses that something shows at some stops in use, as their body twists: those of the unknowns that stay through
-    /// `G - L D'`, and what is left of the latents through `L`.
+    /// Covariances of all poses that something shows at different stops, as their body twists.
     pub fn pose_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<Vec<DMatrix<f64>>> {
-        let asked: HashMap<usize, &LinearStop> = stops.iter().map(|stop| (stop.at, stop)).collect();
-        let poses = |at: usize| asked.get(&at).into_iter().flat_map(|stop| stop.poses());
-        let through = self.spreads(reduced, |at| poses(at).map(|pose| self.through(at, &pose).0).collect());
-        let of = |stop: &LinearStop| {
-            let with_latents = |(pose, through): (LinearPose, &DMatrix<f64>)| {
-                let (_, by_latents) = self.through(stop.at, &pose);
-                through + by_latents.tr_mul(&by_latents)
-            };
-            stop.poses().zip(&through[stop.at]).map(with_latents).collect()
-        };
-        stops.iter().map(of).collect()
-    }
-
-    /// Derivatives of a pose by the unknowns that its stop touches, `(G - L D')'`, and by what is left of the latents, `(L F^-T)'`.
-    fn through(&self, at: usize, pose: &LinearPose) -> (DMatrix<f64>, DMatrix<f64>) {
-        let Block { inverse_factor, rows, y, .. } = &self.blocks[at];
-        let theta = pose.chain.d_theta.ncols();
-        let by_latents = inverse_factor * pose.by_latents(inverse_factor.ncols()).transpose();
-        let mut by_rows = -y * &by_latents;
-        for (mut row, &c) in by_rows.row_iter_mut().zip(rows).filter(|(_, c)| **c < theta) {
-            row += pose.chain.d_theta.column(c).transpose();
-        }
-        (by_rows, by_latents)
+        let poses = |block: &Block, stop: &LinearStop| stop.poses().map(|pose| block.through(&pose)).collect();
+        let mut found = self.covariances(reduced, stops, poses);
+        found.extend(self.bodies.pose_covariances(reduced, stops));
+        stops.iter().filter_map(|stop| found.remove(&stop.at)).collect()
     }
 
     /// Covariance of every marker that was seen; with what moves it with the dense columns for a position.
@@ -351,6 +351,18 @@ impl Coupled {
 }
 
 impl Block {
+    /// Of a pose at its stop, through `G - L D'` and `L F^-T`.
+    fn through(&self, pose: &LinearPose) -> Through {
+        let Self { inverse_factor, rows, y, .. } = self;
+        let theta = pose.chain.d_theta.ncols();
+        let by_latents = inverse_factor * pose.by_latents(inverse_factor.ncols()).transpose();
+        let mut by_rows = -y * &by_latents;
+        for (mut row, &c) in by_rows.row_iter_mut().zip(rows).filter(|(_, c)| **c < theta) {
+            row += pose.chain.d_theta.column(c).transpose();
+        }
+        Through { by_rows, by_latents }
+    }
+
     /// Of a stop with the equations of its images, where markers are among those `seen`; `dense` is the first unknown of the markers.
     fn of<'a>(
         stop: &LinearStop<'a>,
@@ -385,6 +397,6 @@ impl Block {
             }
         }
         let y = product(&coupling, &inverse_factor.transpose());
-        Self { inverse_factor, rows, y, rhs: DVector::zeros(n) }
+        Self { at: stop.at, inverse_factor, rows, y, rhs: DVector::zeros(n) }
     }
 }

@@ -50,7 +50,7 @@ const FEWEST_MARKER_COORDINATES: f64 = 50.0;
 /// Newton decrement between rounds: the components need no better.
 const ROUGH_DECREMENT: f64 = 0.05;
 
-/// Relative change of a factor on the noise of measurements up to which it stays as it is, and what was linearised with it serves on.
+/// Relative change of a factor on the noise of pixels up to which it stays as it is, and what was linearised with it serves on.
 const STAYS: f64 = 1e-3;
 
 /// Stops of which some tell where the components of all will be, and how many those are, at least: of few stops the components tell little.
@@ -83,7 +83,7 @@ pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Out
             Ok(fit) => fit,
             Err(unsolved) => return Outcome { iterations, ..unsolved.outcome },
         };
-        let (before, factors) = (sizes(&mut fit.problem), fit.problem.noise.clone());
+        let (before, factors) = (sizes(&mut fit.problem), fit.problem.noise.pixel_factor.clone());
         let change = fit.update_components(options);
         if change >= CONVERGED {
             let next = acceleration.next_after(change, &before, sizes(&mut fit.problem));
@@ -138,13 +138,10 @@ fn set_sizes(problem: &mut Problem, logarithms: &DVector<f64>) {
 }
 
 impl Fit {
-    /// Keeps the factors on the noise of measurements that are nearly as `before`; true where all are.
-    fn keep_factors(&mut self, before: &Noise) -> bool {
-        let noise = &mut self.problem.noise;
-        let own = noise.pixel_factor.iter_mut().chain(noise.body.iter_mut().flatten());
-        let before = before.pixel_factor.iter().chain(before.body.iter().flatten());
+    /// Keeps the factors on the noise of pixels that are nearly as `before`; true where all are.
+    fn keep_factors(&mut self, before: &[f64]) -> bool {
         let mut all_stay = true;
-        for (own, before) in own.zip(before) {
+        for (own, before) in self.problem.noise.pixel_factor.iter_mut().zip(before) {
             match (*own / before - 1.0).abs() < STAYS {
                 true => *own = *before,
                 false => all_stay = false,

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::runs::{Run, runs};
-use crate::linalg::subtract_gram;
+use crate::linalg::add_gram;
 
 /// The unknowns that some stops touch between them.
 pub(super) struct Group {
@@ -58,7 +58,12 @@ impl Group {
     /// `a -= y y'` in the upper triangle of a matrix over all unknowns, with `y` over those of the group.
     pub fn subtract_gram(&self, a: &mut DMatrix<f64>, y: &DMatrix<f64>) {
         let mut own = DMatrix::zeros(self.rows.len(), self.rows.len());
-        subtract_gram(&mut own, y);
+        add_gram(&mut own, y, -1.0);
+        self.add_upper(a, &own);
+    }
+
+    /// Adds the upper triangle of a matrix over those of the group to that of one over all unknowns.
+    pub fn add_upper(&self, a: &mut DMatrix<f64>, own: &DMatrix<f64>) {
         for (j, &column) in self.rows.iter().enumerate() {
             let mut into = a.column_mut(column);
             for Run { from, into: row, length } in self.runs.iter().take_while(|run| run.from <= j) {

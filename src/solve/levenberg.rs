@@ -376,9 +376,10 @@ pub(super) fn minimise_near(adjustment: Adjustment, settings: &Settings) -> Mini
     minimise_by(Proposer::default(), adjustment, linearised, settings)
 }
 
-/// As [`minimise_near`], where a linearisation at the same state is known that differs in priors and sizes of what is latent alone.
+/// As [`minimise_near`], where a linearisation at the same state is known that differs in priors, sizes of what is latent and factors on the noise of
+/// measured bodies alone.
 pub(super) fn minimise_with_priors(adjustment: Adjustment, linearised: Linearised, settings: &Settings) -> Minimised {
-    let linearised = adjustment.with_its_priors(linearised);
+    let linearised = adjustment.with_its_priors(adjustment.with_its_body_factors(linearised));
     minimise_by(Proposer::default(), adjustment, Some(linearised), settings)
 }
 

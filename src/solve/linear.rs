@@ -208,6 +208,16 @@ impl Adjustment {
         lin.cost.is_finite().then_some(lin)
     }
 
+    /// A linearisation at its state with its factors on the noise of measured bodies.
+    pub(super) fn with_its_body_factors(&self, mut parts: Linearised) -> Linearised {
+        let Self { problem, .. } = self;
+        for BodyPart { index, terms, chain } in &mut parts.bodies {
+            let measured = &problem.body_measurements[*index];
+            *terms = measured.linearise(&chain.pose, problem.body_factors(measured));
+        }
+        parts
+    }
+
     /// A linearisation at its state with its stops, measured distances and cost, of the parts of the images and bodies in use.
     pub(super) fn with_its_priors(&self, parts: Linearised) -> Linearised {
         let Self { problem, state } = self;
@@ -346,8 +356,8 @@ impl<'a> LinearProblem<'a> {
         LinearImage { problem, state, index, image, tie, terms, chain, stop, joints, tie_start, equations }
     }
 
-    /// Right-hand side of the dense columns, without their priors.
-    pub(super) fn dense_gradient(self) -> DVector<f64> {
+    /// Right-hand side of the dense columns from the images and some measurements of bodies, without priors.
+    pub(super) fn dense_gradient(self, bodies: impl Iterator<Item = &'a BodyPart>) -> DVector<f64> {
         let layout = &self.adjustment.problem.layout;
         let mut gradient = DVector::zeros(layout.len());
         for own in self.images() {
@@ -357,7 +367,7 @@ impl<'a> LinearProblem<'a> {
                 c.iter().for_each(|&c| gradient[c] += terms.be[e]);
             }
         }
-        for BodyPart { terms, chain, .. } in &self.lin.bodies {
+        for BodyPart { terms, chain, .. } in bodies {
             (0..layout.theta_len()).for_each(|c| gradient[c] += chain.d_theta.fixed_view::<6, 1>(0, c).dot(&terms.bp));
         }
         gradient
@@ -408,6 +418,11 @@ impl<'a> LinearImage<'a> {
 }
 
 impl<'a> LinearStop<'a> {
+    /// The problem that it is a part of.
+    pub(super) fn problem(&self) -> &'a Problem {
+        &self.linear.adjustment.problem
+    }
+
     /// Its images in use.
     pub fn images(&self) -> impl Iterator<Item = LinearImage<'a>> + use<'a> {
         let linear = self.linear;

@@ -4,6 +4,7 @@ mod acceleration;
 mod alike;
 mod blocks;
 mod body_components;
+mod body_stops;
 mod by_markers;
 mod by_stops;
 mod components;

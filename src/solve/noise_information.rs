@@ -10,7 +10,7 @@ use super::covariance::Covariance;
 use super::fit::Fit;
 use super::latent::{Latent, local_latents, stop_latents};
 use super::system::Elimination;
-use super::tally::SHRINKAGE;
+use super::tally::{JOINT_NOISE_FLOOR, SHRINKAGE};
 use crate::linalg::SymmetricFactor;
 use crate::problem::{Adjustment, Family, Noise, Problem};
 use crate::urdf::JointKind;
@@ -203,6 +203,17 @@ impl NoiseInformation {
     /// Without what it would need for [`super::NoiseUncertainty`].
     pub fn of_sizes(self) -> Self {
         Self { together: Vec::new(), coupled: None, ..self }
+    }
+
+    /// Root mean square of the joint noise of some readings in some series, rad or m, as a fit has it, and its interval at `z` sigmas: that of what
+    /// counts as none starts at none.
+    pub fn joint_noise(&self, noise: &Noise, series: &[usize], readings: &[usize], z: f64) -> (f64, [f64; 2]) {
+        let local = |r: usize| noise.local.get(r).copied().unwrap_or(0.0);
+        let sizes = || series.iter().flat_map(|s| readings.iter().map(|&r| noise.joint[*s][r].hypot(local(r))));
+        let counted = sizes().filter(|size| *size > JOINT_NOISE_FLOOR);
+        let sum: f64 = counted.map(|size| size * size).sum();
+        let [low, high] = self.mean_variance(series, readings).interval(z);
+        ((sum / sizes().count() as f64).sqrt(), [if sum > 0.0 { low } else { 0.0 }, high])
     }
 
     /// Mean variance of some readings in some series (the noise of the stops and local errors together).

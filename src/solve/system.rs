@@ -285,9 +285,7 @@ impl System {
                 };
                 stops.iter().map(of).collect()
             }
-            Eliminated::Stops(e) => {
-                e.latent_covariances(reduced, &stops.iter().map(|stop| stop.at).collect::<Vec<_>>())
-            }
+            Eliminated::Stops(e) => e.latent_covariances(reduced, stops),
         }
     }
 

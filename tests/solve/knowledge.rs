@@ -469,6 +469,17 @@ fn a_joint_noise_that_the_images_contradict_is_named_and_nothing_else() {
         assert!(findings.iter().all(|f| !matches!(f, Finding::Displaced(_) | Finding::LooseMounting(_))), "{stated}");
     }
     assert!(found(JointNoise::Estimated).iter().all(|f| f.weight() != Weight::Gate));
+    let none = identify(
+        chain(),
+        &[world(1, 0.0)],
+        &Options { model: RobotModel::Rigid, joint_noise: JointNoise::Known(2e-4), ..Options::default() },
+    );
+    let too_much = none.unwrap().findings.iter().find_map(|f| match f {
+        Finding::NoiseContradicted(found) => Some((found.weight, found.found, found.interval)),
+        _ => None,
+    });
+    println!("none, 2e-4 stated: {too_much:?}");
+    assert!(matches!(too_much, Some((Weight::Note, 0.0, [0.0, high])) if high > 0.0), "{too_much:?}");
     let true_size = found(JointNoise::Known(1e-4));
     assert!(true_size.iter().all(|f| f.code() != Code::JointNoiseContradicted), "{true_size:?}");
 }

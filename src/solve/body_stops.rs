@@ -1,0 +1,279 @@
+//! Stops at which no image was taken, eliminated in the space of the poses that were measured there.
+//!
+//! Dense columns and what is latent move the poses of a stop by `G` and `L`. With the information `H = S S'` of the poses and the priors `P` of what
+//! is latent, a stop tells `G' R R' G` of the dense columns, `R R' = S (1 + S' L P^-1 L' S)^-1 S'` (the identity of Woodbury): one Gram product,
+//! from which nothing is subtracted. With the information `F F' = P + L' H L` and `K = (F F')^-1 L' H`, latents follow the dense columns by `-K G x`,
+//! poses by `(1 - L K) G x`.
+
+use nalgebra::{DMatrix, DMatrixView, DVector, Vector6};
+use rayon::prelude::*;
+
+use super::group::Group;
+use super::linear::{BodyPart, LinearPose, LinearProblem, LinearStop};
+use super::right_hand_sides::RightHandSides;
+use crate::linalg::{add_gram, product};
+use crate::problem::{Layout, Step};
+
+/// Stops whose equations are taken together: those after each other touch much the same columns.
+const TOGETHER: usize = 48;
+
+/// Share of a pivot that is rounding: what is left of it says nothing.
+const ROUNDING: f64 = 1e-13;
+
+/// One stop with its elimination.
+#[derive(Debug, Clone)]
+struct Block {
+    /// Place among the stops in use.
+    at: usize,
+    /// `F^-1`.
+    inverse_factor: DMatrix<f64>,
+    /// `K`, latent x poses.
+    gain: DMatrix<f64>,
+    /// `F^-1` times the right-hand side.
+    rhs: DVector<f64>,
+}
+
+/// Such stops, ascending.
+#[derive(Debug, Clone)]
+pub(super) struct BodyStops(Vec<Block>);
+
+/// The free columns that move any of the poses of some stops, ascending.
+fn touched(layout: &Layout, stops: &[LinearStop]) -> Vec<usize> {
+    let mut moves = vec![false; layout.theta_len()];
+    for part in stops.iter().flat_map(|stop| stop.bodies()) {
+        for (moves, by) in moves.iter_mut().zip(part.chain.d_theta.as_slice().chunks_exact(6)) {
+            *moves |= by.iter().any(|d| *d != 0.0);
+        }
+    }
+    (0..moves.len()).filter(|&c| moves[c] && layout.columns[c].free).collect()
+}
+
+/// `S`, lower triangular less the columns of zeros, of a positive semidefinite matrix `S S'`.
+fn root(mut m: DMatrix<f64>) -> DMatrix<f64> {
+    let n = m.nrows();
+    let least = m.diagonal() * ROUNDING;
+    let mut told = Vec::with_capacity(n);
+    for k in 0..n {
+        if m[(k, k)] <= least[k] {
+            continue;
+        }
+        let pivot = m[(k, k)].sqrt();
+        let column: Vec<f64> = (k..n).map(|i| m[(i, k)] / pivot).collect();
+        for j in k + 1..n {
+            (j..n).for_each(|i| m[(i, j)] -= column[i - k] * column[j - k]);
+        }
+        (k..n).for_each(|i| m[(i, k)] = column[i - k]);
+        told.push(k);
+    }
+    DMatrix::from_fn(n, told.len(), |i, k| if i < told[k] { 0.0 } else { m[(i, told[k])] })
+}
+
+/// `G' m` of the poses of a stop, over some of the dense columns.
+fn transposed_times(bodies: &[BodyPart], rows: &[usize], m: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut all = DMatrix::zeros(rows.len(), m.ncols());
+    for (mut into, m) in all.column_iter_mut().zip(m.column_iter()) {
+        for (part, m) in bodies.iter().zip(m.as_slice().chunks_exact(6)) {
+            let by = part.chain.d_theta.as_slice();
+            for (sum, &c) in into.iter_mut().zip(rows) {
+                *sum += by[6 * c..6 * c + 6].iter().zip(m).map(|(g, m)| g * m).sum::<f64>();
+            }
+        }
+    }
+    all
+}
+
+/// `G x` of the poses of a stop, one after the other.
+fn times(bodies: &[BodyPart], x: DMatrixView<f64>) -> DMatrix<f64> {
+    let mut all = DMatrix::zeros(6 * bodies.len(), x.ncols());
+    for (k, part) in bodies.iter().enumerate() {
+        let by = &part.chain.d_theta;
+        all.rows_mut(6 * k, 6).copy_from(&(by * x.rows(0, by.ncols())));
+    }
+    all
+}
+
+impl Block {
+    /// With `R`, and what is latent damped by `lambda`.
+    fn of(stop: &LinearStop, lambda: f64) -> (Self, DMatrix<f64>) {
+        let poses: Vec<LinearPose> = stop.poses().collect();
+        let (n, latent) = (6 * poses.len(), stop.unknowns());
+        let (mut h, mut l) = (DMatrix::zeros(n, n), DMatrix::zeros(n, latent));
+        for (k, pose) in poses.iter().enumerate() {
+            h.view_mut((6 * k, 6 * k), (6, 6)).copy_from(pose.pp);
+            l.rows_mut(6 * k, 6).copy_from(&pose.by_latents(latent));
+        }
+        let with_latents = l.tr_mul(&h);
+        let mut information = &with_latents * &l;
+        let prior = stop.prior();
+        let damped: Vec<f64> =
+            prior.iter().zip(information.diagonal().iter()).map(|(p, i)| p + lambda * (p + i)).collect();
+        damped.iter().enumerate().for_each(|(k, prior)| information[(k, k)] += prior);
+        let factor = information.cholesky().and_then(|c| c.l().try_inverse());
+        let inverse_factor = factor.unwrap_or_else(|| DMatrix::zeros(latent, latent));
+        let gain = inverse_factor.tr_mul(&(&inverse_factor * with_latents));
+        let s = root(h);
+        let mut scaled = s.tr_mul(&l);
+        scaled.column_iter_mut().zip(&damped).for_each(|(mut column, prior)| column.unscale_mut(prior.sqrt()));
+        let left = DMatrix::identity(s.ncols(), s.ncols()) + &scaled * scaled.transpose();
+        let left =
+            left.cholesky().and_then(|c| c.l().try_inverse()).unwrap_or_else(|| DMatrix::zeros(s.ncols(), s.ncols()));
+        let r = s * left.transpose();
+        (Self { at: stop.at, inverse_factor, gain, rhs: DVector::zeros(latent) }, r)
+    }
+
+    /// `H_l^-1`.
+    fn left(&self) -> DMatrix<f64> {
+        self.inverse_factor.tr_mul(&self.inverse_factor)
+    }
+}
+
+impl BodyStops {
+    /// Adds their information of the dense columns: upper triangle.
+    pub fn build(linear: LinearProblem, lambda: f64, a: &mut DMatrix<f64>) -> Self {
+        let layout = &linear.adjustment.problem.layout;
+        let stops: Vec<LinearStop> = linear.stops().filter(|stop| stop.places().is_empty()).collect();
+        let of = |stops: &[LinearStop]| {
+            let (blocks, roots): (Vec<Block>, Vec<_>) = stops.iter().map(|stop| Block::of(stop, lambda)).unzip();
+            let rows = touched(layout, stops);
+            let by_columns: Vec<_> =
+                stops.iter().zip(&roots).map(|(stop, r)| transposed_times(stop.bodies(), &rows, r)).collect();
+            let mut information = DMatrix::zeros(rows.len(), rows.len());
+            add_gram(&mut information, &side_by_side(rows.len(), &by_columns), 1.0);
+            (blocks, Group::of(std::iter::once(&rows)), information)
+        };
+        let mut all = Vec::with_capacity(stops.len());
+        for (blocks, group, information) in stops.par_chunks(TOGETHER).map(of).collect::<Vec<_>>() {
+            group.add_upper(a, &information);
+            all.extend(blocks);
+        }
+        Self(all)
+    }
+
+    /// Takes over the right-hand sides of the latents at a linearisation; adds to that of the dense columns.
+    pub fn reduce_gradient(&mut self, linear: LinearProblem, reduced: &mut DVector<f64>) {
+        let theta = linear.adjustment.problem.layout.theta_len();
+        let of = |blocks: &mut [Block]| {
+            let mut sum = DVector::zeros(theta);
+            for block in blocks {
+                let stop = linear.stop(block.at);
+                let gradient = stop.gradient();
+                block.rhs = &block.inverse_factor * &gradient;
+                let taken = block.gain.tr_mul(&gradient);
+                for (part, taken) in stop.bodies().iter().zip(taken.as_slice().chunks_exact(6)) {
+                    let pull = part.terms.bp - Vector6::from_column_slice(taken);
+                    for (sum, by) in sum.iter_mut().zip(part.chain.d_theta.as_slice().chunks_exact(6)) {
+                        *sum += by.iter().zip(pull.iter()).map(|(g, pull)| g * pull).sum::<f64>();
+                    }
+                }
+            }
+            sum
+        };
+        for sum in self.0.par_chunks_mut(TOGETHER).map(of).collect::<Vec<_>>() {
+            let mut reduced = reduced.rows_mut(0, theta);
+            reduced += sum;
+        }
+    }
+
+    /// Puts their part of the step from that of the dense columns.
+    pub fn put_step(&self, linear: LinearProblem, x: &DVector<f64>, step: &mut Step) {
+        let of = |block: &Block| {
+            let stop = linear.stop(block.at);
+            let moved = times(stop.bodies(), x.as_view());
+            let own = block.inverse_factor.tr_mul(&block.rhs) - (&block.gain * moved).column(0);
+            (stop, own)
+        };
+        for (stop, own) in self.0.par_iter().map(of).collect::<Vec<_>>() {
+            stop.put(own.as_slice(), step);
+        }
+    }
+
+    /// Takes what is latent out of right-hand sides of the dense columns.
+    pub fn reduce(&self, linear: LinearProblem, of: &RightHandSides, reduced: &mut DMatrix<f64>) {
+        let theta: Vec<usize> = (0..linear.adjustment.problem.layout.theta_len()).collect();
+        for block in &self.0 {
+            let taken = block.gain.tr_mul(&of.stops[block.at]);
+            let mut reduced = reduced.rows_mut(0, theta.len());
+            reduced -= transposed_times(linear.stop(block.at).bodies(), &theta, &taken);
+        }
+    }
+
+    /// Puts their part of steps from those of the dense columns, for right-hand sides of their own.
+    pub fn put_steps(&self, linear: LinearProblem, of: &RightHandSides, x: &DMatrix<f64>, steps: &mut [Step]) {
+        for block in &self.0 {
+            let stop = linear.stop(block.at);
+            let own = block.left() * &of.stops[block.at] - &block.gain * times(stop.bodies(), x.as_view());
+            steps.iter_mut().zip(own.column_iter()).for_each(|(step, own)| stop.put(own.as_slice(), step));
+        }
+    }
+
+    /// Natural logarithm of the determinant of the information of what is latent.
+    pub fn log_determinant(&self) -> f64 {
+        let of = |block: &Block| -2.0 * block.inverse_factor.diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        self.0.iter().map(of).sum()
+    }
+
+    /// `b' H_l^-1 b` of the right-hand sides of the latents.
+    pub fn squares(&self) -> f64 {
+        self.0.iter().map(|block| block.rhs.norm_squared()).sum()
+    }
+
+    /// `H_l^-1 + K S K'`, `S = G cov(x) G'`, of those of some stops that are among these, with their places.
+    pub fn latent_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<(usize, Vec<DMatrix<f64>>)> {
+        let of = |block: &Block, _: &LinearStop, spread: DMatrix<f64>| {
+            vec![block.left() + &block.gain * spread * block.gain.transpose()]
+        };
+        self.covariances(reduced, stops, of)
+    }
+
+    /// Covariances of the poses, `(1 - L K) S (1 - L K)' + L H_l^-1 L'`, in the same way.
+    pub fn pose_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<(usize, Vec<DMatrix<f64>>)> {
+        let of = |block: &Block, stop: &LinearStop, spread: DMatrix<f64>| {
+            let of_pose = |(k, pose): (usize, LinearPose)| {
+                let l = pose.by_latents(stop.unknowns());
+                let mut by_unknowns = -(&l * &block.gain);
+                (0..6).for_each(|i| by_unknowns[(i, 6 * k + i)] += 1.0);
+                let by_latents = &block.inverse_factor * l.transpose();
+                &by_unknowns * &spread * by_unknowns.transpose() + by_latents.tr_mul(&by_latents)
+            };
+            stop.poses().enumerate().map(of_pose).collect()
+        };
+        self.covariances(reduced, stops, of)
+    }
+
+    fn covariances(
+        &self,
+        reduced: &DMatrix<f64>,
+        stops: &[LinearStop],
+        of: impl Fn(&Block, &LinearStop, DMatrix<f64>) -> Vec<DMatrix<f64>> + Sync,
+    ) -> Vec<(usize, Vec<DMatrix<f64>>)> {
+        let own = |stop: &LinearStop| Some(&self.0[self.0.binary_search_by_key(&stop.at, |block| block.at).ok()?]);
+        let own: Vec<(LinearStop, &Block)> = stops.iter().filter_map(|stop| Some((stop.clone(), own(stop)?))).collect();
+        let of_some = |own: &[(LinearStop, &Block)]| {
+            let stops: Vec<LinearStop> = own.iter().map(|(stop, _)| stop.clone()).collect();
+            let Some(problem) = stops.first().map(LinearStop::problem) else { return Vec::new() };
+            let rows = touched(&problem.layout, &stops);
+            let poses = |stop: &LinearStop| DMatrix::identity(6 * stop.bodies().len(), 6 * stop.bodies().len());
+            let by_columns: Vec<_> =
+                stops.iter().map(|stop| transposed_times(stop.bodies(), &rows, &poses(stop))).collect();
+            let d = side_by_side(rows.len(), &by_columns);
+            let of_reduced = product(&Group::of(std::iter::once(&rows)).part_of(reduced), &d);
+            let mut end = 0;
+            let mut of_stop = |((stop, block), by): (&(LinearStop, &Block), &DMatrix<f64>)| {
+                end += by.ncols();
+                (stop.at, of(block, stop, by.tr_mul(&of_reduced.columns_range(end - by.ncols()..end))))
+            };
+            own.iter().zip(&by_columns).map(&mut of_stop).collect()
+        };
+        own.par_chunks(TOGETHER).flat_map_iter(of_some).collect()
+    }
+}
+
+fn side_by_side(rows: usize, parts: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let mut all = DMatrix::zeros(rows, parts.iter().map(|own| own.ncols()).sum());
+    let mut end = 0;
+    for own in parts {
+        end += own.ncols();
+        all.columns_range_mut(end - own.ncols()..end).copy_from(own);
+    }
+    all
+}
