@@ -1,6 +1,6 @@
 //! Variance components of measured bodies: factors on the stated sigmas of position and rotation, by their redundancy (REML).
 
-use nalgebra::Matrix6;
+use nalgebra::{DMatrix, Matrix6};
 
 use super::fit::Fit;
 use super::linear::LinearStop;
@@ -33,13 +33,12 @@ impl BodyTally {
 }
 
 impl Fit {
-    /// Of every component: position, rotation.
-    pub(super) fn body_tallies(&self) -> Vec<[BodyTally; 2]> {
+    /// Of every component, position and rotation, from the covariances of the bodies that were measured at some stops.
+    pub(super) fn body_tallies(&self, stops: &[LinearStop], covariances: &[Vec<DMatrix<f64>>]) -> Vec<[BodyTally; 2]> {
         let problem = &self.problem;
         let mut tallies = vec![[BodyTally::default(); 2]; problem.noise.body.len()];
-        let stops: Vec<LinearStop> = self.linear().stops().filter(|stop| !stop.bodies().is_empty()).collect();
-        for (stop, covariances) in stops.iter().zip(self.covariance.poses(&stops)) {
-            for (covariance, part) in covariances.iter().skip(stop.places().len()).zip(stop.bodies()) {
+        for (stop, covariances) in stops.iter().zip(covariances) {
+            for (covariance, part) in covariances.iter().zip(stop.bodies()) {
                 let measured = &problem.body_measurements[part.index];
                 let used_up: Matrix6<f64> = Matrix6::from_column_slice(covariance.as_slice()) * part.terms.pp;
                 let tally = &mut tallies[problem.instruments[measured.instrument].component];

@@ -5,9 +5,10 @@
 //! from which nothing is subtracted. With the information `F F' = P + L' H L` and `K = (F F')^-1 L' H`, latents follow the dense columns by `-K G x`,
 //! poses by `(1 - L K) G x`.
 
-use nalgebra::{DMatrix, DMatrixView, DVector, Vector6};
+use nalgebra::{DMatrix, DVector, Vector6};
 use rayon::prelude::*;
 
+use super::covariance::StopCovariance;
 use super::group::Group;
 use super::linear::{BodyPart, LinearPose, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
@@ -37,12 +38,21 @@ struct Block {
 #[derive(Debug, Clone)]
 pub(super) struct BodyStops(Vec<Block>);
 
+/// Columns of `G` of one pose.
+fn columns(part: &BodyPart) -> &[[f64; 6]] {
+    part.chain.d_theta.as_slice().as_chunks().0
+}
+
+fn dot(a: &[f64; 6], b: &[f64; 6]) -> f64 {
+    (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]) + (a[4] * b[4] + a[5] * b[5])
+}
+
 /// The free columns that move any of the poses of some stops, ascending.
 fn touched(layout: &Layout, stops: &[LinearStop]) -> Vec<usize> {
     let mut moves = vec![false; layout.theta_len()];
     for part in stops.iter().flat_map(|stop| stop.bodies()) {
-        for (moves, by) in moves.iter_mut().zip(part.chain.d_theta.as_slice().chunks_exact(6)) {
-            *moves |= by.iter().any(|d| *d != 0.0);
+        for (moves, by) in moves.iter_mut().zip(columns(part)).filter(|(moves, _)| !**moves) {
+            *moves = *by != [0.0; 6];
         }
     }
     (0..moves.len()).filter(|&c| moves[c] && layout.columns[c].free).collect()
@@ -72,24 +82,30 @@ fn root(mut m: DMatrix<f64>) -> DMatrix<f64> {
 fn transposed_times(bodies: &[BodyPart], rows: &[usize], m: &DMatrix<f64>) -> DMatrix<f64> {
     let mut all = DMatrix::zeros(rows.len(), m.ncols());
     for (mut into, m) in all.column_iter_mut().zip(m.column_iter()) {
-        for (part, m) in bodies.iter().zip(m.as_slice().chunks_exact(6)) {
-            let by = part.chain.d_theta.as_slice();
-            for (sum, &c) in into.iter_mut().zip(rows) {
-                *sum += by[6 * c..6 * c + 6].iter().zip(m).map(|(g, m)| g * m).sum::<f64>();
-            }
+        for (part, m) in bodies.iter().zip(m.as_slice().as_chunks().0) {
+            let by = columns(part);
+            into.iter_mut().zip(rows).for_each(|(sum, &c)| *sum += dot(&by[c], m));
         }
     }
     all
 }
 
 /// `G x` of the poses of a stop, one after the other.
-fn times(bodies: &[BodyPart], x: DMatrixView<f64>) -> DMatrix<f64> {
-    let mut all = DMatrix::zeros(6 * bodies.len(), x.ncols());
-    for (k, part) in bodies.iter().enumerate() {
-        let by = &part.chain.d_theta;
-        all.rows_mut(6 * k, 6).copy_from(&(by * x.rows(0, by.ncols())));
+fn times(bodies: &[BodyPart], x: &[f64]) -> DVector<f64> {
+    let mut all = DVector::zeros(6 * bodies.len());
+    for (part, sum) in bodies.iter().zip(all.as_mut_slice().as_chunks_mut::<6>().0) {
+        for (by, x) in columns(part).iter().zip(x) {
+            sum.iter_mut().zip(by).for_each(|(sum, g)| *sum += g * x);
+        }
     }
     all
+}
+
+/// `F^-1` of `F F'`; zero where that is not positive definite.
+fn inverse_factor(m: DMatrix<f64>) -> DMatrix<f64> {
+    let n = m.nrows();
+    let inverse = m.cholesky().and_then(|c| c.l_dirty().solve_lower_triangular(&DMatrix::identity(n, n)));
+    inverse.unwrap_or_else(|| DMatrix::zeros(n, n))
 }
 
 impl Block {
@@ -108,17 +124,27 @@ impl Block {
         let damped: Vec<f64> =
             prior.iter().zip(information.diagonal().iter()).map(|(p, i)| p + lambda * (p + i)).collect();
         damped.iter().enumerate().for_each(|(k, prior)| information[(k, k)] += prior);
-        let factor = information.cholesky().and_then(|c| c.l().try_inverse());
-        let inverse_factor = factor.unwrap_or_else(|| DMatrix::zeros(latent, latent));
+        let inverse_factor = inverse_factor(information);
         let gain = inverse_factor.tr_mul(&(&inverse_factor * with_latents));
         let s = root(h);
         let mut scaled = s.tr_mul(&l);
         scaled.column_iter_mut().zip(&damped).for_each(|(mut column, prior)| column.unscale_mut(prior.sqrt()));
-        let left = DMatrix::identity(s.ncols(), s.ncols()) + &scaled * scaled.transpose();
-        let left =
-            left.cholesky().and_then(|c| c.l().try_inverse()).unwrap_or_else(|| DMatrix::zeros(s.ncols(), s.ncols()));
+        let left = self::inverse_factor(DMatrix::identity(s.ncols(), s.ncols()) + &scaled * scaled.transpose());
         let r = s * left.transpose();
         (Self { at: stop.at, inverse_factor, gain, rhs: DVector::zeros(latent) }, r)
+    }
+
+    /// Covariances from `G cov(x) G'`.
+    fn spread(&self, stop: &LinearStop, spread: &DMatrix<f64>) -> StopCovariance {
+        let of_pose = |(k, pose): (usize, LinearPose)| {
+            let l = pose.by_latents(stop.unknowns());
+            let mut by_unknowns = -(&l * &self.gain);
+            (0..6).for_each(|i| by_unknowns[(i, 6 * k + i)] += 1.0);
+            let by_latents = &self.inverse_factor * l.transpose();
+            &by_unknowns * spread * by_unknowns.transpose() + by_latents.tr_mul(&by_latents)
+        };
+        let latents = self.left() + &self.gain * spread * self.gain.transpose();
+        StopCovariance { latents, bodies: stop.poses().enumerate().map(of_pose).collect() }
     }
 
     /// `H_l^-1`.
@@ -159,10 +185,10 @@ impl BodyStops {
                 let gradient = stop.gradient();
                 block.rhs = &block.inverse_factor * &gradient;
                 let taken = block.gain.tr_mul(&gradient);
-                for (part, taken) in stop.bodies().iter().zip(taken.as_slice().chunks_exact(6)) {
-                    let pull = part.terms.bp - Vector6::from_column_slice(taken);
-                    for (sum, by) in sum.iter_mut().zip(part.chain.d_theta.as_slice().chunks_exact(6)) {
-                        *sum += by.iter().zip(pull.iter()).map(|(g, pull)| g * pull).sum::<f64>();
+                for (part, taken) in stop.bodies().iter().zip(taken.as_slice().as_chunks().0) {
+                    let pull: [f64; 6] = (part.terms.bp - Vector6::from(*taken)).into();
+                    for (sum, by) in sum.iter_mut().zip(columns(part)) {
+                        *sum += dot(by, &pull);
                     }
                 }
             }
@@ -178,8 +204,8 @@ impl BodyStops {
     pub fn put_step(&self, linear: LinearProblem, x: &DVector<f64>, step: &mut Step) {
         let of = |block: &Block| {
             let stop = linear.stop(block.at);
-            let moved = times(stop.bodies(), x.as_view());
-            let own = block.inverse_factor.tr_mul(&block.rhs) - (&block.gain * moved).column(0);
+            let moved = times(stop.bodies(), x.as_slice());
+            let own = block.inverse_factor.tr_mul(&block.rhs) - &block.gain * moved;
             (stop, own)
         };
         for (stop, own) in self.0.par_iter().map(of).collect::<Vec<_>>() {
@@ -201,8 +227,11 @@ impl BodyStops {
     pub fn put_steps(&self, linear: LinearProblem, of: &RightHandSides, x: &DMatrix<f64>, steps: &mut [Step]) {
         for block in &self.0 {
             let stop = linear.stop(block.at);
-            let own = block.left() * &of.stops[block.at] - &block.gain * times(stop.bodies(), x.as_view());
-            steps.iter_mut().zip(own.column_iter()).for_each(|(step, own)| stop.put(own.as_slice(), step));
+            let left = block.left() * &of.stops[block.at];
+            for ((step, x), left) in steps.iter_mut().zip(x.column_iter()).zip(left.column_iter()) {
+                let own = left - &block.gain * times(stop.bodies(), x.as_slice());
+                stop.put(own.as_slice(), step);
+            }
         }
     }
 
@@ -217,55 +246,37 @@ impl BodyStops {
         self.0.iter().map(|block| block.rhs.norm_squared()).sum()
     }
 
-    /// `H_l^-1 + K S K'`, `S = G cov(x) G'`, of those of some stops that are among these, with their places.
-    pub fn latent_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<(usize, Vec<DMatrix<f64>>)> {
-        let of = |block: &Block, _: &LinearStop, spread: DMatrix<f64>| {
-            vec![block.left() + &block.gain * spread * block.gain.transpose()]
-        };
-        self.covariances(reduced, stops, of)
-    }
-
-    /// Covariances of the poses, `(1 - L K) S (1 - L K)' + L H_l^-1 L'`, in the same way.
-    pub fn pose_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<(usize, Vec<DMatrix<f64>>)> {
-        let of = |block: &Block, stop: &LinearStop, spread: DMatrix<f64>| {
-            let of_pose = |(k, pose): (usize, LinearPose)| {
-                let l = pose.by_latents(stop.unknowns());
-                let mut by_unknowns = -(&l * &block.gain);
-                (0..6).for_each(|i| by_unknowns[(i, 6 * k + i)] += 1.0);
-                let by_latents = &block.inverse_factor * l.transpose();
-                &by_unknowns * &spread * by_unknowns.transpose() + by_latents.tr_mul(&by_latents)
-            };
-            stop.poses().enumerate().map(of_pose).collect()
-        };
-        self.covariances(reduced, stops, of)
-    }
-
-    fn covariances(
-        &self,
-        reduced: &DMatrix<f64>,
-        stops: &[LinearStop],
-        of: impl Fn(&Block, &LinearStop, DMatrix<f64>) -> Vec<DMatrix<f64>> + Sync,
-    ) -> Vec<(usize, Vec<DMatrix<f64>>)> {
+    /// Of those of some stops that are among these, with their places. With `S = G cov(x) G'`: of what is latent `H_l^-1 + K S K'`, of the poses
+    /// `(1 - L K) S (1 - L K)' + L H_l^-1 L'`.
+    pub fn stop_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<(usize, StopCovariance)> {
         let own = |stop: &LinearStop| Some(&self.0[self.0.binary_search_by_key(&stop.at, |block| block.at).ok()?]);
         let own: Vec<(LinearStop, &Block)> = stops.iter().filter_map(|stop| Some((stop.clone(), own(stop)?))).collect();
         let of_some = |own: &[(LinearStop, &Block)]| {
-            let stops: Vec<LinearStop> = own.iter().map(|(stop, _)| stop.clone()).collect();
-            let Some(problem) = stops.first().map(LinearStop::problem) else { return Vec::new() };
-            let rows = touched(&problem.layout, &stops);
-            let poses = |stop: &LinearStop| DMatrix::identity(6 * stop.bodies().len(), 6 * stop.bodies().len());
-            let by_columns: Vec<_> =
-                stops.iter().map(|stop| transposed_times(stop.bodies(), &rows, &poses(stop))).collect();
-            let d = side_by_side(rows.len(), &by_columns);
-            let of_reduced = product(&Group::of(std::iter::once(&rows)).part_of(reduced), &d);
-            let mut end = 0;
-            let mut of_stop = |((stop, block), by): (&(LinearStop, &Block), &DMatrix<f64>)| {
-                end += by.ncols();
-                (stop.at, of(block, stop, by.tr_mul(&of_reduced.columns_range(end - by.ncols()..end))))
-            };
-            own.iter().zip(&by_columns).map(&mut of_stop).collect()
+            let (stops, blocks): (Vec<LinearStop>, Vec<&Block>) = own.iter().cloned().unzip();
+            let spreads = spreads(reduced, &stops);
+            let of =
+                |((stop, block), spread): ((LinearStop, &Block), DMatrix<f64>)| (stop.at, block.spread(&stop, &spread));
+            stops.into_iter().zip(blocks).zip(spreads).map(of).collect::<Vec<_>>()
         };
         own.par_chunks(TOGETHER).flat_map_iter(of_some).collect()
     }
+}
+
+/// `G cov(x) G'` of the poses of each of some stops.
+fn spreads(reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
+    let Some(problem) = stops.first().map(LinearStop::problem) else { return Vec::new() };
+    let rows = touched(&problem.layout, stops);
+    let all = |stop: &LinearStop| DMatrix::identity(6 * stop.bodies().len(), 6 * stop.bodies().len());
+    let of_stop = |stop: &LinearStop| transposed_times(stop.bodies(), &rows, &all(stop));
+    let by_columns: Vec<DMatrix<f64>> = stops.iter().map(of_stop).collect();
+    let of_reduced =
+        product(&Group::of(std::iter::once(&rows)).part_of(reduced), &side_by_side(rows.len(), &by_columns));
+    let mut end = 0;
+    let spread = |by: &DMatrix<f64>| {
+        end += by.ncols();
+        by.tr_mul(&of_reduced.columns_range(end - by.ncols()..end))
+    };
+    by_columns.iter().map(spread).collect()
 }
 
 fn side_by_side(rows: usize, parts: &[DMatrix<f64>]) -> DMatrix<f64> {
@@ -276,4 +287,23 @@ fn side_by_side(rows: usize, parts: &[DMatrix<f64>]) -> DMatrix<f64> {
         all.columns_range_mut(end - own.ncols()..end).copy_from(own);
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_nothing_is_told_of_has_no_column_in_the_root() {
+        let told = DMatrix::from_fn(6, 2, |i, k| ((3 * i + 5 * k + 1) as f64).sin() * 10f64.powi(i as i32));
+        let m = &told * told.transpose();
+        let s = root(m.clone());
+        assert_eq!(s.ncols(), 2);
+        let error = &s * s.transpose() - &m;
+        let largest = (0..6).flat_map(|i| (0..6).map(move |j| (i, j)));
+        for (i, j) in largest {
+            assert!(error[(i, j)].abs() < 1e-12 * (m[(i, i)] * m[(j, j)]).sqrt(), "{i} {j}: {error}");
+        }
+        assert_eq!(root(DMatrix::zeros(6, 6)).ncols(), 0);
+    }
 }

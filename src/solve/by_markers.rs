@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT};
 use super::distances::Distances;
-use super::linear::{Carried, LinearImage, LinearProblem};
+use super::linear::{Carried, LinearImage, LinearPose, LinearProblem, LinearStop};
 use super::marker_rows::{ImageRows, MarkerBlock, MarkerRows, times_right};
 use super::pose_space::PoseSpace;
 use super::right_hand_sides::RightHandSides;
@@ -151,6 +151,15 @@ impl MarkersEliminated {
     /// `b' V^-1 b` of the right-hand sides of the markers.
     pub fn squares(&self) -> f64 {
         self.rhs.norm_squared()
+    }
+
+    /// Covariance of a pose at a stop, as its body twist.
+    pub fn pose_covariance(&self, reduced: &DMatrix<f64>, stop: &LinearStop, pose: &LinearPose) -> DMatrix<f64> {
+        let (start, n, theta) = (self.latent_start[stop.at], stop.unknowns(), pose.chain.d_theta.ncols());
+        let rows: Vec<usize> = (0..theta).chain(start..start + n).collect();
+        let mut by = pose.chain.d_theta.clone().resize_horizontally(theta + n, 0.0);
+        by.columns_mut(theta, n).copy_from(&pose.by_latents(n));
+        &by * reduced.select_rows(&rows).select_columns(&rows) * by.transpose()
     }
 
     /// The whole step from the solution `x` of the reduced system, with what measured distances add to that of the whitened markers.

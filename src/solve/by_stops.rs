@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use super::alike::alike;
 use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, latents_with_markers};
 use super::body_stops::BodyStops;
+use super::covariance::StopCovariance;
 use super::group::{Group, union};
 use super::linear::Carried;
 use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
@@ -254,22 +255,25 @@ impl StopsEliminated {
         self.groups.par_iter().flat_map_iter(of_group).collect()
     }
 
-    /// `H^-1 + H^-1 B' cov(x) B H^-1` of different stops.
-    pub fn latent_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
-        let latents = |Block { inverse_factor, y, .. }: &Block, _: &LinearStop| {
-            vec![Through { by_rows: y * inverse_factor, by_latents: inverse_factor.clone() }]
+    /// Of different stops: of what is latent there, `H^-1 + H^-1 B' cov(x) B H^-1`, and of measured bodies.
+    pub fn stop_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<StopCovariance> {
+        let moves = |block: &Block, stop: &LinearStop| {
+            let Block { inverse_factor, y, .. } = block;
+            let latents = Through { by_rows: y * inverse_factor, by_latents: inverse_factor.clone() };
+            std::iter::once(latents).chain(stop.body_poses().map(|pose| block.through(&pose))).collect()
         };
-        let mut found = self.covariances(reduced, stops, latents);
-        found.extend(self.bodies.latent_covariances(reduced, stops));
-        stops.iter().filter_map(|stop| found.remove(&stop.at)).flatten().collect()
+        let of_images = self.covariances(reduced, stops, moves).into_iter();
+        let of_images = of_images.map(|(at, mut all)| (at, StopCovariance { latents: all.remove(0), bodies: all }));
+        let mut found: HashMap<usize, StopCovariance> =
+            of_images.chain(self.bodies.stop_covariances(reduced, stops)).collect();
+        stops.iter().filter_map(|stop| found.remove(&stop.at)).collect()
     }
 
-    /// Covariances of all poses that something shows at different stops, as their body twists.
-    pub fn pose_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<Vec<DMatrix<f64>>> {
-        let poses = |block: &Block, stop: &LinearStop| stop.poses().map(|pose| block.through(&pose)).collect();
-        let mut found = self.covariances(reduced, stops, poses);
-        found.extend(self.bodies.pose_covariances(reduced, stops));
-        stops.iter().filter_map(|stop| found.remove(&stop.at)).collect()
+    /// Covariances of the camera poses of different stops, as their body twists.
+    pub fn camera_poses(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
+        let cameras = |block: &Block, stop: &LinearStop| stop.camera_poses().map(|pose| block.through(&pose)).collect();
+        let mut found = self.covariances(reduced, stops, cameras);
+        stops.iter().filter_map(|stop| found.remove(&stop.at)).flatten().collect()
     }
 
     /// Covariance of every marker that was seen; with what moves it with the dense columns for a position.
@@ -377,7 +381,7 @@ impl Block {
             own.push(Coupled::new(image, rows.of(k), (dense, seen, equations.as_deref())));
             all.extend(equations);
         }
-        own.extend(stop.poses().skip(stop.places().len()).map(|body| Coupled::of_body(&body, rows)));
+        own.extend(stop.body_poses().map(|body| Coupled::of_body(&body, rows)));
         (Self::new(stop, &own, lambda), all)
     }
 

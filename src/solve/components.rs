@@ -155,10 +155,11 @@ impl Fit {
         let problem = &self.problem;
         let mut noise = problem.noise.clone();
         let markers = self.marker_tallies();
-        let bodies = self.body_tallies();
-        let by_bodies: f64 = bodies.iter().flatten().map(BodyTally::taken).sum();
         let stops = self.stops_with_noise();
-        let latents = self.covariance.latents(&stops);
+        let (latents, of_bodies): (Vec<_>, Vec<_>) =
+            self.covariance.at_stops(&stops).into_iter().map(|own| (own.latents, own.bodies)).unzip();
+        let bodies = self.body_tallies(&stops, &of_bodies);
+        let by_bodies: f64 = bodies.iter().flatten().map(BodyTally::taken).sum();
         let taken = self.effective_parameters(&stops, &latents, markers.iter().map(|[_, told]| told).sum()) - by_bodies;
         let mut change = update_markers(&markers, &mut noise).max(update_bodies(&bodies, &mut noise));
         let counts = self.linearised.terms.iter().map(|t| 2.0 * t.residuals.len() as f64);
@@ -235,9 +236,10 @@ impl Fit {
         noise
     }
 
-    /// Stops at which something latent has a prior.
+    /// Stops at which a body was measured, or something latent has a prior.
     fn stops_with_noise(&self) -> Vec<LinearStop<'_>> {
-        self.linear().stops().filter(|stop| stop.prior().iter().any(|prior| *prior > 0.0)).collect()
+        let has_prior = |stop: &LinearStop| stop.prior().iter().any(|prior| *prior > 0.0);
+        self.linear().stops().filter(|stop| !stop.bodies().is_empty() || has_prior(stop)).collect()
     }
 
     /// Number of parameters that the pixels (and not the priors) determine, with so many `markers` coordinates among them; `covariances` of what

@@ -22,6 +22,15 @@ pub struct Covariance {
     pub(super) enlarged: Vec<(usize, f64)>,
 }
 
+/// Covariance of what a fit says at one stop.
+#[derive(Debug, Clone)]
+pub(super) struct StopCovariance {
+    /// Of what is latent: errors of its readings, then the ties of its images.
+    pub latents: DMatrix<f64>,
+    /// Of where each measured body is, as body twists of the pose, m and rad.
+    pub bodies: Vec<DMatrix<f64>>,
+}
+
 impl LinearProblem<'_> {
     /// Covariance of its unknowns.
     ///
@@ -96,7 +105,12 @@ impl Covariance {
 
     /// Covariance of what is latent at each of some stops: errors of its readings, then the ties of its images. Cheaper for all than one by one.
     pub fn latents(&self, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
-        self.system.latent_covariances(&self.reduced, stops)
+        self.at_stops(stops).into_iter().map(|own| own.latents).collect()
+    }
+
+    /// Covariances of what is latent and of measured bodies at each of some stops.
+    pub(super) fn at_stops(&self, stops: &[LinearStop]) -> Vec<StopCovariance> {
+        self.system.stop_covariances(&self.reduced, stops)
     }
 
     /// Covariance of what moves the camera pose of each image in use: errors of its readings, then its tie.
@@ -105,16 +119,10 @@ impl Covariance {
         linear.images().map(|own| own.part_of(&of_stops[own.stop])).collect()
     }
 
-    /// Covariances of all poses that something shows at some stops (images first), as their body twists, m and rad.
-    pub(super) fn poses(&self, stops: &[LinearStop]) -> Vec<Vec<DMatrix<f64>>> {
-        self.system.pose_covariances(&self.reduced, stops)
-    }
-
     /// Covariance of the camera pose of every image in use, as its body twist, m and rad.
     pub fn camera_poses(&self, linear: LinearProblem) -> Vec<Matrix6<f64>> {
         let stops: Vec<LinearStop> = linear.stops().collect();
-        let of_images = |(of, stop): (Vec<DMatrix<f64>>, &LinearStop)| of.into_iter().take(stop.places().len());
-        let all = self.poses(&stops).into_iter().zip(&stops).flat_map(of_images);
+        let all = self.system.camera_poses(&self.reduced, &stops).into_iter();
         all.map(|own| Matrix6::from_column_slice(own.as_slice())).collect()
     }
 

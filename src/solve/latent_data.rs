@@ -71,8 +71,11 @@ impl Fit {
 }
 
 impl OfData {
-    /// `None` where the covariance is not positive definite.
+    /// `None` where nothing is latent, or the covariance is not positive definite.
     fn new(latents: Vec<Latent>, values: &DVector<f64>, covariance: &DMatrix<f64>, prior: &[f64]) -> Option<Self> {
+        if latents.is_empty() {
+            return None;
+        }
         let mut information = covariance.clone().cholesky()?.inverse();
         let pull = &information * values;
         prior.iter().enumerate().for_each(|(k, prior)| information[(k, k)] -= prior);

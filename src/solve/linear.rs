@@ -455,6 +455,16 @@ impl<'a> LinearStop<'a> {
         images.chain(bodies)
     }
 
+    /// Of its images alone.
+    pub(super) fn camera_poses(&self) -> impl Iterator<Item = LinearPose<'a>> {
+        self.poses().take(self.images.len())
+    }
+
+    /// Of its measurements of bodies alone.
+    pub(super) fn body_poses(&self) -> impl Iterator<Item = LinearPose<'a>> {
+        self.poses().skip(self.images.len())
+    }
+
     /// Places of its images among those in use.
     pub fn places(&self) -> Range<usize> {
         self.images.clone()

@@ -6,8 +6,9 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::by_markers::MarkersEliminated;
 use super::by_stops::StopsEliminated;
+use super::covariance::StopCovariance;
 use super::distances::Distances;
-use super::linear::{Carried, LinearPose, LinearProblem, LinearStop};
+use super::linear::{Carried, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
 use super::seen_markers::SeenMarkers;
 use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
@@ -275,38 +276,30 @@ impl System {
         (x.dot(&self.rhs) + eliminated + self.distances.squares()).max(0.0).sqrt()
     }
 
-    /// Covariance of what is latent at each of some stops, from the covariance of the reduced unknowns.
-    pub fn latent_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
-        match &self.eliminated {
-            Eliminated::Markers(e) => {
-                let of = |stop: &LinearStop| {
-                    let (start, n) = (e.latent_start[stop.at], stop.unknowns());
-                    reduced.view((start, start), (n, n)).into_owned()
-                };
-                stops.iter().map(of).collect()
-            }
-            Eliminated::Stops(e) => e.latent_covariances(reduced, stops),
-        }
-    }
-
-    /// Covariances of all poses that something shows at some stops, as their body twists, m and rad.
-    pub(super) fn pose_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<Vec<DMatrix<f64>>> {
+    /// Covariances of what is latent and of measured bodies at each of some stops, from the covariance of the reduced unknowns.
+    pub(super) fn stop_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<StopCovariance> {
         let e = match &self.eliminated {
             Eliminated::Markers(e) => e,
-            Eliminated::Stops(e) => return e.pose_covariances(reduced, stops),
+            Eliminated::Stops(e) => return e.stop_covariances(reduced, stops),
         };
-        let of_stop = |stop: &LinearStop| {
+        let of = |stop: &LinearStop| {
             let (start, n) = (e.latent_start[stop.at], stop.unknowns());
-            let of = |pose: LinearPose| {
-                let theta = pose.chain.d_theta.ncols();
-                let rows: Vec<usize> = (0..theta).chain(start..start + n).collect();
-                let mut by = pose.chain.d_theta.clone().resize_horizontally(theta + n, 0.0);
-                by.columns_mut(theta, n).copy_from(&pose.by_latents(n));
-                &by * reduced.select_rows(&rows).select_columns(&rows) * by.transpose()
-            };
-            stop.poses().map(of).collect()
+            let latents = reduced.view((start, start), (n, n)).into_owned();
+            let bodies = stop.body_poses().map(|pose| e.pose_covariance(reduced, stop, &pose)).collect();
+            StopCovariance { latents, bodies }
         };
-        stops.iter().map(of_stop).collect()
+        stops.iter().map(of).collect()
+    }
+
+    /// Covariances of the camera poses of some stops, as their body twists, m and rad.
+    pub(super) fn camera_poses(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
+        let e = match &self.eliminated {
+            Eliminated::Markers(e) => e,
+            Eliminated::Stops(e) => return e.camera_poses(reduced, stops),
+        };
+        let of_stop =
+            |stop: &LinearStop| stop.camera_poses().map(|pose| e.pose_covariance(reduced, stop, &pose)).collect();
+        stops.iter().flat_map(|stop| -> Vec<DMatrix<f64>> { of_stop(stop) }).collect()
     }
 
     /// Covariance of the correction of every marker that was seen, per plate and marker.
