@@ -5,10 +5,11 @@
 //! S. Self, K.-Y. Liang 1987).
 
 use super::components::ComponentOptions;
+use super::fit::Fit;
 use super::levenberg::{Outcome, Settings, solve};
 use super::noise_information::{NoiseInformation, noise_information};
 use super::tally::JOINT_NOISE_FLOOR;
-use crate::problem::{Adjustment, Noise};
+use crate::problem::Adjustment;
 
 /// Sigmas of an estimate where there is no noise that it must reach: one of a hundred robots without noise gets past.
 const IDENTIFIED: f64 = 2.326;
@@ -21,8 +22,10 @@ type Group = Vec<usize>;
 
 /// The outcome with such noise at its floor, and what was known of all noise before, where that changed.
 pub fn without_unidentified_noise(outcome: Outcome, settings: &Settings) -> (Outcome, Option<NoiseInformation>) {
-    let (outcome, found) = information(outcome);
-    let Some(Found { information: found, most_likely }) = found else { return (outcome, None) };
+    let (outcome, found) = told_by(outcome, |fit| {
+        noise_information(fit).map(|found| (found, fit.most_likely_noise(&ComponentOptions::default())))
+    });
+    let Some((found, most_likely)) = found else { return (outcome, None) };
     let noise = &outcome.adjustment.problem.noise;
     let series: Vec<usize> = (0..noise.joint.len()).collect();
     let above_floor = |r: &usize| noise.joint.iter().any(|own| own[*r] > JOINT_NOISE_FLOOR);
@@ -33,8 +36,8 @@ pub fn without_unidentified_noise(outcome: Outcome, settings: &Settings) -> (Out
     if in_doubt.is_empty() {
         return (outcome, None);
     }
-    let (at_none, spread) = information(solved_without(&outcome.adjustment, &in_doubt, settings));
-    let Some(Found { information: spread, .. }) = spread else { return (outcome, None) };
+    let (at_none, spread) = told_by(solved_without(&outcome.adjustment, &in_doubt, settings), noise_information);
+    let Some(spread) = spread else { return (outcome, None) };
     let is_identified = |group: &Group| {
         let of_series = |own: &Vec<f64>| group.iter().map(|&r| own[r] * own[r]).sum::<f64>() / group.len() as f64;
         let variance = most_likely.joint.iter().map(of_series).sum::<f64>() / series.len() as f64;
@@ -54,19 +57,12 @@ fn groups(Adjustment { problem, state }: &Adjustment) -> impl Iterator<Item = Gr
     of_stops.filter(|g| g.iter().all(|&r| problem.noise.local.get(r).is_none_or(|s| *s == 0.0)))
 }
 
-/// What an outcome tells of the noise.
-struct Found {
-    information: NoiseInformation,
-    most_likely: Noise,
-}
-
-/// The outcome as it is, and what it tells of the noise.
-fn information(outcome: Outcome) -> (Outcome, Option<Found>) {
+/// The outcome as it is, and what its fit tells.
+fn told_by<T>(outcome: Outcome, ask: impl Fn(&Fit) -> Option<T>) -> (Outcome, Option<T>) {
     let Outcome { status, iterations, .. } = outcome;
     match outcome.fit() {
         Ok(fit) => {
-            let most_likely = fit.most_likely_noise(&ComponentOptions::default());
-            let found = noise_information(&fit).map(|information| Found { information, most_likely });
+            let found = ask(&fit);
             (Outcome { status, iterations, adjustment: fit.adjustment, linearised: Some(fit.linearised) }, found)
         }
         Err(unsolved) => (Outcome { status, ..unsolved.outcome }, None),
