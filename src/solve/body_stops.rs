@@ -8,10 +8,10 @@
 use nalgebra::{DMatrix, DVector, Vector6};
 use rayon::prelude::*;
 
-use super::covariance::StopCovariance;
 use super::group::Group;
 use super::linear::{BodyPart, LinearPose, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
+use super::stop_covariance::StopCovariance;
 use crate::linalg::{add_gram, product};
 use crate::problem::{Layout, Step};
 

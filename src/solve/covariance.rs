@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 use super::linear::{LinearProblem, LinearStop};
+use super::stop_covariance::StopCovariance;
 use super::system::{Elimination, Singular, System};
 use crate::linalg::SymmetricFactor;
 use crate::problem::Problem;
@@ -20,15 +21,6 @@ pub struct Covariance {
     pub(super) added: Option<DMatrix<f64>>,
     /// Factors by which the sigmas of dense columns were enlarged after that.
     pub(super) enlarged: Vec<(usize, f64)>,
-}
-
-/// Covariance of what a fit says at one stop.
-#[derive(Debug, Clone)]
-pub(super) struct StopCovariance {
-    /// Of what is latent: errors of its readings, then the ties of its images.
-    pub latents: DMatrix<f64>,
-    /// Of where each measured body is, as body twists of the pose, m and rad.
-    pub bodies: Vec<DMatrix<f64>>,
 }
 
 impl LinearProblem<'_> {

@@ -28,6 +28,7 @@ mod right_hand_sides;
 mod runs;
 mod seen_markers;
 mod snoop;
+mod stop_covariance;
 mod stretch;
 mod system;
 mod tally;

@@ -6,11 +6,11 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::by_markers::MarkersEliminated;
 use super::by_stops::StopsEliminated;
-use super::covariance::StopCovariance;
 use super::distances::Distances;
 use super::linear::{Carried, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
 use super::seen_markers::SeenMarkers;
+use super::stop_covariance::StopCovariance;
 use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Adjustment, Length, Problem, Step};
