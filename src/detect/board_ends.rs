@@ -4,7 +4,7 @@
 //! the width of a few pixels, beside all squares of the line, and with squares of full contrast before it.
 
 use super::Picture;
-use super::board_labels::{BoardSize, Labelling, Lattice, Placement, Shader};
+use super::board_labels::{BoardSize, Labelling, Lattice, Placement, Shader, parity};
 use super::board_seen::{REACH, SQUARES, even_cells, trimmed};
 
 /// How far from the end of the squares they are looked at, px ...
@@ -91,7 +91,7 @@ impl Ends {
         let ([low, high], [first, last]) = (self.range[1 - axis], self.range[axis]);
         let at = if end == 0 { first - 1 } else { last };
         let cell = |across: i32| if axis == 0 { (at, across) } else { (across, at) };
-        let light = |cell: (i32, i32)| ((cell.0 + cell.1).rem_euclid(2) == 0) == self.even_light;
+        let light = |(u, v): (i32, i32)| (parity(u, v) > 0.0) == self.even_light;
         let usual = shader.contrast();
         let (mut sharp, mut next, mut seen) = (0, 0, 0);
         for across in low - 1..high {

@@ -4,6 +4,7 @@
 //! full depth of the picture and its covariance are found here.
 
 use std::borrow::Cow;
+use std::cell::LazyCell;
 
 use calib_targets_chessboard::{ChessboardDetector, ChessboardParams, detect_corners};
 use calib_targets_core::{DetectorConfig, GrayImageView, ImageRefiner, default_chess_config};
@@ -37,24 +38,19 @@ const LARGE_PX: usize = 500_000;
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
     let lattice = find_lattice(picture, board).ok_or_else(no_board)?;
-    let ends = Ends::of(picture, &lattice);
-    let by_ends = || ends.and_then(|ends| ends.place(board));
+    let ends = LazyCell::new(|| Ends::of(picture, &lattice));
+    let placed = |labelling: Labelling| Some((labelling, labelling.placement()?));
+    let by_ends = || placed(ends.as_ref()?.place(board)?);
     let measured = |placement: Placement| measure(picture, &lattice, placement, WINDOW);
     let by_colours = label(picture, &lattice, board);
-    let (mut labelling, mut detection) = match by_colours.placement() {
-        Some(placement) => (by_colours, measured(placement)),
-        None => match by_ends().and_then(|l| Some((l, measured(l.placement()?)))) {
-            Some(other) => other,
-            None if by_colours == Labelling::Ambiguous => return refusal(picture, &lattice, board, ambiguous()),
-            None => return refusal(picture, &lattice, board, contradiction(board)),
-        },
+    let Some((mut labelling, placement)) = placed(by_colours).or_else(by_ends) else {
+        let why = if by_colours == Labelling::Ambiguous { ambiguous() } else { contradiction(board) };
+        return refusal(picture, &lattice, board, why);
     };
+    let mut detection = measured(placement);
     // Light that hides a line looks like the end of the board: what is taken for hidden may as well be what is taken for paper.
-    let doubted = |p: Placement| ends.is_none_or(|ends| !ends.leave_only(board, p));
-    if detection.outline == Outline::LineMissing && labelling.placement().is_some_and(doubted) {
-        let Some((other, placement)) = by_ends().and_then(|l| Some((l, l.placement()?))) else {
-            return refusal(picture, &lattice, board, ambiguous());
-        };
+    if detection.outline == Outline::LineMissing && ends.is_none_or(|ends| !ends.leave_only(board, placement)) {
+        let Some((other, placement)) = by_ends() else { return refusal(picture, &lattice, board, ambiguous()) };
         (labelling, detection) = (other, measured(placement));
     }
     let mut notices = Vec::new();
