@@ -305,11 +305,11 @@ impl<'a> Shader<'a> {
 
     /// Mean of light squares less that of dark ones, counts.
     pub fn contrast(&self) -> f64 {
-        let mean = |odd: i32| {
-            let of = self.inner.iter().filter(|((u, v), _)| (u + v).rem_euclid(2) == odd);
+        let mean = |sign: f64| {
+            let of = self.inner.iter().filter(|((u, v), _)| parity(*u, *v) == sign);
             of.clone().map(|(_, counts)| counts).sum::<f64>() / of.count() as f64
         };
-        (mean(0) - mean(1)).abs()
+        (mean(1.0) - mean(-1.0)).abs()
     }
 
     /// The cells of a line beyond the end (0: the lesser) of an axis, at their side towards the lattice: there may be little paper. With the

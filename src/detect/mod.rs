@@ -12,6 +12,7 @@ pub mod chessboard;
 pub mod circles;
 mod corners;
 mod detection;
+mod dot_sizes;
 mod edge_line;
 mod flat_field;
 mod flat_field_facts;
@@ -30,6 +31,7 @@ mod tag_seen;
 pub mod tags;
 
 pub use detection::{Circles, Detection, Dropped, Outline, Sizes};
+pub use dot_sizes::set_radii;
 pub use flat_field::FlatField;
 pub use flat_field_facts::{Drift, FlatFieldFacts};
 pub use load::{LUMA_WEIGHTS, load, load_bytes};

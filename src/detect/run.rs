@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
+use super::dot_sizes::told_by_others;
 use super::size_seen::{line_missing, nowhere_whole};
 use super::{Detection, Outline, Picture, examine, tags};
 use crate::error::{Code, Error, Notice, Result};
@@ -44,28 +45,44 @@ pub fn detect_series(
     picture: impl Fn(&Path) -> Result<Picture> + Sync,
     progress: impl Fn(&Path) + Sync,
 ) -> Vec<SeriesImage> {
-    let one = |path: &PathBuf| {
+    let one = |path: &Path, plate: &Plate| {
         let mut image = match picture(path) {
             Err(error) => SeriesImage::failed(error),
             Ok(picture) => {
                 SeriesImage { size: Some((picture.width, picture.height)), detection: examine(&picture, plate) }
             }
         };
-        progress(path);
         name_image(&mut image.detection, path);
         image
     };
-    let bytes = |path: &PathBuf| picture_size(path).map_or(0, |(w, h)| BYTES_PER_PX * u64::from(w) * u64::from(h));
-    let sizes: Vec<u64> = images.iter().map(bytes).collect();
-    let mut found: Vec<SeriesImage> = Vec::with_capacity(images.len());
-    for batch in batches(&sizes, MOST_IN_FLIGHT) {
-        found.par_extend(images[batch].par_iter().map(one));
+    let mut found = in_batches(images, |path| {
+        let image = one(path, plate);
+        progress(path);
+        image
+    });
+    if let Some((measured, open)) =
+        told_by_others(plate, &found.iter().map(|image| &image.detection).collect::<Vec<_>>())
+    {
+        let paths: Vec<&PathBuf> = open.iter().map(|&k| &images[k]).collect();
+        let again = in_batches(&paths, |path| one(path, &measured));
+        open.into_iter().zip(again).for_each(|(k, image)| found[k] = image);
     }
     refuse_unproven_boards(images, plate, &mut found);
     note_board_nowhere_whole(plate, &mut found);
     note_unseen_tags(images, plate, &mut found);
     refuse_odd_sizes(images, &mut found);
     refuse_odd_dots(images, &mut found);
+    found
+}
+
+/// Looks at images, as many at a time as memory holds; in their order.
+fn in_batches<P: AsRef<Path> + Sync>(images: &[P], look: impl Fn(&Path) -> SeriesImage + Sync) -> Vec<SeriesImage> {
+    let bytes = |path: &P| picture_size(path.as_ref()).map_or(0, |(w, h)| BYTES_PER_PX * u64::from(w) * u64::from(h));
+    let sizes: Vec<u64> = images.iter().map(bytes).collect();
+    let mut found = Vec::with_capacity(images.len());
+    for batch in batches(&sizes, MOST_IN_FLIGHT) {
+        found.par_extend(images[batch].par_iter().map(|path| look(path.as_ref())));
+    }
     found
 }
 

@@ -11,7 +11,7 @@ use super::detections::{
 use super::seen_image::SeenImage;
 use super::stated::{lens_of, measured_series, on_the_tip_beside_others};
 use crate::assess::Limits;
-use crate::detect::Detection;
+use crate::detect::{Detection, set_radii};
 use crate::error::{Code, Error, Notice, Result};
 use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop};
 use crate::series::{CirclePoint, Observation, Plate, Series, Source, StopOrder};
@@ -149,25 +149,6 @@ fn placement_of(series: &Series, placement: &str, several: bool) -> String {
 /// What all stops show, and the size of the images.
 type SeenStops = (Vec<Seen>, Option<(u32, u32)>);
 
-/// Gives the markers the median of the radii that the images show, where they show any.
-fn set_radii(plate: &mut Plate, images: &[SeenImage]) {
-    let usable = images.iter().filter(|i| i.detection.failure.is_none());
-    let mut seen: BTreeMap<u32, [Vec<f64>; 2]> = BTreeMap::new();
-    for (id, radii) in usable.filter_map(|i| i.detection.circles.as_ref()).flat_map(|c| &c.sizes.radii_m) {
-        let all = seen.entry(*id).or_default();
-        (0..2).for_each(|k| all[k].push(radii[k]));
-    }
-    let middle = |values: &mut Vec<f64>| {
-        values.sort_by(f64::total_cmp);
-        values[values.len() / 2]
-    };
-    for marker in &mut plate.markers {
-        if let Some(radii) = seen.get_mut(&marker.id) {
-            [marker.outer_radius_m, marker.inner_radius_m] = radii.each_mut().map(middle);
-        }
-    }
-}
-
 /// The joint noise is estimated: what a data sheet states says nothing of what the robot model lacks, which is part of it.
 fn unused_repeatability(series: &Series) -> Option<Notice> {
     let stated = series.manifest.robot.repeatability_m?;
@@ -187,7 +168,7 @@ fn look_through(
     plate: &mut Plate,
 ) -> Result<SeenStops> {
     let SeenSeries { images, flat_field } = detect_stops(series, progress)?;
-    set_radii(plate, &images);
+    set_radii(plate, images.iter().map(|image| &image.detection));
     notices.extend(images.iter().flat_map(SeenImage::notices));
     notices.extend(flat_field.iter().flat_map(|f| flat_field_drift(series, &f.facts, &Limits::default())));
     // The detector has refused all images of another size.

@@ -120,6 +120,17 @@ pub fn orthonormal(mut columns: DMatrix<f64>) -> DMatrix<f64> {
     columns.qr().q()
 }
 
+/// `a' b` of twists.
+pub fn dot(a: &[f64; 6], b: &[f64; 6]) -> f64 {
+    (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]) + (a[4] * b[4] + a[5] * b[5])
+}
+
+/// `F^-1` of `F F'`, lower triangular; `None` where that is not positive definite.
+pub fn inverse_factor(m: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = m.nrows();
+    m.cholesky()?.l_dirty().solve_lower_triangular(&DMatrix::identity(n, n))
+}
+
 /// Product of dense matrices.
 pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     multiply(view(a), view(b))

@@ -236,6 +236,11 @@ pub struct Chained {
 }
 
 impl Chained {
+    /// Columns of `G`: how each theta column moves the pose.
+    pub fn columns(&self) -> &[[f64; 6]] {
+        self.d_theta.as_slice().as_chunks().0
+    }
+
     /// How steps of the dense columns and of what is latent move the pose, as a body twist.
     pub fn moved(&self, dense: &DVector<f64>, latents: impl Iterator<Item = f64>) -> Vector6<f64> {
         let mut twist = Vector6::zeros();

@@ -12,7 +12,7 @@ use super::group::Group;
 use super::linear::{BodyPart, LinearPose, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
 use super::stop_covariance::StopCovariance;
-use crate::linalg::{add_gram, product};
+use crate::linalg::{self, add_gram, dot, inverse_factor, product};
 use crate::problem::{Layout, Step};
 
 /// Stops whose equations are taken together: those after each other touch much the same columns.
@@ -38,20 +38,11 @@ struct Block {
 #[derive(Debug, Clone)]
 pub(super) struct BodyStops(Vec<Block>);
 
-/// Columns of `G` of one pose.
-fn columns(part: &BodyPart) -> &[[f64; 6]] {
-    part.chain.d_theta.as_slice().as_chunks().0
-}
-
-fn dot(a: &[f64; 6], b: &[f64; 6]) -> f64 {
-    (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]) + (a[4] * b[4] + a[5] * b[5])
-}
-
 /// The free columns that move any of the poses of some stops, ascending.
 fn touched(layout: &Layout, stops: &[LinearStop]) -> Vec<usize> {
     let mut moves = vec![false; layout.theta_len()];
     for part in stops.iter().flat_map(|stop| stop.bodies()) {
-        for (moves, by) in moves.iter_mut().zip(columns(part)).filter(|(moves, _)| !**moves) {
+        for (moves, by) in moves.iter_mut().zip(part.chain.columns()).filter(|(moves, _)| !**moves) {
             *moves = *by != [0.0; 6];
         }
     }
@@ -78,34 +69,35 @@ fn root(mut m: DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(n, told.len(), |i, k| if i < told[k] { 0.0 } else { m[(i, told[k])] })
 }
 
-/// `G' m` of the poses of a stop, over some of the dense columns.
-fn transposed_times(bodies: &[BodyPart], rows: &[usize], m: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut all = DMatrix::zeros(rows.len(), m.ncols());
-    for (mut into, m) in all.column_iter_mut().zip(m.column_iter()) {
+/// `G' m` of the poses of some stops side by side, over some of the dense columns.
+fn transposed_times(stops: &[LinearStop], rows: &[usize], m: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let mut all = DMatrix::zeros(rows.len(), m.iter().map(|m| m.ncols()).sum());
+    let vectors = stops.iter().zip(m).flat_map(|(stop, m)| m.column_iter().map(|m| (stop.bodies(), m)));
+    for (mut into, (bodies, m)) in all.column_iter_mut().zip(vectors) {
         for (part, m) in bodies.iter().zip(m.as_slice().as_chunks().0) {
-            let by = columns(part);
+            let by = part.chain.columns();
             into.iter_mut().zip(rows).for_each(|(sum, &c)| *sum += dot(&by[c], m));
         }
     }
     all
 }
 
+/// `G'` of the poses of some stops side by side, over some of the dense columns.
+fn transposed(stops: &[LinearStop], rows: &[usize]) -> DMatrix<f64> {
+    let poses: Vec<&[[f64; 6]]> =
+        stops.iter().flat_map(|stop| stop.bodies()).map(|part| part.chain.columns()).collect();
+    DMatrix::from_fn(rows.len(), 6 * poses.len(), |row, column| poses[column / 6][rows[row]][column % 6])
+}
+
 /// `G x` of the poses of a stop, one after the other.
 fn times(bodies: &[BodyPart], x: &[f64]) -> DVector<f64> {
     let mut all = DVector::zeros(6 * bodies.len());
     for (part, sum) in bodies.iter().zip(all.as_mut_slice().as_chunks_mut::<6>().0) {
-        for (by, x) in columns(part).iter().zip(x) {
+        for (by, x) in part.chain.columns().iter().zip(x) {
             sum.iter_mut().zip(by).for_each(|(sum, g)| *sum += g * x);
         }
     }
     all
-}
-
-/// `F^-1` of `F F'`; zero where that is not positive definite.
-fn inverse_factor(m: DMatrix<f64>) -> DMatrix<f64> {
-    let n = m.nrows();
-    let inverse = m.cholesky().and_then(|c| c.l_dirty().solve_lower_triangular(&DMatrix::identity(n, n)));
-    inverse.unwrap_or_else(|| DMatrix::zeros(n, n))
 }
 
 impl Block {
@@ -124,13 +116,15 @@ impl Block {
         let damped: Vec<f64> =
             prior.iter().zip(information.diagonal().iter()).map(|(p, i)| p + lambda * (p + i)).collect();
         damped.iter().enumerate().for_each(|(k, prior)| information[(k, k)] += prior);
-        let inverse_factor = inverse_factor(information);
+        let inverse_factor = inverse_factor(information).unwrap_or_else(|| DMatrix::zeros(latent, latent));
         let gain = inverse_factor.tr_mul(&(&inverse_factor * with_latents));
         let s = root(h);
         let mut scaled = s.tr_mul(&l);
         scaled.column_iter_mut().zip(&damped).for_each(|(mut column, prior)| column.unscale_mut(prior.sqrt()));
-        let left = self::inverse_factor(DMatrix::identity(s.ncols(), s.ncols()) + &scaled * scaled.transpose());
-        let r = s * left.transpose();
+        let r = match linalg::inverse_factor(DMatrix::identity(s.ncols(), s.ncols()) + &scaled * scaled.transpose()) {
+            Some(left) => s * left.transpose(),
+            None => DMatrix::zeros(n, 0),
+        };
         (Self { at: stop.at, inverse_factor, gain, rhs: DVector::zeros(latent) }, r)
     }
 
@@ -161,10 +155,8 @@ impl BodyStops {
         let of = |stops: &[LinearStop]| {
             let (blocks, roots): (Vec<Block>, Vec<_>) = stops.iter().map(|stop| Block::of(stop, lambda)).unzip();
             let rows = touched(layout, stops);
-            let by_columns: Vec<_> =
-                stops.iter().zip(&roots).map(|(stop, r)| transposed_times(stop.bodies(), &rows, r)).collect();
             let mut information = DMatrix::zeros(rows.len(), rows.len());
-            add_gram(&mut information, &side_by_side(rows.len(), &by_columns), 1.0);
+            add_gram(&mut information, &transposed_times(stops, &rows, &roots), 1.0);
             (blocks, Group::of(std::iter::once(&rows)), information)
         };
         let mut all = Vec::with_capacity(stops.len());
@@ -187,7 +179,7 @@ impl BodyStops {
                 let taken = block.gain.tr_mul(&gradient);
                 for (part, taken) in stop.bodies().iter().zip(taken.as_slice().as_chunks().0) {
                     let pull: [f64; 6] = (part.terms.bp - Vector6::from(*taken)).into();
-                    for (sum, by) in sum.iter_mut().zip(columns(part)) {
+                    for (sum, by) in sum.iter_mut().zip(part.chain.columns()) {
                         *sum += dot(by, &pull);
                     }
                 }
@@ -219,7 +211,7 @@ impl BodyStops {
         for block in &self.0 {
             let taken = block.gain.tr_mul(&of.stops[block.at]);
             let mut reduced = reduced.rows_mut(0, theta.len());
-            reduced -= transposed_times(linear.stop(block.at).bodies(), &theta, &taken);
+            reduced -= transposed_times(&[linear.stop(block.at)], &theta, &[taken]);
         }
     }
 
@@ -266,27 +258,15 @@ impl BodyStops {
 fn spreads(reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
     let Some(problem) = stops.first().map(LinearStop::problem) else { return Vec::new() };
     let rows = touched(&problem.layout, stops);
-    let all = |stop: &LinearStop| DMatrix::identity(6 * stop.bodies().len(), 6 * stop.bodies().len());
-    let of_stop = |stop: &LinearStop| transposed_times(stop.bodies(), &rows, &all(stop));
-    let by_columns: Vec<DMatrix<f64>> = stops.iter().map(of_stop).collect();
-    let of_reduced =
-        product(&Group::of(std::iter::once(&rows)).part_of(reduced), &side_by_side(rows.len(), &by_columns));
+    let by_columns = transposed(stops, &rows);
+    let of_reduced = product(&Group::of(std::iter::once(&rows)).part_of(reduced), &by_columns);
     let mut end = 0;
-    let spread = |by: &DMatrix<f64>| {
-        end += by.ncols();
-        by.tr_mul(&of_reduced.columns_range(end - by.ncols()..end))
+    let spread = |stop: &LinearStop| {
+        let own = end..end + 6 * stop.bodies().len();
+        end = own.end;
+        by_columns.columns_range(own.clone()).tr_mul(&of_reduced.columns_range(own))
     };
-    by_columns.iter().map(spread).collect()
-}
-
-fn side_by_side(rows: usize, parts: &[DMatrix<f64>]) -> DMatrix<f64> {
-    let mut all = DMatrix::zeros(rows, parts.iter().map(|own| own.ncols()).sum());
-    let mut end = 0;
-    for own in parts {
-        end += own.ncols();
-        all.columns_range_mut(end - own.ncols()..end).copy_from(own);
-    }
-    all
+    stops.iter().map(spread).collect()
 }
 
 #[cfg(test)]

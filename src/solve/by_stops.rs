@@ -19,7 +19,7 @@ use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
 use super::seen_markers::SeenMarkers;
 use super::stop_covariance::StopCovariance;
-use crate::linalg::{gram, mirror_upper, orthonormal, product};
+use crate::linalg::{gram, inverse_factor, mirror_upper, orthonormal, product};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Equations, Step};
 
@@ -322,8 +322,9 @@ impl Coupled {
     /// Of a measured body.
     fn of_body(body: &LinearPose, rows_of: &PoseRows) -> Self {
         let layout = rows_of.layout();
-        let touched = |c: &usize| layout.columns[*c].free && body.chain.d_theta.column(*c).iter().any(|d| *d != 0.0);
-        let rows: Vec<usize> = (0..layout.theta_len()).filter(touched).collect();
+        let moves = body.chain.columns().iter().map(|by| *by != [0.0; 6]);
+        let rows: Vec<usize> =
+            moves.enumerate().filter(|(c, moves)| *moves && layout.columns[*c].free).map(|(c, _)| c).collect();
         let coupling = with_latents(&body.chain.d_latent, rows_of.of(body.place), &rows);
         Self { latents: body.latents.clone(), rows, coupling }
     }
@@ -389,8 +390,7 @@ impl Block {
         let n = stop.unknowns();
         let mut h = stop.information();
         (0..n).for_each(|s| h[(s, s)] *= 1.0 + lambda);
-        let factor = h.cholesky().and_then(|c| c.l().try_inverse());
-        let inverse_factor = factor.unwrap_or_else(|| DMatrix::zeros(n, n));
+        let inverse_factor = inverse_factor(h).unwrap_or_else(|| DMatrix::zeros(n, n));
         let rows = union(images.iter().map(|own| &own.rows));
         let mut coupling = DMatrix::zeros(rows.len(), n);
         for Coupled { latents, rows: touched, coupling: own } in images {

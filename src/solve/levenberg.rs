@@ -140,6 +140,8 @@ const COMING_DOWN: f64 = 0.5;
 /// Square of the Newton decrement, as a share of the cost, from which on the robust cost is taken as it bends: few residuals pass their bound on
 /// the way, each moving by some hundredths of a sigma.
 const NEARLY_THERE: f64 = 5e-4;
+/// What that bound is multiplied by after a step by that curvature that raised the cost.
+const REFUSED_NEARER: f64 = 0.1;
 
 /// Newton decrement of the first step of a model up to which its information is that of the end: no unknown moved by more sigmas.
 const NEAR: f64 = 1.0;
@@ -187,16 +189,19 @@ struct Proposal {
 }
 
 /// What proposes the steps.
-#[derive(Default)]
 struct Proposer {
     model: Option<Model>,
     /// Decrement of the step before, where that step was taken.
     before: Option<f64>,
-    /// The curvature of the robust cost led uphill: the next steps go by the information.
-    curvature_failed: bool,
+    /// Square of the decrement, as a share of the cost, below which the robust cost is taken as it bends.
+    bent_below: f64,
 }
 
 impl Proposer {
+    fn new() -> Self {
+        Self { model: None, before: None, bent_below: NEARLY_THERE }
+    }
+
     /// The next step; `None` where the information is not positive definite. Where the steps of a model shrink slowly, the robust cost bends
     /// less than the information says.
     fn propose(&mut self, linear: LinearProblem, lambda: f64) -> Option<Proposal> {
@@ -208,7 +213,7 @@ impl Proposer {
                 self.model = Some(model);
                 return Some(Proposal { kept: true, ..proposal });
             }
-            if proposal.decrement.powi(2) < NEARLY_THERE * linear.lin.cost && !self.curvature_failed {
+            if proposal.decrement.powi(2) < self.bent_below * linear.lin.cost {
                 curved = linear.lin.with_robust_curvature();
             }
         }
@@ -227,7 +232,7 @@ impl Proposer {
     }
 
     fn accepted(&mut self, proposal: &Proposal) {
-        (self.before, self.curvature_failed) = (Some(proposal.decrement), false);
+        self.before = Some(proposal.decrement);
     }
 
     fn refused(&mut self) {
@@ -239,10 +244,10 @@ impl Proposer {
         self.model.as_ref().is_some_and(|model| model.is_curved)
     }
 
-    /// Goes on by the information.
+    /// The curvature of the robust cost led uphill: goes on by the information, until much nearer to the end.
     fn refuse_curvature(&mut self) {
         self.refused();
-        self.curvature_failed = true;
+        self.bent_below *= REFUSED_NEARER;
     }
 }
 
@@ -365,7 +370,7 @@ pub(super) fn minimise(mut adjustment: Adjustment, settings: &Settings) -> Minim
         adjustment.linearise()
     });
     let left = Settings { iterations: settings.iterations.saturating_sub(tried), ..*settings };
-    let mut minimised = minimise_by(Proposer::default(), adjustment, linearised, &left);
+    let mut minimised = minimise_by(Proposer::new(), adjustment, linearised, &left);
     minimised.outcome.iterations += tried;
     minimised
 }
@@ -373,20 +378,20 @@ pub(super) fn minimise(mut adjustment: Adjustment, settings: &Settings) -> Minim
 /// As [`minimise`], from near the end.
 pub(super) fn minimise_near(adjustment: Adjustment, settings: &Settings) -> Minimised {
     let linearised = adjustment.linearise();
-    minimise_by(Proposer::default(), adjustment, linearised, settings)
+    minimise_by(Proposer::new(), adjustment, linearised, settings)
 }
 
 /// As [`minimise_near`], where a linearisation at the same state is known that differs in priors, sizes of what is latent and factors on the noise of
 /// measured bodies alone.
 pub(super) fn minimise_with_priors(adjustment: Adjustment, linearised: Linearised, settings: &Settings) -> Minimised {
     let linearised = adjustment.with_its_priors(adjustment.with_its_body_factors(linearised));
-    minimise_by(Proposer::default(), adjustment, Some(linearised), settings)
+    minimise_by(Proposer::new(), adjustment, Some(linearised), settings)
 }
 
 impl LinearisedAdjustment {
     /// The state at the optimum alone: the last step is taken on trust, and nothing is linearised where it ends.
     pub fn settled(self, settings: &Settings) -> State {
-        let descent = Descent::new(Proposer::default(), self.adjustment, self.linearised);
+        let descent = Descent::new(Proposer::new(), self.adjustment, self.linearised);
         let mut descent = Descent { is_trusting: true, ..descent };
         descent.run(settings);
         descent.adjustment.state

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
 
+use crate::linalg::dot;
 use crate::model::plate_modes::MODES;
 use crate::model::robot::LinearOrigins;
 use crate::problem::{
@@ -368,7 +369,8 @@ impl<'a> LinearProblem<'a> {
             }
         }
         for BodyPart { terms, chain, .. } in bodies {
-            (0..layout.theta_len()).for_each(|c| gradient[c] += chain.d_theta.fixed_view::<6, 1>(0, c).dot(&terms.bp));
+            let pull = terms.bp.into();
+            gradient.iter_mut().zip(chain.columns()).for_each(|(sum, by)| *sum += dot(by, &pull));
         }
         gradient
     }

@@ -1,7 +1,5 @@
 //! ChArUco boards and plain grids of dots on rendered pictures with known truth.
 
-#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
-
 use crate::boards_scene::{Print, Scene, View};
 use crate::said::assert_says;
 use calib_targets_aruco::builtins::DICT_4X4_50;

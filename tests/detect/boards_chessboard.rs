@@ -1,7 +1,5 @@
 //! Chessboard corners on rendered boards with known truth.
 
-#![allow(missing_docs, clippy::expect_used, clippy::panic)]
-
 use crate::boards_scene::{Scene, View};
 use crate::said::assert_says;
 use robotcal::Code;

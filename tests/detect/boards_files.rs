@@ -1,7 +1,5 @@
 //! Image files, flat-field correction and whole series: what is read, and what is said about files that cannot be.
 
-#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
-
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -1,7 +1,5 @@
 //! Chessboards of real robots, where the recordings are at hand.
 
-#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
-
 use std::path::{Path, PathBuf};
 
 use robotcal::detect::{Detection, detect_series, load};

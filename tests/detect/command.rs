@@ -1,7 +1,5 @@
 //! `robotcal detect` as a user calls it.
 
-#![allow(clippy::unwrap_used)]
-
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,7 +1,5 @@
 //! Corners of rendered pictures from sharpened to defocused, against truth, the bound of Cramer and Rao, and the stated covariance.
 
-#![allow(missing_docs, clippy::expect_used, clippy::panic)]
-
 use crate::boards_scene::{Scene, View};
 use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder};

@@ -1,7 +1,5 @@
 //! Grids of dots on rendered pictures: clipped paper, sharpening, noise, JPEG, distortion; without radii and without a table.
 
-#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
-
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;

@@ -1,5 +1,7 @@
 //! Tests of detect; one binary, a file a subject.
 
+#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
 #[path = "../boards_scene/mod.rs"]
 mod boards_scene;
 #[path = "../circles_support/mod.rs"]

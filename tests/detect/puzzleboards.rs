@@ -1,7 +1,5 @@
 //! PuzzleBoards: which part of the pattern, drawings, mirrors and other boards.
 
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
-
 use std::path::Path;
 
 use calib_targets_puzzleboard::code_maps::{horizontal_edge_bit, vertical_edge_bit};

@@ -1,7 +1,5 @@
 //! AprilGrids, grids of ArUco markers and single tags on rendered pictures.
 
-#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
-
 use std::path::{Path, PathBuf};
 
 use rand::{RngExt, SeedableRng};

@@ -1,7 +1,5 @@
 //! Lenses that no formula fits: the displacement field takes up what is left, and says where it knows nothing.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::Path;
 
 use nalgebra::{DMatrix, DVector, Vector2, Vector3};

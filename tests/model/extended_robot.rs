@@ -1,7 +1,5 @@
 //! Robots with and without errors beyond rigid geometry: the extended model helps where they are, and costs nothing where they are not.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::Path;
 
 use robotcal::assess::{flange_error_m, median};

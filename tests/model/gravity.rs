@@ -1,7 +1,5 @@
 //! Sag of the joints by the masses that a URDF states, and by a payload.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::{Path, PathBuf};
 
 use robotcal::Code;

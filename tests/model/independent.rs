@@ -1,7 +1,5 @@
 //! What the program writes, as other libraries read it: `tests/independent/make.py` made the tables.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::Path;
 
 use nalgebra::{Vector2, Vector3};

@@ -3,8 +3,6 @@
 //! Tolerances: both sides are sums of some tens of products in f64 and differ by rounding alone, about 1e-14 of the largest entry
 //! of the block; circles lose two or three digits more, because moments of the contour (px^3) are divided by its area (px^2).
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use crate::support::small::{Dice, Part, Request, all_terms, problem};
 use crate::support::witness::{self, D, Seed, body_twist, constant, variable};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};

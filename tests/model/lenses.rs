@@ -1,7 +1,5 @@
 //! Lenses: simulated ones are recovered, the evidence tells them apart, and what ROS cannot say is said with its loss.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::Path;
 
 use robotcal::assess::Limits;

@@ -1,7 +1,5 @@
 //! Files for controllers: joint offsets in either of two places, xacro properties, MDH parameters.
 
-#![allow(clippy::unwrap_used)]
-
 use std::collections::BTreeMap;
 use std::path::Path;
 

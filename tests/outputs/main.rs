@@ -1,5 +1,7 @@
 //! Tests of outputs; one binary, a file a subject.
 
+#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
 #[path = "../outputs_support/mod.rs"]
 mod outputs_support;
 

@@ -1,7 +1,5 @@
 //! `robotcal verify --points` on points that the nominal robot itself puts there.
 
-#![allow(clippy::unwrap_used)]
-
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,5 @@
 //! Programs whose targets are not the same each time, or not where a reader from top to bottom would have them.
 
-#![allow(clippy::unwrap_used)]
-
 use crate::programs_support::{Cell, assert_meets, numbers, status_turn};
 use robotcal::geom::{Pose, log_so3, matrix_from_rpy};
 use robotcal::programs::LeftReason;

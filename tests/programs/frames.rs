@@ -1,7 +1,5 @@
 //! Tool and work object from touches: closed form, covariance, outliers, what cannot be told, and programs that use them.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

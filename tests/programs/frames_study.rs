@@ -1,7 +1,5 @@
 //! What touches make of a corrected program, in worlds with known truth, against the bound that these touches allow.
 
-#![allow(clippy::unwrap_used)]
-
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

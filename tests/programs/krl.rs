@@ -1,7 +1,5 @@
 //! `robotcal compensate` on KUKA KRL, written as the vendor's manuals give it.
 
-#![allow(clippy::unwrap_used)]
-
 use std::collections::BTreeMap;
 
 use crate::programs_support::{Cell, assert_meets, shape, status_turn};

@@ -1,5 +1,7 @@
 //! Tests of programs; one binary, a file a subject.
 
+#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
 #[path = "../programs_support/mod.rs"]
 mod programs_support;
 #[path = "../said/mod.rs"]

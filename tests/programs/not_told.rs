@@ -1,7 +1,5 @@
 //! Programs whose numbers alone do not say where the robot goes: such targets stay as they are, by name.
 
-#![allow(clippy::unwrap_used)]
-
 use crate::programs_support::{Cell, status_turn};
 use robotcal::geom::{Pose, log_so3};
 use robotcal::programs::LeftReason;

@@ -1,7 +1,5 @@
 //! What a corrected program promises in the base frame, against what simulated robots do.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::Path;
 
 use rayon::prelude::*;

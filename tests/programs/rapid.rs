@@ -1,7 +1,5 @@
 //! `robotcal compensate` on ABB RAPID, written as the vendor's manuals give it.
 
-#![allow(clippy::unwrap_used)]
-
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
 use crate::programs_support::{Cell, assert_meets, numbers, shape, status_turn};

@@ -3,8 +3,6 @@
 //! Witness: the new text is read by other code than that which wrote it, and the real robot's forward kinematics at those numbers is held
 //! against the nominal robot's at the old ones.
 
-#![allow(clippy::unwrap_used)]
-
 use std::time::Instant;
 
 use crate::programs_support::findings;

@@ -1,6 +1,6 @@
 //! A robot with known errors as files, and `robotcal compensate` as a user calls it.
 
-#![allow(dead_code, clippy::unwrap_used)]
+#![allow(dead_code)]
 
 pub mod touching;
 

@@ -1,6 +1,6 @@
 //! A robot with known errors that touches known and unknown places with a tool, as a series folder and in memory.
 
-#![allow(dead_code, clippy::unwrap_used)]
+#![allow(dead_code)]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

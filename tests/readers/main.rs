@@ -1,5 +1,7 @@
 //! Tests of readers; one binary, a file a subject.
 
+#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
 #[path = "../../fuzz/readers.rs"]
 mod readers;
 #[path = "../recording_support/mod.rs"]

@@ -1,7 +1,5 @@
 //! A recording with the solution of its series, read without this program's own reader.
 
-#![allow(clippy::unwrap_used)]
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;

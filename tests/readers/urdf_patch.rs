@@ -1,7 +1,5 @@
 //! Patching robot descriptions as text, and real descriptions where they are at hand.
 
-#![allow(clippy::unwrap_used)]
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 //! What the program says is known by its code, and by the names and numbers in it: files with lines, images, joints, keys, flags.
 
-#![allow(dead_code, clippy::unwrap_used)]
+#![allow(dead_code)]
 
 use robotcal::{Code, Error, Notice};
 

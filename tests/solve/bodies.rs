@@ -1,7 +1,5 @@
 //! Trackers and sockets in the place of a camera: simulated robots with known truth.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use std::path::Path;
 
 use nalgebra::{DVector, Vector3};

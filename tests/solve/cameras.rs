@@ -1,7 +1,5 @@
 //! Several cameras at the same stops: one latent joint error a stop, whoever saw it.
 
-#![allow(clippy::unwrap_used)]
-
 use nalgebra::{DVector, Vector3};
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::{Options, Selection, Solution, identify};

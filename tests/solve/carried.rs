@@ -1,7 +1,5 @@
 //! Cells in which more than an arm moves: a positioner that carries the plate, a rail that carries the arm, a second arm.
 
-#![allow(clippy::unwrap_used)]
-
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::Path;

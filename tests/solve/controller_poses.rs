@@ -1,7 +1,5 @@
 //! Poses of a controller in the place of joint readings: what is found without a robot, and the mistakes that are named.
 
-#![allow(clippy::unwrap_used)]
-
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};

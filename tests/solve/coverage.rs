@@ -1,7 +1,5 @@
 //! Stated uncertainties against known truth, over independent worlds.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use nalgebra::Vector6;
 use robotcal::assess::{MeasuredPoint, View, fit_points, predict_pose};
 use robotcal::geom::Pose;

@@ -1,7 +1,5 @@
 //! Series that belong to another robot, or whose camera stands elsewhere than series.toml says, are refused by name.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use robotcal::assess::WorkspacePoint;
 use robotcal::diagnose::Finding;
 use robotcal::identify::{JointNoise, Options, identify};

@@ -1,7 +1,5 @@
 //! What data tell: rank and names, selections, the flange's covariance, clusters, and solving again from solution.json.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use crate::outputs_support::{context, robot, solved};
 use nalgebra::{DMatrix, DVector, Vector6};
 use rand::{RngExt, SeedableRng};

@@ -1,7 +1,5 @@
 //! How often the evidence takes another lens than the one that made the images, and what that does to the flange.
 
-#![allow(clippy::unwrap_used)]
-
 use std::collections::BTreeMap;
 use std::path::Path;
 

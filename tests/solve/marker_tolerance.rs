@@ -1,7 +1,5 @@
 //! How far the markers are off is, on request, a variance component beside image noise and joint noise, where the data tell it.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::Path;
 
 use robotcal::identify::{MarkerTolerance, Options, RobotModel, Solution, identify};

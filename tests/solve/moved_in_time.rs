@@ -1,8 +1,6 @@
 //! A plate or a camera that moves by a millimetre during a series is named with the image from which on it stands elsewhere,
 //! one that creeps is said to creep; series in which nothing moved are not accused.
 
-#![allow(clippy::unwrap_used)]
-
 use nalgebra::Vector6;
 use robotcal::Code;
 use robotcal::diagnose::{Carried, Displaced, Displacement, Finding};

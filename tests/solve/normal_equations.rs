@@ -1,7 +1,5 @@
 //! The normal equations against dense ones from dual numbers: whatever is eliminated first, and however many images a stop has.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use crate::support::dense::{Dense, Unknown};
 use crate::support::small::{Dice, Request, free_poses, problem};
 use nalgebra::{DMatrix, DVector, Vector3};

@@ -1,7 +1,5 @@
 //! A plate that is not of the size that its file states: the robot would take the error over, so that it must be named.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::Path;
 
 use nalgebra::Vector3;

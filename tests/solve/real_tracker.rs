@@ -1,7 +1,5 @@
 //! Three real series of one robot, judged by points that a laser tracker measured on it.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;

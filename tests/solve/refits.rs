@@ -1,7 +1,5 @@
 //! What is held out is predicted by fits that have converged.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use crate::support::small::{Dice, Request, problem, series};
 use robotcal::assess::{Limits, hold_out};
 use robotcal::identify::{Options, identify};

@@ -1,7 +1,5 @@
 //! The second pass over a rendered series: markers across the border of the picture against the truth.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::Path;
 
 use nalgebra::{Matrix2, Vector2, Vector3};

@@ -1,7 +1,5 @@
 //! What must hold of any solver of this problem, whatever it eliminates first.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use crate::support::small::{Dice, Part, Request, free_poses, problem, series};
 use nalgebra::{DMatrix, Matrix2, Vector2, Vector3};
 use robotcal::assess::Limits;

@@ -1,7 +1,5 @@
 //! The second stage with the full covariance of the first is the joint fit.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use std::collections::BTreeSet;
 
 use crate::support::small::{Dice, Request, problem, series};

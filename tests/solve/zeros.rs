@@ -1,7 +1,5 @@
 //! A five-axis hobby arm: zeros off by up to 20 degrees and one axis that counts the other way, found without being told.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::Path;
 
 use nalgebra::Vector3;

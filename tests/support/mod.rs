@@ -1,5 +1,5 @@
 //! What several integration tests share.
-#![allow(dead_code, missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(dead_code)]
 
 pub mod dense;
 pub mod small;

@@ -1,7 +1,5 @@
 //! A result can be solved again from its own file: the same options, the same bits.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
 use std::path::Path;
 use std::process::{Command, Output};
 

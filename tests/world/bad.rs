@@ -1,7 +1,5 @@
 //! Every series of datasets/bad gets the answer that its `expected.toml` asks for.
 
-#![allow(clippy::unwrap_used)]
-
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,7 +1,5 @@
 //! `robotcal plate` and `robotcal simulate` as a user calls them.
 
-#![allow(clippy::unwrap_used)]
-
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};

@@ -3,8 +3,6 @@
 //! `GOLDEN=write cargo test --release --test world golden` writes them anew; a commit of its own says why. Numbers are compared within
 //! [`SAME`] of their size; on the machine that wrote them, `GOLDEN=exact` asks for [`EXACT`].
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,7 @@
 //! Tests of world; one binary, a file a subject.
 
+#![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
 mod again;
 mod bad;
 mod commands;

@@ -1,7 +1,5 @@
 //! Rendered pictures against the geometry that was put in.
 
-#![allow(clippy::unwrap_used)]
-
 use nalgebra::{Vector2, Vector3, Vector6};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

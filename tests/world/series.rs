@@ -1,7 +1,5 @@
 //! Simulated series against what was put into them.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;

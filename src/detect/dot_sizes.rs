@@ -1,0 +1,36 @@
+//! Sizes of the dots of a grid that the plate file does not state, from what the images show.
+
+use std::collections::BTreeMap;
+
+use super::Detection;
+use crate::error::Code;
+use crate::series::Plate;
+
+/// Gives the markers the median of the radii that the images show, where they show any.
+pub fn set_radii<'a>(plate: &mut Plate, images: impl Iterator<Item = &'a Detection>) {
+    let usable = images.filter(|detection| detection.failure.is_none());
+    let mut seen: BTreeMap<u32, [Vec<f64>; 2]> = BTreeMap::new();
+    for (id, radii) in usable.filter_map(|detection| detection.circles.as_ref()).flat_map(|c| &c.sizes.radii_m) {
+        let all = seen.entry(*id).or_default();
+        (0..2).for_each(|k| all[k].push(radii[k]));
+    }
+    let middle = |values: &mut Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    for marker in &mut plate.markers {
+        if let Some(radii) = seen.get_mut(&marker.id) {
+            [marker.outer_radius_m, marker.inner_radius_m] = radii.each_mut().map(middle);
+        }
+    }
+}
+
+/// The plate with the sizes that other images show, and the images that may be told with them: the plate file says which dots are larger and
+/// not how much, so that nothing tells how a grid is turned in which none looks larger.
+pub(super) fn told_by_others(plate: &Plate, found: &[&Detection]) -> Option<(Plate, Vec<usize>)> {
+    let mut measured = plate.clone();
+    set_radii(&mut measured, found.iter().copied());
+    let is_open = |k: &usize| found[*k].failure.as_ref().is_some_and(|f| f.code == Code::PlateIncomplete);
+    let tells = !plate.large.is_empty() && measured.markers != plate.markers;
+    tells.then(|| (measured, (0..found.len()).filter(is_open).collect()))
+}
