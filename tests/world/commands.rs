@@ -123,6 +123,32 @@ fn as_json_the_solution_and_nothing_else_is_printed() {
     assert_eq!(printed["flange"]["model_m"], file["flange"]["model_m"]);
 }
 
+/// Every drawing of the report is a file of its own that a reader of XML opens, with the chapter in its name and a size.
+#[test]
+fn the_figures_of_the_report_are_drawings_by_themselves() {
+    let solution = root("reports/kr6_small/solution.json");
+    let folder = tempfile::tempdir().unwrap();
+    let [figures, report] = ["figures", "report.html"].map(|name| folder.path().join(name).display().to_string());
+    let output = robotcal(&["show", "--figures", &figures, "--report", &report, &solution]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    let page = std::fs::read_to_string(&report).unwrap();
+    let mut drawings = 0;
+    for entry in std::fs::read_dir(&figures).unwrap() {
+        let path = entry.unwrap().path();
+        let svg = std::fs::read_to_string(&path).unwrap();
+        let document = roxmltree::Document::parse(&svg).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        assert_eq!(document.root_element().tag_name().name(), "svg");
+        assert!(document.root_element().has_attribute("viewBox"), "{}", path.display());
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        let chapter = name.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches('-');
+        assert!(page.contains(&format!("id=\"{chapter}\"")), "{name}");
+        let said = document.root_element().attribute("aria-label").unwrap();
+        assert!(page.contains(&format!("aria-label=\"{said}\"")), "{name}: {said}");
+        drawings += 1;
+    }
+    assert!(drawings > 10, "{drawings}");
+}
+
 #[test]
 fn a_folder_of_results_stands_for_its_solution() {
     let [of_folder, of_file] =

@@ -4,6 +4,7 @@ use super::model::{
     Block, Edges, GROWTH, HALO, HALO_BLUR, LANES, LEVEL, LEVEL_SLOPE, LN_BLUR, Matrix, PARAMETERS, Prediction, STEP,
     STEP_SLOPE, THETA, Vector,
 };
+use super::refusal::Refusal;
 use crate::detect::Picture;
 use crate::linalg::wide;
 
@@ -56,39 +57,6 @@ struct Descent {
     least_share: f64,
     /// What a step may still take off the mean square of the residuals over the contrast: amid symmetric pixels a corner rests at once.
     rest: f64,
-}
-
-/// Why no corner came out of a fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Refusal {
-    NoNeighbours,
-    Oblique,
-    AtTheEdge,
-    TooFewPixels,
-    /// The pixels show something else than two crossing edges.
-    NoCrossing,
-    /// The fit was still on its way when its steps were used up: nothing is known about the corner.
-    NotConverged,
-    OffTheLattice,
-}
-
-impl Refusal {
-    pub fn reason(self) -> &'static str {
-        match self {
-            Self::NoNeighbours => "no neighbours",
-            Self::Oblique => "seen too obliquely",
-            Self::AtTheEdge => "at the edge of the picture",
-            Self::TooFewPixels => "too few pixels",
-            Self::NoCrossing => "no crossing of two edges",
-            Self::NotConverged => "fit not converged",
-            Self::OffTheLattice => "off the lattice",
-        }
-    }
-
-    /// Whether a better start may end otherwise.
-    pub fn may_pass(self) -> bool {
-        matches!(self, Self::NoCrossing | Self::NotConverged | Self::OffTheLattice)
-    }
 }
 
 /// A corner as the lattice predicts it.
@@ -420,6 +388,11 @@ impl Saddle {
         gradient[HALO] = -STEEPENING / steepening(self.halo);
         let relative = (gradient.dot(&factor.solve(&gradient))).sqrt() * self.noise;
         [steepness, steepness * relative]
+    }
+
+    /// Pixels of its window.
+    pub fn pixels(&self) -> usize {
+        self.problem.pixels.all.pixels
     }
 
     /// Largest share of either dark square's pixels that reach a level.

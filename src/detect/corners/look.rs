@@ -6,8 +6,9 @@
 
 use std::borrow::Cow;
 
-use super::fit::{Look, Refusal, Saddle, Seed, Window, refine};
+use super::fit::{Look, Saddle, Seed, Window, refine};
 use super::neighbours::{REACH, seed};
+use super::refusal::Refusal;
 use super::smooth::smoothed;
 use crate::detect::Picture;
 use crate::detect::board_labels::Lattice;
@@ -60,6 +61,11 @@ impl<'a> Sight<'a> {
     /// Whether a corner whose fit does not converge may do so once the picture is smoothed: it was sharpened.
     pub fn may_be_smoothed(&self) -> bool {
         self.look.halo && self.smoothing_px.is_none()
+    }
+
+    /// Whether neighbouring pixels have noise in common: the picture was sharpened or smoothed.
+    pub fn has_correlated_noise(&self) -> bool {
+        self.look.halo || self.smoothing_px.is_some()
     }
 
     fn sample(&self, seeds: &[Seed]) -> Vec<Saddle> {

@@ -6,18 +6,22 @@ mod model;
 mod neighbours;
 mod noise;
 mod outline;
+mod raster;
+mod refusal;
 mod rim;
+mod small_windows;
 mod smooth;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use fit::Saddle;
 pub(super) use fit::Window;
-use fit::{Refusal, Saddle};
 use look::Sight;
 pub(super) use look::quantile;
 use neighbours::{FAR_REACH, REACH, seed};
 use noise::Correlation;
 use outline::outline;
+use refusal::Refusal;
 use rim::out_of_line;
 
 use super::board_labels::{Lattice, Placement};
@@ -35,8 +39,9 @@ const DISTURBED: f64 = 3.0;
 /// ... if its residuals exceed this share of the contrast.
 const LEAST_DISTURBED: f64 = 0.06;
 
-/// Corners whose residuals tell how the noise of neighbouring pixels is correlated, at most.
+/// Corners whose residuals tell how the noise of neighbouring pixels is correlated: so many, or more where they have fewer pixels.
 const NOISE_CORNERS: usize = 16;
+const NOISE_PIXELS: usize = 6000;
 
 /// Sub-pixel positions of all corners of the board, also of those that the lattice finder left out.
 pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement, window: Window) -> Detection {
@@ -63,8 +68,10 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
         detection.dropped.push(Dropped::point(saddle.uv, "out of line"));
     }
     detection.outline = outline(picture, &kept, placement);
-    let some = kept.values().step_by(kept.len().div_ceil(NOISE_CORNERS).max(1));
-    let correlation = view.smoothing_px.map_or(Correlation::WHITE, |sigma| Correlation::of(some, sigma));
+    let correlation = match view.has_correlated_noise() {
+        true => Correlation::of(&some(&kept), view.smoothing_px),
+        false => Correlation::WHITE,
+    };
     for (key, saddle) in kept {
         if let Some(marker) = placement.id(key) {
             let covariance = Some(correlation.covariance(&saddle));
@@ -73,6 +80,13 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
     }
     detection.observations.sort_by_key(|o| o.marker);
     detection
+}
+
+/// Corners that tell of the noise, all over the board.
+fn some(kept: &BTreeMap<(i32, i32), Saddle>) -> Vec<&Saddle> {
+    let pixels = kept.values().map(Saddle::pixels).sum::<usize>();
+    let number = NOISE_CORNERS.max(kept.len() * NOISE_PIXELS / pixels.max(1));
+    kept.values().step_by(kept.len().div_ceil(number).max(1)).collect()
 }
 
 /// Fits from where the lattice finder says that corners are.

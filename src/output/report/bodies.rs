@@ -44,9 +44,9 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
         div.wide { table {
             thead { tr { th { "Stop" } th { "frame" } th.n { "held out, nominal" } th.n { "held out, calibrated" } th.n { "residual" } th { "left out" } } }
             tbody { @for m in worst.iter().take(WORST) { tr {
-                td.name { (m.name) } td { (m.instrument) }
+                td { (m.name) } td { (m.instrument) }
                 td.n { (mm(m.held_out_mm.map(|e| e[0]))) } td.n { (mm(m.held_out_mm.map(|e| e[1]))) } td.n { (mm(residual_mm(m))) }
-                td { @if let Some(why) = &m.rejection { (why) } }
+                td.reason { @if let Some(why) = &m.rejection { (why) } }
             } } }
         } }
     }
@@ -64,7 +64,7 @@ fn frame(b: &BodiesRecord, name: &str, kind: InstrumentKind, factor: f64) -> Mar
         InstrumentKind::Places => "given places",
     };
     html! { tr {
-        td.name { (name) } td { (what) } td.n { (own().count()) } td.n { (mm(rms(&residual_mm))) }
+        td { (name) } td { (what) } td.n { (own().count()) } td.n { (mm(rms(&residual_mm))) }
         td.n { (mm(rms(&|m| Some(m.held_out_mm?[0])))) } td.n { (mm(rms(&|m| Some(m.held_out_mm?[1])))) } td.n { (significant(factor)) }
     } }
 }

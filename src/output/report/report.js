@@ -79,3 +79,13 @@ for (const svg of document.querySelectorAll("svg.scene")) {
   slider.addEventListener("input", stop);
   stop();
 }
+
+// Who has no mouse scrolls a wide table by the keys.
+function reach() {
+  for (const box of document.querySelectorAll(".wide")) {
+    if (box.scrollWidth > box.clientWidth) box.tabIndex = 0;
+    else box.removeAttribute("tabindex");
+  }
+}
+addEventListener("resize", reach);
+reach();

@@ -1,0 +1,78 @@
+//! The pixels of a window by their places, two by two by their lag.
+
+use super::fit::{Saddle, Term};
+use super::model::Vector;
+
+/// Lags looked at, px.
+pub(super) const REACH: i32 = 3;
+pub(super) const SIDE: usize = 2 * REACH as usize + 1;
+/// Rows 0 to `REACH`, columns from -`REACH`: the lag of none is number `REACH`, those before it stand for their opposites.
+pub(super) const LAGS: usize = (REACH as usize + 1) * SIDE;
+/// Number of the lag of none.
+pub(super) const NONE: usize = REACH as usize;
+
+/// A window's pixels on their raster.
+pub(super) struct Raster<'a> {
+    terms: &'a [Term],
+    low: [i32; 2],
+    width: i32,
+    /// Index of the term plus one; 0 where the window has no pixel.
+    cells: Vec<u32>,
+}
+
+impl<'a> Raster<'a> {
+    pub fn new(terms: &'a [Term]) -> Self {
+        let least = |axis: usize| terms.iter().map(|t| t.at[axis]).min().unwrap_or(0);
+        let most = |axis: usize| terms.iter().map(|t| t.at[axis]).max().unwrap_or(0);
+        // A margin on every side: no lag leaves the raster.
+        let low = [least(0) - REACH, least(1)];
+        let (width, height) = (most(0) - low[0] + REACH + 1, most(1) - low[1] + REACH + 1);
+        let mut cells = vec![0; (width * height) as usize];
+        for (k, term) in terms.iter().enumerate() {
+            cells[((term.at[1] - low[1]) * width + term.at[0] - low[0]) as usize] = k as u32 + 1;
+        }
+        Self { terms, low, width, cells }
+    }
+
+    /// Index of the term of a pixel.
+    pub fn find(&self, [x, y]: [i32; 2]) -> Option<usize> {
+        let (i, j) = (x - self.low[0], y - self.low[1]);
+        let inside = (0..self.width).contains(&i) && j >= 0;
+        let cell = inside.then(|| self.cells.get((j * self.width + i) as usize)).flatten()?;
+        (*cell as usize).checked_sub(1)
+    }
+
+    /// Calls `pair` with the index of a lag that is not zero and those of every two terms at it.
+    pub fn for_pairs(&self, mut pair: impl FnMut(usize, usize, usize)) {
+        for (k, term) in self.terms.iter().enumerate() {
+            let cell = (term.at[1] - self.low[1]) * self.width + term.at[0] - self.low[0];
+            for lag in REACH as usize + 1..LAGS {
+                let (down, right) = ((lag / SIDE) as i32, (lag % SIDE) as i32 - REACH);
+                let other = self.cells[(cell + down * self.width + right) as usize] as usize;
+                if other > 0 {
+                    pair(lag, k, other - 1);
+                }
+            }
+        }
+    }
+}
+
+/// Of every pixel of a corner that has one opposite: its term and that of the other.
+pub(super) fn opposites(corner: &Saddle, terms: &[Term]) -> Vec<[usize; 2]> {
+    let raster = Raster::new(terms);
+    let [sum_x, sum_y] = corner.uv.map(|c| (2.0 * c).round() as i32);
+    let other = |(k, term): (usize, &Term)| Some([k, raster.find([sum_x - term.at[0], sum_y - term.at[1]])?]);
+    terms.iter().enumerate().filter_map(other).collect()
+}
+
+/// What is left of the residuals of a corner, and of their leverages, where those of the pixels opposite are taken off: another
+/// shape of the edges than that of the model is the same on both sides and does not move the corner; noise is not.
+pub(super) fn odd_part(corner: &Saddle) -> (Vec<Term>, Vec<Vector>) {
+    let (terms, leverages) = (corner.terms(), corner.leverages());
+    let odd = opposites(corner, &terms).into_iter().filter_map(|[k, other]| {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let residual = half * (terms[k].residual - terms[other].residual);
+        Some((Term { residual, ..terms[k] }, half * (leverages.get(k)? - leverages.get(other)?)))
+    });
+    odd.unzip()
+}
