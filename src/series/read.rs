@@ -1,9 +1,10 @@
 //! Reading a series folder.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use unicode_normalization::UnicodeNormalization;
 
 use super::controller_file;
 use super::controller_poses::ControllerPoses;
@@ -304,8 +305,16 @@ fn pictured(images: &Path, csv: &Path, stops: &mut Stops, notices: &mut Vec<Noti
     let on_disk = image_files(images)?;
     let names: BTreeSet<String> = on_disk.iter().map(|p| file_name(p)).collect();
     let mut missing = Vec::new();
-    if stops.key == StopKey::Stop {
-        stops.stops.iter_mut().for_each(|stop| name_image(stop, &names));
+    let composed: BTreeMap<String, &String> = names.iter().map(|name| (name.nfc().collect(), name)).collect();
+    for stop in &mut stops.stops {
+        if stops.key == StopKey::Stop {
+            name_image(stop, &names);
+        }
+        // Some systems write an accent as a character of its own: to a person the names are the same.
+        if let Some(file) = composed.get(&stop.image.nfc().collect::<String>()).filter(|_| !names.contains(&stop.image))
+        {
+            stop.image.clone_from(file);
+        }
     }
     for stop in &mut stops.stops {
         if names.contains(&stop.image) {

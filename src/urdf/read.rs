@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use roxmltree::{Document, Node};
+use roxmltree::{Document, Node, ParsingOptions};
 
 use super::elements::{JointElement, Source};
 use super::inertial::{Inertial, inertial};
@@ -186,7 +186,7 @@ pub(super) fn without_undeclared_prefixes<'a>(path: &Path, text: &'a str) -> Res
     refuse_depth(path, text)?;
     let mut plain = Cow::Borrowed(text);
     for _ in 0..MOST_PREFIXES {
-        let Err(roxmltree::Error::UnknownNamespace(prefix, _)) = Document::parse(&plain) else { break };
+        let Err(roxmltree::Error::UnknownNamespace(prefix, _)) = document(&plain) else { break };
         if prefix == "xacro" {
             return Ok(Cow::Borrowed(text));
         }
@@ -198,19 +198,25 @@ pub(super) fn without_undeclared_prefixes<'a>(path: &Path, text: &'a str) -> Res
     Ok(plain)
 }
 
+/// A document type is let pass, as the parsers of ROS do, where it declares no entities: what those stand for has no place in the text, where
+/// it could be corrected.
+fn document(text: &str) -> std::result::Result<Document<'_>, roxmltree::Error> {
+    let allow_dtd = !text.contains("<!ENTITY");
+    Document::parse_with_options(text, ParsingOptions { allow_dtd, ..ParsingOptions::default() })
+}
+
 /// Parses XML that [`without_undeclared_prefixes`] let pass, with an error that knows the line.
 pub(super) fn parse<'a>(path: &Path, text: &'a str) -> Result<Document<'a>> {
-    Document::parse(text).map_err(|error| match &error {
-        roxmltree::Error::UnknownNamespace(prefix, at) if prefix == "xacro" => xacro(path, at.row),
-        _ => {
-            let what = format!("is not well-formed XML: {error}");
-            Error::new(
-                Code::UrdfSyntax,
-                format!("{}:{}", path.display(), error.pos().row),
-                what,
-                "correct the XML there",
-            )
-        }
+    document(text).map_err(|error| {
+        let line = || text.lines().position(|line| line.contains("<!ENTITY")).map_or(1, |line| line as u32 + 1);
+        let (line, what, remedy) = match &error {
+            roxmltree::Error::UnknownNamespace(prefix, at) if prefix == "xacro" => return xacro(path, at.row),
+            roxmltree::Error::DtdDetected => {
+                (line(), "declares entities (<!ENTITY ..>)".into(), "write what they stand for in their place")
+            }
+            _ => (error.pos().row, format!("is not well-formed XML: {error}"), "correct the XML there"),
+        };
+        Error::new(Code::UrdfSyntax, format!("{}:{line}", path.display()), what, remedy)
     })
 }
 

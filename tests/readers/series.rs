@@ -245,6 +245,20 @@ fn an_impossible_unit_is_refused_and_a_possible_one_is_not() {
     assert_says(&with_readings(Rad, &millimetres).unwrap_err(), Code::MillimetresAsMetres, &["x reads 500"]);
 }
 
+/// A copy over another system may write an accent as a character of its own: to a person the two names are one.
+#[test]
+fn a_name_with_an_accent_is_that_of_its_file_however_both_are_written() {
+    let (composed, decomposed) = ("k\u{e4}fig.png", "ka\u{308}fig.png");
+    for (row, file) in [(composed, decomposed), (decomposed, composed), (composed, composed)] {
+        let renamed = JOINTS.replace("b.png", row);
+        let folder = series_with(&[("joints.csv", &renamed), (&format!("images/{file}"), "")]);
+        fs::remove_file(folder.path().join("images/b.png")).unwrap();
+        let series = read(folder.path()).unwrap();
+        assert!(series.notices.is_empty(), "{:?}", series.notices);
+        assert_eq!(series.stops.stops[1].path.as_ref().unwrap().file_name().unwrap(), file);
+    }
+}
+
 #[test]
 fn observations_replace_images_and_are_checked_by_line() {
     let header = "image,marker,u,v,edge,cov_uu,cov_uv,cov_vv,du,dv,reason\n";
