@@ -11,7 +11,8 @@ use super::start::{StartGiven, start_robot, take_back, usual_misfit};
 use super::start_verdict::StartVerdict;
 use super::stated::camera_starts;
 use super::two_stage::PoseStage;
-use crate::assess::{folds, hold_out, hold_out_bodies, judge, refitted_near};
+use super::unpredicted::nothing_held_out;
+use crate::assess::{hold_out, hold_out_bodies, judge, refitted_near};
 use crate::diagnose::{CheckContext, Diagnosis, StatedNoise};
 use crate::error::{Code, Error, Result};
 use crate::fit::{Fit, FreePoses};
@@ -151,7 +152,7 @@ impl JointFit {
         };
         let (accuracy, held_out) = hold_out(fit.linear(), &fitted, limits)
             .or_else(|| hold_out_bodies(fit.linear(), limits))
-            .ok_or_else(|| nothing_held_out(folds(&fit.problem, limits).is_some(), noise))?;
+            .ok_or_else(|| nothing_held_out("hold-out", &fit.problem, limits, noise))?;
         {
             let _stage = stage("diagnoses");
             diagnosis.after_fit(&fit, &accuracy);
@@ -255,22 +256,6 @@ fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f6
     for (i, mismatch) in remarks {
         adjustment.problem.images[i].rejected = Some(ImageRejection::WronglyPaired(mismatch));
     }
-}
-
-/// Too few images; or `enough`, but fits without some of them cannot predict these.
-fn nothing_held_out(enough: bool, noise: JointNoise) -> Error {
-    let (what, remedy) = match (enough, noise) {
-        (false, _) => ("too few images to hold any out", "take more images"),
-        (true, JointNoise::Known(_)) => (
-            "fits without some of the images do not predict these at all: the readings do not err as little as was stated",
-            "leave out --joint-noise: it is estimated then",
-        ),
-        (true, JointNoise::Estimated) => (
-            "fits without some of the images do not predict these at all",
-            "look at the per-image table for images that do not belong, and take stops that move every joint",
-        ),
-    };
-    Error::new(Code::NothingHeldOut, "hold-out", what, remedy)
 }
 
 /// A two-step calibration goes by camera poses.

@@ -34,6 +34,7 @@ mod stated;
 mod suspects;
 mod turns;
 mod two_stage;
+mod unpredicted;
 mod verify;
 
 pub use crate::model::joint_terms::RobotModel;

@@ -2,9 +2,11 @@
 
 use super::build::build;
 use super::free_poses::adjust_free_poses;
+use super::options::JointNoise;
 use super::start::{StartGiven, start_robot};
 use super::stated::camera_starts;
 use super::turns;
+use super::unpredicted::nothing_held_out;
 use crate::assess::Limits;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
 use crate::error::{Code, Error, Result};
@@ -51,15 +53,9 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
             "check that URDF, base, tip and series belong together",
         ));
     }
-    let errors = outcome.linear().and_then(|fit| hold_out_images(fit, limits)).ok_or_else(|| {
-        Error::new(
-            Code::NothingHeldOut,
-            "verification",
-            "too few images to hold any out",
-            "take at least 12 images of the robot",
-        )
-    })?;
     let problem = &outcome.adjustment.problem;
+    let errors = outcome.linear().and_then(|fit| hold_out_images(fit, limits));
+    let errors = errors.ok_or_else(|| nothing_held_out("verification", problem, limits, JointNoise::Estimated))?;
     let postures = cluster_of_images(problem, limits);
     let judged = |(i, error): (usize, ImageError)| JudgedImage {
         series: problem.images[i].series,

@@ -18,5 +18,6 @@ mod circles;
 mod command;
 mod corners_rendered;
 mod grids;
+mod image_stage;
 mod puzzleboards;
 mod tags;

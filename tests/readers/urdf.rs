@@ -359,14 +359,14 @@ fn elements_under_an_undeclared_prefix_are_passed_over_and_kept() {
 /// The parsers of ROS let a document type pass; what an entity stands for could not be corrected in its place.
 #[test]
 fn a_document_type_is_kept_and_its_entities_are_refused() {
-    let joints = joint("j", "revolute", "a", "b", &format!("{Z}<origin xyz=\"0 0 1\"/>"));
+    let joints = joint("j", "revolute", "a", "b", &format!("{Z}<origin xyz=\"0 0 2\"/>"));
     let plain = wrap(&["a", "b"], &[joints]);
     let head = "<?xml version=\"1.0\"?>\n<!DOCTYPE robot [\n<!ELEMENT robot ANY>\n]>\n";
     let text = format!("{head}{plain}");
     assert_eq!(robot(&text).chain(None, None).unwrap().readings, ["j"]);
-    let new = [("j".to_owned(), Pose::from_xyz_rpy([0.0, 0.0, 1.5], [0.0; 3]))].into();
-    assert_eq!(patch_origins(&text, &new).unwrap(), text.replace("xyz=\"0 0 1\"", "xyz=\"0 0 1.5\""));
-    let entity = text.replace("<!ELEMENT robot ANY>", "<!ENTITY height '1'>").replace("0 0 1", "0 0 &height;");
+    let new = [("j".to_owned(), Pose::from_xyz_rpy([0.0, 0.0, 2.5], [0.0; 3]))].into();
+    assert_eq!(patch_origins(&text, &new).unwrap(), text.replace("xyz=\"0 0 2\"", "xyz=\"0 0 2.5\""));
+    let entity = text.replace("<!ELEMENT robot ANY>", "<!ENTITY height '1'>").replace("0 0 2", "0 0 &height;");
     assert_says(&refusal(&entity), Code::UrdfSyntax, &["r.urdf:3", "<!ENTITY"]);
 }
 

@@ -5,6 +5,7 @@
 mod again;
 mod bad;
 mod commands;
+mod crossover;
 mod golden;
 mod render;
 #[path = "../said/mod.rs"]
