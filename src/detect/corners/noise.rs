@@ -27,7 +27,7 @@ use super::small_windows::{Seen, unfollowed};
 /// printing errors are taken out.
 const SYSTEMATIC_PX: f64 = 0.015;
 
-/// Where a fit follows more than this share of noise that reaches over all lags, the mean of its derivatives says too little.
+/// Where a fit follows more than this share of noise that reaches over all lags, its residuals say nothing about it.
 const MOST_FOLLOWED: f64 = 0.6;
 /// Least pixels of a window, on average, beside which the lags are small.
 const LEAST_PIXELS: f64 = 100.0;
@@ -79,9 +79,13 @@ impl Correlation {
         let all =
             |at_zero: f64, sums: &[f64; LAGS]| at_zero / pixels + 2.0 * (0..LAGS).map(|l| mean(sums, l)).sum::<f64>();
         let all_followed = all(own, &followed);
-        if pixels < LEAST_PIXELS * corners.len() as f64 || all_followed >= MOST_FOLLOWED {
+        let expected = smoothing_px.map_or(Self::WHITE, Self::smoothed);
+        if pixels < LEAST_PIXELS * corners.len() as f64 {
             (covariance[NONE], counts[NONE]) = (square, pixels);
-            return Self::of_small(corners, &Seen { products: covariance, counts }, smoothing_px);
+            return Self::of_small(corners, &Seen { products: covariance, counts }, expected);
+        }
+        if all_followed >= MOST_FOLLOWED {
+            return expected;
         }
         let reach = (all(square, &covariance) / (1.0 - all_followed)).max(0.0);
         let lag = |l: usize| mean(&covariance, l) + reach * mean(&followed, l);
@@ -89,11 +93,10 @@ impl Correlation {
     }
 
     /// Where a fit follows much of the noise.
-    fn of_small(corners: &[&Saddle], seen: &Seen, smoothing_px: Option<f64>) -> Self {
-        let before = smoothing_px.map_or(Self::WHITE, Self::smoothed);
-        let mut expected = before.lags;
-        expected[NONE] = before.variance;
-        let Some(mut lags) = unfollowed(corners, seen, &expected) else { return before };
+    fn of_small(corners: &[&Saddle], seen: &Seen, expected: Self) -> Self {
+        let mut lags = expected.lags;
+        lags[NONE] = expected.variance;
+        let Some(mut lags) = unfollowed(corners, seen, &lags) else { return expected };
         Self { variance: std::mem::take(&mut lags[NONE]), lags }
     }
 
