@@ -242,11 +242,15 @@ fn noise_costs_little_more_than_it_must_and_is_stated() {
     }
 }
 
-/// SEEDS: pictures a line.
+/// SEEDS: pictures a line of a study.
+fn seeds_asked() -> u64 {
+    std::env::var("SEEDS").ok().and_then(|s| s.parse().ok()).unwrap_or(20)
+}
+
 #[test]
 #[ignore = "minutes"]
 fn study_of_noise() {
-    let seeds = std::env::var("SEEDS").ok().and_then(|s| s.parse().ok()).unwrap_or(20);
+    let seeds = seeds_asked();
     println!("| square px | blur px | noise | rms px | of the bound | normalised error |\n|---|---|---|---|---|---|");
     for square in [6.0, 10.0, 20.0, 33.0, 60.0] {
         for blur in [0.3, 0.45, 0.6, 1.0, 2.0] {
@@ -281,11 +285,10 @@ fn noise_that_was_sharpened_is_stated_as_it_is() {
     }
 }
 
-/// SEEDS: pictures a line.
 #[test]
 #[ignore = "minutes"]
 fn study_of_correlated_noise() {
-    let seeds = std::env::var("SEEDS").ok().and_then(|s| s.parse().ok()).unwrap_or(20);
+    let seeds = seeds_asked();
     println!("| picture | square px | blur px | noise | rms px | normalised error |\n|---|---|---|---|---|---|");
     for (name, spoilt) in SPOILT {
         for square in [6.0, 10.0, 20.0, 33.0, 60.0] {
