@@ -28,9 +28,11 @@ pub fn set_radii<'a>(plate: &mut Plate, images: impl Iterator<Item = &'a Detecti
 /// The plate with the sizes that other images show, and the images that may be told with them: the plate file says which dots are larger and
 /// not how much, so that nothing tells how a grid is turned in which none looks larger.
 pub(super) fn told_by_others(plate: &Plate, found: &[&Detection]) -> Option<(Plate, Vec<usize>)> {
+    if plate.large.is_empty() {
+        return None;
+    }
     let mut measured = plate.clone();
     set_radii(&mut measured, found.iter().copied());
     let is_open = |k: &usize| found[*k].failure.as_ref().is_some_and(|f| f.code == Code::PlateIncomplete);
-    let tells = !plate.large.is_empty() && measured.markers != plate.markers;
-    tells.then(|| (measured, (0..found.len()).filter(is_open).collect()))
+    (measured.markers != plate.markers).then(|| (measured, (0..found.len()).filter(is_open).collect()))
 }

@@ -60,9 +60,8 @@ pub fn detect_series(
         progress(path);
         image
     });
-    if let Some((measured, open)) =
-        told_by_others(plate, &found.iter().map(|image| &image.detection).collect::<Vec<_>>())
-    {
+    let detections: Vec<&Detection> = found.iter().map(|image| &image.detection).collect();
+    if let Some((measured, open)) = told_by_others(plate, &detections) {
         let paths: Vec<&PathBuf> = open.iter().map(|&k| &images[k]).collect();
         let again = in_batches(&paths, |path| one(path, &measured));
         open.into_iter().zip(again).for_each(|(k, image)| found[k] = image);

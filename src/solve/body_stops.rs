@@ -13,7 +13,7 @@ use super::linear::{BodyPart, LinearPose, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
 use super::stop_covariance::StopCovariance;
 use crate::linalg::{self, add_gram, dot, inverse_factor, product};
-use crate::problem::{Layout, Step};
+use crate::problem::{Chained, Layout, Step};
 
 /// Stops whose equations are taken together: those after each other touch much the same columns.
 const TOGETHER: usize = 48;
@@ -38,15 +38,19 @@ struct Block {
 #[derive(Debug, Clone)]
 pub(super) struct BodyStops(Vec<Block>);
 
-/// The free columns that move any of the poses of some stops, ascending.
-fn touched(layout: &Layout, stops: &[LinearStop]) -> Vec<usize> {
+/// The free columns that move any of some poses, ascending.
+pub(super) fn touched<'a>(layout: &Layout, chains: impl Iterator<Item = &'a Chained>) -> Vec<usize> {
     let mut moves = vec![false; layout.theta_len()];
-    for part in stops.iter().flat_map(|stop| stop.bodies()) {
-        for (moves, by) in moves.iter_mut().zip(part.chain.columns()).filter(|(moves, _)| !**moves) {
+    for chain in chains {
+        for (moves, by) in moves.iter_mut().zip(chain.columns()).filter(|(moves, _)| !**moves) {
             *moves = *by != [0.0; 6];
         }
     }
     (0..moves.len()).filter(|&c| moves[c] && layout.columns[c].free).collect()
+}
+
+fn chains<'a>(stops: &'a [LinearStop]) -> impl Iterator<Item = &'a Chained> {
+    stops.iter().flat_map(|stop| stop.bodies()).map(|part| &*part.chain)
 }
 
 /// `S`, lower triangular less the columns of zeros, of a positive semidefinite matrix `S S'`.
@@ -154,7 +158,7 @@ impl BodyStops {
         let stops: Vec<LinearStop> = linear.stops().filter(|stop| stop.places().is_empty()).collect();
         let of = |stops: &[LinearStop]| {
             let (blocks, roots): (Vec<Block>, Vec<_>) = stops.iter().map(|stop| Block::of(stop, lambda)).unzip();
-            let rows = touched(layout, stops);
+            let rows = touched(layout, chains(stops));
             let mut information = DMatrix::zeros(rows.len(), rows.len());
             add_gram(&mut information, &transposed_times(stops, &rows, &roots), 1.0);
             (blocks, Group::of(std::iter::once(&rows)), information)
@@ -257,7 +261,7 @@ impl BodyStops {
 /// `G cov(x) G'` of the poses of each of some stops.
 fn spreads(reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
     let Some(problem) = stops.first().map(LinearStop::problem) else { return Vec::new() };
-    let rows = touched(&problem.layout, stops);
+    let rows = touched(&problem.layout, chains(stops));
     let by_columns = transposed(stops, &rows);
     let of_reduced = product(&Group::of(std::iter::once(&rows)).part_of(reduced), &by_columns);
     let mut end = 0;

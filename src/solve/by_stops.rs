@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::alike::alike;
 use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, latents_with_markers};
-use super::body_stops::BodyStops;
+use super::body_stops::{BodyStops, touched};
 use super::group::{Group, union};
 use super::linear::Carried;
 use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
@@ -321,10 +321,7 @@ fn with_latents(l: &DMatrix<f64>, of_pose: DMatrixView<f64>, rows: &[usize]) -> 
 impl Coupled {
     /// Of a measured body.
     fn of_body(body: &LinearPose, rows_of: &PoseRows) -> Self {
-        let layout = rows_of.layout();
-        let moves = body.chain.columns().iter().map(|by| *by != [0.0; 6]);
-        let rows: Vec<usize> =
-            moves.enumerate().filter(|(c, moves)| *moves && layout.columns[*c].free).map(|(c, _)| c).collect();
+        let rows = touched(rows_of.layout(), std::iter::once(body.chain));
         let coupling = with_latents(&body.chain.d_latent, rows_of.of(body.place), &rows);
         Self { latents: body.latents.clone(), rows, coupling }
     }

@@ -20,7 +20,7 @@
 use nalgebra::Matrix2;
 
 use super::fit::{Saddle, Term};
-use super::raster::{LAGS, NONE, REACH, Raster, SIDE, odd_part};
+use super::raster::{LAGS, NONE, OddPart, REACH, Raster, SIDE};
 use super::small_windows::{Seen, unfollowed};
 
 /// What print, lens and blur of other shapes leave beyond the noise, px per axis; seen on real boards after their
@@ -34,70 +34,54 @@ const LEAST_PIXELS: f64 = 100.0;
 /// Least variance of a corner in any direction over that with noise of the same size that is not correlated.
 const LEAST_SHARE: f64 = 0.25;
 
-/// Noise of two pixels by their lag (rows 0 to `REACH`, columns from -`REACH`), over the mean square of the residuals of a fit.
+/// Noise of two pixels by their lag (rows 0 to `REACH`, columns from -`REACH`), over the mean square of the residuals of a fit; the variance of
+/// a pixel at the lag of none.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Correlation {
-    /// Variance of a pixel.
-    variance: f64,
-    /// Covariance by lag.
-    lags: [f64; LAGS],
-}
+pub(super) struct Correlation([f64; LAGS]);
 
 impl Correlation {
     /// Of noise that is not correlated.
-    pub const WHITE: Self = Self { variance: 1.0, lags: [0.0; LAGS] };
+    pub const WHITE: Self = {
+        let mut lags = [0.0; LAGS];
+        lags[NONE] = 1.0;
+        Self(lags)
+    };
 
     /// Of noise that was not correlated before a Gaussian smoothing.
     fn smoothed(sigma_px: f64) -> Self {
         let lag = |l: usize| {
             let (down, right) = ((l / SIDE) as f64, (l % SIDE) as f64 - f64::from(REACH));
-            if l > REACH as usize { (-(down * down + right * right) / (4.0 * sigma_px * sigma_px)).exp() } else { 0.0 }
+            if l >= NONE { (-(down * down + right * right) / (4.0 * sigma_px * sigma_px)).exp() } else { 0.0 }
         };
-        Self { variance: 1.0, lags: std::array::from_fn(lag) }
+        Self(std::array::from_fn(lag))
     }
 
     /// Of the residuals of fitted corners in a picture that was smoothed so, if at all.
     pub fn of(corners: &[&Saddle], smoothing_px: Option<f64>) -> Self {
-        let (mut covariance, mut followed, mut counts) = ([0.0; LAGS], [0.0; LAGS], [0.0; LAGS]);
-        let (mut square, mut own, mut pixels) = (0.0, 0.0, 0.0);
-        for corner in corners {
+        let (mut products, mut followed, mut counts) = ([0.0; LAGS], [0.0; LAGS], [0.0; LAGS]);
+        let parts: Vec<OddPart> = corners.iter().map(|corner| OddPart::of(corner)).collect();
+        for (corner, OddPart { terms, leverages, .. }) in corners.iter().zip(&parts) {
             let scale = 1.0 / (corner.noise * corner.noise).max(f64::MIN_POSITIVE);
-            let (terms, leverages) = odd_part(corner);
-            let product = |a: usize, b: usize| leverages[a].dot(&leverages[b]);
-            for (k, term) in terms.iter().enumerate() {
-                square += scale * term.residual * term.residual;
-                own += product(k, k);
-                pixels += 1.0;
-            }
-            Raster::new(&terms).for_pairs(|lag, a, b| {
-                covariance[lag] += scale * terms[a].residual * terms[b].residual;
-                followed[lag] += product(a, b);
+            let mut add = |lag: usize, a: usize, b: usize| {
+                products[lag] += scale * terms[a].residual * terms[b].residual;
+                followed[lag] += leverages[a].dot(&leverages[b]);
                 counts[lag] += 1.0;
-            });
+            };
+            (0..terms.len()).for_each(|k| add(NONE, k, k));
+            Raster::new(terms).for_pairs(add);
         }
         let mean = |sums: &[f64; LAGS], lag: usize| if counts[lag] > 0.0 { sums[lag] / counts[lag] } else { 0.0 };
-        let all =
-            |at_zero: f64, sums: &[f64; LAGS]| at_zero / pixels + 2.0 * (0..LAGS).map(|l| mean(sums, l)).sum::<f64>();
-        let all_followed = all(own, &followed);
+        let all = |sums: &[f64; LAGS]| mean(sums, NONE) + 2.0 * (NONE + 1..LAGS).map(|l| mean(sums, l)).sum::<f64>();
         let expected = smoothing_px.map_or(Self::WHITE, Self::smoothed);
-        if pixels < LEAST_PIXELS * corners.len() as f64 {
-            (covariance[NONE], counts[NONE]) = (square, pixels);
-            return Self::of_small(corners, &Seen { products: covariance, counts }, expected);
+        if counts[NONE] < LEAST_PIXELS * corners.len() as f64 {
+            return unfollowed(&parts, &Seen { products, counts }, &expected.0).map_or(expected, Self);
         }
+        let all_followed = all(&followed);
         if all_followed >= MOST_FOLLOWED {
             return expected;
         }
-        let reach = (all(square, &covariance) / (1.0 - all_followed)).max(0.0);
-        let lag = |l: usize| mean(&covariance, l) + reach * mean(&followed, l);
-        Self { variance: (square + reach * own) / pixels, lags: std::array::from_fn(lag) }
-    }
-
-    /// Where a fit follows much of the noise.
-    fn of_small(corners: &[&Saddle], seen: &Seen, expected: Self) -> Self {
-        let mut lags = expected.lags;
-        lags[NONE] = expected.variance;
-        let Some(mut lags) = unfollowed(corners, seen, &lags) else { return expected };
-        Self { variance: std::mem::take(&mut lags[NONE]), lags }
+        let reach = (all(&products) / (1.0 - all_followed)).max(0.0);
+        Self(std::array::from_fn(|lag| mean(&products, lag) + reach * mean(&followed, lag)))
     }
 
     /// Covariance uu, uv, vv of a corner in px^2, with what the noise does not explain.
@@ -132,8 +116,8 @@ fn sum(terms: &[Term], noise: &Correlation) -> [f64; 3] {
         sum[1] += weight * 0.5 * (p * s + q * r);
         sum[2] += weight * q * s;
     };
-    terms.iter().for_each(|t| add(noise.variance, t, t));
-    Raster::new(terms).for_pairs(|lag, a, b| add(2.0 * noise.lags[lag], &terms[a], &terms[b]));
+    terms.iter().for_each(|t| add(noise.0[NONE], t, t));
+    Raster::new(terms).for_pairs(|lag, a, b| add(2.0 * noise.0[lag], &terms[a], &terms[b]));
     sum
 }
 

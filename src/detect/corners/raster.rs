@@ -57,22 +57,36 @@ impl<'a> Raster<'a> {
     }
 }
 
-/// Of every pixel of a corner that has one opposite: its term and that of the other.
-pub(super) fn opposites(corner: &Saddle, terms: &[Term]) -> Vec<[usize; 2]> {
+/// A fitted corner with the odd part of what its fit left: where the pixels opposite are taken off, another shape of the edges than that of
+/// the model, which is the same on both sides and does not move the corner, is gone; noise is not.
+pub(super) struct OddPart {
+    /// Terms and leverages of all pixels.
+    pub all: (Vec<Term>, Vec<Vector>),
+    /// Every pixel that has one opposite, and that one.
+    pub opposites: Vec<[usize; 2]>,
+    /// Residuals of these pixels less those opposite, and the same of the leverages.
+    pub terms: Vec<Term>,
+    pub leverages: Vec<Vector>,
+}
+
+impl OddPart {
+    pub fn of(corner: &Saddle) -> Self {
+        let all = (corner.terms(), corner.leverages());
+        let opposites = if all.1.is_empty() { Vec::new() } else { opposites(corner, &all.0) };
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let odd = opposites.iter().map(|&[k, other]| {
+            let (terms, leverages) = &all;
+            let residual = half * (terms[k].residual - terms[other].residual);
+            (Term { residual, ..terms[k] }, half * (leverages[k] - leverages[other]))
+        });
+        let (terms, leverages) = odd.unzip();
+        Self { all, opposites, terms, leverages }
+    }
+}
+
+fn opposites(corner: &Saddle, terms: &[Term]) -> Vec<[usize; 2]> {
     let raster = Raster::new(terms);
     let [sum_x, sum_y] = corner.uv.map(|c| (2.0 * c).round() as i32);
     let other = |(k, term): (usize, &Term)| Some([k, raster.find([sum_x - term.at[0], sum_y - term.at[1]])?]);
     terms.iter().enumerate().filter_map(other).collect()
-}
-
-/// What is left of the residuals of a corner, and of their leverages, where those of the pixels opposite are taken off: another
-/// shape of the edges than that of the model is the same on both sides and does not move the corner; noise is not.
-pub(super) fn odd_part(corner: &Saddle) -> (Vec<Term>, Vec<Vector>) {
-    let (terms, leverages) = (corner.terms(), corner.leverages());
-    let odd = opposites(corner, &terms).into_iter().filter_map(|[k, other]| {
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        let residual = half * (terms[k].residual - terms[other].residual);
-        Some((Term { residual, ..terms[k] }, half * (leverages.get(k)? - leverages.get(other)?)))
-    });
-    odd.unzip()
 }

@@ -11,8 +11,7 @@
 
 use nalgebra::{DMatrix, SMatrix, SVector};
 
-use super::fit::Saddle;
-use super::raster::{LAGS, NONE, Raster, odd_part, opposites};
+use super::raster::{LAGS, NONE, OddPart, Raster};
 
 /// Windows whose `A` is computed: they are much alike.
 const RESPONSES: usize = 4;
@@ -31,10 +30,10 @@ pub(super) struct Seen {
 }
 
 /// Covariance by lag of the noise that left such residuals.
-pub(super) fn unfollowed(corners: &[&Saddle], seen: &Seen, expected: &[f64; LAGS]) -> Option<[f64; LAGS]> {
+pub(super) fn unfollowed(parts: &[OddPart], seen: &Seen, expected: &[f64; LAGS]) -> Option<[f64; LAGS]> {
     let (mut sums, mut counts) = (SMatrix::<f64, UNKNOWN, UNKNOWN>::zeros(), SVector::<f64, UNKNOWN>::zeros());
-    for corner in corners.iter().step_by(corners.len().div_ceil(RESPONSES).max(1)) {
-        add_response(corner, &mut sums, &mut counts);
+    for part in parts.iter().step_by(parts.len().div_ceil(RESPONSES).max(1)) {
+        add_response(part, &mut sums, &mut counts);
     }
     let expected = SVector::<f64, UNKNOWN>::from_column_slice(&expected[NONE..]);
     let mut normal = SMatrix::<f64, UNKNOWN, UNKNOWN>::identity() / UNEXPECTED.powi(2);
@@ -52,18 +51,17 @@ pub(super) fn unfollowed(corners: &[&Saddle], seen: &Seen, expected: &[f64; LAGS
 }
 
 /// Adds `M_ap M_bq` of all pairs of pixels of a corner.
-fn add_response(corner: &Saddle, sums: &mut SMatrix<f64, UNKNOWN, UNKNOWN>, counts: &mut SVector<f64, UNKNOWN>) {
-    let (all, leverages) = (corner.terms(), corner.leverages());
-    let (odd, odd_leverages) = odd_part(corner);
+fn add_response(part: &OddPart, sums: &mut SMatrix<f64, UNKNOWN, UNKNOWN>, counts: &mut SVector<f64, UNKNOWN>) {
+    let ((all, leverages), odd) = (&part.all, &part.terms);
     let half = std::f64::consts::FRAC_1_SQRT_2;
     // `M'`: a column a pixel of the odd part.
-    let mut m = DMatrix::from_fn(all.len(), odd.len(), |p, a| -odd_leverages[a].dot(&leverages[p]));
-    for (a, [k, other]) in opposites(corner, &all).into_iter().enumerate() {
+    let mut m = DMatrix::from_fn(all.len(), odd.len(), |p, a| -part.leverages[a].dot(&leverages[p]));
+    for (a, &[k, other]) in part.opposites.iter().enumerate() {
         m[(k, a)] += half;
         m[(other, a)] -= half;
     }
-    let pixels = Raster::new(&all);
-    let pairs = Raster::new(&odd);
+    let pixels = Raster::new(all);
+    let pairs = Raster::new(odd);
     let mut add = |lag: usize, moved: &DMatrix<f64>| {
         for a in 0..odd.len() {
             sums[(0, lag)] += m.column(a).dot(&moved.column(a));
