@@ -182,17 +182,18 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
     Ok(tests)
 }
 
-/// The pattern that names the cause: of those beyond chance that which gains most, or the simplest that removes nearly as much (what is of
-/// second order in a large fault belongs to no first-order column, and many columns take more of it).
+/// The pattern that names the cause: of those beyond chance that which gains most, or the simplest that removes nearly as much of the squares
+/// of the residuals (what is of second order in a large fault belongs to no first-order column, and many columns take more of it).
 pub fn cause<'a>(tests: &'a [PatternTest], limits: &Limits) -> Option<&'a PatternTest> {
     let found = || tests.iter().filter(|t| t.is_found(limits));
     let best = found().max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     if best.pattern == Pattern::Tolerance {
         return Some(best);
     }
+    let removed = |t: &PatternTest| t.rms_px.powi(2);
     let alike = |t: &&PatternTest| {
         t.pattern != Pattern::Tolerance
-            && t.statistic >= limits.pattern_share * best.statistic
+            && removed(t) >= limits.pattern_share * removed(best)
             && t.degrees < best.degrees
     };
     found().filter(alike).min_by_key(|t| t.degrees).or(Some(best))

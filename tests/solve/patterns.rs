@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use robotcal::assess::{FlangeModel, Limits, Pattern, cause, patterns, still, stops};
 use robotcal::diagnose::{ResidualPattern, residual_pattern};
+use robotcal::geom::{Pose, rigid_fit};
 use robotcal::identify::{Options, RobotModel, Solution, identify, stand_alone};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::plan::plate_design::{PlateRequest, design};
@@ -106,6 +107,9 @@ fn a_pattern_is_named_by_its_cause_and_none_where_there_is_none() {
         (Fault::ThinPrism(8e-3), 4),
         (Fault::Field(0.2), 5),
         (Fault::Bow(0.3e-3), 6),
+        (Fault::ThinPrism(2e-2), 7),
+        (Fault::Field(0.5), 8),
+        (Fault::Parallax(5e-3), 9),
     ] {
         let found = stand_alone(&[seen(&world(fault, seed))], &limits).unwrap();
         let tests = patterns(&found.fit, &limits).unwrap();
@@ -120,8 +124,14 @@ fn a_pattern_is_named_by_its_cause_and_none_where_there_is_none() {
     }
 }
 
-/// Flange of two solutions, RMS difference over what tool and base do not take up, and the stated sigma of the first, m.
-fn apart(faulty: &Solution, clean: &Solution) -> [f64; 2] {
+/// The frame of the nominal markers in a plate that is not what they say: their best fit to the true ones.
+fn frame(made: &SimulatedSeries) -> Pose {
+    let pairs = made.plate.markers.iter().zip(&made.true_plate.markers).map(|(a, b)| (a.position_m, b.position_m));
+    rigid_fit(&pairs.collect::<Vec<_>>()).unwrap()
+}
+
+/// Flange of two solutions, each in the frame of its plate, RMS difference over what the tool does not take up, and the stated sigma of the first, m.
+fn apart((faulty, bent): (&Solution, &Pose), (clean, flat): (&Solution, &Pose)) -> [f64; 2] {
     let fit = &faulty.fit;
     let postures = stops(&fit.problem);
     let model = FlangeModel::new(
@@ -135,7 +145,8 @@ fn apart(faulty: &Solution, clean: &Solution) -> [f64; 2] {
     let layout = &fit.problem.layout;
     let values = fit.state.values(layout) - clean.fit.state.values(layout);
     let mut step = values.rows(0, layout.theta_len()).into_owned();
-    let placement = (clean.fit.state.placements[0].inverse() * fit.state.placements[0]).log();
+    let placed = |solution: &Solution, frame: &Pose| solution.fit.state.placements[0] * frame.inverse();
+    let placement = (placed(clean, flat).inverse() * placed(faulty, bent)).log();
     step.rows_mut(layout.placements[0].start, 6).copy_from(&placement);
     model.unwrap().moved_m(&step)
 }
@@ -148,13 +159,17 @@ struct Outcome {
 
 fn outcome(fault: Fault, seed: u64) -> Option<Outcome> {
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
-    let solved = |fault: Fault| identify(chain(), &[seen(&world(fault, seed))], &options).ok();
-    let faulty = solved(fault)?;
+    let solved = |fault: Fault| {
+        let made = world(fault, seed);
+        Some((identify(chain(), &[seen(&made)], &options).ok()?, frame(&made)))
+    };
+    let (faulty, bent) = solved(fault)?;
     let found = residual_pattern(&faulty.fit, &Limits::default());
     let sigmas = if fault == Fault::Clean {
         0.0
     } else {
-        let [moved, sigma] = apart(&faulty, &solved(Fault::Clean)?);
+        let (clean, flat) = solved(Fault::Clean)?;
+        let [moved, sigma] = apart((&faulty, &bent), (&clean, &flat));
         moved / sigma
     };
     Some(Outcome { sigmas, found })
