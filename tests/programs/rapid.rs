@@ -322,3 +322,48 @@ fn displaced_points_are_exact_and_the_points_they_start_from_are_corrected() {
     }
     assert!(complete >= 2, "{complete}");
 }
+
+#[test]
+fn targets_of_an_array_are_corrected_and_what_is_computed_of_it_is_left() {
+    let (tool, base) = frames();
+    let mut cell = Cell::kuka(61);
+    let q: Vec<Vec<f64>> = (0..4).map(|_| cell.readings()).collect();
+    let rows: Vec<String> = q.iter().map(|q| robtarget(&cell, q, &tool, &base, &confdata(q))).collect();
+    let rows = format!("[\n    {}];", rows.join(",\n    "));
+    let text = |moves: &str| {
+        format!(
+            "MODULE m\n{TOOL}{WORK}CONST robtarget pts{{4}}:={rows}\nVAR robtarget grid{{2,2}};\nPROC main()\n{moves}ENDPROC\nENDMODULE\n"
+        )
+    };
+    let told = |moves: &str, code: i32| {
+        let file = cell.write("m.mod", text(moves).as_bytes());
+        let run = cell.compensate(&[&file], &["--unordered"]).expect(code);
+        (run.told(), run.text("m.mod"))
+    };
+    let by_variable = " FOR i FROM 1 TO 4 DO\n  MoveL pts{i},v1,z1,tGun\\WObj:=wTable;\n ENDFOR\n";
+    let by_number = " MoveJ pts{3},v1,z1,tGun\\WObj:=wTable;\n MoveL Offs(pts{3},0,0,0),v1,z1,tGun\\WObj:=wTable;\n";
+    for moves in [by_variable.to_owned(), format!("{by_variable}{by_number}")] {
+        let (said, new) = told(&moves, 0);
+        assert!(said.left.is_empty(), "{said:?}");
+        let [old, new] = [text(&moves), new].map(|t| lines(&t, "    [["));
+        for ((old, new), q) in old.iter().zip(&new).zip(&q) {
+            assert_tool_meets(&cell, &tool, &(base * pose(old)), &(base * pose(new)), q, 1e-6, "element");
+        }
+    }
+    let left = |moves: &str, reason: LeftReason, count: usize| {
+        let (said, new) = told(moves, 1);
+        let found = said.left.iter().filter(|(.., r)| *r == reason.name()).count();
+        assert_eq!(found, count, "{moves}{said:?}");
+        let same = lines(&text(moves), "    [[").iter().zip(&lines(&new, "    [[")).filter(|(a, b)| a == b).count();
+        assert_eq!(same, 4, "{moves}{new}");
+    };
+    // Which of them is assigned to is not followed, nor a displacement from some of them; without confdata nothing tells the posture.
+    left(&format!(" pts{{2}}.trans.z:=5;\n{by_variable}"), LeftReason::Computed, 4);
+    left(" MoveL Offs(pts{i},0,0,9),v1,z1,tGun\\WObj:=wTable;\n", LeftReason::Computed, 1);
+    left(
+        " MoveL grid{1,2},v1,z1,tGun\\WObj:=wTable;\n MoveL pts{7},v1,z1,tGun\\WObj:=wTable;\n",
+        LeftReason::Computed,
+        2,
+    );
+    left(&format!(" ConfL\\Off;\n{by_variable}"), LeftReason::PostureUnknown, 4);
+}

@@ -1,5 +1,6 @@
 //! ABB RAPID: moves to `robtarget` and `jointtarget`, declared or in the instruction, with `tooldata` and `wobjdata` (mm and degrees).
 
+mod array;
 mod switched;
 mod switching;
 mod value;
@@ -24,7 +25,9 @@ use crate::geom::Pose;
 use crate::urdf::JointKind;
 use switched::Watched;
 use switching::{Now, ROUTINES, Switching};
-use value::{Displacement, NO_AXIS, Node, check, computed, foreign_axis, frame, node, numbers, undeclared};
+use value::{
+    Displacement, NO_AXIS, Node, array_of, check, computed, element, foreign_axis, frame, node, numbers, undeclared,
+};
 
 const DIALECT: Dialect = Dialect { comment: b'!', quotes: b"\"", header: None, based_numbers: false };
 /// Beginnings of the names of instructions that move the robot to their first arguments.
@@ -125,10 +128,12 @@ impl Task<'_> {
             if TYPES.contains(&word.as_str()) && reader.word().is_some() {
                 self.declaration(&mut reader, word)?;
             } else if self.data.contains_key(&word) {
+                let is_value = reader.ahead_is_mark(-2, b'\\');
+                element(&mut reader, String::new());
                 let assigned = reader.is_mark(b':') && reader.ahead_is_mark(1, b'=');
                 let component = reader.is_mark(b'.');
-                if (assigned && !reader.ahead_is_mark(-2, b'\\')) || component {
-                    self.data.entry(word).and_modify(|d| d.value = None);
+                if (assigned && !is_value) || component {
+                    self.is_assigned(&word);
                 }
             }
         }
@@ -139,10 +144,12 @@ impl Task<'_> {
     fn declaration(&mut self, reader: &mut Reader<'_>, kind: String) -> Result<()> {
         let (Some(name), line) = (reader.name(), reader.line()) else { return Ok(()) };
         reader.at += 1;
-        let array = reader.is_mark(b'{');
+        let is_array = reader.is_mark(b'{');
+        let has_rows = is_array && reader.ahead_is_mark(2, b'}');
+        element(reader, String::new());
         let has_value = reader.is_mark(b':') && reader.ahead_is_mark(1, b'=');
         let mut value = None;
-        if has_value && !array {
+        if has_value && (has_rows || !is_array) {
             reader.at += 2;
             reader.skip_line_ends();
             let (place, read) = (reader.place(), node(reader)?);
@@ -151,8 +158,10 @@ impl Task<'_> {
                 let what = format!("{name} does not end with a semicolon");
                 return Err(Error::new(Code::ProgramSyntax, place, what, "write TYPE name:=[..];"));
             }
-            check(&kind, &name, &read, &place)?;
-            value = Some(read);
+            if !is_array {
+                check(&kind, &name, &read, &place)?;
+            }
+            value = Some((read, place));
         }
         let twin = self.data.get(&name);
         if let Some(twin) = twin.filter(|t| t.file != reader.index) {
@@ -165,8 +174,15 @@ impl Task<'_> {
             ));
         }
         // Two data of one name in one file belong to different routines.
-        let value = if twin.is_some() { None } else { value };
-        self.data.insert(name, Datum { kind, file: reader.index, line, value });
+        let datum = Datum { kind, file: reader.index, line, value: None };
+        let is_twin = twin.is_some();
+        if is_twin {
+            self.is_assigned(&name);
+        } else if let (true, Some((rows, place))) = (is_array, &value) {
+            self.elements_declared(&name, &datum, rows, place)?;
+        }
+        let value = value.filter(|_| !is_twin && !is_array).map(|(value, _)| value);
+        self.data.insert(name, Datum { value, ..datum });
         Ok(())
     }
 
@@ -312,16 +328,26 @@ impl Task<'_> {
                 check(kind, name, value, &place)?;
                 (value.clone(), from, name.to_owned())
             }
-            Node::Word(word) => match self.data.get(word) {
-                Some(Datum { value: Some(value), file, line, .. }) => (value.clone(), (*file, *line), word.clone()),
-                Some(_) => return Ok(Err(computed(word))),
-                None => return Ok(Err(undeclared(word))),
+            Node::Word(word) => match (word.strip_suffix("{}"), self.declared(word)) {
+                (Some(array), _) => return self.visit_any(array, name, from, tool, work),
+                (_, Ok((value, place))) => (value, place, word.clone()),
+                (_, Err(why)) => return Ok(Err(why)),
             },
             _ => return Ok(Err(Why::computed())),
         };
         let kind = self.kind(&value, place.0, tool.as_deref(), work);
         let about = |why: Why| Why { about: Some(named.clone()), ..why };
         Ok(kind.map_err(about).and_then(|kind| self.add(named, place, self.with_posture(kind, name))))
+    }
+
+    /// The numbers of a declared target, and where they stand: file and line.
+    fn declared(&self, word: &str) -> Understood<(Node, (usize, usize))> {
+        match self.data.get(word) {
+            Some(Datum { value: Some(value), file, line, .. }) => Ok((value.clone(), (*file, *line))),
+            Some(_) => Err(computed(word)),
+            None if array_of(word).is_some_and(|array| self.data.contains_key(array)) => Err(computed(word)),
+            None => Err(undeclared(word)),
+        }
     }
 
     /// The posture that a kind of move gives a target.
@@ -352,11 +378,7 @@ impl Task<'_> {
             .by
             .clone()
             .ok_or_else(|| Why::new(LeftReason::Computed, "its displacement is computed, not written in numbers"))?;
-        let (value, file, line) = match self.data.get(point) {
-            Some(Datum { value: Some(value), file, line, .. }) => (value.clone(), *file, *line),
-            Some(_) => return Err(computed(point)),
-            None => return Err(undeclared(point)),
-        };
+        let (value, (file, line)) = self.declared(point)?;
         let base = self.kind(&value, file, tool, work)?;
         let base = self.with_posture(base, name);
         let place = (file, base.first_byte());
@@ -539,7 +561,9 @@ impl Task<'_> {
         for (name, datum) in all.into_iter().filter(|(_, d)| d.kind.ends_with("TARGET")) {
             let seen =
                 self.way.program.targets.iter().any(|t| t.file == datum.file && t.line == datum.line && t.name == name);
-            let known = self.way.program.left.iter().any(|l| l.why.about.as_deref() == Some(&name));
+            let some = array_of(&name).map(|array| format!("{array}{{}}"));
+            let about = |left: &Left| left.why.about.as_ref().is_some_and(|a| *a == name || Some(a) == some.as_ref());
+            let known = self.way.program.left.iter().any(about);
             let Some(value) = datum.value.filter(|_| !seen && (!known || self.bases.contains_key(&name))) else {
                 continue;
             };

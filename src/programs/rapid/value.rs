@@ -51,8 +51,9 @@ pub(super) fn displacement(reader: &mut Reader<'_>) -> Option<Displacement> {
     let close = reader.closing(reader.at + 1).filter(|_| reader.ahead_is_mark(1, b'('))?;
     reader.at += 2;
     reader.skip_line_ends();
-    let point = reader.name().filter(|_| reader.ahead_is_mark(1, b','));
+    let name = reader.name();
     reader.at += 1;
+    let point = name.map(|name| element(reader, name)).filter(|_| reader.is_mark(b','));
     let mut by = Vec::new();
     while reader.at < close && reader.take_mark(b',') {
         reader.skip_line_ends();
@@ -93,6 +94,20 @@ pub(super) fn displacement(reader: &mut Reader<'_>) -> Option<Displacement> {
     Some(Displacement { of_tool, point: point?, by, turned, missing_at, file: reader.index })
 }
 
+/// Behind a name: `{3}` names an element, anything else in braces some element. The reader ends behind the braces.
+pub(super) fn element(reader: &mut Reader<'_>, name: String) -> String {
+    let Some(close) = reader.closing(reader.at).filter(|_| reader.is_mark(b'{')) else { return name };
+    reader.at += 1;
+    let number = reader.take_number().filter(|_| reader.at == close);
+    reader.at = close + 1;
+    format!("{name}{{{}}}", number.map_or(String::new(), |(value, _)| value.to_string()))
+}
+
+/// The array of the name of an element.
+pub(super) fn array_of(name: &str) -> Option<&str> {
+    name.split_once('{').map(|(array, _)| array)
+}
+
 /// A value in the text; the reader ends behind it.
 ///
 /// # Errors
@@ -107,7 +122,7 @@ pub(super) fn node(reader: &mut Reader<'_>) -> Result<Node> {
             return Ok(Node::DisplacedTarget(Box::new(displaced)));
         }
         reader.at = at + 1;
-        return Ok(name.map_or(Node::Other, Node::Word));
+        return Ok(name.map_or(Node::Other, |name| Node::Word(element(reader, name))));
     }
     let Some(close) = reader.closing(reader.at) else {
         return Err(Error::new(Code::ProgramSyntax, reader.place(), "a list [ is not closed", "close it with ]"));

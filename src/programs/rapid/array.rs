@@ -1,0 +1,50 @@
+//! Arrays of targets: `TYPE name{3} := [..]`, of which moves use one by its number or any by a variable.
+
+use super::value::{Node, array_of, check, computed};
+use super::{Datum, Task};
+use crate::error::Result;
+use crate::programs::program::Understood;
+
+impl Task<'_> {
+    /// The elements of an array as data of their own, where it has numbers and one dimension.
+    pub(super) fn elements_declared(&mut self, name: &str, datum: &Datum, values: &Node, place: &str) -> Result<()> {
+        let Node::List(values) = values else { return Ok(()) };
+        for (k, value) in values.iter().enumerate() {
+            let element = format!("{name}{{{}}}", k + 1);
+            check(&datum.kind, &element, value, place)?;
+            let value = (!self.data.contains_key(&element)).then(|| value.clone());
+            self.data.insert(element, Datum { value, ..datum.clone() });
+        }
+        Ok(())
+    }
+
+    /// Data of a name, or of the elements of an array, are computed.
+    pub(super) fn is_assigned(&mut self, name: &str) {
+        let own = |key: &String| key == name || array_of(key) == Some(name);
+        self.data.iter_mut().filter(|(key, _)| own(key)).for_each(|(_, datum)| datum.value = None);
+    }
+
+    /// A move to some element of an array: to all of them, in an order that the text does not tell.
+    pub(super) fn visit_any(
+        &mut self,
+        array: &str,
+        name: &str,
+        from: (usize, usize),
+        tool: &Option<String>,
+        work: Option<&Node>,
+    ) -> Result<Understood<()>> {
+        let mut elements: Vec<String> = self.data.keys().filter(|k| array_of(k) == Some(array)).cloned().collect();
+        elements.sort_by_key(|e| (e.len(), e.clone()));
+        if elements.is_empty() {
+            return Ok(Err(computed(array)));
+        }
+        for element in elements {
+            self.way.lose();
+            if let Err(why) = self.visit(&Node::Word(element), name, from, tool, work)? {
+                self.leave(from, name, why);
+            }
+        }
+        self.way.lose();
+        Ok(Ok(()))
+    }
+}
