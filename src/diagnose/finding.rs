@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::camera_model::CameraModelMisfit;
 use super::camera_pattern::ResidualPattern;
+use super::computed_postures::ComputedPostures;
 use super::displaced::Displaced;
 use super::exchanged_readings::ExchangedReadings;
 use super::extrapolates::Extrapolates;
@@ -59,6 +60,7 @@ macro_rules! findings {
 
 findings! {
     CameraModelMisfit,
+    ComputedPostures,
     ContradictedLengths,
     Displaced,
     DoubtedSize,

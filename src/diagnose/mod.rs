@@ -6,6 +6,7 @@
 mod camera_model;
 mod camera_pattern;
 mod checks;
+mod computed_postures;
 mod displaced;
 mod exchanged_readings;
 mod extrapolates;
@@ -38,6 +39,7 @@ mod zeros_off;
 pub use camera_model::CameraModelMisfit;
 pub use camera_pattern::{ResidualPattern, residual_pattern};
 pub use checks::{CHECKS, Check, Diagnosis, Stage};
+pub use computed_postures::ComputedPostures;
 pub use displaced::{Carried, Displaced, Displacement};
 pub use exchanged_readings::ExchangedReadings;
 pub use extrapolates::Extrapolates;

@@ -1,18 +1,26 @@
 //! Poses of a controller to readings of a chain: in closed form where its joints are the coordinates of a pose, else by inverse kinematics
 //! of the nominal robot.
 
+use std::f64::consts::TAU;
+
 use rand::SeedableRng;
 use rand::rngs::SmallRng;
+use rayon::prelude::*;
 
 use crate::error::{Code, Error, Notice, Result};
 use crate::geom::Pose;
 use crate::model::inverse::{random_readings, reading_limits, solve_from};
 use crate::model::robot::Robot;
+use crate::problem::MeasuredStop;
 use crate::series::{ControllerPoses, Series};
-use crate::urdf::Chain;
+use crate::urdf::{Chain, JointKind};
 
 /// Random starts from which a posture is looked for.
 const STARTS: usize = 200;
+/// Postures of an arm of six joints that reach a pose, at most (E. Primrose 1986).
+const MOST_POSTURES: usize = 15;
+/// Readings that are nearer are the same, rad or m.
+const SAME: f64 = 1e-3;
 /// Poses that tell whether the poses of a series can be reached.
 const TRIED: usize = 8;
 
@@ -31,11 +39,24 @@ pub fn readings_of(series: &Series, chain: &Chain) -> Result<Vec<Option<Vec<f64>
     }
 }
 
+/// Where readings were computed: other postures that reach the pose of every stop, as near to its readings as full turns bring them. None of an
+/// arm with more joints than a pose has coordinates, and of a pose where axes meet: they are without number.
+pub(super) fn other_postures(series: &Series, chain: &Chain, stops: &[MeasuredStop]) -> Vec<Vec<Vec<f64>>> {
+    let poses = series.controller.as_ref().filter(|_| chain.pose_coordinates().is_none() && chain.readings.len() <= 6);
+    let Some(poses) = poses else { return Vec::new() };
+    let arm = Arm::of(chain);
+    let of = |(pose, stop): (&Option<Pose>, &MeasuredStop)| match (pose, &stop.readings) {
+        (Some(pose), Some(readings)) if !stop.observations.is_empty() => arm.others(pose, readings),
+        _ => Vec::new(),
+    };
+    poses.base_from_flange.par_iter().zip(stops).map(of).collect()
+}
+
 /// What to say of postures that were not read.
 pub(super) fn notice(series: &Series, chain: &Chain) -> Option<Notice> {
     let is_computed = series.controller.is_some() && chain.pose_coordinates().is_none();
-    let what = "has poses: the joint readings are those with which the nominal robot reaches them, in the posture nearest to that of the stop \
-                before, and for the first stop nearest to the middle of its limits";
+    let what = "has poses: the joint readings are those with which the nominal robot reaches them, in the posture that the images \
+                tell, else in that nearest to the stop before, and at the first stop nearest to the middle of the limits";
     let remedy = "record joint readings (joints.csv) where the controller tells them: they know the posture, and the model in the controller \
                   plays no part then";
     is_computed.then(|| Notice::new(Code::PosturesFromPoses, series.readings_file().display(), what, remedy))
@@ -88,6 +109,25 @@ impl Arm {
         let start = |_| random_readings(&self.limits, &self.robot.chain.reading_kinds, &mut rng);
         let starts: Vec<Vec<f64>> = (0..STARTS).map(start).collect();
         starts.iter().filter_map(|s| solve_from(&self.robot, &self.limits, pose, s)).collect()
+    }
+
+    /// Other postures that reach the pose of some readings; none where they are without number.
+    fn others(&self, pose: &Pose, readings: &[f64]) -> Vec<Vec<f64>> {
+        let kinds = &self.robot.chain.reading_kinds;
+        let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - b).abs() > SAME);
+        let mut all: Vec<Vec<f64>> = Vec::new();
+        for mut found in self.postures_of(pose) {
+            for ((q, near), ((low, high), kind)) in found.iter_mut().zip(readings).zip(self.limits.iter().zip(kinds)) {
+                let turned = *q + TAU * ((near - *q) / TAU).round();
+                if *kind != JointKind::Prismatic && (*low..=*high).contains(&turned) {
+                    *q = turned;
+                }
+            }
+            if apart(&found, readings) && all.iter().all(|other| apart(&found, other)) {
+                all.push(found);
+            }
+        }
+        if all.len() > MOST_POSTURES { Vec::new() } else { all }
     }
 
     /// Whether most of the poses can be reached.

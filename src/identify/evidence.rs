@@ -6,6 +6,7 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
+use super::computed_postures::told_by_images;
 use super::estimator::Estimator;
 use super::joint::{JointFit, fit_model};
 use super::lens_choice::{self, Lensed, with_lenses};
@@ -42,7 +43,9 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let by_joint_fit = Options { model, estimator: Estimator::Joint, ..options.clone() };
     let robot = model.robot_with(chain.clone(), options.harmonics);
     let series = &turns::settled(&robot, series, &options.limits);
-    let Lensed { fit: full, series, lenses, notices } = with_lenses(&chain, series, &by_joint_fit)?;
+    let rigid = RobotModel::Rigid.robot_with(chain.clone(), options.harmonics);
+    let (series, of_postures) = told_by_images(&rigid, series, options);
+    let Lensed { fit: full, series, lenses, notices } = with_lenses(&chain, &series, &by_joint_fit)?;
     let (chosen, evidences) = match options.model_is_open() {
         true => best_model(chain.clone(), &series, options, full)?,
         false => (full, Vec::new()),
@@ -50,6 +53,7 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let chosen = near_nominal(chain, &series, options, chosen)?;
     let mut solution = Solution { evidences, lenses, ..chosen.judged(&series, options.estimator)? };
     solution.findings.extend(notices.into_iter().map(Into::into));
+    solution.findings.extend(of_postures.map(Into::into));
     let losses = lens_choice::losses(&solution);
     solution.findings.extend(losses.into_iter().map(Into::into));
     Ok(Solution { options: options.clone(), ..solution })

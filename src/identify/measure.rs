@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::bodies_measured::{seen_bodies, seen_lengths};
-use super::controller_readings::{self, readings_of};
+use super::controller_readings::{self, other_postures, readings_of};
 use super::detections::{
     SeenSeries, Unused, detect_stops, flat_field_drift, no_images, recording, require_some, several_cameras,
 };
@@ -97,7 +97,8 @@ pub fn measure(
     // The detector measures centroids, whatever observations would mean.
     let centroid = found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid;
     let measured = measured_series(series, lens, (width_px, height_px), centroid, stops);
-    Ok(MeasuredWithNotices { series: MeasuredSeries { plate, bodies, lengths, ..measured }, notices })
+    let postures = other_postures(series, chain, &measured.stops);
+    Ok(MeasuredWithNotices { series: MeasuredSeries { plate, bodies, lengths, postures, ..measured }, notices })
 }
 
 /// What was measured in space alone: touches, and what a tracker saw. Images are not looked at.

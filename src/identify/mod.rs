@@ -7,6 +7,7 @@ mod bodies_start;
 mod build;
 mod compare;
 mod comparison;
+mod computed_postures;
 mod controller_readings;
 mod detections;
 mod dry_run;

@@ -38,6 +38,7 @@ pub(super) fn measured_series(
         bodies: Vec::new(),
         lengths: Vec::new(),
         order_known: series.manifest.robot.order == StopOrder::Visited,
+        postures: Vec::new(),
         otherwise: series.controller.as_ref().map(|c| c.otherwise.clone()).unwrap_or_default(),
         stops,
     }

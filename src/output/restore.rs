@@ -141,6 +141,7 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
             lengths,
             order_known: s.order_known,
             otherwise: Vec::new(),
+            postures: Vec::new(),
             stops: stops.map(|(row, i)| stop(row, i, &s.name, &placements)).collect::<Result<_>>()?,
         })
     });

@@ -75,6 +75,8 @@ pub struct MeasuredSeries {
     pub order_known: bool,
     /// Poses of a controller with a mistake undone, for each mistake that is usual; one a stop.
     pub otherwise: Vec<ReadOtherwise>,
+    /// Where readings were computed from poses of a controller: other readings with which the nominal robot reaches the pose, for every stop.
+    pub postures: Vec<Vec<Vec<f64>>>,
     /// False for a series without images: what it says of camera and plate is not used.
     pub has_images: bool,
     /// Stops in the order of the rows.
@@ -105,6 +107,7 @@ impl MeasuredSeries {
             plate_name: String::new(),
             order_known,
             otherwise: Vec::new(),
+            postures: Vec::new(),
             has_images: false,
             stops,
             bodies: Vec::new(),

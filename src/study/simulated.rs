@@ -43,6 +43,7 @@ pub fn measured(series: &SimulatedSeries, chain: &Chain) -> MeasuredSeries {
         bodies: Vec::new(),
         lengths: Vec::new(),
         order_known: series.manifest.robot.order == StopOrder::Visited,
+        postures: Vec::new(),
         otherwise: Vec::new(),
         stops,
     }

@@ -185,6 +185,7 @@ fn series_where(
         plate,
         plate_name: "/somewhere/run1/plate.toml".into(),
         order_known: true,
+        postures: Vec::new(),
         otherwise: Vec::new(),
         stops,
     }

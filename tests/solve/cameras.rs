@@ -122,6 +122,7 @@ fn seen_displaced(mounts: &[CameraMount], wanted: usize, seed: u64, sizes: [f64;
         plate: plate.clone(),
         plate_name: format!("plate {:?}", mounts[k]),
         order_known: true,
+        postures: Vec::new(),
         otherwise: Vec::new(),
         has_images: true,
         bodies: Vec::new(),

@@ -1,15 +1,20 @@
 //! Poses of a controller in the place of joint readings: what is found without a robot, and the mistakes that are named.
 
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix6, Vector6};
 use robotcal::calibration::{Calibration, Ends, Export, Inputs};
+use robotcal::diagnose::Finding;
 use robotcal::geom::{Pose, log_so3};
-use robotcal::identify::Options;
+use robotcal::identify::{Options, RobotModel, identify};
 use robotcal::model::robot::Robot;
+use robotcal::plan::plate_design::{PlateRequest, design};
 use robotcal::simulate::truth::Truth;
+use robotcal::simulate::{WorldRequest, series as simulated};
+use robotcal::study::measured;
 use robotcal::{Code, Error};
 use tempfile::TempDir;
 
@@ -200,4 +205,64 @@ fn postures_of_poses_identify_the_robot_of_a_urdf() {
     let error = robotcal::identify::readings_of(&robotcal::series::read(folder.path()).unwrap(), &chain).unwrap_err();
     assert_eq!(error.code, Code::PoseOutOfReach);
     assert!(error.place.contains("controller.csv:2") && error.place.contains("img_000.png"), "{error}");
+}
+
+/// Largest difference of two postures but for full turns, rad.
+fn posture_difference(a: &[f64], b: &[f64]) -> f64 {
+    let turned = |(a, b): (&f64, &f64)| ((a - b) - TAU * ((a - b) / TAU).round()).abs();
+    a.iter().zip(b).map(turned).fold(0.0, f64::max)
+}
+
+/// The stops of the dataset are in all postures, the nearest of which is right by chance.
+#[test]
+fn the_images_tell_in_which_posture_a_pose_was_reached() {
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf");
+    let joints = robotcal::series::read(&dataset()).unwrap();
+    let chain = Inputs::read(&urdf, &[dataset()], Ends::default()).unwrap().chain;
+    let robot = Robot::nominal(chain.clone());
+    let readings: Vec<Vec<f64>> = joints.readings_for(&chain).unwrap().into_iter().flatten().collect();
+    let poses: Vec<(String, Pose)> =
+        (joints.stops.stops.iter().zip(&readings)).map(|(s, q)| (s.image.clone(), robot.base_from_tip(q))).collect();
+    let folder = series("quaternion", "qx,qy,qz,qw", &poses, quaternion);
+    let right = |found: Vec<&[f64]>| {
+        found.into_iter().zip(&readings).filter(|(found, read)| posture_difference(found, read) < 1e-3).count()
+    };
+    let nearest = robotcal::identify::readings_of(&robotcal::series::read(folder.path()).unwrap(), &chain).unwrap();
+    let nearest = right(nearest.iter().flatten().map(Vec::as_slice).collect());
+    let inputs = Inputs::read(&urdf, &[folder.path().to_path_buf()], Ends::default()).unwrap();
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let calibration = Calibration::of(inputs.observe(&|_, _| ()).unwrap(), &options).unwrap();
+    let solution = calibration.solution();
+    let told = right(solution.series[0].stops.iter().filter_map(|s| s.readings.as_deref()).collect());
+    println!("nearest {nearest}, told {told} of {}", readings.len());
+    assert!(nearest < readings.len() / 2 && told + 1 >= readings.len(), "{nearest}, {told}");
+    assert!(solution.findings.iter().any(|f| f.code() == Code::PosturesByImages));
+}
+
+#[test]
+fn a_wrist_turned_over_at_all_stops_is_told_to_be_open() {
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let chain = robotcal::urdf::read(&urdf).unwrap().chain(Some("base_link"), Some("link_6")).unwrap();
+    let plate = design(&PlateRequest { markers: Some(60), ..PlateRequest::default() }).unwrap().plate;
+    let made = simulated(&WorldRequest { images: 24, seed: 4, ..WorldRequest::typical(chain.clone(), plate) }).unwrap();
+    let mut seen = measured(&made, &chain);
+    let truth: Vec<Vec<f64>> = seen.stops.iter().map(|s| s.readings.clone().unwrap()).collect();
+    let turned_over =
+        |q: &[f64]| [q[0], q[1], q[2], q[3] - PI * q[3].signum(), -q[4], q[5] - PI * q[5].signum()].to_vec();
+    let robot = Robot::nominal(chain.clone());
+    for (k, (stop, q)) in seen.stops.iter_mut().zip(&truth).enumerate() {
+        let other = turned_over(q);
+        let (angle, distance) = robot.base_from_tip(q).distance(&robot.base_from_tip(&other));
+        assert!(angle < 1e-6 && distance < 1e-6, "{angle}, {distance}");
+        let [first, second] = if k % 3 == 1 { [other, q.clone()] } else { [q.clone(), other] };
+        stop.readings = Some(first);
+        seen.postures.push(vec![second]);
+    }
+    let solution = identify(chain, &[seen], &Options::default()).unwrap();
+    let told = solution.series[0].stops.iter().zip(&truth);
+    let right = told.filter(|(s, q)| posture_difference(s.readings.as_ref().unwrap(), q) < 1e-3).count();
+    assert_eq!(right, truth.len());
+    let finding = solution.findings.iter().find(|f| f.code() == Code::PosturesByImages).unwrap();
+    let Finding::ComputedPostures(found) = finding else { panic!("{finding}") };
+    assert!(found.is_open && found.others.len() == 8 && found.stops == 24, "{finding}");
 }

@@ -113,6 +113,7 @@ fn world(seed: u64, images: usize) -> World {
         plate,
         plate_name: "plate".into(),
         order_known: true,
+        postures: Vec::new(),
         otherwise: Vec::new(),
         has_images: true,
         bodies: Vec::new(),

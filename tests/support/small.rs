@@ -370,6 +370,7 @@ pub fn series(problem: &Problem) -> MeasuredSeries {
         centroid: true,
         plate_name: "plate".into(),
         order_known: false,
+        postures: Vec::new(),
         otherwise: Vec::new(),
         has_images: true,
         bodies: Vec::new(),

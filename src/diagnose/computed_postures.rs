@@ -1,0 +1,70 @@
+//! Which postures were taken for poses of a controller?
+
+use super::kind::{Kind, Quantity, Subject, Weight, some_of};
+use crate::error::Code;
+
+/// Stops that are named.
+const NAMED: usize = 6;
+
+/// What the images say of postures that were computed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComputedPostures {
+    /// Series.
+    pub series: String,
+    /// Its stops.
+    pub stops: usize,
+    /// Images at whose stops another posture is taken than that nearest to the stop before.
+    pub others: Vec<String>,
+    /// True where other postures at many stops together fit as well.
+    pub is_open: bool,
+}
+
+impl Kind for ComputedPostures {
+    fn code(&self) -> Code {
+        Code::PosturesByImages
+    }
+
+    fn weight(&self) -> Weight {
+        Weight::Note
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        let images = self.others.iter().cloned().map(Subject::Image);
+        std::iter::once(Subject::Series(self.series.clone())).chain(images).collect()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        let count = |name: &str, n: usize| Quantity::new(name, n as f64, "1");
+        vec![
+            count("stops", self.stops),
+            count("in_another_posture", self.others.len()),
+            count("others_fit_as_well", usize::from(self.is_open)),
+        ]
+    }
+
+    fn place(&self) -> String {
+        format!("series {}", self.series)
+    }
+
+    fn seen(&self) -> String {
+        let others = match self.others.len() {
+            0 => "the images fit the postures nearest to those of the stops before".to_owned(),
+            count => format!(
+                "at {count} of {} stops the images fit another posture than that nearest to the stop before, which is taken: {}",
+                self.stops,
+                some_of(&self.others, NAMED)
+            ),
+        };
+        let open = match self.is_open {
+            true => {
+                "; other postures at many stops together (a wrist turned over) fit as well: the corrected robot is right for those that were taken"
+            }
+            false => "",
+        };
+        format!("{others}{open}")
+    }
+
+    fn remedy(&self) -> String {
+        "record joint readings (joints.csv): they know the posture".into()
+    }
+}
