@@ -10,6 +10,7 @@ use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
+use crate::model::plate_modes::DOT_GAIN;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
     Adjustment, DISPLACEMENT_SIZES, Family, Image, ImageRejection, Layout, Mark, MarkerObservation, MeasuredSeries,
@@ -122,6 +123,11 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         own.into_iter().flatten().for_each(|c| layout.columns[c].free = false);
     }
     bodies.hold_unseen_turns(&mut layout);
+    for (plate, shape) in layout.shapes.clone().into_iter().enumerate() {
+        let is_circle = |o: &MarkerObservation| o.mark != Mark::Corner;
+        let own = images.iter().filter(|image| image.plate == plate);
+        layout.columns[shape.start + DOT_GAIN].free = own.flat_map(|i| i.observations.iter()).any(is_circle);
+    }
     let noise = Noise {
         pixel_factor: vec![1.0; cameras.len()],
         joint: vec![vec![FIRST_JOINT_NOISE; readings]; runs],

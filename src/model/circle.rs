@@ -83,6 +83,8 @@ pub struct Prediction {
     pub d_pose: SMatrix<f64, 6, 2>,
     /// With respect to the marker's centre in the plate frame, px/m.
     pub d_marker: Matrix2x3<f64>,
+    /// With respect to the radius of the circle.
+    pub d_radius: Vector2<f64>,
     /// With respect to the parameters of pinhole and lens formula: of the column, and of the row.
     pub d_camera: SMatrix<f64, MAX_PARAMETERS, 2>,
     /// With respect to the displacement field: control points that it touches, ascending, with the derivative by their u and v.
@@ -99,7 +101,8 @@ pub fn point(camera: &Camera, camera_from_plate: &Pose, x: &Vector3<f64>) -> Opt
         true => field_columns(camera, std::iter::once((p.by_formula, Matrix2::identity()))),
         false => Vec::new(),
     };
-    Some(Prediction { uv: p.uv, d_pose, d_marker, d_camera: p.d_parameters.transpose(), d_field })
+    let d_radius = Vector2::zeros();
+    Some(Prediction { uv: p.uv, d_pose, d_marker, d_radius, d_camera: p.d_parameters.transpose(), d_field })
 }
 
 /// Predicts the area centroid of the image of a circle of `radius_m` about `centre` (plate frame, m), parallel to the
@@ -197,7 +200,8 @@ impl Sums {
             along.column(0) - across.column(1),
         ]);
         let d_pose = by_twist(&d_marker, &(-d_turn - d_marker * skew(centre)));
-        Prediction { uv, d_pose, d_marker, d_camera: self.d_camera, d_field: Vec::new() }
+        let d_radius = (across.column(0) + along.column(1)) / radius_m;
+        Prediction { uv, d_pose, d_marker, d_radius, d_camera: self.d_camera, d_field: Vec::new() }
     }
 }
 

@@ -3,13 +3,19 @@
 use nalgebra::{SMatrix, Vector3};
 
 /// Number of modes.
-pub const MODES: usize = 6;
+pub const MODES: usize = 7;
 
-/// Names of the modes. Scale, aspect and skew are dimensionless; bows are heights in metres at the half-diagonal.
-pub const NAMES: [&str; MODES] = ["scale", "aspect", "skew", "bow_xx", "bow_xy", "bow_yy"];
+/// The mode by which everything on the plate grows, radii of circles as well.
+pub const SCALE: usize = 0;
+
+/// The mode by which the radii of circles grow, those of inner edges shrink; it moves no marker. Ink spreads by hundredths of a millimetre.
+pub const DOT_GAIN: usize = 6;
+
+/// Names of the modes. Scale, aspect and skew are dimensionless; bows are heights in metres at the half-diagonal, the dot gain is in metres.
+pub const NAMES: [&str; MODES] = ["scale", "aspect", "skew", "bow_xx", "bow_xy", "bow_yy", "dot_gain"];
 
 /// Default prior sigma of each mode.
-pub const PRIOR_SIGMA: [f64; MODES] = [1e-4, 1e-4, 1e-4, 3e-4, 3e-4, 3e-4];
+pub const PRIOR_SIGMA: [f64; MODES] = [1e-4, 1e-4, 1e-4, 3e-4, 3e-4, 3e-4, 1e-4];
 
 /// Displacement of a marker (m) per unit of each mode, one column a mode.
 ///

@@ -82,10 +82,11 @@ impl Weighting {
 
 /// Prediction of one observation; `None` where the marker is behind the camera.
 pub fn predict(image: &Image, state: &State, pose: &Pose, observation: &MarkerObservation) -> Option<Prediction> {
-    let position = state.plates[image.plate].position(observation.marker);
+    let plate = &state.plates[image.plate];
+    let position = plate.position(observation.marker);
     wide(
         #[inline(always)]
-        || observation.mark.predict(&state.cameras[image.camera], pose, &position),
+        || observation.predict(&state.cameras[image.camera], pose, &position, observation.radius(&plate.modes).0),
     )
 }
 
@@ -141,7 +142,8 @@ fn whitened(
     let mut stated = (Matrix2::zeros(), Matrix2::zeros());
     for (observation, o) in used.step_by(weighting.every) {
         let modes = plate.modes_at(o.marker);
-        let p = o.mark.predict(camera, pose, &plate.position_by(&modes, o.marker))?;
+        let (radius_m, radius_by_modes) = o.radius(&plate.modes);
+        let p = o.predict(camera, pose, &plate.position_by(&modes, o.marker), radius_m)?;
         let duv = o.uv - p.uv;
         // Observations one after the other are often alike.
         if stated.0 != o.information {
@@ -151,7 +153,7 @@ fn whitened(
         let normalised = (root * duv).norm();
         let (cost, weight) = weighting.huber(normalised);
         let weighted = if weight < 1.0 { root * weight.sqrt() } else { root };
-        equations.add(o.marker, &p, &modes, &duv, &weighted);
+        equations.add(o.marker, &p, (&modes, &radius_by_modes), &duv, &weighted);
         tell(cost, Residual { observation, duv, normalised, weight });
     }
     Some(equations.finish())

@@ -27,6 +27,7 @@ mod state;
 mod step;
 mod stop;
 
+pub use crate::model::plate_modes::SCALE;
 pub use adjustment::Adjustment;
 pub use body::{
     BodyMeasurement, BodyRejection, BodySeen, BodyTerms, Instrument, InstrumentKind, body_bound, places_body,
@@ -44,9 +45,7 @@ pub use linearise::{
 pub use measured::{Mark, MarkerObservation};
 pub use measured_series::{KnownCamera, LensChoice, MeasuredSeries, MeasuredStop, SeenBody, SeenLength, intern};
 pub use noise::Noise;
-pub use plate_distance::{
-    PlateDistance, SCALE, UNKNOWN_SCALE, release_measured_scales, seen_markers, size_by_distance,
-};
+pub use plate_distance::{PlateDistance, UNKNOWN_SCALE, release_measured_scales, seen_markers, size_by_distance};
 pub use postures::{common_readings, joined, posture_groups, related_readings};
 pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};
 pub use restraint::{JointPrior, Restraint};

@@ -8,11 +8,8 @@ use std::collections::BTreeSet;
 use nalgebra::{SVector, Vector3};
 
 use super::{Layout, PlateShape, Problem};
-use crate::model::plate_modes::MODES;
+use crate::model::plate_modes::{MODES, SCALE};
 use crate::series::{Plate, ScaleBar};
-
-/// Index of the scale among the modes of a plate.
-pub const SCALE: usize = 0;
 
 /// Prior sigma of a scale of which nothing is known.
 pub const UNKNOWN_SCALE: f64 = 0.1;

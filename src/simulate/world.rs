@@ -21,7 +21,7 @@ use crate::detect::Picture;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::joint_terms::{JointTerm, Term, USUAL_HARMONICS};
-use crate::model::plate_modes::{PRIOR_SIGMA, basis};
+use crate::model::plate_modes::{DOT_GAIN, MODES, PRIOR_SIGMA, basis};
 use crate::model::robot::{Posture, Robot};
 use crate::series::{AngleUnit, CameraSection, ImageObservations, Manifest, Plate, SeriesStop, Stops};
 use crate::urdf::JointKind;
@@ -103,7 +103,9 @@ fn true_plate(request: &WorldRequest, rng: &mut impl Rng) -> Plate {
     let mut plate = request.plate.clone();
     if request.plate_modes {
         let half_diagonal = plate.markers.iter().map(|m| m.position_m.norm()).fold(0.0, f64::max);
-        let modes = nalgebra::SVector::from(PRIOR_SIGMA.map(|sigma| normal(sigma, rng)));
+        let mut modes = nalgebra::SVector::<f64, MODES>::zeros();
+        // Circles keep their radii.
+        modes.iter_mut().zip(PRIOR_SIGMA).take(DOT_GAIN).for_each(|(mode, sigma)| *mode = normal(sigma, rng));
         for marker in &mut plate.markers {
             marker.position_m += basis(&marker.position_m, half_diagonal) * modes;
         }

@@ -10,6 +10,7 @@ use robotcal::geom::{Pose, exp_so3, log_so3, right_jacobian_se3, right_jacobian_
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::circle;
 use robotcal::model::joint_terms::Term;
+use robotcal::model::plate_modes::MODES;
 use robotcal::problem::{
     Adjustment, E, Image, Problem, State, TakenFrom, Tie, Weighting, equations, linearise, predict,
 };
@@ -213,15 +214,15 @@ fn projection_through_a_displacement_field() {
     assert!(seen > 10 && beyond > 3, "inside {seen}, beyond the border {beyond}");
 }
 
-/// Library and witness at one view of one circle: value and the 6 + 3 + 9 derivatives.
+/// Library and witness at one view of one circle: value and the 6 + 3 + 9 + 1 derivatives.
 fn circle_witness(
     camera: &Camera,
     pose: &Pose,
     centre: &Vector3<f64>,
     radius: f64,
     n: usize,
-) -> (SMatrix<f64, 2, 18>, [f64; 2]) {
-    let evaluate = |s: [bool; 18]| {
+) -> (SMatrix<f64, 2, 19>, [f64; 2]) {
+    let evaluate = |s: [bool; 19]| {
         let twist = std::array::from_fn(|k| variable(0.0, s[k]));
         let at = std::array::from_fn(|k| variable(centre[k], s[6 + k]));
         let p: Vec<D> = camera.parameters.iter().enumerate().map(|(k, v)| variable(*v, s[9 + k])).collect();
@@ -229,26 +230,28 @@ fn circle_witness(
             |x| witness::project(&p, x),
             &(witness::lift(&pose.matrix()) * witness::exp(&twist)),
             &at,
-            radius,
+            variable(radius, s[18]),
             n,
         )
     };
-    (columns::<18>(evaluate), evaluate([false; 18]).map(|d| d.re))
+    (columns::<19>(evaluate), evaluate([false; 19]).map(|d| d.re))
 }
 
-fn circle_library(camera: &Camera, pose: &Pose, centre: &Vector3<f64>, radius: f64) -> (SMatrix<f64, 2, 18>, [f64; 2]) {
+fn circle_library(camera: &Camera, pose: &Pose, centre: &Vector3<f64>, radius: f64) -> (SMatrix<f64, 2, 19>, [f64; 2]) {
     let p = circle::centroid(camera, pose, centre, radius).unwrap();
-    let mut all = SMatrix::<f64, 2, 18>::zeros();
+    let mut all = SMatrix::<f64, 2, 19>::zeros();
     all.fixed_view_mut::<2, 6>(0, 0).copy_from(&p.d_pose.transpose());
     all.fixed_view_mut::<2, 3>(0, 6).copy_from(&p.d_marker);
     all.fixed_view_mut::<2, 9>(0, 9).copy_from(&p.d_camera.fixed_rows::<9>(0).transpose());
+    all.set_column(18, &p.d_radius);
     (all, p.uv.into())
 }
 
-fn per_block(what: &str, library: &SMatrix<f64, 2, 18>, witness: &SMatrix<f64, 2, 18>, relative: f64) {
-    for c in 0..18 {
+fn per_block(what: &str, library: &SMatrix<f64, 2, 19>, witness: &SMatrix<f64, 2, 19>, relative: f64) {
+    for c in 0..19 {
         // Columns differ in unit; translations and marker coordinates near the image plane's normal may nearly vanish.
-        let scale = witness.column(c).amax().max(1e-3 * witness.columns(3 * (c / 3), 3).amax());
+        let scale =
+            witness.column(c).amax().max(1e-3 * witness.columns(3 * (c / 3), if c == 18 { 1 } else { 3 }).amax());
         let off = (library.column(c) - witness.column(c)).amax();
         assert!(off <= relative * scale, "{what}, column {c}: {off:e} of {scale:e}");
     }
@@ -406,7 +409,7 @@ fn check_image(problem: &Problem, state: &State, image: &Image, pose: &Pose) {
             je.set_column(k, &by(Seed::Column(c)).into());
         }
         for (k, c) in layout.shapes[image.plate].clone().enumerate() {
-            je.set_column(E - 6 + k, &by(Seed::Column(c)).into());
+            je.set_column(E - MODES + k, &by(Seed::Column(c)).into());
         }
         let r = o.uv - SMatrix::<f64, 2, 1>::from(uv);
         let information = o.information / weighting.pixel_factor.powi(2);

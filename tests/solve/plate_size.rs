@@ -5,8 +5,9 @@ use std::path::Path;
 use nalgebra::Vector3;
 use robotcal::Code;
 use robotcal::diagnose::Finding;
-use robotcal::identify::{Estimator, Options, Solution, identify};
-use robotcal::problem::MeasuredSeries;
+use robotcal::identify::{Estimator, Options, RobotModel, Solution, identify};
+use robotcal::model::plate_modes::DOT_GAIN;
+use robotcal::problem::{MeasuredSeries, SCALE};
 use robotcal::series::{Plate, PlateKind, ScaleBar};
 use robotcal::simulate::{WorldRequest, series};
 use robotcal::study::measured;
@@ -132,4 +133,51 @@ fn a_two_stage_result_states_what_is_not_known_of_the_size_of_the_plate() {
         println!("{}: size known {exact:.2e}, not known {staged:.2e}, joint {joint:.2e} m", estimator.title());
         assert!(staged > 2.0 * exact && (0.5..3.0).contains(&(staged / joint)), "{exact} {staged} {joint}");
     }
+}
+
+/// Ink spreads: circles are larger than stated, and tell nothing of the size of the plate.
+#[test]
+fn circles_of_other_radii_doubt_no_plate() {
+    let chain = chain();
+    let solved = |gain_m: f64| {
+        let (mut series, _) = seen(&chain);
+        series.plate.markers.iter_mut().for_each(|m| m.outer_radius_m -= gain_m);
+        identify(chain.clone(), &[series], &Options::default()).unwrap()
+    };
+    let exact = solved(0.0);
+    for gain_m in [-0.2e-3, 0.1e-3] {
+        let found = solved(gain_m);
+        assert_eq!(doubts(&found), [], "{gain_m}");
+        let fit = &found.fit;
+        let at = fit.problem.layout.shapes[0].start + DOT_GAIN;
+        let off = fit.state.plates[0].modes[DOT_GAIN] - gain_m;
+        println!("{gain_m}: off {off:e} +- {:e}", fit.covariance.sigma(at));
+        assert!(off.abs() < 4.0 * fit.covariance.sigma(at), "{off:e}");
+        let scale = |s: &Solution| s.fit.state.plates[0].modes[SCALE];
+        assert!((scale(&found) - scale(&exact)).abs() < 2e-5, "{:e} {:e}", scale(&found), scale(&exact));
+    }
+}
+
+/// By the links of one robot after another: of what a plate is off, within what is stated.
+#[test]
+fn what_links_say_of_the_size_of_a_plate_is_as_sure_as_stated() {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for seed in 1..7 {
+        let chain = chain();
+        let world = series(&WorldRequest { images: 40, seed, ..request(&chain) }).unwrap();
+        let mut stated = measured(&world, &chain);
+        stated.plate.markers.iter_mut().for_each(|m| {
+            m.position_m *= 1.02;
+            m.outer_radius_m *= 1.02;
+        });
+        let options = Options { model: RobotModel::Rigid, ..Options::default() };
+        let solution = identify(chain, &[stated], &options).unwrap();
+        let doubted = solution.findings.iter().find(|f| f.code() == Code::PlateSizeContradicted).unwrap();
+        let size = &doubted.quantities()[0];
+        let off = (size.value - (1.0 / 1.02 - 1.0)) / size.sigma.unwrap();
+        println!("seed {seed}: {:e} +- {:e}, off by {off:.2}", size.value, size.sigma.unwrap());
+        sum += off * off;
+        count += 1.0;
+    }
+    assert!(sum < 22.5, "{sum} of {count}");
 }

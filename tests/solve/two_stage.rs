@@ -63,13 +63,13 @@ fn full_covariance_relinearised_at_the_hard_joint_solution_is_the_hard_joint_fit
 fn full_covariance_relinearised_at_the_joint_solution_is_the_joint_fit() {
     // The same with joint noise of known size: the latents are eliminated in another order, nothing else.
     let mut dice = Dice::new(74);
-    let sigma = 3e-4;
+    let sigma = 1e-4;
     let (mut problem, state) = problem(&mut dice, &Request { images: 8, joint_noise: sigma, ..Request::default() });
     problem.noise.joint = vec![vec![sigma; 6]];
     let joint = solved(&problem, state);
     // The stage is linearised where the joint fit ended, joint noise of each stop included ...
     let stage = PoseStage::linearised(&joint).unwrap();
-    // ... and the charts start where the readings alone would put the camera: a second-order difference (0.3 mrad squared).
+    // ... and the charts start where the readings alone would put the camera: a second-order difference (0.1 mrad squared).
     let (step, two_stage) = linear_step(&joint, &stage, sigma).unwrap();
     let one_stage = covariance(&joint);
     for (c, column) in problem.layout.columns.iter().enumerate().take(problem.layout.theta_len()) {

@@ -10,7 +10,7 @@ use robotcal::model::camera::Lens;
 use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::problem::{Image, Layout, MarkerObservation, State, TakenFrom, Tie};
-use robotcal::series::CameraMount;
+use robotcal::series::{CameraMount, Edge};
 use robotcal::urdf::{Chain, JointKind};
 use std::f64::consts::TAU;
 
@@ -328,20 +328,20 @@ pub fn circle(
     project: impl Fn(&[D; 3]) -> [D; 2],
     camera_from_plate: &D4,
     centre: &[D; 3],
-    radius_m: f64,
+    radius: D,
     samples: usize,
 ) -> [D; 2] {
     let image = |x: [D; 3]| {
         let h = camera_from_plate * SMatrix::<D, 4, 1>::new(x[0], x[1], x[2], constant(1.0));
         project(&[h[0], h[1], h[2]])
     };
-    if radius_m == 0.0 {
+    if radius.re == 0.0 {
         return image(*centre);
     }
     let contour: Vec<[D; 2]> = (0..samples)
         .map(|k| {
             let t = TAU * k as f64 / samples as f64;
-            image([centre[0] + constant(radius_m * t.cos()), centre[1] + constant(radius_m * t.sin()), centre[2]])
+            image([centre[0] + radius * constant(t.cos()), centre[1] + radius * constant(t.sin()), centre[2]])
         })
         .collect();
     centroid(&contour)
@@ -388,6 +388,14 @@ pub fn predict(
         h if field.is_empty() => h,
         h => displaced(h, field, size_px, FIELD_CELLS),
     };
-    let samples = samples(&pose, &centre, observation.mark.radius_m());
-    circle(project, &pose, &centre, observation.mark.radius_m(), samples)
+    // samples and circle: with the dot gain, which moves no marker.
+    let shapes = &layout.shapes[image.plate];
+    let mode = |k: usize| variable(state.plates[image.plate].modes[k], seed == Some(Seed::Column(shapes.start + k)));
+    let (size, gain) = (constant(1.0) + mode(0), mode(6));
+    let radius = match (observation.mark.radius_m(), observation.edge) {
+        (0.0, _) => constant(0.0),
+        (radius_m, Edge::Outer) => constant(radius_m) * size + gain,
+        (radius_m, Edge::Inner) => constant(radius_m) * size - gain,
+    };
+    circle(project, &pose, &centre, radius, samples(&pose, &centre, radius.re))
 }
