@@ -183,16 +183,25 @@ fn mistakes_in_poses_are_named() {
     }
 }
 
+fn urdf() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf")
+}
+
+/// The nominal robot of the dataset, the readings of its stops, and the poses that it has there.
+fn by_joints() -> (Robot, Vec<Vec<f64>>, Vec<(String, Pose)>) {
+    let joints = robotcal::series::read(&dataset()).unwrap();
+    let robot = Robot::nominal(Inputs::read(&urdf(), &[dataset()], Ends::default()).unwrap().chain);
+    let readings: Vec<Vec<f64>> = joints.readings_for(&robot.chain).unwrap().into_iter().flatten().collect();
+    assert_eq!(readings.len(), joints.stops.stops.len());
+    let poses = (joints.stops.stops.iter().zip(&readings)).map(|(s, q)| (s.image.clone(), robot.base_from_tip(q)));
+    let poses = poses.collect();
+    (robot, readings, poses)
+}
+
 #[test]
 fn postures_of_poses_identify_the_robot_of_a_urdf() {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf");
-    let joints = robotcal::series::read(&dataset()).unwrap();
-    let chain = Inputs::read(&urdf, &[dataset()], Ends::default()).unwrap().chain;
-    let robot = Robot::nominal(chain.clone());
-    let readings = joints.readings_for(&chain).unwrap();
-    let poses: Vec<(String, Pose)> = (joints.stops.stops.iter().zip(&readings))
-        .map(|(s, q)| (s.image.clone(), robot.base_from_tip(q.as_ref().unwrap())))
-        .collect();
+    let (robot, _, poses) = by_joints();
+    let chain = robot.chain.clone();
     let folder = series("quaternion", "qx,qy,qz,qw", &poses, quaternion);
     let read = robotcal::series::read(folder.path()).unwrap();
     let found = robotcal::identify::readings_of(&read, &chain).unwrap();
@@ -216,20 +225,15 @@ fn posture_difference(a: &[f64], b: &[f64]) -> f64 {
 /// The stops of the dataset are in all postures, the nearest of which is right by chance.
 #[test]
 fn the_images_tell_in_which_posture_a_pose_was_reached() {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf");
-    let joints = robotcal::series::read(&dataset()).unwrap();
-    let chain = Inputs::read(&urdf, &[dataset()], Ends::default()).unwrap().chain;
-    let robot = Robot::nominal(chain.clone());
-    let readings: Vec<Vec<f64>> = joints.readings_for(&chain).unwrap().into_iter().flatten().collect();
-    let poses: Vec<(String, Pose)> =
-        (joints.stops.stops.iter().zip(&readings)).map(|(s, q)| (s.image.clone(), robot.base_from_tip(q))).collect();
+    let (robot, readings, poses) = by_joints();
+    let chain = robot.chain;
     let folder = series("quaternion", "qx,qy,qz,qw", &poses, quaternion);
     let right = |found: Vec<&[f64]>| {
         found.into_iter().zip(&readings).filter(|(found, read)| posture_difference(found, read) < 1e-3).count()
     };
     let nearest = robotcal::identify::readings_of(&robotcal::series::read(folder.path()).unwrap(), &chain).unwrap();
     let nearest = right(nearest.iter().flatten().map(Vec::as_slice).collect());
-    let inputs = Inputs::read(&urdf, &[folder.path().to_path_buf()], Ends::default()).unwrap();
+    let inputs = Inputs::read(&urdf(), &[folder.path().to_path_buf()], Ends::default()).unwrap();
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
     let calibration = Calibration::of(inputs.observe(&|_, _| ()).unwrap(), &options).unwrap();
     let solution = calibration.solution();
