@@ -1,6 +1,8 @@
 //! Low-order deformations of a plate: what a printer, a roll of paper or a warped board does to all markers together.
 
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::{SMatrix, SVector, Vector3};
+
+use crate::series::Edge;
 
 /// Number of modes.
 pub const MODES: usize = 7;
@@ -16,6 +18,26 @@ pub const NAMES: [&str; MODES] = ["scale", "aspect", "skew", "bow_xx", "bow_xy",
 
 /// Default prior sigma of each mode.
 pub const PRIOR_SIGMA: [f64; MODES] = [1e-4, 1e-4, 1e-4, 3e-4, 3e-4, 3e-4, 1e-4];
+
+/// Share of its radius that a circle keeps, whatever the dot gain.
+const SMALLEST_RADIUS: f64 = 0.1;
+
+/// Radius of a circle (m) on a plate with these modes, and its derivative by them: it grows with the plate and by the dot gain, by which inner
+/// edges shrink. 0 for a point.
+#[inline(always)]
+pub fn radius(radius_m: f64, edge: Edge, modes: &[f64; MODES]) -> (f64, SVector<f64, MODES>) {
+    let mut by_modes = SVector::<f64, MODES>::zeros();
+    if radius_m == 0.0 {
+        return (0.0, by_modes);
+    }
+    by_modes[SCALE] = radius_m;
+    by_modes[DOT_GAIN] = match edge {
+        Edge::Outer => 1.0,
+        Edge::Inner => -1.0,
+    };
+    let grown_m = radius_m + by_modes.dot(&SVector::from(*modes));
+    (grown_m.max(SMALLEST_RADIUS * radius_m), by_modes)
+}
 
 /// Displacement of a marker (m) per unit of each mode, one column a mode.
 ///

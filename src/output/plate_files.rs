@@ -4,9 +4,9 @@ use super::gauge::Gauge;
 use super::names::{file_names, plate_name};
 use super::text::csv;
 use crate::error::Result;
-use crate::model::plate_modes::{DOT_GAIN, SCALE};
+use crate::model::plate_modes::radius;
 use crate::problem::Adjustment;
-use crate::series::plate_toml;
+use crate::series::{Edge, plate_toml};
 
 const HEADER: [&str; 9] =
     ["id", "x_m", "y_m", "z_m", "outer_radius_m", "inner_radius_m", "sigma_x_m", "sigma_y_m", "sigma_z_m"];
@@ -34,9 +34,8 @@ fn plate_csv(Adjustment { problem, state }: &Adjustment, plate: usize, gauge: &G
     for (k, m) in problem.plates[plate].markers.iter().enumerate() {
         let x = shape.position(k);
         let sigma = covariances[k].diagonal().map(|v| v.max(0.0).sqrt());
-        let [size, gain_m] = [1.0 + shape.modes[SCALE], shape.modes[DOT_GAIN]];
-        let grown = |radius_m: f64, gain_m: f64| if radius_m > 0.0 { size * radius_m + gain_m } else { 0.0 };
-        let [outer, inner] = [grown(m.outer_radius_m, gain_m), grown(m.inner_radius_m, -gain_m)];
+        let [outer, inner] = [(m.outer_radius_m, Edge::Outer), (m.inner_radius_m, Edge::Inner)]
+            .map(|(radius_m, edge)| radius(radius_m, edge, &shape.modes).0);
         let numbers = [x.x, x.y, x.z, outer, inner, sigma.x, sigma.y, sigma.z];
         let mut row = vec![m.id.to_string()];
         row.extend(numbers.map(|v| format!("{v:?}")));

@@ -60,13 +60,13 @@ impl Collector {
         Self { columns, markers: Vec::with_capacity(most), field: Vec::new() }
     }
 
-    /// Adds an observation, of whose marker the position and the radius move so with the modes, with its residual and the square root `F'` of its weight.
+    /// Adds an observation with its derivative by the modes of the plate, its residual and the square root `F'` of its weight.
     #[inline(always)]
     pub fn add(
         &mut self,
         marker: usize,
         p: &Prediction,
-        (modes, radius): (&SMatrix<f64, 3, MODES>, &SVector<f64, MODES>),
+        by_modes: &SMatrix<f64, MODES, 2>,
         r: &Vector2<f64>,
         root: &Matrix2<f64>,
     ) {
@@ -74,8 +74,7 @@ impl Collector {
         let pair = self.columns.as_mut_slice().chunks_exact_mut(2 * rows).nth(self.markers.len());
         for (first, second) in pair.into_iter().map(|pair| pair.split_at_mut(rows)) {
             whiten(&mut first[POSE..], &mut second[POSE..], root, &p.d_pose);
-            let by_modes = modes.tr_mul(&p.d_marker.transpose()) + radius * p.d_radius.transpose();
-            whiten(&mut first[MODE..], &mut second[MODE..], root, &by_modes);
+            whiten(&mut first[MODE..], &mut second[MODE..], root, by_modes);
             whiten(&mut first[RESIDUAL..], &mut second[RESIDUAL..], root, &r.transpose());
             whiten(&mut first[FORMULA..], &mut second[FORMULA..], root, &p.d_camera);
         }

@@ -82,11 +82,10 @@ impl Weighting {
 
 /// Prediction of one observation; `None` where the marker is behind the camera.
 pub fn predict(image: &Image, state: &State, pose: &Pose, observation: &MarkerObservation) -> Option<Prediction> {
-    let plate = &state.plates[image.plate];
-    let position = plate.position(observation.marker);
+    let (camera, plate) = (&state.cameras[image.camera], &state.plates[image.plate]);
     wide(
         #[inline(always)]
-        || observation.predict(&state.cameras[image.camera], pose, &position, observation.radius(&plate.modes).0),
+        || observation.predict(camera, pose, plate).map(|(prediction, _)| prediction),
     )
 }
 
@@ -141,9 +140,7 @@ fn whitened(
     let mut equations = Collector::new(most, camera.parametric());
     let mut stated = (Matrix2::zeros(), Matrix2::zeros());
     for (observation, o) in used.step_by(weighting.every) {
-        let modes = plate.modes_at(o.marker);
-        let (radius_m, radius_by_modes) = o.radius(&plate.modes);
-        let p = o.predict(camera, pose, &plate.position_by(&modes, o.marker), radius_m)?;
+        let (p, by_modes) = o.predict(camera, pose, plate)?;
         let duv = o.uv - p.uv;
         // Observations one after the other are often alike.
         if stated.0 != o.information {
@@ -153,7 +150,7 @@ fn whitened(
         let normalised = (root * duv).norm();
         let (cost, weight) = weighting.huber(normalised);
         let weighted = if weight < 1.0 { root * weight.sqrt() } else { root };
-        equations.add(o.marker, &p, (&modes, &radius_by_modes), &duv, &weighted);
+        equations.add(o.marker, &p, &by_modes, &duv, &weighted);
         tell(cost, Residual { observation, duv, normalised, weight });
     }
     Some(equations.finish())

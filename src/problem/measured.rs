@@ -1,16 +1,14 @@
 //! What was measured of a marker in an image, and how each kind of it is predicted.
 
-use nalgebra::{Matrix2, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, SMatrix, Vector2};
 
+use super::plate_shape::PlateShape;
 use super::rejection::ObservationRejection;
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::circle::{self, Prediction};
-use crate::model::plate_modes::{DOT_GAIN, MODES, SCALE};
+use crate::model::plate_modes::{MODES, radius};
 use crate::series::Edge;
-
-/// Share of its radius that a circle keeps, whatever the dot gain.
-const SMALLEST_RADIUS: f64 = 0.1;
 
 /// One observation, ready for the adjustment.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,36 +55,29 @@ impl Mark {
 }
 
 impl MarkerObservation {
-    /// Radius of the circle on a plate with these modes, m, and its derivative by them: it grows with the plate and by the dot gain, by which inner
-    /// edges shrink. 0 for a point.
-    #[inline(always)]
-    pub fn radius(&self, modes: &[f64; MODES]) -> (f64, SVector<f64, MODES>) {
-        let radius_m = self.mark.radius_m();
-        let mut by_modes = SVector::zeros();
-        if radius_m == 0.0 {
-            return (0.0, by_modes);
-        }
-        by_modes[SCALE] = radius_m;
-        by_modes[DOT_GAIN] = match self.edge {
-            Edge::Outer => 1.0,
-            Edge::Inner => -1.0,
-        };
-        let grown_m = radius_m + by_modes.dot(&SVector::from(*modes));
-        (grown_m.max(SMALLEST_RADIUS * radius_m), by_modes)
-    }
-
-    /// Prediction of a circle of this radius, m, about `position` (plate frame, m), of the point itself for none; `None` behind the camera.
+    /// Its prediction on this plate, with the derivative of column and row of the image by the modes of the plate; `None` behind the camera.
     #[inline(always)]
     pub fn predict(
         &self,
         camera: &Camera,
         camera_from_plate: &Pose,
-        position: &Vector3<f64>,
-        radius_m: f64,
-    ) -> Option<Prediction> {
+        plate: &PlateShape,
+    ) -> Option<(Prediction, SMatrix<f64, MODES, 2>)> {
+        let basis = plate.modes_at(self.marker);
+        let position = plate.position_by(&basis, self.marker);
+        let by_position = |p: &Prediction| basis.tr_mul(&p.d_marker.transpose());
         match self.mark {
-            Mark::Circle { .. } => circle::centroid(camera, camera_from_plate, position, radius_m),
-            Mark::Corner => circle::point(camera, camera_from_plate, position),
+            Mark::Circle { radius_m } => {
+                let (grown_m, by_modes) = radius(radius_m, self.edge, &plate.modes);
+                let p = circle::centroid(camera, camera_from_plate, &position, grown_m)?;
+                let by_modes = by_position(&p) + by_modes * p.d_radius.transpose();
+                Some((p, by_modes))
+            }
+            Mark::Corner => {
+                let p = circle::point(camera, camera_from_plate, &position)?;
+                let by_modes = by_position(&p);
+                Some((p, by_modes))
+            }
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector3;
+use nalgebra::{SVector, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -21,9 +21,9 @@ use crate::detect::Picture;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::joint_terms::{JointTerm, Term, USUAL_HARMONICS};
-use crate::model::plate_modes::{DOT_GAIN, MODES, PRIOR_SIGMA, basis};
+use crate::model::plate_modes::{PRIOR_SIGMA, basis, radius};
 use crate::model::robot::{Posture, Robot};
-use crate::series::{AngleUnit, CameraSection, ImageObservations, Manifest, Plate, SeriesStop, Stops};
+use crate::series::{AngleUnit, CameraSection, Edge, ImageObservations, Manifest, Plate, SeriesStop, Stops};
 use crate::urdf::JointKind;
 
 /// Attempts at one more workable pose before the world is called impossible.
@@ -103,11 +103,11 @@ fn true_plate(request: &WorldRequest, rng: &mut impl Rng) -> Plate {
     let mut plate = request.plate.clone();
     if request.plate_modes {
         let half_diagonal = plate.markers.iter().map(|m| m.position_m.norm()).fold(0.0, f64::max);
-        let mut modes = nalgebra::SVector::<f64, MODES>::zeros();
-        // Circles keep their radii.
-        modes.iter_mut().zip(PRIOR_SIGMA).take(DOT_GAIN).for_each(|(mode, sigma)| *mode = normal(sigma, rng));
+        let modes = PRIOR_SIGMA.map(|sigma| normal(sigma, rng));
         for marker in &mut plate.markers {
-            marker.position_m += basis(&marker.position_m, half_diagonal) * modes;
+            marker.position_m += basis(&marker.position_m, half_diagonal) * SVector::from(modes);
+            marker.outer_radius_m = radius(marker.outer_radius_m, Edge::Outer, &modes).0;
+            marker.inner_radius_m = radius(marker.inner_radius_m, Edge::Inner, &modes).0;
         }
     }
     for marker in &mut plate.markers {
