@@ -7,8 +7,8 @@
 //! moved, and `x = J^-1 g` with the covariance `J^-1`.
 //!
 //! The estimated joint noise has grown with the fault, so that `D` is small beside what the sizes say; it is compared with the squares
-//! `R` of the latent joint errors and tilts, which are as many as the degrees of freedom that the robot left. `D / R` has a beta distribution where noise
-//! is Gaussian. Real robots err alike in postures that are alike, so that chance alone does not acquit them: the step must also
+//! `R` of the latent joint errors and tilts, which are as many as the degrees of freedom that the robot left, and `P` of the robot's errors over their
+//! priors, which are as many as it took: a step may take up either. `D / (R + P)` has a beta distribution where noise is Gaussian. Real robots err alike in postures that are alike, so that chance alone does not acquit them: the step must also
 //! explain most of `R`.
 
 use std::ops::Range;
@@ -133,12 +133,14 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<PoseStep> {
         problem.joint_error_squares(stop, &state.joint_errors[stop]).chain(ties).sum::<f64>()
     };
     let all: f64 = linear.stops.iter().map(errors).sum();
+    let of_priors = prior_squares(fit);
     let (mut left, mut found, mut good) = (all, Vec::<PoseStep>::new(), Vec::new());
     while found.len() < limits.displacements {
         let tried = candidates(problem, &linear, limits.displaced_images);
         let Some(mut best) = linear.best(problem, &tried, limits.displaced_images) else { break };
-        best.share = best.fall / left;
-        let chance = tried.len() as f64 * chance(best.share, left);
+        best.share = (best.fall / left).min(1.0);
+        let squares = left + of_priors;
+        let chance = tried.len() as f64 * chance(best.fall / squares, squares);
         tracing::debug!(?best.body, ?best.order, first = %problem.images[best.images[0]].name, moved = best.images.len(),
             fall = best.fall, left, share = best.share, chance, twist = ?best.twist, "step of a body");
         if chance > limits.displaced_false_alarms {
@@ -159,6 +161,13 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<PoseStep> {
     }
     good.sort_by_key(|s| (matches!(s.order, Order::Up(_)), s.images[0]));
     good
+}
+
+/// Squares of the errors of robot, mountings and placements over their priors, `P`.
+fn prior_squares(Adjustment { problem, state }: &Adjustment) -> f64 {
+    let values = state.values(&problem.layout);
+    let columns = problem.layout.columns[..problem.layout.theta_len()].iter().zip(values.iter());
+    columns.filter(|(c, _)| c.free).map(|(c, value)| ((value - c.prior_mean) / c.prior_sigma).powi(2)).sum()
 }
 
 /// Probability that six parameters explain this share of so many squares or more, of Gaussian noise.
