@@ -125,7 +125,7 @@ impl<'a> FlangeModel<'a> {
 
     /// The same relative to the base that fits the stops best, where nothing that stands still remains: least squares over
     /// tool and base, `J(q) = tool + Ad(pose(q)^-1) base`.
-    fn with_fitted_base(mut self, stops: &[Posture]) -> Option<Self> {
+    pub(super) fn with_fitted_base(mut self, stops: &[Posture]) -> Option<Self> {
         let columns = self.layout.theta_len();
         let (mut n, mut rhs) = (DMatrix::zeros(12, 12), DMatrix::zeros(12, columns));
         for (pose, j) in stops.iter().map(|s| self.derivative(s)) {

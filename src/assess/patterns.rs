@@ -5,14 +5,14 @@
 //! `D = s' M^-1 s` of `R`, and `F = D (n' - m) / (R - D)`, `n' = R`, is chi-squared with `m` degrees of freedom where there is no pattern. Of
 //! groups beyond chance the one with the largest `F - m ln n` (G. Schwarz 1978) names the cause.
 
-use nalgebra::{DMatrix, DVector, Matrix3x2, Matrix6, SMatrix, Vector2, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3x2, SMatrix, Vector2, Vector3};
 
-use super::flange::FlangeModel;
-use super::{Limits, still, stops};
+use super::limits::Limits;
+use super::pattern_effect::{Effects, PatternEffect};
 use crate::fit::Fit;
-use crate::geom::adjoint;
-use crate::linalg::{SymmetricFactor, symmetric_eigen};
-use crate::problem::{Adjustment, Equations, Step};
+use crate::linalg::symmetric_eigen;
+use crate::model::camera::Lens;
+use crate::problem::{Adjustment, Equations, PlateShape, Step};
 use crate::solve::{LinearImage, Response, Singular};
 
 /// Share of the information of a scaled direction below which the fit absorbs it.
@@ -21,8 +21,6 @@ const ABSORBED: f64 = 1e-8;
 const LEAST_SHARE: f64 = 1e-9;
 /// One-sided normal deviate of a power of 95 %.
 const POWER_95: f64 = 1.645;
-/// Share of what the poses tell of the common frames that holds what they do not.
-const HELD: f64 = 1e-9;
 /// Degrees of the displacement field, of the bow and of the print of the plate.
 const FIELD_DEGREES: [usize; 2] = [2, 5];
 const BOW_DEGREES: [usize; 2] = [2, 4];
@@ -56,6 +54,23 @@ impl Pattern {
     const OF_CAMERA: [Self; 4] = [Self::ThinPrism, Self::Radial, Self::Parallax, Self::Field];
     /// Those of a plate that are columns.
     const OF_PLATE: [Self; 2] = [Self::PlateBow, Self::PlatePrint];
+
+    /// The formula that has its columns.
+    pub fn lens(self) -> Option<Lens> {
+        match self {
+            Self::ThinPrism => Some(Lens::ThinPrism),
+            Self::Radial => Some(Lens::Rational),
+            Self::Parallax => Some(Lens::Parallax),
+            Self::Field | Self::PlateBow | Self::PlatePrint | Self::Tolerance => None,
+        }
+    }
+
+    /// True where the lens of a camera has the columns, and they are free: what is left there is the pull of their priors.
+    pub fn is_fitted(self, Adjustment { problem, state }: &Adjustment, camera: usize) -> bool {
+        let lens = state.cameras[camera].lens;
+        let is_free = problem.layout.cameras[camera].clone().last().is_some_and(|c| problem.layout.columns[c].free);
+        is_free && (self.lens() == Some(lens.formula()) || self == Self::Field && lens.has_field())
+    }
 
     fn columns(self) -> usize {
         let powers = |[low, high]: [usize; 2]| (low..=high).map(|d| d + 1).sum::<usize>();
@@ -92,6 +107,8 @@ pub struct PatternTest {
     pub degrees: usize,
     /// Normal deviate of the statistic.
     pub deviate: f64,
+    /// Share of the squares of the residuals that it removes.
+    pub share: f64,
     /// RMS of the pattern in the residuals, px.
     pub rms_px: f64,
     /// What would be found with a probability of 95 %, px RMS in the residuals.
@@ -100,25 +117,6 @@ pub struct PatternTest {
     pub gain: f64,
     /// By how much the step to the fit with these columns moves what counts, and what is stated of it; none of shifts in the plate.
     pub moved: Option<PatternEffect>,
-}
-
-/// How far something is moved, RMS, beside its sigma.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PatternEffect {
-    /// The flange relative to the plate, m, and the stated sigma; none without a robot.
-    pub flange_m: Option<[f64; 2]>,
-    /// The camera relative to the plate over the images, m, and the stated sigma.
-    pub pose_m: [f64; 2],
-    /// The same of its direction, rad.
-    pub pose_rad: [f64; 2],
-}
-
-impl PatternEffect {
-    /// The largest displacement in stated sigmas: of the flange where there is one, else of the poses.
-    pub fn sigmas(&self) -> f64 {
-        let ratio = |[moved, sigma]: [f64; 2]| if sigma > 0.0 { moved / sigma } else { 0.0 };
-        self.flange_m.map_or_else(|| ratio(self.pose_m).max(ratio(self.pose_rad)), ratio)
-    }
 }
 
 impl PatternTest {
@@ -147,14 +145,7 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
     let groups = groups(fit);
     let count = groups.iter().map(|g| g.pattern.columns()).sum();
     let response = linear.response(count, |image, equations| columns(fit, &groups, image, equations, count))?;
-    let flange_model = {
-        let postures = stops(&fit.problem);
-        still(fit).map(|s| (s, postures))
-    };
-    let model = flange_model.as_ref().and_then(|(s, postures)| {
-        FlangeModel::new(&fit.state.robot, &fit.problem.layout, *s, &fit.covariance.reduced, postures, limits)
-    });
-    let views = Views::of(fit);
+    let effects = Effects::of(fit, limits);
     let (n, squares) = (response.equations as f64, response.squares);
     let points: usize = linear.images().map(|i| i.terms.residuals.len()).sum();
     let sum: f64 = linear.images().flat_map(|i| i.terms.residuals.iter()).map(|r| r.duv.norm_squared()).sum();
@@ -163,40 +154,32 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
         let (y, statistic, degrees) = solved(&response, g.first, g.pattern.columns());
         let left = (squares - statistic).max(f64::MIN_POSITIVE);
         let statistic = statistic * (squares - degrees as f64).max(1.0) / left;
+        let share = statistic / (statistic + squares);
         let step = combined(&response.steps[g.first..g.first + y.len()], &y)?;
+        let shift = |plate: usize, marker: usize| match g.bearer {
+            Bearer::Plate(k) if k == plate => {
+                let shifts = plate_shifts(g.pattern, &on_plate(&fit.state.plates[plate], marker));
+                shifts.into_iter().zip(y.iter()).map(|(shift, &y)| shift * y).sum()
+            }
+            _ => Vector3::zeros(),
+        };
         Some(PatternTest {
             pattern: g.pattern,
             bearer: g.bearer,
             statistic,
             degrees,
             deviate: deviate(statistic, degrees),
-            rms_px: rms_px * (statistic / (statistic + squares)).sqrt(),
+            share,
+            rms_px: rms_px * share.sqrt(),
             least_px: rms_px * (least(degrees, limits.pattern_sigmas) / squares).sqrt(),
             gain: statistic - degrees as f64 * n.ln(),
             // Shifts in the plate trade against its size, by which the step moves everything: that is judged by itself.
-            moved: (g.pattern != Pattern::PlatePrint).then(|| moved(fit, model.as_ref(), &views, &step)),
+            moved: (g.pattern != Pattern::PlatePrint).then(|| effects.moved(&step, shift)),
         })
     };
     let mut tests: Vec<PatternTest> = groups.iter().filter_map(of_group).collect();
     tests.extend(tolerances(fit, rms_px, squares, limits));
     Ok(tests)
-}
-
-/// The pattern that names the cause: of those beyond chance that which gains most, or the simplest that removes nearly as much of the squares
-/// of the residuals (what is of second order in a large fault belongs to no first-order column, and many columns take more of it).
-pub fn cause<'a>(tests: &'a [PatternTest], limits: &Limits) -> Option<&'a PatternTest> {
-    let found = || tests.iter().filter(|t| t.is_found(limits));
-    let best = found().max_by(|a, b| a.gain.total_cmp(&b.gain))?;
-    if best.pattern == Pattern::Tolerance {
-        return Some(best);
-    }
-    let removed = |t: &PatternTest| t.rms_px.powi(2);
-    let alike = |t: &&PatternTest| {
-        t.pattern != Pattern::Tolerance
-            && removed(t) >= limits.pattern_share * removed(best)
-            && t.degrees < best.degrees
-    };
-    found().filter(alike).min_by_key(|t| t.degrees).or(Some(best))
 }
 
 fn groups(fit: &Adjustment) -> Vec<Group> {
@@ -221,7 +204,6 @@ fn columns(fit: &Adjustment, groups: &[Group], own: &LinearImage, equations: &Eq
     let (camera, plate) = (&fit.state.cameras[image.camera], &fit.state.plates[image.plate]);
     let mut all = DMatrix::zeros(2 * equations.markers.len(), count);
     let corner = camera.corner();
-    let size = plate.nominal.iter().map(|n| n.norm()).fold(f64::MIN_POSITIVE, f64::max);
     for (o, (sight, &marker)) in equations.sights().zip(&equations.markers).enumerate() {
         let at = own.chain.pose.transform(&plate.position(marker));
         let Some(seen) = camera.project_with_jacobian(&at) else { continue };
@@ -233,7 +215,7 @@ fn columns(fit: &Adjustment, groups: &[Group], own: &LinearImage, equations: &Eq
         let middle = |n: u32| 0.5 * (f64::from(n) - 1.0);
         let (mu, mv) = (middle(camera.width_px), middle(camera.height_px));
         let across = Vector2::new((seen.uv.x - mu) / mu, (seen.uv.y - mv) / mv);
-        let on_plate = plate.nominal[marker].xy() / size;
+        let on_plate = on_plate(plate, marker);
         for g in groups {
             let mut put = |k: usize, column: Vector2<f64>| {
                 all.fixed_view_mut::<2, 1>(2 * o, g.first + k).copy_from(&column);
@@ -269,6 +251,11 @@ fn image_shifts(pattern: Pattern, y: &Vector2<f64>, across: &Vector2<f64>, depth
             .collect(),
         Pattern::PlateBow | Pattern::PlatePrint | Pattern::Tolerance => Vec::new(),
     }
+}
+
+/// Place of a marker, 1 at the farthest.
+fn on_plate(plate: &PlateShape, marker: usize) -> Vector2<f64> {
+    plate.nominal[marker].xy() / plate.half_diagonal_m.max(f64::MIN_POSITIVE)
 }
 
 /// Displacements of a marker, m.
@@ -324,70 +311,6 @@ fn combined(steps: &[Step], y: &DVector<f64>) -> Option<Step> {
     Some(steps.iter().zip(y.iter()).fold(none, |sum, (step, y)| sum.plus(-y, step)))
 }
 
-/// The images in use, as what moves is judged in them.
-struct Views {
-    /// Adjoint of the pose of each.
-    adjoints: Vec<Matrix6<f64>>,
-    /// Stated sigma of their cameras relative to the plate, RMS: position, m, and direction, rad.
-    sigmas: [f64; 2],
-}
-
-impl Views {
-    fn of(fit: &Fit) -> Self {
-        let linear = fit.linear();
-        let mut variances = [0.0f64; 2];
-        let mut adjoints = Vec::with_capacity(linear.images().len());
-        for (own, covariance) in linear.images().zip(fit.covariance.camera_poses(linear)) {
-            let ad = adjoint(&own.chain.pose);
-            let covariance = ad * covariance * ad.transpose();
-            for (part, sum) in variances.iter_mut().enumerate() {
-                *sum += (0..3).map(|k| covariance[(3 * part + k, 3 * part + k)]).sum::<f64>().max(0.0);
-            }
-            adjoints.push(ad);
-        }
-        let count = adjoints.len().max(1) as f64;
-        Self { adjoints, sigmas: variances.map(|sum| (sum / count).sqrt()) }
-    }
-}
-
-/// What a step moves. Of the camera poses counts what no common displacement of the camera frame or the plate frame takes up: with the body
-/// twist `w_i` of the camera, `w_i - a - Ad(T_i) b`, least squares over `a` and `b` in units of the stated sigmas.
-fn moved(fit: &Fit, model: Option<&FlangeModel>, Views { adjoints, sigmas }: &Views, step: &Step) -> PatternEffect {
-    let (sigmas, count) = (*sigmas, adjoints.len().max(1) as f64);
-    let twist = |(own, ad): (LinearImage, &Matrix6<f64>)| (*ad, ad * own.pose_step(step));
-    let twists: Vec<(Matrix6<f64>, Vector6<f64>)> = fit.linear().images().zip(adjoints).map(twist).collect();
-    let left = without_frames(&twists, sigmas);
-    let rms =
-        |part: usize| (left.iter().map(|w| w.fixed_rows::<3>(3 * part).norm_squared()).sum::<f64>() / count).sqrt();
-    let theta = fit.problem.layout.theta_len();
-    PatternEffect {
-        flange_m: model.map(|m| m.moved_m(&step.dense.rows(0, theta).into_owned())),
-        pose_m: [rms(0), sigmas[0]],
-        pose_rad: [rms(1), sigmas[1]],
-    }
-}
-
-fn without_frames(twists: &[(Matrix6<f64>, Vector6<f64>)], sigmas: [f64; 2]) -> Vec<Vector6<f64>> {
-    let weight = Vector6::from_fn(|k, _| if sigmas[k / 3] > 0.0 { sigmas[k / 3].powi(-2) } else { 0.0 });
-    let (mut n, mut rhs) = (DMatrix::<f64>::zeros(12, 12), DVector::<f64>::zeros(12));
-    let rows = |ad: &Matrix6<f64>| {
-        let mut a = DMatrix::identity(6, 12);
-        a.fixed_view_mut::<6, 6>(0, 6).copy_from(ad);
-        a
-    };
-    for (ad, twist) in twists {
-        let a = rows(ad);
-        let weighted = DMatrix::from_diagonal(&DVector::from_column_slice(weight.as_slice())) * &a;
-        n += a.tr_mul(&weighted);
-        rhs += weighted.tr_mul(twist);
-    }
-    let size = n.diagonal();
-    (0..12).for_each(|k| n[(k, k)] += HELD * size[k]);
-    let Ok(factor) = SymmetricFactor::new(&n) else { return twists.iter().map(|t| t.1).collect() };
-    let x = factor.solve(&rhs);
-    twists.iter().map(|(ad, twist)| twist - Vector6::from_column_slice((rows(ad) * &x).as_slice())).collect()
-}
-
 /// Normal deviate of a chi-squared statistic (E. Wilson and M. Hilferty 1931).
 fn deviate(statistic: f64, degrees: usize) -> f64 {
     let spread = 2.0 / (9.0 * degrees.max(1) as f64);
@@ -422,6 +345,7 @@ fn tolerances(fit: &Fit, rms_px: f64, squares: f64, limits: &Limits) -> Vec<Patt
             statistic: sum,
             degrees: told.round() as usize,
             deviate: deviate(sum, told.round() as usize),
+            share: 0.0,
             rms_px: f64::NAN,
             least_px: rms_px * (least(told.round() as usize, limits.pattern_sigmas) / squares).sqrt(),
             // Twice the gain in the logarithm of the density, less the price of one parameter.

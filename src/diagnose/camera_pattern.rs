@@ -14,6 +14,8 @@ pub struct ResidualPattern {
     pub bearer: String,
     /// True where it moves flange or poses by more than is stated of them.
     pub matters: bool,
+    /// True where the lens has its columns, and their priors hold them back.
+    pub is_held_back: bool,
 }
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<ResidualPattern> {
@@ -23,7 +25,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<R
 /// The pattern that names the cause, where there is one.
 pub fn residual_pattern(fit: &Fit, limits: &Limits) -> Option<ResidualPattern> {
     let tests = patterns(fit, limits).ok()?;
-    let found = cause(&tests, limits)?.clone();
+    let found = cause(fit, &tests, limits)?.clone();
     let bearer = match found.bearer {
         Bearer::Camera(k) => fit.problem.cameras.get(k)?.clone(),
         Bearer::Plate(k) => match fit.problem.plates.len() {
@@ -32,7 +34,8 @@ pub fn residual_pattern(fit: &Fit, limits: &Limits) -> Option<ResidualPattern> {
         },
     };
     let matters = found.moved.is_some_and(|m| m.sigmas() > limits.pattern_moves);
-    Some(ResidualPattern { found, bearer, matters })
+    let is_held_back = matches!(found.bearer, Bearer::Camera(k) if found.pattern.is_fitted(fit, k));
+    Some(ResidualPattern { found, bearer, matters, is_held_back })
 }
 
 /// What it looks like, and what removes it.
@@ -136,6 +139,9 @@ impl Kind for ResidualPattern {
     }
 
     fn remedy(&self) -> String {
-        words(self.found.pattern)[1].into()
+        match self.is_held_back {
+            true => "this lens has such terms, but smaller ones by their priors: try --camera brown+field".into(),
+            false => words(self.found.pattern)[1].into(),
+        }
     }
 }

@@ -5,18 +5,17 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::build::build;
-use super::free_poses::adjust_free_poses;
+use super::free_poses::free_poses_of;
 use super::joint::{JointFit, fit_model};
 use super::options::Options;
 use super::solution::{LensEvidence, Solution};
-use super::stated::camera_starts;
 use crate::assess::Limits;
 use crate::diagnose::LensNotInRos;
 use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{Fit, FreePoses, log_evidence};
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
-use crate::problem::{Adjustment, Family, LensChoice, MeasuredSeries, Problem, predict};
+use crate::problem::{Adjustment, LensChoice, MeasuredSeries, Problem, predict};
 use crate::solve::{ComponentOptions, LinearProblem, Settings, Status, estimate_components};
 use crate::stage::stage;
 use crate::urdf::Chain;
@@ -142,20 +141,12 @@ fn told(linear: LinearProblem, camera: usize) -> Option<LensEvidence> {
 
 /// The adjustment with another lens for one camera, which images as the present one does.
 fn with_lens(fit: &Adjustment, (camera, depths_m): (usize, &[f64; 2]), lens: Lens) -> Option<Adjustment> {
-    let mut other = fit.clone();
-    let Adjustment { problem, state } = &mut other;
-    let present = &state.cameras[camera];
+    let present = &fit.state.cameras[camera];
     let next = match present.extended(lens) {
         Some(extended) => extended,
         None => fit_lens(present, lens, depths_m)?.camera,
     };
-    let (layout, from, moved) = problem.layout.with_camera(camera, &problem.cameras[camera], &next);
-    problem.layout = layout;
-    let columns = problem.families.iter_mut().flat_map(|f| &mut f.columns);
-    columns.filter(|c| **c >= from).for_each(|c| *c = c.saturating_add_signed(moved));
-    state.cameras[camera] = next;
-    problem.families.extend(Family::of_field(&problem.layout, state, camera));
-    Some(other)
+    Some(fit.with_camera(camera, next))
 }
 
 /// What the size of the image noise adds to the logarithm of the density of the observations.
@@ -263,12 +254,13 @@ fn held_out_errors(
     all.iter_mut().for_each(|s| s.lens = lens);
     let full = build(&robot, &all, false, limits)?.problem;
     let aside = |image: usize, marker: usize| (marker + 7 * image).is_multiple_of(KEPT_ASIDE);
-    let mut thinned = build(&robot, &all, false, limits)?;
-    for (i, image) in thinned.problem.images.iter_mut().enumerate() {
-        image.observations.retain(|o| !aside(i, o.marker));
-    }
-    let stated = camera_starts(&full.cameras, series);
-    let (_, free, _) = adjust_free_poses(thinned, &stated, limits)?;
+    let thin = |start: &mut Adjustment| {
+        for (i, image) in start.problem.images.iter_mut().enumerate() {
+            image.observations.retain(|o| !aside(i, o.marker));
+        }
+        Ok(())
+    };
+    let (_, free, _) = free_poses_of(&robot, &all, limits, thin)?;
     let mut squares: Vec<Vec<f64>> = vec![Vec::new(); full.cameras.len()];
     for (i, image) in full.images.iter().enumerate() {
         let Some(pose) = &free.poses[i] else { continue };

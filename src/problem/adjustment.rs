@@ -2,8 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use super::{BodyRejection, Image, ImageRejection, Problem, State, TakenFrom, Tie};
+use super::{BodyRejection, Family, Image, ImageRejection, Problem, State, TakenFrom, Tie};
 use crate::geom::Pose;
+use crate::model::camera::Camera;
 use crate::series::spread;
 
 /// A problem with a value of every unknown: what a solve starts from and what it leaves.
@@ -148,6 +149,20 @@ impl Adjustment {
         let factor = |name: &str| solved.problem.families.iter().find(|f| f.name == name).map(|f| f.factor);
         problem.families.iter_mut().for_each(|f| f.factor = factor(&f.name).unwrap_or(f.factor));
         self.hold_component_priors();
+    }
+
+    /// The adjustment with another camera in the place of one.
+    #[must_use]
+    pub fn with_camera(&self, index: usize, camera: Camera) -> Self {
+        let mut other = self.clone();
+        let Self { problem, state } = &mut other;
+        let (layout, from, moved) = problem.layout.with_camera(index, &problem.cameras[index], &camera);
+        problem.layout = layout;
+        let columns = problem.families.iter_mut().flat_map(|f| &mut f.columns);
+        columns.filter(|c| **c >= from).for_each(|c| *c = c.saturating_add_signed(moved));
+        state.cameras[index] = camera;
+        problem.families.extend(Family::of_field(&problem.layout, state, index));
+        other
     }
 
     /// What acts through the camera poses (robot, mountings, placements) stays as it is.
