@@ -2,18 +2,17 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix3x6, Matrix6};
 
-use super::build::build;
-use super::free_poses::{adjust_free_poses, covariance_together};
+use super::free_poses::{covariance_together, free_poses_of};
 use super::lens_choice::{choose_lens, open_cameras};
+use super::solution::Solution;
 use super::start_verdict::StartVerdict;
-use super::stated::camera_starts;
 use crate::assess::Limits;
 use crate::diagnose::{CheckContext, Diagnosis, Finding, residual_pattern};
 use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{Fit, FreePose, FreePoses, PlacedCamera};
 use crate::geom::skew;
 use crate::model::robot::Robot;
-use crate::problem::{Adjustment, MeasuredSeries};
+use crate::problem::{Adjustment, LensChoice, MeasuredSeries};
 use crate::solve::PlateScale;
 use crate::urdf::Chain;
 
@@ -83,9 +82,7 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     series.iter_mut().flat_map(|s| &mut s.stops).for_each(|stop| stop.readings = None);
     let open: Vec<String> = open_cameras(&series).into_keys().collect();
     let notices = if open.is_empty() { Vec::new() } else { choose_lens(&chain, &mut series, &open, limits)? };
-    let start = build(&Robot::nominal(chain), &series, false, limits)?;
-    let stated = camera_starts(&start.problem.cameras, &series);
-    let (mut adjustment, free_poses, starts) = adjust_free_poses(start, &stated, limits)?;
+    let (mut adjustment, free_poses, starts) = free_poses_of(&Robot::nominal(chain), &series, limits, |_| Ok(()))?;
     adjustment.hold_poses();
     let mut diagnosis =
         Diagnosis::new(CheckContext { series: &series, free: &free_poses, on_robot: 0, stated_noise: None, limits });
@@ -94,6 +91,18 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     let fit = at_solution(adjustment)?;
     findings.extend(residual_pattern(&fit, limits).map(Finding::from));
     Ok(StandAlone { fit, free_poses, starts, notices, findings })
+}
+
+impl Solution {
+    /// Covariance of the stand-alone poses of all images together, as [`StandAlone::covariance_together`] has it.
+    ///
+    /// # Errors
+    /// As of [`stand_alone`].
+    pub fn poses_together(&self) -> Result<Option<(Vec<usize>, DMatrix<f64>)>> {
+        let mut series = self.series.clone();
+        series.iter_mut().for_each(|s| s.lens_choice = LensChoice::Settled);
+        stand_alone(&series, &self.options.limits)?.covariance_together()
+    }
 }
 
 /// The fit where the adjustment stands.

@@ -104,17 +104,23 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
     for (name, text) in plate_files::plates(&solution.fit, &context.series, &gauge)? {
         add(name, text);
     }
+    let images = names::ImageNames::new(problem, &context.series);
     if context.poses == Poses::Written {
-        let names = names::ImageNames::new(problem, &context.series);
-        add("poses.csv".into(), pose_files::poses_csv(&names, &solution.free_poses));
+        add("poses.csv".into(), pose_files::poses_csv(&images, &solution.free_poses));
     }
     add("observations.csv".into(), observation_table::observations_csv(solution, context));
+    let together = if context.poses == Poses::Written { solution.poses_together()? } else { None };
+    if let Some((_, covariance)) = &together {
+        files.insert(pose_files::TOGETHER.into(), npy::matrix(covariance));
+    }
     let mut names: Vec<String> = files.keys().cloned().collect();
     names.push(solution_json::FILE_NAME.to_owned());
     #[cfg(feature = "report")]
     names.push(REPORT.to_owned());
     names.sort();
-    let record = solution_record::record(solution, context, &gauge, names)?;
+    let mut record = solution_record::record(solution, context, &gauge, names)?;
+    record.covariance_together =
+        together.map(|(order, _)| order.into_iter().map(|i| images.of(i).to_owned()).collect());
     #[cfg(feature = "report")]
     files.insert(REPORT.into(), report::report_html(&record, &Thumbnails::of_files(&record)).into_bytes());
     files.insert(solution_json::FILE_NAME.into(), solution_json::to_bytes(&record)?);

@@ -11,6 +11,9 @@ use crate::identify::Solution;
 use crate::problem::Image;
 use crate::series::CameraMount;
 
+/// Name of the covariance of all stand-alone poses together.
+pub(super) const TOGETHER: &str = "poses_covariance.npy";
+
 const PERTURBATION: &str = "\
 # The pose maps coordinates in child to coordinates in parent (m, rad; rpy: R = Rz(yaw) Ry(pitch) Rx(roll)).
 # covariance: 6x6, row by row, of the body-fixed perturbation parent_from_child * Exp([rho, phi]), translation rho (m) first,

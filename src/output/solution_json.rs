@@ -436,6 +436,9 @@ pub struct SolutionRecord {
     pub covariance_lower: Vec<f64>,
     /// Images with their observations.
     pub images: Vec<ImageRecord>,
+    /// Images in the order of poses_covariance.npy, six rows each (body twist of `plate_from_camera`, m and rad); none without `--poses`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance_together: Option<Vec<String>>,
     /// What trackers and contacts measured of bodies on the tip.
     #[serde(default, skip_serializing_if = "BodiesRecord::is_empty")]
     pub bodies: BodiesRecord,

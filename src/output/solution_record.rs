@@ -79,6 +79,7 @@ pub(super) fn record(
         estimates: estimates(solution, context)?,
         covariance_lower: lower_triangle(solution),
         images: images(solution, context),
+        covariance_together: None,
         bodies: BodiesRecord::of(solution),
     })
 }

@@ -17,8 +17,6 @@ use crate::series::InputFile;
 
 /// Name of the record that a program reads.
 pub const FILE_NAME: &str = "poses.json";
-/// Name of the covariance of all poses together.
-const TOGETHER: &str = "poses_covariance.npy";
 
 /// What the files need beside the adjustment.
 #[derive(Debug, Clone)]
@@ -133,7 +131,7 @@ pub fn stand_alone_files(found: &StandAlone, context: &StandAloneContext) -> Res
     let mut files: BTreeMap<String, Vec<u8>> = texts.map(|(name, text)| (name, text.into_bytes())).collect();
     let together = found.covariance_together()?;
     if let Some((_, covariance)) = &together {
-        files.insert(TOGETHER.to_owned(), npy::matrix(covariance));
+        files.insert(pose_files::TOGETHER.to_owned(), npy::matrix(covariance));
     }
     let mut listed: Vec<String> = files.keys().cloned().chain([FILE_NAME.to_owned()]).collect();
     listed.sort();

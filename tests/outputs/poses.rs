@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use crate::outputs_support::robot;
 use crate::outputs_support::truth_frame::{Alignment, least_eigenvalue};
+use crate::outputs_support::{context, robot};
 use nalgebra::{Matrix6, Vector3};
 use rayon::prelude::*;
 use robotcal::assess::Limits;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, OtherBody, RobotModel, compare_poses, identify, stand_alone};
 use robotcal::output::restore::measured_series;
-use robotcal::output::solution_json;
 use robotcal::output::stand_alone_files::{StandAloneContext, stand_alone_files};
+use robotcal::output::{files, solution_json};
 use robotcal::plan::plate_design::{PlateRequest, design};
 use robotcal::problem::{LensChoice, MeasuredSeries};
 use robotcal::series::{Plate, PlateKind};
@@ -27,12 +27,24 @@ fn shipped() -> Vec<MeasuredSeries> {
     series
 }
 
+fn of_poses(series: &str) -> StandAloneContext {
+    StandAloneContext {
+        series: vec![series.to_owned()],
+        inputs: Vec::new(),
+        command: String::new(),
+        notices: Vec::new(),
+        against: None,
+    }
+}
+
 #[test]
 fn poses_without_a_robot_are_those_of_an_identification() {
     let series = shipped();
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
-    let identified = identify(robot().chain(None, None).unwrap(), &series, &options).unwrap().free_poses;
-    let alone = stand_alone(&series, &Limits::default()).unwrap().free_poses;
+    let robot = robot();
+    let solution = identify(robot.chain(None, None).unwrap(), &series, &options).unwrap();
+    let found = stand_alone(&series, &Limits::default()).unwrap();
+    let (identified, alone) = (&solution.free_poses, &found.free_poses);
     assert_eq!(alone.poses.len(), 24);
     for (a, b) in alone.poses.iter().zip(&identified.poses) {
         let (a, b) = (&a.as_ref().unwrap().in_frame, &b.as_ref().unwrap().in_frame);
@@ -41,6 +53,12 @@ fn poses_without_a_robot_are_those_of_an_identification() {
         let off = (a.covariance - b.covariance).amax() / b.covariance.amax();
         assert!(off < 1e-6, "{off:e}");
     }
+    let written = files(&solution, &context(&robot)).unwrap();
+    let of_poses = stand_alone_files(&found, &of_poses("run1")).unwrap();
+    assert_eq!(written["poses_covariance.npy"], of_poses["poses_covariance.npy"]);
+    let order = |file: &[u8]| serde_json::from_slice::<serde_json::Value>(file).unwrap()["covariance_together"].clone();
+    assert_eq!(order(&written["solution.json"]), order(&of_poses["poses.json"]));
+    assert_eq!(order(&written["solution.json"]).as_array().unwrap().len(), 24);
 }
 
 #[test]
@@ -74,14 +92,7 @@ fn poses_without_a_robot_are_as_far_off_as_stated() {
 fn files_of_poses_without_a_robot_are_complete() {
     let series = shipped();
     let found = stand_alone(&series, &Limits::default()).unwrap();
-    let context = StandAloneContext {
-        series: vec!["kr6_small".to_owned()],
-        inputs: Vec::new(),
-        command: String::new(),
-        notices: Vec::new(),
-        against: None,
-    };
-    let files = stand_alone_files(&found, &context).unwrap();
+    let files = stand_alone_files(&found, &of_poses("kr6_small")).unwrap();
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
     assert_eq!(names, ["camera.yaml", "plate.csv", "plate.toml", "poses.csv", "poses.json", "poses_covariance.npy"]);
     let record: serde_json::Value = serde_json::from_slice(&files["poses.json"]).unwrap();
