@@ -9,9 +9,9 @@ const NAMED: usize = 6;
 /// What the images say of postures that were computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ComputedPostures {
-    /// Series.
-    pub series: String,
-    /// Its stops.
+    /// Series with such poses.
+    pub series: Vec<String>,
+    /// Their stops.
     pub stops: usize,
     /// Images at whose stops another posture is taken than that nearest to the stop before.
     pub others: Vec<String>,
@@ -30,7 +30,7 @@ impl Kind for ComputedPostures {
 
     fn subjects(&self) -> Vec<Subject> {
         let images = self.others.iter().cloned().map(Subject::Image);
-        std::iter::once(Subject::Series(self.series.clone())).chain(images).collect()
+        self.series.iter().cloned().map(Subject::Series).chain(images).collect()
     }
 
     fn quantities(&self) -> Vec<Quantity> {
@@ -43,7 +43,7 @@ impl Kind for ComputedPostures {
     }
 
     fn place(&self) -> String {
-        format!("series {}", self.series)
+        format!("series {}", some_of(&self.series, NAMED))
     }
 
     fn seen(&self) -> String {

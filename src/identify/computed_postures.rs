@@ -19,12 +19,11 @@ use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 
-use super::build::build;
-use super::free_poses::adjust_free_poses;
-use super::options::Options;
+use super::free_poses::free_poses_of;
 use super::start::{StartGiven, start_robot};
-use super::stated::camera_starts;
+use crate::assess::Limits;
 use crate::diagnose::ComputedPostures;
+use crate::error::Result;
 use crate::fit::FreePoses;
 use crate::linalg::SymmetricFactor;
 use crate::model::robot::{Posture, Robot};
@@ -70,19 +69,21 @@ struct Stops {
     prior: DVector<f64>,
 }
 
-/// The series with the postures that the images tell, and what is to be said of them; unchanged where readings were read.
+/// The series with the postures that the images tell, and what is to be said of them; unchanged where readings were read. `hold` holds the
+/// columns that are not to be fitted.
 pub(super) fn told_by_images<'a>(
     robot: &Robot,
     series: &'a [MeasuredSeries],
-    options: &Options,
+    limits: &Limits,
+    hold: impl FnOnce(&mut Adjustment) -> Result<()>,
 ) -> (Cow<'a, [MeasuredSeries]>, Option<ComputedPostures>) {
     let unchanged = (Cow::Borrowed(series), None);
     if series.iter().flat_map(|s| &s.postures).all(Vec::is_empty) {
         return unchanged;
     }
     let _stage = stage("postures");
-    let Some(stops) = Stops::of(robot, series, options) else { return unchanged };
-    let Some((chosen, is_open)) = stops.chosen(options.limits.decisive_log_odds) else { return unchanged };
+    let Some(stops) = Stops::of(robot, series, limits, hold) else { return unchanged };
+    let Some((chosen, is_open)) = stops.chosen(limits.decisive_log_odds) else { return unchanged };
     let mut told = series.to_vec();
     let mut others = Vec::new();
     for (stop, &c) in stops.all.iter().zip(&chosen.postures).filter(|(_, c)| **c > 0) {
@@ -92,17 +93,20 @@ pub(super) fn told_by_images<'a>(
         let (s, row) = stop.rows[0];
         others.push(series[s].stops[row].image.clone());
     }
-    let series = series[stops.all[0].rows[0].0].name.clone();
-    (Cow::Owned(told), Some(ComputedPostures { series, stops: stops.all.len(), others, is_open }))
+    let computed = |s: &MeasuredSeries| s.postures.iter().any(|others| !others.is_empty());
+    let count = stops.all.iter().filter(|stop| computed(&series[stop.rows[0].0])).count();
+    let series = series.iter().filter(|s| computed(s)).map(|s| s.name.clone()).collect();
+    (Cow::Owned(told), Some(ComputedPostures { series, stops: count, others, is_open }))
 }
 
 impl Stops {
-    fn of(robot: &Robot, series: &[MeasuredSeries], options: &Options) -> Option<Self> {
-        let limits = &options.limits;
-        let mut start = build(robot, series, false, limits).ok()?;
-        options.selection.apply(&mut start.problem.layout, &mut start.state, limits).ok()?;
-        let stated = camera_starts(&start.problem.cameras, series);
-        let (mut adjustment, free, mut verdicts) = adjust_free_poses(start, &stated, limits).ok()?;
+    fn of(
+        robot: &Robot,
+        series: &[MeasuredSeries],
+        limits: &Limits,
+        hold: impl FnOnce(&mut Adjustment) -> Result<()>,
+    ) -> Option<Self> {
+        let (mut adjustment, free, mut verdicts) = free_poses_of(robot, series, limits, hold).ok()?;
         start_robot(&mut adjustment, &free, StartGiven { series, limits }, &mut verdicts).ok()?;
         let layout = &adjustment.problem.layout;
         let columns: Vec<usize> = (0..layout.theta_len()).filter(|&c| layout.columns[c].free).collect();

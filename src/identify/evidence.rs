@@ -44,7 +44,9 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let robot = model.robot_with(chain.clone(), options.harmonics);
     let series = &turns::settled(&robot, series, &options.limits);
     let rigid = RobotModel::Rigid.robot_with(chain.clone(), options.harmonics);
-    let (series, of_postures) = told_by_images(&rigid, series, options);
+    let (series, of_postures) = told_by_images(&rigid, series, &options.limits, |start| {
+        options.selection.apply(&mut start.problem.layout, &mut start.state, &options.limits)
+    });
     let Lensed { fit: full, series, lenses, notices } = with_lenses(&chain, &series, &by_joint_fit)?;
     let (chosen, evidences) = match options.model_is_open() {
         true => best_model(chain.clone(), &series, options, full)?,

@@ -2,17 +2,19 @@
 
 use nalgebra::{DMatrix, Matrix6, Vector2};
 
+use super::build::build;
 use super::start_verdict::{StartReached, StartVerdict};
-use super::stated::CameraStart;
+use super::stated::{CameraStart, camera_starts};
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::fit::{FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
+use crate::model::robot::Robot;
 use crate::problem::{
-    Adjustment, Image, ImageRejection, Mark, MarkerObservation, ObservationRejection, Problem, State, Tie, Weighting,
-    size_by_distance,
+    Adjustment, Image, ImageRejection, Mark, MarkerObservation, MeasuredSeries, ObservationRejection, Problem, State,
+    Tie, Weighting, size_by_distance,
 };
 use crate::solve::{
     ComponentOptions, Elimination, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status,
@@ -83,6 +85,22 @@ impl FreeStart {
         problem.families.iter_mut().zip(&self.family_factor).for_each(|(f, factor)| f.factor = *factor);
         problem.families.iter().for_each(|f| f.hold(&mut problem.layout));
     }
+}
+
+/// The adjustment of what the images of some series say by themselves, with exact readings; `prepare` may hold columns or leave observations out.
+///
+/// # Errors
+/// Those of [`build`], of `prepare` and of [`adjust_free_poses`].
+pub(super) fn free_poses_of(
+    robot: &Robot,
+    series: &[MeasuredSeries],
+    limits: &Limits,
+    prepare: impl FnOnce(&mut Adjustment) -> Result<()>,
+) -> Result<(Adjustment, FreePoses, Vec<StartVerdict>)> {
+    let mut start = build(robot, series, false, limits)?;
+    prepare(&mut start)?;
+    let stated = camera_starts(&start.problem.cameras, series);
+    adjust_free_poses(start, &stated, limits)
 }
 
 /// Adjusts from nothing. The adjustment that is left holds rejections and pixel factors, cameras, plates and poses.

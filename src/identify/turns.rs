@@ -9,9 +9,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::build::build;
-use super::free_poses::adjust_free_poses;
-use super::stated::camera_starts;
+use super::free_poses::free_poses_of;
 use crate::assess::Limits;
 use crate::geom::{exp_so3, log_so3};
 use crate::init::{PosePair, solve_hand_eye};
@@ -69,9 +67,7 @@ fn groups(
     turns: &[Vec<PlateTurn>],
     limits: &Limits,
 ) -> Vec<(usize, Vec<View>)> {
-    let Ok(start) = build(robot, series, false, limits) else { return Vec::new() };
-    let stated = camera_starts(&start.problem.cameras, series);
-    let Ok((adjustment, free, _)) = adjust_free_poses(start, &stated, limits) else { return Vec::new() };
+    let Ok((adjustment, free, _)) = free_poses_of(robot, series, limits, |_| Ok(())) else { return Vec::new() };
     let mut groups: BTreeMap<(usize, usize), Vec<View>> = BTreeMap::new();
     let place = |i: usize| {
         let images = &adjustment.problem.images;

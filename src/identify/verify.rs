@@ -1,17 +1,16 @@
 //! A robot model judged by a series that it was not fitted to: camera, hand-camera offset and plate are fitted, the robot is not.
 
-use super::build::build;
-use super::free_poses::adjust_free_poses;
+use super::computed_postures::told_by_images;
+use super::free_poses::free_poses_of;
 use super::options::JointNoise;
 use super::start::{StartGiven, start_robot};
-use super::stated::camera_starts;
 use super::turns;
 use super::unpredicted::nothing_held_out;
 use crate::assess::Limits;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
 use crate::error::{Code, Error, Result};
 use crate::model::robot::Robot;
-use crate::problem::MeasuredSeries;
+use crate::problem::{Adjustment, MeasuredSeries};
 use crate::solve::{ComponentOptions, Status, estimate_components};
 
 /// Error of one image, predicted from its joint readings by a fit of camera and plate to the other images.
@@ -29,20 +28,23 @@ pub struct JudgedImage {
 
 /// Errors of all images on the robot that a fixed robot model leaves.
 ///
-/// Joint noise is a variance component of its own for each model, so that a bad model does not bend camera and plate.
+/// Joint noise is a variance component of its own for each model, so that a bad model does not bend camera and plate. Poses of a controller are
+/// taken in the postures that the images tell with this robot.
 ///
 /// # Errors
 /// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset.
 pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<JudgedImage>> {
     let limits = &Limits::default();
     let series = &turns::settled(robot, series, limits);
-    let mut adjustment = build(robot, series, false, limits)?;
-    let layout = &mut adjustment.problem.layout;
-    let columns = layout.robot();
-    layout.columns[columns].iter_mut().for_each(|c| c.free = false);
-    let stated = camera_starts(&adjustment.problem.cameras, series);
-    let (mut adjustment, free, mut starts) = adjust_free_poses(adjustment, &stated, limits)?;
-    start_robot(&mut adjustment, &free, StartGiven { series, limits }, &mut starts)?;
+    let held = |start: &mut Adjustment| {
+        let layout = &mut start.problem.layout;
+        let columns = layout.robot();
+        layout.columns[columns].iter_mut().for_each(|c| c.free = false);
+        Ok(())
+    };
+    let (series, _) = told_by_images(robot, series, limits, held);
+    let (mut adjustment, free, mut starts) = free_poses_of(robot, &series, limits, held)?;
+    start_robot(&mut adjustment, &free, StartGiven { series: &series, limits }, &mut starts)?;
     adjustment.tie_to_readings(false);
     let outcome = estimate_components(adjustment, &ComponentOptions::default());
     if outcome.status != Status::Converged {
