@@ -110,21 +110,21 @@ impl Scene {
             let inside = |d: &[f64; 3]| (x - d[0]).powi(2) + (y - d[1]).powi(2) < d[2] * d[2];
             return if dots.iter().any(inside) { 0.0 } else { 1.0 };
         }
-        let (c, r) = ((x + 1.0).floor(), (y + 1.0).floor());
-        let inside = c >= 0.0 && r >= 0.0 && c <= f64::from(self.columns) && r <= f64::from(self.rows);
+        let inside = x >= -1.0 && y >= -1.0 && x < f64::from(self.columns) && y < f64::from(self.rows);
         if !inside {
             return 1.0;
         }
+        let (c, r) = ((x + 1.0) as u32, (y + 1.0) as u32);
         let light_first = matches!(self.print, Print::Charuco { legacy: true, .. });
-        if ((c + r).rem_euclid(2.0) < 0.5) != light_first {
+        if (c + r).is_multiple_of(2) != light_first {
             0.0
         } else {
-            self.light_square([x + 1.0 - c, y + 1.0 - r], c, r)
+            self.light_square([x + 1.0 - f64::from(c), y + 1.0 - f64::from(r)], c, r)
         }
     }
 
     /// Shade inside a light square; `at` runs from 0 to 1 along both sides.
-    fn light_square(&self, at: [f64; 2], c: f64, r: f64) -> f64 {
+    fn light_square(&self, at: [f64; 2], c: u32, r: u32) -> f64 {
         let Print::Charuco { dictionary, ratio, .. } = &self.print else { return 1.0 };
         let side = dictionary.marker_size() + 2;
         let bit = at.map(|t| ((t - 0.5) / ratio + 0.5) * side as f64);
@@ -136,7 +136,7 @@ impl Scene {
             return 0.0;
         }
         // Light squares before this one, row by row.
-        let before = r as usize * (self.columns as usize + 1) + c as usize;
+        let before = (r * (self.columns + 1) + c) as usize;
         let code = dictionary.codes()[before / 2];
         let index = (y - 1) * (side - 2) + x - 1;
         1.0 - f64::from(((code >> index) & 1) as u8)
@@ -154,18 +154,21 @@ impl Scene {
         let margin = (4.0 * self.blur).ceil() as usize;
         let (w, h) = (FINE * (width + 2 * margin), FINE * (height + 2 * margin));
         let step = 1.0 / FINE as f64;
+        let edge = |n: usize| n as f64 * step - margin as f64 - 0.5;
+        let shade = |x: f64, y: f64| self.shade(project(&inverse, [x, y]));
+        let corners: Vec<f64> =
+            (0..=h).flat_map(|y| (0..=w).map(move |x| (x, y))).map(|(x, y)| shade(edge(x), edge(y))).collect();
         let sharp: Vec<f32> = (0..w * h)
             .map(|k| {
-                let edge = |n: usize| n as f64 * step - margin as f64 - 0.5;
-                let corner = [edge(k % w), edge(k / w)];
-                let shade =
-                    |x: f64, y: f64| self.shade(project(&inverse, [corner[0] + x * step, corner[1] + y * step]));
-                let rim = shade(0.0, 0.0) + shade(1.0, 0.0) + shade(0.0, 1.0) + shade(1.0, 1.0);
+                let (x, y) = (k % w, k / w);
+                let rim: f64 = [y, y + 1].map(|y| y * (w + 1) + x).map(|at| corners[at] + corners[at + 1]).iter().sum();
                 if rim == 0.0 || rim == 4.0 {
                     return rim as f32 / 4.0;
                 }
                 let sample = |s: u32| {
-                    shade((f64::from(s) + 0.5) / SAMPLES, ((f64::from(s) * SAMPLES_STEP + 0.5) / SAMPLES).fract())
+                    let across = (f64::from(s) + 0.5) / SAMPLES;
+                    let down = (f64::from(s) * SAMPLES_STEP + 0.5) / SAMPLES % 1.0;
+                    shade(edge(x) + across * step, edge(y) + down * step)
                 };
                 (0..SAMPLES as u32).map(sample).sum::<f64>() as f32 / SAMPLES as f32
             })
