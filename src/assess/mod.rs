@@ -11,7 +11,6 @@ mod in_base;
 mod limits;
 mod mean_square;
 mod near_nominal;
-mod pattern_cause;
 mod pattern_effect;
 mod patterns;
 mod points;
@@ -40,9 +39,8 @@ pub use identifiability::{
 pub use in_base::sigma_in_base;
 pub use limits::Limits;
 pub use near_nominal::{extrapolation_m, restraint};
-pub use pattern_cause::cause;
 pub use pattern_effect::PatternEffect;
-pub use patterns::{Bearer, Pattern, PatternTest, patterns};
+pub use patterns::{Bearer, Pattern, PatternTest, cause, patterns};
 pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
 pub use projection::ProjectionMap;
 pub use promise::{FlangeErrors, FlangeIntervals, usual_joint_sigma};

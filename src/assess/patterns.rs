@@ -152,8 +152,9 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
     let rms_px = (sum / points.max(1) as f64).sqrt();
     let of_group = |g: &Group| {
         let (y, statistic, degrees) = solved(&response, g.first, g.pattern.columns());
-        let left = (squares - statistic).max(f64::MIN_POSITIVE);
-        let statistic = statistic * (squares - degrees as f64).max(1.0) / left;
+        // One step from a large fault may take more than there is.
+        let taken = (statistic / squares).min(1.0 - f64::EPSILON);
+        let statistic = taken * (squares - degrees as f64).max(1.0) / (1.0 - taken);
         let share = statistic / (statistic + squares);
         let step = combined(&response.steps[g.first..g.first + y.len()], &y)?;
         let shift = |plate: usize, marker: usize| match g.bearer {
@@ -180,6 +181,21 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
     let mut tests: Vec<PatternTest> = groups.iter().filter_map(of_group).collect();
     tests.extend(tolerances(fit, rms_px, squares, limits));
     Ok(tests)
+}
+
+/// The pattern that names the cause: of those beyond chance that which gains most, or the simplest that removes nearly as much of the squares
+/// of the residuals (what is of second order in a large fault belongs to no first-order column, and many columns take more of it).
+pub fn cause<'a>(tests: &'a [PatternTest], limits: &Limits) -> Option<&'a PatternTest> {
+    let found = || tests.iter().filter(|t| t.is_found(limits));
+    let best = found().max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+    if best.pattern == Pattern::Tolerance {
+        return Some(best);
+    }
+    let alike = |t: &&PatternTest| {
+        let is_simpler = t.pattern != Pattern::Tolerance && t.degrees < best.degrees;
+        is_simpler && t.share >= limits.pattern_share * best.share
+    };
+    found().filter(alike).min_by_key(|t| t.degrees).or(Some(best))
 }
 
 fn groups(fit: &Adjustment) -> Vec<Group> {

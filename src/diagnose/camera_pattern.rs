@@ -25,7 +25,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<R
 /// The pattern that names the cause, where there is one.
 pub fn residual_pattern(fit: &Fit, limits: &Limits) -> Option<ResidualPattern> {
     let tests = patterns(fit, limits).ok()?;
-    let found = cause(fit, &tests, limits)?.clone();
+    let found = cause(&tests, limits)?.clone();
     let bearer = match found.bearer {
         Bearer::Camera(k) => fit.problem.cameras.get(k)?.clone(),
         Bearer::Plate(k) => match fit.problem.plates.len() {

@@ -24,7 +24,6 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("assess/mean_square.rs SAMPLES", "samples of a quantile"),
     ("assess/mean_square.rs SEED", "start of random numbers"),
     ("assess/near_nominal.rs HALVINGS", "iterations"),
-    ("assess/pattern_cause.rs ROUNDS", "most iterations"),
     ("assess/pattern_effect.rs HELD", "rounding"),
     ("assess/patterns.rs ABSORBED", "rounding of an eigenvalue"),
     ("assess/patterns.rs LEAST_SHARE", "rounding of an eigenvalue"),
