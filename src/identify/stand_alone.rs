@@ -94,11 +94,14 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
 }
 
 impl Solution {
-    /// Covariance of the stand-alone poses of all images together, as [`StandAlone::covariance_together`] has it.
+    /// Covariance of the stand-alone poses of all images together, as [`StandAlone::covariance_together`] has it; none without such poses.
     ///
     /// # Errors
     /// As of [`stand_alone`].
     pub fn poses_together(&self) -> Result<Option<(Vec<usize>, DMatrix<f64>)>> {
+        if self.free_poses.poses.iter().all(Option::is_none) {
+            return Ok(None);
+        }
         let mut series = self.series.clone();
         series.iter_mut().for_each(|s| s.lens_choice = LensChoice::Settled);
         stand_alone(&series, &self.options.limits)?.covariance_together()
