@@ -10,7 +10,7 @@ use robotcal::error::Code;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::model::robot::{Posture, Robot};
-use robotcal::output::{restore, solution_json};
+use robotcal::output::{Poses, restore, solution_json};
 use robotcal::problem::{
     Adjustment, BodySeen, InstrumentKind, MeasuredSeries, MeasuredStop, SeenBody, SeenLength, Step,
 };
@@ -394,8 +394,9 @@ fn a_folder_of_contacts_gives_a_robot_and_its_record_gives_it_again() {
     let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
     let calibration = robotcal::calibrate(&urdf, [folder.path()], &options).unwrap();
-    let files = calibration.files(&Export::default()).unwrap();
+    let files = calibration.files(&Export { poses: Poses::Written, ..Export::default() }).unwrap();
     assert!(files.keys().any(|name| name.ends_with(".urdf")) && files.contains_key("report.html"));
+    assert!(!files.contains_key("poses_covariance.npy"), "there are no poses");
     assert!(!files.keys().any(|name| name.starts_with("camera") || name.starts_with("plate")), "{:?}", files.keys());
     let record = solution_json::read(&files["solution.json"]).unwrap();
     assert_eq!((record.bodies.measurements.len(), record.bodies.lengths.len()), (42, 2));
