@@ -14,8 +14,8 @@ pub struct ResidualPattern {
     pub bearer: String,
     /// True where it moves flange or poses by more than is stated of them.
     pub matters: bool,
-    /// True where the lens has its columns, and their priors hold them back.
-    pub is_held_back: bool,
+    /// True where the lens has terms of this kind, which do not suffice: priors hold them back, or their form is another.
+    pub is_fitted: bool,
 }
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<ResidualPattern> {
@@ -34,8 +34,8 @@ pub fn residual_pattern(fit: &Fit, limits: &Limits) -> Option<ResidualPattern> {
         },
     };
     let matters = found.moved.is_some_and(|m| m.sigmas() > limits.pattern_moves);
-    let is_held_back = matches!(found.bearer, Bearer::Camera(k) if found.pattern.is_fitted(fit, k));
-    Some(ResidualPattern { found, bearer, matters, is_held_back })
+    let is_fitted = matches!(found.bearer, Bearer::Camera(k) if found.pattern.is_fitted(fit, k));
+    Some(ResidualPattern { found, bearer, matters, is_fitted })
 }
 
 /// What it looks like, and what removes it.
@@ -139,8 +139,8 @@ impl Kind for ResidualPattern {
     }
 
     fn remedy(&self) -> String {
-        match self.is_held_back {
-            true => "this lens has such terms, but smaller ones by their priors: try --camera brown+field".into(),
+        match self.is_fitted {
+            true => "this lens has terms of this kind, and they do not suffice: try --camera brown+field".into(),
             false => words(self.found.pattern)[1].into(),
         }
     }

@@ -6,10 +6,11 @@
 //! `J = sum_P A' A - V' K V`, `V = sum_P T' A`, the cost falls by `D = g' J^-1 g`, chi-squared with six degrees of freedom where nothing
 //! moved, and `x = J^-1 g` with the covariance `J^-1`.
 //!
-//! The estimated joint noise has grown with the fault, so that `D` is small beside what the sizes say; it is compared with the squares
-//! `R` of the latent joint errors and tilts, which are as many as the degrees of freedom that the robot left, and `P` of the robot's errors over their
-//! priors, which are as many as it took: a step may take up either. `D / (R + P)` has a beta distribution where noise is Gaussian. Real robots err alike in postures that are alike, so that chance alone does not acquit them: the step must also
-//! explain most of `R`.
+//! The estimated joint noise has grown with the fault, so that `D` is small beside what the sizes say; it is compared with the squares `R` of what
+//! the poses of the images miss those of the readings, in units of the noise of both, which are as many as the degrees of freedom that the robot
+//! left, and with the squares `P` of the robot's errors over their priors, which are as many as it took: a step may take up either. `D / (R + P)`
+//! has a beta distribution where noise is Gaussian. Real robots err alike in postures that are alike, so that chance alone does not acquit them:
+//! the step must also explain most of `R`.
 
 use std::ops::Range;
 use std::rc::Rc;
@@ -110,6 +111,14 @@ impl Row {
         self.by_columns.columns_range(columns.clone()).into_owned()
     }
 
+    /// Squares of what its pose misses that of the readings.
+    fn squares(&self, problem: &Problem) -> f64 {
+        let image = &problem.images[self.images[0].image];
+        let by_pose = self.by(&problem.layout.placements[image.placement]);
+        let score = by_pose.tr_mul(&self.score);
+        SymmetricFactor::new(&by_pose.tr_mul(&by_pose)).map_or(0.0, |factor| score.dot(&factor.solve(&score)))
+    }
+
     /// Its images of a body.
     fn of(&self, problem: &Problem, body: Body) -> impl Iterator<Item = Shown> {
         self.images.iter().copied().filter(move |shown| body.is_of(&problem.images[shown.image]))
@@ -123,16 +132,10 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Disp
 
 /// Steps that explain most of the joint noise, in the order of the images.
 fn find_steps(fit: &Fit, limits: &Limits) -> Vec<PoseStep> {
-    let Adjustment { problem, state } = &fit.adjustment;
+    let problem = &fit.problem;
     let mut linear = Linear::of(fit.linear());
     let columns = linear.information.ncols();
-    let errors = |row: &Row| {
-        let stop = problem.images[row.images[0].image].stop;
-        let ties =
-            row.images.iter().flat_map(|own| problem.tie_squares(&problem.images[own.image], &state.ties[own.image]));
-        problem.joint_error_squares(stop, &state.joint_errors[stop]).chain(ties).sum::<f64>()
-    };
-    let all: f64 = linear.stops.iter().map(errors).sum();
+    let all: f64 = linear.stops.iter().map(|row| row.squares(problem)).sum();
     let of_priors = prior_squares(fit);
     let (mut left, mut found, mut good) = (all, Vec::<PoseStep>::new(), Vec::new());
     while found.len() < limits.displacements {

@@ -20,6 +20,7 @@ mod moved_in_time;
 mod normal_equations;
 mod patterns;
 mod plate_size;
+mod random_worlds;
 mod real_tracker;
 mod refits;
 mod second_pass;

@@ -1,0 +1,147 @@
+//! Clean worlds of all kinds: what is called good is as good as is stated, and nothing clean is refused.
+
+use std::path::Path;
+
+use nalgebra::Vector6;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use robotcal::assess::{FlangeModel, Limits, still, stops};
+use robotcal::geom::{Pose, rigid_fit};
+use robotcal::identify::{Options, RobotModel, Solution, identify};
+use robotcal::model::camera::Lens;
+use robotcal::plan::plate_design::{PlateRequest, design};
+use robotcal::problem::{LensChoice, MeasuredSeries};
+use robotcal::series::{CameraMount, Plate, PlateKind};
+use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series};
+use robotcal::study::measured;
+use robotcal::urdf::Chain;
+
+/// A setting by its number: everything that a user chooses or has.
+struct Setting {
+    chain: Chain,
+    lens: Lens,
+    model: RobotModel,
+    request: WorldRequest,
+    words: String,
+}
+
+fn setting(seed: u64) -> Setting {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut one_of = |n: usize| rng.random_range(0..n);
+    let robot = ["kuka_kr6_r900", "ur10e", "lbr_iiwa_14"][one_of(3)];
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("robots/{robot}/{robot}.urdf"));
+    let chain = robotcal::urdf::read(&path).unwrap().chain(None, None).unwrap();
+    let lens = [Lens::Brown, Lens::Brown, Lens::Fisheye, Lens::Parallax, Lens::Rational][one_of(5)];
+    let degrees = [35.0, 60.0, 85.0][one_of(3)];
+    let (is_full, mount) = (one_of(3) == 0, [CameraMount::Hand, CameraMount::Hand, CameraMount::Fixed][one_of(3)]);
+    let marker_sigma_m = [0.0, 0.03e-3, 0.1e-3][one_of(3)];
+    let plate = match one_of(3) {
+        0 => Plate::lattice(PlateKind::Points, 9, 6, 0.035, marker_sigma_m),
+        1 => Plate::lattice(PlateKind::Points, 12, 9, 0.03, marker_sigma_m),
+        _ => design(&PlateRequest { markers: Some(160), ..PlateRequest::default() }).unwrap().plate,
+    };
+    let request = WorldRequest {
+        camera: lens_camera(lens, 1280, 1024, f64::to_radians(degrees)),
+        images: [15, 20, 30, 50][one_of(4)],
+        placements: [1, 1, 1, 2, 3][one_of(5)],
+        errors: if is_full { RobotErrors::full() } else { RobotErrors::default() },
+        joint_noise_rad: [0.0, 0.02e-3, 0.1e-3, 0.5e-3][one_of(4)],
+        pixel_sigma_px: [0.02, 0.05, 0.2][one_of(3)],
+        plate_modes: true,
+        held_out: 60,
+        mount,
+        marker_sigma_m,
+        seed,
+        ..WorldRequest::typical(chain.clone(), plate)
+    };
+    let model = [RobotModel::Auto, RobotModel::Full][one_of(2)];
+    let words = format!(
+        "{robot}, {} images, {mount:?}, {lens:?}, {degrees} deg, {} markers off by {} mm in {} places, {} px, {} mrad, full errors {is_full}, {model:?}",
+        request.images,
+        request.plate.markers.len(),
+        1e3 * marker_sigma_m,
+        request.placements,
+        request.pixel_sigma_px,
+        1e3 * request.joint_noise_rad,
+    );
+    Setting { chain, lens, model, request, words }
+}
+
+/// What stands still, where it truly is, in the frame that the solution has of it: a plate by its markers, a camera by itself.
+fn true_still(solution: &Solution, made: &SimulatedSeries) -> Pose {
+    let image = &solution.fit.problem.images[solution.fit.problem.used_on_robot().next().unwrap()];
+    if image.mount == CameraMount::Fixed {
+        return made.truth.camera_pose.pose();
+    }
+    let markers = made.true_plate.markers.iter().enumerate();
+    let pairs: Vec<_> = markers.map(|(k, m)| (solution.fit.state.plates[0].position(k), m.position_m)).collect();
+    made.truth.plate_poses[&image_place(solution)].pose() * rigid_fit(&pairs).unwrap()
+}
+
+fn image_place(solution: &Solution) -> String {
+    let problem = &solution.fit.problem;
+    problem.placements[problem.images[problem.used_on_robot().next().unwrap()].placement].clone()
+}
+
+/// Position of the flange within the range of the stops, RMS in mm: off, but for the tool, and as stated.
+fn off_and_stated(solution: &Solution, made: &SimulatedSeries) -> [f64; 2] {
+    let (fit, postures) = (&solution.fit, stops(&solution.fit.problem));
+    let model = FlangeModel::new(
+        &fit.state.robot,
+        &fit.problem.layout,
+        still(fit).unwrap(),
+        &fit.covariance.reduced,
+        &postures,
+        &Limits::default(),
+    );
+    let (model, still) = (model.unwrap(), true_still(solution, made));
+    let found = made.truth.held_out.iter().map(|h| (h.base_from_tip.pose(), model.at(&h.readings)));
+    let within: Vec<(Vector6<f64>, f64)> = found
+        .filter(|(_, predicted)| predicted.outside.is_empty())
+        .map(|(tip, predicted)| (((still.inverse() * tip).inverse() * predicted.pose).log(), predicted.sigmas()[0]))
+        .collect();
+    let count = within.len() as f64;
+    let tool = within.iter().map(|(twist, _)| twist).sum::<Vector6<f64>>() / count;
+    let off: f64 = within.iter().map(|(twist, _)| (twist - tool).fixed_rows::<3>(0).norm_squared()).sum();
+    let stated: f64 = within.iter().map(|(_, sigma)| sigma * sigma).sum();
+    [off, stated].map(|sum| 1e3 * (sum / count).sqrt())
+}
+
+fn solved(seed: u64) -> Option<(Solution, SimulatedSeries, String)> {
+    let Setting { chain, lens, model, request, words } = setting(seed);
+    let made = series(&request).ok()?;
+    let seen = MeasuredSeries { lens, lens_choice: LensChoice::Settled, ..measured(&made, &chain) };
+    let solution = identify(chain, &[seen], &Options { model, ..Options::default() }).ok()?;
+    Some((solution, made, words))
+}
+
+/// Two of the settings of the study, in which no joint noise was: plate and camera were called loose.
+#[test]
+fn a_robot_without_joint_noise_carries_no_loose_camera() {
+    for seed in [2, 60] {
+        let (solution, _, words) = solved(seed).unwrap();
+        let gates = solution.failed_gates();
+        assert!(gates.is_empty(), "seed {seed}, {words}: {gates:?}");
+    }
+}
+
+#[test]
+#[ignore = "minutes; its figures stand in the guide, accuracy; WORLDS settings"]
+fn study_of_random_worlds() {
+    let worlds: u64 = std::env::var("WORLDS").map_or(40, |n| n.parse().unwrap());
+    let judged = |seed: u64| {
+        let (solution, made, words) = solved(seed)?;
+        let [off, stated] = off_and_stated(&solution, &made);
+        let gates = solution.failed_gates();
+        println!("seed {seed}: off {off:.3} stated {stated:.3} mm, {:.2}; {words}; {gates:?}", off / stated);
+        Some((off / stated, gates.is_empty()))
+    };
+    let all: Vec<(f64, bool)> = (1..=worlds).into_par_iter().filter_map(judged).collect();
+    let good: Vec<f64> = all.iter().filter(|(_, is_good)| *is_good).map(|(ratio, _)| *ratio).collect();
+    let rms = (good.iter().map(|r| r * r).sum::<f64>() / good.len() as f64).sqrt();
+    let largest = good.iter().copied().fold(0.0, f64::max);
+    println!("{} worlds, {} good: off over stated RMS {rms:.2}, at most {largest:.2}", all.len(), good.len());
+    assert!(all.len() as u64 > worlds * 9 / 10 && good.len() * 50 >= all.len() * 49, "{} of {}", good.len(), all.len());
+    assert!(largest < 3.0 && (0.5..1.2).contains(&rms), "{rms}, {largest}");
+}
