@@ -5,9 +5,9 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use robotcal::assess::{FlangeModel, Limits, Pattern, cause, patterns, still, stops};
+use robotcal::assess::{Limits, Pattern, cause, patterns};
 use robotcal::diagnose::{ResidualPattern, residual_pattern};
-use robotcal::geom::{Pose, rigid_fit};
+use robotcal::fit::Fit;
 use robotcal::identify::{Options, RobotModel, Solution, identify, stand_alone};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::plan::plate_design::{PlateRequest, design};
@@ -15,6 +15,8 @@ use robotcal::problem::{LensChoice, MeasuredSeries};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::study::measured;
 use robotcal::urdf::{Chain, read};
+
+use crate::support::flange::{flange_of, true_from_fitted};
 
 /// What is put in, and how much of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -147,33 +149,16 @@ fn a_lens_that_was_taken_is_not_the_remedy() {
     }
 }
 
-/// The plate in the base, in the frame of its true markers, to which those of the solution are fitted: a bent plate takes the frame along
-/// that its markers are given in.
-fn placed(solution: &Solution, made: &SimulatedSeries) -> Pose {
-    let state = &solution.fit.state;
-    let markers = made.true_plate.markers.iter().enumerate();
-    let pairs: Vec<_> = markers.map(|(k, m)| (state.plates[0].position(k), m.position_m)).collect();
-    state.placements[0] * rigid_fit(&pairs).unwrap().inverse()
-}
-
-/// Flange of two solutions, each in the frame of its plate, RMS difference over what the tool does not take up, and the stated sigma of the first, m.
+/// Flange of two solutions, each in the frame of its true markers, RMS difference over what the tool does not take up, and the stated sigma of the
+/// first, m.
 fn apart((faulty, bent): (&Solution, &SimulatedSeries), (clean, flat): (&Solution, &SimulatedSeries)) -> [f64; 2] {
-    let fit = &faulty.fit;
-    let postures = stops(&fit.problem);
-    let model = FlangeModel::new(
-        &fit.state.robot,
-        &fit.problem.layout,
-        still(fit).unwrap(),
-        &fit.covariance.reduced,
-        &postures,
-        &Limits::default(),
-    );
-    let layout = &fit.problem.layout;
+    let (fit, layout) = (&faulty.fit, &faulty.fit.problem.layout);
     let values = fit.state.values(layout) - clean.fit.state.values(layout);
     let mut step = values.rows(0, layout.theta_len()).into_owned();
-    let placement = (placed(clean, flat).inverse() * placed(faulty, bent)).log();
+    let placed = |fit: &Fit, made: &SimulatedSeries| fit.state.placements[0] * true_from_fitted(fit, made).inverse();
+    let placement = (placed(&clean.fit, flat).inverse() * placed(fit, bent)).log();
     step.rows_mut(layout.placements[0].start, 6).copy_from(&placement);
-    model.unwrap().moved_m(&step)
+    flange_of(fit).moved_m(&step)
 }
 
 struct Outcome {

@@ -6,8 +6,8 @@ use nalgebra::Vector6;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use robotcal::assess::{FlangeModel, Limits, still, stops};
-use robotcal::geom::{Pose, rigid_fit};
+use robotcal::fit::Fit;
+use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::model::camera::Lens;
 use robotcal::plan::plate_design::{PlateRequest, design};
@@ -16,6 +16,8 @@ use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::study::measured;
 use robotcal::urdf::Chain;
+
+use crate::support::flange::{flange_of, true_from_fitted};
 
 /// A setting by its number: everything that a user chooses or has.
 struct Setting {
@@ -68,34 +70,21 @@ fn setting(seed: u64) -> Setting {
     Setting { chain, lens, model, request, words }
 }
 
-/// What stands still, where it truly is, in the frame that the solution has of it: a plate by its markers, a camera by itself.
-fn true_still(solution: &Solution, made: &SimulatedSeries) -> Pose {
-    let image = &solution.fit.problem.images[solution.fit.problem.used_on_robot().next().unwrap()];
-    if image.mount == CameraMount::Fixed {
-        return made.truth.camera_pose.pose();
+/// What stands still, where it truly is, in the frame that the fit has of it: a plate by its markers, a camera by itself.
+fn true_still(fit: &Fit, made: &SimulatedSeries) -> Pose {
+    let image = &fit.problem.images[fit.problem.used_on_robot().next().unwrap()];
+    match image.mount {
+        CameraMount::Fixed => made.truth.camera_pose.pose(),
+        CameraMount::Hand => {
+            let placement = &fit.problem.placements[image.placement];
+            made.truth.plate_poses[placement].pose() * true_from_fitted(fit, made)
+        }
     }
-    let markers = made.true_plate.markers.iter().enumerate();
-    let pairs: Vec<_> = markers.map(|(k, m)| (solution.fit.state.plates[0].position(k), m.position_m)).collect();
-    made.truth.plate_poses[&image_place(solution)].pose() * rigid_fit(&pairs).unwrap()
-}
-
-fn image_place(solution: &Solution) -> String {
-    let problem = &solution.fit.problem;
-    problem.placements[problem.images[problem.used_on_robot().next().unwrap()].placement].clone()
 }
 
 /// Position of the flange within the range of the stops, RMS in mm: off, but for the tool, and as stated.
-fn off_and_stated(solution: &Solution, made: &SimulatedSeries) -> [f64; 2] {
-    let (fit, postures) = (&solution.fit, stops(&solution.fit.problem));
-    let model = FlangeModel::new(
-        &fit.state.robot,
-        &fit.problem.layout,
-        still(fit).unwrap(),
-        &fit.covariance.reduced,
-        &postures,
-        &Limits::default(),
-    );
-    let (model, still) = (model.unwrap(), true_still(solution, made));
+fn off_and_stated(fit: &Fit, made: &SimulatedSeries) -> [f64; 2] {
+    let (model, still) = (flange_of(fit), true_still(fit, made));
     let found = made.truth.held_out.iter().map(|h| (h.base_from_tip.pose(), model.at(&h.readings)));
     let within: Vec<(Vector6<f64>, f64)> = found
         .filter(|(_, predicted)| predicted.outside.is_empty())
@@ -132,7 +121,7 @@ fn study_of_random_worlds() {
     let worlds: u64 = std::env::var("WORLDS").map_or(40, |n| n.parse().unwrap());
     let judged = |seed: u64| {
         let (solution, made, words) = solved(seed)?;
-        let [off, stated] = off_and_stated(&solution, &made);
+        let [off, stated] = off_and_stated(&solution.fit, &made);
         let gates = solution.failed_gates();
         println!("seed {seed}: off {off:.3} stated {stated:.3} mm, {:.2}; {words}; {gates:?}", off / stated);
         Some((off / stated, gates.is_empty()))

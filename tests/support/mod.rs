@@ -2,5 +2,6 @@
 #![allow(dead_code)]
 
 pub mod dense;
+pub mod flange;
 pub mod small;
 pub mod witness;
