@@ -13,10 +13,11 @@ use super::limits::Limits;
 use super::mean_square::MeanSquare;
 use super::root_mean_square;
 use super::stops::{halton_stops, range_of};
+use super::used_stops::{still, stops};
 use crate::geom::{Pose, adjoint};
 use crate::linalg::SymmetricFactor;
 use crate::model::robot::{Posture, Robot};
-use crate::problem::Layout;
+use crate::problem::{Adjustment, Layout};
 
 /// Samples of the workspace: so many in the region of the stops, as many within all joint limits.
 const SAMPLES: usize = 250;
@@ -83,6 +84,12 @@ pub struct FlangeModel<'a> {
 }
 
 impl<'a> FlangeModel<'a> {
+    /// That of an adjustment and the covariance of its dense columns; `None` as of [`FlangeModel::new`].
+    pub fn of(adjustment: &'a Adjustment, covariance: &'a DMatrix<f64>, limits: &Limits) -> Option<Self> {
+        let Adjustment { problem, state } = adjustment;
+        Self::new(&state.robot, &problem.layout, still(adjustment)?, covariance, &stops(problem), limits)
+    }
+
     /// `still` is the plate (or the fixed camera) in the base frame with its first column; `None` without stops, or where nothing
     /// determines that pose.
     pub fn new(
@@ -121,6 +128,11 @@ impl<'a> FlangeModel<'a> {
         // A tracker or a socket is gone after the calibration: right is what is right relative to the base that fits.
         let is_gone = layout.instruments.iter().any(|r| r.start == still_column);
         if is_gone { model.with_fitted_base(stops) } else { Some(model) }
+    }
+
+    /// Whether a fixed camera is what stands still.
+    pub(super) fn is_relative_to_a_camera(&self) -> bool {
+        self.layout.mountings.iter().any(|r| r.start == self.still_column)
     }
 
     /// The same relative to the base that fits the stops best, where nothing that stands still remains: least squares over

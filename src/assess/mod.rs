@@ -22,6 +22,7 @@ mod statistics;
 mod stops;
 mod truth;
 mod uncertainty;
+mod used_stops;
 
 pub use advice::Advice;
 pub use alone::urdf_alone;
@@ -48,4 +49,5 @@ pub use propagate::{PredictedPose, View, predict_pose};
 pub use statistics::{Ratio, bootstrap_ratio, by_cluster, median, root_mean_square};
 pub use stops::{Structural, ideal_stops, minimal_set, structural};
 pub use truth::{camera_errors_m, flange_error_m};
-pub use uncertainty::{NORMAL_95, Uncertainty, judge, still, stops};
+pub use uncertainty::{NORMAL_95, Uncertainty, judge};
+pub use used_stops::{still, stops};

@@ -14,7 +14,7 @@ use super::flange::{FlangeModel, everywhere};
 use super::limits::Limits;
 use super::promise::{FlangeErrors, nominal_laid_over, usual_joint_sigma};
 use super::repeating::Repeats;
-use super::uncertainty::{on_robot_sigmas, still, stops};
+use super::used_stops::{on_robot_sigmas, stops};
 use super::{WorkspacePoint, median};
 use crate::geom::adjoint;
 use crate::linalg::{SymmetricFactor, symmetric_eigen};
@@ -38,7 +38,7 @@ pub fn restraint(fit: &Fit, limits: &Limits) -> Option<Restraint> {
     }
     let repeats = Repeats::of(fit).filter(|r| r.deviate > limits.pattern_sigmas)?;
     let (robot, layout, stops) = (&fit.state.robot, &fit.problem.layout, stops(&fit.problem));
-    let model = FlangeModel::new(robot, layout, still(fit)?, &fit.covariance.reduced, &stops, limits)?;
+    let model = FlangeModel::of(fit, &fit.covariance.reduced, limits)?;
     let flange = FlangeErrors::new(&model, (robot, None), &usual_joint_sigma(&on_robot_sigmas(&fit.problem)), &stops)?;
     extrapolation_m(&model.workspace(), flange.nominal_m, limits)?;
     let exported = robot.without_local_errors();

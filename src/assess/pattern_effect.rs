@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
 use super::flange::FlangeModel;
-use super::{Limits, still, stops};
+use super::{Limits, stops};
 use crate::fit::Fit;
 use crate::geom::{adjoint, rigid_fit};
 use crate::linalg::SymmetricFactor;
@@ -59,12 +59,9 @@ impl<'a> Effects<'a> {
         }
         let count = adjoints.len().max(1) as f64;
         let sigmas = variances.map(|sum| (sum / count).sqrt());
-        let (layout, postures) = (&fit.problem.layout, stops(&fit.problem));
-        let model = still(fit).and_then(|still| {
-            let model = FlangeModel::new(&fit.state.robot, layout, still, &fit.covariance.reduced, &postures, limits)?;
+        let model = FlangeModel::of(fit, &fit.covariance.reduced, limits).and_then(|model| {
             // The optical frame of a fixed camera turns with its principal point, and what it sees stays where it is.
-            let is_camera = layout.mountings.iter().any(|r| r.start == still.1);
-            if is_camera { model.with_fitted_base(&postures) } else { Some(model) }
+            if model.is_relative_to_a_camera() { model.with_fitted_base(&stops(&fit.problem)) } else { Some(model) }
         });
         Self { fit, model, adjoints, sigmas, markers: SeenMarkers::of(linear).order }
     }

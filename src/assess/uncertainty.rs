@@ -2,14 +2,13 @@
 
 use nalgebra::DMatrix;
 
+use super::used_stops::{on_robot_sigmas, stops};
 use crate::assess::{
     FlangeErrors, FlangeModel, Identifiability, Limits, WorkspacePoint, clustered_covariance, identifiability,
     urdf_alone, usual_joint_sigma,
 };
-use crate::geom::Pose;
-use crate::model::robot::{Posture, Robot};
-use crate::problem::{Adjustment, Noise, Problem};
-use crate::series::CameraMount;
+use crate::model::robot::Robot;
+use crate::problem::{Adjustment, Noise};
 use crate::solve::{Covariance, Fit, NoiseInformation, NoiseUncertainty, noise_information};
 
 /// Sigmas of a 95 % interval.
@@ -40,31 +39,6 @@ pub struct Uncertainty {
     pub workspace: Vec<WorkspacePoint>,
 }
 
-/// Stops of the images in use.
-pub fn stops(problem: &Problem) -> Vec<Posture> {
-    problem.used_stops().into_iter().filter_map(|s| problem.stops[s].posture.clone()).collect()
-}
-
-/// Joint noise of every stop on the robot that is in use, rad or m.
-pub(super) fn on_robot_sigmas(problem: &Problem) -> Vec<Vec<f64>> {
-    let on_robot = problem.used_stops().into_iter().map(|s| &problem.stops[s]).filter(|s| s.posture.is_some());
-    on_robot.map(|s| problem.joint_sigma(s.series)).collect()
-}
-
-/// What stands still in the base frame for the first image on the robot, with its first column: the plate, or a fixed camera; without images
-/// an instrument.
-pub fn still(Adjustment { problem, state }: &Adjustment) -> Option<(Pose, usize)> {
-    let layout = &problem.layout;
-    let Some(image) = problem.used_on_robot().next().map(|i| &problem.images[i]) else {
-        let (_, measured) = problem.used_bodies().next()?;
-        return Some((state.instruments[measured.instrument], layout.instruments[measured.instrument].start));
-    };
-    Some(match image.mount {
-        CameraMount::Hand => (state.placements[image.placement], layout.placements[image.placement].start),
-        CameraMount::Fixed => (state.mountings[image.mounting], layout.mountings[image.mounting].start),
-    })
-}
-
 /// Judges a fit. Its covariance is made larger by what the uncertainty of an estimated joint noise adds, and where the scatter
 /// between images says clearly more than the noise model. What was `told_before` some joint noise was set to none is what is stated.
 pub fn judge(
@@ -76,8 +50,8 @@ pub fn judge(
     let told = if joint_noise_is_estimated { noise_information(fit) } else { None };
     let uncertainty = told.as_ref().and_then(|told| NoiseUncertainty::of(told, fit));
     let clustered = clustered_covariance(fit.linear(), limits).filter(|_| images_know_the_robot(fit));
-    let still = still(fit);
-    let Fit { adjustment: Adjustment { problem, state }, covariance, .. } = fit;
+    let Fit { adjustment, covariance, .. } = fit;
+    let Adjustment { problem, state } = &*adjustment;
     let layout = &problem.layout;
     let n = layout.len();
     let stops = stops(problem);
@@ -92,7 +66,7 @@ pub fn judge(
     }
     found.model_sigma = sigmas(&covariance.reduced);
     if let Some(clustered) = clustered {
-        let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &clustered.model, &stops, limits));
+        let model = FlangeModel::of(adjustment, &clustered.model, limits);
         found.clustered_ratio = model.map(|m| m.ratio_of(&clustered.sandwich));
         let by_clusters: Vec<f64> = found.model_sigma.iter().zip(clustered.ratios()).map(|(s, r)| s * r).collect();
         if found.clustered_ratio.is_some_and(|ratio| ratio > limits.scatter_ratio) {
@@ -102,7 +76,7 @@ pub fn judge(
         }
         found.clustered_sigma = Some(by_clusters);
     }
-    let model = still.and_then(|s| FlangeModel::new(&state.robot, layout, s, &covariance.reduced, &stops, limits));
+    let model = FlangeModel::of(adjustment, &covariance.reduced, limits);
     let noise = usual_joint_sigma(&on_robot_sigmas(problem));
     found.alone = model.as_ref().and_then(|m| urdf_alone(&state.robot, layout, &m.region()));
     let robots = (&state.robot, found.alone.as_ref());

@@ -1,15 +1,13 @@
 //! The flange of a solution, and where its plate truly is.
 
-use robotcal::assess::{FlangeModel, Limits, still, stops};
+use robotcal::assess::{FlangeModel, Limits};
 use robotcal::fit::Fit;
 use robotcal::geom::{Pose, rigid_fit};
 use robotcal::simulate::SimulatedSeries;
 
 /// The model of the flange of a fit.
 pub fn flange_of(fit: &Fit) -> FlangeModel<'_> {
-    let (layout, postures) = (&fit.problem.layout, stops(&fit.problem));
-    let still = still(fit).unwrap();
-    FlangeModel::new(&fit.state.robot, layout, still, &fit.covariance.reduced, &postures, &Limits::default()).unwrap()
+    FlangeModel::of(fit, &fit.covariance.reduced, &Limits::default()).unwrap()
 }
 
 /// From the frame of the first plate, as it was fitted, to that of its true markers: a bent plate takes the frame along that its markers are
