@@ -61,8 +61,9 @@ pub fn write(folder: &Path, series: &SimulatedSeries, content: Content<'_>) -> R
     put(&folder.join("series.toml"), manifest.to_toml()?)?;
     put(&folder.join("joints.csv"), series.stops.to_csv())?;
     let has_circles = series.plate.markers.iter().any(|m| m.outer_radius_m > 0.0);
-    put(&folder.join("plate.toml"), plate_toml(&series.plate, has_circles.then_some("plate.csv"))?)?;
-    if has_circles {
+    let has_table = has_circles || series.plate.kind.print().needs_marker_file;
+    put(&folder.join("plate.toml"), plate_toml(&series.plate, has_table.then_some("plate.csv"))?)?;
+    if has_table {
         put(&folder.join("plate.csv"), plate_csv(&series.plate))?;
     }
     put(&folder.join("truth.toml"), truth.to_toml()?)

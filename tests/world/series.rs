@@ -7,7 +7,7 @@ use robotcal::model::circle;
 use robotcal::model::inverse;
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::plan::plate_design::{PlateRequest, design};
-use robotcal::series::{AngleUnit, CameraMount, Edge, Plate, Source};
+use robotcal::series::{AngleUnit, CameraMount, Edge, Plate, PlateKind, Source};
 use robotcal::simulate::conditions::ImagingConditions;
 use robotcal::simulate::faults::{FAULTS, Fault};
 use robotcal::simulate::folder::{Content, write};
@@ -159,6 +159,18 @@ fn a_written_series_reads_back_as_it_was_made() {
         assert_eq!(Truth::read(&place.join("truth.toml")).unwrap(), made.truth);
         assert!(write(&place, &made, Content::Observations).is_err(), "an old series is not overwritten");
     }
+}
+
+#[test]
+fn a_written_series_of_bare_points_reads_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let plate = Plate::lattice(PlateKind::Points, 9, 6, 0.035, 5e-5);
+    let made = series(&WorldRequest { plate, ..small("ur10e", 3) }).unwrap();
+    let place = folder.path().join("points");
+    write(&place, &made, Content::Observations).unwrap();
+    let read = robotcal::series::read(&place).unwrap();
+    assert_eq!((&read.plate.markers, read.plate.kind), (&made.plate.markers, made.plate.kind));
+    assert_eq!(read.source, Source::Observations(made.observations.clone()));
 }
 
 #[test]
