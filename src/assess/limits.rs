@@ -35,6 +35,8 @@ limits! {
     joint_noise: f64 = 2e-3;
     /// Joint noise that no robot in order has, rad or m: two to five times what was found of real ones.
     unusual_joint_noise: f64 = 5e-4;
+    /// Share of the stops, whose poses were read, in other postures from which a choice as good leaves open which robot is the right one.
+    open_postures: f64 = 0.25;
     /// Sigma of the flange that is no reason to distrust, mm: what nominal robots miss by.
     flange_sigma_mm: f64 = 1.0;
     /// Share of the robot's images that may be left out in a result worth having.

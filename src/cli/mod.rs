@@ -114,7 +114,7 @@ enum Command {
     /// Make a series of a robot with known errors, with images or observations
     #[command(after_help = examples::SIMULATE)]
     Simulate(Box<simulate::SimulateArgs>),
-    /// Judge a corrected model by points that another device measured
+    /// Judge a corrected model by points that another device measured, or by another series
     #[command(after_help = examples::VERIFY)]
     Verify(verify_args::VerifyArgs),
 }

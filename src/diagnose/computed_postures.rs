@@ -25,7 +25,7 @@ impl Kind for ComputedPostures {
     }
 
     fn weight(&self) -> Weight {
-        Weight::Note
+        if self.is_open { Weight::Gate } else { Weight::Note }
     }
 
     fn subjects(&self) -> Vec<Subject> {
@@ -65,6 +65,11 @@ impl Kind for ComputedPostures {
     }
 
     fn remedy(&self) -> String {
-        "record joint readings (joints.csv): they know the posture".into()
+        match self.is_open {
+            true => "state the joint angles of the first stop, roughly (series.toml: [controller] first_stop_deg), or record joint readings \
+                     (joints.csv)",
+            false => "record joint readings (joints.csv): they know the posture",
+        }
+        .into()
     }
 }

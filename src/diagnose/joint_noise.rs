@@ -31,6 +31,8 @@ pub struct JointNoiseLarge {
     pub worst_predicted: Vec<ImageValue>,
     /// Images whose markers are known far less well than usual, sigma in px: blurred, badly lit, far away.
     pub badly_seen: Vec<ImageValue>,
+    /// Whether the readings were computed from poses of a controller.
+    pub readings_are_computed: bool,
     /// Gate or note.
     pub weight: Weight,
 }
@@ -39,8 +41,11 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
     let limits = setting.limits;
     let of_series = |(k, of): (usize, &crate::problem::MeasuredSeries)| {
         let (joint, sigma) = noisiest_joint(setting.with_noise_found(fit), k)?;
+        let readings_are_computed = of.readings_are_computed();
         let weight = match sigma {
             s if s > limits.joint_noise => Weight::Gate,
+            // Then they are not those that the robot had.
+            s if s >= limits.unusual_joint_noise && readings_are_computed => Weight::Gate,
             s if s >= limits.unusual_joint_noise => Weight::Note,
             _ => return None,
         };
@@ -56,6 +61,7 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
             sigma,
             worst_predicted: standing_out(problem, k, errors, limits.times_usual_error),
             badly_seen: standing_out(problem, k, sigma_px, limits.times_usual_blur),
+            readings_are_computed,
             weight,
         })
     };
@@ -127,6 +133,10 @@ impl Kind for JointNoiseLarge {
 
     fn remedy(&self) -> String {
         let remedy = match self.weight {
+            _ if self.readings_are_computed => {
+                "the joint readings were computed from poses, which tell neither postures nor full turns for certain, and take the URDF for the \
+                 model in the controller: record joint readings (joints.csv)"
+            }
             Weight::Note => {
                 "did plate or camera move, were images taken before the arm stood still, are readings rounded? the stated sigmas contain it"
             }

@@ -9,7 +9,8 @@
 //! ```
 //!
 //! `x` is fitted to a choice and the choice made by `x` in turns (S. Lloyd 1957), from the postures nearest to those before and from random
-//! ones. Where the axes of a wrist meet, all stops with the wrist turned over are a robot as likely as the first: the images do not tell which.
+//! ones; then every stop takes the posture that all others predict best, in turns. Where the axes of a wrist meet, all stops with the wrist
+//! turned over are a robot as likely as the first: the images do not tell which.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -34,6 +35,8 @@ use crate::stage::stage;
 const JOINT_SIGMA: f64 = 1e-4;
 /// Random choices that are started from.
 const STARTS: u64 = 64;
+/// The best choices of fitting and choosing in turns, from which every stop is chosen by the others.
+const DESCENDED: usize = 16;
 /// Most turns of fitting and choosing.
 const TURNS: usize = 50;
 /// Share of the information that holds what nothing tells.
@@ -42,10 +45,9 @@ const HELD: f64 = 1e-12;
 /// What the images say of one posture of a stop.
 struct Candidate {
     readings: Vec<f64>,
-    /// `G' V^-1 G`, `G' V^-1 e` and `e' V^-1 e`.
-    information: DMatrix<f64>,
-    rhs: DVector<f64>,
-    squares: f64,
+    /// `V^-1/2 G` and `V^-1/2 e` of all images of the stop.
+    g: DMatrix<f64>,
+    e: DVector<f64>,
 }
 
 /// A stop whose pose was read.
@@ -69,34 +71,67 @@ struct Stops {
     prior: DVector<f64>,
 }
 
-/// The series with the postures that the images tell, and what is to be said of them; unchanged where readings were read. `hold` holds the
-/// columns that are not to be fitted.
+/// What the postures of a series are before the images tell them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Before {
+    /// Those nearest to the stops before.
+    Nearest,
+    /// Those of a fit, nearly all of them right.
+    Fitted,
+}
+
+/// The series with the postures that the images tell; unchanged where readings were read. `hold` holds the columns that are not to be fitted.
 pub(super) fn told_by_images<'a>(
     robot: &Robot,
-    series: &'a [MeasuredSeries],
+    (series, from): (&'a [MeasuredSeries], Before),
     limits: &Limits,
     hold: impl FnOnce(&mut Adjustment) -> Result<()>,
-) -> (Cow<'a, [MeasuredSeries]>, Option<ComputedPostures>) {
+) -> (Cow<'a, [MeasuredSeries]>, Option<Told>) {
     let unchanged = (Cow::Borrowed(series), None);
-    if series.iter().flat_map(|s| &s.postures).all(Vec::is_empty) {
+    if !series.iter().any(MeasuredSeries::readings_are_computed) {
         return unchanged;
     }
     let _stage = stage("postures");
     let Some(stops) = Stops::of(robot, series, limits, hold) else { return unchanged };
-    let Some((chosen, is_open)) = stops.chosen(limits.decisive_log_odds) else { return unchanged };
+    let Some((chosen, is_open)) = stops.chosen(from, limits) else { return unchanged };
     let mut told = series.to_vec();
-    let mut others = Vec::new();
+    let mut changed = 0;
     for (stop, &c) in stops.all.iter().zip(&chosen.postures).filter(|(_, c)| **c > 0) {
         for &(s, row) in &stop.rows {
-            told[s].stops[row].readings = Some(stop.candidates[c].readings.clone());
+            let MeasuredSeries { stops, postures, .. } = &mut told[s];
+            let before = stops[row].readings.replace(stop.candidates[c].readings.clone());
+            if let Some((other, before)) = postures[row].get_mut(c - 1).zip(before) {
+                *other = before;
+            }
         }
-        let (s, row) = stop.rows[0];
-        others.push(series[s].stops[row].image.clone());
+        changed += 1;
     }
-    let computed = |s: &MeasuredSeries| s.postures.iter().any(|others| !others.is_empty());
-    let count = stops.all.iter().filter(|stop| computed(&series[stop.rows[0].0])).count();
-    let series = series.iter().filter(|s| computed(s)).map(|s| s.name.clone()).collect();
-    (Cow::Owned(told), Some(ComputedPostures { series, stops: count, others, is_open }))
+    let count = stops.all.iter().filter(|stop| series[stop.rows[0].0].readings_are_computed()).count();
+    (Cow::Owned(told), Some(Told { stops: count, changed, is_open }))
+}
+
+/// What the images told of the postures.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Told {
+    /// Stops whose poses were read.
+    pub stops: usize,
+    /// Stops that are in another posture now.
+    pub changed: usize,
+    /// Whether other choices at many stops together are as good.
+    pub is_open: bool,
+}
+
+impl Told {
+    /// What is to be said where the series were `given` and are `told` now.
+    pub fn finding(&self, given: &[MeasuredSeries], told: &[MeasuredSeries]) -> ComputedPostures {
+        let mut others: Vec<String> = Vec::new();
+        for (given, told) in given.iter().zip(told) {
+            let pairs = given.stops.iter().zip(&told.stops);
+            others.extend(pairs.filter(|(g, t)| g.readings != t.readings).map(|(g, _)| g.image.clone()));
+        }
+        let series = given.iter().filter(|s| s.readings_are_computed()).map(|s| s.name.clone()).collect();
+        ComputedPostures { series, stops: self.stops, others, is_open: self.is_open }
+    }
 }
 
 impl Stops {
@@ -121,81 +156,157 @@ impl Stops {
         (!all.is_empty()).then_some(Self { all, prior })
     }
 
-    /// The best choice, of those that are as good the one with most postures as they are; and whether there are others as good.
-    fn chosen(&self, decisive: f64) -> Option<(Choice, bool)> {
+    /// The best choice, of those that are as good the one with most postures as they are, from those of a fit the one nearest to it; and whether
+    /// one that is as good is quite another.
+    fn chosen(&self, from: Before, limits: &Limits) -> Option<(Choice, bool)> {
         let first = std::iter::once(self.settled(vec![0; self.all.len()]));
         let random = |seed| {
             let mut rng = SmallRng::seed_from_u64(seed);
             self.settled(self.all.iter().map(|s| rng.random_range(0..s.candidates.len())).collect())
         };
         let random: Vec<Option<Choice>> = (0..STARTS).into_par_iter().map(random).collect();
-        let all: Vec<Choice> = first.chain(random).flatten().collect();
-        let least = all.iter().map(|c| c.cost).min_by(f64::total_cmp)?;
-        let equations: usize = self.all.iter().map(|s| 6 * s.rows.len()).sum();
-        let noise = (least / equations.saturating_sub(self.prior.len()).max(1) as f64).max(1.0);
-        let as_good = 2.0 * decisive * noise;
-        let mut best: Vec<Choice> = Vec::new();
-        for choice in all.into_iter().filter(|c| c.cost <= least + as_good) {
-            let choice = self.without_doubtful(choice, as_good)?;
-            if !best.iter().any(|b| b.postures == choice.postures) {
-                best.push(choice);
+        let mut all: Vec<Choice> = Vec::new();
+        for choice in first.chain(random).flatten() {
+            if !all.contains(&choice) {
+                all.push(choice);
             }
         }
-        let is_open = best.len() > 1;
-        let kept = |c: &Choice| c.postures.iter().filter(|p| **p == 0).count();
-        Some((best.into_iter().max_by_key(kept)?, is_open))
+        all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        all.truncate(DESCENDED);
+        let all: Vec<Choice> = all.into_par_iter().filter_map(|c| self.descended(c.postures)).collect();
+        let base = match from {
+            Before::Nearest => all.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?.clone(),
+            Before::Fitted => self.descended(vec![0; self.all.len()])?,
+        };
+        let equations: usize = self.all.iter().map(|s| s.candidates[0].e.len()).sum();
+        let as_good = 2.0 * limits.decisive_log_odds * (base.cost / equations as f64).max(1.0);
+        let mut best = vec![self.without_doubtful(base.postures, as_good)?];
+        for choice in all.into_iter().filter(|c| c.cost <= base.cost + as_good) {
+            let postures = self.without_doubtful(choice.postures, as_good)?;
+            if !best.contains(&postures) {
+                best.push(postures);
+            }
+        }
+        let kept = |postures: &&Vec<usize>| postures.iter().filter(|p| **p == 0).count();
+        let postures = match from {
+            Before::Nearest => best.iter().max_by_key(kept)?,
+            Before::Fitted => &best[0],
+        };
+        let others = |other: &Vec<usize>| other.iter().zip(postures).filter(|(a, b)| a != b).count();
+        let many = limits.open_postures * self.all.len() as f64;
+        let is_open = best.iter().any(|other| others(other) as f64 > many);
+        Some((self.choice(postures.clone())?, is_open))
     }
 
-    /// Parameters of a choice.
-    fn fitted(&self, postures: &[usize]) -> Option<DVector<f64>> {
-        let mut n = DMatrix::from_diagonal(&self.prior);
-        let mut rhs = DVector::zeros(self.prior.len());
-        for (stop, &c) in self.all.iter().zip(postures) {
-            n += &stop.candidates[c].information;
-            rhs += &stop.candidates[c].rhs;
-        }
-        let held = HELD * n.diagonal().max();
-        (0..n.nrows()).for_each(|k| n[(k, k)] += held);
-        Some(SymmetricFactor::new(&n).ok()?.solve(&rhs))
+    /// What a choice says of the parameters.
+    fn told_by(&self, postures: &[usize]) -> Knowledge {
+        let mut known = Knowledge::of_priors(&self.prior);
+        self.all.iter().zip(postures).for_each(|(stop, &c)| known.add(&stop.candidates[c], 1.0));
+        known
+    }
+
+    /// With its cost.
+    fn choice(&self, postures: Vec<usize>) -> Option<Choice> {
+        let known = self.told_by(&postures);
+        let x = known.factor()?.solve(&known.rhs);
+        Some(Choice { postures, cost: known.squares - known.rhs.dot(&x) })
     }
 
     /// Fits and chooses in turns.
     fn settled(&self, mut postures: Vec<usize>) -> Option<Choice> {
         for _ in 0..TURNS {
-            let x = self.fitted(&postures)?;
+            let known = self.told_by(&postures);
+            let x = known.factor()?.solve(&known.rhs);
             let next: Vec<usize> = self.all.iter().map(|s| s.nearest(&x)).collect();
-            let prior: f64 = x.iter().zip(self.prior.iter()).map(|(x, p)| x * x * p).sum();
-            let cost = prior + self.all.iter().zip(&postures).map(|(s, &c)| s.candidates[c].cost(&x)).sum::<f64>();
             if next == postures {
-                return Some(Choice { postures, cost });
+                return Some(Choice { postures, cost: known.squares - known.rhs.dot(&x) });
             }
             postures = next;
         }
         None
     }
 
-    /// With every stop that it hardly matters to as it was.
-    fn without_doubtful(&self, mut choice: Choice, as_good: f64) -> Option<Choice> {
-        let x = self.fitted(&choice.postures)?;
-        for (stop, c) in self.all.iter().zip(&mut choice.postures) {
-            if stop.candidates[0].cost(&x) <= stop.candidates[*c].cost(&x) + as_good {
-                *c = 0;
+    /// Every stop in the posture that all others predict best, in turns.
+    fn descended(&self, mut postures: Vec<usize>) -> Option<Choice> {
+        let mut known = self.told_by(&postures);
+        for _ in 0..TURNS {
+            let mut is_changed = false;
+            for (stop, c) in self.all.iter().zip(&mut postures) {
+                known.add(&stop.candidates[*c], -1.0);
+                let costs = stop.predicted(&known)?;
+                let best = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(*c);
+                if costs[best] < costs[*c] {
+                    *c = best;
+                    is_changed = true;
+                }
+                known.add(&stop.candidates[*c], 1.0);
+            }
+            if !is_changed {
+                break;
             }
         }
-        Some(choice)
+        self.choice(postures)
+    }
+
+    /// With every stop that it hardly matters to as it was.
+    fn without_doubtful(&self, mut postures: Vec<usize>, as_good: f64) -> Option<Vec<usize>> {
+        let mut known = self.told_by(&postures);
+        for (stop, c) in self.all.iter().zip(&mut postures).filter(|(_, c)| **c > 0) {
+            known.add(&stop.candidates[*c], -1.0);
+            let costs = stop.predicted(&known)?;
+            if costs[0] <= costs[*c] + as_good {
+                *c = 0;
+            }
+            known.add(&stop.candidates[*c], 1.0);
+        }
+        Some(postures)
+    }
+}
+
+/// Normal equations of the parameters.
+struct Knowledge {
+    information: DMatrix<f64>,
+    rhs: DVector<f64>,
+    squares: f64,
+}
+
+impl Knowledge {
+    fn of_priors(prior: &DVector<f64>) -> Self {
+        let n = prior.len();
+        Self { information: DMatrix::from_diagonal(prior), rhs: DVector::zeros(n), squares: 0.0 }
+    }
+
+    /// Takes a posture of a stop in, or by a weight of -1 out again.
+    fn add(&mut self, Candidate { g, e, .. }: &Candidate, weight: f64) {
+        self.information.gemm_tr(weight, g, g, 1.0);
+        self.rhs.gemv_tr(weight, g, e, 1.0);
+        self.squares += weight * e.norm_squared();
+    }
+
+    fn factor(&self) -> Option<SymmetricFactor> {
+        let mut n = self.information.clone();
+        let held = HELD * n.diagonal().max();
+        (0..n.nrows()).for_each(|k| n[(k, k)] += held);
+        SymmetricFactor::new(&n).ok()
     }
 }
 
 impl Stop {
     fn nearest(&self, x: &DVector<f64>) -> usize {
-        let costs: Vec<f64> = self.candidates.iter().map(|c| c.cost(x)).collect();
+        let costs: Vec<f64> = self.candidates.iter().map(|c| (&c.e - &c.g * x).norm_squared()).collect();
         (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0)
     }
-}
 
-impl Candidate {
-    fn cost(&self, x: &DVector<f64>) -> f64 {
-        self.squares - 2.0 * self.rhs.dot(x) + x.dot(&(&self.information * x))
+    /// What every posture adds to the cost of the other stops: with `r = e - G x` and `W = 1 + G N^-1 G'` by their `x` and `N`, `r' W^-1 r`.
+    fn predicted(&self, others: &Knowledge) -> Option<Vec<f64>> {
+        let factor = others.factor()?;
+        let x = factor.solve(&others.rhs);
+        let cost = |Candidate { g, e, .. }: &Candidate| {
+            let w = DMatrix::identity(e.len(), e.len()) + g * factor.solve_many(&g.transpose());
+            let r = e - g * &x;
+            Some(r.dot(&w.cholesky()?.solve(&r)))
+        };
+        self.candidates.iter().map(cost).collect()
     }
 }
 
@@ -215,14 +326,15 @@ fn stop(
     };
     let rows: Vec<(usize, usize)> = images.iter().filter_map(row).collect();
     let &(s, row) = rows.first()?;
+    let read = problem.stops[problem.images[images[0]].stop].posture.as_ref()?;
     let own = series[s].stops[row].readings.clone()?;
     let others = series[s].postures.get(row).cloned().unwrap_or_default();
     let origins = state.robot.linear_origins();
     let of = |readings: Vec<f64>| {
-        let (posture, zeros) = (Posture::at(&readings), vec![0.0; readings.len()]);
-        let mut information = DMatrix::zeros(columns.len(), columns.len());
-        let (mut rhs, mut squares) = (DVector::zeros(columns.len()), 0.0);
-        for &i in images {
+        let (posture, zeros) = (approached(read, &readings), vec![0.0; readings.len()]);
+        let mut g = DMatrix::zeros(6 * images.len(), columns.len());
+        let mut e = DVector::zeros(6 * images.len());
+        for (k, &i) in images.iter().enumerate() {
             let pose = free.poses[i].as_ref()?;
             let from = TakenFrom::rigid(&posture, &zeros);
             let chained = state.chained_from(&origins, &problem.layout, &problem.images[i], from)?;
@@ -230,14 +342,20 @@ fn stop(
             let noise =
                 pose.covariance + Matrix6::from_column_slice((&by_readings * by_readings.transpose()).as_slice());
             let root = noise.cholesky()?.l().try_inverse()?;
-            let e = root * (chained.pose.inverse() * pose.camera_from_plate).log();
-            let g = root * chained.d_theta.select_columns(columns);
-            information += g.tr_mul(&g);
-            rhs += g.tr_mul(&e);
-            squares += e.norm_squared();
+            e.rows_mut(6 * k, 6).copy_from(&(root * (chained.pose.inverse() * pose.camera_from_plate).log()));
+            g.rows_mut(6 * k, 6).copy_from(&(root * chained.d_theta.select_columns(columns)));
         }
-        Some(Candidate { readings, information, rhs, squares })
+        Some(Candidate { readings, g, e })
     };
     let candidates = std::iter::once(own).chain(others).map(of).collect::<Option<Vec<_>>>()?;
     Some(Stop { rows, candidates })
+}
+
+/// A stop in another posture than that in which it was `read`, reached from the same stop before.
+fn approached(read: &Posture, readings: &[f64]) -> Posture {
+    let from_there = |approach: &Vec<f64>| {
+        let before = read.readings.iter().zip(approach).map(|(q, a)| q - a);
+        readings.iter().zip(before).map(|(q, before)| q - before).collect()
+    };
+    Posture { readings: readings.to_vec(), approach: read.approach.as_ref().map(from_there) }
 }

@@ -15,19 +15,23 @@ use crate::problem::MeasuredStop;
 use crate::series::{ControllerPoses, Series};
 use crate::urdf::{Chain, JointKind};
 
+/// Coordinates of a pose.
+const POSE_COORDINATES: usize = 6;
 /// Random starts from which a posture is looked for.
 const STARTS: usize = 200;
 /// Postures of an arm of six joints that reach a pose, at most (E. Primrose 1986).
 const MOST_POSTURES: usize = 15;
 /// Readings that are nearer are the same, rad or m.
 const SAME: f64 = 1e-3;
+/// Angles that are stated for a posture are nearer than this, rad: another posture is farther.
+const FARTHEST_STATED_RAD: f64 = 0.5;
 /// Poses that tell whether the poses of a series can be reached.
 const TRIED: usize = 8;
 
 /// Readings of every stop of a series in the order of the chain, rad or m; `None` for images taken off the robot.
 ///
 /// # Errors
-/// Those of [`Series::readings_for`]; poses that the nominal robot does not reach.
+/// Those of [`Series::readings_for`]; poses that the nominal robot does not reach, or reaches in postures without number.
 pub fn readings_of(series: &Series, chain: &Chain) -> Result<Vec<Option<Vec<f64>>>> {
     let Some(poses) = &series.controller else { return series.readings_for(chain) };
     match chain.pose_coordinates() {
@@ -35,31 +39,44 @@ pub fn readings_of(series: &Series, chain: &Chain) -> Result<Vec<Option<Vec<f64>
             let of = |pose: &Option<Pose>| pose.as_ref().map(|p| coordinates.of(p).to_vec());
             Ok(poses.base_from_flange.iter().map(of).collect())
         }
+        None if chain.readings.len() > POSE_COORDINATES => {
+            let count = chain.readings.len();
+            let what = format!("a pose does not tell the readings of {count} joints ({})", chain.readings.join(", "));
+            let remedy = "record joint readings (joints.csv); or leave out --urdf: then camera and hand-eye transform are fitted to the poses \
+                          alone";
+            Err(Error::new(Code::JointMissing, series.readings_file().display(), what, remedy))
+        }
         None => Arm::of(chain).postures(series, poses),
     }
 }
 
-/// Where readings were computed: other postures that reach the pose of every stop, as near to its readings as full turns bring them. None of an
-/// arm with more joints than a pose has coordinates, and of a pose where axes meet: they are without number.
+/// Whether the readings of a series are computed from poses of the controller by inverse kinematics: right with the model in the controller alone.
+pub fn postures_are_computed(series: &Series, chain: &Chain) -> bool {
+    series.controller.is_some() && chain.pose_coordinates().is_none()
+}
+
+/// Where readings were computed: other postures that reach the pose of every stop, as near to its readings as full turns bring them. None of a
+/// pose where axes meet: they are without number.
 pub(super) fn other_postures(series: &Series, chain: &Chain, stops: &[MeasuredStop]) -> Vec<Vec<Vec<f64>>> {
-    let poses = series.controller.as_ref().filter(|_| chain.pose_coordinates().is_none() && chain.readings.len() <= 6);
+    let poses = series.controller.as_ref().filter(|_| postures_are_computed(series, chain));
     let Some(poses) = poses else { return Vec::new() };
     let arm = Arm::of(chain);
-    let of = |(pose, stop): (&Option<Pose>, &MeasuredStop)| match (pose, &stop.readings) {
-        (Some(pose), Some(readings)) if !stop.observations.is_empty() => arm.others(pose, readings),
+    let of = |((pose, stated), stop): ((&Option<Pose>, &Option<Vec<f64>>), &MeasuredStop)| match (pose, &stop.readings)
+    {
+        (Some(pose), Some(readings)) if stated.is_none() && !stop.observations.is_empty() => arm.others(pose, readings),
         _ => Vec::new(),
     };
-    poses.base_from_flange.par_iter().zip(stops).map(of).collect()
+    poses.base_from_flange.par_iter().zip(&poses.stated_deg).zip(stops).map(of).collect()
 }
 
 /// What to say of postures that were not read.
 pub(super) fn notice(series: &Series, chain: &Chain) -> Option<Notice> {
-    let is_computed = series.controller.is_some() && chain.pose_coordinates().is_none();
-    let what = "has poses: the joint readings are those with which the nominal robot reaches them, in the posture that the images \
+    let what = "has poses: the joint readings are those with which the robot of the URDF reaches them, in the posture that the images \
                 tell, else in that nearest to the stop before, and at the first stop nearest to the middle of the limits";
-    let remedy = "record joint readings (joints.csv) where the controller tells them: they know the posture, and the model in the controller \
-                  plays no part then";
-    is_computed.then(|| Notice::new(Code::PosturesFromPoses, series.readings_file().display(), what, remedy))
+    let remedy = "see that the URDF is the model in the controller (of a corrected one the readings are wrong by the correction), or record \
+                  joint readings (joints.csv): they know the posture, and no model plays a part then";
+    postures_are_computed(series, chain)
+        .then(|| Notice::new(Code::PosturesFromPoses, series.readings_file().display(), what, remedy))
 }
 
 /// An arm whose postures are looked for.
@@ -81,12 +98,52 @@ impl Arm {
                 all.push(None);
                 continue;
             };
-            let found = self.nearest(pose, before.as_deref());
-            let readings = found.ok_or_else(|| self.out_of_reach(series, poses, row))?;
+            let readings = match &poses.stated_deg[row] {
+                Some(stated_deg) => self.near_stated(series, pose, stated_deg)?,
+                None => self.nearest(pose, before.as_deref()).ok_or_else(|| self.out_of_reach(series, poses, row))?,
+            };
             before = Some(readings.clone());
             all.push(Some(readings));
         }
         Ok(all)
+    }
+
+    /// The posture that was stated, deg (m of a prismatic joint).
+    fn near_stated(&self, series: &Series, pose: &Pose, stated_deg: &[f64]) -> Result<Vec<f64>> {
+        let chain = &self.robot.chain;
+        let place = format!("{}: [controller] first_stop_deg", series.folder.join("series.toml").display());
+        if stated_deg.len() != chain.readings.len() {
+            let what =
+                format!("has {} values, and the robot the joints {}", stated_deg.len(), chain.readings.join(", "));
+            return Err(Error::new(Code::SettingRange, place, what, "give the angles of all of them in this order"));
+        }
+        let is_angle = |kind: &JointKind| *kind != JointKind::Prismatic;
+        let read = |(v, kind): (&f64, &JointKind)| if is_angle(kind) { v.to_radians() } else { *v };
+        let stated: Vec<f64> = stated_deg.iter().zip(&chain.reading_kinds).map(read).collect();
+        let farthest_rad = |q: &Vec<f64>| {
+            let angles = q.iter().zip(&stated).zip(&chain.reading_kinds).filter(|(_, kind)| is_angle(kind));
+            angles.map(|((q, s), _)| (q - s).abs()).fold(0.0, f64::max)
+        };
+        let by_start = solve_from(&self.robot, &self.limits, pose, &stated);
+        let all = by_start.into_iter().chain(self.postures_of(pose)).map(|q| self.turned(q, &stated));
+        let found = all.min_by(|a, b| farthest_rad(a).total_cmp(&farthest_rad(b)));
+        found.filter(|q| farthest_rad(q) < FARTHEST_STATED_RAD).ok_or_else(|| {
+            let what = "the robot of the URDF reaches the first pose in no posture near these angles";
+            let remedy = "give the joint angles that the controller shows at the first stop, in deg, with zeros and signs as in the URDF";
+            Error::new(Code::SettingConflict, place, what, remedy)
+        })
+    }
+
+    /// The same posture by full turns as near to some readings as the limits allow.
+    fn turned(&self, mut readings: Vec<f64>, near: &[f64]) -> Vec<f64> {
+        let kinds = &self.robot.chain.reading_kinds;
+        for ((q, near), ((low, high), kind)) in readings.iter_mut().zip(near).zip(self.limits.iter().zip(kinds)) {
+            let turned = *q + TAU * ((near - *q) / TAU).round();
+            if *kind != JointKind::Prismatic && (*low..=*high).contains(&turned) {
+                *q = turned;
+            }
+        }
+        readings
     }
 
     /// The posture nearest to the one before, or to the middle of the limits.
@@ -114,15 +171,13 @@ impl Arm {
     /// Other postures that reach the pose of some readings; none where they are without number.
     fn others(&self, pose: &Pose, readings: &[f64]) -> Vec<Vec<f64>> {
         let kinds = &self.robot.chain.reading_kinds;
-        let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - b).abs() > SAME);
+        let off = |a: f64, b: f64, kind: JointKind| match kind {
+            JointKind::Prismatic => (a - b).abs(),
+            _ => (a - b - TAU * ((a - b) / TAU).round()).abs(),
+        };
+        let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).zip(kinds).any(|((a, b), kind)| off(*a, *b, *kind) > SAME);
         let mut all: Vec<Vec<f64>> = Vec::new();
-        for mut found in self.postures_of(pose) {
-            for ((q, near), ((low, high), kind)) in found.iter_mut().zip(readings).zip(self.limits.iter().zip(kinds)) {
-                let turned = *q + TAU * ((near - *q) / TAU).round();
-                if *kind != JointKind::Prismatic && (*low..=*high).contains(&turned) {
-                    *q = turned;
-                }
-            }
+        for found in self.postures_of(pose).into_iter().map(|q| self.turned(q, readings)) {
             if apart(&found, readings) && all.iter().all(|other| apart(&found, other)) {
                 all.push(found);
             }

@@ -6,18 +6,19 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::computed_postures::told_by_images;
+use super::computed_postures::{Before, Told, told_by_images};
 use super::estimator::Estimator;
 use super::joint::{JointFit, fit_model};
 use super::lens_choice::{self, Lensed, with_lenses};
 use super::near_nominal::near_nominal;
 use super::options::Options;
-use super::solution::{Evidence, Solution};
+use super::solution::{Evidence, LensEvidence, Solution};
 use super::turns;
-use crate::error::Result;
+use crate::error::{Notice, Result};
 use crate::fit::{Fit, log_evidence};
 use crate::linalg::SymmetricFactor;
 use crate::model::joint_terms::RobotModel;
+use crate::model::robot::Robot;
 use crate::problem::{Adjustment, MeasuredSeries};
 use crate::solve::{LinearProblem, Settings, solve};
 use crate::stage::stage;
@@ -25,6 +26,9 @@ use crate::urdf::Chain;
 
 /// Newton decrement of a fit that is judged by its evidence, whose logarithm is then known to a tenth or so.
 const DECREMENT: f64 = 0.1;
+
+/// Most times that postures are told anew by the identified robot.
+const RETELLINGS: usize = 3;
 
 /// Identifies robot, cameras, mountings and plates from identified series. The automatic model is the largest that no smaller one
 /// beats decisively; whoever names a joint term wants all of them.
@@ -44,21 +48,63 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let robot = model.robot_with(chain.clone(), options.harmonics);
     let series = &turns::settled(&robot, series, &options.limits);
     let rigid = RobotModel::Rigid.robot_with(chain.clone(), options.harmonics);
-    let (series, of_postures) = told_by_images(&rigid, series, &options.limits, |start| {
-        options.selection.apply(&mut start.problem.layout, &mut start.state, &options.limits)
-    });
-    let Lensed { fit: full, series, lenses, notices } = with_lenses(&chain, &series, &by_joint_fit)?;
-    let (chosen, evidences) = match options.model_is_open() {
-        true => best_model(chain.clone(), &series, options, full)?,
-        false => (full, Vec::new()),
-    };
-    let chosen = near_nominal(chain, &series, options, chosen)?;
-    let mut solution = Solution { evidences, lenses, ..chosen.judged(&series, options.estimator)? };
+    let (mut told, mut of_postures) = in_told_postures(&rigid, (series, Before::Nearest), options);
+    let mut chosen = choose(&chain, &told, options, &by_joint_fit)?;
+    for _ in 0..RETELLINGS {
+        // A wrong posture hides the joint terms: the robot that has all of them tells what the first model could not.
+        let fitted = (chosen.series.as_slice(), Before::Fitted);
+        let (again, Some(found)) = in_told_postures(&chosen.widest, fitted, options) else { break };
+        // Terms enough to fit any choice do not close what was open before.
+        let is_open = found.is_open || of_postures.is_some_and(|before| before.is_open);
+        of_postures = Some(Told { is_open, ..found });
+        if found.changed == 0 {
+            break;
+        }
+        for (told, again) in told.iter_mut().zip(again) {
+            (told.stops, told.postures) = (again.stops, again.postures);
+        }
+        chosen = choose(&chain, &told, options, &by_joint_fit)?;
+    }
+    let Chosen { fit, series: lensed, evidences, lenses, notices, .. } = chosen;
+    let mut solution = Solution { evidences, lenses, ..fit.judged(&lensed, options.estimator)? };
     solution.findings.extend(notices.into_iter().map(Into::into));
-    solution.findings.extend(of_postures.map(Into::into));
+    solution.findings.extend(of_postures.map(|t| t.finding(series, &told).into()));
     let losses = lens_choice::losses(&solution);
     solution.findings.extend(losses.into_iter().map(Into::into));
     Ok(Solution { options: options.clone(), ..solution })
+}
+
+fn in_told_postures(
+    robot: &Robot,
+    series: (&[MeasuredSeries], Before),
+    options: &Options,
+) -> (Vec<MeasuredSeries>, Option<Told>) {
+    let (told, found) = told_by_images(robot, series, &options.limits, |start| {
+        options.selection.apply(&mut start.problem.layout, &mut start.state, &options.limits)
+    });
+    (told.into_owned(), found)
+}
+
+/// The fit with the lenses and the robot model that the data support.
+struct Chosen {
+    fit: JointFit,
+    /// The robot with all terms, local errors apart.
+    widest: Robot,
+    series: Vec<MeasuredSeries>,
+    evidences: Vec<Evidence>,
+    lenses: Vec<LensEvidence>,
+    notices: Vec<Notice>,
+}
+
+fn choose(chain: &Chain, series: &[MeasuredSeries], options: &Options, by_joint_fit: &Options) -> Result<Chosen> {
+    let Lensed { fit: full, series, lenses, notices } = with_lenses(chain, series, by_joint_fit)?;
+    let widest = full.fit.state.robot.without_local_errors();
+    let (fit, evidences) = match options.model_is_open() {
+        true => best_model(chain.clone(), &series, options, full)?,
+        false => (full, Vec::new()),
+    };
+    let fit = near_nominal(chain.clone(), &series, options, fit)?;
+    Ok(Chosen { fit, widest, series, evidences, lenses, notices })
 }
 
 /// The fit of the smallest robot model that the evidence supports, from that of the full one.

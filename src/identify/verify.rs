@@ -1,6 +1,6 @@
 //! A robot model judged by a series that it was not fitted to: camera, hand-camera offset and plate are fitted, the robot is not.
 
-use super::computed_postures::told_by_images;
+use super::computed_postures::{Before, told_by_images};
 use super::free_poses::free_poses_of;
 use super::options::JointNoise;
 use super::start::{StartGiven, start_robot};
@@ -26,6 +26,24 @@ pub struct JudgedImage {
     pub error: ImageError,
 }
 
+/// Series with readings that were computed from poses of a controller in the postures that the images tell with this robot: a better one tells
+/// them for a worse one, and that by which they were computed tells none. Other series stay as they are, but for full turns.
+pub fn in_told_postures(robot: &Robot, series: &[MeasuredSeries]) -> Vec<MeasuredSeries> {
+    let limits = &Limits::default();
+    let settled = turns::settled(robot, series, limits);
+    let (told, _) = told_by_images(robot, (&settled, Before::Nearest), limits, with_robot_held);
+    let mut told = told.into_owned();
+    told.iter_mut().for_each(|s| s.postures.clear());
+    told
+}
+
+fn with_robot_held(start: &mut Adjustment) -> Result<()> {
+    let layout = &mut start.problem.layout;
+    let columns = layout.robot();
+    layout.columns[columns].iter_mut().for_each(|c| c.free = false);
+    Ok(())
+}
+
 /// Errors of all images on the robot that a fixed robot model leaves.
 ///
 /// Joint noise is a variance component of its own for each model, so that a bad model does not bend camera and plate. Poses of a controller are
@@ -35,15 +53,8 @@ pub struct JudgedImage {
 /// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset.
 pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<JudgedImage>> {
     let limits = &Limits::default();
-    let series = &turns::settled(robot, series, limits);
-    let held = |start: &mut Adjustment| {
-        let layout = &mut start.problem.layout;
-        let columns = layout.robot();
-        layout.columns[columns].iter_mut().for_each(|c| c.free = false);
-        Ok(())
-    };
-    let (series, _) = told_by_images(robot, series, limits, held);
-    let (mut adjustment, free, mut starts) = free_poses_of(robot, &series, limits, held)?;
+    let series = in_told_postures(robot, series);
+    let (mut adjustment, free, mut starts) = free_poses_of(robot, &series, limits, with_robot_held)?;
     start_robot(&mut adjustment, &free, StartGiven { series: &series, limits }, &mut starts)?;
     adjustment.tie_to_readings(false);
     let outcome = estimate_components(adjustment, &ComponentOptions::default());

@@ -121,6 +121,10 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
         }
         let of_plate = || damaged(format!("series {} has no plate", s.name));
         let stops = record.images.iter().filter(|i| i.series == s.name).enumerate();
+        let stops: Vec<MeasuredStop> =
+            stops.map(|(row, i)| stop(row, i, &s.name, &placements)).collect::<Result<_>>()?;
+        let other_postures = |stop: &MeasuredStop| s.other_postures.get(&stop.image).cloned().unwrap_or_default();
+        let are_computed = !s.other_postures.is_empty();
         Ok(MeasuredSeries {
             name: s.name.clone(),
             run: s.run.clone(),
@@ -141,8 +145,8 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
             lengths,
             order_known: s.order_known,
             otherwise: Vec::new(),
-            postures: Vec::new(),
-            stops: stops.map(|(row, i)| stop(row, i, &s.name, &placements)).collect::<Result<_>>()?,
+            postures: if are_computed { stops.iter().map(other_postures).collect() } else { Vec::new() },
+            stops,
         })
     });
     series.collect()

@@ -1,5 +1,7 @@
 //! A series in solution.json.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use crate::model::camera::Lens;
@@ -47,6 +49,9 @@ pub struct SeriesRecord {
     /// Name of its stops, where other cameras saw them, too.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run: Option<String>,
+    /// Where readings were computed from poses of a controller: the other readings, by image, with which the robot of the URDF reaches them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub other_postures: BTreeMap<String, Vec<Vec<f64>>>,
     /// What scatters from stop to stop in it; absent in files that know it per camera only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<StopNoise>,

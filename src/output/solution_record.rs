@@ -162,8 +162,13 @@ fn series(solution: &Solution, context: &Context) -> Vec<SeriesRecord> {
         order_known: s.order_known,
         noise: Some(stop_noise(solution, &[solution.fit.problem.noise_of(k)])),
         run: s.run.clone(),
+        other_postures: s.stops.iter().zip(&s.postures).filter_map(other_postures).collect(),
     };
     solution.series.iter().enumerate().map(record).collect()
+}
+
+fn other_postures((stop, others): (&MeasuredStop, &Vec<Vec<f64>>)) -> Option<(String, Vec<Vec<f64>>)> {
+    (!others.is_empty()).then(|| (stop.image.clone(), others.clone()))
 }
 
 fn cameras(solution: &Solution) -> Vec<CameraRecord> {

@@ -88,6 +88,11 @@ pub struct MeasuredSeries {
 }
 
 impl MeasuredSeries {
+    /// Whether readings were computed from poses of a controller that are reached in several postures.
+    pub fn readings_are_computed(&self) -> bool {
+        self.postures.iter().any(|others| !others.is_empty())
+    }
+
     /// A series without images: stops, and nothing measured yet.
     pub fn without_images(name: &str, order_known: bool, stops: Vec<MeasuredStop>) -> Self {
         Self {

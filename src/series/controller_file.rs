@@ -79,7 +79,11 @@ fn from_table(table: &Table, kind: RotationKind) -> Result<(Stops, ControllerPos
     }
     refuse_units(table, kind, &known)?;
     let stops = Stops { key, stops, ..Stops::default() };
-    Ok((stops, ControllerPoses { base_from_flange: as_written(&poses), otherwise: otherwise(kind, &poses) }))
+    let stated_deg = vec![None; poses.len()];
+    Ok((
+        stops,
+        ControllerPoses { base_from_flange: as_written(&poses), stated_deg, otherwise: otherwise(kind, &poses) },
+    ))
 }
 
 /// Columns of another convention than the one that is stated.

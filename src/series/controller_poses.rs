@@ -8,6 +8,8 @@ use crate::geom::Pose;
 pub struct ControllerPoses {
     /// Of every stop; `None` for an image that was taken off the robot.
     pub base_from_flange: Vec<Option<Pose>>,
+    /// Joint angles that were stated with some of them, roughly, deg (m of a prismatic joint).
+    pub stated_deg: Vec<Option<Vec<f64>>>,
     /// The same table with a mistake undone, for each mistake that is usual.
     pub otherwise: Vec<ReadOtherwise>,
 }
@@ -30,7 +32,8 @@ impl ControllerPoses {
     pub(super) fn of_rows(&self, rows: impl Iterator<Item = usize> + Clone) -> Self {
         let of = |poses: &[Option<Pose>]| rows.clone().map(|k| poses[k]).collect::<Vec<_>>();
         let otherwise = self.otherwise.iter().map(|o| ReadOtherwise { poses: of(&o.poses), ..o.clone() });
-        Self { base_from_flange: of(&self.base_from_flange), otherwise: otherwise.collect() }
+        let stated_deg = rows.clone().map(|k| self.stated_deg[k].clone()).collect();
+        Self { base_from_flange: of(&self.base_from_flange), stated_deg, otherwise: otherwise.collect() }
     }
 }
 

@@ -240,13 +240,16 @@ fn stops_of(
         let remedy = "remove controller.csv; joint readings tell more";
         return Err(Error::new(Code::SettingConflict, poses.display(), what, remedy));
     }
-    let Some(section) = manifest.controller else {
+    let Some(section) = &manifest.controller else {
         let names = RotationKind::ALL.map(RotationKind::name).join(", ");
         let what = "does not say how controller.csv writes rotations";
         let remedy = format!("add [controller] with rotation = one of {names}; there is no default on purpose");
         return Err(Error::new(Code::SettingMissing, manifest_path.display(), what, remedy));
     };
-    let (stops, poses) = controller_file::read(&poses, section.rotation, inputs)?;
+    let (stops, mut poses) = controller_file::read(&poses, section.rotation, inputs)?;
+    if let Some(first) = poses.base_from_flange.iter().position(Option::is_some) {
+        poses.stated_deg[first].clone_from(&section.first_stop_deg);
+    }
     Ok((stops, Some(poses)))
 }
 

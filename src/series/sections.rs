@@ -55,11 +55,14 @@ impl DistanceSection {
 }
 
 /// `[controller]`: what controller.csv means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ControllerSection {
     /// How the controller writes rotations; there is no default.
     pub rotation: RotationKind,
+    /// Joint angles at the first stop, roughly, in the order of the chain, deg (m of a prismatic joint): they tell the posture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_stop_deg: Option<Vec<f64>>,
 }
 
 /// `[plate_mount]`.

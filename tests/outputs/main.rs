@@ -4,11 +4,14 @@
 
 #[path = "../outputs_support/mod.rs"]
 mod outputs_support;
+#[path = "../support/mod.rs"]
+mod support;
 
 mod controller;
 mod gauge;
 mod poses;
 mod report;
 mod verify_points;
+mod verify_series;
 mod whole;
 mod write;

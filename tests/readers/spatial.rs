@@ -80,7 +80,7 @@ fn sections_beside_the_camera_are_read() {
     assert_eq!(manifest.tracker.as_ref().unwrap().sigma_m, Some(5e-5));
     assert_eq!(manifest.contact.as_ref().unwrap().frame.as_deref(), Some("cad"));
     assert_eq!(manifest.distance[0].between, ["a", "b"]);
-    assert_eq!(manifest.controller.unwrap().rotation, RotationKind::Abc);
+    assert_eq!(manifest.controller.as_ref().unwrap().rotation, RotationKind::Abc);
     let names: Vec<_> = manifest.cameras.iter().map(|c| c.name.as_deref().unwrap()).collect();
     assert_eq!(names, ["left", "right"]);
     let again = manifest.to_toml().unwrap();

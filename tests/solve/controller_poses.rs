@@ -216,6 +216,43 @@ fn postures_of_poses_identify_the_robot_of_a_urdf() {
     assert!(error.place.contains("controller.csv:2") && error.place.contains("img_000.png"), "{error}");
 }
 
+#[test]
+fn stated_angles_of_the_first_stop_fix_its_posture() {
+    let (robot, readings, poses) = by_joints();
+    let read = |first: usize, angles_deg: Option<&[f64]>| {
+        let folder = series("quaternion", "qx,qy,qz,qw", &poses[first..], quaternion);
+        let path = folder.path().join("series.toml");
+        let stated = angles_deg.map(|a| format!("first_stop_deg = {a:?}\n")).unwrap_or_default();
+        fs::write(&path, fs::read_to_string(&path).unwrap() + &stated).unwrap();
+        robotcal::identify::readings_of(&robotcal::series::read(folder.path())?, &robot.chain)
+    };
+    let is_right = |found: &[Option<Vec<f64>>], first: usize| {
+        posture_difference(found[0].as_ref().unwrap(), &readings[first]) < 1e-6
+    };
+    let tens =
+        |first: usize| -> Vec<f64> { readings[first].iter().map(|q| 10.0 * (q.to_degrees() / 10.0).round()).collect() };
+    let stops = 40..poses.len();
+    let unstated = stops.clone().filter(|&k| is_right(&read(k, None).unwrap(), k)).count();
+    assert!(unstated < stops.len(), "{unstated}");
+    for k in stops {
+        assert!(is_right(&read(k, Some(&tens(k))).unwrap(), k), "stop {k}");
+    }
+    let all = tens(40);
+    let elsewhere: Vec<f64> = all.iter().map(|a| a + 40.0).collect();
+    assert_eq!(read(40, Some(&all[..5])).unwrap_err().code, Code::SettingRange);
+    assert_eq!(read(40, Some(&elsewhere)).unwrap_err().code, Code::SettingConflict);
+}
+
+#[test]
+fn poses_do_not_tell_the_readings_of_seven_joints() {
+    let (_, _, poses) = by_joints();
+    let folder = series("quaternion", "qx,qy,qz,qw", &poses, quaternion);
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/lbr_iiwa_14/lbr_iiwa_14.urdf");
+    let chain = robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap();
+    let error = robotcal::identify::readings_of(&robotcal::series::read(folder.path()).unwrap(), &chain).unwrap_err();
+    assert_eq!(error.code, Code::JointMissing);
+}
+
 /// Largest difference of two postures but for full turns, rad.
 fn posture_difference(a: &[f64], b: &[f64]) -> f64 {
     let turned = |(a, b): (&f64, &f64)| ((a - b) - TAU * ((a - b) / TAU).round()).abs();
@@ -241,6 +278,12 @@ fn the_images_tell_in_which_posture_a_pose_was_reached() {
     println!("nearest {nearest}, told {told} of {}", readings.len());
     assert!(nearest < readings.len() / 2 && told + 1 >= readings.len(), "{nearest}, {told}");
     assert!(solution.findings.iter().any(|f| f.code() == Code::PosturesByImages));
+    // Solved again from its file, the same is open.
+    let files = calibration.files(&Export::default()).unwrap();
+    let record = robotcal::output::solution_json::read(&files["solution.json"]).unwrap();
+    let restored = robotcal::output::restore::measured_series(&record).unwrap();
+    assert_eq!(restored[0].postures, solution.series[0].postures);
+    assert!(restored[0].readings_are_computed());
 }
 
 #[test]
@@ -263,13 +306,20 @@ fn a_wrist_turned_over_at_all_stops_is_told_to_be_open() {
         seen.postures.push(vec![second]);
     }
     let seen = [seen];
-    let solution = identify(chain, &seen, &Options::default()).unwrap();
+    let solution = identify(chain.clone(), &seen, &Options::default()).unwrap();
     let told = solution.series[0].stops.iter().zip(&truth);
     let right = told.filter(|(s, q)| posture_difference(s.readings.as_ref().unwrap(), q) < 1e-3).count();
     assert_eq!(right, truth.len());
     let finding = solution.findings.iter().find(|f| f.code() == Code::PosturesByImages).unwrap();
     let Finding::ComputedPostures(found) = finding else { panic!("{finding}") };
     assert!(found.is_open && found.others.len() == 8 && found.stops == 24, "{finding}");
+    assert!(finding.fails());
+    // The angles of one stop tell the side of the wrist at all of them.
+    let mut stated = seen[0].clone();
+    stated.postures[0].clear();
+    let by_one = identify(chain, &[stated], &Options::default()).unwrap();
+    let side = by_one.findings.iter().find(|f| f.code() == Code::PosturesByImages).unwrap();
+    assert!(matches!(side, Finding::ComputedPostures(found) if !found.is_open && found.others.len() == 8), "{side}");
     // A robot that is judged by such poses is judged in the same postures.
     let mut by_readings = solution.series.clone();
     by_readings[0].postures.clear();

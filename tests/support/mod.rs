@@ -1,6 +1,7 @@
 //! What several integration tests share.
 #![allow(dead_code)]
 
+pub mod by_poses;
 pub mod dense;
 pub mod flange;
 pub mod small;
