@@ -48,12 +48,12 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let robot = model.robot_with(chain.clone(), options.harmonics);
     let series = &turns::settled(&robot, series, &options.limits);
     let rigid = RobotModel::Rigid.robot_with(chain.clone(), options.harmonics);
-    let (mut told, mut of_postures) = in_told_postures(&rigid, (series, Before::Nearest), options);
+    let (mut told, mut of_postures) = told_postures(&rigid, (series, Before::Nearest), options);
     let mut chosen = choose(&chain, &told, options, &by_joint_fit)?;
     for _ in 0..RETELLINGS {
         // A wrong posture hides the joint terms: the robot that has all of them tells what the first model could not.
         let fitted = (chosen.series.as_slice(), Before::Fitted);
-        let (again, Some(found)) = in_told_postures(&chosen.widest, fitted, options) else { break };
+        let (again, Some(found)) = told_postures(&chosen.widest, fitted, options) else { break };
         // Terms enough to fit any choice do not close what was open before.
         let is_open = found.is_open || of_postures.is_some_and(|before| before.is_open);
         of_postures = Some(Told { is_open, ..found });
@@ -74,7 +74,7 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     Ok(Solution { options: options.clone(), ..solution })
 }
 
-fn in_told_postures(
+fn told_postures(
     robot: &Robot,
     series: (&[MeasuredSeries], Before),
     options: &Options,

@@ -27,7 +27,7 @@ pub struct JudgedImage {
 }
 
 /// Series with readings that were computed from poses of a controller in the postures that the images tell with this robot: a better one tells
-/// them for a worse one, and that by which they were computed tells none. Other series stay as they are, but for full turns.
+/// them for a worse one, and that by which they were computed tells none. Ids of plates that look the same when they are turned are settled, too.
 pub fn in_told_postures(robot: &Robot, series: &[MeasuredSeries]) -> Vec<MeasuredSeries> {
     let limits = &Limits::default();
     let settled = turns::settled(robot, series, limits);
