@@ -13,7 +13,7 @@
 //! turned over are a robot as likely as the first: the images do not tell which.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector, Matrix6};
 use rand::rngs::SmallRng;
@@ -124,10 +124,13 @@ pub(super) struct Told {
 impl Told {
     /// What is to be said where the series were `given` and are `told` now.
     pub fn finding(&self, given: &[MeasuredSeries], told: &[MeasuredSeries]) -> ComputedPostures {
+        // Cameras at the same stops say it once.
+        let mut stops: BTreeSet<(&str, usize)> = BTreeSet::new();
         let mut others: Vec<String> = Vec::new();
         for (given, told) in given.iter().zip(told) {
-            let pairs = given.stops.iter().zip(&told.stops);
-            others.extend(pairs.filter(|(g, t)| g.readings != t.readings).map(|(g, _)| g.image.clone()));
+            let run = given.run.as_deref().unwrap_or(&given.name);
+            let turned = given.stops.iter().zip(&told.stops).filter(|(g, t)| g.readings != t.readings);
+            others.extend(turned.filter(|(g, _)| stops.insert((run, g.row))).map(|(g, _)| g.image.clone()));
         }
         let series = given.iter().filter(|s| s.readings_are_computed()).map(|s| s.name.clone()).collect();
         ComputedPostures { series, stops: self.stops, others, is_open: self.is_open }
