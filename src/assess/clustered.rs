@@ -1,7 +1,7 @@
 //! Covariance that trusts the scatter between stops more than the model of the noise.
 //!
 //! Markers count as known here: every one is told by many images, and a shift of all of them is none of the plate. With the
-//! information `S = R R'` of the images of a stop about their poses and intrinsics, joint noise eliminated, and their derivatives `T` by the
+//! information `S = R R'` of the images and measured bodies of a stop about their poses and intrinsics, joint noise eliminated, and their derivatives `T` by the
 //! columns, the covariance is `K = (sum T' S T + P)^-1` with the prior information `P`. With the scores `b` of the stops (the latents
 //! included, whose own score is zero at the optimum) the sandwich is `K (sum T' b b' T + P) K`; priors count as the observations that
 //! they stand for.
@@ -94,15 +94,24 @@ impl StopInformation {
             let row = DVector::from_iterator(free.len(), free.iter().map(own));
             information.ger(1.0, &row, &row, 1.0);
         }
+        for length in &linear.lin.lengths {
+            let own = |c: &usize| length.by_columns.iter().filter(|(own, _)| own == c).map(|(_, d)| d).sum();
+            let row = DVector::from_iterator(free.len(), free.iter().map(own));
+            information.ger(1.0, &row, &row, 1.0);
+        }
         Self { stops, free, prior, information }
     }
 }
 
-/// What the images of one stop tell.
+/// What images and measured bodies of one stop tell.
 #[derive(Debug, Clone)]
 pub struct RootInformation {
+    /// Index of the stop.
+    pub stop: usize,
     /// Places of its images among those in use.
     pub places: Range<usize>,
+    /// Indices of its measurements of bodies.
+    pub bodies: Vec<usize>,
     /// `R^-1 b`.
     pub score: DVector<f64>,
     /// `R' T`, rows x all columns.
@@ -113,22 +122,28 @@ pub struct RootInformation {
 
 impl RootInformation {
     fn of(stop: &LinearStop, layout: &Layout, free: &[usize]) -> Option<Self> {
-        let (n, size) = (stop.unknowns(), 6 + E);
-        if stop.places().is_empty() {
-            return None;
+        let n = stop.unknowns();
+        let images = stop.images().map(|own| SeenAtStop::of_image(own.terms, own.by_latents(n)));
+        let bodies = stop.bodies().iter().map(|own| SeenAtStop::of_body(&own.terms, own.by_latents(n)));
+        let (root, inverse) = roots(&condensed(&images.chain(bodies).collect::<Vec<_>>(), &stop.prior())?)?;
+        let mut score = DVector::zeros(root.nrows());
+        let mut t = DMatrix::zeros(root.nrows(), layout.len());
+        let mut first = 0;
+        for own in stop.images() {
+            score.rows_mut(first, 6).copy_from(&own.terms.bp);
+            score.rows_mut(first + 6, E).copy_from(&own.terms.be.rows(0, E));
+            t.rows_mut(first, 6 + E).copy_from(&by_columns(layout, own.image, own.chain));
+            first += 6 + E;
         }
-        let images: Vec<SeenAtStop> = stop.images().map(|own| (own.terms, own.by_latents(n))).collect();
-        let (root, inverse) = roots(&condensed(&images, &stop.prior())?)?;
-        let mut score = DVector::zeros(size * images.len());
-        let mut t = DMatrix::zeros(size * images.len(), layout.len());
-        for (k, own) in stop.images().enumerate() {
-            score.rows_mut(size * k, 6).copy_from(&own.terms.bp);
-            score.rows_mut(size * k + 6, E).copy_from(&own.terms.be.rows(0, E));
-            t.rows_mut(size * k, size).copy_from(&by_columns(layout, own.image, own.chain));
+        for own in stop.bodies() {
+            score.rows_mut(first, 6).copy_from(&own.terms.bp);
+            t.view_mut((first, 0), (6, layout.theta_len())).copy_from(&own.chain.d_theta);
+            first += 6;
         }
         let by_root = product(&root.transpose(), &t);
         let by_free = by_root.select_columns(free);
-        Some(Self { places: stop.places(), score: inverse * score, by_root, by_free })
+        let bodies = stop.bodies().iter().map(|own| own.index).collect();
+        Some(Self { stop: stop.index, places: stop.places(), bodies, score: inverse * score, by_root, by_free })
     }
 
     /// The score with what the fit took of its scatter, of which `taken` is `R' Q R`; at most `most` of any direction counts.

@@ -51,9 +51,13 @@ pub const CHECKS: &[Check] = &[
         explains: |own, other| match (own, other) {
             (Finding::Displaced(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             (Finding::Displaced(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
+            (Finding::ZeroMoved(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
+            (Finding::Displaced(own), Finding::MeasurementsScatter(other)) => {
+                own.explains_scatter_of(&other.instrument)
+            }
             _ => false,
         },
-        ..check("pose_step", Stage::Fit(|a, b, s| found(pose_step::check(a, b, s))))
+        ..check("pose_step", Stage::Fit(pose_step::check))
     },
     Check {
         // Another focal length looks like a plate that stands elsewhere.

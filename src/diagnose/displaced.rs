@@ -17,6 +17,10 @@ pub enum Carried {
     CameraInHand,
     /// The camera that stands still.
     Camera,
+    /// A tracker, or what given places are fixed to.
+    Instrument,
+    /// What a tracker or a socket sees of the tip.
+    Target,
 }
 
 /// In which images it stands elsewhere.
@@ -28,6 +32,8 @@ pub enum Displacement {
     AxisUp(usize),
     /// More in each than in the one before: it creeps.
     AllThrough,
+    /// In all of them: elsewhere than in the other series.
+    InAll,
 }
 
 /// A body stands elsewhere in some images, by too little for any of them to be left out.
@@ -37,16 +43,16 @@ pub struct Displaced {
     pub series: String,
     /// What.
     pub body: Carried,
-    /// Name of the mounting of its images.
+    /// Name of the mounting of its images, or of what measures it.
     pub mounting: String,
     /// How the images are divided.
     pub displacement: Displacement,
-    /// Images in which it stands elsewhere, in this order.
+    /// Images or stops in which it stands elsewhere, in this order.
     pub images: Vec<String>,
     /// How far, m, and sigma per axis; of what creeps, from the first to the last image.
     pub distance_m: (f64, f64),
-    /// By which angle, rad, and sigma per axis.
-    pub angle_rad: (f64, f64),
+    /// By which angle, rad, and sigma per axis; none where points alone were seen.
+    pub angle_rad: Option<(f64, f64)>,
     /// Share of the squares of the joint noise that this and the other displacements explain.
     pub share: f64,
     /// Gate where it is beyond what a good robot repeats to.
@@ -59,8 +65,18 @@ impl Displaced {
         !matches!(self.displacement, Displacement::AxisUp(_)) && self.mounting == mounting
     }
 
+    /// True where measurements with this instrument scatter because of it.
+    pub(super) fn explains_scatter_of(&self, instrument: &str) -> bool {
+        matches!(self.body, Carried::Instrument | Carried::Target) && self.mounting == instrument
+    }
+
     fn is_camera(&self) -> bool {
         matches!(self.body, Carried::CameraInHand | Carried::Camera)
+    }
+
+    /// "image" or "stop".
+    fn shown(&self) -> &'static str {
+        if matches!(self.body, Carried::Instrument | Carried::Target) { "stop" } else { "image" }
     }
 
     /// The first image in which it stands elsewhere.
@@ -74,19 +90,24 @@ impl Displaced {
             Carried::PlateInHand => "plate in the hand",
             Carried::CameraInHand => "camera on its mount",
             Carried::Camera => "camera on its stand",
+            Carried::Instrument => "tracker",
+            Carried::Target => "target on the tip",
         }
     }
 }
 
 impl Kind for Displaced {
     fn code(&self) -> Code {
-        match (self.displacement, self.is_camera()) {
-            (Displacement::FromThenOn, false) => Code::PlateDisplaced,
-            (Displacement::FromThenOn, true) => Code::CameraDisplaced,
-            (Displacement::AllThrough, false) => Code::PlateDrifts,
-            (Displacement::AllThrough, true) => Code::CameraDrifts,
-            (Displacement::AxisUp(_), false) => Code::PlateLoose,
-            (Displacement::AxisUp(_), true) => Code::CameraLoose,
+        let of = |displaced, drifts, loose| match self.displacement {
+            Displacement::FromThenOn | Displacement::InAll => displaced,
+            Displacement::AllThrough => drifts,
+            Displacement::AxisUp(_) => loose,
+        };
+        match self.body {
+            Carried::Plate | Carried::PlateInHand => of(Code::PlateDisplaced, Code::PlateDrifts, Code::PlateLoose),
+            Carried::Camera | Carried::CameraInHand => of(Code::CameraDisplaced, Code::CameraDrifts, Code::CameraLoose),
+            Carried::Instrument => of(Code::TrackerDisplaced, Code::TrackerDrifts, Code::TrackerDisplaced),
+            Carried::Target => of(Code::TargetDisplaced, Code::TargetDrifts, Code::TargetDisplaced),
         }
     }
 
@@ -96,18 +117,18 @@ impl Kind for Displaced {
 
     fn subjects(&self) -> Vec<Subject> {
         let mut all = vec![Subject::Series(self.series.clone()), Subject::Body(self.body().to_owned())];
-        if self.displacement != Displacement::AllThrough {
-            all.extend(self.images.iter().cloned().map(Subject::Image));
+        if !matches!(self.displacement, Displacement::AllThrough | Displacement::InAll) {
+            let subject = if self.shown() == "stop" { Subject::Stop } else { Subject::Image };
+            all.extend(self.images.iter().cloned().map(subject));
         }
         all
     }
 
     fn quantities(&self) -> Vec<Quantity> {
-        vec![
-            Quantity::new("distance", self.distance_m.0, "m").with_sigma(self.distance_m.1),
-            Quantity::new("angle", self.angle_rad.0, "rad").with_sigma(self.angle_rad.1),
-            Quantity::new("share_of_joint_noise", self.share, "1"),
-        ]
+        let distance = Quantity::new("distance", self.distance_m.0, "m").with_sigma(self.distance_m.1);
+        let angle = self.angle_rad.map(|(angle, sigma)| Quantity::new("angle", angle, "rad").with_sigma(sigma));
+        let share = Quantity::new("share_of_joint_noise", self.share, "1");
+        [Some(distance), angle, Some(share)].into_iter().flatten().collect()
     }
 
     fn place(&self) -> String {
@@ -116,18 +137,20 @@ impl Kind for Displaced {
 
     fn seen(&self) -> String {
         let body = self.body();
-        let size = format!(
-            "{:.2} mm, {:.2} mrad (sigma at most {:.2} mm, {:.2} mrad per axis)",
-            1e3 * self.distance_m.0,
-            1e3 * self.angle_rad.0,
-            1e3 * self.distance_m.1,
-            1e3 * self.angle_rad.1
-        );
+        let (far, far_sigma) = (1e3 * self.distance_m.0, 1e3 * self.distance_m.1);
+        let size = match self.angle_rad {
+            Some((angle, sigma)) => format!(
+                "{far:.2} mm, {:.2} mrad (sigma at most {far_sigma:.2} mm, {:.2} mrad per axis)",
+                1e3 * angle,
+                1e3 * sigma
+            ),
+            None => format!("{far:.2} mm (sigma at most {far_sigma:.2} mm per axis)"),
+        };
         let what = match self.displacement {
             Displacement::FromThenOn => {
                 let stands = match self.body {
-                    Carried::Plate | Carried::Camera => "stands",
-                    Carried::PlateInHand | Carried::CameraInHand => "sits",
+                    Carried::Plate | Carried::Camera | Carried::Instrument => "stands",
+                    Carried::PlateInHand | Carried::CameraInHand | Carried::Target => "sits",
                 };
                 let touched = if self.is_camera() { ", creeps, or its lens was touched" } else { ", or creeps" };
                 format!(
@@ -143,8 +166,12 @@ impl Kind for Displaced {
             ),
             Displacement::AllThrough => {
                 format!(
-                    "from the first to the last image the {body} creeps by {size}: it is not yet warm, or gives way"
+                    "from the first to the last {} the {body} creeps by {size}: it is not yet warm, or gives way",
+                    self.shown()
                 )
+            }
+            Displacement::InAll => {
+                format!("the {body} is {size} from where it is in the other series: it was moved between them")
             }
         };
         format!("{what} (this explains {:.0} % of the squares of the joint noise)", 100.0 * self.share)
@@ -152,14 +179,36 @@ impl Kind for Displaced {
 
     fn remedy(&self) -> String {
         match self.displacement {
-            Displacement::FromThenOn if self.is_camera() => format!(
-                "fasten the camera, and take the series again, or put the images from {} on into a series of their own with the same [camera] name and another mounting",
-                self.first()
-            ),
-            Displacement::FromThenOn => format!(
-                "write a column placement in joints.csv that differs from {} on, or fasten the plate and take the series again",
-                self.first()
-            ),
+            Displacement::FromThenOn => match self.body {
+                Carried::Camera | Carried::CameraInHand => format!(
+                    "fasten the camera, and take the series again, or put the images from {} on into a series of their own with the same [camera] name and another mounting",
+                    self.first()
+                ),
+                Carried::Plate | Carried::PlateInHand => format!(
+                    "write a column placement in joints.csv that differs from {} on, or fasten the plate and take the series again",
+                    self.first()
+                ),
+                Carried::Instrument => format!(
+                    "put the stops from {} on into a series of their own with another [tracker] name, or measure again",
+                    self.first()
+                ),
+                Carried::Target => format!(
+                    "give the target another name from {} on (of contacts, put them into a series of their own), or fasten it and measure again",
+                    self.first()
+                ),
+            },
+            Displacement::InAll => match self.body {
+                Carried::Camera | Carried::CameraInHand => {
+                    format!("write another mounting under [camera] in the series.toml of {}", self.series)
+                }
+                Carried::Plate | Carried::PlateInHand => {
+                    format!("write a placement of its own into the joints.csv of {}", self.series)
+                }
+                Carried::Instrument => {
+                    format!("write another name under [tracker] in the series.toml of {}", self.series)
+                }
+                Carried::Target => format!("give the target another name in {}", self.series),
+            },
             Displacement::AxisUp(_) => "fasten it, and take the series again".into(),
             Displacement::AllThrough => {
                 "let camera and robot warm up, fasten what creeps, and take the series again".into()

@@ -30,6 +30,7 @@ use super::plate_size::DoubtedSize;
 use super::scatter::LargeScatter;
 use super::stated_noise::NoiseContradicted;
 use super::undetermined::FlangeUndetermined;
+use super::zero_moved::ZeroMoved;
 use super::zeros_off::ZeroOff;
 use crate::error::{Code, Error, Notice};
 
@@ -86,6 +87,7 @@ findings! {
     ObservationsLeftOut,
     ParameterOff,
     ResidualPattern,
+    ZeroMoved,
     ZeroOff,
 }
 

@@ -48,7 +48,7 @@ pub enum MistakeKind {
         /// Its pitch as stated, m.
         pitch_m: f64,
     },
-    /// A table of poses is to be read in another way.
+    /// A table of poses or positions is to be read in another way.
     Poses {
         /// Which.
         code: Code,

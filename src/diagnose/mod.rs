@@ -33,7 +33,11 @@ mod plate_size;
 mod pose_step;
 mod scatter;
 mod stated_noise;
+mod step_candidates;
+mod step_orders;
+mod step_rows;
 mod undetermined;
+mod zero_moved;
 mod zeros_off;
 
 pub use camera_model::CameraModelMisfit;
@@ -66,4 +70,5 @@ pub use plate_size::DoubtedSize;
 pub use scatter::LargeScatter;
 pub use stated_noise::NoiseContradicted;
 pub use undetermined::FlangeUndetermined;
+pub use zero_moved::ZeroMoved;
 pub use zeros_off::ZeroOff;

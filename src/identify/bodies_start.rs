@@ -8,15 +8,14 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::mistakes::mistakes_undone;
+use super::body_mistakes::{SeenAt, name_mistake};
 use crate::assess::{Limits, median};
-use crate::diagnose::{Finding, Mistake};
 use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, project_to_so3};
 use crate::init::{PosePair, solve_hand_eye};
 use crate::linalg::SymmetricFactor;
 use crate::model::robot::Robot;
-use crate::problem::{Adjustment, BodyMeasurement, BodySeen, InstrumentKind, Problem};
+use crate::problem::{Adjustment, BodyMeasurement, BodyRejection, BodySeen, InstrumentKind, Problem};
 
 /// Information of a prior on unknown lengths, 1/m^2 where measurements have 1: it holds what they do not tell near zero.
 const HOLD: f64 = 1e-6;
@@ -45,12 +44,12 @@ pub(super) fn start_bodies(adjustment: &mut Adjustment, limits: &Limits) -> Resu
         let (sockets, others): (Vec<_>, Vec<_>) = seen_by.into_iter().partition(|(i, _)| is_socket(i));
         for (instrument, measured) in others {
             let (frame, at) = framed(adjustment, instrument, &measured)?;
-            name_mistake(adjustment, (instrument, &measured), limits)?;
+            name_mistake(adjustment, &measured, limits, usual_misfit)?;
             adjustment.state.instruments[instrument] = frame;
             adjustment.state.bodies[body] = at;
         }
         if !sockets.is_empty() {
-            start_sockets(adjustment, body, &sockets)?;
+            start_sockets(adjustment, body, &sockets, limits)?;
         }
     }
     Ok(())
@@ -110,48 +109,9 @@ fn framed(adjustment: &Adjustment, instrument: usize, measured: &[usize]) -> Res
     nearest(&points).ok_or_else(|| too_few(problem, instrument, points.len(), FEWEST_POINTS))
 }
 
-/// What a body was seen as, and the readings at its stops.
-struct SeenAt {
-    seen: BodySeen,
-    readings: Vec<f64>,
-}
-
-/// Refuses readings that fit what an instrument saw of a body with one of the usual mistakes undone, and only then.
-fn name_mistake(
-    Adjustment { problem, state }: &Adjustment,
-    (instrument, measured): (usize, &[usize]),
-    limits: &Limits,
-) -> Result<()> {
-    let robot = &state.robot;
-    let at = |k: &usize| {
-        let BodyMeasurement { stop, seen, .. } = problem.body_measurements[*k];
-        let readings = problem.stops[stop].posture.as_ref()?.readings.clone();
-        Some(SeenAt { seen, readings })
-    };
-    let seen: Vec<SeenAt> = measured.iter().filter_map(at).collect();
-    let given: Vec<Vec<f64>> = seen.iter().map(|s| s.readings.clone()).collect();
-    let as_described = usual_misfit(robot, &seen, &given);
-    if as_described < limits.suspicious_misfit || robot.chain.pose_coordinates().is_some() {
-        return Ok(());
-    }
-    let tried = mistakes_undone(robot, &given).into_iter().map(|(readings, kind)| {
-        let left = usual_misfit(robot, &seen, &readings);
-        (left, kind)
-    });
-    let best = tried
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .filter(|(left, _)| *left < limits.mistake_explains * as_described && *left < limits.suspicious_misfit);
-    best.map_or(Ok(()), |(left, kind)| {
-        let instrument = &problem.instruments[instrument];
-        let of = format!("{} {}", instrument.kind.block(), instrument.name);
-        let mistake = Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false };
-        Err(Finding::from(mistake).refusal())
-    })
-}
-
 /// Median misfit of the poses (rad + m), or of the points (m), with readings.
-fn usual_misfit(robot: &Robot, seen: &[SeenAt], readings: &[Vec<f64>]) -> f64 {
-    let tips: Vec<Pose> = readings.iter().map(|q| robot.base_from_tip(q)).collect();
+fn usual_misfit(robot: &Robot, seen: &[SeenAt]) -> f64 {
+    let tips: Vec<Pose> = seen.iter().map(|s| robot.base_from_tip(&s.readings)).collect();
     let pair = |(seen, tip): (&SeenAt, &Pose)| match seen.seen {
         BodySeen::Pose(pose) => Some(PosePair { camera_from_plate: pose, chain: *tip }),
         BodySeen::Point(_) => None,
@@ -248,31 +208,97 @@ fn turn(points: &[(Vector3<f64>, Pose)], body: &Vector3<f64>) -> Option<Matrix3<
 }
 
 /// Places of sockets and the body in the tip, from all sockets that hold it.
-fn start_sockets(adjustment: &mut Adjustment, body: usize, sockets: &[(usize, Vec<usize>)]) -> Result<()> {
-    let unknowns = 3 + 3 * sockets.len();
-    let (mut n, mut rhs) = (DMatrix::identity(unknowns, unknowns) * HOLD, DVector::zeros(unknowns));
-    let mut count = 0;
-    for (at, (_, measured)) in sockets.iter().enumerate() {
-        for tip in measured.iter().filter_map(|&k| tip(adjustment, &adjustment.problem.body_measurements[k])) {
-            let mut row = DMatrix::zeros(3, unknowns);
-            row.fixed_view_mut::<3, 3>(0, 0).copy_from(&-tip.rotation);
-            row.fixed_view_mut::<3, 3>(0, 3 + 3 * at).fill_with_identity();
-            n += row.tr_mul(&row);
-            rhs += row.tr_mul(&tip.translation);
-            count += 1;
-        }
-    }
+fn start_sockets(
+    adjustment: &mut Adjustment,
+    body: usize,
+    sockets: &[(usize, Vec<usize>)],
+    limits: &Limits,
+) -> Result<()> {
+    let all = sockets.iter().flat_map(|(_, measured)| measured.iter().copied());
+    let at_robot = |k: usize| {
+        let measured = &adjustment.problem.body_measurements[k];
+        Some((k, (measured.instrument, tip(adjustment, measured)?)))
+    };
+    let (all, held): (Vec<usize>, Vec<(usize, Pose)>) = all.filter_map(at_robot).unzip();
     // Every stop gives three coordinates: a place and the body are told by three stops.
-    if count < sockets.len() + 2 {
-        return Err(too_few(&adjustment.problem, sockets[0].0, count, sockets.len() + 2));
+    let needed = sockets.len() + 2;
+    let too_few = || too_few(&adjustment.problem, sockets[0].0, held.len(), needed);
+    if held.len() < needed {
+        return Err(too_few());
     }
-    let factor =
-        SymmetricFactor::new(&n).map_err(|_| too_few(&adjustment.problem, sockets[0].0, count, sockets.len() + 2))?;
-    let x = factor.solve(&rhs);
-    let part = |first: usize| Pose::new(Matrix3::identity(), x.fixed_rows::<3>(first).into_owned());
-    adjustment.state.bodies[body] = part(0);
-    for (at, (instrument, _)) in sockets.iter().enumerate() {
-        adjustment.state.instruments[*instrument] = part(3 + 3 * at);
+    let found = in_sockets(&held).ok_or_else(too_few)?;
+    name_mistake(adjustment, &all, limits, |robot, seen| {
+        let held: Vec<(usize, Pose)> = seen.iter().map(|s| (s.instrument, robot.base_from_tip(&s.readings))).collect();
+        in_sockets(&held).and_then(|found| median(&found.misfits(&held))).unwrap_or(f64::INFINITY)
+    })?;
+    // What sat in another socket than is said would spoil the noise of all before it is left out by its residual.
+    let bound = f64::max(limits.suspicious_misfit, DISAGREES * median(&found.misfits(&held)).unwrap_or(0.0));
+    for (k, misfit) in all.into_iter().zip(found.misfits(&held)).filter(|(_, misfit)| *misfit > bound) {
+        let measured = &mut adjustment.problem.body_measurements[k];
+        measured.rejected = Some(BodyRejection::Residual { sigmas: misfit / measured.sigma_m });
+    }
+    let at = |place: Vector3<f64>| Pose::new(Matrix3::identity(), place);
+    adjustment.state.bodies[body] = at(found.body);
+    for (instrument, place) in found.places {
+        adjustment.state.instruments[instrument] = at(place);
     }
     Ok(())
+}
+
+/// A body in the tip, and the places of the sockets that hold it by their indices, m.
+struct InSockets {
+    body: Vector3<f64>,
+    places: BTreeMap<usize, Vector3<f64>>,
+}
+
+impl InSockets {
+    /// How far the body is from the place of its socket at each stop, m; infinite where no place was found.
+    fn misfits(&self, held: &[(usize, Pose)]) -> Vec<f64> {
+        let of = |(socket, tip): &(usize, Pose)| {
+            self.places.get(socket).map_or(f64::INFINITY, |place| (tip.transform(&self.body) - place).norm())
+        };
+        held.iter().map(of).collect()
+    }
+}
+
+/// Rounds in which stops that disagree are left out of a start.
+const TRIMMINGS: usize = 5;
+
+/// Times the median misfit beyond which a stop disagrees.
+const DISAGREES: f64 = 4.0;
+
+/// From the stops that agree: those of a wrong socket would spoil it for all.
+fn in_sockets(held: &[(usize, Pose)]) -> Option<InSockets> {
+    let mut found = by_all(held)?;
+    for _ in 0..TRIMMINGS {
+        let misfits = found.misfits(held);
+        let bound = DISAGREES * median(&misfits)?;
+        let agreeing: Vec<(usize, Pose)> =
+            held.iter().zip(&misfits).filter(|(_, misfit)| **misfit <= bound).map(|(stop, _)| *stop).collect();
+        match by_all(&agreeing) {
+            Some(better) if better.places.len() == found.places.len() => found = better,
+            _ => break,
+        }
+    }
+    Some(found)
+}
+
+/// Least squares over the body and the places; `None` where they are not determined.
+fn by_all(held: &[(usize, Pose)]) -> Option<InSockets> {
+    let sockets: BTreeMap<usize, usize> = {
+        let named: std::collections::BTreeSet<usize> = held.iter().map(|(socket, _)| *socket).collect();
+        named.into_iter().zip((3..).step_by(3)).collect()
+    };
+    let unknowns = 3 + 3 * sockets.len();
+    let (mut n, mut rhs) = (DMatrix::identity(unknowns, unknowns) * HOLD, DVector::zeros(unknowns));
+    for (socket, tip) in held {
+        let mut row = DMatrix::zeros(3, unknowns);
+        row.fixed_view_mut::<3, 3>(0, 0).copy_from(&-tip.rotation);
+        row.fixed_view_mut::<3, 3>(0, sockets[socket]).fill_with_identity();
+        n += row.tr_mul(&row);
+        rhs += row.tr_mul(&tip.translation);
+    }
+    let x = SymmetricFactor::new(&n).ok()?.solve(&rhs);
+    let part = |first: usize| x.fixed_rows::<3>(first).into_owned();
+    Some(InSockets { body: part(0), places: sockets.iter().map(|(socket, first)| (*socket, part(*first))).collect() })
 }

@@ -4,6 +4,7 @@ mod block_diagonal;
 mod bodies;
 mod bodies_measured;
 mod bodies_start;
+mod body_mistakes;
 mod build;
 mod compare;
 mod comparison;

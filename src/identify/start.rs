@@ -56,6 +56,7 @@ pub(super) fn start_robot(
             problem.mountings[*mounting], problem.placements[*placement]
         );
         let known = (cameras.get(mounting).copied(), plates.get(placement).copied());
+        let is_shared = known != (None, None);
         let solution = match known {
             (Some(camera), Some(plate)) => HandEye { camera, plate },
             (Some(camera), None) => {
@@ -66,6 +67,9 @@ pub(super) fn start_robot(
             }
             (None, None) => closed_form(adjustment, pairs, &poses, (*mounting, *placement), &of, given, verdicts)?,
         };
+        if is_shared {
+            check_shared(adjustment, pairs, &solution, &of, given)?;
+        }
         cameras.insert(*mounting, solution.camera);
         plates.insert(*placement, solution.plate);
         aside.extend(set_aside(&mut adjustment.problem, pairs, &solution, given.limits));
@@ -244,6 +248,45 @@ fn closed_form(
         ));
     }
     Ok(best.solution)
+}
+
+/// Refuses images that share the mounting or the placement of others and do not fit there: for a mistake of theirs, or because what they
+/// share was moved.
+fn check_shared(
+    Adjustment { problem, state }: &Adjustment,
+    pairs: &[(usize, PosePair)],
+    shared: &HandEye,
+    of: &str,
+    StartGiven { series, limits }: StartGiven<'_>,
+) -> Result<()> {
+    let poses: Vec<PosePair> = pairs.iter().map(|(_, pair)| *pair).collect();
+    let misfit = shared.median_error(&poses);
+    if misfit < limits.suspicious_misfit || pairs.len() < limits.hand_eye_images {
+        return Ok(());
+    }
+    let alone = solve_hand_eye(&poses).first().map_or(f64::INFINITY, |s| s.median_error);
+    if alone < limits.suspicious_misfit && alone < limits.mistake_explains * misfit {
+        let what = format!(
+            "by themselves its {} images fit to {:.1} (mm plus mrad), with what they share with others they miss by {:.0}: camera or plate were \
+             moved between them",
+            pairs.len(),
+            1e3 * alone,
+            1e3 * misfit
+        );
+        let remedy =
+            "write another mounting under [camera] of one of the series, or another placement in its joints.csv";
+        return Err(Error::new(Code::SharedPoseDiffers, of, what, remedy));
+    }
+    let suspects = Suspects { problem, robot: &state.robot, series, pairs, limits };
+    if let Some((kind, misfit_undone)) = suspects.better_than(misfit) {
+        let mistake = Mistake { kind, of: of.to_owned(), misfit, misfit_undone, by_images: true };
+        return Err(Finding::from(mistake).refusal());
+    }
+    if misfit > limits.hand_eye_spread {
+        let what = format!("with what is shared with other images they miss by {:.0} (mm plus mrad)", 1e3 * misfit);
+        return Err(no_fit(of, &what));
+    }
+    Ok(())
 }
 
 fn no_fit(of: &str, what: &str) -> Error {

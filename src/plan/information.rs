@@ -8,7 +8,7 @@ use super::setting::{PlannedStop, Setting};
 use crate::geom::skew;
 use crate::linalg::{product, symmetric_eigen};
 use crate::model::robot::{Posture, Robot};
-use crate::problem::{self, Adjustment, Problem, TakenFrom, Weighting, by_columns, linearise};
+use crate::problem::{self, Adjustment, Problem, SeenAtStop, TakenFrom, Weighting, by_columns, linearise};
 
 /// Information of the image of a stop about all columns; `None` where it shows nothing.
 ///
@@ -35,7 +35,7 @@ fn condensed(
     let chain = state.chained(&problem.layout, image, TakenFrom::rigid(posture, &exact))?;
     let terms = linearise(image, state, &chain.pose, &Weighting::of(problem, image))?;
     let t = by_columns(&problem.layout, image, &chain);
-    let h = problem::condensed(&[(&terms, chain.d_latent)], &prior)?;
+    let h = problem::condensed(&[SeenAtStop::of_image(&terms, chain.d_latent)], &prior)?;
     Some((h, t))
 }
 

@@ -1,33 +1,54 @@
-//! What the images of a stop tell of their poses and intrinsics, whatever is latent there.
+//! What images and measured bodies of a stop tell of their poses and intrinsics, whatever is latent there.
 
 use nalgebra::DMatrix;
 
+use super::body::BodyTerms;
 use super::equations::E;
 use super::linearise::{Chained, ImageTerms};
 use super::{Image, Layout};
 use crate::linalg::SymmetricFactor;
 
-/// One image of a stop: its pixel blocks, and how its pose moves with what is latent at the stop, 6 x latent.
-pub type SeenAtStop<'a> = (&'a ImageTerms, DMatrix<f64>);
+/// What something at a stop tells: information about its pose (6), and of an image about its intrinsics ([`E`] more).
+#[derive(Debug, Clone)]
+pub struct SeenAtStop {
+    own: DMatrix<f64>,
+    /// How its pose moves with what is latent at the stop, 6 x latent.
+    by_latents: DMatrix<f64>,
+}
 
-/// Information of the images of a stop about their poses and intrinsics, 6 + [`E`] an image, without what is latent (Schur complement),
-/// which has the information `prior`. The displacement field of a lens and single markers count as known. `None` where what is latent is
-/// not determined.
-pub fn condensed(images: &[SeenAtStop], prior: &[f64]) -> Option<DMatrix<f64>> {
-    let size = 6 + E;
-    let mut h = DMatrix::zeros(size * images.len(), size * images.len());
-    let mut coupling = DMatrix::zeros(prior.len(), size * images.len());
-    let mut latent = DMatrix::zeros(prior.len(), prior.len());
-    for (k, (terms, d_latent)) in images.iter().enumerate() {
-        let mut own = DMatrix::zeros(size, size);
+impl SeenAtStop {
+    /// An image, by its pixel blocks.
+    pub fn of_image(terms: &ImageTerms, by_latents: DMatrix<f64>) -> Self {
+        let mut own = DMatrix::zeros(6 + E, 6 + E);
         own.view_mut((0, 0), (6, 6)).copy_from(&terms.pp);
         own.view_mut((0, 6), (6, E)).copy_from(&terms.pe.columns(0, E));
         own.view_mut((6, 0), (E, 6)).copy_from(&terms.pe.columns(0, E).transpose());
         own.view_mut((6, 6), (E, E)).copy_from(&terms.ee.view((0, 0), (E, E)));
-        let with_latent = d_latent.transpose() * own.rows(0, 6);
-        latent += with_latent.columns(0, 6) * d_latent;
-        coupling.columns_mut(size * k, size).copy_from(&with_latent);
-        h.view_mut((size * k, size * k), (size, size)).copy_from(&own);
+        Self { own, by_latents }
+    }
+
+    /// A measurement of a body, by its blocks.
+    pub fn of_body(terms: &BodyTerms, by_latents: DMatrix<f64>) -> Self {
+        Self { own: DMatrix::from_column_slice(6, 6, terms.pp.as_slice()), by_latents }
+    }
+}
+
+/// Information of what was seen at a stop about poses and intrinsics, one behind the other, without what is latent (Schur complement),
+/// which has the information `prior`. The displacement field of a lens and single markers count as known. `None` where what is latent is
+/// not determined.
+pub fn condensed(seen: &[SeenAtStop], prior: &[f64]) -> Option<DMatrix<f64>> {
+    let size = seen.iter().map(|s| s.own.nrows()).sum();
+    let mut h = DMatrix::zeros(size, size);
+    let mut coupling = DMatrix::zeros(prior.len(), size);
+    let mut latent = DMatrix::zeros(prior.len(), prior.len());
+    let mut first = 0;
+    for SeenAtStop { own, by_latents } in seen {
+        let size = own.nrows();
+        let with_latent = by_latents.transpose() * own.rows(0, 6);
+        latent += with_latent.columns(0, 6) * by_latents;
+        coupling.columns_mut(first, size).copy_from(&with_latent);
+        h.view_mut((first, first), (size, size)).copy_from(own);
+        first += size;
     }
     if prior.is_empty() {
         return Some(h);

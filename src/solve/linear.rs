@@ -170,6 +170,13 @@ fn by_latents(chain: &Chained, places: impl Iterator<Item = usize>, latent: usiz
     by
 }
 
+impl BodyPart {
+    /// `L` by everything that is latent at its stop, 6 x latent.
+    pub fn by_latents(&self, latent: usize) -> DMatrix<f64> {
+        by_latents(&self.chain, 0..self.chain.d_latent.ncols(), latent)
+    }
+}
+
 impl LinearPose<'_> {
     /// `L` by everything that is latent at its stop, 6 x latent.
     pub fn by_latents(&self, latent: usize) -> DMatrix<f64> {

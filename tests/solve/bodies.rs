@@ -2,230 +2,20 @@
 
 use std::path::Path;
 
-use nalgebra::{DVector, Vector3};
-use robotcal::assess::{MeasuredPoint, fit_points};
+use nalgebra::DVector;
 use robotcal::calibration::Export;
-use robotcal::diagnose::{Subject, Weight};
+use robotcal::diagnose::{Carried, Displacement, Finding, Subject, Weight};
 use robotcal::error::Code;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
-use robotcal::model::robot::{Posture, Robot};
+use robotcal::model::robot::Robot;
 use robotcal::output::{Poses, restore, solution_json};
-use robotcal::problem::{
-    Adjustment, BodySeen, InstrumentKind, MeasuredSeries, MeasuredStop, SeenBody, SeenLength, Step,
-};
+use robotcal::problem::{Adjustment, BodySeen, MeasuredSeries, MeasuredStop, Step};
 use robotcal::solve::{Elimination, System};
-use robotcal::urdf::{self, Chain};
+use robotcal::urdf::Chain;
 
+use crate::measured_worlds::{Kind, World};
 use crate::support::small::Dice;
-
-/// What measures, and how well.
-#[derive(Clone, Copy, PartialEq)]
-enum Kind {
-    Points,
-    Poses,
-}
-
-struct World {
-    truth: Robot,
-    chain: Chain,
-    series: MeasuredSeries,
-    sigma_m: f64,
-    noise_rad: f64,
-}
-
-fn chain() -> Chain {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
-    urdf::read(&urdf).unwrap().chain(None, None).unwrap()
-}
-
-fn stop(k: usize, readings: Vec<f64>) -> MeasuredStop {
-    let (image, placement) = (format!("{k:03}"), "placement_0".to_owned());
-    MeasuredStop { row: k, image, readings: Some(readings), placement, observations: Vec::new(), left_out: None }
-}
-
-/// Robot with errors of 0.5 mm and 1 mrad an axis.
-fn truth(dice: &mut Dice, chain: &Chain) -> Robot {
-    let mut robot = Robot::nominal(chain.clone());
-    for twist in &mut robot.twists {
-        for k in 0..6 {
-            twist[k] = dice.normal(if k < 3 { 5e-4 } else { 1e-3 });
-        }
-    }
-    robot
-}
-
-/// Readings of the middle of the workspace.
-fn readings(dice: &mut Dice) -> Vec<f64> {
-    let middle = [0.0, -1.2, 1.4, 0.0, 0.6, 0.0];
-    let reach = [1.2, 0.5, 0.6, 1.8, 0.9, 2.5];
-    middle.iter().zip(reach).map(|(m, r)| m + dice.between(-r, r)).collect()
-}
-
-impl World {
-    fn new(seed: u64, kind: Kind, stops: usize, sigmas: (f64, f64), noise_rad: f64) -> Self {
-        let mut dice = Dice::new(seed);
-        let chain = chain();
-        let truth = truth(&mut dice, &chain);
-        Self::taken(dice, truth, kind, stops, sigmas, noise_rad, |dice| {
-            let q = readings(dice);
-            let errors = (0..q.len()).map(|_| dice.normal(noise_rad)).collect();
-            (q, errors)
-        })
-    }
-
-    /// Poses at stops within ten degrees of each other, of a robot with a share of the usual errors. Its joints are off by `drive_rad`
-    /// at each reading, in waves of five degrees, and by as much noise where `repeats` is false.
-    fn neighbours(seed: u64, share: f64, drive_rad: f64, repeats: bool) -> Self {
-        let mut dice = Dice::new(seed);
-        let chain = chain();
-        let mut truth = truth(&mut dice, &chain);
-        truth.twists.iter_mut().for_each(|twist| *twist *= share);
-        Self::taken(dice, truth, Kind::Poses, 60, (3e-5, 5e-5), drive_rad, |dice| {
-            let middle = [0.1, -1.1, 1.3, 0.2, 0.7, -0.1];
-            let q: Vec<f64> = middle.iter().map(|m| m + dice.between(-0.1, 0.1)).collect();
-            let wave = |(r, q): (usize, &f64)| drive_rad * std::f64::consts::SQRT_2 * (75.0 * q + r as f64).sin();
-            let errors = match repeats {
-                true => q.iter().enumerate().map(wave).collect(),
-                false => q.iter().map(|_| dice.normal(drive_rad)).collect(),
-            };
-            (q, errors)
-        })
-    }
-
-    fn taken(
-        mut dice: Dice,
-        truth: Robot,
-        kind: Kind,
-        stops: usize,
-        (sigma_m, sigma_rad): (f64, f64),
-        noise_rad: f64,
-        mut at: impl FnMut(&mut Dice) -> (Vec<f64>, Vec<f64>),
-    ) -> Self {
-        let tip_from_body = dice.pose(0.15, 1.0);
-        let base_from_tracker = dice.pose(2.5, 2.0);
-        let mut all = Vec::new();
-        let mut seen = Vec::new();
-        for k in 0..stops {
-            let (q, errors) = at(&mut dice);
-            let body = truth.pose_at(&Posture::at(&q), &errors) * tip_from_body;
-            let tracker_from_body = base_from_tracker.inverse() * body;
-            let jitter = Vector3::from_fn(|_, _| dice.normal(sigma_m));
-            let turn = Vector3::from_fn(|_, _| dice.normal(sigma_rad));
-            let noise = nalgebra::Vector6::new(jitter.x, jitter.y, jitter.z, turn.x, turn.y, turn.z);
-            let measured = tracker_from_body.perturbed(&noise);
-            let what = match kind {
-                Kind::Points => BodySeen::Point(measured.translation),
-                _ => BodySeen::Pose(measured),
-            };
-            seen.push(SeenBody {
-                stop: k,
-                instrument: "tracker".into(),
-                kind: InstrumentKind::Tracker,
-                body: "reflector".into(),
-                seen: what,
-                sigma_m,
-                sigma_rad: sigma_rad.max(1e-6),
-            });
-            all.push(stop(k, q));
-        }
-        let mut series = MeasuredSeries::without_images("run", true, all);
-        series.bodies = seen;
-        Self { chain: truth.chain.clone(), truth, series, sigma_m, noise_rad }
-    }
-
-    /// A ball on the tip, put into sockets with the tip turned to many directions.
-    fn sockets(seed: u64, places: usize, stops_each: usize, sigma_m: f64, noise_rad: f64) -> Self {
-        let mut dice = Dice::new(seed);
-        let chain = chain();
-        let truth = truth(&mut dice, &chain);
-        let ball = Pose::new(nalgebra::Matrix3::identity(), Vector3::new(0.02, -0.03, 0.11));
-        let mut world =
-            Self { series: MeasuredSeries::without_images("run", true, Vec::new()), truth, chain, sigma_m, noise_rad };
-        let mut centres = Vec::new();
-        for place in 0..places {
-            let centre = (world.truth.pose_at(&Posture::at(&readings(&mut dice)), &[0.0; 6]) * ball).translation;
-            for _ in 0..stops_each {
-                let q = loop {
-                    if let Some(q) = world.reached(&mut dice, &ball, &centre) {
-                        break q;
-                    }
-                };
-                let k = world.series.stops.len();
-                world.series.bodies.push(SeenBody {
-                    stop: k,
-                    instrument: format!("socket {place}"),
-                    kind: InstrumentKind::Socket,
-                    body: "ball".into(),
-                    seen: BodySeen::Point(Vector3::zeros()),
-                    sigma_m,
-                    sigma_rad: 1.0,
-                });
-                world.series.stops.push(stop(k, q));
-            }
-            centres.push(centre);
-        }
-        for (k, pair) in centres.windows(2).enumerate() {
-            world.series.lengths.push(SeenLength {
-                between: [format!("socket {k}"), format!("socket {}", k + 1)],
-                distance_m: (pair[1] - pair[0]).norm() + dice.normal(5e-5),
-                sigma_m: 5e-5,
-            });
-        }
-        world
-    }
-
-    /// Readings with which the true robot, its joint errors included, has the ball in the socket up to its noise.
-    fn reached(&self, dice: &mut Dice, ball: &Pose, centre: &Vector3<f64>) -> Option<Vec<f64>> {
-        let mut q = readings(dice);
-        let errors: Vec<f64> = (0..q.len()).map(|_| dice.normal(self.noise_rad)).collect();
-        let wanted = centre + Vector3::from_fn(|_, _| dice.normal(self.sigma_m));
-        for _ in 0..30 {
-            let kinematics = self.truth.kinematics(&Posture::at(&q), &errors);
-            let body = kinematics.base_from_tip * *ball;
-            let missing = wanted - body.translation;
-            if missing.norm() < 1e-12 {
-                return (q.iter().all(|q| q.abs() < 3.0)).then_some(q);
-            }
-            let j = nalgebra::Matrix3xX::from_columns(
-                &kinematics
-                    .d_readings
-                    .iter()
-                    .map(|d| {
-                        let (rho, phi) = (d.fixed_rows::<3>(0).into_owned(), d.fixed_rows::<3>(3).into_owned());
-                        kinematics.base_from_tip.rotation * (rho + phi.cross(&ball.translation))
-                    })
-                    .collect::<Vec<_>>(),
-            );
-            let step = j.clone().svd(true, true).pseudo_inverse(1e-9).unwrap() * missing;
-            let longest = step.amax();
-            let share = if longest > 0.3 { 0.3 / longest } else { 1.0 };
-            q.iter_mut().zip(step.iter()).for_each(|(q, s)| *q += share * s);
-        }
-        None
-    }
-
-    fn solve(&self, model: RobotModel) -> Solution {
-        self.solve_with(&Options { model, ..Options::default() })
-    }
-
-    fn solve_with(&self, options: &Options) -> Solution {
-        identify(self.chain.clone(), std::slice::from_ref(&self.series), options).unwrap()
-    }
-
-    /// RMS error of points on the tip, mm, over joint vectors that were not measured, the base frame and the point fitted.
-    fn error_mm(&self, robot: &Robot) -> f64 {
-        let mut dice = Dice::new(999);
-        let points: Vec<MeasuredPoint> = (0..120)
-            .map(|_| {
-                let readings = readings(&mut dice);
-                let at = self.truth.base_from_tip(&readings).transform(&Vector3::new(0.05, 0.02, 0.1));
-                MeasuredPoint { position_m: at, readings }
-            })
-            .collect();
-        1e3 * fit_points(robot, &points).unwrap().rms_m
-    }
-}
 
 fn check(world: &World, most_mm: f64) {
     let solution = world.solve(RobotModel::Rigid);
@@ -448,24 +238,110 @@ fn scatter(series: &MeasuredSeries, chain: &Chain) -> Vec<(String, Weight)> {
 fn measurements_that_miss_their_stated_sigma_by_far_are_named() {
     let world = World::new(11, Kind::Poses, 40, (5e-5, 1e-4), 2e-5);
     assert_eq!(scatter(&world.series, &world.chain), []);
-    let with = |change: &dyn Fn(usize, &mut Pose)| {
-        let mut series = world.series.clone();
-        for body in &mut series.bodies {
-            if let BodySeen::Pose(pose) = &mut body.seen {
-                change(body.stop, pose);
+    for (times, weight) in [(5.0, Weight::Note), (20.0, Weight::Gate)] {
+        let mut series = World::new(11, Kind::Poses, 40, (times * 5e-5, 1e-4), 2e-5).series;
+        series.bodies.iter_mut().for_each(|body| body.sigma_m = 5e-5);
+        assert_eq!(scatter(&series, &world.chain), [("position_sigma_factor".to_owned(), weight)]);
+    }
+}
+
+/// With what `change` makes of what was seen at each stop.
+fn changed(world: &World, change: impl Fn(usize, &mut Pose)) -> MeasuredSeries {
+    let mut series = world.series.clone();
+    for body in &mut series.bodies {
+        match &mut body.seen {
+            BodySeen::Pose(pose) => change(body.stop, pose),
+            BodySeen::Point(at) => {
+                let mut pose = Pose::new(nalgebra::Matrix3::identity(), *at);
+                change(body.stop, &mut pose);
+                *at = pose.translation;
             }
         }
-        scatter(&series, &world.chain)
+    }
+    series
+}
+
+#[test]
+fn a_tracker_and_a_target_that_move_are_named_with_the_stop() {
+    let moved = Pose::from_xyz_rpy([8e-4, -6e-4, 0.0], [0.0; 3]);
+    for (kind, sigma_rad) in [(Kind::Points, 0.0), (Kind::Poses, 1e-4)] {
+        let world = World::new(12, kind, 60, (3e-5, sigma_rad), 2e-5);
+        let said = |series: MeasuredSeries| {
+            let solution = identify(world.chain.clone(), &[series], &Options::default()).unwrap();
+            let displaced = |f| if let Finding::Displaced(found) = f { Some(found) } else { None };
+            let all: Vec<_> = solution.findings.into_iter().filter(Finding::fails).filter_map(displaced).collect();
+            let [found] = &all[..] else { panic!("{all:?}") };
+            assert!((found.distance_m.0 - 1e-3).abs() < 1e-4, "{found:?}");
+            (found.body, found.displacement, found.images[0].clone())
+        };
+        let from = |stop: usize| move |k: usize| k >= stop;
+        let pushed = changed(&world, |k, pose| *pose = if from(22)(k) { moved * *pose } else { *pose });
+        assert_eq!(said(pushed), (Carried::Instrument, Displacement::FromThenOn, "022".into()));
+        if kind == Kind::Poses {
+            let slipped = changed(&world, |k, pose| *pose = if from(35)(k) { *pose * moved } else { *pose });
+            assert_eq!(said(slipped), (Carried::Target, Displacement::FromThenOn, "035".into()));
+        }
+    }
+}
+
+/// What is done to every pose, and the code with which it is refused.
+type Misread<'a> = (&'a dyn Fn(&mut Pose), Code);
+
+/// Files that are read in another way than they were written are refused by name, and not fitted.
+#[test]
+fn mistakes_in_the_file_of_a_tracker_are_named() {
+    let turned = |pose: &mut Pose, to: [f64; 4]| *pose = Pose::from_xyz_quaternion(pose.xyz(), to);
+    for (kind, sigma_rad) in [(Kind::Points, 0.0), (Kind::Poses, 1e-4)] {
+        let world = World::new(13, kind, 60, (3e-5, sigma_rad), 2e-5);
+        let said = |change: &dyn Fn(&mut Pose)| {
+            let series = changed(&world, |_, pose| change(pose));
+            identify(world.chain.clone(), &[series], &Options::default()).map_or_else(|e| Some(e.code), |_| None)
+        };
+        let mirrored = |pose: &mut Pose| {
+            pose.translation.z *= -1.0;
+            let [x, y, z, w] = pose.quaternion_xyzw();
+            turned(pose, [-x, -y, z, w]);
+        };
+        let scalar_first = |pose: &mut Pose| {
+            let [x, y, z, w] = pose.quaternion_xyzw();
+            turned(pose, [w, x, y, z]);
+        };
+        let of_positions: [Misread; 2] = [
+            (&|pose| pose.translation *= 1e3, Code::MeasuredUnit),
+            (&|pose| pose.translation.x *= -1.0, Code::AxesMirrored),
+        ];
+        let of_poses: [Misread; 4] = [
+            (&mirrored, Code::AxesMirrored),
+            (&|pose| pose.rotation = pose.rotation.transpose(), Code::PosesInverted),
+            (&|pose| *pose = pose.inverse(), Code::PosesInverted),
+            (&scalar_first, Code::RotationConvention),
+        ];
+        let tried = of_positions.iter().chain(of_poses.iter().filter(|_| kind == Kind::Poses));
+        let said: Vec<_> = tried.map(|(change, code)| (said(change), Some(*code))).collect();
+        assert!(said.iter().all(|(said, code)| said == code), "{said:?}");
+    }
+}
+
+#[test]
+fn labels_of_two_sockets_that_were_exchanged_are_left_out_by_name() {
+    let mut world = World::sockets(14, 4, 8, 5e-5, 2e-5);
+    world.series.bodies[3].instrument = "socket 1".into();
+    world.series.bodies[12].instrument = "socket 0".into();
+    let solution = world.solve(RobotModel::Rigid);
+    let found = solution.findings.iter().find(|f| f.code() == Code::MeasurementsLeftOut).unwrap();
+    assert_eq!(found.subjects(), [Subject::Stop("003".into()), Subject::Stop("012".into())]);
+}
+
+#[test]
+fn mistakes_in_readings_are_named_by_sockets_alone() {
+    let world = World::sockets(15, 4, 12, 5e-5, 2e-5);
+    let named = |change: &dyn Fn(&mut Vec<f64>)| {
+        let mut series = world.series.clone();
+        series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(change);
+        identify(world.chain.clone(), &[series], &Options::default()).map(|_| ()).unwrap_err().code
     };
-    let positions = |weight| vec![("position_sigma_factor".to_owned(), weight)];
-    // The tracker was pushed by a millimetre, by five, and it counts x the other way.
-    let pushed = |by: f64| with(&|stop, pose| pose.translation.x += if stop >= 22 { by } else { 0.0 });
-    assert_eq!(pushed(1e-3), positions(Weight::Note));
-    assert_eq!(pushed(5e-3), positions(Weight::Gate));
-    assert_eq!(with(&|_, pose| pose.translation.x *= -1.0), positions(Weight::Gate));
-    // target_from_instrument for instrument_from_target.
-    let inverted = with(&|_, pose| pose.rotation = pose.rotation.transpose());
-    assert_eq!(inverted, [("rotation_sigma_factor".to_owned(), Weight::Gate)]);
+    assert_eq!(named(&|q| q[4] = -q[4]), Code::JointSignWrong);
+    assert_eq!(named(&|q| q.swap(3, 5)), Code::JointOrderWrong);
 }
 
 /// What is said of the size of measured lengths: by how much they are too long.

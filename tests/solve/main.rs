@@ -7,6 +7,7 @@ mod outputs_support;
 #[path = "../support/mod.rs"]
 mod support;
 
+mod between_series;
 mod bodies;
 mod cameras;
 mod carried;
@@ -16,6 +17,7 @@ mod diagnosis;
 mod knowledge;
 mod lens_study;
 mod marker_tolerance;
+mod measured_worlds;
 mod moved_in_time;
 mod normal_equations;
 mod patterns;

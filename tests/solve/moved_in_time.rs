@@ -7,15 +7,15 @@ use robotcal::diagnose::{Carried, Displaced, Displacement, Finding};
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::model::camera::Lens;
-use robotcal::model::circle::centroid_uv;
 use robotcal::plan::plate_design::{PlateRequest, design};
 use robotcal::problem::{LensChoice, MeasuredSeries};
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::study::measured;
 use robotcal::urdf::Chain;
-use std::ops::Range;
 use std::path::Path;
+
+use crate::support::displaced::change;
 
 const RADIUS_M: f64 = 0.01;
 
@@ -29,22 +29,6 @@ fn seen(mount: CameraMount, images: usize, seed: u64) -> SimulatedSeries {
     plate.markers.iter_mut().for_each(|m| m.outer_radius_m = RADIUS_M);
     let request = WorldRequest { mount, images, least_markers: 12, seed, ..WorldRequest::typical(chain(), plate) };
     series(&request).unwrap()
-}
-
-/// The images of these stops as they are where `change` makes another pose of the plate before the camera.
-fn change(series: &mut SimulatedSeries, stops: Range<usize>, change: impl Fn(Pose) -> Pose) {
-    for k in stops {
-        let before = series.truth.stops[k].camera_from_plate.pose();
-        let after = change(before);
-        for o in &mut series.observations[k].observations {
-            let marker = &series.true_plate.markers[series.true_plate.index_of(o.marker).unwrap()];
-            let at = |pose: &Pose| {
-                centroid_uv(&series.truth.camera, pose, &marker.position_m, marker.outer_radius_m).unwrap()
-            };
-            let by = at(&after) - at(&before);
-            o.uv = [o.uv[0] + by.x, o.uv[1] + by.y];
-        }
-    }
 }
 
 fn solved(series: &SimulatedSeries) -> Solution {

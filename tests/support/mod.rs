@@ -3,6 +3,7 @@
 
 pub mod by_poses;
 pub mod dense;
+pub mod displaced;
 pub mod flange;
 pub mod small;
 pub mod witness;

@@ -1,0 +1,80 @@
+//! Which changes are tried, and at which stops; for [`super::pose_step`].
+
+use std::rc::Rc;
+
+use super::step_candidates::{Candidate, Changed, Order, Shown, stride};
+use super::step_rows::Linear;
+use crate::problem::{InstrumentKind, Problem};
+use crate::series::CameraMount;
+
+impl Linear {
+    /// Ways to divide the stops, with at least so many of them on either side.
+    pub(super) fn candidates(&self, problem: &Problem, fewest: usize) -> Vec<Candidate> {
+        let mut all = Vec::new();
+        let groups = 0..self.rows.iter().map(|r| r.group + 1).max().unwrap_or(0);
+        for changed in self.what_may_change(problem) {
+            if changed.columns(&problem.layout, &self.zeros).is_empty() {
+                continue;
+            }
+            let telling = |r: &usize| self.rows[*r].of(problem, changed).next().is_some();
+            let every: Vec<usize> = (0..self.rows.len()).filter(telling).collect();
+            for group in groups.clone() {
+                let rows: Vec<usize> = every.iter().copied().filter(|r| self.rows[*r].group == group).collect();
+                let elsewhere = every.len() - rows.len();
+                let mut divide = |order, rows: Vec<usize>| {
+                    let rows = Rc::new(rows);
+                    let (from, fewest) = match order {
+                        Order::Whole | Order::Drift => (0..1, 0),
+                        Order::Time | Order::Up(_) => (fewest..(rows.len() + 1).saturating_sub(fewest), fewest),
+                    };
+                    let from = from.rev().step_by(stride(rows.len()));
+                    all.extend(from.map(|from| Candidate { changed, order, group, rows: rows.clone(), from, fewest }));
+                };
+                let by_weight = (0..3).filter(|_| self.is_carried(problem, changed, &rows));
+                for axis in by_weight {
+                    let mut rows = rows.clone();
+                    rows.sort_by(|a, b| {
+                        self.up(problem, changed, *a, axis).total_cmp(&self.up(problem, changed, *b, axis))
+                    });
+                    divide(Order::Up(axis), rows);
+                }
+                if rows.len() >= 2 * fewest && !matches!(changed, Changed::Zero(_)) {
+                    divide(Order::Drift, rows.clone());
+                }
+                if rows.len() >= fewest && elsewhere >= fewest {
+                    divide(Order::Whole, rows.clone());
+                }
+                divide(Order::Time, rows);
+            }
+        }
+        all
+    }
+
+    fn what_may_change(&self, problem: &Problem) -> Vec<Changed> {
+        let placements = (0..problem.placements.len()).map(Changed::Placement);
+        let mountings = (0..problem.mountings.len()).map(Changed::Mounting);
+        // A socket is measured by nothing but the body in it.
+        let framed = (0..problem.instruments.len()).filter(|i| problem.instruments[*i].kind != InstrumentKind::Socket);
+        let targets = (0..problem.layout.bodies.len()).map(Changed::Target);
+        let zeros = (0..self.zeros.len()).map(Changed::Zero);
+        placements.chain(mountings).chain(framed.map(Changed::Instrument)).chain(targets).chain(zeros).collect()
+    }
+
+    /// True for what the robot carries before a camera, or a camera that it carries: its weight may move it.
+    fn is_carried(&self, problem: &Problem, changed: Changed, rows: &[usize]) -> bool {
+        let first = rows.first().and_then(|r| self.rows[*r].of(problem, changed).next());
+        let Some(Shown::Image { index, .. }) = first else { return false };
+        match changed {
+            Changed::Placement(_) => problem.images[index].mount == CameraMount::Fixed,
+            Changed::Mounting(_) => problem.images[index].mount == CameraMount::Hand,
+            _ => false,
+        }
+    }
+
+    fn up(&self, problem: &Problem, changed: Changed, row: usize, axis: usize) -> f64 {
+        match self.rows[row].of(problem, changed).next() {
+            Some(Shown::Image { up, .. }) => up[axis],
+            _ => 0.0,
+        }
+    }
+}

@@ -1,0 +1,381 @@
+//! The linearised fit stop by stop, and what a change of one body or of the zero of a joint at some stops would explain of it; for
+//! [`super::pose_step`].
+
+use std::ops::Range;
+use std::rc::Rc;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::step_candidates::{Candidate, Changed, Order, Shown};
+use crate::assess::{RootInformation, StopInformation};
+use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
+use crate::model::joint_terms::Term;
+use crate::problem::{Adjustment, Problem};
+use crate::series::CameraMount;
+use crate::solve::LinearProblem;
+
+/// One stop.
+pub(super) struct Row {
+    /// Index of its noise: series that several cameras took at the same stops are one.
+    pub(super) group: usize,
+    pub(super) shown: Rc<Vec<Shown>>,
+    /// Root score.
+    score: DVector<f64>,
+    by_free: DMatrix<f64>,
+    /// Derivatives by all columns.
+    by_columns: Rc<DMatrix<f64>>,
+}
+
+impl Row {
+    fn by(&self, columns: &Range<usize>) -> DMatrix<f64> {
+        self.by_columns.columns_range(columns.clone()).into_owned()
+    }
+
+    /// What tells of a change.
+    pub(super) fn of(&self, problem: &Problem, changed: Changed) -> impl Iterator<Item = Shown> {
+        self.shown.iter().copied().filter(move |shown| shown.tells_of(problem, changed))
+    }
+
+    /// Squares of what the poses that were seen, or these parts of those of bodies, miss of the readings.
+    fn squares(&self, problem: &Problem, part: Part) -> f64 {
+        let mut bodies: Vec<Range<usize>> = Vec::new();
+        for shown in self.shown.iter() {
+            let own = match (*shown, part) {
+                (Shown::Image { index, .. }, Part::Pose) => Changed::Placement(problem.images[index].placement),
+                (Shown::Measurement(k), _) => Changed::Target(problem.body_measurements[k].body),
+                (Shown::Image { .. }, _) => continue,
+            };
+            let all = own.columns(&problem.layout, &[]);
+            let columns = match part {
+                Part::Pose => all,
+                Part::Position => all.start..all.end.min(all.start + 3),
+                Part::Rotation => all.end.min(all.start + 3)..all.end,
+            };
+            if !columns.is_empty() && !bodies.contains(&columns) {
+                bodies.push(columns);
+            }
+        }
+        let columns: Vec<usize> = bodies.into_iter().flatten().collect();
+        if columns.is_empty() {
+            return 0.0;
+        }
+        let by_pose = self.by_columns.select_columns(&columns);
+        let score = by_pose.tr_mul(&self.score);
+        SymmetricFactor::new(&by_pose.tr_mul(&by_pose)).map_or(0.0, |factor| score.dot(&factor.solve(&score)))
+    }
+}
+
+/// What of the poses that were seen is looked at: positions and rotations of a tracker have noise of their own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Part {
+    Pose,
+    Position,
+    Rotation,
+}
+
+/// A change between two parts of the stops.
+#[derive(Debug, Clone)]
+pub(super) struct Step {
+    pub(super) changed: Changed,
+    pub(super) order: Order,
+    /// Index of the noise of its stops.
+    pub(super) group: usize,
+    /// Rows of [`Linear`] that it moves, in this order, and by which part of it.
+    moved: Vec<(usize, f64)>,
+    /// What was measured there.
+    pub(super) shown: Vec<Shown>,
+    /// Twist of a body, m and rad, its translation alone where nothing tells its rotation, or offset of a reading, rad or m.
+    pub(super) change: DVector<f64>,
+    /// Its covariance by the joint noise that was estimated without it.
+    pub(super) covariance: DMatrix<f64>,
+    /// Fall of the cost, `D`.
+    pub(super) fall: f64,
+    /// Share of the squares `R` that this and the other steps of its series explain.
+    pub(super) share: f64,
+    /// Logarithm of the probability that noise alone explains so much, of one candidate.
+    pub(super) log_chance: f64,
+}
+
+impl Step {
+    /// False where what was found after it took its place: then it is less than noise alone makes of it.
+    pub(super) fn still_counts(&self) -> bool {
+        let squares = SymmetricFactor::new(&self.covariance).map(|factor| self.change.dot(&factor.solve(&self.change)));
+        squares.is_ok_and(|squares| squares > self.change.len() as f64)
+    }
+}
+
+/// Logarithm of the probability that so many parameters explain this share of so many squares or more, of Gaussian noise; of an odd number
+/// of parameters a bound, that of one more.
+pub(super) fn log_chance(share: f64, squares: f64, parameters: usize) -> f64 {
+    let pairs = parameters.div_ceil(2);
+    let b = 0.5 * squares - pairs as f64;
+    if b <= 0.0 {
+        return 0.0;
+    }
+    let x = share.clamp(0.0, 1.0);
+    let (mut term, mut sum) = (1.0, 0.0);
+    for j in 0..pairs {
+        sum += term;
+        term *= (b + j as f64) * x / (j + 1) as f64;
+    }
+    b * (-x).ln_1p() + f64::ln(sum)
+}
+
+/// The fit, linearised.
+pub(super) struct Linear {
+    pub(super) rows: Vec<Row>,
+    information: DMatrix<f64>,
+    /// Columns of the zeros of readings.
+    pub(super) zeros: Vec<Option<usize>>,
+}
+
+impl Linear {
+    pub(super) fn of(linear: LinearProblem) -> Self {
+        let Adjustment { problem, state } = linear.adjustment;
+        let lin = linear.lin;
+        let StopInformation { stops: all, information, .. } = StopInformation::of(linear);
+        let image = |k: usize| {
+            let image = &problem.images[lin.images[k]];
+            if state.joint_errors[image.stop].is_empty() || state.ties[lin.images[k]].is_free() {
+                return None;
+            }
+            let camera_from_plate = lin.chains[k].pose;
+            let carried = match image.mount {
+                CameraMount::Hand => state.placements[image.placement] * camera_from_plate.inverse(),
+                CameraMount::Fixed => state.mountings[image.mounting] * camera_from_plate,
+            };
+            Some(Shown::Image { index: lin.images[k], up: [0, 1, 2].map(|axis| carried.rotation[(2, axis)]) })
+        };
+        let row = |told: RootInformation| {
+            let bodies = told.bodies.into_iter().map(Shown::Measurement);
+            let shown: Vec<Shown> = told.places.filter_map(image).chain(bodies).collect();
+            let (shown, by_columns) = (Rc::new(shown), Rc::new(told.by_root));
+            let group = problem.stops[told.stop].series;
+            (!shown.is_empty()).then_some(Row { group, shown, score: told.score, by_free: told.by_free, by_columns })
+        };
+        let robot = &state.robot;
+        let zero = |reading: usize| {
+            let mut terms = robot.terms.iter();
+            let term = terms.position(|t| t.reading == reading && t.term == Term::Offset)?;
+            Some(problem.layout.terms.start + term)
+        };
+        let zeros = (0..robot.chain.readings.len()).map(zero).collect();
+        Self { rows: all.into_iter().filter_map(row).collect(), information, zeros }
+    }
+
+    /// Squares `R` of what the poses that were seen miss of the readings, by the index of the noise.
+    pub(super) fn squares(&self, problem: &Problem, part: Part) -> Vec<f64> {
+        let mut of_groups = vec![0.0; problem.noise.joint.len()];
+        self.rows.iter().for_each(|row| of_groups[row.group] += row.squares(problem, part));
+        of_groups
+    }
+
+    /// Number of free columns.
+    pub(super) fn columns(&self) -> usize {
+        self.information.ncols()
+    }
+
+    /// Squares of what the misfit shows in the direction of a single reading, by the index of the noise and the reading: its own noise.
+    pub(super) fn zero_squares(&self, groups: usize) -> Vec<Vec<f64>> {
+        let mut all = vec![vec![0.0; self.zeros.len()]; groups];
+        for row in &self.rows {
+            for (reading, column) in self.zeros.iter().enumerate() {
+                let by = column.map(|c| row.by_columns.column(c)).filter(|by| by.norm_squared() > 0.0);
+                all[row.group][reading] += by.map_or(0.0, |by| by.dot(&row.score).powi(2) / by.norm_squared());
+            }
+        }
+        all
+    }
+
+    /// The step that noise explains least, `squares` being those that it may explain. The noise of one joint that has grown with the fault
+    /// of its zero hides it from the squares of all: where a step explains this `share` of those in the direction of its reading, these count.
+    pub(super) fn best(&self, problem: &Problem, tried: &[Candidate], squares: f64, share: f64) -> Option<Step> {
+        let covariance = SymmetricFactor::new(&self.information).ok()?.inverse();
+        let chance = |fall: &Fall| log_chance(fall.cost / squares, squares, fall.told);
+        let mut best = self.least(problem, tried, &covariance, chance)?;
+        let of_zeros = self.zero_squares(problem.noise.joint.len());
+        for (group, of_readings) in of_zeros.iter().enumerate() {
+            for (reading, own) in of_readings.iter().enumerate() {
+                let is_own = |c: &&Candidate| c.group == group && c.changed == Changed::Zero(reading);
+                let tried: Vec<Candidate> = tried.iter().filter(is_own).cloned().collect();
+                let Some(mut step) = self.least(problem, &tried, &covariance, |fall| -fall.cost) else { continue };
+                if step.fall <= share * own {
+                    continue;
+                }
+                let Some((next, _)) = self.with(problem, &step) else { continue };
+                let left = next.zero_squares(problem.noise.joint.len())[group][reading];
+                step.log_chance = log_chance(1.0 - left / own, *own, 1);
+                if step.log_chance < best.log_chance {
+                    best = step;
+                }
+            }
+        }
+        Some(best)
+    }
+
+    /// The step of which `score` is least; where several are alike, the first.
+    fn least(
+        &self,
+        problem: &Problem,
+        tried: &[Candidate],
+        covariance: &DMatrix<f64>,
+        score: impl Fn(&Fall) -> f64,
+    ) -> Option<Step> {
+        let (coarse, ..) = self.least_of(problem, tried, covariance, &score)?;
+        let finer = tried[coarse].neighbours();
+        let (best, log_chance, fall) = self.least_of(problem, &finer, covariance, &score)?;
+        let candidate = &finer[best];
+        let moved: Vec<(usize, f64)> = candidate.moved().collect();
+        let shown = moved.iter().flat_map(|(r, _)| self.rows[*r].of(problem, candidate.changed)).collect();
+        let Candidate { changed, order, group, .. } = *candidate;
+        let Fall { cost, change, covariance, .. } = fall;
+        Some(Step { changed, order, group, moved, shown, change, covariance, fall: cost, share: 0.0, log_chance })
+    }
+
+    /// Place of the candidate with the least score, this, and what it explains.
+    fn least_of(
+        &self,
+        problem: &Problem,
+        tried: &[Candidate],
+        covariance: &DMatrix<f64>,
+        score: impl Fn(&Fall) -> f64,
+    ) -> Option<(usize, f64, Fall)> {
+        let mut best: Option<(usize, f64, Fall)> = None;
+        let mut sums = Sums::new(self.columns(), 0);
+        let mut before: Option<&Candidate> = None;
+        for (c, candidate) in tried.iter().enumerate() {
+            let columns = candidate.changed.columns(&problem.layout, &self.zeros);
+            // Behind a step are the rows behind the one before it, and those between both.
+            if let Some(last) = before.filter(|b| Rc::ptr_eq(&b.rows, &candidate.rows) && b.from > candidate.from) {
+                let between = &candidate.rows[candidate.from..last.from];
+                between.iter().for_each(|r| sums.add(&self.rows[*r], &columns, 1.0));
+            } else {
+                sums = Sums::new(self.columns(), columns.len());
+                candidate.moved().for_each(|(r, part)| sums.add(&self.rows[r], &columns, part));
+            }
+            before = Some(candidate);
+            let Some(fall) = sums.fall(covariance).filter(|fall| fall.told > 0) else { continue };
+            let score = score(&fall);
+            if best.as_ref().is_none_or(|(_, least, _)| score < *least) {
+                best = Some((c, score, fall));
+            }
+        }
+        best
+    }
+
+    /// With the change as more columns, at the optimum; and the way there.
+    pub(super) fn with(&self, problem: &Problem, step: &Step) -> Option<(Self, DVector<f64>)> {
+        let columns = step.changed.columns(&problem.layout, &self.zeros);
+        let (n, more) = (self.columns(), columns.len());
+        let mut information = self.information.clone().resize(n + more, n + more, 0.0);
+        let mut gradient = DVector::zeros(n + more);
+        let mut derivatives = Vec::with_capacity(self.rows.len());
+        for (r, row) in self.rows.iter().enumerate() {
+            let mut by_free = row.by_free.clone().resize_horizontally(n + more, 0.0);
+            if let Some((_, part)) = step.moved.iter().find(|(moved, _)| *moved == r) {
+                let own = row.by(&columns) * *part;
+                by_free.columns_mut(n, more).copy_from(&own);
+                let coupling = by_free.tr_mul(&own);
+                let mut right = information.columns_mut(n, more);
+                right += &coupling;
+                let mut below = information.view_mut((n, 0), (more, n));
+                below += coupling.rows(0, n).transpose();
+                let mut rest = gradient.rows_mut(n, more);
+                rest += own.tr_mul(&row.score);
+            }
+            derivatives.push(by_free);
+        }
+        // Directions of the change that are not told stay where they are.
+        (n..n + more).for_each(|k| information[(k, k)] *= 1.0 + LEFT);
+        let step = SymmetricFactor::new(&information).ok()?.solve(&gradient);
+        let rows = (self.rows.iter().zip(derivatives))
+            .map(|(row, by_free)| Row {
+                group: row.group,
+                shown: row.shown.clone(),
+                score: &row.score - &by_free * &step,
+                by_free,
+                by_columns: row.by_columns.clone(),
+            })
+            .collect();
+        Some((Self { rows, information, zeros: self.zeros.clone() }, step))
+    }
+}
+
+/// Sums over the stops that a change moves.
+struct Sums {
+    score: DVector<f64>,
+    own: DMatrix<f64>,
+    coupling: DMatrix<f64>,
+}
+
+/// Fall of the cost, what changed, its covariance, and how many directions of it are told.
+struct Fall {
+    cost: f64,
+    change: DVector<f64>,
+    covariance: DMatrix<f64>,
+    told: usize,
+}
+
+/// Share of what a change moves by itself that must be left of a direction beside all columns: the pose of a plate that stands in one
+/// series alone takes up the zero of the first joint to the last digit.
+const LEFT: f64 = 1e-6;
+
+impl Sums {
+    fn new(columns: usize, parameters: usize) -> Self {
+        Self {
+            score: DVector::zeros(parameters),
+            own: DMatrix::zeros(parameters, parameters),
+            coupling: DMatrix::zeros(columns, parameters),
+        }
+    }
+
+    fn add(&mut self, row: &Row, columns: &Range<usize>, part: f64) {
+        let by = &(row.by(columns) * part);
+        self.score += by.tr_mul(&row.score);
+        self.own += by.tr_mul(by);
+        self.coupling += row.by_free.tr_mul(by);
+    }
+
+    fn fall(&self, covariance: &DMatrix<f64>) -> Option<Fall> {
+        let left = &self.own - self.coupling.tr_mul(&product(covariance, &self.coupling));
+        let unit = self.own.diagonal().map(f64::sqrt);
+        let inverse = unit.map(|u| if u > 0.0 { u.recip() } else { 0.0 });
+        let (values, directions) = symmetric_eigen(&DMatrix::from_fn(left.nrows(), left.ncols(), |i, k| {
+            left[(i, k)] * inverse[i] * inverse[k]
+        }))?;
+        let told = values.iter().filter(|v| **v > LEFT).count();
+        let by_value = values.map(|v| if v > LEFT { v.recip() } else { 0.0 });
+        let scaled = DMatrix::from_diagonal(&inverse) * directions;
+        let covariance = &scaled * DMatrix::from_diagonal(&by_value) * scaled.transpose();
+        let change = &covariance * &self.score;
+        Some(Fall { cost: self.score.dot(&change), change, covariance, told })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::log_chance;
+
+    fn chance(share: f64, squares: f64) -> f64 {
+        log_chance(share, squares, 6).exp()
+    }
+
+    #[test]
+    fn the_chance_is_that_of_a_beta_distribution() {
+        // Of eight squares six are explained: the share has the density 3 x^2.
+        for x in [0.1, 0.5, 0.9] {
+            assert!((chance(x, 8.0) - (1.0 - x * x * x)).abs() < 1e-12);
+        }
+        assert!((chance(0.0, 100.0) - 1.0).abs() < 1e-12 && chance(1.0, 100.0) == 0.0);
+        assert!((chance(0.999, 6.0) - 1.0).abs() < 1e-12, "nothing is left to compare with");
+    }
+
+    #[test]
+    fn many_squares_make_it_chi_squared() {
+        // The 99.9 % points of chi-squared with two, four and six degrees of freedom.
+        for (parameters, point) in [(2, 13.816), (4, 18.467), (6, 22.458)] {
+            assert!((log_chance(point / 1e6, 1e6, parameters).exp() - 1e-3).abs() < 1e-5);
+        }
+        assert!(log_chance(0.3, 40.0, 1) == log_chance(0.3, 40.0, 2), "of an odd number a bound");
+    }
+}

@@ -1,0 +1,105 @@
+//! The finding that the zero of a joint is another at some of the stops; [`super::pose_step`] looks for it.
+
+use super::displaced::Displacement;
+use super::kind::{Kind, Quantity, Subject, Weight};
+use crate::assess::Limits;
+use crate::error::Code;
+use crate::urdf::JointKind;
+
+/// The zero of a joint is another from some stop on, or in one of several series.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ZeroMoved {
+    /// Name of the joint.
+    pub joint: String,
+    /// How it moves.
+    pub kind: JointKind,
+    /// Series.
+    pub series: String,
+    /// At which of its stops.
+    pub displacement: Displacement,
+    /// Images or stops at which it is another, in this order.
+    pub stops: Vec<String>,
+    /// By how much, rad or m, and its sigma.
+    pub offset: (f64, f64),
+    /// Share of the squares of the joint noise that this and what else changed explain.
+    pub share: f64,
+    /// Gate where it is beyond what a good robot repeats to.
+    pub weight: Weight,
+}
+
+impl ZeroMoved {
+    pub(super) fn new(
+        joint: String,
+        kind: JointKind,
+        series: String,
+        displacement: Displacement,
+        stops: Vec<String>,
+    ) -> Self {
+        Self { joint, kind, series, displacement, stops, offset: (0.0, 0.0), share: 0.0, weight: Weight::Note }
+    }
+
+    pub(super) fn by(self, offset: f64, sigma: f64, share: f64) -> Self {
+        Self { offset: (offset, sigma), share, ..self }
+    }
+
+    pub(super) fn weighed(self, limits: &Limits) -> Self {
+        let repeats_to = if self.kind == JointKind::Prismatic { limits.displaced_m } else { limits.displaced_rad };
+        let weight = if self.offset.0.abs() > repeats_to { Weight::Gate } else { Weight::Note };
+        Self { weight, ..self }
+    }
+
+    fn unit(&self) -> &'static str {
+        if self.kind == JointKind::Prismatic { "mm" } else { "mrad" }
+    }
+
+    fn first(&self) -> &str {
+        self.stops.first().map_or("", String::as_str)
+    }
+}
+
+impl Kind for ZeroMoved {
+    fn code(&self) -> Code {
+        Code::ZeroMoved
+    }
+
+    fn weight(&self) -> Weight {
+        self.weight
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        vec![Subject::Series(self.series.clone()), Subject::Joint(self.joint.clone())]
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        let unit = if self.kind == JointKind::Prismatic { "m" } else { "rad" };
+        vec![
+            Quantity::new("offset", self.offset.0, unit).with_sigma(self.offset.1),
+            Quantity::new("share_of_joint_noise", self.share, "1"),
+        ]
+    }
+
+    fn place(&self) -> String {
+        format!("series {}", self.series)
+    }
+
+    fn seen(&self) -> String {
+        let size = format!("{:+.3} {} (sigma {:.3})", 1e3 * self.offset.0, self.unit(), 1e3 * self.offset.1);
+        let where_ = match self.displacement {
+            Displacement::InAll => format!("the zero of {} is off by {size} from that of the other series", self.joint),
+            _ => format!("from {} on the zero of {} is off by {size} from that before", self.first(), self.joint),
+        };
+        format!(
+            "{where_}: the joint was mastered anew, or its encoder or belt slipped (this explains {:.0} % of the squares of the joint noise)",
+            100.0 * self.share
+        )
+    }
+
+    fn remedy(&self) -> String {
+        match self.displacement {
+            Displacement::InAll => {
+                "identify the robot from series of one mastering: give this one alone, or the others".into()
+            }
+            _ => format!("identify the robot from the stops of one mastering, before {} or from it on", self.first()),
+        }
+    }
+}
