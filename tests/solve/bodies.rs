@@ -292,7 +292,7 @@ type Misread<'a> = (&'a dyn Fn(&mut Pose), Code);
 fn mistakes_in_the_file_of_a_tracker_are_named() {
     let turned = |pose: &mut Pose, to: [f64; 4]| *pose = Pose::from_xyz_quaternion(pose.xyz(), to);
     for (kind, sigma_rad) in [(Kind::Points, 0.0), (Kind::Poses, 1e-4)] {
-        let world = World::new(13, kind, 60, (3e-5, sigma_rad), 2e-5);
+        let world = World::new(13, kind, 30, (3e-5, sigma_rad), 2e-5);
         let said = |change: &dyn Fn(&mut Pose)| {
             let series = changed(&world, |_, pose| change(pose));
             identify(world.chain.clone(), &[series], &Options::default()).map_or_else(|e| Some(e.code), |_| None)
@@ -388,7 +388,7 @@ fn distances_between_sockets_that_are_wrong_alike_are_doubted() {
 #[test]
 fn mistakes_in_readings_are_named_by_a_tracker_alone() {
     for (kind, sigma_rad) in [(Kind::Points, 0.0), (Kind::Poses, 5e-5)] {
-        let world = World::new(43, kind, 60, (3e-5, sigma_rad), 2e-5);
+        let world = World::new(43, kind, 30, (3e-5, sigma_rad), 2e-5);
         let named = |change: &dyn Fn(&mut Vec<f64>)| {
             let mut series = world.series.clone();
             series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(change);
