@@ -11,7 +11,6 @@ over the stated sigma, RMS within the range of the stops.
 """
 import csv
 import math
-import os
 import subprocess
 import sys
 import tempfile
@@ -20,7 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-ROBOTCAL = os.environ.get("ROBOTCAL", "target/release/robotcal")
+from bodies import ROBOTCAL, rotation, write
+
 ROBOTS = {
     "kuka_kr6_r900": [0, -1.2, 1.4, 0, 0.9, 0],
     "ur10e": [0, -1.6, 1.9, -1.8, -1.57, 0],
@@ -68,15 +68,6 @@ def quaternion_of(rotation):
         [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], np.trace(r)],
     ])
     return np.linalg.eigh(k, UPLO="L")[1][:, 3]
-
-
-def rotation_of(q):
-    x, y, z, w = q
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])
 
 
 def adjoint(m):
@@ -164,12 +155,7 @@ class Board:
     def write(self, folder):
         kind = f'format = 1\nkind = "points"\nmarkers = "plate.csv"\ntolerance_m = {max(self.error, 1e-6)}\n'
         (folder / "plate.toml").write_text(kind)
-        table(folder / "plate.csv", ["id", "x_m", "y_m", "z_m"], [[i, *p] for i, p in enumerate(self.nominal)])
-
-
-def table(path, head, rows):
-    with open(path, "w", newline="") as file:
-        csv.writer(file).writerows([head] + rows)
+        write(folder / "plate.csv", ["id", "x_m", "y_m", "z_m"], [[i, *p] for i, p in enumerate(self.nominal)])
 
 
 def looking(rng, distance):
@@ -198,20 +184,20 @@ class World:
         return readings, self.robot.tip_at(readings + self.rng.normal(0, 1, len(middle)) * self.joint_noise)
 
     def write(self, folder, key, names, readings, manifest):
-        table(folder / "joints.csv", [key, *self.robot.names], [[n, *q] for n, q in zip(names, readings)])
+        write(folder / "joints.csv", [key, *self.robot.names], [[n, *q] for n, q in zip(names, readings)])
         ends = f'format = 1\njoint_unit = "rad"\nbase = "{self.robot.base}"\ntip = "{self.robot.tip}"\n'
         (folder / "series.toml").write_text(ends + manifest)
 
     def observations(self, folder, rows):
         square = self.sigma_px**2
         head = ["image", "marker", "u", "v", "cov_uu", "cov_uv", "cov_vv"]
-        table(folder / "observations.csv", head, [[*row, square, 0, square] for row in rows])
+        write(folder / "observations.csv", head, [[*row, square, 0, square] for row in rows])
 
     def judged(self, series, middle, stills, base_is_fitted=False):
         """Error over stated sigma, and the verdict."""
         readings = [middle + self.rng.uniform(-1, 1, len(middle)) * self.robot.reach for _ in range(60)]
         asked, out = self.folder / "at_in.csv", self.folder / "out"
-        table(asked, self.robot.names, readings)
+        write(asked, self.robot.names, readings)
         command = [ROBOTCAL, "identify", "--urdf", self.robot.urdf, "--out", str(out), "--at", str(asked), "--at-unit", "rad"]
         done = subprocess.run(command + [p for s in series for p in ("--series", str(s))], capture_output=True, text=True)
         said = next((l for l in (done.stdout + done.stderr).splitlines() if l.startswith(("verdict", "error"))), "")
@@ -219,7 +205,7 @@ class World:
             return None, said
         with open(out / "at.csv", newline="") as file:
             rows = list(csv.DictReader(file))
-        found = [pose(rotation_of([float(r[k]) for k in ("qx", "qy", "qz", "qw")]), [float(r[k]) for k in ("x_m", "y_m", "z_m")]) for r in rows]
+        found = [pose(rotation([float(r[k]) for k in ("qx", "qy", "qz", "qw")]), [float(r[k]) for k in ("x_m", "y_m", "z_m")]) for r in rows]
         stated = np.array([sum(float(r[f"c{k}{k}"]) for k in (1, 2, 3)) for r in rows])
         inside = np.array([not r["outside"].strip() for r in rows])
         inside = inside if inside.sum() > 5 else np.ones(len(rows), bool)
@@ -280,7 +266,7 @@ def cameras(seed, folder):
                     images.append([f"{len(readings):03}", f"cam{k}", image])
                     seen += [[image, corner, *uv] for corner, uv in view.items()]
             readings.append(q)
-    table(folder / "images.csv", ["stop", "camera", "image"], images)
+    write(folder / "images.csv", ["stop", "camera", "image"], images)
     world.observations(folder, seen)
     manifest = 'plate = "plate.toml"\n[observations]\npoint = "centre"\n' + "".join(
         f'[[camera]]\nname = "cam{k}"\nmount = "{m}"\nwidth_px = {WIDTH}\nheight_px = {HEIGHT}\n' for k, m in enumerate(mounts)
@@ -363,7 +349,7 @@ def several(seed, folder):
             continue
         if kind == "sockets":
             readings, sockets = in_sockets(world, middle, count)
-            table(path / "contacts.csv", ["stop", "contact"], [[f"{i:03}", f"socket {s}"] for i, s in enumerate(sockets)])
+            write(path / "contacts.csv", ["stop", "contact"], [[f"{i:03}", f"socket {s}"] for i, s in enumerate(sockets)])
             manifest = "[contact]\nsigma_m = 0.00005\n"
         else:
             if tracker is None or rng.integers(2):
@@ -379,7 +365,7 @@ def several(seed, folder):
                     turned = quaternion_of(m[:3, :3] @ turn(rng.normal(0, 1e-4, 3))) if kind == "poses" else []
                     rows.append([f"{i:03}", f"target {k} {b}", *position, *turned])
             head = ["stop", "target", "x_m", "y_m", "z_m"] + (["qx", "qy", "qz", "qw"] if kind == "poses" else [])
-            table(path / f"{kind}.csv", head, rows)
+            write(path / f"{kind}.csv", head, rows)
             manifest = f'[tracker]\nname = "{name_of_tracker}"\nsigma_m = 0.00003\nsigma_rad = 0.0001\n'
         world.write(path, "stop", [f"{i:03}" for i in range(len(readings))], readings, manifest)
     words = f"{robot.urdf.split('/')[1]}, series of {', '.join(kinds)}"
