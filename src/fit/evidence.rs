@@ -5,7 +5,7 @@ use crate::problem::Family;
 use crate::solve::{Elimination, LinearProblem, System};
 
 /// `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what models of the same data share, with the whole information `N`
-/// (dense columns, latents and markers) at the optimum, and what holding directions of a family adds to the density of its prior; `None` where it
+/// (dense columns, latents and markers) at the optimum and the priors of columns and of what is latent at stops, and what holding directions of a family adds to the density of its prior; `None` where it
 /// is not finite.
 pub fn log_evidence(linear: LinearProblem) -> Option<f64> {
     let system = System::with(Elimination::cheaper(linear), linear, 0.0);
@@ -16,7 +16,9 @@ pub fn log_evidence(linear: LinearProblem) -> Option<f64> {
         .filter(|c| c.free && c.prior_sigma.is_finite())
         .map(|c| c.prior_sigma.ln())
         .sum();
+    let of_latent: f64 = linear.stops().flat_map(|s| s.prior()).filter(|p| *p > 0.0).map(|p| 0.5 * p.ln()).sum();
     let families = linear.adjustment.problem.families.iter();
     let held: f64 = families.map(Family::log_density_of_held).sum();
-    Some(-linear.lin.cost - 0.5 * (reduced + eliminated + distances) - priors + held).filter(|e| e.is_finite())
+    Some(-linear.lin.cost - 0.5 * (reduced + eliminated + distances) - priors + of_latent + held)
+        .filter(|e| e.is_finite())
 }

@@ -22,7 +22,7 @@ use crate::series::{Edge, Observation, Plate};
 const DEFAULT_SIGMA_PX: f64 = 0.1;
 
 /// First guess of the joint noise: from above, rad or m.
-const FIRST_JOINT_NOISE: f64 = 3e-3;
+pub(super) const FIRST_JOINT_NOISE: f64 = 3e-3;
 
 /// First guess of the apparent displacement of the plate in an image: from above, rad or m.
 const FIRST_DISPLACEMENT: f64 = 1e-3;

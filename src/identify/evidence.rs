@@ -1,4 +1,4 @@
-//! Which robot model the data support: Laplace's approximation of the evidence, at the same noise components.
+//! Which robot model the data support: Laplace's approximation of the evidence, each at the joint noise that it leaves.
 //!
 //! `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what the models share, with the whole information `N` (dense columns,
 //! latents and markers) at the optimum of each (D. MacKay, *Bayesian interpolation*, 1992).
@@ -6,12 +6,13 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
+use super::build::FIRST_JOINT_NOISE;
 use super::computed_postures::{Before, Told, told_by_images};
 use super::estimator::Estimator;
 use super::joint::{JointFit, fit_model};
 use super::lens_choice::{self, Lensed, with_lenses};
 use super::near_nominal::near_nominal;
-use super::options::Options;
+use super::options::{JointNoise, Options};
 use super::solution::{Evidence, LensEvidence, Solution};
 use super::turns;
 use crate::error::{Notice, Result};
@@ -20,12 +21,15 @@ use crate::linalg::SymmetricFactor;
 use crate::model::joint_terms::RobotModel;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, MeasuredSeries};
-use crate::solve::{LinearProblem, Settings, solve};
+use crate::solve::{ComponentOptions, JOINT_NOISE_FLOOR, LinearProblem, Settings, estimate_components, solve};
 use crate::stage::stage;
 use crate::urdf::Chain;
 
 /// Newton decrement of a fit that is judged by its evidence, whose logarithm is then known to a tenth or so.
 const DECREMENT: f64 = 0.1;
+
+/// Rounds in which a model finds its joint noise: its size is then known to a few percent.
+const ROUNDS: usize = 8;
 
 /// Most times that postures are told anew by the identified robot.
 const RETELLINGS: usize = 3;
@@ -116,7 +120,7 @@ fn best_model(
 ) -> Result<(JointFit, Vec<Evidence>)> {
     let (evidences, mut reduced): (Vec<_>, Vec<_>) = {
         let _stage = stage("evidence of robot models");
-        compare_models(&full.fit).into_iter().unzip()
+        compare_models(&full.fit, options.joint_noise == JointNoise::Estimated).into_iter().unzip()
     };
     let supported = evidences.iter().enumerate().filter(|(_, e)| e.log_evidence > -options.limits.decisive_log_odds);
     let largest = supported.max_by_key(|(_, e)| e.parameters).map(|(k, e)| (e.model, reduced.swap_remove(k)));
@@ -130,22 +134,37 @@ fn best_model(
     Ok((chosen, evidences))
 }
 
-/// Evidence of every model that a fit of the full one holds, at its noise components, and its optimum there.
-fn compare_models(full: &Fit) -> Vec<(Evidence, Adjustment)> {
+/// Evidence of every model that a fit of the full one holds, and its optimum: of smaller ones with their own joint noise, where it is `estimated`.
+fn compare_models(full: &Fit, estimated: bool) -> Vec<(Evidence, Adjustment)> {
     let models = [RobotModel::Rigid, RobotModel::Gear, RobotModel::Full];
-    let mut all: Vec<_> = models.into_par_iter().filter_map(|m| evidence(full, m)).collect();
+    let mut all: Vec<_> = models.into_par_iter().filter_map(|m| evidence(full, m, estimated)).collect();
     let best = all.iter().map(|(e, _)| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     all.iter_mut().for_each(|(e, _)| e.log_evidence -= best);
     all
 }
 
-fn evidence(full: &Fit, model: RobotModel) -> Option<(Evidence, Adjustment)> {
+fn evidence(full: &Fit, model: RobotModel, estimated: bool) -> Option<(Evidence, Adjustment)> {
     let dropped = dropped_terms(full, model);
     if dropped.is_empty() {
         return Some((told(full.linear(), model)?, full.adjustment.clone()));
     }
-    let smaller = without_terms(full, &dropped);
-    let outcome = solve(smaller, &Settings { decrement: DECREMENT, ..Settings::default() });
+    let mut smaller = without_terms(full, &dropped);
+    let settings = Settings { decrement: DECREMENT, ..Settings::default() };
+    let outcome = match estimated && full.problem.noise.joint.iter().flatten().all(|s| *s <= JOINT_NOISE_FLOOR) {
+        // Terms enough to take up all noise would leave a smaller model none, and judge it by errors that it does not have.
+        true => {
+            smaller.problem.noise.joint.iter_mut().flatten().for_each(|s| *s = FIRST_JOINT_NOISE);
+            let options = ComponentOptions {
+                factors: false,
+                displacement: false,
+                rounds: ROUNDS,
+                settings,
+                ..ComponentOptions::default()
+            };
+            estimate_components(smaller, &options)
+        }
+        false => solve(smaller, &settings),
+    };
     let evidence = told(outcome.linear()?, model)?;
     Some((evidence, outcome.adjustment))
 }

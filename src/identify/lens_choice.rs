@@ -125,7 +125,8 @@ fn evidence(fit: &Fit, (camera, depths_m): (usize, &[f64; 2]), lens: Lens) -> Op
     let settings = Settings { decrement: DECREMENT, ..Settings::default() };
     // The size of a displacement field is found from above.
     let rounds = if lens.has_field() { FIELD_ROUNDS } else { ROUNDS };
-    let options = ComponentOptions { joint: false, displacement: false, rounds, settings };
+    let options =
+        ComponentOptions { joint: false, displacement: false, rounds, settings, ..ComponentOptions::default() };
     let outcome = estimate_components(other, &options);
     told(outcome.linear().filter(|_| outcome.status == Status::Converged)?, camera)
 }

@@ -19,6 +19,7 @@ use crate::solve::{
 };
 
 use super::block_diagonal::BlockDiagonal;
+use super::build::FIRST_JOINT_NOISE;
 use super::estimator::Estimator;
 use super::options::JointNoise;
 
@@ -148,11 +149,9 @@ struct ErrorModel {
     estimated: bool,
 }
 
-/// First guesses, from above: position (m) and rotation (rad) of a pose, factor on its stated sigma, joint noise (rad or m) where the joint fit
-/// has none.
+/// First guesses, from above: position (m) and rotation (rad) of a pose, factor on its stated sigma.
 const FIRST_ISOTROPIC: f64 = 1e-2;
 const FIRST_FACTOR: f64 = 30.0;
-const FIRST_JOINT_NOISE: f64 = 3e-3;
 
 /// Images up to which the covariance of all poses is taken together: its cost grows with their cube.
 const MOST_TOGETHER: usize = 100;

@@ -16,6 +16,8 @@ use crate::problem::{Adjustment, Noise, Problem};
 /// What is estimated and how long.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ComponentOptions {
+    /// Estimate the factors on stated sigmas: of pixels, bodies, markers and families; else they stay as given in the problem.
+    pub factors: bool,
     /// Estimate the joint noise; else it stays as given in the problem.
     pub joint: bool,
     /// Estimate the apparent displacements of the plate; else they stay as given in the problem.
@@ -28,7 +30,7 @@ pub struct ComponentOptions {
 
 impl Default for ComponentOptions {
     fn default() -> Self {
-        Self { joint: true, displacement: true, rounds: 60, settings: Settings::default() }
+        Self { factors: true, joint: true, displacement: true, rounds: 60, settings: Settings::default() }
     }
 }
 
@@ -152,18 +154,40 @@ impl Fit {
 
     /// One round; returns the largest relative change.
     fn update_components(&mut self, options: &ComponentOptions) -> f64 {
-        let problem = &self.problem;
-        let mut noise = problem.noise.clone();
-        let markers = self.marker_tallies();
+        let mut noise = self.problem.noise.clone();
         let stops = self.stops_with_noise();
-        let (latents, of_bodies): (Vec<_>, Vec<_>) =
-            self.covariance.at_stops(&stops).into_iter().map(|own| (own.latents, own.bodies)).unzip();
-        let bodies = self.body_tallies(&stops, &of_bodies);
+        let at_stops = self.covariance.at_stops(&stops);
+        let (latents, of_bodies): (Vec<_>, Vec<_>) = at_stops.into_iter().map(|own| (own.latents, own.bodies)).unzip();
+        let mut change = 0.0f64;
+        if options.factors {
+            change = self.update_factors(&stops, (&latents, &of_bodies), &mut noise);
+        }
+        if options.joint || options.displacement {
+            let kinds = self.state.robot.chain.reading_kinds.as_slice();
+            change = change.max(self.latent_data(&stops, &latents).update(options, kinds, &mut noise));
+        }
+        self.problem.noise = noise;
+        if options.factors {
+            change = change.max(self.update_families());
+        }
+        self.hold_component_priors();
+        change
+    }
+
+    /// New factors on the stated sigmas of pixels, bodies and markers, from the covariances of what is latent at the stops and of bodies measured
+    /// there; returns the largest relative change.
+    fn update_factors(
+        &self,
+        stops: &[LinearStop],
+        (latents, of_bodies): (&[DMatrix<f64>], &[Vec<DMatrix<f64>>]),
+        noise: &mut Noise,
+    ) -> f64 {
+        let markers = self.marker_tallies();
+        let bodies = self.body_tallies(stops, of_bodies);
         let by_bodies: f64 = bodies.iter().flatten().map(BodyTally::taken).sum();
-        let taken = self.effective_parameters(&stops, &latents, markers.iter().map(|[_, told]| told).sum()) - by_bodies;
-        let mut change = update_markers(&markers, &mut noise).max(update_bodies(&bodies, &mut noise));
-        let counts = self.linearised.terms.iter().map(|t| 2.0 * t.residuals.len() as f64);
-        let total: f64 = counts.clone().sum();
+        let taken = self.effective_parameters(stops, latents, markers.iter().map(|[_, told]| told).sum()) - by_bodies;
+        let mut change = update_markers(&markers, noise).max(update_bodies(&bodies, noise));
+        let total: f64 = self.linearised.terms.iter().map(|t| 2.0 * t.residuals.len() as f64).sum();
         for (camera, factor) in noise.pixel_factor.iter_mut().enumerate() {
             let of_camera = self.linear().images().filter(|i| i.image.camera == camera);
             let (mut squares, mut count) = (0.0, 0.0);
@@ -175,17 +199,10 @@ impl Fit {
             if redundancy < 1.0 || squares <= 0.0 {
                 continue;
             }
-            let ratio = (squares * huber_consistency(problem.huber) / redundancy).sqrt();
+            let ratio = (squares * huber_consistency(self.problem.huber) / redundancy).sqrt();
             *factor *= ratio;
             change = change.max((ratio - 1.0).abs());
         }
-        if options.joint || options.displacement {
-            let kinds = self.state.robot.chain.reading_kinds.as_slice();
-            change = change.max(self.latent_data(&stops, &latents).update(options, kinds, &mut noise));
-        }
-        self.problem.noise = noise;
-        change = change.max(self.update_families());
-        self.hold_component_priors();
         change
     }
 

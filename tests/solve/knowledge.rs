@@ -492,6 +492,17 @@ fn evidence_prefers_the_rigid_model_for_a_rigid_robot() {
     assert_eq!(solution.fit.state.robot.terms.len(), 6);
 }
 
+/// The terms of the full model take up all noise of a few stops; a rigid robot is not judged by that.
+#[test]
+fn a_rigid_robot_of_few_stops_is_found_rigid() {
+    let mut few = world(5, 5e-5);
+    few.stops.truncate(9);
+    let auto = Options { model: RobotModel::Auto, ..Options::default() };
+    let solution = identify(chain(), &[few], &auto).unwrap();
+    println!("{:?}", solution.evidences);
+    assert_eq!(solution.fit.state.robot.terms.len(), 6, "{:?}", solution.evidences);
+}
+
 #[test]
 fn another_series_tells_a_calibrated_robot_from_the_nominal_one() {
     // Seeds share no robot: the second series is the second half of the first.
