@@ -31,6 +31,8 @@ pub enum MistakeKind {
     Rows {
         /// True for the row below.
         below: bool,
+        /// The joints of which it does, as those of a positioner that was recorded apart; empty where it is all of them.
+        columns: Vec<String>,
     },
     /// The camera is mounted in the way that is not stated.
     Mount(CameraMount),
@@ -78,7 +80,9 @@ impl Mistake {
     /// Joints that it is about; none where it is about all.
     fn joints(&self) -> &[String] {
         match &self.kind {
-            MistakeKind::Signs(joints) | MistakeKind::Columns(joints) => joints,
+            MistakeKind::Signs(joints) | MistakeKind::Columns(joints) | MistakeKind::Rows { columns: joints, .. } => {
+                joints
+            }
             MistakeKind::Unit { joint, .. } => joint.as_slice(),
             MistakeKind::Coupled { joints, .. } => &joints[..1],
             _ => &[],
@@ -167,7 +171,14 @@ impl Kind for Mistake {
                 let word = if *is_sum { "plus" } else { "minus" };
                 format!("write {joint} {word} {before} into the column {joint} of joints.csv")
             }
-            MistakeKind::Rows { .. } => "shift the names in the first column of joints.csv by one row".into(),
+            MistakeKind::Rows { columns, .. } if columns.is_empty() => {
+                "shift the names in the first column of joints.csv by one row".into()
+            }
+            MistakeKind::Rows { columns, below } => format!(
+                "shift the columns {} of joints.csv one row {}, and see how they were recorded",
+                columns.join(", "),
+                if *below { "up" } else { "down" }
+            ),
             MistakeKind::Mount(mount) => {
                 let word = if *mount == CameraMount::Hand { "hand" } else { "fixed" };
                 format!("write camera_mount = \"{word}\" in series.toml")
@@ -213,8 +224,12 @@ impl Mistake {
                 "the controller counts {joint} together with {before}, as where J3 is counted from the ground: with {joint} {} {before} the images fit",
                 if *is_sum { "plus" } else { "minus" }
             ),
-            MistakeKind::Rows { below } => format!(
-                "images and joint readings are shifted by one row: every image fits the readings of the row {}",
+            MistakeKind::Rows { below, columns } => format!(
+                "images and {} are shifted by one row: every image fits the readings of the row {}",
+                match columns.as_slice() {
+                    [] => "joint readings".to_owned(),
+                    some => format!("the readings of {} alone", some.join(", ")),
+                },
                 if *below { "below" } else { "above" }
             ),
             MistakeKind::Mount(CameraMount::Hand) => {

@@ -51,15 +51,30 @@ pub(super) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> 
     }
     add(MistakeKind::Reversed, &|q| q.reverse());
     all.extend(shifted_rows(given));
+    // Positioner, rail or second arm stand before the first arm, or behind it, and may have been recorded apart.
+    for k in 1..n {
+        for columns in [0..k, k..n] {
+            all.extend([true, false].map(|below| {
+                let rows = shifted(given, below);
+                let mut changed = given.to_vec();
+                changed
+                    .iter_mut()
+                    .zip(&rows)
+                    .for_each(|(q, of)| q[columns.clone()].copy_from_slice(&of[columns.clone()]));
+                (changed, MistakeKind::Rows { below, columns: names[columns.clone()].to_vec() })
+            }));
+        }
+    }
     all
 }
 
 /// Readings of the row below, or above.
 pub(super) fn shifted_rows(given: &[Vec<f64>]) -> Vec<Undone> {
-    let shifted = |below: bool| {
-        let mut shifted = given.to_vec();
-        shifted.rotate_left(if below { 1 } else { given.len().saturating_sub(1) });
-        (shifted, MistakeKind::Rows { below })
-    };
-    [true, false].map(shifted).into()
+    [true, false].map(|below| (shifted(given, below), MistakeKind::Rows { below, columns: Vec::new() })).into()
+}
+
+fn shifted(given: &[Vec<f64>], below: bool) -> Vec<Vec<f64>> {
+    let mut shifted = given.to_vec();
+    shifted.rotate_left(if below { 1 } else { given.len().saturating_sub(1) });
+    shifted
 }

@@ -2,23 +2,20 @@
 
 use std::collections::BTreeMap;
 
+use super::bases;
 use super::start_verdict::{StartReached, StartVerdict};
 use super::suspects::Suspects;
 use crate::assess::{Limits, median};
 use crate::diagnose::{Finding, Mistake};
 use crate::error::{Code, Error, Result};
 use crate::fit::FreePoses;
-use crate::geom::{Pose, log_so3};
-use crate::init::{
-    HandEye, HandEyeStart, PosePair, PoseTriple, SeenStop, Zeros, shah, solve_between, solve_hand_eye, solve_zeros,
-    upper_median,
-};
+use crate::geom::log_so3;
+use crate::init::{HandEye, HandEyeStart, PosePair, SeenStop, Zeros, shah, solve_hand_eye, solve_zeros, upper_median};
 use crate::linalg::symmetric_eigen;
 use crate::problem::{
     Adjustment, ImageRejection, MeasuredSeries, Misfit, Mismatch, Problem, State, TakenFrom, predict,
 };
-use crate::series::CameraMount;
-use crate::urdf::{BASE_FROM_BASE, FoundOrigin, Joint};
+use crate::urdf::BASE_FROM_BASE;
 
 /// Closed forms whose pixel cost is compared.
 const COMPARED: usize = 4;
@@ -103,31 +100,18 @@ fn most_seen_stops(adjustment: &Adjustment, free: &FreePoses) -> Vec<SeenStop> {
 
 /// Gives the joint between the bases of two arms an origin, where it has none yet.
 fn place_bases(adjustment: &mut Adjustment, free: &FreePoses) -> Result<()> {
-    let chain = &adjustment.state.robot.chain;
-    let unplaced = |j: &Joint| j.is_between_bases() && j.origin == Pose::identity();
-    let Some(k) = chain.joints.iter().position(unplaced) else { return Ok(()) };
+    let robot = &adjustment.state.robot;
+    let Some(joint) = bases::unplaced(robot) else { return Ok(()) };
     let stops = most_seen_stops(adjustment, free);
-    let Some(mount) = stops.first().map(|stop| stop.mount) else { return Ok(()) };
-    let triple = |stop: &SeenStop| {
-        let behind = adjustment.state.robot.link_poses(&stop.readings);
-        let tip = behind.last().copied().unwrap_or_else(Pose::identity);
-        let second = k.checked_sub(1).map_or_else(Pose::identity, |before| behind[before]);
-        let first = behind[k].inverse() * tip;
-        let camera_from_plate = stop.camera_from_plate;
-        match mount {
-            CameraMount::Hand => PoseTriple { camera_from_plate, before: first.inverse(), after: second.inverse() },
-            CameraMount::Fixed => PoseTriple { camera_from_plate, before: second, after: first },
-        }
-    };
-    let found = solve_between(&stops.iter().map(triple).collect::<Vec<_>>()).map(|(pose, _)| pose);
-    let Some(pose) = found else {
+    if stops.is_empty() {
+        return Ok(());
+    }
+    let Some(placed) = bases::placed(robot, joint, &stops) else {
         let what = "how the bases of the two arms stand to each other does not come out of these stops";
         let remedy = "take more stops at which both arms move all their joints";
         return Err(Error::new(Code::StopsAlike, BASE_FROM_BASE, what, remedy));
     };
-    let joint = &mut adjustment.state.robot.chain.joints[k];
-    joint.origin = if mount == CameraMount::Hand { pose.inverse() } else { pose };
-    joint.found = Some(FoundOrigin::Pose);
+    adjustment.state.robot = placed;
     Ok(())
 }
 
@@ -233,20 +217,7 @@ fn closed_form(
         });
     }
     let suspects = Suspects { problem, robot: &state.robot, series, pairs, limits };
-    if let Some((kind, misfit_undone)) = suspects.better_than(best.median_error) {
-        let misfit = best.median_error;
-        let mistake = Mistake { kind, of: of.to_owned(), misfit, misfit_undone, by_images: true };
-        return Err(Finding::from(mistake).refusal());
-    }
-    if best.median_error > limits.hand_eye_spread {
-        return Err(no_fit(
-            of,
-            &format!(
-                "even the best start leaves a median hand-eye residual of {:.0} (mm plus mrad)",
-                1e3 * best.median_error
-            ),
-        ));
-    }
+    check_fit(&suspects, best.median_error, of, "even at the best start")?;
     Ok(best.solution)
 }
 
@@ -278,13 +249,17 @@ fn check_shared(
         return Err(Error::new(Code::SharedPoseDiffers, of, what, remedy));
     }
     let suspects = Suspects { problem, robot: &state.robot, series, pairs, limits };
+    check_fit(&suspects, misfit, of, "with what is shared with other images")
+}
+
+/// Refuses what does not fit: for the mistake that explains it, or because it is too far off.
+fn check_fit(suspects: &Suspects, misfit: f64, of: &str, how: &str) -> Result<()> {
     if let Some((kind, misfit_undone)) = suspects.better_than(misfit) {
         let mistake = Mistake { kind, of: of.to_owned(), misfit, misfit_undone, by_images: true };
         return Err(Finding::from(mistake).refusal());
     }
-    if misfit > limits.hand_eye_spread {
-        let what = format!("with what is shared with other images they miss by {:.0} (mm plus mrad)", 1e3 * misfit);
-        return Err(no_fit(of, &what));
+    if misfit > suspects.limits.hand_eye_spread {
+        return Err(no_fit(of, &format!("{how} the camera poses miss by {:.0} (median, mm plus mrad)", 1e3 * misfit)));
     }
     Ok(())
 }

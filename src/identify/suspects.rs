@@ -1,9 +1,12 @@
 //! When readings and images do not fit: the usual mistakes, tried one by one, named where one of them explains it.
 
+use super::bases;
 use super::mistakes::{mistakes_undone, shifted_rows};
+use rayon::prelude::*;
+
 use crate::assess::Limits;
 use crate::diagnose::MistakeKind;
-use crate::init::{PosePair, plate_scale, solve_hand_eye};
+use crate::init::{PosePair, SeenStop, plate_scale, solve_hand_eye};
 use crate::model::robot::Robot;
 use crate::problem::{MeasuredSeries, Problem};
 use crate::series::CameraMount;
@@ -35,8 +38,9 @@ impl Suspects<'_> {
         }
         let hypotheses =
             if of_poses { shifted_rows(&self.readings()) } else { mistakes_undone(self.robot, &self.readings()) };
-        let tried = hypotheses.into_iter().map(|(readings, mistake)| (self.misfit(&readings), mistake));
-        let best = tried.chain([self.wrong_mount()]).filter(explains).min_by(|a, b| a.0.total_cmp(&b.0));
+        let tried: Vec<(f64, MistakeKind)> =
+            hypotheses.into_par_iter().map(|(readings, mistake)| (self.misfit(&readings), mistake)).collect();
+        let best = tried.into_iter().chain([self.wrong_mount()]).filter(explains).min_by(|a, b| a.0.total_cmp(&b.0));
         match best {
             Some((left, mistake)) => Some((mistake, Some(left))),
             None => self.other_lengths().filter(|_| !of_poses).map(|mistake| (mistake, None)),
@@ -77,11 +81,16 @@ impl Suspects<'_> {
     }
 
     fn misfit_mounted(&self, readings: &[Vec<f64>], changed: impl Fn(CameraMount) -> CameraMount) -> f64 {
-        let pairs: Vec<PosePair> = (self.pairs.iter().zip(readings))
-            .map(|((i, pair), q)| {
-                PosePair::of_stop(self.robot, changed(self.problem.images[*i].mount), q, pair.camera_from_plate)
-            })
-            .collect();
+        let stop = |((i, pair), readings): (&(usize, PosePair), &Vec<f64>)| SeenStop {
+            readings: readings.clone(),
+            mount: changed(self.problem.images[*i].mount),
+            camera_from_plate: pair.camera_from_plate,
+        };
+        let stops: Vec<SeenStop> = self.pairs.iter().zip(readings).map(stop).collect();
+        // Where bases were found from the readings as they are, they are found anew.
+        let placed = bases::found(self.robot).and_then(|joint| bases::placed(self.robot, joint, &stops));
+        let robot = placed.as_ref().unwrap_or(self.robot);
+        let pairs: Vec<PosePair> = stops.iter().map(|stop| stop.pair(robot)).collect();
         solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error)
     }
 

@@ -4,6 +4,8 @@
 
 #[path = "../outputs_support/mod.rs"]
 mod outputs_support;
+#[path = "../said/mod.rs"]
+mod said;
 #[path = "../support/mod.rs"]
 mod support;
 
