@@ -150,7 +150,8 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
         } else if is_seen {
             let tables = [controller_file::NAME, "joints.csv"].map(|name| folder.join(name));
             let table = if controller.is_some() { &tables[0] } else { &tables[1] };
-            pictured(&folder.join("images"), table, &mut stops, &mut notices)?
+            let lines: Vec<u64> = stops.stops.iter().map(|s| s.line).collect();
+            pictured(&folder.join("images"), (table, &lines), &mut stops, &mut notices)?
         } else {
             Source::NoImages
         }
@@ -203,7 +204,7 @@ fn one_view(
     use_observations: bool,
     inputs: &mut Vec<InputFile>,
 ) -> Result<Series> {
-    let CameraView { name, manifest, images, mut stops, rows, controller } = view;
+    let CameraView { name, manifest, images, mut stops, lines, rows, controller } = view;
     if stops.stops.is_empty() {
         let what = format!("has no image of camera \"{}\"", manifest.camera().name.as_deref().unwrap_or(&name));
         let remedy = "add its images, or remove the [[camera]] from series.toml";
@@ -215,7 +216,7 @@ fn one_view(
         let path = series.folder.join("observations.csv");
         observed(&path, &manifest, &series.plate, &stops, inputs, &mut Vec::new())?
     } else {
-        pictured(&images, table, &mut stops, &mut notices)?
+        pictured(&images, (table, &lines), &mut stops, &mut notices)?
     };
     let has_mixed_mounts = has_mixed_mounts(&series.manifest);
     let run = Some(Run { name: series.name.clone(), has_mixed_mounts, rows });
@@ -303,8 +304,13 @@ fn observed(
     Ok(Source::Observations(ordered))
 }
 
-/// Finds the image of every stop, and tells of images without one.
-fn pictured(images: &Path, csv: &Path, stops: &mut Stops, notices: &mut Vec<Notice>) -> Result<Source> {
+/// Finds the image of every stop, which a table names in these lines, and tells of images without one.
+fn pictured(
+    images: &Path,
+    (csv, lines): (&Path, &[u64]),
+    stops: &mut Stops,
+    notices: &mut Vec<Notice>,
+) -> Result<Source> {
     let on_disk = image_files(images)?;
     let names: BTreeSet<String> = on_disk.iter().map(|p| file_name(p)).collect();
     let mut missing = Vec::new();
@@ -319,11 +325,11 @@ fn pictured(images: &Path, csv: &Path, stops: &mut Stops, notices: &mut Vec<Noti
             stop.image.clone_from(file);
         }
     }
-    for stop in &mut stops.stops {
+    for (stop, line) in stops.stops.iter_mut().zip(lines) {
         if names.contains(&stop.image) {
             stop.path = Some(images.join(&stop.image));
         } else {
-            missing.push((stop.line, stop.image.clone()));
+            missing.push((*line, stop.image.clone()));
         }
     }
     let remedy = |name: &str| match similar(name, &names) {
@@ -480,7 +486,7 @@ impl Series {
         if self.controller.is_some() {
             return Vec::new();
         }
-        units::notices(&self.readings_file(), &self.stops, self.joint_unit(), chain)
+        units::notices(&self.readings_file(), (&self.stops, self.run.is_some()), self.joint_unit(), chain)
     }
 
     /// The file that says where the robot stood, for messages.

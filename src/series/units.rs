@@ -167,8 +167,9 @@ fn range(rows: &[&[f64]], reading: usize) -> (f64, f64) {
     rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(q[reading]), h.max(q[reading])))
 }
 
-/// Columns that the chain does not need, and readings beyond the limits of the URDF.
-pub(super) fn notices(file: &Path, stops: &Stops, unit: AngleUnit, chain: &Chain) -> Vec<Notice> {
+/// Columns that the chain does not need, and readings beyond the limits of the URDF. Of the `view` of one among several cameras, what is said is
+/// that of the others.
+pub(super) fn notices(file: &Path, (stops, view): (&Stops, bool), unit: AngleUnit, chain: &Chain) -> Vec<Notice> {
     let mut notices = Vec::new();
     let extra: Vec<&str> = stops.joints.iter().filter(|j| !chain.readings.contains(j)).map(String::as_str).collect();
     if !extra.is_empty() {
@@ -183,7 +184,7 @@ pub(super) fn notices(file: &Path, stops: &Stops, unit: AngleUnit, chain: &Chain
     notices.extend(unused_covariates(file, stops));
     let Ok(columns) = columns_of(file, stops, chain) else { return notices };
     for (reading, column) in columns.into_iter().enumerate() {
-        notices.extend(beyond_limits(file, stops, unit, chain, reading, column));
+        notices.extend(beyond_limits(file, (stops, view), unit, chain, (reading, column)));
     }
     notices
 }
@@ -203,11 +204,10 @@ fn unused_covariates(file: &Path, stops: &Stops) -> Option<Notice> {
 /// The worst offender of one joint, and how many there are.
 fn beyond_limits(
     file: &Path,
-    stops: &Stops,
+    (stops, view): (&Stops, bool),
     unit: AngleUnit,
     chain: &Chain,
-    reading: usize,
-    column: usize,
+    (reading, column): (usize, usize),
 ) -> Option<Notice> {
     let (low, high) = limits(chain, reading)?;
     let revolute = chain.reading_kinds[reading] == JointKind::Revolute;
@@ -222,12 +222,10 @@ fn beyond_limits(
     let (stop, worst) = outside.iter().max_by(|a, b| beyond(a.1).total_cmp(&beyond(b.1)))?;
     let shown = if revolute { unit.name() } else { "m" };
     let [worst, low, high] = [*worst, low, high].map(|q| (1e4 * q / factor).round() / 1e4);
-    let what = format!(
-        "{} reads {worst} {shown}, beyond its limits {low} to {high} in the URDF ({} of {} images)",
-        chain.readings[reading],
-        outside.len(),
-        stops.stops.len()
-    );
-    let place = format!("{}:{}, image {}", file.display(), stop.line, stop.image);
+    let (line, image) = (format!("{}:{}", file.display(), stop.line), &stop.image);
+    let counted = format!(" ({} of {} images)", outside.len(), stops.stops.len());
+    let (place, counted) = if view { (line, String::new()) } else { (format!("{line}, image {image}"), counted) };
+    let joint = &chain.readings[reading];
+    let what = format!("{joint} reads {worst} {shown}, beyond its limits {low} to {high} in the URDF{counted}");
     Some(Notice::new(Code::JointBeyondLimits, place, what, "check the joint's unit and sign, or correct the limits"))
 }

@@ -18,6 +18,8 @@ pub(super) struct CameraView {
     pub images: PathBuf,
     /// The stops that it saw, one an image.
     pub stops: Stops,
+    /// Lines of images.csv that name the images.
+    pub lines: Vec<u64>,
     /// Their places among all stops.
     pub rows: Vec<usize>,
     /// Poses of the controller at these stops.
@@ -57,7 +59,7 @@ impl Seen<'_> {
         };
         let stop = |row: &&ImageRow| {
             let stop = &self.stops.stops[row.stop];
-            SeriesStop { image: row.image.clone(), line: row.line, ..stop.clone() }
+            SeriesStop { image: row.image.clone(), ..stop.clone() }
         };
         CameraView {
             name: called.map_or_else(|| self.series.to_owned(), |name| format!("{} {name}", self.series)),
@@ -68,6 +70,7 @@ impl Seen<'_> {
             },
             images: folder,
             stops: Stops { stops: rows.iter().map(stop).collect(), key: StopKey::Image, ..self.stops.clone() },
+            lines: rows.iter().map(|r| r.line).collect(),
             rows: rows.iter().map(|r| r.stop).collect(),
             controller: self.controller.map(|c| c.of_rows(rows.iter().map(|r| r.stop))),
         }

@@ -3,7 +3,8 @@
 use std::fs;
 
 use robotcal::series::{CameraMount, Series, Source, read};
-use robotcal::{Code, Error};
+use robotcal::urdf::RobotDescription;
+use robotcal::{Code, Error, Notice};
 use tempfile::TempDir;
 
 use crate::said::assert_says;
@@ -72,4 +73,22 @@ fn a_bad_row_names_line_and_column() {
     let folder = folder(&[]);
     fs::remove_file(folder.path().join("images.csv")).unwrap();
     assert_says(&read(folder.path()).unwrap_err(), Code::FileMissing, &["images.csv"]);
+}
+
+/// A reading stands in one line of joints.csv, however many cameras saw the stop.
+#[test]
+fn what_is_said_of_readings_is_said_once_with_their_line() {
+    let urdf = "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><joint name=\"j1\" type=\"revolute\">\
+        <parent link=\"a\"/><child link=\"b\"/><axis xyz=\"0 0 1\"/>\
+        <limit lower=\"-1\" upper=\"0.15\" effort=\"0\" velocity=\"1\"/></joint></robot>";
+    let chain = RobotDescription::from_text("r.urdf".as_ref(), urdf.into()).unwrap().chain(None, None).unwrap();
+    let folder = folder(&[]);
+    let series = read(folder.path()).unwrap();
+    let said: Vec<Notice> = series.views().iter().flat_map(|v| v.reading_notices(&chain)).collect();
+    let [said] = &Notice::said_once(&said)[..] else { panic!("{said:?}") };
+    assert_eq!(said.code, Code::JointBeyondLimits);
+    // The worst of "left" is at stop three, that of "wrist" at stop two.
+    assert!(said.place.starts_with("2 places") && said.place.contains("joints.csv:4"), "{said:?}");
+    // words: what is counted in images differs from view to view.
+    assert!(said.place.contains("joints.csv:3") && !said.what.contains("images"), "{said:?}");
 }
