@@ -14,7 +14,7 @@ use crate::diagnose::Weight;
 use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::frames::{FrameFit, Given, KnownRobot, Seen, Touches, fit};
 use crate::geom::{Pose, matrix_from_rpy};
-use crate::identify::measure_bodies;
+use crate::identify::{measure_bodies, touch_mistake};
 use crate::output::frame_files::{self, Frames, Named};
 use crate::output::frame_findings::{at_the_places, frame_findings};
 use crate::output::frames_record::{
@@ -86,7 +86,8 @@ pub(super) fn run(args: &FramesArgs) -> Result<Verdict> {
         fitted.tools[0].rotation = orientation(args)?;
     }
     let subject = args.touches.first().unwrap_or(&args.from).display().to_string();
-    let findings = frame_findings(&fitted, &touches, &found.limits, &subject);
+    let mistake = touch_mistake(&robot, &touches, &given, (&fitted, &found.limits));
+    let findings = frame_findings((&fitted, mistake), &touches, &found.limits, &subject);
     let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
     let made = FramesRecord {
         format: FORMAT,

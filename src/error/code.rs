@@ -329,6 +329,8 @@ codes! {
         FrameWeak "frame_weak" "a direction of tool or work object is hardly told",
         TouchesLeftOut "touches_left_out" "touches disagree with the others, and are left out",
         TouchesScatter "touches_scatter" "touches scatter more than their stated sigma says",
+        PlaceContradicted "place_contradicted" "a place that was touched is not where the other touches have it",
+        WorkDisplaced "work_displaced" "the work object stands elsewhere from some touch on",
         FramesUnknown "frames_unknown" "base and tool of the real robot are known worse than the correction is large",
         FramesNominal "frames_nominal" "base and tool were taken as nominal, as asked for",
     }

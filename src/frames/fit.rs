@@ -10,7 +10,7 @@ use super::equations::{Columns, Given, Rows, Unknowns, rows, sigmas};
 use super::knowledge::{Knowledge, scatter_m};
 use super::robot::KnownRobot;
 use super::start::start;
-use super::touch::{Seen, Touches};
+use super::touch::{Seen, Touch, Touches};
 use crate::assess::{Limits, root_mean_square};
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
@@ -237,6 +237,25 @@ fn judged(solved: &Solved) -> BTreeMap<usize, (DVector<f64>, f64)> {
     all
 }
 
+/// The place of a touch less that of the tool, in the base, m.
+fn missed(robot: &KnownRobot, touches: &Touches, unknowns: &Unknowns, t: &Touch) -> Vector3<f64> {
+    let tip = robot.at(&touches.postures[t.posture]).0;
+    let place = match t.seen {
+        Seen::Point(place) => place,
+        Seen::Pose(pose) => pose.translation,
+        Seen::Unknown(contact) => unknowns.places[contact],
+    };
+    unknowns.work.transform(&place) - tip.transform(&unknowns.tools[t.body].translation)
+}
+
+/// By the closed form that the fit starts from: what the touches miss, m RMS, and unknown places in the work object, m; `None` where there is none.
+pub fn closed_form(robot: &KnownRobot, touches: &Touches, given: &Given) -> Option<(f64, Vec<Vector3<f64>>)> {
+    let unknowns = start(robot, touches, &Columns::new(touches, given), given)?;
+    let squares = touches.all.iter().map(|t| (missed(robot, touches, &unknowns, t).norm_squared(), 1.0));
+    let rms_m = root_mean_square(&squares.collect::<Vec<_>>());
+    rms_m.is_finite().then_some((rms_m, unknowns.places))
+}
+
 /// Tool and work object that fit the touches best.
 ///
 /// # Errors
@@ -296,14 +315,8 @@ impl Work<'_> {
     fn finished(&self, unknowns: &Unknowns, factor: f64, solved: &Solved, without: &BTreeMap<usize, f64>) -> FrameFit {
         let columns = &self.columns;
         let lengths = judged(solved);
-        let judge = |(k, t): (usize, &super::touch::Touch)| {
-            let tip = self.robot.at(&self.touches.postures[t.posture]).0;
-            let place = match t.seen {
-                Seen::Point(place) => place,
-                Seen::Pose(pose) => pose.translation,
-                Seen::Unknown(contact) => unknowns.places[contact],
-            };
-            let residual_m = unknowns.work.transform(&place) - tip.transform(&unknowns.tools[t.body].translation);
+        let judge = |(k, t): (usize, &Touch)| {
+            let residual_m = missed(self.robot, self.touches, unknowns, t);
             let left_out = without.get(&k);
             let sigmas = left_out.copied().or_else(|| Some(lengths.get(&k)?.1)).unwrap_or_default();
             Judged { residual_m, sigmas, left_out: left_out.is_some() }

@@ -1,5 +1,6 @@
 //! Series -> solution: `series -> observations -> free poses -> starting values -> joint fit -> assessment`.
 
+mod bases;
 mod block_diagonal;
 mod bodies;
 mod bodies_measured;
@@ -20,6 +21,7 @@ mod joint;
 mod lens_choice;
 mod local_errors;
 mod measure;
+mod misread;
 mod mistakes;
 mod near_nominal;
 mod options;
@@ -34,6 +36,7 @@ mod start;
 mod start_verdict;
 mod stated;
 mod suspects;
+mod touch_mistakes;
 mod turns;
 mod two_stage;
 mod unpredicted;
@@ -59,5 +62,6 @@ pub use solution::{Evidence, LensEvidence, Solution};
 pub use stand_alone::{PoseSigma, StandAlone, stand_alone};
 pub use start_verdict::{StartReached, StartVerdict};
 pub use stated::CameraStart;
+pub use touch_mistakes::touch_mistake;
 pub use two_stage::{Estimate, PoseStage, estimate_all, fit_joint, fit_poses, linear_step};
 pub use verify::{JudgedImage, in_told_postures, verify_series};

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
 
 use super::corrections::{FileFinding, numbers};
 use crate::assess::Limits;
-use crate::diagnose::Weight;
+use crate::diagnose::{Finding, Mistake, Weight};
 use crate::error::Code;
 use crate::frames::{FrameFit, Touches};
 use crate::geom::{Pose, adjoint};
@@ -12,10 +12,26 @@ use crate::geom::{Pose, adjoint};
 /// Stops that are named.
 const NAMED: usize = 5;
 
-/// Findings of a fit of tool and work object; `subject` is the file of the touches.
-pub fn frame_findings(fit: &FrameFit, touches: &Touches, limits: &Limits, subject: &str) -> Vec<FileFinding> {
+/// Findings of a fit of tool and work object, and of the mistake that explains why it is bad; `subject` is the file of the touches.
+pub fn frame_findings(
+    (fit, mistake): (&FrameFit, Option<Mistake>),
+    touches: &Touches,
+    limits: &Limits,
+    subject: &str,
+) -> Vec<FileFinding> {
     let finding =
         |code, weight, quantities, text| FileFinding { code, weight, subject: subject.to_owned(), quantities, text };
+    if let Some(mistake) = mistake {
+        let (rms, undone) = (1e3 * mistake.misfit, 1e3 * mistake.misfit_undone.unwrap_or_default());
+        let quantities = numbers([("rms_mm", rms), ("rms_undone_mm", undone)]);
+        let found = Finding::from(mistake);
+        let text = format!(
+            "{}; {} (touches miss by {rms:.2} mm RMS, by {undone:.2} mm without)",
+            found.seen(),
+            found.remedy()
+        );
+        return vec![finding(found.code(), Weight::Gate, quantities, text)];
+    }
     let mut all = Vec::new();
     let left_out: Vec<usize> = (0..touches.all.len()).filter(|&k| fit.judged[k].left_out).collect();
     if !left_out.is_empty() {

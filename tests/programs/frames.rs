@@ -7,9 +7,11 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use robotcal::assess::Limits;
+use robotcal::diagnose::Finding;
 use robotcal::error::Code;
 use robotcal::frames::{Given, KnownRobot, Seen, Touches, fit};
 use robotcal::geom::Pose;
+use robotcal::identify::touch_mistake;
 use robotcal::model::robot::Robot;
 use robotcal::output::restore::found_model;
 use robotcal::output::solution_json;
@@ -489,4 +491,55 @@ fn a_taught_program_is_moved_by_a_common_work_object() {
         Code::FramesDiffer,
         &["fixture", "table"],
     );
+}
+
+/// One mistake in touches that tell enough: its name, where it is, and how large.
+#[test]
+fn usual_mistakes_in_touches_are_named() {
+    let World { robot, truth } = world();
+    let mut rng = rng(31);
+    let toucher = Toucher { truth: &truth, work: work(), tool: TOOL.into(), sigma_m: 5e-5, joint_sigma: 2e-5 };
+    let q = spread(&ranges(&robot.stops), 16, &mut rng);
+    let good = toucher.places(&q, "fixture", &mut rng);
+    let (given, limits) = (Given { tool: None, plate: None }, Limits::default());
+    let named = |change: &dyn Fn(&mut Touches)| {
+        let mut touches = good.clone();
+        change(&mut touches);
+        let found = fit(&robot, &touches, &given, &limits).unwrap();
+        touch_mistake(&robot, &touches, &given, (&found, &limits)).map(Finding::from)
+    };
+    assert_eq!(named(&|_| ()), None, "good touches");
+    let place = |seen: &mut Seen, change: &dyn Fn(&mut Vector3<f64>)| {
+        if let Seen::Point(place) = seen {
+            change(place);
+        }
+    };
+    let places = |touches: &mut Touches, of: std::ops::Range<usize>, change: &dyn Fn(&mut Vector3<f64>)| {
+        touches.all[of].iter_mut().for_each(|t| place(&mut t.seen, change));
+    };
+    let is = |found: Option<Finding>, code: Code, says: &str| {
+        let found = found.unwrap_or_else(|| panic!("{code} is not named"));
+        assert_eq!(found.code(), code, "{}", found.seen());
+        // words: the stops and joints that are named.
+        assert!(found.seen().contains(says), "{}", found.seen());
+    };
+    let rows = |touches: &mut Touches| touches.postures.rotate_right(1);
+    is(named(&rows), Code::RowsShifted, "row below");
+    let sign = |touches: &mut Touches| touches.postures.iter_mut().for_each(|p| p.readings[3] *= -1.0);
+    is(named(&sign), Code::JointSignWrong, "joint_a4");
+    is(named(&|t| places(t, 0..16, &|p| p.y = -p.y)), Code::AxesMirrored, "left-handed");
+    is(named(&|t| places(t, 7..16, &|p| p.x += 1e-3)), Code::WorkDisplaced, "from t07 on");
+    let bent = Toucher { tool: Vector3::from(TOOL) + Vector3::new(1e-3, 0.0, 0.0), ..toucher };
+    let bent = bent.places(&q, "fixture", &mut ChaCha8Rng::seed_from_u64(32));
+    is(named(&|t| t.all[9..].clone_from_slice(&bent.all[9..])), Code::TargetDisplaced, "from t09 on");
+    let typed = |touches: &mut Touches| {
+        // The same place thrice, and typed wrongly.
+        let readings = touches.postures[0].readings.clone();
+        for k in 1..3 {
+            touches.postures[k].readings.clone_from(&readings);
+            touches.all[k].seen = touches.all[0].seen;
+        }
+        places(touches, 0..3, &|p| p.y += 0.01);
+    };
+    is(named(&typed), Code::PlaceContradicted, "t00, t01, t02");
 }

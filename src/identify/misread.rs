@@ -1,0 +1,106 @@
+//! The usual mistakes in what a file says of the places of bodies.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::diagnose::MistakeKind;
+use crate::error::Code;
+use crate::geom::Pose;
+use crate::problem::BodySeen;
+
+/// One of them, and what the file would have said without.
+pub(super) struct Misread {
+    code: Code,
+    what: &'static str,
+    remedy: &'static str,
+    /// What it would have said; `None` where that is the same.
+    pub undone: fn(BodySeen) -> Option<BodySeen>,
+}
+
+/// All of them.
+pub(super) const MISREAD: [Misread; 8] = [
+    Misread {
+        code: Code::MeasuredUnit,
+        what: "positions are in millimetres: in metres the measurements fit",
+        remedy: "divide x_m, y_m and z_m by 1000",
+        undone: |seen| Some(moved(seen, |pose| Pose::new(pose.rotation, pose.translation / 1e3))),
+    },
+    Misread {
+        code: Code::AxesMirrored,
+        what: "its axes are left-handed: with y_m negated the measurements fit",
+        remedy: "negate y_m, or set the instrument to right-handed axes",
+        undone: |seen| Some(moved(seen, |pose| Pose::new(pose.rotation, mirrored(pose.translation, 1)))),
+    },
+    Misread {
+        code: Code::AxesMirrored,
+        what: "its axes are left-handed: with x_m negated the measurements fit",
+        remedy: "negate x_m, or set the instrument to right-handed axes",
+        undone: |seen| Some(moved(seen, |pose| Pose::new(pose.rotation, mirrored(pose.translation, 0)))),
+    },
+    Misread {
+        code: Code::AxesMirrored,
+        what: "its axes are left-handed: with z_m negated the measurements fit",
+        remedy: "negate z_m, or set the instrument to right-handed axes",
+        undone: |seen| Some(moved(seen, |pose| Pose::new(pose.rotation, mirrored(pose.translation, 2)))),
+    },
+    Misread {
+        code: Code::AxesMirrored,
+        what: "its axes are left-handed, in positions and rotations: with one of them mirrored the measurements fit",
+        remedy: "negate y_m, qx and qz, or set the instrument to right-handed axes",
+        undone: |seen| {
+            of_pose(seen, |pose| {
+                let [x, y, z, w] = pose.quaternion_xyzw();
+                Pose::from_xyz_quaternion(mirrored(pose.translation, 1).into(), [-x, y, -z, w])
+            })
+        },
+    },
+    Misread {
+        code: Code::RotationConvention,
+        what: "quaternions stand in the order qw, qx, qy, qz: read so, the measurements fit",
+        remedy: "name the columns in the order in which they stand",
+        undone: |seen| {
+            of_pose(seen, |pose| {
+                let [w, x, y, z] = pose.quaternion_xyzw();
+                Pose::from_xyz_quaternion(pose.xyz(), [x, y, z, w])
+            })
+        },
+    },
+    Misread {
+        code: Code::PosesInverted,
+        what: "rotations are those of the tracker in the target: inverted, the measurements fit",
+        remedy: "negate qx, qy and qz",
+        undone: |seen| of_pose(seen, |pose| Pose::new(pose.rotation.transpose(), pose.translation)),
+    },
+    Misread {
+        code: Code::PosesInverted,
+        what: "poses are those of the tracker in the target: inverted, the measurements fit",
+        remedy: "write the pose of the target in the frame of the tracker",
+        undone: |seen| of_pose(seen, |pose| pose.inverse()),
+    },
+];
+
+impl Misread {
+    /// As a mistake with its remedy.
+    pub fn kind(&self) -> MistakeKind {
+        let Self { code, what, remedy, .. } = self;
+        MistakeKind::Poses { code: *code, what: (*what).to_owned(), remedy: (*remedy).to_owned() }
+    }
+}
+
+fn mirrored(mut position: Vector3<f64>, axis: usize) -> Vector3<f64> {
+    position[axis] = -position[axis];
+    position
+}
+
+fn moved(seen: BodySeen, to: impl Fn(Pose) -> Pose) -> BodySeen {
+    match seen {
+        BodySeen::Point(position) => BodySeen::Point(to(Pose::new(Matrix3::identity(), position)).translation),
+        BodySeen::Pose(pose) => BodySeen::Pose(to(pose)),
+    }
+}
+
+fn of_pose(seen: BodySeen, to: impl Fn(Pose) -> Pose) -> Option<BodySeen> {
+    match seen {
+        BodySeen::Point(_) => None,
+        BodySeen::Pose(pose) => Some(BodySeen::Pose(to(pose))),
+    }
+}

@@ -1,0 +1,243 @@
+//! When touches scatter far more than is stated: the usual mistakes, each undone and the touches fitted again (those that the closed form fits
+//! best), named where one of them explains it.
+//!
+//! Readings may be in another order, of another sign or of other rows; the places may be mirrored, or one of them wrong; the tool may have
+//! been bent, or the work object moved, between two touches. A place that may be wrong counts as unknown. The work object after some touch is
+//! `D` away from where it was: `D` brings its places, as given, to where they are found while they count as unknown.
+
+use std::cmp::Ordering;
+use std::collections::BTreeSet;
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::misread::MISREAD;
+use super::mistakes::mistakes_undone;
+use crate::assess::Limits;
+use crate::diagnose::{Mistake, MistakeKind};
+use crate::error::Code;
+use crate::frames::{FrameFit, Given, KnownRobot, Seen, Touch, Touches, closed_form, fit};
+use crate::geom::{Pose, log_so3, rigid_fit};
+use crate::problem::BodySeen;
+
+/// Of mistakes of one kind, those that are fitted: the closed form fits them best.
+const FITTED: usize = 3;
+
+/// Touches that are named.
+const NAMED: usize = 5;
+
+/// Touches with a mistake undone, and what it is.
+struct Undone {
+    touches: Touches,
+    what: What,
+}
+
+enum What {
+    Kind(MistakeKind),
+    /// This place, now an unknown contact, the last.
+    Place(Vector3<f64>),
+    /// The tool, now the last body, from this posture on.
+    Tool {
+        from: usize,
+    },
+    /// The work object from this posture on, and how it was moved.
+    Work {
+        from: usize,
+        moved: Pose,
+    },
+}
+
+/// The mistake that explains why touches scatter; `None` where they do not, or none of them does.
+pub fn touch_mistake(
+    robot: &KnownRobot,
+    touches: &Touches,
+    given: &Given,
+    (found, limits): (&FrameFit, &Limits),
+) -> Option<Mistake> {
+    if found.factor <= limits.touch_factor {
+        return None;
+    }
+    let fewest = limits.fewest_touches;
+    let from = fewest..(touches.postures.len() + 1).saturating_sub(fewest);
+    let tools = from.clone().filter(|_| given.tool.is_none()).map(|from| other_tool(touches, from));
+    let works = from.filter_map(|from| {
+        let (apart, known) = places_apart(touches, from);
+        work_moved(touches, from, &known, &closed_form(robot, &apart, given)?.1)
+    });
+    let nearest = |undone: Vec<Undone>| nearest(robot, given, undone);
+    let all: Vec<Undone> = [
+        nearest(read_otherwise(robot, touches).collect()),
+        nearest(other_places(touches).collect()),
+        nearest(tools.collect()),
+        nearest(works.collect()),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    let fitted = |touches: &Touches| fit(robot, touches, given, limits).ok();
+    let explains = |fit: &FrameFit| fit.factor < limits.mistake_explains * found.factor;
+    let tried = |undone: Undone| fitted(&undone.touches).filter(explains).map(|fit| (fit, undone));
+    let (left, undone) = all.into_par_iter().filter_map(tried).min_by(|a, b| by_rank(rank(a), rank(b)))?;
+    let frame = touches.frame.as_ref().map_or_else(String::new, |frame| format!(" in frame {frame}"));
+    let (misfit, misfit_undone) = (found.rms_m, Some(left.rms_m));
+    let kind = named(&undone, &left, touches);
+    Some(Mistake { kind, of: format!("touches{frame}"), misfit, misfit_undone, by_images: false })
+}
+
+/// Those that the closed form fits best.
+fn nearest(robot: &KnownRobot, given: &Given, undone: Vec<Undone>) -> Vec<Undone> {
+    let misses = |undone: Undone| closed_form(robot, &undone.touches, given).map(|(rms_m, _)| (rms_m, undone));
+    let mut all: Vec<(f64, Undone)> = undone.into_par_iter().filter_map(misses).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all.into_iter().take(FITTED).map(|(_, undone)| undone).collect()
+}
+
+/// What leaves fewer touches out is better, then what takes no more unknowns, then what fits better.
+fn rank((fit, undone): &(FrameFit, Undone)) -> (usize, bool, f64) {
+    let left_out = fit.judged.iter().filter(|j| j.left_out).count();
+    (left_out, !matches!(undone.what, What::Kind(_)), fit.factor)
+}
+
+fn by_rank(a: (usize, bool, f64), b: (usize, bool, f64)) -> Ordering {
+    (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2))
+}
+
+/// Other readings, or all places otherwise.
+fn read_otherwise(robot: &KnownRobot, touches: &Touches) -> impl Iterator<Item = Undone> {
+    let readings: Vec<Vec<f64>> = touches.postures.iter().map(|p| p.readings.clone()).collect();
+    let of_readings = mistakes_undone(robot.exported(), &readings).into_iter().map(|(readings, kind)| {
+        let mut undone = touches.clone();
+        undone.postures.iter_mut().zip(readings).for_each(|(p, readings)| p.readings = readings);
+        Undone { touches: undone, what: What::Kind(kind) }
+    });
+    let of_places = MISREAD.iter().filter_map(|misread| {
+        let mut undone = touches.clone();
+        for touch in &mut undone.all {
+            touch.seen = match touch.seen {
+                Seen::Point(point) => seen((misread.undone)(BodySeen::Point(point))?),
+                Seen::Pose(pose) => seen((misread.undone)(BodySeen::Pose(pose))?),
+                unknown @ Seen::Unknown(_) => unknown,
+            };
+        }
+        touches.frame.is_some().then(|| Undone { touches: undone, what: What::Kind(misread.kind()) })
+    });
+    of_readings.chain(of_places)
+}
+
+fn seen(seen: BodySeen) -> Seen {
+    match seen {
+        BodySeen::Point(point) => Seen::Point(point),
+        BodySeen::Pose(pose) => Seen::Pose(pose),
+    }
+}
+
+/// One of the places unknown.
+fn other_places(touches: &Touches) -> impl Iterator<Item = Undone> {
+    distinct(touches.all.iter()).into_iter().map(|place| {
+        let mut undone = touches.clone();
+        let contact = undone.contacts.len();
+        undone.contacts.push(String::new());
+        undone.all.iter_mut().filter(|t| t.seen == Seen::Point(place)).for_each(|t| t.seen = Seen::Unknown(contact));
+        Undone { touches: undone, what: What::Place(place) }
+    })
+}
+
+/// Places of points that are known, each once.
+fn distinct<'a>(touches: impl Iterator<Item = &'a Touch>) -> Vec<Vector3<f64>> {
+    let mut all: Vec<Vector3<f64>> = Vec::new();
+    for touch in touches {
+        match touch.seen {
+            Seen::Point(place) if !all.contains(&place) => all.push(place),
+            _ => {}
+        }
+    }
+    all
+}
+
+fn other_tool(touches: &Touches, from: usize) -> Undone {
+    let mut undone = touches.clone();
+    let bodies = touches.bodies.len();
+    undone.bodies.extend_from_within(..);
+    undone.all.iter_mut().filter(|t| t.posture >= from).for_each(|t| t.body += bodies);
+    Undone { touches: undone, what: What::Tool { from } }
+}
+
+/// Places from some posture on as unknown contacts, the last, and where they are said to be.
+fn places_apart(touches: &Touches, from: usize) -> (Touches, Vec<Vector3<f64>>) {
+    let mut apart = touches.clone();
+    let known = distinct(touches.all.iter().filter(|t| t.posture >= from));
+    for touch in apart.all.iter_mut().filter(|t| t.posture >= from) {
+        let Seen::Point(place) = touch.seen else { continue };
+        let index = known.iter().position(|p| *p == place).unwrap_or_default();
+        touch.seen = Seen::Unknown(touches.contacts.len() + index);
+    }
+    apart.contacts.extend(known.iter().map(|_| String::new()));
+    (apart, known)
+}
+
+fn work_moved(touches: &Touches, from: usize, known: &[Vector3<f64>], places: &[Vector3<f64>]) -> Option<Undone> {
+    let found = places.get(touches.contacts.len()..)?;
+    let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = known.iter().copied().zip(found.iter().copied()).collect();
+    let moved = rigid_fit(&pairs).filter(|_| pairs.len() > 2)?;
+    let mut undone = touches.clone();
+    for touch in undone.all.iter_mut().filter(|t| t.posture >= from) {
+        touch.seen = match touch.seen {
+            Seen::Point(place) => Seen::Point(moved.transform(&place)),
+            Seen::Pose(pose) => Seen::Pose(moved * pose),
+            unknown @ Seen::Unknown(_) => unknown,
+        };
+    }
+    Some(Undone { touches: undone, what: What::Work { from, moved } })
+}
+
+fn named(undone: &Undone, left: &FrameFit, touches: &Touches) -> MistakeKind {
+    let first = |from: usize| {
+        let touch = touches.all.iter().find(|t| t.posture == from);
+        touch.map_or_else(String::new, |t| t.stop.clone())
+    };
+    let (code, what, remedy) = match &undone.what {
+        What::Kind(kind) => return kind.clone(),
+        What::Place(place) => {
+            let found = left.places.last().copied().unwrap_or(*place);
+            let of: BTreeSet<&str> =
+                touches.all.iter().filter(|t| t.seen == Seen::Point(*place)).map(|t| t.stop.as_str()).collect();
+            let more = if of.len() > NAMED { ", .." } else { "" };
+            let names: Vec<&str> = of.into_iter().take(NAMED).collect();
+            let what = format!(
+                "the place {} that was touched at {}{more} is at {} by the others, {:.2} mm away",
+                in_metres(place),
+                names.join(", "),
+                in_metres(&found),
+                1e3 * (found - place).norm()
+            );
+            (Code::PlaceContradicted, what, "correct it in contacts.csv, or touch the point that was meant".to_owned())
+        }
+        What::Tool { from } => {
+            let half = touches.bodies.len();
+            let moved = left.tools[half].translation - left.tools[0].translation;
+            let what = format!(
+                "from {} on the point of the tool is {:.2} mm elsewhere on the tip: it was bent, exchanged or came loose",
+                first(*from),
+                1e3 * moved.norm()
+            );
+            let remedy = format!("use the touches before {}, or those from it on", first(*from));
+            (Code::TargetDisplaced, what, remedy)
+        }
+        What::Work { from, moved } => {
+            let places: Vec<Vector3<f64>> = touches.placed().map(|(_, place)| place).collect();
+            let middle = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
+            let what = format!(
+                "from {} on the work object stands {:.2} mm, {:.2} mrad elsewhere: it was moved, or the base of the robot, or the zero of a joint slipped",
+                first(*from),
+                1e3 * (moved.transform(&middle) - middle).norm(),
+                1e3 * log_so3(&moved.rotation).norm()
+            );
+            (Code::WorkDisplaced, what, format!("use the touches before {}, or those from it on", first(*from)))
+        }
+    };
+    MistakeKind::Poses { code, what, remedy }
+}
+
+fn in_metres(place: &Vector3<f64>) -> String {
+    format!("({:.4}, {:.4}, {:.4}) m", place.x, place.y, place.z)
+}
