@@ -1,8 +1,8 @@
 //! Covariance that trusts the scatter between stops more than the model of the noise.
 //!
 //! Markers count as known here: every one is told by many images, and a shift of all of them is none of the plate. With the
-//! information `S = R R'` of the images and measured bodies of a stop about their poses and intrinsics, joint noise eliminated, and their derivatives `T` by the
-//! columns, the covariance is `K = (sum T' S T + P)^-1` with the prior information `P`. With the scores `b` of the stops (the latents
+//! information `S = R R'` of the images and measured bodies of a stop about their poses and intrinsics, joint noise eliminated,
+//! and their derivatives `T` by the columns, the covariance is `K = (sum T' S T + P)^-1` with the prior information `P`. With the scores `b` of the stops (the latents
 //! included, whose own score is zero at the optimum) the sandwich is `K (sum T' b b' T + P) K`; priors count as the observations that
 //! they stand for.
 //!

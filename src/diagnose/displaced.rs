@@ -67,16 +67,16 @@ impl Displaced {
 
     /// True where measurements with this instrument scatter because of it.
     pub(super) fn explains_scatter_of(&self, instrument: &str) -> bool {
-        matches!(self.body, Carried::Instrument | Carried::Target) && self.mounting == instrument
+        self.is_measured() && self.mounting == instrument
     }
 
     fn is_camera(&self) -> bool {
         matches!(self.body, Carried::CameraInHand | Carried::Camera)
     }
 
-    /// "image" or "stop".
-    fn shown(&self) -> &'static str {
-        if matches!(self.body, Carried::Instrument | Carried::Target) { "stop" } else { "image" }
+    /// True where a tracker or contacts show it, not images.
+    fn is_measured(&self) -> bool {
+        matches!(self.body, Carried::Instrument | Carried::Target)
     }
 
     /// The first image in which it stands elsewhere.
@@ -118,7 +118,7 @@ impl Kind for Displaced {
     fn subjects(&self) -> Vec<Subject> {
         let mut all = vec![Subject::Series(self.series.clone()), Subject::Body(self.body().to_owned())];
         if !matches!(self.displacement, Displacement::AllThrough | Displacement::InAll) {
-            let subject = if self.shown() == "stop" { Subject::Stop } else { Subject::Image };
+            let subject = if self.is_measured() { Subject::Stop } else { Subject::Image };
             all.extend(self.images.iter().cloned().map(subject));
         }
         all
@@ -167,7 +167,7 @@ impl Kind for Displaced {
             Displacement::AllThrough => {
                 format!(
                     "from the first to the last {} the {body} creeps by {size}: it is not yet warm, or gives way",
-                    self.shown()
+                    if self.is_measured() { "stop" } else { "image" }
                 )
             }
             Displacement::InAll => {

@@ -23,6 +23,7 @@ use crate::assess::{Accuracy, Limits};
 use crate::fit::Fit;
 use crate::problem::{Adjustment, Problem};
 use crate::series::CameraMount;
+use crate::urdf::JointKind;
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Finding> {
     let fit = setting.with_noise_found(fit);
@@ -40,7 +41,9 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
     while found.len() < limits.displacements {
         let tried = linear.candidates(problem, limits.displaced_images);
         let squares = left.poses.iter().sum::<f64>() + of_priors;
-        let Some(mut best) = linear.best(problem, &tried, squares, limits.displaced_share) else { break };
+        let Some(mut best) = linear.best(problem, &tried, (squares, &left.zeros), limits.displaced_share) else {
+            break;
+        };
         let log_chance = best.log_chance + (tried.len() as f64).ln();
         if log_chance > limits.displaced_false_alarms.ln() {
             break;
@@ -137,13 +140,12 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     let limits = setting.limits;
     if let Changed::Zero(reading) = step.changed {
         let chain = &fit.state.robot.chain;
-        let kind = chain.reading_kinds[reading];
-        return Some(
-            ZeroMoved::new(chain.readings[reading].clone(), kind, series, displacement, images)
-                .by(step.change[0], step.covariance[(0, 0)].sqrt(), step.share)
-                .weighed(limits)
-                .into(),
-        );
+        let (joint, kind) = (chain.readings[reading].clone(), chain.reading_kinds[reading]);
+        let repeats_to = if kind == JointKind::Prismatic { limits.displaced_m } else { limits.displaced_rad };
+        let offset = (step.change[0], step.covariance[(0, 0)].sqrt());
+        let weight = if offset.0.abs() > repeats_to { Weight::Gate } else { Weight::Note };
+        let (stops, share) = (images, step.share);
+        return Some(ZeroMoved { joint, kind, series, displacement, stops, offset, share, weight }.into());
     }
     let sized = |from: usize| {
         let axes = from..(from + 3).min(step.change.len());

@@ -188,22 +188,28 @@ impl Linear {
     }
 
     /// The step that noise explains least, `squares` being those that it may explain. The noise of one joint that has grown with the fault
-    /// of its zero hides it from the squares of all: where a step explains this `share` of those in the direction of its reading, these count.
-    pub(super) fn best(&self, problem: &Problem, tried: &[Candidate], squares: f64, share: f64) -> Option<Step> {
+    /// of its zero hides it from the squares of all: where a step explains this `share` of those in the direction of its reading, `of_zeros`,
+    /// these count.
+    pub(super) fn best(
+        &self,
+        problem: &Problem,
+        tried: &[Candidate],
+        (squares, of_zeros): (f64, &[Vec<f64>]),
+        share: f64,
+    ) -> Option<Step> {
         let covariance = SymmetricFactor::new(&self.information).ok()?.inverse();
         let chance = |fall: &Fall| log_chance(fall.cost / squares, squares, fall.told);
-        let mut best = self.least(problem, tried, &covariance, chance)?;
-        let of_zeros = self.zero_squares(problem.noise.joint.len());
+        let mut best = self.least(problem, tried.iter(), &covariance, chance)?;
         for (group, of_readings) in of_zeros.iter().enumerate() {
             for (reading, own) in of_readings.iter().enumerate() {
                 let is_own = |c: &&Candidate| c.group == group && c.changed == Changed::Zero(reading);
-                let tried: Vec<Candidate> = tried.iter().filter(is_own).cloned().collect();
-                let Some(mut step) = self.least(problem, &tried, &covariance, |fall| -fall.cost) else { continue };
+                let tried = tried.iter().filter(is_own);
+                let Some(mut step) = self.least(problem, tried, &covariance, |fall| -fall.cost) else { continue };
                 if step.fall <= share * own {
                     continue;
                 }
                 let Some((next, _)) = self.with(problem, &step) else { continue };
-                let left = next.zero_squares(problem.noise.joint.len())[group][reading];
+                let left = next.zero_squares(of_zeros.len())[group][reading];
                 step.log_chance = log_chance(1.0 - left / own, *own, 1);
                 if step.log_chance < best.log_chance {
                     best = step;
@@ -214,17 +220,16 @@ impl Linear {
     }
 
     /// The step of which `score` is least; where several are alike, the first.
-    fn least(
+    fn least<'a>(
         &self,
         problem: &Problem,
-        tried: &[Candidate],
+        tried: impl Iterator<Item = &'a Candidate>,
         covariance: &DMatrix<f64>,
         score: impl Fn(&Fall) -> f64,
     ) -> Option<Step> {
         let (coarse, ..) = self.least_of(problem, tried, covariance, &score)?;
-        let finer = tried[coarse].neighbours();
-        let (best, log_chance, fall) = self.least_of(problem, &finer, covariance, &score)?;
-        let candidate = &finer[best];
+        let finer = coarse.neighbours();
+        let (candidate, log_chance, fall) = self.least_of(problem, finer.iter(), covariance, &score)?;
         let moved: Vec<(usize, f64)> = candidate.moved().collect();
         let shown = moved.iter().flat_map(|(r, _)| self.rows[*r].of(problem, candidate.changed)).collect();
         let Candidate { changed, order, group, .. } = *candidate;
@@ -232,18 +237,18 @@ impl Linear {
         Some(Step { changed, order, group, moved, shown, change, covariance, fall: cost, share: 0.0, log_chance })
     }
 
-    /// Place of the candidate with the least score, this, and what it explains.
-    fn least_of(
+    /// The candidate with the least score, this, and what it explains.
+    fn least_of<'a>(
         &self,
         problem: &Problem,
-        tried: &[Candidate],
+        tried: impl Iterator<Item = &'a Candidate>,
         covariance: &DMatrix<f64>,
         score: impl Fn(&Fall) -> f64,
-    ) -> Option<(usize, f64, Fall)> {
-        let mut best: Option<(usize, f64, Fall)> = None;
+    ) -> Option<(&'a Candidate, f64, Fall)> {
+        let mut best: Option<(&Candidate, f64, Fall)> = None;
         let mut sums = Sums::new(self.columns(), 0);
         let mut before: Option<&Candidate> = None;
-        for (c, candidate) in tried.iter().enumerate() {
+        for candidate in tried {
             let columns = candidate.changed.columns(&problem.layout, &self.zeros);
             // Behind a step are the rows behind the one before it, and those between both.
             if let Some(last) = before.filter(|b| Rc::ptr_eq(&b.rows, &candidate.rows) && b.from > candidate.from) {
@@ -257,7 +262,7 @@ impl Linear {
             let Some(fall) = sums.fall(covariance).filter(|fall| fall.told > 0) else { continue };
             let score = score(&fall);
             if best.as_ref().is_none_or(|(_, least, _)| score < *least) {
-                best = Some((c, score, fall));
+                best = Some((candidate, score, fall));
             }
         }
         best

@@ -2,7 +2,6 @@
 
 use super::displaced::Displacement;
 use super::kind::{Kind, Quantity, Subject, Weight};
-use crate::assess::Limits;
 use crate::error::Code;
 use crate::urdf::JointKind;
 
@@ -28,24 +27,9 @@ pub struct ZeroMoved {
 }
 
 impl ZeroMoved {
-    pub(super) fn new(
-        joint: String,
-        kind: JointKind,
-        series: String,
-        displacement: Displacement,
-        stops: Vec<String>,
-    ) -> Self {
-        Self { joint, kind, series, displacement, stops, offset: (0.0, 0.0), share: 0.0, weight: Weight::Note }
-    }
-
-    pub(super) fn by(self, offset: f64, sigma: f64, share: f64) -> Self {
-        Self { offset: (offset, sigma), share, ..self }
-    }
-
-    pub(super) fn weighed(self, limits: &Limits) -> Self {
-        let repeats_to = if self.kind == JointKind::Prismatic { limits.displaced_m } else { limits.displaced_rad };
-        let weight = if self.offset.0.abs() > repeats_to { Weight::Gate } else { Weight::Note };
-        Self { weight, ..self }
+    /// True where hand or camera seem to have two positions because of it.
+    pub(super) fn explains_two_places(&self) -> bool {
+        self.weight == Weight::Gate && self.displacement == Displacement::FromThenOn
     }
 
     fn unit(&self) -> &'static str {
