@@ -4,10 +4,11 @@
 usage: python3 benches/worlds.py [FIRST LAST]     (seeds, default 1 40 of each kind; needs numpy; ROBOTCAL names the binary)
 
 Robots of robots/ with errors of 0.3 mm and 1 mrad at every origin and 3 mrad at every zero. "cameras": two of them at the same stops, in
-the hand, fixed, or one of each. "series": one to three, each with a camera in the hand, a fixed one, tracker points, tracker poses or a
-ball in sockets, cameras, mountings and boards shared or not. A world is judged by `identify --at` at 60 joint vectors that were not
-measured: error of the position of the flange, its mean in the frame of the tip taken off (and without a camera the base that fits best),
-over the stated sigma, RMS within the range of the stops.
+the hand, fixed, or one of each. "several": one to three series, each with a camera in the hand, a fixed one, tracker points, tracker poses
+or a ball in sockets, cameras, mountings and boards shared or not. "cells": an arm on a rail, before a positioner, or before a second arm
+that carries the board. A world is judged by `identify --at` at 60 joint vectors that were not measured: error of the position of the flange
+(of cells in the frame of what carries the board), its mean in the frame of the tip taken off (and without a camera at rest the base that
+fits best), over the stated sigma, RMS within the range of the stops.
 """
 import csv
 import math
@@ -77,42 +78,112 @@ def adjoint(m):
     return a
 
 
-class Robot:
-    """A chain of a URDF with errors."""
+class Chain:
+    """The joints between two links of a URDF, with errors."""
 
-    def __init__(self, name, rng):
-        self.urdf = f"robots/{name}/{name}.urdf"
-        root = ElementTree.parse(self.urdf).getroot()
+    def __init__(self, root, base, tip, rng):
         joints = {j.find("child").get("link"): j for j in root.findall("joint")}
-        links = [link.get("name") for link in root.findall("link")]
-        self.base = next(link for link in links if link not in joints)
-        leaves = set(links) - {j.find("parent").get("link") for j in joints.values()}
-        self.tip = next((t for t in ("tool0", "tool_0", "flange") if t in links), None) or leaves.pop()
-        chain, link = [], self.tip
-        while link != self.base:
+        chain, link = [], tip
+        while link != base:
             chain.append(joints[link])
             link = joints[link].find("parent").get("link")
-        self.names, self.steps = [], []
+        self.names, self.steps, self.unit = [], [], []
         for joint in reversed(chain):
             origin = joint.find("origin")
             numbers = lambda key: [float(v) for v in ((origin.get(key) if origin is not None else None) or "0 0 0").split()]
             step, axis = pose(rpy(*numbers("rpy")), numbers("xyz")), None
-            if joint.get("type") in ("revolute", "continuous"):
+            if joint.get("type") in ("revolute", "continuous", "prismatic"):
                 axis = np.array([float(v) for v in joint.find("axis").get("xyz").split()])
                 step = step @ pose(turn(rng.normal(0, 1e-3, 3)), rng.normal(0, 3e-4, 3))
                 self.names.append(joint.get("name"))
-            self.steps.append((step, axis))
-        self.zeros = rng.normal(0, 3e-3, len(self.names))
+                self.unit.append(0.1 if joint.get("type") == "prismatic" else 1.0)
+            self.steps.append((step, axis, joint.get("type") == "prismatic"))
+        # Metres of a rail are repeated to ten times better than radians of a joint.
+        self.unit = np.array(self.unit)
+        self.zeros = rng.normal(0, 3e-3, len(self.names)) * self.unit
+
+    def tip_at(self, readings):
+        m, values = np.eye(4), iter(readings + self.zeros)
+        for step, axis, slides in self.steps:
+            m = m @ step
+            if axis is not None:
+                by = axis * next(values)
+                m = m @ (pose(position=by) if slides else pose(turn(by)))
+        return m
+
+
+def ends(root):
+    """Root link and tip of a description."""
+    children = {j.find("child").get("link") for j in root.findall("joint")}
+    links = [link.get("name") for link in root.findall("link")]
+    leaves = set(links) - {j.find("parent").get("link") for j in root.findall("joint")}
+    tip = next((t for t in ("tool0", "tool_0", "flange") if t in links), None) or leaves.pop()
+    return next(link for link in links if link not in children), tip
+
+
+class Robot(Chain):
+    """An arm of robots/ with errors."""
+
+    def __init__(self, name, rng):
+        self.urdf = f"robots/{name}/{name}.urdf"
+        root = ElementTree.parse(self.urdf).getroot()
+        self.base, self.tip = ends(root)
+        super().__init__(root, self.base, self.tip, rng)
         self.middle = np.array(ROBOTS[name])
         self.reach = REACH[: len(self.names)]
 
+
+LIMIT = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
+RAIL = f"""<r><link name="hall"/><joint name="e1" type="prismatic"><origin xyz="0 0 0.2"/><parent link="hall"/><child link="BASE"/>
+<axis xyz="0 1 0"/>{LIMIT}</joint></r>"""
+TABLE = f"""<r><link name="cell"/><link name="stand"/><link name="cradle"/><link name="table"/>
+<joint name="floor" type="fixed"><parent link="cell"/><child link="BASE"/></joint>
+<joint name="foot" type="fixed"><origin xyz="0.75 0.05 0.1"/><parent link="cell"/><child link="stand"/></joint>
+<joint name="e1" type="revolute"><parent link="stand"/><child link="cradle"/><axis xyz="0 1 0"/>{LIMIT}</joint>
+<joint name="e2" type="revolute"><origin xyz="0 0 0.12"/><parent link="cradle"/><child link="table"/><axis xyz="0 0 1"/>{LIMIT}</joint></r>"""
+
+
+class Cell:
+    """An arm on a rail, before a positioner, or before a second arm that carries the board: the tip as what carries the board sees it."""
+
+    def __init__(self, kind, rng, folder):
+        arm = ElementTree.parse("robots/kuka_kr6_r900/kuka_kr6_r900.urdf").getroot()
+        (self.base, self.tip), self.manifest = ends(arm), ""
+        for element in ElementTree.fromstring({"rail": RAIL, "positioner": TABLE}.get(kind, "<r/>").replace("BASE", self.base)):
+            arm.append(element)
+        self.base = {"rail": "hall", "positioner": "cell"}.get(kind, self.base)
+        self.urdf = str(folder / "cell.urdf")
+        ElementTree.ElementTree(arm).write(self.urdf)
+        self.first, self.second, self.between = Chain(arm, self.base, self.tip, rng), None, np.eye(4)
+        middle, reach = ROBOTS["kuka_kr6_r900"], list(REACH[:6])
+        if kind == "rail":
+            self.middle, self.reach = np.array([0, *middle]), np.array([0.6, *reach])
+        elif kind == "positioner":
+            self.second = Chain(arm, "cell", "table", rng)
+            self.middle, self.reach = np.array([*middle, 0, 0]), np.array([*reach, 0.5, 1.5])
+            self.manifest = '[plate_mount]\nlink = "table"\n'
+        else:
+            other = Path("robots/ur10e/ur10e.urdf").resolve()
+            root = ElementTree.parse(other).getroot()
+            base, tip = ends(root)
+            self.second = Chain(root, base, tip, rng)
+            self.middle = np.array([*middle, *ROBOTS["ur10e"]])
+            self.reach = np.array([*reach, 0.2, 0.2, 0.2, 0.5, 0.5, 1.5])
+            self.manifest = f'[robot_2]\nurdf = "{other}"\nbase = "{base}"\ntip = "{tip}"\n'
+        chains = [c for c in (self.first, self.second) if c is not None]
+        # Links of the second arm are called as those of the first, so that all its names get a prefix.
+        prefix = "robot_2_" if kind == "two arms" else ""
+        self.names = self.first.names + [prefix + n for c in chains[1:] for n in c.names]
+        self.unit = np.concatenate([c.unit for c in chains])
+
+    def ends_at(self, readings):
+        """Tip of the arm, and what carries the board, each in the frame of its base."""
+        n = len(self.first.names)
+        return self.first.tip_at(readings[:n]), np.eye(4) if self.second is None else self.second.tip_at(readings[n:])
+
     def tip_at(self, readings):
-        m, angles = np.eye(4), iter(readings + self.zeros)
-        for step, axis in self.steps:
-            m = m @ step
-            if axis is not None:
-                m = m @ pose(turn(axis * next(angles)))
-        return m
+        tip, board = self.ends_at(readings)
+        return np.linalg.inv(self.between @ board) @ tip
 
 
 class Camera:
@@ -170,9 +241,9 @@ def carried(rng):
 class World:
     """A robot with its noise, and what files of a series have in common."""
 
-    def __init__(self, seed, folder):
+    def __init__(self, seed, folder, robot=None):
         self.rng = np.random.default_rng(seed)
-        self.robot = Robot(self.rng.choice(list(ROBOTS)), self.rng)
+        self.robot = robot(self.rng) if robot else Robot(self.rng.choice(list(ROBOTS)), self.rng)
         self.sigma_px = self.rng.choice([0.02, 0.05, 0.2])
         self.joint_noise = self.rng.choice([0, 2e-5, 1e-4, 5e-4])
         self.board_error = self.rng.choice([0, 3e-5, 1e-4])
@@ -181,7 +252,7 @@ class World:
     def stop(self, middle, wider=1.0):
         """Readings, and where the tip truly is."""
         readings = middle + self.rng.uniform(-1, 1, len(middle)) * self.robot.reach * wider
-        return readings, self.robot.tip_at(readings + self.rng.normal(0, 1, len(middle)) * self.joint_noise)
+        return readings, self.robot.tip_at(readings + self.rng.normal(0, 1, len(middle)) * self.joint_noise * self.robot.unit)
 
     def write(self, folder, key, names, readings, manifest):
         write(folder / "joints.csv", [key, *self.robot.names], [[n, *q] for n, q in zip(names, readings)])
@@ -374,9 +445,41 @@ def several(seed, folder):
     return *world.judged(paths, first, [np.eye(4)] + ([tracker] if tracker is not None else []), True), words
 
 
+def cells(seed, folder):
+    """A camera in the hand of an arm that does not stand alone."""
+    kind = ["rail", "positioner", "two arms"][seed % 3]
+    world = World(2000 + seed, folder, lambda rng: Cell(kind, rng, folder))
+    rng, cell, inverse = world.rng, world.robot, np.linalg.inv
+    board, lens, hand = Board(rng, world.board_error), Camera(rng), carried(rng)
+    board.write(folder)
+    tip, carrier = cell.ends_at(cell.middle)
+    if kind == "two arms":
+        held = carried(rng)
+        cell.between = tip @ hand @ looking(rng, 0.4) @ inverse(carrier @ held)
+    else:
+        held = inverse(carrier) @ tip @ hand @ looking(rng, 0.4)
+    readings, seen, wanted = [], [], int(rng.choice([24, 40]))
+    for _ in range(60000):
+        q, tip = world.stop(cell.middle)
+        corners = lens.see(inverse(tip @ hand) @ held, board, world.sigma_px, rng)
+        if corners:
+            seen += [[f"{len(readings):03}.png", corner, *uv] for corner, uv in corners.items()]
+            readings.append(q)
+        if len(readings) == wanted:
+            break
+    world.observations(folder, seen)
+    manifest = (
+        'camera_mount = "hand"\nplate = "plate.toml"\n[camera]\nname = "hand"\n'
+        f'width_px = {WIDTH}\nheight_px = {HEIGHT}\n[observations]\npoint = "centre"\n{cell.manifest}'
+    )
+    world.write(folder, "image", [f"{i:03}.png" for i in range(len(readings))], readings, manifest)
+    words = f"{kind}, {len(readings)} of {wanted} stops"
+    return *world.judged([folder], cell.middle, [np.eye(4)], True), words
+
+
 def main():
     first, last = (int(v) for v in sys.argv[1:3]) if len(sys.argv) > 2 else (1, 40)
-    for kind in (cameras, several):
+    for kind in (cameras, several, cells):
         ratios = []
         for seed in range(first, last + 1):
             with tempfile.TemporaryDirectory() as folder:
