@@ -118,7 +118,6 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/two_stage.rs DECREMENT", "convergence"),
     ("identify/two_stage.rs FIRST_FACTOR", "first guess"),
     ("identify/two_stage.rs FIRST_ISOTROPIC", "first guess"),
-    ("identify/two_stage.rs FIRST_JOINT_NOISE", "first guess"),
     ("identify/two_stage.rs MOST_TOGETHER", "bounds the work; what it leaves out is none of the result"),
     ("identify/two_stage.rs PREDICTED", "convergence"),
     ("identify/two_stage.rs ROUNDS", "most iterations"),
