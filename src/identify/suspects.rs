@@ -1,9 +1,9 @@
 //! When readings and images do not fit: the usual mistakes, tried one by one, named where one of them explains it.
 
-use super::bases;
-use super::mistakes::{mistakes_undone, shifted_rows};
 use rayon::prelude::*;
 
+use super::bases;
+use super::mistakes::{mistakes_undone, shifted_rows};
 use crate::assess::Limits;
 use crate::diagnose::MistakeKind;
 use crate::init::{PosePair, SeenStop, plate_scale, solve_hand_eye};
