@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::hold_out::{Accuracy, Errors, dealt, nominal, of_fold, refitted_near, side_by_side};
 use super::limits::Limits;
-use crate::problem::{State, TakenFrom};
+use crate::problem::{Problem, State, TakenFrom};
 use crate::solve::{LinearProblem, solve};
 use crate::stage::stage;
 
@@ -21,9 +21,11 @@ pub fn hold_out_bodies(fit: LinearProblem, limits: &Limits) -> Option<(Accuracy,
         return None;
     }
     let folds = dealt(stops.into_iter().map(|stop| vec![stop]).collect());
-    let nominal = solve(nominal(fit.adjustment), &of_fold(fit.adjustment));
-    let (before, _) = predictions(nominal.linear()?, &folds)?;
-    let (after, states) = predictions(fit, &folds)?;
+    let nominal = nominal(fit.adjustment);
+    let settings = of_fold(&nominal);
+    let nominal = solve(nominal, &settings);
+    let (before, _) = predictions(problem, nominal.linear()?, &folds)?;
+    let (after, states) = predictions(problem, fit, &folds)?;
     let mut per_body_mm = vec![None; problem.body_measurements.len()];
     for ((k, a), (_, b)) in before.iter().zip(&after) {
         per_body_mm[*k] = Some([*a, *b]);
@@ -36,8 +38,8 @@ pub fn hold_out_bodies(fit: LinearProblem, limits: &Limits) -> Option<(Accuracy,
 /// Distance of what was measured from what is predicted, mm, with the index of the measurement; ascending.
 type Predictions = (Vec<(usize, f64)>, Vec<State>);
 
-fn predictions(fit: LinearProblem, folds: &[Vec<usize>]) -> Option<Predictions> {
-    let problem = &fit.adjustment.problem;
+/// Of all that is in use in a problem, by fits of it, or of some of it.
+fn predictions(problem: &Problem, fit: LinearProblem, folds: &[Vec<usize>]) -> Option<Predictions> {
     let states = side_by_side(folds, |_, held| refitted_near(fit.without_bodies_at(held)));
     let mut errors = Vec::new();
     for (held, state) in folds.iter().zip(&states) {

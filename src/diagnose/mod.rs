@@ -3,6 +3,7 @@
 //! To add one: a file with a function of the stage at which it runs and a type that is a `Kind`; the type as a variant of
 //! [`Finding`]; the function as a row of [`CHECKS`]. Numbers that decide stand in [`crate::assess::Limits`].
 
+mod agreement;
 mod camera_model;
 mod camera_pattern;
 mod checks;
@@ -40,6 +41,7 @@ mod undetermined;
 mod zero_moved;
 mod zeros_off;
 
+pub use agreement::agreement;
 pub use camera_model::CameraModelMisfit;
 pub use camera_pattern::{ResidualPattern, residual_pattern};
 pub use checks::{CHECKS, Check, Diagnosis, Stage};
@@ -62,7 +64,7 @@ pub use loose::LooseMounting;
 pub use marker_off::MarkerOff;
 pub use measurement_scatter::MeasurementsScatter;
 pub use mistake::{Mistake, MistakeKind};
-pub use moved::{BodyMoved, MovedBody};
+pub use moved::BodyMoved;
 pub use no_gain::NoGain;
 pub use noticed::Noticed;
 pub use parameter_off::ParameterOff;

@@ -1,33 +1,20 @@
-//! Images that disagree with their readings but agree with each other: the plate or the camera was moved.
+//! Images that disagree with their readings but agree with each other: the plate or the camera was moved, or a joint reads otherwise.
 
+use super::agreement::{Agreement, Moved, agreement};
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
-use crate::geom::Pose;
-use crate::init::PosePair;
-use crate::problem::{Adjustment, ImageRejection};
+use crate::init::{HandEye, SeenStop};
+use crate::problem::{Adjustment, ImageRejection, Problem};
 
-/// Plate or camera was moved within a series, by so much that its images were left out.
+/// Something is another at some images of a series, by so much that these do not fit the others.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodyMoved {
-    /// What was moved.
-    pub body: MovedBody,
+    /// What, and by how much.
+    pub moved: Moved,
     /// Last image before and first image after it.
     pub between: [String; 2],
-    /// Images that saw the new place.
+    /// Images that saw it.
     pub images: Vec<String>,
-    /// How far, m.
-    pub distance_m: f64,
-    /// By which angle, rad.
-    pub angle_rad: f64,
-}
-
-/// What can be moved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MovedBody {
-    /// The plate.
-    Plate,
-    /// The camera on its mount.
-    Camera,
 }
 
 pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<BodyMoved> {
@@ -35,122 +22,111 @@ pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<Body
     series.filter_map(|k| find_move(adjustment, setting, k)).collect()
 }
 
-/// Looks for one common new place among the wrongly paired images of a series.
+/// Looks for what the wrongly paired images of a series agree on.
 fn find_move(Adjustment { problem, state }: &Adjustment, setting: &CheckContext, series: usize) -> Option<BodyMoved> {
-    let free = setting.free;
-    let mut wrong: Vec<(usize, PosePair)> = Vec::new();
-    for (i, image) in problem.images.iter().enumerate().filter(|(_, image)| image.series == series) {
-        let suspect = image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair);
-        if let (true, Some(stop), Some(pose)) = (suspect, problem.posture(i), &free.poses[i]) {
-            wrong.push((i, PosePair::of_stop(&state.robot, image.mount, &stop.readings, pose.camera_from_plate)));
-        }
+    let of_series = problem.images.iter().enumerate().filter(|(_, image)| image.series == series);
+    let (wrong, seen): (Vec<usize>, Vec<SeenStop>) = of_series
+        .filter(|(_, image)| image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair))
+        .filter_map(|(i, image)| {
+            let (stop, pose) = (problem.posture(i)?, setting.free.poses[i].as_ref()?);
+            let (readings, camera_from_plate) = (stop.readings.clone(), pose.camera_from_plate);
+            Some((i, SeenStop { readings, mount: image.mount, camera_from_plate }))
+        })
+        .unzip();
+    let first = &problem.images[*wrong.first()?];
+    let others = HandEye { camera: state.mountings[first.mounting], plate: state.placements[first.placement] };
+    let found = agreement(&state.robot, &others, &seen, setting.limits)?;
+    BodyMoved::of(problem, &wrong, found)
+}
+
+impl BodyMoved {
+    /// What some `images`, by their index, agree on.
+    pub fn of(problem: &Problem, images: &[usize], found: Agreement) -> Option<Self> {
+        let images: Vec<usize> = found.members.iter().map(|&k| images[k]).collect();
+        let (from, to) = (*images.first()?, *images.last()?);
+        let own = |i: &usize| problem.images[*i].series == problem.images[from].series;
+        let neighbour = (to + 1..problem.images.len()).find(own).or_else(|| (0..from).rev().find(own))?;
+        let (early, late) = if neighbour > to { (to, neighbour) } else { (neighbour, from) };
+        let name = |i: usize| problem.images[i].name.clone();
+        let between = [name(early), name(late)];
+        Some(Self { moved: found.moved, between, images: images.into_iter().map(name).collect() })
     }
-    let first = &problem.images[wrong.first()?.0];
-    let (camera, plate) = (state.mountings[first.mounting], state.placements[first.placement]);
-    let plate_at = |p: &PosePair| p.chain.inverse() * camera * p.camera_from_plate;
-    let camera_at = |p: &PosePair| p.chain * plate * p.camera_from_plate.inverse();
-    let plates: Vec<Pose> = wrong.iter().map(|(_, p)| plate_at(p)).collect();
-    let cameras: Vec<Pose> = wrong.iter().map(|(_, p)| camera_at(p)).collect();
-    let (fewest, agreement) = (setting.limits.moved_images, setting.limits.moved_agreement);
-    let candidates = [
-        (MovedBody::Plate, common(&plates, &plate, fewest, agreement)),
-        (MovedBody::Camera, common(&cameras, &camera, fewest, agreement)),
-    ];
-    let (body, place) = candidates
-        .into_iter()
-        .filter_map(|(body, common)| common.map(|c| (body, c)))
-        .min_by(|a, b| a.1.spread.total_cmp(&b.1.spread))?;
-    let images: Vec<usize> = place.members.iter().map(|&k| wrong[k].0).collect();
-    let (from, to) = (images.first()?, images.last()?);
-    let own = |i: &usize| problem.images[*i].series == series;
-    let neighbour = (*to + 1..problem.images.len()).find(own).or_else(|| (0..*from).rev().find(own))?;
-    let (early, late) = if neighbour > *to { (*to, neighbour) } else { (neighbour, *from) };
-    let name = |i: usize| problem.images[i].name.clone();
-    Some(BodyMoved {
-        body,
-        between: [name(early), name(late)],
-        distance_m: place.moved.1,
-        angle_rad: place.moved.0,
-        images: images.into_iter().map(name).collect(),
-    })
 }
 
 impl Kind for BodyMoved {
     fn code(&self) -> Code {
-        match self.body {
-            MovedBody::Plate => Code::PlateMoved,
-            MovedBody::Camera => Code::CameraMoved,
+        match self.moved {
+            Moved::Plate { .. } => Code::PlateMoved,
+            Moved::Camera { .. } => Code::CameraMoved,
+            Moved::Zero { .. } => Code::ZeroMoved,
+            Moved::Readings { .. } => Code::JointReadingsWrong,
         }
     }
 
     fn subjects(&self) -> Vec<Subject> {
-        self.images.iter().cloned().map(Subject::Image).collect()
+        let joint = match &self.moved {
+            Moved::Zero { joint, .. } | Moved::Readings { joint, .. } => Some(Subject::Joint(joint.clone())),
+            _ => None,
+        };
+        joint.into_iter().chain(self.images.iter().cloned().map(Subject::Image)).collect()
     }
 
     fn quantities(&self) -> Vec<Quantity> {
-        vec![Quantity::new("distance", self.distance_m, "m"), Quantity::new("angle", self.angle_rad, "rad")]
+        match self.moved {
+            Moved::Plate { distance_m, angle_rad } | Moved::Camera { distance_m, angle_rad } => {
+                vec![Quantity::new("distance", distance_m, "m"), Quantity::new("angle", angle_rad, "rad")]
+            }
+            Moved::Zero { kind, offset, .. } => vec![Quantity::new("offset", offset, kind.units()[0])],
+            Moved::Readings { .. } => Vec::new(),
+        }
     }
 
     fn place(&self) -> String {
-        match self.body {
-            MovedBody::Plate => "plate".into(),
-            MovedBody::Camera => "camera on its mount".into(),
+        match &self.moved {
+            Moved::Plate { .. } => "plate".into(),
+            Moved::Camera { .. } => "camera on its mount".into(),
+            Moved::Zero { joint, .. } | Moved::Readings { joint, .. } => joint.clone(),
         }
     }
 
     fn seen(&self) -> String {
-        format!(
-            "was moved between {} and {}: {} images, {} to {}, agree on a place {:.1} mm and {:.1} mrad from that of the others",
-            self.between[0],
-            self.between[1],
+        let [before, after] = &self.between;
+        let images = format!(
+            "{} images, {} to {}",
             self.images.len(),
             self.images.first().map_or("", String::as_str),
             self.images.last().map_or("", String::as_str),
-            1e3 * self.distance_m,
-            1e3 * self.angle_rad
-        )
+        );
+        match &self.moved {
+            Moved::Plate { distance_m, angle_rad } | Moved::Camera { distance_m, angle_rad } => format!(
+                "was moved between {before} and {after}: {images}, agree on a place {:.1} mm and {:.1} mrad from that of the others",
+                1e3 * distance_m,
+                1e3 * angle_rad
+            ),
+            Moved::Zero { kind, offset, or, .. } => format!(
+                "its zero was moved between {before} and {after}: {images}, agree on {:+.3} {} from that of the others: the joint was mastered anew, its encoder or belt slipped{}",
+                1e3 * offset,
+                kind.units()[1],
+                or.map(|body| format!(", or {body} was turned")).unwrap_or_default()
+            ),
+            Moved::Readings { stand_still, .. } => format!(
+                "its readings are wrong at some stops: {images}, fit where it stands elsewhere at each{}",
+                if *stand_still { ", and it reads the same at all of them: it was not read any more" } else { "" }
+            ),
+        }
     }
 
     fn remedy(&self) -> String {
-        let remedy = match self.body {
-            MovedBody::Plate => {
+        let remedy = match self.moved {
+            Moved::Plate { .. } => {
                 "give the rows after the move a placement of their own in joints.csv, and fix the plate better"
             }
-            MovedBody::Camera => {
+            Moved::Camera { .. } => {
                 "put the images after the move into a series of their own with another [camera] mounting"
             }
+            Moved::Zero { .. } => "identify the robot from the stops of one mastering, before the move or after it",
+            Moved::Readings { .. } => "correct its readings at these stops, or leave their rows out",
         };
         remedy.into()
     }
-}
-
-struct Place {
-    members: Vec<usize>,
-    /// Angle and distance from the old place.
-    moved: (f64, f64),
-    spread: f64,
-}
-
-/// The place that most of the poses agree on, if they do and it is not the old one.
-fn common(poses: &[Pose], old: &Pose, fewest: usize, agreement: f64) -> Option<Place> {
-    let mut best: Option<Place> = None;
-    for candidate in poses {
-        let moved = old.distance(candidate);
-        let bound = agreement * (moved.0 + moved.1);
-        let mut members = Vec::new();
-        let mut spread = 0.0;
-        for (k, pose) in poses.iter().enumerate() {
-            let (angle, distance) = candidate.distance(pose);
-            if angle + distance < bound {
-                members.push(k);
-                spread += angle + distance;
-            }
-        }
-        spread /= (members.len().max(2) - 1) as f64;
-        let more = best.as_ref().is_none_or(|b| (members.len(), -spread) > (b.members.len(), -b.spread));
-        if members.len() >= fewest && more {
-            best = Some(Place { members, moved, spread });
-        }
-    }
-    best
 }

@@ -32,10 +32,6 @@ impl ZeroMoved {
         self.weight == Weight::Gate && self.displacement == Displacement::FromThenOn
     }
 
-    fn unit(&self) -> &'static str {
-        if self.kind == JointKind::Prismatic { "mm" } else { "mrad" }
-    }
-
     fn first(&self) -> &str {
         self.stops.first().map_or("", String::as_str)
     }
@@ -55,9 +51,8 @@ impl Kind for ZeroMoved {
     }
 
     fn quantities(&self) -> Vec<Quantity> {
-        let unit = if self.kind == JointKind::Prismatic { "m" } else { "rad" };
         vec![
-            Quantity::new("offset", self.offset.0, unit).with_sigma(self.offset.1),
+            Quantity::new("offset", self.offset.0, self.kind.units()[0]).with_sigma(self.offset.1),
             Quantity::new("share_of_joint_noise", self.share, "1"),
         ]
     }
@@ -67,7 +62,7 @@ impl Kind for ZeroMoved {
     }
 
     fn seen(&self) -> String {
-        let size = format!("{:+.3} {} (sigma {:.3})", 1e3 * self.offset.0, self.unit(), 1e3 * self.offset.1);
+        let size = format!("{:+.3} {} (sigma {:.3})", 1e3 * self.offset.0, self.kind.units()[1], 1e3 * self.offset.1);
         let where_ = match self.displacement {
             Displacement::InAll => format!("the zero of {} is off by {size} from that of the other series", self.joint),
             _ => format!("from {} on the zero of {} is off by {size} from that before", self.first(), self.joint),

@@ -50,31 +50,27 @@ pub(super) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> 
         });
     }
     add(MistakeKind::Reversed, &|q| q.reverse());
-    all.extend(shifted_rows(given));
-    // Positioner, rail or second arm stand before the first arm, or behind it, and may have been recorded apart.
-    for k in 1..n {
-        for columns in [0..k, k..n] {
-            all.extend([true, false].map(|below| {
-                let rows = shifted(given, below);
-                let mut changed = given.to_vec();
-                changed
-                    .iter_mut()
-                    .zip(&rows)
-                    .for_each(|(q, of)| q[columns.clone()].copy_from_slice(&of[columns.clone()]));
-                (changed, MistakeKind::Rows { below, columns: names[columns.clone()].to_vec() })
-            }));
-        }
+    for (shifted, mistake) in shifted_rows(given) {
+        // Positioner, rail or second arm stand before the first arm, or behind it, and may have been recorded apart.
+        let below = matches!(mistake, MistakeKind::Rows { below: true, .. });
+        let of_columns = (1..n).flat_map(|k| [0..k, k..n]).map(|columns| {
+            let mut changed = given.to_vec();
+            let rows = changed.iter_mut().zip(&shifted);
+            rows.for_each(|(q, of)| q[columns.clone()].copy_from_slice(&of[columns.clone()]));
+            (changed, MistakeKind::Rows { below, columns: names[columns].to_vec() })
+        });
+        let of_columns: Vec<Undone> = of_columns.collect();
+        all.push((shifted, mistake));
+        all.extend(of_columns);
     }
     all
 }
 
 /// Readings of the row below, or above.
-pub(super) fn shifted_rows(given: &[Vec<f64>]) -> Vec<Undone> {
-    [true, false].map(|below| (shifted(given, below), MistakeKind::Rows { below, columns: Vec::new() })).into()
-}
-
-fn shifted(given: &[Vec<f64>], below: bool) -> Vec<Vec<f64>> {
-    let mut shifted = given.to_vec();
-    shifted.rotate_left(if below { 1 } else { given.len().saturating_sub(1) });
-    shifted
+pub(super) fn shifted_rows(given: &[Vec<f64>]) -> [Undone; 2] {
+    [true, false].map(|below| {
+        let mut shifted = given.to_vec();
+        shifted.rotate_left(if below { 1 } else { given.len().saturating_sub(1) });
+        (shifted, MistakeKind::Rows { below, columns: Vec::new() })
+    })
 }

@@ -6,6 +6,7 @@ mod bodies;
 mod bodies_measured;
 mod bodies_start;
 mod body_mistakes;
+mod breaks;
 mod build;
 mod compare;
 mod comparison;

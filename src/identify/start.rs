@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::bases;
+use super::breaks::broken;
 use super::start_verdict::{StartReached, StartVerdict};
 use super::suspects::Suspects;
 use crate::assess::{Limits, median};
@@ -259,6 +260,9 @@ fn check_fit(suspects: &Suspects, misfit: f64, of: &str, how: &str) -> Result<()
         return Err(Finding::from(mistake).refusal());
     }
     if misfit > suspects.limits.hand_eye_spread {
+        if let Some(broken) = broken(suspects, misfit, of) {
+            return Err(broken);
+        }
         return Err(no_fit(of, &format!("{how} the camera poses miss by {:.0} (median, mm plus mrad)", 1e3 * misfit)));
     }
     Ok(())

@@ -36,8 +36,11 @@ impl Suspects<'_> {
         if !is_suspicious {
             return None;
         }
-        let hypotheses =
-            if of_poses { shifted_rows(&self.readings()) } else { mistakes_undone(self.robot, &self.readings()) };
+        let hypotheses = if of_poses {
+            shifted_rows(&self.readings()).into()
+        } else {
+            mistakes_undone(self.robot, &self.readings())
+        };
         let tried: Vec<(f64, MistakeKind)> =
             hypotheses.into_par_iter().map(|(readings, mistake)| (self.misfit(&readings), mistake)).collect();
         let best = tried.into_iter().chain([self.wrong_mount()]).filter(explains).min_by(|a, b| a.0.total_cmp(&b.0));
@@ -69,7 +72,7 @@ impl Suspects<'_> {
         Some(PosePair::of_flange(own.mount, tip, pair.camera_from_plate))
     }
 
-    fn readings(&self) -> Vec<Vec<f64>> {
+    pub fn readings(&self) -> Vec<Vec<f64>> {
         self.pairs
             .iter()
             .map(|(i, _)| self.problem.posture(*i).map(|s| s.readings.clone()).unwrap_or_default())

@@ -1,8 +1,8 @@
 //! When touches scatter far more than is stated: the usual mistakes, each undone and the touches fitted again (those that the closed form fits
 //! best), named where one of them explains it.
 //!
-//! Readings may be in another order, of another sign or of other rows; the places may be mirrored, or one of them wrong; the tool may have
-//! been bent, or the work object moved, between two touches. A place that may be wrong counts as unknown. The work object after some touch is
+//! Readings may be in another order, of another sign or of other rows; the places may be mirrored, or one of them wrong; the tool that was given
+//! may be another; the tool may have been bent, or the work object moved, between two touches. A place that may be wrong counts as unknown. The work object after some touch is
 //! `D` away from where it was: `D` brings its places, as given, to where they are found while they count as unknown.
 
 use std::cmp::Ordering;
@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::misread::MISREAD;
+use super::misread::{MISREAD, Misread};
 use super::mistakes::mistakes_undone;
 use crate::assess::Limits;
 use crate::diagnose::{Mistake, MistakeKind};
@@ -26,9 +26,10 @@ const FITTED: usize = 3;
 /// Touches that are named.
 const NAMED: usize = 5;
 
-/// Touches with a mistake undone, and what it is.
+/// Touches with a mistake undone, what is known beside them, and what the mistake is.
 struct Undone {
     touches: Touches,
+    given: Given,
     what: What,
 }
 
@@ -36,6 +37,8 @@ enum What {
     Kind(MistakeKind),
     /// This place, now an unknown contact, the last.
     Place(Vector3<f64>),
+    /// The tool that was given; now it is found.
+    GivenTool(Pose),
     /// The tool, now the last body, from this posture on.
     Tool {
         from: usize,
@@ -59,24 +62,27 @@ pub fn touch_mistake(
     }
     let fewest = limits.fewest_touches;
     let from = fewest..(touches.postures.len() + 1).saturating_sub(fewest);
+    let with_given = |(touches, what): (Touches, What)| Undone { touches, given: *given, what };
+    let places = distinct(touches.all.iter()).into_iter().map(|place| {
+        let (other, _) = with_unknown_places(touches, |touch| touch.seen == Seen::Point(place));
+        (other, What::Place(place))
+    });
     let tools = from.clone().filter(|_| given.tool.is_none()).map(|from| other_tool(touches, from));
     let works = from.filter_map(|from| {
-        let (apart, known) = places_apart(touches, from);
+        let (apart, known) = with_unknown_places(touches, |touch| touch.posture >= from);
         work_moved(touches, from, &known, &closed_form(robot, &apart, given)?.1)
     });
-    let nearest = |undone: Vec<Undone>| nearest(robot, given, undone);
-    let all: Vec<Undone> = [
-        nearest(read_otherwise(robot, touches).collect()),
-        nearest(other_places(touches).collect()),
-        nearest(tools.collect()),
-        nearest(works.collect()),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
-    let fitted = |touches: &Touches| fit(robot, touches, given, limits).ok();
+    let kinds = [
+        read_otherwise(robot, touches).map(with_given).collect(),
+        places.map(with_given).collect(),
+        tools.map(with_given).collect(),
+        works.map(with_given).collect(),
+        given.tool.map(|tool| without_tool(touches, given, tool)).into_iter().collect::<Vec<Undone>>(),
+    ];
+    let all: Vec<Undone> = kinds.into_iter().flat_map(|undone| nearest(robot, undone)).collect();
+    let fitted = |undone: &Undone| fit(robot, &undone.touches, &undone.given, limits).ok();
     let explains = |fit: &FrameFit| fit.factor < limits.mistake_explains * found.factor;
-    let tried = |undone: Undone| fitted(&undone.touches).filter(explains).map(|fit| (fit, undone));
+    let tried = |undone: Undone| fitted(&undone).filter(explains).map(|fit| (fit, undone));
     let (left, undone) = all.into_par_iter().filter_map(tried).min_by(|a, b| by_rank(rank(a), rank(b)))?;
     let frame = touches.frame.as_ref().map_or_else(String::new, |frame| format!(" in frame {frame}"));
     let (misfit, misfit_undone) = (found.rms_m, Some(left.rms_m));
@@ -85,8 +91,8 @@ pub fn touch_mistake(
 }
 
 /// Those that the closed form fits best.
-fn nearest(robot: &KnownRobot, given: &Given, undone: Vec<Undone>) -> Vec<Undone> {
-    let misses = |undone: Undone| closed_form(robot, &undone.touches, given).map(|(rms_m, _)| (rms_m, undone));
+fn nearest(robot: &KnownRobot, undone: Vec<Undone>) -> Vec<Undone> {
+    let misses = |undone: Undone| closed_form(robot, &undone.touches, &undone.given).map(|(rms_m, _)| (rms_m, undone));
     let mut all: Vec<(f64, Undone)> = undone.into_par_iter().filter_map(misses).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     all.into_iter().take(FITTED).map(|(_, undone)| undone).collect()
@@ -103,14 +109,15 @@ fn by_rank(a: (usize, bool, f64), b: (usize, bool, f64)) -> Ordering {
 }
 
 /// Other readings, or all places otherwise.
-fn read_otherwise(robot: &KnownRobot, touches: &Touches) -> impl Iterator<Item = Undone> {
+fn read_otherwise(robot: &KnownRobot, touches: &Touches) -> impl Iterator<Item = (Touches, What)> {
     let readings: Vec<Vec<f64>> = touches.postures.iter().map(|p| p.readings.clone()).collect();
     let of_readings = mistakes_undone(robot.exported(), &readings).into_iter().map(|(readings, kind)| {
         let mut undone = touches.clone();
         undone.postures.iter_mut().zip(readings).for_each(|(p, readings)| p.readings = readings);
-        Undone { touches: undone, what: What::Kind(kind) }
+        (undone, What::Kind(kind))
     });
-    let of_places = MISREAD.iter().filter_map(|misread| {
+    let has_places = |_: &&Misread| touches.frame.is_some();
+    let of_places = MISREAD.iter().filter(has_places).filter_map(|misread| {
         let mut undone = touches.clone();
         for touch in &mut undone.all {
             touch.seen = match touch.seen {
@@ -119,7 +126,7 @@ fn read_otherwise(robot: &KnownRobot, touches: &Touches) -> impl Iterator<Item =
                 unknown @ Seen::Unknown(_) => unknown,
             };
         }
-        touches.frame.is_some().then(|| Undone { touches: undone, what: What::Kind(misread.kind()) })
+        Some((undone, What::Kind(misread.kind())))
     });
     of_readings.chain(of_places)
 }
@@ -129,17 +136,6 @@ fn seen(seen: BodySeen) -> Seen {
         BodySeen::Point(point) => Seen::Point(point),
         BodySeen::Pose(pose) => Seen::Pose(pose),
     }
-}
-
-/// One of the places unknown.
-fn other_places(touches: &Touches) -> impl Iterator<Item = Undone> {
-    distinct(touches.all.iter()).into_iter().map(|place| {
-        let mut undone = touches.clone();
-        let contact = undone.contacts.len();
-        undone.contacts.push(String::new());
-        undone.all.iter_mut().filter(|t| t.seen == Seen::Point(place)).for_each(|t| t.seen = Seen::Unknown(contact));
-        Undone { touches: undone, what: What::Place(place) }
-    })
 }
 
 /// Places of points that are known, each once.
@@ -154,19 +150,11 @@ fn distinct<'a>(touches: impl Iterator<Item = &'a Touch>) -> Vec<Vector3<f64>> {
     all
 }
 
-fn other_tool(touches: &Touches, from: usize) -> Undone {
-    let mut undone = touches.clone();
-    let bodies = touches.bodies.len();
-    undone.bodies.extend_from_within(..);
-    undone.all.iter_mut().filter(|t| t.posture >= from).for_each(|t| t.body += bodies);
-    Undone { touches: undone, what: What::Tool { from } }
-}
-
-/// Places from some posture on as unknown contacts, the last, and where they are said to be.
-fn places_apart(touches: &Touches, from: usize) -> (Touches, Vec<Vector3<f64>>) {
+/// The known places of some touches as unknown contacts, the last, and where they are said to be.
+fn with_unknown_places(touches: &Touches, of: impl Fn(&Touch) -> bool) -> (Touches, Vec<Vector3<f64>>) {
     let mut apart = touches.clone();
-    let known = distinct(touches.all.iter().filter(|t| t.posture >= from));
-    for touch in apart.all.iter_mut().filter(|t| t.posture >= from) {
+    let known = distinct(touches.all.iter().filter(|t| of(t)));
+    for touch in apart.all.iter_mut().filter(|t| of(t)) {
         let Seen::Point(place) = touch.seen else { continue };
         let index = known.iter().position(|p| *p == place).unwrap_or_default();
         touch.seen = Seen::Unknown(touches.contacts.len() + index);
@@ -175,7 +163,24 @@ fn places_apart(touches: &Touches, from: usize) -> (Touches, Vec<Vector3<f64>>) 
     (apart, known)
 }
 
-fn work_moved(touches: &Touches, from: usize, known: &[Vector3<f64>], places: &[Vector3<f64>]) -> Option<Undone> {
+fn without_tool(touches: &Touches, given: &Given, tool: Pose) -> Undone {
+    Undone { touches: touches.clone(), given: Given { tool: None, ..*given }, what: What::GivenTool(tool) }
+}
+
+fn other_tool(touches: &Touches, from: usize) -> (Touches, What) {
+    let mut undone = touches.clone();
+    let bodies = touches.bodies.len();
+    undone.bodies.extend_from_within(..);
+    undone.all.iter_mut().filter(|t| t.posture >= from).for_each(|t| t.body += bodies);
+    (undone, What::Tool { from })
+}
+
+fn work_moved(
+    touches: &Touches,
+    from: usize,
+    known: &[Vector3<f64>],
+    places: &[Vector3<f64>],
+) -> Option<(Touches, What)> {
     let found = places.get(touches.contacts.len()..)?;
     let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = known.iter().copied().zip(found.iter().copied()).collect();
     let moved = rigid_fit(&pairs).filter(|_| pairs.len() > 2)?;
@@ -187,7 +192,7 @@ fn work_moved(touches: &Touches, from: usize, known: &[Vector3<f64>], places: &[
             unknown @ Seen::Unknown(_) => unknown,
         };
     }
-    Some(Undone { touches: undone, what: What::Work { from, moved } })
+    Some((undone, What::Work { from, moved }))
 }
 
 fn named(undone: &Undone, left: &FrameFit, touches: &Touches) -> MistakeKind {
@@ -211,6 +216,16 @@ fn named(undone: &Undone, left: &FrameFit, touches: &Touches) -> MistakeKind {
                 1e3 * (found - place).norm()
             );
             (Code::PlaceContradicted, what, "correct it in contacts.csv, or touch the point that was meant".to_owned())
+        }
+        What::GivenTool(tool) => {
+            let found = &left.tools[0];
+            let what = format!(
+                "the tool that was given misses: by the touches its point is at {} on the tip, {:.2} mm away",
+                in_metres(&found.translation),
+                1e3 * (found.translation - tool.translation).norm()
+            );
+            let remedy = "leave --tool out: the touches find it; or give the frame of the tool as it is mounted now";
+            (Code::ToolContradicted, what, remedy.to_owned())
         }
         What::Tool { from } => {
             let half = touches.bodies.len();

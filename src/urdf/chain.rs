@@ -17,6 +17,13 @@ pub enum JointKind {
     Prismatic,
 }
 
+impl JointKind {
+    /// Unit of its readings, and of their thousandth.
+    pub const fn units(self) -> [&'static str; 2] {
+        if matches!(self, Self::Prismatic) { ["m", "mm"] } else { ["rad", "mrad"] }
+    }
+}
+
 /// Where the position of a moving joint comes from: `multiplier * reading + offset`.
 ///
 /// A joint with a reading of its own has multiplier 1 and offset 0; a mimic joint takes those of URDF.

@@ -542,4 +542,10 @@ fn usual_mistakes_in_touches_are_named() {
         places(touches, 0..3, &|p| p.y += 0.01);
     };
     is(named(&typed), Code::PlaceContradicted, "t00, t01, t02");
+    let tool = Vector3::from(TOOL) + Vector3::new(0.0, 0.06, 0.0);
+    let given = Given { tool: Some(Pose::new(Matrix3::identity(), tool)), plate: None };
+    let found = fit(&robot, &good, &given, &limits).unwrap();
+    let mistake = touch_mistake(&robot, &good, &given, (&found, &limits)).map(Finding::from);
+    // 60 mm to the hundredth of a millimetre that is told.
+    is(mistake, Code::ToolContradicted, "60.0");
 }

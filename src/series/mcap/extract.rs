@@ -94,7 +94,16 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         ));
     }
     let image_delay_s = scan.delay_s(std::slice::from_ref(&image_topic)) - scan.delay_s(&topics);
-    if image_delay_s.abs() > NOTABLE_DELAY_S {
+    let growth_s = scan.delay_growth_s(&image_topic) - scan.delay_growth_s(&topics[0]);
+    if growth_s.abs() > NOTABLE_DELAY_S {
+        let sign = if growth_s < 0.0 { "earlier" } else { "later" };
+        let what = format!(
+            "images arrive {:.3} s {sign} after their stamp at the end than at the beginning, joint states do not: the clocks of camera and robot run apart",
+            growth_s.abs()
+        );
+        let remedy = "use the times of recording (--clock log), or let one clock stamp both";
+        notices.push(Notice::new(Code::ClocksApart, recording.display(), what, remedy));
+    } else if image_delay_s.abs() > NOTABLE_DELAY_S {
         let sign = if image_delay_s < 0.0 { "earlier" } else { "later" };
         let what = format!("images arrive {:.3} s {sign} after their stamp than joint states", image_delay_s.abs());
         let remedy = "check that camera and robot stamp by the same clock; a robot that stands is not affected";

@@ -150,8 +150,10 @@ impl Scan {
 
     fn stamped(&mut self, message: &Message<'_>, stamp_ns: i64, clock: Clock) -> i64 {
         if let Some(topic) = self.topics.get_mut(message.topic) {
-            topic.unstamped |= stamp_ns == 0;
-            topic.delays_ns.push(log_time_ns(message) - stamp_ns);
+            match stamp_ns {
+                0 => topic.unstamped = true,
+                _ => topic.delays_ns.push(log_time_ns(message) - stamp_ns),
+            }
         }
         time_ns(stamp_ns, message, clock)
     }
@@ -327,10 +329,20 @@ impl Scan {
     /// Median time from stamp to recording over some topics, s.
     pub fn delay_s(&self, topics: &[String]) -> f64 {
         let all = topics.iter().filter_map(|topic| self.topics.get(topic));
-        let mut delays: Vec<i64> = all.flat_map(|topic| topic.delays_ns.iter().copied()).collect();
-        delays.sort_unstable();
-        delays.get(delays.len() / 2).map_or(0.0, |d| *d as f64 * 1e-9)
+        median_s(all.flat_map(|topic| topic.delays_ns.iter().copied()).collect())
     }
+
+    /// By how much more the time from stamp to recording is over the last quarter of the messages of a topic than over the first, s.
+    pub fn delay_growth_s(&self, topic: &str) -> f64 {
+        let delays = self.topics.get(topic).map_or(&[][..], |topic| &topic.delays_ns);
+        let quarter = delays.len() / 4;
+        median_s(delays[delays.len() - quarter..].to_vec()) - median_s(delays[..quarter].to_vec())
+    }
+}
+
+fn median_s(mut times_ns: Vec<i64>) -> f64 {
+    times_ns.sort_unstable();
+    times_ns.get(times_ns.len() / 2).map_or(0.0, |ns| *ns as f64 * 1e-9)
 }
 
 #[cfg(test)]
@@ -399,5 +411,27 @@ mod tests {
         assert_eq!(code(&scan, &["x", "a", "b"]), Code::TopicAmbiguous);
         let readings = scan.joint_readings(&wanted(&["x", "b"])).unwrap();
         assert_eq!((readings.samples.len(), readings.joints), (2, vec!["x".to_owned(), "b".to_owned()]));
+    }
+
+    #[test]
+    fn the_delay_is_that_of_messages_with_a_stamp_and_may_grow() {
+        let mut scan = Scan::default();
+        let mut note = |topic: &str, stamped: bool, delay_s: f64| {
+            let mut data = joint_state(&[("a", 0.5)]);
+            if !stamped {
+                data[4] = 0;
+            }
+            let log_time_ns = 1_000_000_000 + (1e9 * delay_s) as u64;
+            let schema = messages::JOINT_STATE;
+            scan.note(&Message { topic, schema, encoding: "cdr", log_time_ns, data: &data }, Clock::Stamp);
+        };
+        [0.1, 0.2, 0.3, 0.4].into_iter().for_each(|delay_s| note("/grows", true, delay_s));
+        [true, false, false, false].into_iter().for_each(|stamped| note("/once", stamped, 0.02));
+        note("/never", false, 0.0);
+        let delay = |topic: &str| scan.delay_s(&[topic.to_owned()]);
+        assert!((delay("/grows") - 0.3).abs() < 1e-9 && (delay("/once") - 0.02).abs() < 1e-9);
+        assert_eq!(delay("/never"), 0.0);
+        assert!((scan.delay_growth_s("/grows") - 0.3).abs() < 1e-9);
+        assert_eq!(scan.delay_growth_s("/once"), 0.0);
     }
 }

@@ -1,0 +1,233 @@
+//! What images that do not fit their readings agree on.
+//!
+//! An image shows the tip at `B` (`Z C^-1 X^-1` of a camera in the hand, `X C Z^-1` of a fixed one, as in [`crate::init::HandEye`]), its readings
+//! put it at `A`. Where one reading alone is off by `d`, `B A^-1 = exp(d s)`, `s` the twist of its joint in the base, however large `d` is.
+
+use crate::assess::Limits;
+use crate::geom::{Pose, log_so3};
+use crate::init::{HandEye, SeenStop};
+use crate::model::robot::Robot;
+use crate::series::CameraMount;
+use crate::urdf::JointKind;
+
+/// What is another at some stops.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Moved {
+    /// The zero of a joint.
+    Zero {
+        /// Name of the joint.
+        joint: String,
+        /// How it moves.
+        kind: JointKind,
+        /// By how much, rad or m.
+        offset: f64,
+        /// A body that may have been turned in its place.
+        or: Option<&'static str>,
+    },
+    /// The plate, by so much.
+    Plate {
+        /// m.
+        distance_m: f64,
+        /// rad.
+        angle_rad: f64,
+    },
+    /// The camera on its mount, by so much.
+    Camera {
+        /// m.
+        distance_m: f64,
+        /// rad.
+        angle_rad: f64,
+    },
+    /// The readings of one joint, by another amount at each stop.
+    Readings {
+        /// Name of the joint.
+        joint: String,
+        /// True where all of them are the same.
+        stand_still: bool,
+    },
+}
+
+impl Moved {
+    const fn unknowns(&self) -> f64 {
+        match self {
+            Self::Plate { .. } | Self::Camera { .. } => 6.0,
+            _ => 1.0,
+        }
+    }
+
+    const fn body(&self) -> Option<&'static str> {
+        match self {
+            Self::Plate { .. } => Some("the plate"),
+            Self::Camera { .. } => Some("the camera"),
+            _ => None,
+        }
+    }
+}
+
+/// Stops that agree, by their index, and on what.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Agreement {
+    /// What.
+    pub moved: Moved,
+    /// The stops, ascending.
+    pub members: Vec<usize>,
+    /// Mean misfit that is left, rad + m.
+    pub spread: f64,
+}
+
+/// What most of some stops agree on, beside where the others say that camera and plate are; `None` where too few do.
+pub fn agreement(robot: &Robot, others: &HandEye, seen: &[SeenStop], limits: &Limits) -> Option<Agreement> {
+    let stops: Vec<Stop> = seen.iter().map(|stop| Stop::new(robot, others, stop)).collect();
+    let readings = match robot.chain.pose_coordinates() {
+        Some(_) => 0..0,
+        None => 0..robot.chain.readings.len(),
+    };
+    let zeros = readings.clone().filter_map(|joint| zero(robot, &stops, joint, limits));
+    let all: Vec<Agreement> =
+        zeros.chain(plate(&stops, others, limits)).chain(camera(&stops, others, limits)).collect();
+    let most = all.iter().map(|a| a.members.len()).max().unwrap_or(0);
+    let weighed = |a: &Agreement| a.moved.unknowns() * a.spread;
+    let or = all.iter().filter(|a| a.members.len() == most).find_map(|a| a.moved.body());
+    let best = all.into_iter().filter(|a| a.members.len() == most);
+    let mut best = best.min_by(|a, b| weighed(a).total_cmp(&weighed(b)));
+    if let Some(Agreement { moved: Moved::Zero { or: own, .. }, .. }) = &mut best {
+        *own = or;
+    }
+    // An amount of its own for every stop fits more easily.
+    let wrong = readings.filter_map(|joint| wrong_readings(robot, &stops, joint, limits));
+    let wrong = wrong.filter(|a| a.members.len() > most).max_by_key(|a| a.members.len());
+    wrong.or(best)
+}
+
+/// A stop with what its image shows.
+struct Stop<'a> {
+    seen: &'a SeenStop,
+    /// Tip in the base by the image.
+    by_image: Pose,
+    /// Rotation and translation by which its readings miss that, rad + m.
+    misfit: f64,
+    /// Where it would have the plate, and the camera.
+    plate: Pose,
+    camera: Pose,
+}
+
+impl<'a> Stop<'a> {
+    fn new(robot: &Robot, HandEye { camera, plate }: &HandEye, seen: &'a SeenStop) -> Self {
+        let tip = match seen.mount {
+            CameraMount::Hand => *plate * seen.camera_from_plate.inverse() * camera.inverse(),
+            CameraMount::Fixed => *camera * seen.camera_from_plate * plate.inverse(),
+        };
+        let chain = seen.pair(robot).chain;
+        Self {
+            seen,
+            by_image: tip,
+            misfit: apart(&tip, &robot.base_from_tip(&seen.readings)),
+            plate: chain.inverse() * (*camera * seen.camera_from_plate),
+            camera: (chain * *plate) * seen.camera_from_plate.inverse(),
+        }
+    }
+
+    /// Its misfit with a reading that is off by so much.
+    fn misfit_with(&self, robot: &Robot, joint: usize, offset: f64) -> f64 {
+        apart(&self.by_image, &robot.base_from_tip(&self.readings_with(joint, offset)))
+    }
+
+    fn readings_with(&self, joint: usize, offset: f64) -> Vec<f64> {
+        let mut readings = self.seen.readings.clone();
+        readings[joint] += offset;
+        readings
+    }
+
+    /// By how much a reading is off, if it alone is; `None` where it does not move the tip.
+    fn offset(&self, robot: &Robot, joint: usize) -> Option<f64> {
+        let back = robot.base_from_tip(&self.seen.readings).inverse();
+        let by_offset = |offset: f64| robot.base_from_tip(&self.readings_with(joint, offset)) * back;
+        let (step, whole) = (by_offset(STEP), self.by_image * back);
+        let (turn, shift) = (log_so3(&step.rotation) / STEP, step.translation / STEP);
+        let along = |by: nalgebra::Vector3<f64>, whole: nalgebra::Vector3<f64>| by.dot(&whole) / by.norm_squared();
+        match turn.norm() > f64::EPSILON.sqrt() {
+            true => Some(along(turn, log_so3(&whole.rotation))),
+            false if shift.norm() > f64::EPSILON.sqrt() => Some(along(shift, whole.translation)),
+            false => None,
+        }
+    }
+}
+
+/// Step of a difference quotient, rad or m.
+const STEP: f64 = 1e-6;
+
+fn apart(a: &Pose, b: &Pose) -> f64 {
+    let (angle, distance) = a.distance(b);
+    angle + distance
+}
+
+/// Of these candidates the one that most stops agree with, of several the one with the least misfit: where they leave, by stop, less than the
+/// `bound` of that stop and candidate.
+fn common<T: Copy>(
+    candidates: impl Iterator<Item = T>,
+    stops: &[Stop],
+    left: impl Fn(T, &Stop) -> f64,
+    bound: impl Fn(T, &Stop) -> f64,
+    fewest: usize,
+) -> Option<(T, Vec<usize>, f64)> {
+    let mut best: Option<(T, Vec<usize>, f64)> = None;
+    for candidate in candidates {
+        let misfits = stops.iter().map(|stop| (left(candidate, stop), bound(candidate, stop))).enumerate();
+        let (members, misfits): (Vec<usize>, Vec<f64>) =
+            misfits.filter(|(_, (left, bound))| left < bound).map(|(k, (left, _))| (k, left)).unzip();
+        let spread = misfits.iter().sum::<f64>() / (members.len().max(2) - 1) as f64;
+        let more = best.as_ref().is_none_or(|(_, m, s)| (members.len(), -spread) > (m.len(), -s));
+        if members.len() >= fewest && more {
+            best = Some((candidate, members, spread));
+        }
+    }
+    best
+}
+
+fn zero(robot: &Robot, stops: &[Stop], joint: usize, limits: &Limits) -> Option<Agreement> {
+    let (offset, members, spread) = common(
+        stops.iter().filter_map(|stop| stop.offset(robot, joint)),
+        stops,
+        |offset, stop| stop.misfit_with(robot, joint, offset),
+        |_, stop| limits.moved_agreement * stop.misfit,
+        limits.moved_images,
+    )?;
+    let (name, kind) = (robot.chain.readings[joint].clone(), robot.chain.reading_kinds[joint]);
+    Some(Agreement { moved: Moved::Zero { joint: name, kind, offset, or: None }, members, spread })
+}
+
+fn wrong_readings(robot: &Robot, stops: &[Stop], joint: usize, limits: &Limits) -> Option<Agreement> {
+    let left = |stop: &Stop| stop.misfit_with(robot, joint, stop.offset(robot, joint).unwrap_or(0.0));
+    let bound = |(): (), stop: &Stop| limits.moved_agreement * stop.misfit;
+    let ((), members, spread) = common(std::iter::once(()), stops, |(), stop| left(stop), bound, limits.moved_images)?;
+    let own = |k: &usize| stops[*k].seen.readings[joint];
+    let stand_still = members.iter().all(|k| own(k) == own(&members[0]));
+    Some(Agreement {
+        moved: Moved::Readings { joint: robot.chain.readings[joint].clone(), stand_still },
+        members,
+        spread,
+    })
+}
+
+fn plate(stops: &[Stop], others: &HandEye, limits: &Limits) -> Option<Agreement> {
+    let (place, members, spread) = place(stops, &others.plate, |stop| stop.plate, limits)?;
+    let (angle_rad, distance_m) = others.plate.distance(&place);
+    Some(Agreement { moved: Moved::Plate { distance_m, angle_rad }, members, spread })
+}
+
+fn camera(stops: &[Stop], others: &HandEye, limits: &Limits) -> Option<Agreement> {
+    let (place, members, spread) = place(stops, &others.camera, |stop| stop.camera, limits)?;
+    let (angle_rad, distance_m) = others.camera.distance(&place);
+    Some(Agreement { moved: Moved::Camera { distance_m, angle_rad }, members, spread })
+}
+
+/// The place of a body that most stops agree on, near enough beside how far it is from the `old` one.
+fn place(stops: &[Stop], old: &Pose, of: impl Fn(&Stop) -> Pose, limits: &Limits) -> Option<(Pose, Vec<usize>, f64)> {
+    common(
+        stops.iter().map(&of),
+        stops,
+        |candidate, stop| apart(&candidate, &of(stop)),
+        |candidate, _| limits.moved_agreement * apart(old, &candidate),
+        limits.moved_images,
+    )
+}
