@@ -330,6 +330,7 @@ codes! {
         FrameWeak "frame_weak" "a direction of tool or work object is hardly told",
         TouchesLeftOut "touches_left_out" "touches disagree with the others, and are left out",
         TouchesScatter "touches_scatter" "touches scatter more than their stated sigma says",
+        RobotContradicted "robot_contradicted" "touches say of the robot what the solution excludes",
         ToolContradicted "tool_contradicted" "the tool that was given is not where the touches have it",
         PlaceContradicted "place_contradicted" "a place that was touched is not where the other touches have it",
         WorkDisplaced "work_displaced" "the work object stands elsewhere from some touch on",

@@ -24,7 +24,7 @@ const ROUNDS: usize = 50;
 const STEP: f64 = 1e-13;
 /// Change of the size of the errors that ends its search.
 const SIZE: f64 = 1e-6;
-/// Degrees of freedom that the stated sigma is worth.
+/// Degrees of freedom that a stated sigma is worth.
 const STATED: f64 = 4.0;
 
 /// One touch after the fit.
@@ -55,12 +55,21 @@ pub struct FrameFit {
     pub knowledge: Knowledge,
     /// Factor that the touches ask for on their stated sigmas.
     pub factor: f64,
+    /// Factor that what the touches say of the robot asks for on the covariance of the solution.
+    pub robot_factor: f64,
     /// One for each touch.
     pub judged: Vec<Judged>,
     /// RMS of the lengths of the residuals in use, m.
     pub rms_m: f64,
     /// What can be expected of the tool over the stops and touches, RMS of the length.
     pub expected: Expected,
+}
+
+impl FrameFit {
+    /// The larger of the factors: how far the touches contradict each other, or the solution.
+    pub fn contradiction(&self) -> f64 {
+        self.factor.max(self.robot_factor)
+    }
 }
 
 /// Expected error of the tool over the stops and touches, RMS of the length, m. Joint noise is apart: no frame removes it.
@@ -183,6 +192,15 @@ impl Work<'_> {
             factor = next;
         }
         None
+    }
+}
+
+impl Solved {
+    /// `z` has the covariance `I` by the solution, of which `I - P_zz` is what the touches can tell.
+    fn robot_factor(&self, free: usize) -> f64 {
+        let z = self.step.rows(free, self.step.len() - free);
+        let told = (0..z.len()).map(|k| 1.0 - self.inverse[(free + k, free + k)]).sum::<f64>();
+        ((z.norm_squared() + STATED) / (told.max(0.0) + STATED)).sqrt()
     }
 }
 
@@ -351,6 +369,7 @@ impl Work<'_> {
             work: has_work.then_some(unknowns.work),
             places: unknowns.places.clone(),
             factor,
+            robot_factor: solved.robot_factor(columns.free.len()),
             rms_m: (used.iter().sum::<f64>() / used.len().max(1) as f64).sqrt(),
             judged,
         }

@@ -1,8 +1,7 @@
-//! When no usual mistake explains why readings and images do not fit: a series that fits in two parts and not together, or a joint whose readings
-//! stand still while the others move.
+//! When no usual mistake explains why readings and images do not fit: a series of which a part fits by itself.
 //!
-//! Parts by rows `[0, k)` and `[k, n)`: where something changed at `t`, the closed forms of both parts go by the majority of their images, so that
-//! a few `k` find it; `t` is then where fewest images miss the solution of their part.
+//! Parts by rows `[0, k)` and `[k, n)`: where something changed at `t`, the closed form of a part that holds more images of one side of `t` than of
+//! the other goes by these, so that a few `k` find it; `t` is then where fewest images of that side miss it, and fewest of the other fit.
 
 use std::ops::Range;
 
@@ -17,64 +16,57 @@ const PARTS: usize = 8;
 /// Why images of one mounting and placement that miss by `misfit` do not fit.
 pub(super) fn broken(suspects: &Suspects, misfit: f64, of: &str) -> Option<Error> {
     let pairs: Vec<PosePair> = suspects.pairs.iter().map(|(_, pair)| *pair).collect();
-    let bound = suspects.limits.suspicious_misfit.min(suspects.limits.mistake_explains * misfit);
-    let fewest = suspects.limits.hand_eye_images;
-    let solved = |part: &[PosePair]| {
-        let best = (part.len() >= fewest).then(|| solve_hand_eye(part)).and_then(|all| all.into_iter().next());
+    let left = suspects.limits.mistake_explains * misfit;
+    let bound = suspects.limits.suspicious_misfit.min(left);
+    let (n, fewest) = (pairs.len(), suspects.limits.hand_eye_images);
+    let solved = |part: Range<usize>| {
+        let best = (part.len() >= fewest).then(|| solve_hand_eye(&pairs[part])).and_then(|all| all.into_iter().next());
         best.filter(|start| start.median_error < bound).map(|start| start.solution)
     };
-    let fits = |solution: &HandEye, pair: &PosePair| {
-        let (angle, distance) = solution.error(pair);
-        angle + distance < suspects.limits.mistake_explains * misfit
-    };
-    in_two_parts(&pairs, fewest, solved, fits)
-        .map(|parts| parts.named(suspects).unwrap_or_else(|| parts.unnamed(of, misfit)))
-        .or_else(|| stands_still(suspects, &pairs, solved))
+    let divisions = (1..PARTS).map(|k| (k * n / PARTS).max(fewest).min(n.saturating_sub(fewest)));
+    let parts = divisions.flat_map(|k| [(0..k, true), (k..n, false)]).filter_map(|(part, is_first)| {
+        let solution = solved(part)?;
+        let fits: Vec<bool> = pairs.iter().map(|pair| total(solution.error(pair)) < left).collect();
+        Some(Part::of(solution, &fits, is_first))
+    });
+    let part = parts.min_by_key(|part| (part.missed, part.others.len()))?;
+    let both = || solved(part.others.clone()).map(|_| part.unnamed(of, n, misfit));
+    part.named(suspects).or_else(both)
 }
 
-/// A series that fits in two parts.
-struct Parts {
-    /// First of the second part.
-    from: usize,
-    all: usize,
-    solutions: [HandEye; 2],
+fn total((angle, distance): (f64, f64)) -> f64 {
+    angle + distance
 }
 
-fn in_two_parts(
-    pairs: &[PosePair],
-    fewest: usize,
-    solved: impl Fn(&[PosePair]) -> Option<HandEye>,
-    fits: impl Fn(&HandEye, &PosePair) -> bool,
-) -> Option<Parts> {
-    let n = pairs.len();
-    let divisions = (1..PARTS).map(|k| (k * n / PARTS).clamp(fewest, n.saturating_sub(fewest).max(fewest)));
-    let parts = divisions.filter(|k| *k < n).filter_map(|k| Some([solved(&pairs[..k])?, solved(&pairs[k..])?]));
-    let missing = |[first, second]: &[HandEye; 2], from: usize| {
-        let before = pairs[..from].iter().filter(|pair| !fits(first, pair)).count();
-        before + pairs[from..].iter().filter(|pair| !fits(second, pair)).count()
-    };
-    let best_from = |solutions: &[HandEye; 2]| (1..n).map(|from| (missing(solutions, from), from)).min();
-    let (_, from, solutions) = parts
-        .filter_map(|solutions| best_from(&solutions).map(|(missing, from)| (missing, from, solutions)))
-        .min_by_key(|(missing, from, _)| (*missing, *from))?;
-    Some(Parts { from, all: n, solutions })
+/// A part of a series that fits by itself.
+struct Part {
+    solution: HandEye,
+    /// The other images.
+    others: Range<usize>,
+    /// Images on the wrong side of the division.
+    missed: usize,
 }
 
-impl Parts {
-    /// What the smaller part agrees on, beside the larger one.
-    fn named(&self, suspects: &Suspects) -> Option<Error> {
-        let (first, second) = (0..self.from, self.from..self.all);
-        let (others, smaller) =
-            if first.len() > second.len() { (self.solutions[0], second) } else { (self.solutions[1], first) };
-        let found = finding(suspects, &others, smaller.clone())?;
-        (2 * found.images.len() > smaller.len()).then(|| Finding::from(found).refusal())
+impl Part {
+    /// Divides where the solution of the first part, or the last, serves best.
+    fn of(solution: HandEye, fits: &[bool], is_first: bool) -> Self {
+        let n = fits.len();
+        let missed = |at: usize| fits.iter().enumerate().filter(|(k, fits)| **fits != ((*k < at) == is_first)).count();
+        let (missed, at) = (0..=n).map(|at| (missed(at), at)).min().unwrap_or((n, n));
+        Self { solution, others: if is_first { at..n } else { 0..at }, missed }
     }
 
-    fn unnamed(&self, of: &str, misfit: f64) -> Error {
+    /// What the others agree on, if most of them do.
+    fn named(&self, suspects: &Suspects) -> Option<Error> {
+        let found = finding(suspects, &self.solution, self.others.clone())?;
+        (2 * found.images.len() > self.others.len()).then(|| Finding::from(found).refusal())
+    }
+
+    fn unnamed(&self, of: &str, all: usize, misfit: f64) -> Error {
         let what = format!(
-            "its first {} images fit by themselves, and so do the other {}; together they miss by {:.0} (median, mm plus mrad): something was changed between them",
-            self.from,
-            self.all - self.from,
+            "{} of its images fit by themselves, and so do the other {}; together they miss by {:.0} (median, mm plus mrad): something was changed between them",
+            all - self.others.len(),
+            self.others.len(),
             1e3 * misfit
         );
         let remedy = "make two series of it, each with a mounting under [camera] and a placement of its own";
@@ -96,46 +88,19 @@ fn finding(suspects: &Suspects, others: &HandEye, some: Range<usize>) -> Option<
     BodyMoved::of(suspects.problem, &images, found)
 }
 
-/// A joint that reads the same at many stops in a row, where the images of all others fit.
-fn stands_still(
-    suspects: &Suspects,
-    pairs: &[PosePair],
-    solved: impl Fn(&[PosePair]) -> Option<HandEye>,
-) -> Option<Error> {
-    let readings = suspects.readings();
-    let joints = 0..suspects.robot.chain.readings.len();
-    joints.filter(|_| suspects.robot.chain.pose_coordinates().is_none()).find_map(|joint| {
-        let still = longest_run(&readings, joint);
-        let others: Vec<PosePair> = [&pairs[..still.start], &pairs[still.end..]].concat();
-        let found = finding(suspects, &solved(&others)?, still)?;
-        Some(Finding::from(found).refusal())
-    })
-}
-
-/// The longest run of stops at which a joint reads the same.
-fn longest_run(readings: &[Vec<f64>], joint: usize) -> Range<usize> {
-    let mut longest = 0..0;
-    let mut from = 0;
-    for k in 0..readings.len() {
-        if readings[k][joint] != readings[from][joint] {
-            from = k;
-        }
-        if k + 1 - from > longest.len() {
-            longest = from..k + 1;
-        }
-    }
-    longest
-}
-
 #[cfg(test)]
 mod tests {
-    use super::longest_run;
+    use super::*;
+    use crate::geom::Pose;
 
     #[test]
-    fn the_longest_run_of_equal_readings_is_found() {
-        let readings: Vec<Vec<f64>> = [1.0, 1.0, 2.0, 3.0, 3.0, 3.0, 1.0].map(|q| vec![0.0, q]).into();
-        assert_eq!(longest_run(&readings, 1), 3..6);
-        assert_eq!(longest_run(&readings, 0), 0..7);
-        assert_eq!(longest_run(&[], 0), 0..0);
+    fn a_series_is_divided_where_fewest_images_are_on_the_wrong_side() {
+        let solution = HandEye { camera: Pose::identity(), plate: Pose::identity() };
+        let fits = [true, true, false, true, false, false, true, false];
+        let first = Part::of(solution, &fits, true);
+        assert_eq!((first.others, first.missed), (4..8, 2));
+        let fits = fits.map(|fits| !fits);
+        let last = Part::of(solution, &fits, false);
+        assert_eq!((last.others, last.missed), (0..4, 2));
     }
 }

@@ -61,6 +61,15 @@ pub fn frame_findings(
             text,
         ));
     }
+    if fit.robot_factor > limits.touch_factor {
+        let text = format!(
+            "the touches say {:.1} times as much of the robot as the solution leaves open: another robot, tool or mastering than that of the solution{}",
+            fit.robot_factor,
+            if fit.tool_covariances[0].is_none() { ", or a tool that was given wrongly" } else { "" }
+        );
+        let quantities = numbers([("factor", fit.robot_factor)]);
+        all.push(finding(Code::RobotContradicted, Weight::Gate, quantities, text));
+    }
     let weak = |what: &str, covariance: &Matrix3<f64>, per_m: f64, unit: &str| {
         let eigen = covariance.symmetric_eigen();
         let k = eigen.eigenvalues.imax();
