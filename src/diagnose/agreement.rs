@@ -38,10 +38,10 @@ pub enum Moved {
         /// rad.
         angle_rad: f64,
     },
-    /// The readings of one joint, by another amount at each stop.
+    /// The readings, by another amount at each stop.
     Readings {
-        /// Name of the joint.
-        joint: String,
+        /// Name of the joint; none where it is all of them.
+        joint: Option<String>,
         /// True where all of them are the same.
         stand_still: bool,
     },
@@ -95,8 +95,8 @@ pub fn agreement(robot: &Robot, others: &HandEye, seen: &[SeenStop], limits: &Li
     }
     // An amount of its own for every stop fits more easily.
     let wrong = readings.filter_map(|joint| wrong_readings(robot, &stops, joint, limits));
-    let wrong = wrong.filter(|a| a.members.len() > most).max_by_key(|a| a.members.len());
-    wrong.or(best)
+    let wrong = wrong.chain(copied(&stops, limits)).filter(|a| a.members.len() > most);
+    wrong.max_by_key(|a| a.members.len()).or(best)
 }
 
 /// A stop with what its image shows.
@@ -161,6 +161,11 @@ fn apart(a: &Pose, b: &Pose) -> f64 {
     angle + distance
 }
 
+/// What may be left of a misfit of stops that agree.
+fn bound(misfit: f64, limits: &Limits) -> f64 {
+    (limits.moved_agreement * misfit).min(limits.set_aside_floor)
+}
+
 /// Of these candidates the one that most stops agree with, of several the one with the least misfit: where they leave, by stop, less than the
 /// `bound` of that stop and candidate.
 fn common<T: Copy>(
@@ -189,7 +194,7 @@ fn zero(robot: &Robot, stops: &[Stop], joint: usize, limits: &Limits) -> Option<
         stops.iter().filter_map(|stop| stop.offset(robot, joint)),
         stops,
         |offset, stop| stop.misfit_with(robot, joint, offset),
-        |_, stop| limits.moved_agreement * stop.misfit,
+        |_, stop| bound(stop.misfit, limits),
         limits.moved_images,
     )?;
     let (name, kind) = (robot.chain.readings[joint].clone(), robot.chain.reading_kinds[joint]);
@@ -198,15 +203,33 @@ fn zero(robot: &Robot, stops: &[Stop], joint: usize, limits: &Limits) -> Option<
 
 fn wrong_readings(robot: &Robot, stops: &[Stop], joint: usize, limits: &Limits) -> Option<Agreement> {
     let left = |stop: &Stop| stop.misfit_with(robot, joint, stop.offset(robot, joint).unwrap_or(0.0));
-    let bound = |(): (), stop: &Stop| limits.moved_agreement * stop.misfit;
-    let ((), members, spread) = common(std::iter::once(()), stops, |(), stop| left(stop), bound, limits.moved_images)?;
+    let ((), members, spread) = common(
+        std::iter::once(()),
+        stops,
+        |(), stop| left(stop),
+        |(), stop| bound(stop.misfit, limits),
+        limits.moved_images,
+    )?;
     let own = |k: &usize| stops[*k].seen.readings[joint];
     let stand_still = members.iter().all(|k| own(k) == own(&members[0]));
     Some(Agreement {
-        moved: Moved::Readings { joint: robot.chain.readings[joint].clone(), stand_still },
+        moved: Moved::Readings { joint: Some(robot.chain.readings[joint].clone()), stand_still },
         members,
         spread,
     })
+}
+
+/// Stops with the same readings whose images differ.
+fn copied(stops: &[Stop], limits: &Limits) -> Option<Agreement> {
+    let same = |stop: &Stop| -> Vec<usize> {
+        (0..stops.len()).filter(|k| stops[*k].seen.readings == stop.seen.readings).collect()
+    };
+    let members = stops.iter().map(same).max_by_key(Vec::len)?;
+    let first = &stops[members[0]].by_image;
+    let differ = members.iter().filter(|k| apart(first, &stops[**k].by_image) > limits.set_aside_floor).count();
+    let spread = members.iter().map(|k| stops[*k].misfit).sum::<f64>() / members.len() as f64;
+    let moved = Moved::Readings { joint: None, stand_still: true };
+    (differ + 1 >= limits.moved_images).then_some(Agreement { moved, members, spread })
 }
 
 fn plate(stops: &[Stop], others: &HandEye, limits: &Limits) -> Option<Agreement> {
@@ -227,7 +250,7 @@ fn place(stops: &[Stop], old: &Pose, of: impl Fn(&Stop) -> Pose, limits: &Limits
         stops.iter().map(&of),
         stops,
         |candidate, stop| apart(&candidate, &of(stop)),
-        |candidate, _| limits.moved_agreement * apart(old, &candidate),
+        |candidate, _| bound(apart(old, &candidate), limits),
         limits.moved_images,
     )
 }

@@ -1,5 +1,7 @@
 //! Images that disagree with their readings but agree with each other: the plate or the camera was moved, or a joint reads otherwise.
 
+use std::collections::BTreeMap;
+
 use super::agreement::{Agreement, Moved, agreement};
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
@@ -17,26 +19,23 @@ pub struct BodyMoved {
     pub images: Vec<String>,
 }
 
-pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<BodyMoved> {
-    let series = 0..setting.series.len();
-    series.filter_map(|k| find_move(adjustment, setting, k)).collect()
-}
-
-/// Looks for what the wrongly paired images of a series agree on.
-fn find_move(Adjustment { problem, state }: &Adjustment, setting: &CheckContext, series: usize) -> Option<BodyMoved> {
-    let of_series = problem.images.iter().enumerate().filter(|(_, image)| image.series == series);
-    let (wrong, seen): (Vec<usize>, Vec<SeenStop>) = of_series
-        .filter(|(_, image)| image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair))
-        .filter_map(|(i, image)| {
-            let (stop, pose) = (problem.posture(i)?, setting.free.poses[i].as_ref()?);
+/// What the wrongly paired images of a series agree on, for each mounting and placement.
+pub(super) fn check(Adjustment { problem, state }: &Adjustment, setting: &CheckContext) -> Vec<BodyMoved> {
+    let mut wrong: BTreeMap<(usize, usize, usize), (Vec<usize>, Vec<SeenStop>)> = BTreeMap::new();
+    for (i, image) in problem.images.iter().enumerate() {
+        let suspect = image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair);
+        if let (true, Some(stop), Some(pose)) = (suspect, problem.posture(i), &setting.free.poses[i]) {
             let (readings, camera_from_plate) = (stop.readings.clone(), pose.camera_from_plate);
-            Some((i, SeenStop { readings, mount: image.mount, camera_from_plate }))
-        })
-        .unzip();
-    let first = &problem.images[*wrong.first()?];
-    let others = HandEye { camera: state.mountings[first.mounting], plate: state.placements[first.placement] };
-    let found = agreement(&state.robot, &others, &seen, setting.limits)?;
-    BodyMoved::of(problem, &wrong, found)
+            let (images, seen) = wrong.entry((image.series, image.mounting, image.placement)).or_default();
+            images.push(i);
+            seen.push(SeenStop { readings, mount: image.mount, camera_from_plate });
+        }
+    }
+    let moved = |((_, mounting, placement), (images, seen)): (&(usize, usize, usize), &(Vec<usize>, Vec<SeenStop>))| {
+        let others = HandEye { camera: state.mountings[*mounting], plate: state.placements[*placement] };
+        BodyMoved::of(problem, images, agreement(&state.robot, &others, seen, setting.limits)?)
+    };
+    wrong.iter().filter_map(moved).collect()
 }
 
 impl BodyMoved {
@@ -65,7 +64,9 @@ impl Kind for BodyMoved {
 
     fn subjects(&self) -> Vec<Subject> {
         let joint = match &self.moved {
-            Moved::Zero { joint, .. } | Moved::Readings { joint, .. } => Some(Subject::Joint(joint.clone())),
+            Moved::Zero { joint, .. } | Moved::Readings { joint: Some(joint), .. } => {
+                Some(Subject::Joint(joint.clone()))
+            }
             _ => None,
         };
         joint.into_iter().chain(self.images.iter().cloned().map(Subject::Image)).collect()
@@ -85,7 +86,8 @@ impl Kind for BodyMoved {
         match &self.moved {
             Moved::Plate { .. } => "plate".into(),
             Moved::Camera { .. } => "camera on its mount".into(),
-            Moved::Zero { joint, .. } | Moved::Readings { joint, .. } => joint.clone(),
+            Moved::Zero { joint, .. } | Moved::Readings { joint: Some(joint), .. } => joint.clone(),
+            Moved::Readings { joint: None, .. } => "joint readings".into(),
         }
     }
 
@@ -109,6 +111,9 @@ impl Kind for BodyMoved {
                 kind.units()[1],
                 or.map(|body| format!(", or {body} was turned")).unwrap_or_default()
             ),
+            Moved::Readings { joint: None, .. } => {
+                format!("are the same for {images}, which show different poses: nothing was read any more")
+            }
             Moved::Readings { stand_still, .. } => format!(
                 "its readings are wrong at some stops: {images}, fit where it stands elsewhere at each{}",
                 if *stand_still { ", and it reads the same at all of them: it was not read any more" } else { "" }
@@ -125,7 +130,7 @@ impl Kind for BodyMoved {
                 "put the images after the move into a series of their own with another [camera] mounting"
             }
             Moved::Zero { .. } => "identify the robot from the stops of one mastering, before the move or after it",
-            Moved::Readings { .. } => "correct its readings at these stops, or leave their rows out",
+            Moved::Readings { .. } => "correct the readings of these stops, or leave their rows out",
         };
         remedy.into()
     }
