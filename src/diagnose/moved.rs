@@ -21,21 +21,21 @@ pub struct BodyMoved {
 
 /// What the wrongly paired images of a series agree on, for each mounting and placement.
 pub(super) fn check(Adjustment { problem, state }: &Adjustment, setting: &CheckContext) -> Vec<BodyMoved> {
-    let mut wrong: BTreeMap<(usize, usize, usize), (Vec<usize>, Vec<SeenStop>)> = BTreeMap::new();
+    let mut groups: BTreeMap<[usize; 3], Vec<(usize, SeenStop)>> = BTreeMap::new();
     for (i, image) in problem.images.iter().enumerate() {
         let suspect = image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair);
         if let (true, Some(stop), Some(pose)) = (suspect, problem.posture(i), &setting.free.poses[i]) {
             let (readings, camera_from_plate) = (stop.readings.clone(), pose.camera_from_plate);
-            let (images, seen) = wrong.entry((image.series, image.mounting, image.placement)).or_default();
-            images.push(i);
-            seen.push(SeenStop { readings, mount: image.mount, camera_from_plate });
+            let seen = SeenStop { readings, mount: image.mount, camera_from_plate };
+            groups.entry([image.series, image.mounting, image.placement]).or_default().push((i, seen));
         }
     }
-    let moved = |((_, mounting, placement), (images, seen)): (&(usize, usize, usize), &(Vec<usize>, Vec<SeenStop>))| {
-        let others = HandEye { camera: state.mountings[*mounting], plate: state.placements[*placement] };
-        BodyMoved::of(problem, images, agreement(&state.robot, &others, seen, setting.limits)?)
+    let moved = |([_, mounting, placement], wrong): ([usize; 3], Vec<(usize, SeenStop)>)| {
+        let others = HandEye { camera: state.mountings[mounting], plate: state.placements[placement] };
+        let (images, seen): (Vec<usize>, Vec<SeenStop>) = wrong.into_iter().unzip();
+        BodyMoved::of(problem, &images, agreement(&state.robot, &others, &seen, setting.limits)?)
     };
-    wrong.iter().filter_map(moved).collect()
+    groups.into_iter().filter_map(moved).collect()
 }
 
 impl BodyMoved {
