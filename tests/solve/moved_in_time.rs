@@ -211,7 +211,7 @@ fn what_breaks_a_series_is_named() {
             change(&mut series, from..24, by);
             measured(&series, &chain())
         };
-        let pushed = Pose::exp(&Vector6::new(0.08, 0.05, 0.0, 0.1, 0.1, 0.2));
+        let pushed = Pose::exp(&Vector6::new(0.03, 0.02, 0.0, 0.0, 0.0, 0.5));
         assert_named(&moved(&|pose| pose * pushed), Code::PlateMoved, &[first]);
         assert_named(&moved(&|pose| pushed * pose), Code::CameraMoved, &[first]);
     }
