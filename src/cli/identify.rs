@@ -144,7 +144,10 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let estimator = args.two_stage.map_or(options.estimator, Into::into);
     let of_cameras = args.cameras.apply(&mut observed.series)?;
     observed.notices.extend(of_cameras);
-    let calibration = Calibration::of(observed, &Options { estimator, ..options })?;
+    let noticed = observed.notices.clone();
+    // A refusal says nothing of what was noticed before, which may be its cause.
+    let calibration = Calibration::of(observed, &Options { estimator, ..options })
+        .inspect_err(|_| noticed.iter().for_each(|notice| tracing::warn!("{}", notice.coded())))?;
     write(args, &calibration, place)
 }
 
