@@ -51,6 +51,10 @@ const FOLDS: usize = 6;
 /// Joint error that a nominal robot is allowed per stop, rad or m, so that its geometric errors do not bend camera and plate.
 const NOMINAL_JOINT_ERROR: f64 = 3e-3;
 
+/// Error of its pose that it is allowed in place of that where no image is, m and rad: base and tool are then where it misses least. By joint errors
+/// the few stops at which these cannot be what it misses by would decide.
+const NOMINAL_POSE_ERROR: f64 = 3e-3;
+
 /// Predicts every image on the robot by models that have not seen it: of what is calibrated by `fitted`, from the images that are left, which is
 /// [`refitted_near`] for the joint fit. Also returns what was fitted, fold by fold.
 pub fn hold_out(fit: LinearProblem, fitted: &Refit, limits: &Limits) -> Option<(Accuracy, Vec<State>)> {
@@ -71,7 +75,7 @@ pub fn hold_out(fit: LinearProblem, fitted: &Refit, limits: &Limits) -> Option<(
     Some((Accuracy { nominal, calibrated, per_image_mm, per_body_mm, folds: folds.len() }, states))
 }
 
-/// Stops that are enough for what is fitted beside the nominal robot: they add less than a thousandth to the squares of its errors.
+/// Stops that are enough for what is fitted beside the nominal robot.
 const NOMINAL_STOPS: usize = 500;
 
 /// With the nominal robot, which stays as it is; of very many stops some.
@@ -88,7 +92,14 @@ pub(super) fn nominal(fit: &Adjustment) -> Adjustment {
     let known: Vec<usize> = robot.filter(|c| !problem.layout.is_between_bases(*c)).collect();
     known.into_iter().for_each(|c| problem.layout.columns[c].free = false);
     problem.noise.local.fill(0.0);
-    problem.noise.joint.iter_mut().flatten().for_each(|s| *s = s.max(NOMINAL_JOINT_ERROR));
+    if problem.used().next().is_some() {
+        problem.noise.joint.iter_mut().flatten().for_each(|s| *s = s.max(NOMINAL_JOINT_ERROR));
+        return nominal;
+    }
+    for measured in &mut problem.body_measurements {
+        let sigmas = [&mut measured.sigma_m, &mut measured.sigma_rad];
+        sigmas.into_iter().filter(|sigma| **sigma > 0.0).for_each(|sigma| *sigma = sigma.max(NOMINAL_POSE_ERROR));
+    }
     nominal
 }
 

@@ -18,6 +18,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("assess/hold_out.rs FOLDS", "how the hold-out is divided"),
     ("assess/hold_out.rs MANY", "memory"),
     ("assess/hold_out.rs NOMINAL_JOINT_ERROR", "prior of the nominal fit"),
+    ("assess/hold_out.rs NOMINAL_POSE_ERROR", "prior of the nominal fit"),
     ("assess/hold_out.rs NOMINAL_STOPS", "samples of a fit"),
     ("assess/identifiability.rs AS_LONG", "rounding of a length"),
     ("assess/identifiability.rs MOST_PAIRS", "how many pairs are kept"),
