@@ -369,6 +369,21 @@ def in_sockets(world, middle, count):
     return readings, sockets
 
 
+def taken(world, camera, middle, view, bounds):
+    """Readings of the stops at which the camera sees the board, whose pose before it is view(tip), and what it sees there."""
+    (lens, board), (wanted, most) = camera, bounds
+    readings, seen = [], []
+    for _ in range(most):
+        q, tip = world.stop(middle)
+        corners = lens.see(view(tip), board, world.sigma_px, world.rng)
+        if corners:
+            seen += [[f"{len(readings):03}.png", corner, *uv] for corner, uv in corners.items()]
+            readings.append(q)
+        if len(readings) == wanted:
+            break
+    return readings, seen
+
+
 def several(seed, folder):
     """One to three series of one robot."""
     world = World(1000 + seed, folder)
@@ -401,15 +416,7 @@ def several(seed, folder):
                 still = tip @ held @ inverse(looking(rng, 0.55))
                 view = lambda t: inverse(still) @ t @ held
             stills = stills or [still]
-            readings, seen = [], []
-            for _ in range(20000):
-                q, t = world.stop(middle)
-                corners = lens.see(view(t), board, world.sigma_px, rng)
-                if corners:
-                    seen += [[f"{len(readings):03}.png", corner, *uv] for corner, uv in corners.items()]
-                    readings.append(q)
-                if len(readings) == count:
-                    break
+            readings, seen = taken(world, (lens, board), middle, view, (count, 20000))
             world.observations(path, seen)
             mounting = 'mounting = "same"\n' if one_mounting and kind == "hand" else ""
             manifest = (
@@ -458,15 +465,8 @@ def cells(seed, folder):
         cell.between = tip @ hand @ looking(rng, 0.4) @ inverse(carrier @ held)
     else:
         held = inverse(carrier) @ tip @ hand @ looking(rng, 0.4)
-    readings, seen, wanted = [], [], int(rng.choice([24, 40]))
-    for _ in range(60000):
-        q, tip = world.stop(cell.middle)
-        corners = lens.see(inverse(tip @ hand) @ held, board, world.sigma_px, rng)
-        if corners:
-            seen += [[f"{len(readings):03}.png", corner, *uv] for corner, uv in corners.items()]
-            readings.append(q)
-        if len(readings) == wanted:
-            break
+    wanted = int(rng.choice([24, 40]))
+    readings, seen = taken(world, (lens, board), cell.middle, lambda tip: inverse(tip @ hand) @ held, (wanted, 60000))
     world.observations(folder, seen)
     manifest = (
         'camera_mount = "hand"\nplate = "plate.toml"\n[camera]\nname = "hand"\n'
