@@ -12,7 +12,7 @@ use crate::init::resect_near;
 use crate::linalg::symmetric_eigen;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Image, Problem, State, TakenFrom, Weighting, posture_groups, predict};
-use crate::solve::{LinearProblem, LinearisedAdjustment, Settings, solve};
+use crate::solve::{LinearProblem, LinearisedAdjustment, Outcome, Settings, solve};
 use crate::stage::stage;
 
 /// Errors of predicted images.
@@ -62,8 +62,6 @@ pub fn hold_out(fit: LinearProblem, fitted: &Refit, limits: &Limits) -> Option<(
     let problem = &fit.adjustment.problem;
     let folds = folds(problem, limits)?;
     let nominal = nominal(fit.adjustment);
-    let settings = of_fold(&nominal);
-    let nominal = solve(nominal, &settings);
     let (nominal, _) = predictions(nominal.linear()?, &folds, &joint)?;
     let (calibrated, states) = predictions(fit, &folds, fitted)?;
     let mut per_image_mm = vec![None; problem.images.len()];
@@ -78,8 +76,14 @@ pub fn hold_out(fit: LinearProblem, fitted: &Refit, limits: &Limits) -> Option<(
 /// Stops that are enough for what is fitted beside the nominal robot.
 const NOMINAL_STOPS: usize = 500;
 
-/// With the nominal robot, which stays as it is; of very many stops some.
-pub(super) fn nominal(fit: &Adjustment) -> Adjustment {
+/// The fit of what is beside the nominal robot, to some of very many stops.
+pub(super) fn nominal(fit: &Adjustment) -> Outcome {
+    let nominal = of_nominal(fit);
+    let settings = of_fold(&nominal);
+    solve(nominal, &settings)
+}
+
+fn of_nominal(fit: &Adjustment) -> Adjustment {
     let mut nominal = fit.some_stops(NOMINAL_STOPS, NOMINAL_STOPS).unwrap_or_else(|| fit.clone());
     let Adjustment { problem, state } = &mut nominal;
     state.robot = Robot { terms: fit.state.robot.terms.clone(), ..Robot::nominal(fit.state.robot.chain.clone()) };

@@ -2,10 +2,10 @@
 
 use std::collections::HashSet;
 
-use super::hold_out::{Accuracy, Errors, dealt, nominal, of_fold, refitted_near, side_by_side};
+use super::hold_out::{Accuracy, Errors, dealt, nominal, refitted_near, side_by_side};
 use super::limits::Limits;
 use crate::problem::{Problem, State, TakenFrom};
-use crate::solve::{LinearProblem, solve};
+use crate::solve::LinearProblem;
 use crate::stage::stage;
 
 /// Predicts what was measured of bodies by models that have not seen the stop. Also returns the states, fold by fold; `None` for too few stops.
@@ -22,8 +22,6 @@ pub fn hold_out_bodies(fit: LinearProblem, limits: &Limits) -> Option<(Accuracy,
     }
     let folds = dealt(stops.into_iter().map(|stop| vec![stop]).collect());
     let nominal = nominal(fit.adjustment);
-    let settings = of_fold(&nominal);
-    let nominal = solve(nominal, &settings);
     let (before, _) = predictions(problem, nominal.linear()?, &folds)?;
     let (after, states) = predictions(problem, fit, &folds)?;
     let mut per_body_mm = vec![None; problem.body_measurements.len()];

@@ -102,6 +102,8 @@ limits! {
     displaced_images: usize = 3;
     /// Share of the squares of the joint noise that a displacement must explain: real robots err alike in postures that are alike.
     displaced_share: f64 = 0.6;
+    /// Share from which it is named as a doubt: image noise has its part of the squares, too.
+    displaced_doubt: f64 = 0.4;
     /// Probability, over all displacements that are looked at, with which Gaussian noise may look like one.
     displaced_false_alarms: f64 = 1e-4;
     /// Displacement from which a result is not to be trusted, m: as far as a good robot repeats.

@@ -7,7 +7,7 @@ use crate::assess::Limits;
 use crate::geom::{Pose, log_so3};
 use crate::init::{HandEye, SeenStop};
 use crate::model::robot::Robot;
-use crate::series::CameraMount;
+use crate::series::{CameraMount, spread};
 use crate::urdf::JointKind;
 
 /// What is another at some stops.
@@ -83,8 +83,9 @@ pub fn agreement(robot: &Robot, others: &HandEye, seen: &[SeenStop], limits: &Li
         None => 0..robot.chain.readings.len(),
     };
     let zeros = readings.clone().filter_map(|joint| zero(robot, &stops, joint, limits));
-    let all: Vec<Agreement> =
-        zeros.chain(plate(&stops, others, limits)).chain(camera(&stops, others, limits)).collect();
+    let plate = place(&stops, &others.plate, |stop| stop.plate, limits, plate_moved);
+    let camera = place(&stops, &others.camera, |stop| stop.camera, limits, camera_moved);
+    let all: Vec<Agreement> = zeros.chain(plate).chain(camera).collect();
     let most = all.iter().map(|a| a.members.len()).max().unwrap_or(0);
     let weighed = |a: &Agreement| a.moved.unknowns() * a.spread;
     let or = all.iter().filter(|a| a.members.len() == most).find_map(|a| a.moved.body());
@@ -121,7 +122,7 @@ impl<'a> Stop<'a> {
         Self {
             seen,
             by_image: tip,
-            misfit: apart(&tip, &robot.base_from_tip(&seen.readings)),
+            misfit: tip.misfit(&robot.base_from_tip(&seen.readings)),
             plate: chain.inverse() * (*camera * seen.camera_from_plate),
             camera: (chain * *plate) * seen.camera_from_plate.inverse(),
         }
@@ -129,7 +130,7 @@ impl<'a> Stop<'a> {
 
     /// Its misfit with a reading that is off by so much.
     fn misfit_with(&self, robot: &Robot, joint: usize, offset: f64) -> f64 {
-        apart(&self.by_image, &robot.base_from_tip(&self.readings_with(joint, offset)))
+        self.by_image.misfit(&robot.base_from_tip(&self.readings_with(joint, offset)))
     }
 
     fn readings_with(&self, joint: usize, offset: f64) -> Vec<f64> {
@@ -156,9 +157,11 @@ impl<'a> Stop<'a> {
 /// Step of a difference quotient, rad or m.
 const STEP: f64 = 1e-6;
 
-fn apart(a: &Pose, b: &Pose) -> f64 {
-    let (angle, distance) = a.distance(b);
-    angle + distance
+/// Stops that are enough to propose what all agree on.
+const CANDIDATES: usize = 100;
+
+fn some<'a, 'b>(stops: &'a [Stop<'b>]) -> impl Iterator<Item = &'a Stop<'b>> {
+    spread(stops.len(), CANDIDATES).map(|k| &stops[k])
 }
 
 /// What may be left of a misfit of stops that agree.
@@ -191,7 +194,7 @@ fn common<T: Copy>(
 
 fn zero(robot: &Robot, stops: &[Stop], joint: usize, limits: &Limits) -> Option<Agreement> {
     let (offset, members, spread) = common(
-        stops.iter().filter_map(|stop| stop.offset(robot, joint)),
+        some(stops).filter_map(|stop| stop.offset(robot, joint)),
         stops,
         |offset, stop| stop.misfit_with(robot, joint, offset),
         |_, stop| bound(stop.misfit, limits),
@@ -224,33 +227,36 @@ fn copied(stops: &[Stop], limits: &Limits) -> Option<Agreement> {
     let same = |stop: &Stop| -> Vec<usize> {
         (0..stops.len()).filter(|k| stops[*k].seen.readings == stop.seen.readings).collect()
     };
-    let members = stops.iter().map(same).max_by_key(Vec::len)?;
+    let members = some(stops).map(same).max_by_key(Vec::len)?;
     let first = &stops[members[0]].by_image;
-    let differ = members.iter().filter(|k| apart(first, &stops[**k].by_image) > limits.set_aside_floor).count();
+    let differ = members.iter().filter(|k| first.misfit(&stops[**k].by_image) > limits.set_aside_floor).count();
     let spread = members.iter().map(|k| stops[*k].misfit).sum::<f64>() / members.len() as f64;
     let moved = Moved::Readings { joint: None, stand_still: true };
     (differ + 1 >= limits.moved_images).then_some(Agreement { moved, members, spread })
 }
 
-fn plate(stops: &[Stop], others: &HandEye, limits: &Limits) -> Option<Agreement> {
-    let (place, members, spread) = place(stops, &others.plate, |stop| stop.plate, limits)?;
-    let (angle_rad, distance_m) = others.plate.distance(&place);
-    Some(Agreement { moved: Moved::Plate { distance_m, angle_rad }, members, spread })
+fn plate_moved((angle_rad, distance_m): (f64, f64)) -> Moved {
+    Moved::Plate { distance_m, angle_rad }
 }
 
-fn camera(stops: &[Stop], others: &HandEye, limits: &Limits) -> Option<Agreement> {
-    let (place, members, spread) = place(stops, &others.camera, |stop| stop.camera, limits)?;
-    let (angle_rad, distance_m) = others.camera.distance(&place);
-    Some(Agreement { moved: Moved::Camera { distance_m, angle_rad }, members, spread })
+fn camera_moved((angle_rad, distance_m): (f64, f64)) -> Moved {
+    Moved::Camera { distance_m, angle_rad }
 }
 
 /// The place of a body that most stops agree on, near enough beside how far it is from the `old` one.
-fn place(stops: &[Stop], old: &Pose, of: impl Fn(&Stop) -> Pose, limits: &Limits) -> Option<(Pose, Vec<usize>, f64)> {
-    common(
-        stops.iter().map(&of),
+fn place(
+    stops: &[Stop],
+    old: &Pose,
+    of: impl Fn(&Stop) -> Pose,
+    limits: &Limits,
+    moved: fn((f64, f64)) -> Moved,
+) -> Option<Agreement> {
+    let (place, members, spread) = common(
+        some(stops).map(&of),
         stops,
-        |candidate, stop| apart(&candidate, &of(stop)),
-        |candidate, _| bound(apart(old, &candidate), limits),
+        |candidate, stop| candidate.misfit(&of(stop)),
+        |candidate, _| bound(old.misfit(&candidate), limits),
         limits.moved_images,
-    )
+    )?;
+    Some(Agreement { moved: moved(old.distance(&place)), members, spread })
 }

@@ -55,19 +55,21 @@ pub struct Displaced {
     pub angle_rad: Option<(f64, f64)>,
     /// Share of the squares of the joint noise that this and the other displacements explain.
     pub share: f64,
-    /// Gate where it is beyond what a good robot repeats to.
+    /// True where that is most of them.
+    pub explains_most: bool,
+    /// Gate where it is beyond what a good robot repeats to, and explains most.
     pub weight: Weight,
 }
 
 impl Displaced {
     /// True where it happened in the course of time, in images of this mounting.
     pub(super) fn explains_two_places_of(&self, mounting: &str) -> bool {
-        !matches!(self.displacement, Displacement::AxisUp(_)) && self.mounting == mounting
+        self.explains_most && !matches!(self.displacement, Displacement::AxisUp(_)) && self.mounting == mounting
     }
 
     /// True where measurements with this instrument scatter because of it.
     pub(super) fn explains_scatter_of(&self, instrument: &str) -> bool {
-        self.is_measured() && self.mounting == instrument
+        self.explains_most && self.is_measured() && self.mounting == instrument
     }
 
     fn is_camera(&self) -> bool {

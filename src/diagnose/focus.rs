@@ -1,10 +1,9 @@
 //! Did focus or zoom change within the series? Every image votes for a focal length of its own.
 
-use nalgebra::SVector;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
-use crate::problem::{E, ImageTerms, Problem};
+use crate::fit::FocalLength;
+use crate::problem::Problem;
 
 /// From an image on the focal length differs.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,28 +18,15 @@ pub struct FocusChange {
     pub significance: f64,
 }
 
-/// One image's vote: relative change of the focal length, given its other intrinsics, with the pose free; `None` where the
-/// image does not say (seen from straight ahead).
-fn vote(terms: &ImageTerms, fx: f64, fy: f64, least_information: f64) -> Option<f64> {
-    let mut direction = SVector::<f64, E>::zeros();
-    (direction[0], direction[1]) = (fx, fy);
-    let with_pose = terms.pe.fixed_columns::<E>(0) * direction;
-    let solved = terms.pp.cholesky()?.solve(&with_pose);
-    let information = direction.dot(&(terms.ee.fixed_view::<E, E>(0, 0) * direction)) - with_pose.dot(&solved);
-    let pull = direction.dot(&terms.be.fixed_rows::<E>(0)) - solved.dot(&terms.bp);
-    (information > least_information).then(|| pull / information)
-}
-
 /// The most significant change along the order of the images of a camera; of the first camera that has one.
 pub(super) fn check(problem: &Problem, setting: &CheckContext) -> Option<FocusChange> {
-    let (free, limits) = (setting.free, setting.limits);
+    let limits = setting.limits;
     for (camera, name) in problem.cameras.iter().enumerate() {
-        let p = &free.state.cameras[camera].parameters;
-        let votes: Vec<(usize, f64)> = (free.linearised.images.iter().zip(&free.linearised.terms))
-            .filter(|(i, _)| problem.images[**i].camera == camera)
-            .filter_map(|(i, terms)| vote(terms, p[0], p[1], limits.focus_information).map(|v| (*i, v)))
-            .collect();
-        let values: Vec<f64> = votes.iter().map(|(_, v)| *v).collect();
+        let of_camera = problem.images.iter().enumerate().filter(|(_, image)| image.camera == camera);
+        let all = of_camera.filter_map(|(i, _)| Some((i, setting.free.poses[i].as_ref()?.focal?)));
+        let votes: Vec<(usize, FocalLength)> =
+            all.filter(|(_, focal)| focal.information > limits.focus_information).collect();
+        let values: Vec<f64> = votes.iter().map(|(_, focal)| focal.change).collect();
         let mut best: Option<(f64, usize, f64)> = None;
         for split in limits.focus_images..(values.len() + 1).saturating_sub(limits.focus_images) {
             let (before, after) = values.split_at(split);

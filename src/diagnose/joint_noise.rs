@@ -138,9 +138,9 @@ impl Kind for JointNoiseLarge {
                  model in the controller: record joint readings (joints.csv)"
             }
             Weight::Note => {
-                "did plate or camera move, were images taken before the arm stood still, are readings rounded? the stated sigmas contain it"
+                "did plate or camera move, were images taken before the arm stood still, are readings rounded, is autofocus or a stabiliser on? the stated sigmas contain it"
             }
-            _ => "look for a loose camera or plate, motion, a wrong robot model",
+            _ => "look for a loose camera or plate, motion, autofocus, a wrong URDF",
         };
         remedy.into()
     }

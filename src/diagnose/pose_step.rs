@@ -11,7 +11,7 @@
 //! the poses of the images miss those of the readings, in units of the noise of both, which are as many as the degrees of freedom that the robot
 //! left, and with the squares `P` of the robot's errors over their priors, which are as many as it took: a step may take up either. `D / (R + P)`
 //! has a beta distribution where noise is Gaussian. Real robots err alike in postures that are alike, so that chance alone does not acquit them:
-//! the step must also explain most of `R`.
+//! the step must also explain most of `R`; one that explains less, but much, is a doubt.
 
 use super::displaced::{Carried, Displaced, Displacement};
 use super::finding::Finding;
@@ -30,7 +30,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Find
     find_steps(fit, setting.limits).iter().filter_map(|step| finding(step, fit, setting)).collect()
 }
 
-/// Steps that explain most of the joint noise of their series, in the order of the images.
+/// Steps that explain much of the joint noise of their series, in the order of the images.
 fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
     let problem = &fit.problem;
     let mut linear = Linear::of(fit.linear());
@@ -65,7 +65,7 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
             own.share = all.explained(&left, own);
             first += size;
         }
-        if share > limits.displaced_share {
+        if share > limits.displaced_doubt {
             good.clone_from(&found);
         }
     }
@@ -138,12 +138,14 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     };
     let images: Vec<String> = step.shown.iter().map(name).collect();
     let limits = setting.limits;
+    let explains_most = step.share > limits.displaced_share;
+    let weight = |matters: bool| if matters && explains_most { Weight::Gate } else { Weight::Note };
     if let Changed::Zero(reading) = step.changed {
         let chain = &fit.state.robot.chain;
         let (joint, kind) = (chain.readings[reading].clone(), chain.reading_kinds[reading]);
         let repeats_to = if kind == JointKind::Prismatic { limits.displaced_m } else { limits.displaced_rad };
         let offset = (step.change[0], step.covariance[(0, 0)].sqrt());
-        let weight = if offset.0.abs() > repeats_to { Weight::Gate } else { Weight::Note };
+        let weight = weight(offset.0.abs() > repeats_to);
         let (stops, share) = (images, step.share);
         return Some(ZeroMoved { joint, kind, series, displacement, stops, offset, share, weight }.into());
     }
@@ -155,11 +157,22 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     };
     let (distance_m, angle_rad) = (sized(0), (step.change.len() > 3).then(|| sized(3)));
     let matters = distance_m.0 > limits.displaced_m || angle_rad.is_some_and(|angle| angle.0 > limits.displaced_rad);
-    let weight = if matters { Weight::Gate } else { Weight::Note };
+    let weight = weight(matters);
     let (body, mounting) = carried(step.changed, first, problem)?;
     Some(
-        Displaced { series, body, mounting, displacement, images, distance_m, angle_rad, share: step.share, weight }
-            .into(),
+        Displaced {
+            series,
+            body,
+            mounting,
+            displacement,
+            images,
+            distance_m,
+            angle_rad,
+            share: step.share,
+            explains_most,
+            weight,
+        }
+        .into(),
     )
 }
 

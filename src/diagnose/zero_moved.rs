@@ -22,7 +22,7 @@ pub struct ZeroMoved {
     pub offset: (f64, f64),
     /// Share of the squares of the joint noise that this and what else changed explain.
     pub share: f64,
-    /// Gate where it is beyond what a good robot repeats to.
+    /// Gate where it is beyond what a good robot repeats to, and explains most.
     pub weight: Weight,
 }
 

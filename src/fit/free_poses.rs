@@ -1,10 +1,10 @@
 //! Stand-alone camera poses: what the free-pose adjustment found.
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, SVector};
 
 use crate::geom::Pose;
-use crate::problem::State;
-use crate::solve::{Linearised, PlateScale};
+use crate::problem::{E, ImageTerms, State};
+use crate::solve::PlateScale;
 
 /// Stand-alone pose of one image.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +18,30 @@ pub struct FreePose {
     pub in_frame: PlacedCamera,
     /// RMS of the lengths of its residuals, px.
     pub rms_px: f64,
+    /// What the image by itself says of the focal length; `None` where it says nothing (seen from straight ahead).
+    pub focal: Option<FocalLength>,
+}
+
+/// The focal length of one image, its pose being free and the other intrinsics those of all images.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FocalLength {
+    /// Relative difference from that of all images.
+    pub change: f64,
+    /// Information on it, the inverse of its variance by the image noise.
+    pub information: f64,
+}
+
+impl FocalLength {
+    /// From the blocks of an image at a state with the focal lengths `[fx, fy]`, px.
+    pub fn of(terms: &ImageTerms, [fx, fy]: [f64; 2]) -> Option<Self> {
+        let mut direction = SVector::<f64, E>::zeros();
+        (direction[0], direction[1]) = (fx, fy);
+        let with_pose = terms.pe.fixed_columns::<E>(0) * direction;
+        let solved = terms.pp.cholesky()?.solve(&with_pose);
+        let information = direction.dot(&(terms.ee.fixed_view::<E, E>(0, 0) * direction)) - with_pose.dot(&solved);
+        let pull = direction.dot(&terms.be.fixed_rows::<E>(0)) - solved.dot(&terms.bp);
+        (information > 0.0).then(|| Self { change: pull / information, information })
+    }
 }
 
 /// A camera in the frame of a plate.
@@ -32,15 +56,7 @@ pub struct PlacedCamera {
 impl FreePoses {
     /// Of no image.
     pub fn none(state: State) -> Self {
-        Self {
-            poses: Vec::new(),
-            rms_px: 0.0,
-            observations: 0,
-            state,
-            scales: Vec::new(),
-            pixel_factor: Vec::new(),
-            linearised: Linearised::default(),
-        }
+        Self { poses: Vec::new(), rms_px: 0.0, observations: 0, state, scales: Vec::new(), pixel_factor: Vec::new() }
     }
 }
 
@@ -60,6 +76,4 @@ pub struct FreePoses {
     pub scales: Vec<Option<PlateScale>>,
     /// Pixel factors found.
     pub pixel_factor: Vec<f64>,
-    /// Linearisation of this adjustment: residuals and weights of the images in use.
-    pub linearised: Linearised,
 }

@@ -5,4 +5,4 @@ mod free_poses;
 
 pub use crate::solve::Fit;
 pub use evidence::log_evidence;
-pub use free_poses::{FreePose, FreePoses, PlacedCamera};
+pub use free_poses::{FocalLength, FreePose, FreePoses, PlacedCamera};

@@ -101,6 +101,12 @@ impl Pose {
         let d = &self.inverse() * other;
         (log_so3(&d.rotation).norm(), d.translation.norm())
     }
+
+    /// Both in one figure, the angle at an arm of 1 m: rad plus m.
+    pub fn misfit(&self, other: &Self) -> f64 {
+        let (angle, distance) = self.distance(other);
+        angle + distance
+    }
 }
 
 /// Adjoint for twists with translation first: `T Exp(x) T^-1 = Exp(Ad_T x)`.

@@ -26,16 +26,12 @@ pub(super) fn broken(suspects: &Suspects, misfit: f64, of: &str) -> Option<Error
     let divisions = (1..PARTS).map(|k| (k * n / PARTS).max(fewest).min(n.saturating_sub(fewest)));
     let parts = divisions.flat_map(|k| [(0..k, true), (k..n, false)]).filter_map(|(part, is_first)| {
         let solution = solved(part)?;
-        let fits: Vec<bool> = pairs.iter().map(|pair| total(solution.error(pair)) < left).collect();
+        let fits: Vec<bool> = pairs.iter().map(|pair| solution.misfit(pair) < left).collect();
         Some(Part::of(solution, &fits, is_first))
     });
     let part = parts.min_by_key(|part| (part.missed, part.others.len()))?;
     let both = || solved(part.others.clone()).map(|_| part.unnamed(of, n, misfit));
     part.named(suspects).or_else(both)
-}
-
-fn total((angle, distance): (f64, f64)) -> f64 {
-    angle + distance
 }
 
 /// A part of a series that fits by itself.

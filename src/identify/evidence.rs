@@ -128,6 +128,7 @@ fn best_model(
         None | Some((RobotModel::Full, _)) => full,
         Some((model, near)) => {
             let options = Options { model, ..options.clone() };
+            drop(full.fit);
             fit_model(chain, series, &options, Some((full.start, Some(near))))?
         }
     };

@@ -7,7 +7,7 @@ use super::start_verdict::{StartReached, StartVerdict};
 use super::stated::{CameraStart, camera_starts};
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
-use crate::fit::{FreePose, FreePoses, PlacedCamera};
+use crate::fit::{FocalLength, FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
@@ -407,13 +407,17 @@ fn collect(fit: &Fit) -> Result<FreePoses> {
     let (placed, scales) = placed_cameras(fit)?;
     let mut poses = vec![None; problem.images.len()];
     let covariances = covariance.of_images(fit.linear());
-    for ((LinearImage { index, terms, chain, .. }, c), in_frame) in fit.linear().images().zip(covariances).zip(placed) {
+    for ((LinearImage { index, image, terms, chain, .. }, c), in_frame) in
+        fit.linear().images().zip(covariances).zip(placed)
+    {
+        let intrinsics = &state.cameras[image.camera].parameters;
         let squares: f64 = terms.residuals.iter().map(|r| r.duv.norm_squared()).sum();
         poses[index] = Some(FreePose {
             camera_from_plate: chain.pose,
             covariance: Matrix6::from_column_slice(c.as_slice()),
             in_frame,
             rms_px: (squares / terms.residuals.len().max(1) as f64).sqrt(),
+            focal: FocalLength::of(terms, [intrinsics[0], intrinsics[1]]),
         });
     }
     Ok(FreePoses {
@@ -423,7 +427,6 @@ fn collect(fit: &Fit) -> Result<FreePoses> {
         state: state.clone(),
         scales,
         pixel_factor: problem.noise.pixel_factor.clone(),
-        linearised: lin.clone().without_equations(),
     })
 }
 

@@ -244,10 +244,7 @@ fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f6
         let Some((angle_rad, distance_m)) = adjustment.misfit(pose, i) else { continue };
         let better = (0..problem.images.len())
             .filter(|&k| k != i && problem.images[k].series == image.series)
-            .filter_map(|k| {
-                let (a, d) = adjustment.camera_by_readings_of(i, k)?.distance(pose);
-                Some((a + d, k))
-            })
+            .filter_map(|k| Some((adjustment.camera_by_readings_of(i, k)?.misfit(pose), k)))
             .min_by(|a, b| a.0.total_cmp(&b.0));
         let better = better.filter(|(size, _)| *size < usual + explained * (angle_rad + distance_m));
         let fits = better.map(|(misfit, k)| FitsReadings { of: problem.images[k].name.clone(), misfit });

@@ -318,11 +318,11 @@ fn check_rotations(of: &str, poses: &[PosePair], least: f64) -> Result<()> {
 
 fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &HandEye, limits: &Limits) -> Vec<usize> {
     let mut aside = Vec::new();
-    let sizes: Vec<f64> = pairs.iter().map(|(_, p)| solution.error(p)).map(|(a, d)| a + d).collect();
-    let bound = (limits.set_aside_factor * upper_median(sizes)).max(limits.set_aside_floor);
+    let misfits: Vec<f64> = pairs.iter().map(|(_, p)| solution.misfit(p)).collect();
+    let bound = (limits.set_aside_factor * upper_median(misfits)).max(limits.set_aside_floor);
     for (i, pair) in pairs {
-        let (angle_rad, distance_m) = solution.error(pair);
-        if angle_rad + distance_m > bound {
+        if solution.misfit(pair) > bound {
+            let (angle_rad, distance_m) = solution.error(pair);
             problem.images[*i].rejected =
                 Some(ImageRejection::WronglyPaired(Mismatch::HandEye(Misfit { distance_m, angle_rad })));
             aside.push(*i);

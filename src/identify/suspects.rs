@@ -9,7 +9,7 @@ use crate::diagnose::MistakeKind;
 use crate::init::{PosePair, SeenStop, plate_scale, solve_hand_eye};
 use crate::model::robot::Robot;
 use crate::problem::{MeasuredSeries, Problem};
-use crate::series::CameraMount;
+use crate::series::{CameraMount, spread};
 
 /// Images of one camera mounting and one plate placement with what they say.
 pub(super) struct Suspects<'a> {
@@ -19,6 +19,9 @@ pub(super) struct Suspects<'a> {
     pub pairs: &'a [(usize, PosePair)],
     pub limits: &'a Limits,
 }
+
+/// Images by which a mistake is seen to explain the misfit of all.
+const ENOUGH: usize = 100;
 
 impl Suspects<'_> {
     /// The mistake that, undone, fits far better than `misfit`, if there is one, and the misfit that it then leaves.
@@ -93,7 +96,7 @@ impl Suspects<'_> {
         // Where bases were found from the readings as they are, they are found anew.
         let placed = bases::found(self.robot).and_then(|joint| bases::placed(self.robot, joint, &stops));
         let robot = placed.as_ref().unwrap_or(self.robot);
-        let pairs: Vec<PosePair> = stops.iter().map(|stop| stop.pair(robot)).collect();
+        let pairs: Vec<PosePair> = spread(stops.len(), ENOUGH).map(|k| stops[k].pair(robot)).collect();
         solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error)
     }
 

@@ -62,13 +62,14 @@ impl HandEye {
         (self.camera * pair.camera_from_plate).distance(&(pair.chain * self.plate))
     }
 
-    /// Median over the images of rotation error (rad) plus translation error (m).
+    /// Both in one figure, as [`Pose::misfit`].
+    pub fn misfit(&self, pair: &PosePair) -> f64 {
+        (self.camera * pair.camera_from_plate).misfit(&(pair.chain * self.plate))
+    }
+
+    /// Median misfit of the images, rad plus m.
     pub fn median_error(&self, pairs: &[PosePair]) -> f64 {
-        let size = |p: &PosePair| {
-            let (angle, distance) = self.error(p);
-            angle + distance
-        };
-        upper_median(pairs.iter().map(size).collect())
+        upper_median(pairs.iter().map(|p| self.misfit(p)).collect())
     }
 }
 
@@ -125,11 +126,7 @@ pub fn solve_hand_eye(pairs: &[PosePair]) -> Vec<HandEyeStart> {
         }
         if let Some(solution) = best {
             let mut ranked: Vec<&PosePair> = pairs.iter().collect();
-            let size = |p: &PosePair| {
-                let (angle, distance) = solution.error(p);
-                angle + distance
-            };
-            ranked.sort_by(|a, b| size(a).total_cmp(&size(b)));
+            ranked.sort_by(|a, b| solution.misfit(a).total_cmp(&solution.misfit(b)));
             let keep = ((pairs.len() as f64 * CONSENSUS_SHARE) as usize).max(SAMPLE_SIZE);
             let consensus: Vec<PosePair> = ranked.into_iter().take(keep).copied().collect();
             add("Shah, best sample of images".into(), Some(solution));

@@ -294,6 +294,30 @@ fn a_series_of_many_stops_without_images_has_a_small_page_without_chapters_of_im
 }
 
 #[test]
+fn of_very_many_images_some_are_drawn_and_the_worst_are_listed() {
+    let mut record = record();
+    let (first, of_files) = (record.images.clone(), record.inputs.clone());
+    record.images = (0..10_000)
+        .map(|k| {
+            let image = &first[k % first.len()];
+            let rms_px = image.rms_px.map(|px| if k % 1000 == 7 { px + 1.0 } else { px });
+            let reason = (k % 500 == 3).then(|| "in motion".to_owned());
+            solution_json::ImageRecord { name: format!("images/{k:05}.png"), rms_px, reason, ..image.clone() }
+        })
+        .collect();
+    record.inputs.extend(
+        (0..10_000).map(|k| InputFile { path: format!("run/images/{k:05}.png").into(), ..of_files[0].clone() }),
+    );
+    let page = report_html(&record, &Thumbnails::default());
+    assert!(page.len() < LARGEST, "{}", page.len());
+    let listed = |k: usize| page.contains(&format!("<td class=\"name\">images/{k:05}.png</td>"));
+    assert!((0..10_000).filter(|k| k % 1000 == 7 || k % 500 == 3).all(listed));
+    assert!((200..=400).contains(&page.matches("class=\"camera").count()));
+    assert!(of_files.iter().all(|f| page.contains(&*f.path.to_string_lossy())));
+    assert!(!page.contains("run/images/00000.png"));
+}
+
+#[test]
 fn local_errors_are_summed_up_and_make_no_columns() {
     let mut record = record();
     let heads = |page: &str| page.matches("<th class=\"n\">").count();

@@ -135,6 +135,19 @@ fn a_plate_and_a_camera_that_creep_are_not_called_moved_once() {
 }
 
 #[test]
+fn what_creeps_by_little_is_a_doubt() {
+    let far = |k: usize| 0.1e-3 * k as f64 / 23.0;
+    let mut series = seen(CameraMount::Hand, 24, 8);
+    (0..24).for_each(|k| change(&mut series, k..k + 1, |pose| pose * by(0.8 * far(k), -0.6 * far(k), 0.0)));
+    let solution = solved(&series);
+    assert!(solution.failed_gates().is_empty(), "{:?}", solution.findings);
+    let found = solution.findings.iter().find_map(|f| if let Finding::Displaced(d) = f { Some(d) } else { None });
+    let found = found.unwrap();
+    assert_eq!((found.body, found.displacement), (Carried::Plate, Displacement::AllThrough), "{found:?}");
+    assert!(!found.explains_most && (found.distance_m.0 - 0.1e-3).abs() < 3.0 * found.distance_m.1, "{found:?}");
+}
+
+#[test]
 fn series_in_which_nothing_moved_are_not_accused() {
     for (mount, images, seed) in [
         (CameraMount::Hand, 12, 11),

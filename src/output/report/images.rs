@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 
 use super::figure::pointed;
+use super::many;
 use super::plots;
 use super::words::fixed;
 use crate::output::solution_json::{ImageRecord, SolutionRecord};
@@ -13,18 +14,25 @@ pub(super) fn table(r: &SolutionRecord) -> Markup {
         return html! {};
     }
     let several = r.images.iter().any(|i| i.series != r.images[0].series);
+    let listed = many::listed(r);
     html! {
-        @if let Some(svg) = plots::by_image(r) { (pointed(&svg, "Point at a bar, or touch it: image, pose, joints, residual.")) }
+        @if let Some((svg, bars)) = plots::by_image(r) {
+            (pointed(&svg, "Point at a bar, or touch it: image, pose, joints, residual."))
+            (many::note(bars, r.images.len()))
+        }
         p.note {
             "Markers: used of those found. Residual: RMS per point in the joint fit. Held out: how far the robot model misses the "
             "plate in an image that it had not seen, nominal and calibrated."
+            @if listed.len() < r.images.len() {
+                " Of " (r.images.len()) " images, those that were left out or fit worst; the others stand in solution.json."
+            }
         }
         div.wide.long { table {
             thead { tr {
                 th { "Image" } th.n { "markers" } th.n { "residual, px" } th.n { "nominal, mm" } th.n { "calibrated, mm" } th { "left out because" }
             } }
-            tbody { @for (k, i) in r.images.iter().enumerate() {
-                @if several && (k == 0 || r.images[k - 1].series != i.series) { tr { th colspan="6" { (i.series) } } }
+            tbody { @for (k, i) in listed.iter().enumerate() {
+                @if several && (k == 0 || listed[k - 1].series != i.series) { tr { th colspan="6" { (i.series) } } }
                 (row(i))
             } }
         } }

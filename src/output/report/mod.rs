@@ -12,6 +12,7 @@ mod first_page;
 mod gallery;
 mod images;
 mod knowledge;
+mod many;
 mod maps;
 pub(crate) mod page;
 mod parameters;

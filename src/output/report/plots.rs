@@ -1,6 +1,7 @@
 //! Plots of numbers: histogram of held-out errors, joint noise.
 
 use super::describe::describe;
+use super::many;
 use super::svg::{Anchor, Svg, ticks};
 use super::words::plain;
 use crate::output::solution_json::SolutionRecord;
@@ -98,8 +99,8 @@ pub(super) fn histogram(record: &SolutionRecord) -> Option<String> {
     Some(svg.finish())
 }
 
-/// Residuals of every image in use, a bar each in the order of the series; left-out images are marked at the foot.
-pub(super) fn by_image(record: &SolutionRecord) -> Option<String> {
+/// Residuals of every image in use, a bar each in the order of the series; left-out images are marked at the foot. With the number of bars.
+pub(super) fn by_image(record: &SolutionRecord) -> Option<(String, usize)> {
     let most = record.images.iter().filter_map(|i| i.rms_px).fold(0.0, f64::max);
     if most <= 0.0 {
         return None;
@@ -113,9 +114,10 @@ pub(super) fn by_image(record: &SolutionRecord) -> Option<String> {
         svg.line([left, y(t)], [left + w, y(t)], "grid");
         svg.text([left - 6.0, y(t) + 4.0], Anchor::End, &plain(t));
     }
-    let step = w / record.images.len() as f64;
+    let drawn = many::drawn(record.images.iter().collect());
+    let step = w / drawn.len() as f64;
     let bar = (0.8 * step).min(24.0);
-    for (k, image) in record.images.iter().enumerate() {
+    for (k, &image) in drawn.iter().enumerate() {
         let x = left + step * (k as f64 + 0.5) - bar / 2.0;
         svg.titled(&describe(record, image), |svg| match (image.rms_px, &image.reason) {
             (Some(px), None) => svg.rect([x, y(px)], [bar, TOP + h - y(px)], "after"),
@@ -125,7 +127,7 @@ pub(super) fn by_image(record: &SolutionRecord) -> Option<String> {
     svg.line([left, TOP + h], [left + w, TOP + h], "axis");
     svg.text([left + w / 2.0, HEIGHT - 22.0], Anchor::Middle, "images in the order of the series; red: left out");
     svg.text_upwards([13.0, TOP + h / 2.0], "px RMS");
-    Some(svg.finish())
+    Some((svg.finish(), drawn.len()))
 }
 
 /// Joint noise in thousandths of a degree (of a millimetre for a prismatic joint), a bar for each joint and series.

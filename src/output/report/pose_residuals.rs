@@ -6,6 +6,7 @@ use nalgebra::Vector6;
 
 use super::describe::name;
 use super::figure::pointed;
+use super::many;
 use super::svg::{Anchor, Svg, round_below};
 use super::words::plain;
 use crate::geom::Pose;
@@ -22,8 +23,6 @@ const GAP: f64 = 22.0;
 const BOTTOM: f64 = 26.0;
 /// Half the size of a mark.
 const MARK: f64 = 2.6;
-/// Most images that are drawn.
-const MOST_IMAGES: usize = 300;
 /// Fewest images that show a course.
 const FEWEST_IMAGES: usize = 3;
 
@@ -55,8 +54,8 @@ fn residuals(r: &SolutionRecord) -> Option<Vec<PoseResidual<'_>>> {
 /// The chapter; empty for series without images.
 pub(super) fn section(r: &SolutionRecord) -> Markup {
     let Some(all) = residuals(r).filter(|all| all.len() >= FEWEST_IMAGES) else { return html! {} };
-    let every = all.len().div_ceil(MOST_IMAGES);
-    let shown: Vec<PoseResidual> = all.into_iter().step_by(every).collect();
+    let of_all = all.len();
+    let shown = many::drawn(all);
     html! {
         p {
             "The pose of the plate in every image, less what the corrected model makes of the joint readings. Good series scatter about zero. "
@@ -67,7 +66,7 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
             (of_axes(r, &shown, "camera", |p| p.camera))
             (of_axes(r, &shown, "plate", |p| p.plate))
         }
-        @if every > 1 { p.note { "One image of " (every) " is drawn." } }
+        (many::note(shown.len(), of_all))
     }
 }
 

@@ -7,6 +7,7 @@ use maud::{Markup, PreEscaped, html};
 use nalgebra::{Vector2, Vector3};
 
 use super::describe::describe;
+use super::many;
 use super::svg::escaped;
 use crate::geom::Pose;
 use crate::model::robot::Robot;
@@ -27,6 +28,8 @@ type Line = Vec<Vector3<f64>>;
 
 /// Everything in the base frame, m.
 struct Scene {
+    /// Images on the robot, of which some are drawn.
+    on_robot: usize,
     /// Through the origins of the joints, for each image on the robot.
     arms: Vec<(usize, Line)>,
     cameras: Vec<(usize, Pose)>,
@@ -37,10 +40,13 @@ struct Scene {
 impl Scene {
     fn of(r: &SolutionRecord) -> Option<Self> {
         let robot = found_model(r).ok()?.robot;
-        let mut scene = Self { arms: Vec::new(), cameras: Vec::new(), plates: Vec::new(), places: Vec::new() };
+        let images = r.images.iter().enumerate();
+        let stops: Vec<_> = images.filter_map(|(k, image)| Some((k, image.readings.as_ref()?))).collect();
+        let (arms, cameras, plates, places) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut scene = Self { on_robot: stops.len(), arms, cameras, plates, places };
         let mut placed = Vec::new();
-        for (k, image) in r.images.iter().enumerate() {
-            let Some(readings) = &image.readings else { continue };
+        for (k, readings) in many::drawn(stops) {
+            let image = &r.images[k];
             let links = robot.link_poses(readings);
             let Some(flange) = links.last() else { continue };
             let (Some(mounting), Some(placement)) =
@@ -196,5 +202,6 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
             output aria-live="polite" {}
             figcaption { "Drag, pinch or use the arrow keys to turn it; point at a camera to see its image." }
         }
+        (many::note(scene.cameras.len(), scene.on_robot))
     }
 }

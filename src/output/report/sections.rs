@@ -4,7 +4,7 @@ use maud::{Markup, PreEscaped, html};
 
 use super::figure::figure;
 use super::words::{count, data, plus_minus, significant, unit};
-use super::{maps, plots};
+use super::{many, maps, plots};
 use crate::identify::StartReached;
 use crate::output::solution_json::SolutionRecord;
 
@@ -186,6 +186,7 @@ pub(super) fn starts(r: &SolutionRecord) -> Markup {
 
 /// What is needed to repeat the result.
 pub(super) fn record(r: &SolutionRecord) -> Markup {
+    let files = many::files(r);
     html! {
         p { code { (r.program.command) } }
         p { (r.program.name) " " (r.program.version) "; the last solve " (r.status) " after " (count(r.iterations, "step")) " in all." }
@@ -200,7 +201,8 @@ pub(super) fn record(r: &SolutionRecord) -> Markup {
         h3 { "Files read, with SHA-256" }
         div.wide.long { table {
             thead { tr { th { "File" } th { "SHA-256" } } }
-            tbody { @for f in &r.inputs { tr { td.name { code { (f.path.display()) } } td.name { code { (f.sha256) } } } } }
+            tbody { @for f in &files { tr { td.name { code { (f.path.display()) } } td.name { code { (f.sha256) } } } } }
         } }
+        @if files.len() < r.inputs.len() { p.note { "Those of all images stand in solution.json." } }
     }
 }
