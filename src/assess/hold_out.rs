@@ -12,7 +12,7 @@ use crate::init::resect_near;
 use crate::linalg::symmetric_eigen;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Image, Problem, State, TakenFrom, Weighting, posture_groups, predict};
-use crate::solve::{LinearProblem, LinearisedAdjustment, Outcome, Settings, solve};
+use crate::solve::{LinearProblem, LinearisedAdjustment, Outcome, Settings, side_by_side, solve};
 use crate::stage::stage;
 
 /// Errors of predicted images.
@@ -223,23 +223,11 @@ fn along_the_workspace(Adjustment { problem, state }: &Adjustment, postures: Vec
 /// Error of every held-out image with its index, and the state of every fold.
 type Predictions = (Vec<(usize, ImageError)>, Vec<State>);
 
-/// Members of all folds beyond which these are worked on one by one: each needs the memory of a solve.
-const MANY: usize = 2000;
-
-/// What `work` makes of the folds with their numbers, as many at a time as there are threads.
-pub fn side_by_side<T: Send>(folds: &[Vec<usize>], work: impl Fn(usize, &Vec<usize>) -> T + Sync) -> Vec<T> {
-    let are_many = folds.iter().map(Vec::len).sum::<usize>() > MANY;
-    let at_a_time = if are_many { 1 } else { rayon::current_num_threads().max(1) };
-    let numbered: Vec<(usize, &Vec<usize>)> = folds.iter().enumerate().collect();
-    numbered
-        .chunks(at_a_time)
-        .flat_map(|some| some.par_iter().map(|(k, fold)| work(*k, fold)).collect::<Vec<T>>())
-        .collect()
-}
-
 fn predictions(fit: LinearProblem, folds: &[Vec<usize>], fitted: &Refit) -> Option<Predictions> {
+    let problem = &fit.adjustment.problem;
     let of_fold = |held: &Vec<usize>| fitted(fit.without_images(held));
-    let states: Vec<State> = side_by_side(folds, |_, held| of_fold(held)).into_iter().collect::<Option<_>>()?;
+    let states: Vec<State> =
+        side_by_side(problem, folds, |_, held| of_fold(held)).into_iter().collect::<Option<_>>()?;
     let held: Vec<(usize, &State)> =
         folds.iter().zip(&states).flat_map(|(held, fitted)| held.iter().map(move |&i| (i, fitted))).collect();
     let predicted = held.par_iter().map(|(i, fitted)| Some((*i, predict_image(fit.adjustment, fitted, *i)?)));

@@ -2,10 +2,10 @@
 
 use std::collections::HashSet;
 
-use super::hold_out::{Accuracy, Errors, dealt, nominal, refitted_near, side_by_side};
+use super::hold_out::{Accuracy, Errors, dealt, nominal, refitted_near};
 use super::limits::Limits;
 use crate::problem::{Problem, State, TakenFrom};
-use crate::solve::LinearProblem;
+use crate::solve::{LinearProblem, side_by_side};
 use crate::stage::stage;
 
 /// Predicts what was measured of bodies by models that have not seen the stop. Also returns the states, fold by fold; `None` for too few stops.
@@ -38,7 +38,7 @@ type Predictions = (Vec<(usize, f64)>, Vec<State>);
 
 /// Of all that is in use in a problem, by fits of it, or of some of it.
 fn predictions(problem: &Problem, fit: LinearProblem, folds: &[Vec<usize>]) -> Option<Predictions> {
-    let states = side_by_side(folds, |_, held| refitted_near(fit.without_bodies_at(held)));
+    let states = side_by_side(problem, folds, |_, held| refitted_near(fit.without_bodies_at(held)));
     let mut errors = Vec::new();
     for (held, state) in folds.iter().zip(&states) {
         let held: HashSet<usize> = held.iter().copied().collect();

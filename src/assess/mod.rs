@@ -30,7 +30,7 @@ pub use clustered::{Clustered, RootInformation, StopInformation, clustered_covar
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
 pub use hold_out::{
     Accuracy, Errors, ImageError, Refit, cluster_of_images, folds, hold_out, hold_out_images, predict_image, refitted,
-    refitted_near, regions, side_by_side,
+    refitted_near, regions,
 };
 pub use hold_out_bodies::hold_out_bodies;
 pub use identifiability::{

@@ -9,14 +9,14 @@ use super::solution::Solution;
 use super::two_stage::{PoseStage, fit_joint, fit_poses};
 use crate::assess::{
     ImageError, bootstrap_ratio, by_cluster, camera_errors_m, cluster_of_images, flange_error_m, folds, predict_image,
-    refitted_near, regions, root_mean_square, side_by_side,
+    refitted_near, regions, root_mean_square,
 };
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::problem::{Adjustment, Problem, State};
 use crate::series::CameraMount;
 use crate::simulate::truth::Truth;
-use crate::solve::LinearisedAdjustment;
+use crate::solve::{LinearisedAdjustment, side_by_side};
 use crate::stage::stage;
 
 /// Compares on the observations of a solution: its outliers and rejected images are left out for all estimators.
@@ -133,7 +133,7 @@ fn held_out(
         tick();
         errors
     };
-    side_by_side(folds, of_fold).concat()
+    side_by_side(&joint.problem, folds, of_fold).concat()
 }
 
 fn summary(errors: &Errors, clusters: &[usize], k: usize, joint: Option<usize>) -> Option<HeldOut> {

@@ -4,7 +4,6 @@
 //! latents and markers) at the optimum of each (D. MacKay, *Bayesian interpolation*, 1992).
 
 use nalgebra::DVector;
-use rayon::prelude::*;
 
 use super::build::FIRST_JOINT_NOISE;
 use super::computed_postures::{Before, Told, told_by_images};
@@ -21,7 +20,9 @@ use crate::linalg::SymmetricFactor;
 use crate::model::joint_terms::RobotModel;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, MeasuredSeries};
-use crate::solve::{ComponentOptions, JOINT_NOISE_FLOOR, LinearProblem, Settings, estimate_components, solve};
+use crate::solve::{
+    ComponentOptions, JOINT_NOISE_FLOOR, LinearProblem, Settings, estimate_components, side_by_side, solve,
+};
 use crate::stage::stage;
 use crate::urdf::Chain;
 
@@ -138,7 +139,8 @@ fn best_model(
 /// Evidence of every model that a fit of the full one holds, and its optimum: of smaller ones with their own joint noise, where it is `estimated`.
 fn compare_models(full: &Fit, estimated: bool) -> Vec<(Evidence, Adjustment)> {
     let models = [RobotModel::Rigid, RobotModel::Gear, RobotModel::Full];
-    let mut all: Vec<_> = models.into_par_iter().filter_map(|m| evidence(full, m, estimated)).collect();
+    let found = side_by_side(&full.problem, &models, |_, model| evidence(full, *model, estimated));
+    let mut all: Vec<_> = found.into_iter().flatten().collect();
     let best = all.iter().map(|(e, _)| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     all.iter_mut().for_each(|(e, _)| e.log_evidence -= best);
     all

@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
-
 use super::build::build;
 use super::free_poses::free_poses_of;
 use super::joint::{JointFit, fit_model};
@@ -16,7 +14,7 @@ use crate::fit::{Fit, FreePoses, log_evidence};
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, LensChoice, MeasuredSeries, Problem, predict};
-use crate::solve::{ComponentOptions, LinearProblem, Settings, Status, estimate_components};
+use crate::solve::{ComponentOptions, LinearProblem, Settings, Status, estimate_components, side_by_side};
 use crate::stage::stage;
 use crate::urdf::Chain;
 
@@ -104,8 +102,8 @@ fn compare_lenses(joint: &JointFit, camera: &str, choice: LensChoice, limits: &L
     let depths = depths_m(&fit.problem, &joint.start.free)[k];
     let formulas = Lens::ALL.into_iter().filter(|l| choice.has(*l) && (l.formula() != Lens::Fisheye || is_wide));
     let formulas: Vec<Lens> = formulas.collect();
-    let mut all: Vec<LensEvidence> =
-        formulas.into_par_iter().filter_map(|lens| evidence(fit, (k, &depths), lens)).collect();
+    let found = side_by_side(&fit.problem, &formulas, |_, lens| evidence(fit, (k, &depths), *lens));
+    let mut all: Vec<LensEvidence> = found.into_iter().flatten().collect();
     let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     all.iter_mut().for_each(|e| e.log_evidence -= best);
     let decisive = limits.decisive_log_odds;

@@ -108,13 +108,12 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
     if context.poses == Poses::Written {
         add("poses.csv".into(), pose_files::poses_csv(&images, &solution.free_poses));
     }
-    add("observations.csv".into(), observation_table::observations_csv(solution, context));
     let together = if context.poses == Poses::Written { solution.poses_together()? } else { None };
     if let Some((_, covariance)) = &together {
         files.insert(pose_files::TOGETHER.into(), npy::matrix(covariance));
     }
     let mut names: Vec<String> = files.keys().cloned().collect();
-    names.push(solution_json::FILE_NAME.to_owned());
+    names.extend([solution_json::FILE_NAME, OBSERVATIONS].map(str::to_owned));
     #[cfg(feature = "report")]
     names.push(REPORT.to_owned());
     names.sort();
@@ -124,8 +123,14 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
     #[cfg(feature = "report")]
     files.insert(REPORT.into(), report::report_html(&record, &Thumbnails::of_files(&record)).into_bytes());
     files.insert(solution_json::FILE_NAME.into(), solution_json::to_bytes(&record)?);
+    // Of very many images record and table are large, and not both are needed.
+    drop(record);
+    files.insert(OBSERVATIONS.into(), observation_table::observations_csv(solution, context).into_bytes());
     Ok(files)
 }
+
+/// Name of the table of observations.
+const OBSERVATIONS: &str = "observations.csv";
 
 /// Name of the report.
 #[cfg(feature = "report")]

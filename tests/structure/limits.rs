@@ -16,7 +16,6 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("assess/flange.rs HELD", "rounding"),
     ("assess/flange.rs SAMPLES", "samples of an average"),
     ("assess/hold_out.rs FOLDS", "how the hold-out is divided"),
-    ("assess/hold_out.rs MANY", "memory"),
     ("assess/hold_out.rs NOMINAL_JOINT_ERROR", "prior of the nominal fit"),
     ("assess/hold_out.rs NOMINAL_POSE_ERROR", "prior of the nominal fit"),
     ("assess/hold_out.rs NOMINAL_STOPS", "samples of a fit"),
