@@ -55,7 +55,7 @@ pub struct Displaced {
     pub angle_rad: Option<(f64, f64)>,
     /// Share of the squares of the joint noise that this and the other displacements explain.
     pub share: f64,
-    /// True where that is most of them.
+    /// True where it, or one that was found after it, explains most of what was left.
     pub explains_most: bool,
     /// Gate where it is beyond what a good robot repeats to, and explains most.
     pub weight: Weight,

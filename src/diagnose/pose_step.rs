@@ -65,6 +65,9 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
             own.share = all.explained(&left, own);
             first += size;
         }
+        if share > limits.displaced_share {
+            found.iter_mut().for_each(|own| own.explains_most = true);
+        }
         if share > limits.displaced_doubt {
             good.clone_from(&found);
         }
@@ -138,7 +141,7 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     };
     let images: Vec<String> = step.shown.iter().map(name).collect();
     let limits = setting.limits;
-    let explains_most = step.share > limits.displaced_share;
+    let explains_most = step.explains_most;
     let weight = |matters: bool| if matters && explains_most { Weight::Gate } else { Weight::Note };
     if let Changed::Zero(reading) = step.changed {
         let chain = &fit.state.robot.chain;

@@ -92,6 +92,8 @@ pub(super) struct Step {
     pub(super) fall: f64,
     /// Share of the squares `R` that this and the other steps of its series explain.
     pub(super) share: f64,
+    /// True where it, or one that was found after it, explains most of what was left.
+    pub(super) explains_most: bool,
     /// Logarithm of the probability that noise alone explains so much, of one candidate.
     pub(super) log_chance: f64,
 }
@@ -234,7 +236,19 @@ impl Linear {
         let shown = moved.iter().flat_map(|(r, _)| self.rows[*r].of(problem, candidate.changed)).collect();
         let Candidate { changed, order, group, .. } = *candidate;
         let Fall { cost, change, covariance, .. } = fall;
-        Some(Step { changed, order, group, moved, shown, change, covariance, fall: cost, share: 0.0, log_chance })
+        Some(Step {
+            changed,
+            order,
+            group,
+            moved,
+            shown,
+            change,
+            covariance,
+            fall: cost,
+            share: 0.0,
+            explains_most: false,
+            log_chance,
+        })
     }
 
     /// The candidate with the least score, this, and what it explains.

@@ -68,11 +68,6 @@ type Part = ((Arc<ImageTerms>, Arc<Chained>), Option<Arc<Equations>>);
 const MOST_KEPT: usize = 120_000;
 
 impl Linearised {
-    /// Without the equations, which only the solver needs, and makes again where the system is built once more.
-    pub fn without_equations(self) -> Self {
-        Self { equations: Vec::new(), ..self }
-    }
-
     /// With the curvature of the robust cost of measured bodies in place of their information; `None` where both are the same.
     pub(super) fn with_robust_curvature(&self) -> Option<Self> {
         if self.bodies.iter().all(|part| part.terms.weight == 1.0) {
