@@ -1,6 +1,5 @@
 //! Of very many images some are shown, so that the page can be mailed; all of them stand in solution.json.
 
-use std::cmp::Reverse;
 use std::collections::HashSet;
 use std::ffi::OsStr;
 use std::path::Path;
@@ -21,12 +20,14 @@ pub(super) fn drawn<T>(mut all: Vec<T>) -> Vec<T> {
     all
 }
 
-/// Those that are listed, in the order of the series: left-out ones, then those with the largest residual or held-out error.
+/// Those that are listed, in the order of the series: left-out ones, then those whose residual or held-out error is largest beside that of all.
 pub(super) fn listed(r: &SolutionRecord) -> Vec<&ImageRecord> {
+    let errors = |i: &ImageRecord| [i.rms_px, i.held_out_mm.map(|e| e[1])].map(Option::unwrap_or_default);
+    let all = [0, 1].map(|k| r.images.iter().map(|i| errors(i)[k]).sum::<f64>().max(f64::MIN_POSITIVE));
+    let size = |i: &ImageRecord| f64::max(errors(i)[0] / all[0], errors(i)[1] / all[1]);
     let mut order: Vec<(usize, &ImageRecord)> = r.images.iter().enumerate().collect();
-    let errors = |i: &ImageRecord| [i.held_out_mm.map_or(0.0, |e| e[1]), i.rms_px.unwrap_or(0.0)];
-    let bits = |i: &ImageRecord| errors(i).map(f64::to_bits);
-    order.sort_by_key(|(_, i)| Reverse((i.reason.is_some(), bits(i))));
+    let is_out = |i: &ImageRecord| i.reason.is_some();
+    order.sort_by(|(_, a), (_, b)| is_out(b).cmp(&is_out(a)).then(size(b).total_cmp(&size(a))));
     order.truncate(MOST_IMAGES);
     order.sort_by_key(|(k, _)| *k);
     order.into_iter().map(|(_, image)| image).collect()
