@@ -333,8 +333,7 @@ fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &Hand
 
 /// How far the stand-alone camera pose of an image is from that of its readings, rad + m.
 fn misfit(adjustment: &Adjustment, free: &FreePoses, image: usize) -> Option<f64> {
-    let (angle, distance) = adjustment.misfit(&free.poses[image].as_ref()?.camera_from_plate, image)?;
-    Some(angle + distance)
+    Some(adjustment.camera_by_readings(image)?.misfit(&free.poses[image].as_ref()?.camera_from_plate))
 }
 
 /// Median of these of the images in use.

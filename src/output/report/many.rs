@@ -10,7 +10,7 @@ use crate::output::solution_json::{ImageRecord, SolutionRecord};
 use crate::series::{InputFile, spread};
 
 /// Most images of a drawing or a table.
-pub(super) const MOST_IMAGES: usize = 300;
+const MOST_IMAGES: usize = 300;
 
 /// Those that are drawn, in the order of the series: spread over all of them.
 pub(super) fn drawn<T>(mut all: Vec<T>) -> Vec<T> {
