@@ -17,9 +17,11 @@ pub(super) fn poses(solution: &Solution) -> Vec<Option<Pose>> {
     poses
 }
 
-/// Measured minus predicted, px, of every observation of an image; `None` where nothing can be predicted.
+/// Measured minus predicted, px, of every observation of an image; `None` where nothing can be predicted, as of a marker that wrong readings
+/// put beside the camera.
 pub(super) fn residuals(solution: &Solution, image: usize, pose: Option<&Pose>) -> Vec<Option<Vector2<f64>>> {
     let i = &solution.fit.problem.images[image];
-    let residual = |o| predict(i, &solution.fit.state, pose?, o).map(|p| o.uv - p.uv);
+    let predicted = |o| predict(i, &solution.fit.state, pose?, o).filter(|p| p.uv.iter().all(|px| px.is_finite()));
+    let residual = |o| predicted(o).map(|p| o.uv - p.uv);
     i.observations.iter().map(residual).collect()
 }
