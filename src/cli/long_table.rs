@@ -305,8 +305,7 @@ fn two_stage(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 
 /// What the lengths of the robot hang on.
 fn scales(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    let scales = r.estimates.iter().filter(|e| e.name.starts_with("plate_shape") && e.name.ends_with(".scale"));
-    for (e, plate) in scales.zip(&r.plates).filter(|(e, _)| e.free) {
+    for (e, plate) in r.plate_sizes() {
         let (Some(prior), Some(sigma)) = (e.prior_sigma, e.sigma) else { continue };
         let known =
             format!("scale     the robot's lengths follow the plate, whose size is known to {:.3} %", 100.0 * sigma);

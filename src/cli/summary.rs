@@ -173,14 +173,18 @@ fn spoken(code: Code) -> String {
     }
 }
 
-/// Remedies of a failed result, else the stops that would help most; the most useful first.
+/// Remedies of a failed result, else what would help most; the most useful first.
 fn next(r: &SolutionRecord, verdict: &Verdict, most: usize) -> Vec<String> {
     if !verdict.remedies.is_empty() {
         return shared("next      ", &verdict.remedies, most);
     }
-    let stops = r.identifiability.iter().flat_map(|found| &found.next);
-    stops.map(|a| indented("next", &advice(r, a))).take(most).collect()
+    let size = r.hangs_on_a_stated_size().then(|| MEASURE_THE_PLATE.to_owned());
+    let stops = r.identifiability.iter().flat_map(|found| &found.next).map(|a| advice(r, a));
+    size.into_iter().chain(stops).map(|words| indented("next", &words)).take(most).collect()
 }
+
+/// Where its size stands in its file alone.
+const MEASURE_THE_PLATE: &str = "measure the plate (give [scale]): 0.1 % off its stated size is 1 mm a metre";
 
 /// A stop to add, in a line.
 fn advice(r: &SolutionRecord, a: &Advice) -> String {

@@ -9,7 +9,7 @@ use super::dot_sizes::told_by_others;
 use super::size_seen::{line_missing, nowhere_whole};
 use super::{Detection, Outline, Picture, examine, tags};
 use crate::error::{Code, Error, Notice, Result};
-use crate::files::{batches, picture_size};
+use crate::files::{batches, is_turned_by_viewers, picture_size};
 use crate::series::{Plate, PlateKind};
 
 /// Of a picture of three colours and its grey values.
@@ -53,6 +53,7 @@ pub fn detect_series(
             }
         };
         name_image(&mut image.detection, path);
+        image.detection.notices.extend(is_turned_by_viewers(path).then(turned));
         image
     };
     let mut found = in_batches(images, |path| {
@@ -172,6 +173,16 @@ fn refuse_odd_sizes(images: &[PathBuf], found: &mut [SeriesImage]) {
             ));
         }
     }
+}
+
+/// A camera does not turn when a viewer turns what it took.
+fn turned() -> Notice {
+    Notice::new(
+        Code::ImageTurned,
+        "image",
+        "its EXIF data ask viewers to turn or mirror it; its pixels are taken as they are stored, and so is the camera",
+        "read images so elsewhere, too (in OpenCV with IMREAD_IGNORE_ORIENTATION)",
+    )
 }
 
 /// Names the image where the detector could only say `image`.

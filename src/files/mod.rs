@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-pub use picture::{MOST_SIDE_PX, batches, decode_picture, decoded_bytes, picture_size};
+pub use picture::{MOST_SIDE_PX, batches, decode_picture, decoded_bytes, is_turned_by_viewers, picture_size};
 
 use crate::error::{Code, Error, Result};
 

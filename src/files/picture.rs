@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use image::error::{ImageFormatHint, LimitError, LimitErrorKind, UnsupportedError, UnsupportedErrorKind};
+use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Limits};
 
 use super::{FileKind, open};
@@ -83,6 +84,12 @@ pub fn picture_size(path: &Path) -> Result<(u32, u32)> {
     })
 }
 
+/// True where what stands beside the pixels (EXIF) asks viewers to turn or mirror the picture.
+pub fn is_turned_by_viewers(path: &Path) -> bool {
+    let decoder = open(path, FileKind::Image).ok().and_then(|(file, _)| decoder(BufReader::new(file)).ok());
+    decoder.is_some_and(|mut d| d.orientation().is_ok_and(|o| o != Orientation::NoTransforms))
+}
+
 fn decoder<'a>(source: impl BufRead + Seek + 'a) -> ImageResult<impl ImageDecoder + 'a> {
     let mut reader = ImageReader::new(source).with_guessed_format()?;
     if !reader.format().is_some_and(|f| FORMATS.contains(&f)) {
@@ -100,4 +107,34 @@ fn limits() -> Limits {
     limits.max_image_height = Some(MOST_SIDE_PX);
     limits.max_alloc = Some(MOST_BYTES);
     limits
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture of 3 x 2 px with an EXIF orientation, where one is given.
+    fn photograph(orientation: Option<u8>) -> tempfile::NamedTempFile {
+        let mut jpeg = std::io::Cursor::new(Vec::new());
+        DynamicImage::new_luma8(3, 2).write_to(&mut jpeg, ImageFormat::Jpeg).unwrap();
+        let mut bytes = jpeg.into_inner();
+        if let Some(orientation) = orientation {
+            let tag = [0x12, 0x01, 3, 0, 1, 0, 0, 0, orientation, 0, 0, 0];
+            let exif = [b"Exif\0\0II*\0\x08\0\0\0\x01\0".as_slice(), &tag, &[0; 4]].concat();
+            let head = [0xff, 0xe1, 0, exif.len() as u8 + 2];
+            bytes.splice(2..2, head.into_iter().chain(exif));
+        }
+        let file = tempfile::Builder::new().suffix(".jpg").tempfile().unwrap();
+        std::fs::write(file.path(), bytes).unwrap();
+        file
+    }
+
+    #[test]
+    fn pictures_that_viewers_turn_are_known_and_stay_as_they_are() {
+        let turned = [None, Some(1), Some(3), Some(6), Some(2)].map(photograph);
+        assert_eq!(turned.each_ref().map(|f| is_turned_by_viewers(f.path())), [false, false, true, true, true]);
+        for file in &turned {
+            assert_eq!(picture_size(file.path()).unwrap(), (3, 2));
+        }
+    }
 }

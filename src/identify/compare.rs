@@ -1,5 +1,6 @@
 //! All estimators side by side: against truth where it is known, on held-out images where it is not.
 
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::comparison::{Comparison, ComparisonRow, HeldOut, TruthError};
@@ -19,6 +20,23 @@ use crate::simulate::truth::Truth;
 use crate::solve::{LinearisedAdjustment, side_by_side};
 use crate::stage::stage;
 
+/// Stops beyond which some of them are compared, and how many those are: the ratio of two errors on the same images is then known to a percent.
+const MANY_STOPS: usize = 500;
+const SOME_STOPS: usize = 250;
+
+/// Images up to which the estimator with the covariance of all poses together is beside the others in every report: with its cube of their number it is
+/// soon a fifth of the whole, and it is the joint fit up to terms of second order.
+const MOST_TOGETHER: usize = 60;
+
+/// What is compared, and the joint fits of its folds where they are known: some of very many stops.
+fn compared(solution: &Solution) -> (Cow<'_, Adjustment>, &[State]) {
+    let joint = solution.joint_fit();
+    match joint.some_stops(MANY_STOPS, SOME_STOPS) {
+        Some(some) => (Cow::Owned(some), &[]),
+        None => (Cow::Borrowed(joint), &solution.held_out),
+    }
+}
+
 /// Compares on the observations of a solution: its outliers and rejected images are left out for all estimators.
 ///
 /// The joint fit keeps the noise components of the solution, as in its accuracy; the others find them in the images that are left, but for the
@@ -31,8 +49,8 @@ pub fn compare(
     truth: Option<&Truth>,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Comparison> {
-    let joint = solution.joint_fit();
-    let (problem, limits) = (&joint.problem, &solution.options.limits);
+    let (some, known) = compared(solution);
+    let (joint, problem, limits) = (some.as_ref(), &some.problem, &solution.options.limits);
     let images = on_robot(problem);
     let Some(by_image) = folds(problem, limits).filter(|_| images >= limits.compared_images) else {
         return Err(Error::new(
@@ -47,9 +65,9 @@ pub fn compare(
     let total = by_image.len() + by_region.len() + 1;
     let done = AtomicUsize::new(0);
     let tick = || progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
-    let against_truth = truth.map(|t| truth_errors(joint, t)).transpose()?;
+    let against_truth = truth.map(|t| truth_errors(solution.joint_fit(), t)).transpose()?;
     tick();
-    let image_errors = held_out(joint, &by_image, (&all, &solution.held_out), &tick);
+    let image_errors = held_out(joint, &by_image, (&all, known), &tick);
     let region_errors = held_out(joint, &by_region, (&all, &[]), &tick);
     let of_truth = |k: usize| against_truth.as_ref().and_then(|t| t[k]);
     let held = [Some(&image_errors), Some(&region_errors).filter(|e| !e.is_empty())];
@@ -61,14 +79,19 @@ pub fn compare(
 /// `None` for too few images.
 pub fn beside_two_stages(solution: &Solution) -> Option<Comparison> {
     let _stage = stage("comparison with two stages");
-    let joint = solution.joint_fit();
-    let (problem, limits) = (&joint.problem, &solution.options.limits);
+    let (some, known) = compared(solution);
+    let (joint, problem, limits) = (some.as_ref(), &some.problem, &solution.options.limits);
     let images = on_robot(problem);
     // Camera poses know nothing of what a tracker measured.
     let is_fair = problem.body_measurements.is_empty() && images >= limits.compared_images;
     let folds = folds(problem, limits).filter(|_| is_fair)?;
-    let taking_part: Vec<Estimator> = Estimator::ALL.into_iter().filter(|e| *e != Estimator::HardJoint).collect();
-    let errors = held_out(joint, &folds, (&taking_part, &solution.held_out), &|| ());
+    let takes_part = |e: &Estimator| match e {
+        Estimator::HardJoint => false,
+        Estimator::FullAndRepeatability => images <= MOST_TOGETHER,
+        _ => true,
+    };
+    let taking_part: Vec<Estimator> = Estimator::ALL.into_iter().filter(takes_part).collect();
+    let errors = held_out(joint, &folds, (&taking_part, known), &|| ());
     let rows = rows(&cluster_of_images(problem, limits), &taking_part, [Some(&errors), None], |_| None);
     Some(Comparison { rows, images, folds: [folds.len(), 0] })
 }
@@ -103,7 +126,7 @@ fn fitted(
     known: Option<&State>,
 ) -> Vec<Option<State>> {
     let start = &left.adjustment;
-    let stage = solved.and_then(|solved| PoseStage::of_left(solved, start));
+    let stage = solved.and_then(|solved| PoseStage::of_left(solved, start, estimators));
     let noise = JointNoise::Estimated;
     let found = |estimator: &Estimator| match estimator {
         Estimator::Joint => Some(known.cloned().unwrap_or_else(|| refitted_near(left.clone()))),

@@ -29,6 +29,10 @@ use crate::urdf::Chain;
 /// Newton decrement of a fit that is judged by its evidence, whose logarithm is then known to a tenth or so.
 const DECREMENT: f64 = 0.1;
 
+/// Stops beyond which some of them tell the model, and how many those are.
+const MANY_STOPS: usize = 2000;
+const SOME_STOPS: usize = 1000;
+
 /// Rounds in which a model finds its joint noise: its size is then known to a few percent.
 const ROUNDS: usize = 8;
 
@@ -148,10 +152,12 @@ fn compare_models(full: &Fit, estimated: bool) -> Vec<(Evidence, Adjustment)> {
 
 fn evidence(full: &Fit, model: RobotModel, estimated: bool) -> Option<(Evidence, Adjustment)> {
     let dropped = dropped_terms(full, model);
-    if dropped.is_empty() {
-        return Some((told(full.linear(), model)?, full.adjustment.clone()));
+    let whole = if dropped.is_empty() { full.adjustment.clone() } else { without_terms(full, &dropped) };
+    let some = whole.some_stops(MANY_STOPS, SOME_STOPS);
+    if dropped.is_empty() && some.is_none() {
+        return Some((told(full.linear(), model)?, whole));
     }
-    let mut smaller = without_terms(full, &dropped);
+    let mut smaller = some.unwrap_or(whole);
     let settings = Settings { decrement: DECREMENT, ..Settings::default() };
     let outcome = match estimated && full.problem.noise.joint.iter().flatten().all(|s| *s <= JOINT_NOISE_FLOOR) {
         // Terms enough to take up all noise would leave a smaller model none, and judge it by errors that it does not have.

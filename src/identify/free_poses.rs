@@ -18,7 +18,7 @@ use crate::problem::{
 };
 use crate::solve::{
     ComponentOptions, Elimination, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status,
-    estimate_components, frames, in_frame, in_frame_by, reject_observations, solve,
+    estimate_components, estimate_components_from_above, frames, in_frame, in_frame_by, reject_observations, solve,
 };
 use crate::stage::stage;
 
@@ -76,9 +76,7 @@ impl FreeStart {
         state.ties.clone_from(&self.ties);
         for (image, left) in problem.images.iter_mut().zip(&self.images) {
             image.rejected.clone_from(&left.image);
-            if !image.observations.iter().map(|o| &o.rejected).eq(&left.observations) {
-                image.observations.iter_mut().zip(&left.observations).for_each(|(o, rejected)| o.rejected = *rejected);
-            }
+            image.leave_out_as(left.observations.iter().copied());
         }
         problem.noise.pixel_factor.clone_from(&self.free.pixel_factor);
         problem.noise.marker.clone_from(&self.marker_factor);
@@ -258,7 +256,7 @@ fn start_camera(
             Code::PlateMirrored,
             format!("camera {name}"),
             format!("{behind} of {} images show the plate mirrored, as if seen from behind", own.len()),
-            "check that the images are not flipped, and that the plate was not printed or described mirrored",
+            "check that the images are not flipped, that u is the column in observations.csv, and that the plate was not printed or described mirrored",
         )),
         Some((rms, state, _)) if rms.is_finite() => Ok(state),
         _ => Err(Error::new(
@@ -354,7 +352,7 @@ fn facing(adjustment: &Adjustment, least_tilt: f64) -> Option<Error> {
 fn finish(start: Adjustment, limits: &Limits) -> Result<(Adjustment, FreePoses)> {
     check_views(&start, limits.alike_views_rad)?;
     let options = ComponentOptions { joint: false, rounds: 20, ..ComponentOptions::default() };
-    let mut outcome = estimate_components(start, &options);
+    let mut outcome = estimate_components_from_above(start, &options);
     for _ in 0..ROUNDS {
         if reject_observations(&mut outcome.adjustment) == 0 {
             break;

@@ -10,7 +10,7 @@ use super::solution::{LensEvidence, Solution};
 use crate::assess::Limits;
 use crate::diagnose::LensNotInRos;
 use crate::error::{Code, Error, Notice, Result};
-use crate::fit::{Fit, FreePoses, log_evidence};
+use crate::fit::{FreePoses, log_evidence};
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, LensChoice, MeasuredSeries, Problem, predict};
@@ -22,6 +22,9 @@ use crate::urdf::Chain;
 const KEPT_ASIDE: usize = 4;
 /// Share of the largest errors that does not count: what is wrongly identified says nothing of the lens.
 const OUTLIERS: f64 = 0.02;
+/// Stops beyond which some of them tell the lens, and how many those are: what they leave open of it is far below the noise of a circle.
+const MANY_STOPS: usize = 500;
+const SOME_STOPS: usize = 250;
 /// Newton decrement of a fit that is judged by its evidence, whose logarithm is then known to a tenth or so.
 const DECREMENT: f64 = 0.01;
 /// Rounds in which image noise and fit follow the lens.
@@ -102,7 +105,12 @@ fn compare_lenses(joint: &JointFit, camera: &str, choice: LensChoice, limits: &L
     let depths = depths_m(&fit.problem, &joint.start.free)[k];
     let formulas = Lens::ALL.into_iter().filter(|l| choice.has(*l) && (l.formula() != Lens::Fisheye || is_wide));
     let formulas: Vec<Lens> = formulas.collect();
-    let found = side_by_side(&fit.problem, &formulas, |_, lens| evidence(fit, (k, &depths), *lens));
+    let some = fit.adjustment.some_stops(MANY_STOPS, SOME_STOPS);
+    let found = side_by_side(&fit.problem, &formulas, |_, lens| match (&some, fit.state.cameras[k].lens == *lens) {
+        (None, true) => told(fit.linear(), k),
+        (None, false) => evidence(&fit.adjustment, (k, &depths), *lens),
+        (Some(some), _) => evidence(some, (k, &depths), *lens),
+    });
     let mut all: Vec<LensEvidence> = found.into_iter().flatten().collect();
     let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     all.iter_mut().for_each(|e| e.log_evidence -= best);
@@ -113,11 +121,11 @@ fn compare_lenses(joint: &JointFit, camera: &str, choice: LensChoice, limits: &L
     all
 }
 
-fn evidence(fit: &Fit, (camera, depths_m): (usize, &[f64; 2]), lens: Lens) -> Option<LensEvidence> {
-    if fit.state.cameras[camera].lens == lens {
-        return told(fit.linear(), camera);
-    }
-    let mut other = with_lens(fit, (camera, depths_m), lens)?;
+fn evidence(fit: &Adjustment, (camera, depths_m): (usize, &[f64; 2]), lens: Lens) -> Option<LensEvidence> {
+    let mut other = match fit.state.cameras[camera].lens == lens {
+        true => fit.clone(),
+        false => with_lens(fit, (camera, depths_m), lens)?,
+    };
     // Image noise follows the lens; joint noise, tilt and the sizes of families stay.
     other.problem.families.retain(|f| f.held.ncols() > 0);
     let settings = Settings { decrement: DECREMENT, ..Settings::default() };

@@ -13,7 +13,7 @@ use super::stated::{lens_of, measured_series, on_the_tip_beside_others};
 use crate::assess::Limits;
 use crate::detect::{Detection, set_radii};
 use crate::error::{Code, Error, Notice, Result};
-use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop};
+use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop, Shared};
 use crate::series::{CirclePoint, Observation, Plate, Series, Source, StopOrder};
 use crate::urdf::Chain;
 
@@ -27,7 +27,7 @@ pub struct MeasuredWithNotices {
 }
 
 struct Seen {
-    observations: Vec<Observation>,
+    observations: Shared<Vec<Observation>>,
     left_out: Option<ImageRejection>,
     /// What the detector advises where it found no plate.
     remedy: Option<String>,
@@ -60,8 +60,12 @@ pub fn measure(
             let by_name: BTreeMap<&str, &Vec<Observation>> =
                 all.iter().map(|i| (i.image.as_str(), &i.observations)).collect();
             let given = |image: &str| match by_name.get(image) {
-                Some(o) => Seen { observations: (*o).clone(), left_out: None, remedy: None },
-                None => Seen { observations: vec![], left_out: Some(ImageRejection::NoObservations), remedy: None },
+                Some(o) => Seen { observations: (*o).clone().into(), left_out: None, remedy: None },
+                None => Seen {
+                    observations: Shared::default(),
+                    left_out: Some(ImageRejection::NoObservations),
+                    remedy: None,
+                },
             };
             (series.stops.stops.iter().map(|s| given(&s.image)).collect(), None)
         }
@@ -131,7 +135,7 @@ fn without_images(series: &Series, readings: Vec<Option<Vec<f64>>>) -> MeasuredS
         image: stop.image.clone(),
         readings,
         placement: stop.placement.clone(),
-        observations: Vec::new(),
+        observations: Shared::default(),
         left_out: None,
     };
     let stops = series.stops.stops.iter().zip(readings).enumerate().map(of).collect();
@@ -179,7 +183,7 @@ fn look_through(
         let Detection { observations, failure, .. } = image.detection;
         let remedy = failure.as_ref().map(|error| error.remedy.clone());
         let left_out = failure.map(|error| ImageRejection::Unusable { why: error.code, what: error.what });
-        Seen { observations, left_out, remedy }
+        Seen { observations: observations.into(), left_out, remedy }
     };
     Ok((images.into_iter().map(seen).collect(), size))
 }

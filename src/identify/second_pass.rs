@@ -55,7 +55,7 @@ fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Opti
         image: image.name.clone(),
         readings: None,
         placement: DEFAULT_PLACEMENT.to_owned(),
-        observations: image.detection.observations.clone(),
+        observations: image.detection.observations.clone().into(),
         left_out: image
             .detection
             .failure

@@ -70,7 +70,7 @@ pub(super) fn refit(
     estimator: Estimator,
     noise: JointNoise,
 ) -> Option<State> {
-    let stage = PoseStage::of_left(solved, left)?;
+    let stage = PoseStage::of_left(solved, left, &[estimator])?;
     Some(fit_poses(left, &stage, estimator, noise)?.state)
 }
 

@@ -72,24 +72,24 @@ impl PoseStage {
     }
 
     /// Of the images that are `left` of those of a solved free-pose adjustment: one step from there. Images have nothing but cameras and plates
-    /// in common, which move by less than their sigmas.
-    pub fn of_left(solved: &LinearisedAdjustment, left: &Adjustment) -> Option<Self> {
+    /// in common, which move by less than their sigmas. The covariance of all poses together is there where one of the `estimators` takes it.
+    pub fn of_left(solved: &LinearisedAdjustment, left: &Adjustment, estimators: &[Estimator]) -> Option<Self> {
         let is_held = |i: &usize| left.problem.images[*i].rejected.is_some();
         let held: Vec<usize> = solved.linearised.images.iter().copied().filter(is_held).collect();
-        Self::of(&solved.linear().without_images(&held))
+        Self::of(&solved.linear().without_images(&held), estimators.contains(&Estimator::FullAndRepeatability))
     }
 
     /// The adjustment linearised at its poses, cameras and plates: one step from there, not iterated.
     pub fn linearised(at: &Adjustment) -> Option<Self> {
-        Self::of(&LinearisedAdjustment::of(with_free_poses(at)?)?)
+        Self::of(&LinearisedAdjustment::of(with_free_poses(at)?)?, true)
     }
 
-    /// One step from where the adjustment stands.
-    fn of(near: &LinearisedAdjustment) -> Option<Self> {
+    /// One step from where the adjustment stands, with the covariance of all poses `together` where they are few.
+    fn of(near: &LinearisedAdjustment, together: bool) -> Option<Self> {
         let (free, linear) = (&near.adjustment, near.linear());
         let on_robot = |own: &LinearImage| free.problem.on_robot(own.index);
         let images: Vec<LinearImage> = linear.images().filter(on_robot).collect();
-        let are_together = images.len() <= MOST_TOGETHER;
+        let are_together = together && images.len() <= MOST_TOGETHER;
         let which = if are_together { Elimination::Markers } else { Elimination::cheaper(linear) };
         let cov = linear.covariance_by(which).ok()?;
         let step = cov.system.step(linear, &(&cov.reduced * &cov.system.rhs));

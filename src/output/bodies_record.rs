@@ -9,7 +9,7 @@ use crate::identify::Solution;
 use crate::model::robot::Posture;
 use crate::problem::{
     BodyMeasurement, BodyRejection, BodySeen, Instrument, InstrumentKind, MeasuredSeries, MeasuredStop, SeenBody,
-    SeenLength,
+    SeenLength, Shared,
 };
 
 /// Measurements of trackers and contacts, and where their frames and bodies are.
@@ -179,7 +179,7 @@ impl BodiesRecord {
             image: s.name.clone(),
             readings: s.readings.clone(),
             placement: String::new(),
-            observations: Vec::new(),
+            observations: Shared::default(),
             left_out: None,
         };
         self.stops.iter().filter(|s| s.series == series).enumerate().map(of).collect()

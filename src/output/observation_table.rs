@@ -3,7 +3,7 @@
 use super::Context;
 use super::names::ImageNames;
 use super::residuals::{poses, residuals};
-use super::text::csv;
+use super::text::csv_line;
 use crate::identify::Solution;
 use crate::series::Edge;
 
@@ -14,7 +14,7 @@ const HEADER: [&str; 11] = ["image", "marker", "u", "v", "edge", "cov_uu", "cov_
 pub(super) fn observations_csv(solution: &Solution, context: &Context) -> String {
     let names = ImageNames::new(&solution.fit.problem, &context.series);
     let poses = poses(solution);
-    let mut rows = vec![HEADER.map(String::from).to_vec()];
+    let mut text = csv_line(&HEADER.map(String::from));
     for (k, image) in solution.fit.problem.images.iter().enumerate() {
         let markers = &solution.fit.problem.plates[image.plate].markers;
         let residuals = residuals(solution, k, poses[k].as_ref());
@@ -35,8 +35,8 @@ pub(super) fn observations_csv(solution: &Solution, context: &Context) -> String
                     |reason| format!("image: {reason}"),
                 ),
             );
-            rows.push(row);
+            text.push_str(&csv_line(&row));
         }
     }
-    csv(&rows)
+    text
 }

@@ -16,7 +16,7 @@ use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes::MODES;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{Layout, Names, PlateShape, State};
-use crate::problem::{MeasuredSeries, MeasuredStop};
+use crate::problem::{MeasuredSeries, MeasuredStop, Shared};
 use crate::series::{CameraMount, Marker, Observation, Plate};
 use crate::urdf::{Chain, RobotDescription};
 
@@ -93,7 +93,7 @@ fn stop(row: usize, image: &ImageRecord, series: &str, placements: &[String]) ->
     }
     let observation =
         |k: usize| Observation { marker: o.marker[k], edge: o.edge[k], uv: o.uv[k], covariance: Some(o.covariance[k]) };
-    let observations: Vec<Observation> = (0..o.marker.len()).map(observation).collect();
+    let observations: Shared<Vec<Observation>> = (0..o.marker.len()).map(observation).collect();
     let placement = placements.get(image.placement);
     let prefix = format!("{series}/");
     Ok(MeasuredStop {

@@ -469,6 +469,18 @@ impl SolutionRecord {
         self.images.iter().try_for_each(|i| plain("image", &i.name))
     }
 
+    /// What is known of the size of every plate whose size is free.
+    pub fn plate_sizes(&self) -> impl Iterator<Item = (&EstimateRecord, &PlateRecord)> {
+        let is_size = |e: &&EstimateRecord| e.name.starts_with("plate_shape") && e.name.ends_with(".scale");
+        self.estimates.iter().filter(is_size).zip(&self.plates).filter(|(e, _)| e.free)
+    }
+
+    /// True where the lengths of the robot hang on the size that the file of a plate states: nobody measured it, and all else tells less of it.
+    pub fn hangs_on_a_stated_size(&self) -> bool {
+        let is_as_stated = |e: &EstimateRecord| e.share_of_data.is_some_and(|share| share < 0.5);
+        self.flange.is_some() && self.plate_sizes().any(|(e, plate)| plate.scale.is_none() && is_as_stated(e))
+    }
+
     /// Free parameters of the robot, without local errors, which are noise.
     pub fn robot_parameters(&self) -> impl Iterator<Item = &EstimateRecord> {
         let of_robot = |e: &&EstimateRecord| e.name.starts_with("robot/") && !e.name.contains(".local_");

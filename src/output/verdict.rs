@@ -77,6 +77,7 @@ fn is_information(code: Code) -> bool {
         Code::DictionaryGuessed
             | Code::ImageDelayFound
             | Code::ImageNotThere
+            | Code::ImageTurned
             | Code::ImageUnlisted
             | Code::ImagesInMotion
             | Code::JointUnused

@@ -134,8 +134,8 @@ impl Adjustment {
         }
     }
 
-    /// Starts where an adjustment of the same series with another robot model ended: what both have is taken over, and the noise, joint noise at
-    /// `least`, rad or m, or more.
+    /// Starts where an adjustment of the same series with another robot model ended: what both have is taken over, the observations that are left out, and the noise, joint
+    /// noise at `least`, rad or m, or more.
     pub fn start_near(&mut self, solved: &Self, least: f64) {
         let Self { problem, state } = self;
         let mut robot = state.robot.clone();
@@ -145,6 +145,9 @@ impl Adjustment {
             own.value = known.map_or(own.value, |t| t.value);
         }
         *state = State { robot, ..solved.state.clone() };
+        for (own, known) in problem.images.iter_mut().zip(&solved.problem.images) {
+            own.leave_out_as(known.observations.iter().map(|o| o.rejected));
+        }
         problem.noise.start_near(&solved.problem.noise, least);
         let factor = |name: &str| solved.problem.families.iter().find(|f| f.name == name).map(|f| f.factor);
         problem.families.iter_mut().for_each(|f| f.factor = factor(&f.name).unwrap_or(f.factor));

@@ -1,7 +1,7 @@
 //! An image of the problem: what it shows, and what it belongs to.
 
 use super::measured::MarkerObservation;
-use super::rejection::ImageRejection;
+use super::rejection::{ImageRejection, ObservationRejection};
 use super::shared::Shared;
 use crate::series::CameraMount;
 
@@ -34,5 +34,12 @@ impl Image {
     /// Observations that take part.
     pub fn used(&self) -> impl Iterator<Item = &MarkerObservation> {
         self.observations.iter().filter(|o| o.rejected.is_none())
+    }
+
+    /// Leaves observations out, or takes them back, in their order. Where nothing changes they stay shared.
+    pub fn leave_out_as(&mut self, rejected: impl Iterator<Item = Option<ObservationRejection>> + Clone) {
+        if !self.observations.iter().map(|o| o.rejected).eq(rejected.clone()) {
+            self.observations.iter_mut().zip(rejected).for_each(|(o, rejected)| o.rejected = rejected);
+        }
     }
 }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::body::{BodySeen, InstrumentKind};
 use super::rejection::ImageRejection;
+use super::shared::Shared;
 use crate::model::camera::{Camera, Lens};
 use crate::series::{CameraMount, Observation, Plate, PlateKind, ReadOtherwise};
 
@@ -163,7 +164,7 @@ pub struct MeasuredStop {
     /// Where the plate stood.
     pub placement: String,
     /// What was seen.
-    pub observations: Vec<Observation>,
+    pub observations: Shared<Vec<Observation>>,
     /// Why the image is left out already (unreadable, nothing found).
     pub left_out: Option<ImageRejection>,
 }

@@ -36,6 +36,11 @@ impl LinearProblem<'_> {
         self.left_in(self.adjustment.without_bodies_at(stops))
     }
 
+    /// With some of the stops in use; see [`Adjustment::some_stops`].
+    pub fn some_stops(self, many: usize, some: usize) -> Option<LinearisedAdjustment> {
+        self.adjustment.some_stops(many, some).map(|left| self.left_in(left))
+    }
+
     fn left_in(self, adjustment: Adjustment) -> LinearisedAdjustment {
         let linearised = adjustment.left_of(self.lin);
         LinearisedAdjustment { adjustment, linearised }

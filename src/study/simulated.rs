@@ -19,7 +19,7 @@ pub fn measured(series: &SimulatedSeries, chain: &Chain) -> MeasuredSeries {
             image: stop.image.clone(),
             readings: stop.raw_readings.as_ref().map(in_si),
             placement: stop.placement.clone(),
-            observations: seen.observations.clone(),
+            observations: seen.observations.clone().into(),
             left_out: None,
         })
         .collect();

@@ -101,7 +101,7 @@ fn seen_displaced(mounts: &[CameraMount], wanted: usize, seed: u64, sizes: [f64;
                 image: format!("cam{k}_{row:03}.png"),
                 readings: Some(readings.clone()),
                 placement: format!("{:?}", mounts[k]),
-                observations,
+                observations: observations.into(),
                 left_out: None,
             });
         }

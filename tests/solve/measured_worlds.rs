@@ -34,7 +34,7 @@ pub fn chain() -> Chain {
 
 pub fn stop(k: usize, readings: Vec<f64>) -> MeasuredStop {
     let (image, placement) = (format!("{k:03}"), "placement_0".to_owned());
-    MeasuredStop { row: k, image, readings: Some(readings), placement, observations: Vec::new(), left_out: None }
+    MeasuredStop { row: k, image, readings: Some(readings), placement, observations: Vec::new().into(), left_out: None }
 }
 
 /// Robot with errors of 0.5 mm and 1 mrad an axis.

@@ -118,6 +118,12 @@ fn steps(r: &SolutionRecord, v: &Verdict) -> Vec<Markup> {
             ": it holds what a URDF cannot (gears, sag, backlash)."
         });
     }
+    if r.hangs_on_a_stated_size() {
+        all.push(html! {
+            "Measure the distance of two far markers and give " code { "[scale]" } " in plate.toml: all lengths of the robot are those of the plate, "
+            "whose size nobody measured. 0.1 % off its stated size is 1 mm a metre, and no figure of this page has it."
+        });
+    }
     let next = r.identifiability.iter().flat_map(|found| &found.next).take(MOST_NEXT);
     let next: Vec<&str> = next.map(|a| a.words.as_str()).collect();
     if !next.is_empty() {
