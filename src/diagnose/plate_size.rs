@@ -12,6 +12,9 @@ use crate::solve::{ComponentOptions, Status, System, estimate_components};
 
 const ASPECT: usize = 1;
 
+/// Stops that tell of the size: what more of them leave open is small beside what the links do.
+const MOST_STOPS: usize = 2000;
+
 /// A reason not to believe the size of a plate.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DoubtedSize {
@@ -38,9 +41,10 @@ pub enum DoubtedSize {
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<DoubtedSize> {
     let Adjustment { problem, state } = &fit.adjustment;
     let limits = setting.limits;
+    let some = fit.adjustment.some_stops(MOST_STOPS, MOST_STOPS);
     let mut doubts = Vec::new();
     for (k, plate) in problem.plates.iter().enumerate() {
-        let released = ReleasedSize::of(&fit.adjustment, k);
+        let released = ReleasedSize::of(some.as_ref().unwrap_or(&fit.adjustment), k);
         let beyond = |told: &Told, sigmas: f64| told.off.abs() > sigmas * told.sigma;
         // A size that is stated wrongly makes the links look worse than they are, and what they say less certain.
         let suspected = released.one_step().filter(|told| beyond(told, limits.plate_size_suspected));

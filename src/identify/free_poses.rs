@@ -18,7 +18,7 @@ use crate::problem::{
 };
 use crate::solve::{
     ComponentOptions, Elimination, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status,
-    estimate_components, estimate_components_from_above, frames, in_frame, in_frame_by, reject_observations, solve,
+    estimate_components, frames, in_frame, in_frame_by, reject_observations, solve,
 };
 use crate::stage::stage;
 
@@ -352,7 +352,7 @@ fn facing(adjustment: &Adjustment, least_tilt: f64) -> Option<Error> {
 fn finish(start: Adjustment, limits: &Limits) -> Result<(Adjustment, FreePoses)> {
     check_views(&start, limits.alike_views_rad)?;
     let options = ComponentOptions { joint: false, rounds: 20, ..ComponentOptions::default() };
-    let mut outcome = estimate_components_from_above(start, &options);
+    let mut outcome = estimate_components(start, &options);
     for _ in 0..ROUNDS {
         if reject_observations(&mut outcome.adjustment) == 0 {
             break;

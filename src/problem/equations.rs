@@ -161,11 +161,12 @@ impl Equations {
             let by_marker = sight.by_marker();
             let (mm, bm) = (by_marker * by_marker.transpose(), by_marker * sight.residual());
             match all.last_mut().filter(|last| last.marker == marker) {
-                Some(last) => {
-                    last.mm += mm;
-                    last.bm += bm;
+                Some(last) => last.add(&mm, &bm),
+                None => {
+                    let mut own = MarkerTerms { marker, upper: [0.0; 6], bm: Vector3::zeros() };
+                    own.add(&mm, &bm);
+                    all.push(own);
                 }
-                None => all.push(MarkerTerms { marker, mm, bm }),
             }
         }
         all
@@ -274,10 +275,24 @@ impl<'a> Sight<'a> {
 pub struct MarkerTerms {
     /// Index of the marker on its plate.
     pub marker: usize,
-    /// 3x3 information.
-    pub mm: Matrix3<f64>,
+    /// Upper triangle of the information, column by column: there is one for every observation.
+    upper: [f64; 6],
     /// Right-hand side.
     pub bm: Vector3<f64>,
+}
+
+impl MarkerTerms {
+    /// 3x3 information.
+    pub fn information(&self) -> Matrix3<f64> {
+        let [xx, xy, yy, xz, yz, zz] = self.upper;
+        Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+    }
+
+    fn add(&mut self, mm: &Matrix3<f64>, bm: &Vector3<f64>) {
+        let upper = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)];
+        self.upper.iter_mut().zip(upper).for_each(|(own, at)| *own += mm[at]);
+        self.bm += bm;
+    }
 }
 
 /// Normal-equation blocks of one marker with the other unknowns of one image.

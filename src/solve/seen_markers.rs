@@ -52,7 +52,7 @@ impl SeenMarkers {
         for LinearImage { image, terms, .. } in linear.images() {
             let number = &self.number[image.plate];
             for own in &terms.markers {
-                number[own.marker].iter().for_each(|&at| information[at] += own.mm);
+                number[own.marker].iter().for_each(|&at| information[at] += own.information());
             }
         }
         information

@@ -428,7 +428,7 @@ fn check_image(problem: &Problem, state: &State, image: &Image, pose: &Pose) {
         bp += jp.transpose() * w * r;
         be += je.transpose() * w * r;
         assert_eq!([terms.marker, coupling.marker], [o.marker; 2]);
-        assert_same("mm", &terms.mm, &(jm.transpose() * w * jm), CIRCLE);
+        assert_same("mm", &terms.information(), &(jm.transpose() * w * jm), CIRCLE);
         assert_same("mp", &coupling.mp, &(jm.transpose() * w * jp), CIRCLE);
         assert_same("me", &coupling.me, &(jm.transpose() * w * je), CIRCLE);
         assert_same("bm", &terms.bm, &(jm.transpose() * w * r), CIRCLE.max(1e-9 / r.norm()));

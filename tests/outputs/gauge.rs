@@ -76,7 +76,7 @@ impl Whole {
                 let row = c * &j;
                 let at = marker_start + 3 * t.marker;
                 let mut own = a.view_mut((at, at), (3, 3));
-                own += own_terms.mm;
+                own += own_terms.information();
                 let mut rows = a.rows_mut(at, 3);
                 rows += &row;
                 let mut columns = a.columns_mut(at, 3);

@@ -54,6 +54,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("diagnose/length_standard.rs ROUNDS", "most iterations"),
     ("diagnose/loose.rs MOST_IMAGES", "how many are named"),
     ("diagnose/plate_size.rs ASPECT", "index of a mode"),
+    ("diagnose/plate_size.rs MOST_STOPS", "samples of a fit"),
     ("diagnose/step_rows.rs LEFT", "rounding"),
     ("diagnose/step_candidates.rs MOST_TRIED", "how many are tried at first"),
     ("frames/absorbed.rs HELD", "rounding"),
