@@ -26,7 +26,7 @@ const SOME_STOPS: usize = 250;
 
 /// Images up to which the estimator with the covariance of all poses together is beside the others in every report: with its cube of their number it is
 /// soon a fifth of the whole, and it is the joint fit up to terms of second order.
-const MOST_TOGETHER: usize = 60;
+const MOST_TOGETHER: usize = 80;
 
 /// What is compared, and the joint fits of its folds where they are known: some of very many stops.
 fn compared(solution: &Solution) -> (Cow<'_, Adjustment>, &[State]) {
