@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use super::{BodyRejection, Family, Image, ImageRejection, Problem, State, TakenFrom, Tie};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
-use crate::series::spread;
 
 /// A problem with a value of every unknown: what a solve starts from and what it leaves.
 #[derive(Debug, Clone)]
@@ -71,22 +70,6 @@ impl Adjustment {
     pub fn used_stops(&self) -> BTreeSet<usize> {
         let images = self.problem.used().map(|(_, image)| image.stop);
         images.chain(self.problem.used_bodies().map(|(_, m)| m.stop)).collect()
-    }
-
-    /// About `some` of the stops in use, evenly chosen, with all that was measured there, where there are more than `many`.
-    pub fn some_stops(&self, many: usize, some: usize) -> Option<Self> {
-        let used = self.used_stops();
-        if used.len() <= many {
-            return None;
-        }
-        let chosen: BTreeSet<usize> = spread(used.len(), some).collect();
-        let rest: BTreeSet<usize> =
-            used.iter().enumerate().filter(|(k, _)| !chosen.contains(k)).map(|(_, s)| *s).collect();
-        let held: Vec<usize> =
-            self.problem.used().filter(|(_, image)| rest.contains(&image.stop)).map(|(i, _)| i).collect();
-        let mut chosen = self.without_bodies_at(&rest.into_iter().collect::<Vec<_>>());
-        held.iter().for_each(|&i| chosen.problem.images[i].rejected = Some(ImageRejection::Excluded));
-        Some(chosen)
     }
 
     /// Starts where an adjustment of some of its stops ended; sizes of latent joint errors and apparent displacements at `least`, rad or m, or

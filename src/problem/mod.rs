@@ -24,6 +24,7 @@ mod rejection;
 mod restraint;
 mod select;
 mod shared;
+mod some_stops;
 mod state;
 mod step;
 mod stop;
