@@ -26,8 +26,8 @@ pub(super) struct CompareArgs {
     /// Robot description (URDF)
     #[arg(long, value_name = "FILE")]
     urdf: PathBuf,
-    /// Series folder; give it several times to fit several series of the same robot together
-    #[arg(long, value_name = "FOLDER", required_unless_present_any = ["study", "monte_carlo"])]
+    /// Series folder; several of them to fit several series of the same robot together
+    #[arg(long, value_name = "FOLDER", num_args = 1.., required_unless_present_any = ["study", "monte_carlo"])]
     series: Vec<PathBuf>,
     /// Simulate where the joint fit beats two-step calibration, over repeatability and number of markers, instead of reading a series
     #[arg(long, conflicts_with = "series")]

@@ -34,8 +34,8 @@ pub(super) struct FramesArgs {
     /// solution.json of the robot
     #[arg(long, value_name = "FILE")]
     from: PathBuf,
-    /// Folder with series.toml, joints.csv and contacts.csv (or points.csv, poses.csv); several times for several sessions with one tool
-    #[arg(long, value_name = "FOLDER", required_unless_present = "plate")]
+    /// Folder with series.toml, joints.csv and contacts.csv (or points.csv, poses.csv); several of them for several sessions with one tool
+    #[arg(long, value_name = "FOLDER", num_args = 1.., required_unless_present = "plate")]
     touches: Vec<PathBuf>,
     /// The plate of the solution is the work object; of several placements this one. Touches of it are in its frame
     #[arg(long, value_name = "PLACEMENT", num_args = 0..=1, default_missing_value = "")]
@@ -192,7 +192,7 @@ fn same_links(s: &Series, record: &SolutionRecord) -> Result<()> {
 fn placement_named(record: &SolutionRecord, name: &str) -> Result<usize> {
     let names: Vec<&str> = record.placements.iter().map(|p| p.name.as_str()).collect();
     let refuse = |what: String, remedy: String| Err(Error::new(Code::OptionRange, "--plate", what, remedy));
-    let hand = record.images.iter().any(|i| i.camera_mount == series::CameraMount::Hand && i.readings.is_some());
+    let hand = record.images.iter().any(|i| i.camera_mount == series::CameraMount::Hand && i.is_on_robot());
     if names.is_empty() || !hand {
         let what = "the solution has no plate that stands in the base".to_owned();
         return refuse(what, "give touches of the work object with --touches".into());

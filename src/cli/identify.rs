@@ -23,8 +23,8 @@ pub(super) struct IdentifyArgs {
     /// Robot description (URDF); without it a series of controller poses (controller.csv) calibrates camera, hand-eye transform and plate alone
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
-    /// Series folder or recording (.mcap, rosbag2 folder); give it several times to fit several series of the same robot together
-    #[arg(long, value_name = "FOLDER", required_unless_present = "from")]
+    /// Series folder or recording (.mcap, rosbag2 folder); several of them to fit several series of the same robot together
+    #[arg(long, value_name = "FOLDER", num_args = 1.., required_unless_present = "from")]
     series: Vec<PathBuf>,
     /// Solve again from an earlier solution.json alone: with its options, or with those given
     #[arg(long, value_name = "SOLUTION", conflicts_with_all = ["urdf", "series", "dry_run"], requires = "out")]

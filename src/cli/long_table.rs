@@ -1,11 +1,12 @@
 //! The long table of `identify -v` and `show --all`: all of it stands in solution.json.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use crate::assess::{Cause, Errors, Identifiability, UnknownDirection, median};
 use crate::error::Notice;
 use crate::identify::{Comparison, Estimator, LensEvidence};
-use crate::output::solution_json::SolutionRecord;
+use crate::output::solution_json::{EstimateRecord, PlateRecord, SolutionRecord};
 use crate::problem::{OriginPrior, short_name};
 use crate::urdf::JointKind;
 
@@ -68,7 +69,7 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     }
     for one in &r.series {
         let images = || r.images.iter().filter(|i| i.series == one.name);
-        let used = || images().filter(|i| i.reason.is_none());
+        let used = || images().filter(|i| i.is_used());
         let observations: usize = used().map(|i| i.observations.reason.iter().filter(|o| o.is_none()).count()).sum();
         if images().next().is_none() {
             let of_series = r.bodies.stops.iter().filter(|s| s.series == one.name).count();
@@ -305,20 +306,21 @@ fn two_stage(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 
 /// What the lengths of the robot hang on.
 fn scales(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    for (e, plate) in r.plate_sizes() {
-        let (Some(prior), Some(sigma)) = (e.prior_sigma, e.sigma) else { continue };
-        let known =
-            format!("scale     the robot's lengths follow the plate, whose size is known to {:.3} %", 100.0 * sigma);
-        let all_else = e.share_of_data.filter(|s| *s > 0.0).map(|s| 100.0 * prior / s.sqrt());
-        match (plate.scale, all_else) {
-            (None, Some(all_else)) => writeln!(
-                out,
-                "{known} if its file is right (nobody measured it, and all else tells {all_else:.2} %); 0.1 % is 1 mm a metre: give [scale]"
-            )?,
-            _ => writeln!(out, "{known}")?,
-        }
-    }
-    Ok(())
+    let lines: BTreeSet<String> = r.plate_sizes().filter_map(|(e, plate)| scale(e, plate)).collect();
+    lines.into_iter().try_for_each(|line| writeln!(out, "{line}"))
+}
+
+fn scale(e: &EstimateRecord, plate: &PlateRecord) -> Option<String> {
+    let (prior, sigma) = (e.prior_sigma?, e.sigma?);
+    let known =
+        format!("scale     the robot's lengths follow the plate, whose size is known to {:.3} %", 100.0 * sigma);
+    let all_else = e.share_of_data.filter(|s| *s > 0.0).map(|s| 100.0 * prior / s.sqrt());
+    Some(match (plate.scale, all_else) {
+        (None, Some(all_else)) => format!(
+            "{known} if its file is right (nobody measured it, and all else tells {all_else:.2} %); 0.1 % is 1 mm a metre: give [scale]"
+        ),
+        _ => known,
+    })
 }
 
 /// Uncertainty of the flange over the workspace.

@@ -25,8 +25,8 @@ const MOST_ROWS: usize = 40;
 /// Flags of `poses`.
 #[derive(Debug, Args)]
 pub(super) struct PosesArgs {
-    /// Series folder, or a folder with images/ and plate.toml; give it several times to adjust several series together
-    #[arg(long, value_name = "FOLDER", required_unless_present = "images")]
+    /// Series folder, or a folder with images/ and plate.toml; several of them to adjust several series together
+    #[arg(long, value_name = "FOLDER", num_args = 1.., required_unless_present = "images")]
     series: Vec<PathBuf>,
     /// Single images instead of a series; they need --plate
     #[arg(value_name = "IMAGE", conflicts_with = "series", requires = "plate")]

@@ -26,7 +26,7 @@ pub(super) struct VerifyArgs {
     #[arg(long, value_enum)]
     pub(super) joint_unit: Option<Unit>,
     /// Another series of the robot, in mm and px; several are judged together
-    #[arg(long, value_name = "FOLDER", conflicts_with = "points")]
+    #[arg(long, value_name = "FOLDER", num_args = 1.., conflicts_with = "points")]
     pub(super) series: Vec<PathBuf>,
     /// Base link
     #[arg(long, value_name = "LINK")]

@@ -56,8 +56,7 @@ pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -
         let what = format!("is of joints {}", record.robot.readings.join(", "));
         return Err(refuse(what, "give the URDF, --base and --tip with which it was made"));
     }
-    let on_robot = |i: &&ImageRecord| i.readings.is_some() && i.reason.is_none();
-    let first = record.images.iter().find(on_robot).ok_or_else(|| {
+    let first = record.images.iter().find(|i| i.is_used_on_robot()).ok_or_else(|| {
         refuse("has no image on the robot in use".into(), "plan from --plate-pose and --hand-camera instead")
     })?;
     let camera = &record.cameras[first.camera];
@@ -67,7 +66,7 @@ pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -
     }
     let lens = lens.without_field();
     let used = |i: &&ImageRecord| {
-        on_robot(i) && (i.camera, i.mounting, i.plate) == (first.camera, first.mounting, first.plate)
+        i.is_used_on_robot() && (i.camera, i.mounting, i.plate) == (first.camera, first.mounting, first.plate)
     };
     let stops: Vec<PlannedStop> =
         record.images.iter().filter(used).filter_map(|i| taken(i, camera.pixel_factor, record)).collect();

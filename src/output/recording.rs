@@ -82,7 +82,7 @@ fn frames(
 
 fn marks(name: &str, image: &ImageRecord) -> ImageMarks {
     let o = &image.observations;
-    let used = |k: &usize| image.reason.is_none() && o.reason[*k].is_none();
+    let used = |k: &usize| image.is_used() && o.reason[*k].is_none();
     let all = 0..o.uv.len();
     let residual = |k: usize| {
         let (uv, d) = (o.uv[k], o.duv[k]?);

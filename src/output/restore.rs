@@ -161,7 +161,7 @@ pub fn camera(c: &CameraRecord) -> Camera {
 /// Nearest and farthest plate centre that each camera saw, m.
 pub fn depths_of_record(record: &SolutionRecord) -> Vec<[f64; 2]> {
     let seen = |camera: usize| {
-        let poses = record.images.iter().filter(move |i| i.camera == camera && i.reason.is_none());
+        let poses = record.images.iter().filter(move |i| i.camera == camera && i.is_used());
         poses.filter_map(|i| i.free_pose.as_ref()).map(|f| Pose::from(&f.plate_from_camera).inverse().translation.z)
     };
     let range = |k: usize| match (seen(k).reduce(f64::min), seen(k).reduce(f64::max)) {
@@ -245,9 +245,9 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
         column.prior_mean = e.prior_mean.unwrap_or(0.0);
     }
     let at = |i: usize, j: usize| record.covariance_lower[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
-    let used = || record.images.iter().filter(|i| i.reason.is_none());
+    let used = || record.images.iter().filter(|i| i.is_used());
     let stop = |i: &ImageRecord| i.readings.clone().map(|readings| Posture { readings, approach: i.approach.clone() });
-    let still = used().find(|i| i.readings.is_some()).map(|i| match i.camera_mount {
+    let still = used().find(|i| i.is_on_robot()).map(|i| match i.camera_mount {
         CameraMount::Hand => (state.placements[i.placement], layout.placements[i.placement].start),
         CameraMount::Fixed => (state.mountings[i.mounting], layout.mountings[i.mounting].start),
     });

@@ -529,7 +529,7 @@ impl SolutionRecord {
 
     /// Observations in use of a camera: measured place (px) and stated covariance uu, uv, vv (px^2).
     pub fn seen_by(&self, camera: usize) -> impl Iterator<Item = ([f64; 2], [f64; 3])> {
-        let images = self.images.iter().filter(move |i| i.camera == camera && i.reason.is_none());
+        let images = self.images.iter().filter(move |i| i.camera == camera && i.is_used());
         images.flat_map(|i| {
             let o = &i.observations;
             let used = o.reason.iter().map(Option::is_none);
@@ -543,6 +543,21 @@ impl SolutionRecord {
 }
 
 impl ImageRecord {
+    /// True for an image taken on the robot.
+    pub const fn is_on_robot(&self) -> bool {
+        self.readings.is_some()
+    }
+
+    /// True where it takes part.
+    pub const fn is_used(&self) -> bool {
+        self.reason.is_none()
+    }
+
+    /// True for an image taken on the robot that takes part.
+    pub const fn is_used_on_robot(&self) -> bool {
+        self.is_on_robot() && self.is_used()
+    }
+
     /// Why the image is left out; of files that have it in words alone, these.
     pub fn rejection(&self) -> Option<ImageRejection> {
         let in_words = || self.reason.clone().map(|what| ImageRejection::InWords { what });

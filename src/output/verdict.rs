@@ -90,8 +90,8 @@ fn is_information(code: Code) -> bool {
 }
 
 fn left_out(r: &SolutionRecord) -> Option<VerdictReason> {
-    let on_robot = || r.images.iter().filter(|i| i.readings.is_some());
-    let (all, out) = (on_robot().count(), on_robot().filter(|i| i.reason.is_some()).count());
+    let on_robot = || r.images.iter().filter(|i| i.is_on_robot());
+    let (all, out) = (on_robot().count(), on_robot().filter(|i| !i.is_used()).count());
     let many = out as f64 > r.limits().doubtful_share_left_out * all as f64;
     many.then(|| VerdictReason {
         what: format!("{out} of {all} images of the robot were left out"),

@@ -60,6 +60,8 @@ const MANY_STOPS: usize = 400;
 const SOME_STOPS: usize = 150;
 /// One in so many of more.
 const ONE_IN: usize = 8;
+/// Steps at most after the rough solve converged: along a direction that is hardly determined, each lowers the cost by little.
+const POLISHING_STEPS: usize = 20;
 
 /// As [`estimate_components`], from sizes that are far off: of many stops, some come near at a small part of the cost.
 pub fn estimate_components_from_above(start: Adjustment, options: &ComponentOptions) -> Outcome {
@@ -105,7 +107,8 @@ pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Out
         }
     }
     if minimised.outcome.status == Status::Converged {
-        minimised = minimised.polished(&options.settings);
+        let most = options.settings.iterations.min(POLISHING_STEPS);
+        minimised = minimised.polished(&Settings { iterations: most, ..options.settings });
         iterations += minimised.outcome.iterations;
         // The rough solve converged to 0.05 sigma; polishing lowered the cost further, if slowly.
         if minimised.outcome.status == Status::OutOfIterations {

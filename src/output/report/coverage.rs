@@ -40,7 +40,7 @@ struct Stop<'a> {
 
 /// Those of images, then those of series without images.
 fn stops(r: &SolutionRecord) -> impl Iterator<Item = Stop<'_>> {
-    let of_image = |i: &'_ ImageRecord| (name(r, i), i.reason.is_some());
+    let of_image = |i: &'_ ImageRecord| (name(r, i), !i.is_used());
     let images = r.images.iter().filter_map(move |i| Some((of_image(i), i.readings.as_deref()?)));
     let bodies = r.bodies.stops.iter().filter_map(|s| Some(((s.name.clone(), false), s.readings.as_deref()?)));
     images.chain(bodies).map(|((name, is_gone), readings)| Stop { name, readings, is_gone })

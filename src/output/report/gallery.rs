@@ -78,7 +78,7 @@ fn drawing(image: &ImageRecord, picture: &Thumbnail, magnified: f64) -> String {
         let [dx, dy] = duv.map(|d| magnified * d);
         let _ = write!(lines, "M{:.0} {:.0}l{dx:.1} {dy:.1}", uv[0] + 0.5, uv[1] + 0.5);
     }
-    let in_use = image.reason.is_none();
+    let in_use = image.is_used();
     let (used, out) = (dots(&|k| in_use && o.reason[k].is_none()), dots(&|k| !in_use || o.reason[k].is_some()));
     let lines = if in_use { lines } else { String::new() };
     let label = escaped(&format!("Image {} with the markers that were found", image.name));

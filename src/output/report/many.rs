@@ -26,7 +26,7 @@ pub(super) fn listed(r: &SolutionRecord) -> Vec<&ImageRecord> {
     let all = [0, 1].map(|k| r.images.iter().map(|i| errors(i)[k]).sum::<f64>().max(f64::MIN_POSITIVE));
     let size = |i: &ImageRecord| f64::max(errors(i)[0] / all[0], errors(i)[1] / all[1]);
     let mut order: Vec<(usize, &ImageRecord)> = r.images.iter().enumerate().collect();
-    let is_out = |i: &ImageRecord| i.reason.is_some();
+    let is_out = |i: &ImageRecord| !i.is_used();
     order.sort_by(|(_, a), (_, b)| is_out(b).cmp(&is_out(a)).then(size(b).total_cmp(&size(a))));
     order.truncate(MOST_IMAGES);
     order.sort_by_key(|(k, _)| *k);

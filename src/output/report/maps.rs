@@ -94,7 +94,7 @@ fn selection(all: usize) -> String {
 
 fn used(image: &ImageRecord) -> impl Iterator<Item = (usize, [f64; 2])> + '_ {
     let o = &image.observations;
-    let in_use = image.reason.is_none();
+    let in_use = image.is_used();
     (0..o.marker.len()).filter(move |&k| in_use && o.reason[k].is_none()).filter_map(|k| o.duv[k].map(|d| (k, d)))
 }
 

@@ -47,7 +47,7 @@ fn residuals(r: &SolutionRecord) -> Option<Vec<PoseResidual<'_>>> {
         let (camera, plate) = ((found * predicted.inverse()).log(), (predicted.inverse() * found).log());
         Some((camera, plate))
     };
-    let used = r.images.iter().filter(|i| i.reason.is_none());
+    let used = r.images.iter().filter(|i| i.is_used());
     Some(used.filter_map(|image| of(image).map(|(camera, plate)| PoseResidual { image, camera, plate })).collect())
 }
 

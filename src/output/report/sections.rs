@@ -78,12 +78,12 @@ pub(super) fn left_out(r: &SolutionRecord) -> Markup {
 
 fn series_row(r: &SolutionRecord, name: &str) -> Markup {
     let images = || r.images.iter().filter(|i| i.series == name);
-    let used = || images().filter(|i| i.reason.is_none());
+    let used = || images().filter(|i| i.is_used());
     let markers: usize = used().map(|i| i.observations.reason.iter().filter(|o| o.is_none()).count()).sum();
     let camera = images().next().and_then(|i| r.cameras.get(i.camera)).map_or("", |c| &c.name);
     html! { tr {
         td.name { (name) } td { (camera) } td.n { (images().count()) } td.n { (used().count()) }
-        td.n { (images().filter(|i| i.readings.is_some()).count()) } td.n { (markers) }
+        td.n { (images().filter(|i| i.is_on_robot()).count()) } td.n { (markers) }
     } }
 }
 

@@ -57,7 +57,7 @@ pub(super) fn shown(record: &SolutionRecord) -> Vec<(usize, Shown)> {
     used.sort_by(|a, b| a.1.total_cmp(&b.1));
     let best = used.iter().take(MOST[0]).map(|(k, _)| (*k, Shown::Best));
     let worst = used.iter().skip(MOST[0]).rev().take(MOST[1]).map(|(k, _)| (*k, Shown::Worst));
-    let out = images().filter(|(_, i)| i.reason.is_some()).take(MOST[2]).map(|(k, _)| (k, Shown::LeftOut));
+    let out = images().filter(|(_, i)| !i.is_used()).take(MOST[2]).map(|(k, _)| (k, Shown::LeftOut));
     best.chain(worst).chain(out).collect()
 }
 

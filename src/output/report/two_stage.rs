@@ -15,7 +15,7 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
         p {
             "Would it have done to find every camera pose by itself and to fit the robot to these poses? "
             "Both ways were fitted to the same " (count(comparison.images, "image"))
-            @if comparison.images < used_on_robot(r) { ", chosen evenly among all of them" }
+            @if comparison.images < r.images.iter().filter(|i| i.is_used_on_robot()).count() { ", chosen evenly among all of them" }
             ", less those put aside in "
             (count(comparison.folds[0], "group")) " in turn, and had to predict these from their joint readings. Observations, outliers and priors are the same; "
             "the two-stage fits find their own weights, the joint fit keeps the noise that the whole series showed."
@@ -39,10 +39,6 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
         }
         p.note { "With the joint fit that takes the readings as exact, and regions of the workspace held out: " code { "robotcal compare" } "." }
     }
-}
-
-fn used_on_robot(r: &SolutionRecord) -> usize {
-    r.images.iter().filter(|i| i.readings.is_some() && i.reason.is_none()).count()
 }
 
 fn verdict(comparison: &Comparison) -> String {
