@@ -14,6 +14,12 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// What is bright in it is dark, and the other way round.
+    pub fn negative(mut self) -> Self {
+        self.pixels.iter_mut().for_each(|p| *p = self.full_scale - *p);
+        self
+    }
+
     /// Grey value of a pixel; column `x`, row `y`.
     pub fn at(&self, x: usize, y: usize) -> f32 {
         self.pixels[y * self.width + x]

@@ -33,7 +33,29 @@ impl SeriesImage {
     }
 }
 
-/// Detects the plate in all images of a series.
+/// What the markers of a plate are printed in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ink {
+    /// Darker than the ground.
+    Dark,
+    /// Brighter than the ground.
+    Bright,
+}
+
+/// Dots, and tags that tell their numbers: the squares of a chessboard are dark and bright alike.
+const fn may_be_bright(kind: PlateKind) -> bool {
+    match kind {
+        PlateKind::CodedCircles
+        | PlateKind::CircleGrid
+        | PlateKind::Charuco
+        | PlateKind::Aprilgrid
+        | PlateKind::ArucoGrid
+        | PlateKind::Tag => true,
+        PlateKind::Chessboard | PlateKind::Puzzleboard | PlateKind::Points => false,
+    }
+}
+
+/// Detects the plate in all images of a series; where none shows it, in their negatives.
 ///
 /// Results stand in the order of `images`, whatever the number of threads; an image that cannot be read or shows no
 /// plate is a failure in its own place only, and so is one whose size differs from that of most; where outer lines of a chessboard or a grid
@@ -45,26 +67,37 @@ pub fn detect_series(
     picture: impl Fn(&Path) -> Result<Picture> + Sync,
     progress: impl Fn(&Path) + Sync,
 ) -> Vec<SeriesImage> {
-    let one = |path: &Path, plate: &Plate| {
+    let one = |path: &Path, plate: &Plate, ink: Ink| {
         let mut image = match picture(path) {
             Err(error) => SeriesImage::failed(error),
             Ok(picture) => {
-                SeriesImage { size: Some((picture.width, picture.height)), detection: examine(&picture, plate) }
+                let size = Some((picture.width, picture.height));
+                let picture = if ink == Ink::Bright { picture.negative() } else { picture };
+                SeriesImage { size, detection: examine(&picture, plate) }
             }
         };
         name_image(&mut image.detection, path);
         image.detection.notices.extend(is_turned_by_viewers(path).then(turned));
+        image.detection.notices.extend((ink == Ink::Bright).then(bright));
         image
     };
+    let mut ink = Ink::Dark;
     let mut found = in_batches(images, |path| {
-        let image = one(path, plate);
+        let image = one(path, plate, ink);
         progress(path);
         image
     });
+    let shows = |image: &SeriesImage| !image.detection.observations.is_empty();
+    if may_be_bright(plate.kind) && !found.iter().any(shows) {
+        let negatives = in_batches(images, |path| one(path, plate, Ink::Bright));
+        if negatives.iter().any(shows) {
+            (ink, found) = (Ink::Bright, negatives);
+        }
+    }
     let detections: Vec<&Detection> = found.iter().map(|image| &image.detection).collect();
     if let Some((measured, open)) = told_by_others(plate, &detections) {
         let paths: Vec<&PathBuf> = open.iter().map(|&k| &images[k]).collect();
-        let again = in_batches(&paths, |path| one(path, &measured));
+        let again = in_batches(&paths, |path| one(path, &measured, ink));
         open.into_iter().zip(again).for_each(|(k, image)| found[k] = image);
     }
     refuse_unproven_boards(images, plate, &mut found);
@@ -182,6 +215,16 @@ fn turned() -> Notice {
         "image",
         "its EXIF data ask viewers to turn or mirror it; its pixels are taken as they are stored, and so is the camera",
         "read images so elsewhere, too (in OpenCV with IMREAD_IGNORE_ORIENTATION)",
+    )
+}
+
+/// Markers on glass in reflected light, for one.
+fn bright() -> Notice {
+    Notice::new(
+        Code::MarkersBright,
+        "image",
+        "its markers are brighter than the ground, and are measured in its negative",
+        "nothing is lost by that; if the images were inverted by mistake, take them as they are",
     )
 }
 

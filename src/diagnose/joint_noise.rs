@@ -1,6 +1,7 @@
 //! Do the joint readings explain the images as well as those of robots usually do?
 
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
+use super::stands_still::{StandsStill, stands_still};
 use crate::assess::{Accuracy, median};
 use crate::error::Code;
 use crate::fit::Fit;
@@ -31,6 +32,10 @@ pub struct JointNoiseLarge {
     pub worst_predicted: Vec<ImageValue>,
     /// Images whose markers are known far less well than usual, sigma in px: blurred, badly lit, far away.
     pub badly_seen: Vec<ImageValue>,
+    /// Stops at which that joint reads the same.
+    pub stands_still: Option<StandsStill>,
+    /// Whether images tell of it; else trackers and contacts do.
+    pub by_images: bool,
     /// Whether the readings were computed from poses of a controller.
     pub readings_are_computed: bool,
     /// Gate or note.
@@ -40,7 +45,7 @@ pub struct JointNoiseLarge {
 pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> Vec<JointNoiseLarge> {
     let limits = setting.limits;
     let of_series = |(k, of): (usize, &crate::problem::MeasuredSeries)| {
-        let (joint, sigma) = noisiest_joint(setting.with_noise_found(fit), k)?;
+        let (reading, joint, sigma) = noisiest_joint(setting.with_noise_found(fit), k)?;
         let readings_are_computed = of.readings_are_computed();
         let weight = match sigma {
             s if s > limits.joint_noise => Weight::Gate,
@@ -61,6 +66,8 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
             sigma,
             worst_predicted: standing_out(problem, k, errors, limits.times_usual_error),
             badly_seen: standing_out(problem, k, sigma_px, limits.times_usual_blur),
+            stands_still: stands_still(of, reading, limits.moved_images),
+            by_images: problem.used_on_robot().any(|i| problem.images[i].series == k),
             readings_are_computed,
             weight,
         })
@@ -70,11 +77,11 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
     setting.series.iter().enumerate().filter(|(k, _)| is_first(*k)).filter_map(of_series).collect()
 }
 
-/// The reading with the largest joint noise in a series, and its size, rad or m.
-fn noisiest_joint(fit: &Fit, series: usize) -> Option<(&str, f64)> {
+/// The reading with the largest joint noise in a series: its index, its name, and the size of the noise, rad or m.
+fn noisiest_joint(fit: &Fit, series: usize) -> Option<(usize, &str, f64)> {
     let sigmas = fit.problem.joint_sigma(fit.problem.noise_of(series)).into_iter();
     let named = fit.state.robot.chain.readings.iter().map(String::as_str).zip(sigmas);
-    named.max_by(|a, b| a.1.total_cmp(&b.1))
+    named.enumerate().map(|(k, (name, sigma))| (k, name, sigma)).max_by(|a, b| a.2.total_cmp(&b.2))
 }
 
 /// Images of a series of which something is more than so many times its median, the largest first.
@@ -122,8 +129,9 @@ impl Kind for JointNoiseLarge {
     }
 
     fn seen(&self) -> String {
+        let still = self.stands_still.as_ref().map_or_else(String::new, |still| format!(", which reads {still}"));
         format!(
-            "the joint noise is {:.2} mrad ({} most), where robots repeat to some 0.1 mrad{}{}",
+            "the joint noise is {:.2} mrad ({} most{still}), where robots repeat to some 0.1 mrad{}{}",
             1e3 * self.sigma,
             self.joint,
             in_words(", the others predict worst", &self.worst_predicted, |mm| format!("{mm:.1} mm")),
@@ -137,10 +145,16 @@ impl Kind for JointNoiseLarge {
                 "the joint readings were computed from poses, which tell neither postures nor full turns for certain, and take the URDF for the \
                  model in the controller: record joint readings (joints.csv)"
             }
+            Weight::Gate if self.stands_still.is_some() => {
+                "see whether that joint was read at these stops: correct their readings, or leave their rows out"
+            }
             Weight::Note => {
                 "did plate or camera move, were images taken before the arm stood still, are readings rounded, is autofocus or a stabiliser on? the stated sigmas contain it"
             }
-            _ => "look for a loose camera or plate, motion, autofocus, a wrong URDF",
+            _ if self.by_images => "look for a loose camera or plate, motion, autofocus, a wrong URDF",
+            _ => {
+                "look for a loose tracker or target, rows of other stops, motion, a larger sigma than is stated, a wrong URDF"
+            }
         };
         remedy.into()
     }

@@ -59,7 +59,8 @@ impl Kind for MeasurementsScatter {
 
     fn seen(&self) -> String {
         let kind = if self.turned { "rotations" } else { "positions" };
-        format!("its {kind} scatter {:.3e} times as much as their stated sigma says", self.factor)
+        let decimals = (2.0 - self.factor.log10().floor()).max(0.0) as usize;
+        format!("its {kind} scatter {:.decimals$} times as much as their stated sigma says", self.factor)
     }
 
     fn remedy(&self) -> String {

@@ -12,13 +12,19 @@ pub struct NoGain {
     pub calibrated_mm: f64,
     /// Of the nominal one, mm RMS.
     pub nominal_mm: f64,
+    /// Whether images were held out; else measurements of trackers and contacts.
+    pub by_images: bool,
 }
 
 /// Nothing can be gained where nothing of the robot was free, as with poses of a controller alone.
 pub(super) fn check(fit: &Fit, accuracy: &Accuracy, _: &CheckContext) -> Option<NoGain> {
     let layout = &fit.problem.layout;
     layout.robot().any(|c| layout.columns[c].free).then_some(())?;
-    let found = NoGain { calibrated_mm: accuracy.calibrated.rms_mm, nominal_mm: accuracy.nominal.rms_mm };
+    let found = NoGain {
+        calibrated_mm: accuracy.calibrated.rms_mm,
+        nominal_mm: accuracy.nominal.rms_mm,
+        by_images: fit.problem.used_on_robot().next().is_some(),
+    };
     (found.calibrated_mm > found.nominal_mm).then_some(found)
 }
 
@@ -43,8 +49,10 @@ impl Kind for NoGain {
 
     fn seen(&self) -> String {
         format!(
-            "the corrected robot predicts images no better than the nominal one ({:.3} mm against {:.3} mm)",
-            self.calibrated_mm, self.nominal_mm
+            "the corrected robot predicts {} no better than the nominal one ({:.3} mm against {:.3} mm)",
+            if self.by_images { "images" } else { "measurements" },
+            self.calibrated_mm,
+            self.nominal_mm
         )
     }
 

@@ -190,6 +190,7 @@ codes! {
         ImageSizeImpossible "image_size_impossible" "an image is too small to show anything, or larger than is read or drawn",
         ImageSizeDiffers "image_size_differs" "an image has another size or depth than the others",
         ImageDepth "image_depth" "pixels do not fit the stated number of bits",
+        MarkersBright "markers_bright" "the markers are brighter than the ground and measured in the negative",
         ImageTurned "image_turned" "viewers turn or mirror an image as its EXIF data ask; here pixels are as the sensor gave them",
         FlatFieldDrift "flat_field_drift" "dark or white images of the end differ from those of the begin",
         FlatFieldUseless "flat_field_useless" "white images are saturated, or not brighter than dark ones",

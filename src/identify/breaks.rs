@@ -1,14 +1,16 @@
-//! When no usual mistake explains why readings and images do not fit: a series of which a part fits by itself.
+//! When no usual mistake explains why readings and images do not fit: a series of which a part fits by itself, or whose readings stand still.
 //!
 //! Parts by rows `[0, k)` and `[k, n)`: where something changed at `t`, the closed form of a part that holds more images of one side of `t` than of
 //! the other goes by these, so that a few `k` find it; `t` is then where fewest images of that side miss it, and fewest of the other fit.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::suspects::Suspects;
-use crate::diagnose::{BodyMoved, Finding, agreement};
+use crate::diagnose::{BodyMoved, Finding, agreement, all_stand_still, stands_still};
 use crate::error::{Code, Error};
 use crate::init::{HandEye, PosePair, SeenStop, solve_hand_eye};
+use crate::problem::MeasuredSeries;
 
 /// Parts of a series at whose ends it is divided at first.
 const PARTS: usize = 8;
@@ -29,9 +31,29 @@ pub(super) fn broken(suspects: &Suspects, misfit: f64, of: &str) -> Option<Error
         let fits: Vec<bool> = pairs.iter().map(|pair| solution.misfit(pair) < left).collect();
         Some(Part::of(solution, &fits, is_first))
     });
-    let part = parts.min_by_key(|part| (part.missed, part.others.len()))?;
-    let both = || solved(part.others.clone()).map(|_| part.unnamed(of, n, misfit));
-    part.named(suspects).or_else(both)
+    let part = parts.min_by_key(|part| (part.missed, part.others.len()));
+    let by_parts = part.and_then(|part| {
+        let both = || solved(part.others.clone()).map(|_| part.unnamed(of, n, misfit));
+        part.named(suspects).or_else(both)
+    });
+    by_parts.or_else(|| not_read(suspects, misfit))
+}
+
+/// Readings that stay the same for a while.
+fn not_read(Suspects { problem, robot, series, pairs, limits }: &Suspects, misfit: f64) -> Option<Error> {
+    let shown: BTreeSet<usize> = pairs.iter().map(|(i, _)| problem.images[*i].series).collect();
+    let own: Vec<&MeasuredSeries> = shown.into_iter().map(|k| &series[k]).collect();
+    let few = limits.moved_images;
+    let all = own.iter().find_map(|series| all_stand_still(series, few)).map(|still| ("joint readings", still));
+    let names = robot.chain.readings.iter().map(String::as_str).enumerate();
+    let mut of_one = names.flat_map(|(k, name)| own.iter().filter_map(move |s| Some((name, stands_still(s, k, few)?))));
+    let (place, still) = all.or_else(|| of_one.next())?;
+    let what = format!(
+        "read {still}, though the robot moved, and do not fit the images (the camera poses miss by {:.0}, median, mm plus mrad)",
+        1e3 * misfit
+    );
+    let remedy = "see whether the joints were read at these stops: correct their readings, or leave their rows out";
+    Some(Error::new(Code::JointReadingsWrong, place, what, remedy))
 }
 
 /// A part of a series that fits by itself.

@@ -364,7 +364,8 @@ fn stated(solution: &Solution, image: usize) -> Vec<[f64; 3]> {
 fn observations(solution: &Solution, image: usize, pose: Option<&Pose>) -> ObservationColumns {
     let i = &solution.fit.problem.images[image];
     let markers = &solution.fit.problem.plates[i.plate].markers;
-    let mut columns = ObservationColumns { covariance: stated(solution, image), ..ObservationColumns::default() };
+    let mut columns = ObservationColumns::with_capacity(i.observations.len());
+    columns.covariance = stated(solution, image);
     for (o, residual) in i.observations.iter().zip(residuals(solution, image, pose)) {
         columns.marker.push(markers[o.marker].id);
         columns.edge.push(o.edge);

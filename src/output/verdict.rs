@@ -78,6 +78,7 @@ fn is_information(code: Code) -> bool {
             | Code::ImageDelayFound
             | Code::ImageNotThere
             | Code::ImageTurned
+            | Code::MarkersBright
             | Code::ImageUnlisted
             | Code::ImagesInMotion
             | Code::JointUnused

@@ -207,6 +207,24 @@ fn plain_asymmetric_and_ringed_grids_need_no_radius() {
     }
 }
 
+/// Bright dots on dark ground, as on glass in reflected light: measured where the dark ones are, and said.
+#[test]
+fn bright_dots_are_measured_in_the_negative() {
+    let stated = grid("columns = 9\nrows = 7\nlarge = [[4, 3], [5, 3], [4, 2]]");
+    let view = view(&mut ChaCha8Rng::seed_from_u64(3), Spoiling::None);
+    let plate = printed(&stated, &[31, 32, 22], &[]);
+    let picture = Scene { plate, camera_from_plate: pose(&view), ..scene(&view) }.render(1);
+    let paths = [Path::new("1.png").to_path_buf()];
+    let seen = |picture: &Picture| detect_series(&paths, &stated, |_| Ok(picture.clone()), |_| {}).remove(0).detection;
+    let (dark, bright) = (seen(&picture), seen(&picture.clone().negative()));
+    assert_eq!((dark.observations.len(), bright.observations.len()), (63, 63));
+    for (a, b) in dark.observations.iter().zip(&bright.observations) {
+        assert!(a.marker == b.marker && (0..2).all(|k| (a.uv[k] - b.uv[k]).abs() < 1e-3), "{a:?} {b:?}");
+    }
+    let codes = |of: &Detection| of.notices.iter().map(|n| n.code).collect::<Vec<_>>();
+    assert_eq!((codes(&dark), codes(&bright)), (vec![], vec![Code::MarkersBright]));
+}
+
 /// The dot that tells the turn is hidden in one image: what is read there may be turned, and is not used.
 #[test]
 fn an_image_without_the_larger_dot_that_the_others_show_is_refused() {

@@ -211,6 +211,22 @@ fn tags_of_another_dictionary_number_or_kind_are_named() {
     }
 }
 
+#[test]
+fn bright_tags_are_read_in_the_negative() {
+    let look = View { distance_m: 0.7, tilt_deg: 20.0, roll_deg: 30.0, ..View::default() };
+    for (stated, corners) in [(ARUCO, 140), (APRILGRID, 144)] {
+        let stated = plate(stated);
+        let picture = Scene { plate: stated.clone(), camera_from_plate: pose(&look), ..scene(&look) }.render(1);
+        let image = detect_series(&["1.png".into()], &stated, |_| Ok(picture.clone().negative()), |_| {}).remove(0);
+        let right = detect(&picture, &stated).unwrap().observations;
+        assert_eq!((right.len(), image.detection.observations.len()), (corners, corners));
+        for (a, b) in right.iter().zip(&image.detection.observations) {
+            assert!(a.marker == b.marker && (0..2).all(|k| (a.uv[k] - b.uv[k]).abs() < 1e-2), "{a:?} {b:?}");
+        }
+        assert!(image.detection.notices.iter().any(|n| n.code == Code::MarkersBright));
+    }
+}
+
 /// The numbers tell the places: more rows than there are put the frame of the plate elsewhere, and no corner.
 #[test]
 fn a_row_that_no_image_shows_is_said() {

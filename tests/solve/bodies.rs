@@ -415,6 +415,22 @@ fn mistakes_in_readings_are_named_by_a_tracker_alone() {
 }
 
 #[test]
+fn a_joint_that_was_not_read_any_more_is_named_by_a_tracker() {
+    let world = World::new(43, Kind::Poses, 30, (3e-5, 5e-5), 2e-5);
+    let mut series = world.series.clone();
+    let last = series.stops[14].readings.as_ref().unwrap()[2];
+    series.stops[15..].iter_mut().filter_map(|s| s.readings.as_mut()).for_each(|q| q[2] = last);
+    let solution = identify(world.chain.clone(), &[series], &Options::default()).unwrap();
+    let still = solution.findings.iter().find_map(|f| match f {
+        Finding::JointNoiseLarge(noise) if f.fails() => {
+            noise.stands_still.clone().map(|still| (&noise.joint, still.stops))
+        }
+        _ => None,
+    });
+    assert_eq!(still, Some((&"joint_a3".to_owned(), 16)), "{:?}", solution.findings);
+}
+
+#[test]
 fn zeros_that_are_far_off_are_no_good_result_of_a_tracker() {
     let world = World::new(44, Kind::Poses, 60, (3e-5, 5e-5), 2e-5);
     let mut series = world.series.clone();

@@ -68,6 +68,23 @@ fn the_size_of_a_plate_that_does_not_fit_is_told() {
 }
 
 #[test]
+fn joints_that_were_not_read_any_more_are_named_in_a_short_series() {
+    let chain = chain();
+    let frozen = |joints: std::ops::Range<usize>| {
+        let mut series = seen(&chain);
+        series.stops.truncate(9);
+        let last = series.stops[3].readings.clone().unwrap();
+        for q in series.stops[4..].iter_mut().filter_map(|s| s.readings.as_mut()) {
+            q[joints.clone()].copy_from_slice(&last[joints.clone()]);
+        }
+        let said = diagnosis(chain.clone(), series);
+        (said.code, said.place)
+    };
+    assert_eq!(frozen(2..3), (Code::JointReadingsWrong, "joint_a3".to_owned()));
+    assert_eq!(frozen(0..6), (Code::JointReadingsWrong, "joint readings".to_owned()));
+}
+
+#[test]
 fn an_exchanged_camera_mount_is_named() {
     let chain = chain();
     let mut series = seen(&chain);
