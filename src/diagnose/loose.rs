@@ -121,7 +121,7 @@ impl Kind for LooseMounting {
 
     fn seen(&self) -> String {
         format!(
-            "the {} of the camera has two values {:.2} mrad apart ({} of {} images: {}): it is loose on its mount, or slips",
+            "the {} of the camera has two values {:.2} mrad apart ({} of {} images: {}): it is loose on its mount or slips, or a joint has backlash",
             self.turn,
             1e3 * self.angle_rad,
             self.images.len(),
@@ -131,7 +131,7 @@ impl Kind for LooseMounting {
     }
 
     fn remedy(&self) -> String {
-        "fasten it and take the series again".into()
+        "fasten it and take the series again; if it is fast, look for a joint with play".into()
     }
 }
 

@@ -27,18 +27,27 @@ struct Point {
     f: DVector<f64>,
 }
 
+/// Growth of the change from which on the points before are taken to have misled.
+const MISLED: f64 = 2.0;
+
 /// The points before. Components are logarithms of sizes.
 #[derive(Debug, Default)]
 pub struct Acceleration {
     before: Vec<Point>,
+    /// The largest change at the point before.
+    change: Option<f64>,
 }
 
 impl Acceleration {
     /// The next point, from a point and what the iteration made of it, where the largest component changed by that share. After large changes it
-    /// is that of the iteration, and all points before are forgotten: the way down from a first guess is none that others tell of.
+    /// is that of the iteration, and all points before are forgotten: the way down from a first guess is none that others tell of. So they are
+    /// where the change grew: they differed by no more than the iteration is known to.
     pub fn next_after(&mut self, change: f64, x: &DVector<f64>, g: DVector<f64>) -> DVector<f64> {
-        if change > ACCELERATED {
+        let misled = self.change.replace(change).is_some_and(|before| change > MISLED * before);
+        if misled || change > ACCELERATED {
             self.before.clear();
+        }
+        if change > ACCELERATED {
             return g;
         }
         self.next(x, g)
@@ -90,6 +99,19 @@ mod tests {
         assert!(few <= 7 && plain > 40, "{few} steps instead of {plain}");
         // Off by less than the ridge leaves: a thousandth of residual is 0.02 of the slow direction.
         assert!((found[0] - 1.0).abs() < 0.02, "{found}");
+    }
+
+    #[test]
+    fn points_after_which_the_change_grew_are_forgotten() {
+        let point = |x: f64| DVector::from_vec(vec![x]);
+        let third = |change: f64| {
+            let mut acceleration = Acceleration::default();
+            acceleration.next_after(0.05, &point(0.0), point(0.05));
+            acceleration.next_after(0.04, &point(0.05), point(0.09));
+            acceleration.next_after(change, &point(0.3), point(0.3 - change))
+        };
+        assert_eq!(third(0.1), point(0.3 - 0.1), "what the iteration says");
+        assert!(third(0.07) != point(0.3 - 0.07), "accelerated");
     }
 
     #[test]
