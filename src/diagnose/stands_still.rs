@@ -14,11 +14,13 @@ pub struct StandsStill {
 }
 
 impl StandsStill {
-    /// The longest of the runs, one of more stops than `few`, if it is not all of them.
-    fn longest<'a>(runs: impl Iterator<Item = &'a [Read<'a>]>, few: usize, all: usize) -> Option<Self> {
-        let longest = runs.filter(|run| (few + 1..all).contains(&run.len())).max_by_key(|run| run.len())?;
-        let [(first, _), .., (last, _)] = longest else { return None };
-        Some(Self { stops: longest.len(), between: [first, last].map(|stop| stop.image.clone()) })
+    /// The only run of more stops than `few`, if it is not all of them: a rail stands still again and again, and so does an arm of which several
+    /// images are taken at every stop.
+    fn only<'a>(runs: impl Iterator<Item = &'a [Read<'a>]>, few: usize, all: usize) -> Option<Self> {
+        let mut long = runs.filter(|run| (few + 1..all).contains(&run.len()));
+        let (run, None) = (long.next()?, long.next()) else { return None };
+        let [(first, _), .., (last, _)] = run else { return None };
+        Some(Self { stops: run.len(), between: [first, last].map(|stop| stop.image.clone()) })
     }
 }
 
@@ -39,17 +41,17 @@ fn stops<T: PartialEq>(series: &MeasuredSeries, by: impl Fn(&Read) -> T) -> Vec<
     stops
 }
 
-/// The longest run of stops of a series at which this reading is the same while others change, where these are more than `few` and the reading
-/// is another elsewhere.
+/// The run of stops of a series at which this reading is the same while others change, where these are more than `few` and the reading
+/// changes elsewhere.
 pub fn stands_still(series: &MeasuredSeries, reading: usize, few: usize) -> Option<StandsStill> {
     let stops = stops(series, |(_, readings)| readings.to_vec());
-    StandsStill::longest(stops.chunk_by(|(_, a), (_, b)| a[reading] == b[reading]), few, stops.len())
+    StandsStill::only(stops.chunk_by(|(_, a), (_, b)| a[reading] == b[reading]), few, stops.len())
 }
 
 /// The same of all readings together.
 pub fn all_stand_still(series: &MeasuredSeries, few: usize) -> Option<StandsStill> {
     let stops = stops(series, |(stop, _)| stop.row);
-    StandsStill::longest(stops.chunk_by(|(_, a), (_, b)| a == b), few, stops.len())
+    StandsStill::only(stops.chunk_by(|(_, a), (_, b)| a == b), few, stops.len())
 }
 
 #[cfg(test)]
@@ -75,6 +77,8 @@ mod tests {
         assert_eq!((found.stops, found.between), (4, ["2".to_owned(), "5".to_owned()]));
         assert_eq!(stands_still(&frozen, 0, 4), None, "too few");
         assert_eq!(stands_still(&frozen, 1, 3), None, "it moves");
+        let rail = [0.1, 0.1, 0.1, 0.2, 0.2, 0.2, 0.3].into_iter().enumerate().map(|(k, q)| [q, k as f64]);
+        assert_eq!(stands_still(&series(&rail.collect::<Vec<_>>()), 0, 2), None, "a rail");
         assert_eq!(stands_still(&series(&[[0.3, 1.0], [0.3, 2.0], [0.3, 3.0], [0.3, 4.0]]), 0, 3), None, "never moved");
         let twice = [[0.1, 1.0], [0.3, 3.0], [0.3, 3.0], [0.3, 3.0], [0.3, 3.0]];
         assert_eq!(stands_still(&series(&twice), 0, 3), None, "at one stop nothing moves");

@@ -52,7 +52,7 @@ fn not_read(Suspects { problem, robot, series, pairs, limits }: &Suspects, misfi
         "read {still}, though the robot moved, and do not fit the images (the camera poses miss by {:.0}, median, mm plus mrad)",
         1e3 * misfit
     );
-    let remedy = "see whether the joints were read at these stops: correct their readings, or leave their rows out";
+    let remedy = "see whether the joints were read at these stops: correct their readings, or leave their rows out; if they were, check joint_unit, order and signs of the joints, the rows of the images and the URDF";
     Some(Error::new(Code::JointReadingsWrong, place, what, remedy))
 }
 
