@@ -148,14 +148,13 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     // A refusal says nothing of what was noticed before, which may be its cause.
     let calibration = Calibration::of(observed, &Options { estimator, ..options })
         .inspect_err(|_| noticed.iter().for_each(|notice| tracing::warn!("{}", notice.coded())))?;
-    write(args, calibration, place)
+    write(args, &calibration, place)
 }
 
-fn write(args: &IdentifyArgs, calibration: Calibration, place: ResultFolder) -> Result<Verdict> {
+fn write(args: &IdentifyArgs, calibration: &Calibration, place: ResultFolder) -> Result<Verdict> {
     let poses = if args.poses { Poses::Written } else { Poses::LeftOut };
     let command = super::command_line().join(" ");
     let mut files = calibration.files(&Export { offsets: args.offsets.into(), poses, command })?;
-    drop(calibration);
     if stages::are_told() {
         files.insert(TIMINGS.to_owned(), stages::timings());
     }

@@ -268,21 +268,6 @@ pub struct ObservationColumns {
     pub reason: Vec<Option<ObservationRejection>>,
 }
 
-impl ObservationColumns {
-    /// Empty, for so many: of very many images no space is left over.
-    pub fn with_capacity(observations: usize) -> Self {
-        Self {
-            marker: Vec::with_capacity(observations),
-            edge: Vec::with_capacity(observations),
-            radius_m: Vec::with_capacity(observations),
-            uv: Vec::with_capacity(observations),
-            covariance: Vec::new(),
-            duv: Vec::with_capacity(observations),
-            reason: Vec::with_capacity(observations),
-        }
-    }
-}
-
 /// One image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageRecord {

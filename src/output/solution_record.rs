@@ -23,7 +23,7 @@ use crate::identify::{Solution, depths_m, stated_covariance};
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes;
 use crate::problem::{Image, MeasuredStop, Problem, State};
-use crate::series::Observation;
+use crate::series::{Observation, Plate};
 
 /// The record of a solution.
 ///
@@ -265,7 +265,7 @@ fn placements(solution: &Solution, gauge: &Gauge) -> Vec<PlacedRecord> {
 
 fn plates(solution: &Solution, context: &Context, gauge: &Gauge) -> Vec<PlateRecord> {
     let problem = &solution.fit.problem;
-    let plate = |(k, p): (usize, &crate::series::Plate)| {
+    let plate = |(k, p): (usize, &Plate)| {
         let shape = &solution.fit.state.plates[k];
         let sigmas = &gauge.positions[k];
         PlateRecord {
@@ -297,11 +297,11 @@ fn plates(solution: &Solution, context: &Context, gauge: &Gauge) -> Vec<PlateRec
 fn images(solution: &Solution, context: &Context) -> Vec<ImageRecord> {
     let problem = &solution.fit.problem;
     let names = ImageNames::new(problem, &context.series);
-    let poses = poses(solution);
+    let (poses, stops) = (poses(solution), measured_stops(solution));
     let image = |(k, i): (usize, &Image)| {
         let from = solution.fit.taken_from(k);
         let joint_noise = Some(from.joint_errors.to_vec()).filter(|_| i.rejected.is_none() && from.joints() > 0);
-        let observations = observations(solution, k, poses[k].as_ref());
+        let observations = observations(solution, k, stops[k], poses[k].as_ref());
         ImageRecord {
             name: names.of(k).to_owned(),
             series: series_name(&context.series, i.series),
@@ -323,7 +323,7 @@ fn images(solution: &Solution, context: &Context) -> Vec<ImageRecord> {
             held_out_mm: solution.accuracy.per_image_mm.get(k).copied().flatten(),
             reason: i.rejected.as_ref().map(ToString::to_string),
             rejection: i.rejected.clone(),
-            row: row_of(solution, k),
+            row: solution.series[i.series].run.as_ref().map(|_| stops[k].row),
             observations,
         }
     };
@@ -338,41 +338,29 @@ pub(super) fn rms_px(solution: &Solution, image: usize) -> Option<f64> {
     Some((squares / residuals.len().max(1) as f64).sqrt())
 }
 
-/// The stop of an image in its series.
-fn measured_stop(solution: &Solution, image: usize) -> &MeasuredStop {
-    let images = &solution.fit.problem.images;
-    let series = images[image].series;
-    let before = images[..image].iter().filter(|i| i.series == series).count();
-    &solution.series[series].stops[before]
-}
-
-/// Place of its stop, where several cameras saw it.
-fn row_of(solution: &Solution, image: usize) -> Option<usize> {
-    let series = &solution.series[solution.fit.problem.images[image].series];
-    series.run.as_ref().map(|_| measured_stop(solution, image).row)
+/// The stop of every image in its series.
+fn measured_stops(solution: &Solution) -> Vec<&MeasuredStop> {
+    let mut stops: Vec<_> = solution.series.iter().map(|series| series.stops.iter()).collect();
+    solution.fit.problem.images.iter().filter_map(|image| stops[image.series].next()).collect()
 }
 
 /// Covariances as they were stated, in the order of the observations of the image: inverted twice they would be others in the last bit.
-fn stated(solution: &Solution, image: usize) -> Vec<[f64; 3]> {
-    let images = &solution.fit.problem.images;
-    let series = &solution.series[images[image].series];
-    let mut all: Vec<&Observation> = measured_stop(solution, image).observations.iter().collect();
-    all.sort_by_key(|o| (series.plate.index_of(o.marker), o.edge));
+fn stated(plate: &Plate, stop: &MeasuredStop) -> Vec<[f64; 3]> {
+    let mut all: Vec<&Observation> = stop.observations.iter().collect();
+    all.sort_by_key(|o| (plate.index_of(o.marker), o.edge));
     all.into_iter().map(stated_covariance).collect()
 }
 
-fn observations(solution: &Solution, image: usize, pose: Option<&Pose>) -> ObservationColumns {
-    let i = &solution.fit.problem.images[image];
-    let markers = &solution.fit.problem.plates[i.plate].markers;
-    let mut columns = ObservationColumns::with_capacity(i.observations.len());
-    columns.covariance = stated(solution, image);
-    for (o, residual) in i.observations.iter().zip(residuals(solution, image, pose)) {
-        columns.marker.push(markers[o.marker].id);
-        columns.edge.push(o.edge);
-        columns.radius_m.push(o.mark.radius_m());
-        columns.uv.push(o.uv.into());
-        columns.duv.push(residual.map(Into::into));
-        columns.reason.push(o.rejected);
+fn observations(solution: &Solution, image: usize, stop: &MeasuredStop, pose: Option<&Pose>) -> ObservationColumns {
+    let Image { series, plate, ref observations, .. } = solution.fit.problem.images[image];
+    let markers = &solution.fit.problem.plates[plate].markers;
+    ObservationColumns {
+        marker: observations.iter().map(|o| markers[o.marker].id).collect(),
+        edge: observations.iter().map(|o| o.edge).collect(),
+        radius_m: observations.iter().map(|o| o.mark.radius_m()).collect(),
+        uv: observations.iter().map(|o| o.uv.into()).collect(),
+        covariance: stated(&solution.series[series].plate, stop),
+        duv: residuals(solution, image, pose).into_iter().map(|r| r.map(Into::into)).collect(),
+        reason: observations.iter().map(|o| o.rejected).collect(),
     }
-    columns
 }

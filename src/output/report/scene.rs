@@ -171,7 +171,7 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
     scene.plates.iter().for_each(|(_, line)| d.line("plate", line, "plate"));
     for (k, pose) in &scene.cameras {
         let image = &r.images[*k];
-        let class = if !image.is_used() { "camera gone" } else { "camera" };
+        let class = if image.is_used() { "camera" } else { "camera gone" };
         d.line(class, &view(r, image, pose, VIEW_LENGTH * 2.0 * size), &describe(r, image));
     }
     d.line("arm", &scene.arms[0].1, "arm");
