@@ -1,6 +1,6 @@
 //! A kinematic model judged by points that another device measured: only the frame of the device and the reflector are fitted.
 
-use nalgebra::{DMatrix, DVector, Matrix3x6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3x6, SMatrix, Vector3};
 
 use crate::geom::{Pose, rigid_fit, skew};
 use crate::linalg::{SymmetricFactor, product};
@@ -50,20 +50,16 @@ fn from_start(tips: &[Pose], points: &[MeasuredPoint], start: Vector3<f64>) -> O
     let pairs = tips.iter().zip(points).map(|(tip, p)| (tip.transform(&start), p.position_m));
     let mut frame = rigid_fit(&pairs.collect::<Vec<_>>())?;
     for _ in 0..100 {
-        let mut n = DMatrix::<f64>::zeros(9, 9);
-        let mut b = DVector::<f64>::zeros(9);
+        let (mut n, mut b) = (DMatrix::<f64>::zeros(9, 9), DVector::<f64>::zeros(9));
         for (tip, p) in tips.iter().zip(points) {
             let y = tip.transform(&tip_point);
             let r = p.position_m - frame.transform(&y);
-            let mut j = DMatrix::<f64>::zeros(3, 9);
-            j.view_mut((0, 0), (3, 3)).copy_from(&frame.rotation);
-            j.view_mut((0, 3), (3, 3)).copy_from(&(-frame.rotation * skew(&y)));
-            j.view_mut((0, 6), (3, 3)).copy_from(&(frame.rotation * tip.rotation));
-            n += j.transpose() * &j;
-            b += j.transpose() * DVector::from_column_slice(r.as_slice());
+            let j = by_frame_and_reflector(&frame, tip, &tip_point);
+            n += j.transpose() * j;
+            b += j.transpose() * r;
         }
         let step = SymmetricFactor::new(&n).ok()?.solve(&b);
-        frame = frame.perturbed(&Vector6::from_column_slice(step.rows(0, 6).as_slice()));
+        frame = frame.perturbed(&step.fixed_rows::<6>(0).into_owned());
         tip_point += Vector3::new(step[6], step[7], step[8]);
         if step.norm() < 1e-12 {
             break;
@@ -73,6 +69,20 @@ fn from_start(tips: &[Pose], points: &[MeasuredPoint], start: Vector3<f64>) -> O
         tips.iter().zip(points).map(|(tip, p)| p.position_m - frame.transform(&tip.transform(&tip_point))).collect();
     let rms_m = (residuals_m.iter().map(Vector3::norm_squared).sum::<f64>() / points.len() as f64).sqrt();
     rms_m.is_finite().then_some(PointFit { device_from_base: frame, tip_point_m: tip_point, residuals_m, rms_m })
+}
+
+/// Derivatives of a point in the frame of the device by `device_from_base` (a twist on its right) and by the reflector on the tip.
+pub(super) fn by_frame_and_reflector(
+    device_from_base: &Pose,
+    base_from_tip: &Pose,
+    tip_point_m: &Vector3<f64>,
+) -> SMatrix<f64, 3, 9> {
+    let rotation = &device_from_base.rotation;
+    let mut by = SMatrix::<f64, 3, 9>::zeros();
+    by.fixed_view_mut::<3, 3>(0, 0).copy_from(rotation);
+    by.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-rotation * skew(&base_from_tip.transform(tip_point_m))));
+    by.fixed_view_mut::<3, 3>(0, 6).copy_from(&(rotation * base_from_tip.rotation));
+    by
 }
 
 /// What a fit of points should leave, by the covariance of the model.
@@ -101,6 +111,12 @@ fn pairs(points: usize, readings: usize) -> impl Iterator<Item = (usize, usize, 
 }
 
 impl PointFit {
+    /// How far a point, of the fit or not, was measured from where the robot puts it, m, in the frame of the device.
+    pub fn residual_m(&self, robot: &Robot, point: &MeasuredPoint) -> Vector3<f64> {
+        let on_tip = robot.base_from_tip(&point.readings).transform(&self.tip_point_m);
+        point.position_m - self.device_from_base.transform(&on_tip)
+    }
+
     /// Expected RMS of the residuals: the model's errors at the points, less what the fit of frame and reflector takes up.
     ///
     /// `covariance` is that of the robot's columns (twists, then terms), m and rad; `joint_sigma` that of every reading.
@@ -183,10 +199,8 @@ impl PointFit {
             for (r, d) in kinematics.d_readings.iter().enumerate() {
                 by_noise.fixed_view_mut::<3, 1>(3 * k, k * readings + r).copy_from(&(moved * d * joint_sigma[r]));
             }
-            let y = tip.transform(&self.tip_point_m);
-            fitted.fixed_view_mut::<3, 3>(3 * k, 0).copy_from(&self.device_from_base.rotation);
-            fitted.fixed_view_mut::<3, 3>(3 * k, 3).copy_from(&(-self.device_from_base.rotation * skew(&y)));
-            fitted.fixed_view_mut::<3, 3>(3 * k, 6).copy_from(&turned);
+            let by = by_frame_and_reflector(&self.device_from_base, &tip, &self.tip_point_m);
+            fitted.fixed_view_mut::<3, 9>(3 * k, 0).copy_from(&by);
         }
         Derivatives { by_model, by_noise, fitted }
     }

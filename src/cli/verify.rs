@@ -1,6 +1,7 @@
 //! `robotcal verify`: a corrected model judged by points that another device measured, or by another series.
 
-use std::path::PathBuf;
+use std::collections::HashMap;
+use std::path::Path;
 
 use nalgebra::Vector3;
 
@@ -9,8 +10,12 @@ use super::robot::read_chain;
 use super::say::say_line;
 use super::verify_args::VerifyArgs;
 use super::{Verdict, verify_series};
-use crate::assess::{MeasuredPoint, fit_points};
+use crate::assess::{
+    DeviceMoved, Limits, MeasuredPoint, OddPoints, PointFit, Ratio, ReadingMistake, bootstrap_ratio, by_cluster,
+    device_moved, fit_points, odd_points, reading_mistake,
+};
 use crate::error::{Code, Error, Result};
+use crate::model::robot::Robot;
 use crate::output::compensated;
 use crate::urdf::Chain;
 
@@ -24,46 +29,160 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
 /// How far, RMS, points may be from where a robot puts them, m: robots miss by millimetres.
 const FARTHEST_M: f64 = 0.05;
 
-fn points(args: &VerifyArgs, points_file: &std::path::Path, unit: Unit) -> Result<Verdict> {
-    let rms = |file: &PathBuf, compensation: Option<&PathBuf>| -> Result<(usize, f64, f64)> {
-        let chain = read_chain(file, args.base.as_deref(), args.tip.as_deref())?;
-        let points = read_points(points_file, &chain, unit)?;
-        let robot = compensated(chain, compensation.map(PathBuf::as_path))?;
-        let fit = fit_points(&robot, &points).ok_or_else(|| {
-            Error::new(
-                Code::PointsUndetermined,
-                points_file.display(),
-                "the points do not determine the frame of the device and the reflector",
-                "measure at least 10 points that differ in position and in hand orientation",
-            )
-        })?;
-        if fit.rms_m > FARTHEST_M {
-            let what = format!(
-                "the points are {:.0} mm RMS from where {} puts them: no error of a robot, but another robot or other readings",
-                1e3 * fit.rms_m,
-                file.display()
-            );
-            let remedy = "check --joint-unit, the order of the joint columns, and the unit of the points (m)";
-            return Err(Error::new(Code::PointsContradict, points_file.display(), what, remedy));
-        }
-        let worst = fit.residuals_m.iter().map(Vector3::norm).fold(0.0, f64::max);
-        Ok((points.len(), 1e3 * fit.rms_m, 1e3 * worst))
-    };
-    let (count, corrected, worst) = rms(&args.urdf, args.compensation.as_ref())?;
-    say_line!("points    {count} of {}; frame of the device and reflector fitted", points_file.display());
-    say_line!("model     {}: {corrected:.3} mm RMS, worst {worst:.3} mm", args.urdf.display());
-    let Some(file) = &args.nominal else { return Ok(Verdict::Good) };
-    let (_, nominal, worst) = rms(file, None)?;
-    say_line!("nominal   {}: {nominal:.3} mm RMS, worst {worst:.3} mm", file.display());
-    if corrected < nominal {
-        say_line!("verdict   good: {:.0} % of the nominal error", 100.0 * corrected / nominal);
-        return Ok(Verdict::Good);
-    }
-    say_line!("verdict   NOT TO BE TRUSTED: the corrected model is no better than the nominal one");
-    Ok(Verdict::GateFailed)
+/// A robot model with the fit of the points to it.
+struct Judged {
+    robot: Robot,
+    points: Vec<MeasuredPoint>,
+    fit: PointFit,
 }
 
-fn read_points(path: &std::path::Path, chain: &Chain, unit: Unit) -> Result<Vec<MeasuredPoint>> {
+fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
+    let limits = &Limits::default();
+    let model = judged(args, (&args.urdf, args.compensation.as_deref()), (file, unit))?;
+    refuse_mistaken(&model, &args.urdf, file, limits)?;
+    refuse_far(&model, &args.urdf, file)?;
+    let count = model.points.len();
+    say_line!("points    {count} of {}; frame of the device and reflector fitted", file.display());
+    say_line!("{}", line("model", &args.urdf, &model));
+    let nominal = args.nominal.as_ref().map(|urdf| {
+        let nominal = judged(args, (urdf, None), (file, unit))?;
+        refuse_far(&nominal, urdf, file)?;
+        say_line!("{}", line("nominal", urdf, &nominal));
+        Ok(nominal)
+    });
+    let nominal = nominal.transpose()?;
+    let moved = device_moved(&model.robot, &model.points, &model.fit, limits);
+    match moved {
+        Some(DeviceMoved { first, by_m, rms_m }) => say_line!(
+            "moved     the device, or the base, stands {:.1} mm elsewhere from row {} on (without that {:.3} mm RMS): judge the rows before and after alone",
+            1e3 * by_m,
+            first + 1,
+            1e3 * rms_m
+        ),
+        None => odd_points(&model.robot, &model.points, limits).iter().for_each(say_odd),
+    }
+    let verdict = match (moved, &nominal) {
+        (Some(_), _) => Err("the points do not belong together".to_owned()),
+        _ if different(&model.points) < limits.scatter_images => Err(format!(
+            "{} different points, of which frame and reflector take up nine of {} values: measure {} or more",
+            different(&model.points),
+            3 * different(&model.points),
+            limits.scatter_images
+        )),
+        (None, Some(nominal)) => gain(&model, nominal, limits),
+        (None, None) => return Ok(Verdict::Good),
+    };
+    match verdict {
+        Ok(good) => {
+            say_line!("verdict   {good}");
+            Ok(Verdict::Good)
+        }
+        Err(why) => {
+            say_line!("verdict   NOT TO BE TRUSTED: {why}");
+            Ok(Verdict::GateFailed)
+        }
+    }
+}
+
+fn judged(
+    args: &VerifyArgs,
+    (urdf, compensation): (&Path, Option<&Path>),
+    (file, unit): (&Path, Unit),
+) -> Result<Judged> {
+    let chain = read_chain(urdf, args.base.as_deref(), args.tip.as_deref())?;
+    let points = read_points(file, &chain, unit)?;
+    let robot = compensated(chain, compensation)?;
+    let fit = fit_points(&robot, &points).ok_or_else(|| {
+        Error::new(
+            Code::PointsUndetermined,
+            file.display(),
+            "the points do not determine the frame of the device and the reflector",
+            "measure at least 10 points that differ in position and in hand orientation",
+        )
+    })?;
+    Ok(Judged { robot, points, fit })
+}
+
+fn contradict((model, urdf): (&Judged, &Path), file: &Path, why: &str, remedy: &str) -> Error {
+    let what =
+        format!("the points are {:.1} mm RMS from where {} puts them{why}", 1e3 * model.fit.rms_m, urdf.display());
+    Error::new(Code::PointsContradict, file.display(), what, remedy)
+}
+
+fn refuse_mistaken(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) -> Result<()> {
+    let Judged { robot, points, fit } = model;
+    let Some((mistake, left_m)) = reading_mistake(robot, points, fit.rms_m, limits) else { return Ok(()) };
+    let name = |reading: usize| &robot.chain.readings[reading];
+    let undone = match mistake {
+        ReadingMistake::Reversed(joint) => format!("with the other sign of {}", name(joint)),
+        ReadingMistake::Exchanged(a, b) => format!("with {} and {} exchanged", name(a), name(b)),
+    };
+    let why = format!(", and {:.3} mm {undone}", 1e3 * left_m);
+    Err(contradict((model, urdf), file, &why, "correct the columns of the joints"))
+}
+
+fn refuse_far(model: &Judged, urdf: &Path, file: &Path) -> Result<()> {
+    if model.fit.rms_m <= FARTHEST_M {
+        return Ok(());
+    }
+    let why = ": no error of a robot, but another robot or other readings";
+    let remedy = "check --joint-unit, the order of the joint columns, and the unit of the points (m)";
+    Err(contradict((model, urdf), file, why, remedy))
+}
+
+fn line(what: &str, urdf: &Path, Judged { fit, .. }: &Judged) -> String {
+    let worst = fit.residuals_m.iter().map(Vector3::norm).fold(0.0, f64::max);
+    format!("{what:<9} {}: {:.3} mm RMS, worst {:.3} mm", urdf.display(), 1e3 * fit.rms_m, 1e3 * worst)
+}
+
+fn say_odd(OddPoints { points, off_m, without }: &OddPoints) {
+    let each: Vec<String> =
+        points.iter().zip(off_m).map(|(k, off)| format!("{} ({:.1} mm)", k + 1, 1e3 * off)).collect();
+    say_line!(
+        "odd       row {}: wrong points or readings? Without {:.3} mm RMS: look at them, measure again",
+        each.join(", "),
+        1e3 * without.rms_m
+    );
+}
+
+/// Number of points at different readings.
+fn different(points: &[MeasuredPoint]) -> usize {
+    clusters(points).into_iter().max().map_or(0, |last| last + 1)
+}
+
+/// For every point the number of its readings.
+fn clusters(points: &[MeasuredPoint]) -> Vec<usize> {
+    let mut known: HashMap<Vec<u64>, usize> = HashMap::new();
+    let bits = |p: &MeasuredPoint| p.readings.iter().map(|q| q.to_bits()).collect();
+    points
+        .iter()
+        .map(|p| {
+            let next = known.len();
+            *known.entry(bits(p)).or_insert(next)
+        })
+        .collect()
+}
+
+/// What is gained over the nominal robot; why nothing, where the points do not tell it.
+fn gain(model: &Judged, nominal: &Judged, limits: &Limits) -> std::result::Result<String, String> {
+    let clusters = clusters(&model.points);
+    let units = |judged: &Judged| {
+        let squares: Vec<(f64, f64)> = judged.fit.residuals_m.iter().map(|r| (r.norm_squared(), 1.0)).collect();
+        by_cluster(&clusters, &squares)
+    };
+    let Some(Ratio { value, low, high }) = bootstrap_ratio(&units(model), &units(nominal)) else {
+        return Err("the nominal model leaves nothing".into());
+    };
+    let share = format!("{:.0} % of the nominal error ({:.0} to {:.0} %)", 100.0 * value, 100.0 * low, 100.0 * high);
+    match () {
+        () if high >= 1.0 && value < 1.0 => Err(format!("{share}, which these points do not tell from no gain")),
+        () if high >= 1.0 => Err(share),
+        () if value * limits.doubtful_gain > 1.0 => Ok(format!("good with doubts: {share}, hardly worth installing")),
+        () => Ok(format!("good: {share}")),
+    }
+}
+
+fn read_points(path: &Path, chain: &Chain, unit: Unit) -> Result<Vec<MeasuredPoint>> {
     let rows = joint_table::read(path, &["x_m", "y_m", "z_m"], &chain.readings, &chain.reading_kinds, unit)?;
     let point = |(xyz, readings): (Vec<f64>, Vec<f64>)| MeasuredPoint {
         position_m: Vector3::from_column_slice(&xyz),

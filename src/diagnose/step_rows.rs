@@ -7,7 +7,7 @@ use std::rc::Rc;
 use nalgebra::{DMatrix, DVector};
 
 use super::step_candidates::{Candidate, Changed, Order, Shown};
-use crate::assess::{RootInformation, StopInformation};
+use crate::assess::{RootInformation, StopInformation, log_chance};
 use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
 use crate::model::joint_terms::Term;
 use crate::problem::{Adjustment, Problem};
@@ -104,23 +104,6 @@ impl Step {
         let squares = SymmetricFactor::new(&self.covariance).map(|factor| self.change.dot(&factor.solve(&self.change)));
         squares.is_ok_and(|squares| squares > self.change.len() as f64)
     }
-}
-
-/// Logarithm of the probability that so many parameters explain this share of so many squares or more, of Gaussian noise; of an odd number
-/// of parameters a bound, that of one more.
-pub(super) fn log_chance(share: f64, squares: f64, parameters: usize) -> f64 {
-    let pairs = parameters.div_ceil(2);
-    let b = 0.5 * squares - pairs as f64;
-    if b <= 0.0 {
-        return 0.0;
-    }
-    let x = share.clamp(0.0, 1.0);
-    let (mut term, mut sum) = (1.0, 0.0);
-    for j in 0..pairs {
-        sum += term;
-        term *= (b + j as f64) * x / (j + 1) as f64;
-    }
-    b * (-x).ln_1p() + f64::ln(sum)
 }
 
 /// The fit, linearised.
@@ -368,33 +351,5 @@ impl Sums {
         let covariance = &scaled * DMatrix::from_diagonal(&by_value) * scaled.transpose();
         let change = &covariance * &self.score;
         Some(Fall { cost: self.score.dot(&change), change, covariance, told })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::log_chance;
-
-    fn chance(share: f64, squares: f64) -> f64 {
-        log_chance(share, squares, 6).exp()
-    }
-
-    #[test]
-    fn the_chance_is_that_of_a_beta_distribution() {
-        // Of eight squares six are explained: the share has the density 3 x^2.
-        for x in [0.1, 0.5, 0.9] {
-            assert!((chance(x, 8.0) - (1.0 - x * x * x)).abs() < 1e-12);
-        }
-        assert!((chance(0.0, 100.0) - 1.0).abs() < 1e-12 && chance(1.0, 100.0) == 0.0);
-        assert!((chance(0.999, 6.0) - 1.0).abs() < 1e-12, "nothing is left to compare with");
-    }
-
-    #[test]
-    fn many_squares_make_it_chi_squared() {
-        // The 99.9 % points of chi-squared with two, four and six degrees of freedom.
-        for (parameters, point) in [(2, 13.816), (4, 18.467), (6, 22.458)] {
-            assert!((log_chance(point / 1e6, 1e6, parameters).exp() - 1e-3).abs() < 1e-5);
-        }
-        assert!(log_chance(0.3, 40.0, 1) == log_chance(0.3, 40.0, 2), "of an odd number a bound");
     }
 }

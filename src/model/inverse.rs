@@ -86,12 +86,12 @@ impl Reach<'_> {
     /// # Errors
     /// [`Stalled`] where the iteration does not get there within the limits.
     pub fn solve_from(&self, base_from_tip: &Pose, start: &[f64]) -> Result<Vec<f64>, Stalled> {
-        let zeros = vec![0.0; start.len()];
+        let (zeros, origins) = (vec![0.0; start.len()], self.robot.linear_origins());
         let mut q = start.to_vec();
         let mut last = f64::INFINITY;
         let mut error = Vector6::zeros();
         for _ in 0..STEPS {
-            let k = self.robot.kinematics(&self.stop(&q), &zeros);
+            let k = self.robot.kinematics_from(&origins, &self.stop(&q), &zeros);
             error = (k.base_from_tip.inverse() * *base_from_tip).log();
             let size = error.norm();
             if size < TOLERANCE {

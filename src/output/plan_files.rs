@@ -140,7 +140,7 @@ fn record<'a>(
             image: image_name(k),
             readings: c.readings.clone(),
             placement: placement_name(request, c.placement),
-            markers: c.markers,
+            markers: c.seen.len(),
             via: leg.via.clone(),
             way_is_free: leg.is_free,
         }

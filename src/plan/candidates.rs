@@ -27,8 +27,8 @@ pub struct Candidate {
     pub view: Viewpoint,
     /// The camera.
     pub camera_from_plate: Pose,
-    /// Markers seen.
-    pub markers: usize,
+    /// Indices of the markers seen.
+    pub seen: Vec<usize>,
     /// Side of the middle of its range on which each joint from the second to the last but one stands, one bit each.
     pub posture: u32,
 }
@@ -222,7 +222,7 @@ impl<'a> Search<'a> {
             placement,
             view,
             camera_from_plate,
-            markers: seen.len(),
+            seen: seen.clone(),
         });
         (made.collect(), tally)
     }

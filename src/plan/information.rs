@@ -44,7 +44,7 @@ fn condensed_candidate(
     setting: &Setting,
     candidate: &Candidate,
 ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-    let stop = setting.stop(&planned.state, "", &candidate.readings, candidate.placement)?;
+    let stop = setting.stop_of_middles(&planned.state, (&candidate.readings, candidate.placement, &candidate.seen))?;
     condensed(planned, &stop)
 }
 

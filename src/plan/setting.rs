@@ -1,5 +1,7 @@
 //! What is roughly known before the measurement, as a problem without images.
 
+use std::iter;
+
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use super::visibility::seen_markers;
@@ -9,7 +11,7 @@ use crate::model::robot::{Posture, Robot};
 use crate::problem::{
     Adjustment, Image, Layout, Mark, MarkerObservation, Names, Noise, PlateShape, Problem, State, Stop, Tie, predict,
 };
-use crate::series::{CameraMount, Edge, Plate};
+use crate::series::{CameraMount, Edge, Marker, Plate};
 
 /// Huber bound of planned images; predictions have no residuals, so that it never acts.
 const HUBER: f64 = 2.45;
@@ -126,6 +128,30 @@ impl Setting {
 
     /// The stop with the image that would be taken: every marker seen, observed where it is predicted. `None` where nothing is seen.
     pub fn stop(&self, state: &State, name: &str, readings: &[f64], placement: usize) -> Option<PlannedStop> {
+        let seen = seen_markers(&self.plate, &self.camera, &self.camera_from_plate(readings, placement));
+        self.stop_of(state, name, (readings, placement, &seen), |marker| {
+            let inner = Some((Edge::Inner, marker.inner_radius_m, 1.0)).filter(|(_, radius_m, _)| *radius_m > 0.0);
+            iter::once((Edge::Outer, marker.outer_radius_m, 1.0)).chain(inner)
+        })
+    }
+
+    /// The same, from readings, placement and the indices of the markers seen, with one point for all contours of a marker, as exact as all
+    /// together: where a circle is small, its image moves as that of its middle.
+    pub fn stop_of_middles(&self, state: &State, stop: (&[f64], usize, &[usize])) -> Option<PlannedStop> {
+        self.stop_of(state, "", stop, |marker| {
+            let contours = if marker.inner_radius_m > 0.0 { 2.0 } else { 1.0 };
+            iter::once((Edge::Outer, 0.0, contours))
+        })
+    }
+
+    /// A stop, from readings and placement, at which these contours are seen of some markers: with radius, m (0: a point), and how often.
+    fn stop_of<I: Iterator<Item = (Edge, f64, f64)>>(
+        &self,
+        state: &State,
+        name: &str,
+        (readings, placement, seen): (&[f64], usize, &[usize]),
+        contours: impl Fn(&Marker) -> I,
+    ) -> Option<PlannedStop> {
         let pose = self.camera_from_plate(readings, placement);
         let mut image = Image {
             name: name.to_owned(),
@@ -140,18 +166,14 @@ impl Setting {
             rejected: None,
         };
         let information = Matrix2::identity() * self.pixel_sigma_px.powi(-2);
-        for marker in seen_markers(&self.plate, &self.camera, &pose) {
-            let m = &self.plate.markers[marker];
-            for (edge, radius_m) in [(Edge::Outer, m.outer_radius_m), (Edge::Inner, m.inner_radius_m)] {
-                if edge == Edge::Inner && radius_m <= 0.0 {
-                    continue;
-                }
+        for &marker in seen {
+            for (edge, radius_m, times) in contours(&self.plate.markers[marker]) {
                 let mut o = MarkerObservation {
                     marker,
                     edge,
                     mark: Mark::of_radius(radius_m),
                     uv: Vector2::zeros(),
-                    information,
+                    information: information * times,
                     rejected: None,
                 };
                 o.uv = predict(&image, state, &pose, &o)?.uv;

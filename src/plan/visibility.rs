@@ -1,5 +1,7 @@
 //! Which markers a camera sees.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use nalgebra::{Matrix2, Vector3};
 
 use super::plate_design::LEAST_MINOR_AXIS_PX;
@@ -10,24 +12,33 @@ use crate::series::{Marker, Plate};
 /// How far a contour stays away from the border of the image, px.
 const BORDER_PX: f64 = 3.0;
 
+/// Where a contour is looked at, in radii from its middle: east, west, north and south of it, and between these.
+const AXES: [[f64; 2]; 4] = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+const DIAGONALS: [[f64; 2]; 4] = [
+    [FRAC_1_SQRT_2, FRAC_1_SQRT_2],
+    [-FRAC_1_SQRT_2, FRAC_1_SQRT_2],
+    [-FRAC_1_SQRT_2, -FRAC_1_SQRT_2],
+    [FRAC_1_SQRT_2, -FRAC_1_SQRT_2],
+];
+
 /// True when the whole outer contour is in the image and its minor axis is large enough (a point: in the image).
 pub fn is_seen(marker: &Marker, camera: &Camera, camera_from_plate: &Pose) -> bool {
-    let image = |dx: f64, dy: f64| {
-        let r = marker.outer_radius_m;
-        let x = marker.position_m + Vector3::new(dx * r, dy * r, 0.0);
-        camera.project(&camera_from_plate.transform(&x)).filter(|uv| camera.contains(uv, BORDER_PX))
+    let in_image = |directions: &[[f64; 2]; 4]| {
+        let mut points = [[0.0; 4]; 3];
+        for (n, [dx, dy]) in directions.iter().enumerate() {
+            let from_middle = Vector3::new(dx * marker.outer_radius_m, dy * marker.outer_radius_m, 0.0);
+            let x = camera_from_plate.transform(&(marker.position_m + from_middle));
+            (0..3).for_each(|i| points[i][n] = x[i]);
+        }
+        camera.project_all(&points).filter(|uv| uv.iter().all(|uv| camera.contains(uv, BORDER_PX)))
     };
-    let diagonal = std::f64::consts::FRAC_1_SQRT_2;
-    let corners = [(diagonal, diagonal), (-diagonal, diagonal), (-diagonal, -diagonal), (diagonal, -diagonal)];
-    if corners.iter().any(|&(x, y)| image(x, y).is_none()) {
-        return false;
+    let Some([e, w, n, s]) = in_image(&AXES) else { return false };
+    if marker.outer_radius_m == 0.0 {
+        return true;
     }
-    let (Some(e), Some(w), Some(n), Some(s)) = (image(1.0, 0.0), image(-1.0, 0.0), image(0.0, 1.0), image(0.0, -1.0))
-    else {
-        return false;
-    };
     let half_axes = Matrix2::from_columns(&[(e - w) / 2.0, (n - s) / 2.0]).singular_values();
-    marker.outer_radius_m == 0.0 || 2.0 * half_axes.min() >= LEAST_MINOR_AXIS_PX
+    let is_far_from_border = || camera.contains(&((e + w) / 2.0), BORDER_PX + (e - w).norm() + (n - s).norm());
+    2.0 * half_axes.min() >= LEAST_MINOR_AXIS_PX && (is_far_from_border() || in_image(&DIAGONALS).is_some())
 }
 
 /// What a view must fulfil to be workable.

@@ -4,6 +4,8 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
+use nalgebra::Vector3;
+use robotcal::assess::{Limits, MeasuredPoint, device_moved, fit_points, odd_points};
 use robotcal::identify::Estimator;
 use robotcal::model::robot::Robot;
 use robotcal::simulate::truth::Truth;
@@ -90,29 +92,100 @@ fn a_two_stage_result_is_written_shown_judged_and_solved_again_like_a_joint_one(
     assert_eq!(refused.status.code(), Some(2));
 }
 
-#[test]
-fn readings_in_another_unit_are_no_good_verdict() {
+const NOISE_M: f64 = 5e-5;
+
+fn kr6() -> (PathBuf, Robot) {
     let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
     let robot = Robot::nominal(robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap());
-    let mut table = format!("x_m,y_m,z_m,{}\n", robot.chain.readings.join(","));
-    for k in 0..30 {
-        let q: Vec<f64> = (0..6).map(|j| (f64::from((k * (2 * j + 3) + 5 * j) % 17) - 8.0) / 8.0).collect();
-        let at = robot.base_from_tip(&q).transform(&[0.03, -0.02, 0.1].into());
-        let cells: Vec<String> = at.iter().chain(&q).map(|v| format!("{v:.9}")).collect();
-        writeln!(table, "{}", cells.join(",")).unwrap();
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let points = folder.path().join("points.csv");
-    std::fs::write(&points, table).unwrap();
-    let run = |unit: &str| {
-        let mut command = Command::cargo_bin("robotcal").unwrap();
-        command.args(["verify", "--joint-unit", unit, "--urdf"]).arg(&urdf).arg("--points").arg(&points);
-        command.output().unwrap()
+    (urdf, robot)
+}
+
+/// Points of a reflector where the robot puts it, with errors that repeat every seven rows.
+fn points(robot: &Robot, count: usize, noise_m: f64) -> Vec<MeasuredPoint> {
+    let point = |k: usize| {
+        let readings: Vec<f64> = (0..6).map(|j| (((k * (2 * j + 3) + 5 * j) % 17) as f64 - 8.0) / 8.0).collect();
+        let error = [1, 3, 5].map(|step| (step * k % 7) as f64 / 2.0 - 1.5);
+        let at = robot.base_from_tip(&readings).transform(&[0.03, -0.02, 0.1].into());
+        MeasuredPoint { position_m: at + noise_m * Vector3::from(error), readings }
     };
-    let right = run("rad");
+    (0..count).map(point).collect()
+}
+
+#[test]
+fn one_wrong_point_is_told_from_the_others() {
+    let ((_, robot), limits) = (kr6(), Limits::default());
+    let mut seen = points(&robot, 40, NOISE_M);
+    assert_eq!(odd_points(&robot, &seen, &limits), None);
+    seen[17].position_m.x += 5e-3;
+    let odd = odd_points(&robot, &seen, &limits).unwrap();
+    assert_eq!(odd.points, [17]);
+    assert!((odd.off_m[0] - 5e-3).abs() < 4.0 * NOISE_M && odd.without.rms_m < 2.5 * NOISE_M, "{odd:?}");
+}
+
+#[test]
+fn a_device_that_was_moved_is_told_from_noise() {
+    let ((_, robot), limits) = (kr6(), Limits::default());
+    let mut seen = points(&robot, 40, NOISE_M);
+    let moved = |seen: &[MeasuredPoint]| device_moved(&robot, seen, &fit_points(&robot, seen).unwrap(), &limits);
+    assert_eq!(moved(&seen), None);
+    seen[22..].iter_mut().for_each(|p| p.position_m.y += 3e-3);
+    let found = moved(&seen).unwrap();
+    assert_eq!(found.first, 22);
+    assert!((found.by_m - 3e-3).abs() < 3.0 * NOISE_M && found.rms_m < 2.5 * NOISE_M, "{found:?}");
+}
+
+/// `verify --points` of the robot by these points, with readings in this unit.
+fn verdict(points: &[MeasuredPoint], unit: &str, compared_with: Option<&Path>) -> std::process::Output {
+    let (urdf, robot) = kr6();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("points.csv");
+    let rows =
+        points.iter().map(|p| p.position_m.iter().chain(&p.readings).map(|v| format!("{v:.9}")).collect::<Vec<_>>());
+    let rows: Vec<String> = rows.map(|row| row.join(",")).collect();
+    std::fs::write(&file, format!("x_m,y_m,z_m,{}\n{}\n", robot.chain.readings.join(","), rows.join("\n"))).unwrap();
+    let mut command = Command::cargo_bin("robotcal").unwrap();
+    command.args(["verify", "--joint-unit", unit, "--urdf"]).arg(&urdf).arg("--points").arg(&file);
+    compared_with.into_iter().for_each(|other| {
+        command.arg("--nominal").arg(other);
+    });
+    command.output().unwrap()
+}
+
+#[test]
+fn points_that_do_not_belong_together_or_are_few_are_no_good_verdict() {
+    let (urdf, robot) = kr6();
+    let folder = tempfile::tempdir().unwrap();
+    let other = folder.path().join("nominal.urdf");
+    let text = std::fs::read_to_string(&urdf).unwrap();
+    // The upper arm 5 mm longer.
+    assert!(text.contains("0.455 0 0"), "the arm of this robot");
+    std::fs::write(&other, text.replace("0.455 0 0", "0.460 0 0")).unwrap();
+    let code = |points: &[MeasuredPoint]| {
+        let found = verdict(points, "rad", Some(&other));
+        assert!(found.status.code().is_some_and(|c| c < 3), "{}", String::from_utf8_lossy(&found.stderr));
+        found.status.code()
+    };
+    let good = points(&robot, 40, NOISE_M);
+    assert_eq!(code(&good), Some(0));
+    assert_eq!(code(&good[..5]), Some(1), "few");
+    let repeated: Vec<MeasuredPoint> = good[..5].iter().cycle().take(40).cloned().collect();
+    assert_eq!(code(&repeated), Some(1), "the same few again and again");
+    let mut moved = good.clone();
+    moved[22..].iter_mut().for_each(|p| p.position_m.y += 3e-3);
+    assert_eq!(code(&moved), Some(1), "moved");
+    let mut wrong = good;
+    wrong.iter_mut().for_each(|p| p.readings[5] = -p.readings[5]);
+    assert_eq!(code(&wrong), Some(2), "the sign of a joint");
+}
+
+#[test]
+fn readings_in_another_unit_are_no_good_verdict() {
+    let (_, robot) = kr6();
+    let seen = points(&robot, 30, 0.0);
+    let right = verdict(&seen, "rad", None);
     assert!(right.status.success(), "{}", String::from_utf8_lossy(&right.stderr));
     assert!(String::from_utf8_lossy(&right.stdout).contains(": 0.000 mm RMS"));
-    let wrong = run("deg");
+    let wrong = verdict(&seen, "deg", None);
     let said = String::from_utf8_lossy(&wrong.stderr);
     assert!(!wrong.status.success() && said.contains("--joint-unit"), "{said}");
 }

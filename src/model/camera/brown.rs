@@ -38,7 +38,12 @@ pub(super) fn distort<const N: usize>([k1, k2, p1, p2, k3]: [f64; 5], point: Ide
 
 /// True while `r (1 + k1 r^2 + k2 r^4 + k3 r^6)` still grows from the axis out to `r2 = r^2`.
 pub(super) fn is_monotonic_to(c: &[f64], r2: f64) -> bool {
-    let slope = |s: f64| 1.0 + s * (3.0 * c[0] + s * (5.0 * c[1] + s * 7.0 * c[4]));
+    let slope_of = |[a, b, c]: [f64; 3], s: f64| 1.0 + s * (3.0 * a + s * (5.0 * b + s * 7.0 * c));
+    let slope = |s: f64| slope_of([c[0], c[1], c[4]], s);
+    // What falls falls most at the end.
+    if slope_of([c[0], c[1], c[4]].map(|k| k.min(0.0)), r2) > 0.0 {
+        return true;
+    }
     if slope(r2) <= 0.0 {
         return false;
     }

@@ -1,5 +1,6 @@
 //! A camera: pinhole, lens and displacement field; points to pixels and pixels to rays.
 
+use std::array;
 use std::borrow::Cow;
 
 use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
@@ -119,14 +120,23 @@ impl Camera {
 
     /// Image (px) of a point in the camera frame (m); `None` behind the camera or where the lens model folds over.
     pub fn project(&self, x_camera: &Vector3<f64>) -> Option<Vector2<f64>> {
-        let x = normalised(x_camera)?;
-        let inverse_depth = 1.0 / x_camera.z;
-        if !self.lens.is_monotonic_to(&self.parameters[4..], x.norm_squared(), inverse_depth) {
-            return None;
-        }
-        let (image, _) = self.distorted(&x, inverse_depth);
-        let h = self.to_pixels(&image);
-        Some(h + self.displacement(&h).0)
+        self.project_all(&[[x_camera.x], [x_camera.y], [x_camera.z]]).map(|[uv]| uv)
+    }
+
+    /// Images (px) of N points in the camera frame (m); `None` where one of them has none.
+    pub fn project_all<const N: usize>(&self, points: &[[f64; N]; 3]) -> Option<[Vector2<f64>; N]> {
+        let [x, y, z] = points;
+        let formula = self.project_together(points)?;
+        let is_imaged = |n: usize| {
+            let r2 = (x[n] / z[n]).powi(2) + (y[n] / z[n]).powi(2);
+            self.lens.is_monotonic_to(&self.parameters[4..], r2, 1.0 / z[n])
+        };
+        (0..N).all(is_imaged).then(|| {
+            array::from_fn(|n| {
+                let h = Vector2::new(formula.uv[0][n], formula.uv[1][n]);
+                h + self.displacement(&h).0
+            })
+        })
     }
 
     /// As [`Camera::project`], with derivatives; `None` only behind the camera, so that an adjustment can pass through a poor state.
@@ -200,7 +210,7 @@ impl Camera {
         let target = (uv - Vector2::new(p[2], p[3])).component_div(&scale);
         // Image on the plane z = 1, the field included, and its derivative.
         let image = |x: &Vector2<f64>| {
-            let (point, by_x) = self.distorted(x, 0.0);
+            let (point, by_x) = self.distorted(x);
             let (shift, bend) = self.displacement(&self.to_pixels(&point));
             let bend = Matrix2::from_fn(|i, k| bend[(i, k)] * scale[k] / scale[i]);
             (point + shift.component_div(&scale), (Matrix2::identity() + bend) * by_x)
@@ -225,9 +235,9 @@ impl Camera {
         inside(uv.x, self.width_px) && inside(uv.y, self.height_px)
     }
 
-    /// A point of the plane z = 1, distorted, and its derivative by that point.
-    fn distorted(&self, x: &Vector2<f64>, inverse_depth: f64) -> (Vector2<f64>, Matrix2<f64>) {
-        let ideal = Points { at: [[x.x], [x.y]], inverse_depth: [inverse_depth] };
+    /// A point of the plane z = 1, distorted as far away, and its derivative by that point.
+    fn distorted(&self, x: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+        let ideal = Points { at: [[x.x], [x.y]], inverse_depth: [0.0] };
         let d = self.lens.distort(&self.parameters[4..], &ideal);
         (Vector2::new(d.point[0][0], d.point[1][0]), Matrix2::from_fn(|i, j| d.d_point[i][j][0]))
     }
@@ -243,11 +253,6 @@ impl Camera {
         let p = &self.parameters;
         Vector2::new(p[0] * x.x + p[2], p[1] * x.y + p[3])
     }
-}
-
-#[inline(always)]
-fn normalised(x: &Vector3<f64>) -> Option<Vector2<f64>> {
-    Camera::is_before(x.z).then(|| Vector2::new(x.x / x.z, x.y / x.z))
 }
 
 #[cfg(test)]

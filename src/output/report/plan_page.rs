@@ -136,7 +136,7 @@ fn stops(request: &PlanRequest, plan: &Plan) -> Markup {
                 tr {
                     td { (image_name(k)) }
                     @for q in written(&c.readings, &chain.reading_kinds) { td class="n" { (format!("{q:.2}")) } }
-                    td class="n" { (c.markers) }
+                    td class="n" { (c.seen.len()) }
                     td { @if !leg.is_free { "teach" } @else if !leg.via.is_empty() { "by another posture" } }
                 }
             }
