@@ -34,10 +34,9 @@ impl AtArgs {
     /// A table that cannot be read, a solution that does not tie robot and plate, a file that cannot be written.
     pub(super) fn run(&self, record: &SolutionRecord, folder: &Path) -> Result<String> {
         let (Some(file), Some(unit)) = (&self.at, self.at_unit) else { return Ok(String::new()) };
-        let robot = &record.robot;
-        let rows = joint_table::read(file, &[], &robot.readings, &robot.reading_kinds, unit)?;
-        let readings: Vec<Vec<f64>> = rows.into_iter().map(|(_, q)| q).collect();
         let model = found_model(record)?;
+        let rows = joint_table::read(file, &[], &model.robot.chain, (unit, "--at-unit"))?;
+        let readings: Vec<Vec<f64>> = rows.into_iter().map(|(_, q)| q).collect();
         let found = flange_at(&model, &readings)?;
         let path = folder.join("at.csv");
         let table = at_csv(&model, &readings, &found);

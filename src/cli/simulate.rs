@@ -227,6 +227,12 @@ fn request(args: &SimulateArgs) -> Result<WorldRequest> {
         let remedy = "near-m > 0, far-m >= near-m, tilt below 85 degrees, field of 5 to 140 degrees, at least 64x64 px";
         return Err(Error::new(Code::OptionRange, "simulate", "the camera or its views cannot be", remedy));
     }
+    let noises = [(args.joint_noise_mrad, 100.0), (args.pixel_noise_px, 100.0), (args.marker_noise_mm, 100.0)];
+    if !noises.iter().all(|(noise, most)| (0.0..=*most).contains(noise)) || args.images == 0 || args.placements == 0 {
+        let what = "the noise or the number of stops or placements cannot be";
+        let remedy = "a stop and a placement at least; noise from 0 to 100 mrad, px and mm";
+        return Err(Error::new(Code::OptionRange, "simulate", what, remedy));
+    }
     let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
     Ok(WorldRequest {
         camera: lens_camera(lens(&args.lens)?, args.width_px, args.height_px, args.field_deg.to_radians()),

@@ -183,7 +183,7 @@ fn gain(model: &Judged, nominal: &Judged, limits: &Limits) -> std::result::Resul
 }
 
 fn read_points(path: &Path, chain: &Chain, unit: Unit) -> Result<Vec<MeasuredPoint>> {
-    let rows = joint_table::read(path, &["x_m", "y_m", "z_m"], &chain.readings, &chain.reading_kinds, unit)?;
+    let rows = joint_table::read(path, &["x_m", "y_m", "z_m"], chain, (unit, "--joint-unit"))?;
     let point = |(xyz, readings): (Vec<f64>, Vec<f64>)| MeasuredPoint {
         position_m: Vector3::from_column_slice(&xyz),
         readings,

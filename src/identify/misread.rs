@@ -17,7 +17,7 @@ pub(super) struct Misread {
 }
 
 /// All of them.
-pub(super) const MISREAD: [Misread; 8] = [
+pub(super) const MISREAD: [Misread; 9] = [
     Misread {
         code: Code::MeasuredUnit,
         what: "positions are in millimetres: in metres the measurements fit",
@@ -25,21 +25,27 @@ pub(super) const MISREAD: [Misread; 8] = [
         undone: |seen| Some(moved(seen, |pose| Pose::new(pose.rotation, pose.translation / 1e3))),
     },
     Misread {
+        code: Code::MeasuredUnit,
+        what: "positions are in inches: in metres the measurements fit",
+        remedy: "multiply x_m, y_m and z_m by 0.0254",
+        undone: |seen| Some(moved(seen, |pose| Pose::new(pose.rotation, pose.translation * 0.0254))),
+    },
+    Misread {
         code: Code::AxesMirrored,
         what: "its axes are left-handed: with y_m negated the measurements fit",
-        remedy: "negate y_m, or set the instrument to right-handed axes",
+        remedy: "see which axis is wrong, as another sign or two exchanged columns may fit alike: negate y_m, or set the instrument to right-handed axes",
         undone: |seen| Some(moved(seen, |pose| Pose::new(pose.rotation, mirrored(pose.translation, 1)))),
     },
     Misread {
         code: Code::AxesMirrored,
         what: "its axes are left-handed: with x_m negated the measurements fit",
-        remedy: "negate x_m, or set the instrument to right-handed axes",
+        remedy: "see which axis is wrong, as another sign or two exchanged columns may fit alike: negate x_m, or set the instrument to right-handed axes",
         undone: |seen| Some(moved(seen, |pose| Pose::new(pose.rotation, mirrored(pose.translation, 0)))),
     },
     Misread {
         code: Code::AxesMirrored,
         what: "its axes are left-handed: with z_m negated the measurements fit",
-        remedy: "negate z_m, or set the instrument to right-handed axes",
+        remedy: "see which axis is wrong, as another sign or two exchanged columns may fit alike: negate z_m, or set the instrument to right-handed axes",
         undone: |seen| Some(moved(seen, |pose| Pose::new(pose.rotation, mirrored(pose.translation, 2)))),
     },
     Misread {

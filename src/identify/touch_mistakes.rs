@@ -37,6 +37,8 @@ enum What {
     Kind(MistakeKind),
     /// This place, now an unknown contact, the last.
     Place(Vector3<f64>),
+    /// The place of this touch alone, likewise.
+    Touch(usize, Vector3<f64>),
     /// The tool that was given; now it is found.
     GivenTool(Pose),
     /// The tool, now the last body, from this posture on.
@@ -67,6 +69,7 @@ pub fn touch_mistake(
         let (other, _) = with_unknown_places(touches, |touch| touch.seen == Seen::Point(place));
         (other, What::Place(place))
     });
+    let single = (0..touches.all.len()).filter_map(|k| of_another_place(touches, k));
     let tools = from.clone().filter(|_| given.tool.is_none()).map(|from| other_tool(touches, from));
     let works = from.filter_map(|from| {
         let (apart, known) = with_unknown_places(touches, |touch| touch.posture >= from);
@@ -75,13 +78,16 @@ pub fn touch_mistake(
     let kinds = [
         read_otherwise(robot, touches).map(with_given).collect(),
         places.map(with_given).collect(),
+        single.map(with_given).collect(),
         tools.map(with_given).collect(),
         works.map(with_given).collect(),
         given.tool.map(|tool| without_tool(touches, given, tool)).into_iter().collect::<Vec<Undone>>(),
     ];
     let all: Vec<Undone> = kinds.into_iter().flat_map(|undone| nearest(robot, undone)).collect();
     let fitted = |undone: &Undone| fit(robot, &undone.touches, &undone.given, limits).ok();
-    let explains = |fit: &FrameFit| fit.contradiction() < limits.mistake_explains * found.contradiction();
+    let explains = |fit: &FrameFit| {
+        fit.contradiction() < limits.mistake_explains * found.contradiction() && fit.rms_m < limits.touch_sigma_m
+    };
     let tried = |undone: Undone| fitted(&undone).filter(explains).map(|fit| (fit, undone));
     let (left, undone) = all.into_par_iter().filter_map(tried).min_by(|a, b| by_rank(rank(a), rank(b)))?;
     let frame = touches.frame.as_ref().map_or_else(String::new, |frame| format!(" in frame {frame}"));
@@ -163,6 +169,14 @@ fn with_unknown_places(touches: &Touches, of: impl Fn(&Touch) -> bool) -> (Touch
     (apart, known)
 }
 
+fn of_another_place(touches: &Touches, k: usize) -> Option<(Touches, What)> {
+    let Seen::Point(place) = touches.all[k].seen else { return None };
+    let mut undone = touches.clone();
+    undone.all[k].seen = Seen::Unknown(touches.contacts.len());
+    undone.contacts.push(String::new());
+    Some((undone, What::Touch(k, place)))
+}
+
 fn without_tool(touches: &Touches, given: &Given, tool: Pose) -> Undone {
     Undone { touches: touches.clone(), given: Given { tool: None, ..*given }, what: What::GivenTool(tool) }
 }
@@ -216,6 +230,17 @@ fn named(undone: &Undone, left: &FrameFit, touches: &Touches) -> MistakeKind {
                 1e3 * (found - place).norm()
             );
             (Code::PlaceContradicted, what, "correct it in contacts.csv, or touch the point that was meant".to_owned())
+        }
+        What::Touch(k, place) => {
+            let found = left.places.last().copied().unwrap_or(*place);
+            let what = format!(
+                "the touch at {} was not of the place {}: by the others it was at {}, {:.2} mm away",
+                touches.all[*k].stop,
+                in_metres(place),
+                in_metres(&found),
+                1e3 * (found - place).norm()
+            );
+            (Code::PlaceContradicted, what, "correct its row in contacts.csv, or leave it out".to_owned())
         }
         What::GivenTool(tool) => {
             let found = &left.tools[0];

@@ -35,7 +35,7 @@ pub(super) fn readings_for(
         .map(|stop| stop.raw_readings.as_ref().map(|r| columns.iter().map(|&c| r[c]).collect()))
         .collect();
     let known: Vec<&[f64]> = raw.iter().flatten().map(Vec::as_slice).collect();
-    check_unit(file, unit, chain, &known)?;
+    check_unit(file, unit, chain, &known, |unit| format!("write joint_unit = \"{unit}\" in series.toml"))?;
     Ok(raw.into_iter().map(|row| row.map(|q| to_si(chain, unit, &q))).collect())
 }
 
@@ -83,18 +83,28 @@ fn fits(chain: &Chain, mut readings: impl Iterator<Item = usize>, q: &[f64], fac
     readings.all(|i| limits(chain, i).is_none_or(|(low, high)| (low - slack..=high + slack).contains(&(q[i] * factor))))
 }
 
-fn check_unit(file: &Path, unit: AngleUnit, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
+/// Whether readings of a file, as they stand there, can be in this unit; `stating` says how the other one is stated, `"deg"` or `"rad"`.
+///
+/// # Errors
+/// A unit that cannot be true.
+pub fn check_unit(
+    file: &Path,
+    unit: AngleUnit,
+    chain: &Chain,
+    rows: &[&[f64]],
+    stating: impl Fn(&str) -> String,
+) -> Result<()> {
     if rows.is_empty() {
         return Ok(());
     }
     match unit {
-        AngleUnit::Rad => refuse_degrees_as_radians(file, chain, rows)?,
-        AngleUnit::Deg => refuse_radians_as_degrees(file, chain, rows)?,
+        AngleUnit::Rad => refuse_degrees_as_radians(file, chain, rows, stating("deg"))?,
+        AngleUnit::Deg => refuse_radians_as_degrees(file, chain, rows, &stating("rad"))?,
     }
     refuse_millimetres(file, chain, rows)
 }
 
-fn refuse_degrees_as_radians(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
+fn refuse_degrees_as_radians(file: &Path, chain: &Chain, rows: &[&[f64]], remedy: String) -> Result<()> {
     let possible = |q: &[f64], factor, slack| fits(chain, revolute(chain), q, factor, slack);
     let mostly = |test: &dyn Fn(&[f64]) -> bool| 2 * rows.iter().filter(|q| test(q)).count() > rows.len();
     let beyond_limits =
@@ -111,10 +121,10 @@ fn refuse_degrees_as_radians(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Res
         false => "more than two turns as radians",
     };
     let what = format!("joint_unit is rad, but {joint} reads {low} to {high}: most rows are {why}");
-    Err(Error::new(Code::DegreesAsRadians, file.display(), what, "write joint_unit = \"deg\" in series.toml"))
+    Err(Error::new(Code::DegreesAsRadians, file.display(), what, remedy))
 }
 
-fn refuse_radians_as_degrees(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
+fn refuse_radians_as_degrees(file: &Path, chain: &Chain, rows: &[&[f64]], stating: &str) -> Result<()> {
     let all = || revolute(chain).flat_map(|i| rows.iter().map(move |q| q[i]));
     let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(q), h.max(q)));
     let small = low > -SMALL_DEG && high < SMALL_DEG && all().next().is_some();
@@ -129,8 +139,8 @@ fn refuse_radians_as_degrees(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Res
         "joint_unit is deg, but all readings lie between {low} and {high} ({joint}: {joint_low} to {joint_high}): \
          as degrees the robot hardly moves, as radians they are usual"
     );
-    let remedy =
-        "write joint_unit = \"rad\" in series.toml (if they are degrees, convert them to radians in joints.csv)";
+    let table = file.file_name().unwrap_or_default().display();
+    let remedy = format!("{stating} (if they are degrees, convert them to radians in {table})");
     Err(Error::new(Code::RadiansAsDegrees, file.display(), what, remedy))
 }
 
