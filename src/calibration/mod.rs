@@ -25,7 +25,7 @@ use crate::error::Result;
 use crate::geom::Pose;
 use crate::identify::{Options, Solution, beside_two_stages, identify};
 use crate::model::robot::Robot;
-use crate::output::{self, Context, Offsets, Poses, ResultFolder};
+use crate::output::{self, Context, Offsets, Poses, ResultFolder, solution_json};
 use crate::series::{InputFile, RecordingOptions};
 use crate::stage::stage;
 use crate::urdf::RobotDescription;
@@ -122,7 +122,7 @@ impl Calibration {
     /// # Errors
     /// As of [`Calibration::files`] and [`output::write_all`].
     pub fn save(&self, folder: impl AsRef<Path>) -> Result<()> {
-        ResultFolder::claim(folder.as_ref())?.write_all(&self.files(&Export::default())?)
+        ResultFolder::claim(folder.as_ref(), solution_json::FILE_NAME)?.write_all(&self.files(&Export::default())?)
     }
 
     /// The report, a self-contained page.

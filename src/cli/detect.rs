@@ -14,7 +14,9 @@ use crate::calibration::{Pictures, require_unchanged};
 use crate::detect::{FlatField, FlatFieldFacts, load};
 use crate::error::{Code, Error, Notice, Result};
 use crate::identify::{SeenImage, SeenSeries, Unused, detect_stops, flat_field_drift, pictures, require_some};
-use crate::output::detection_files::{DetectionContext, detection_files, dropped_counts, marker_counts, picture_names};
+use crate::output::detection_files::{
+    self, DetectionContext, detection_files, dropped_counts, marker_counts, picture_names,
+};
 use crate::output::overlay::{Palette, overlay_png};
 use crate::output::{NewResult, ResultFolder, folder_name};
 use crate::series::{self, InputFile, Plate, Series, series_of_images};
@@ -60,11 +62,12 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
     }
     // Pictures of a recording are needed until they have been drawn on.
     let pictures = Pictures::new();
-    let claimed = args.out.as_deref().map(ResultFolder::claim).transpose()?;
+    let claim = |folder: &Path| ResultFolder::claim(folder, detection_files::FILE_NAME);
+    let claimed = args.out.as_deref().map(claim).transpose()?;
     let series = args.series.as_deref().map(series::read_images).transpose()?;
     let name = series.as_ref().map_or("images", |s| s.name.as_str()).to_owned();
     let folder = format!("{}-detected", folder_name(std::slice::from_ref(&name)));
-    let place = claimed.map_or_else(|| ResultFolder::claim(&Path::new("reports").join(folder)), Ok)?;
+    let place = claimed.map_or_else(|| claim(&Path::new("reports").join(folder)), Ok)?;
     let looked = match (series, &args.plate) {
         (Some(series), _) => of_series(args, series, &pictures)?,
         (None, Some(plate)) => of_images(&args.images, plate)?,

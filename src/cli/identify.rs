@@ -113,8 +113,9 @@ impl From<TwoStage> for Estimator {
 }
 
 pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
+    let claim = |folder: &Path| ResultFolder::claim(folder, FILE_NAME);
     // Tried before the work that the result costs.
-    let mut place = args.out.as_deref().filter(|_| !args.dry_run).map(ResultFolder::claim).transpose()?;
+    let mut place = args.out.as_deref().filter(|_| !args.dry_run).map(claim).transpose()?;
     let earlier = args.from.as_deref().map(read_solution).transpose()?;
     let options = args.choices.options(earlier.as_ref().map_or_else(Options::default, restore::options))?;
     let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
@@ -127,7 +128,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
             };
             if place.is_none() && !args.dry_run {
                 let names: Vec<String> = inputs.series.iter().map(|s| s.name.clone()).collect();
-                place = Some(ResultFolder::claim(&Path::new("reports").join(folder_name(&names)))?);
+                place = Some(claim(&Path::new("reports").join(folder_name(&names)))?);
             }
             let inputs = inputs.with_recordings(&args.recording.options(&[])?)?;
             if args.dry_run {

@@ -43,7 +43,7 @@ pub(super) struct PlanArgs {
     /// Robot description (URDF)
     #[arg(long, value_name = "FILE", required_unless_present = "touch")]
     urdf: Option<PathBuf>,
-    /// New folder for joints.csv, programs and plan.html, or one of an earlier plan
+    /// New folder for joints.csv, programs and plan.html, or one of an earlier plan that nobody has worked with
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// Plate (plate.toml)
@@ -201,7 +201,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     if let Some(worlds) = args.study {
         return study(args, worlds);
     }
-    let place = ResultFolder::claim(&args.out)?;
+    let place = ResultFolder::claim(&args.out, plan_files::FILE_NAME)?;
     let description = urdf::read(args.urdf())?;
     let chain = noted_chain(&description, args.base.as_deref(), args.tip.as_deref())?;
     let (capsules, meshes) = description.carried_capsules(&chain);

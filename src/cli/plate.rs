@@ -116,7 +116,9 @@ fn write(place: &ResultFolder, made: &PlateDesign, dpi: f64) -> Result<String> {
         ("plate.svg", svg(plate, &caption)),
         ("plate.png", png(plate, &caption, dpi)?),
     ];
-    place.write_beside(&files.each_ref().map(|(file, bytes)| ((*file).to_owned(), bytes.as_slice())), &[])?;
+    let files = files.each_ref().map(|(file, bytes)| ((*file).to_owned(), bytes.as_slice()));
+    place.require_the_same(&["plate.toml", "plate.csv"], &files)?;
+    place.write_beside(&files, &[])?;
     Ok(name)
 }
 

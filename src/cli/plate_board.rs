@@ -110,6 +110,7 @@ pub(super) fn draw(place: &ResultFolder, out: &Path, args: &BoardArgs, size: &Bo
     ];
     files.extend(table.map(|text| ("plate.csv", text.into_bytes())));
     let all: Vec<(String, &[u8])> = files.iter().map(|(file, bytes)| ((*file).to_owned(), bytes.as_slice())).collect();
+    place.require_the_same(&["plate.toml", "plate.csv"], &all)?;
     place.write_beside(&all, &[])?;
     let paper = sheet.paper.map_or(String::new(), |p| format!("{p}, "));
     let (width, height) = (sheet.width_m * 1e3, sheet.height_m * 1e3);

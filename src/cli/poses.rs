@@ -13,7 +13,7 @@ use crate::calibration::{Pictures, require_unchanged};
 use crate::diagnose::Finding;
 use crate::error::{Code, Error, Notice, Result};
 use crate::identify::{PoseSigma, StandAlone, measure, stand_alone};
-use crate::output::stand_alone_files::{StandAloneContext, stand_alone_files};
+use crate::output::stand_alone_files::{self, StandAloneContext, stand_alone_files};
 use crate::output::{ResultFolder, folder_name};
 use crate::problem::{Adjustment, MeasuredSeries};
 use crate::series::{InputFile, Series, read_without_robot, series_of_images};
@@ -49,7 +49,8 @@ pub(super) struct PosesArgs {
 pub(super) fn run(args: &PosesArgs) -> Result<Verdict> {
     // Pictures of a recording are needed until they have been looked at.
     let pictures = Pictures::new();
-    let claimed = args.out.as_deref().map(ResultFolder::claim).transpose()?;
+    let claim = |folder: &Path| ResultFolder::claim(folder, stand_alone_files::FILE_NAME);
+    let claimed = args.out.as_deref().map(claim).transpose()?;
     let series = match &args.plate {
         Some(plate) => vec![series_of_images(&args.images, plate)?],
         None => args.series.iter().map(|folder| read_without_robot(folder)).collect::<Result<Vec<Series>>>()?,
@@ -57,7 +58,7 @@ pub(super) fn run(args: &PosesArgs) -> Result<Verdict> {
     let names: Vec<String> = series.iter().map(|s| s.name.clone()).collect();
     let place = match claimed {
         Some(place) => place,
-        None => ResultFolder::claim(&Path::new("reports").join(format!("{}-poses", folder_name(&names))))?,
+        None => claim(&Path::new("reports").join(format!("{}-poses", folder_name(&names))))?,
     };
     let mut series = pictures.of_recordings(series, &args.recording.options(&[])?)?;
     series.iter_mut().for_each(forget_joints);

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::names::file_parts;
-use super::text::{csv, json};
+use super::text::{as_written, csv, json};
 use crate::error::{Code, Result};
 use crate::identify::SeenImage;
 use crate::series::{
@@ -81,6 +81,7 @@ pub fn detection_files(images: &[SeenImage], context: &DetectionContext) -> Resu
         program: concat!("robotcal ", env!("CARGO_PKG_VERSION")),
         command: &context.command,
         files: names,
+        as_written: as_written(&files),
         inputs: &context.inputs,
         images: images.iter().map(ImageRecord::of).collect(),
     };
@@ -129,6 +130,7 @@ struct Record<'a> {
     program: &'static str,
     command: &'a str,
     files: BTreeSet<String>,
+    as_written: BTreeMap<String, String>,
     inputs: &'a [InputFile],
     images: Vec<ImageRecord>,
 }

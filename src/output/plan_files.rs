@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::text::json;
+use super::text::{as_written, json};
 use crate::error::Result;
 use crate::plan::{Forecast, Plan, PlanRequest, image_name};
 use crate::series::{AngleUnit, DEFAULT_PLACEMENT, Manifest, SeriesStop, Stops, plate_csv, plate_toml};
@@ -49,6 +49,7 @@ struct CurveRecord {
 struct PlanRecord<'a> {
     format: u32,
     files: Vec<String>,
+    as_written: BTreeMap<String, String>,
     command: &'a str,
     robot: &'a str,
     joints: &'a [String],
@@ -119,9 +120,7 @@ pub fn plan_files(
     if circles {
         files.insert("plate.csv".into(), plate_csv(&setting.plate).into_bytes());
     }
-    let mut names: Vec<String> = files.keys().cloned().collect();
-    names.push(FILE_NAME.to_owned());
-    let record = record(request, plan, forecast, command, names);
+    let record = record(request, plan, forecast, command, &files);
     files.insert(FILE_NAME.to_owned(), json(&record, FILE_NAME)?);
     Ok(files)
 }
@@ -131,7 +130,7 @@ fn record<'a>(
     plan: &'a Plan,
     forecast: &'a Forecast,
     command: &'a str,
-    files: Vec<String>,
+    files: &BTreeMap<String, Vec<u8>>,
 ) -> PlanRecord<'a> {
     let chain = &request.setting.robot.chain;
     let stop = |(k, leg): (usize, &crate::plan::order::Leg)| {
@@ -147,7 +146,8 @@ fn record<'a>(
     };
     PlanRecord {
         format: FORMAT,
-        files,
+        files: files.keys().cloned().chain([FILE_NAME.to_owned()]).collect(),
+        as_written: as_written(files),
         command,
         robot: &chain.robot,
         joints: &chain.readings,

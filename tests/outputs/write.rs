@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use robotcal::Code;
 use robotcal::output::{NewFolder, ResultFolder, recover, write_all, write_beside};
+use robotcal::series::InputFile;
 
 type Files = BTreeMap<String, Vec<u8>>;
 
@@ -77,6 +78,54 @@ fn a_folder_with_other_things_is_left_alone() {
     assert_eq!(error.code, Code::OutputForeign, "{error}");
     assert_eq!(found(&series), before);
     assert_eq!(names(root.path()), ["run1"]);
+}
+
+/// A plan, as `plan` lists it.
+fn plan(joints: &str) -> Files {
+    let sha256 = InputFile::of_bytes(Path::new("joints.csv"), joints.as_bytes()).sha256;
+    let record =
+        format!("{{\"files\": [\"joints.csv\", \"plan.json\"], \"as_written\": {{\"joints.csv\": \"{sha256}\"}}}}");
+    [("joints.csv", joints.to_owned()), ("plan.json", record)].map(|(n, t)| (n.to_owned(), t.into_bytes())).into()
+}
+
+#[test]
+fn the_result_of_another_command_is_left_alone() {
+    let root = tempfile::tempdir().unwrap();
+    for (there, new) in [(plan("a"), result(&["camera.yaml"], "new")), (result(&["camera.yaml"], "old"), plan("b"))] {
+        let out = root.path().join(if there.contains_key("plan.json") { "run1" } else { "solved" });
+        write_all(&out, &there).unwrap();
+        assert_eq!(write_all(&out, &new).unwrap_err().code, Code::OutputForeign);
+        assert_eq!(found(&out), there);
+    }
+}
+
+#[test]
+fn a_plan_that_became_a_series_is_left_alone() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("run1");
+    write_all(&out, &plan("planned")).unwrap();
+    write_all(&out, &plan("planned anew")).unwrap();
+    fs::write(out.join("joints.csv"), "measured").unwrap();
+    let before = found(&out);
+    assert_eq!(write_all(&out, &plan("planned again")).unwrap_err().code, Code::OutputForeign);
+    assert_eq!(found(&out), before);
+    fs::write(out.join("joints.csv"), "planned anew").unwrap();
+    fs::create_dir(out.join("images")).unwrap();
+    assert_eq!(write_all(&out, &plan("planned again")).unwrap_err().code, Code::OutputForeign);
+    assert_eq!(fs::read(out.join("joints.csv")).unwrap(), b"planned anew");
+}
+
+#[test]
+fn a_plate_that_was_measured_is_not_drawn_over() {
+    let root = tempfile::tempdir().unwrap();
+    let draw = |kind: &str| robotcal(root.path(), &["plate", "--sheet", "A4", "--kind", kind, "--out", "plate"]).0;
+    assert_eq!([draw("coded-circles"), draw("coded-circles")], [Some(0), Some(0)], "the same plate again");
+    let file = root.path().join("plate/plate.toml");
+    let measured =
+        fs::read_to_string(&file).unwrap() + "\n[scale]\nfrom = 0\nto = 1\ndistance_m = 0.0083\nsigma_m = 1e-5\n";
+    fs::write(&file, &measured).unwrap();
+    assert_eq!([draw("coded-circles"), draw("chessboard")], [Some(2), Some(2)]);
+    assert_eq!(fs::read_to_string(&file).unwrap(), measured);
 }
 
 #[test]
@@ -287,7 +336,7 @@ fn what_the_user_puts_there_meanwhile_stays() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
     write_all(&out, &two_results()[0]).unwrap();
-    let place = ResultFolder::claim(&out).unwrap();
+    let place = ResultFolder::claim(&out, "solution.json").unwrap();
     let new = place.begin().unwrap();
     two_results()[1].iter().for_each(|(name, bytes)| new.put(name, bytes).unwrap());
     fs::write(out.join("overlay/mine.txt"), "mine").unwrap();
@@ -359,13 +408,13 @@ fn a_link_to_a_folder_is_followed_and_stays_a_link() {
 fn of_two_runs_into_one_folder_the_second_is_refused_at_once() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
-    let first = ResultFolder::claim(&out).unwrap();
-    let second = ResultFolder::claim(&out).unwrap_err();
+    let first = ResultFolder::claim(&out, "solution.json").unwrap();
+    let second = ResultFolder::claim(&out, "solution.json").unwrap_err();
     assert_eq!(second.exit_code(), 2);
     assert_eq!(NewFolder::begin(&out).unwrap_err().exit_code(), 2);
     first.write_all(&two_results()[0]).unwrap();
     assert_eq!(all_below(&out), two_results()[0]);
-    ResultFolder::claim(&out).unwrap().write_all(&two_results()[1]).unwrap();
+    ResultFolder::claim(&out, "solution.json").unwrap().write_all(&two_results()[1]).unwrap();
     assert_eq!(all_below(&out), two_results()[1]);
 }
 
@@ -387,7 +436,7 @@ fn many_processes_in_one_folder_leave_one_whole_result() {
 fn a_folder_made_for_nothing_goes_again() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("reports/2026/run1");
-    drop(ResultFolder::claim(&out).unwrap());
+    drop(ResultFolder::claim(&out, "solution.json").unwrap());
     drop(NewFolder::begin(&out).unwrap());
     assert_eq!(names(root.path()), Vec::<String>::new());
     let folder = NewFolder::begin(&out).unwrap();
@@ -419,11 +468,11 @@ fn files_among_others_come_together() {
 fn a_folder_that_vanishes_is_made_again() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("reports/out");
-    let place = ResultFolder::claim(&out).unwrap();
+    let place = ResultFolder::claim(&out, "solution.json").unwrap();
     fs::remove_dir_all(root.path().join("reports")).unwrap();
     place.write_all(&two_results()[0]).unwrap();
     assert_eq!(all_below(&out), two_results()[0]);
-    let new = ResultFolder::claim(&out).unwrap().begin().unwrap();
+    let new = ResultFolder::claim(&out, "solution.json").unwrap().begin().unwrap();
     two_results()[1].iter().for_each(|(name, bytes)| new.put(name, bytes).unwrap());
     fs::remove_dir_all(&out).unwrap();
     new.finish().unwrap();

@@ -29,7 +29,8 @@ use crate::error::Result;
 /// # Errors
 /// As [`ResultFolder::claim`] and [`NewResult::finish`]; anything that cannot be written.
 pub fn write_all(dir: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
-    ResultFolder::claim(dir)?.write_all(files)
+    let record = tree::RECORDS.into_iter().find(|record| files.contains_key(*record));
+    ResultFolder::claim(dir, record.unwrap_or(tree::RECORDS[0]))?.write_all(files)
 }
 
 /// Writes files into a folder among whatever is there, all of them or none; none of them may be one of `inputs`.

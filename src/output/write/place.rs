@@ -22,17 +22,30 @@ pub struct ResultFolder {
 }
 
 impl ResultFolder {
-    /// Claims a folder for a result: it is made, or is empty, or holds an earlier result, and no other run writes to it.
-    /// What a run that was cut short left there is brought in order.
+    /// Claims a folder for a result that has this record: it is made, or is empty, or holds an earlier result of the same kind that nobody
+    /// has worked with, and no other run writes to it. What a run that was cut short left there is brought in order.
     ///
     /// # Errors
     /// A `dir` that is a file, holds something else than an earlier result, cannot be written, or belongs to another run.
-    pub fn claim(dir: &Path) -> Result<Self> {
+    pub fn claim(dir: &Path, record: &str) -> Result<Self> {
         let place = Self::locked(dir)?;
-        if place.holds_something()? && tree::earlier_files(&place.target).is_none() {
-            let what = "is not empty and holds no earlier result of this program";
+        let foreign = |what: String| {
             let remedy = "choose another folder for the results, or empty this one";
-            return Err(Error::new(Code::OutputForeign, place.target.display(), what, remedy));
+            Err(Error::new(Code::OutputForeign, place.target.display(), what, remedy))
+        };
+        if !place.holds_something()? {
+            return Ok(place);
+        }
+        if let Some(other) = tree::other_record(&place.target, record) {
+            return foreign(format!("holds {other}, the result of another command, which would be lost"));
+        }
+        if tree::earlier_files(&place.target).is_none() {
+            return foreign("is not empty and holds no earlier result of this program".into());
+        }
+        if let Some(used) = tree::used_since(&place.target) {
+            return foreign(format!(
+                "is in use: {used} was changed or put there since the earlier result, and would be lost"
+            ));
         }
         Ok(place)
     }
@@ -152,6 +165,22 @@ impl ResultFolder {
         journal::commit(target, &files.iter().map(|(name, _)| name.clone()).collect(), &[])?;
         drop(held);
         Ok(())
+    }
+
+    /// Refuses to replace one of these files by other ones: somebody may have measured what stands in them. `files` are those that are to be
+    /// written, with their bytes.
+    ///
+    /// # Errors
+    /// A file that is there, and would be another, or would not be written.
+    pub fn require_the_same(&self, names: &[&str], files: &[(String, &[u8])]) -> Result<()> {
+        let would_be = |name: &str| files.iter().find(|(file, _)| file == name).map(|(_, bytes)| *bytes);
+        let is_other =
+            |name: &&&str| fs::read(self.target.join(name)).is_ok_and(|there| would_be(name) != Some(&there[..]));
+        names.iter().find(is_other).map_or(Ok(()), |name| {
+            let place = self.given.join(name);
+            let remedy = "give a new folder with --out, or remove this file";
+            Err(Error::new(Code::OutputExists, place.display(), "is there already, and would be another", remedy))
+        })
     }
 
     fn require_its_own(&self, name: &str, inputs: &[PathBuf]) -> Result<()> {

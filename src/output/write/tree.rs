@@ -1,6 +1,6 @@
 //! Which files of a folder are of the result in it, and which are the user's.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
@@ -9,10 +9,14 @@ use serde::Deserialize;
 
 use crate::output::detection_files::OVERLAY_FOLDER;
 use crate::output::{detection_files, plan_files, solution_json, stand_alone_files};
+use crate::series::InputFile;
 
 /// Files that list all others of their result; the last to come and the last to go.
 pub(super) const RECORDS: [&str; 4] =
     [solution_json::FILE_NAME, plan_files::FILE_NAME, detection_files::FILE_NAME, stand_alone_files::FILE_NAME];
+
+/// Where the images of a series lie.
+const IMAGES: &str = "images";
 
 /// The folder of a run at work within its target.
 pub(super) const UNFINISHED: &str = ".robotcal-unfinished";
@@ -70,6 +74,28 @@ pub(super) fn earlier_files(target: &Path) -> Option<BTreeSet<String>> {
         Some(files)
     };
     RECORDS.iter().find_map(listed)
+}
+
+/// Records in a folder of other commands than that whose own this is.
+pub(super) fn other_record(target: &Path, own: &str) -> Option<&'static str> {
+    RECORDS.into_iter().find(|record| *record != own && target.join(record).symlink_metadata().is_ok())
+}
+
+/// A file of an earlier result that is not what its record says was written, or what was put there to be used with it.
+pub(super) fn used_since(target: &Path) -> Option<String> {
+    #[derive(Deserialize)]
+    struct Listed {
+        #[serde(default)]
+        as_written: BTreeMap<String, String>,
+    }
+    let read = |record: &str| serde_json::from_slice::<Listed>(&fs::read(target.join(record)).ok()?).ok();
+    let is_other = |(file, sha256): &(&String, &String)| {
+        let path = target.join(file);
+        path.exists() && InputFile::of_file(&path).is_ok_and(|now| now.sha256 != **sha256)
+    };
+    let listed: Vec<Listed> = RECORDS.into_iter().filter_map(read).collect();
+    let changed = listed.iter().flat_map(|l| &l.as_written).find(is_other).map(|(file, _)| file.clone());
+    changed.or_else(|| target.join(IMAGES).exists().then(|| IMAGES.to_owned()))
 }
 
 /// Pictures of a detection whose record lists nothing but their folder, as the first version did.
