@@ -12,7 +12,7 @@ use super::arguments::pair;
 use super::choices::Model;
 use super::plan_targets::targets;
 use super::plan_touches::{self, TouchArgs};
-use super::robot::{noted_chain, read_chain};
+use super::robot::{noted_chain, read_chain, refuse_degrees};
 use super::say::say;
 use super::show::read_solution;
 use super::simulate::Mount;
@@ -203,6 +203,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     }
     let place = ResultFolder::claim(&args.out, plan_files::FILE_NAME)?;
     let description = urdf::read(args.urdf())?;
+    refuse_degrees(&description)?;
     let chain = noted_chain(&description, args.base.as_deref(), args.tip.as_deref())?;
     let (capsules, meshes) = description.carried_capsules(&chain);
     let described = scene::described(&capsules, &chain);

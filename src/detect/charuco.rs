@@ -4,7 +4,8 @@
 //! a plain chessboard, from the pixels along the edges that the markers leave free.
 
 use calib_targets_aruco::MarkerDetection;
-use calib_targets_chessboard::detect_corners;
+use calib_targets_chessboard::{ChessCorner, detect_corners};
+use calib_targets_core::GrayImageView;
 
 use super::board_labels::{BoardSize, Lattice, Placement};
 use super::charuco_markers::{Print, decode, prints};
@@ -20,6 +21,8 @@ use crate::series::Plate;
 const KEEP_OFF_PX: f64 = 2.0;
 /// Markers that must be read where the dictionary is not stated, or where an outer line is not seen.
 const LEAST_MARKERS: usize = 4;
+/// Markers that prove a row below the last.
+const FURTHER_MARKERS: usize = 2;
 /// Wrong bits of a marker that proves where the board lies.
 const SURE_BITS: u8 = 1;
 
@@ -38,7 +41,7 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let least = if plate.aruco.is_some() { 1 } else { LEAST_MARKERS };
     let at_scale = |bytes: &Bytes, scale: f64| at_scale(bytes, scale, &prints, board, least);
     let found = best_of_sizes(&bytes, board, |found: &Found| &found.lattice, |scale| at_scale(&bytes, scale))?;
-    let Some(Found { print, lattice, is_sure, .. }) = found else {
+    let Some(Found { print, lattice, is_sure, has_further_row, .. }) = found else {
         bytes.mirror();
         if at_scale(&bytes, 1.0)?.is_some() {
             return Err(mirrored_board());
@@ -47,6 +50,9 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     };
     if plate.aruco.is_some() && prints.first().is_some_and(|stated| stated.legacy != print.legacy) {
         return Err(other_layout(print.legacy));
+    }
+    if has_further_row {
+        return Ok(Detection::beyond(more_rows(plate)));
     }
     let window = Window { arm: 0.5 * (1.0 - print.ratio), keep_off_px: KEEP_OFF_PX, ..WINDOW };
     let mut detection = measure(picture, &lattice, Placement::on_board(board, print.legacy), window);
@@ -79,6 +85,8 @@ struct Found {
     lattice: Lattice,
     /// Whether the markers alone say which corner is which, wherever the board seems to end.
     is_sure: bool,
+    /// Whether markers of a row below the last are seen.
+    has_further_row: bool,
 }
 
 impl Found {
@@ -107,7 +115,7 @@ fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least
             corners.filter_map(|c| Some((on_board(c.id)?, place(c.position.x, c.position.y)))).collect();
         let is_sure = are_sure(&found.markers, board);
         others.push((print.legacy, markers));
-        let found = Found { print: *print, markers, lattice, is_sure };
+        let found = Found { print: *print, markers, lattice, is_sure, has_further_row: false };
         if best.as_ref().is_none_or(|other| other.explains() < found.explains()) {
             best = Some(found);
         }
@@ -115,8 +123,19 @@ fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least
     if let Some(best) = &mut best {
         // The markers of a part of the board may fit into the other layout as well, moved by a column.
         best.is_sure &= others.iter().all(|(legacy, markers)| *legacy == best.print.legacy || *markers < best.markers);
+        best.has_further_row = best.is_sure && has_further_row(&scaled.view(), &corners, &best.print, board);
     }
     Ok(best)
+}
+
+/// Whether a board with a row more explains markers of that row, too: the numbers of the others are the same on both.
+fn has_further_row(view: &GrayImageView<'_>, corners: &[ChessCorner], print: &Print, board: BoardSize) -> bool {
+    let larger = BoardSize { rows: board.rows + 1, ..board };
+    // The dictionary may end with the board.
+    let Ok(Some(found)) = decode(view, corners, print, larger) else { return false };
+    let squares = (board.columns + 1) * (board.rows + 1 + i32::from(print.legacy));
+    let is_further = |m: &&MarkerDetection| m.id >= squares.unsigned_abs() / 2 && m.hamming <= SURE_BITS;
+    found.markers.iter().filter(is_further).count() >= FURTHER_MARKERS
 }
 
 /// Whether enough markers, in more than one row, say where the board lies: with twenty cells of 4 x 4 bits, one such place in 50 million boards
@@ -187,6 +206,13 @@ fn other_board(plate: &Plate, seen: &Seen) -> Error {
         }
     };
     Error::new(Code::PlateNotFound, "image", format!("{}: {}", not_found(plate), differs.join(", ")), remedy)
+}
+
+fn more_rows(plate: &Plate) -> Error {
+    let what =
+        format!("markers of a further row are seen below the {} rows of inner corners of the plate file", plate.rows);
+    let remedy = "correct rows of the plate file: columns and rows count inner corners (one less than squares)";
+    Error::new(Code::PlateContradicted, "image", what, remedy)
 }
 
 fn other_layout(legacy: bool) -> Error {

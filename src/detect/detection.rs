@@ -28,6 +28,11 @@ impl Detection {
     pub(super) fn other_size(error: Error) -> Self {
         Self { failure: Some(error), outline: Outline::OtherSize, ..Self::default() }
     }
+
+    /// A board with a code that goes on where it should end.
+    pub(super) fn beyond(error: Error) -> Self {
+        Self { failure: Some(error), outline: Outline::Beyond, ..Self::default() }
+    }
 }
 
 /// The sizes of the dots of a grid as an image shows them, where the plate does not state them.
@@ -53,6 +58,8 @@ pub enum Outline {
     TagsMissing,
     /// A board without a code ends in view, and not where the plate says.
     OtherSize,
+    /// Markers with a code are seen where there should be none: the board is larger than the plate says.
+    Beyond,
 }
 
 /// What an image of circles tells beyond their places.

@@ -146,11 +146,12 @@ fn refuse_odd_dots(images: &[PathBuf], found: &mut [SeriesImage]) {
 /// A line of a board that is missing in view may be covered only where another image shows the whole board: else the board is not as large
 /// as the plate says, and every id is in doubt. An image that shows where the board ends says how large it is.
 fn refuse_unproven_boards(images: &[PathBuf], plate: &Plate, found: &mut [SeriesImage]) {
-    if found.iter().any(|i| i.detection.outline == Outline::Whole) {
+    let of = |outline: Outline| found.iter().find(|i| i.detection.outline == outline);
+    let beyond = of(Outline::Beyond);
+    if of(Outline::Whole).is_some() && beyond.is_none() {
         return;
     }
-    let other =
-        found.iter().find(|i| i.detection.outline == Outline::OtherSize).and_then(|i| i.detection.failure.clone());
+    let other = beyond.or_else(|| of(Outline::OtherSize)).and_then(|i| i.detection.failure.clone());
     let missing = || found.iter().filter(|i| i.detection.outline == Outline::LineMissing);
     let line = || {
         let told = missing().find(|i| i.detection.size_seen.is_some()).or_else(|| missing().next())?;

@@ -122,6 +122,12 @@ fn a_board_of_another_size_or_with_other_markers_is_named() {
         let other = detect(&picture, &plate).expect_err("another size");
         assert_says(&other, Code::PlateNotFound, &[" 8 "]);
     }
+    // Stated and searched for: the board goes on below.
+    for dictionary in [Some(("DICT_4X4_50", 0.7)), None] {
+        let plate = Plate { rows: ROWS - 1, ..charuco_plate(dictionary) };
+        let other = detect(&picture, &plate).expect_err("a row too few");
+        assert_says(&other, Code::PlateContradicted, &[" 4 "]);
+    }
     // Theirs is 0.7.
     let side = detect(&picture, &charuco_plate(Some(("DICT_4X4_50", 0.45)))).expect_err("smaller markers");
     assert_says(&side, Code::PlateNotFound, &["DICT_4X4_50", "0.69"]);

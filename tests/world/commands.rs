@@ -59,6 +59,9 @@ fn wrong_wishes_of_a_simulation_are_refused() {
         (&["--tip", "tool9"][..], 2, Code::LinkUnknown, "tool9"),
         (&["--bits", "9"][..], 2, Code::OptionRange, "--bits"),
         (&["--tilt-deg", "89"][..], 2, Code::OptionRange, "85"),
+        (&["--pixel-noise-px", "nan"][..], 2, Code::OptionRange, "noise"),
+        (&["--joint-noise-mrad=-1"][..], 2, Code::OptionRange, "noise"),
+        (&["--images", "0"][..], 2, Code::OptionRange, "stop"),
         (&far[..], 3, Code::SimulationOutOfReach, "robot ur10e"),
     ] {
         let output = robotcal(&[&common[..], flags].concat());
@@ -293,6 +296,25 @@ fn too_few_targets_of_a_plan_are_refused() {
     ]);
     assert_eq!(output.status.code(), Some(2), "{}", text(&output));
     assert!(text(&output).contains("targets.csv") && !out.exists(), "{}", text(&output));
+}
+
+/// Programs for a robot are written by the limits.
+#[test]
+fn limits_in_degrees_are_refused_where_a_robot_is_to_be_moved() {
+    let folder = tempfile::tempdir().unwrap();
+    let text_of = std::fs::read_to_string(root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf")).unwrap();
+    let limit = text_of.match_indices("lower=\"").last().unwrap().0;
+    let (before, behind) = text_of.split_at(limit);
+    let degrees = behind.split_once("/>").unwrap().1;
+    let urdf = folder.path().join("degrees.urdf");
+    std::fs::write(&urdf, format!("{before}lower=\"-350\" upper=\"350\" effort=\"0\" velocity=\"1\"/>{degrees}"))
+        .unwrap();
+    let out = folder.path().join("plan");
+    let plate = root("datasets/kr6_small/plate.toml");
+    let paths = [&urdf, &out].map(|path| path.to_str().unwrap());
+    let output = robotcal(&["plan", "--urdf", paths[0], "--plate", &plate, "--out", paths[1]]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(text(&output).contains(Code::UrdfAngleUnit.name()) && !out.exists(), "{}", text(&output));
 }
 
 /// What a library says while it looks for the board is no word to the user.
