@@ -1,5 +1,6 @@
 //! `robotcal convert`: a recording becomes a series folder, a series folder becomes a recording, a camera goes to another program.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -102,6 +103,7 @@ fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<()> {
         ));
     };
     let series = series::read_images(&args.from)?;
+    refuse_more_than_one(&series)?;
     let readings = series.readings_for(&chain)?;
     let names: Vec<&str> = series.stops.stops.iter().map(|s| s.image.as_str()).collect();
     let found = args.solution.as_deref().map(|path| overlay(&read_solution(path)?, &names, &readings)).transpose()?;
@@ -127,6 +129,18 @@ fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<()> {
         say_line!("note      {}", notice.coded());
     }
     Ok(())
+}
+
+/// A recording has one camera, and says nothing of where the plate stood.
+fn refuse_more_than_one(series: &Series) -> Result<()> {
+    let placements: BTreeSet<&str> = series.stops.stops.iter().map(|stop| stop.placement.as_str()).collect();
+    let what = match (series.manifest.cameras.len(), placements.len()) {
+        (0 | 1, 0 | 1) => return Ok(()),
+        (0 | 1, places) => format!("its plate stands in {places} places, which a recording cannot tell apart"),
+        (cameras, _) => format!("has {cameras} cameras, and a recording has one"),
+    };
+    let remedy = "make a series of each, and a recording of each of these";
+    Err(Error::new(Code::StopsNotRecorded, series.folder.display(), what, remedy))
 }
 
 type Given = (Option<CameraInfo>, Vec<FramePoses>, Vec<ImageMarks>);

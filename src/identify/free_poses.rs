@@ -13,8 +13,8 @@ use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
 use crate::model::robot::Robot;
 use crate::problem::{
-    Adjustment, Image, ImageRejection, Mark, MarkerObservation, MeasuredSeries, ObservationRejection, Problem, State,
-    Tie, Weighting, size_by_distance,
+    Adjustment, Image, ImageRejection, Layout, Mark, MarkerObservation, MeasuredSeries, ObservationRejection, Problem,
+    State, Tie, Weighting, size_by_distance,
 };
 use crate::solve::{
     ComponentOptions, Elimination, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status,
@@ -309,11 +309,15 @@ fn rms_px(lin: &Linearised) -> f64 {
     (sum / count.max(1) as f64).sqrt()
 }
 
-/// A camera is determined by views from different directions only.
+/// A camera is determined by views from different directions only, if it is not held.
 fn check_views(adjustment: &Adjustment, least_turn: f64) -> Result<()> {
     for (camera, name) in adjustment.problem.cameras.iter().enumerate() {
         let views: Vec<&Pose> = views(adjustment, camera).collect();
         let Some(first) = views.first() else { continue };
+        let Layout { cameras, columns, .. } = &adjustment.problem.layout;
+        if columns[cameras[camera].clone()].iter().all(|c| !c.free) {
+            continue;
+        }
         let turn = views.iter().map(|v| first.distance(v).0).fold(0.0, f64::max);
         if turn < least_turn {
             return Err(undetermined(

@@ -54,6 +54,9 @@ struct PlateFile {
     gap_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     dictionary: Option<String>,
+    /// The layout of a charuco board before OpenCV 4.6.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    legacy: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     first_id: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -237,28 +240,39 @@ fn large(path: &Path, file: &PlateFile, [columns, rows]: [u32; 2]) -> Result<Vec
     Ok(ids)
 }
 
-/// The markers of a ChArUco board, where they are stated; no other kind has any.
+/// The markers of a ChArUco board, where they are stated, by its own keys or in a table; no other kind has any.
 fn aruco(path: &Path, file: &PlateFile, pitch_m: f64) -> Result<Option<Aruco>> {
-    let place = path.display();
-    match (&file.aruco, file.kind.print().has_tags) {
-        (Some(aruco), true) if aruco.side_m > 0.0 && aruco.side_m < pitch_m => Ok(Some(aruco.clone())),
-        (Some(aruco), true) => {
-            let what = format!("[aruco] side_m = {} does not fit into a square of {pitch_m} m", aruco.side_m);
-            Err(Error::new(
-                Code::SettingRange,
-                place,
-                what,
-                "give the side of a marker with its black border, in metres",
-            ))
-        }
-        (Some(_), false) => Err(Error::new(
-            Code::SettingConflict,
-            place,
-            "[aruco] is only for a charuco plate",
-            "remove it or correct `kind`",
-        )),
-        (None, _) => Ok(None),
+    let conflict =
+        |what: &str| Err(Error::new(Code::SettingConflict, path.display(), what, "remove them, or correct `kind`"));
+    let of_tags = [file.tag_m, file.spacing, file.gap_m].iter().any(Option::is_some) || file.family.is_some();
+    if of_tags || file.first_id.is_some() || file.id.is_some() {
+        return conflict("tag_m, spacing, gap_m, family, first_id and id are only for plates of tags");
     }
+    let own = file.marker_m.is_some() || file.dictionary.is_some() || file.legacy.is_some();
+    if !file.kind.print().has_tags {
+        return match own || file.aruco.is_some() {
+            true => conflict("marker_m, dictionary, legacy and [aruco] are only for plates with markers in them"),
+            false => Ok(None),
+        };
+    }
+    let aruco = match (&file.aruco, file.marker_m, &file.dictionary) {
+        (None, None, None) if !own => return Ok(None),
+        (Some(aruco), ..) if !own => aruco.clone(),
+        (None, Some(side_m), Some(dictionary)) => {
+            Aruco { dictionary: dictionary.clone(), side_m, legacy: file.legacy.unwrap_or(false) }
+        }
+        (None, ..) => {
+            let what = "marker_m and dictionary state the markers of a charuco board together";
+            return Err(Error::new(Code::SettingMissing, path.display(), what, "add what is missing, or remove all"));
+        }
+        (Some(_), ..) => return conflict("marker_m, dictionary and legacy stand beside [aruco], which says the same"),
+    };
+    if !(aruco.side_m > 0.0 && aruco.side_m < pitch_m) {
+        let what = format!("a marker of {} m does not fit into a square of {pitch_m} m", aruco.side_m);
+        let remedy = "give the side of a marker with its black border, in metres";
+        return Err(Error::new(Code::SettingRange, path.display(), what, remedy));
+    }
+    Ok(Some(aruco))
 }
 
 fn read_markers(table: &Table, plate: &Plate) -> Result<Vec<Marker>> {
@@ -455,6 +469,7 @@ pub fn plate_toml(plate: &Plate, markers: Option<&str>) -> Result<String> {
             marker_m: tags.marker_m,
             gap_m: tags.gap_m,
             dictionary: tags.dictionary,
+            legacy: None,
             first_id: tags.first_id,
             id: tags.id,
             radius_m: radius.filter(|_| plate.kind.print().has_radius && markers.is_none()),

@@ -3,9 +3,11 @@
 use std::path::Path;
 
 use super::camera_section::CameraMount;
+use super::joints::Stops;
 use super::manifest::{AngleUnit, Manifest};
 use super::mcap::{CameraInfo, Extracted, RecordingOptions, extract};
 use super::read::{Series, Source, file_name, manifest_beside, optional_images};
+use super::units::SMALL_DEG;
 use crate::error::{Code, Error, Notice, Result};
 
 impl Series {
@@ -20,11 +22,25 @@ impl Series {
         let (dark, white) = optional_images(&self.folder)?;
         self.source = Source::Images { folder: images.to_path_buf(), dark, white };
         self.notices.extend(extracted.notices);
+        self.notices.extend(settle_unit(&mut self.manifest, &extracted.stops, &self.folder));
         self.inputs.extend(extracted.inputs);
         fill_camera(&mut self.manifest, extracted.camera_info.as_ref());
         self.stops = extracted.stops;
         Ok(self)
     }
+}
+
+/// Joint states are in rad: what stands beside a recording may be of the series that it was made of, in degrees.
+fn settle_unit(manifest: &mut Manifest, stops: &Stops, recording: &Path) -> Option<Notice> {
+    let stated = *manifest.joint_unit.get_or_insert(AngleUnit::Rad);
+    let mut all = stops.stops.iter().filter_map(|stop| stop.raw_readings.as_ref()).flatten();
+    if stated == AngleUnit::Rad || !all.all(|q| q.abs() < SMALL_DEG) {
+        return None;
+    }
+    manifest.joint_unit = Some(AngleUnit::Rad);
+    let what = "joint_unit is deg, but its joint states are all within a turn in radians, in which ROS has them, and are taken so";
+    let remedy = "write joint_unit = \"rad\" in the series.toml beside it";
+    Some(Notice::new(Code::RadiansAsDegrees, recording.display(), what, remedy))
 }
 
 /// What a camera info knows and the manifest does not.
@@ -107,7 +123,7 @@ fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extract
         }
     };
     manifest.mcap = None;
-    manifest.joint_unit.get_or_insert(AngleUnit::Rad);
+    extracted.notices.extend(settle_unit(&mut manifest, &extracted.stops, recording));
     fill_camera(&mut manifest, extracted.camera_info.as_ref());
     let text = manifest.to_toml()?;
     let stays = |line: &&str| known || !line.starts_with("camera_mount");

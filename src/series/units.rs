@@ -14,7 +14,7 @@ const FOREIGN_LIMITS_RAD: f64 = std::f64::consts::PI;
 /// Soft limits of controllers differ from those of the description by less than this.
 const SOFT_LIMITS_RAD: f64 = 0.5;
 /// Readings that all stay below this number of degrees are a whole turn if they are radians.
-const SMALL_DEG: f64 = 6.3;
+pub(super) const SMALL_DEG: f64 = 6.3;
 /// Fewer stops than this say nothing about their unit.
 const MANY_STOPS: usize = 5;
 

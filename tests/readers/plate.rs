@@ -105,6 +105,24 @@ fn a_bad_plate_names_line_column_and_marker() {
 }
 
 #[test]
+fn markers_of_a_charuco_board_are_stated_in_one_of_two_ways() {
+    let board = |keys: &str| format!("format = 1\nkind = \"charuco\"\ncolumns = 8\nrows = 5\npitch_m = 0.03\n{keys}");
+    let own = plate(&board("marker_m = 0.02\ndictionary = \"DICT_4X4_50\"\nlegacy = true\n"), "");
+    let table = plate(&board("[aruco]\nside_m = 0.02\ndictionary = \"DICT_4X4_50\"\nlegacy = true\n"), "");
+    assert_eq!(own, table);
+    assert_eq!(own.aruco.map(|a| (a.side_m, a.legacy)), Some((0.02, true)));
+    let refused = |keys: &str| refusal(&board(keys), "").code;
+    assert_eq!(refused("marker_m = 0.02\n"), Code::SettingMissing);
+    assert_eq!(refused("legacy = true\n"), Code::SettingMissing);
+    assert_eq!(refused("marker_m = 0.04\ndictionary = \"DICT_4X4_50\"\n"), Code::SettingRange);
+    let both = "marker_m = 0.02\ndictionary = \"DICT_4X4_50\"\n[aruco]\nside_m = 0.02\ndictionary = \"DICT_4X4_50\"\n";
+    assert_eq!(refused(both), Code::SettingConflict);
+    assert_eq!(refused("tag_m = 0.02\n"), Code::SettingConflict);
+    let chessboard = "format = 1\nkind = \"chessboard\"\ncolumns = 8\nrows = 5\npitch_m = 0.03\nmarker_m = 0.02\n";
+    assert_eq!(refusal(chessboard, "").code, Code::SettingConflict);
+}
+
+#[test]
 fn a_scale_bar_must_be_possible() {
     let scaled = |from: u32, to: u32, distance: f64| {
         format!("{CODED}[scale]\nfrom = {from}\nto = {to}\ndistance_m = {distance}\nsigma_m = 0.00002\n")
