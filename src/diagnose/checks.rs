@@ -5,7 +5,7 @@ use super::kind::{CheckContext, Weight};
 use super::{
     camera_model, camera_pattern, exchanged_readings, extrapolates, few_images, focus, held_near_nominal, joint_noise,
     left_out_bodies, left_out_images, left_out_observations, length_standard, loose, marker_off, measurement_scatter,
-    moved, no_gain, parameter_off, plate_size, pose_step, scatter, stated_noise, undetermined, zeros_off,
+    moved, no_gain, parameter_off, plate_size, pose_step, scatter, stated_noise, tag_size, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -85,6 +85,7 @@ pub const CHECKS: &[Check] = &[
     check("plate_size", Stage::Fit(|a, b, s| found(plate_size::check(a, b, s)))),
     check("length_standard", Stage::Fit(|a, b, s| found(length_standard::check(a, b, s)))),
     check("marker_off", Stage::Fit(|a, b, s| found(marker_off::check(a, b, s)))),
+    check("tag_size", Stage::Fit(|a, b, s| found(tag_size::check(a, b, s)))),
     check("parameter_off", Stage::Fit(|a, b, s| found(parameter_off::check(a, b, s)))),
     check("scatter", Stage::Uncertainty(|a, b, s| found(scatter::check(a, b, s)))),
     check("held_near_nominal", Stage::Fit(|a, b, s| found(held_near_nominal::check(a, b, s)))),

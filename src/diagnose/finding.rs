@@ -29,6 +29,7 @@ use super::parameter_off::ParameterOff;
 use super::plate_size::DoubtedSize;
 use super::scatter::LargeScatter;
 use super::stated_noise::NoiseContradicted;
+use super::tag_size::TagsOff;
 use super::undetermined::FlangeUndetermined;
 use super::zero_moved::ZeroMoved;
 use super::zeros_off::ZeroOff;
@@ -87,6 +88,7 @@ findings! {
     ObservationsLeftOut,
     ParameterOff,
     ResidualPattern,
+    TagsOff,
     ZeroMoved,
     ZeroOff,
 }

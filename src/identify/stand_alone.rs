@@ -7,7 +7,7 @@ use super::lens_choice::{choose_lens, open_cameras};
 use super::solution::Solution;
 use super::start_verdict::StartVerdict;
 use crate::assess::Limits;
-use crate::diagnose::{CheckContext, Diagnosis, Finding, residual_pattern};
+use crate::diagnose::{CheckContext, Diagnosis, Finding, residual_pattern, tags_off};
 use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{Fit, FreePose, FreePoses, PlacedCamera};
 use crate::geom::skew;
@@ -90,6 +90,7 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     let mut findings = diagnosis.findings();
     let fit = at_solution(adjustment)?;
     findings.extend(residual_pattern(&fit, limits).map(Finding::from));
+    findings.extend(tags_off(&fit, limits).into_iter().map(Finding::from));
     Ok(StandAlone { fit, free_poses, starts, notices, findings })
 }
 

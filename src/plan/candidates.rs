@@ -260,6 +260,13 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
         return Error::new(Code::PlanViewless, "plan: views", what, remedy);
     }
     let arm = arm_length_m(&setting.robot);
+    let axes = setting.robot.chain.readings.len();
+    if tally.out_of_reach + tally.unseen == tally.views && axes < 6 {
+        let what =
+            format!("an arm of {axes} axes cannot take the views that are drawn, which are free in all six directions");
+        let remedy = "choose its postures by hand, spread over all joints; identify --dry-run says what they tell";
+        return Error::new(Code::PlanOutOfReach, "plan: robot", what, remedy);
+    }
     if tally.out_of_reach + tally.unseen == tally.views {
         let (thing, distance, remedy) = match setting.mount {
             CameraMount::Hand => (

@@ -398,6 +398,41 @@ fn poses_need_no_robot_and_no_joint_values() {
     assert_eq!(std::fs::read_to_string(Path::new(out).join("poses.csv")).unwrap(), poses);
 }
 
+/// The scale hangs on both, and nothing else says that one of them is wrong.
+#[test]
+fn tags_of_another_size_beside_their_distance_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let [plate, series] = ["plate", "series"].map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    let file = format!("{plate}/plate.toml");
+    let drawn = robotcal(&[
+        "plate",
+        "--kind",
+        "aprilgrid",
+        "--shape",
+        "6x5",
+        "--tag-mm",
+        "30",
+        "--sheet",
+        "A2",
+        "--out",
+        &plate,
+    ]);
+    assert!(drawn.status.success(), "{}", text(&drawn));
+    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let seen = ["--plate", &file, "--observations", "--images", "12", "--held-out", "0", "--out", &series];
+    let simulated = robotcal(&[&["simulate", "--urdf", &urdf][..], &seen].concat());
+    assert!(simulated.status.success(), "{}", text(&simulated));
+    let stated = std::fs::read_to_string(&file).unwrap();
+    for (spacing, is_named) in [("0.3", false), ("0.305", true), ("0.295", true)] {
+        let other = stated.replace("spacing = 0.3\n", &format!("spacing = {spacing}\n"));
+        assert_eq!(other != stated, is_named);
+        std::fs::write(format!("{series}/plate.toml"), other).unwrap();
+        let out = folder.path().join(spacing);
+        let output = robotcal(&["poses", "--series", &series, "--out", out.to_str().unwrap()]);
+        assert_eq!(text(&output).contains(Code::TagsOff.name()), is_named, "{spacing}: {}", text(&output));
+    }
+}
+
 /// What moves makes the noise larger than it is: it is named, and the true noise is not blamed.
 #[test]
 fn a_loose_camera_is_named_also_where_the_joint_noise_is_stated() {

@@ -1,6 +1,7 @@
 //! First pass over a recording: joint samples, stamps of the images, what else there is.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -42,6 +43,8 @@ struct Topic {
     unstamped: bool,
     /// Time from stamp to recording, ns.
     delays_ns: Vec<i64>,
+    /// Latest time so far, ns.
+    latest_ns: Option<i64>,
 }
 
 /// Everything of the first pass.
@@ -53,6 +56,8 @@ pub(super) struct Scan {
     joints: BTreeMap<String, Vec<JointSample>>,
     images: BTreeMap<String, Vec<i64>>,
     infos: BTreeMap<String, CameraInfo>,
+    /// Times that were there twice, because a clock was set back, ns.
+    twice: Vec<Range<i64>>,
     /// Memory of the joint samples, bytes.
     held: usize,
     pub notices: Vec<Notice>,
@@ -71,12 +76,16 @@ pub(super) fn scan(recording: &Path, clock: Clock) -> Result<Scan> {
         scan.notices.extend(damage);
         scan.inputs.push(InputFile::of_file(&path)?);
     }
+    scan.leave_out_what_was_twice();
     scan.judge()?;
     Ok(scan)
 }
 
 /// Memory of all joint samples of a recording, bytes: some hours at 500 Hz.
 const MOST_HELD: usize = 512 << 20;
+
+/// By how much times may go back without a clock that was set, ns: pictures that are compressed side by side come out of order.
+const SET_BACK_NS: i64 = 500_000_000;
 
 /// Latest time of recording, ns (in the year 2096): later ones are damaged, and differences of times stay numbers.
 const LATEST_NS: u64 = 4_000_000_000_000_000_000;
@@ -155,7 +164,28 @@ impl Scan {
                 _ => topic.delays_ns.push(log_time_ns(message) - stamp_ns),
             }
         }
-        time_ns(stamp_ns, message, clock)
+        let time_ns = time_ns(stamp_ns, message, clock);
+        let latest = self.topics.get_mut(message.topic).map(|topic| &mut topic.latest_ns);
+        if let Some(latest) = latest.map(|latest| latest.get_or_insert(time_ns)) {
+            if time_ns < *latest - SET_BACK_NS {
+                self.twice.push(time_ns..*latest);
+            }
+            *latest = time_ns.max(*latest);
+        }
+        time_ns
+    }
+
+    /// Leaves out what was recorded in times that were there twice: nobody knows which picture belongs to which joints.
+    fn leave_out_what_was_twice(&mut self) {
+        let Some(longest) = self.twice.iter().map(|t| t.end - t.start).max() else { return };
+        let once = |time: i64| !self.twice.iter().any(|t| (t.start..=t.end).contains(&time));
+        self.joints.values_mut().for_each(|samples| samples.retain(|s| once(s.time_ns)));
+        self.images.values_mut().for_each(|times| times.retain(|t| once(*t)));
+        let what =
+            format!("its times go back by {:.1} s: a clock was set while it was recorded", longest as f64 * 1e-9);
+        let remedy =
+            "what was recorded in the times that are there twice is left out; record again with a clock that runs on";
+        self.notices.push(Notice::new(Code::ClockSetBack, self.recording.display(), what, remedy));
     }
 
     /// What the whole pass showed: malformed or unstamped topics; recordings of ROS 1.
