@@ -16,4 +16,5 @@ mod plan_choice;
 mod plan_poses;
 mod promise;
 mod rapid;
+mod rapid_statements;
 mod urscript;

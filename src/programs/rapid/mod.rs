@@ -1,8 +1,11 @@
 //! ABB RAPID: moves to `robtarget` and `jointtarget`, declared or in the instruction, with `tooldata` and `wobjdata` (mm and degrees).
 
 mod array;
+mod statements;
 mod switched;
 mod switching;
+mod unvisited;
+mod uses;
 mod value;
 
 use std::collections::BTreeMap;
@@ -18,26 +21,21 @@ use super::program::{
     TargetKind, Understood,
 };
 use super::reason::{LeftReason, Why};
-use super::scan::{Dialect, Reader, TokenKind};
+use super::scan::{Dialect, Reader};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
 use switched::Watched;
-use switching::{Now, ROUTINES, Switching};
+use switching::{Now, Switching};
+use uses::Use;
 use value::{
     Displacement, NO_AXIS, Node, array_of, check, computed, element, foreign_axis, frame, node, numbers, undeclared,
 };
 
 const DIALECT: Dialect = Dialect { comment: b'!', quotes: b"\"", header: None, based_numbers: false };
-/// Beginnings of the names of instructions that move the robot to their first arguments.
-const MOVES: [&str; 7] = ["MOVE", "TRIGGL", "TRIGGJ", "TRIGGC", "ARC", "SPOT", SEARCH];
-/// Behind a signal and the point that is found.
-const SEARCH: &str = "SEARCH";
-/// Beginnings of lines in which a position in numbers is not where the robot goes.
-const DECLARE: [&str; 8] = ["CONST", "PERS", "VAR", "LOCAL", "TASK", "PROC", "FUNC", "TRAP"];
-/// Instructions that begin so, but move no robot.
-const NO_MOVES: [&str; 2] = ["MOVEEXTJ", "ARCREFRESH"];
+/// The work object of moves that name none.
+const WORLD: &str = "WOBJ0";
 const TYPES: [&str; 4] = ["ROBTARGET", "JOINTTARGET", "TOOLDATA", "WOBJDATA"];
 const DECIMALS_MM: usize = 4;
 const DECIMALS_DEG: usize = 6;
@@ -65,6 +63,7 @@ fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>)
         setting,
         data: BTreeMap::new(),
         bases: BTreeMap::new(),
+        uses: BTreeMap::new(),
         switching: Switching::new(known),
         way: Itinerary::new(),
     };
@@ -74,10 +73,10 @@ fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>)
     }
     for (index, file) in files.iter().enumerate() {
         task.way.start_afresh();
-        task.moves(Reader::new(file, index, DIALECT)?)?;
+        task.statements(Reader::new(file, index, DIALECT)?)?;
         task.switching.all_end();
     }
-    task.unvisited()?;
+    task.unvisited();
     Ok((task.way.program, task.switching.found()))
 }
 
@@ -86,34 +85,11 @@ struct Task<'a> {
     data: BTreeMap<String, Datum>,
     /// Points from which displaced ones start: how they would be visited.
     bases: BTreeMap<String, Target>,
+    /// What statements that are no known moves do with points.
+    uses: BTreeMap<String, Vec<Use>>,
     /// What instructions switch for those behind them.
     switching: Switching,
     way: Itinerary,
-}
-
-/// To behind the next semicolon.
-fn skip_statement(reader: &mut Reader<'_>) {
-    while !reader.done() && !reader.take_mark(b';') {
-        reader.at += 1;
-    }
-}
-
-/// True where a robtarget is written in the rest of a line that sets no data.
-fn has_literal(reader: &mut Reader<'_>) -> Result<bool> {
-    let start = reader.at;
-    let mut found = false;
-    while !found && !reader.at_line_end() && !reader.is_mark(b';') {
-        let assigned = reader.is_mark(b':') && reader.ahead_is_mark(1, b'=') && !reader.ahead_is_mark(-2, b'\\');
-        if assigned {
-            break;
-        }
-        let nested = reader.is_mark(b'[') && reader.ahead_is_mark(1, b'[');
-        let at = reader.at;
-        found = nested && node(reader)?.is_robtarget();
-        reader.at = at + 1;
-    }
-    reader.at = start;
-    Ok(found)
 }
 
 impl Task<'_> {
@@ -186,121 +162,6 @@ impl Task<'_> {
         Ok(())
     }
 
-    fn moves(&mut self, mut reader: Reader<'_>) -> Result<()> {
-        while !reader.done() {
-            let Some(word) = reader.name() else {
-                reader.at += 1;
-                continue;
-            };
-            let begins = reader.at == 0
-                || matches!(reader.ahead(-1).map(|t| t.kind), Some(TokenKind::LineEnd | TokenKind::Mark(b';' | b':')));
-            let moves = MOVES.iter().any(|m| word.starts_with(m)) && !NO_MOVES.contains(&word.as_str());
-            let follows = reader.ahead(1).map(|t| t.kind);
-            let called = !matches!(follows, Some(TokenKind::Mark(b':' | b'(' | b';') | TokenKind::LineEnd));
-            if begins && moves && called {
-                self.instruction(&mut reader)?;
-                skip_statement(&mut reader);
-            } else {
-                if begins && !DECLARE.contains(&word.as_str()) && has_literal(&mut reader)? {
-                    let words = format!("a position stands in it, and what {word} does with it is not known");
-                    self.leave((reader.index, reader.line()), &word, Why::new(LeftReason::NotATarget, words));
-                }
-                reader.at += if begins || ROUTINES.contains(&word.as_str()) {
-                    self.switching.statement(&reader, &word, &mut self.way)
-                } else {
-                    self.switching.behind_condition(&word, &mut self.way);
-                    1
-                };
-            }
-        }
-        Ok(())
-    }
-
-    /// A move; the reader stands on its name.
-    fn instruction(&mut self, reader: &mut Reader<'_>) -> Result<()> {
-        let line = reader.line();
-        let name = String::from_utf8_lossy(reader.word().unwrap_or_default()).into_owned();
-        reader.at += 1;
-        let mut arguments = Vec::new();
-        let mut work = None;
-        let mut nothing = true;
-        let mut plain = Vec::new();
-        loop {
-            reader.skip_line_ends();
-            if reader.done() || (nothing && reader.is_mark(b';')) {
-                let what = format!("{name} does not end with a semicolon");
-                return Err(Error::new(
-                    Code::ProgramSyntax,
-                    format!("{}:{line}", reader.file.name),
-                    what,
-                    "complete the instruction",
-                ));
-            }
-            if reader.take_mark(b'\\') {
-                let switch = reader.name().unwrap_or_default();
-                reader.at += 1;
-                if reader.take_mark(b':') && reader.take_mark(b'=') {
-                    let value = node(reader)?;
-                    if switch == "WOBJ" {
-                        work = Some(value);
-                    }
-                }
-                continue;
-            }
-            if reader.is_mark(b';') {
-                break;
-            }
-            if reader.take_mark(b',') {
-                continue;
-            }
-            nothing = false;
-            arguments.push(node(reader)?);
-            plain.push(true);
-            // What follows up to the comma makes it an expression.
-            while !matches!(
-                reader.peek().map(|t| t.kind),
-                None | Some(TokenKind::Mark(b',' | b';' | b'\\') | TokenKind::LineEnd)
-            ) {
-                let open = matches!(reader.peek().map(|t| t.kind), Some(TokenKind::Mark(b'(' | b'[' | b'{')));
-                reader.at = if open { reader.closing(reader.at).unwrap_or(reader.at) + 1 } else { reader.at + 1 };
-                if let Some(last) = plain.last_mut() {
-                    *last = false;
-                }
-            }
-        }
-        if name.to_ascii_uppercase().starts_with(SEARCH) {
-            arguments.drain(..arguments.len().min(2));
-            plain.drain(..plain.len().min(2));
-        }
-        let count = self.targets_of(&name, &arguments);
-        let tool = self.tool_of(&arguments, count);
-        for k in 0..count {
-            let done = match plain[k] {
-                true => self.visit(&arguments[k], &name, (reader.index, line), &tool, work.as_ref())?,
-                false => Err(Why::computed()),
-            };
-            if let Err(why) = done {
-                self.leave((reader.index, line), &name, why);
-            }
-        }
-        Ok(())
-    }
-
-    /// Number of arguments that are targets: two for circles.
-    fn targets_of(&self, name: &str, arguments: &[Node]) -> usize {
-        let name = name.to_ascii_uppercase();
-        let circle = ["MOVEC", "TRIGGC", "ARCC", "SPOTC", "SEARCHC"].iter().any(|c| name.starts_with(c));
-        (1 + usize::from(circle)).min(arguments.len())
-    }
-
-    /// Name of the tool: the argument that is one, else that behind speed and zone.
-    fn tool_of(&self, arguments: &[Node], targets: usize) -> Option<String> {
-        let word = |n: &Node| if let Node::Word(w) = n { Some(w.clone()) } else { None };
-        let is_tool = |w: &String| w == "TOOL0" || self.data.get(w).is_some_and(|d| d.kind == "TOOLDATA");
-        let rest = arguments.get(targets..).unwrap_or_default();
-        rest.iter().filter_map(word).find(is_tool).or_else(|| rest.get(2).and_then(word))
-    }
-
     fn leave(&mut self, (file, line): (usize, usize), name: &str, why: Why) {
         // Confdata may mean another posture, but on a path of the tool it goes on.
         let upper = name.to_ascii_uppercase();
@@ -335,7 +196,7 @@ impl Task<'_> {
             },
             _ => return Ok(Err(Why::computed())),
         };
-        let kind = self.kind(&value, place.0, tool.as_deref(), work);
+        let kind = self.kind(&value, place.0, tool.as_deref(), self.work(work));
         let about = |why: Why| Why { about: Some(named.clone()), ..why };
         Ok(kind.map_err(about).and_then(|kind| self.add(named, place, self.with_posture(kind, name))))
     }
@@ -374,12 +235,11 @@ impl Task<'_> {
         work: Option<&Node>,
     ) -> Understood<()> {
         let point = &displaced.point;
-        let by = displaced
-            .by
-            .clone()
-            .ok_or_else(|| Why::new(LeftReason::Computed, "its displacement is computed, not written in numbers"))?;
+        let by = displaced.by.clone().ok_or_else(|| {
+            Why::of(point, LeftReason::Computed, "its displacement is computed, not written in numbers")
+        })?;
         let (value, (file, line)) = self.declared(point)?;
-        let base = self.kind(&value, file, tool, work)?;
+        let base = self.kind(&value, file, tool, self.work(work))?;
         let base = self.with_posture(base, name);
         let place = (file, base.first_byte());
         let TargetKind::Pose(mut pose) = base.clone() else {
@@ -425,7 +285,7 @@ impl Task<'_> {
         if visited { Ok(()) } else { Err(Why::of(&named, LeftReason::FramesDiffer, clash)) }
     }
 
-    fn kind(&self, value: &Node, file: usize, tool: Option<&str>, work: Option<&Node>) -> Understood<TargetKind> {
+    fn kind(&self, value: &Node, file: usize, tool: Option<&str>, work: Understood<Pose>) -> Understood<TargetKind> {
         let Node::List(parts) = value else {
             return Err(Why::new(LeftReason::NotATarget, "it is no robtarget and no jointtarget"));
         };
@@ -471,7 +331,7 @@ impl Task<'_> {
         Ok(TargetKind::Pose(Box::new(PoseTarget {
             position: trans.map(|t| field(t, 1e-3, DECIMALS_MM)),
             rotation: RotationFields::Quaternion([x, y, z, w].map(|q| field(q, 1.0, DECIMALS_QUATERNION))),
-            base_from_work: self.setting.base * self.work(work)?,
+            base_from_work: self.setting.base * work?,
             flange_from_tool: self.tool(tool)?,
             fixed,
             posture,
@@ -534,10 +394,11 @@ impl Task<'_> {
         read().or_else(|why| self.setting.tool.ok_or(why))
     }
 
+    /// Without a name it is `wobj0`.
     fn work(&self, name: Option<&Node>) -> Understood<Pose> {
         let name = match name {
-            None => return Ok(self.setting.work.unwrap_or_else(Pose::identity)),
-            Some(Node::Word(name)) if name == "WOBJ0" => return Ok(Pose::identity()),
+            None => return Ok(Pose::identity()),
+            Some(Node::Word(name)) if name == WORLD => return Ok(Pose::identity()),
             Some(Node::Word(name)) => name,
             Some(_) => return Err(Why::new(LeftReason::FrameUnknown, "its work object is computed")),
         };
@@ -553,34 +414,5 @@ impl Task<'_> {
             frames.map(|(user, object)| user * object).ok_or_else(|| unknown("is not written in numbers"))
         };
         read().or_else(|why| self.setting.work.ok_or(why))
-    }
-
-    /// Declared targets to which no move of the files goes.
-    fn unvisited(&mut self) -> Result<()> {
-        let all: Vec<(String, Datum)> = self.data.iter().map(|(n, d)| (n.clone(), d.clone())).collect();
-        for (name, datum) in all.into_iter().filter(|(_, d)| d.kind.ends_with("TARGET")) {
-            let seen =
-                self.way.program.targets.iter().any(|t| t.file == datum.file && t.line == datum.line && t.name == name);
-            let some = array_of(&name).map(|array| format!("{array}{{}}"));
-            let about = |left: &Left| left.why.about.as_ref().is_some_and(|a| *a == name || Some(a) == some.as_ref());
-            let known = self.way.program.left.iter().any(about);
-            let Some(value) = datum.value.filter(|_| !seen && (!known || self.bases.contains_key(&name))) else {
-                continue;
-            };
-            let place = (datum.file, datum.line);
-            if let Some(base) = self.bases.remove(&name) {
-                self.way.declare(base);
-                continue;
-            }
-            let done = self.kind(&value, datum.file, None, None).map(|kind| {
-                let (file, line, approach) = (place.0, place.1, Approach::Unknown);
-                self.way.declare(Target { file, line, name: name.clone(), approach, visited: true, kind });
-            });
-            if let Err(why) = done {
-                let words = format!("no move of the files goes there, and {}", why.words);
-                self.leave(place, &name, Why::new(LeftReason::Unvisited, words));
-            }
-        }
-        Ok(())
     }
 }

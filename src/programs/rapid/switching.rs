@@ -8,11 +8,16 @@ use crate::programs::scan::{Reader, TokenKind};
 /// Beginnings of routines.
 pub(super) const ROUTINES: [&str; 3] = ["PROC", "FUNC", "TRAP"];
 
-/// Name of the routine that the reader stands on, and its place behind the first word: `PROC NAME(..)`, `FUNC TYPE NAME(..)`, `TRAP NAME`.
-fn routine_name(reader: &Reader<'_>) -> (usize, String) {
-    let behind = if reader.name().as_deref() == Some("FUNC") { 2 } else { 1 };
-    let name = reader.ahead(behind).map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase());
-    (behind as usize, name.unwrap_or_default())
+/// Words between that with which a routine begins and its name: `PROC NAME(..)`, `FUNC TYPE NAME(..)`, `TRAP NAME`.
+pub(super) fn words_before_name(word: &str) -> usize {
+    usize::from(word == "FUNC")
+}
+
+/// Name of the routine on whose first word the reader stands.
+fn routine_name(reader: &Reader<'_>) -> String {
+    let behind = 1 + words_before_name(&reader.name().unwrap_or_default());
+    let name = reader.ahead(behind as isize).map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase());
+    name.unwrap_or_default()
 }
 
 /// What instructions have switched, and where the robot stands.
@@ -71,8 +76,8 @@ impl Switching {
         }
     }
 
-    /// A statement that begins with a word; returns how many words of it were read.
-    pub fn statement(&mut self, reader: &Reader<'_>, word: &str, way: &mut Itinerary) -> usize {
+    /// A statement that begins with a word.
+    pub fn statement(&mut self, reader: &Reader<'_>, word: &str, way: &mut Itinerary) {
         let line_has = |wanted: &[u8]| {
             let line = (1..).map_while(|k| reader.ahead(k).filter(|t| t.kind != TokenKind::LineEnd));
             line.into_iter().any(|t| reader.text(t).eq_ignore_ascii_case(wanted))
@@ -89,32 +94,31 @@ impl Switching {
                     Switched::new(self.switched_off.map(state), self.displaces && is_called, self.offsets && is_called);
                 let uncalled = (uncalled, Stands::default());
                 self.flow.all_end(&mut self.now);
-                let (behind, name) = routine_name(reader);
-                self.flow.routine_begins(name, &mut self.now, &uncalled);
+                self.flow.routine_begins(routine_name(reader), &mut self.now, &uncalled);
                 // Modules that are not given may call it, too.
                 self.now = self.now.merged(&uncalled, "");
-                return 1 + behind;
             }
             "ENDPROC" | "ENDFUNC" | "ENDTRAP" => self.flow.routine_ends(&mut self.now),
-            // Without THEN it is a statement of one line.
-            "IF" if line_has(b"THEN") => self.begin(Branching::If, way),
+            "IF" => self.begin(Branching::If, way),
             "TEST" => self.begin(Branching::Cases, way),
             "WHILE" | "FOR" => self.begin(Branching::Loop, way),
             "ELSE" | "ELSEIF" | "CASE" | "DEFAULT" => {
                 way.next_branch();
                 self.flow.next(&mut self.now, matches!(word, "ELSE" | "DEFAULT"));
             }
-            "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => {
-                way.branches_end();
-                self.flow.end(&mut self.now);
-            }
+            "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => self.branches_end(way),
             _ => self.step(word, way),
         }
-        1
     }
 
-    /// A word behind the condition of a statement of one line: it may take place.
-    pub fn behind_condition(&mut self, word: &str, way: &mut Itinerary) {
+    /// Behind a statement with branches, or a loop.
+    pub fn branches_end(&mut self, way: &mut Itinerary) {
+        way.branches_end();
+        self.flow.end(&mut self.now);
+    }
+
+    /// A word within a statement: what it names may take place.
+    pub fn within(&mut self, word: &str, way: &mut Itinerary) {
         let before = self.now.clone();
         self.step(word, way);
         self.now = self.now.merged(&before, "");

@@ -1,0 +1,287 @@
+//! Statements of RAPID: where each begins and ends, and which of them move.
+
+use super::switching::{ROUTINES, words_before_name};
+use super::value::{Node, node};
+use super::{TYPES, Task};
+use crate::error::{Code, Error, Result};
+use crate::programs::reason::{LeftReason, Why};
+use crate::programs::scan::{Reader, TokenKind};
+
+/// Beginnings of the names of instructions that move the robot to their first arguments.
+const MOVES: [&str; 7] = ["MOVE", "TRIGGL", "TRIGGJ", "TRIGGC", "ARC", "SPOT", SEARCH];
+/// Behind a signal and the point that is found.
+const SEARCH: &str = "SEARCH";
+/// Beginnings of lines in which a position in numbers is not where the robot goes.
+const DECLARE: [&str; 8] = ["CONST", "PERS", "VAR", "LOCAL", "TASK", "PROC", "FUNC", "TRAP"];
+/// Instructions that begin so, but move no robot.
+const NO_MOVES: [&str; 2] = ["MOVEEXTJ", "ARCREFRESH"];
+/// Words of the language that begin a statement, or part of one, which ends without a semicolon.
+const CONTROL: [&str; 26] = [
+    "MODULE",
+    "ENDMODULE",
+    "PROC",
+    "ENDPROC",
+    "FUNC",
+    "ENDFUNC",
+    "TRAP",
+    "ENDTRAP",
+    "RECORD",
+    "ENDRECORD",
+    "IF",
+    "ELSEIF",
+    "ELSE",
+    "ENDIF",
+    "TEST",
+    "CASE",
+    "DEFAULT",
+    "ENDTEST",
+    "WHILE",
+    "ENDWHILE",
+    "FOR",
+    "ENDFOR",
+    "ERROR",
+    "UNDO",
+    "BACKWARD",
+    "THEN",
+];
+/// Words between two operands.
+const OPERATORS: [&str; 6] = ["AND", "OR", "XOR", "NOT", "DIV", "MOD"];
+
+fn is_control(reader: &Reader<'_>) -> bool {
+    reader.name().is_some_and(|word| CONTROL.contains(&word.as_str()))
+}
+
+/// Token at which a statement ends: its semicolon, or a word that cannot stand within it.
+fn statement_end(reader: &mut Reader<'_>) -> usize {
+    let start = reader.at;
+    reader.at += 1;
+    while !reader.done() && !reader.is_mark(b';') && !is_control(reader) {
+        reader.at += 1;
+    }
+    std::mem::replace(&mut reader.at, start)
+}
+
+/// The first token behind the condition of an `IF`: two operands without anything between them end it.
+fn condition_end(reader: &mut Reader<'_>) -> usize {
+    let start = reader.at;
+    let mut has_operand = false;
+    reader.at += 1;
+    while let Some(kind) = reader.peek().map(|t| t.kind) {
+        let is_operator = reader.name().is_some_and(|word| OPERATORS.contains(&word.as_str()));
+        let is_bracket = matches!(kind, TokenKind::Mark(b'(' | b'[' | b'{'));
+        let begins = (kind == TokenKind::Word && !is_operator) || kind == TokenKind::Mark(b'%');
+        if kind == TokenKind::Mark(b';') || is_control(reader) || (begins && has_operand) {
+            break;
+        }
+        if is_bracket {
+            reader.at = reader.closing(reader.at).unwrap_or(reader.at);
+        }
+        has_operand = match kind {
+            TokenKind::LineEnd => has_operand,
+            TokenKind::Word => !is_operator,
+            TokenKind::Mark(_) => is_bracket,
+            TokenKind::Number(_) | TokenKind::Text => true,
+        };
+        reader.at += 1;
+    }
+    std::mem::replace(&mut reader.at, start)
+}
+
+/// Behind the brackets that stand `words` words behind the present one.
+fn behind_brackets(reader: &Reader<'_>, words: usize) -> usize {
+    let open = reader.at + words + 1;
+    let is_open = reader.ahead_is_mark(words as isize + 1, b'(');
+    reader.closing(open).filter(|_| is_open).map_or(open, |close| close + 1)
+}
+
+/// Where the statement behind a word of [`CONTROL`] begins.
+fn behind_header(reader: &mut Reader<'_>, word: &str) -> usize {
+    let end = statement_end(reader);
+    let behind = |found: &dyn Fn(isize) -> bool| {
+        let all = 1..(end - reader.at) as isize;
+        all.into_iter().find(|&k| found(k)).map_or(reader.at + 1, |k| reader.at + 1 + k as usize)
+    };
+    match word {
+        "WHILE" | "FOR" => behind(&|k| reader.ahead_is_word(k, "DO")),
+        "CASE" | "DEFAULT" => behind(&|k| reader.ahead_is_mark(k, b':')),
+        "MODULE" => behind_brackets(reader, 1),
+        "RECORD" => reader.at + 2,
+        "ERROR" => behind_brackets(reader, 0),
+        w if ROUTINES.contains(&w) => behind_brackets(reader, 1 + words_before_name(w)),
+        "IF" | "ELSEIF" => condition_end(reader),
+        _ => reader.at + 1,
+    }
+}
+
+/// True where a robtarget is written in a statement that sets no data.
+fn has_literal(reader: &mut Reader<'_>, end: usize) -> Result<bool> {
+    let start = reader.at;
+    let mut found = false;
+    while !found && reader.at < end {
+        let assigned = reader.is_mark(b':') && reader.ahead_is_mark(1, b'=') && !reader.ahead_is_mark(-2, b'\\');
+        if assigned {
+            break;
+        }
+        let nested = reader.is_mark(b'[') && reader.ahead_is_mark(1, b'[');
+        let at = reader.at;
+        found = nested && node(reader)?.is_robtarget();
+        reader.at = at + 1;
+    }
+    reader.at = start;
+    Ok(found)
+}
+
+/// True for a known instruction that moves the robot; the reader stands on its name.
+fn is_move(reader: &Reader<'_>, word: &str) -> bool {
+    let moves = MOVES.iter().any(|m| word.starts_with(m)) && !NO_MOVES.contains(&word);
+    let mut behind = (1..).filter_map(|k| match reader.ahead(k) {
+        Some(token) if token.kind == TokenKind::LineEnd => None,
+        token => Some(token.map(|t| t.kind)),
+    });
+    moves && !matches!(behind.next().flatten(), None | Some(TokenKind::Mark(b':' | b'(' | b';')))
+}
+
+impl Task<'_> {
+    /// All statements of a file, in their order.
+    pub(super) fn statements(&mut self, mut reader: Reader<'_>) -> Result<()> {
+        // Conditions of one line, which end with the statement behind them.
+        let (mut begins, mut conditions) = (0, 0_usize);
+        while !reader.done() {
+            if reader.ahead_is_mark(-1, b';') {
+                (0..std::mem::take(&mut conditions)).for_each(|_| self.switching.branches_end(&mut self.way));
+            }
+            let Some(word) = reader.name() else {
+                reader.at += 1;
+                continue;
+            };
+            if reader.at < begins {
+                self.switching.within(&word, &mut self.way);
+                reader.at += 1;
+            } else if is_move(&reader, &word) {
+                self.instruction(&mut reader)?;
+                reader.at += 1;
+            } else if CONTROL.contains(&word.as_str()) {
+                begins = behind_header(&mut reader, &word);
+                self.switching.statement(&reader, &word, &mut self.way);
+                let is_block = reader.ahead_is_word((begins - reader.at) as isize, "THEN");
+                conditions += usize::from(word == "IF" && !is_block);
+                let is_definition = ROUTINES.contains(&word.as_str()) || word == "MODULE" || word == "RECORD";
+                reader.at = if is_definition { begins } else { reader.at + 1 };
+            } else {
+                begins = if reader.ahead_is_mark(1, b':') && !reader.ahead_is_mark(2, b'=') {
+                    reader.at + 2
+                } else {
+                    statement_end(&mut reader)
+                };
+                self.no_move(&mut reader, &word, begins)?;
+                self.switching.statement(&reader, &word, &mut self.way);
+                reader.at += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// What a statement that is no known move says of positions.
+    fn no_move(&mut self, reader: &mut Reader<'_>, word: &str, end: usize) -> Result<()> {
+        if DECLARE.contains(&word) || TYPES.contains(&word) {
+            return Ok(());
+        }
+        if has_literal(reader, end)? {
+            let words = format!("a position stands in it, and what {word} does with it is not known");
+            self.leave((reader.index, reader.line()), word, Why::new(LeftReason::NotATarget, words));
+        }
+        let start = reader.at;
+        let used = self.used(reader, word, end);
+        reader.at = start;
+        used
+    }
+
+    /// A move; the reader stands on its name and ends on its semicolon.
+    fn instruction(&mut self, reader: &mut Reader<'_>) -> Result<()> {
+        let line = reader.line();
+        let name = String::from_utf8_lossy(reader.word().unwrap_or_default()).into_owned();
+        reader.at += 1;
+        let mut arguments = Vec::new();
+        let mut work = None;
+        let mut nothing = true;
+        let mut plain = Vec::new();
+        loop {
+            reader.skip_line_ends();
+            if reader.done() || (nothing && reader.is_mark(b';')) {
+                let what = format!("{name} does not end with a semicolon");
+                return Err(Error::new(
+                    Code::ProgramSyntax,
+                    format!("{}:{line}", reader.file.name),
+                    what,
+                    "complete the instruction",
+                ));
+            }
+            if reader.take_mark(b'\\') {
+                let switch = reader.name().unwrap_or_default();
+                reader.at += 1;
+                if reader.take_mark(b':') && reader.take_mark(b'=') {
+                    let value = node(reader)?;
+                    if switch == "WOBJ" {
+                        work = Some(value);
+                    }
+                }
+                continue;
+            }
+            if reader.is_mark(b';') {
+                break;
+            }
+            if reader.take_mark(b',') {
+                continue;
+            }
+            nothing = false;
+            arguments.push(node(reader)?);
+            plain.push(true);
+            // What follows up to the comma makes it an expression.
+            while !matches!(
+                reader.peek().map(|t| t.kind),
+                None | Some(TokenKind::Mark(b',' | b';' | b'\\') | TokenKind::LineEnd)
+            ) {
+                let open = matches!(reader.peek().map(|t| t.kind), Some(TokenKind::Mark(b'(' | b'[' | b'{')));
+                reader.at = if open { reader.closing(reader.at).unwrap_or(reader.at) + 1 } else { reader.at + 1 };
+                if let Some(last) = plain.last_mut() {
+                    *last = false;
+                }
+            }
+        }
+        if name.to_ascii_uppercase().starts_with(SEARCH) {
+            arguments.drain(..arguments.len().min(2));
+            plain.drain(..plain.len().min(2));
+        }
+        let count = self.targets_of(&name, &arguments);
+        let tool = self.tool_of(&arguments, count);
+        for k in 0..count {
+            let done = match plain[k] {
+                true => self.visit(&arguments[k], &name, (reader.index, line), &tool, work.as_ref())?,
+                false => Err(Why::computed()),
+            };
+            if let Err(why) = done {
+                self.leave((reader.index, line), &name, why);
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of arguments that are targets: two for circles.
+    fn targets_of(&self, name: &str, arguments: &[Node]) -> usize {
+        let name = name.to_ascii_uppercase();
+        let circle = ["MOVEC", "TRIGGC", "ARCC", "SPOTC", "SEARCHC"].iter().any(|c| name.starts_with(c));
+        (1 + usize::from(circle)).min(arguments.len())
+    }
+
+    /// True for the name of a tool.
+    pub(super) fn is_tool(&self, name: &str) -> bool {
+        name == "TOOL0" || self.data.get(name).is_some_and(|d| d.kind == "TOOLDATA")
+    }
+
+    /// Name of the tool: the argument that is one, else that behind speed and zone.
+    fn tool_of(&self, arguments: &[Node], targets: usize) -> Option<String> {
+        let word = |n: &Node| if let Node::Word(w) = n { Some(w.clone()) } else { None };
+        let rest = arguments.get(targets..).unwrap_or_default();
+        rest.iter().filter_map(word).find(|w| self.is_tool(w)).or_else(|| rest.get(2).and_then(word))
+    }
+}

@@ -1,0 +1,104 @@
+//! Declared targets to which no known move goes: by what other statements do with them, or by the flags.
+
+use super::switched::{DISPLACES, OFFSETS};
+use super::uses::{Does, Use};
+use super::value::{Node, array_of, element, node};
+use super::{Datum, Task};
+use crate::error::Result;
+use crate::geom::Pose;
+use crate::programs::program::{Approach, Left, Target, TargetKind, Understood};
+use crate::programs::reason::{LeftReason, Why};
+use crate::programs::scan::Reader;
+
+impl Task<'_> {
+    /// Notes the points that a statement uses; the reader stands on its first word.
+    pub(super) fn used(&mut self, reader: &mut Reader<'_>, by: &str, end: usize) -> Result<()> {
+        let (mut names, mut work) = (Vec::new(), None);
+        let mut computes = DISPLACES.contains(&by) || OFFSETS.contains(&by);
+        reader.at += 1;
+        while reader.at < end {
+            let is_switch = reader.ahead_is_mark(-1, b'\\');
+            let Some(word) = reader.name() else {
+                computes |= reader.is_mark(b':') && reader.ahead_is_mark(1, b'=');
+                reader.at += 1;
+                continue;
+            };
+            reader.at += 1;
+            let assigned = is_switch && reader.is_mark(b':') && reader.ahead_is_mark(1, b'=');
+            if assigned {
+                reader.at += 2;
+            }
+            if assigned && word == "WOBJ" {
+                work = Some(node(reader)?);
+            } else if !is_switch {
+                names.push(element(reader, word));
+            }
+        }
+        let is_point = |name: &&String| self.data.get(*name).is_some_and(|d| d.kind == "ROBTARGET");
+        let points: Vec<String> = names.iter().filter(is_point).cloned().collect();
+        let tool = names.into_iter().find(|name| self.is_tool(name));
+        for point in points {
+            let does = if computes { Does::Compute } else { Does::Go { tool: tool.clone(), work: work.clone() } };
+            self.uses.entry(point).or_default().push(Use { by: by.to_owned(), does });
+        }
+        Ok(())
+    }
+
+    /// What a declared target says to which no known move goes.
+    fn unvisited_kind(&self, name: &str, value: &Node, file: usize) -> Understood<TargetKind> {
+        let untold = || {
+            let words = "its work object is not named; give --work";
+            self.setting.work.ok_or_else(|| Why::new(LeftReason::FrameUnknown, words))
+        };
+        let uses = self.uses.get(name).map(Vec::as_slice).unwrap_or_default();
+        let mut found: Option<TargetKind> = None;
+        for Use { by, does } in uses {
+            let Does::Go { tool, work } = does else {
+                return Err(Why::new(LeftReason::NotATarget, format!("{by} computes with it")));
+            };
+            let base = work.as_ref().map_or_else(untold, |work| self.work(Some(work)));
+            let kind = self.kind(value, file, tool.as_deref(), base)?;
+            if found.as_ref().is_some_and(|other| frames_of(other) != frames_of(&kind)) {
+                return Err(Why::new(LeftReason::FramesDiffer, "it is used with different tools or work objects"));
+            }
+            found = Some(kind);
+        }
+        found.map_or_else(|| self.kind(value, file, None, untold()), Ok)
+    }
+
+    /// Declared targets to which no move of the files goes.
+    pub(super) fn unvisited(&mut self) {
+        let all: Vec<(String, Datum)> = self.data.iter().map(|(n, d)| (n.clone(), d.clone())).collect();
+        for (name, datum) in all.into_iter().filter(|(_, d)| d.kind.ends_with("TARGET")) {
+            let seen =
+                self.way.program.targets.iter().any(|t| t.file == datum.file && t.line == datum.line && t.name == name);
+            let some = array_of(&name).map(|array| format!("{array}{{}}"));
+            let about = |left: &Left| left.why.about.as_ref().is_some_and(|a| *a == name || Some(a) == some.as_ref());
+            let known = self.way.program.left.iter().any(about);
+            let Some(value) = datum.value.filter(|_| !seen && (!known || self.bases.contains_key(&name))) else {
+                continue;
+            };
+            let place = (datum.file, datum.line);
+            if let Some(base) = self.bases.remove(&name) {
+                self.way.declare(base);
+                continue;
+            }
+            let done = self.unvisited_kind(&name, &value, datum.file).map(|kind| {
+                let (file, line, approach) = (place.0, place.1, Approach::Unknown);
+                self.way.declare(Target { file, line, name: name.clone(), approach, visited: true, kind });
+            });
+            if let Err(why) = done {
+                let words = format!("no known move of the files goes there, and {}", why.words);
+                self.leave(place, &name, Why::new(LeftReason::Unvisited, words));
+            }
+        }
+    }
+}
+
+/// Tool and work object of a pose.
+fn frames_of(kind: &TargetKind) -> Option<(Pose, Pose)> {
+    match kind {
+        TargetKind::Pose(pose) => Some((pose.flange_from_tool, pose.base_from_work)),
+        TargetKind::Joints(_) => None,
+    }
+}

@@ -1,0 +1,144 @@
+//! Where statements of RAPID begin, and the frames of points to which no known move goes.
+
+use crate::programs_support::{Cell, Run};
+use crate::rapid::{TOOL, WORK, assert_tool_meets, confdata, frames, jointtarget, lines, pose, robtarget};
+use robotcal::programs::LeftReason;
+
+/// A posture away from singular ones, rad.
+const START: [f64; 6] = [0.17, -1.4, 1.7, 0.35, 0.7, 0.5];
+
+/// A little beside it.
+fn beside(k: usize) -> Vec<f64> {
+    START.iter().enumerate().map(|(i, q)| q + 0.02 * ((7 * k + i) as f64).sin()).collect()
+}
+
+/// A module with the robtargets `p1` to `p9` in `tGun` and `wTable`; `@` stands for such a robtarget, `#` for a jointtarget.
+fn module(cell: &Cell, body: &str) -> String {
+    let (tool, base) = frames();
+    let point = |k: usize| robtarget(cell, &beside(k), &tool, &base, &confdata(&beside(k)));
+    let declared = (1..10).filter(|k| body.contains(&format!("p{k}")));
+    let points: String = declared.map(|k| format!("CONST robtarget p{k}:={};\n", point(k))).collect();
+    let mut text = format!("MODULE m\n{TOOL}{WORK}{points}PROC main()\n{body}\nENDPROC\nENDMODULE\n");
+    text = text.replace('#', &jointtarget(&START));
+    for k in 11.. {
+        let Some(at) = text.find('@') else { break };
+        text.replace_range(at..=at, &point(k));
+    }
+    text
+}
+
+fn run(cell: &Cell, body: &str, flags: &[&str]) -> (String, Run) {
+    let text = module(cell, body);
+    let file = cell.write("m.mod", text.as_bytes());
+    (text, cell.compensate(&[&file], &[&["--unordered"], flags].concat()))
+}
+
+/// Asserts that all robtargets of `tGun` and `wTable` of a text, declared ones first, are met by the real robot.
+fn assert_all_meet(cell: &Cell, old: &str, new: &str, names: &[usize]) {
+    let (tool, base) = frames();
+    let points = |text: &str| lines(text, "[0,").into_iter().filter(|n| n.len() > 16).collect::<Vec<_>>();
+    let (old, new) = (points(old), points(new));
+    assert_eq!((old.len(), new.len()), (names.len(), names.len()));
+    for ((old, new), k) in old.iter().zip(&new).zip(names) {
+        assert_ne!(old[..3], new[..3]);
+        assert_tool_meets(cell, &tool, &(base * pose(old)), &(base * pose(new)), &beside(*k), 1e-6, &k.to_string());
+    }
+}
+
+#[test]
+fn moves_behind_conditions_of_one_line_and_over_several_lines_are_corrected() {
+    let cell = Cell::kuka(91);
+    let end = "v1,z1,tGun\\WObj:=wTable;";
+    for (body, targets, points) in [
+        (format!("MoveAbsJ #,v1,z1,tGun;\nIF di1=1 MoveAbsJ #,v1,z1,tGun;\nIF di1=1 MoveL @,{end}"), 3, vec![11]),
+        (format!("IF (a OR b{{2}}) AND NOT f(x) MoveJ p1,{end}\nIF a MoveL Offs(p1,0,0,9),{end}"), 2, vec![1]),
+        (format!("MoveJ\n p1,{end}\nMoveL\n  @,\n{end}"), 2, vec![1, 11]),
+        (format!("IF a=1\n  MoveJ p1,{end} IF r.b MoveJ @,{end}"), 2, vec![1, 11]),
+        (format!("IF a THEN MoveJ p1,{end} ELSE MoveJ @,{end} ENDIF MoveJ p2,{end}"), 3, vec![1, 2, 11]),
+        (format!("WHILE a AND\n b DO MoveJ p1,{end} ENDWHILE\nhere: MoveJ @,{end}"), 2, vec![1, 11]),
+        (format!("TEST n CASE 1,\n k: MoveJ p1,{end}\nDEFAULT: MoveJ @,{end} ENDTEST"), 2, vec![1, 11]),
+        (
+            format!("ENDPROC\nPROC go(\n  num x,\n  num y)\nMoveJ p1,{end}\nERROR (A,\n B)\nMoveJ @,{end}"),
+            2,
+            vec![1, 11],
+        ),
+        (format!("IF a %\"go\"+x% p1;\nMoveJ p1,{end}"), 1, vec![1]),
+    ] {
+        let (text, run) = run(&cell, &body, &[]);
+        let run = run.expect(0);
+        assert_eq!(run.told().corrected, targets, "{body}");
+        assert_all_meet(&cell, &text, &run.text("m.mod"), &points);
+    }
+}
+
+#[test]
+fn tools_and_work_objects_of_moves_behind_conditions_are_held_against_each_other() {
+    let cell = Cell::kuka(92);
+    for second in ["tool0\\WObj:=wTable", "tGun\\WObj:=wobj0", "tGun"] {
+        let body = format!("MoveJ p1,v1,z1,tGun\\WObj:=wTable;\nIF di1=1 MoveJ p1,v1,z1,{second};");
+        let told = run(&cell, &body, &[]).1.expect(1).told();
+        assert_eq!(told.left.len(), 1, "{told:?}");
+        assert_eq!(told.left[0].2, LeftReason::FramesDiffer.name());
+    }
+}
+
+#[test]
+fn a_condition_over_several_lines_begins_the_statement_that_its_end_closes() {
+    let cell = Cell::kuka(93);
+    let end = "\nMoveJ p1,v1,z1,tGun\\WObj:=wTable;";
+    let displaced = "PDispSet [[100,0,0],[1,0,0,0],[0,0,0],[0,0,0]];\n";
+    let frame = LeftReason::FrameUnknown.name();
+    for (body, left) in [
+        (format!("{displaced}IF a AND\n b THEN\nPDispOff;\nENDIF{end}"), vec![frame]),
+        (format!("{displaced}IF a\nTHEN\nPDispOff;\nENDIF{end}"), vec![frame]),
+        (format!("{displaced}IF a\nPDispOff;{end}"), vec![frame]),
+        (format!("{displaced}IF a OR\n b THEN\nPDispOff;\nELSE\nPDispOff;\nENDIF{end}"), vec![]),
+        (format!("IF a\n{displaced}{end}"), vec![frame]),
+        (format!("{displaced}PDispOff;IF a{end}"), vec![]),
+    ] {
+        let told = run(&cell, &body, &[]).1.told();
+        assert_eq!(told.left.iter().map(|(.., reason)| reason.as_str()).collect::<Vec<_>>(), left, "{body}");
+    }
+}
+
+#[test]
+fn points_to_which_no_known_move_goes_are_corrected_in_the_frames_that_are_named_or_left() {
+    let cell = Cell::kuka(94);
+    let told_tool = ["--tool=97.4,0,223.1,0.924,0,0.382389,0"];
+    let told_work = ["--work=279.75,-60,23.5,0.707106781,0,0,0.707106781"];
+    let unvisited = vec![LeftReason::Unvisited.name().to_owned()];
+    let own = "CapL p1,v1,cap,start,w,fine,tGun\\WObj:=wTable;";
+    for (body, flags, corrected) in [
+        ("! p1 alone", vec![], 0),
+        ("! p1 alone", told_tool.to_vec(), 0),
+        ("! p1 alone", [told_tool, told_work].concat(), 1),
+        (own, vec![], 1),
+        (own, vec!["--tool=0,0,9,1,0,0,0", "--work=0,0,9,1,0,0,0"], 1),
+        ("CapL p1,v1,cap,tGun;", told_tool.to_vec(), 0),
+        ("Grip p1;", told_tool.to_vec(), 0),
+        ("CapL p1,v1,cap,tGun\\WObj:=wTable;\nCapL p1,v1,cap,tGun\\WObj:=wobj0;", vec![], 0),
+        ("PDispOn p1,tGun\\WObj:=wTable;", [told_tool, told_work].concat(), 0),
+        ("pHere:=Offs(p1,0,0,9);", [told_tool, told_work].concat(), 0),
+    ] {
+        let (text, run) = run(&cell, body, &flags);
+        let told = run.told();
+        let left: Vec<String> = told.left.iter().map(|(.., reason)| reason.clone()).collect();
+        let wanted = if corrected == 1 { vec![] } else { unvisited.clone() };
+        assert_eq!((told.corrected, left), (corrected, wanted), "{body} {flags:?}");
+        if body == own {
+            assert_all_meet(&cell, &text, &run.text("m.mod"), &[1]);
+        }
+    }
+}
+
+#[test]
+fn a_move_that_names_no_work_object_is_in_that_of_the_world_whatever_the_flags_say() {
+    let cell = Cell::kuka(95);
+    let world = nalgebra::Vector3::new(0.3, -0.06, 0.0205);
+    let (tool, _) = frames();
+    let target = robtarget(&cell, &beside(1), &tool, &robotcal::geom::Pose::identity(), &confdata(&beside(1)));
+    let body = format!("MoveJ {target},v1,z1,tGun;\nMoveAbsJ #,v1,z1,tGun;");
+    let flag = format!("--work={},{},{},1,0,0,0", 1e3 * world.x, 1e3 * world.y, 1e3 * world.z);
+    let texts = [&[][..], &[flag.as_str()]].map(|flags| run(&cell, &body, flags).1.expect(0).text("m.mod"));
+    assert_eq!(texts[0], texts[1]);
+}
