@@ -101,6 +101,8 @@ pub(super) enum Branching {
     Loop,
     /// A loop that runs at least once.
     LoopTaken,
+    /// A loop that ends only where it is left from within.
+    LoopForever,
 }
 
 /// What a reading found at places that others depend on.
@@ -155,6 +157,8 @@ pub(super) struct Flow<T> {
     found: Places<T>,
     open: Vec<Open<T>>,
     routines: Vec<Routine<T>>,
+    /// False behind a statement that goes elsewhere.
+    is_reached: bool,
 }
 
 /// A statement with branches, or a loop.
@@ -162,6 +166,13 @@ struct Open<T> {
     before: T,
     /// What holds at the end of the branches so far.
     ends: Vec<T>,
+    kind: Branching,
+    /// True where the statement is reached.
+    is_reached: bool,
+    /// What holds where a loop is left from within.
+    leaves: Vec<T>,
+    /// What holds where a loop is begun again from within.
+    agains: Vec<T>,
     /// False while none of the branches need be taken.
     one_is_taken: bool,
     /// False before the first branch.
@@ -178,12 +189,20 @@ struct Routine<T> {
     end: Option<T>,
     /// Statements open around it.
     open: usize,
+    /// True where the text around it is reached.
+    is_reached: bool,
+}
+
+/// What is known where any of these holds.
+fn merged<T: Followed>(all: &[T]) -> Option<T> {
+    let (first, others) = all.split_first()?;
+    Some(others.iter().fold(first.clone(), |one, other| one.merged(other, BRANCHES)))
 }
 
 impl<T: Followed> Flow<T> {
     /// With what the reading before found.
     pub fn new(known: Places<T>) -> Self {
-        Self { known, found: Places::default(), open: Vec::new(), routines: Vec::new() }
+        Self { known, found: Places::default(), open: Vec::new(), routines: Vec::new(), is_reached: true }
     }
 
     /// What this reading found.
@@ -194,7 +213,7 @@ impl<T: Followed> Flow<T> {
     /// A statement with branches, or a loop, begins.
     pub fn begin(&mut self, now: &mut T, kind: Branching) {
         let before = now.clone();
-        let is_loop = matches!(kind, Branching::Loop | Branching::LoopTaken);
+        let is_loop = matches!(kind, Branching::Loop | Branching::LoopTaken | Branching::LoopForever);
         let number = is_loop.then_some(self.found.loops.len());
         if let Some(number) = number {
             self.found.loops.push(None);
@@ -205,7 +224,11 @@ impl<T: Followed> Flow<T> {
         self.open.push(Open {
             before,
             ends: Vec::new(),
-            one_is_taken: kind == Branching::LoopTaken,
+            kind,
+            is_reached: self.is_reached,
+            leaves: Vec::new(),
+            agains: Vec::new(),
+            one_is_taken: matches!(kind, Branching::LoopTaken | Branching::LoopForever),
             is_in_branch: kind != Branching::Cases,
             number,
         });
@@ -215,33 +238,66 @@ impl<T: Followed> Flow<T> {
     pub fn next(&mut self, now: &mut T, is_last: bool) {
         if let Some(open) = self.open.last_mut() {
             let end = std::mem::replace(now, open.before.clone());
-            open.ends.extend(std::mem::replace(&mut open.is_in_branch, true).then_some(end));
+            let was_in_branch = std::mem::replace(&mut open.is_in_branch, true);
+            open.ends.extend((was_in_branch && self.is_reached).then_some(end));
             open.one_is_taken |= is_last;
+            self.is_reached = open.is_reached;
         }
     }
 
     /// The statement ends.
     pub fn end(&mut self, now: &mut T) {
         let Some(open) = self.open.pop() else { return };
+        let agains: Vec<T> = self.is_reached.then(|| now.clone()).into_iter().chain(open.agains).collect();
         if let Some(number) = open.number {
-            self.found.loops[number] = Some(now.clone());
+            self.found.loops[number] = merged(&agains);
         }
-        let not_taken = (!open.one_is_taken).then_some(open.before);
-        for other in open.ends.iter().chain(&not_taken) {
-            *now = now.merged(other, BRANCHES);
+        let not_taken = (!open.one_is_taken && open.is_reached).then_some(open.before);
+        let only_left = open.kind == Branching::LoopForever && !open.leaves.is_empty();
+        let ends = agains.into_iter().filter(|_| !only_left);
+        let all: Vec<T> = ends.chain(open.leaves).chain(open.ends).chain(not_taken).collect();
+        let behind = merged(&all);
+        self.is_reached = behind.is_some();
+        *now = behind.unwrap_or_else(|| now.clone());
+    }
+
+    /// The innermost loop is left from where `now` holds.
+    pub fn leaves(&mut self, now: &T) {
+        if let Some(open) = self.innermost_loop() {
+            open.leaves.push(now.clone());
+            self.is_reached = false;
         }
+    }
+
+    /// The innermost loop begins again from where `now` holds.
+    pub fn begins_again(&mut self, now: &T) {
+        if let Some(open) = self.innermost_loop() {
+            open.agains.push(now.clone());
+            self.is_reached = false;
+        }
+    }
+
+    fn innermost_loop(&mut self) -> Option<&mut Open<T>> {
+        let around = self.routines.last().map_or(0, |routine| routine.open);
+        self.open.iter_mut().skip(around).rev().find(|open| open.number.is_some())
+    }
+
+    /// A jump may lead here.
+    pub fn arrives(&mut self) {
+        self.is_reached = true;
     }
 
     /// A routine begins, inside another one where that is still open; `uncalled` holds at its top where nothing calls it.
     pub fn routine_begins(&mut self, name: String, now: &mut T, uncalled: &T) {
         let top = self.known.calls.get(&name).unwrap_or(uncalled).at_top();
         let around = std::mem::replace(now, top);
-        self.routines.push(Routine { name, around, end: None, open: self.open.len() });
+        let is_reached = std::mem::replace(&mut self.is_reached, true);
+        self.routines.push(Routine { name, around, end: None, open: self.open.len(), is_reached });
     }
 
     /// The innermost routine returns from where `now` holds.
     pub fn returns(&mut self, now: &T) {
-        if let Some(routine) = self.routines.last_mut() {
+        if let Some(routine) = self.routines.last_mut().filter(|_| self.is_reached) {
             routine.end = Some(routine.end.as_ref().map_or_else(|| now.clone(), |end| end.merged(now, BRANCHES)));
         }
     }
@@ -249,7 +305,8 @@ impl<T: Followed> Flow<T> {
     /// The innermost routine ends.
     pub fn routine_ends(&mut self, now: &mut T) {
         self.returns(now);
-        let Some(Routine { name, around, end, open }) = self.routines.pop() else { return };
+        let Some(Routine { name, around, end, open, is_reached }) = self.routines.pop() else { return };
+        self.is_reached = is_reached;
         self.open.truncate(open);
         *now = around;
         self.found.ends.extend(end.map(|end| (name, end)));
@@ -261,6 +318,7 @@ impl<T: Followed> Flow<T> {
             self.routine_ends(now);
         }
         self.open.clear();
+        self.is_reached = true;
     }
 
     /// A routine is called.
@@ -326,6 +384,65 @@ mod tests {
         assert_eq!(at_loop(Branching::LoopTaken, 1), [None, Some(1)]);
         assert_eq!(at_loop(Branching::Loop, 1), [None, None]);
         assert_eq!(at_loop(Branching::Loop, 0), [Some(0), Some(0)]);
+    }
+
+    /// Tools at the top of a loop and behind it that sets tool 3, goes elsewhere in a branch, and sets tool 1 at its end.
+    fn at_loop_with(kind: Branching, goes: fn(&mut Flow<Tool>, &Tool)) -> [Option<u8>; 2] {
+        settled(|known| {
+            let (mut flow, mut now) = (Flow::new(known), Tool::new(Some(0)));
+            flow.begin(&mut now, kind);
+            let top = now.value;
+            now.set(Some(3));
+            flow.begin(&mut now, Branching::If);
+            goes(&mut flow, &now);
+            flow.end(&mut now);
+            assert_eq!(now.value, Some(3));
+            now.set(Some(1));
+            flow.end(&mut now);
+            Ok(([top, now.value], flow.found()))
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn what_holds_where_a_loop_is_left_from_within_holds_behind_it() {
+        let leaves: fn(&mut Flow<Tool>, &Tool) = |flow, now| flow.leaves(now);
+        assert_eq!(at_loop_with(Branching::LoopForever, leaves), [None, Some(3)]);
+        assert_eq!(at_loop_with(Branching::LoopTaken, leaves), [None, None]);
+        assert_eq!(at_loop_with(Branching::Loop, leaves), [None, None]);
+    }
+
+    #[test]
+    fn what_holds_where_a_loop_begins_again_from_within_holds_at_its_top() {
+        let again: fn(&mut Flow<Tool>, &Tool) = |flow, now| flow.begins_again(now);
+        for kind in [Branching::Loop, Branching::LoopTaken, Branching::LoopForever] {
+            assert_eq!(at_loop_with(kind, again), [None, None]);
+        }
+        let behind = settled(|known| {
+            let (mut flow, mut now) = (Flow::new(known), Tool::new(Some(0)));
+            flow.begin(&mut now, Branching::Loop);
+            let top = now.value;
+            flow.begins_again(&now);
+            now.set(Some(1));
+            flow.end(&mut now);
+            Ok(([top, now.value], flow.found()))
+        });
+        assert_eq!(behind.unwrap(), [Some(0), Some(0)]);
+    }
+
+    #[test]
+    fn text_behind_a_statement_that_goes_elsewhere_is_reached_by_a_jump_alone() {
+        for (jumps, wanted) in [(false, Some(3)), (true, None)] {
+            let (mut flow, mut now) = (Flow::new(Places::default()), Tool::new(Some(3)));
+            flow.begin(&mut now, Branching::LoopTaken);
+            flow.leaves(&now);
+            if jumps {
+                flow.arrives();
+            }
+            now.set(Some(1));
+            flow.end(&mut now);
+            assert_eq!(now.value, wanted);
+        }
     }
 
     /// Tools at the top of a routine that may set one, and behind its two calls, with tools 1 and 2.

@@ -11,6 +11,7 @@ mod changing;
 mod frames;
 mod frames_study;
 mod krl;
+mod loops;
 mod not_told;
 mod plan_choice;
 mod plan_poses;

@@ -5,7 +5,7 @@ use robotcal::geom::{Pose, log_so3};
 use robotcal::programs::LeftReason;
 
 /// A flange pose as KRL has it, with status and turn.
-fn krl(cell: &Cell, q: &[f64]) -> String {
+pub(super) fn krl(cell: &Cell, q: &[f64]) -> String {
     let pose = cell.nominal.base_from_tip(q);
     let [c, b, a] = pose.rpy().map(f64::to_degrees);
     let [x, y, z] = pose.xyz().map(|v| 1e3 * v);
@@ -14,7 +14,7 @@ fn krl(cell: &Cell, q: &[f64]) -> String {
 }
 
 /// How many targets were corrected, and the reasons of those that were left.
-fn told(cell: &Cell, files: &[(&str, String)], flags: &[&str]) -> (usize, Vec<String>) {
+pub(super) fn told(cell: &Cell, files: &[(&str, String)], flags: &[&str]) -> (usize, Vec<String>) {
     let paths: Vec<_> = files.iter().map(|(name, text)| cell.write(name, text.as_bytes())).collect();
     let flags = [&["--unordered"], flags].concat();
     let told = cell.compensate(&paths.iter().collect::<Vec<_>>(), &flags).told();
@@ -123,7 +123,7 @@ fn robtargets_under_a_program_displacement_are_left() {
 }
 
 /// A pose of the tool as URScript has it.
-fn script_pose(flange: &Pose) -> String {
+pub(super) fn script_pose(flange: &Pose) -> String {
     let (xyz, r) = (flange.xyz(), log_so3(&flange.rotation));
     format!("p[{:.9},{:.9},{:.9},{:.9},{:.9},{:.9}]", xyz[0], xyz[1], xyz[2], r[0], r[1], r[2])
 }
@@ -243,14 +243,14 @@ fn poses_behind_branches_that_set_tool_frame_or_displacement_differently_are_lef
 }
 
 /// A module of KRL whose tool and base are flange and foot at first; `SET` sets another tool, `MOVE` goes to a pose.
-fn krl_text(pose: &str, body: &str) -> String {
+pub(super) fn krl_text(pose: &str, body: &str) -> String {
     let set = "$TOOL={X 0.0,Y 0.0,Z 50.0,A 0.0,B 0.0,C 0.0}";
     let body = body.replace("SET", set).replace("MOVE", &format!("PTP {pose}"));
     format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{body}\nEND\n")
 }
 
 /// The motions of a module as they were corrected.
-fn krl_moves(cell: &Cell, text: &str) -> Vec<String> {
+pub(super) fn krl_moves(cell: &Cell, text: &str) -> Vec<String> {
     let file = cell.write("a.src", text.as_bytes());
     let run = cell.compensate(&[&file], &["--unordered"]);
     run.text("a.src").lines().filter(|line| line.starts_with("PTP")).map(str::to_owned).collect()

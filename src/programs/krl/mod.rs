@@ -418,13 +418,15 @@ impl Module<'_> {
                 self.flow.routine_begins(name, &mut self.now, &unset());
             }
             "RETURN" => self.flow.returns(&self.now),
+            "EXIT" => self.flow.leaves(&self.now),
             "END" | "ENDFCT" => self.flow.routine_ends(&mut self.now),
             "IF" | "SWITCH" | "WHILE" | "LOOP" | "FOR" | "REPEAT" => {
                 self.way.branches_begin();
                 let kind = match word {
                     "IF" => Branching::If,
                     "SWITCH" => Branching::Cases,
-                    "LOOP" | "REPEAT" => Branching::LoopTaken,
+                    "LOOP" => Branching::LoopForever,
+                    "REPEAT" => Branching::LoopTaken,
                     _ => Branching::Loop,
                 };
                 self.flow.begin(&mut self.now, kind);
@@ -447,6 +449,7 @@ impl Module<'_> {
     fn label(&mut self) {
         let unknown = || FrameIs::Unknown("a GOTO may come from elsewhere".into());
         self.now.0.set(Frames { tool: unknown(), base: unknown(), tool_in_room: self.now.0.tool_in_room.value });
+        self.flow.arrives();
         self.way.lose();
         self.now.1 = self.way.stands();
     }

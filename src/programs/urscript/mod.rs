@@ -1,11 +1,13 @@
 //! URScript: `movej`, `movel`, `movep`, `movec`, `servoj`, `servoc`, `optimovej` and `optimovel` with joints `[..]` (rad) or poses `p[..]` (m, rotation vector in rad),
 //! written in the call or in a variable, `get_inverse_kin` around a pose, and `set_tcp`.
 
+mod arguments;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::ProgramSetting;
 use super::field::{Field, FieldPlace};
-use super::flow::{Branching, Flow, Held, Places, settled};
+use super::flow::{Branching, Flow, Followed, Held, Places, settled};
 use super::itinerary::{Itinerary, Stands};
 use super::program::{
     Approach, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind, Understood,
@@ -72,6 +74,8 @@ struct Argument {
     /// Joints beside the pose: `name_q` of `name_p`.
     taught: Option<Vec<f64>>,
     posture: MeantPosture,
+    /// The tool that is at a pose.
+    tool: Understood<Pose>,
     /// False where the move may change the posture to one that the text does not tell.
     keeps: bool,
 }
@@ -214,13 +218,22 @@ impl Script<'_> {
                 self.variables.insert(name, value);
             } else {
                 if next == Some(TokenKind::Mark(b'(')) {
-                    self.way.call(String::from_utf8_lossy(word).into_owned(), self.flow, &mut self.now);
+                    self.call(String::from_utf8_lossy(word).into_owned());
                 }
                 self.reader.at = at + 1;
             }
         }
         self.flow.all_end(&mut self.now);
         Ok(())
+    }
+
+    /// A call of a routine, or of a thread, which goes on beside the text.
+    fn call(&mut self, name: String) {
+        let before = self.now.clone();
+        self.way.call(name, self.flow, &mut self.now);
+        if self.reader.ahead_is_word(-1, "run") {
+            self.now = self.now.merged(&before, "");
+        }
     }
 
     /// Follows statements that end with `end`; false for any other word.
@@ -243,6 +256,7 @@ impl Script<'_> {
                 let kind = match word {
                     b"if" => Branching::If,
                     b"switch" => Branching::Cases,
+                    b"while" if self.is_endless() => Branching::LoopForever,
                     _ => Branching::Loop,
                 };
                 self.flow.begin(&mut self.now, kind);
@@ -266,12 +280,22 @@ impl Script<'_> {
                 self.flow.returns(&self.now);
                 return false;
             }
+            b"break" => self.flow.leaves(&self.now),
+            b"continue" => self.flow.begins_again(&self.now),
             _ => return false,
         }
         if begins {
             self.blocks.push(routine);
         }
         true
+    }
+
+    /// `while True:`
+    fn is_endless(&self) -> bool {
+        let condition = if self.reader.ahead_is_mark(1, b'(') { 2 } else { 1 };
+        let behind = condition + 1;
+        self.reader.ahead_is_word(condition, "True")
+            && (self.reader.ahead_is_mark(behind, b':') || self.reader.ahead_is_mark(behind, b')'))
     }
 
     /// A call that moves; the reader stands on its name.
@@ -309,70 +333,6 @@ impl Script<'_> {
         }
         self.reader.at = close + 1;
         Ok(())
-    }
-
-    /// An argument, `name=` before it left out, `get_inverse_kin` around it looked into.
-    fn target_argument(&mut self, way: Way) -> Result<Argument> {
-        self.skip_argument_name();
-        let inverse = self.reader.word() == Some(b"get_inverse_kin")
-            && self.reader.ahead(1).is_some_and(|t| t.kind == TokenKind::Mark(b'('));
-        if !inverse {
-            let taught = self.taught();
-            let value = self.argument()?;
-            let keeps = way != Way::Joints || matches!(value, Value::Pose(..));
-            return Ok(Argument { value, taught, posture: way.posture(), keeps });
-        }
-        let close = self.reader.closing(self.reader.at + 1);
-        self.reader.at += 2;
-        self.skip_argument_name();
-        let taught = self.taught();
-        let mut found = Argument { value: self.argument()?, taught, posture: MeantPosture::Nearest, keeps: true };
-        if self.reader.take_mark(b',') {
-            self.skip_argument_name();
-            let own = self.reader.word() == Some(b"get_actual_joint_positions");
-            match self.argument()? {
-                Value::Joints(fields, _) if fields.len() == self.setting.axes.len() => {
-                    found.posture = MeantPosture::Near(self.readings(&fields));
-                }
-                // The joints beside the pose are better than a `qnear` that the text does not tell.
-                _ if own || found.taught.is_some() => {}
-                _ => found = Argument { value: Value::Expression, keeps: false, ..found },
-            }
-        }
-        if let Some(close) = close {
-            self.reader.at = close + 1;
-        }
-        Ok(found)
-    }
-
-    /// Joints of `name_q` where the reader stands on `name_p`.
-    fn taught(&self) -> Option<Vec<f64>> {
-        let stem = self.reader.word()?.strip_suffix(b"_p")?;
-        let name = [stem, b"_q"].concat();
-        match self.variables.get(&name).filter(|_| !self.computed.contains(&name))? {
-            Value::Joints(fields, _) if fields.len() == self.setting.axes.len() => Some(self.readings(fields)),
-            _ => None,
-        }
-    }
-
-    fn skip_argument_name(&mut self) {
-        if self.reader.word().is_some() && self.reader.ahead(1).is_some_and(|t| t.kind == TokenKind::Mark(b'=')) {
-            self.reader.at += 2;
-        }
-    }
-
-    /// A value that ends with the argument; anything longer is an expression.
-    fn argument(&mut self) -> Result<Value> {
-        let value = match self.reader.word() {
-            Some(word) if word != b"p" || !self.reader.ahead(1).is_some_and(|t| t.kind == TokenKind::Mark(b'[')) => {
-                self.reader.at += 1;
-                let known = self.variables.get(word).filter(|_| !self.computed.contains(word));
-                known.cloned().unwrap_or(Value::Expression)
-            }
-            _ => self.value()?,
-        };
-        let ends = self.reader.is_mark(b',') || self.reader.is_mark(b')');
-        Ok(if ends { value } else { Value::Expression })
     }
 
     /// `[..]` or `p[..]`; the reader ends behind it. Anything else is an expression and is not stepped over.
@@ -486,7 +446,7 @@ impl Script<'_> {
                 (TargetKind::Joints(JointTarget { readings, fields: by_reading }), line)
             }
             Value::Pose(fields, line) => {
-                let pose = self.pose(*fields, argument.posture)?;
+                let pose = self.pose(*fields, argument.posture, argument.tool?);
                 (TargetKind::Pose(Box::new(PoseTarget { taught: argument.taught, ..pose })), line)
             }
             Value::Expression => return Err(Why::computed()),
@@ -502,14 +462,16 @@ impl Script<'_> {
         }
     }
 
-    fn pose(&self, fields: [Field; 6], posture: MeantPosture) -> Understood<PoseTarget> {
-        let Some(tool) = self.now.0.value else {
-            let words = "its tool is not known: no set_tcp(p[..]) with numbers before it; give --tool";
-            return Err(Why::new(LeftReason::ToolUnknown, words));
-        };
+    /// The tool that `set_tcp` has set.
+    fn active_tool(&self) -> Understood<Pose> {
+        let words = "its tool is not known: no set_tcp(p[..]) with numbers before it; give --tool";
+        self.now.0.value.ok_or_else(|| Why::new(LeftReason::ToolUnknown, words))
+    }
+
+    fn pose(&self, fields: [Field; 6], posture: MeantPosture, tool: Pose) -> PoseTarget {
         let [x, y, z, rx, ry, rz] = fields;
         let readings = self.setting.chain.readings.len();
-        Ok(PoseTarget {
+        PoseTarget {
             position: [x, y, z],
             rotation: RotationFields::Vector([rx, ry, rz]),
             base_from_work: self.setting.base * self.setting.work.unwrap_or_else(Pose::identity),
@@ -519,7 +481,7 @@ impl Script<'_> {
             taught: None,
             displaced: None,
             joint_fields: vec![None; readings],
-        })
+        }
     }
 }
 
