@@ -101,7 +101,7 @@ pub(super) struct CompensateArgs {
         help_heading = "How the program is read"
     )]
     tool: Vec<f64>,
-    /// Work frame where the program sets none, in the notation of the language
+    /// Work frame where the program sets none, in the notation of the language (a move of RAPID without \WObj is in wobj0)
     #[arg(
         long,
         value_name = "NUMBERS",
@@ -205,6 +205,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
         &subject,
     ));
     findings.extend(corrections::left_finding(&left, &subject));
+    findings.extend(corrections::missing_finding(&program, &left, &subject));
     let report = corrections::table(&program, &done, expected.as_deref().ok(), &controller.chain);
     let said = corrections::findings_json(&findings)?;
     let mut written: Vec<(String, &[u8])> = Vec::new();

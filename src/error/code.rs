@@ -234,6 +234,7 @@ codes! {
     }
     Input "Corrected programs" {
         TargetsLeft "targets_left" "targets stay as they are; their reasons are counted",
+        TargetsMissing "targets_missing" "no target is found in the programs",
         NominalIsControllers "nominal_is_controllers" "the nominal model is the one in the controller",
         NominalDiffers "nominal_differs" "the nominal model is not the one in the controller",
         TaughtWithOtherFrames "taught_with_other_frames" "joints and poses were taught with another tool or base",

@@ -113,6 +113,14 @@ pub fn left_finding(left: &[Left], subject: &str) -> Option<FileFinding> {
     (!left.is_empty()).then_some(FileFinding { code, weight, subject, quantities, text })
 }
 
+/// No target at all: the text is not of that language, or it moves nothing.
+pub fn missing_finding(program: &Program, left: &[Left], subject: &str) -> Option<FileFinding> {
+    let is_empty = program.targets.is_empty() && left.is_empty();
+    let text = "no target is found in the programs: look at --language, and whether the files are whole".to_owned();
+    let (code, weight, subject) = (Code::TargetsMissing, Weight::Gate, subject.to_owned());
+    is_empty.then(|| FileFinding { code, weight, subject, quantities: BTreeMap::new(), text })
+}
+
 /// Expected error of every corrected target with base and tool unknown, m.
 pub fn expected_errors(program: &Program, done: &Compensated, model: &FoundModel) -> Vec<Option<f64>> {
     let expected = |(target, outcome): (&crate::programs::Target, &TargetOutcome)| {

@@ -63,6 +63,7 @@ pub(super) fn tokens(file: &TextFile, dialect: Dialect) -> Result<Vec<Token>> {
         }
         let (kind, length) = match byte {
             b'\n' => (Some(TokenKind::LineEnd), 1),
+            b'\r' if rest.get(1) != Some(&b'\n') => (Some(TokenKind::LineEnd), 1),
             // Other control characters, and what is not ASCII (blanks of other widths, byte order marks), separate.
             b if b <= b' ' || b >= 0x7f => (None, 1),
             b if b.is_ascii_alphabetic() || matches!(b, b'_' | b'$') => {

@@ -53,10 +53,11 @@ fn trimmed(bytes: &[u8], range: Range<usize>) -> Range<usize> {
 fn rows(file: &TextFile) -> (Vec<Row>, u8) {
     let bytes = file.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&file.bytes);
     let mut start = file.bytes.len() - bytes.len();
-    let first = bytes.split(|b| *b == b'\n').next().unwrap_or_default();
+    let line_end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
+    let first = bytes.split(|b| *b == line_end).next().unwrap_or_default();
     let separator = [b',', b';', b'\t'].into_iter().find(|s| first.contains(s)).unwrap_or(b',');
     let mut out = Vec::new();
-    for (number, text) in (1..).zip(bytes.split(|b| *b == b'\n')) {
+    for (number, text) in (1..).zip(bytes.split(|b| *b == line_end)) {
         let end = start + text.len() - usize::from(text.ends_with(b"\r"));
         if !text.trim_ascii().is_empty() {
             out.push(Row { line: number, cells: cells(&file.bytes, start..end, separator), end });

@@ -10,6 +10,7 @@ mod said;
 mod changing;
 mod frames;
 mod frames_study;
+mod given;
 mod krl;
 mod loops;
 mod not_told;
