@@ -9,6 +9,7 @@ use clap::{Args, ValueEnum};
 
 use super::Verdict;
 use super::compensate_frames::{Choice, Side, Sides, known_error};
+use super::compensate_models::{equal, exchanged, not_given};
 use super::robot::noted_chain;
 use super::say::{say, say_line};
 use crate::diagnose::Weight;
@@ -17,7 +18,7 @@ use crate::files;
 use crate::geom::Pose;
 use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
-use crate::output::corrections::{self, TABLE};
+use crate::output::corrections::{self, FileFinding, TABLE};
 use crate::output::{ResultFolder, compensated};
 use crate::programs::program::MeantPosture;
 use crate::programs::{
@@ -194,7 +195,8 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     let done = programs::compensate(&program, models, &postures(args, &controller.chain, &axes)?);
     let left = done.left(&program);
     let expected = choice.expected(&sides, &framed, &program, &done)?;
-    let mut findings = corrections::nominal_findings(&program, &done);
+    let mut findings = model_findings(args, nominal, &models, &sides)?;
+    findings.extend(corrections::nominal_findings(&program, &done));
     findings.extend(corrections::displaced_finding(&program, &done));
     let subject = args.urdf.display().to_string();
     let meant = choice.meant();
@@ -229,6 +231,22 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     }
     say_line!("results   {} ({} files)", args.out.display(), written.len());
     Ok(if good { Verdict::Good } else { Verdict::GateFailed })
+}
+
+/// Whether the descriptions are those that were meant.
+fn model_findings(
+    args: &CompensateArgs,
+    nominal: &Path,
+    models: &Models<'_>,
+    sides: &Sides,
+) -> Result<Vec<FileFinding>> {
+    let mut findings = Vec::new();
+    findings.extend(models.frames.is_none().then(|| equal(models.from, sides)).flatten());
+    findings.extend(exchanged(models.controller, nominal, sides)?);
+    findings.extend(not_given(&sides.to, args.compensation.as_deref(), "--compensation"));
+    let taught = sides.from.as_ref();
+    findings.extend(taught.and_then(|from| not_given(from, args.from_compensation.as_deref(), "--from-compensation")));
+    Ok(findings)
 }
 
 /// The link of the chain on which `--base` is fixed, where it does not lie in the chain itself.

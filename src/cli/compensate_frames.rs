@@ -40,7 +40,7 @@ pub(super) enum Choice {
 const NOMINAL: &str = "nominal";
 
 /// Distance (m and rad) within which the origins of two descriptions are those of one robot.
-const SAME_ORIGIN: f64 = 1e-6;
+pub(super) const SAME_ORIGIN: f64 = 1e-6;
 
 /// Why a value is not known.
 type Known<T> = std::result::Result<T, String>;
@@ -213,7 +213,7 @@ fn framed(side: &Side, record: &FramesRecord, is_taught: bool) -> Result<Known<F
 }
 
 /// The solution from which a description came.
-fn solution(side: &Side, recorded: Option<&Path>) -> Result<Known<SolutionRecord>> {
+pub(super) fn solution(side: &Side, recorded: Option<&Path>) -> Result<Known<SolutionRecord>> {
     let beside = side.urdf.with_file_name(solution_json::FILE_NAME);
     let there = [Some(beside.as_path()), recorded].into_iter().flatten().find(|p| p.is_file());
     let Some(path) = side.solution.or(there) else {

@@ -10,6 +10,7 @@ mod choices;
 mod compare;
 mod compensate;
 mod compensate_frames;
+mod compensate_models;
 mod convert;
 mod convert_camera;
 mod detect;

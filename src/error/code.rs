@@ -235,6 +235,9 @@ codes! {
     Input "Corrected programs" {
         TargetsLeft "targets_left" "targets stay as they are; their reasons are counted",
         TargetsMissing "targets_missing" "no target is found in the programs",
+        ModelsEqual "models_equal" "both descriptions are of the same robot: nothing is corrected",
+        ModelsExchanged "models_exchanged" "the nominal description is the corrected one, and the other the nominal one",
+        CompensationNotGiven "compensation_not_given" "the compensation.toml beside a description is not used",
         NominalIsControllers "nominal_is_controllers" "the nominal model is the one in the controller",
         NominalDiffers "nominal_differs" "the nominal model is not the one in the controller",
         TaughtWithOtherFrames "taught_with_other_frames" "joints and poses were taught with another tool or base",

@@ -1,7 +1,19 @@
 //! What `compensate` says of files that are not what they should be: no targets, other line ends, other descriptions.
 
-use crate::programs_support::{Cell, Run, findings};
+use std::path::Path;
+use std::process::Command;
+
+use crate::programs_support::{Cell, Run, findings, repo};
 use robotcal::Code;
+
+/// `compensate` with these descriptions, base and tool nominal.
+fn compensate(cell: &Cell, file: &Path, nominal: &Path, urdf: &Path, flags: &[&str]) -> Run {
+    let out = cell.folder.path().join("out");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_robotcal"));
+    command.arg("compensate").arg(file).arg("--out").arg(&out).arg("--nominal").arg(nominal).arg("--urdf").arg(urdf);
+    command.args(["--frames", "nominal", "--base", "base_link", "--tip", "tool0"]);
+    Run { output: command.args(flags).output().unwrap(), out }
+}
 
 fn weight(run: &Run, code: Code) -> Option<String> {
     findings(run).get(code.name()).map(|(weight, _)| weight.clone())
@@ -45,5 +57,35 @@ fn line_ends_without_line_feed_are_line_ends() {
         let old_style = run(&text.replace('\n', "\r"));
         assert_eq!(old_style.replace('\r', "\n"), run(&text));
         assert_ne!(run(&text), text);
+    }
+}
+
+#[test]
+fn descriptions_that_correct_nothing_or_the_wrong_way_are_named() {
+    let mut cell = Cell::kuka(123);
+    let q: Vec<String> = cell.readings().iter().map(|v| format!("{v:.4}")).collect();
+    let table = format!("{}\n{}\n", cell.nominal.chain.readings.join(","), q.join(","));
+    let file = cell.write("t.csv", table.as_bytes());
+    let rad = ["--joint-unit", "rad", "--unordered"];
+    let (nominal, real) = (&cell.nominal_urdf, &cell.real_urdf);
+    let (solved, toml) = (repo("reports/kr6_small/kuka_kr6_r900.calibrated.urdf"), cell.compensation.to_str().unwrap());
+    for (nominal, urdf, flags, code) in [
+        (nominal, nominal, vec![], Some(Code::ModelsEqual)),
+        (real, real, vec![], Some(Code::ModelsEqual)),
+        (nominal, real, vec![], None),
+        (real, real, vec!["--compensation", toml], None),
+        (&solved, nominal, vec![], Some(Code::ModelsExchanged)),
+        (nominal, &solved, vec![], None),
+        // From one calibrated robot to another.
+        (&solved, real, vec![], None),
+    ] {
+        let run =
+            compensate(&cell, &file, nominal, urdf, &[&rad[..], &flags].concat()).expect(i32::from(code.is_some()));
+        for gate in [Code::ModelsEqual, Code::ModelsExchanged] {
+            assert_eq!(weight(&run, gate).is_some(), code == Some(gate), "{}", run.said());
+        }
+        let is_left_out = flags.is_empty() && urdf == real;
+        let note = is_left_out.then(|| "note".to_owned());
+        assert_eq!(weight(&run, Code::CompensationNotGiven), note, "{}", run.said());
     }
 }
