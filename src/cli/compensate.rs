@@ -193,6 +193,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
         beyond: [true, false].map(|taught| framed.as_ref().ok().and_then(|all| known_error(all, taught))),
     };
     let done = programs::compensate(&program, models, &postures(args, &controller.chain, &axes)?);
+    done.tell_what_moves(&mut program);
     let left = done.left(&program);
     let expected = choice.expected(&sides, &framed, &program, &done)?;
     let mut findings = model_findings(args, nominal, &models, &sides)?;

@@ -17,7 +17,7 @@ use super::posture::{Before, Finder, Known};
 use super::program::{
     Approach, DisplacedTarget, Left, PoseTarget, Program, Target, TargetKind, Understood, write_joints,
 };
-use super::reason::{LeftReason, Why};
+use super::reason::{DeclaredPoint, LeftReason, Why};
 use crate::geom::Pose;
 use crate::model::inverse::{self, Reach, Stalled};
 use crate::model::robot::Robot;
@@ -114,6 +114,22 @@ pub struct Compensated {
 }
 
 impl Compensated {
+    /// Says of computed targets with which corrected points they move.
+    pub fn tell_what_moves(&self, program: &mut Program) {
+        let corrected = |point: &&DeclaredPoint| {
+            let all = program.targets.iter().zip(&self.outcomes);
+            all.into_iter().any(|(t, outcome)| {
+                (t.file, t.line) == (point.file, point.line) && matches!(outcome, TargetOutcome::Done(_))
+            })
+        };
+        for Left { why, .. } in &mut program.left {
+            let names: Vec<&str> = why.starts_from.iter().filter(corrected).map(|point| &point.name[..]).collect();
+            if !names.is_empty() {
+                why.words += &format!("; it moves with {}, corrected for itself", names.join(" and "));
+            }
+        }
+    }
+
     /// All targets that stay as they are, those included that could not be read.
     pub fn left(&self, program: &Program) -> Vec<Left> {
         let visited = program.targets.iter().zip(&self.outcomes).filter(|(t, _)| t.visited);

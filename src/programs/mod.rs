@@ -38,6 +38,6 @@ pub use language::{Language, read};
 pub use measured_frames::{KnownError, MeasuredFrames, MeasuredTool, RobotFrames};
 pub use posture::Known;
 pub use program::{Left, Program, Target, TargetKind};
-pub use reason::{LeftReason, Why};
+pub use reason::{DeclaredPoint, LeftReason, Why};
 pub use setting::ProgramSetting;
 pub use text_file::TextFile;

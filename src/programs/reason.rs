@@ -71,19 +71,37 @@ pub struct Why {
     pub reason: LeftReason,
     /// Declared name that it is about, where it is about one.
     pub about: Option<String>,
+    /// Declared points from which a computed target starts: it moves with those that are corrected.
+    pub starts_from: Vec<DeclaredPoint>,
     /// The sentence.
     pub words: String,
+}
+
+/// A point by its declaration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeclaredPoint {
+    /// Its name.
+    pub name: String,
+    /// Index of the file.
+    pub file: usize,
+    /// Line, from 1.
+    pub line: usize,
 }
 
 impl Why {
     /// A reason with its sentence.
     pub(super) fn new(reason: LeftReason, words: impl Into<String>) -> Self {
-        Self { reason, about: None, words: words.into() }
+        Self { reason, about: None, starts_from: Vec::new(), words: words.into() }
     }
 
     /// A reason that is about a declared name.
     pub(super) fn of(name: &str, reason: LeftReason, words: impl Into<String>) -> Self {
         Self { about: Some(name.to_owned()), ..Self::new(reason, words) }
+    }
+
+    /// The same of a target that is computed from these points.
+    pub(super) fn starting_from(self, starts_from: Vec<DeclaredPoint>) -> Self {
+        Self { starts_from, ..self }
     }
 
     /// An external axis of which the description knows nothing stands elsewhere than at zero.

@@ -20,3 +20,4 @@ mod promise;
 mod rapid;
 mod rapid_statements;
 mod urscript;
+mod used;

@@ -4,6 +4,8 @@ mod aggregate;
 mod assigned;
 mod frames;
 mod motions;
+mod unvisited;
+mod uses;
 
 use std::collections::BTreeMap;
 
@@ -11,6 +13,7 @@ use aggregate::{Aggregate, index};
 use assigned::{Assigned, assigned, matching};
 use frames::{Active, FrameIs, Frames, OwnFrames};
 use motions::{MOVES, RELATIVE, posture_of};
+use uses::Uses;
 
 use super::ProgramSetting;
 use super::flow::{Branching, Flow, Places, settled};
@@ -49,6 +52,7 @@ fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>)
         prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
         values: BTreeMap::new(),
         assigned: Assigned::default(),
+        uses: Uses::default(),
         declared: Vec::new(),
         root: FrameIs::Unset,
         now: unset(),
@@ -59,6 +63,9 @@ fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>)
     let has_moves = |file: &TextFile| !file.name.to_ascii_lowercase().ends_with(".dat");
     for (index, file) in files.iter().enumerate() {
         module.assigned.look_through(Reader::new(file, index, DIALECT)?, !has_moves(file));
+        if has_moves(file) {
+            module.uses.look_through(Reader::new(file, index, DIALECT)?);
+        }
     }
     // Data first: programs use them in whatever order the files are given.
     for wanted in [false, true] {
@@ -95,6 +102,8 @@ struct Module<'a> {
     values: BTreeMap<String, Value>,
     /// What of them changes.
     assigned: Assigned,
+    /// What statements do with names beside going there.
+    uses: Uses,
     /// Positions declared in data files that are no data of the controller: name, file, line.
     declared: Vec<(String, usize, usize)>,
     /// `$ROBROOT`: the foot of the robot in the world, of which `$BASE` is a part.
@@ -394,7 +403,8 @@ impl Module<'_> {
                     self.way.lose();
                 }
                 if let Err(why) = self.visit(&value, name, (reader.index, line), &frames) {
-                    self.leave_at(reader.index, line, name, why);
+                    let points = self.points_in(&value, reader.index, line);
+                    self.leave_at(reader.index, line, name, why.starting_from(points));
                 }
                 if several {
                     self.way.lose();
@@ -498,6 +508,10 @@ impl Module<'_> {
 
     fn visit(&mut self, value: &Value, motion: &str, from: (usize, usize), frames: &Frames) -> Understood<()> {
         let (aggregate, name) = self.resolved(value)?;
+        if let Some(frame) = name.filter(|name| self.uses.is_frame(name)) {
+            let words = format!("{frame} is $BASE or $TOOL as well, of other targets; give it a position of its own");
+            return Err(Why::of(frame, LeftReason::FramesDiffer, words));
+        }
         let named = name.unwrap_or(motion).to_owned();
         let about = |why: Why| Why { about: name.map(str::to_owned).or(why.about.clone()), ..why };
         let mut kind = self.kind(aggregate, frames).map_err(about)?;
@@ -558,36 +572,5 @@ impl Module<'_> {
             displaced: None,
             joint_fields: vec![None; axes.len()],
         })))
-    }
-
-    /// Declared positions that no motion of the files goes to: by their own motion data (`XP1` with `FP1`), or by the flags.
-    fn unvisited(&mut self) {
-        for (name, file, line) in std::mem::take(&mut self.declared) {
-            let Some(Value::Aggregate(a)) = self.values.get(&name) else { continue };
-            let data = name.strip_prefix('X').and_then(|n| match self.values.get(&format!("F{n}")) {
-                Some(Value::Aggregate(data)) => self.data_frames(data),
-                _ => None,
-            });
-            let kind = self.kind(a, &data.unwrap_or_default());
-            if let Ok(kind) = &kind
-                && self.way.has(file, kind)
-            {
-                continue;
-            }
-            let program = &self.way.program;
-            let visited = program.targets.iter().any(|t| t.file == file && t.line == line && t.name == name);
-            // A motion that goes there said why it stays.
-            if visited || program.left.iter().any(|l| l.why.about.as_deref() == Some(&name)) {
-                continue;
-            }
-            let done = kind.map(|kind| {
-                let approach = Approach::Unknown;
-                self.way.declare(Target { file, line, name: name.clone(), approach, visited: true, kind });
-            });
-            if let Err(why) = done {
-                let words = format!("no motion of the files goes there, and {}", why.words);
-                self.leave_at(file, line, &name, Why::new(LeftReason::Unvisited, words));
-            }
-        }
     }
 }

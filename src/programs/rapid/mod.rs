@@ -20,7 +20,7 @@ use super::program::{
     Approach, DisplacedTarget, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target,
     TargetKind, Understood,
 };
-use super::reason::{LeftReason, Why};
+use super::reason::{DeclaredPoint, LeftReason, Why};
 use super::scan::{Dialect, Reader};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
@@ -235,10 +235,12 @@ impl Task<'_> {
         work: Option<&Node>,
     ) -> Understood<()> {
         let point = &displaced.point;
-        let by = displaced.by.clone().ok_or_else(|| {
-            Why::of(point, LeftReason::Computed, "its displacement is computed, not written in numbers")
-        })?;
         let (value, (file, line)) = self.declared(point)?;
+        let by = displaced.by.clone().ok_or_else(|| {
+            let words = "its displacement is computed, not written in numbers";
+            let declared = DeclaredPoint { name: point.clone(), file, line };
+            Why::of(point, LeftReason::Computed, words).starting_from(vec![declared])
+        })?;
         let base = self.kind(&value, file, tool, self.work(work))?;
         let base = self.with_posture(base, name);
         let place = (file, base.first_byte());

@@ -47,14 +47,14 @@ impl Task<'_> {
     /// What a declared target says to which no known move goes.
     fn unvisited_kind(&self, name: &str, value: &Node, file: usize) -> Understood<TargetKind> {
         let untold = || {
-            let words = "its work object is not named; give --work";
+            let words = "its work object is not named; give --work, and --tool where no tool is named either";
             self.setting.work.ok_or_else(|| Why::new(LeftReason::FrameUnknown, words))
         };
         let uses = self.uses.get(name).map(Vec::as_slice).unwrap_or_default();
         let mut found: Option<TargetKind> = None;
         for Use { by, does } in uses {
             let Does::Go { tool, work } = does else {
-                return Err(Why::new(LeftReason::NotATarget, format!("{by} computes with it")));
+                return Err(Why::new(LeftReason::NotATarget, format!("{by} depends on it")));
             };
             let base = work.as_ref().map_or_else(untold, |work| self.work(Some(work)));
             let kind = self.kind(value, file, tool.as_deref(), base)?;

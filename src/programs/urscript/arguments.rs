@@ -3,7 +3,7 @@
 use super::{Argument, Script, Value, Way, pose_of};
 use crate::error::Result;
 use crate::programs::program::MeantPosture;
-use crate::programs::reason::{LeftReason, Why};
+use crate::programs::reason::{DeclaredPoint, LeftReason, Why};
 use crate::programs::scan::TokenKind;
 
 /// Parameters of `get_inverse_kin`, in their order.
@@ -22,13 +22,14 @@ impl Script<'_> {
         let taught = self.taught();
         let value = self.argument()?;
         let keeps = way != Way::Joints || matches!(value, Value::Pose(..));
-        Ok(Argument { value, taught, posture: way.posture(), tool: self.active_tool(), keeps })
+        Ok(Argument { value, taught, posture: way.posture(), tool: self.active_tool(), points: Vec::new(), keeps })
     }
 
     /// The pose in `get_inverse_kin(..)`, on whose name the reader stands; it ends behind the bracket.
     fn inverse(&mut self) -> Result<Argument> {
         let (value, tool) = (Value::Expression, self.active_tool());
-        let mut found = Argument { value, taught: None, posture: MeantPosture::Nearest, tool, keeps: true };
+        let mut found =
+            Argument { value, taught: None, posture: MeantPosture::Nearest, tool, points: Vec::new(), keeps: true };
         let open = self.reader.at + 1;
         let Some(close) = self.reader.closing(open) else {
             self.reader.at = open;
@@ -49,6 +50,26 @@ impl Script<'_> {
         }
         self.reader.at = close + 1;
         Ok(found)
+    }
+
+    /// Variables with targets in the argument at which the reader stands.
+    pub(super) fn points_in_argument(&self, close: usize) -> Vec<DeclaredPoint> {
+        let mut depth = 0;
+        let mut points = Vec::new();
+        for token in (0..).map_while(|k| self.reader.ahead(k)).take(close - self.reader.at) {
+            match token.kind {
+                TokenKind::Mark(b'(' | b'[') => depth += 1,
+                TokenKind::Mark(b')' | b']') => depth -= 1,
+                TokenKind::Mark(b',') if depth == 0 => break,
+                _ => {}
+            }
+            let name = self.reader.text(token);
+            if let Some(Value::Joints(_, line) | Value::Pose(_, line)) = self.variables.get(name) {
+                let name = String::from_utf8_lossy(name).into_owned();
+                points.push(DeclaredPoint { name, file: self.reader.index, line: *line });
+            }
+        }
+        points
     }
 
     /// Where the arguments of `get_inverse_kin` begin; `None` for others than it has.

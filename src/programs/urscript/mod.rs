@@ -12,7 +12,7 @@ use super::itinerary::{Itinerary, Stands};
 use super::program::{
     Approach, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind, Understood,
 };
-use super::reason::{LeftReason, Why};
+use super::reason::{DeclaredPoint, LeftReason, Why};
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
@@ -76,6 +76,8 @@ struct Argument {
     posture: MeantPosture,
     /// The tool that is at a pose.
     tool: Understood<Pose>,
+    /// Points in variables that an expression names.
+    points: Vec<DeclaredPoint>,
     /// False where the move may change the posture to one that the text does not tell.
     keeps: bool,
 }
@@ -322,7 +324,8 @@ impl Script<'_> {
                     "complete the call",
                 ));
             }
-            let argument = self.target_argument(way)?;
+            let points = self.points_in_argument(close);
+            let argument = Argument { points, ..self.target_argument(way)? };
             self.visit(&name, line, argument)?;
             // To the next argument.
             while self.reader.at < close && !self.reader.take_mark(b',') {
@@ -449,7 +452,7 @@ impl Script<'_> {
                 let pose = self.pose(*fields, argument.posture, argument.tool?);
                 (TargetKind::Pose(Box::new(PoseTarget { taught: argument.taught, ..pose })), line)
             }
-            Value::Expression => return Err(Why::computed()),
+            Value::Expression => return Err(Why::computed().starting_from(argument.points)),
         };
         let file = self.reader.index;
         let target = Target { file, line, name: name.to_owned(), approach: Approach::Unknown, visited: true, kind };
