@@ -243,7 +243,10 @@ fn model_findings(
 ) -> Result<Vec<FileFinding>> {
     let mut findings = Vec::new();
     findings.extend(models.frames.is_none().then(|| equal(models.from, sides)).flatten());
-    findings.extend(exchanged(models.controller, nominal, sides)?);
+    // From a real robot to a nominal one is a retargeting as any other.
+    if sides.from.is_none() {
+        findings.extend(exchanged(models.controller, nominal, sides)?);
+    }
     findings.extend(not_given(&sides.to, args.compensation.as_deref(), "--compensation"));
     let taught = sides.from.as_ref();
     findings.extend(taught.and_then(|from| not_given(from, args.from_compensation.as_deref(), "--from-compensation")));
