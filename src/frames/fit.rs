@@ -57,6 +57,8 @@ pub struct FrameFit {
     pub factor: f64,
     /// Factor that what the touches say of the robot asks for on the covariance of the solution.
     pub robot_factor: f64,
+    /// Of the directions in which the touches say most of the robot the one in which it is farthest from the solution, in sigmas of that.
+    pub robot_sigmas: f64,
     /// One for each touch.
     pub judged: Vec<Judged>,
     /// RMS of the lengths of the residuals in use, m.
@@ -66,9 +68,10 @@ pub struct FrameFit {
 }
 
 impl FrameFit {
-    /// The larger of the factors: how far the touches contradict each other, or the solution.
-    pub fn contradiction(&self) -> f64 {
-        self.factor.max(self.robot_factor)
+    /// The largest of the factors: how far the touches contradict each other, or the solution, in all directions or in one.
+    pub fn contradiction(&self, limits: &Limits) -> f64 {
+        let in_one = self.robot_sigmas * limits.touch_factor / limits.sigmas_beyond_tolerance;
+        self.factor.max(self.robot_factor).max(in_one)
     }
 }
 
@@ -201,6 +204,16 @@ impl Solved {
         let z = self.step.rows(free, self.step.len() - free);
         let told = (0..z.len()).map(|k| 1.0 - self.inverse[(free + k, free + k)]).sum::<f64>();
         ((z.norm_squared() + STATED) / (told.max(0.0) + STATED)).sqrt()
+    }
+
+    /// `z` in the directions of `I - P_zz`, each in its own sigmas: the largest of those that the touches tell more of than the solution does.
+    fn robot_sigmas(&self, free: usize) -> f64 {
+        let n = self.step.len() - free;
+        let z = self.step.rows(free, n);
+        let told = DMatrix::identity(n, n) - self.inverse.view((free, free), (n, n));
+        let eigen = told.symmetric_eigen();
+        let of = |k: usize| eigen.eigenvectors.column(k).dot(&z).abs() / eigen.eigenvalues[k].sqrt();
+        (0..n).filter(|&k| eigen.eigenvalues[k] > 0.5).map(of).fold(0.0, f64::max)
     }
 }
 
@@ -370,6 +383,7 @@ impl Work<'_> {
             places: unknowns.places.clone(),
             factor,
             robot_factor: solved.robot_factor(columns.free.len()),
+            robot_sigmas: solved.robot_sigmas(columns.free.len()),
             rms_m: (used.iter().sum::<f64>() / used.len().max(1) as f64).sqrt(),
             judged,
         }

@@ -59,7 +59,7 @@ pub fn touch_mistake(
     given: &Given,
     (found, limits): (&FrameFit, &Limits),
 ) -> Option<Mistake> {
-    if found.contradiction() <= limits.touch_factor {
+    if found.contradiction(limits) <= limits.touch_factor {
         return None;
     }
     let fewest = limits.fewest_touches;
@@ -86,10 +86,12 @@ pub fn touch_mistake(
     let all: Vec<Undone> = kinds.into_iter().flat_map(|undone| nearest(robot, undone)).collect();
     let fitted = |undone: &Undone| fit(robot, &undone.touches, &undone.given, limits).ok();
     let explains = |fit: &FrameFit| {
-        fit.contradiction() < limits.mistake_explains * found.contradiction() && fit.rms_m < limits.touch_sigma_m
+        fit.contradiction(limits) < limits.mistake_explains * found.contradiction(limits)
+            && fit.rms_m < limits.touch_sigma_m
     };
     let tried = |undone: Undone| fitted(&undone).filter(explains).map(|fit| (fit, undone));
-    let (left, undone) = all.into_par_iter().filter_map(tried).min_by(|a, b| by_rank(rank(a), rank(b)))?;
+    let (left, undone) =
+        all.into_par_iter().filter_map(tried).min_by(|a, b| by_rank(rank(a, limits), rank(b, limits)))?;
     let frame = touches.frame.as_ref().map_or_else(String::new, |frame| format!(" in frame {frame}"));
     let (misfit, misfit_undone) = (found.rms_m, Some(left.rms_m));
     let kind = named(&undone, &left, touches);
@@ -105,9 +107,9 @@ fn nearest(robot: &KnownRobot, undone: Vec<Undone>) -> Vec<Undone> {
 }
 
 /// What leaves fewer touches out is better, then what takes no more unknowns, then what fits better.
-fn rank((fit, undone): &(FrameFit, Undone)) -> (usize, bool, f64) {
+fn rank((fit, undone): &(FrameFit, Undone), limits: &Limits) -> (usize, bool, f64) {
     let left_out = fit.judged.iter().filter(|j| j.left_out).count();
-    (left_out, !matches!(undone.what, What::Kind(_)), fit.contradiction())
+    (left_out, !matches!(undone.what, What::Kind(_)), fit.contradiction(limits))
 }
 
 fn by_rank(a: (usize, bool, f64), b: (usize, bool, f64)) -> Ordering {

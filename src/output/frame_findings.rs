@@ -61,13 +61,17 @@ pub fn frame_findings(
             text,
         ));
     }
-    if fit.robot_factor > limits.touch_factor {
+    let in_one = fit.robot_sigmas > limits.sigmas_beyond_tolerance;
+    if fit.robot_factor > limits.touch_factor || in_one {
+        let how_far = match in_one {
+            true => format!("what is {:.1} sigmas from the solution", fit.robot_sigmas),
+            false => format!("{:.1} times as much as the solution leaves open", fit.robot_factor),
+        };
         let text = format!(
-            "the touches say {:.1} times as much of the robot as the solution leaves open: another robot, tool or mastering than that of the solution{}",
-            fit.robot_factor,
+            "the touches say of the robot {how_far}: another robot, tool or mastering than that of the solution{}",
             if fit.tool_covariances[0].is_none() { ", or a tool that was given wrongly" } else { "" }
         );
-        let quantities = numbers([("factor", fit.robot_factor)]);
+        let quantities = numbers([("factor", fit.robot_factor), ("sigmas", fit.robot_sigmas)]);
         all.push(finding(Code::RobotContradicted, Weight::Gate, quantities, text));
     }
     let weak = |what: &str, covariance: &Matrix3<f64>, per_m: f64, unit: &str| {
