@@ -4,8 +4,7 @@
 //! a plain chessboard, from the pixels along the edges that the markers leave free.
 
 use calib_targets_aruco::MarkerDetection;
-use calib_targets_chessboard::{ChessCorner, detect_corners};
-use calib_targets_core::GrayImageView;
+use calib_targets_chessboard::detect_corners;
 
 use super::board_labels::{BoardSize, Lattice, Placement};
 use super::charuco_markers::{Print, decode, prints};
@@ -21,7 +20,7 @@ use crate::series::Plate;
 const KEEP_OFF_PX: f64 = 2.0;
 /// Markers that must be read where the dictionary is not stated, or where an outer line is not seen.
 const LEAST_MARKERS: usize = 4;
-/// Markers that prove a row below the last.
+/// Markers of the last row that prove a row below it.
 const FURTHER_MARKERS: usize = 2;
 /// Wrong bits of a marker that proves where the board lies.
 const SURE_BITS: u8 = 1;
@@ -85,7 +84,7 @@ struct Found {
     lattice: Lattice,
     /// Whether the markers alone say which corner is which, wherever the board seems to end.
     is_sure: bool,
-    /// Whether markers of a row below the last are seen.
+    /// Whether the board goes on below its last row.
     has_further_row: bool,
 }
 
@@ -114,8 +113,9 @@ fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least
         let lattice: Lattice =
             corners.filter_map(|c| Some((on_board(c.id)?, place(c.position.x, c.position.y)))).collect();
         let is_sure = are_sure(&found.markers, board);
+        let has_further_row = has_further_row(&found.markers, board, print.legacy);
         others.push((print.legacy, markers));
-        let found = Found { print: *print, markers, lattice, is_sure, has_further_row: false };
+        let found = Found { print: *print, markers, lattice, is_sure, has_further_row };
         if best.as_ref().is_none_or(|other| other.explains() < found.explains()) {
             best = Some(found);
         }
@@ -123,28 +123,29 @@ fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least
     if let Some(best) = &mut best {
         // The markers of a part of the board may fit into the other layout as well, moved by a column.
         best.is_sure &= others.iter().all(|(legacy, markers)| *legacy == best.print.legacy || *markers < best.markers);
-        best.has_further_row = best.is_sure && has_further_row(&scaled.view(), &corners, &best.print, board);
+        best.has_further_row &= best.is_sure;
     }
     Ok(best)
 }
 
-/// Whether a board with a row more explains markers of that row, too: the numbers of the others are the same on both.
-fn has_further_row(view: &GrayImageView<'_>, corners: &[ChessCorner], print: &Print, board: BoardSize) -> bool {
-    let larger = BoardSize { rows: board.rows + 1, ..board };
-    // The dictionary may end with the board.
-    let Ok(Some(found)) = decode(view, corners, print, larger) else { return false };
-    let squares = (board.columns + 1) * (board.rows + 1 + i32::from(print.legacy));
-    let is_further = |m: &&MarkerDetection| m.id >= squares.unsigned_abs() / 2 && m.hamming <= SURE_BITS;
-    found.markers.iter().filter(is_further).count() >= FURTHER_MARKERS
+/// Row of squares in which a marker lies, by its number.
+fn row_of(id: u32, board: BoardSize) -> u32 {
+    let squares = board.columns.unsigned_abs() + 1;
+    // The first row has one fewer, where they are odd.
+    2 * (id / squares) + u32::from(id % squares >= squares / 2)
+}
+
+/// Whether markers of the last row of squares are read: that takes the corners below them, and at the end of a board there are none.
+fn has_further_row(markers: &[MarkerDetection], board: BoardSize, legacy: bool) -> bool {
+    let last = board.rows.unsigned_abs() + u32::from(legacy);
+    let is_last = |m: &&MarkerDetection| m.hamming <= SURE_BITS && row_of(m.id, board) == last;
+    markers.iter().filter(is_last).count() >= FURTHER_MARKERS
 }
 
 /// Whether enough markers, in more than one row, say where the board lies: with twenty cells of 4 x 4 bits, one such place in 50 million boards
 /// is there by chance.
 fn are_sure(markers: &[MarkerDetection], board: BoardSize) -> bool {
-    let squares = board.columns.unsigned_abs() + 1;
-    // The first row has one fewer, where they are odd.
-    let row = |id: u32| 2 * (id / squares) + u32::from(id % squares >= squares / 2);
-    let rows: Vec<u32> = markers.iter().filter(|m| m.hamming <= SURE_BITS).map(|m| row(m.id)).collect();
+    let rows: Vec<u32> = markers.iter().filter(|m| m.hamming <= SURE_BITS).map(|m| row_of(m.id, board)).collect();
     rows.len() >= LEAST_MARKERS && rows.iter().any(|r| *r != rows[0])
 }
 
@@ -209,8 +210,7 @@ fn other_board(plate: &Plate, seen: &Seen) -> Error {
 }
 
 fn more_rows(plate: &Plate) -> Error {
-    let what =
-        format!("markers of a further row are seen below the {} rows of inner corners of the plate file", plate.rows);
+    let what = format!("the board goes on below the {} rows of inner corners of the plate file", plate.rows);
     let remedy = "correct rows of the plate file: columns and rows count inner corners (one less than squares)";
     Error::new(Code::PlateContradicted, "image", what, remedy)
 }

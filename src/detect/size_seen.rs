@@ -39,7 +39,10 @@ impl Counted {
 
 /// All four ends are in view; `seen` in any order.
 pub(super) fn other_size(counted: Counted, seen: [u32; 2], stated: [u32; 2]) -> Error {
-    let [columns, rows] = as_stated(seen, stated);
+    let [columns, rows] = match as_stated(seen, stated) {
+        exchanged if exchanged == stated => [stated[1], stated[0]],
+        other => other,
+    };
     let [stated_columns, stated_rows] = stated;
     let what = format!("{columns} x {rows} {} are seen, not {stated_columns} x {stated_rows}", counted.name());
     Error::new(Code::PlateContradicted, "image", what, format!("{CORRECT}{}", counted.rule()))

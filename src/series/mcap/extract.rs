@@ -106,7 +106,8 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     } else if image_delay_s.abs() > NOTABLE_DELAY_S {
         let sign = if image_delay_s < 0.0 { "earlier" } else { "later" };
         let what = format!("images arrive {:.3} s {sign} after their stamp than joint states", image_delay_s.abs());
-        let remedy = "check that camera and robot stamp by the same clock; a robot that stands is not affected";
+        let remedy =
+            "check that camera and robot stamp by the same clock; a robot that stands for longer is not affected";
         notices.push(Notice::new(Code::ImagesDelayed, recording.display(), what, remedy));
     }
     let (stops, reports) = taken.rows.into_values().unzip();
