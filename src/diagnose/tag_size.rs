@@ -97,9 +97,10 @@ impl Kind for TagsOff {
     fn seen(&self) -> String {
         let Self { larger, stated, .. } = self;
         format!(
-            "its tags are {:+.2} % larger beside their distance than the plate file says (side over pitch {:.4}, stated {stated:.4}): one of them \
+            "its tags are {:.2} % {} beside their distance than the plate file says (side over pitch {:.4}, stated {stated:.4}): one of them \
              is wrong, and the scale with it",
-            100.0 * larger,
+            100.0 * larger.abs(),
+            if *larger > 0.0 { "larger" } else { "smaller" },
             stated * (1.0 + larger)
         )
     }

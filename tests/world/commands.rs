@@ -429,7 +429,9 @@ fn tags_of_another_size_beside_their_distance_are_named() {
         std::fs::write(format!("{series}/plate.toml"), other).unwrap();
         let out = folder.path().join(spacing);
         let output = robotcal(&["poses", "--series", &series, "--out", out.to_str().unwrap()]);
-        assert_eq!(text(&output).contains(Code::TagsOff.name()), is_named, "{spacing}: {}", text(&output));
+        assert!(output.status.success(), "{}", text(&output));
+        let found = std::fs::read_to_string(out.join("poses.json")).unwrap();
+        assert_eq!(found.contains(Code::TagsOff.name()), is_named, "{spacing}: {}", text(&output));
     }
 }
 
