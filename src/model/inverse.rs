@@ -86,13 +86,13 @@ impl Reach<'_> {
     /// # Errors
     /// [`Stalled`] where the iteration does not get there within the limits.
     pub fn solve_from(&self, base_from_tip: &Pose, start: &[f64]) -> Result<Vec<f64>, Stalled> {
-        let (zeros, origins) = (vec![0.0; start.len()], self.robot.linear_origins());
+        let origins = self.robot.linear_origins();
         let mut q = start.to_vec();
         let mut last = f64::INFINITY;
         let mut error = Vector6::zeros();
         for _ in 0..STEPS {
-            let k = self.robot.kinematics_from(&origins, &self.stop(&q), &zeros);
-            error = (k.base_from_tip.inverse() * *base_from_tip).log();
+            let (reached, d_readings) = self.robot.tip_by_readings(&origins, &self.stop(&q));
+            error = (reached.inverse() * *base_from_tip).log();
             let size = error.norm();
             if size < TOLERANCE {
                 return Ok(q);
@@ -102,13 +102,13 @@ impl Reach<'_> {
             last = size;
             let free = |i: usize| !self.held.get(i).copied().unwrap_or(false);
             let mut normal = Matrix6::identity() * damping;
-            for (_, j) in k.d_readings.iter().enumerate().filter(|(i, _)| free(*i)) {
+            for (_, j) in d_readings.iter().enumerate().filter(|(i, _)| free(*i)) {
                 normal += j * j.transpose();
             }
             let Some(factor) = normal.cholesky() else { break };
             let weights: Vector6<f64> = factor.solve(&error);
             let step = |(i, j): (usize, &Vector6<f64>)| if free(i) { j.dot(&weights) } else { 0.0 };
-            let step: Vec<f64> = k.d_readings.iter().enumerate().map(step).collect();
+            let step: Vec<f64> = d_readings.iter().enumerate().map(step).collect();
             let longest = step.iter().fold(LONGEST_STEP, |m, s| m.max(s.abs()));
             for (i, (q, s)) in q.iter_mut().zip(&step).enumerate().filter(|(i, _)| free(*i)) {
                 let (low, high) = self.limits[i];

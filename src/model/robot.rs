@@ -107,23 +107,39 @@ impl Robot {
     /// As [`Robot::kinematics`], where the origins of this robot are at hand.
     pub fn kinematics_from(&self, origins: &LinearOrigins, stop: &Posture, noise: &[f64]) -> Kinematics {
         let (positions, bases) = self.positions(stop, noise);
-        let joints = &self.chain.joints;
-        let mut d_twists = vec![Matrix6::zeros(); joints.len()];
+        let mut d_twists = vec![Matrix6::zeros(); self.chain.joints.len()];
+        let (base_from_tip, d_readings) = self.inwards(origins, &positions, |i, rest_from_tip| {
+            d_twists[i] = adjoint(&rest_from_tip.inverse()) * origins.0[i].1;
+        });
+        let d_terms = self.terms.iter().zip(bases).map(|(t, basis)| d_readings[t.reading] * basis).collect();
+        Kinematics { base_from_tip, d_twists, d_readings, d_terms }
+    }
+
+    /// Of [`Robot::kinematics_from`] the pose of the tip and the derivatives by the readings alone, without noise.
+    pub fn tip_by_readings(&self, origins: &LinearOrigins, stop: &Posture) -> (Pose, Vec<Vector6<f64>>) {
+        let positions = self.positions(stop, &vec![0.0; stop.readings.len()]).0;
+        self.inwards(origins, &positions, |_, _| ())
+    }
+
+    /// From the tip inwards: its pose and the derivatives by the readings. `behind` is told of every joint what lies behind its origin.
+    fn inwards(
+        &self,
+        origins: &LinearOrigins,
+        positions: &[f64],
+        mut behind: impl FnMut(usize, &Pose),
+    ) -> (Pose, Vec<Vector6<f64>>) {
         let mut d_readings = vec![Vector6::zeros(); self.chain.readings.len()];
-        // From the tip inwards: `rest_from_tip` is what lies behind the point of perturbation.
         let mut rest_from_tip = Pose::identity();
-        for (i, joint) in joints.iter().enumerate().rev() {
+        for (i, joint) in self.chain.joints.iter().enumerate().rev() {
             if let Some(drive) = joint.drive {
                 let column = adjoint(&rest_from_tip.inverse()) * motion_twist(joint);
                 d_readings[drive.reading] += column * drive.multiplier;
             }
             rest_from_tip = joint.motion(positions[i]) * rest_from_tip;
-            let (origin, d_twist) = &origins.0[i];
-            d_twists[i] = adjoint(&rest_from_tip.inverse()) * d_twist;
-            rest_from_tip = origin * &rest_from_tip;
+            behind(i, &rest_from_tip);
+            rest_from_tip = origins.0[i].0 * rest_from_tip;
         }
-        let d_terms = self.terms.iter().zip(bases).map(|(t, basis)| d_readings[t.reading] * basis).collect();
-        Kinematics { base_from_tip: rest_from_tip, d_twists, d_readings, d_terms }
+        (rest_from_tip, d_readings)
     }
 
     /// Local error of every reading at a stop, rad or m.
