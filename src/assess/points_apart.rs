@@ -18,16 +18,16 @@ pub struct OddPoints {
     pub without: PointFit,
 }
 
-/// Points that are more than `set_aside_factor` times the median from where the others put them, with the fit of these: least squares over
-/// what is left, until it is the same. `None` where there is none, or more than a fifth.
+/// Points that are more than `set_aside_factor` times the median, and more than `displaced_m`, from where the others put them, with the fit of
+/// these: least squares over what is left, until it is the same. `None` where there is none, or more than a fifth.
 pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], limits: &Limits) -> Option<OddPoints> {
     let mut odd: Vec<usize> = Vec::new();
     loop {
         let kept: Vec<MeasuredPoint> =
             points.iter().enumerate().filter(|(k, _)| !odd.contains(k)).map(|(_, p)| p.clone()).collect();
         let without = fit_points(robot, &kept)?;
-        let bound =
-            limits.set_aside_factor * median(&without.residuals_m.iter().map(Vector3::norm).collect::<Vec<_>>())?;
+        let usual = median(&without.residuals_m.iter().map(Vector3::norm).collect::<Vec<_>>())?;
+        let bound = (limits.set_aside_factor * usual).max(limits.displaced_m);
         let off_m: Vec<f64> = points.iter().map(|p| without.residual_m(robot, p).norm()).collect();
         let found: Vec<usize> = (0..points.len()).filter(|k| off_m[*k] > bound).collect();
         if found.len() * limits.touches_for_one_left_out > points.len() {
@@ -54,8 +54,8 @@ pub struct DeviceMoved {
     pub rms_m: f64,
 }
 
-/// The device elsewhere from some point on, where that explains more than `displaced_share` of the squares of the residuals, and chance does
-/// not.
+/// The device elsewhere from some point on by more than `displaced_m`, where that explains more than `displaced_share` of the squares of the
+/// residuals, and chance does not.
 ///
 /// The fit is linear in a second frame: with `A` the derivatives by it of the points behind the step, what those by frame and reflector take
 /// up projected out, the squares fall by `g' J^-1 g`, `g = A' r`, `J = A' A`.
@@ -93,9 +93,7 @@ pub fn device_moved(robot: &Robot, points: &[MeasuredPoint], fit: &PointFit, lim
         return None;
     }
     let displaced: f64 = derivatives[first..].iter().map(|d| (d.fixed_columns::<6>(0) * change).norm_squared()).sum();
-    Some(DeviceMoved {
-        first,
-        by_m: (displaced / (points.len() - first) as f64).sqrt(),
-        rms_m: ((squares - fall).max(0.0) / points.len() as f64).sqrt(),
-    })
+    let by_m = (displaced / (points.len() - first) as f64).sqrt();
+    let rms_m = ((squares - fall).max(0.0) / points.len() as f64).sqrt();
+    (by_m > limits.displaced_m).then_some(DeviceMoved { first, by_m, rms_m })
 }

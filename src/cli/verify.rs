@@ -111,6 +111,10 @@ fn contradict((model, urdf): (&Judged, &Path), file: &Path, why: &str, remedy: &
 
 fn refuse_mistaken(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) -> Result<()> {
     let Judged { robot, points, fit } = model;
+    // Of few points everything explains everything.
+    if different(points) < limits.scatter_images || fit.rms_m < limits.displaced_m {
+        return Ok(());
+    }
     let Some((mistake, left_m)) = reading_mistake(robot, points, fit.rms_m, limits) else { return Ok(()) };
     let name = |reading: usize| &robot.chain.readings[reading];
     let undone = match mistake {

@@ -168,6 +168,8 @@ fn points_that_do_not_belong_together_or_are_few_are_no_good_verdict() {
     let good = points(&robot, 40, NOISE_M);
     assert_eq!(code(&good), Some(0));
     assert_eq!(code(&good[..5]), Some(1), "few");
+    // Three points fit by themselves, whatever sign their readings have.
+    assert_eq!(code(&good[..3]), Some(1), "three");
     let repeated: Vec<MeasuredPoint> = good[..5].iter().cycle().take(40).cloned().collect();
     assert_eq!(code(&repeated), Some(1), "the same few again and again");
     let mut moved = good.clone();

@@ -11,6 +11,9 @@ use super::tree::write_synced;
 use super::{journal, tree};
 use crate::error::{Code, Error, Result};
 
+/// What to do where work would be lost.
+const OTHER: &str = "choose another folder for the results";
+
 /// A folder that can be written, for as long as this lives; folders that were made for it go again when nothing was written.
 #[derive(Debug)]
 pub struct ResultFolder {
@@ -29,23 +32,22 @@ impl ResultFolder {
     /// A `dir` that is a file, holds something else than an earlier result, cannot be written, or belongs to another run.
     pub fn claim(dir: &Path, record: &str) -> Result<Self> {
         let place = Self::locked(dir)?;
-        let foreign = |what: String| {
-            let remedy = "choose another folder for the results, or empty this one";
-            Err(Error::new(Code::OutputForeign, place.target.display(), what, remedy))
-        };
+        let foreign =
+            |what: String, remedy: &str| Err(Error::new(Code::OutputForeign, place.target.display(), what, remedy));
         if !place.holds_something()? {
             return Ok(place);
         }
         if let Some(other) = tree::other_record(&place.target, record) {
-            return foreign(format!("holds {other}, the result of another command, which would be lost"));
+            return foreign(format!("holds {other}, the result of another command, which would be lost"), OTHER);
         }
         if tree::earlier_files(&place.target).is_none() {
-            return foreign("is not empty and holds no earlier result of this program".into());
+            let remedy = "choose another folder for the results, or empty this one";
+            return foreign("is not empty and holds no earlier result of this program".into(), remedy);
         }
         if let Some(used) = tree::used_since(&place.target) {
-            return foreign(format!(
-                "is in use: {used} was changed or put there since the earlier result, and would be lost"
-            ));
+            let what =
+                format!("is in use: {used} was changed or put there since the earlier result, and would be lost");
+            return foreign(what, OTHER);
         }
         Ok(place)
     }

@@ -15,6 +15,9 @@ use crate::series::InputFile;
 pub(super) const RECORDS: [&str; 4] =
     [solution_json::FILE_NAME, plan_files::FILE_NAME, detection_files::FILE_NAME, stand_alone_files::FILE_NAME];
 
+/// Records of results that can be completed to a series.
+const SERIES: [&str; 2] = [plan_files::FILE_NAME, detection_files::FILE_NAME];
+
 /// Where the images of a series lie.
 const IMAGES: &str = "images";
 
@@ -95,7 +98,8 @@ pub(super) fn used_since(target: &Path) -> Option<String> {
     };
     let listed: Vec<Listed> = RECORDS.into_iter().filter_map(read).collect();
     let changed = listed.iter().flat_map(|l| &l.as_written).find(is_other).map(|(file, _)| file.clone());
-    changed.or_else(|| target.join(IMAGES).exists().then(|| IMAGES.to_owned()))
+    let is_series = || SERIES.iter().any(|record| target.join(record).exists()) && target.join(IMAGES).exists();
+    changed.or_else(|| is_series().then(|| IMAGES.to_owned()))
 }
 
 /// Pictures of a detection whose record lists nothing but their folder, as the first version did.
