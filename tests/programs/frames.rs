@@ -550,4 +550,9 @@ fn usual_mistakes_in_touches_are_named() {
     let mistake = touch_mistake(&robot, &good, &given, (&found, &limits)).map(Finding::from);
     // 60 mm away, to what touches of 0.05 mm tell.
     is(mistake, Code::ToolContradicted, "59.9");
+    // 10 mm, of which the robot takes up what its tip is not known by.
+    let tool = Vector3::from(TOOL) + Vector3::new(0.0, 0.0, 0.01);
+    let near = fit(&robot, &good, &Given { tool: Some(Pose::new(Matrix3::identity(), tool)), plate: None }, &limits);
+    assert!(near.unwrap().robot_sigmas > limits.sigmas_beyond_tolerance);
+    assert!(fit(&robot, &good, &Given { tool: None, plate: None }, &limits).unwrap().robot_sigmas < 4.0);
 }

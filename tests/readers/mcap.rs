@@ -174,6 +174,38 @@ fn the_clock_of_recording_can_be_used_instead_of_stamps() {
     }
 }
 
+/// From the middle on by two seconds: a picture of the one time must not get the joints of the other.
+#[test]
+fn what_was_recorded_in_times_that_are_there_twice_is_left_out() {
+    let whole = fs::read(recording("lz4.mcap")).unwrap();
+    let messages: Vec<_> = mcap::MessageStream::new(&whole).unwrap().map(Result::unwrap).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set_back.mcap");
+    let mut writer = mcap::Writer::new(fs::File::create(&path).unwrap()).unwrap();
+    let half = messages.len() / 2;
+    for (k, mut message) in messages.into_iter().enumerate() {
+        message.log_time -= if k < half { 0 } else { 2_000_000_000 };
+        writer.write(&message).unwrap();
+    }
+    writer.finish().unwrap();
+    let (_images, extracted) = read(&path, &RecordingOptions { clock: Clock::Log, ..three() });
+    assert!(extracted.notices.iter().any(|n| n.code == Code::ClockSetBack), "{:?}", extracted.notices);
+    let stops = &extracted.stops.stops;
+    assert!((1..STOPS).contains(&stops.len()), "{} stops", stops.len());
+    for (stop, picture) in stops.iter().zip(pictures(&extracted)) {
+        let readings = stop.raw_readings.as_ref().unwrap();
+        let is_of = |k: &usize| readings.iter().zip(posture(*k)).all(|(q, wanted)| (q - wanted).abs() < 1e-12);
+        let k = (0..STOPS).find(is_of).unwrap_or_else(|| panic!("{readings:?} are of no stop"));
+        let grey = picture.to_luma8();
+        // The last one is a JPEG.
+        let misses = |(stop, shot): &(usize, usize)| -> u32 {
+            grey.enumerate_pixels().map(|(x, y, p)| u32::from(p[0]).abs_diff(count(*stop, *shot, x, y))).sum()
+        };
+        let shown = (0..STOPS).flat_map(|stop| [0, 4].map(|shot| (stop, shot))).min_by_key(misses);
+        assert_eq!(shown.map(|(stop, _)| stop), Some(k), "{}", stop.image);
+    }
+}
+
 #[test]
 fn a_robot_that_never_stands_is_refused_unless_asked_for() {
     let restless = RecordingOptions { least_still_s: 5.0, ..three() };

@@ -8,8 +8,8 @@ use crate::said::assert_says;
 use robotcal::Code;
 use robotcal::geom::Pose;
 use robotcal::series::{
-    CameraInfo, Edge, FramePoses, ImageMarks, ImageObservations, MarkKind, MarkLayer, Observation, RecordingContent,
-    RecordingOptions, Series, Source, convert_recording, extract, read, write_recording,
+    AngleUnit, CameraInfo, Edge, FramePoses, ImageMarks, ImageObservations, MarkKind, MarkLayer, Observation,
+    RecordingContent, RecordingOptions, Series, Source, convert_recording, extract, read, write_recording,
 };
 use robotcal::urdf::{Chain, RobotDescription};
 use tempfile::TempDir;
@@ -92,6 +92,21 @@ fn a_recording_and_the_folder_made_of_it_are_the_same_series() {
 
     let error = convert_recording(&path, &converted, &RecordingOptions::default()).unwrap_err();
     assert_eq!(error.code, Code::OutputExists, "{error}");
+}
+
+/// The manifest may be of the series in degrees that the recording was made of.
+#[test]
+fn joint_states_are_radians_though_the_manifest_beside_them_says_degrees() {
+    let folder = recorded("run.toml", &format!("{MANIFEST}joint_unit = \"deg\"\n"));
+    let path = folder.path().join("run.mcap");
+    let direct = with_stops(&path, &folder.path().join("pictures"));
+    assert_eq!(direct.joint_unit(), AngleUnit::Rad);
+    assert!(direct.notices.iter().any(|n| n.code == Code::RadiansAsDegrees), "{:?}", direct.notices);
+    let options = RecordingOptions { joints: chain().readings, ..RecordingOptions::default() };
+    let converted = folder.path().join("series");
+    let extracted = convert_recording(&path, &converted, &options).unwrap();
+    assert!(extracted.notices.iter().any(|n| n.code == Code::RadiansAsDegrees), "{:?}", extracted.notices);
+    assert_eq!(read(&converted).unwrap().joint_unit(), AngleUnit::Rad);
 }
 
 #[test]

@@ -398,6 +398,43 @@ fn poses_need_no_robot_and_no_joint_values() {
     assert_eq!(std::fs::read_to_string(Path::new(out).join("poses.csv")).unwrap(), poses);
 }
 
+#[test]
+fn a_series_of_two_placements_makes_no_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let series = folder.path().join("run");
+    std::fs::create_dir_all(series.join("images")).unwrap();
+    let dataset = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/kr6_small");
+    for name in ["series.toml", "plate.toml", "plate.csv", "images/img_000.png", "images/img_001.png"] {
+        std::fs::copy(dataset.join(name), series.join(name)).unwrap();
+    }
+    let joints = std::fs::read_to_string(dataset.join("joints.csv")).unwrap();
+    let rows: Vec<&str> = joints.lines().take(3).collect();
+    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    for (second, status) in [("a", 0), ("b", 2)] {
+        let placed: String =
+            rows.iter().zip(["placement", "a", second]).map(|(row, p)| format!("{row},{p}\n")).collect();
+        std::fs::write(series.join("joints.csv"), placed).unwrap();
+        let recording = folder.path().join(format!("{second}.mcap"));
+        let [from, to] = [&series, &recording].map(|path| path.to_str().unwrap());
+        let output = robotcal(&["convert", from, to, "--urdf", &urdf]);
+        assert_eq!(output.status.code(), Some(status), "{}", text(&output));
+        assert_eq!(recording.exists(), status == 0);
+    }
+}
+
+/// A camera that is given needs no other views.
+#[test]
+fn one_image_and_a_held_camera_give_a_pose() {
+    let folder = tempfile::tempdir().unwrap();
+    let [plate, image] = ["plate.toml", "images/img_000.png"].map(|name| root(&format!("datasets/kr6_small/{name}")));
+    let (camera, out) = (root("reports/kr6_small/camera.yaml"), folder.path().join("poses"));
+    let given = ["--camera-file", &camera, "--hold-camera"];
+    for (given, status) in [(&given[..], 0), (&[], 3)] {
+        let output = robotcal(&[&["poses", "--plate", &plate, &image, "--out", out.to_str().unwrap()], given].concat());
+        assert_eq!(output.status.code(), Some(status), "{}", text(&output));
+    }
+}
+
 /// The scale hangs on both, and nothing else says that one of them is wrong.
 #[test]
 fn tags_of_another_size_beside_their_distance_are_named() {
