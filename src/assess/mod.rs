@@ -43,7 +43,7 @@ pub use in_base::sigma_in_base;
 pub use limits::Limits;
 pub use near_nominal::{extrapolation_m, restraint};
 pub use pattern_effect::PatternEffect;
-pub use patterns::{Bearer, Pattern, PatternTest, cause, patterns};
+pub use patterns::{Bearer, Pattern, PatternTest, camera_shows_pattern, cause, patterns};
 pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
 pub use points_apart::{DeviceMoved, OddPoints, device_moved, odd_points};
 pub use points_mistaken::{ReadingMistake, reading_mistake};

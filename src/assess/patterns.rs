@@ -13,7 +13,7 @@ use crate::fit::Fit;
 use crate::linalg::symmetric_eigen;
 use crate::model::camera::Lens;
 use crate::problem::{Adjustment, Equations, PlateShape, Step};
-use crate::solve::{LinearImage, Response, Singular};
+use crate::solve::{LinearImage, LinearProblem, Response, Singular};
 
 /// Share of the information of a scaled direction below which the fit absorbs it.
 const ABSORBED: f64 = 1e-8;
@@ -143,18 +143,14 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
         return Ok(Vec::new());
     }
     let groups = groups(fit);
-    let count = groups.iter().map(|g| g.pattern.columns()).sum();
-    let response = linear.response(count, |image, equations| columns(fit, &groups, image, equations, count))?;
+    let response = response(linear, &groups)?;
     let effects = Effects::of(fit, limits);
     let (n, squares) = (response.equations as f64, response.squares);
     let points: usize = linear.images().map(|i| i.terms.residuals.len()).sum();
     let sum: f64 = linear.images().flat_map(|i| i.terms.residuals.iter()).map(|r| r.duv.norm_squared()).sum();
     let rms_px = (sum / points.max(1) as f64).sqrt();
     let of_group = |g: &Group| {
-        let (y, statistic, degrees) = solved(&response, g.first, g.pattern.columns());
-        // One step from a large fault may take more than there is.
-        let taken = (statistic / squares).min(1.0 - f64::EPSILON);
-        let statistic = taken * (squares - degrees as f64).max(1.0) / (1.0 - taken);
+        let (y, statistic, degrees) = solved(&response, g);
         let share = statistic / (statistic + squares);
         let step = combined(&response.steps[g.first..g.first + y.len()], &y)?;
         let shift = |plate: usize, marker: usize| match g.bearer {
@@ -183,6 +179,23 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
     Ok(tests)
 }
 
+/// True where the residuals of a camera show a pattern over image or depth that noise does not leave, near an optimum; false without images.
+///
+/// # Errors
+/// Normal equations that are singular.
+pub fn camera_shows_pattern(linear: LinearProblem, camera: usize, limits: &Limits) -> Result<bool, Singular> {
+    if linear.images().len() == 0 {
+        return Ok(false);
+    }
+    let groups = placed(Pattern::OF_CAMERA.into_iter().map(|p| (p, Bearer::Camera(camera))));
+    let response = response(linear, &groups)?;
+    let is_found = |g: &Group| {
+        let (_, statistic, degrees) = solved(&response, g);
+        deviate(statistic, degrees) > limits.pattern_sigmas
+    };
+    Ok(groups.iter().any(is_found))
+}
+
 /// The pattern that names the cause: of those beyond chance that which gains most, or the simplest that removes nearly as much of the squares
 /// of the residuals (what is of second order in a large fault belongs to no first-order column, and many columns take more of it).
 pub fn cause<'a>(tests: &'a [PatternTest], limits: &Limits) -> Option<&'a PatternTest> {
@@ -199,19 +212,24 @@ pub fn cause<'a>(tests: &'a [PatternTest], limits: &Limits) -> Option<&'a Patter
 }
 
 fn groups(fit: &Adjustment) -> Vec<Group> {
-    let mut all: Vec<Group> = Vec::new();
-    let mut first = 0;
-    let mut add = |pattern: Pattern, bearer: Bearer| {
-        all.push(Group { pattern, bearer, first });
-        first += pattern.columns();
+    let of_cameras = (0..fit.problem.cameras.len()).flat_map(|k| Pattern::OF_CAMERA.map(|p| (p, Bearer::Camera(k))));
+    let of_plates = (0..fit.problem.plates.len()).flat_map(|k| Pattern::OF_PLATE.map(|p| (p, Bearer::Plate(k))));
+    placed(of_cameras.chain(of_plates))
+}
+
+fn placed(patterns: impl Iterator<Item = (Pattern, Bearer)>) -> Vec<Group> {
+    let mut next = 0;
+    let place = |(pattern, bearer): (Pattern, Bearer)| {
+        let first = next;
+        next += pattern.columns();
+        Group { pattern, bearer, first }
     };
-    for k in 0..fit.problem.cameras.len() {
-        Pattern::OF_CAMERA.into_iter().for_each(|p| add(p, Bearer::Camera(k)));
-    }
-    for k in 0..fit.problem.plates.len() {
-        Pattern::OF_PLATE.into_iter().for_each(|p| add(p, Bearer::Plate(k)));
-    }
-    all
+    patterns.map(place).collect()
+}
+
+fn response(linear: LinearProblem, groups: &[Group]) -> Result<Response, Singular> {
+    let count = groups.iter().map(|g| g.pattern.columns()).sum();
+    linear.response(count, |image, equations| columns(linear.adjustment, groups, image, equations, count))
 }
 
 /// Columns of an image, whitened, equations x columns.
@@ -302,8 +320,9 @@ fn polynomials(at: &Vector2<f64>, [low, high]: [usize; 2]) -> Vec<f64> {
     (low..=high).flat_map(|d| (0..=d).map(move |i| (i, d - i))).map(|(i, k)| x[i] * y[k]).collect()
 }
 
-/// `y = M^-1 s`, `s' M^-1 s` and the number of directions that the rest of the fit does not absorb.
-fn solved(response: &Response, first: usize, count: usize) -> (DVector<f64>, f64, usize) {
+/// `y = M^-1 s`, the statistic `F` and the number of directions that the rest of the fit does not absorb.
+fn solved(response: &Response, group: &Group) -> (DVector<f64>, f64, usize) {
+    let (first, count) = (group.first, group.pattern.columns());
     let scale = response.by_itself.rows(first, count).map(|d| if d > 0.0 { d.sqrt().recip() } else { 0.0 });
     let m = response.information.view((first, first), (count, count));
     let scaled = DMatrix::from_fn(count, count, |i, k| m[(i, k)] * scale[i] * scale[k]);
@@ -318,6 +337,9 @@ fn solved(response: &Response, first: usize, count: usize) -> (DVector<f64>, f64
         statistic += along * along / value;
         degrees += 1;
     }
+    // One step from a large fault may take more than there is.
+    let taken = (statistic / response.squares).min(1.0 - f64::EPSILON);
+    let statistic = taken * (response.squares - degrees as f64).max(1.0) / (1.0 - taken);
     (y.component_mul(&scale), statistic, degrees)
 }
 

@@ -11,7 +11,7 @@ use crate::problem::{KnownCamera, LensChoice, MeasuredSeries};
 /// Flags of cameras.
 #[derive(Debug, Args)]
 pub(super) struct CameraArgs {
-    /// Lens: auto (the simplest of all that none beats decisively), brown, fisheye, parallax, rational, thin_prism, brown+field or fisheye+field [default: as in series.toml, else of those that camera.yaml can express]
+    /// Lens: brown, fisheye, parallax, rational, thin_prism, brown+field, fisheye+field; auto: the simplest of all that none beats decisively; ros: of those that camera.yaml can express [default: as in series.toml, else auto]
     #[arg(long, value_name = "LENS", help_heading = "What is estimated")]
     camera: Option<String>,
     /// Camera to start from, in a file of OpenCV, Kalibr, mrcal or ROS; of several cameras NAME=FILE for each
@@ -30,6 +30,7 @@ impl CameraArgs {
     pub fn apply(&self, series: &mut [MeasuredSeries]) -> Result<Vec<Notice>> {
         match self.camera.as_deref() {
             Some("auto") => series.iter_mut().for_each(|s| s.lens_choice = LensChoice::All),
+            Some("ros") => series.iter_mut().for_each(|s| s.lens_choice = LensChoice::Exported),
             Some(name) => {
                 let lens = super::simulate::lens(name)?;
                 series.iter_mut().for_each(|s| (s.lens, s.lens_choice) = (lens, LensChoice::Settled));

@@ -33,7 +33,16 @@ const FARTHEST_M: f64 = 0.05;
 struct Judged {
     robot: Robot,
     points: Vec<MeasuredPoint>,
+    /// For every point the number of its readings.
+    clusters: Vec<usize>,
     fit: PointFit,
+}
+
+impl Judged {
+    /// Number of points at different readings.
+    fn different(&self) -> usize {
+        self.clusters.iter().max().map_or(0, |last| last + 1)
+    }
 }
 
 fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
@@ -61,12 +70,12 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
         ),
         None => odd_points(&model.robot, &model.points, limits).iter().for_each(say_odd),
     }
+    let different = model.different();
     let verdict = match (moved, &nominal) {
         (Some(_), _) => Err("the points do not belong together".to_owned()),
-        _ if different(&model.points) < limits.scatter_images => Err(format!(
-            "{} different points, of which frame and reflector take up nine of {} values: measure {} or more",
-            different(&model.points),
-            3 * different(&model.points),
+        _ if different < limits.scatter_images => Err(format!(
+            "{different} different points, of which frame and reflector take up nine of {} values: measure {} or more",
+            3 * different,
             limits.scatter_images
         )),
         (None, Some(nominal)) => gain(&model, nominal, limits),
@@ -100,7 +109,7 @@ fn judged(
             "measure at least 10 points that differ in position and in hand orientation",
         )
     })?;
-    Ok(Judged { robot, points, fit })
+    Ok(Judged { robot, clusters: clusters(&points), points, fit })
 }
 
 fn contradict((model, urdf): (&Judged, &Path), file: &Path, why: &str, remedy: &str) -> Error {
@@ -110,9 +119,9 @@ fn contradict((model, urdf): (&Judged, &Path), file: &Path, why: &str, remedy: &
 }
 
 fn refuse_mistaken(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) -> Result<()> {
-    let Judged { robot, points, fit } = model;
+    let Judged { robot, points, fit, .. } = model;
     // Of few points everything explains everything.
-    if different(points) < limits.scatter_images || fit.rms_m < limits.displaced_m {
+    if model.different() < limits.scatter_images || fit.rms_m < limits.displaced_m {
         return Ok(());
     }
     let Some((mistake, left_m)) = reading_mistake(robot, points, fit.rms_m, limits) else { return Ok(()) };
@@ -149,11 +158,6 @@ fn say_odd(OddPoints { points, off_m, without }: &OddPoints) {
     );
 }
 
-/// Number of points at different readings.
-fn different(points: &[MeasuredPoint]) -> usize {
-    clusters(points).into_iter().max().map_or(0, |last| last + 1)
-}
-
 /// For every point the number of its readings.
 fn clusters(points: &[MeasuredPoint]) -> Vec<usize> {
     let mut known: HashMap<Vec<u64>, usize> = HashMap::new();
@@ -169,10 +173,9 @@ fn clusters(points: &[MeasuredPoint]) -> Vec<usize> {
 
 /// What is gained over the nominal robot; why nothing, where the points do not tell it.
 fn gain(model: &Judged, nominal: &Judged, limits: &Limits) -> std::result::Result<String, String> {
-    let clusters = clusters(&model.points);
     let units = |judged: &Judged| {
         let squares: Vec<(f64, f64)> = judged.fit.residuals_m.iter().map(|r| (r.norm_squared(), 1.0)).collect();
-        by_cluster(&clusters, &squares)
+        by_cluster(&model.clusters, &squares)
     };
     let Some(Ratio { value, low, high }) = bootstrap_ratio(&units(model), &units(nominal)) else {
         return Err("the nominal model leaves nothing".into());

@@ -28,10 +28,7 @@ pub fn residual_pattern(fit: &Fit, limits: &Limits) -> Option<ResidualPattern> {
     let found = cause(&tests, limits)?.clone();
     let bearer = match found.bearer {
         Bearer::Camera(k) => fit.problem.cameras.get(k)?.clone(),
-        Bearer::Plate(k) => match fit.problem.plates.len() {
-            1 => "plate".to_owned(),
-            _ => format!("plate {}", k + 1),
-        },
+        Bearer::Plate(k) => fit.problem.plate_name(k),
     };
     let matters = found.moved.is_some_and(|m| m.sigmas() > limits.pattern_moves);
     let is_fitted = matches!(found.bearer, Bearer::Camera(k) if found.pattern.is_fitted(fit, k));

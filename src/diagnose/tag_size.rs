@@ -9,7 +9,7 @@ use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
 use crate::fit::Fit;
-use crate::problem::{Adjustment, Problem, seen_markers};
+use crate::problem::{Adjustment, seen_markers};
 
 /// The tags of a plate are larger or smaller beside their distance than the plate file says.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,17 +60,10 @@ fn of_plate(Adjustment { problem, state }: &Adjustment, plate: usize, limits: &L
     let larger = b - a;
     // One tag has no distance: nothing is to be compared, and the numbers are not finite.
     (larger.abs() > limits.sigmas_beyond_tolerance * sigma).then(|| TagsOff {
-        plate: name(problem, plate),
+        plate: problem.plate_name(plate),
         larger,
         stated: tags.side_m / (tags.side_m + tags.gap_m),
     })
-}
-
-fn name(problem: &Problem, plate: usize) -> String {
-    match problem.plates.len() {
-        1 => "plate".to_owned(),
-        _ => format!("plate {}", plate + 1),
-    }
 }
 
 impl Kind for TagsOff {

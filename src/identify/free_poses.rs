@@ -13,8 +13,8 @@ use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
 use crate::model::camera::Camera;
 use crate::model::robot::Robot;
 use crate::problem::{
-    Adjustment, Image, ImageRejection, Layout, Mark, MarkerObservation, MeasuredSeries, ObservationRejection, Problem,
-    State, Tie, Weighting, size_by_distance,
+    Adjustment, Family, Image, ImageRejection, Layout, Mark, MarkerObservation, MeasuredSeries, ObservationRejection,
+    Problem, State, Tie, Weighting, size_by_distance,
 };
 use crate::solve::{
     ComponentOptions, Elimination, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status,
@@ -42,7 +42,7 @@ pub(super) struct FreeStart {
     ties: Vec<Tie>,
     images: Vec<LeftOut>,
     marker_factor: Vec<f64>,
-    family_factor: Vec<f64>,
+    families: Vec<Family>,
 }
 
 /// What was left out of an image.
@@ -65,7 +65,7 @@ impl FreeStart {
             ties: state.ties.clone(),
             images: problem.images.iter().map(left_out).collect(),
             marker_factor: problem.noise.marker.clone(),
-            family_factor: problem.families.iter().map(|f| f.factor).collect(),
+            families: problem.families.clone(),
         }
     }
 
@@ -80,8 +80,35 @@ impl FreeStart {
         }
         problem.noise.pixel_factor.clone_from(&self.free.pixel_factor);
         problem.noise.marker.clone_from(&self.marker_factor);
-        problem.families.iter_mut().zip(&self.family_factor).for_each(|(f, factor)| f.factor = *factor);
+        problem.families.iter_mut().for_each(|f| f.take_factor(&self.families));
         problem.families.iter().for_each(|f| f.hold(&mut problem.layout));
+    }
+
+    /// True for poses by the lenses of a state.
+    pub fn has_lenses_of(&self, state: &State) -> bool {
+        self.free.state.cameras.iter().map(|c| c.lens).eq(state.cameras.iter().map(|c| c.lens))
+    }
+
+    /// The free-pose adjustment with the lenses of an adjustment that was solved `near` this one, from these poses; `adjustment` is left where it ends.
+    ///
+    /// # Errors
+    /// As of [`adjust_free_poses`].
+    pub fn with_lenses_of(
+        self,
+        near: &Adjustment,
+        adjustment: Adjustment,
+        limits: &Limits,
+    ) -> Result<(Adjustment, Self)> {
+        let mut adjustment = adjustment;
+        self.carry_to(&mut adjustment);
+        let Adjustment { problem, state } = &mut adjustment;
+        state.cameras.clone_from(&near.state.cameras);
+        problem.noise.pixel_factor.clone_from(&near.problem.noise.pixel_factor);
+        problem.families.iter_mut().for_each(|f| f.take_factor(&near.problem.families));
+        problem.families.iter().for_each(|f| f.hold(&mut problem.layout));
+        let (adjustment, free) = of_images_alone(adjustment, limits, |_| Ok(()))?;
+        let start = Self::of(&adjustment, free, self.verdicts);
+        Ok((adjustment, start))
     }
 }
 
@@ -106,25 +133,38 @@ pub(super) fn free_poses_of(
 /// # Errors
 /// When no image shows enough markers, when the plate is mirrored, when no start converges or the focal length is not determined.
 pub fn adjust_free_poses(
-    mut adjustment: Adjustment,
+    adjustment: Adjustment,
     starts: &[CameraStart],
     limits: &Limits,
 ) -> Result<(Adjustment, FreePoses, Vec<StartVerdict>)> {
+    let mut verdicts = Vec::new();
+    let (adjustment, free) = of_images_alone(adjustment, limits, |adjustment| {
+        let homographies = fit_homographies(adjustment)?;
+        for (camera, start) in starts.iter().enumerate() {
+            adjustment.state = start_camera(adjustment, camera, &homographies, start, &mut verdicts)?;
+        }
+        Ok(())
+    })?;
+    Ok((adjustment, free, verdicts))
+}
+
+/// Adjusts cameras, plates and poses from where `start` brings them; the robot and what was measured of bodies take no part.
+fn of_images_alone(
+    mut adjustment: Adjustment,
+    limits: &Limits,
+    start: impl FnOnce(&mut Adjustment) -> Result<()>,
+) -> Result<(Adjustment, FreePoses)> {
     let _stage = stage("free poses");
     let bodies = adjustment.problem.take_bodies();
     let free_before: Vec<bool> = adjustment.problem.layout.columns.iter().map(|c| c.free).collect();
     adjustment.hold_poses();
-    let homographies = fit_homographies(&mut adjustment)?;
-    let mut verdicts = Vec::new();
-    for (camera, start) in starts.iter().enumerate() {
-        adjustment.state = start_camera(&adjustment, camera, &homographies, start, &mut verdicts)?;
-    }
+    start(&mut adjustment)?;
     let (mut adjustment, free) = finish(adjustment, limits)?;
     for (column, free) in adjustment.problem.layout.columns.iter_mut().zip(free_before) {
         column.free = free;
     }
     adjustment.problem.put_bodies(bodies);
-    Ok((adjustment, free, verdicts))
+    Ok((adjustment, free))
 }
 
 fn fit_homographies(Adjustment { problem, state }: &mut Adjustment) -> Result<Vec<Option<Homography>>> {

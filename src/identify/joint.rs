@@ -47,7 +47,7 @@ pub(super) struct JointFit {
 }
 
 /// Fits one robot model jointly. Of the same series with another robot model, the free-pose adjustment, in which the robot takes no part, and an
-/// adjustment near the end may be `known`.
+/// adjustment near the end may be `known`; with other lenses both.
 ///
 /// # Errors
 /// As of [`super::identify`].
@@ -69,10 +69,17 @@ pub(super) fn fit_model(
     }
     let (known, near) = known.map_or((None, None), |(start, near)| (Some(start), near));
     let left = match known {
-        Some(known) => {
-            known.carry_to(&mut start);
-            known
-        }
+        Some(known) => match near.as_ref().filter(|_| !known.has_lenses_of(&start.state)) {
+            Some(near) => {
+                let (adjusted, left) = known.with_lenses_of(near, start, &options.limits)?;
+                start = adjusted;
+                left
+            }
+            None => {
+                known.carry_to(&mut start);
+                known
+            }
+        },
         None if problem.images.is_empty() => FreeStart::of(&start, FreePoses::none(start.state.clone()), Vec::new()),
         None => {
             let stated = camera_starts(&problem.cameras, series);

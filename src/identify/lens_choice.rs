@@ -7,14 +7,14 @@ use super::free_poses::free_poses_of;
 use super::joint::{JointFit, fit_model};
 use super::options::Options;
 use super::solution::{LensEvidence, Solution};
-use crate::assess::Limits;
+use crate::assess::{Limits, camera_shows_pattern};
 use crate::diagnose::LensNotInRos;
 use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{FreePoses, log_evidence};
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
-use crate::problem::{Adjustment, LensChoice, MeasuredSeries, Problem, predict};
-use crate::solve::{ComponentOptions, LinearProblem, Settings, Status, estimate_components, side_by_side};
+use crate::problem::{Adjustment, Family, LensChoice, MeasuredSeries, Problem, predict};
+use crate::solve::{ComponentOptions, LinearProblem, Outcome, Settings, Status, estimate_components, side_by_side};
 use crate::stage::stage;
 use crate::urdf::Chain;
 
@@ -56,15 +56,18 @@ pub(super) fn with_lenses(chain: &Chain, series: &[MeasuredSeries], options: &Op
         Ok(fit) => (fit, Vec::new()),
         Err(error) => by_hold_out(chain, &mut series, &open, options).ok_or(error)?,
     };
-    let lenses: Vec<LensEvidence> =
-        open.iter().flat_map(|(camera, choice)| compare_lenses(&fit, camera, *choice, &options.limits)).collect();
-    let mut better = series.clone();
-    for chosen in lenses.iter().filter(|l| l.taken) {
-        better.iter_mut().filter(|s| s.camera == chosen.camera).for_each(|s| s.lens = chosen.lens);
+    let mut near: Option<Adjustment> = None;
+    let mut lenses = Vec::new();
+    for (camera, choice) in &open {
+        let (told, better) = compare_lenses(&fit, camera, *choice, &options.limits);
+        lenses.extend(told);
+        if let Some(better) = better {
+            series.iter_mut().filter(|s| s.camera == *camera).for_each(|s| s.lens = better.lens());
+            near = Some(better.in_place_of(near.as_ref().unwrap_or(&fit.fit.adjustment)));
+        }
     }
-    if better.iter().zip(&series).any(|(a, b)| a.lens != b.lens) {
-        fit = fit_model(chain.clone(), &better, options, None)?;
-        series = better;
+    if near.is_some() {
+        fit = fit_model(chain.clone(), &series, options, Some((fit.start, near)))?;
     }
     Ok(Lensed { fit, series, lenses, notices })
 }
@@ -96,45 +99,94 @@ fn by_hold_out(
     Some((fit, notices))
 }
 
-/// Evidence of every lens formula for a camera, from the fit with its present one.
-fn compare_lenses(joint: &JointFit, camera: &str, choice: LensChoice, limits: &Limits) -> Vec<LensEvidence> {
+/// Evidence of the lenses for a camera, from the fit with its present one, and another one where that is better; of the present one alone, where its
+/// residuals show no pattern.
+fn compare_lenses(
+    joint: &JointFit,
+    camera: &str,
+    choice: LensChoice,
+    limits: &Limits,
+) -> (Vec<LensEvidence>, Option<BetterLens>) {
     let _stage = stage("evidence of lenses");
     let fit = &joint.fit;
-    let Some(k) = fit.problem.cameras.iter().position(|c| c == camera) else { return Vec::new() };
+    let Some(k) = fit.problem.cameras.iter().position(|c| c == camera) else { return (Vec::new(), None) };
+    let some = fit.adjustment.some_stops(MANY_STOPS, SOME_STOPS).map(|some| settled(some, ROUNDS));
+    let Some(present) = some.as_ref().map_or(Some(fit.linear()), converged) else { return (Vec::new(), None) };
+    let lens = present.adjustment.state.cameras[k].lens;
     let is_wide = fit.state.cameras[k].corner() > limits.fisheye_tangent;
     let depths = depths_m(&fit.problem, &joint.start.free)[k];
-    let formulas = Lens::ALL.into_iter().filter(|l| choice.has(*l) && (l.formula() != Lens::Fisheye || is_wide));
-    let formulas: Vec<Lens> = formulas.collect();
-    let some = fit.adjustment.some_stops(MANY_STOPS, SOME_STOPS);
-    let found = side_by_side(&fit.problem, &formulas, |_, lens| match (&some, fit.state.cameras[k].lens == *lens) {
-        (None, true) => told(fit.linear(), k),
-        (None, false) => evidence(&fit.adjustment, (k, &depths), *lens),
-        (Some(some), _) => evidence(some, (k, &depths), *lens),
+    let is_asked = |l: &Lens| *l == lens || (choice.has(*l) && (l.formula() != Lens::Fisheye || is_wide));
+    let lenses: Vec<Lens> = match camera_shows_pattern(present, k, limits) {
+        Ok(false) => vec![lens],
+        _ => Lens::ALL.into_iter().filter(is_asked).collect(),
+    };
+    let found = side_by_side(&fit.problem, &lenses, |_, next| match *next == lens {
+        true => told(present, k).map(|told| (told, None)),
+        false => evidence(present.adjustment, (k, &depths), *next),
     });
-    let mut all: Vec<LensEvidence> = found.into_iter().flatten().collect();
-    let best = all.iter().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-    all.iter_mut().for_each(|e| e.log_evidence -= best);
-    let decisive = limits.decisive_log_odds;
-    if let Some(simplest) = all.iter_mut().find(|e| e.log_evidence > -decisive) {
-        simplest.taken = true;
-    }
-    all
+    let mut all: Vec<(LensEvidence, Option<BetterLens>)> = found.into_iter().flatten().collect();
+    let best = all.iter().map(|(e, _)| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    all.iter_mut().for_each(|(e, _)| e.log_evidence -= best);
+    let simplest = all.iter_mut().find(|(e, _)| e.log_evidence > -limits.decisive_log_odds);
+    let better = simplest.and_then(|(e, better)| {
+        e.taken = true;
+        better.take()
+    });
+    (all.into_iter().map(|(e, _)| e).collect(), better)
 }
 
-fn evidence(fit: &Adjustment, (camera, depths_m): (usize, &[f64; 2]), lens: Lens) -> Option<LensEvidence> {
-    let mut other = match fit.state.cameras[camera].lens == lens {
-        true => fit.clone(),
-        false => with_lens(fit, (camera, depths_m), lens)?,
-    };
-    // Image noise follows the lens; joint noise, tilt and the sizes of families stay.
-    other.problem.families.retain(|f| f.held.ncols() > 0);
-    let settings = Settings { decrement: DECREMENT, ..Settings::default() };
+/// Another lens than the present one, at its optimum.
+struct BetterLens {
+    index: usize,
+    camera: Camera,
+    pixel_factor: f64,
+    families: Vec<Family>,
+}
+
+impl BetterLens {
+    fn of(linear: LinearProblem, index: usize) -> Self {
+        let Adjustment { problem, state } = linear.adjustment;
+        let pixel_factor = problem.noise.pixel_factor[index];
+        Self { index, camera: state.cameras[index].clone(), pixel_factor, families: problem.families.clone() }
+    }
+
+    fn lens(&self) -> Lens {
+        self.camera.lens
+    }
+
+    /// A fit with this lens.
+    fn in_place_of(self, fit: &Adjustment) -> Adjustment {
+        let mut other = fit.with_camera(self.index, self.camera);
+        let problem = &mut other.problem;
+        problem.noise.pixel_factor[self.index] = self.pixel_factor;
+        problem.families.iter_mut().filter(|f| f.held.ncols() > 0).for_each(|f| f.take_factor(&self.families));
+        other
+    }
+}
+
+fn evidence(
+    fit: &Adjustment,
+    (camera, depths_m): (usize, &[f64; 2]),
+    lens: Lens,
+) -> Option<(LensEvidence, Option<BetterLens>)> {
     // The size of a displacement field is found from above.
     let rounds = if lens.has_field() { FIELD_ROUNDS } else { ROUNDS };
+    let outcome = settled(with_lens(fit, (camera, depths_m), lens)?, rounds);
+    let linear = converged(&outcome)?;
+    Some((told(linear, camera)?, Some(BetterLens::of(linear, camera))))
+}
+
+/// The optimum near an adjustment. Image noise follows the lens; joint noise, tilt and the sizes of families stay.
+fn settled(mut near: Adjustment, rounds: usize) -> Outcome {
+    near.problem.families.retain(|f| f.held.ncols() > 0);
+    let settings = Settings { decrement: DECREMENT, ..Settings::default() };
     let options =
         ComponentOptions { joint: false, displacement: false, rounds, settings, ..ComponentOptions::default() };
-    let outcome = estimate_components(other, &options);
-    told(outcome.linear().filter(|_| outcome.status == Status::Converged)?, camera)
+    estimate_components(near, &options)
+}
+
+fn converged(outcome: &Outcome) -> Option<LinearProblem<'_>> {
+    outcome.linear().filter(|_| outcome.status == Status::Converged)
 }
 
 /// Of the lens that a camera has at an optimum.

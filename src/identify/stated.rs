@@ -29,7 +29,7 @@ pub(super) fn measured_series(
         lens,
         lens_choice: match camera.model {
             Some(_) => LensChoice::Settled,
-            None => LensChoice::Exported,
+            None => LensChoice::All,
         },
         centroid,
         plate: series.plate.clone(),

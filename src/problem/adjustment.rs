@@ -132,8 +132,7 @@ impl Adjustment {
             own.leave_out_as(known.observations.iter().map(|o| o.rejected));
         }
         problem.noise.start_near(&solved.problem.noise, least);
-        let factor = |name: &str| solved.problem.families.iter().find(|f| f.name == name).map(|f| f.factor);
-        problem.families.iter_mut().for_each(|f| f.factor = factor(&f.name).unwrap_or(f.factor));
+        problem.families.iter_mut().for_each(|f| f.take_factor(&solved.problem.families));
         self.hold_component_priors();
     }
 

@@ -35,7 +35,10 @@ impl Family {
     /// The displacement field of camera `camera`, across what lens formula and pose can say; `None` for a lens without one.
     pub fn of_field(layout: &Layout, state: &State, camera: usize) -> Option<Self> {
         let held = state.cameras[camera].parametric_directions()?;
-        Some(Self { held, ..Self::new("displacement field", layout, layout.fields[camera].clone().collect()) })
+        Some(Self {
+            held,
+            ..Self::new(&format!("displacement field {camera}"), layout, layout.fields[camera].clone().collect())
+        })
     }
 
     /// The twists of the joints whose priors nobody has stated: how far robots are from nominal is known to a factor of two.
@@ -59,6 +62,11 @@ impl Family {
     pub fn new(name: &str, layout: &Layout, columns: Vec<usize>) -> Self {
         let base = columns.iter().map(|&c| layout.columns[c].prior_sigma).collect();
         Self { name: name.into(), held: DMatrix::zeros(columns.len(), 0), columns, base, factor: 1.0, drawn: 0.0 }
+    }
+
+    /// Takes the factor of the family of the same name, where there is one.
+    pub fn take_factor(&mut self, others: &[Self]) {
+        self.factor = others.iter().find(|f| f.name == self.name).map_or(self.factor, |f| f.factor);
     }
 
     /// Gives the columns the priors of the present factor.

@@ -57,6 +57,14 @@ pub struct Problem {
 pub struct TakenBodies(Vec<BodyMeasurement>, Vec<MeasuredLength>);
 
 impl Problem {
+    /// What a plate is called where the series do not name it.
+    pub fn plate_name(&self, plate: usize) -> String {
+        match self.plates.len() {
+            1 => "plate".to_owned(),
+            _ => format!("plate {}", plate + 1),
+        }
+    }
+
     /// Joint readings of an image; `None` where it was taken off the robot.
     pub fn posture(&self, image: usize) -> Option<&Posture> {
         self.stops[self.images[image].stop].posture.as_ref()

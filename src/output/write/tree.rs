@@ -96,7 +96,7 @@ pub(super) fn used_since(target: &Path) -> Option<String> {
         let path = target.join(file);
         path.exists() && InputFile::of_file(&path).is_ok_and(|now| now.sha256 != **sha256)
     };
-    let listed: Vec<Listed> = RECORDS.into_iter().filter_map(read).collect();
+    let listed: Vec<Listed> = SERIES.into_iter().filter_map(read).collect();
     let changed = listed.iter().flat_map(|l| &l.as_written).find(is_other).map(|(file, _)| file.clone());
     let is_series = || SERIES.iter().any(|record| target.join(record).exists()) && target.join(IMAGES).exists();
     changed.or_else(|| is_series().then(|| IMAGES.to_owned()))

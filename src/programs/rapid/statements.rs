@@ -141,6 +141,67 @@ fn is_move(reader: &Reader<'_>, word: &str) -> bool {
     moves && !matches!(behind.next().flatten(), None | Some(TokenKind::Mark(b':' | b'(' | b';')))
 }
 
+/// Arguments of an instruction.
+#[derive(Default)]
+struct Arguments {
+    /// Those that stand between commas.
+    plain: Vec<Argument>,
+    /// The work object, behind its switch.
+    work: Option<Node>,
+}
+
+/// One that stands between commas.
+struct Argument {
+    /// Its first operand.
+    value: Node,
+    /// False where more follows, so that it is an expression.
+    is_whole: bool,
+}
+
+/// Reads the arguments of an instruction of this name and line, up to its semicolon.
+fn arguments(reader: &mut Reader<'_>, (name, line): (&str, usize)) -> Result<Arguments> {
+    let mut read = Arguments::default();
+    loop {
+        reader.skip_line_ends();
+        if reader.done() || (read.plain.is_empty() && reader.is_mark(b';')) {
+            let (file, what) = (&reader.file.name, format!("{name} does not end with a semicolon"));
+            return Err(Error::new(Code::ProgramSyntax, format!("{file}:{line}"), what, "complete the instruction"));
+        }
+        if reader.take_mark(b'\\') {
+            if let Some(work) = switch(reader)? {
+                read.work = Some(work);
+            }
+        } else if reader.is_mark(b';') {
+            return Ok(read);
+        } else if !reader.take_mark(b',') {
+            read.plain.push(argument(reader)?);
+        }
+    }
+}
+
+/// Reads a switch behind its stroke; what it gives, where it is the work object.
+fn switch(reader: &mut Reader<'_>) -> Result<Option<Node>> {
+    let is_work = reader.ahead_is_word(0, "WOBJ");
+    reader.at += 1;
+    let has_value = reader.take_mark(b':') && reader.take_mark(b'=');
+    let value = has_value.then(|| node(reader)).transpose()?;
+    Ok(value.filter(|_| is_work))
+}
+
+/// Reads an argument up to the comma, switch or semicolon behind it.
+fn argument(reader: &mut Reader<'_>) -> Result<Argument> {
+    let value = node(reader)?;
+    let behind = reader.at;
+    while let Some(kind) = reader.peek().map(|t| t.kind) {
+        match kind {
+            TokenKind::Mark(b',' | b';' | b'\\') | TokenKind::LineEnd => break,
+            TokenKind::Mark(b'(' | b'[' | b'{') => reader.at = reader.closing(reader.at).unwrap_or(reader.at) + 1,
+            _ => reader.at += 1,
+        }
+    }
+    Ok(Argument { value, is_whole: reader.at == behind })
+}
+
 impl Task<'_> {
     /// All statements of a file, in their order.
     pub(super) fn statements(&mut self, mut reader: Reader<'_>) -> Result<()> {
@@ -201,62 +262,15 @@ impl Task<'_> {
         let line = reader.line();
         let name = String::from_utf8_lossy(reader.word().unwrap_or_default()).into_owned();
         reader.at += 1;
-        let mut arguments = Vec::new();
-        let mut work = None;
-        let mut nothing = true;
-        let mut plain = Vec::new();
-        loop {
-            reader.skip_line_ends();
-            if reader.done() || (nothing && reader.is_mark(b';')) {
-                let what = format!("{name} does not end with a semicolon");
-                return Err(Error::new(
-                    Code::ProgramSyntax,
-                    format!("{}:{line}", reader.file.name),
-                    what,
-                    "complete the instruction",
-                ));
-            }
-            if reader.take_mark(b'\\') {
-                let switch = reader.name().unwrap_or_default();
-                reader.at += 1;
-                if reader.take_mark(b':') && reader.take_mark(b'=') {
-                    let value = node(reader)?;
-                    if switch == "WOBJ" {
-                        work = Some(value);
-                    }
-                }
-                continue;
-            }
-            if reader.is_mark(b';') {
-                break;
-            }
-            if reader.take_mark(b',') {
-                continue;
-            }
-            nothing = false;
-            arguments.push(node(reader)?);
-            plain.push(true);
-            // What follows up to the comma makes it an expression.
-            while !matches!(
-                reader.peek().map(|t| t.kind),
-                None | Some(TokenKind::Mark(b',' | b';' | b'\\') | TokenKind::LineEnd)
-            ) {
-                let open = matches!(reader.peek().map(|t| t.kind), Some(TokenKind::Mark(b'(' | b'[' | b'{')));
-                reader.at = if open { reader.closing(reader.at).unwrap_or(reader.at) + 1 } else { reader.at + 1 };
-                if let Some(last) = plain.last_mut() {
-                    *last = false;
-                }
-            }
-        }
+        let Arguments { mut plain, work } = arguments(reader, (&name, line))?;
         if name.to_ascii_uppercase().starts_with(SEARCH) {
-            arguments.drain(..arguments.len().min(2));
             plain.drain(..plain.len().min(2));
         }
-        let count = self.targets_of(&name, &arguments);
-        let tool = self.tool_of(&arguments, count);
-        for k in 0..count {
-            let done = match plain[k] {
-                true => self.visit(&arguments[k], &name, (reader.index, line), &tool, work.as_ref())?,
+        let count = self.targets_of(&name, &plain);
+        let tool = self.tool_of(&plain, count);
+        for Argument { value, is_whole } in &plain[..count] {
+            let done = match is_whole {
+                true => self.visit(value, &name, (reader.index, line), &tool, work.as_ref())?,
                 false => Err(Why::computed()),
             };
             if let Err(why) = done {
@@ -267,7 +281,7 @@ impl Task<'_> {
     }
 
     /// Number of arguments that are targets: two for circles.
-    fn targets_of(&self, name: &str, arguments: &[Node]) -> usize {
+    fn targets_of(&self, name: &str, arguments: &[Argument]) -> usize {
         let name = name.to_ascii_uppercase();
         let circle = ["MOVEC", "TRIGGC", "ARCC", "SPOTC", "SEARCHC"].iter().any(|c| name.starts_with(c));
         (1 + usize::from(circle)).min(arguments.len())
@@ -279,8 +293,8 @@ impl Task<'_> {
     }
 
     /// Name of the tool: the argument that is one, else that behind speed and zone.
-    fn tool_of(&self, arguments: &[Node], targets: usize) -> Option<String> {
-        let word = |n: &Node| if let Node::Word(w) = n { Some(w.clone()) } else { None };
+    fn tool_of(&self, arguments: &[Argument], targets: usize) -> Option<String> {
+        let word = |a: &Argument| if let Node::Word(w) = &a.value { Some(w.clone()) } else { None };
         let rest = arguments.get(targets..).unwrap_or_default();
         rest.iter().filter_map(word).find(|w| self.is_tool(w)).or_else(|| rest.get(2).and_then(word))
     }
