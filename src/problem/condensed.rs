@@ -62,7 +62,7 @@ pub fn condensed(seen: &[SeenAtStop], prior: &[f64]) -> Option<DMatrix<f64>> {
 pub fn by_columns(layout: &Layout, image: &Image, chain: &Chained) -> DMatrix<f64> {
     let mut t = DMatrix::zeros(6 + E, layout.len());
     t.view_mut((0, 0), (6, layout.theta_len())).copy_from(&chain.d_theta);
-    for (k, column) in layout.intrinsics(image).into_iter().enumerate().take(E) {
+    for (k, column) in layout.intrinsics(image, &[]).into_iter().enumerate().take(E) {
         if let Some(c) = column {
             t[(6 + k, c)] = 1.0;
         }

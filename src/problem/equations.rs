@@ -20,12 +20,13 @@ const MODE: usize = POSE + P;
 const RESIDUAL: usize = MODE + MODES;
 const FORMULA: usize = RESIDUAL + 1;
 
-/// Control points of the displacement field that an observation touches, ascending, with the derivative by their u and v.
+/// Control points of the displacement field that an observation touches, ascending, by their places among those that the image touches, with the
+/// derivative by their u and v.
 type Field = Vec<(usize, Matrix2<f64>)>;
 
 /// Intrinsic unknowns of one image before its displacement field: camera parameters (padded), then plate modes.
 ///
-/// The field follows: u and v of every control point.
+/// The field follows: u and v of every control point that the image touches.
 pub const E: usize = MAX_PARAMETERS + MODES;
 
 /// Whitened equations of one image, two an observation.
@@ -37,6 +38,8 @@ pub struct Equations {
     pub markers: Vec<usize>,
     /// Of every observation; empty for a lens without a field.
     field: Vec<Field>,
+    /// Control points of the field that any of them touches, ascending.
+    pub touched: Vec<usize>,
 }
 
 /// One observation in the equations of its image.
@@ -85,11 +88,16 @@ impl Collector {
     }
 
     pub fn finish(self) -> Equations {
-        let Self { mut columns, markers, field } = self;
+        let Self { mut columns, markers, mut field } = self;
+        let mut touched: Vec<usize> = field.iter().flatten().map(|(k, _)| *k).collect();
+        touched.sort_unstable();
+        touched.dedup();
+        let place = |k: usize| touched.partition_point(|t| *t < k);
+        field.iter_mut().flatten().for_each(|(k, _)| *k = place(*k));
         if columns.ncols() > 2 * markers.len() {
             columns = columns.resize_horizontally(2 * markers.len(), 0.0);
         }
-        Equations { columns, markers, field }
+        Equations { columns, markers, field, touched }
     }
 }
 
@@ -252,7 +260,7 @@ impl<'a> Sight<'a> {
         SMatrix::from_fn(|e, k| self.equations[k].get(intrinsic_row(e)).copied().unwrap_or(0.0))
     }
 
-    /// Derivatives by the field: control points, each with one row an equation.
+    /// Derivatives by the field: control points by their places among those that the image touches, each with one row an equation.
     pub fn by_field(&self) -> &'a [(usize, Matrix2<f64>)] {
         self.field
     }
@@ -304,7 +312,7 @@ pub struct MarkerCoupling {
     pub mp: SMatrix<f64, 3, P>,
     /// With the intrinsics before the field.
     pub me: SMatrix<f64, 3, E>,
-    /// With the control points of the field that it touches, ascending.
+    /// With the control points of the field that it touches, ascending, by their places among those that the image touches.
     pub field: Vec<(usize, Matrix3x2<f64>)>,
 }
 

@@ -249,11 +249,12 @@ impl Layout {
         self.cameras.first().map_or(self.len(), |c| c.start)
     }
 
-    /// Column of every intrinsic unknown of an image, in their order ([`super::E`]); `None` for padding.
-    pub fn intrinsics(&self, image: &Image) -> Vec<Option<usize>> {
+    /// Column of every intrinsic unknown of an image that touches some control points of the field, in their order ([`super::E`]); `None` for padding.
+    pub fn intrinsics(&self, image: &Image, touched: &[usize]) -> Vec<Option<usize>> {
         let (camera, field) = (&self.cameras[image.camera], &self.fields[image.camera]);
         let formula = (camera.start..field.start).map(Some).chain(std::iter::repeat(None)).take(MAX_PARAMETERS);
-        formula.chain(self.shapes[image.plate].clone().map(Some)).chain(field.clone().map(Some)).collect()
+        let points = touched.iter().flat_map(|k| [0, 1].map(|d| field.start + 2 * k + d));
+        formula.chain(self.shapes[image.plate].clone().map(Some)).chain(points.map(Some)).collect()
     }
 
     /// Index of a column by its full name.

@@ -34,7 +34,7 @@ pub struct ImageTerms {
     pub cost: f64,
     /// Pose block.
     pub pp: Matrix6<f64>,
-    /// Pose with intrinsics, 6 x (E + field).
+    /// Pose with intrinsics, 6 x (E + u and v of what is touched).
     pub pe: Matrix6xX<f64>,
     /// Intrinsics.
     pub ee: DMatrix<f64>,
@@ -42,6 +42,8 @@ pub struct ImageTerms {
     pub bp: Vector6<f64>,
     /// Right-hand side of the intrinsics.
     pub be: DVector<f64>,
+    /// Control points of the displacement field that are touched, ascending.
+    pub touched: Vec<usize>,
     /// Markers that were seen, ascending, by themselves; how they are coupled with the rest is told by [`equations`].
     pub markers: Vec<MarkerTerms>,
     /// Residuals of the observations in use.
@@ -111,9 +113,7 @@ pub fn linearise_with_equations(
         #[inline(always)]
         || whitened(image, state, pose, weighting, tell),
     )?;
-    let camera = &state.cameras[image.camera];
-    let field = camera.parameters.len() - camera.parametric();
-    Some((ImageTerms::new(cost, &equations, field, residuals), equations))
+    Some((ImageTerms::new(cost, &equations, residuals), equations))
 }
 
 /// The equations that [`linearise`] sums up.
@@ -165,8 +165,9 @@ fn square_root(m: &Matrix2<f64>) -> Matrix2<f64> {
 }
 
 impl ImageTerms {
-    /// Of equations with `field` unknowns of a displacement field behind those that all lenses have.
-    fn new(cost: f64, equations: &Equations, field: usize, residuals: Vec<Residual>) -> Self {
+    fn new(cost: f64, equations: &Equations, residuals: Vec<Residual>) -> Self {
+        let touched = equations.touched.clone();
+        let field = 2 * touched.len();
         let products = equations.products();
         let mut pe = Matrix6xX::zeros(E + field);
         pe.fixed_columns_mut::<E>(0).copy_from(&products.pose_with_intrinsics());
@@ -175,7 +176,7 @@ impl ImageTerms {
         let mut be = DVector::zeros(E + field);
         be.fixed_rows_mut::<E>(0).copy_from(&products.intrinsics_with_residual());
         let (pp, bp) = (products.pose(), products.pose_with_residual());
-        let mut terms = Self { cost, pp, pe, ee, bp, be, markers: equations.marker_terms(), residuals };
+        let mut terms = Self { cost, pp, pe, ee, bp, be, touched, markers: equations.marker_terms(), residuals };
         if field > 0 {
             terms.add_field(equations);
         }

@@ -381,7 +381,7 @@ impl<'a> LinearProblem<'a> {
 impl<'a> LinearImage<'a> {
     /// Columns that act on it directly and not through its pose, in the order of its blocks; `None` for padding.
     pub fn columns(&self) -> Vec<Option<usize>> {
-        self.problem.layout.intrinsics(self.image)
+        self.problem.layout.intrinsics(self.image, &self.terms.touched)
     }
 
     /// The equations that its blocks are sums of.
