@@ -169,6 +169,7 @@ fn spoken(code: Code) -> String {
         Code::ReadingsExchanged => "with exchanged rows of joints.csv".into(),
         Code::ImageDuplicate => "duplicates".into(),
         Code::MarkersTooFew => "with too few markers".into(),
+        Code::ImageContradictory => "contradicting the others".into(),
         other => other.name().replace('_', " "),
     }
 }

@@ -1,6 +1,7 @@
 //! Do most observations agree with the others?
 
 use super::kind::{CheckContext, Kind, Quantity, Subject};
+use crate::assess::Limits;
 use crate::error::Code;
 use crate::problem::Adjustment;
 
@@ -14,6 +15,11 @@ pub struct ObservationsLeftOut {
 }
 
 pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<ObservationsLeftOut> {
+    observations_left_out(adjustment, setting.limits)
+}
+
+/// More observations left out than clean images lose.
+pub fn observations_left_out(adjustment: &Adjustment, limits: &Limits) -> Option<ObservationsLeftOut> {
     let (mut out, mut all, mut worst) = (0, 0, (0.0, ""));
     for (_, image) in adjustment.problem.used() {
         let (n, rejected) = (image.observations.len(), image.observations.len() - image.used().count());
@@ -25,7 +31,7 @@ pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<O
     }
     let share = f64::from(out as u32) / f64::from(all.max(1) as u32);
     let found = ObservationsLeftOut { share, worst: (worst.1.to_owned(), worst.0) };
-    (share > setting.limits.share_of_observations_left_out).then_some(found)
+    (share > limits.share_of_observations_left_out).then_some(found)
 }
 
 impl Kind for ObservationsLeftOut {

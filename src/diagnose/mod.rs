@@ -59,7 +59,7 @@ pub use joint_noise::{ImageValue, JointNoiseLarge};
 pub use kind::{CheckContext, Quantity, StatedNoise, Subject, Weight};
 pub use left_out_bodies::MeasurementsLeftOut;
 pub use left_out_images::ImagesLeftOut;
-pub use left_out_observations::ObservationsLeftOut;
+pub use left_out_observations::{ObservationsLeftOut, observations_left_out};
 pub use length_standard::ContradictedLengths;
 pub use lens_not_in_ros::LensNotInRos;
 pub use loose::LooseMounting;

@@ -165,6 +165,7 @@ codes! {
         ImageDuplicate "image_duplicate" "an image shows exactly what another one shows, and is left out",
         ImageExcluded "image_excluded" "an image is left out because the caller does not want it",
         MarkersTooFew "markers_too_few" "an image shows fewer markers than a pose needs, and is left out",
+        ImageContradictory "image_contradictory" "most of what was found in an image contradicts the other images, and it is left out",
         MarkersCollinear "markers_collinear" "the markers of an image lie on a line, and it is left out",
         WronglyPaired "wrongly_paired" "image and joint readings of a stop do not belong together, or the robot moved: it is left out",
         ImageTwice "image_twice" "two images have one name",

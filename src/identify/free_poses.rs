@@ -18,7 +18,7 @@ use crate::problem::{
 };
 use crate::solve::{
     ComponentOptions, Elimination, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status,
-    estimate_components, frames, in_frame, in_frame_by, reject_observations, solve,
+    estimate_components, frames, in_frame, in_frame_by, reject_contradictory, reject_observations, solve,
 };
 use crate::stage::stage;
 
@@ -29,7 +29,7 @@ const GOOD_START_PX: f64 = 2.0;
 const START_DECREMENT: f64 = 0.01;
 
 /// Most rounds of rejection.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 12;
 
 /// What a free-pose adjustment leaves to a joint fit, whatever the robot model.
 #[derive(Debug, Clone)]
@@ -398,7 +398,8 @@ fn finish(start: Adjustment, limits: &Limits) -> Result<(Adjustment, FreePoses)>
     let options = ComponentOptions { joint: false, rounds: 20, ..ComponentOptions::default() };
     let mut outcome = estimate_components(start, &options);
     for _ in 0..ROUNDS {
-        if reject_observations(&mut outcome.adjustment) == 0 {
+        let changed = reject_observations(&mut outcome.adjustment) > 0;
+        if reject_contradictory(&mut outcome.adjustment).is_none() && !changed {
             break;
         }
         outcome = estimate_components(outcome.adjustment, &options);

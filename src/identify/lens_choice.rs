@@ -92,8 +92,15 @@ fn by_hold_out(
 ) -> Option<(JointFit, Vec<Notice>)> {
     let first: Vec<Lens> = series.iter().map(|s| s.lens).collect();
     let names: Vec<String> = open.keys().cloned().collect();
-    let notices =
-        if open.is_empty() { return None } else { choose_lens(chain, series, &names, &options.limits).ok()? };
+    if open.is_empty() {
+        return None;
+    }
+    // A formula that explains the images at all is enough to begin with.
+    let choices: Vec<LensChoice> = series.iter().map(|s| s.lens_choice).collect();
+    series.iter_mut().for_each(|s| s.lens_choice = s.lens_choice.min(LensChoice::Exported));
+    let chosen = choose_lens(chain, series, &names, &options.limits);
+    series.iter_mut().zip(choices).for_each(|(s, choice)| s.lens_choice = choice);
+    let notices = chosen.ok()?;
     let is_another = series.iter().zip(first).any(|(s, first)| s.lens != first);
     let fit = if is_another { fit_model(chain.clone(), series, options, None).ok()? } else { return None };
     Some((fit, notices))

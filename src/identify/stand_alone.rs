@@ -6,11 +6,12 @@ use super::free_poses::{covariance_together, free_poses_of};
 use super::lens_choice::{choose_lens, open_cameras};
 use super::solution::Solution;
 use super::start_verdict::StartVerdict;
-use crate::assess::Limits;
-use crate::diagnose::{CheckContext, Diagnosis, Finding, residual_pattern, tags_off};
+use crate::assess::{Limits, camera_shows_pattern};
+use crate::diagnose::{CheckContext, Diagnosis, Finding, observations_left_out, residual_pattern, tags_off};
 use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{Fit, FreePose, FreePoses, PlacedCamera};
 use crate::geom::skew;
+use crate::model::camera::Lens;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, LensChoice, MeasuredSeries};
 use crate::solve::PlateScale;
@@ -81,17 +82,47 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     let mut series = series.to_vec();
     series.iter_mut().flat_map(|s| &mut s.stops).for_each(|stop| stop.readings = None);
     let open: Vec<String> = open_cameras(&series).into_keys().collect();
-    let notices = if open.is_empty() { Vec::new() } else { choose_lens(&chain, &mut series, &open, limits)? };
-    let (mut adjustment, free_poses, starts) = free_poses_of(&Robot::nominal(chain), &series, limits, |_| Ok(()))?;
-    adjustment.hold_poses();
+    series.iter_mut().filter(|s| open.contains(&s.camera)).for_each(|s| s.lens = Lens::ALL[0]);
+    let by_first = adjusted(&series, limits);
+    let (poses, notices) = match by_first {
+        Ok(poses) if !poses.shows_pattern(&open, limits) => (poses, Vec::new()),
+        Err(error) if open.is_empty() => return Err(error),
+        _ => {
+            let notices = choose_lens(&chain, &mut series, &open, limits)?;
+            (adjusted(&series, limits)?, notices)
+        }
+    };
+    let Adjusted { fit, free_poses, starts } = poses;
     let mut diagnosis =
         Diagnosis::new(CheckContext { series: &series, free: &free_poses, on_robot: 0, stated_noise: None, limits });
-    diagnosis.after_free_poses(&adjustment.problem);
+    diagnosis.after_free_poses(&fit.problem);
     let mut findings = diagnosis.findings();
-    let fit = at_solution(adjustment)?;
+    findings.extend(observations_left_out(&fit, limits).map(Finding::from));
     findings.extend(residual_pattern(&fit, limits).map(Finding::from));
     findings.extend(tags_off(&fit, limits).into_iter().map(Finding::from));
     Ok(StandAlone { fit, free_poses, starts, notices, findings })
+}
+
+/// Free poses with the lenses that the series have.
+struct Adjusted {
+    fit: Fit,
+    free_poses: FreePoses,
+    starts: Vec<StartVerdict>,
+}
+
+fn adjusted(series: &[MeasuredSeries], limits: &Limits) -> Result<Adjusted> {
+    let robot = Robot::nominal(Chain::empty());
+    let (mut adjustment, free_poses, starts) = free_poses_of(&robot, series, limits, |_| Ok(()))?;
+    adjustment.hold_poses();
+    Ok(Adjusted { fit: at_solution(adjustment)?, free_poses, starts })
+}
+
+impl Adjusted {
+    /// True where the residuals of one of some cameras show a pattern, or do not tell.
+    fn shows_pattern(&self, cameras: &[String], limits: &Limits) -> bool {
+        let own = self.fit.problem.cameras.iter().enumerate().filter(|(_, name)| cameras.contains(name));
+        own.into_iter().any(|(k, _)| camera_shows_pattern(self.fit.linear(), k, limits).unwrap_or(true))
+    }
 }
 
 impl Solution {

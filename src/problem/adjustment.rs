@@ -141,6 +141,8 @@ impl Adjustment {
     pub fn with_camera(&self, index: usize, camera: Camera) -> Self {
         let mut other = self.clone();
         let Self { problem, state } = &mut other;
+        let field = problem.layout.fields[index].clone();
+        problem.families.retain(|f| !f.columns.iter().any(|c| field.contains(c)));
         let (layout, from, moved) = problem.layout.with_camera(index, &problem.cameras[index], &camera);
         problem.layout = layout;
         let columns = problem.families.iter_mut().flat_map(|f| &mut f.columns);

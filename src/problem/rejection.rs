@@ -39,6 +39,13 @@ pub enum ImageRejection {
     },
     /// Its markers lie on a line.
     Collinear,
+    /// Most of what was found in it contradicts the other images: it was turned or cut, or the plate, the camera or its focus was another.
+    Contradictory {
+        /// Observations that contradict them.
+        contradict: usize,
+        /// All of its observations.
+        of: usize,
+    },
     /// Image and joint readings do not belong together: wrongly paired, or taken while the robot moved.
     WronglyPaired(Mismatch),
     /// The caller does not want it: held out, of another camera.
@@ -106,6 +113,7 @@ impl ImageRejection {
             Self::Duplicate { .. } => Code::ImageDuplicate,
             Self::TooFewMarkers { .. } => Code::MarkersTooFew,
             Self::Collinear => Code::MarkersCollinear,
+            Self::Contradictory { .. } => Code::ImageContradictory,
             Self::WronglyPaired(_) => Code::WronglyPaired,
             Self::Excluded => Code::ImageExcluded,
         }
@@ -130,6 +138,10 @@ impl fmt::Display for ImageRejection {
             Self::Duplicate { of } => write!(f, "duplicate: it shows exactly what {of} shows"),
             Self::TooFewMarkers { found, needed } => write!(f, "only {found} markers found, {needed} are needed"),
             Self::Collinear => f.write_str("its markers lie on a line"),
+            Self::Contradictory { contradict, of } => write!(
+                f,
+                "{contradict} of its {of} points contradict the other images: was it turned or cut, or is it of another camera, focus or plate?"
+            ),
             Self::WronglyPaired(mismatch) => write!(f, "wrongly paired or taken in motion: {mismatch}"),
             Self::Excluded => f.write_str("not asked for"),
         }

@@ -49,7 +49,7 @@ pub use noise_uncertainty::NoiseUncertainty;
 pub use response::Response;
 pub use seen_markers::SeenMarkers;
 pub use side_by_side::side_by_side;
-pub use snoop::{reject_bodies, reject_contradicting, reject_observations, reject_stops};
+pub use snoop::{reject_bodies, reject_contradicting, reject_contradictory, reject_observations, reject_stops};
 pub use stretch::{LengthStandard, Stretch};
 pub use system::{Elimination, Singular, System};
 pub use tally::{JOINT_NOISE_FLOOR, Tally, share_out};

@@ -1,8 +1,8 @@
 //! Rejection with reasons: single observations by their residual, whole images by the joint error that they would need.
 
 use crate::problem::{
-    Adjustment, BodyMeasurement, BodyRejection, ImageRejection, Mismatch, ObservationRejection, TakenFrom, Weighting,
-    predict,
+    Adjustment, BodyMeasurement, BodyRejection, Image, ImageRejection, Mismatch, ObservationRejection, TakenFrom,
+    Weighting, predict,
 };
 
 /// Normalised residual length beyond which an observation is left out (a clean one is so with probability 4e-5).
@@ -52,12 +52,38 @@ pub fn reject_contradicting(adjustment: &mut Adjustment) -> Option<usize> {
     let (worst, contradict) = counted
         .filter(|&(i, out)| 2 * out > problem.images[i].observations.len() && at_stop(problem.images[i].stop) > 1)
         .max_by_key(|&(i, out)| (out, std::cmp::Reverse(i)))?;
-    let image = &mut adjustment.problem.images[worst];
-    let of = image.observations.len();
-    image.rejected = Some(ImageRejection::WronglyPaired(Mismatch::OtherImages { contradict, of }));
+    let of = problem.images[worst].observations.len();
+    leave_out(adjustment, worst, ImageRejection::WronglyPaired(Mismatch::OtherImages { contradict, of }));
+    Some(worst)
+}
+
+/// One image in so many may contradict the others; more of them contradict the model.
+const ONE_IN: usize = 4;
+
+/// Leaves out the image that lost the largest share of its observations, where that is most of them and few images of its camera did. Returns its
+/// index.
+pub fn reject_contradictory(adjustment: &mut Adjustment) -> Option<usize> {
+    let problem = &adjustment.problem;
+    let left_out = |image: &Image| image.observations.len() - image.used().count();
+    let lost_most = |image: &Image| 2 * left_out(image) > image.observations.len();
+    let share = |image: &Image| left_out(image) as f64 / image.observations.len() as f64;
+    let (worst, image) =
+        problem.used().filter(|(_, image)| lost_most(image)).max_by(|a, b| share(a.1).total_cmp(&share(b.1)))?;
+    let alike = || problem.used().filter(|(_, other)| other.camera == image.camera);
+    if ONE_IN * alike().filter(|(_, other)| lost_most(other)).count() > alike().count() {
+        return None;
+    }
+    let (contradict, of) = (left_out(image), image.observations.len());
+    leave_out(adjustment, worst, ImageRejection::Contradictory { contradict, of });
+    Some(worst)
+}
+
+/// Leaves out an image as a whole, in place of its observations by their residuals.
+fn leave_out(adjustment: &mut Adjustment, index: usize, why: ImageRejection) {
+    let image = &mut adjustment.problem.images[index];
+    image.rejected = Some(why);
     let by_residual = image.observations.iter_mut().filter(|o| o.rejected == Some(ObservationRejection::Residual));
     by_residual.for_each(|o| o.rejected = None);
-    Some(worst)
 }
 
 /// Latent and local error of every reading where something was taken from, rad or m; `None` for what its readings do not hold.

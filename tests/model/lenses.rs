@@ -6,7 +6,7 @@ use robotcal::assess::Limits;
 use robotcal::identify::{Options, RobotModel, Solution, choose_lens, depths_m, identify};
 use robotcal::model::camera::{Camera, Lens, fit_lens};
 use robotcal::plan::plate_design::{PlateRequest, design};
-use robotcal::problem::LensChoice;
+use robotcal::problem::{Adjustment, LensChoice};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::study::measured;
 use robotcal::urdf::{Chain, read};
@@ -110,9 +110,27 @@ fn the_joint_fit_tells_lenses_apart_and_states_what_ros_cannot_express() {
     }
 }
 
-/// Without a word of the user the evidence chooses among the lenses that camera.yaml can express.
 #[test]
-fn the_default_takes_a_lens_that_ros_can_express() {
+fn other_lenses_are_asked_where_the_residuals_show_a_pattern() {
+    let asked = |lens: Lens| found(&world(lens, 60.0), Lens::Brown, LensChoice::All).lenses.len();
+    assert_eq!(asked(Lens::Brown), 1);
+    assert!(asked(Lens::Parallax) > 4);
+}
+
+#[test]
+fn a_camera_without_a_field_has_no_family_of_one() {
+    let s = found(&world(Lens::Brown, 60.0), Lens::BrownField, LensChoice::Settled);
+    let fields = |a: &Adjustment| a.problem.families.iter().filter(|f| f.held.ncols() > 0).count();
+    let camera = &s.fit.state.cameras[0];
+    let formula =
+        Camera { lens: Lens::Brown, parameters: camera.parameters[..camera.parametric()].to_vec(), ..*camera };
+    let other = s.fit.adjustment.with_camera(0, formula);
+    assert_eq!((fields(&s.fit.adjustment), fields(&other)), (1, 0));
+    assert!(other.linearise().is_some());
+}
+
+#[test]
+fn the_lenses_that_ros_can_express_are_a_choice_of_their_own() {
     for (lens, field_deg) in [(Lens::Brown, 60.0), (Lens::Fisheye, 100.0), (Lens::Parallax, 60.0)] {
         let s = found(&world(lens, field_deg), Lens::Brown, LensChoice::Exported);
         println!("{lens:?}: {:?}", s.lenses);

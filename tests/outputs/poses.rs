@@ -6,6 +6,7 @@ use crate::outputs_support::truth_frame::{Alignment, least_eigenvalue};
 use crate::outputs_support::{context, robot};
 use nalgebra::{Matrix6, Vector3};
 use rayon::prelude::*;
+use robotcal::Code;
 use robotcal::assess::Limits;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, OtherBody, RobotModel, compare_poses, identify, stand_alone};
@@ -13,7 +14,7 @@ use robotcal::output::restore::measured_series;
 use robotcal::output::stand_alone_files::{StandAloneContext, stand_alone_files};
 use robotcal::output::{files, solution_json};
 use robotcal::plan::plate_design::{PlateRequest, design};
-use robotcal::problem::{LensChoice, MeasuredSeries};
+use robotcal::problem::{ImageRejection, LensChoice, MeasuredSeries, Problem};
 use robotcal::series::{Plate, PlateKind};
 use robotcal::simulate::truth::Truth;
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series as simulate};
@@ -146,6 +147,35 @@ fn poses_are_compared_after_the_common_frames() {
     assert!(other.rms.iter().all(|r| *r < 1e-8), "{:?}", other.rms);
     assert!(other.relative_scale.abs() < 1e-6);
     assert!(compare_poses(&found, &poses(body)[..2], OtherBody::Camera, "few").is_err());
+}
+
+/// As a viewer that turns a picture by half a turn leaves it.
+#[test]
+fn an_image_that_contradicts_the_others_is_left_out() {
+    let made = world(48, 14, 0.02, true, 3);
+    let chain = robot().chain(None, None).unwrap();
+    let seen = measured(&made, &chain);
+    let (width, height) = (f64::from(seen.width_px) - 1.0, f64::from(seen.height_px) - 1.0);
+    for turned in [4, 9] {
+        let mut series = seen.clone();
+        series.stops[turned].observations.iter_mut().for_each(|o| {
+            let turned = (width - o.uv[0], height - o.uv[1]);
+            (o.uv[0], o.uv[1]) = turned;
+        });
+        let rejected = |problem: &Problem| -> Vec<(usize, Code)> {
+            let codes = problem.images.iter().map(|i| i.rejected.as_ref().map(ImageRejection::code));
+            codes.enumerate().filter_map(|(k, code)| Some((k, code?))).collect()
+        };
+        let alone = stand_alone(&[series.clone()], &Limits::default()).unwrap();
+        let options = Options { model: RobotModel::Rigid, ..Options::default() };
+        let solution = identify(chain.clone(), &[series], &options).unwrap();
+        assert_eq!(rejected(&alone.fit.problem), [(turned, Code::ImageContradictory)]);
+        assert_eq!(rejected(&solution.fit.problem), [(turned, Code::ImageContradictory)]);
+        let truth: Vec<(String, Pose)> =
+            (made.truth.stops.iter()).map(|s| (s.image.clone(), s.camera_from_plate.pose().inverse())).collect();
+        let [distance_m, _] = compare_poses(&alone, &truth, OtherBody::Camera, "truth").unwrap().rms;
+        assert!(distance_m < 1e-4, "{distance_m}");
+    }
 }
 
 /// A world of 48 circles seen 24 to 30 times, or of the 504-marker plate; with markers off by 0.1 mm and by the modes, or all as stated.
