@@ -270,8 +270,11 @@ fn lenses(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         let all: Vec<&LensEvidence> = r.lenses.iter().filter(|l| l.camera == camera.name).collect();
         let Some(taken) = all.iter().find(|l| l.taken) else { continue };
         let each: Vec<String> = all.iter().map(|l| format!("{} {:.1}", l.lens.name(), l.log_evidence)).collect();
-        let (lens, each) = (taken.lens.name(), each.join(", "));
-        writeln!(out, "lens      of {}: {lens}; evidence, logarithm, relative to the best: {each}", camera.name)?;
+        let why = match all.len() {
+            1 => "its residuals show no pattern that asks for another".to_owned(),
+            _ => format!("evidence, logarithm, relative to the best: {}", each.join(", ")),
+        };
+        writeln!(out, "lens      of {}: {}; {why}", camera.name, taken.lens.name())?;
     }
     Ok(())
 }

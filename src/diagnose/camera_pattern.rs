@@ -16,6 +16,8 @@ pub struct ResidualPattern {
     pub matters: bool,
     /// True where the lens has terms of this kind, which do not suffice: priors hold them back, or their form is another.
     pub is_fitted: bool,
+    /// True where the lens has a displacement field already.
+    pub has_field: bool,
 }
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<ResidualPattern> {
@@ -32,7 +34,8 @@ pub fn residual_pattern(fit: &Fit, limits: &Limits) -> Option<ResidualPattern> {
     };
     let matters = found.moved.is_some_and(|m| m.sigmas() > limits.pattern_moves);
     let is_fitted = matches!(found.bearer, Bearer::Camera(k) if found.pattern.is_fitted(fit, k));
-    Some(ResidualPattern { found, bearer, matters, is_fitted })
+    let has_field = matches!(found.bearer, Bearer::Camera(k) if fit.state.cameras[k].lens.has_field());
+    Some(ResidualPattern { found, bearer, matters, is_fitted, has_field })
 }
 
 /// What it looks like, and what removes it.
@@ -137,6 +140,9 @@ impl Kind for ResidualPattern {
 
     fn remedy(&self) -> String {
         match self.is_fitted {
+            _ if self.has_field => {
+                "no lens of this program has it beside a displacement field: nothing to do while the flange moves by less than its sigma".into()
+            }
             true => "this lens has terms of this kind, and they do not suffice: try --camera brown+field".into(),
             false => words(self.found.pattern)[1].into(),
         }

@@ -45,6 +45,6 @@ impl Kind for LensNotInRos {
     }
 
     fn remedy(&self) -> String {
-        "solution.json has the lens itself; --camera brown identifies one that camera.yaml can express".into()
+        "solution.json has the lens itself; --camera ros identifies one that camera.yaml can express".into()
     }
 }

@@ -211,6 +211,9 @@ fn unused_covariates(file: &Path, stops: &Stops) -> Option<Notice> {
     (!columns.is_empty()).then(|| Notice::new(Code::CovariatesUnused, file.display(), what, remedy))
 }
 
+/// One over the last digit that is shown of a reading; what it does not show is rounding.
+const SHOWN: f64 = 1e4;
+
 /// The worst offender of one joint, and how many there are.
 fn beyond_limits(
     file: &Path,
@@ -227,11 +230,11 @@ fn beyond_limits(
         .stops
         .iter()
         .filter_map(|s| Some((s, s.raw_readings.as_ref()?[column] * factor)))
-        .filter(|(_, q)| beyond(*q) > 1e-9)
+        .filter(|(_, q)| beyond(*q) > factor / SHOWN)
         .collect();
     let (stop, worst) = outside.iter().max_by(|a, b| beyond(a.1).total_cmp(&beyond(b.1)))?;
     let shown = if revolute { unit.name() } else { "m" };
-    let [worst, low, high] = [*worst, low, high].map(|q| (1e4 * q / factor).round() / 1e4);
+    let [worst, low, high] = [*worst, low, high].map(|q| (SHOWN * q / factor).round() / SHOWN);
     let (line, image) = (format!("{}:{}", file.display(), stop.line), &stop.image);
     let counted = format!(" ({} of {} images)", outside.len(), stops.stops.len());
     let (place, counted) = if view { (line, String::new()) } else { (format!("{line}, image {image}"), counted) };

@@ -144,7 +144,9 @@ fn confirms(real: &Path, names: &[&str], selections: &[&[usize]], tracker: &str)
         let mut urdf = s.fit.state.robot.clone();
         urdf.terms.retain(|t| t.term == Term::Offset);
         let alone = s.uncertainty.alone.clone().unwrap_or_else(|| urdf.clone());
-        let found = [s.fit.state.robot.clone(), alone, urdf].map(|robot| fit_points(&robot, &points).unwrap().rms_m);
+        // Local errors of the joints are in no file.
+        let found = [s.fit.state.robot.without_local_errors(), alone, urdf]
+            .map(|robot| fit_points(&robot, &points).unwrap().rms_m);
         let stated = [flange.model_m, flange.best_urdf_m().0, flange.urdf_m];
         let ratio: [f64; 3] = std::array::from_fn(|k| stated[k] / found[k]);
         let expected = judged(&s, &points).expected_mm;
@@ -153,8 +155,9 @@ fn confirms(real: &Path, names: &[&str], selections: &[&[usize]], tracker: &str)
         cells.insert(1, format!("{expected:.3} | {:.2}", expected / (1e3 * found[0])));
         println!("| {} | {} |", names.join(" + "), cells.join(" | "));
         // Four fifths of the tracker's points lie outside the region of the stops that the figure is stated for.
+        assert!(ratio[..2].iter().all(|r| (0.8..1.3).contains(r)), "{names:?}: stated {stated:?}, found {found:?}");
         assert!(ratio.iter().all(|r| (0.7..1.4).contains(r)), "{names:?}: stated {stated:?}, found {found:?}");
-        assert!(found[0] < 0.62e-3 && found[0] < nominal, "{names:?}: {}", found[0]);
+        assert!(found[0] < 0.46e-3 && found[0] < nominal, "{names:?}: {}", found[0]);
         assert!((0.6..2.0).contains(&(1e3 * found[0] / expected)), "{names:?}: {found:?} over expected {expected}");
     }
 }
