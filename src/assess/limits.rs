@@ -255,6 +255,15 @@ limits! {
     region_postures: usize = 2;
     /// Fewest regions, and fewest postures that are held out as wholes: a fit needs two others to hold on to.
     regions: usize = 3;
+
+    /// Error of a model in another measurement over the most that its solution states (the upper end of the 95 % interval) from which it is no
+    /// longer the robot: sigmas are believed to a factor of two. Between one and this it is a doubt.
+    beyond_stated: f64 = 2.0;
+    /// Size of the residuals of touches in their stated sigmas below which they were computed, not made: sigmas are believed to a factor of
+    /// two, and this is a tenth.
+    exact_touches: f64 = 0.1;
+    /// Fewest degrees of freedom for that verdict: of six, noise leaves a tenth with a probability of 5e-6.
+    exact_touches_freedom: usize = 6;
 }
 
 impl Limits {

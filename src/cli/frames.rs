@@ -1,5 +1,6 @@
 //! `robotcal frames`: tool and work object of a robot that was identified, from touches.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -10,11 +11,13 @@ use super::Verdict;
 use super::pose_argument::pose;
 use super::say::{say, say_line};
 use super::show::read_solution;
-use crate::diagnose::Weight;
+use crate::assess::Limits;
+use crate::diagnose::{Mistake, Weight};
 use crate::error::{Code, Error, Notice, Result, closest_name};
-use crate::frames::{FrameFit, Given, KnownRobot, Seen, Touches, fit};
+use crate::frames::{AsStated, FrameFit, Given, KnownRobot, Seen, Touches, fit};
 use crate::geom::{Pose, matrix_from_rpy};
 use crate::identify::{measure_bodies, touch_mistake};
+use crate::output::corrections::{FileFinding, numbers};
 use crate::output::frame_files::{self, Frames, Named};
 use crate::output::frame_findings::{at_the_places, frame_findings};
 use crate::output::frames_record::{
@@ -87,7 +90,7 @@ pub(super) fn run(args: &FramesArgs) -> Result<Verdict> {
     }
     let subject = args.touches.first().unwrap_or(&args.from).display().to_string();
     let mistake = touch_mistake(&robot, &touches, &given, (&fitted, &found.limits));
-    let findings = frame_findings((&fitted, mistake), &touches, &found.limits, &subject);
+    let findings = findings((&fitted, mistake), &touches, (&found.limits, placement), &subject);
     let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
     let made = FramesRecord {
         format: FORMAT,
@@ -137,6 +140,52 @@ pub(super) fn run(args: &FramesArgs) -> Result<Verdict> {
     }
     say_line!("results   {} ({})", args.out.display(), files.keys().cloned().collect::<Vec<_>>().join(", "));
     Ok(if findings.iter().all(|f| f.weight == Weight::Note) { Verdict::Good } else { Verdict::GateFailed })
+}
+
+/// What is to be said of the fit. The plate of a solution counts by where it brings the tool: in the base it stands as uncertainly as the base
+/// itself, which no target sees.
+fn findings(
+    (fit, mistake): (&FrameFit, Option<Mistake>),
+    touches: &Touches,
+    (limits, placement): (&Limits, Option<usize>),
+    subject: &str,
+) -> Vec<FileFinding> {
+    let is_explained = mistake.is_some();
+    let work_covariance = if placement.is_some() { None } else { fit.work_covariance.clone() };
+    let by_use = FrameFit { work_covariance, ..fit.clone() };
+    let mut all = frame_findings((&by_use, mistake), touches, limits, subject);
+    if !is_explained {
+        all.extend(placement.and_then(|_| plate_weak(fit, touches, limits, subject)));
+        all.extend(too_exact(fit, limits, subject));
+    }
+    all
+}
+
+/// The tool is hardly known relative to the plate.
+fn plate_weak(fit: &FrameFit, touches: &Touches, limits: &Limits, subject: &str) -> Option<FileFinding> {
+    let sigma_mm = 1e3 * fit.expected.with_frames_m;
+    let text = format!(
+        "the tool relative to the plate is hardly told: {sigma_mm:.1} mm RMS expected over the stops of the solution and the touches; touch with the tip turned further, and markers further apart"
+    );
+    let is_weak = !touches.all.is_empty() && sigma_mm > limits.frame_sigma_mm;
+    is_weak.then(|| gate(Code::FrameWeak, subject, numbers([("sigma_mm", sigma_mm)]), text))
+}
+
+/// Touches as exact as only computed ones are: those of a plan, with the joint values that it proposed.
+fn too_exact(fit: &FrameFit, limits: &Limits, subject: &str) -> Option<FileFinding> {
+    let AsStated { size, freedom } = fit.as_stated;
+    let text = format!(
+        "the touches fit {:.0} times better than their stated sigma and the joint noise let them ({:.4} mm RMS, {freedom} degrees of freedom): these are the joint values of a plan, or computed ones, not those at which the tool touched; write these into joints.csv (or correct sigma_m, if it is so much too large)",
+        1.0 / size.max(f64::MIN_POSITIVE),
+        1e3 * fit.rms_m
+    );
+    let quantities = numbers([("size", size), ("freedom", freedom as f64), ("rms_mm", 1e3 * fit.rms_m)]);
+    let is_exact = freedom >= limits.exact_touches_freedom && size < limits.exact_touches;
+    is_exact.then(|| gate(Code::TouchesExact, subject, quantities, text))
+}
+
+fn gate(code: Code, subject: &str, quantities: BTreeMap<String, f64>, text: String) -> FileFinding {
+    FileFinding { code, weight: Weight::Gate, subject: subject.to_owned(), quantities, text }
 }
 
 /// The failure with the folder that it is about.

@@ -55,6 +55,8 @@ pub struct FrameFit {
     pub knowledge: Knowledge,
     /// Factor that the touches ask for on their stated sigmas.
     pub factor: f64,
+    /// The residuals by the sigmas as they are stated.
+    pub as_stated: AsStated,
     /// Factor that what the touches say of the robot asks for on the covariance of the solution.
     pub robot_factor: f64,
     /// Of the directions in which the touches say most of the robot the one in which it is farthest from the solution, in sigmas of that.
@@ -73,6 +75,15 @@ impl FrameFit {
         let in_one = self.robot_sigmas * limits.touch_factor / limits.sigmas_beyond_tolerance;
         self.factor.max(self.robot_factor).max(in_one)
     }
+}
+
+/// Residuals of touches in use by stated sigmas, joint noise and covariance of the solution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AsStated {
+    /// Their size: root of the mean square over the degrees of freedom, 1 where the sigmas are right.
+    pub size: f64,
+    /// Degrees of freedom.
+    pub freedom: usize,
 }
 
 /// Expected error of the tool over the stops and touches, RMS of the length, m. Joint noise is apart: no frame removes it.
@@ -343,6 +354,22 @@ fn predicted(work: &Work<'_>, unknowns: &Unknowns, factor: f64, solved: &Solved,
 }
 
 impl Work<'_> {
+    /// `sum v' V^-1 v + z' z` has as many degrees of freedom as there are rows beyond the free columns.
+    fn as_stated(&self, unknowns: &Unknowns, without: &BTreeMap<usize, f64>) -> AsStated {
+        let used: Vec<bool> = (0..self.touches.all.len()).map(|k| !without.contains_key(&k)).collect();
+        let Some(solved) = self.solved(unknowns, &used, 1.0) else { return AsStated { size: 1.0, freedom: 0 } };
+        let free = self.columns.free.len();
+        let rows: usize = solved.stops.iter().map(|part| part.r.len()).sum();
+        let of_stop = |part: &StopPart| {
+            let v = residual(part, &solved);
+            v.dot(&(&part.weight * &v))
+        };
+        let of_touches: f64 = solved.stops.iter().map(of_stop).sum();
+        let of_robot = solved.step.rows(free, solved.step.len() - free).norm_squared();
+        let freedom = rows.saturating_sub(free);
+        AsStated { size: ((of_touches + of_robot) / freedom.max(1) as f64).sqrt(), freedom }
+    }
+
     fn finished(&self, unknowns: &Unknowns, factor: f64, solved: &Solved, without: &BTreeMap<usize, f64>) -> FrameFit {
         let columns = &self.columns;
         let lengths = judged(solved);
@@ -382,6 +409,7 @@ impl Work<'_> {
             work: has_work.then_some(unknowns.work),
             places: unknowns.places.clone(),
             factor,
+            as_stated: self.as_stated(unknowns, without),
             robot_factor: solved.robot_factor(columns.free.len()),
             robot_sigmas: solved.robot_sigmas(columns.free.len()),
             rms_m: (used.iter().sum::<f64>() / used.len().max(1) as f64).sqrt(),

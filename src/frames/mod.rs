@@ -25,7 +25,7 @@ mod start;
 pub mod touch;
 
 pub use equations::Given;
-pub use fit::{FrameFit, Judged, closed_form, fit};
+pub use fit::{AsStated, FrameFit, Judged, closed_form, fit};
 pub use knowledge::Knowledge;
 pub use plan::{PlannedTouch, TouchPlan, TouchRequest, plan_touches};
 pub use robot::KnownRobot;

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use robotcal::assess::Limits;
-use robotcal::diagnose::Finding;
+use robotcal::diagnose::{Finding, Weight};
 use robotcal::error::Code;
 use robotcal::frames::{Given, KnownRobot, Seen, Touches, fit};
 use robotcal::geom::Pose;
@@ -389,7 +389,7 @@ fn frames_are_written_as_controllers_read_them() {
     assert_eq!(format!("{}{}", &urdf[..start], &urdf[end..]), calibrated);
 }
 
-/// A plan is a series: touched as planned it gives back tool and work object that it was made for.
+/// A plan is a series: with the joint values that it proposed it gives back tool and work object that it was made for, and is no measurement.
 #[test]
 fn planned_touches_are_a_series_that_frames_reads() {
     let folder = tempfile::tempdir().unwrap();
@@ -414,7 +414,7 @@ fn planned_touches_are_a_series_that_frames_reads() {
     let run = robotcal(&[&plan[..], &["--touch-frame", "fixture", "--count", "8"]].concat(), &out).expect(0);
     println!("{}", run.said());
     let frames = folder.path().join("frames");
-    let run = robotcal(&["frames", "--from", &solution, "--touches", out.to_str().unwrap()], &frames).expect(0);
+    let run = robotcal(&["frames", "--from", &solution, "--touches", out.to_str().unwrap()], &frames).expect(1);
     println!("{}", run.said());
     let record = robotcal::output::frames_record::read(&run.file("frames.json")).unwrap();
     let (rad, m) =
@@ -422,6 +422,9 @@ fn planned_touches_are_a_series_that_frames_reads() {
     // Joint values have four decimals of a degree.
     assert!(rad < 2e-5 && m < 2e-5, "{rad:.1e} rad, {m:.1e} m");
     assert!((record.tool.unwrap().pose.xyz_m[2] - 0.1).abs() < 2e-5);
+    let [exact] = &record.findings[..] else { panic!("{:?}", record.findings) };
+    assert_eq!((exact.code, exact.weight), (Code::TouchesExact, Weight::Gate));
+    assert!(record.rms_m < 2e-6 && exact.quantities["size"] < 0.05, "{exact:?}");
     // Points in mm, and points that no posture touches.
     std::fs::write(&points, "name,x_m,y_m,z_m\na,0,0,0\nb,100,0,0\nc,0,100,0\n").unwrap();
     assert_says(&robotcal(&plan, &out).expect(2).said(), Code::TouchUnit, &["fixture.csv:3"]);
@@ -555,4 +558,21 @@ fn usual_mistakes_in_touches_are_named() {
     let near = fit(&robot, &good, &Given { tool: Some(Pose::new(Matrix3::identity(), tool)), plate: None }, &limits);
     assert!(near.unwrap().robot_sigmas > limits.sigmas_beyond_tolerance);
     assert!(fit(&robot, &good, &Given { tool: None, plate: None }, &limits).unwrap().robot_sigmas < 4.0);
+}
+
+/// The plate of a solution stands in the base as uncertainly as the base itself, and that is no error of the tool on the plate.
+#[test]
+fn touches_of_the_plate_are_judged_by_where_the_tool_is_on_it() {
+    let truth = Truth::read(&repo("datasets/kr6_small/truth.toml")).unwrap();
+    let Files { folder, touches, .. } = files("plate", truth.plate_poses["placement_0"].pose(), 14);
+    let solution = repo(SOLUTION);
+    let [from, touched] = [&solution, &touches].map(|p| p.to_str().unwrap());
+    let run = robotcal(&["frames", "--from", from, "--plate", "--touches", touched], &folder.path().join("frames"));
+    let record = robotcal::output::frames_record::read(&run.file("frames.json")).unwrap();
+    println!("{}", run.said());
+    assert_eq!(run.output.status.code(), Some(0));
+    let covariance = record.work.unwrap().covariance;
+    let in_the_base = (0..3).map(|k| covariance[7 * k].sqrt()).fold(0.0, f64::max);
+    assert!(in_the_base > 1e-3, "{in_the_base}");
+    assert!(record.expected.with_frames_m < 2e-4, "{:?}", record.expected);
 }
