@@ -42,6 +42,8 @@ mod verdict;
 mod verify;
 mod verify_args;
 mod verify_series;
+mod verify_stated;
+mod verify_verdict;
 
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;

@@ -5,14 +5,18 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
+use super::compensate_frames::Side;
+use super::compensate_models::not_given;
 use super::joint_table::{self, Unit};
 use super::robot::read_chain;
 use super::say::say_line;
 use super::verify_args::VerifyArgs;
+use super::verify_stated::Stated;
+use super::verify_verdict::Reasons;
 use super::{Verdict, verify_series};
 use crate::assess::{
-    DeviceMoved, Limits, MeasuredPoint, OddPoints, PointFit, Ratio, ReadingMistake, bootstrap_ratio, by_cluster,
-    device_moved, fit_points, odd_points, reading_mistake,
+    DeviceMoved, Limits, MeasuredPoint, OddPoints, PointFit, ReadingMistake, bootstrap_ratio, by_cluster, device_moved,
+    fit_points, odd_points, reading_mistake,
 };
 use crate::error::{Code, Error, Result};
 use crate::model::robot::Robot;
@@ -61,36 +65,41 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     });
     let nominal = nominal.transpose()?;
     let moved = device_moved(&model.robot, &model.points, &model.fit, limits);
-    match moved {
-        Some(DeviceMoved { first, by_m, rms_m }) => say_line!(
-            "moved     the device, or the base, stands {:.1} mm elsewhere from row {} on (without that {:.3} mm RMS): judge the rows before and after alone",
-            1e3 * by_m,
-            first + 1,
-            1e3 * rms_m
-        ),
-        None => odd_points(&model.robot, &model.points, limits).iter().for_each(say_odd),
-    }
+    let odd = if moved.is_none() { odd_points(&model.robot, &model.points, limits) } else { None };
+    moved.iter().for_each(say_moved);
+    odd.iter().for_each(say_odd);
+    let mut reasons = Reasons::default();
+    reasons.doubts.extend(odd.as_ref().map(|odd| format!("{} points are wrong, or their readings", odd.points.len())));
+    // Wrong points are none of the robot's errors.
+    let rms_m = odd.map_or(model.fit.rms_m, |odd| odd.without.rms_m);
     let different = model.different();
-    let verdict = match (moved, &nominal) {
-        (Some(_), _) => Err("the points do not belong together".to_owned()),
-        _ if different < limits.scatter_images => Err(format!(
+    if moved.is_some() {
+        reasons.against.push("the points do not belong together".into());
+    } else if different < limits.scatter_images {
+        reasons.against.push(format!(
             "{different} different points, of which frame and reflector take up nine of {} values: measure {} or more",
             3 * different,
             limits.scatter_images
-        )),
-        (None, Some(nominal)) => gain(&model, nominal, limits),
-        (None, None) => return Ok(Verdict::Good),
-    };
-    match verdict {
-        Ok(good) => {
-            say_line!("verdict   {good}");
-            Ok(Verdict::Good)
-        }
-        Err(why) => {
-            say_line!("verdict   NOT TO BE TRUSTED: {why}");
-            Ok(Verdict::GateFailed)
-        }
+        ));
+    } else {
+        weigh(args, (&model, nominal.as_ref()), rms_m, &mut reasons);
     }
+    let side = Side { robot: &model.robot, urdf: &args.urdf, solution: None };
+    reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
+    Ok(reasons.verdict())
+}
+
+/// The gain over the nominal robot, and the error beside what the solution states.
+fn weigh(args: &VerifyArgs, (model, nominal): (&Judged, Option<&Judged>), rms_m: f64, reasons: &mut Reasons) {
+    let limits = &Limits::default();
+    match nominal.map(|nominal| bootstrap_ratio(&units(model, model), &units(model, nominal))) {
+        Some(Some(ratio)) => reasons.add_gain(ratio, "points", limits),
+        Some(None) => reasons.against.push("the nominal model leaves nothing".into()),
+        None => {}
+    }
+    let stated = Stated::beside(&args.urdf, &model.robot);
+    let expected = stated.as_ref().and_then(|s| Some((s, s.at_points(&model.points)?)));
+    reasons.add_error((&args.urdf, rms_m), expected, nominal.is_some(), limits);
 }
 
 fn judged(
@@ -148,6 +157,15 @@ fn line(what: &str, urdf: &Path, Judged { fit, .. }: &Judged) -> String {
     format!("{what:<9} {}: {:.3} mm RMS, worst {:.3} mm", urdf.display(), 1e3 * fit.rms_m, 1e3 * worst)
 }
 
+fn say_moved(DeviceMoved { first, by_m, rms_m }: &DeviceMoved) {
+    say_line!(
+        "moved     the device, or the base, stands {:.1} mm elsewhere from row {} on (without that {:.3} mm RMS): judge the rows before and after alone",
+        1e3 * by_m,
+        first + 1,
+        1e3 * rms_m
+    );
+}
+
 fn say_odd(OddPoints { points, off_m, without }: &OddPoints) {
     let each: Vec<String> =
         points.iter().zip(off_m).map(|(k, off)| format!("{} ({:.1} mm)", k + 1, 1e3 * off)).collect();
@@ -171,22 +189,10 @@ fn clusters(points: &[MeasuredPoint]) -> Vec<usize> {
         .collect()
 }
 
-/// What is gained over the nominal robot; why nothing, where the points do not tell it.
-fn gain(model: &Judged, nominal: &Judged, limits: &Limits) -> std::result::Result<String, String> {
-    let units = |judged: &Judged| {
-        let squares: Vec<(f64, f64)> = judged.fit.residuals_m.iter().map(|r| (r.norm_squared(), 1.0)).collect();
-        by_cluster(&model.clusters, &squares)
-    };
-    let Some(Ratio { value, low, high }) = bootstrap_ratio(&units(model), &units(nominal)) else {
-        return Err("the nominal model leaves nothing".into());
-    };
-    let share = format!("{:.0} % of the nominal error ({:.0} to {:.0} %)", 100.0 * value, 100.0 * low, 100.0 * high);
-    match () {
-        () if high >= 1.0 && value < 1.0 => Err(format!("{share}, which these points do not tell from no gain")),
-        () if high >= 1.0 => Err(share),
-        () if value * limits.doubtful_gain > 1.0 => Ok(format!("good with doubts: {share}, hardly worth installing")),
-        () => Ok(format!("good: {share}")),
-    }
+/// Squares of the residuals, those at the same readings together.
+fn units(model: &Judged, judged: &Judged) -> Vec<(f64, f64)> {
+    let squares: Vec<(f64, f64)> = judged.fit.residuals_m.iter().map(|r| (r.norm_squared(), 1.0)).collect();
+    by_cluster(&model.clusters, &squares)
 }
 
 fn read_points(path: &Path, chain: &Chain, unit: Unit) -> Result<Vec<MeasuredPoint>> {

@@ -2,17 +2,25 @@
 
 use std::path::Path;
 
+use super::compensate_frames::Side;
+use super::compensate_models::not_given;
 use super::recording::RecordingArgs;
 use super::say::say_line;
 use super::verify_args::VerifyArgs;
+use super::verify_stated::Stated;
+use super::verify_verdict::{Reasons, of_series};
 use super::{Verdict, progress};
-use crate::assess::{Ratio, bootstrap_ratio, by_cluster, root_mean_square};
+use crate::assess::{Limits, bootstrap_ratio, by_cluster, root_mean_square};
 use crate::calibration::{Ends, Inputs, Observed};
 use crate::error::{Code, Error, Result};
-use crate::identify::{JudgedImage, in_told_postures, postures_are_computed, verify_series};
+use crate::identify::{
+    JudgedImage, Options, RobotModel, Selection, identify, in_told_postures, postures_are_computed, verify_series,
+};
 use crate::model::robot::Robot;
 use crate::output::compensated;
+use crate::output::corrections::FileFinding;
 use crate::problem::MeasuredSeries;
+use crate::series::InputFile;
 use crate::urdf::Chain;
 
 /// Judges the model, and the nominal one where it is given, by the images that both predict.
@@ -24,20 +32,72 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let Some(file) = &args.nominal else {
         let inputs = judged_inputs.with_recordings(&options)?;
         require_readings(&inputs)?;
-        let Observed { chain, series, .. } = inputs.observe(&progress::of_series())?;
+        let Observed { chain, series, files, .. } = inputs.observe(&progress::of_series())?;
         let robot = compensated(chain, args.compensation.as_deref())?;
-        say_line!("{}", line("model", &args.urdf, &judged(&robot, &args.urdf, &series)?.iter().collect::<Vec<_>>()));
-        return Ok(Verdict::Good);
+        let model = judged(&robot, &args.urdf, &series)?;
+        let model: Vec<&JudgedImage> = model.iter().collect();
+        say_line!("{}", line("model", &args.urdf, &model));
+        let mut reasons = Reasons::default();
+        weigh(args, &mut reasons, Measured { robot: &robot, series: &series, files: &files, model: &model });
+        return Ok(reasons.verdict());
     };
     // Poses of a controller are those of the model that is in it, whichever robot is judged by them.
     let nominal_inputs = read(file)?;
     require_same_joints(&judged_inputs.chain, &nominal_inputs.chain, &args.urdf, file)?;
-    let Observed { chain, series, .. } = nominal_inputs.with_recordings(&options)?.observe(&progress::of_series())?;
+    let Observed { chain, series, files, .. } =
+        nominal_inputs.with_recordings(&options)?.observe(&progress::of_series())?;
     let robot = compensated(judged_inputs.chain, args.compensation.as_deref())?;
     let series = in_told_postures(&robot, &series);
     let model = judged(&robot, &args.urdf, &series)?;
     let nominal = judged(&Robot::nominal(chain), file, &series)?;
-    compare(args, file, &model, &nominal)
+    let (model, nominal) = of_both(&model, &nominal);
+    let mut reasons = compare(args, file, &model, &nominal)?;
+    weigh(args, &mut reasons, Measured { robot: &robot, series: &series, files: &files, model: &model });
+    Ok(reasons.verdict())
+}
+
+/// What was measured of a model, and how it does.
+struct Measured<'a> {
+    robot: &'a Robot,
+    series: &'a [MeasuredSeries],
+    files: &'a [InputFile],
+    model: &'a [&'a JudgedImage],
+}
+
+/// The model beside what its solution states, and what the series shows of itself where it misses more.
+fn weigh(args: &VerifyArgs, reasons: &mut Reasons, measured: Measured<'_>) {
+    let Measured { robot, series, files, model } = measured;
+    let (urdf, limits) = (&args.urdf, &Limits::default());
+    let stated = Stated::beside(urdf, robot);
+    let expected = stated.as_ref().and_then(|s| Some((s, s.at_stops(series)?)));
+    let rms_m = 1e-3 * root_mean_square(&units(model));
+    reasons.add_error((urdf, rms_m), expected, args.nominal.is_some(), limits);
+    if let Some(stated) = stated.as_ref().filter(|s| s.was_fitted_to(files)) {
+        reasons.add_own(urdf, stated);
+    }
+    let side = Side { robot, urdf, solution: None };
+    reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
+    let is_unexplained = expected.is_none() && rms_m > 1e-3 * limits.flange_sigma_mm;
+    if reasons.misses() || is_unexplained {
+        reasons.findings.extend(shown_by_series(robot.chain.clone(), series));
+    }
+}
+
+/// What the series shows of itself with the origins of the model held: a plate or a camera that was moved, a zero that is off.
+fn shown_by_series(chain: Chain, series: &[MeasuredSeries]) -> Vec<FileFinding> {
+    let selection = Selection { fix: vec![ROBOT.to_owned()], ..Selection::default() };
+    let options = Options { model: RobotModel::Rigid, selection, ..Options::default() };
+    let found = identify(chain, series, &options);
+    found.map_or_else(|_| Vec::new(), |solution| solution.findings.iter().filter_map(of_series).collect())
+}
+
+/// Name of all parameters of the robot.
+const ROBOT: &str = "robot";
+
+/// The images that both models predict.
+fn of_both<'a>(model: &'a [JudgedImage], nominal: &'a [JudgedImage]) -> (Vec<&'a JudgedImage>, Vec<&'a JudgedImage>) {
+    let same = |a: &JudgedImage, b: &JudgedImage| a.series == b.series && a.name == b.name;
+    model.iter().filter_map(|m| nominal.iter().find(|n| same(m, n)).map(|n| (m, n))).unzip()
 }
 
 /// Without the model in the controller its poses tell no readings.
@@ -61,20 +121,16 @@ fn require_same_joints(model: &Chain, nominal: &Chain, urdf: &Path, file: &Path)
     Err(Error::new(Code::JointUnknown, urdf.display(), what, remedy))
 }
 
-fn compare(args: &VerifyArgs, file: &Path, model: &[JudgedImage], nominal: &[JudgedImage]) -> Result<Verdict> {
-    let same = |a: &JudgedImage, b: &JudgedImage| a.series == b.series && a.name == b.name;
-    let pairs: Vec<(&JudgedImage, &JudgedImage)> =
-        model.iter().filter_map(|m| nominal.iter().find(|n| same(m, n)).map(|n| (m, n))).collect();
-    let (model, nominal): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
+fn compare(args: &VerifyArgs, file: &Path, model: &[&JudgedImage], nominal: &[&JudgedImage]) -> Result<Reasons> {
     say_line!(
         "images    {} that both models predict; camera, hand-eye transform and plate fitted to the others",
         model.len()
     );
-    say_line!("{}", line("model", &args.urdf, &model));
-    say_line!("{}", line("nominal", file, &nominal));
+    say_line!("{}", line("model", &args.urdf, model));
+    say_line!("{}", line("nominal", file, nominal));
     let postures: Vec<usize> = model.iter().map(|i| i.posture).collect();
     let of_postures = |images: &[&JudgedImage]| by_cluster(&postures, &units(images));
-    let ratio = bootstrap_ratio(&of_postures(&model), &of_postures(&nominal)).ok_or_else(|| {
+    let ratio = bootstrap_ratio(&of_postures(model), &of_postures(nominal)).ok_or_else(|| {
         Error::new(
             Code::FitUndetermined,
             "verification",
@@ -82,15 +138,9 @@ fn compare(args: &VerifyArgs, file: &Path, model: &[JudgedImage], nominal: &[Jud
             "check that both URDFs are of this robot",
         )
     })?;
-    let Ratio { value, low, high } = ratio;
-    let share = format!("{:.0} % of the nominal error ({:.0} to {:.0} %)", 100.0 * value, 100.0 * low, 100.0 * high);
-    if high < 1.0 {
-        say_line!("verdict   good: {share}");
-        return Ok(Verdict::Good);
-    }
-    let why = if value < 1.0 { ", which these images do not tell from no gain" } else { "" };
-    say_line!("verdict   NOT TO BE TRUSTED: {share}{why}");
-    Ok(Verdict::GateFailed)
+    let mut reasons = Reasons::default();
+    reasons.add_gain(ratio, "images", &Limits::default());
+    Ok(reasons)
 }
 
 fn judged(robot: &Robot, file: &Path, series: &[MeasuredSeries]) -> Result<Vec<JudgedImage>> {

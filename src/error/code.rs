@@ -250,6 +250,9 @@ codes! {
     Input "Earlier results" {
         SolutionDamaged "solution_damaged" "a solution.json is not as the program wrote it",
         SolutionDiffers "solution_differs" "a solution.json is of another robot or series",
+        StatedExceeded "stated_exceeded" "a model misses more in another measurement than its solution states",
+        OwnMeasurement "own_measurement" "a model is judged by what it was fitted to",
+        NotCorrected "not_corrected" "a model misses as much as robots that nobody corrected",
     }
     Unsolved "Geometry that does not fit" {
         CameraUndetermined "camera_undetermined" "the images do not determine the camera",

@@ -5,10 +5,13 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use nalgebra::Vector3;
+use robotcal::Code;
 use robotcal::assess::{Limits, MeasuredPoint, device_moved, fit_points, odd_points};
 use robotcal::identify::Estimator;
 use robotcal::model::robot::Robot;
 use robotcal::simulate::truth::Truth;
+
+use crate::verify_series::codes;
 
 /// A copy of a series with its first 24 stops.
 fn few_stops(of: &Path, into: &Path) -> PathBuf {
@@ -190,4 +193,52 @@ fn readings_in_another_unit_are_no_good_verdict() {
     let wrong = verdict(&seen, "deg", None);
     let said = String::from_utf8_lossy(&wrong.stderr);
     assert!(!wrong.status.success() && said.contains("--joint-unit"), "{said}");
+}
+
+/// Points of the robot of the shipped report, within the ranges of its stops, with this error of the zero of its third joint, rad.
+fn measured_by_a_tracker(folder: &Path, zero: f64) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let truth = Truth::read(&root.join("datasets/kr6_small/truth.toml")).unwrap();
+    let robot = truth.robot(&kr6().1.chain).unwrap();
+    let mut table = format!("x_m,y_m,z_m,{}\n", truth.joints.join(","));
+    for (k, held) in truth.held_out.iter().enumerate() {
+        let mut readings = held.readings.clone();
+        readings[2] += zero;
+        let error = [1, 3, 5].map(|step| (step * k % 7) as f64 / 2.0 - 1.5);
+        let at = robot.base_from_tip(&readings).transform(&[0.03, -0.02, 0.1].into()) + 2e-5 * Vector3::from(error);
+        let cells: Vec<String> = at.iter().chain(&held.readings).map(|v| format!("{v:.9}")).collect();
+        writeln!(table, "{}", cells.join(",")).unwrap();
+    }
+    let file = folder.join(format!("points_{zero}.csv"));
+    std::fs::write(&file, table).unwrap();
+    file
+}
+
+#[test]
+fn points_that_a_model_misses_by_more_than_its_solution_states_are_no_good_verdict() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let report = root.join("reports/kr6_small");
+    let folder = tempfile::tempdir().unwrap();
+    let urdf = report.join("kuka_kr6_r900.calibrated.urdf");
+    let judged = |urdf: &Path, points: &Path, flags: &[&str]| {
+        let mut command = Command::cargo_bin("robotcal").unwrap();
+        command.args(["verify", "--joint-unit", "rad", "--urdf"]).arg(urdf);
+        command.arg("--points").arg(points).args(flags);
+        let found = command.output().unwrap();
+        let text = String::from_utf8(found.stdout).unwrap();
+        println!("{text}{}", String::from_utf8_lossy(&found.stderr));
+        (found.status.code(), codes(&text))
+    };
+    let (nominal, compensation) = (kr6().0, report.join("compensation.toml"));
+    let [nominal, compensation] = [&nominal, &compensation].map(|p| p.to_str().unwrap());
+    let (right, changed) = (measured_by_a_tracker(folder.path(), 0.0), measured_by_a_tracker(folder.path(), 2e-3));
+    for flags in [vec!["--compensation", compensation], vec!["--compensation", compensation, "--nominal", nominal]] {
+        assert_eq!(judged(&urdf, &right, &flags), (Some(0), vec![]));
+        assert_eq!(judged(&urdf, &changed, &flags), (Some(1), vec![Code::StatedExceeded]));
+    }
+    // A compensation.toml of the URDF lies beside it, and no solution.
+    let copy = folder.path().join("copy.urdf");
+    std::fs::copy(&urdf, &copy).unwrap();
+    std::fs::write(folder.path().join("compensation.toml"), "[joint.joint_a2]\ngear_scale = 0.0001\n").unwrap();
+    assert_eq!(judged(&copy, &right, &[]), (Some(0), vec![Code::CompensationNotGiven]));
 }

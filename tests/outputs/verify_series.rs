@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 use assert_cmd::Command;
+use robotcal::Code;
 
 use crate::support::by_poses::with_poses;
 
@@ -67,4 +68,106 @@ fn poses_of_a_controller_judge_a_model_as_the_readings_do() {
         found.status.code()
     });
     assert_eq!(codes, [Some(2); 2]);
+}
+
+fn robotcal(args: &[&str]) -> Output {
+    let output = Command::cargo_bin("robotcal").unwrap().args(args).output().unwrap();
+    println!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+/// Exit code, the codes of what is said, and the error of the model, mm RMS.
+fn verdict(urdf: &Path, series: &Path, flags: &[&str]) -> (Option<i32>, Vec<Code>, f64) {
+    let [urdf, series] = [urdf, series].map(|p| p.to_str().unwrap());
+    let output = robotcal(&[&["verify", "--urdf", urdf, "--series", series], flags].concat());
+    let text = String::from_utf8(output.stdout).unwrap();
+    let model = text.lines().find(|line| line.starts_with("model"));
+    let mm = model.and_then(|line| line.rsplit_once(": ")?.1.split(' ').next()?.parse().ok());
+    (output.status.code(), codes(&text), mm.unwrap_or(f64::NAN))
+}
+
+/// What stands in brackets behind notes and gates.
+pub fn codes(text: &str) -> Vec<Code> {
+    let name = |line: &str| Some(line.strip_suffix(']')?.rsplit_once('[')?.1.to_owned());
+    let of = |name: String| Code::ALL.iter().copied().find(|code| code.name() == name);
+    text.lines().filter_map(name).filter_map(of).collect()
+}
+
+/// A series of 20 stops of a robot with these errors beside its URDF.
+fn simulated(urdf: &Path, out: &Path, errors: &str, flags: &[&str]) -> PathBuf {
+    let [urdf, folder] = [urdf, out].map(|p| p.to_str().unwrap());
+    let of = ["simulate", "--urdf", urdf, "--out", folder, "--observations", "--images", "20", "--errors", errors];
+    assert!(robotcal(&[&of, flags].concat()).status.success());
+    out.to_path_buf()
+}
+
+/// The zero of a joint is another: everything was seen where the readings of the controller are not.
+fn with_other_zero(series: &Path, joint: &str, deg: f64) {
+    let path = series.join("joints.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (head, rows) = text.split_once('\n').unwrap();
+    let column = head.split(',').position(|name| name == joint).unwrap();
+    let shifted = |row: &str| {
+        let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
+        cells[column] = (cells[column].parse::<f64>().unwrap() + deg).to_string();
+        cells.join(",")
+    };
+    let rows: Vec<String> = rows.lines().map(shifted).collect();
+    std::fs::write(path, format!("{head}\n{}\n", rows.join("\n"))).unwrap();
+}
+
+/// A robot that changed since it was identified, or a series that is at fault, is not a good model for being better than the nominal one.
+#[test]
+fn a_model_that_misses_more_than_its_solution_states_is_not_trusted() {
+    let nominal = root().join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = root().join("reports/kr6_small/kuka_kr6_r900.calibrated.urdf");
+    let compared = ["--nominal", nominal.to_str().unwrap()];
+    let folder = tempfile::tempdir().unwrap();
+    let same = simulated(&urdf, &folder.path().join("same"), "none", &[]);
+    let changed = simulated(&urdf, &folder.path().join("changed"), "none", &["--seed", "2"]);
+    with_other_zero(&changed, "joint_a3", 2e-3f64.to_degrees());
+    let moved = simulated(&urdf, &folder.path().join("moved"), "none", &["--fault", "moved-plate"]);
+    for flags in [&compared[..], &[]] {
+        let (exit, said, mm) = verdict(&urdf, &same, flags);
+        assert_eq!((exit, said), (Some(0), vec![]));
+        assert!(mm < 0.1, "{mm}");
+        let (exit, said, mm) = verdict(&urdf, &changed, flags);
+        assert_eq!(exit, Some(1));
+        assert!(said.contains(&Code::StatedExceeded) && mm > 0.5, "{said:?} {mm}");
+        let (exit, said, _) = verdict(&urdf, &moved, flags);
+        assert_eq!(exit, Some(1));
+        assert!(said.contains(&Code::StatedExceeded) && said.contains(&Code::PlateDisplaced), "{said:?}");
+    }
+    // Of another robot no solution says anything, and nothing is compared.
+    let other = simulated(&nominal, &folder.path().join("other"), "rigid", &[]);
+    let (exit, said, mm) = verdict(&nominal, &other, &[]);
+    assert_eq!((exit, said), (Some(1), vec![Code::NotCorrected]));
+    assert!(mm > 1.0, "{mm}");
+}
+
+#[test]
+fn the_series_that_a_model_was_fitted_to_proves_nothing() {
+    let nominal = root().join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let folder = tempfile::tempdir().unwrap();
+    let series = simulated(&nominal, &folder.path().join("series"), "rigid", &[]);
+    let out = folder.path().join("result");
+    let [urdf, of, into] = [&nominal, &series, &out].map(|p| p.to_str().unwrap());
+    assert!(
+        robotcal(&["identify", "--urdf", urdf, "--series", of, "--robot-model", "rigid", "--out", into])
+            .status
+            .success()
+    );
+    let corrected = out.join("kuka_kr6_r900.calibrated.urdf");
+    let own = verdict(&corrected, &series, &["--nominal", urdf]);
+    assert_eq!((own.0, own.1), (Some(0), vec![Code::OwnMeasurement]));
+    // The same stops of the same robot, measured again.
+    let again = folder.path().join("again");
+    std::fs::create_dir(&again).unwrap();
+    for entry in std::fs::read_dir(&series).unwrap().map(Result::unwrap) {
+        std::fs::copy(entry.path(), again.join(entry.file_name())).unwrap();
+    }
+    let observations = std::fs::read_to_string(again.join("observations.csv")).unwrap();
+    std::fs::write(again.join("observations.csv"), observations + "\n").unwrap();
+    let other = verdict(&corrected, &again, &["--nominal", urdf]);
+    assert_eq!((other.0, other.1), (Some(0), vec![]));
 }
