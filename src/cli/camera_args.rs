@@ -14,7 +14,7 @@ pub(super) struct CameraArgs {
     /// Lens: brown, fisheye, parallax, rational, thin_prism, brown+field, fisheye+field; auto: the simplest of all that none beats decisively; ros: of those that camera.yaml can express [default: as in series.toml, else auto]
     #[arg(long, value_name = "LENS", help_heading = "What is estimated")]
     camera: Option<String>,
-    /// Camera to start from, in a file of OpenCV, Kalibr, mrcal or ROS; of several cameras NAME=FILE for each
+    /// Camera to start from, in a file of OpenCV, Kalibr, mrcal or ROS; of several cameras NAME=FILE for each; of a file of several cameras (Kalibr) FILE#cam1, NAME=FILE#cam1
     #[arg(long, value_name = "FILE", conflicts_with = "camera", help_heading = "What is estimated")]
     camera_file: Vec<String>,
     /// Take the cameras of --camera-file as they are instead of starting from them
@@ -57,12 +57,14 @@ impl CameraArgs {
                         Code::OptionRange,
                         "--camera-file",
                         what,
-                        "write NAME=FILE for each camera",
+                        "write NAME=FILE for each camera (NAME=FILE#cam1 where a camchain of Kalibr holds several)",
                     ));
                 }
             },
         };
-        let read = read_camera_file(&path, Some(&name))?;
+        let (path, in_file) = camera_in_file(path);
+        let read =
+            read_camera_file(&path, Some(in_file.as_deref().unwrap_or(&name))).map_err(|e| which(e, &name, &path))?;
         let lost = read.what_is_lost();
         if let (true, Some(lost)) = (self.hold_camera, &lost) {
             let remedy = "leave --hold-camera out, to start from the nearest";
@@ -78,6 +80,24 @@ impl CameraArgs {
     }
 }
 
+/// A file, and the camera in it that is named behind a `#`.
+fn camera_in_file(given: PathBuf) -> (PathBuf, Option<String>) {
+    let parts = given.to_str().and_then(|text| text.rsplit_once('#'));
+    match parts {
+        Some((file, camera)) if !given.exists() => (PathBuf::from(file), Some(camera.to_owned())),
+        _ => (given, None),
+    }
+}
+
+/// Of several cameras in a file none is named: how it is done here.
+fn which(error: Error, name: &str, path: &Path) -> Error {
+    if error.code != Code::OptionMissing {
+        return error;
+    }
+    let remedy = format!("name one of them behind a #: {name}={}#cam0", path.display());
+    Error { remedy, ..error }
+}
+
 fn require_size(path: &Path, [width, height]: [u32; 2], s: &MeasuredSeries) -> Result<()> {
     if [width, height] == [s.width_px, s.height_px] {
         return Ok(());
@@ -87,4 +107,53 @@ fn require_size(path: &Path, [width, height]: [u32; 2], s: &MeasuredSeries) -> R
         s.name, s.width_px, s.height_px
     );
     Err(Error::new(Code::SeriesDisagree, path.display(), what, "give the file of this camera, at this resolution"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMCHAIN: &str = "\
+cam0:
+  camera_model: pinhole
+  intrinsics: [1100.0, 1100.0, 640.0, 512.0]
+  distortion_model: radtan
+  distortion_coeffs: [-0.11, 0.09, 0.0004, -0.0003]
+  resolution: [1280, 1024]
+cam1:
+  camera_model: pinhole
+  intrinsics: [800.0, 800.0, 640.0, 512.0]
+  distortion_model: radtan
+  distortion_coeffs: [-0.05, 0.03, 0.0, 0.0]
+  resolution: [1280, 1024]
+";
+
+    fn series(camera: &str) -> MeasuredSeries {
+        let own = MeasuredSeries::without_images(camera, true, Vec::new());
+        MeasuredSeries { camera: camera.to_owned(), has_images: true, width_px: 1280, height_px: 1024, ..own }
+    }
+
+    fn focal_lengths(given: &[String], cameras: &[&str]) -> Result<Vec<f64>> {
+        let args = CameraArgs { camera: None, camera_file: given.to_vec(), hold_camera: false };
+        let mut all: Vec<MeasuredSeries> = cameras.iter().map(|name| series(name)).collect();
+        args.apply(&mut all)?;
+        Ok(all.iter().map(|s| s.known_camera.as_ref().map_or(f64::NAN, |c| c.camera.parameters[0])).collect())
+    }
+
+    /// Kalibr calls its cameras cam0 and cam1, whatever they are called in series.toml.
+    #[test]
+    fn cameras_of_a_camchain_are_named_behind_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("camchain.yaml");
+        std::fs::write(&file, CAMCHAIN).unwrap();
+        let of = |text: &str| text.replace("FILE", file.to_str().unwrap());
+        let both = [of("left=FILE#cam1"), of("right=FILE#cam0")];
+        assert_eq!(focal_lengths(&both, &["left", "right"]).unwrap(), [800.0, 1100.0]);
+        assert_eq!(focal_lengths(&[of("FILE#cam1")], &["front"]).unwrap(), [800.0]);
+        for given in ["FILE", "front=FILE", "FILE#cam2"] {
+            let refused = focal_lengths(&[of(given)], &["front"]).unwrap_err();
+            assert_eq!(refused.code, Code::OptionMissing);
+            assert!(refused.remedy.ends_with(&of("front=FILE#cam0")), "{}", refused.remedy);
+        }
+    }
 }
