@@ -160,7 +160,9 @@ impl Kind for Mistake {
                 format!("exchange the column names {} in joints.csv", joints.join(" and "))
             }
             MistakeKind::Columns(joints) => format!("correct the column names {} in joints.csv", joints.join(", ")),
-            MistakeKind::Reversed => "reverse the column names in joints.csv".into(),
+            MistakeKind::Reversed => {
+                "exchange the column names in joints.csv in pairs, in the order of the joints from base to tip (of two arms all joints, one arm after the other): the first with the last, the second with the last but one, and so on".into()
+            }
             MistakeKind::Unit { joint: Some(joint), .. } => {
                 format!("bring the column {joint} of joints.csv to the unit of the others")
             }
