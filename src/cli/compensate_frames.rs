@@ -14,6 +14,7 @@ use crate::output::restore::found_model;
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::programs::compensate::Compensated;
 use crate::programs::{KnownError, MeasuredFrames, MeasuredTool, Program, RobotFrames};
+use crate::urdf::Chain;
 
 /// One of the calibrated robots.
 pub(super) struct Side<'a> {
@@ -238,12 +239,33 @@ pub(super) fn solution(side: &Side, recorded: Option<&Path>) -> Result<Known<Sol
     if same {
         return Ok(Ok(record));
     }
-    let what = format!("is not the solution from which {} came", side.urdf.display());
+    let (what, remedy) = match base_that_differs(&record, chain) {
+        Some(base) => (
+            format!("is of the chain from {base}, and {} was read from {}", side.urdf.display(), chain.base),
+            format!("give --base {base}, from which the robot was identified"),
+        ),
+        None => (
+            format!("is not the solution from which {} came", side.urdf.display()),
+            "give the solution.json that was written beside it".to_owned(),
+        ),
+    };
     match side.solution {
-        Some(_) => {
-            let remedy = "give the solution.json that was written beside it";
-            Err(Error::new(Code::SolutionDiffers, path.display(), what, remedy))
-        }
-        None => Ok(Err(format!("{} {what}", path.display()))),
+        Some(_) => Err(Error::new(Code::SolutionDiffers, path.display(), what, remedy)),
+        None => Ok(Err(format!("{} {what}; {remedy}", path.display()))),
     }
+}
+
+/// The base of a solution of this robot, where that alone is another: one chain goes on where the other ends.
+fn base_that_differs<'r>(record: &'r SolutionRecord, chain: &Chain) -> Option<&'r str> {
+    let found = |name: &str| record.robot.joints.iter().find(|j| j.name == name);
+    let driven = || chain.joints.iter().filter(|j| j.drive.is_some());
+    let common: Vec<_> = driven().filter_map(|j| Some((j, found(&j.name)?))).collect();
+    let are_same = common.iter().all(|(own, other)| {
+        let (rad, m) = Pose::from(&other.corrected_origin).distance(&own.origin);
+        rad < SAME_ORIGIN && m < SAME_ORIGIN
+    });
+    let of_record = record.robot.joints.iter().filter(|j| j.drive.is_some()).count();
+    let is_part = !common.is_empty() && common.len() == of_record.min(driven().count());
+    let is_other = chain.tip == record.robot.tip && chain.base != record.robot.base;
+    (is_other && is_part && are_same).then_some(record.robot.base.as_str())
 }
