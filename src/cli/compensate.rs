@@ -20,7 +20,6 @@ use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
 use crate::output::corrections::{self, FileFinding, TABLE};
 use crate::output::{ResultFolder, compensated};
-use crate::programs::program::MeantPosture;
 use crate::programs::{
     self, Correction, Language, Left, Models, Postures, Program, ProgramSetting, Target, TargetKind, TargetOutcome,
     TextFile,
@@ -165,14 +164,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
         return Err(Error::new(Code::ProgramModelMissing, place, what, "give that model with --nominal"));
     }
     if args.nearest_posture {
-        for target in &mut program.targets {
-            if let TargetKind::Pose(pose) = &mut target.kind
-                && pose.posture.codes().is_some()
-            {
-                let on_path = matches!(pose.posture, MeantPosture::Unheeded(..));
-                pose.posture = if on_path { MeantPosture::Along } else { MeantPosture::Nearest };
-            }
-        }
+        program.heed_no_codes();
     }
     let sides = Sides {
         to: Side { robot: &to, urdf: &args.urdf, solution: args.solution.as_deref() },

@@ -12,8 +12,9 @@ use nalgebra::Vector6;
 
 use super::codes::Branch;
 use super::field::{Edit, FieldPlace, splice};
+use super::meant::{Meant, meant};
 use super::measured_frames::{KnownError, MeasuredFrames, Moved};
-use super::posture::{Before, Finder, Known};
+use super::posture::{Finder, Known};
 use super::program::{
     Approach, DisplacedTarget, Left, PoseTarget, Program, Target, TargetKind, Understood, write_joints,
 };
@@ -147,12 +148,14 @@ impl Compensated {
 
 /// Corrects every target of a program, in the order of visiting.
 pub fn compensate(program: &Program, models: Models<'_>, postures: &Postures) -> Compensated {
-    let mut work = Work::new(models, postures);
+    let mut work = Work::new(models);
     let mut edits = program.edits.clone();
     let mut outcomes = Vec::with_capacity(program.targets.len());
     let mut displaced = Vec::new();
-    for (k, target) in program.targets.iter().enumerate() {
-        match work.target(target, program) {
+    let finder = Finder::new(models.controller, &work.limits, postures.start.as_deref());
+    let all_meant = meant(program, models.controller, finder, &postures.held);
+    for ((k, target), meant) in program.targets.iter().enumerate().zip(all_meant) {
+        match work.target(target, meant, program) {
             Ok((correction, own, later)) => {
                 edits.extend(own);
                 displaced.extend(later.map(|l| (k, l)));
@@ -206,22 +209,14 @@ struct Later {
     wanted: Pose,
 }
 
-/// Joints of a target that was worked on.
-#[derive(Debug, Clone, Default)]
-struct Reached {
-    /// As programmed and as corrected.
-    readings: Option<(Vec<f64>, Vec<f64>)>,
-    /// Joints whose posture goes on from here, where those of the target itself are not known.
-    posture: Option<Vec<f64>>,
-}
+/// Joints of a target as programmed and as corrected; `None` where they are not known.
+type Reached = Option<(Vec<f64>, Vec<f64>)>;
 
 /// The way through a program.
 struct Work<'a> {
     models: Models<'a>,
-    postures: &'a Postures,
     /// Limits of the robot that runs the program; joints without any have none.
     limits: Vec<(f64, f64)>,
-    finder: Finder<'a>,
     /// One for each target so far.
     places: Vec<Reached>,
     /// Corrected points that others may start from: file and first byte -> pose in the work object.
@@ -232,27 +227,25 @@ struct Work<'a> {
 type Worked = (Correction, Vec<Edit>, Option<Later>);
 
 impl<'a> Work<'a> {
-    fn new(models: Models<'a>, postures: &'a Postures) -> Self {
+    fn new(models: Models<'a>) -> Self {
         let limits = inverse::stated_limits(&models.to.chain);
         let limits: Vec<_> = limits.into_iter().map(|l| l.unwrap_or((f64::NEG_INFINITY, f64::INFINITY))).collect();
-        let finder = Finder::new(models.controller, &limits, postures.start.as_deref());
-        Self { models, postures, limits, finder, places: Vec::new(), written: BTreeMap::new() }
+        Self { models, limits, places: Vec::new(), written: BTreeMap::new() }
     }
 
-    fn target(&mut self, target: &Target, program: &Program) -> Understood<Worked> {
-        let posture = target.approach.target().and_then(|k| self.places.get(k)).and_then(|p| p.posture.clone());
-        self.places.push(Reached { readings: None, posture });
-        self.worked(target, program)
+    fn target(&mut self, target: &Target, meant: Understood<Meant>, program: &Program) -> Understood<Worked> {
+        self.places.push(None);
+        self.worked(target, meant?, program)
     }
 
-    fn worked(&mut self, target: &Target, program: &Program) -> Understood<Worked> {
+    fn worked(&mut self, target: &Target, meant: Meant, program: &Program) -> Understood<Worked> {
         let before = match target.approach {
-            Approach::From(k) => self.places.get(k).and_then(|p| p.readings.clone()),
+            Approach::From(k) => self.places.get(k).and_then(Clone::clone),
             _ => None,
         };
         let (programmed_before, corrected_before) = before.unzip();
-        let kind = &self.completed(target, programmed_before.as_deref())?;
-        let (programmed, held, known) = self.meant(kind, programmed_before.is_some())?;
+        let Meant { kind, readings: programmed, held, known } = meant;
+        let kind = &kind;
         let meant = reach(self.models.from, &self.limits, &held, programmed_before.as_deref()).stop(&programmed);
         let moved = self.models.frames.map_or_else(|| Ok(Moved::none()), |f| f.moved(kind))?;
         let taught = self.models.from.pose_at(&meant, &vec![0.0; programmed.len()]);
@@ -263,7 +256,7 @@ impl<'a> Work<'a> {
         // The next target is approached from here also when this one stays as it is.
         let stands = corrected.clone().unwrap_or_else(|_| programmed.clone());
         if let Some(place) = self.places.last_mut() {
-            *place = Reached { posture: Some(programmed.clone()), readings: Some((programmed.clone(), stands)) };
+            *place = Some((programmed.clone(), stands));
         }
         let corrected = corrected?;
         let pose_at = |q: &[f64]| self.models.to.pose_at(&to.stop(q), &vec![0.0; q.len()]);
@@ -309,24 +302,6 @@ impl<'a> Work<'a> {
         let correction =
             Correction { programmed, corrected: read, posture, shift_m, turn_rad, residual_m, residual_rad };
         Ok((correction, edits, later))
-    }
-
-    /// Joints that the program means, which of them stay, and how the posture is known.
-    fn meant(&mut self, kind: &TargetKind, straight: bool) -> Understood<(Vec<f64>, Vec<bool>, Known)> {
-        let held = |own: Vec<bool>| own.iter().zip(&self.postures.held).map(|(a, h)| *a || *h).collect::<Vec<bool>>();
-        match kind {
-            TargetKind::Joints(joints) => {
-                let held = held(joints.fields.iter().map(Option::is_none).collect());
-                Ok((joints.readings.clone(), held, Known::Joints))
-            }
-            TargetKind::Pose(pose) => {
-                let held = held(pose.fixed.iter().map(Option::is_some).collect());
-                let readings = self.places.last().and_then(|p| p.posture.clone());
-                let before = Before { readings: readings.as_deref(), straight };
-                let (q, known) = self.finder.joints(pose, &held, before)?;
-                Ok((q, held, known))
-            }
-        }
     }
 
     /// Edits that write the pose of the controller's model, and the joints that this model finds in it.
@@ -377,30 +352,6 @@ impl<'a> Work<'a> {
             return Err(Why::new(LeftReason::Coarse, format!("the point that it starts from leaves {rest}")));
         }
         Ok(edits)
-    }
-
-    /// The target with what its text leaves out, which is what the target before it says.
-    fn completed(&self, target: &Target, before: Option<&[f64]>) -> Understood<TargetKind> {
-        let unknown =
-            || Why::new(LeftReason::Incomplete, "it leaves numbers out, and the target before it is not known");
-        let mut kind = target.kind.clone();
-        match &mut kind {
-            TargetKind::Joints(joints) => {
-                for (i, q) in joints.readings.iter_mut().enumerate().filter(|(_, q)| !q.is_finite()) {
-                    // Axes that the target does not have keep their place, wherever that is.
-                    let known = before.map(|b| b[i]);
-                    *q = match joints.fields[i] {
-                        None => known.unwrap_or_else(|| self.finder.anywhere(i)),
-                        Some(_) => known.ok_or_else(unknown)?,
-                    };
-                }
-            }
-            TargetKind::Pose(pose) if pose.is_partial() => {
-                pose.complete(&self.models.controller.base_from_tip(before.ok_or_else(unknown)?));
-            }
-            TargetKind::Pose(_) => {}
-        }
-        Ok(kind)
     }
 
     fn code_edits(&self, pose: &PoseTarget, programmed: &[f64], corrected: &[f64], program: &Program) -> Vec<Edit> {

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use crate::error::Result;
 
 /// Readings after which what differs from one to the next is not known: routines that call each other may never agree.
-const MOST_READINGS: usize = 8;
+const MOST_READINGS: usize = 24;
 /// Why something is not known.
 const BRANCHES: &str = "it is set in a branch or a loop";
 const CALLS: &str = "it is not the same at all calls of the routine";
@@ -295,8 +295,18 @@ impl<T: Followed> Flow<T> {
         self.routines.push(Routine { name, around, end: None, open: self.open.len(), is_reached });
     }
 
-    /// The innermost routine returns from where `now` holds.
+    /// The innermost routine returns from where `now` holds; what follows is not reached.
     pub fn returns(&mut self, now: &T) {
+        self.ends_with(now);
+        self.goes_elsewhere();
+    }
+
+    /// What follows is reached by a jump alone.
+    pub fn goes_elsewhere(&mut self) {
+        self.is_reached = false;
+    }
+
+    fn ends_with(&mut self, now: &T) {
         if let Some(routine) = self.routines.last_mut().filter(|_| self.is_reached) {
             routine.end = Some(routine.end.as_ref().map_or_else(|| now.clone(), |end| end.merged(now, BRANCHES)));
         }
@@ -304,7 +314,7 @@ impl<T: Followed> Flow<T> {
 
     /// The innermost routine ends.
     pub fn routine_ends(&mut self, now: &mut T) {
-        self.returns(now);
+        self.ends_with(now);
         let Some(Routine { name, around, end, open, is_reached }) = self.routines.pop() else { return };
         self.is_reached = is_reached;
         self.open.truncate(open);

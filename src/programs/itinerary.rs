@@ -1,29 +1,72 @@
 //! The way through the targets of a program: in which order they are visited, and from where the robot comes to each.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::flow::{Flow, Followed};
-use super::program::{Approach, Left, Program, Target, TargetKind};
+use super::program::{Approach, Arrival, Left, MeantPosture, Program, Target, TargetKind};
 
 /// File of a target, and its first byte there.
 type Place = (usize, usize);
 
-/// Where a routine has left the robot: none where it has not moved it, and no place where the text does not tell.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Stands(Option<Option<Place>>);
+/// Where the robot may stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Stand {
+    /// At a target.
+    At(Place),
+    /// Further than a target, in its posture.
+    Beyond(Place),
+    /// Where it stood when the routine was called.
+    AsCalled,
+    /// The text does not tell.
+    Unknown,
+}
 
-/// Of several ways to here the one that stands last in the text counts, as it does for the targets behind it.
+impl Stand {
+    fn beyond(self) -> Self {
+        match self {
+            Self::At(place) => Self::Beyond(place),
+            other => other,
+        }
+    }
+}
+
+/// Where the robot may stand: once for every way to here.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Stands(BTreeSet<Stand>);
+
+impl Stands {
+    fn at(stand: Stand) -> Self {
+        Self(BTreeSet::from([stand]))
+    }
+
+    fn beyond(&self) -> Self {
+        Self(self.0.iter().map(|stand| stand.beyond()).collect())
+    }
+}
+
+/// Where a routine has not moved the robot yet.
+impl Default for Stands {
+    fn default() -> Self {
+        Self::at(Stand::AsCalled)
+    }
+}
+
 impl Followed for Stands {
     fn merged(&self, other: &Self, _: &str) -> Self {
-        Self(self.0.or(other.0))
+        Self(self.0.union(&other.0).copied().collect())
     }
 
     fn at_top(&self) -> Self {
-        Self(None)
+        Self::default()
     }
 
     fn behind_call(&self, end: &Self) -> Self {
-        Self(end.0.or(self.0))
+        if *end == Self::default() {
+            return self.clone();
+        }
+        let moved = end.0.iter().filter(|stand| **stand != Stand::AsCalled).map(|stand| stand.beyond());
+        let kept = end.0.contains(&Stand::AsCalled).then(|| self.beyond().0).into_iter().flatten();
+        Self(moved.chain(kept).collect())
     }
 }
 
@@ -33,6 +76,8 @@ pub(super) struct Itinerary {
     pub program: Program,
     /// File and first byte of a target -> its index in the program.
     visited: BTreeMap<Place, usize>,
+    /// Ways to each target, with the posture that the motion means.
+    arrivals: BTreeMap<usize, Vec<(Stand, MeantPosture)>>,
     /// From where the robot comes to the next target.
     from: Approach,
     /// From where it came to the branches, loops and routines that are open.
@@ -43,7 +88,7 @@ impl Itinerary {
     /// Nothing visited yet.
     pub fn new() -> Self {
         let program = Program { files: vec![], targets: vec![], left: vec![], edits: vec![], notices: vec![] };
-        Self { program, visited: BTreeMap::new(), from: Approach::Unknown, open: Vec::new() }
+        Self { program, visited: BTreeMap::new(), arrivals: BTreeMap::new(), from: Approach::Unknown, open: Vec::new() }
     }
 
     /// The next target comes from nowhere in particular.
@@ -80,23 +125,14 @@ impl Itinerary {
         self.from = self.open.pop().unwrap_or(Approach::Unknown);
     }
 
-    /// Where the routine that is being read has moved the robot.
-    pub fn stands(&self) -> Stands {
-        let place = |k: usize| self.program.targets.get(k).map(|t| (t.file, t.kind.first_byte()));
-        Stands(Some(self.from.target().and_then(place)))
-    }
-
     /// Follows a call of a routine: behind it the robot comes from where that has left it.
     pub fn call<T: Followed>(&mut self, name: String, flow: &mut Flow<(T, Stands)>, now: &mut (T, Stands)) {
         let before = std::mem::take(&mut now.1);
         flow.call(name, now);
-        match now.1.0 {
-            None => now.1 = before,
-            Some(place) => {
-                let index = place.and_then(|place| self.visited.get(&place));
-                self.from = index.map_or(Approach::Unknown, |&index| Approach::Beyond(index));
-            }
+        if now.1 != Stands::default() {
+            self.from = Approach::Unknown;
         }
+        now.1 = before.behind_call(&now.1);
     }
 
     /// True for a target that was visited.
@@ -105,8 +141,11 @@ impl Itinerary {
     }
 
     /// A target that stays as it is; `same_posture` where the robot keeps its posture on the way there.
-    pub fn leave(&mut self, left: Left, same_posture: bool) {
-        self.from = if same_posture { self.from.beyond() } else { Approach::Unknown };
+    pub fn leave(&mut self, left: Left, same_posture: bool, now: &mut Stands) {
+        match same_posture {
+            true => self.go_beyond(now),
+            false => self.lose(now),
+        }
         self.program.left.push(left);
     }
 
@@ -118,33 +157,84 @@ impl Itinerary {
 
     /// Visits a target, perhaps again. False where it was visited before with another tool or work object.
     #[must_use]
-    pub fn visit(&mut self, mut target: Target) -> bool {
+    pub fn visit(&mut self, mut target: Target, now: &mut Stands) -> bool {
         let place = (target.file, target.kind.first_byte());
-        let Some(&known) = self.visited.get(&place) else {
-            target.approach = self.from;
-            self.from = Approach::From(self.program.targets.len());
-            self.declare(target);
-            return true;
-        };
-        let same = match (&self.program.targets[known].kind, &target.kind) {
-            (TargetKind::Pose(a), TargetKind::Pose(b)) => {
-                (a.flange_from_tool, a.base_from_work) == (b.flange_from_tool, b.base_from_work)
+        let index = match self.visited.get(&place) {
+            Some(&known) if !has_frames_of(&self.program.targets[known].kind, &target.kind) => return false,
+            Some(&known) => {
+                self.keep_codes(known, &target.kind);
+                known
             }
-            _ => true,
+            None => self.program.targets.len(),
         };
-        if same {
-            self.from = Approach::From(known);
+        self.arrive(index, &target.kind, now);
+        if index == self.program.targets.len() {
+            target.approach = self.from;
+            self.declare(target);
         }
-        same
+        self.from = Approach::From(index);
+        *now = Stands::at(Stand::At(place));
+        true
+    }
+
+    /// Codes stand in the text and are corrected, whether the motion that comes first heeds them or not.
+    fn keep_codes(&mut self, index: usize, again: &TargetKind) {
+        if let (TargetKind::Pose(first), TargetKind::Pose(again)) = (&mut self.program.targets[index].kind, again)
+            && first.posture.codes().is_none()
+            && again.posture.codes().is_some()
+        {
+            first.posture = again.posture.clone();
+        }
+    }
+
+    fn arrive(&mut self, index: usize, kind: &TargetKind, now: &Stands) {
+        let posture = match kind {
+            TargetKind::Pose(pose) => pose.posture.clone(),
+            TargetKind::Joints(_) => MeantPosture::Nearest,
+        };
+        let known = self.arrivals.entry(index).or_default();
+        for stand in &now.0 {
+            let arrival = (*stand, posture.clone());
+            if !known.contains(&arrival) {
+                known.push(arrival);
+            }
+        }
     }
 
     /// The robot goes on beyond the target, in its posture.
-    pub fn go_beyond(&mut self) {
+    pub fn go_beyond(&mut self, now: &mut Stands) {
         self.from = self.from.beyond();
+        *now = now.beyond();
     }
 
     /// The next target is approached from one of several: from none in particular.
-    pub fn lose(&mut self) {
+    pub fn lose(&mut self, now: &mut Stands) {
         self.from = Approach::Unknown;
+        *now = Stands::at(Stand::Unknown);
+    }
+
+    /// The program with all ways to its targets.
+    pub fn finished(mut self) -> Program {
+        let index = |place| self.visited.get(&place).copied();
+        let approach = |stand| match stand {
+            Stand::At(place) => index(place).map_or(Approach::Unknown, Approach::From),
+            Stand::Beyond(place) => index(place).map_or(Approach::Unknown, Approach::Beyond),
+            Stand::AsCalled | Stand::Unknown => Approach::Unknown,
+        };
+        for (target, ways) in std::mem::take(&mut self.arrivals) {
+            let arrival = |(stand, posture)| Arrival { from: approach(stand), posture };
+            self.program.targets[target].arrivals = ways.into_iter().map(arrival).collect();
+        }
+        self.program
+    }
+}
+
+/// True where two poses have the same tool and work object.
+fn has_frames_of(one: &TargetKind, other: &TargetKind) -> bool {
+    match (one, other) {
+        (TargetKind::Pose(a), TargetKind::Pose(b)) => {
+            (a.flange_from_tool, a.base_from_work) == (b.flange_from_tool, b.base_from_work)
+        }
+        _ => true,
     }
 }

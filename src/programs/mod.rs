@@ -6,9 +6,12 @@
 //! | [`program`] | targets: joints or a pose, made of fields |
 //! | [`codes`] | status and turn, confdata: which posture a pose means |
 //! | [`posture`] | which joints a pose means |
+//! | `meant` | the same from wherever the robot comes |
 //! | [`measured_frames`] | tool and work object of the real robot instead of those of the program |
 //! | [`mod@compensate`] | targets of one robot to targets of another |
 //! | `flow` | what statements set, followed through branches, loops and calls |
+//! | `references` | what routines change that is given them by reference |
+//! | `names` | names that stand for something else in one module than in another |
 //! | `scan` | tokens that all languages share |
 //! | `language` | the table of languages |
 //! | `table`, `krl`, `rapid`, `urscript` | text -> targets |
@@ -22,11 +25,14 @@ mod flow;
 mod itinerary;
 mod krl;
 mod language;
+mod meant;
 pub mod measured_frames;
+mod names;
 pub mod posture;
 pub mod program;
 mod rapid;
 mod reason;
+mod references;
 mod scan;
 mod setting;
 mod table;

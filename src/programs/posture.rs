@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Matrix6xX;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -10,7 +11,7 @@ use super::program::{MeantPosture, PoseTarget, Understood};
 use super::reason::{LeftReason, Why};
 use crate::geom::Pose;
 use crate::model::inverse::{self, Reach};
-use crate::model::robot::Robot;
+use crate::model::robot::{Posture as At, Robot};
 use crate::urdf::JointKind;
 
 /// Random starts for the joints of a pose that no earlier target is near to.
@@ -27,6 +28,8 @@ const LINE_STEP: f64 = 0.02;
 const LINE_STEPS: f64 = 400.0;
 /// A second posture that is less than so many times as far as the nearest leaves open which is meant.
 const AMBIGUOUS: f64 = 1.25;
+/// A posture whose smallest singular value (m and rad) is less is singular.
+const SINGULAR: f64 = 1e-3;
 /// Joints of two solutions that differ by less are the same, rad or m.
 const SAME: f64 = 1e-3;
 
@@ -95,6 +98,11 @@ type Six<'c> = Option<(&'c Codes, &'c [usize; 6])>;
 
 fn farthest(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// True for joints (rad or m) of one posture and turn.
+pub(super) fn same_posture(a: &[f64], b: &[f64]) -> bool {
+    farthest(a, b) < SAME
 }
 
 fn unreached(posture: &str) -> Why {
@@ -250,13 +258,28 @@ impl<'a> Finder<'a> {
         let direct = std::iter::once(&near)
             .chain(&known)
             .find_map(|start| self.solved(&wanted, start, &near, held, Some(codes)));
-        let found = direct.or_else(|| self.searched(&wanted, &near, held, codes)).ok_or_else(|| {
-            let posture = format!(" in the posture {}", codes.0.shown());
-            let why = unreached(&posture);
-            Why::new(why.reason, why.words + "; --nearest-posture heeds no codes")
-        })?;
+        let found = direct.or_else(|| self.searched(&wanted, &near, held, codes));
+        let Some(found) = found else { return Err(self.not_in_posture(&wanted, &near, held, codes.0)) };
         self.by_code.insert(codes.0.shown(), found.clone());
         Ok((found, Known::Codes))
+    }
+
+    /// Why no joints of the posture of the codes reach a pose: in a singular posture, codes say nothing.
+    fn not_in_posture(&mut self, wanted: &Pose, near: &[f64], held: &[bool], codes: &Codes) -> Why {
+        let remedy = "; --nearest-posture heeds no codes";
+        if self.postures(wanted, near, held).iter().any(|q| self.is_singular(q)) {
+            let words = format!("it is singular: {} do not tell which of its postures is meant{remedy}", codes.shown());
+            return Why::new(LeftReason::Singular, words);
+        }
+        let why = unreached(&format!(" in the posture {}", codes.shown()));
+        Why::new(why.reason, why.words + remedy)
+    }
+
+    /// True where the robot cannot move in some direction.
+    fn is_singular(&self, q: &[f64]) -> bool {
+        let columns = self.robot.kinematics(&At::at(q), &vec![0.0; q.len()]).d_readings;
+        let jacobian = Matrix6xX::from_columns(&columns);
+        (jacobian.clone() * jacobian.transpose()).symmetric_eigenvalues().min() < SINGULAR.powi(2)
     }
 
     fn reach<'r>(&'r self, held: &'r [bool]) -> Reach<'r> {

@@ -51,14 +51,37 @@ pub struct Target {
     pub name: String,
     /// From where the robot comes to it when it visits it first.
     pub approach: Approach,
+    /// All ways to it, where there are others than its approach.
+    pub arrivals: Vec<Arrival>,
     /// False for a point that no motion goes to, because only displacements start from it.
     pub visited: bool,
     /// What it says.
     pub kind: TargetKind,
 }
 
+impl Program {
+    /// Takes codes of postures for nothing: a pose means the posture to which the way there leads.
+    pub fn heed_no_codes(&mut self) {
+        for target in &mut self.targets {
+            if let TargetKind::Pose(pose) = &mut target.kind {
+                pose.posture.heed_no_codes();
+            }
+            target.arrivals.iter_mut().for_each(|arrival| arrival.posture.heed_no_codes());
+        }
+    }
+}
+
+/// One way to a target.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arrival {
+    /// From where the robot comes.
+    pub from: Approach,
+    /// Which posture the motion means.
+    pub posture: MeantPosture,
+}
+
 /// From where the robot comes to a target; targets by their index in the program.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Approach {
     /// Straight from this target.
     From(usize),
@@ -223,6 +246,14 @@ pub enum MeantPosture {
 }
 
 impl MeantPosture {
+    fn heed_no_codes(&mut self) {
+        match self {
+            Self::Unheeded(..) => *self = Self::Along,
+            Self::Coded(..) | Self::Either(..) => *self = Self::Nearest,
+            Self::Nearest | Self::Along | Self::Near(_) => {}
+        }
+    }
+
     /// Codes that stand in the text, heeded or not.
     pub fn codes(&self) -> Option<(&Codes, &[usize; 6])> {
         match self {

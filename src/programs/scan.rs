@@ -1,5 +1,6 @@
 //! Tokens of program text: bytes in, so that comments may be in any encoding.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::text_file::TextFile;
@@ -40,6 +41,8 @@ pub(super) struct Dialect {
     pub header: Option<u8>,
     /// `'B101'` and `'H1F'` are numbers.
     pub based_numbers: bool,
+    /// Letters of Latin-1 beyond ASCII belong to names.
+    pub latin_letters: bool,
 }
 
 /// Tokens of a file.
@@ -48,6 +51,8 @@ pub(super) struct Dialect {
 /// A text that does not end on its line.
 pub(super) fn tokens(file: &TextFile, dialect: Dialect) -> Result<Vec<Token>> {
     let bytes = &file.bytes;
+    let is_utf8 = std::str::from_utf8(bytes).is_ok();
+    let letter = |rest: &[u8]| letter_length(rest, dialect.latin_letters, is_utf8);
     let mut out = Vec::new();
     let mut at = 0;
     let mut line_begins = true;
@@ -62,13 +67,11 @@ pub(super) fn tokens(file: &TextFile, dialect: Dialect) -> Result<Vec<Token>> {
             continue;
         }
         let (kind, length) = match byte {
+            b if !b.is_ascii_digit() && letter(rest) > 0 => (Some(TokenKind::Word), word_length(rest, letter)),
             b'\n' => (Some(TokenKind::LineEnd), 1),
             b'\r' if rest.get(1) != Some(&b'\n') => (Some(TokenKind::LineEnd), 1),
             // Other control characters, and what is not ASCII (blanks of other widths, byte order marks), separate.
             b if b <= b' ' || b >= 0x7f => (None, 1),
-            b if b.is_ascii_alphabetic() || matches!(b, b'_' | b'$') => {
-                (Some(TokenKind::Word), until(&|b| !(b.is_ascii_alphanumeric() || matches!(b, b'_' | b'$'))))
-            }
             b if b.is_ascii_digit() || (b == b'.' && rest.get(1).is_some_and(u8::is_ascii_digit)) => {
                 let length = number_length(rest);
                 (Some(TokenKind::Number(number(&rest[..length]))), length)
@@ -99,6 +102,39 @@ pub(super) fn tokens(file: &TextFile, dialect: Dialect) -> Result<Vec<Token>> {
         at += length;
     }
     Ok(out)
+}
+
+/// Bytes of a letter, digit, `_` or `$` with which a text begins; 0 for anything else.
+fn letter_length(text: &[u8], latin_letters: bool, is_utf8: bool) -> usize {
+    match text {
+        [b, ..] if b.is_ascii_alphanumeric() || matches!(b, b'_' | b'$') => 1,
+        // Between the letters stand the signs of multiplication and division.
+        [0xc3, 0x97 | 0xb7, ..] if is_utf8 => 0,
+        [0xc3, 0x80..=0xbf, ..] if latin_letters && is_utf8 => 2,
+        [0xd7 | 0xf7, ..] => 0,
+        [0xc0..=0xff, ..] if latin_letters && !is_utf8 => 1,
+        _ => 0,
+    }
+}
+
+fn word_length(text: &[u8], letter: impl Fn(&[u8]) -> usize) -> usize {
+    let mut end = 0;
+    loop {
+        match letter(&text[end..]) {
+            0 => return end,
+            length => end += length,
+        }
+    }
+}
+
+/// A word in capital letters; the bytes of a text that is no UTF-8 are letters of Latin-1.
+fn capitals(word: &[u8]) -> String {
+    let text = std::str::from_utf8(word).map_or_else(|_| word.iter().map(|b| char::from(*b)).collect(), str::to_owned);
+    let capital = |c: char| match c {
+        '\u{e0}'..='\u{fe}' if c != '\u{f7}' => c.to_uppercase().next().unwrap_or(c),
+        c => c.to_ascii_uppercase(),
+    };
+    text.chars().map(capital).collect()
 }
 
 /// Digits, point, digits, exponent.
@@ -141,15 +177,26 @@ pub(super) struct Reader<'a> {
     pub index: usize,
     tokens: Vec<Token>,
     pub at: usize,
+    /// Names of words that are others than they are written, by their tokens.
+    names: BTreeMap<usize, String>,
 }
 
 impl<'a> Reader<'a> {
     pub fn new(file: &'a TextFile, index: usize, dialect: Dialect) -> Result<Self> {
-        Ok(Self { file, index, tokens: tokens(file, dialect)?, at: 0 })
+        Ok(Self { file, index, tokens: tokens(file, dialect)?, at: 0, names: BTreeMap::new() })
     }
 
     pub fn peek(&self) -> Option<&Token> {
         self.tokens.get(self.at)
+    }
+
+    pub fn token_is_mark(&self, token: usize, mark: u8) -> bool {
+        self.token(token).is_some_and(|t| t.kind == TokenKind::Mark(mark))
+    }
+
+    /// A token by its number.
+    pub fn token(&self, k: usize) -> Option<&Token> {
+        self.tokens.get(k)
     }
 
     /// The token `n` places on (before, where negative).
@@ -250,7 +297,18 @@ impl<'a> Reader<'a> {
 
     /// The word at the present place in capital letters.
     pub fn name(&self) -> Option<String> {
-        self.word().map(|w| String::from_utf8_lossy(w).to_ascii_uppercase())
+        self.name_of(self.at)
+    }
+
+    /// The word at a token in capital letters.
+    pub fn name_of(&self, token: usize) -> Option<String> {
+        let word = self.token(token).filter(|t| t.kind == TokenKind::Word)?;
+        Some(self.names.get(&token).cloned().unwrap_or_else(|| capitals(self.text(word))))
+    }
+
+    /// Gives words other names than they are written with, by their tokens.
+    pub fn rename(&mut self, names: BTreeMap<usize, String>) {
+        self.names = names;
     }
 
     /// To the beginning of the next line.

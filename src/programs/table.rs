@@ -167,7 +167,7 @@ impl Table<'_> {
             Some(pose) => TargetKind::Pose(Box::new(self.pose(row, pose)?)),
         };
         let name = format!("row {}", row.line);
-        Ok(Target { file: self.index, line: row.line, name, approach, visited: true, kind })
+        Ok(Target { file: self.index, line: row.line, name, approach, arrivals: Vec::new(), visited: true, kind })
     }
 
     fn joints(&self, row: &Row) -> Result<JointTarget> {

@@ -21,3 +21,4 @@ mod rapid;
 mod rapid_statements;
 mod urscript;
 mod used;
+mod ways;

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::aggregate::index;
-use crate::programs::scan::{Reader, TokenKind};
+use super::reads::reads;
+use crate::programs::references::References;
+use crate::programs::scan::Reader;
 
 /// Beginnings and ends of branches and loops.
 const BEGIN: [&str; 6] = ["IF", "SWITCH", "WHILE", "LOOP", "FOR", "REPEAT"];
@@ -36,13 +38,6 @@ pub(super) fn matching(name: &str, pattern: &str) -> Option<Vec<i64>> {
     same.then_some(numbers)
 }
 
-/// Parameters in the rest of a line, `NAME :IN`: they are what the call has.
-fn parameters(reader: &Reader<'_>) -> Vec<String> {
-    let line = (0..).take_while(|&n| reader.ahead(n).is_some_and(|t| t.kind != TokenKind::LineEnd));
-    let names = line.filter(|&n| reader.ahead_is_mark(n + 1, b':')).filter_map(|n| reader.ahead(n));
-    names.map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase()).collect()
-}
-
 /// How often a name is set: in data, in statements, and of these in branches and loops; by its components, or by a call.
 #[derive(Debug, Clone, Copy, Default)]
 struct Times {
@@ -72,10 +67,8 @@ impl Assigned {
             let is_one_of = |words: &[&str]| words.iter().any(|word| reader.ahead_is_word(of_all, word));
             depth = (depth + usize::from(is_one_of(&BEGIN))).saturating_sub(usize::from(is_one_of(&END)));
             self.jumps += usize::from(is_one_of(&["GOTO"]));
-            if is_one_of(&["DEF", "DEFFCT"]) {
-                self.routines += 1;
-                parameters(&reader).into_iter().for_each(|name| self.times.entry(name).or_default().parts += 1);
-            }
+            self.routines += usize::from(is_one_of(&["DEF", "DEFFCT"]));
+            self.beside(&mut reader);
             if let Some((name, component)) = assigned(&mut reader).filter(|(name, _)| !name.starts_with('$')) {
                 if name.ends_with(']') && matching(&name, &name).is_none() {
                     self.any_of.insert(name.clone());
@@ -87,6 +80,35 @@ impl Assigned {
             }
             reader.skip_line();
         }
+    }
+
+    /// What an interrupt or a trigger sets, `DO NAME=..`, whenever that is.
+    fn beside(&mut self, reader: &mut Reader<'_>) {
+        let start = reader.at;
+        while !reader.at_line_end() {
+            reader.at += 1;
+            if reader.ahead_is_word(-1, "DO")
+                && let Some((name, _)) = assigned(reader)
+            {
+                self.changes_somewhere(name);
+            }
+        }
+        reader.at = start;
+    }
+
+    fn changes_somewhere(&mut self, name: String) {
+        if name.ends_with(']') && matching(&name, &name).is_none() {
+            self.any_of.insert(name);
+        } else {
+            self.times.entry(name).or_default().parts += 1;
+        }
+    }
+
+    /// Parameters are what the call has; what calls change by reference changes, too.
+    pub fn changed_by_calls(&mut self, references: &References) {
+        let parameters = references.parameters().map(|parameter| parameter.name.clone());
+        let changed = references.changed(|call, given| !reads(&call.routine, &given.which));
+        parameters.chain(changed).for_each(|name| self.changes_somewhere(name));
     }
 
     /// True for a name whose value changes: as a parameter, by a component, beside its data, by an index that is computed, or by one of several

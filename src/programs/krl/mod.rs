@@ -2,31 +2,41 @@
 
 mod aggregate;
 mod assigned;
+mod calls;
 mod frames;
 mod motions;
+mod reads;
+mod scopes;
+mod stated;
 mod unvisited;
 mod uses;
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use aggregate::{Aggregate, index};
 use assigned::{Assigned, assigned, matching};
+use calls::routine_name;
 use frames::{Active, FrameIs, Frames, OwnFrames};
 use motions::{MOVES, RELATIVE, posture_of};
+use scopes::Scopes;
 use uses::Uses;
 
 use super::ProgramSetting;
 use super::flow::{Branching, Flow, Places, settled};
 use super::itinerary::{Itinerary, Stands};
+use super::names::{plain_error, plain_names};
 use super::program::{Approach, Left, PoseTarget, Program, Target, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
+use super::references::References;
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
 
-const DIALECT: Dialect = Dialect { comment: b';', quotes: b"\"", header: Some(b'&'), based_numbers: true };
+const DIALECT: Dialect =
+    Dialect { comment: b';', quotes: b"\"", header: Some(b'&'), based_numbers: true, latin_letters: false };
 const POSE_NAMES: [&str; 8] = ["X", "Y", "Z", "A", "B", "C", "S", "T"];
 const AXIS_NAMES: [&str; 6] = ["A1", "A2", "A3", "A4", "A5", "A6"];
 
@@ -41,12 +51,36 @@ enum Value {
 
 /// Reads a module of one or more files.
 pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
-    let program = settled(|known| reading(&files, setting, known))?;
-    Ok(Program { files, ..program })
+    let mut scopes = Scopes::new(&files);
+    for (index, file) in files.iter().enumerate().filter(|(_, file)| is_of_program(file)) {
+        scopes.look_through(Reader::new(file, index, DIALECT)?);
+    }
+    let program = settled(|known| reading(&files, &scopes, setting, known)).map_err(plain_error)?;
+    Ok(Program { files, ..plain_names(program) })
+}
+
+/// True for the data list of a program; those of the controller begin with `$`.
+fn is_of_program(file: &TextFile) -> bool {
+    let name = Path::new(&file.name).file_name();
+    !has_moves(file) && name.is_some_and(|name| !name.to_string_lossy().starts_with('$'))
+}
+
+fn has_moves(file: &TextFile) -> bool {
+    !file.name.to_ascii_lowercase().ends_with(".dat")
 }
 
 /// One reading, with what the one before found, and what it found itself.
-fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>) -> Result<(Program, Places<Now>)> {
+fn reading(
+    files: &[TextFile],
+    scopes: &Scopes,
+    setting: &ProgramSetting<'_>,
+    known: Places<Now>,
+) -> Result<(Program, Places<Now>)> {
+    let reader = |index: usize, file| {
+        let mut reader = Reader::new(file, index, DIALECT)?;
+        scopes.name(&mut reader);
+        Ok(reader)
+    };
     let mut module = Module {
         setting,
         prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
@@ -57,35 +91,27 @@ fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>)
         root: FrameIs::Unset,
         now: unset(),
         flow: Flow::new(known),
+        motion_data: None,
         spline: OwnFrames::default(),
         way: Itinerary::new(),
     };
-    let has_moves = |file: &TextFile| !file.name.to_ascii_lowercase().ends_with(".dat");
+    let mut references = References::default();
     for (index, file) in files.iter().enumerate() {
-        module.assigned.look_through(Reader::new(file, index, DIALECT)?, !has_moves(file));
+        module.assigned.look_through(reader(index, file)?, !has_moves(file));
         if has_moves(file) {
-            module.uses.look_through(Reader::new(file, index, DIALECT)?);
+            module.uses.look_through(reader(index, file)?);
+            calls::look_through(&mut references, reader(index, file)?);
         }
     }
+    module.assigned.changed_by_calls(&references);
     // Data first: programs use them in whatever order the files are given.
     for wanted in [false, true] {
         for (index, file) in files.iter().enumerate().filter(|(_, f)| has_moves(f) == wanted) {
-            module.file(Reader::new(file, index, DIALECT)?, wanted)?;
+            module.file(reader(index, file)?, wanted)?;
         }
     }
     module.unvisited();
-    Ok((module.way.program, module.flow.found()))
-}
-
-/// Name of the routine that a line begins: `[GLOBAL] DEF NAME(..)`, `[GLOBAL] DEFFCT TYPE NAME(..)`.
-fn routine_name(reader: &Reader<'_>) -> Option<String> {
-    let word = |k| Some(String::from_utf8_lossy(reader.text(reader.ahead(k)?)).to_ascii_uppercase());
-    let first = isize::from(word(0)? == "GLOBAL");
-    match word(first)?.as_str() {
-        "DEF" => word(first + 1),
-        "DEFFCT" => word(first + 2),
-        _ => None,
-    }
+    Ok((module.way.finished(), module.flow.found()))
 }
 
 /// Frames that statements have set, and where the robot stands.
@@ -111,6 +137,8 @@ struct Module<'a> {
     now: Now,
     /// How they change.
     flow: Flow<Now>,
+    /// Motion data (`FDAT_ACT`) that `BAS` has not taken yet.
+    motion_data: Option<Frames>,
     /// Frames of the spline block that is open.
     spline: OwnFrames,
     way: Itinerary,
@@ -119,7 +147,7 @@ struct Module<'a> {
 impl Module<'_> {
     fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
         self.start_afresh();
-        (self.now, self.spline) = (unset(), OwnFrames::default());
+        (self.now, self.motion_data, self.spline) = (unset(), None, OwnFrames::default());
         let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {
             let Some(word) = reader.name() else {
@@ -236,133 +264,6 @@ impl Module<'_> {
         Err(Why::computed())
     }
 
-    fn frame(&self, value: &Value) -> FrameIs {
-        if let Value::Name(name) = value
-            && name == "$NULLFRAME"
-        {
-            return FrameIs::Known(Pose::identity());
-        }
-        match self.resolved(value) {
-            Ok((aggregate, _)) => match aggregate.frame() {
-                Some(frame) => FrameIs::Known(frame),
-                None => FrameIs::Unknown("not all of X, Y, Z, A, B, C are given".into()),
-            },
-            Err(why) if why.reason == LeftReason::Computed => {
-                FrameIs::Unknown("it is computed, not written in numbers".into())
-            }
-            Err(why) => FrameIs::Unknown(why.words),
-        }
-    }
-
-    /// `TOOL_DATA[n]` or `BASE_DATA[n]`; number 0 is the flange or the world.
-    fn numbered(&self, table: &str, number: i64) -> FrameIs {
-        match number {
-            0 => FrameIs::Known(Pose::identity()),
-            n => self.frame(&Value::Name(format!("{table}[{n}]"))),
-        }
-    }
-
-    /// Tool and base of a set of motion data, as `BAS` sets them.
-    fn data_frames(&self, data: &Aggregate) -> Option<Frames> {
-        let (tool, base) = (data.whole("TOOL_NO")?, data.whole("BASE_NO")?);
-        Some(Frames {
-            tool: self.numbered("TOOL_DATA", tool),
-            base: self.numbered("BASE_DATA", base),
-            tool_in_room: data.word("IPO_FRAME") == Some("TCP"),
-        })
-    }
-
-    fn use_data(&mut self, value: &Value) {
-        let data = self.resolved(value).ok().and_then(|(data, _)| self.data_frames(data));
-        let unknown = || FrameIs::Unknown("its motion data are in none of the files (give the .dat as well)".into());
-        self.now.0.set(data.unwrap_or_else(|| Frames { tool: unknown(), base: unknown(), ..Frames::default() }));
-    }
-
-    /// `WITH .., $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO), ..` in the rest of a line.
-    fn with(&self, reader: &mut Reader<'_>) -> OwnFrames {
-        let mut frames = OwnFrames::default();
-        let mut within = false;
-        while !reader.at_line_end() {
-            let word = reader.name();
-            within |= word.as_deref() == Some("WITH");
-            let assigned = within && reader.ahead_is_mark(1, b'=');
-            reader.at += 1;
-            match word.as_deref().filter(|_| assigned) {
-                Some("$TOOL") => {
-                    reader.at += 1;
-                    frames.tool = Some(self.stated_frame(reader, "TOOL_DATA", "TOOL_NO"));
-                }
-                Some("$BASE") => {
-                    reader.at += 1;
-                    frames.base = Some(self.stated_frame(reader, "BASE_DATA", "BASE_NO"));
-                }
-                Some("$IPO_MODE") => {
-                    reader.at += 1;
-                    frames.tool_in_room = Some(self.is_tool_in_room(reader));
-                }
-                _ => {}
-            }
-        }
-        frames
-    }
-
-    /// A frame as the inline forms state it: an aggregate, `TOOL_DATA[1]`, `STOOL2(FP1)`, `SBASE(FP1.BASE_NO)` or a number in brackets.
-    fn stated_frame(&self, reader: &mut Reader<'_>, table: &str, number: &str) -> FrameIs {
-        let called = reader.ahead_is_mark(1, b'(');
-        if !called {
-            let value = match reader.is_mark(b'{') {
-                true => Aggregate::read(reader).map(Value::Aggregate),
-                false => {
-                    let name = reader.name();
-                    reader.at += 1;
-                    Ok(name.map_or(Value::Expression, |n| Value::Name(n + &index(reader))))
-                }
-            };
-            return value.map_or_else(|e| FrameIs::Unknown(e.what), |v| self.frame(&v));
-        }
-        reader.at += 2;
-        if let Some((n, _)) = reader.take_number() {
-            return self.numbered(table, n as i64);
-        }
-        let data = reader.name().map(Value::Name).unwrap_or(Value::Expression);
-        let found = self.resolved(&data).ok().and_then(|(data, _)| data.whole(number));
-        match found {
-            Some(n) => self.numbered(table, n),
-            None => FrameIs::Unknown("its number is in none of the files (give the .dat as well)".into()),
-        }
-    }
-
-    /// `#TCP`, `FP1.IPO_FRAME` and `SIPO_MODE(FP1.IPO_FRAME)`.
-    fn is_tool_in_room(&self, reader: &Reader<'_>) -> bool {
-        let named = |ahead| reader.ahead(ahead).map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase());
-        if reader.is_mark(b'#') {
-            return named(1).as_deref() == Some("TCP");
-        }
-        let data = named(if reader.ahead_is_mark(1, b'(') { 2 } else { 0 }).map(Value::Name);
-        data.is_some_and(|d| self.resolved(&d).is_ok_and(|(data, _)| data.word("IPO_FRAME") == Some("TCP")))
-    }
-
-    /// `BAS(#TOOL, n)` and `BAS(#BASE, n)`.
-    fn bas(&mut self, reader: &mut Reader<'_>) {
-        reader.at += 1;
-        if !(reader.take_mark(b'(') && reader.take_mark(b'#')) {
-            return;
-        }
-        let what = reader.name();
-        reader.at += 1;
-        reader.take_mark(b',');
-        let number = reader.take_number().map(|(n, _)| n as i64);
-        let frame = |table| match number {
-            Some(n) => self.numbered(table, n),
-            None => FrameIs::Unknown("its number is computed".into()),
-        };
-        match what.as_deref() {
-            Some("TOOL") => self.now.0.tool.set(frame("TOOL_DATA")),
-            Some("BASE") => self.now.0.base.set(frame("BASE_DATA")),
-            _ => {}
-        }
-    }
-
     /// A motion; the reader stands on its name.
     fn motion(&mut self, reader: &mut Reader<'_>, name: &str, count: usize) -> Result<()> {
         let line = reader.line();
@@ -400,21 +301,20 @@ impl Module<'_> {
             let several = elements.len() > 1;
             for value in elements {
                 if several {
-                    self.way.lose();
+                    self.way.lose(&mut self.now.1);
                 }
                 if let Err(why) = self.visit(&value, name, (reader.index, line), &frames) {
                     let points = self.points_in(&value, reader.index, line);
                     self.leave_at(reader.index, line, name, why.starting_from(points));
                 }
                 if several {
-                    self.way.lose();
-                    self.now.1 = self.way.stands();
+                    self.way.lose(&mut self.now.1);
                 }
             }
         }
         if reader.rest_of_line_has("CA") {
             // The circle goes on, or ends before the point.
-            self.way.go_beyond();
+            self.way.go_beyond(&mut self.now.1);
         }
         Ok(())
     }
@@ -428,6 +328,7 @@ impl Module<'_> {
                 self.flow.routine_begins(name, &mut self.now, &unset());
             }
             "RETURN" => self.flow.returns(&self.now),
+            "GOTO" => self.flow.goes_elsewhere(),
             "EXIT" => self.flow.leaves(&self.now),
             "END" | "ENDFCT" => self.flow.routine_ends(&mut self.now),
             "IF" | "SWITCH" | "WHILE" | "LOOP" | "FOR" | "REPEAT" => {
@@ -460,8 +361,7 @@ impl Module<'_> {
         let unknown = || FrameIs::Unknown("a GOTO may come from elsewhere".into());
         self.now.0.set(Frames { tool: unknown(), base: unknown(), tool_in_room: self.now.0.tool_in_room.value });
         self.flow.arrives();
-        self.way.lose();
-        self.now.1 = self.way.stands();
+        self.way.lose(&mut self.now.1);
     }
 
     /// Routines that a line calls, which may set frames; the reader stands at its beginning.
@@ -471,10 +371,18 @@ impl Module<'_> {
             return;
         }
         let line = (0..).map_while(|k| Some((k, reader.ahead(k).filter(|t| t.kind != TokenKind::LineEnd)?)));
-        for (k, token) in line {
-            if token.kind == TokenKind::Word && reader.ahead_is_mark(k + 1, b'(') {
-                let name = String::from_utf8_lossy(reader.text(token)).to_ascii_uppercase();
+        for (k, token) in line.filter(|(_, token)| token.kind == TokenKind::Word) {
+            let name = String::from_utf8_lossy(reader.text(token)).to_ascii_uppercase();
+            let is_given = [b'(', b','].iter().any(|mark| reader.ahead_is_mark(k - 1, *mark));
+            if reader.ahead_is_mark(k + 1, b'(') {
                 self.way.call(name, &mut self.flow, &mut self.now);
+            } else if is_given && self.assigned.changes(&name) {
+                let unknown = FrameIs::Unknown("a routine that it is given to may change it".into());
+                match name.as_str() {
+                    "$TOOL" => self.now.0.tool.set(unknown),
+                    "$BASE" => self.now.0.base.set(unknown),
+                    _ => {}
+                }
             }
         }
     }
@@ -487,8 +395,7 @@ impl Module<'_> {
     fn leave_at(&mut self, file: usize, line: usize, name: &str, why: Why) {
         // Status and turn may mean another posture, but on a path of the tool it goes on.
         let same_posture = !name.starts_with("PTP") && !name.starts_with("SPTP");
-        self.way.leave(Left { file, line, name: name.to_owned(), why }, same_posture);
-        self.now.1 = self.way.stands();
+        self.way.leave(Left { file, line, name: name.to_owned(), why }, same_posture, &mut self.now.1);
     }
 
     /// `P[I]` stands for all elements of `P` that the text has, in the order of their numbers; anything else for itself.
@@ -521,9 +428,9 @@ impl Module<'_> {
         let place = if name.is_some() { (aggregate.file, aggregate.line) } else { from };
         let clash = format!("{named} is used with different $TOOL or $BASE; give it a position for each");
         let (file, line) = place;
-        let target = Target { file, line, name: named, approach: Approach::Unknown, visited: true, kind };
-        let visited = self.way.visit(target);
-        self.now.1 = self.way.stands();
+        let target =
+            Target { file, line, name: named, approach: Approach::Unknown, arrivals: Vec::new(), visited: true, kind };
+        let visited = self.way.visit(target, &mut self.now.1);
         if visited { Ok(()) } else { Err(Why::new(LeftReason::FramesDiffer, clash)) }
     }
 

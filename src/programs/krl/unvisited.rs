@@ -1,6 +1,7 @@
 //! Declared positions that no motion of the files goes to.
 
 use super::{Module, Value};
+use crate::programs::names::plain;
 use crate::programs::program::{Approach, Target};
 use crate::programs::reason::{DeclaredPoint, LeftReason, Why};
 
@@ -11,7 +12,8 @@ impl Module<'_> {
             let Some(Value::Aggregate(a)) = self.values.get(&name).filter(|_| !self.uses.is_frame(&name)) else {
                 continue;
             };
-            let data = name.strip_prefix('X').and_then(|n| match self.values.get(&format!("F{n}")) {
+            let own = name.strip_prefix('X').map(|n| format!("F{n}"));
+            let data = own.and_then(|own| match self.values.get(&own).or_else(|| self.values.get(&plain(&own))) {
                 Some(Value::Aggregate(data)) => self.data_frames(data),
                 _ => None,
             });
@@ -30,7 +32,15 @@ impl Module<'_> {
             let used = self.uses.of(&name).map(|by| Why::new(LeftReason::NotATarget, format!("{by} depends on it")));
             let done = used.map_or(kind, Err).map(|kind| {
                 let approach = Approach::Unknown;
-                self.way.declare(Target { file, line, name: name.clone(), approach, visited: true, kind });
+                self.way.declare(Target {
+                    file,
+                    line,
+                    name: name.clone(),
+                    approach,
+                    arrivals: Vec::new(),
+                    visited: true,
+                    kind,
+                });
             });
             if let Err(why) = done {
                 let words = format!("no motion of the files goes there, and {}", why.words);

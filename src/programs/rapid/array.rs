@@ -39,12 +39,12 @@ impl Task<'_> {
             return Ok(Err(computed(array)));
         }
         for element in elements {
-            self.way.lose();
+            self.way.lose(self.switching.stands());
             if let Err(why) = self.visit(&Node::Word(element), name, from, tool, work)? {
                 self.leave(from, name, why);
             }
         }
-        self.way.lose();
+        self.way.lose(self.switching.stands());
         Ok(Ok(()))
     }
 }

@@ -1,6 +1,8 @@
 //! ABB RAPID: moves to `robtarget` and `jointtarget`, declared or in the instruction, with `tooldata` and `wobjdata` (mm and degrees).
 
 mod array;
+mod calls;
+mod scopes;
 mod statements;
 mod switched;
 mod switching;
@@ -16,27 +18,33 @@ use super::codes::{Codes, PostureCode};
 use super::field::{Field, FieldPlace};
 use super::flow::{Places, settled};
 use super::itinerary::Itinerary;
+use super::names::{plain_error, plain_names};
 use super::program::{
     Approach, DisplacedTarget, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target,
     TargetKind, Understood,
 };
 use super::reason::{DeclaredPoint, LeftReason, Why};
+use super::references::References;
 use super::scan::{Dialect, Reader};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
+use scopes::Scopes;
 use switched::Watched;
 use switching::{Now, Switching};
 use uses::Use;
 use value::{
-    Displacement, NO_AXIS, Node, array_of, check, computed, element, foreign_axis, frame, node, numbers, undeclared,
+    Displacement, NO_AXIS, Node, TYPES, array_of, check, computed, element, foreign_axis, frame, node, numbers,
+    undeclared,
 };
 
-const DIALECT: Dialect = Dialect { comment: b'!', quotes: b"\"", header: None, based_numbers: false };
+const DIALECT: Dialect =
+    Dialect { comment: b'!', quotes: b"\"", header: None, based_numbers: false, latin_letters: true };
 /// The work object of moves that name none.
 const WORLD: &str = "WOBJ0";
-const TYPES: [&str; 4] = ["ROBTARGET", "JOINTTARGET", "TOOLDATA", "WOBJDATA"];
+/// Most names that stand for each other.
+const MOST_NAMES: usize = 8;
 const DECIMALS_MM: usize = 4;
 const DECIMALS_DEG: usize = 6;
 const DECIMALS_QUATERNION: usize = 9;
@@ -47,19 +55,35 @@ struct Datum {
     kind: String,
     file: usize,
     line: usize,
+    is_constant: bool,
     /// `None` where the text does not give its numbers.
     value: Option<Node>,
 }
 
 /// Reads modules that belong together.
 pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
-    let program = settled(|known| reading(&files, setting, known))?;
-    Ok(Program { files, ..program })
+    let mut scopes = Scopes::default();
+    for (index, file) in files.iter().enumerate() {
+        scopes.look_through(Reader::new(file, index, DIALECT)?);
+    }
+    let program = settled(|known| reading(&files, &scopes, setting, known)).map_err(plain_error)?;
+    Ok(Program { files, ..plain_names(program) })
 }
 
 /// One reading, with what the one before found, and what it found itself.
-fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>) -> Result<(Program, Places<Now>)> {
+fn reading(
+    files: &[TextFile],
+    scopes: &Scopes,
+    setting: &ProgramSetting<'_>,
+    known: Places<Now>,
+) -> Result<(Program, Places<Now>)> {
+    let reader = |(index, file)| {
+        let mut reader = Reader::new(file, index, DIALECT)?;
+        scopes.name(&mut reader);
+        Ok(reader)
+    };
     let mut task = Task {
+        files,
         setting,
         data: BTreeMap::new(),
         bases: BTreeMap::new(),
@@ -67,20 +91,24 @@ fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>)
         switching: Switching::new(known),
         way: Itinerary::new(),
     };
-    for (index, file) in files.iter().enumerate() {
-        task.declarations(Reader::new(file, index, DIALECT)?)?;
-        task.switching.look_through(Reader::new(file, index, DIALECT)?);
+    let mut references = References::default();
+    for file in files.iter().enumerate() {
+        task.declarations(reader(file)?)?;
+        Task::look_for_calls(&mut references, reader(file)?);
+        task.switching.look_through(reader(file)?);
     }
-    for (index, file) in files.iter().enumerate() {
+    task.changed_by_calls(&references);
+    for file in files.iter().enumerate() {
         task.way.start_afresh();
-        task.statements(Reader::new(file, index, DIALECT)?)?;
+        task.statements(reader(file)?)?;
         task.switching.all_end();
     }
     task.unvisited();
-    Ok((task.way.program, task.switching.found()))
+    Ok((task.way.finished(), task.switching.found()))
 }
 
 struct Task<'a> {
+    files: &'a [TextFile],
     setting: &'a ProgramSetting<'a>,
     data: BTreeMap<String, Datum>,
     /// Points from which displaced ones start: how they would be visited.
@@ -119,6 +147,7 @@ impl Task<'_> {
     /// `TYPE name := value;` behind its type.
     fn declaration(&mut self, reader: &mut Reader<'_>, kind: String) -> Result<()> {
         let (Some(name), line) = (reader.name(), reader.line()) else { return Ok(()) };
+        let is_constant = reader.ahead_is_word(-2, "CONST");
         reader.at += 1;
         let is_array = reader.is_mark(b'{');
         let has_rows = is_array && reader.ahead_is_mark(2, b'}');
@@ -141,16 +170,16 @@ impl Task<'_> {
         }
         let twin = self.data.get(&name);
         if let Some(twin) = twin.filter(|t| t.file != reader.index) {
-            let what = format!("{name} is declared in {} already", twin.line);
+            let what = format!("{name} is declared in {}:{} already", self.files[twin.file].name, twin.line);
             return Err(Error::new(
                 Code::ProgramTwin,
                 reader.place(),
                 what,
-                "correct modules with equal names one after the other",
+                "correct these modules one after the other, or make one of the two LOCAL",
             ));
         }
         // Two data of one name in one file belong to different routines.
-        let datum = Datum { kind, file: reader.index, line, value: None };
+        let datum = Datum { kind, file: reader.index, line, is_constant, value: None };
         let is_twin = twin.is_some();
         if is_twin {
             self.is_assigned(&name);
@@ -167,8 +196,7 @@ impl Task<'_> {
         let upper = name.to_ascii_uppercase();
         let same_posture =
             !upper.starts_with("MOVEJ") && !upper.starts_with("MOVEABSJ") && !upper.starts_with("TRIGGJ");
-        self.way.leave(Left { file, line, name: name.to_owned(), why }, same_posture);
-        self.switching.moved(&self.way);
+        self.way.leave(Left { file, line, name: name.to_owned(), why }, same_posture, self.switching.stands());
     }
 
     fn visit(
@@ -191,7 +219,7 @@ impl Task<'_> {
             }
             Node::Word(word) => match (word.strip_suffix("{}"), self.declared(word)) {
                 (Some(array), _) => return self.visit_any(array, name, from, tool, work),
-                (_, Ok((value, place))) => (value, place, word.clone()),
+                (_, Ok((value, place))) => (value, place, self.meant(word).to_owned()),
                 (_, Err(why)) => return Ok(Err(why)),
             },
             _ => return Ok(Err(Why::computed())),
@@ -201,8 +229,21 @@ impl Task<'_> {
         Ok(kind.map_err(about).and_then(|kind| self.add(named, place, self.with_posture(kind, name))))
     }
 
+    /// The name whose numbers a name has: `CONST robtarget name:=other;`.
+    fn meant<'n>(&'n self, name: &'n str) -> &'n str {
+        let mut meant = name;
+        for _ in 0..MOST_NAMES {
+            match self.data.get(meant).and_then(|datum| datum.value.as_ref()) {
+                Some(Node::Word(other)) => meant = other,
+                _ => break,
+            }
+        }
+        meant
+    }
+
     /// The numbers of a declared target, and where they stand: file and line.
     fn declared(&self, word: &str) -> Understood<(Node, (usize, usize))> {
+        let word = self.meant(word);
         match self.data.get(word) {
             Some(Datum { value: Some(value), file, line, .. }) => Ok((value.clone(), (*file, *line))),
             Some(_) => Err(computed(word)),
@@ -234,7 +275,7 @@ impl Task<'_> {
         tool: Option<&str>,
         work: Option<&Node>,
     ) -> Understood<()> {
-        let point = &displaced.point;
+        let point = &self.meant(&displaced.point).to_owned();
         let (value, (file, line)) = self.declared(point)?;
         let by = displaced.by.clone().ok_or_else(|| {
             let words = "its displacement is computed, not written in numbers";
@@ -273,7 +314,8 @@ impl Task<'_> {
             .map_err(|why| Why { about: Some(point.clone()), ..why })?;
         // Its posture is that of the displaced point, where nothing else tells it.
         let approach = Approach::Beyond(index);
-        let target = Target { file, line, name: point.clone(), approach, visited: false, kind: base };
+        let target =
+            Target { file, line, name: point.clone(), approach, arrivals: Vec::new(), visited: false, kind: base };
         self.bases.entry(point.clone()).or_insert(target);
         Ok(())
     }
@@ -281,9 +323,9 @@ impl Task<'_> {
     fn add(&mut self, name: String, (file, line): (usize, usize), kind: TargetKind) -> Understood<()> {
         let clash = format!("{name} is used with different tools or work objects; give it a robtarget for each");
         let named = name.clone();
-        let target = Target { file, line, name, approach: Approach::Unknown, visited: true, kind };
-        let visited = self.way.visit(target);
-        self.switching.moved(&self.way);
+        let target =
+            Target { file, line, name, approach: Approach::Unknown, arrivals: Vec::new(), visited: true, kind };
+        let visited = self.way.visit(target, self.switching.stands());
         if visited { Ok(()) } else { Err(Why::of(&named, LeftReason::FramesDiffer, clash)) }
     }
 

@@ -1,8 +1,8 @@
 //! Statements of RAPID: where each begins and ends, and which of them move.
 
+use super::Task;
 use super::switching::{ROUTINES, words_before_name};
-use super::value::{Node, node};
-use super::{TYPES, Task};
+use super::value::{Node, TYPES, node};
 use crate::error::{Code, Error, Result};
 use crate::programs::reason::{LeftReason, Why};
 use crate::programs::scan::{Reader, TokenKind};
@@ -12,11 +12,11 @@ const MOVES: [&str; 7] = ["MOVE", "TRIGGL", "TRIGGJ", "TRIGGC", "ARC", "SPOT", S
 /// Behind a signal and the point that is found.
 const SEARCH: &str = "SEARCH";
 /// Beginnings of lines in which a position in numbers is not where the robot goes.
-const DECLARE: [&str; 8] = ["CONST", "PERS", "VAR", "LOCAL", "TASK", "PROC", "FUNC", "TRAP"];
+pub(super) const DECLARE: [&str; 8] = ["CONST", "PERS", "VAR", "LOCAL", "TASK", "PROC", "FUNC", "TRAP"];
 /// Instructions that begin so, but move no robot.
 const NO_MOVES: [&str; 2] = ["MOVEEXTJ", "ARCREFRESH"];
 /// Words of the language that begin a statement, or part of one, which ends without a semicolon.
-const CONTROL: [&str; 26] = [
+pub(super) const CONTROL: [&str; 26] = [
     "MODULE",
     "ENDMODULE",
     "PROC",
@@ -45,14 +45,14 @@ const CONTROL: [&str; 26] = [
     "THEN",
 ];
 /// Words between two operands.
-const OPERATORS: [&str; 6] = ["AND", "OR", "XOR", "NOT", "DIV", "MOD"];
+pub(super) const OPERATORS: [&str; 6] = ["AND", "OR", "XOR", "NOT", "DIV", "MOD"];
 
-fn is_control(reader: &Reader<'_>) -> bool {
+pub(super) fn is_control(reader: &Reader<'_>) -> bool {
     reader.name().is_some_and(|word| CONTROL.contains(&word.as_str()))
 }
 
 /// Token at which a statement ends: its semicolon, or a word that cannot stand within it.
-fn statement_end(reader: &mut Reader<'_>) -> usize {
+pub(super) fn statement_end(reader: &mut Reader<'_>) -> usize {
     let start = reader.at;
     reader.at += 1;
     while !reader.done() && !reader.is_mark(b';') && !is_control(reader) {
@@ -95,7 +95,7 @@ fn behind_brackets(reader: &Reader<'_>, words: usize) -> usize {
 }
 
 /// Where the statement behind a word of [`CONTROL`] begins.
-fn behind_header(reader: &mut Reader<'_>, word: &str) -> usize {
+pub(super) fn behind_header(reader: &mut Reader<'_>, word: &str) -> usize {
     let end = statement_end(reader);
     let behind = |found: &dyn Fn(isize) -> bool| {
         let all = 1..(end - reader.at) as isize;
@@ -229,11 +229,11 @@ impl Task<'_> {
                 let is_definition = ROUTINES.contains(&word.as_str()) || word == "MODULE" || word == "RECORD";
                 reader.at = if is_definition { begins } else { reader.at + 1 };
             } else {
-                begins = if reader.ahead_is_mark(1, b':') && !reader.ahead_is_mark(2, b'=') {
-                    reader.at + 2
-                } else {
-                    statement_end(&mut reader)
-                };
+                let is_label = reader.ahead_is_mark(1, b':') && !reader.ahead_is_mark(2, b'=');
+                begins = if is_label { reader.at + 2 } else { statement_end(&mut reader) };
+                if is_label {
+                    self.switching.label(&mut self.way);
+                }
                 self.no_move(&mut reader, &word, begins)?;
                 self.switching.statement(&reader, &word, &mut self.way);
                 reader.at += 1;

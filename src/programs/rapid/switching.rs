@@ -14,10 +14,9 @@ pub(super) fn words_before_name(word: &str) -> usize {
 }
 
 /// Name of the routine on whose first word the reader stands.
-fn routine_name(reader: &Reader<'_>) -> String {
+pub(super) fn routine_name(reader: &Reader<'_>) -> String {
     let behind = 1 + words_before_name(&reader.name().unwrap_or_default());
-    let name = reader.ahead(behind as isize).map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase());
-    name.unwrap_or_default()
+    reader.name_of(reader.at + behind).unwrap_or_default()
 }
 
 /// What instructions have switched, and where the robot stands.
@@ -47,9 +46,9 @@ impl Switching {
         &self.now.0
     }
 
-    /// The robot was moved.
-    pub fn moved(&mut self, way: &Itinerary) {
-        self.now.1 = way.stands();
+    /// Where the robot stands.
+    pub fn stands(&mut self) -> &mut Stands {
+        &mut self.now.1
     }
 
     /// What this reading found.
@@ -88,11 +87,7 @@ impl Switching {
         match word {
             w if ROUTINES.contains(&w) => {
                 way.start_afresh();
-                let state = |off: bool| if off { Watched::Unknown } else { Watched::On };
-                let is_called = !line_has(b"main");
-                let uncalled =
-                    Switched::new(self.switched_off.map(state), self.displaces && is_called, self.offsets && is_called);
-                let uncalled = (uncalled, Stands::default());
+                let uncalled = (self.anything(!line_has(b"main")), Stands::default());
                 self.flow.all_end(&mut self.now);
                 self.flow.routine_begins(routine_name(reader), &mut self.now, &uncalled);
                 // Modules that are not given may call it, too.
@@ -106,9 +101,28 @@ impl Switching {
                 way.next_branch();
                 self.flow.next(&mut self.now, matches!(word, "ELSE" | "DEFAULT"));
             }
+            "ERROR" | "UNDO" | "BACKWARD" => {
+                // From anywhere in the routine.
+                self.flow.returns(&self.now);
+                way.lose(&mut self.now.1);
+            }
             "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => self.branches_end(way),
             _ => self.step(word, way),
         }
+    }
+
+    /// All that the routines of the files may have switched.
+    fn anything(&self, is_displaced: bool) -> Switched {
+        let state = |off: bool| if off { Watched::Unknown } else { Watched::On };
+        Switched::new(self.switched_off.map(state), self.displaces && is_displaced, self.offsets && is_displaced)
+    }
+
+    /// `name:`, to which GOTO may come from anywhere in the routine.
+    pub fn label(&mut self, way: &mut Itinerary) {
+        let any = (self.anything(true), Stands::default());
+        self.now = self.now.merged(&any, "");
+        self.flow.arrives();
+        way.lose(&mut self.now.1);
     }
 
     /// Behind a statement with branches, or a loop.
@@ -128,6 +142,7 @@ impl Switching {
     fn step(&mut self, word: &str, way: &mut Itinerary) {
         match word {
             "RETURN" => self.flow.returns(&self.now),
+            "GOTO" => self.flow.goes_elsewhere(),
             w if DISPLACES.contains(&w) => self.now.0.displaced.set(true),
             w if OFFSETS.contains(&w) => self.now.0.offset.set(true),
             "PDISPOFF" => self.now.0.displaced.set(false),

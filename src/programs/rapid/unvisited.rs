@@ -78,6 +78,10 @@ impl Task<'_> {
             let Some(value) = datum.value.filter(|_| !seen && (!known || self.bases.contains_key(&name))) else {
                 continue;
             };
+            // Its numbers are those of another, and stand there.
+            if self.meant(&name) != name && self.declared(&name).is_ok() {
+                continue;
+            }
             let place = (datum.file, datum.line);
             if let Some(base) = self.bases.remove(&name) {
                 self.way.declare(base);
@@ -85,7 +89,15 @@ impl Task<'_> {
             }
             let done = self.unvisited_kind(&name, &value, datum.file).map(|kind| {
                 let (file, line, approach) = (place.0, place.1, Approach::Unknown);
-                self.way.declare(Target { file, line, name: name.clone(), approach, visited: true, kind });
+                self.way.declare(Target {
+                    file,
+                    line,
+                    name: name.clone(),
+                    approach,
+                    arrivals: Vec::new(),
+                    visited: true,
+                    kind,
+                });
             });
             if let Err(why) = done {
                 let words = format!("no known move of the files goes there, and {}", why.words);

@@ -7,6 +7,9 @@ use crate::geom::Pose;
 use crate::programs::reason::{LeftReason, Why};
 use crate::programs::scan::Reader;
 
+/// Types of data that say where the robot goes.
+pub(super) const TYPES: [&str; 4] = ["ROBTARGET", "JOINTTARGET", "TOOLDATA", "WOBJDATA"];
+
 /// `[..]` with what is in it.
 #[derive(Debug, Clone)]
 pub(super) enum Node {

@@ -18,7 +18,8 @@ use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, exp_so3};
 
-const DIALECT: Dialect = Dialect { comment: b'#', quotes: b"\"'", header: None, based_numbers: false };
+const DIALECT: Dialect =
+    Dialect { comment: b'#', quotes: b"\"'", header: None, based_numbers: false, latin_letters: false };
 /// Calls that move the robot to their first arguments, how many of them are targets, and how the tool gets there.
 const MOVES: [(&[u8], usize, Way); 8] = [
     (b"movej", 1, Way::Joints),
@@ -107,7 +108,7 @@ fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>)
         script.find_computed()?;
         script.read()?;
     }
-    Ok((way.program, flow.found()))
+    Ok((way.finished(), flow.found()))
 }
 
 /// The active tool; `None` where it is not known.
@@ -428,8 +429,8 @@ impl Script<'_> {
         }
         let keeps = argument.keeps;
         if let Err(why) = self.take(name, argument) {
-            self.way.leave(Left { file: self.reader.index, line, name: name.to_owned(), why }, keeps);
-            self.now.1 = self.way.stands();
+            let left = Left { file: self.reader.index, line, name: name.to_owned(), why };
+            self.way.leave(left, keeps, &mut self.now.1);
         }
         Ok(())
     }
@@ -455,9 +456,16 @@ impl Script<'_> {
             Value::Expression => return Err(Why::computed().starting_from(argument.points)),
         };
         let file = self.reader.index;
-        let target = Target { file, line, name: name.to_owned(), approach: Approach::Unknown, visited: true, kind };
-        let visited = self.way.visit(target);
-        self.now.1 = self.way.stands();
+        let target = Target {
+            file,
+            line,
+            name: name.to_owned(),
+            approach: Approach::Unknown,
+            arrivals: Vec::new(),
+            visited: true,
+            kind,
+        };
+        let visited = self.way.visit(target, &mut self.now.1);
         if visited {
             Ok(())
         } else {

@@ -1,0 +1,163 @@
+//! Frames as statements state them: `$TOOL`, `$BASE`, `BAS(..)`, motion data, and what stands behind `WITH`.
+
+use super::aggregate::{Aggregate, index};
+use super::frames::{FrameIs, Frames, OwnFrames};
+use super::{Module, Value};
+use crate::geom::Pose;
+use crate::programs::reason::LeftReason;
+use crate::programs::scan::Reader;
+
+impl Module<'_> {
+    pub(super) fn frame(&self, value: &Value) -> FrameIs {
+        if let Value::Name(name) = value
+            && name == "$NULLFRAME"
+        {
+            return FrameIs::Known(Pose::identity());
+        }
+        match self.resolved(value) {
+            Ok((aggregate, _)) => match aggregate.frame() {
+                Some(frame) => FrameIs::Known(frame),
+                None => FrameIs::Unknown("not all of X, Y, Z, A, B, C are given".into()),
+            },
+            Err(why) if why.reason == LeftReason::Computed => {
+                FrameIs::Unknown("it is computed, not written in numbers".into())
+            }
+            Err(why) => FrameIs::Unknown(why.words),
+        }
+    }
+
+    /// `TOOL_DATA[n]` or `BASE_DATA[n]`; number 0 is the flange or the world.
+    fn numbered(&self, table: &str, number: i64) -> FrameIs {
+        match number {
+            0 => FrameIs::Known(Pose::identity()),
+            n if table == "BASE_DATA" && self.is_on_kinematic(n) => {
+                FrameIs::Unknown(format!("MACHINE_FRAME_DAT[{n}] puts it on an external kinematic"))
+            }
+            n => self.frame(&Value::Name(format!("{table}[{n}]"))),
+        }
+    }
+
+    /// True for a base that an external kinematic carries; kinematic 1 is the robot.
+    fn is_on_kinematic(&self, number: i64) -> bool {
+        match self.values.get(&format!("MACHINE_FRAME_DAT[{number}]")) {
+            Some(Value::Aggregate(frame)) => frame.whole("MACH_DEF_INDEX").is_some_and(|index| index > 1),
+            _ => false,
+        }
+    }
+
+    /// Tool and base of a set of motion data, as `BAS` sets them.
+    pub(super) fn data_frames(&self, data: &Aggregate) -> Option<Frames> {
+        let (tool, base) = (data.whole("TOOL_NO")?, data.whole("BASE_NO")?);
+        Some(Frames {
+            tool: self.numbered("TOOL_DATA", tool),
+            base: self.numbered("BASE_DATA", base),
+            tool_in_room: data.word("IPO_FRAME") == Some("TCP"),
+        })
+    }
+
+    pub(super) fn use_data(&mut self, value: &Value) {
+        let data = self.resolved(value).ok().and_then(|(data, _)| self.data_frames(data));
+        let unknown = || FrameIs::Unknown("its motion data are in none of the files (give the .dat as well)".into());
+        let data = data.unwrap_or_else(|| Frames { tool: unknown(), base: unknown(), ..Frames::default() });
+        // Frames that are in force stay so until `BAS(#FRAMES)`, or what sets the rest of a motion, takes the data.
+        let stays = |is: &FrameIs, new: &FrameIs| matches!(is, FrameIs::Known(_)) && is != new;
+        let active = &self.now.0;
+        let waits = stays(&active.tool.value, &data.tool) || stays(&active.base.value, &data.base);
+        let untaken = || FrameIs::Unknown("no BAS(#FRAMES) takes the motion data before it".into());
+        let now = Frames { tool: untaken(), base: untaken(), ..data.clone() };
+        self.now.0.set(if waits { now } else { data.clone() });
+        self.motion_data = Some(data);
+    }
+
+    /// `WITH .., $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO), ..` in the rest of a line.
+    pub(super) fn with(&self, reader: &mut Reader<'_>) -> OwnFrames {
+        let mut frames = OwnFrames::default();
+        let mut within = false;
+        while !reader.at_line_end() {
+            let word = reader.name();
+            within |= word.as_deref() == Some("WITH");
+            let assigned = within && reader.ahead_is_mark(1, b'=');
+            reader.at += 1;
+            match word.as_deref().filter(|_| assigned) {
+                Some("$TOOL") => {
+                    reader.at += 1;
+                    frames.tool = Some(self.stated_frame(reader, "TOOL_DATA", "TOOL_NO"));
+                }
+                Some("$BASE") => {
+                    reader.at += 1;
+                    frames.base = Some(self.stated_frame(reader, "BASE_DATA", "BASE_NO"));
+                }
+                Some("$IPO_MODE") => {
+                    reader.at += 1;
+                    frames.tool_in_room = Some(self.is_tool_in_room(reader));
+                }
+                _ => {}
+            }
+        }
+        frames
+    }
+
+    /// A frame as the inline forms state it: an aggregate, `TOOL_DATA[1]`, `STOOL2(FP1)`, `SBASE(FP1.BASE_NO)` or a number in brackets.
+    fn stated_frame(&self, reader: &mut Reader<'_>, table: &str, number: &str) -> FrameIs {
+        let called = reader.ahead_is_mark(1, b'(');
+        if !called {
+            let value = match reader.is_mark(b'{') {
+                true => Aggregate::read(reader).map(Value::Aggregate),
+                false => {
+                    let name = reader.name();
+                    reader.at += 1;
+                    Ok(name.map_or(Value::Expression, |n| Value::Name(n + &index(reader))))
+                }
+            };
+            return value.map_or_else(|e| FrameIs::Unknown(e.what), |v| self.frame(&v));
+        }
+        reader.at += 2;
+        if let Some((n, _)) = reader.take_number() {
+            return self.numbered(table, n as i64);
+        }
+        let data = reader.name().map(Value::Name).unwrap_or(Value::Expression);
+        let found = self.resolved(&data).ok().and_then(|(data, _)| data.whole(number));
+        match found {
+            Some(n) => self.numbered(table, n),
+            None => FrameIs::Unknown("its number is in none of the files (give the .dat as well)".into()),
+        }
+    }
+
+    /// `#TCP`, `FP1.IPO_FRAME` and `SIPO_MODE(FP1.IPO_FRAME)`.
+    pub(super) fn is_tool_in_room(&self, reader: &Reader<'_>) -> bool {
+        let named = |ahead| reader.name_of(reader.at + ahead);
+        if reader.is_mark(b'#') {
+            return named(1).as_deref() == Some("TCP");
+        }
+        let data = named(if reader.ahead_is_mark(1, b'(') { 2 } else { 0 }).map(Value::Name);
+        data.is_some_and(|d| self.resolved(&d).is_ok_and(|(data, _)| data.word("IPO_FRAME") == Some("TCP")))
+    }
+
+    /// `BAS(#TOOL, n)`, `BAS(#BASE, n)`, and `BAS(#INITMOV, 0)`, which sets tool 1, the world as base, and a tool that the robot holds.
+    pub(super) fn bas(&mut self, reader: &mut Reader<'_>) {
+        reader.at += 1;
+        if !(reader.take_mark(b'(') && reader.take_mark(b'#')) {
+            return;
+        }
+        let what = reader.name();
+        reader.at += 1;
+        reader.take_mark(b',');
+        let number = reader.take_number().map(|(n, _)| n as i64);
+        let frame = |table| match number {
+            Some(n) => self.numbered(table, n),
+            None => FrameIs::Unknown("its number is computed".into()),
+        };
+        match what.as_deref() {
+            Some("TOOL") => self.now.0.tool.set(frame("TOOL_DATA")),
+            Some("BASE") => self.now.0.base.set(frame("BASE_DATA")),
+            Some(taken) if taken == "FRAMES" || taken.ends_with("PARAMS") => {
+                self.motion_data.take().into_iter().for_each(|data| self.now.0.set(data));
+            }
+            Some("INITMOV") => {
+                let (tool, base) = (self.numbered("TOOL_DATA", 1), FrameIs::Known(Pose::identity()));
+                self.now.0.set(Frames { tool, base, tool_in_room: false });
+            }
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! Which joints targets mean: the same from wherever the robot comes to them, else their posture is not known.
+//!
+//! In a loop that depends on targets further on in the text. So the targets are gone through until nothing new is found: a target of which nothing
+//! is known yet says nothing of those that are reached from it.
+
+use std::collections::BTreeSet;
+
+use super::posture::{Before, Finder, Known, same_posture};
+use super::program::{Approach, Arrival, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood};
+use super::reason::{LeftReason, Why};
+use crate::model::robot::Robot;
+
+/// What a target means.
+#[derive(Debug, Clone)]
+pub(super) struct Meant {
+    /// The target with what its text leaves out.
+    pub kind: TargetKind,
+    /// Its readings, rad or m.
+    pub readings: Vec<f64>,
+    /// True for readings that keep their value.
+    pub held: Vec<bool>,
+    /// How its posture is known.
+    pub known: Known,
+}
+
+/// What was found of a target so far.
+enum Found {
+    Nothing,
+    Meant(Box<Meant>, Approach),
+    Left(Why),
+}
+
+/// What all targets of a program mean to the controller; `held` readings keep the value of the program.
+pub(super) fn meant(
+    program: &Program,
+    controller: &Robot,
+    finder: Finder<'_>,
+    held: &[bool],
+) -> Vec<Understood<Meant>> {
+    let targets = &program.targets;
+    let arrivals = targets.iter().map(arrivals).collect();
+    let found = targets.iter().map(|_| Found::Nothing).collect();
+    let mut meaning = Meaning { targets, arrivals, controller, held, finder, found, followed: BTreeSet::new() };
+    while meaning.finds_more() || meaning.begins_anywhere() {}
+    let one = |found| match found {
+        Found::Meant(meant, _) => Ok(*meant),
+        Found::Left(why) => Err(why),
+        Found::Nothing => Err(unreached()),
+    };
+    meaning.found.into_iter().map(one).collect()
+}
+
+fn unreached() -> Why {
+    Why::new(LeftReason::PostureUnknown, "its posture is not known: nothing leads to it")
+}
+
+fn arrivals(target: &Target) -> Vec<Arrival> {
+    if !target.arrivals.is_empty() {
+        return target.arrivals.clone();
+    }
+    let posture = match &target.kind {
+        TargetKind::Pose(pose) => pose.posture.clone(),
+        TargetKind::Joints(_) => MeantPosture::Nearest,
+    };
+    vec![Arrival { from: target.approach, posture }]
+}
+
+struct Meaning<'a> {
+    targets: &'a [Target],
+    /// All ways to each of them.
+    arrivals: Vec<Vec<Arrival>>,
+    controller: &'a Robot,
+    held: &'a [bool],
+    finder: Finder<'a>,
+    found: Vec<Found>,
+    /// Targets with the ways that were followed: the number of the arrival, and where it begins.
+    followed: BTreeSet<(usize, usize, Approach)>,
+}
+
+impl Meaning<'_> {
+    /// Follows all ways that begin where something is known; true where one of them was new.
+    fn finds_more(&mut self) -> bool {
+        let before = self.followed.len();
+        (0..self.targets.len()).for_each(|k| self.look_at(k));
+        self.followed.len() > before
+    }
+
+    /// Where targets are reached from each other alone, nothing tells the joints at the first of them.
+    fn begins_anywhere(&mut self) -> bool {
+        let open = self.found.iter().position(|found| matches!(found, Found::Nothing));
+        open.is_some_and(|k| {
+            self.follow(k, 0, Approach::Unknown);
+            true
+        })
+    }
+
+    fn look_at(&mut self, k: usize) {
+        let mut ways = BTreeSet::new();
+        for (n, arrival) in self.arrivals[k].iter().enumerate() {
+            let mut origins = BTreeSet::new();
+            self.origins(arrival.from, &mut BTreeSet::new(), &mut origins);
+            ways.extend(origins.into_iter().map(|origin| (origin, n)));
+        }
+        // Where a target tells its posture itself, an unknown way to it says nothing against it.
+        let is_told = self.arrivals[k].iter().all(|arrival| self.tells_itself(k, arrival));
+        let has_known = ways.iter().any(|(origin, _)| *origin != Approach::Unknown);
+        for (origin, n) in ways {
+            if matches!(self.found[k], Found::Left(_)) {
+                return;
+            }
+            if !(is_told && has_known && origin == Approach::Unknown) {
+                self.follow(k, n, origin);
+            }
+        }
+    }
+
+    /// True where joints or codes beside a pose tell its posture.
+    fn tells_itself(&self, k: usize, arrival: &Arrival) -> bool {
+        match &self.targets[k].kind {
+            TargetKind::Joints(_) => true,
+            TargetKind::Pose(pose) => match arrival.posture {
+                MeantPosture::Coded(..) | MeantPosture::Unheeded(..) | MeantPosture::Near(_) => true,
+                MeantPosture::Nearest | MeantPosture::Along => pose.taught.is_some(),
+                MeantPosture::Either(..) => false,
+            },
+        }
+    }
+
+    /// Where a way begins: through targets that are left, in the posture in which the robot came to these.
+    fn origins(&self, from: Approach, through: &mut BTreeSet<usize>, all: &mut BTreeSet<Approach>) {
+        let Some(k) = from.target() else {
+            all.insert(Approach::Unknown);
+            return;
+        };
+        match &self.found[k] {
+            Found::Nothing => {}
+            Found::Meant(..) => _ = all.insert(from),
+            Found::Left(why) if self.loses_posture(k, why) => _ = all.insert(Approach::Unknown),
+            Found::Left(_) if through.insert(k) => {
+                self.arrivals[k].iter().for_each(|a| self.origins(a.from.beyond(), through, all));
+            }
+            Found::Left(_) => {}
+        }
+    }
+
+    /// True where the robot stands in a posture of its own at a target that is left.
+    fn loses_posture(&self, k: usize, why: &Why) -> bool {
+        why.reason == LeftReason::PostureUnknown || matches!(self.targets[k].kind, TargetKind::Joints(_))
+    }
+
+    /// Follows a way to a target, unless that was done: what it means must be what the others say.
+    fn follow(&mut self, k: usize, n: usize, origin: Approach) {
+        if !self.followed.insert((k, n, origin)) {
+            return;
+        }
+        let new = self.by(k, n, origin);
+        match (new, &self.found[k]) {
+            (Err(why), _) => self.found[k] = Found::Left(why),
+            (Ok(new), Found::Meant(known, first)) if !same_posture(&known.readings, &new.readings) => {
+                self.found[k] = Found::Left(self.differing(k, *first, origin));
+            }
+            (Ok(new), Found::Nothing) => self.found[k] = Found::Meant(Box::new(new), origin),
+            (Ok(_), _) => {}
+        }
+    }
+
+    fn differing(&self, k: usize, one: Approach, other: Approach) -> Why {
+        let place = |from: Approach| match from.target() {
+            Some(k) => format!("from line {}", self.targets[k].line),
+            None => "from where the text does not tell".to_owned(),
+        };
+        let ways = format!("the ways {} and {}", place(one), place(other));
+        let is_partial = match &self.targets[k].kind {
+            TargetKind::Joints(joints) => joints.readings.iter().any(|q| !q.is_finite()),
+            TargetKind::Pose(pose) => pose.is_partial(),
+        };
+        if is_partial {
+            return Why::new(LeftReason::Incomplete, format!("it leaves numbers out, and {ways} give different ones"));
+        }
+        let words = format!("its posture is not known: {ways} lead to different ones");
+        Why::new(LeftReason::PostureUnknown, words)
+    }
+
+    /// What a target means to a robot that comes from there.
+    fn by(&mut self, k: usize, n: usize, origin: Approach) -> Understood<Meant> {
+        let before = origin.target().and_then(|j| match &self.found[j] {
+            Found::Meant(meant, _) => Some(meant.readings.clone()),
+            _ => None,
+        });
+        let straight = matches!(origin, Approach::From(_));
+        let kind = self.completed(&self.targets[k], before.as_deref().filter(|_| straight))?;
+        let held = |own: Vec<bool>| own.iter().zip(self.held).map(|(a, h)| *a || *h).collect::<Vec<bool>>();
+        match &kind {
+            TargetKind::Joints(joints) => {
+                let held = held(joints.fields.iter().map(Option::is_none).collect());
+                let readings = joints.readings.clone();
+                Ok(Meant { kind, readings, held, known: Known::Joints })
+            }
+            TargetKind::Pose(pose) => {
+                let held = held(pose.fixed.iter().map(Option::is_some).collect());
+                let aimed = PoseTarget { posture: self.arrivals[k][n].posture.clone(), ..(**pose).clone() };
+                let before = Before { readings: before.as_deref(), straight };
+                let (readings, known) = self.finder.joints(&aimed, &held, before)?;
+                Ok(Meant { kind, readings, held, known })
+            }
+        }
+    }
+
+    /// The target with what its text leaves out, which is what the target before it says.
+    fn completed(&self, target: &Target, before: Option<&[f64]>) -> Understood<TargetKind> {
+        let unknown =
+            || Why::new(LeftReason::Incomplete, "it leaves numbers out, and the target before it is not known");
+        let mut kind = target.kind.clone();
+        match &mut kind {
+            TargetKind::Joints(joints) => {
+                for (i, q) in joints.readings.iter_mut().enumerate().filter(|(_, q)| !q.is_finite()) {
+                    // Axes that the target does not have keep their place, wherever that is.
+                    let known = before.map(|b| b[i]);
+                    *q = match joints.fields[i] {
+                        None => known.unwrap_or_else(|| self.finder.anywhere(i)),
+                        Some(_) => known.ok_or_else(unknown)?,
+                    };
+                }
+            }
+            TargetKind::Pose(pose) if pose.is_partial() => {
+                pose.complete(&self.controller.base_from_tip(before.ok_or_else(unknown)?));
+            }
+            TargetKind::Pose(_) => {}
+        }
+        Ok(kind)
+    }
+}

@@ -1,0 +1,180 @@
+//! Targets to which several ways lead: they are corrected where all of these mean the same posture.
+
+use crate::not_told::{script_pose, told};
+use crate::programs_support::{Cell, assert_meets, numbers};
+use robotcal::geom::{Pose, matrix_from_rpy};
+use robotcal::programs::LeftReason;
+
+/// A posture away from singular ones, rad.
+const START: [f64; 6] = [0.17, -1.4, 1.7, 0.35, 0.7, 0.5];
+
+/// A little beside it.
+fn beside(k: usize) -> Vec<f64> {
+    START.iter().enumerate().map(|(i, q)| q + 0.02 * ((7 * k + i) as f64).sin()).collect()
+}
+
+/// Nearly the same pose in another posture: the wrist is turned over.
+fn turned_over() -> Vec<f64> {
+    let [a, b, c, d, e, f] = START;
+    vec![a, b, c, d - std::f64::consts::PI, 0.05 - e, f + std::f64::consts::PI]
+}
+
+fn degrees(q: &[f64]) -> Vec<f64> {
+    q.iter().map(|v| v.to_degrees()).collect()
+}
+
+/// How a language writes joints and poses.
+struct Writer<'a> {
+    joints: &'a dyn Fn(&[f64]) -> String,
+    pose: &'a dyn Fn(&[f64]) -> String,
+}
+
+impl Writer<'_> {
+    /// `N` stands for joints near the start, `O` for the wrist turned over, `@` for a new pose each time.
+    fn text(&self, body: &str) -> String {
+        let mut text = body.replace("<N>", &(self.joints)(&beside(40))).replace("<O>", &(self.joints)(&turned_over()));
+        for k in 1.. {
+            let Some(at) = text.find('@') else { break };
+            text.replace_range(at..=at, &(self.pose)(&beside(k)));
+        }
+        text
+    }
+}
+
+fn krl_joints(q: &[f64]) -> String {
+    let axes: Vec<_> = degrees(q).iter().enumerate().map(|(k, q)| format!("A{} {q:.6}", k + 1)).collect();
+    format!("{{{}}}", axes.join(","))
+}
+
+fn krl_pose(cell: &Cell, q: &[f64]) -> String {
+    let pose = cell.nominal.base_from_tip(q);
+    let [c, b, a] = pose.rpy().map(f64::to_degrees);
+    let [x, y, z] = pose.xyz().map(|v| 1e3 * v);
+    format!("{{X {x:.5},Y {y:.5},Z {z:.5},A {a:.7},B {b:.7},C {c:.7}}}")
+}
+
+fn krl(cell: &Cell, body: &str) -> String {
+    let writer = Writer { joints: &krl_joints, pose: &|q| krl_pose(cell, q) };
+    let head = format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {}\n", krl_joints(&START));
+    head + &writer.text(body) + "END\n"
+}
+
+fn unknown(count: usize) -> Vec<String> {
+    vec![LeftReason::PostureUnknown.name().to_owned(); count]
+}
+
+#[test]
+fn a_target_of_krl_is_left_where_the_ways_to_it_mean_several_postures() {
+    let cell = Cell::kuka(111);
+    let maybe = |joints: &str| format!("IF $IN[1] THEN\nPTP {joints}\nENDIF\n");
+    for (body, corrected, left) in [
+        (maybe("<O>") + "PTP @\n", 2, 1),
+        (maybe("<N>") + "PTP @\n", 3, 0),
+        (maybe("<O>") + "LIN @\nLIN @\nPTP <N>\nLIN @\n", 4, 2),
+        ("IF $IN[1] THEN\nPTP <O>\nELSE\nPTP <O>\nENDIF\nPTP @\n".to_owned(), 4, 0),
+        ("IF $IN[1] THEN\nPTP <O>\nRETURN\nENDIF\nPTP @\n".to_owned(), 3, 0),
+        ("LOOP\nPTP @\nPTP <O>\nENDLOOP\n".to_owned(), 2, 1),
+        ("LOOP\nPTP @\nPTP <N>\nENDLOOP\n".to_owned(), 3, 0),
+        ("LOOP\nPTP @\nLIN @\nENDLOOP\n".to_owned(), 3, 0),
+        ("LOOP\nLIN @\nLIN @\nPTP <O>\nENDLOOP\n".to_owned(), 2, 2),
+        ("WHILE $IN[1]\nPTP <O>\nENDWHILE\nPTP @\n".to_owned(), 2, 1),
+        ("LOOP\nPTP <N>\nIF $IN[1] THEN\nEXIT\nENDIF\nPTP <O>\nENDLOOP\nPTP @\n".to_owned(), 4, 0),
+        ("W=@\nPTP W\nPTP <O>\nPTP W\n".to_owned(), 2, 1),
+        ("W=@\nPTP W\nPTP <N>\nPTP W\n".to_owned(), 3, 0),
+        ("SUB()\nPTP @\nEND\nDEF SUB()\n".to_owned() + &maybe("<O>"), 2, 1),
+        ("SUB()\nPTP @\nEND\nDEF SUB()\n".to_owned() + &maybe("<N>"), 3, 0),
+        ("SUB()\nPTP @\nPTP <O>\nSUB()\nEND\nDEF SUB()\n".to_owned() + &maybe("<N>"), 4, 0),
+    ] {
+        let told = told(&cell, &[("a.src", krl(&cell, &body))], &[]);
+        assert_eq!(told, (corrected, unknown(left)), "{body}");
+    }
+}
+
+/// Components that a motion leaves out must be the same from everywhere.
+#[test]
+fn what_a_target_leaves_out_is_the_same_on_all_ways() {
+    let cell = Cell::kuka(112);
+    for (body, wanted) in [
+        ("LOOP\nLIN {Z 700}\nLIN {Z 690}\nENDLOOP\n", (3, vec![])),
+        ("PTP @\nLOOP\nLIN {Z 700}\nLIN @\nENDLOOP\n", (3, vec![LeftReason::Incomplete.name().to_owned()])),
+    ] {
+        assert_eq!(told(&cell, &[("a.src", krl(&cell, body))], &[]), wanted, "{body}");
+    }
+}
+
+#[test]
+fn a_target_of_a_script_is_left_where_the_ways_to_it_mean_several_postures() {
+    let cell = Cell::kuka(113);
+    let writer = Writer { joints: &|q| format!("{q:?}"), pose: &|q| script_pose(&cell.nominal.base_from_tip(q)) };
+    let text =
+        |body: &str| format!("def p():\n  set_tcp(p[0,0,0,0,0,0])\n  movej({START:?})\n{}end\n", writer.text(body));
+    for (body, corrected, left) in [
+        ("  if x:\n    movej(<O>)\n  end\n  movej(@)\n", 2, 1),
+        ("  if x:\n    movej(<O>)\n  end\n  movel(@)\n  movel(@)\n", 2, 2),
+        ("  if x:\n    movej(<N>)\n  end\n  movel(@)\n  movel(@)\n", 4, 0),
+        ("  while True:\n    movej(@)\n    movej(<O>)\n  end\n", 2, 1),
+        ("  while True:\n    movej(@)\n    movel(@)\n  end\n", 3, 0),
+        ("  w=@\n  movej(w)\n  movej(<O>)\n  movej(w)\n", 2, 1),
+        ("  if x:\n    movej(<O>)\n    return False\n  end\n  movej(@)\n", 3, 0),
+    ] {
+        let told = told(&cell, &[("a.script", text(body))], &[]);
+        assert_eq!(told, (corrected, unknown(left)), "{body}");
+    }
+}
+
+#[test]
+fn a_target_of_rapid_without_confdata_is_left_where_the_ways_to_it_mean_several_postures() {
+    let cell = Cell::kuka(114);
+    let joints = |q: &[f64]| format!("[{:?},[9E9,9E9,9E9,9E9,9E9,9E9]]", degrees(q));
+    let pose = |q: &[f64]| {
+        let pose = cell.nominal.base_from_tip(q);
+        let ([x, y, z], [i, j, l, w]) = (pose.xyz().map(|v| 1e3 * v), pose.quaternion_xyzw());
+        format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{l:.9}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
+    };
+    let writer = Writer { joints: &joints, pose: &pose };
+    let end = ",v10,fine,tool0;\n";
+    let text = |body: &str| {
+        let body = writer.text(body).replace(".\n", end);
+        format!(
+            "MODULE m\nPROC main()\nConfJ\\Off;\nConfL\\Off;\nMoveAbsJ {}{end}{body}ENDPROC\nENDMODULE\n",
+            joints(&START)
+        )
+    };
+    for (body, corrected, left) in [
+        ("IF a THEN\nMoveAbsJ <O>.\nENDIF\nMoveJ @.\n", 2, 1),
+        ("IF a THEN\nMoveAbsJ <N>.\nENDIF\nMoveJ @.\n", 3, 0),
+        ("IF a THEN\nMoveAbsJ <O>.\nRETURN;\nENDIF\nMoveJ @.\n", 3, 0),
+        ("WHILE TRUE DO\nMoveJ @.\nMoveAbsJ <O>.\nENDWHILE\n", 2, 1),
+        ("WHILE TRUE DO\nMoveJ @.\nMoveL @.\nENDWHILE\n", 3, 0),
+        ("MoveAbsJ <O>.\nback:\nMoveJ @.\nMoveAbsJ <N>.\nGOTO back;\n", 3, 1),
+        ("MoveJ @.\nERROR\nMoveJ @.\n", 2, 1),
+    ] {
+        let told = told(&cell, &[("m.mod", text(body))], &[]);
+        assert_eq!(told, (corrected, unknown(left)), "{body}");
+    }
+}
+
+/// In a loop whose ends agree the target comes where it was meant.
+#[test]
+fn a_target_at_the_top_of_a_loop_meets_its_place() {
+    let cell = Cell::kuka(115);
+    let file = cell.write("a.src", krl(&cell, "LOOP\nPTP @\nPTP <N>\nENDLOOP\n").as_bytes());
+    let new = cell.compensate(&[&file], &["--unordered"]).expect(0).text("a.src");
+    let line = new.lines().find(|l| l.starts_with("PTP {X")).unwrap();
+    let n: Vec<f64> = numbers(line);
+    let [x, y, z] = [n[0], n[1], n[2]].map(|v| 1e-3 * v);
+    let commanded = Pose::new(matrix_from_rpy([n[5], n[4], n[3]].map(f64::to_radians)), [x, y, z].into());
+    let limits = robotcal::model::inverse::reading_limits(&cell.nominal.chain);
+    let q = robotcal::model::inverse::solve_from(&cell.nominal, &limits, &commanded, &beside(1)).unwrap();
+    assert_meets(&cell.real_at(&q, None), &cell.nominal.base_from_tip(&beside(1)), line);
+}
+
+/// At a singular posture two axes turn alike, and status and turn say nothing.
+#[test]
+fn a_singular_target_is_said_to_be_singular() {
+    let cell = Cell::kuka(116);
+    let straight = [0.1, -1.5, 1.6, 0.4, 0.0, 0.3];
+    let pose = krl_pose(&cell, &straight).replace('}', ",S 2,T 2}");
+    let (_, reasons) = told(&cell, &[("a.src", krl(&cell, &format!("PTP {pose}\n")))], &[]);
+    assert_eq!(reasons, [LeftReason::Singular.name()]);
+}
