@@ -19,6 +19,7 @@ mod plan_poses;
 mod promise;
 mod rapid;
 mod rapid_statements;
+mod references;
 mod urscript;
 mod used;
 mod ways;
