@@ -20,6 +20,7 @@ mod promise;
 mod rapid;
 mod rapid_statements;
 mod references;
+mod scopes;
 mod urscript;
 mod used;
 mod ways;
