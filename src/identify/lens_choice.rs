@@ -52,24 +52,51 @@ pub(super) fn with_lenses(chain: &Chain, series: &[MeasuredSeries], options: &Op
     let mut series = series.to_vec();
     let open = if options.selection.names_cameras() { BTreeMap::new() } else { open_cameras(&series) };
     series.iter_mut().filter(|s| open.contains_key(&s.camera)).for_each(|s| s.lens = Lens::ALL[0]);
-    let (mut fit, notices) = match fit_model(chain.clone(), &series, options, None) {
+    let (fit, notices) = match fit_model(chain.clone(), &series, options, None) {
         Ok(fit) => (fit, Vec::new()),
         Err(error) => by_hold_out(chain, &mut series, &open, options).ok_or(error)?,
     };
     let mut near: Option<Adjustment> = None;
+    let mut better_series = series.clone();
     let mut lenses = Vec::new();
     for (camera, choice) in &open {
         let (told, better) = compare_lenses(&fit, camera, *choice, &options.limits);
         lenses.extend(told);
         if let Some(better) = better {
-            series.iter_mut().filter(|s| s.camera == *camera).for_each(|s| s.lens = better.lens());
+            better_series.iter_mut().filter(|s| s.camera == *camera).for_each(|s| s.lens = better.lens());
             near = Some(better.in_place_of(near.as_ref().unwrap_or(&fit.fit.adjustment)));
         }
     }
-    if near.is_some() {
-        fit = fit_model(chain.clone(), &series, options, Some((fit.start, near)))?;
+    let first = Lensed { fit, series, lenses, notices };
+    if near.is_none() {
+        return Ok(first);
     }
-    Ok(Lensed { fit, series, lenses, notices })
+    Ok(match fit_model(chain.clone(), &better_series, options, Some((first.fit.start.clone(), near))) {
+        Ok(fit) => Lensed { fit, series: better_series, ..first },
+        Err(error) => first.kept(&error),
+    })
+}
+
+impl Lensed {
+    /// The first lenses, where the fit with those of the evidence came to no end.
+    fn kept(mut self, error: &Error) -> Self {
+        for lens in self.lenses.iter_mut().filter(|l| l.taken) {
+            let first = self.series.iter().find(|s| s.camera == lens.camera).map(|s| s.lens);
+            let Some(first) = first.filter(|first| *first != lens.lens) else { continue };
+            lens.taken = false;
+            let what = format!(
+                "lens '{}' has more evidence, and the fit with it came to no end ({}): '{}' is kept",
+                lens.lens.name(),
+                error.what,
+                first.name()
+            );
+            let remedy = format!("name a lens with --camera, or look at the residuals of camera {}", lens.camera);
+            self.notices.push(Notice::new(Code::NotConverged, format!("camera {}", lens.camera), what, remedy));
+        }
+        let kept = |l: &LensEvidence| self.series.iter().any(|s| s.camera == l.camera && s.lens == l.lens);
+        self.lenses.iter_mut().filter(|l| kept(l)).for_each(|l| l.taken = true);
+        self
+    }
 }
 
 /// Cameras none of whose series settles the lens.
