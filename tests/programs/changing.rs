@@ -1,19 +1,19 @@
 //! Programs whose targets are not the same each time, or not where a reader from top to bottom would have them.
 
-use crate::programs_support::{Cell, assert_meets, numbers, status_turn};
-use robotcal::geom::{Pose, log_so3, matrix_from_rpy};
+use crate::programs_support::{Cell, assert_brings_to, krl_frame, numbers, status_turn};
+use robotcal::geom::{Pose, log_so3};
 use robotcal::programs::LeftReason;
 
 /// A posture away from singular ones, rad.
-const START: [f64; 6] = [0.17, -1.4, 1.7, 0.35, 0.7, 0.5];
+pub(super) const START: [f64; 6] = [0.17, -1.4, 1.7, 0.35, 0.7, 0.5];
 
 /// A little beside it.
-fn beside(k: usize) -> Vec<f64> {
+pub(super) fn beside(k: usize) -> Vec<f64> {
     START.iter().enumerate().map(|(i, q)| q + 0.02 * ((7 * k + i) as f64).sin()).collect()
 }
 
 /// Components X to C of the flange.
-fn pose_text(cell: &Cell, q: &[f64]) -> String {
+pub(super) fn pose_text(cell: &Cell, q: &[f64]) -> String {
     let pose = cell.nominal.base_from_tip(q);
     let [c, b, a] = pose.rpy().map(f64::to_degrees);
     let [x, y, z] = pose.xyz().map(|v| 1e3 * v);
@@ -170,9 +170,7 @@ fn targets_of_other_instructions_of_rapid_are_corrected_or_named() {
     let rotation = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(n[3], n[4], n[5], n[6]));
     let commanded =
         Pose::new(rotation.to_rotation_matrix().into_inner(), [n[0] * 1e-3, n[1] * 1e-3, n[2] * 1e-3].into());
-    let limits = robotcal::model::inverse::reading_limits(&cell.nominal.chain);
-    let q = robotcal::model::inverse::solve_from(&cell.nominal, &limits, &commanded, &beside(1)).unwrap();
-    assert_meets(&cell.real_at(&q, None), &cell.nominal.base_from_tip(&beside(1)), line);
+    assert_brings_to(&cell, &commanded, &beside(1), line);
 }
 
 #[test]
@@ -183,10 +181,5 @@ fn a_corrected_path_with_codes_meets_its_target() {
     let file = cell.write("a.src", text.as_bytes());
     let new = cell.compensate(&[&file], &["--unordered"]).expect(0).text("a.src");
     let line = new.lines().find(|l| l.starts_with("LIN")).unwrap();
-    let n: Vec<f64> = numbers(line);
-    let [x, y, z] = [n[0], n[1], n[2]].map(|v| 1e-3 * v);
-    let commanded = Pose::new(matrix_from_rpy([n[5], n[4], n[3]].map(f64::to_radians)), [x, y, z].into());
-    let limits = robotcal::model::inverse::reading_limits(&cell.nominal.chain);
-    let q = robotcal::model::inverse::solve_from(&cell.nominal, &limits, &commanded, &beside(1)).unwrap();
-    assert_meets(&cell.real_at(&q, None), &cell.nominal.base_from_tip(&beside(1)), line);
+    assert_brings_to(&cell, &krl_frame(line), &beside(1), line);
 }

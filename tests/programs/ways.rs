@@ -1,17 +1,9 @@
 //! Targets to which several ways lead: they are corrected where all of these mean the same posture.
 
+use crate::changing::{START, beside, pose_text};
 use crate::not_told::{script_pose, told};
-use crate::programs_support::{Cell, assert_meets, numbers};
-use robotcal::geom::{Pose, matrix_from_rpy};
+use crate::programs_support::{Cell, assert_brings_to, krl_frame};
 use robotcal::programs::LeftReason;
-
-/// A posture away from singular ones, rad.
-const START: [f64; 6] = [0.17, -1.4, 1.7, 0.35, 0.7, 0.5];
-
-/// A little beside it.
-fn beside(k: usize) -> Vec<f64> {
-    START.iter().enumerate().map(|(i, q)| q + 0.02 * ((7 * k + i) as f64).sin()).collect()
-}
 
 /// Nearly the same pose in another posture: the wrist is turned over.
 fn turned_over() -> Vec<f64> {
@@ -47,10 +39,7 @@ fn krl_joints(q: &[f64]) -> String {
 }
 
 fn krl_pose(cell: &Cell, q: &[f64]) -> String {
-    let pose = cell.nominal.base_from_tip(q);
-    let [c, b, a] = pose.rpy().map(f64::to_degrees);
-    let [x, y, z] = pose.xyz().map(|v| 1e3 * v);
-    format!("{{X {x:.5},Y {y:.5},Z {z:.5},A {a:.7},B {b:.7},C {c:.7}}}")
+    format!("{{{}}}", pose_text(cell, q))
 }
 
 fn krl(cell: &Cell, body: &str) -> String {
@@ -161,12 +150,7 @@ fn a_target_at_the_top_of_a_loop_meets_its_place() {
     let file = cell.write("a.src", krl(&cell, "LOOP\nPTP @\nPTP <N>\nENDLOOP\n").as_bytes());
     let new = cell.compensate(&[&file], &["--unordered"]).expect(0).text("a.src");
     let line = new.lines().find(|l| l.starts_with("PTP {X")).unwrap();
-    let n: Vec<f64> = numbers(line);
-    let [x, y, z] = [n[0], n[1], n[2]].map(|v| 1e-3 * v);
-    let commanded = Pose::new(matrix_from_rpy([n[5], n[4], n[3]].map(f64::to_radians)), [x, y, z].into());
-    let limits = robotcal::model::inverse::reading_limits(&cell.nominal.chain);
-    let q = robotcal::model::inverse::solve_from(&cell.nominal, &limits, &commanded, &beside(1)).unwrap();
-    assert_meets(&cell.real_at(&q, None), &cell.nominal.base_from_tip(&beside(1)), line);
+    assert_brings_to(&cell, &krl_frame(line), &beside(1), line);
 }
 
 /// At a singular posture two axes turn alike, and status and turn say nothing.

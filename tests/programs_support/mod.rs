@@ -11,7 +11,8 @@ use std::process::{Command, Output};
 use nalgebra::Vector6;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use robotcal::geom::Pose;
+use robotcal::geom::{Pose, matrix_from_rpy};
+use robotcal::model::inverse::{reading_limits, solve_from};
 use robotcal::model::joint_terms::{JointTerm, Term};
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::programs::LeftReason;
@@ -227,6 +228,19 @@ pub fn shape(text: &[u8]) -> Vec<u8> {
 pub fn assert_meets(reached: &Pose, wanted: &Pose, what: &str) {
     let (rad, m) = reached.distance(wanted);
     assert!(rad < 1e-6 && m < 1e-6, "{what}: {m:e} m, {rad:e} rad");
+}
+
+/// The frame that the six numbers of a line of KRL say.
+pub fn krl_frame(line: &str) -> Pose {
+    let n: Vec<f64> = numbers(line);
+    let [x, y, z] = [n[0], n[1], n[2]].map(|v| 1e-3 * v);
+    Pose::new(matrix_from_rpy([n[5], n[4], n[3]].map(f64::to_radians)), [x, y, z].into())
+}
+
+/// Asserts that a commanded pose, with the joints next to `q`, brings the real robot where the nominal one is at `q`.
+pub fn assert_brings_to(cell: &Cell, commanded: &Pose, q: &[f64], what: &str) {
+    let joints = solve_from(&cell.nominal, &reading_limits(&cell.nominal.chain), commanded, q).unwrap();
+    assert_meets(&cell.real_at(&joints, None), &cell.nominal.base_from_tip(q), what);
 }
 
 /// Status and turn as the manual defines them, for the KR 6 R900: S bit 2 and T are signs; bit 1 is A3 against the stretched arm, whose
