@@ -16,7 +16,7 @@ use crate::output::write_beside;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "The flange at given readings")]
 pub(super) struct AtArgs {
-    /// Joint vectors (CSV, columns named as the joints): pose and uncertainty of the flange relative to the plate, by the corrected URDF with compensation.toml, go to at.csv
+    /// Joint vectors (CSV, columns named as the joints): pose and uncertainty of the flange relative to the plate, by the corrected URDF with compensation.toml, go to at.csv. A constant displacement of the flange, which no series tells, is in no uncertainty there: that of the camera on it is in hand_camera.yaml
     #[arg(long, value_name = "FILE", requires = "at_unit")]
     at: Option<PathBuf>,
     /// Unit of the revolute joints in that file

@@ -15,8 +15,8 @@ use super::verify_stated::Stated;
 use super::verify_verdict::Reasons;
 use super::{Verdict, verify_series};
 use crate::assess::{
-    DeviceMoved, Limits, MeasuredPoint, OddPoints, PointFit, ReadingMistake, bootstrap_ratio, by_cluster, device_moved,
-    fit_points, odd_points, reading_mistake,
+    DeviceMoved, Limits, MeasuredPoint, OddPoints, PointFit, Ratio, ReadingMistake, bootstrap_ratio, by_cluster,
+    device_moved, fit_points, odd_points, reading_mistake,
 };
 use crate::error::{Code, Error, Result};
 use crate::model::robot::Robot;
@@ -47,6 +47,14 @@ impl Judged {
     fn different(&self) -> usize {
         self.clusters.iter().max().map_or(0, |last| last + 1)
     }
+
+    /// By the points but some; `None` where the others do not determine the frames.
+    fn without(&self, left_out: &[usize]) -> Option<Self> {
+        let kept = self.points.iter().enumerate().filter(|(k, _)| !left_out.contains(k));
+        let points: Vec<MeasuredPoint> = kept.map(|(_, point)| point.clone()).collect();
+        let fit = fit_points(&self.robot, &points)?;
+        Some(Self { robot: self.robot.clone(), clusters: clusters(&points), points, fit })
+    }
 }
 
 fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
@@ -75,7 +83,8 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     let mut reasons = Reasons::default();
     reasons.doubts.extend(odd.as_ref().map(|odd| format!("{} points are wrong, or their readings", odd.points.len())));
     // Wrong points are none of the robot's errors.
-    let rms_m = odd.map_or(model.fit.rms_m, |odd| odd.without.rms_m);
+    let rms_m = odd.as_ref().map_or(model.fit.rms_m, |odd| odd.without.rms_m);
+    let left_out = odd.as_ref().map_or(&[][..], |odd| &odd.points);
     let different = model.different();
     if moved.is_some() {
         reasons.against.push("the points do not belong together".into());
@@ -86,7 +95,7 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
             limits.scatter_images
         ));
     } else {
-        match nominal.as_ref().map(|nominal| bootstrap_ratio(&units(&model, &model), &units(&model, nominal))) {
+        match nominal.as_ref().map(|nominal| gain(&model, nominal, left_out)) {
             Some(Some(ratio)) => reasons.add_gain(ratio, "points", limits),
             Some(None) => reasons.against.push("the nominal model leaves nothing".into()),
             None => {}
@@ -96,6 +105,13 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     let side = Side { robot: &model.robot, urdf: &args.urdf, solution: None };
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     Ok(reasons.verdict())
+}
+
+/// The error of a model over that of the nominal one, by the points but some.
+fn gain(model: &Judged, nominal: &Judged, left_out: &[usize]) -> Option<Ratio> {
+    let [model, nominal] = [model, nominal].map(|judged| judged.without(left_out));
+    let (model, nominal) = (model?, nominal?);
+    bootstrap_ratio(&units(&model, &model), &units(&model, &nominal))
 }
 
 fn judged(

@@ -25,14 +25,14 @@ pub struct FlatFieldFacts {
     /// Pixels without signal.
     pub dead: usize,
     /// Change of the dark images from begin to end; none where no frames are named so.
-    pub dark_drift: Option<Drift>,
+    pub dark_drift: Option<LightDrift>,
     /// Change of the white images.
-    pub white_drift: Option<Drift>,
+    pub white_drift: Option<LightDrift>,
 }
 
 /// Change from frames `begin*` to frames `end*`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drift {
+pub struct LightDrift {
     /// Of all pixels in common: relative for white images, over full scale for dark ones.
     pub level: f64,
     /// What is left between the blocks, RMS, in the same unit.
@@ -70,7 +70,7 @@ fn named<'a>(paths: &'a [PathBuf], start: &str) -> Vec<&'a PathBuf> {
 ///
 /// # Errors
 /// An unreadable image.
-pub(super) fn drift(paths: &[PathBuf], bits: Option<u32>, light: Light) -> Result<Option<Drift>> {
+pub(super) fn drift(paths: &[PathBuf], bits: Option<u32>, light: Light) -> Result<Option<LightDrift>> {
     let [begin, end] = ["begin", "end"].map(|start| named(paths, start));
     if begin.is_empty() || end.is_empty() {
         return Ok(None);
@@ -89,7 +89,7 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 /// From the block means of every frame.
-fn drift_of(begin: &[Vec<f64>], end: &[Vec<f64>], light: Light) -> Option<Drift> {
+fn drift_of(begin: &[Vec<f64>], end: &[Vec<f64>], light: Light) -> Option<LightDrift> {
     let levels = |frames: &[Vec<f64>]| frames.iter().map(|f| mean(f)).collect::<Vec<f64>>();
     let (b, e) = (levels(begin), levels(end));
     let level = match light {
@@ -122,7 +122,7 @@ fn drift_of(begin: &[Vec<f64>], end: &[Vec<f64>], light: Light) -> Option<Drift>
     let means = 1.0 / begin.len() as f64 + 1.0 / end.len() as f64;
     let noise = (free > 0.0).then(|| (scatter / free * means).sqrt());
     let pattern = changed.sqrt();
-    (level.is_finite() && pattern.is_finite()).then_some(Drift { level, pattern, noise })
+    (level.is_finite() && pattern.is_finite()).then_some(LightDrift { level, pattern, noise })
 }
 
 #[cfg(test)]

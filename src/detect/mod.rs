@@ -33,7 +33,7 @@ pub mod tags;
 pub use detection::{Circles, Detection, Dropped, Outline, Sizes};
 pub use dot_sizes::set_radii;
 pub use flat_field::FlatField;
-pub use flat_field_facts::{Drift, FlatFieldFacts};
+pub use flat_field_facts::{FlatFieldFacts, LightDrift};
 pub use load::{LUMA_WEIGHTS, load, load_bytes};
 pub use picture::Picture;
 pub use run::{SeriesImage, detect_series};

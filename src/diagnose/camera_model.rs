@@ -11,9 +11,13 @@ pub struct CameraModelMisfit {
     pub rms_px: f64,
 }
 
-pub(super) fn check(_: &Problem, setting: &CheckContext) -> Option<CameraModelMisfit> {
+/// Looks at what is left beside the noise that is stated of the observations.
+pub(super) fn check(problem: &Problem, setting: &CheckContext) -> Option<CameraModelMisfit> {
     let rms_px = setting.free.rms_px;
-    (rms_px > setting.limits.free_rms_px).then_some(CameraModelMisfit { rms_px })
+    let variances = problem.used().flat_map(|(_, image)| image.used()).map(|o| o.stated_variance_px2());
+    let (sum, count) = variances.fold((0.0, 0.0f64), |(sum, count), v| (sum + v, count + 1.0));
+    let unexplained = rms_px.powi(2) - sum / count.max(1.0);
+    (unexplained > setting.limits.free_rms_px.powi(2)).then_some(CameraModelMisfit { rms_px })
 }
 
 impl Kind for CameraModelMisfit {

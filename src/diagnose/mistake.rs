@@ -174,7 +174,7 @@ impl Kind for Mistake {
                 format!("write {joint} {word} {before} into the column {joint} of joints.csv")
             }
             MistakeKind::Rows { columns, .. } if columns.is_empty() => {
-                "shift the names in the first column of joints.csv by one row".into()
+                "shift the names in the first column of joints.csv by one row; of a recording, see --image-delay and --clock log".into()
             }
             MistakeKind::Rows { columns, below } => format!(
                 "shift the columns {} of joints.csv one row {}, and see how they were recorded",

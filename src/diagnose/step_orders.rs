@@ -38,7 +38,7 @@ impl Linear {
                     });
                     divide(Order::Up(axis), rows);
                 }
-                if rows.len() >= 2 * fewest && !matches!(changed, Changed::Zero(_)) {
+                if rows.len() >= 2 * fewest {
                     divide(Order::Drift, rows.clone());
                 }
                 if rows.len() >= fewest && elsewhere >= fewest {

@@ -1,11 +1,11 @@
-//! The finding that the zero of a joint is another at some of the stops; [`super::pose_step`] looks for it.
+//! The finding that the zero of a joint is another at some of the stops, or creeps; [`super::pose_step`] looks for it.
 
 use super::displaced::Displacement;
 use super::kind::{Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 use crate::urdf::JointKind;
 
-/// The zero of a joint is another from some stop on, or in one of several series.
+/// The zero of a joint is another from some stop on, or in one of several series, or creeps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ZeroMoved {
     /// Name of the joint.
@@ -18,7 +18,7 @@ pub struct ZeroMoved {
     pub displacement: Displacement,
     /// Images or stops at which it is another, in this order.
     pub stops: Vec<String>,
-    /// By how much, rad or m, and its sigma.
+    /// By how much, rad or m, and its sigma; of what creeps, from the first to the last stop.
     pub offset: (f64, f64),
     /// Share of the squares of the joint noise that this and what else changed explain.
     pub share: f64,
@@ -63,18 +63,27 @@ impl Kind for ZeroMoved {
 
     fn seen(&self) -> String {
         let size = format!("{:+.3} {} (sigma {:.3})", 1e3 * self.offset.0, self.kind.units()[1], 1e3 * self.offset.1);
-        let where_ = match self.displacement {
-            Displacement::InAll => format!("the zero of {} is off by {size} from that of the other series", self.joint),
-            _ => format!("from {} on the zero of {} is off by {size} from that before", self.first(), self.joint),
+        let anew = "the joint was mastered anew, or its encoder or belt slipped";
+        let what = match self.displacement {
+            Displacement::AllThrough => format!(
+                "from the first to the last stop the zero of {} creeps by {size}: the arm is not yet warm, or a belt, brake or gear gives way",
+                self.joint
+            ),
+            Displacement::InAll => {
+                format!("the zero of {} is off by {size} from that of the other series: {anew}", self.joint)
+            }
+            _ => {
+                format!("from {} on the zero of {} is off by {size} from that before: {anew}", self.first(), self.joint)
+            }
         };
-        format!(
-            "{where_}: the joint was mastered anew, or its encoder or belt slipped (this explains {:.0} % of the squares of the joint noise)",
-            100.0 * self.share
-        )
+        format!("{what} (this explains {:.0} % of the squares of the joint noise)", 100.0 * self.share)
     }
 
     fn remedy(&self) -> String {
         match self.displacement {
+            Displacement::AllThrough => {
+                "let the arm warm up at the speed of its work, and take the series again".into()
+            }
             Displacement::InAll => {
                 "identify the robot from series of one mastering: give this one alone, or the others".into()
             }

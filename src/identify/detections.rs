@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::second_pass::second_pass;
 use super::seen_image::SeenImage;
 use crate::assess::Limits;
-use crate::detect::{Drift, FlatField, FlatFieldFacts, Picture, SeriesImage, detect_series, load};
+use crate::detect::{FlatField, FlatFieldFacts, LightDrift, Picture, SeriesImage, detect_series, load};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::{Plate, Series, Source};
 
@@ -99,7 +99,7 @@ pub fn flat_field_drift(series: &Series, facts: &FlatFieldFacts, limits: &Limits
 }
 
 /// Beyond what matters, in common or from place to place, and there beyond what single frames scatter.
-fn changed(drift: &Drift, [level, pattern]: [f64; 2], limits: &Limits) -> bool {
+fn changed(drift: &LightDrift, [level, pattern]: [f64; 2], limits: &Limits) -> bool {
     let chance = limits.drift_sigmas * drift.noise.unwrap_or(0.0);
     drift.level.abs() > level || drift.pattern > pattern.max(chance)
 }

@@ -273,7 +273,7 @@ fn no_fit(of: &str, what: &str) -> Error {
         Code::ReadingsContradict,
         of,
         format!("joint readings and images do not belong together: {what}"),
-        "check joint_unit, the order and signs of the joints in joints.csv, that image names stand in the right rows, that the URDF is of this robot, base and tip, and that the plate did not move",
+        "check joint_unit, the order and signs of the joints in joints.csv, that image names stand in the right rows (of a recording: the clocks, see --image-delay and --clock log), that the URDF is of this robot, base and tip, and that the plate did not move",
     )
 }
 

@@ -55,6 +55,11 @@ impl Mark {
 }
 
 impl MarkerObservation {
+    /// Mean square of the distance to the truth that the detector states, px^2.
+    pub fn stated_variance_px2(&self) -> f64 {
+        self.information.trace() / self.information.determinant()
+    }
+
     /// Its prediction on this plate, with the derivative of column and row of the image by the modes of the plate; `None` behind the camera.
     #[inline(always)]
     pub fn predict(

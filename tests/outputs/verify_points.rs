@@ -154,15 +154,38 @@ fn verdict(points: &[MeasuredPoint], unit: &str, compared_with: Option<&Path>) -
     command.output().unwrap()
 }
 
-#[test]
-fn points_that_do_not_belong_together_or_are_few_are_no_good_verdict() {
-    let (urdf, robot) = kr6();
-    let folder = tempfile::tempdir().unwrap();
-    let other = folder.path().join("nominal.urdf");
-    let text = std::fs::read_to_string(&urdf).unwrap();
-    // The upper arm 5 mm longer.
+/// The description with the upper arm 5 mm longer.
+fn with_a_longer_arm(folder: &Path) -> PathBuf {
+    let other = folder.join("nominal.urdf");
+    let text = std::fs::read_to_string(kr6().0).unwrap();
     assert!(text.contains("0.455 0 0"), "the arm of this robot");
     std::fs::write(&other, text.replace("0.455 0 0", "0.460 0 0")).unwrap();
+    other
+}
+
+/// Wrong points are none of the robot's errors, neither of the model nor of the nominal one.
+#[test]
+fn a_wrong_point_takes_nothing_off_the_gain() {
+    let (_, robot) = kr6();
+    let folder = tempfile::tempdir().unwrap();
+    let nominal = with_a_longer_arm(folder.path());
+    let share = |points: &[MeasuredPoint]| -> f64 {
+        let text = String::from_utf8(verdict(points, "rad", Some(&nominal)).stdout).unwrap();
+        println!("{text}");
+        let (before, _) = text.split_once(" % of the nominal error").unwrap();
+        before.split_whitespace().last().unwrap().parse().unwrap()
+    };
+    let mut seen = points(&robot, 60, NOISE_M);
+    let clean = share(&seen);
+    seen[17].position_m.x += 17e-3;
+    assert!(clean < 10.0 && (share(&seen) - clean).abs() <= 1.0, "{clean}");
+}
+
+#[test]
+fn points_that_do_not_belong_together_or_are_few_are_no_good_verdict() {
+    let (_, robot) = kr6();
+    let folder = tempfile::tempdir().unwrap();
+    let other = with_a_longer_arm(folder.path());
     let code = |points: &[MeasuredPoint]| {
         let found = verdict(points, "rad", Some(&other));
         assert!(found.status.code().is_some_and(|c| c <= 3), "{}", String::from_utf8_lossy(&found.stderr));

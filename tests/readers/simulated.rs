@@ -8,7 +8,8 @@ use image::GrayImage;
 use mcap::records::MessageHeader;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use robotcal::series::{Extracted, Motion, RecordingOptions, extract};
+use robotcal::error::Code;
+use robotcal::series::{Clock, Extracted, Motion, RecordingOptions, extract};
 use tempfile::TempDir;
 
 const START_S: f64 = 1_700_000_000.0;
@@ -101,13 +102,24 @@ impl Cdr {
     }
 }
 
-/// Joints at 125 Hz, images every `step_s`, stamped and recorded `delay_s` after what they show.
-fn write(path: &Path, arm: &Arm, step_s: f64, delay_s: f64, random: &mut ChaCha8Rng) {
+/// When images and joints are taken and stamped.
+#[derive(Clone, Copy)]
+struct Times {
+    /// From image to image, s.
+    step_s: f64,
+    /// Images are stamped and recorded so much after what they show, s.
+    delay_s: f64,
+    /// The clock that stamps the joints is so much behind that of images and recording, s.
+    behind_s: f64,
+}
+
+/// Joints at 125 Hz, and images.
+fn write(path: &Path, arm: &Arm, Times { step_s, delay_s, behind_s }: Times, random: &mut ChaCha8Rng) {
     let mut messages: BTreeMap<(u64, u16), Vec<u8>> = BTreeMap::new();
     let ns = |t: f64| ((START_S + t) * 1e9) as u64;
     for k in 0..(arm.end() / 0.008) as u32 {
         let t = f64::from(k) * 0.008;
-        messages.insert((ns(t), 0), Cdr::new(ns(t)).joint_state(arm.joints(t)));
+        messages.insert((ns(t), 0), Cdr::new(ns(t - behind_s)).joint_state(arm.joints(t)));
     }
     for k in 0..(arm.end() / step_s) as u32 {
         // Cameras are not punctual.
@@ -138,11 +150,15 @@ struct Recorded {
 
 impl Recorded {
     fn new(seed: u64, step_s: f64, delay_s: f64) -> Self {
+        Self::at(seed, Times { step_s, delay_s, behind_s: 0.0 })
+    }
+
+    fn at(seed: u64, times: Times) -> Self {
         println!("seed {seed}");
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let (folder, arm) = (tempfile::tempdir().unwrap(), Arm::new(&mut random));
         let path = folder.path().join("run.mcap");
-        write(&path, &arm, step_s, delay_s, &mut random);
+        write(&path, &arm, times, &mut random);
         Self { folder, arm, path }
     }
 
@@ -208,6 +224,38 @@ fn a_given_delay_is_taken_as_it_is() {
     let recorded = Recorded::new(21, 0.1, 0.25);
     let given = recorded.extract(&RecordingOptions { image_delay_s: Some(0.25), ..RecordingOptions::default() });
     assert_eq!((given.late, recorded.wrong(&given, 3.0)), (None, 0));
+}
+
+/// Stamps of two clocks seconds apart, which arrive at the same time: arrival says where to look for the motion.
+#[test]
+fn stamps_of_two_clocks_are_told_by_arrival_and_motion() {
+    for (seed, behind_s) in [(51, 3.0), (52, -3.0), (53, 5.0)] {
+        let recorded = Recorded::at(seed, Times { step_s: 0.066, delay_s: 0.0, behind_s });
+        let extracted = recorded.extract(&RecordingOptions::default());
+        let late = extracted.late.unwrap();
+        assert!((late.delay_s - behind_s).abs() < (4.0 * late.sigma_s).max(0.004), "{late:?} {behind_s}");
+        assert_eq!(recorded.wrong(&extracted, 3.0), 0);
+        assert!(extracted.stops.stops.len() > STOPS - 12, "{}", extracted.stops.stops.len());
+    }
+}
+
+/// Images too far apart show no motion. Stamps or arrival: of a stop that is longer than their difference, images of both are taken; where none is,
+/// nobody knows.
+#[test]
+fn of_stamps_that_arrival_contradicts_no_image_is_of_another_stop() {
+    let seldom = |seed, behind_s| Recorded::at(seed, Times { step_s: 0.3, delay_s: 0.0, behind_s });
+    let little = seldom(61, 0.3);
+    let extracted = little.extract(&RecordingOptions::default());
+    let codes: Vec<Code> = extracted.notices.iter().map(|n| n.code).collect();
+    assert!(extracted.late.is_none() && codes.contains(&Code::ImagesDelayed), "{codes:?}");
+    assert!(little.wrong(&little.extract(&as_stamped()), 3.0) > 0);
+    assert_eq!(little.wrong(&extracted, 3.0), 0);
+    assert!(extracted.stops.stops.len() > STOPS / 2);
+    let much = seldom(62, 3.0);
+    let error = extract(&much.path, &much.folder.path().join("images"), &RecordingOptions::default()).unwrap_err();
+    assert_eq!(error.code, Code::ClocksApart);
+    let by_arrival = much.extract(&RecordingOptions { clock: Clock::Log, ..RecordingOptions::default() });
+    assert_eq!(much.wrong(&by_arrival, 3.0), 0);
 }
 
 /// Images in motion need the delay most: joints and picture differ by the way of a quarter of a second.

@@ -17,8 +17,10 @@ use super::scan::time_ns;
 use crate::error::{Code, Notice};
 
 const MS: i64 = 1_000_000;
-/// Longest delay that is looked for, ns.
+/// Longest delay that is looked for, ns: beside none, and beside what the times of arrival tell.
 const REACH_NS: i64 = 2_000 * MS;
+/// Delays by the times of arrival beyond which these are no guess any more, ns.
+const LONGEST_GUESS_NS: i64 = 60_000 * MS;
 /// Pictures that are compared are at least so far apart, ns: more would say the same.
 const LEAST_STEP_NS: i64 = 40 * MS;
 /// Pictures farther apart are not compared, ns: a whole motion would fit between them.
@@ -49,6 +51,31 @@ pub struct Delay {
     pub delay_s: f64,
     /// Its standard deviation, s.
     pub sigma_s: f64,
+}
+
+/// The delay for which the times of arrival speak.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Guess {
+    /// As [`Delay::delay_s`], ns.
+    delay_ns: i64,
+}
+
+impl Guess {
+    /// As times of arrival and stamps tell it together, s.
+    pub fn of_arrival(delay_s: f64) -> Self {
+        let delay_ns = (1e9 * delay_s).round() as i64;
+        Self { delay_ns: if delay_ns.abs() > LONGEST_GUESS_NS { 0 } else { delay_ns } }
+    }
+
+    /// Delays that are looked for.
+    fn reach(self) -> std::ops::RangeInclusive<i64> {
+        self.delay_ns.min(0) - REACH_NS..=self.delay_ns.max(0) + REACH_NS
+    }
+
+    /// How far a delay is from none and from this guess, whichever is nearer, ns.
+    fn distance(self, delay_ns: i64) -> i64 {
+        delay_ns.abs().min((delay_ns - self.delay_ns).abs())
+    }
 }
 
 impl Delay {
@@ -82,7 +109,7 @@ pub(super) struct Frames {
 
 impl Frames {
     /// The pictures about motions, evenly spread over the recording; `None` where there are too few.
-    pub fn about_motions(times: &[i64], still: &[Standstill]) -> Option<Self> {
+    pub fn about_motions(times: &[i64], still: &[Standstill], guess: Guess) -> Option<Self> {
         let mut thinned: Vec<i64> = Vec::new();
         for time in times {
             if thinned.last().is_none_or(|last| time - last >= LEAST_STEP_NS) {
@@ -93,10 +120,10 @@ impl Frames {
         if motions.is_empty() {
             motions.push((*times.first()?, *times.last()?));
         }
+        let (least, most) = guess.reach().into_inner();
         let about = |every: usize| -> Vec<i64> {
-            let near = |t: &&i64| {
-                motions.iter().step_by(every).any(|(from, to)| (from - REACH_NS..=to + REACH_NS).contains(*t))
-            };
+            let near =
+                |t: &&i64| motions.iter().step_by(every).any(|(from, to)| (from + least..=to + most).contains(*t));
             thinned.iter().filter(near).copied().collect()
         };
         let all = about(1);
@@ -143,13 +170,13 @@ fn reduced(picture: &DynamicImage) -> Vec<f32> {
     small.iter().map(|v| f32::from(*v) / mean.max(1.0)).collect()
 }
 
-/// The delay of the pictures, where the motion tells it and it is longer than half the time from picture to picture.
-pub(super) fn measured(pairs: &[Pair], postures: &[Posture]) -> Option<Delay> {
+/// The delay of the pictures, where the motion tells it.
+pub(super) fn measured(pairs: &[Pair], postures: &[Posture], guess: Guess) -> Option<Delay> {
     if pairs.len() < *PICTURES.start() {
         return None;
     }
-    let coarse = Search::new(pairs, postures, (-REACH_NS..=REACH_NS).step_by(10 * MS as usize));
-    let (best, explained) = coarse.nearest_maximum()?;
+    let coarse = Search::new(pairs, postures, guess.reach().step_by(10 * MS as usize));
+    let (best, explained) = coarse.nearest_maximum(guess)?;
     if explained < LEAST_EXPLAINED {
         return None;
     }
@@ -160,11 +187,17 @@ pub(super) fn measured(pairs: &[Pair], postures: &[Posture]) -> Option<Delay> {
     let scatter: f64 = left_out.iter().map(|d| (d - mean).powi(2)).sum();
     // The jackknife, and the step of the search.
     let variance = scatter * (PARTS - 1) as f64 / PARTS as f64 + (1e-9 * MS as f64).powi(2) / 12.0;
-    let sigma_s = variance.sqrt();
-    let mut steps: Vec<i64> = pairs.iter().map(|p| p.to_ns - p.from_ns).collect();
-    steps.sort_unstable();
-    let half_step_s = 0.5e-9 * steps[steps.len() / 2] as f64;
-    (delay_s.abs() > half_step_s.max(CERTAIN * sigma_s)).then_some(Delay { delay_s, sigma_s })
+    Some(Delay { delay_s, sigma_s: variance.sqrt() })
+}
+
+impl Delay {
+    /// True where it is longer than half the time from picture to picture, and certain.
+    pub(super) fn is_notable(self, pairs: &[Pair]) -> bool {
+        let mut steps: Vec<i64> = pairs.iter().map(|p| p.to_ns - p.from_ns).collect();
+        steps.sort_unstable();
+        let half_step_s = steps.get(steps.len() / 2).map_or(0.0, |ns| 0.5e-9 * *ns as f64);
+        self.delay_s.abs() > half_step_s.max(CERTAIN * self.sigma_s)
+    }
 }
 
 /// Motions between the pictures for every delay that is tried.
@@ -194,8 +227,8 @@ impl<'a> Search<'a> {
     }
 
     /// The delay that explains most, ns, and how much; of several that explain nearly as much, as cycles of equal length do, the
-    /// shortest, if no other is nearly as short.
-    fn nearest_maximum(&self) -> Option<(i64, f64)> {
+    /// one nearest to none or to the guess, if no other is nearly as near.
+    fn nearest_maximum(&self, guess: Guess) -> Option<(i64, f64)> {
         let all: Vec<(i64, f64)> = (0..self.tried.len()).map(|k| (self.tried[k].0, self.explained(k, None))).collect();
         let most = all.iter().map(|(_, e)| *e).fold(0.0, f64::max);
         let is_maximum = |k: &usize| {
@@ -203,10 +236,10 @@ impl<'a> Search<'a> {
             all[*k].1 > 0.0 && all[*k].1 >= NEARLY * most && about.clone().all(|(_, e)| *e <= all[*k].1)
         };
         let mut maxima: Vec<(i64, f64)> = (0..all.len()).filter(is_maximum).map(|k| all[k]).collect();
-        maxima.sort_by_key(|(delay, _)| delay.abs());
+        maxima.sort_by_key(|(delay, _)| guess.distance(*delay));
         match maxima[..] {
             [] => None,
-            [first, second, ..] if second.0.abs() < 2 * first.0.abs() => None,
+            [first, second, ..] if guess.distance(second.0) < 2 * guess.distance(first.0) => None,
             [first, ..] => Some(first),
         }
     }

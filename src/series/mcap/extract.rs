@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use super::collect::{Collector, Group, StopReport};
-use super::delay::{self, Delay, Frames};
+use super::delay::{self, Delay, Frames, Guess};
 use super::file::for_each;
 use super::messages::CameraInfo;
 use super::motion::{Posture, Standstill, interpolate, postures, standstills};
-use super::options::{Motion, RecordingOptions};
+use super::options::{Clock, Motion, RecordingOptions};
 use super::scan::{JointReadings, Scan, scan};
 use super::silence;
 use crate::error::{Code, Error, Notice, Result};
@@ -57,13 +57,25 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     let mut postures = postures(&samples, &joints);
     require_overlap(&scan, &postures, &times)?;
     scan.notices.extend(silence::notices(recording, &samples, &joints, &times));
-    let late = late(&scan, &image_topic, &postures, &times, options)?;
-    if let Some(delay_s) = options.image_delay_s.or(late.map(|d| d.delay_s)) {
+    let image_delay_s = scan.delay_s(std::slice::from_ref(&image_topic)) - scan.delay_s(&topics);
+    let guess = match options.clock {
+        Clock::Stamp => Guess::of_arrival(-image_delay_s),
+        Clock::Log => Guess::of_arrival(image_delay_s),
+    };
+    let told = match options.image_delay_s {
+        Some(delay_s) => Told::By(delay_s),
+        None => told_by_motion(&scan, &image_topic, (&postures, &times), guess, options)?,
+    };
+    if let Told::By(delay_s) | Told::Found(Delay { delay_s, .. }) = told {
         // In the time of the images, the joints were there so much later.
-        postures.iter_mut().for_each(|p| p.time_ns += (delay_s * 1e9).round() as i64);
+        postures.iter_mut().for_each(|p| p.time_ns += nanoseconds(delay_s));
     }
+    let late = told.late();
     scan.notices.extend(late.map(|d| d.notice(recording)));
-    let groups = groups(&mut scan, &postures, &times, options)?;
+    let growth_s = scan.delay_growth_s(&image_topic) - scan.delay_growth_s(&topics[0]);
+    let is_open = told == Told::Nothing && options.clock == Clock::Stamp && image_delay_s.abs() > NOTABLE_DELAY_S;
+    let open_s = if is_open { -image_delay_s } else { 0.0 };
+    let groups = groups(&mut scan, &postures, &times, options, nanoseconds(open_s))?;
     std::fs::create_dir_all(images).map_err(|e| Error::io(images, &e))?;
     let mut collector = Collector::new(groups, images, options, &postures);
     for file in scan.files.clone() {
@@ -93,8 +105,6 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
             "they are left out",
         ));
     }
-    let image_delay_s = scan.delay_s(std::slice::from_ref(&image_topic)) - scan.delay_s(&topics);
-    let growth_s = scan.delay_growth_s(&image_topic) - scan.delay_growth_s(&topics[0]);
     if growth_s.abs() > NOTABLE_DELAY_S {
         let sign = if growth_s < 0.0 { "earlier" } else { "later" };
         let what = format!(
@@ -103,12 +113,12 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         );
         let remedy = "use the times of recording (--clock log), or let one clock stamp both";
         notices.push(Notice::new(Code::ClocksApart, recording.display(), what, remedy));
-    } else if image_delay_s.abs() > NOTABLE_DELAY_S {
-        let sign = if image_delay_s < 0.0 { "earlier" } else { "later" };
-        let what = format!("images arrive {:.3} s {sign} after their stamp than joint states", image_delay_s.abs());
-        let remedy =
-            "check that camera and robot stamp by the same clock; a robot that stands for longer is not affected";
-        notices.push(Notice::new(Code::ImagesDelayed, recording.display(), what, remedy));
+    } else if is_open {
+        let what = format!(
+            "{}, and motion in the images does not tell which is right: images are taken where the robot stands still by either",
+            delayed(image_delay_s)
+        );
+        notices.push(Notice::new(Code::ImagesDelayed, recording.display(), what, OTHER_CLOCK));
     }
     let (stops, reports) = taken.rows.into_values().unzip();
     Ok(Extracted {
@@ -124,19 +134,51 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     })
 }
 
-/// The delay of the images by what they show, unless it is given.
-fn late(
+/// What to do where stamps and arrival contradict each other.
+const OTHER_CLOCK: &str =
+    "state the delay (--image-delay 0 where the stamps are right), or take the times of recording (--clock log)";
+
+fn delayed(image_delay_s: f64) -> String {
+    let sign = if image_delay_s < 0.0 { "earlier" } else { "later" };
+    format!("images arrive {:.3} s {sign} after their stamp than joint states", image_delay_s.abs())
+}
+
+fn nanoseconds(s: f64) -> i64 {
+    (s * 1e9).round() as i64
+}
+
+/// What is known of the delay of the images.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Told {
+    /// It is given, s.
+    By(f64),
+    /// What the images show tells it.
+    Found(Delay),
+    /// What the images show tells that there is none.
+    None,
+    /// The images do not tell it.
+    Nothing,
+}
+
+impl Told {
+    fn late(self) -> Option<Delay> {
+        match self {
+            Self::Found(delay) => Some(delay),
+            _ => None,
+        }
+    }
+}
+
+/// The delay of the images by what they show.
+fn told_by_motion(
     scan: &Scan,
     topic: &str,
-    postures: &[Posture],
-    times: &[i64],
+    (postures, times): (&[Posture], &[i64]),
+    guess: Guess,
     options: &RecordingOptions,
-) -> Result<Option<Delay>> {
-    if options.image_delay_s.is_some() {
-        return Ok(None);
-    }
-    let still = standstills(postures, options.still_speed, (options.least_still_s * 1e9) as i64);
-    let Some(mut frames) = Frames::about_motions(times, &still) else { return Ok(None) };
+) -> Result<Told> {
+    let still = standstills(postures, options.still_speed, nanoseconds(options.least_still_s));
+    let Some(mut frames) = Frames::about_motions(times, &still, guess) else { return Ok(Told::Nothing) };
     for file in &scan.files {
         for_each(file, |message| {
             if message.topic == topic {
@@ -145,7 +187,12 @@ fn late(
             Ok(())
         })?;
     }
-    Ok(delay::measured(&frames.pairs(), postures))
+    let pairs = frames.pairs();
+    Ok(match delay::measured(&pairs, postures, guess) {
+        Some(delay) if delay.is_notable(&pairs) => Told::Found(delay),
+        Some(_) => Told::None,
+        None => Told::Nothing,
+    })
 }
 
 fn require_overlap(scan: &Scan, postures: &[Posture], times: &[i64]) -> Result<()> {
@@ -174,14 +221,23 @@ fn require_overlap(scan: &Scan, postures: &[Posture], times: &[i64]) -> Result<(
     ))
 }
 
-fn groups(scan: &mut Scan, postures: &[Posture], times: &[i64], options: &RecordingOptions) -> Result<Vec<Group>> {
-    let still = standstills(postures, options.still_speed, (options.least_still_s * 1e9) as i64);
+/// Images of the standstills; where it is `open` whether they are late by so many ns, those of both.
+fn groups(
+    scan: &mut Scan,
+    postures: &[Posture],
+    times: &[i64],
+    options: &RecordingOptions,
+    open: i64,
+) -> Result<Vec<Group>> {
+    let still = standstills(postures, options.still_speed, nanoseconds(options.least_still_s));
     let mut groups: Vec<Group> = Vec::new();
     let mut empty = 0;
     let mut used = 0;
     for standstill in &still {
         let Standstill { from_ns, to_ns } = shrunk(*standstill);
-        let inside = &times[times.partition_point(|t| *t < from_ns)..times.partition_point(|t| *t <= to_ns)];
+        let (from_ns, to_ns) = (from_ns + open.max(0), to_ns + open.min(0));
+        let first = times.partition_point(|t| *t < from_ns);
+        let inside = &times[first..times.partition_point(|t| *t <= to_ns).max(first)];
         used += inside.len();
         match inside {
             [] => empty += 1,
@@ -190,6 +246,11 @@ fn groups(scan: &mut Scan, postures: &[Posture], times: &[i64], options: &Record
     }
     let place = scan.recording.display().to_string();
     if let Motion::Accept { interval_s } = options.motion {
+        if open != 0 {
+            let what =
+                format!("{}: where the robot was at an image in motion is not known", delayed(-1e-9 * open as f64));
+            return Err(Error::new(Code::ClocksApart, &place, what, OTHER_CLOCK));
+        }
         let outside =
             |t: &i64| still.iter().all(|s| !(s.from_ns..=s.to_ns).contains(t)) && interpolate(postures, *t).is_some();
         let mut last = i64::MIN;
@@ -216,6 +277,14 @@ fn groups(scan: &mut Scan, postures: &[Posture], times: &[i64], options: &Record
             what,
             "wait longer at each stop, or check the stamps of the images",
         ));
+    }
+    if groups.is_empty() && open != 0 && !still.is_empty() {
+        let what = format!(
+            "{}, and the robot stands for less at each of the {} stops: nobody knows which image is of which stop",
+            delayed(-1e-9 * open as f64),
+            still.len()
+        );
+        return Err(Error::new(Code::ClocksApart, &place, what, OTHER_CLOCK));
     }
     if groups.is_empty() {
         return Err(no_stop(&place, postures, still.len(), options));
