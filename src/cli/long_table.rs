@@ -174,7 +174,7 @@ fn cameras(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         let first = format!("camera/{}/", camera.name);
         let sigma = r.estimates.iter().find(|e| e.name.starts_with(&first)).and_then(|e| e.sigma);
         let sigma = sigma.map_or("fixed".to_owned(), |s| format!("+- {s:.2}"));
-        let known = camera.projection_known(r.seen_by(k).map(|(uv, _)| uv));
+        let known = camera.projection_known(r.photogrammetry().seen_by(k).map(|(uv, _)| uv));
         let known = known.map_or(String::new(), |[seen, largest]| {
             format!("; projection known to {seen:.3} px where markers were seen, at worst {largest:.3} px")
         });
@@ -197,7 +197,7 @@ fn cameras(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 
 /// Typical standard deviation of an observation per axis, px: stated sigma times the estimated factor.
 fn image_noise_px(r: &SolutionRecord, camera: usize) -> f64 {
-    let determinants = r.seen_by(camera).map(|(_, c)| c[0] * c[2] - c[1] * c[1]).filter(|d| *d > 0.0);
+    let determinants = r.photogrammetry().seen_by(camera).map(|(_, c)| c[0] * c[2] - c[1] * c[1]).filter(|d| *d > 0.0);
     let (sum, count) = determinants.fold((0.0, 0.0), |(s, n), d| (s + d.sqrt(), n + 1.0));
     (sum / f64::max(count, 1.0)).sqrt() * r.cameras[camera].pixel_factor
 }

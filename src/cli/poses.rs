@@ -8,13 +8,14 @@ use super::camera_args::CameraArgs;
 use super::recording::RecordingArgs;
 use super::say::{say, say_line};
 use super::{Verdict, against, progress};
-use crate::assess::{Limits, median};
+use crate::assess::Limits;
 use crate::calibration::{Pictures, require_unchanged};
 use crate::diagnose::Finding;
 use crate::error::{Code, Error, Notice, Result};
 use crate::identify::{PoseSigma, StandAlone, measure, stand_alone};
+use crate::output::poses_record::{usual, worst};
 use crate::output::stand_alone_files::{self, StandAloneContext, stand_alone_files};
-use crate::output::{ResultFolder, folder_name};
+use crate::output::{REPORT, ResultFolder, folder_name};
 use crate::problem::{Adjustment, MeasuredSeries};
 use crate::series::{InputFile, Series, read_without_robot, series_of_images};
 use crate::urdf::Chain;
@@ -70,12 +71,14 @@ pub(super) fn run(args: &PosesArgs) -> Result<Verdict> {
     let (mut measured, mut notices) = observe(&series)?;
     series.iter().try_for_each(|s| require_unchanged(&inputs, &s.image_hashes()?))?;
     notices.extend(args.cameras.apply(&mut measured)?);
-    let found = stand_alone(&measured, &Limits::default())?;
+    let limits = Limits::default();
+    let found = stand_alone(&measured, &limits)?;
     notices.extend(found.notices.iter().cloned());
     let command = super::command_line().join(" ");
     let against = args.against.as_deref().map(|path| Ok((path.display().to_string(), against::compare(&found, path)?)));
     let against = against.transpose()?;
-    let context = StandAloneContext { series: names, inputs, command, notices: Notice::said_once(&notices), against };
+    let notices = Notice::said_once(&notices);
+    let context = StandAloneContext { series: names, inputs, command, limits, notices, against };
     let files = stand_alone_files(&found, &context)?;
     let folder = place.path().to_path_buf();
     place.write_all(&files)?;
@@ -88,6 +91,7 @@ pub(super) fn run(args: &PosesArgs) -> Result<Verdict> {
         say_line!("{word:9} {finding}");
     }
     context.notices.iter().for_each(|n| say_line!("note      {}", n.coded()));
+    say_line!("report    {}", folder.join(REPORT).display());
     say_line!("results   {} ({} files)", folder.display(), files.len());
     Ok(if found.findings.iter().any(Finding::fails) { Verdict::GateFailed } else { Verdict::Good })
 }
@@ -110,26 +114,24 @@ fn observe(series: &[Series]) -> Result<(Vec<MeasuredSeries>, Vec<Notice>)> {
 }
 
 /// Position in mm and direction in arcmin.
-fn in_words(sigma: &PoseSigma) -> String {
-    format!("{:.4} mm   {:.3} arcmin", 1e3 * sigma.position_m, 60.0 * sigma.rotation_rad.to_degrees())
+fn in_words([position_m, rotation_rad]: [f64; 2]) -> String {
+    format!("{:.4} mm   {:.3} arcmin", 1e3 * position_m, 60.0 * rotation_rad.to_degrees())
 }
 
 /// What is printed: the poses as a whole, cameras, scale, and the images.
 fn text(found: &StandAlone) -> Result<String> {
     let Adjustment { problem, state } = &found.fit.adjustment;
     let sigmas = found.sigmas();
-    let middle = |of: fn(&PoseSigma) -> f64| median(&sigmas.iter().map(of).collect::<Vec<_>>()).unwrap_or(f64::NAN);
-    let worst = sigmas.iter().max_by(|a, b| a.position_m.total_cmp(&b.position_m)).ok_or_else(|| {
+    let (usual, worst) = usual(&sigmas).zip(worst(&sigmas)).ok_or_else(|| {
         Error::new(Code::PlateNowhere, "poses", "no image has a pose", "look at one of the images: is the plate in it?")
     })?;
     let name = |image: usize| &problem.images[image].name;
-    let usual = PoseSigma { position_m: middle(|s| s.position_m), rotation_rad: middle(|s| s.rotation_rad), ..*worst };
     let mut text = format!(
         "poses     {} of {} images, known to {} per axis (median; one sigma, in the frame of the plate)\n          worst: {} ({})\n",
         sigmas.len(),
         problem.images.len(),
-        in_words(&usual),
-        in_words(worst),
+        in_words(usual),
+        in_words([worst.position_m, worst.rotation_rad]),
         name(worst.image)
     );
     let cameras = problem.cameras.iter().zip(&state.cameras).zip(&problem.layout.cameras);

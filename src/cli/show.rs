@@ -58,7 +58,7 @@ pub(super) fn run(args: &ShowArgs) -> Result<Verdict> {
         return compare(args, &first, &read_solution(second)?);
     }
     if let Some(file) = &args.report {
-        let page = report_html(&first, &Thumbnails::of_files(&first));
+        let page = report_html(&first, &Thumbnails::of_files(first.photogrammetry()));
         let name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let folder = file.parent().unwrap_or(Path::new("."));
         write_beside(folder, &[(name, page.as_bytes())], &args.solutions)?;

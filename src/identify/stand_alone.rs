@@ -24,6 +24,8 @@ pub struct StandAlone {
     pub fit: Fit,
     /// The poses, also in the frames of the plates.
     pub free_poses: FreePoses,
+    /// What they were found from, with the lenses that were taken.
+    pub series: Vec<MeasuredSeries>,
     /// How the starting values were found.
     pub starts: Vec<StartVerdict>,
     /// Why which lens was taken.
@@ -100,7 +102,7 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     findings.extend(observations_left_out(&fit, limits).map(Finding::from));
     findings.extend(residual_pattern(&fit, limits).map(Finding::from));
     findings.extend(tags_off(&fit, limits).into_iter().map(Finding::from));
-    Ok(StandAlone { fit, free_poses, starts, notices, findings })
+    Ok(StandAlone { fit, free_poses, series, starts, notices, findings })
 }
 
 /// Free poses with the lenses that the series have.

@@ -1,6 +1,6 @@
 //! Solution -> bytes.
 //!
-//! Exporters are pure: [`files`] makes every file of a result in memory (for small pictures in the report it looks at images of the series),
+//! Exporters are pure: [`files`] and [`stand_alone_files`] make every file of a result in memory (for small pictures in the report they look at images of the series),
 //! [`write_all`] alone writes.
 //! A new exporter is one file here and one row in [`files`].
 
@@ -26,12 +26,14 @@ pub mod frame_files;
 pub mod frame_findings;
 pub mod frames_record;
 mod gauge;
+mod image_records;
 mod kinematics_file;
 mod names;
 mod npy;
 mod observation_table;
 #[cfg(feature = "draw")]
 pub mod overlay;
+pub mod photogrammetry;
 pub mod plan_files;
 pub mod plan_programs;
 pub mod plan_start;
@@ -46,6 +48,7 @@ mod plate_png;
 mod plate_svg;
 mod pose_files;
 mod pose_record;
+pub mod poses_record;
 #[cfg(feature = "mcap")]
 pub mod recording;
 #[cfg(feature = "report")]
@@ -69,7 +72,9 @@ pub use controller_files::kinematics_xacro;
 pub use kinematics_file::kinematics_yaml;
 pub use names::folder_name;
 #[cfg(feature = "report")]
-pub use report::{FigureFile, Shown, Thumbnail, Thumbnails, figure_files, plan_html, report_html, sigma_text};
+pub use report::{
+    FILE_NAME as REPORT, FigureFile, Shown, Thumbnail, Thumbnails, figure_files, plan_html, report_html, sigma_text,
+};
 pub use robot_files::{ALONE, CALIBRATED};
 pub use write::{NewFolder, NewResult, ResultFolder, recover, write_all, write_beside};
 
@@ -113,25 +118,24 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
         files.insert(pose_files::TOGETHER.into(), npy::matrix(covariance));
     }
     let mut names: Vec<String> = files.keys().cloned().collect();
-    names.extend([solution_json::FILE_NAME, OBSERVATIONS].map(str::to_owned));
+    names.extend([solution_json::FILE_NAME, observation_table::FILE_NAME].map(str::to_owned));
     #[cfg(feature = "report")]
-    names.push(REPORT.to_owned());
+    names.push(report::FILE_NAME.to_owned());
     names.sort();
     let mut record = solution_record::record(solution, context, &gauge, names)?;
     record.covariance_together =
         together.map(|(order, _)| order.into_iter().map(|i| images.of(i).to_owned()).collect());
     #[cfg(feature = "report")]
-    files.insert(REPORT.into(), report::report_html(&record, &Thumbnails::of_files(&record)).into_bytes());
+    files.insert(
+        report::FILE_NAME.into(),
+        report::report_html(&record, &Thumbnails::of_files(record.photogrammetry())).into_bytes(),
+    );
     files.insert(solution_json::FILE_NAME.into(), solution_json::to_bytes(&record)?);
     // Of very many images record and table are large, and not both are needed.
     drop(record);
-    files.insert(OBSERVATIONS.into(), observation_table::observations_csv(solution, context).into_bytes());
+    files.insert(
+        observation_table::FILE_NAME.into(),
+        observation_table::observations_csv(&solution.fit, &context.series).into_bytes(),
+    );
     Ok(files)
 }
-
-/// Name of the table of observations.
-const OBSERVATIONS: &str = "observations.csv";
-
-/// Name of the report.
-#[cfg(feature = "report")]
-pub const REPORT: &str = "report.html";

@@ -1,23 +1,25 @@
 //! observations.csv: everything that was measured, its residual, and why some of it was left out.
 
-use super::Context;
 use super::names::ImageNames;
 use super::residuals::{poses, residuals};
 use super::text::csv_line;
-use crate::identify::Solution;
 use crate::series::Edge;
+use crate::solve::Fit;
+
+/// Name of the file.
+pub(super) const FILE_NAME: &str = "observations.csv";
 
 const HEADER: [&str; 11] = ["image", "marker", "u", "v", "edge", "cov_uu", "cov_uv", "cov_vv", "du", "dv", "reason"];
 
 /// Text of observations.csv; covariances as the detector states them, du and dv measured minus predicted (px). For an image
 /// that is left out the prediction is that of its joint readings.
-pub(super) fn observations_csv(solution: &Solution, context: &Context) -> String {
-    let names = ImageNames::new(&solution.fit.problem, &context.series);
-    let poses = poses(solution);
+pub(super) fn observations_csv(fit: &Fit, series: &[String]) -> String {
+    let names = ImageNames::new(&fit.problem, series);
+    let poses = poses(fit);
     let mut text = csv_line(&HEADER.map(String::from));
-    for (k, image) in solution.fit.problem.images.iter().enumerate() {
-        let markers = &solution.fit.problem.plates[image.plate].markers;
-        let residuals = residuals(solution, k, poses[k].as_ref());
+    for (k, image) in fit.problem.images.iter().enumerate() {
+        let markers = &fit.problem.plates[image.plate].markers;
+        let residuals = residuals(fit, k, poses[k].as_ref());
         for (o, residual) in image.observations.iter().zip(residuals) {
             let covariance = o.information.try_inverse().unwrap_or_default();
             let edge = match o.edge {

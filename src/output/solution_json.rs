@@ -526,20 +526,6 @@ impl SolutionRecord {
         };
         if found.is_empty() { self.cameras.iter().map(|c| (c.name.as_str(), of_camera(c))).collect() } else { found }
     }
-
-    /// Observations in use of a camera: measured place (px) and stated covariance uu, uv, vv (px^2).
-    pub fn seen_by(&self, camera: usize) -> impl Iterator<Item = ([f64; 2], [f64; 3])> {
-        let images = self.images.iter().filter(move |i| i.camera == camera && i.is_used());
-        images.flat_map(|i| {
-            let o = &i.observations;
-            let used = o.reason.iter().map(Option::is_none);
-            o.uv.iter()
-                .copied()
-                .zip(o.covariance.iter().copied())
-                .zip(used)
-                .filter_map(|(seen, used)| used.then_some(seen))
-        })
-    }
 }
 
 impl ImageRecord {

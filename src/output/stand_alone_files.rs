@@ -6,17 +6,23 @@ use serde::Serialize;
 
 use super::finding_record::FindingRecord;
 use super::gauge::Gauge;
+use super::image_records::ImageRecords;
 use super::names::{ImageNames, plate_name};
+use super::poses_record::PosesRecord;
+#[cfg(feature = "report")]
+use super::report::{self, Thumbnails, poses_html};
+use super::solution_json::{ProgramRecord, StatisticsRecord};
 use super::text::json;
-use super::{camera_file, npy, plate_files, pose_files};
+use super::{camera_file, npy, observation_table, plate_files, pose_files};
+use crate::assess::Limits;
+use crate::diagnose::Finding;
 use crate::error::{Notice, Result};
 use crate::identify::{PoseComparison, StandAlone, depths_m};
 use crate::model::camera::Lens;
 use crate::problem::Adjustment;
 use crate::series::InputFile;
 
-/// Name of the record that a program reads.
-pub const FILE_NAME: &str = "poses.json";
+pub use super::poses_record::FILE_NAME;
 
 /// What the files need beside the adjustment.
 #[derive(Debug, Clone)]
@@ -27,6 +33,8 @@ pub struct StandAloneContext {
     pub inputs: Vec<InputFile>,
     /// The command line.
     pub command: String,
+    /// Numbers that decided.
+    pub limits: Limits,
     /// What the user should know.
     pub notices: Vec<Notice>,
     /// The poses of another source, by the name of their file.
@@ -42,6 +50,7 @@ struct Record<'a> {
     cameras: Vec<CameraOf<'a>>,
     plates: Vec<PlateOf>,
     images: Vec<ImageOf<'a>>,
+    statistics: &'a StatisticsRecord,
     /// Images in the order of poses_covariance.npy, six rows each (body twist of `plate_from_camera`, m and rad).
     #[serde(skip_serializing_if = "Option::is_none")]
     covariance_together: Option<Vec<&'a str>>,
@@ -119,13 +128,13 @@ struct ImageOf<'a> {
 /// Every file of the result: name -> bytes.
 ///
 /// # Errors
-/// A camera that a ROS camera_info cannot express; markers that lie on a line.
+/// A camera that a ROS camera_info cannot express; markers that lie on a line; estimates that are not finite.
 pub fn stand_alone_files(found: &StandAlone, context: &StandAloneContext) -> Result<BTreeMap<String, Vec<u8>>> {
     let Adjustment { problem, state } = &found.fit.adjustment;
     let (series, depths) = (&context.series, depths_m(problem, &found.free_poses));
-    let names = ImageNames::new(problem, series);
+    let (names, gauge) = (ImageNames::new(problem, series), Gauge::of(&found.fit)?);
     let cameras = camera_file::cameras(&problem.cameras, &state.cameras, &depths)?;
-    let plates = plate_files::plates(&found.fit, series, &Gauge::of(&found.fit)?)?;
+    let plates = plate_files::plates(&found.fit, series, &gauge)?;
     let poses = [("poses.csv".to_owned(), pose_files::poses_csv(&names, &found.free_poses))];
     let texts = cameras.into_iter().chain(plates).chain(poses);
     let mut files: BTreeMap<String, Vec<u8>> = texts.map(|(name, text)| (name, text.into_bytes())).collect();
@@ -133,15 +142,75 @@ pub fn stand_alone_files(found: &StandAlone, context: &StandAloneContext) -> Res
     if let Some((_, covariance)) = &together {
         files.insert(pose_files::TOGETHER.to_owned(), npy::matrix(covariance));
     }
+    files.insert(
+        observation_table::FILE_NAME.to_owned(),
+        observation_table::observations_csv(&found.fit, series).into(),
+    );
     let mut listed: Vec<String> = files.keys().cloned().chain([FILE_NAME.to_owned()]).collect();
+    #[cfg(feature = "report")]
+    listed.push(report::FILE_NAME.to_owned());
     listed.sort();
+    let seen = poses_record(found, context, &gauge, listed)?;
+    #[cfg(feature = "report")]
+    let pictures = Thumbnails::of_files(seen.photogrammetry());
+    #[cfg(feature = "report")]
+    files.insert(report::FILE_NAME.to_owned(), poses_html(&seen, &pictures).into_bytes());
     let order = together.map(|(images, _)| images.into_iter().map(|i| names.of(i)).collect());
-    let record = Record { files: listed, covariance_together: order, ..record(found, context, &names) };
+    let record = Record { covariance_together: order, ..record(found, context, &names, &seen) };
     files.insert(FILE_NAME.to_owned(), json(&record, FILE_NAME)?);
     Ok(files)
 }
 
-fn record<'a>(found: &'a StandAlone, context: &'a StandAloneContext, names: &'a ImageNames) -> Record<'a> {
+/// What the report is made from.
+///
+/// # Errors
+/// Estimates that are not finite.
+fn poses_record(
+    found: &StandAlone,
+    context: &StandAloneContext,
+    gauge: &Gauge,
+    files: Vec<String>,
+) -> Result<PosesRecord> {
+    let seen = ImageRecords {
+        fit: &found.fit,
+        free_poses: &found.free_poses,
+        measured: &found.series,
+        names: &context.series,
+        gauge,
+        uncertainty: None,
+        held_out_mm: &[],
+    };
+    let notes = found.findings.iter().filter(|f| !f.fails()).map(Finding::notice);
+    Ok(PosesRecord {
+        program: ProgramRecord {
+            name: env!("CARGO_PKG_NAME").into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            command: context.command.clone(),
+            options: Vec::new(),
+        },
+        files,
+        inputs: context.inputs.clone(),
+        limits: context.limits,
+        findings: found.findings.iter().map(FindingRecord::from).collect(),
+        notices: context.notices.iter().cloned().chain(notes).collect(),
+        series: seen.series(),
+        statistics: seen.statistics(),
+        starts: found.starts.clone(),
+        cameras: seen.cameras(),
+        plates: seen.plates(),
+        images: seen.images(),
+        estimates: seen.estimates()?,
+        known: found.sigmas(),
+        against: context.against.clone(),
+    })
+}
+
+fn record<'a>(
+    found: &'a StandAlone,
+    context: &'a StandAloneContext,
+    names: &'a ImageNames,
+    seen: &'a PosesRecord,
+) -> Record<'a> {
     let Adjustment { problem, state } = &found.fit.adjustment;
     let covariance = &found.fit.covariance;
     let depths = depths_m(problem, &found.free_poses);
@@ -166,7 +235,7 @@ fn record<'a>(found: &'a StandAlone, context: &'a StandAloneContext, names: &'a 
         name: plate_name(problem, &context.series, k),
         relative_scale: found.free_poses.scales[k].map(|s| Value { value: s.relative, sigma: Some(s.sigma) }),
     };
-    let sigmas: BTreeMap<usize, _> = found.sigmas().into_iter().map(|s| (s.image, s)).collect();
+    let sigmas: BTreeMap<usize, _> = seen.known.iter().map(|s| (s.image, s)).collect();
     let image = |k: usize| {
         let known = sigmas.get(&k);
         ImageOf {
@@ -189,6 +258,7 @@ fn record<'a>(found: &'a StandAlone, context: &'a StandAloneContext, names: &'a 
         cameras: problem.cameras.iter().enumerate().map(camera).collect(),
         plates: (0..problem.plates.len()).map(plate).collect(),
         images: (0..problem.images.len()).map(image).collect(),
+        statistics: &seen.statistics,
         covariance_together: None,
         against: context.against.as_ref().map(|(file, c)| AgainstOf {
             file,
@@ -201,6 +271,6 @@ fn record<'a>(found: &'a StandAlone, context: &'a StandAloneContext, names: &'a 
         }),
         findings: found.findings.iter().map(FindingRecord::from).collect(),
         notices: context.notices.iter().map(Notice::coded).collect(),
-        files: Vec::new(),
+        files: seen.files.clone(),
     }
 }

@@ -1,6 +1,8 @@
 //! The verdict: may this result be used? Terminal and report say the same.
 
+use crate::assess::Limits;
 use crate::error::{Code, Notice};
+use crate::output::poses_record::PosesRecord;
 use crate::output::solution_json::SolutionRecord;
 
 /// How far a result may be trusted.
@@ -39,11 +41,30 @@ impl Verdict {
     pub fn of(record: &SolutionRecord) -> Self {
         if !record.failed_gates.is_empty() {
             let reasons: Vec<VerdictReason> = record.failed_gates.iter().map(|gate| of_gate(record, gate)).collect();
-            let remedies = reasons.iter().map(|r| r.remedy.clone()).chain(of_rows(record));
-            let remedies = remedies.filter(|remedy| !remedy.is_empty()).collect();
-            return Self { trust: Trust::Failed, reasons, remedies };
+            return Self::failed(reasons, of_rows(record));
         }
-        let reasons = doubts(record);
+        Self::not_failed(doubts(record))
+    }
+
+    /// Of poses from images alone.
+    pub fn of_poses(record: &PosesRecord) -> Self {
+        let failed = record.failed().map(|f| VerdictReason { what: f.seen.clone(), remedy: f.remedy.clone() });
+        let failed: Vec<VerdictReason> = failed.collect();
+        if !failed.is_empty() {
+            return Self::failed(failed, std::iter::empty());
+        }
+        let (all, out) = (record.images.len(), record.images.iter().filter(|i| !i.is_used()).count());
+        let many = left_out([out, all], "images", "look at their reasons (report)", &record.limits);
+        Self::not_failed(noted(&record.notices).chain(many).collect())
+    }
+
+    fn failed(reasons: Vec<VerdictReason>, others: impl Iterator<Item = String>) -> Self {
+        let remedies = reasons.iter().map(|r| r.remedy.clone()).chain(others);
+        let remedies = remedies.filter(|remedy| !remedy.is_empty()).collect();
+        Self { trust: Trust::Failed, reasons, remedies }
+    }
+
+    fn not_failed(reasons: Vec<VerdictReason>) -> Self {
         let trust = if reasons.is_empty() { Trust::Good } else { Trust::Doubts };
         Self { trust, reasons, remedies: Vec::new() }
     }
@@ -63,10 +84,18 @@ fn of_gate(record: &SolutionRecord, sentence: &str) -> VerdictReason {
 }
 
 fn doubts(r: &SolutionRecord) -> Vec<VerdictReason> {
-    let noted: Vec<Notice> = r.notices.iter().filter(|n| !is_information(n.code)).cloned().collect();
+    let on_robot = || r.images.iter().filter(|i| i.is_on_robot());
+    let (all, out) = (on_robot().count(), on_robot().filter(|i| !i.is_used()).count());
+    let many =
+        left_out([out, all], "images of the robot", "look at their reasons (report, or show --all)", &r.limits());
+    noted(&r.notices).chain(many).chain(small_gain(r)).chain(odd_image(r)).collect()
+}
+
+/// Notices that ask for a look.
+fn noted(notices: &[Notice]) -> impl Iterator<Item = VerdictReason> + use<> {
+    let noted: Vec<Notice> = notices.iter().filter(|n| !is_information(n.code)).cloned().collect();
     let noted = Notice::said_once(&noted).into_iter();
-    let noted = noted.map(|n| VerdictReason { what: format!("{}: {}", n.place, n.what), remedy: n.remedy });
-    noted.chain(left_out(r)).chain(small_gain(r)).chain(odd_image(r)).collect()
+    noted.map(|n| VerdictReason { what: format!("{}: {}", n.place, n.what), remedy: n.remedy })
 }
 
 /// Notices that tell of a choice, of what is counted among the images left out, or of what every recording has between its stops, and cast no
@@ -90,14 +119,9 @@ fn is_information(code: Code) -> bool {
     )
 }
 
-fn left_out(r: &SolutionRecord) -> Option<VerdictReason> {
-    let on_robot = || r.images.iter().filter(|i| i.is_on_robot());
-    let (all, out) = (on_robot().count(), on_robot().filter(|i| !i.is_used()).count());
-    let many = out as f64 > r.limits().doubtful_share_left_out * all as f64;
-    many.then(|| VerdictReason {
-        what: format!("{out} of {all} images of the robot were left out"),
-        remedy: "look at their reasons (report, or show --all)".into(),
-    })
+fn left_out([out, all]: [usize; 2], images: &str, remedy: &str, limits: &Limits) -> Option<VerdictReason> {
+    let many = out as f64 > limits.doubtful_share_left_out * all as f64;
+    many.then(|| VerdictReason { what: format!("{out} of {all} {images} were left out"), remedy: remedy.to_owned() })
 }
 
 fn small_gain(r: &SolutionRecord) -> Option<VerdictReason> {

@@ -33,6 +33,7 @@ fn of_poses(series: &str) -> StandAloneContext {
         series: vec![series.to_owned()],
         inputs: Vec::new(),
         command: String::new(),
+        limits: Limits::default(),
         notices: Vec::new(),
         against: None,
     }
@@ -95,7 +96,17 @@ fn files_of_poses_without_a_robot_are_complete() {
     let found = stand_alone(&series, &Limits::default()).unwrap();
     let files = stand_alone_files(&found, &of_poses("kr6_small")).unwrap();
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
-    assert_eq!(names, ["camera.yaml", "plate.csv", "plate.toml", "poses.csv", "poses.json", "poses_covariance.npy"]);
+    let expected = [
+        "camera.yaml",
+        "observations.csv",
+        "plate.csv",
+        "plate.toml",
+        "poses.csv",
+        "poses.json",
+        "poses_covariance.npy",
+        "report.html",
+    ];
+    assert_eq!(names, expected);
     let record: serde_json::Value = serde_json::from_slice(&files["poses.json"]).unwrap();
     assert_eq!(record["images"].as_array().unwrap().len(), 24);
     let fx = &record["cameras"][0]["parameters"]["fx"];

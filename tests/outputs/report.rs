@@ -224,13 +224,17 @@ fn pictures_are_shown_of_images_whose_files_are_those_that_were_looked_at() {
     }
     record.images[0].reason = Some("in motion".into());
     record.images[0].rms_px = None;
-    let pictures = Thumbnails::of_files(&record);
+    let pictures = Thumbnails::of_files(record.photogrammetry());
     let page = report_html(&record, &pictures);
     // Two with the smallest residuals, three with the largest, one left out.
     assert_eq!(page.matches("data:image/jpeg;base64,").count(), 6);
     assert!(page.len() < 2_000_000);
     record.inputs.iter_mut().for_each(|f| f.sha256 = "0".into());
-    assert_eq!(Thumbnails::of_files(&record), Thumbnails::default(), "another image is not shown for it");
+    assert_eq!(
+        Thumbnails::of_files(record.photogrammetry()),
+        Thumbnails::default(),
+        "another image is not shown for it"
+    );
 }
 
 #[test]

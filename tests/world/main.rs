@@ -7,6 +7,7 @@ mod bad;
 mod commands;
 mod crossover;
 mod golden;
+mod poses_report;
 mod render;
 #[path = "../said/mod.rs"]
 mod said;

@@ -8,6 +8,7 @@ use super::describe::name;
 use super::figure::pointed;
 use super::svg::{Anchor, Svg};
 use super::words::fixed;
+use crate::output::photogrammetry::Photogrammetry;
 use crate::output::solution_json::{ImageRecord, SolutionRecord};
 use crate::urdf::JointKind;
 
@@ -17,16 +18,32 @@ const MANY: usize = 400;
 /// Columns of the picture of the image.
 const COLUMNS: usize = 20;
 
+const SEEN_EVERYWHERE: &str = "Markers should have been seen everywhere in the image, the corners too.";
+
 /// Both.
 pub(super) fn section(r: &SolutionRecord) -> Markup {
     html! {
         p {
             "Each dot is the reading of a joint at a stop, within the limits of the joint. What no stop covered is extrapolated. "
-            @if !r.images.is_empty() { "Markers should have been seen everywhere in the image, the corners too." }
+            @if !r.images.is_empty() { (SEEN_EVERYWHERE) }
         }
         @if let Some(svg) = joints(r) { (pointed(&svg, "Readings of every joint; the bar is its range by the URDF.")) }
-        div.pair { @for k in 0..r.cameras.len() { @if let Some(svg) = field(r, k) {
-            (pointed(&svg, &format!("Markers in use over the image of camera {}; darker: more of them.", r.cameras[k].name)))
+        (fields(r.photogrammetry()))
+    }
+}
+
+/// That of images alone.
+pub(super) fn of_images(p: Photogrammetry) -> Markup {
+    html! {
+        p { (SEEN_EVERYWHERE) }
+        (fields(p))
+    }
+}
+
+fn fields(p: Photogrammetry) -> Markup {
+    html! {
+        div.pair { @for k in 0..p.cameras.len() { @if let Some(svg) = field(p, k) {
+            (pointed(&svg, &format!("Markers in use over the image of camera {}; darker: more of them.", p.cameras[k].name)))
         } } }
     }
 }
@@ -40,7 +57,7 @@ struct Stop<'a> {
 
 /// Those of images, then those of series without images.
 fn stops(r: &SolutionRecord) -> impl Iterator<Item = Stop<'_>> {
-    let of_image = |i: &'_ ImageRecord| (name(r, i), !i.is_used());
+    let of_image = |i: &'_ ImageRecord| (name(r.photogrammetry(), i), !i.is_used());
     let images = r.images.iter().filter_map(move |i| Some((of_image(i), i.readings.as_deref()?)));
     let bodies = r.bodies.stops.iter().filter_map(|s| Some(((s.name.clone(), false), s.readings.as_deref()?)));
     images.chain(bodies).map(|((name, is_gone), readings)| Stop { name, readings, is_gone })
@@ -91,7 +108,7 @@ fn joints(r: &SolutionRecord) -> Option<String> {
     Some(svg.finish())
 }
 
-fn field(r: &SolutionRecord, camera: usize) -> Option<String> {
+fn field(r: Photogrammetry, camera: usize) -> Option<String> {
     let c = &r.cameras[camera];
     let size = [f64::from(c.width_px), f64::from(c.height_px)];
     let rows = ((COLUMNS as f64 * size[1] / size[0]).round() as usize).clamp(2, 40);

@@ -3,14 +3,12 @@
 use maud::{Markup, html};
 
 use crate::error::Notice;
-use crate::output::solution_json::SolutionRecord;
 use crate::output::verdict::{Trust, Verdict, VerdictReason};
 
 /// Failed gates or doubts, then notes.
-pub(super) fn section(r: &SolutionRecord) -> Markup {
-    let v = Verdict::of(r);
+pub(super) fn section(v: &Verdict, notices: &[Notice]) -> Markup {
     // Most doubts are notes, and stand there.
-    let is_noted = |reason: &&VerdictReason| r.notices.iter().any(|n| reason.what.ends_with(&n.what));
+    let is_noted = |reason: &&VerdictReason| notices.iter().any(|n| reason.what.ends_with(&n.what));
     let others: Vec<&VerdictReason> = v.reasons.iter().filter(|reason| !is_noted(reason)).collect();
     html! {
         @match v.trust {
@@ -24,9 +22,9 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
                 (list(v.reasons.iter()))
             },
         }
-        @if !r.notices.is_empty() {
+        @if !notices.is_empty() {
             h3 { "Notes" }
-            ul { @for group in Notice::alike(&r.notices) { (notes(&group)) } }
+            ul { @for group in Notice::alike(notices) { (notes(&group)) } }
         }
     }
 }

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::findings::remedy;
 use super::words::{count, significant};
-use crate::output::solution_json::SolutionRecord;
+use crate::output::solution_json::{SolutionRecord, StatisticsRecord};
 use crate::output::verdict::{Trust, Verdict};
 use crate::output::{ALONE, CALIBRATED};
 
@@ -14,36 +14,54 @@ const MOST_NEXT: usize = 3;
 /// The first page.
 pub(super) fn first_page(r: &SolutionRecord) -> Markup {
     let v = Verdict::of(r);
-    let (class, headline) = match v.trust {
-        Trust::Good => ("good", "Good: the corrected model can be used"),
-        Trust::Doubts => ("care", "Good, with doubts: look at the points below first"),
-        Trust::Failed => ("failed", "Not to be trusted: do not use this model before the cause is found"),
-    };
     html! {
         h1 { "Calibration of " (r.robot.name) }
         p.sub {
             (r.robot.base) " to " (r.robot.tip) ", " (count(r.robot.readings.len(), "moving joint")) "; "
             @if !r.images.is_empty() {
-                (count(r.statistics.images_used, "image")) " of " (r.statistics.images) " used"
-                @if r.statistics.images > r.statistics.images_used { " (" a href="#left-out" { "why not all" } ")" }
-                ", " (r.statistics.observations_left_out) " of " (r.statistics.observations_left_out + r.statistics.observations_used)
-                " observations left out. "
+                (images_used(&r.statistics))
             }
             @if !r.bodies.is_empty() {
                 (r.bodies.left_out()) " of " (count(r.bodies.measurements.len(), "measurement")) " by trackers and contacts left out. "
             }
             (r.program.name) " " (r.program.version) "."
         }
+        (judged(&v, [
+            "Good: the corrected model can be used",
+            "Good, with doubts: look at the points below first",
+            "Not to be trusted: do not use this model before the cause is found",
+        ]))
+        (promise(r, v.trust))
+        (held_out(r))
+        h2 { "What to do" }
+        ol.steps { @for step in steps(r, &v) { li { (step) } } }
+    }
+}
+
+/// How many images and observations take part.
+pub(super) fn images_used(s: &StatisticsRecord) -> Markup {
+    html! {
+        (count(s.images_used, "image")) " of " (s.images) " used"
+        @if s.images > s.images_used { " (" a href="#left-out" { "why not all" } ")" }
+        ", " (s.observations_left_out) " of " (s.observations_left_out + s.observations_used)
+        " observations left out. "
+    }
+}
+
+/// The verdict with its reasons, under the headline of a good result, of one with doubts, or of one that failed.
+pub(super) fn judged(v: &Verdict, [good, doubts, failed]: [&str; 3]) -> Markup {
+    let (class, headline) = match v.trust {
+        Trust::Good => ("good", good),
+        Trust::Doubts => ("care", doubts),
+        Trust::Failed => ("failed", failed),
+    };
+    html! {
         div class={ "verdict " (class) } {
             strong { (headline) }
             @if !v.reasons.is_empty() { ul { @for reason in &v.reasons {
                 li { (reason.what) (remedy(&reason.remedy)) }
             } } }
         }
-        (promise(r, v.trust))
-        (held_out(r))
-        h2 { "What to do" }
-        ol.steps { @for step in steps(r, &v) { li { (step) } } }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Of very many images some are shown, so that the page can be mailed; all of them stand in solution.json.
+//! Of very many images some are shown, so that the page can be mailed; all of them stand in the record of the result.
 
 use std::collections::HashSet;
 use std::ffi::OsStr;
@@ -6,7 +6,8 @@ use std::path::Path;
 
 use maud::{Markup, html};
 
-use crate::output::solution_json::{ImageRecord, SolutionRecord};
+use crate::output::photogrammetry::Photogrammetry;
+use crate::output::solution_json::ImageRecord;
 use crate::series::{InputFile, spread};
 
 /// Most images of a drawing or a table.
@@ -20,21 +21,22 @@ pub(super) fn drawn<T>(mut all: Vec<T>) -> Vec<T> {
     all
 }
 
-/// Those that are listed, in the order of the series: left-out ones, then those whose residual or held-out error is largest beside that of all.
-pub(super) fn listed(r: &SolutionRecord) -> Vec<&ImageRecord> {
-    let errors = |i: &ImageRecord| [i.rms_px, i.held_out_mm.map(|e| e[1])].map(Option::unwrap_or_default);
-    let all = [0, 1].map(|k| r.images.iter().map(|i| errors(i)[k]).sum::<f64>().max(f64::MIN_POSITIVE));
-    let size = |i: &ImageRecord| f64::max(errors(i)[0] / all[0], errors(i)[1] / all[1]);
-    let mut order: Vec<(usize, &ImageRecord)> = r.images.iter().enumerate().collect();
+/// Those that are listed, in the order of the series: left-out ones, then those of which the residual or another error, of each image if it has
+/// one, is largest beside that of all.
+pub(super) fn listed<'a>(images: &'a [ImageRecord], other: &[Option<f64>]) -> Vec<(usize, &'a ImageRecord)> {
+    let errors = |k: usize| [images[k].rms_px, other[k]].map(Option::unwrap_or_default);
+    let all = [0, 1].map(|e| (0..images.len()).map(|k| errors(k)[e]).sum::<f64>().max(f64::MIN_POSITIVE));
+    let size = |k: usize| f64::max(errors(k)[0] / all[0], errors(k)[1] / all[1]);
+    let mut order: Vec<(usize, &ImageRecord)> = images.iter().enumerate().collect();
     let is_out = |i: &ImageRecord| !i.is_used();
-    order.sort_by(|(_, a), (_, b)| is_out(b).cmp(&is_out(a)).then(size(b).total_cmp(&size(a))));
+    order.sort_by(|(a, i), (b, j)| is_out(j).cmp(&is_out(i)).then(size(*b).total_cmp(&size(*a))));
     order.truncate(MOST_IMAGES);
     order.sort_by_key(|(k, _)| *k);
-    order.into_iter().map(|(_, image)| image).collect()
+    order
 }
 
 /// Files that were read: all, or those that are no images where these are very many.
-pub(super) fn files(r: &SolutionRecord) -> Vec<&InputFile> {
+pub(super) fn files(r: Photogrammetry<'_>) -> Vec<&InputFile> {
     let are_many = r.inputs.len() > MOST_IMAGES;
     let images: HashSet<&OsStr> = r.images.iter().filter_map(|i| Path::new(&i.name).file_name()).collect();
     let is_image = |f: &InputFile| f.path.file_name().is_some_and(|name| images.contains(name));

@@ -6,8 +6,9 @@ use super::svg::{Anchor, Svg, round_below};
 use super::words::{ordinal, plain};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
+use crate::output::photogrammetry::Photogrammetry;
 use crate::output::restore::camera;
-use crate::output::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
+use crate::output::solution_json::{CameraRecord, ImageRecord, PlateRecord};
 
 const WIDTH: f64 = 560.0;
 const MARGIN: f64 = 6.0;
@@ -99,7 +100,7 @@ fn used(image: &ImageRecord) -> impl Iterator<Item = (usize, [f64; 2])> + '_ {
 }
 
 /// Residuals of all images of a camera over its field.
-pub(super) fn residuals_over_image(record: &SolutionRecord, camera: usize) -> Option<Map> {
+pub(super) fn residuals_over_image(record: Photogrammetry, camera: usize) -> Option<Map> {
     let c = &record.cameras[camera];
     let images = record.images.iter().filter(|i| i.camera == camera);
     let arrows: Vec<Arrow> = images.flat_map(|i| used(i).map(|(k, d)| (i.observations.uv[k], d))).collect();
@@ -114,7 +115,7 @@ pub(super) fn residuals_over_image(record: &SolutionRecord, camera: usize) -> Op
 }
 
 /// Mean residual of every marker, carried back to the plate, mm.
-pub(super) fn residuals_over_plate(record: &SolutionRecord, plate: usize) -> Option<Map> {
+pub(super) fn residuals_over_plate(record: Photogrammetry, plate: usize) -> Option<Map> {
     let p = &record.plates[plate];
     let mut sums = vec![(Vector2::zeros(), 0.0); p.id.len()];
     for image in record.images.iter().filter(|i| i.plate == plate) {
@@ -140,7 +141,7 @@ pub(super) fn residuals_over_plate(record: &SolutionRecord, plate: usize) -> Opt
 }
 
 /// Correction of every marker against nominal: arrows in the plane, circles for the height.
-pub(super) fn plate_corrections(record: &SolutionRecord, plate: usize) -> Option<Map> {
+pub(super) fn plate_corrections(record: Photogrammetry, plate: usize) -> Option<Map> {
     let p = &record.plates[plate];
     let difference = |m: usize| Vector3::from(p.position_m[m]) - Vector3::from(p.nominal_m[m]);
     let arrows: Vec<Arrow> =
@@ -201,7 +202,7 @@ pub(super) fn distortion(camera_record: &CameraRecord) -> Option<Map> {
 const SIGMA_BOUNDS_PX: [f64; 4] = [0.02, 0.05, 0.1, 0.3];
 
 /// How well it is known where in the image a direction shows.
-pub(super) fn uncertainty(r: &SolutionRecord, camera: usize) -> Option<Map> {
+pub(super) fn uncertainty(r: Photogrammetry, camera: usize) -> Option<Map> {
     let c = &r.cameras[camera];
     let map = c.projection.as_ref()?;
     let [seen, largest] = c.projection_known(r.seen_by(camera).map(|(uv, _)| uv))?;

@@ -20,6 +20,7 @@ mod plan_page;
 mod plan_pictures;
 mod plots;
 mod pose_residuals;
+mod poses_page;
 mod scene;
 mod sections;
 pub(crate) mod svg;
@@ -29,12 +30,16 @@ mod words;
 
 pub use figure_files::FigureFile;
 pub use plan_page::{plan_html, sigma_text};
+pub use poses_page::poses_html;
 pub use thumbnails::{Shown, Thumbnail, Thumbnails};
 
-use maud::Markup;
-
 use crate::output::solution_json::SolutionRecord;
+use crate::output::verdict::Verdict;
 use page::{Chapter, page_of_chapters};
+use words::count;
+
+/// Name of the report.
+pub const FILE_NAME: &str = "report.html";
 
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("report.js");
@@ -52,28 +57,29 @@ pub fn figure_files(record: &SolutionRecord) -> Vec<FigureFile> {
 
 /// All chapters; those without content are left out.
 fn chapters(r: &SolutionRecord, pictures: &Thumbnails) -> Vec<Chapter> {
-    let chapter = |id: &'static str, title: &str, body: Markup| Chapter { id, title: title.to_owned(), body };
+    let seen = r.photogrammetry();
+    let ended = format!("; the last solve {} after {} in all", r.status, count(r.iterations, "step"));
     vec![
-        chapter("accuracy", "Accuracy before and after", sections::accuracy(r)),
-        chapter("findings", "Findings, and what to do", findings::section(r)),
-        chapter("left-out", "What was read, and what was left out", sections::left_out(r)),
-        chapter("pictures", "Pictures: best, worst and left out", gallery::gallery(r, pictures)),
-        chapter("scene", "Arm, camera poses and plate", scene::section(r)),
-        chapter("coverage", "What the stops covered", coverage::section(r)),
-        chapter("bodies", "Trackers and contacts", bodies::section(r)),
-        chapter("images", "Residuals by image", images::table(r)),
-        chapter("pose-residuals", "Pose residuals by image", pose_residuals::section(r)),
-        chapter("residuals", "Residuals", sections::residuals(r)),
-        chapter("workspace", "How well the flange is known where", knowledge::workspace(r)),
-        chapter("corrections", "What was corrected on the robot", parameters::robot(r)),
-        chapter("undetermined", "What the data could not determine", parameters::undetermined(r)),
-        chapter("known", "What the data tell, and what to measure next", knowledge::identifiable(r)),
-        chapter("two-step", "Two-step calibration", two_stage::section(r)),
-        chapter("joint-noise", "Joint noise", sections::joint_noise(r)),
-        chapter("poses", "Hand-eye transform and target pose", parameters::placed(r)),
-        chapter("cameras", "Camera", parameters::cameras(r)),
-        chapter("plate", "Plate", sections::plates(r)),
-        chapter("starts", "Starting values", sections::starts(r)),
-        chapter("record", "For the record", sections::record(r)),
+        Chapter::new("accuracy", "Accuracy before and after", sections::accuracy(r)),
+        Chapter::new("findings", "Findings, and what to do", findings::section(&Verdict::of(r), &r.notices)),
+        Chapter::new("left-out", "What was read, and what was left out", sections::left_out(r)),
+        Chapter::new("pictures", "Pictures: best, worst and left out", gallery::gallery(seen, pictures)),
+        Chapter::new("scene", "Arm, camera poses and plate", scene::section(r)),
+        Chapter::new("coverage", "What the stops covered", coverage::section(r)),
+        Chapter::new("bodies", "Trackers and contacts", bodies::section(r)),
+        Chapter::new("images", "Residuals by image", images::table(r)),
+        Chapter::new("pose-residuals", "Pose residuals by image", pose_residuals::section(r)),
+        Chapter::new("residuals", "Residuals", sections::residuals(seen)),
+        Chapter::new("workspace", "How well the flange is known where", knowledge::workspace(r)),
+        Chapter::new("corrections", "What was corrected on the robot", parameters::robot(r)),
+        Chapter::new("undetermined", "What the data could not determine", parameters::undetermined(r)),
+        Chapter::new("known", "What the data tell, and what to measure next", knowledge::identifiable(r)),
+        Chapter::new("two-step", "Two-step calibration", two_stage::section(r)),
+        Chapter::new("joint-noise", "Joint noise", sections::joint_noise(r)),
+        Chapter::new("poses", "Hand-eye transform and target pose", parameters::placed(r)),
+        Chapter::new("cameras", "Camera", parameters::cameras(seen)),
+        Chapter::new("plate", "Plate", sections::plates(seen)),
+        Chapter::new("starts", "Starting values", sections::starts(seen)),
+        Chapter::new("record", "For the record", sections::record(seen, &ended)),
     ]
 }

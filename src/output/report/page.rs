@@ -20,12 +20,19 @@ pub struct Chapter {
     pub body: Markup,
 }
 
+impl Chapter {
+    /// A chapter under its heading.
+    pub fn new(id: &'static str, title: &str, body: Markup) -> Self {
+        Self { id, title: title.to_owned(), body }
+    }
+}
+
 /// A page with a first part that stands by itself, a list of contents, chapters, and a script.
 pub fn page_of_chapters(title: &str, style: &str, script: &str, first: &Markup, chapters: &[Chapter]) -> String {
     let chapters = || chapters.iter().filter(|c| !c.body.0.is_empty());
     let body = html! {
         body.chapters {
-            a.skip href="#accuracy" { "To the chapters" }
+            @if let Some(first) = chapters().next() { a.skip href={ "#" (first.id) } { "To the chapters" } }
             header { (first) }
             nav.contents aria-label="Contents" {
                 h2 { "Contents" }

@@ -8,6 +8,7 @@ use super::figure::figure;
 use super::maps;
 use super::words::{fixed, grouped, is_local, parameter, plus_minus, short, significant, split, unit};
 use crate::geom::Pose;
+use crate::output::photogrammetry::Photogrammetry;
 use crate::output::solution_json::{EstimateRecord, PlacedRecord, SolutionRecord};
 use crate::series::CameraMount;
 
@@ -211,7 +212,7 @@ fn is_of_formula(e: &EstimateRecord, camera: &str) -> bool {
 }
 
 /// Cameras: parameters, distortion and uncertainty.
-pub(super) fn cameras(r: &SolutionRecord) -> Markup {
+pub(super) fn cameras(r: Photogrammetry) -> Markup {
     html! {
         @for (k, camera) in r.cameras.iter().enumerate() {
             h3 { (camera.name) ", " (camera.lens.name()) " lens, " (camera.width_px) " × " (camera.height_px) " px" }
@@ -221,6 +222,8 @@ pub(super) fn cameras(r: &SolutionRecord) -> Markup {
                     tbody { @for e in r.estimates.iter().filter(|e| is_of_formula(e, &camera.name)) {
                         @if let Some((value, sigma)) = known(e) {
                             tr { td { (component_of(e)) } td.n { (plus_minus(value, sigma)) } td { (unit(e).1) } }
+                        } @else if let (false, Some(value)) = (e.free, e.value) {
+                            tr { td { (component_of(e)) } td.n { (fixed(value, 4)) " (held)" } td { (unit(e).1) } }
                         }
                     } }
                 } }

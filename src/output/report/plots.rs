@@ -4,6 +4,7 @@ use super::describe::describe;
 use super::many;
 use super::svg::{Anchor, Svg, ticks};
 use super::words::plain;
+use crate::output::photogrammetry::Photogrammetry;
 use crate::output::solution_json::SolutionRecord;
 use crate::urdf::JointKind;
 
@@ -100,7 +101,7 @@ pub(super) fn histogram(record: &SolutionRecord) -> Option<String> {
 }
 
 /// Residuals of every image in use, a bar each in the order of the series; left-out images are marked at the foot. With the number of bars.
-pub(super) fn by_image(record: &SolutionRecord) -> Option<(String, usize)> {
+pub(super) fn by_image(record: Photogrammetry) -> Option<(String, usize)> {
     let most = record.images.iter().filter_map(|i| i.rms_px).fold(0.0, f64::max);
     if most <= 0.0 {
         return None;

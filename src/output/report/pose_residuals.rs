@@ -76,9 +76,19 @@ fn of_axes(
     body: &str,
     twist: impl Fn(&PoseResidual) -> Vector6<f64>,
 ) -> Markup {
-    let twists: Vec<Vector6<f64>> = shown.iter().map(twist).collect();
+    let of = |p: &PoseResidual| (name(r.photogrammetry(), p.image), twist(p));
+    let caption = format!("In the axes of the {body}: displacement above, rotation below.");
+    course(
+        &shown.iter().map(of).collect::<Vec<_>>(),
+        &format!("Pose residuals in the axes of the {body}, by image"),
+        &caption,
+    )
+}
+
+/// Twists (m, rad) by the name of their image, in the order of the series.
+pub(super) fn course(shown: &[(String, Vector6<f64>)], label: &str, caption: &str) -> Markup {
     let height = TOP + 2.0 * PANEL + GAP + BOTTOM;
-    let mut svg = Svg::new(WIDTH, height, &format!("Pose residuals in the axes of the {body}, by image"));
+    let mut svg = Svg::new(WIDTH, height, label);
     for (k, class) in ["x", "y", "z"].into_iter().enumerate() {
         let at = [LEFT + 14.0 + 46.0 * k as f64, TOP - 14.0];
         mark(&mut svg, at, class);
@@ -88,7 +98,7 @@ fn of_axes(
     for (panel, unit) in ["mm", "mrad"].into_iter().enumerate() {
         let top = TOP + (PANEL + GAP) * panel as f64;
         let part = |t: &Vector6<f64>| [0, 1, 2].map(|k| 1e3 * t[3 * panel + k]);
-        let largest = twists.iter().flat_map(part).map(f64::abs).fold(1e-6, f64::max);
+        let largest = shown.iter().map(|(_, t)| t).flat_map(part).map(f64::abs).fold(1e-6, f64::max);
         let y = |value: f64| top + PANEL / 2.0 * (1.0 - value / (1.1 * largest));
         svg.rect([LEFT, top], [WIDTH - LEFT - RIGHT, PANEL], "frame");
         let round = round_below(largest);
@@ -98,16 +108,16 @@ fn of_axes(
             svg.text([LEFT - 6.0, y(value) + 4.0], Anchor::End, &plain(value));
         }
         svg.text_upwards([13.0, top + PANEL / 2.0], unit);
-        for (k, (residual, twist)) in shown.iter().zip(&twists).enumerate() {
+        for (k, (name, twist)) in shown.iter().enumerate() {
             let (x, values) = (LEFT + step * (k as f64 + 0.5), part(twist));
             let [a, b, c] = values.map(|v| format!("{v:.3}"));
-            svg.titled(&format!("{}: {a}, {b}, {c} {unit}", name(r, residual.image)), |svg| {
+            svg.titled(&format!("{name}: {a}, {b}, {c} {unit}"), |svg| {
                 values.into_iter().zip(["x", "y", "z"]).for_each(|(value, class)| mark(svg, [x, y(value)], class));
             });
         }
     }
     svg.text([LEFT + (WIDTH - LEFT - RIGHT) / 2.0, height - 8.0], Anchor::Middle, "images in the order of the series");
-    pointed(&svg.finish(), &format!("In the axes of the {body}: displacement above, rotation below."))
+    pointed(&svg.finish(), caption)
 }
 
 /// The mark of an axis: a disc for x, a square for y, a cross for z.

@@ -66,12 +66,12 @@ for (const svg of document.querySelectorAll("svg.scene")) {
   });
   figure.querySelectorAll("[data-turn]").forEach((b) => b.addEventListener("click", () => turn(...numbers(b.dataset.turn))));
   figure.querySelectorAll("[data-zoom]").forEach((b) => b.addEventListener("click", () => nearer(Number(b.dataset.zoom))));
-  const slider = figure.querySelector("[data-arms]");
+  const slider = figure.querySelector("[data-names]");
   const arm = lines.find(({ line }) => line.classList.contains("arm"));
   const cameras = lines.filter(({ line }) => line.classList.contains("camera"));
   function stop() {
     const k = Number(slider.value);
-    arm.p = numbers(slider.dataset.arms.split("|")[k]);
+    if (arm) arm.p = numbers(slider.dataset.arms.split("|")[k]);
     cameras.forEach(({ line }, i) => line.classList.toggle("here", i === k));
     figure.querySelector("output").textContent = slider.dataset.names.split("|")[k];
     draw();

@@ -1,4 +1,4 @@
-//! Arm, camera views, plate and the region of the stops in three dimensions: a drawing that a small script turns.
+//! Camera views and plate in three dimensions, with arm and region of the stops where there is a robot: a drawing that a small script turns.
 
 use std::f64::consts::FRAC_PI_4;
 use std::fmt::Write as _;
@@ -10,7 +10,9 @@ use super::describe::describe;
 use super::many;
 use super::svg::escaped;
 use crate::geom::Pose;
+use crate::model::camera::Camera;
 use crate::model::robot::Robot;
+use crate::output::photogrammetry::Photogrammetry;
 use crate::output::restore::{camera, found_model};
 use crate::output::solution_json::{ImageRecord, PlateRecord, SolutionRecord};
 use crate::series::CameraMount;
@@ -26,11 +28,12 @@ const MOST_PLACES: usize = 120;
 
 type Line = Vec<Vector3<f64>>;
 
-/// Everything in the base frame, m.
+/// Everything in the base frame, or without a robot in that of the plate, m.
+#[derive(Default)]
 struct Scene {
-    /// Images on the robot, of which some are drawn.
-    on_robot: usize,
-    /// Through the origins of the joints, for each image on the robot.
+    /// Images of which some are drawn.
+    images: usize,
+    /// Through the origins of the joints, for each image on the robot; none without one.
     arms: Vec<(usize, Line)>,
     cameras: Vec<(usize, Pose)>,
     plates: Vec<(usize, Line)>,
@@ -42,8 +45,7 @@ impl Scene {
         let robot = found_model(r).ok()?.robot;
         let images = r.images.iter().enumerate();
         let stops: Vec<_> = images.filter_map(|(k, image)| Some((k, image.readings.as_ref()?))).collect();
-        let (arms, cameras, plates, places) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let mut scene = Self { on_robot: stops.len(), arms, cameras, plates, places };
+        let mut scene = Self { images: stops.len(), ..Self::default() };
         let mut placed = Vec::new();
         for (k, readings) in many::drawn(stops) {
             let image = &r.images[k];
@@ -72,6 +74,17 @@ impl Scene {
         let step = covered.len().div_ceil(MOST_PLACES).max(1);
         scene.places = covered.into_iter().step_by(step).collect();
         (!scene.arms.is_empty()).then_some(scene)
+    }
+
+    /// A plate with the images of it whose pose is known.
+    fn of_plate(p: Photogrammetry, plate: usize) -> Option<Self> {
+        let own = p.images.iter().enumerate().filter(|(_, image)| image.plate == plate && image.is_used());
+        let own: Vec<_> = own.filter_map(|(k, image)| Some((k, image.camera_from_plate.as_ref()?))).collect();
+        let mut scene = Self { images: own.len(), ..Self::default() };
+        scene.cameras = many::drawn(own).into_iter().map(|(k, pose)| (k, Pose::from(pose).inverse())).collect();
+        let (first, _) = scene.cameras.first()?;
+        scene.plates.push((*first, outline(p.plates.get(plate)?, &Pose::identity())));
+        Some(scene)
     }
 
     /// Middle and half of the size.
@@ -106,15 +119,21 @@ fn outline(plate: &PlateRecord, pose: &Pose) -> Line {
 }
 
 /// The view of a camera as one line: its edges from the centre, and the frame of the image.
-fn view(r: &SolutionRecord, image: &ImageRecord, pose: &Pose, length: f64) -> Line {
+fn view(r: Photogrammetry, image: &ImageRecord, pose: &Pose, length: f64) -> Line {
     let Some(c) = r.cameras.get(image.camera).map(camera) else { return Vec::new() };
     let (w, h) = (f64::from(c.width_px) - 1.0, f64::from(c.height_px) - 1.0);
     let corner = |u: f64, v: f64| {
-        let ray = c.ray(&Vector2::new(u, v)).unwrap_or(Vector3::z());
+        let ray = c.ray(&Vector2::new(u, v)).unwrap_or_else(|| straight(&c, u, v));
         pose.transform(&(length * ray / ray.norm().max(1e-9)))
     };
     let (a, b, c, d, eye) = (corner(0.0, 0.0), corner(w, 0.0), corner(w, h), corner(0.0, h), pose.translation);
     vec![eye, a, b, eye, c, d, eye, d, a, b, c]
+}
+
+/// Where a camera without distortion sees a pixel: no marker tells what a lens does far outside of all that were seen.
+fn straight(c: &Camera, u: f64, v: f64) -> Vector3<f64> {
+    let [fx, fy, cx, cy] = [0, 1, 2, 3].map(|k| c.parameters[k]);
+    Vector3::new((u - cx) / fx, (v - cy) / fy, 1.0)
 }
 
 /// How a place is seen: the same formula stands in the script.
@@ -153,55 +172,107 @@ fn coordinates(points: &[Vector3<f64>]) -> String {
     all.join(" ")
 }
 
-/// The chapter.
+/// What is said of a scene.
+struct Words<'a> {
+    /// What is drawn, as its label.
+    label: &'a str,
+    /// Whose axes are drawn.
+    frame: &'a str,
+    /// What the slider goes through.
+    slider: &'a str,
+}
+
+/// The chapter of a robot.
 pub(super) fn section(r: &SolutionRecord) -> Markup {
     let Some(scene) = Scene::of(r) else { return html! {} };
-    let (centre, size) = scene.bounds();
-    let mut d = Drawing { centre, size, body: String::new() };
-    let o = Vector3::zeros();
-    for k in 0..8 {
-        let turn = |k: f64| 0.35 * size * Vector3::new((k * FRAC_PI_4).cos(), (k * FRAC_PI_4).sin(), 0.0);
-        d.line("ground", &[turn(f64::from(k)), turn(f64::from(k) + 1.0)], "");
-    }
-    for (k, class) in ["x", "y", "z"].into_iter().enumerate() {
-        let tip = Vector3::from_fn(|row, _| if row == k { 0.22 * size } else { 0.0 });
-        d.line(class, &[o, tip], &format!("{class} of the base frame"));
-    }
-    scene.places.iter().for_each(|p| d.line("reach", &[*p, *p], ""));
-    scene.plates.iter().for_each(|(_, line)| d.line("plate", line, "plate"));
-    for (k, pose) in &scene.cameras {
-        let image = &r.images[*k];
-        let class = if image.is_used() { "camera" } else { "camera gone" };
-        d.line(class, &view(r, image, pose, VIEW_LENGTH * 2.0 * size), &describe(r, image));
-    }
-    d.line("arm", &scene.arms[0].1, "arm");
-    let arms: Vec<String> = scene.arms.iter().map(|(_, line)| coordinates(line)).collect();
-    let names: Vec<String> = scene.arms.iter().map(|(k, _)| describe(r, &r.images[*k]).replace('|', "/")).collect();
     let label = format!("Arm, {} camera poses, plate and region of the stops", scene.cameras.len());
-    let last = scene.arms.len() - 1;
     html! {
         p {
             "The arm at one stop, the view of the camera at every stop (red: left out), the plate (green), and the region in which the "
             "accuracy is stated (grey). Good series look at the plate from all sides, from near and far, with the arm in many postures."
         }
-        figure {
-            (PreEscaped(format!(
-                "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"scene\" tabindex=\"0\" role=\"application\" aria-label=\"{label}. Arrow keys turn, plus and minus zoom.\" \
-                 viewBox=\"0 0 {WIDTH} {HEIGHT}\" data-view=\"{} {}\" data-centre=\"{}\" data-size=\"{size:.4}\">{}</svg>",
-                VIEW[0], VIEW[1], coordinates(&[centre]), d.body
-            )))
-            div.controls {
-                button type="button" data-turn="-0.2 0" { "turn left" }
-                button type="button" data-turn="0.2 0" { "turn right" }
-                button type="button" data-turn="0 0.15" { "from above" }
-                button type="button" data-turn="0 -0.15" { "from below" }
-                button type="button" data-zoom="1.25" { "nearer" }
-                button type="button" data-zoom="0.8" { "farther" }
-                label { "stop " input type="range" min="0" max=(last) value="0" data-arms=(arms.join("|")) data-names=(names.join("|")); }
+        (scene.drawn(r.photogrammetry(), &Words { label: &label, frame: "base frame", slider: "stop" }))
+    }
+}
+
+/// The chapter of images alone: each plate with the cameras that saw it.
+pub(super) fn of_plates(p: Photogrammetry) -> Markup {
+    let scenes: Vec<(&str, Scene)> = p
+        .plates
+        .iter()
+        .enumerate()
+        .filter_map(|(k, plate)| Some((plate.name.as_str(), Scene::of_plate(p, k)?)))
+        .collect();
+    html! {
+        @if !scenes.is_empty() {
+            p {
+                "The view of the camera in every image that was used, and the plate (green), in the frame of the plate. "
+                "Good series look at the plate from all sides, tilted and turned, from near and far."
             }
-            output aria-live="polite" {}
-            figcaption { "Drag, pinch or use the arrow keys to turn it; point at a camera to see its image." }
         }
-        (many::note(scene.cameras.len(), scene.on_robot))
+        @for (plate, scene) in &scenes {
+            @if p.plates.len() > 1 { h3 { "Plate of " (plate) } }
+            @let label = format!("{} camera poses and plate", scene.cameras.len());
+            (scene.drawn(p, &Words { label: &label, frame: "frame of the plate", slider: "image" }))
+        }
+    }
+}
+
+impl Scene {
+    fn lines(&self, p: Photogrammetry, frame: &str) -> Drawing {
+        let (centre, size) = self.bounds();
+        let mut d = Drawing { centre, size, body: String::new() };
+        let o = Vector3::zeros();
+        if !self.arms.is_empty() {
+            for k in 0..8 {
+                let turn = |k: f64| 0.35 * size * Vector3::new((k * FRAC_PI_4).cos(), (k * FRAC_PI_4).sin(), 0.0);
+                d.line("ground", &[turn(f64::from(k)), turn(f64::from(k) + 1.0)], "");
+            }
+        }
+        for (k, class) in ["x", "y", "z"].into_iter().enumerate() {
+            let tip = Vector3::from_fn(|row, _| if row == k { 0.22 * size } else { 0.0 });
+            d.line(class, &[o, tip], &format!("{class} of the {frame}"));
+        }
+        self.places.iter().for_each(|p| d.line("reach", &[*p, *p], ""));
+        self.plates.iter().for_each(|(_, line)| d.line("plate", line, "plate"));
+        for (k, pose) in &self.cameras {
+            let image = &p.images[*k];
+            let class = if image.is_used() { "camera" } else { "camera gone" };
+            d.line(class, &view(p, image, pose, VIEW_LENGTH * 2.0 * size), &describe(p, image));
+        }
+        if let Some((_, arm)) = self.arms.first() {
+            d.line("arm", arm, "arm");
+        }
+        d
+    }
+
+    fn drawn(&self, p: Photogrammetry, words: &Words) -> Markup {
+        let Drawing { centre, size, body } = self.lines(p, words.frame);
+        let arms: Vec<String> = self.arms.iter().map(|(_, line)| coordinates(line)).collect();
+        let arms = Some(arms.join("|")).filter(|arms| !arms.is_empty());
+        let names: Vec<String> =
+            self.cameras.iter().map(|(k, _)| describe(p, &p.images[*k]).replace('|', "/")).collect();
+        let (label, last) = (words.label, names.len() - 1);
+        html! {
+            figure {
+                (PreEscaped(format!(
+                    "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"scene\" tabindex=\"0\" role=\"application\" aria-label=\"{label}. Arrow keys turn, plus and minus zoom.\" \
+                     viewBox=\"0 0 {WIDTH} {HEIGHT}\" data-view=\"{} {}\" data-centre=\"{}\" data-size=\"{size:.4}\">{body}</svg>",
+                    VIEW[0], VIEW[1], coordinates(&[centre])
+                )))
+                div.controls {
+                    button type="button" data-turn="-0.2 0" { "turn left" }
+                    button type="button" data-turn="0.2 0" { "turn right" }
+                    button type="button" data-turn="0 0.15" { "from above" }
+                    button type="button" data-turn="0 -0.15" { "from below" }
+                    button type="button" data-zoom="1.25" { "nearer" }
+                    button type="button" data-zoom="0.8" { "farther" }
+                    label { (words.slider) " " input type="range" min="0" max=(last) value="0" data-arms=[arms] data-names=(names.join("|")); }
+                }
+                output aria-live="polite" {}
+                figcaption { "Drag, pinch or use the arrow keys to turn it; point at a camera to see its image." }
+            }
+            (many::note(self.cameras.len(), self.images))
+        }
     }
 }

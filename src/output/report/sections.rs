@@ -6,6 +6,7 @@ use super::figure::figure;
 use super::words::{count, data, plus_minus, significant, unit};
 use super::{many, maps, plots};
 use crate::identify::StartReached;
+use crate::output::photogrammetry::Photogrammetry;
 use crate::output::solution_json::SolutionRecord;
 
 /// Before and after on held-out images.
@@ -45,6 +46,14 @@ pub(super) fn accuracy(r: &SolutionRecord) -> Markup {
 
 /// What was read, what was left out and why, and what else should be known.
 pub(super) fn left_out(r: &SolutionRecord) -> Markup {
+    if r.images.is_empty() {
+        return html! { p { (r.bodies.left_out()) " of " (count(r.bodies.measurements.len(), "measurement")) " left out." } };
+    }
+    images_left_out(r.photogrammetry())
+}
+
+/// The same of images.
+pub(super) fn images_left_out(r: Photogrammetry) -> Markup {
     let mut series: Vec<&str> = Vec::new();
     r.images.iter().for_each(|i| {
         if !series.contains(&i.series.as_str()) {
@@ -52,12 +61,9 @@ pub(super) fn left_out(r: &SolutionRecord) -> Markup {
         }
     });
     let rejected: Vec<_> = r.images.iter().filter_map(|i| i.reason.as_ref().map(|reason| (&i.name, reason))).collect();
-    if r.images.is_empty() {
-        return html! { p { (r.bodies.left_out()) " of " (count(r.bodies.measurements.len(), "measurement")) " left out." } };
-    }
     html! {
         div.wide { table {
-            thead { tr { th { "Series" } th { "camera" } th.n { "images" } th.n { "used" } th.n { "on the robot" } th.n { "markers observed" } } }
+            thead { tr { th { "Series" } th { "camera" } th.n { "images" } th.n { "used" } @if r.robot.is_some() { th.n { "on the robot" } } th.n { "markers observed" } } }
             tbody { @for name in &series { (series_row(r, name)) } }
         } }
         @if rejected.is_empty() {
@@ -76,14 +82,14 @@ pub(super) fn left_out(r: &SolutionRecord) -> Markup {
     }
 }
 
-fn series_row(r: &SolutionRecord, name: &str) -> Markup {
+fn series_row(r: Photogrammetry, name: &str) -> Markup {
     let images = || r.images.iter().filter(|i| i.series == name);
     let used = || images().filter(|i| i.is_used());
     let markers: usize = used().map(|i| i.observations.reason.iter().filter(|o| o.is_none()).count()).sum();
     let camera = images().next().and_then(|i| r.cameras.get(i.camera)).map_or("", |c| &c.name);
     html! { tr {
         td.name { (name) } td { (camera) } td.n { (images().count()) } td.n { (used().count()) }
-        td.n { (images().filter(|i| i.is_on_robot()).count()) } td.n { (markers) }
+        @if r.robot.is_some() { td.n { (images().filter(|i| i.is_on_robot()).count()) } } td.n { (markers) }
     } }
 }
 
@@ -102,7 +108,7 @@ pub(super) fn joint_noise(r: &SolutionRecord) -> Markup {
 }
 
 /// Residual maps.
-pub(super) fn residuals(r: &SolutionRecord) -> Markup {
+pub(super) fn residuals(r: Photogrammetry) -> Markup {
     if r.images.is_empty() {
         return html! {};
     }
@@ -127,12 +133,12 @@ pub(super) fn residuals(r: &SolutionRecord) -> Markup {
 }
 
 /// " of run1" where there are several plates.
-fn of_several(r: &SolutionRecord, plate: &str) -> String {
+pub(super) fn of_several(r: Photogrammetry, plate: &str) -> String {
     if r.plates.len() > 1 { format!(" of {plate}") } else { String::new() }
 }
 
 /// The plates as found.
-pub(super) fn plates(r: &SolutionRecord) -> Markup {
+pub(super) fn plates(r: Photogrammetry) -> Markup {
     if r.plates.is_empty() {
         return html! {};
     }
@@ -166,7 +172,7 @@ pub(super) fn plates(r: &SolutionRecord) -> Markup {
 }
 
 /// Where the solution started.
-pub(super) fn starts(r: &SolutionRecord) -> Markup {
+pub(super) fn starts(r: Photogrammetry) -> Markup {
     let tried = || r.starts.iter().filter(|s| s.reached != StartReached::NotNeeded);
     let spared = r.starts.len() - tried().count();
     html! {
@@ -184,12 +190,12 @@ pub(super) fn starts(r: &SolutionRecord) -> Markup {
     }
 }
 
-/// What is needed to repeat the result.
-pub(super) fn record(r: &SolutionRecord) -> Markup {
+/// What is needed to repeat the result, behind what `ended` says of its end.
+pub(super) fn record(r: Photogrammetry, ended: &str) -> Markup {
     let files = many::files(r);
     html! {
         p { code { (r.program.command) } }
-        p { (r.program.name) " " (r.program.version) "; the last solve " (r.status) " after " (count(r.iterations, "step")) " in all." }
+        p { (r.program.name) " " (r.program.version) (ended) "." }
         @if !r.program.options.is_empty() {
             div.wide { table {
                 thead { tr { th { "Option" } th { "value" } } }
@@ -203,6 +209,6 @@ pub(super) fn record(r: &SolutionRecord) -> Markup {
             thead { tr { th { "File" } th { "SHA-256" } } }
             tbody { @for f in &files { tr { td.name { code { (f.path.display()) } } td.name { code { (f.sha256) } } } } }
         } }
-        @if files.len() < r.inputs.len() { p.note { "Those of all images stand in solution.json." } }
+        @if files.len() < r.inputs.len() { p.note { "Those of all images stand in " (r.record) "." } }
     }
 }

@@ -8,7 +8,8 @@ use image::codecs::jpeg::JpegEncoder;
 
 use crate::detect::{Picture, load_bytes};
 use crate::files::{self, FileKind};
-use crate::output::solution_json::{ImageRecord, SolutionRecord};
+use crate::output::photogrammetry::Photogrammetry;
+use crate::output::solution_json::ImageRecord;
 use crate::series::InputFile;
 
 /// Width of a small picture, px.
@@ -44,14 +45,14 @@ pub struct Thumbnails(pub(super) BTreeMap<usize, Thumbnail>);
 
 impl Thumbnails {
     /// Those of the images that the report shows. An image whose file is not there any more, or is another, has none.
-    pub fn of_files(record: &SolutionRecord) -> Self {
+    pub fn of_files(record: Photogrammetry) -> Self {
         let images = shown(record).into_iter().map(|(k, _)| k);
         Self(images.filter_map(|k| Some((k, read(file_of(record, &record.images[k])?)?))).collect())
     }
 }
 
 /// Images that are worth a look, by their index.
-pub(super) fn shown(record: &SolutionRecord) -> Vec<(usize, Shown)> {
+pub(super) fn shown(record: Photogrammetry) -> Vec<(usize, Shown)> {
     let images = || record.images.iter().enumerate();
     let mut used: Vec<(usize, f64)> = images().filter_map(|(k, i)| Some((k, i.rms_px?))).collect();
     used.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -62,7 +63,7 @@ pub(super) fn shown(record: &SolutionRecord) -> Vec<(usize, Shown)> {
 }
 
 /// The file of an image: of several of its name the one in the folder of its series.
-fn file_of<'a>(record: &'a SolutionRecord, image: &ImageRecord) -> Option<&'a InputFile> {
+fn file_of<'a>(record: Photogrammetry<'a>, image: &ImageRecord) -> Option<&'a InputFile> {
     let named: Vec<&InputFile> = record.inputs.iter().filter(|f| f.path.ends_with(Path::new(&image.name))).collect();
     let in_series = |f: &&&InputFile| f.path.iter().any(|part| part.to_str() == Some(image.series.as_str()));
     match named.as_slice() {

@@ -155,6 +155,11 @@ pub(super) fn plain(value: f64) -> String {
     written((d..d + 3).find(is_whole).unwrap_or(d))
 }
 
+/// Semi-axes of an ellipsoid, mm.
+pub(super) fn axes_mm(all: &[f64; 3]) -> String {
+    all.map(|a| fixed(1e3 * a, 4)).join(" ")
+}
+
 /// "2nd", "11th".
 pub(super) fn ordinal(n: usize) -> String {
     let ending = match (n % 10, n % 100) {
