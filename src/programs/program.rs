@@ -59,6 +59,13 @@ pub struct Target {
     pub kind: TargetKind,
 }
 
+impl Target {
+    /// One in a file and line; from where the robot comes to it is not told yet.
+    pub(super) fn at((file, line): (usize, usize), name: String, kind: TargetKind) -> Self {
+        Self { file, line, name, approach: Approach::Unknown, arrivals: Vec::new(), visited: true, kind }
+    }
+}
+
 impl Program {
     /// Takes codes of postures for nothing: a pose means the posture to which the way there leads.
     pub fn heed_no_codes(&mut self) {

@@ -186,6 +186,17 @@ impl<'a> Reader<'a> {
         Ok(Self { file, index, tokens: tokens(file, dialect)?, at: 0, names: BTreeMap::new() })
     }
 
+    /// The same with names of their own for some of its words, by the number of their token.
+    pub fn renamed(
+        file: &'a TextFile,
+        index: usize,
+        dialect: Dialect,
+        names: impl Fn(&Self) -> BTreeMap<usize, String>,
+    ) -> Result<Self> {
+        let plain = Self::new(file, index, dialect)?;
+        Ok(Self { names: names(&plain), ..plain })
+    }
+
     pub fn peek(&self) -> Option<&Token> {
         self.tokens.get(self.at)
     }
@@ -304,11 +315,6 @@ impl<'a> Reader<'a> {
     pub fn name_of(&self, token: usize) -> Option<String> {
         let word = self.token(token).filter(|t| t.kind == TokenKind::Word)?;
         Some(self.names.get(&token).cloned().unwrap_or_else(|| capitals(self.text(word))))
-    }
-
-    /// Gives words other names than they are written with, by their tokens.
-    pub fn rename(&mut self, names: BTreeMap<usize, String>) {
-        self.names = names;
     }
 
     /// To the beginning of the next line.

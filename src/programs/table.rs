@@ -167,7 +167,7 @@ impl Table<'_> {
             Some(pose) => TargetKind::Pose(Box::new(self.pose(row, pose)?)),
         };
         let name = format!("row {}", row.line);
-        Ok(Target { file: self.index, line: row.line, name, approach, arrivals: Vec::new(), visited: true, kind })
+        Ok(Target { approach, ..Target::at((self.index, row.line), name, kind) })
     }
 
     fn joints(&self, row: &Row) -> Result<JointTarget> {

@@ -26,7 +26,7 @@ use super::ProgramSetting;
 use super::flow::{Branching, Flow, Places, settled};
 use super::itinerary::{Itinerary, Stands};
 use super::names::{plain_error, plain_names};
-use super::program::{Approach, Left, PoseTarget, Program, Target, TargetKind, Understood};
+use super::program::{Left, PoseTarget, Program, Target, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
 use super::references::References;
 use super::scan::{Dialect, Reader, TokenKind};
@@ -39,6 +39,7 @@ const DIALECT: Dialect =
     Dialect { comment: b';', quotes: b"\"", header: Some(b'&'), based_numbers: true, latin_letters: false };
 const POSE_NAMES: [&str; 8] = ["X", "Y", "Z", "A", "B", "C", "S", "T"];
 const AXIS_NAMES: [&str; 6] = ["A1", "A2", "A3", "A4", "A5", "A6"];
+
 
 /// What a name stands for.
 #[derive(Debug, Clone)]
@@ -76,11 +77,7 @@ fn reading(
     setting: &ProgramSetting<'_>,
     known: Places<Now>,
 ) -> Result<(Program, Places<Now>)> {
-    let reader = |index: usize, file| {
-        let mut reader = Reader::new(file, index, DIALECT)?;
-        scopes.name(&mut reader);
-        Ok(reader)
-    };
+    let reader = |index: usize, file| Reader::renamed(file, index, DIALECT, |reader| scopes.names(reader));
     let mut module = Module {
         setting,
         prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
@@ -427,10 +424,7 @@ impl Module<'_> {
         }
         let place = if name.is_some() { (aggregate.file, aggregate.line) } else { from };
         let clash = format!("{named} is used with different $TOOL or $BASE; give it a position for each");
-        let (file, line) = place;
-        let target =
-            Target { file, line, name: named, approach: Approach::Unknown, arrivals: Vec::new(), visited: true, kind };
-        let visited = self.way.visit(target, &mut self.now.1);
+        let visited = self.way.visit(Target::at(place, named, kind), &mut self.now.1);
         if visited { Ok(()) } else { Err(Why::new(LeftReason::FramesDiffer, clash)) }
     }
 

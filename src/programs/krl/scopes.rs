@@ -36,8 +36,8 @@ impl Scopes {
         }
     }
 
-    /// Gives words of a file names of their own, where its module has data of a name that others have, too.
-    pub fn name(&self, reader: &mut Reader<'_>) {
+    /// Names of their own for words of a file, where its module has data of a name that others have, too.
+    pub fn names(&self, reader: &Reader<'_>) -> BTreeMap<usize, String> {
         let own = |name: &str| {
             let all = self.local.get(name).filter(|all| all.len() > 1)?;
             all.iter().copied().find(|&list| self.modules[list] == self.modules[reader.index])
@@ -50,6 +50,6 @@ impl Scopes {
                 names.insert(at, in_scope(&name, list));
             }
         }
-        reader.rename(names);
+        names
     }
 }

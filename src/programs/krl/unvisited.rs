@@ -2,7 +2,7 @@
 
 use super::{Module, Value};
 use crate::programs::names::plain;
-use crate::programs::program::{Approach, Target};
+use crate::programs::program::Target;
 use crate::programs::reason::{DeclaredPoint, LeftReason, Why};
 
 impl Module<'_> {
@@ -30,18 +30,8 @@ impl Module<'_> {
                 continue;
             }
             let used = self.uses.of(&name).map(|by| Why::new(LeftReason::NotATarget, format!("{by} depends on it")));
-            let done = used.map_or(kind, Err).map(|kind| {
-                let approach = Approach::Unknown;
-                self.way.declare(Target {
-                    file,
-                    line,
-                    name: name.clone(),
-                    approach,
-                    arrivals: Vec::new(),
-                    visited: true,
-                    kind,
-                });
-            });
+            let done =
+                used.map_or(kind, Err).map(|kind| self.way.declare(Target::at((file, line), name.clone(), kind)));
             if let Err(why) = done {
                 let words = format!("no motion of the files goes there, and {}", why.words);
                 self.leave_at(file, line, &name, Why::new(LeftReason::Unvisited, words));

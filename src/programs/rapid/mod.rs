@@ -77,11 +77,7 @@ fn reading(
     setting: &ProgramSetting<'_>,
     known: Places<Now>,
 ) -> Result<(Program, Places<Now>)> {
-    let reader = |(index, file)| {
-        let mut reader = Reader::new(file, index, DIALECT)?;
-        scopes.name(&mut reader);
-        Ok(reader)
-    };
+    let reader = |(index, file)| Reader::renamed(file, index, DIALECT, |reader| scopes.names(reader));
     let mut task = Task {
         files,
         setting,
@@ -314,18 +310,15 @@ impl Task<'_> {
             .map_err(|why| Why { about: Some(point.clone()), ..why })?;
         // Its posture is that of the displaced point, where nothing else tells it.
         let approach = Approach::Beyond(index);
-        let target =
-            Target { file, line, name: point.clone(), approach, arrivals: Vec::new(), visited: false, kind: base };
+        let target = Target { approach, visited: false, ..Target::at((file, line), point.clone(), base) };
         self.bases.entry(point.clone()).or_insert(target);
         Ok(())
     }
 
-    fn add(&mut self, name: String, (file, line): (usize, usize), kind: TargetKind) -> Understood<()> {
+    fn add(&mut self, name: String, place: (usize, usize), kind: TargetKind) -> Understood<()> {
         let clash = format!("{name} is used with different tools or work objects; give it a robtarget for each");
         let named = name.clone();
-        let target =
-            Target { file, line, name, approach: Approach::Unknown, arrivals: Vec::new(), visited: true, kind };
-        let visited = self.way.visit(target, self.switching.stands());
+        let visited = self.way.visit(Target::at(place, name, kind), self.switching.stands());
         if visited { Ok(()) } else { Err(Why::of(&named, LeftReason::FramesDiffer, clash)) }
     }
 

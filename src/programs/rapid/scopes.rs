@@ -49,8 +49,8 @@ impl Scopes {
         }
     }
 
-    /// Gives words of a file that mean local data names of their own, where there are others of their name.
-    pub fn name(&self, reader: &mut Reader<'_>) {
+    /// Names of their own for words of a file that mean local data, where there are others of their name.
+    pub fn names(&self, reader: &Reader<'_>) -> BTreeMap<usize, String> {
         let several = |all: &[Declaration]| all.iter().map(|d| d.scope).collect::<BTreeSet<_>>().len() > 1;
         let mut names = BTreeMap::new();
         for at in 0.. {
@@ -63,7 +63,7 @@ impl Scopes {
             let number = all.and_then(|all| self.number(all, reader.index, at));
             names.extend(number.map(|number| (at, in_scope(&name, number))));
         }
-        reader.rename(names);
+        names
     }
 
     /// Number of the scope of local data that a word at a token means.

@@ -6,7 +6,7 @@ use super::value::{Node, array_of, element, node};
 use super::{Datum, Task};
 use crate::error::Result;
 use crate::geom::Pose;
-use crate::programs::program::{Approach, Left, Target, TargetKind, Understood};
+use crate::programs::program::{Left, Target, TargetKind, Understood};
 use crate::programs::reason::{LeftReason, Why};
 use crate::programs::scan::Reader;
 
@@ -87,18 +87,8 @@ impl Task<'_> {
                 self.way.declare(base);
                 continue;
             }
-            let done = self.unvisited_kind(&name, &value, datum.file).map(|kind| {
-                let (file, line, approach) = (place.0, place.1, Approach::Unknown);
-                self.way.declare(Target {
-                    file,
-                    line,
-                    name: name.clone(),
-                    approach,
-                    arrivals: Vec::new(),
-                    visited: true,
-                    kind,
-                });
-            });
+            let kind = self.unvisited_kind(&name, &value, datum.file);
+            let done = kind.map(|kind| self.way.declare(Target::at(place, name.clone(), kind)));
             if let Err(why) = done {
                 let words = format!("no known move of the files goes there, and {}", why.words);
                 self.leave(place, &name, Why::new(LeftReason::Unvisited, words));

@@ -10,7 +10,7 @@ use super::field::{Field, FieldPlace};
 use super::flow::{Branching, Flow, Followed, Held, Places, settled};
 use super::itinerary::{Itinerary, Stands};
 use super::program::{
-    Approach, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind, Understood,
+    JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind, Understood,
 };
 use super::reason::{DeclaredPoint, LeftReason, Why};
 use super::scan::{Dialect, Reader, TokenKind};
@@ -455,16 +455,7 @@ impl Script<'_> {
             }
             Value::Expression => return Err(Why::computed().starting_from(argument.points)),
         };
-        let file = self.reader.index;
-        let target = Target {
-            file,
-            line,
-            name: name.to_owned(),
-            approach: Approach::Unknown,
-            arrivals: Vec::new(),
-            visited: true,
-            kind,
-        };
+        let target = Target::at((self.reader.index, line), name.to_owned(), kind);
         let visited = self.way.visit(target, &mut self.now.1);
         if visited {
             Ok(())
