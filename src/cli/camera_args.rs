@@ -8,6 +8,11 @@ use crate::error::{Code, Error, Notice, Result};
 use crate::output::camera_formats::{ReadCamera, read_camera_file};
 use crate::problem::{KnownCamera, LensChoice, MeasuredSeries};
 
+/// The lens is chosen by the data.
+const AUTO: &str = "auto";
+/// The same, of those that camera.yaml can express.
+const ROS: &str = "ros";
+
 /// Flags of cameras.
 #[derive(Debug, Args)]
 pub(super) struct CameraArgs {
@@ -29,10 +34,10 @@ impl CameraArgs {
     /// Lenses that are not known, files that cannot be read or are of another camera.
     pub fn apply(&self, series: &mut [MeasuredSeries]) -> Result<Vec<Notice>> {
         match self.camera.as_deref() {
-            Some("auto") => series.iter_mut().for_each(|s| s.lens_choice = LensChoice::All),
-            Some("ros") => series.iter_mut().for_each(|s| s.lens_choice = LensChoice::Exported),
+            Some(AUTO) => series.iter_mut().for_each(|s| s.lens_choice = LensChoice::All),
+            Some(ROS) => series.iter_mut().for_each(|s| s.lens_choice = LensChoice::Exported),
             Some(name) => {
-                let lens = super::simulate::lens(name)?;
+                let lens = super::simulate::lens(name).map_err(with_choices)?;
                 series.iter_mut().for_each(|s| (s.lens, s.lens_choice) = (lens, LensChoice::Settled));
             }
             None => {}
@@ -78,6 +83,12 @@ impl CameraArgs {
         }
         Ok(lost.map(|lost| Notice::new(Code::LensChosen, path.display(), lost, "")))
     }
+}
+
+/// Beside the lenses, those that the data choose.
+fn with_choices(error: Error) -> Error {
+    let remedy = format!("{}; {AUTO} or {ROS} where the data are to choose", error.remedy);
+    Error { remedy, ..error }
 }
 
 /// A file, and the camera in it that is named behind a `#`.
@@ -138,6 +149,14 @@ cam1:
         let mut all: Vec<MeasuredSeries> = cameras.iter().map(|name| series(name)).collect();
         args.apply(&mut all)?;
         Ok(all.iter().map(|s| s.known_camera.as_ref().map_or(f64::NAN, |c| c.camera.parameters[0])).collect())
+    }
+
+    #[test]
+    fn an_unknown_lens_is_answered_with_all_that_can_be_given() {
+        let args = CameraArgs { camera: Some("pinhole".into()), camera_file: Vec::new(), hold_camera: false };
+        let refused = args.apply(&mut [series("front")]).unwrap_err();
+        assert_eq!(refused.code, Code::LensUnknown);
+        assert!([AUTO, ROS, "brown"].iter().all(|name| refused.remedy.contains(name)), "{}", refused.remedy);
     }
 
     /// Kalibr calls its cameras cam0 and cam1, whatever they are called in series.toml.
