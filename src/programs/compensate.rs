@@ -14,7 +14,7 @@ use super::codes::Branch;
 use super::field::{Edit, FieldPlace, splice};
 use super::meant::{Meant, meant};
 use super::measured_frames::{KnownError, MeasuredFrames, Moved};
-use super::posture::{Finder, Known};
+use super::posture::{Finder, Known, is_parted, smallest_singular_value};
 use super::program::{
     Approach, DisplacedTarget, Left, PoseTarget, Program, Target, TargetKind, Understood, write_joints,
 };
@@ -26,8 +26,10 @@ use crate::urdf::JointKind;
 
 /// What may remain at a target, m and rad.
 pub const RESIDUAL: f64 = 1e-6;
-/// A joint that has to move further than this (rad or m) leaves the posture of the program: the target is next to a singularity.
+/// Joints that have to move further than this (rad or m) may leave the posture of the program: then the Jacobian is asked.
 const MOST_JOINT_CHANGE: f64 = 0.3;
+/// Where its smallest singular value (m and rad) is less, a mm or mrad moves a joint by more than 0.1 rad: the target is next to a singularity.
+const NEAR_SINGULAR: f64 = 0.01;
 /// Steps that place a displaced point exactly, though its orientation is that of another.
 const PLACING_STEPS: usize = 4;
 
@@ -385,7 +387,7 @@ impl<'a> Work<'a> {
             }
         })?;
         let (i, change) = largest_change(start, &found);
-        if change.abs() > MOST_JOINT_CHANGE {
+        if change.abs() > MOST_JOINT_CHANGE && is_left(to, start, &found) {
             let name = &self.models.to.chain.readings[i];
             let change = self.amount(i, change);
             let words = format!("{name} would have to move by {change}: the target lies next to a singular posture");
@@ -415,6 +417,12 @@ impl<'a> Work<'a> {
 
 fn reach<'a>(robot: &'a Robot, limits: &'a [(f64, f64)], held: &'a [bool], previous: Option<&'a [f64]>) -> Reach<'a> {
     Reach { robot, limits, held, previous }
+}
+
+/// True where the way from one posture to another leads by a singular one, or one of them is singular.
+fn is_left(to: &Reach<'_>, from: &[f64], found: &[f64]) -> bool {
+    let is_near = |q: &[f64]| smallest_singular_value(to.robot, q, to.held) < NEAR_SINGULAR;
+    is_near(from) || is_near(found) || is_parted(to.robot, from, found, to.held)
 }
 
 /// As [`Reach::solve_from`]; a redundant robot leaves joints at their limits and moves the others.

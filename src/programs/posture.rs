@@ -30,6 +30,8 @@ const LINE_STEPS: f64 = 400.0;
 const AMBIGUOUS: f64 = 1.25;
 /// A posture whose smallest singular value (m and rad) is less is singular.
 const SINGULAR: f64 = 1e-3;
+/// Places between two postures at which the sign of the Jacobian's determinant is looked at.
+const BETWEEN: usize = 40;
 /// Joints of two solutions that differ by less are the same, rad or m.
 const SAME: f64 = 1e-3;
 
@@ -103,6 +105,37 @@ fn farthest(a: &[f64], b: &[f64]) -> f64 {
 /// True for joints (rad or m) of one posture and turn.
 pub(super) fn same_posture(a: &[f64], b: &[f64]) -> bool {
     farthest(a, b) < SAME
+}
+
+/// Motion of the tip by the readings that are free.
+fn jacobian(robot: &Robot, q: &[f64], held: &[bool]) -> Matrix6xX<f64> {
+    let columns = robot.kinematics(&At::at(q), &vec![0.0; q.len()]).d_readings;
+    let is_free = |i: usize| !held.get(i).copied().unwrap_or(false);
+    let free: Vec<_> = columns.iter().enumerate().filter(|(i, _)| is_free(*i)).map(|(_, column)| *column).collect();
+    Matrix6xX::from_columns(&free)
+}
+
+/// How little the tip moves (m and rad) by a unit of the readings in the direction in which that is least; of fewer than six free readings, by these.
+pub(super) fn smallest_singular_value(robot: &Robot, q: &[f64], held: &[bool]) -> f64 {
+    let jacobian = jacobian(robot, q, held);
+    let gram = if jacobian.ncols() < 6 {
+        (jacobian.transpose() * &jacobian).symmetric_eigenvalues().min()
+    } else {
+        (&jacobian * jacobian.transpose()).symmetric_eigenvalues().min()
+    };
+    gram.max(0.0).sqrt()
+}
+
+/// True where a singular posture lies between two of six free readings: there the determinant of the Jacobian changes its sign.
+pub(super) fn is_parted(robot: &Robot, from: &[f64], to: &[f64], held: &[bool]) -> bool {
+    let sign = |k: usize| {
+        let share = k as f64 / BETWEEN as f64;
+        let q: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect();
+        let jacobian = jacobian(robot, &q, held);
+        (jacobian.ncols() == 6).then(|| jacobian.fixed_columns::<6>(0).determinant() > 0.0)
+    };
+    let first = sign(0);
+    (1..=BETWEEN).any(|k| sign(k) != first)
 }
 
 fn unreached(posture: &str) -> Why {
@@ -277,9 +310,7 @@ impl<'a> Finder<'a> {
 
     /// True where the robot cannot move in some direction.
     fn is_singular(&self, q: &[f64]) -> bool {
-        let columns = self.robot.kinematics(&At::at(q), &vec![0.0; q.len()]).d_readings;
-        let jacobian = Matrix6xX::from_columns(&columns);
-        (jacobian.clone() * jacobian.transpose()).symmetric_eigenvalues().min() < SINGULAR.powi(2)
+        smallest_singular_value(self.robot, q, &[]) < SINGULAR
     }
 
     fn reach<'r>(&'r self, held: &'r [bool]) -> Reach<'r> {

@@ -20,6 +20,7 @@ mod promise;
 mod rapid;
 mod rapid_statements;
 mod references;
+mod retarget;
 mod scopes;
 mod urscript;
 mod used;
