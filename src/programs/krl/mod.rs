@@ -53,8 +53,8 @@ enum Value {
 /// Reads a module of one or more files.
 pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
     let mut scopes = Scopes::new(&files);
-    for (index, file) in files.iter().enumerate().filter(|(_, file)| is_of_program(file)) {
-        scopes.look_through(Reader::new(file, index, DIALECT)?);
+    for (index, file) in files.iter().enumerate().filter(|(_, file)| !has_moves(file)) {
+        scopes.look_through(Reader::new(file, index, DIALECT)?, is_of_program(file));
     }
     let program = settled(|known| reading(&files, &scopes, setting, known)).map_err(plain_error)?;
     Ok(Program { files, ..plain_names(program) })
@@ -63,7 +63,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
 /// True for the data list of a program; those of the controller begin with `$`.
 fn is_of_program(file: &TextFile) -> bool {
     let name = Path::new(&file.name).file_name();
-    !has_moves(file) && name.is_some_and(|name| !name.to_string_lossy().starts_with('$'))
+    name.is_some_and(|name| !name.to_string_lossy().starts_with('$'))
 }
 
 fn has_moves(file: &TextFile) -> bool {
