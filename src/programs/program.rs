@@ -148,7 +148,7 @@ impl TargetKind {
 pub struct JointTarget {
     /// rad or m; not finite where the text leaves an axis out.
     pub readings: Vec<f64>,
-    /// Their numbers in the text; `None` for axes that the target does not have (they are held).
+    /// Their numbers in the text; `None` for those that are held: external axes, and axes that the target does not have.
     pub fields: Vec<Option<Field>>,
 }
 

@@ -1,13 +1,14 @@
-//! Programs for another cell: joints that move far and stay in their posture.
+//! Programs for another cell: joints that move far and stay in their posture, and external axes that keep their place.
 
+use nalgebra::Vector6;
 use robotcal::geom::Pose;
 use robotcal::model::robot::Robot;
 use robotcal::programs::{
     self, Language, LeftReason, MeasuredFrames, Models, Postures, ProgramSetting, RobotFrames, TargetOutcome, TextFile,
 };
-use robotcal::urdf::Chain;
+use robotcal::urdf::{Chain, read};
 
-use crate::programs_support::{Cell, assert_meets};
+use crate::programs_support::{Cell, assert_meets, repo};
 
 /// A program by the nominal robot of a chain, run by another one whose work object is elsewhere.
 fn outcomes(name: &str, text: String, to: &Robot, from: &Chain, moved: Option<Pose>) -> (Vec<TargetOutcome>, String) {
@@ -88,5 +89,38 @@ fn a_target_with_aligned_wrist_axes_is_singular_wherever_the_cell_stands() {
     for outcome in outcomes {
         let TargetOutcome::Left(why) = outcome else { panic!("corrected") };
         assert_eq!(why.reason, LeftReason::Singular, "{}", why.words);
+    }
+}
+
+/// A rail under the arm keeps its place: the arm alone makes up for what is wrong, with axis angles as with poses.
+#[test]
+fn external_axes_keep_their_value_beside_axis_angles() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(repo("robots/kuka_kr6_r900/kuka_kr6_r900.urdf")).unwrap();
+    let rail = "<link name=\"rail\"/><joint name=\"slide\" type=\"prismatic\"><parent link=\"rail\"/><child link=\"base_link\"/>\
+                <axis xyz=\"1 0 0\"/><limit lower=\"0\" upper=\"3\" effort=\"1\" velocity=\"1\"/></joint></robot>";
+    let path = folder.path().join("rail.urdf");
+    std::fs::write(&path, text.replace("</robot>", rail)).unwrap();
+    let chain = read(&path).unwrap().chain(Some("rail"), Some("tool0")).unwrap();
+    let mut real = Robot::nominal(chain.clone());
+    for (k, joint) in real.chain.joints.iter_mut().enumerate() {
+        let twist = Vector6::from_fn(|i, _| 1e-3 * ((3 * k + i) as f64).sin());
+        joint.origin = joint.origin.perturbed(&twist);
+    }
+    let degrees = [12.0, -60.0, 80.0, 20.0, 50.0, 10.0];
+    let axes = degrees.iter().enumerate().map(|(k, v)| format!("A{} {v:.1}", k + 1)).collect::<Vec<_>>().join(",");
+    let krl = format!("DEF a()\nPTP {{E6AXIS: {axes},E1 500.0}}\nPTP {{E1 700.0}}\nEND\n");
+    let rapid = format!(
+        "MODULE m\nPROC main()\nMoveAbsJ [{degrees:?},[500.0,9E9,9E9,9E9,9E9,9E9]],v10,fine,tool0;\nENDPROC\nENDMODULE\n"
+    );
+    let given: Vec<f64> = std::iter::once(0.5).chain(degrees.map(f64::to_radians)).collect();
+    let wanted = Robot::nominal(chain.clone()).base_from_tip(&given);
+    for (name, text, kept) in [("a.src", krl, "E1 500.0}"), ("m.mod", rapid, "[500.0,")] {
+        let (outcomes, new) = outcomes(name, text, &real, &chain, None);
+        let [TargetOutcome::Done(correction)] = &outcomes[..] else { panic!("{outcomes:?}") };
+        assert_meets(&real.base_from_tip(&correction.corrected), &wanted, name);
+        assert_eq!(correction.corrected[0], 0.5, "{name}");
+        assert!(new.contains(kept), "{new}");
+        assert!(name != "a.src" || new.contains("PTP {E1 700.0}"), "{new}");
     }
 }

@@ -152,13 +152,13 @@ impl Aggregate {
         (name, field)
     }
 
-    /// Axis values by reading; external axes that are missing have no field.
+    /// Axis values by reading; external axes keep theirs and have no field.
     pub fn joints(&self, axes: &[usize], prismatic: &[bool]) -> JointTarget {
         let mut target = JointTarget { readings: vec![f64::NAN; axes.len()], fields: vec![None; axes.len()] };
         for (k, &reading) in axes.iter().enumerate() {
             let (_, field) = self.axis_field(k, prismatic[reading]);
             target.readings[reading] = field.value();
-            target.fields[reading] = (k < 6 || field.written.is_finite()).then_some(field);
+            target.fields[reading] = (k < 6).then_some(field);
         }
         target
     }

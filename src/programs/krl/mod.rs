@@ -40,6 +40,7 @@ const DIALECT: Dialect =
 const POSE_NAMES: [&str; 8] = ["X", "Y", "Z", "A", "B", "C", "S", "T"];
 const AXIS_NAMES: [&str; 6] = ["A1", "A2", "A3", "A4", "A5", "A6"];
 
+const EXTERNAL_NAMES: [&str; 6] = ["E1", "E2", "E3", "E4", "E5", "E6"];
 
 /// What a name stands for.
 #[derive(Debug, Clone)]
@@ -434,7 +435,10 @@ impl Module<'_> {
             return Ok(TargetKind::Joints(a.joints(axes, &self.prismatic)));
         }
         if !a.has(&POSE_NAMES) {
-            let words = "it has neither axes A1 to A6 nor components X to C";
+            let words = match a.has(&EXTERNAL_NAMES) {
+                true => "it moves external axes alone: what the arm does meanwhile depends on the controller",
+                false => "it has neither axes A1 to A6 nor components X to C",
+            };
             return Err(Why::new(LeftReason::NotATarget, words));
         }
         if frames.tool_in_room {

@@ -391,14 +391,16 @@ impl Task<'_> {
             .ok_or_else(|| Why::new(LeftReason::Computed, "it is computed, not written in numbers"))?;
         let n = self.setting.axes.len();
         let mut target = JointTarget { readings: vec![f64::NAN; n], fields: vec![None; n] };
-        for (&reading, (written, range)) in self.setting.axes.iter().zip(values.iter().chain(external)) {
+        for (k, (&reading, (written, range))) in self.setting.axes.iter().zip(values.iter().chain(external)).enumerate()
+        {
             if *written >= NO_AXIS {
                 continue;
             }
             let (si, decimals) = self.unit(reading);
             target.readings[reading] = written * si;
             let place = FieldPlace::At(range.clone());
-            target.fields[reading] = Some(Field { file, place, written: *written, si, decimals });
+            // External axes keep their value.
+            target.fields[reading] = (k < 6).then_some(Field { file, place, written: *written, si, decimals });
         }
         Ok(target)
     }
