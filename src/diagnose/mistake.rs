@@ -11,8 +11,8 @@ pub enum MistakeKind {
     Signs(Vec<String>),
     /// Columns stand in each other's place: the first takes the readings of the second, and so on, the last those of the first.
     Columns(Vec<String>),
-    /// All columns stand in reverse order.
-    Reversed,
+    /// All columns stand in reverse order: these, from base to tip.
+    Reversed(Vec<String>),
     /// Angles are in another unit than they are read in; of one joint alone, or of all.
     Unit {
         /// The joint; none where it is all of them.
@@ -98,7 +98,7 @@ impl Kind for Mistake {
     fn code(&self) -> Code {
         match &self.kind {
             MistakeKind::Signs(_) => Code::JointSignWrong,
-            MistakeKind::Columns(_) | MistakeKind::Reversed => Code::JointOrderWrong,
+            MistakeKind::Columns(_) | MistakeKind::Reversed(_) => Code::JointOrderWrong,
             MistakeKind::Unit { .. } => Code::JointUnitWrong,
             MistakeKind::Coupled { .. } => Code::JointCoupled,
             MistakeKind::Rows { .. } => Code::RowsShifted,
@@ -160,8 +160,9 @@ impl Kind for Mistake {
                 format!("exchange the column names {} in joints.csv", joints.join(" and "))
             }
             MistakeKind::Columns(joints) => format!("correct the column names {} in joints.csv", joints.join(", ")),
-            MistakeKind::Reversed => {
-                "exchange the column names in joints.csv in pairs, in the order of the joints from base to tip (of two arms all joints, one arm after the other): the first with the last, the second with the last but one, and so on".into()
+            MistakeKind::Reversed(joints) => {
+                let reversed: Vec<&str> = joints.iter().rev().map(String::as_str).collect();
+                format!("name the columns {} of joints.csv {}", joints.join(", "), reversed.join(", "))
             }
             MistakeKind::Unit { joint: Some(joint), .. } => {
                 format!("bring the column {joint} of joints.csv to the unit of the others")
@@ -216,7 +217,13 @@ impl Mistake {
                     joints.join(", ")
                 )
             }
-            MistakeKind::Reversed => "the joints stand in reverse order: reversed, the images fit".into(),
+            MistakeKind::Reversed(joints) => {
+                let ends = joints
+                    .first()
+                    .zip(joints.last())
+                    .map_or(String::new(), |(a, b)| format!(", {a} in the place of {b} and so on"));
+                format!("the joints stand in reverse order{ends}: reversed, the images fit")
+            }
             MistakeKind::Unit { joint, are_degrees } => {
                 let [is, read_as, _] = unit(*are_degrees);
                 let values = joint.as_ref().map_or("the joint values".into(), |j| format!("the readings of {j} alone"));

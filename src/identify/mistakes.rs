@@ -49,7 +49,7 @@ pub(super) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> 
             revolute.for_each(|(v, _)| *v *= factor);
         });
     }
-    add(MistakeKind::Reversed, &|q| q.reverse());
+    add(MistakeKind::Reversed(names.clone()), &|q| q.reverse());
     for (shifted, mistake) in shifted_rows(given) {
         // Positioner, rail or second arm stand before the first arm, or behind it, and may have been recorded apart.
         let below = matches!(mistake, MistakeKind::Rows { below: true, .. });

@@ -117,6 +117,9 @@ fn mistakes_in_single_columns_are_named() {
     }
     let said = with(&|q| (q[3], q[4], q[5]) = (q[4], q[5], q[3]));
     assert_eq!((said.code, said.place.as_str()), (Code::JointOrderWrong, "joint_a4, joint_a6, joint_a5"), "{said}");
+    let said = with(&|q| q.reverse());
+    assert_eq!(said.code, Code::JointOrderWrong, "{said}");
+    assert!(said.remedy.contains("joint_a6, joint_a5, joint_a4"), "{said}");
 }
 
 #[test]
