@@ -15,6 +15,11 @@ const FOREIGN_LIMITS_RAD: f64 = std::f64::consts::PI;
 const SOFT_LIMITS_RAD: f64 = 0.5;
 /// Readings that all stay below this number of degrees are a whole turn if they are radians.
 pub(super) const SMALL_DEG: f64 = 6.3;
+/// The same of a rail, m.
+const SOFT_LIMITS_M: f64 = 0.01;
+/// Units in which rails are read, beside metres, m.
+const LENGTHS: [(&str, &str, f64); 3] =
+    [("millimetres", "mm", 1e-3), ("centimetres", "cm", 1e-2), ("inches", "inch", 0.0254)];
 /// Fewer stops than this say nothing about their unit.
 const MANY_STOPS: usize = 5;
 
@@ -101,7 +106,7 @@ pub fn check_unit(
         AngleUnit::Rad => refuse_degrees_as_radians(file, chain, rows, stating("deg"))?,
         AngleUnit::Deg => refuse_radians_as_degrees(file, chain, rows, &stating("rad"))?,
     }
-    refuse_millimetres(file, chain, rows)
+    refuse_other_lengths(file, chain, rows)
 }
 
 fn refuse_degrees_as_radians(file: &Path, chain: &Chain, rows: &[&[f64]], remedy: String) -> Result<()> {
@@ -144,26 +149,33 @@ fn refuse_radians_as_degrees(file: &Path, chain: &Chain, rows: &[&[f64]], statin
     Err(Error::new(Code::RadiansAsDegrees, file.display(), what, remedy))
 }
 
-fn refuse_millimetres(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
+fn refuse_other_lengths(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
     let sliding = || (0..chain.readings.len()).filter(|&i| chain.reading_kinds[i] == JointKind::Prismatic);
-    let beyond = |i: usize| {
-        let only = || std::iter::once(i);
-        let count =
-            rows.iter().filter(|q| !fits(chain, only(), q, 1.0, 1.0) && fits(chain, only(), q, 1e-3, 0.01)).count();
-        2 * count > rows.len()
+    let of_most = |test: &dyn Fn(&[f64]) -> bool| 2 * rows.iter().filter(|q| test(q)).count() > rows.len();
+    let keeps = |i: usize, q: &[f64], factor: f64, slack: f64| fits(chain, std::iter::once(i), q, factor, slack);
+    let units_of = |i: usize| -> Vec<&(&str, &str, f64)> {
+        let fit = |(_, _, factor): &&(&str, &str, f64)| {
+            of_most(&|q| !keeps(i, q, 1.0, 1.0) && keeps(i, q, *factor, SOFT_LIMITS_M))
+        };
+        LENGTHS.iter().filter(fit).collect()
     };
-    let Some(reading) = sliding().find(|&i| beyond(i)) else { return Ok(()) };
+    let Some((reading, units)) = sliding().map(|i| (i, units_of(i))).find(|(_, units)| !units.is_empty()) else {
+        return Ok(());
+    };
     let (low, high) = range(rows, reading);
+    let joined = |one: &dyn Fn(&(&str, &str, f64)) -> String| {
+        units.iter().map(|unit| one(unit)).collect::<Vec<_>>().join(" or ")
+    };
     let what = format!(
-        "{} reads {low} to {high}, beyond the limits in the URDF, which it keeps if it is in millimetres",
-        chain.readings[reading]
+        "{} reads {low} to {high}, beyond the limits in the URDF, which it keeps if it is in {}",
+        chain.readings[reading],
+        joined(&|(name, ..)| (*name).to_owned())
     );
-    Err(Error::new(
-        Code::MillimetresAsMetres,
-        file.display(),
-        what,
-        "prismatic joints are metres: divide the column by 1000",
-    ))
+    let remedy = format!(
+        "prismatic joints are metres: multiply the column by {}",
+        joined(&|(_, sign, m)| format!("{m} ({sign})"))
+    );
+    Err(Error::new(Code::MillimetresAsMetres, file.display(), what, remedy))
 }
 
 /// Name and range of the revolute reading that reaches furthest from zero.

@@ -242,7 +242,18 @@ fn an_impossible_unit_is_refused_and_a_possible_one_is_not() {
     let near: Vec<[f64; 3]> = (0..6).map(|i| [0.5, 45.0 + 0.1 * f64::from(i), 1.0]).collect();
     assert_eq!(with_readings(Deg, &near), Ok(()));
     let millimetres: Vec<[f64; 3]> = radians.iter().map(|[x, a, b]| [x * 1000.0, *a, *b]).collect();
-    assert_says(&with_readings(Rad, &millimetres).unwrap_err(), Code::MillimetresAsMetres, &["x reads 500"]);
+    assert_says(
+        &with_readings(Rad, &millimetres).unwrap_err(),
+        Code::MillimetresAsMetres,
+        &["x reads 500", "0.001 (mm)"],
+    );
+    // Neither the factor of mm nor another alone is named where several keep the limits.
+    for (unit, factor) in [("cm", 100.0), ("inch", 1.0 / 0.0254)] {
+        let read: Vec<[f64; 3]> = radians.iter().map(|[x, a, b]| [x * factor, *a, *b]).collect();
+        let refused = with_readings(Rad, &read).unwrap_err();
+        assert_eq!(refused.code, Code::MillimetresAsMetres);
+        assert!(refused.remedy.contains(&format!("({unit})")), "{}", refused.remedy);
+    }
 }
 
 /// A copy over another system may write an accent as a character of its own: to a person the two names are one.
