@@ -209,7 +209,8 @@ impl RobotDescription {
 
     pub(super) fn known_link(&self, name: &str, role: &str) -> Result<&str> {
         self.links().find(|l| *l == name).ok_or_else(|| {
-            let what = format!("has no link \"{name}\" (wanted as {role})");
+            let what =
+                format!("has no link \"{name}\" (wanted as {role}, or as the link of camera or plate in its place)");
             Error::new(Code::LinkUnknown, self.path.display(), what, suggest(name, self.links()))
         })
     }
