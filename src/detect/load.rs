@@ -5,7 +5,7 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageError};
 
-use super::Picture;
+use super::{Picture, jpeg};
 use crate::error::{Code, Error, Result};
 use crate::files::{self, FileKind, MOST_SIDE_PX, decode_picture};
 
@@ -41,8 +41,13 @@ pub fn load_bytes(path: &Path, bytes: &[u8], bits: Option<u32>) -> Result<Pictur
 }
 
 fn load_from(path: &Path, source: impl BufRead + Seek, bits: Option<u32>) -> Result<Picture> {
-    let decoded = decode_picture(source).map_err(|e| decode_error(path, &e))?;
+    let mut source = source;
+    let decoded = decode_picture(&mut source).map_err(|e| decode_error(path, &e))?;
     let picture = to_picture(&decoded);
+    if ends_in_one_value(&picture) && !jpeg::is_complete(&mut source).unwrap_or(true) {
+        let what = "the file ends before the lowest rows of the image";
+        return Err(Error::new(Code::ImageTruncated, path.display(), what, "copy or record the image again"));
+    }
     if picture.width < 2 || picture.height < 2 {
         return Err(Error::new(
             Code::ImageSizeImpossible,
@@ -55,6 +60,15 @@ fn load_from(path: &Path, source: impl BufRead + Seek, bits: Option<u32>) -> Res
         Some(bits) => with_bits(picture, bits, path),
         None => Ok(picture),
     }
+}
+
+/// Rows of a block of JPEG.
+const BLOCK: usize = 8;
+
+/// True where the lowest rows have no content: so a decoder fills what a file does not have.
+fn ends_in_one_value(picture: &Picture) -> bool {
+    let lowest = &picture.pixels[picture.width * picture.height.saturating_sub(BLOCK)..];
+    lowest.iter().all(|value| *value == lowest[0])
 }
 
 fn decode_error(path: &Path, error: &ImageError) -> Error {

@@ -7,7 +7,7 @@ use crate::said::assert_says;
 use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Rgb};
 use robotcal::Code;
 use robotcal::Error;
-use robotcal::detect::{FlatField, Picture, detect_series, load};
+use robotcal::detect::{FlatField, Picture, detect_series, load, load_bytes};
 use robotcal::series::{Plate, PlateKind};
 
 use crate::boards_scene::{Scene, View};
@@ -44,6 +44,22 @@ fn every_format_keeps_its_depth() {
         let tolerance = if extension == "jpg" { 8.0 } else { 0.0 };
         assert!((picture.at(20, 10) - f32::from(ramp(20, 10) >> 8)).abs() <= tolerance, "{extension}");
     }
+}
+
+/// A copy that was cut short is decoded with its lower half grey.
+#[test]
+fn a_jpeg_that_ends_early_is_refused_and_one_without_a_mark_of_the_end_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cut.jpg");
+    let noisy = GrayImage::from_fn(160, 120, |x, y| Luma([(x * 7919 + y * 104_729 + x * y * 31) as u8]));
+    DynamicImage::ImageLuma8(noisy).save(&path).unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    let loaded = |bytes: &[u8]| load_bytes("cut.jpg".as_ref(), bytes, None);
+    assert_eq!(loaded(&whole[..whole.len() / 2]).unwrap_err().code, Code::ImageTruncated);
+    let unmarked = &whole[..whole.len() - 2];
+    let appended = [&whole[..], b"appended by the camera"].concat();
+    assert_eq!(loaded(unmarked).unwrap(), loaded(&whole).unwrap());
+    assert_eq!(loaded(&appended).unwrap(), loaded(&whole).unwrap());
 }
 
 #[test]
