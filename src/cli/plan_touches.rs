@@ -16,8 +16,8 @@ use crate::files::{self, FileKind};
 use crate::frames::{KnownRobot, PlannedTouch, TouchPlan, TouchRequest, plan_touches};
 use crate::geom::Pose;
 use crate::model::robot::Posture;
-use crate::output::ResultFolder;
 use crate::output::restore::found_model;
+use crate::output::{ResultFolder, plan_files};
 use crate::series::{AngleUnit, CameraMount, ContactSection, Manifest};
 use crate::urdf::{Chain, JointKind};
 
@@ -57,7 +57,7 @@ pub(super) fn run(
     count: usize,
     out: &Path,
 ) -> Result<Verdict> {
-    let place = ResultFolder::among(out)?;
+    let place = ResultFolder::claim(out, plan_files::FILE_NAME)?;
     let record = read_solution(from)?;
     let found = found_model(&record)?;
     let robot = found.known_robot(None)?;
@@ -86,12 +86,12 @@ pub(super) fn run(
     }
     let TouchPlan { touches: planned, unreached } = plan_touches(&robot, &request, &found.limits)?;
     let files = [
-        ("series.toml".to_owned(), manifest(args, chain)?),
-        ("joints.csv".to_owned(), joints(&planned, chain)),
-        ("contacts.csv".to_owned(), contacts(&planned, &request)),
+        ("series.toml", manifest(args, chain)?),
+        ("joints.csv", joints(&planned, chain)),
+        ("contacts.csv", contacts(&planned, &request)),
     ];
-    let listed: Vec<(String, &[u8])> = files.iter().map(|(name, text)| (name.clone(), text.as_bytes())).collect();
-    place.write_beside(&listed, &[from.to_path_buf(), points.to_path_buf()])?;
+    let files = files.map(|(name, text)| (name.to_owned(), text.into_bytes()));
+    place.write_all(&plan_files::touch_files(files.into(), &super::command_line().join(" "))?)?;
     say!("{}", text(&planned, &request, &robot, out));
     if !unreached.is_empty() {
         let names: Vec<&str> = unreached.iter().map(|k| request.points[*k].0.as_str()).collect();
@@ -224,7 +224,7 @@ fn text(planned: &[PlannedTouch], request: &TouchRequest, robot: &KnownRobot, ou
     let _ = writeln!(text, "note      collisions are not looked at: approach by hand");
     let _ = writeln!(
         text,
-        "results   {} (series.toml, joints.csv, contacts.csv): write the joint values of each touch into joints.csv, then robotcal frames --touches",
+        "results   {} (series.toml, joints.csv, contacts.csv, plan.json): write the joint values of each touch into joints.csv, then robotcal frames --touches",
         out.display()
     );
     text

@@ -125,6 +125,25 @@ pub fn plan_files(
     Ok(files)
 }
 
+#[derive(Serialize)]
+struct TouchRecord<'a> {
+    format: u32,
+    files: Vec<String>,
+    as_written: BTreeMap<String, String>,
+    command: &'a str,
+}
+
+/// The files of planned touches with their record.
+///
+/// # Errors
+/// None in practice: everything can be written as text.
+pub fn touch_files(mut files: BTreeMap<String, Vec<u8>>, command: &str) -> Result<BTreeMap<String, Vec<u8>>> {
+    let listed = files.keys().cloned().chain([FILE_NAME.to_owned()]).collect();
+    let record = TouchRecord { format: FORMAT, files: listed, as_written: as_written(&files), command };
+    files.insert(FILE_NAME.to_owned(), json(&record, FILE_NAME)?);
+    Ok(files)
+}
+
 fn record<'a>(
     request: &'a PlanRequest,
     plan: &'a Plan,

@@ -274,6 +274,14 @@ fn bad_touches_are_refused_by_file_and_place() {
         Code::SolutionDiffers,
         &["series.toml", "link_5", "tool0"],
     );
+    let other_base = |folder: &Path| {
+        let path = folder.join("series.toml");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let plain: String =
+            text.lines().filter(|line| !line.starts_with("base =")).map(|line| format!("{line}\n")).collect();
+        std::fs::write(path, plain.replacen("tip =", "base = \"link_1\"\ntip =", 1)).unwrap();
+    };
+    refused(call(&other_base), 2, Code::SolutionDiffers, &["series.toml", "link_1", "base_link"]);
     refused(call(&edit("series.toml", "sigma_m = 0.00005", "sigma_m = 0.05")), 2, Code::TouchUnit, &["t00"]);
     refused(
         call(&edit("contacts.csv", "x_m,y_m,z_m", "x_mm,y_mm,z_mm")),
@@ -425,6 +433,12 @@ fn planned_touches_are_a_series_that_frames_reads() {
     let [exact] = &record.findings[..] else { panic!("{:?}", record.findings) };
     assert_eq!((exact.code, exact.weight), (Code::TouchesExact, Weight::Gate));
     assert!(record.rms_m < 2e-6 && exact.quantities["size"] < 0.05, "{exact:?}");
+    // What was measured since is not planned over.
+    let table = out.join("joints.csv");
+    let as_planned = std::fs::read_to_string(&table).unwrap();
+    std::fs::write(&table, as_planned.replacen("touch_01,", "touch_01,1", 1)).unwrap();
+    assert_says(&robotcal(&plan, &out).expect(2).said(), Code::OutputForeign, &["joints.csv"]);
+    std::fs::write(&table, as_planned).unwrap();
     // Points in mm, and points that no posture touches.
     std::fs::write(&points, "name,x_m,y_m,z_m\na,0,0,0\nb,100,0,0\nc,0,100,0\n").unwrap();
     assert_says(&robotcal(&plan, &out).expect(2).said(), Code::TouchUnit, &["fixture.csv:3"]);
